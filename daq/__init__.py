@@ -1,0 +1,1 @@
+"""Data acquisition: cameras, pulses, interlock, run and recorder. Knows neither processing nor server."""

@@ -1,0 +1,179 @@
+"""The seam: what acquisition asks of a device. Drivers and simulations are tested by one contract suite each.
+
+A constructor acquires nothing; ``with device:`` opens and closes it. Light is off after opening, after
+an error and after closing. Every method has a deadline and raises ``daq.errors.DeviceTimeout``.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from types import TracebackType
+from typing import Protocol, Self
+
+from daq.run_plan import RunKind
+from daq.shot import DoubleFrame, FiredTrain, Image
+from daq.timing import CameraTiming, ShotTiming
+
+
+@dataclass(frozen=True)
+class DeviceIdentity:
+    """Who a device says it is."""
+
+    vendor: str
+    model: str
+    serial: str
+    firmware: str
+
+
+class Device(Protocol):
+    """What every device has: a name in the rig, an identity, and a life between ``with`` and its end."""
+
+    @property
+    def name(self) -> str:
+        """Name in the rig configuration."""
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None: ...
+
+    def identity(self) -> DeviceIdentity:
+        """Vendor, model, serial number and firmware version, as the device answers."""
+
+
+class Camera(Device, Protocol):
+    """A double-frame camera of one view."""
+
+    @property
+    def timing(self) -> CameraTiming:
+        """Timing model of the armed profile."""
+
+    @property
+    def image_shape(self) -> tuple[int, int]:
+        """(rows, columns) of one exposure."""
+
+    @property
+    def bits(self) -> int:
+        """Significant bits of a grey value: 8, 12 or 16."""
+
+    def arm(self) -> None:
+        """Write the profile, read every value back, drain the stream, start acquisition."""
+
+    def begin_shot(self) -> None:
+        """Re-base frame counting: whatever arrives from now on belongs to the next firing."""
+
+    def collect(self, deadline_s: float) -> DoubleFrame:
+        """Exposures A and B of the firing since ``begin_shot``; a missing one is flagged, not raised."""
+
+    def disarm(self) -> None:
+        """Stop acquisition; safe to call in any state."""
+
+    def latest(self) -> Image | None:
+        """Newest exposure seen, for the live view; None before the first."""
+
+
+class GeneratorState(StrEnum):
+    """State of the pulse generator as it reports it."""
+
+    SAFE = "safe"
+    ARMED = "armed"
+    FAULT = "fault"
+
+
+@dataclass(frozen=True)
+class GeneratorStatus:
+    """Answer of the pulse generator to a status request.
+
+    Parameters
+    ----------
+    state : GeneratorState
+        SAFE, ARMED or FAULT.
+    faults : tuple[str, ...]
+        Names of the latched faults.
+    interlock_closed : bool
+        The generator's own interlock input.
+    shots_left : int
+        Shot budget that remains.
+    counters : Mapping[str, int]
+        ``requested, fired, suppressed, early, crc_errors``, since boot.
+    """
+
+    state: GeneratorState
+    faults: tuple[str, ...]
+    interlock_closed: bool
+    shots_left: int
+    counters: Mapping[str, int]
+
+
+class PulseGenerator(Device, Protocol):
+    """The microcontroller that fires the LED driver and triggers the cameras."""
+
+    def configure(self, timing: ShotTiming) -> FiredTrain:
+        """Load a pulse train; returns the actual, quantised one (sequence 0). Refused while armed."""
+
+    def arm(self, shots: int) -> None:
+        """Permit this many shots, not one more."""
+
+    def fire(self) -> FiredTrain:
+        """Fire one shot; returns what was really fired."""
+
+    def status(self) -> GeneratorStatus:
+        """State, faults, counters; also the host heartbeat."""
+
+    def off(self) -> None:
+        """Light off, disarm; may be called from any thread at any time, and never waits for another command."""
+
+    def clear(self) -> None:
+        """Acknowledge latched faults; the generator stays SAFE."""
+
+
+class Interlock(Device, Protocol):
+    """The laboratory's door and enclosure switches."""
+
+    def is_closed(self) -> bool:
+        """True while light is allowed."""
+
+    def wait_for_change(self, deadline_s: float) -> bool:
+        """Wait for the next edge; False if there was none within the deadline."""
+
+
+class TranslationStage(Device, Protocol):
+    """The stage that carries the calibration target along z."""
+
+    @property
+    def range_mm(self) -> tuple[float, float]:
+        """Lowest and highest position."""
+
+    def move_to(self, z_mm: float) -> float:
+        """Move, wait until it stands, return the actual position in mm."""
+
+    def position_mm(self) -> float:
+        """Actual position."""
+
+
+def _nothing_to_prepare(_: RunKind) -> None:
+    """On a real rig the operator prepares the scene before pressing start."""
+
+
+@dataclass(frozen=True)
+class Rig:
+    """All devices of one rig.
+
+    Parameters
+    ----------
+    cameras : Mapping[str, Camera]
+        Cameras by view.
+    generator, interlock : PulseGenerator, Interlock
+        Light and its permission.
+    stage : TranslationStage | None
+        Carries the calibration target, where there is one.
+    prepare_scene : Callable[[RunKind], None]
+        Called before a run; the simulated bench plays the operator here (spray on or off, target in).
+    """
+
+    cameras: Mapping[str, Camera]
+    generator: PulseGenerator
+    interlock: Interlock
+    stage: TranslationStage | None = None
+    prepare_scene: Callable[[RunKind], None] = _nothing_to_prepare

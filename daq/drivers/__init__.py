@@ -1,0 +1,1 @@
+"""One module per wire: GigE Vision (Aravis), serial line (pyserial), GPIO (libgpiod)."""

@@ -1,0 +1,98 @@
+"""The errors of data acquisition.
+
+::
+
+    DaqError
+    ├── PlanError             the plan cannot run on this rig; names value and limit
+    ├── BusyError             a run is active; there is no queue of runs
+    ├── DeviceError           a device did not do what it was asked to
+    │   ├── DeviceUnavailable   it is absent, or held by somebody else
+    │   ├── DeviceTimeout       it did not answer before the deadline
+    │   ├── DeviceRefused       it answered, and said no
+    │   └── ProtocolError       it answered something that makes no sense
+    ├── InterlockOpen         the light must not be switched on
+    ├── FrameMiss             a shot lacks exposures, or has wrong ones
+    ├── RecorderError         a shot could not be stored
+    │   └── RecorderOverflow    the disk does not keep up
+    └── ShotFileError         a run directory or a shot file cannot be read
+"""
+
+
+class DaqError(Exception):
+    """Base of every error that daq raises on purpose."""
+
+
+class PlanError(DaqError):
+    """The plan cannot run on this rig; the text names value and limit."""
+
+
+class BusyError(DaqError):
+    """Another run is active."""
+
+
+class DeviceError(DaqError):
+    """A device did not do what it was asked to.
+
+    Parameters
+    ----------
+    device : str
+        Name of the device in the rig configuration, for example ``view2``.
+    reason : str
+        What happened, with values and limits.
+    """
+
+    def __init__(self, device: str, reason: str) -> None:
+        super().__init__(f"{device}: {reason}")
+        self.device = device
+        self.reason = reason
+
+
+class DeviceUnavailable(DeviceError):
+    """The device is absent, or another client holds it."""
+
+
+class DeviceTimeout(DeviceError):
+    """The device did not answer before the deadline.
+
+    Parameters
+    ----------
+    device : str
+        Name of the device in the rig configuration.
+    command : str
+        What it was asked to do.
+    limit_s : float
+        The deadline that passed.
+    """
+
+    def __init__(self, device: str, command: str, limit_s: float) -> None:
+        super().__init__(device, f"no answer to {command!r} within {limit_s:g} s")
+        self.command = command
+        self.limit_s = limit_s
+
+
+class DeviceRefused(DeviceError):
+    """The device answered, and refused."""
+
+
+class ProtocolError(DeviceError):
+    """The device answered something that makes no sense."""
+
+
+class InterlockOpen(DaqError):
+    """The interlock is open: the light must not be switched on."""
+
+
+class FrameMiss(DaqError):
+    """A shot lacks exposures, or has wrong ones."""
+
+
+class RecorderError(DaqError):
+    """A shot could not be stored."""
+
+
+class RecorderOverflow(RecorderError):
+    """The recorder's queue is full: the disk does not keep up with the cameras."""
+
+
+class ShotFileError(DaqError):
+    """A run directory or a shot file cannot be read; the text names the file."""

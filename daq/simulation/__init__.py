@@ -1,0 +1,1 @@
+"""The simulated bench: the other end of every wire. Real drivers always run against it."""

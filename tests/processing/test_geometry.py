@@ -1,0 +1,66 @@
+"""The pinhole camera: eqs. 3 to 5, distortion, tilt, and their inverses."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from processing.geometry import PinholeCamera, rotation_from_angles, view_camera
+
+DISTORTION = np.array([2.0, 50.0, 0.004, -0.003, 0.0])
+
+
+def camera(azimuth_deg: float = 45.0) -> PinholeCamera:
+    return view_camera(azimuth_deg, focal_length_mm=100, magnification=0.45, scale_px_per_mm=60, distortion=DISTORTION)
+
+
+@given(st.floats(-1.5, 1.5), st.floats(-0.5, 0.5), st.floats(-0.2, 0.2))
+def test_rotation_is_a_rotation(yaw: float, pitch: float, roll: float) -> None:
+    rotation = rotation_from_angles(yaw, pitch, roll)
+    np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-12)
+    assert np.linalg.det(rotation) == pytest.approx(1.0)
+
+
+def test_rotation_is_equation_4() -> None:
+    phi, psi = 0.3, -0.2
+    pitch = np.array([[1, 0, 0], [0, np.cos(psi), np.sin(psi)], [0, -np.sin(psi), np.cos(psi)]])
+    yaw = np.array([[np.cos(phi), 0, -np.sin(phi)], [0, 1, 0], [np.sin(phi), 0, np.cos(phi)]])
+    np.testing.assert_allclose(rotation_from_angles(phi, psi), pitch @ yaw)
+
+
+def test_origin_is_seen_at_the_image_centre_at_the_stated_scale() -> None:
+    view = view_camera(0.0, focal_length_mm=85, magnification=0.43, scale_px_per_mm=60)
+    seen_px = view.project(np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]))
+    np.testing.assert_allclose(seen_px[0], [799.5, 599.5], atol=1e-9)
+    np.testing.assert_allclose(seen_px[1:] - seen_px[0], [[60, 0], [0, 60]], atol=1e-9)
+
+
+def test_offset_principal_point_still_looks_at_the_origin() -> None:
+    view = view_camera(
+        15, focal_length_mm=85, magnification=0.43, scale_px_per_mm=60, principal_offset_px=(250.0, -100.0)
+    )
+    np.testing.assert_allclose(view.project(np.zeros((1, 3)))[0], [799.5, 599.5], atol=1e-9)
+
+
+@pytest.mark.parametrize("tilt_rad", [(0.0, 0.0), (0.05, -0.08)])
+@pytest.mark.parametrize("azimuth_deg", [45.0, 15.0, -15.0, -45.0])
+def test_back_projection_inverts_projection(azimuth_deg: float, tilt_rad: tuple[float, float]) -> None:
+    base = camera(azimuth_deg)
+    view = PinholeCamera(
+        base.camera_matrix, base.rotation, base.translation_mm, base.image_size_px, base.distortion, tilt_rad
+    )
+    points_mm = np.random.default_rng(1).uniform([-8, -8, 0], [8, 8, 0], (50, 3)) + [0, 0, 2.5]
+    recovered_mm = view.back_project(view.project(points_mm), z_mm=2.5)
+    np.testing.assert_allclose(recovered_mm, points_mm, atol=1e-6)
+
+
+def test_projection_follows_the_ray() -> None:
+    view = camera(-15.0)
+    point_mm = np.array([[3.0, -2.0, 1.0]])
+    further_mm = view.centre_mm + 1.1 * (point_mm - view.centre_mm)
+    np.testing.assert_allclose(view.project(further_mm), view.project(point_mm), atol=1e-8)
+    np.testing.assert_allclose(view.ray_directions(further_mm), view.ray_directions(point_mm))
+
+
+def test_no_points_project_to_no_points() -> None:
+    assert camera().project(np.empty((0, 3))).shape == (0, 2)
