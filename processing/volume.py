@@ -74,4 +74,4 @@ class VoxelGrid:
     def to_mm(self, indices: NDArray[np.float64]) -> NDArray[np.float64]:
         """Points (x, y, z) in mm of fractional voxel indices (z, y, x); the inverse of ``to_index``."""
         offsets_mm: NDArray[np.float64] = np.asarray(indices)[..., ::-1] * self.pitch_mm
-        return offsets_mm + np.asarray(self.origin_mm)
+        return offsets_mm + np.asarray(self.origin_mm, dtype=np.float64)
