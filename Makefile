@@ -1,0 +1,64 @@
+# Each target does its own set-up on a bare Debian 12 or 13 machine, is quick when that is done, and says what it does.
+SHELL := /bin/bash
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test lint serve firmware bench lock clean
+
+PYTHON := .venv/bin/python
+DEBIAN_PACKAGES := python3-venv python3-gi gir1.2-aravis-0.8 iproute2 gcc g++ make chromium fonts-dejavu-core
+AS_ROOT := $(shell [ "$$(id -u)" = 0 ] || echo sudo)
+KERNEL_SOURCES := $(wildcard processing/reconstruction/kernels/*.cpp processing/reconstruction/kernels/*.hpp processing/reconstruction/kernels/CMakeLists.txt)
+FIRMWARE_SOURCES := $(wildcard firmware/*/*.c firmware/*/*.h firmware/Makefile)
+
+# A network of its own, so that no camera broadcast leaves the machine; without it where the machine forbids user namespaces.
+PRIVATE_NETWORK := $(shell unshare -rn true 2>/dev/null && echo "unshare -rn bash -c 'ip link set lo up && exec \"\$$@\"' --")
+
+help: ## Show this list.
+	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /  make \1\t/' | expand -t 18
+
+setup: .venv/.native firmware ## Install Debian packages, the Python environment and the native parts.
+
+demo: setup ## Run the whole chain on the simulated bench; writes demo-out/report.html.
+	$(PRIVATE_NETWORK) $(PYTHON) -m server.cli demo --out demo-out $(DEMO_OPTIONS)
+
+test: lint ## Run linters and all tests.
+	$(PRIVATE_NETWORK) $(PYTHON) -m pytest $(TEST_OPTIONS)
+
+lint: setup ## Run ruff, mypy and import-linter.
+	.venv/bin/ruff check .
+	.venv/bin/ruff format --check .
+	.venv/bin/mypy
+	.venv/bin/lint-imports --no-cache
+
+serve: setup ## Start server and web page on the simulated bench, http://127.0.0.1:8080.
+	$(PYTHON) -m server.cli serve --config configs/simulated.toml
+
+firmware: $(FIRMWARE_SOURCES) | .venv/.debian ## Build the firmware core for this computer.
+	@$(MAKE) --no-print-directory -C firmware host
+
+lock: .venv/.python ## Pin the newest versions of all Python packages.
+	$(PYTHON) -m pip install --quiet uv
+	.venv/bin/uv pip compile --universal --python-version 3.11 --extra dev --no-emit-index-url --upgrade --quiet pyproject.toml -o requirements.lock
+
+clean: ## Remove everything that was built.
+	rm -rf .venv build demo-out .mypy_cache .ruff_cache .pytest_cache
+
+.venv/.debian: Makefile
+	@mkdir -p .venv
+	@missing=$$(for name in $(DEBIAN_PACKAGES); do dpkg-query -W -f='$${db:Status-Status}' $$name 2>/dev/null | grep -qx installed || echo $$name; done); \
+	if [ -n "$$missing" ]; then \
+	    echo "Installing Debian packages:" $$missing; \
+	    $(AS_ROOT) apt-get update -qq && \
+	    $(AS_ROOT) env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $$missing >/dev/null; \
+	fi
+	@touch $@
+
+.venv/.python: requirements.lock | .venv/.debian
+	@echo "Installing Python packages into .venv"
+	@/usr/bin/python3 -m venv --system-site-packages .venv
+	@$(PYTHON) -m pip install --quiet --disable-pip-version-check -r requirements.lock
+	@touch $@
+
+.venv/.native: .venv/.python pyproject.toml $(KERNEL_SOURCES)
+	@echo "Building the reconstruction kernels"
+	@$(PYTHON) -m pip install --quiet --disable-pip-version-check --no-build-isolation --no-deps --editable .
+	@touch $@
