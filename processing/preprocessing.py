@@ -79,7 +79,8 @@ def intensity(
         light = opacity(light, _light_field(light, dark, background, full_scale, settings.minimum_window_px))
     if settings.minimum_window_px:
         light = light - sliding_minimum(light, settings.minimum_window_px)
-    return np.clip((light - settings.noise_floor) / (1 - settings.noise_floor), 0, 1).astype(np.float32)
+    above_noise: Intensity = np.clip((light - settings.noise_floor) / (1 - settings.noise_floor), 0, 1)
+    return above_noise
 
 
 def opacity(light: Intensity, light_field: Intensity) -> Intensity:

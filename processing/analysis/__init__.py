@@ -1,0 +1,1 @@
+"""What a volume says: figures, and the measurements of later stages."""

@@ -1,0 +1,1 @@
+"""Intensity volumes from preprocessed images: line of sight and iterative methods."""
