@@ -57,6 +57,10 @@ class CameraTiming:
         """Smallest pulse separation that straddles the frame boundary (pulse start to pulse start)."""
         return width_ns + self.gap_ns + 2 * self.guard_ns
 
+    def longest_separation_ns(self, width_ns: int) -> int:
+        """Largest pulse separation that keeps both pulses inside their exposures (pulse start to pulse start)."""
+        return self.exposure_a_ns + self.gap_ns + self.exposure_b_ns - width_ns - 2 * self.guard_ns
+
 
 @dataclass(frozen=True)
 class Window:
@@ -109,16 +113,10 @@ def plan_shot_timing(plan: RunPlan, cameras: Mapping[str, CameraTiming]) -> Shot
 
 
 def _view_timing(view: str, pulse: PulsePair, camera: CameraTiming) -> ViewTiming:
-    shortest_ns = camera.shortest_separation_ns(pulse.width_ns)
-    if pulse.separation_ns < shortest_ns:
-        raise PlanError(
-            f"pulse.separation_ns: {pulse.separation_ns} ns is below {shortest_ns} ns, the limit of camera {view} "
-            f"(width {pulse.width_ns} + gap {camera.gap_ns} + 2 x guard {camera.guard_ns} ns)"
-        )
-    slack_ns = pulse.separation_ns - shortest_ns
-    frame_a_close_ns = pulse.width_ns + camera.guard_ns + slack_ns // 2
+    _check_straddling(view, pulse, camera)
+    frame_a_close_ns = _frame_a_close_ns(pulse, camera)
     trigger_ns = frame_a_close_ns - camera.frame_a_close_ns
-    timing = ViewTiming(
+    return ViewTiming(
         camera_trigger_ns=trigger_ns,
         frame_a=Window(trigger_ns + camera.trigger_delay_ns, frame_a_close_ns),
         frame_b=Window(trigger_ns + camera.frame_b_open_ns, trigger_ns + camera.frame_b_open_ns + camera.exposure_b_ns),
@@ -126,16 +124,30 @@ def _view_timing(view: str, pulse: PulsePair, camera: CameraTiming) -> ViewTimin
         pulse_b=Window(pulse.separation_ns, pulse.separation_ns + pulse.width_ns),
         current_a=pulse.current_a[view],
     )
-    _check_inside(view, pulse, timing, camera.guard_ns)
-    return timing
 
 
-def _check_inside(view: str, pulse: PulsePair, timing: ViewTiming, guard_ns: int) -> None:
-    if timing.pulse_a.open_ns < timing.frame_a.open_ns + guard_ns:
-        exposure_ns = timing.frame_a.close_ns - timing.frame_a.open_ns
-        raise PlanError(f"pulse.width_ns: {pulse.width_ns} ns does not fit exposure A of {view}, {exposure_ns} ns")
-    if timing.pulse_b.close_ns > timing.frame_b.close_ns - guard_ns:
-        exposure_ns = timing.frame_b.close_ns - timing.frame_b.open_ns
+def _check_straddling(view: str, pulse: PulsePair, camera: CameraTiming) -> None:
+    shorter_ns = min(camera.exposure_a_ns, camera.exposure_b_ns)
+    if pulse.width_ns + 2 * camera.guard_ns > shorter_ns:
+        raise PlanError(f"pulse.width_ns: {pulse.width_ns} ns does not fit the exposure of {view}, {shorter_ns} ns")
+    shortest_ns = camera.shortest_separation_ns(pulse.width_ns)
+    if pulse.separation_ns < shortest_ns:
         raise PlanError(
-            f"pulse.separation_ns: with {pulse.separation_ns} ns pulse B misses exposure B of {view}, {exposure_ns} ns"
+            f"pulse.separation_ns: {pulse.separation_ns} ns is below {shortest_ns} ns, the limit of camera {view} "
+            f"(width {pulse.width_ns} + gap {camera.gap_ns} + 2 x guard {camera.guard_ns} ns)"
         )
+    longest_ns = camera.longest_separation_ns(pulse.width_ns)
+    if pulse.separation_ns > longest_ns:
+        raise PlanError(
+            f"pulse.separation_ns: {pulse.separation_ns} ns is above {longest_ns} ns, the limit of camera {view} "
+            f"(exposures {camera.exposure_a_ns} and {camera.exposure_b_ns} ns)"
+        )
+
+
+def _frame_a_close_ns(pulse: PulsePair, camera: CameraTiming) -> int:
+    """Midway between both pulses where the exposures are long enough, else as near to it as they allow."""
+    midway_ns = (pulse.width_ns + pulse.separation_ns - camera.gap_ns) // 2
+    latest_ns = camera.exposure_a_ns - camera.guard_ns
+    pulse_b_end_ns = pulse.separation_ns + pulse.width_ns
+    earliest_ns = pulse_b_end_ns + camera.guard_ns - camera.gap_ns - camera.exposure_b_ns
+    return max(earliest_ns, min(midway_ns, latest_ns))

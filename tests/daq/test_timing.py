@@ -18,13 +18,15 @@ def plan(width_ns: int = 1000, separation_ns: int = 6400, rate_hz: float = 10.0)
     return RunPlan(name="test", shots=1, rate_hz=rate_hz, pulse=pulse)
 
 
-@given(st.integers(250, 2000), st.integers(2000, 9000), st.integers(0, 2000), st.integers(0, 3000), st.integers(0, 500))
+@given(
+    st.integers(250, 2000), st.integers(2000, 200_000), st.integers(0, 2000), st.integers(0, 3000), st.integers(0, 500)
+)
 def test_every_accepted_plan_straddles(width: int, separation: int, delay: int, gap: int, guard: int) -> None:
     camera = CameraTiming(delay, 10_000, gap, 30_000_000, 30_000_000, guard)
     try:
         view = plan_shot_timing(plan(width, separation), {"view1": camera}).views["view1"]
     except PlanError:
-        assert separation < camera.shortest_separation_ns(width) or separation > 10_000 - width - guard
+        assert separation < camera.shortest_separation_ns(width)
         return
     assert view.frame_a.open_ns + guard <= view.pulse_a.open_ns
     assert view.pulse_a.close_ns + guard <= view.frame_a.close_ns
