@@ -1,0 +1,132 @@
+"""Figures as the paper has them: residuals per plane (Fig. 3), slices and projections, iso-surfaces (Fig. 4).
+
+Each function returns a matplotlib Figure; who wants a file saves it.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import LightSource
+from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+from numpy.typing import NDArray
+from skimage.measure import marching_cubes
+
+from processing.volume import VoxelGrid
+
+Volume = NDArray[np.float32]
+VIEW_COLOURS = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#f0e442", "#000000")
+FRAME_COLOURS = {"A": "#1f4e9c", "B": "#c0392b"}
+LIMIT_PX = 0.05
+
+
+@dataclass(frozen=True)
+class PlaneResiduals:
+    """Mean back-projection error (eq. 2) of one view at each calibration plane, (N,) arrays."""
+
+    z_mm: NDArray[np.float64]
+    mean_error_px: NDArray[np.float64]
+    holdout_error_px: float
+
+
+def residuals_figure(views: Mapping[str, PlaneResiduals]) -> Figure:
+    """Mean back-projection error of each view over the calibration planes (Fig. 3 of the paper)."""
+    figure = Figure(figsize=(6.4, 4.0), layout="constrained")
+    axes = figure.subplots()
+    for (name, view), colour in zip(views.items(), VIEW_COLOURS, strict=False):
+        label = f"{name} (hold-out {view.holdout_error_px:.3f} px)"
+        axes.plot(view.z_mm, view.mean_error_px, marker="o", color=colour, label=label)
+    axes.axhline(LIMIT_PX, color="0.4", linestyle="--", linewidth=1)
+    axes.annotate("paper: < 0.05 px", (0.01, LIMIT_PX), xycoords=("axes fraction", "data"), va="bottom", color="0.4")
+    highest_px = max(LIMIT_PX, *(float(view.mean_error_px.max()) for view in views.values()))
+    axes.set(xlabel="plane z [mm]", ylabel="mean back-projection error [px]", ylim=(0, 1.15 * highest_px))
+    axes.legend(frameon=False, fontsize="small")
+    return figure
+
+
+def slices_figure(volume: Volume, grid: VoxelGrid, title: str = "") -> Figure:
+    """Centre slices (top) and maximum projections (bottom) of a volume along its three axes."""
+    figure = Figure(figsize=(11, 7.2), layout="constrained")
+    panels = figure.subplots(2, 3)
+    brightest = float(np.quantile(volume.max(axis=0), 0.999)) or 1.0
+    centre = [n // 2 for n in volume.shape]
+    for column, axis in enumerate((0, 1, 2)):
+        depth_mm = (grid.z_mm, grid.y_mm, grid.x_mm)[axis][centre[axis]]
+        label = f"{'zyx'[axis]} = {depth_mm:.2f} mm"
+        picture = _show(panels[0, column], volume.take(centre[axis], axis=axis), grid, axis, brightest)
+        panels[0, column].set_title(f"slice at {label}", fontsize="medium")
+        _show(panels[1, column], volume.max(axis=axis), grid, axis, brightest)
+        panels[1, column].set_title(f"maximum along {'zyx'[axis]}", fontsize="medium")
+    figure.colorbar(picture, ax=panels, label="reconstructed intensity [-]", shrink=0.6)
+    if title:
+        figure.suptitle(title)
+    return figure
+
+
+def isosurface_figure(frames: Mapping[str, Volume], grid: VoxelGrid, level: float, title: str = "") -> Figure:
+    """Iso-surfaces of exposures A (blue) and B (red) in one volume (Fig. 4 of the paper).
+
+    Parameters
+    ----------
+    frames : Mapping[str, Volume]
+        Volumes (z, y, x) by the name of the exposure.
+    grid : VoxelGrid
+        Grid of all of them; a few million voxels at most.
+    level : float
+        Intensity of the surface.
+    title : str
+        Title of the figure.
+    """
+    figure = Figure(figsize=(6.4, 6.0), layout="constrained")
+    axes = figure.add_subplot(projection="3d")
+    for name, volume in frames.items():
+        mesh = _surface(volume, grid, level)
+        if mesh is not None:
+            vertices_mm, faces = mesh
+            axes.add_collection3d(_shaded(vertices_mm[faces][..., [0, 2, 1]], FRAME_COLOURS[name]))
+        axes.plot([], [], [], color=FRAME_COLOURS[name], linewidth=6, label=f"exposure {name}")
+    axes.set(xlim=grid.x_mm[[0, -1]], ylim=grid.z_mm[[0, -1]], zlim=grid.y_mm[[-1, 0]])
+    axes.set(xlabel="x [mm]", ylabel="z [mm]", zlabel="y [mm]")
+    axes.set_box_aspect([float(np.ptp(extent_mm)) or 1.0 for extent_mm in (grid.x_mm, grid.z_mm, grid.y_mm)], zoom=0.85)
+    axes.legend(frameon=False, loc="upper left")
+    if title:
+        figure.suptitle(title)
+    return figure
+
+
+def shadowgraph_figure(images: Mapping[str, NDArray[np.generic]], title: str = "") -> Figure:
+    """One exposure of every view, side by side."""
+    figure = Figure(figsize=(3.4 * len(images), 2.9), layout="constrained")
+    panels: Sequence[Axes] = np.atleast_1d(figure.subplots(1, len(images))).tolist()
+    for axes, (name, image) in zip(panels, images.items(), strict=True):
+        axes.imshow(image, cmap="gray", vmin=0)
+        axes.set(title=name, xlabel="column [px]", ylabel="row [px]" if axes is panels[0] else "")
+        axes.tick_params(labelsize="small")
+    if title:
+        figure.suptitle(title)
+    return figure
+
+
+def _show(axes: Axes, image: NDArray[np.float32], grid: VoxelGrid, axis: int, brightest: float) -> AxesImage:
+    names = [name for name in "zyx" if name != "zyx"[axis]]
+    across_mm, down_mm = ({"x": grid.x_mm, "y": grid.y_mm, "z": grid.z_mm}[name] for name in reversed(names))
+    half_mm = grid.pitch_mm / 2
+    extent = (across_mm[0] - half_mm, across_mm[-1] + half_mm, down_mm[-1] + half_mm, down_mm[0] - half_mm)
+    axes.set(xlabel=f"{names[1]} [mm]", ylabel=f"{names[0]} [mm]")
+    return axes.imshow(image, cmap="magma", vmin=0, vmax=brightest, extent=extent, interpolation="antialiased")
+
+
+def _surface(volume: Volume, grid: VoxelGrid, level: float) -> tuple[NDArray[np.float64], NDArray[np.intp]] | None:
+    if not volume.min() < level < volume.max():
+        return None
+    vertices, faces, _, _ = marching_cubes(volume, level)  # type: ignore[no-untyped-call]
+    return grid.to_mm(vertices), faces
+
+
+def _shaded(triangles: NDArray[np.float64], colour: str) -> Poly3DCollection:
+    return Poly3DCollection(
+        triangles, facecolors=colour, linewidths=0, shade=True, lightsource=LightSource(azdeg=225, altdeg=45)
+    )

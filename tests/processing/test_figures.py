@@ -1,0 +1,72 @@
+"""Figures show what they are given, with units on their axes."""
+
+import io
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from processing.analysis.figures import (
+    PlaneResiduals,
+    isosurface_figure,
+    residuals_figure,
+    shadowgraph_figure,
+    slices_figure,
+)
+from processing.volume import VoxelGrid
+
+GRID = VoxelGrid.centred((20, 30, 40), 0.1)
+
+
+def ball(offset_mm: float = 0.0) -> np.ndarray[tuple[int, ...], np.dtype[np.float32]]:
+    z, y, x = np.meshgrid(GRID.z_mm, GRID.y_mm, GRID.x_mm, indexing="ij")
+    return np.exp(-((x - offset_mm) ** 2 + y**2 + z**2) / 0.2).astype(np.float32)
+
+
+def drawn(figure: Figure) -> int:
+    """Bytes of the picture: drawing it must work without a warning."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=60)
+    return len(buffer.getvalue())
+
+
+def test_residuals_show_every_view_and_its_holdout_error() -> None:
+    z_mm = np.linspace(-4.5, 4.5, 10)
+    figure = residuals_figure({f"view{n}": PlaneResiduals(z_mm, np.full(10, 0.01 * n), 0.02 * n) for n in (1, 2)})
+    axes = figure.axes[0]
+    legend = axes.get_legend()
+    assert legend is not None
+    assert [text.get_text() for text in legend.get_texts()] == [
+        "view1 (hold-out 0.020 px)",
+        "view2 (hold-out 0.040 px)",
+    ]
+    assert axes.get_xlabel() == "plane z [mm]"
+    assert axes.get_ylabel() == "mean back-projection error [px]"
+    assert drawn(figure) > 1000
+
+
+def test_slices_have_the_extent_of_the_grid() -> None:
+    figure = slices_figure(ball(), GRID)
+    first = figure.axes[0].images[0]
+    left, right, bottom, top = first.get_extent()
+    assert np.isclose([left, right, bottom, top], [-2.0, 2.0, 1.5, -1.5]).all()
+    assert figure.axes[0].get_xlabel() == "x [mm]"
+    assert figure.axes[1].get_ylabel() == "z [mm]"
+    assert drawn(figure) > 1000
+
+
+def test_isosurface_of_a_ball_has_its_radius() -> None:
+    figure = isosurface_figure({"A": ball(), "B": ball(0.5)}, GRID, level=float(np.exp(-1)))
+    surfaces = figure.axes[0].collections
+    assert len(surfaces) == 2
+    assert drawn(figure) > 1000
+
+
+def test_isosurface_of_an_empty_volume_is_empty() -> None:
+    figure = isosurface_figure({"A": np.zeros(GRID.shape, np.float32)}, GRID, level=0.5)
+    assert len(figure.axes[0].collections) == 0
+
+
+def test_shadowgraphs_of_all_views() -> None:
+    figure = shadowgraph_figure({"view1": np.ones((30, 40)), "view2": np.zeros((30, 40))}, "shot 1")
+    assert [axes.get_title() for axes in figure.axes] == ["view1", "view2"]
+    assert drawn(figure) > 1000
