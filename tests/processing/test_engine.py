@@ -1,0 +1,82 @@
+import asyncio
+import os
+import signal
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from processing.engine import DaskEngine, Engine, InlineEngine, TaskAborted, TaskError
+
+ENGINES = pytest.mark.parametrize("make", [InlineEngine, DaskEngine])
+
+
+def double(job: dict[str, Any], should_stop: Callable[[], bool]) -> dict[str, Any]:
+    should_stop()
+    return {"value": 2 * job["value"]}
+
+
+def refuse(job: dict[str, Any], should_stop: Callable[[], bool]) -> dict[str, Any]:
+    raise ValueError(f"volume {job['value']} is empty")
+
+
+def step_until_stopped(job: dict[str, Any], should_stop: Callable[[], bool]) -> dict[str, Any]:
+    tick = threading.Event()
+    while not should_stop():
+        tick.wait(0.01)
+    return {}
+
+
+def die_once(job: dict[str, Any], should_stop: Callable[[], bool]) -> dict[str, Any]:
+    mark = Path(job["mark"])
+    if not mark.exists():
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return {"niceness": os.nice(0)}
+
+
+async def _observe(engine: Engine, tmp_path: Path) -> None:
+    async with engine:
+        assert await engine.submit("a", double, {"value": 21}, _ignore) == {"value": 42}
+        with pytest.raises(TaskError, match="ValueError: volume 7 is empty"):
+            await engine.submit("b", refuse, {"value": 7}, _ignore)
+        await _abort_a_running_task(engine)
+        if isinstance(engine, DaskEngine):
+            result = await engine.submit("d", die_once, {"mark": str(tmp_path / "mark")}, _ignore)
+            assert result == {"niceness": 10}
+
+
+async def _abort_a_running_task(engine: Engine) -> None:
+    steps: list[int] = []
+    going = asyncio.Event()
+
+    def on_progress(count: int) -> None:
+        steps.append(count)
+        if count > 0:
+            going.set()
+
+    running = asyncio.ensure_future(engine.submit("c", step_until_stopped, {}, on_progress))
+    await asyncio.wait_for(going.wait(), 20)
+    await engine.abort("c")
+    with pytest.raises(TaskAborted):
+        await asyncio.wait_for(running, 5)
+    assert steps[0] == 0
+    assert steps == sorted(steps)
+
+
+def _ignore(_: int) -> None:
+    pass
+
+
+@ENGINES
+def test_an_engine_returns_results_reports_errors_obeys_aborts_and_outlives_its_workers(
+    make: Callable[[], Engine], tmp_path: Path
+) -> None:
+    asyncio.run(_observe(make(), tmp_path))
+
+
+def test_an_engine_that_was_not_started_says_so() -> None:
+    with pytest.raises(TaskError, match="not running"):
+        asyncio.run(DaskEngine().abort("x"))
