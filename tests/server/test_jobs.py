@@ -1,0 +1,110 @@
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from server.jobs import (
+    TRANSITIONS,
+    Job,
+    JobKind,
+    JobState,
+    JobTable,
+    calibration_job,
+    jobs_on_disk,
+    reconstruction_job,
+)
+from server.problems import Conflict, NotFound
+
+
+@pytest.fixture
+def table(tmp_path: Path) -> Iterator[JobTable]:
+    table = JobTable(tmp_path / "jobs.sqlite")
+    yield table
+    table.close()
+
+
+def job_of(shot: int) -> Job:
+    return reconstruction_job("run-1", shot, "cal-1", "mlos-12345678", {"method": "mlos"})
+
+
+def test_a_job_keeps_what_it_was_asked_and_what_it_answered(table: JobTable) -> None:
+    job = table.add(job_of(3))
+    table.move(job.id, JobState.RUNNING)
+    done = table.move(job.id, JobState.DONE, result={"volumes": []})
+    assert table.get(job.id) == done
+    assert (done.kind, done.shot, done.result, done.settings) == (
+        JobKind.RECONSTRUCTION,
+        3,
+        {"volumes": []},
+        {"method": "mlos"},
+    )
+
+
+def test_the_same_work_is_done_once_but_failed_work_can_be_asked_for_again(table: JobTable) -> None:
+    table.add(job_of(0))
+    table.move(job_of(0).id, JobState.RUNNING)
+    assert table.add(job_of(0)).state is JobState.RUNNING
+    table.move(job_of(0).id, JobState.FAILED, error="no light")
+    again = table.add(job_of(0))
+    assert (again.state, again.error) == (JobState.QUEUED, None)
+    assert len(table.newest()) == 1
+
+
+@given(st.lists(st.sampled_from(JobState), max_size=12))
+def test_only_the_transition_table_moves_a_job(path: list[JobState]) -> None:
+    table = JobTable(Path(":memory:"))
+    state = table.add(job_of(0)).state
+    for wanted in path:
+        if wanted in TRANSITIONS[state]:
+            state = table.move(job_of(0).id, wanted).state
+            assert state is wanted
+        else:
+            with pytest.raises(Conflict, match=rf"is {state}, it cannot become {wanted}"):
+                table.move(job_of(0).id, wanted)
+    assert table.get(job_of(0).id).state is state
+    table.close()
+
+
+def test_the_longest_waiting_job_is_next_and_lists_show_the_newest_first(table: JobTable) -> None:
+    for shot in range(3):
+        table.add(job_of(shot))
+    table.add(calibration_job("run-2", "cal-2", "pinhole"))
+    assert [job.shot for job in table.oldest(JobState.QUEUED, limit=2)] == [0, 1]
+    assert [job.run_id for job in table.newest()] == ["run-2", "run-1", "run-1", "run-1"]
+    assert [job.shot for job in table.newest(run_id="run-1", limit=2)] == [2, 1]
+    assert table.newest(states=[JobState.DONE]) == []
+
+
+def test_what_was_running_when_the_server_died_waits_again(tmp_path: Path) -> None:
+    before = JobTable(tmp_path / "jobs.sqlite")
+    for shot in range(3):
+        before.add(job_of(shot))
+    before.move(job_of(0).id, JobState.RUNNING)
+    before.move(job_of(1).id, JobState.ABORTED)
+    before.close()
+    after = JobTable(tmp_path / "jobs.sqlite")
+    assert after.requeue_interrupted() == 1
+    assert [job.state for job in after.newest()] == [JobState.QUEUED, JobState.ABORTED, JobState.QUEUED]
+    after.close()
+
+
+def test_a_lost_table_comes_back_from_the_run_directories(table: JobTable, tmp_path: Path) -> None:
+    job = job_of(7)
+    assert job.results_id is not None
+    results = tmp_path / "run-1" / "results" / job.results_id
+    results.mkdir(parents=True)
+    (results / "settings.json").write_text(json.dumps({"calibration": "cal-1", "settings": {"method": "mlos"}}))
+    (results / "shot_00007_a.vtkhdf").touch()
+    assert table.restore(jobs_on_disk(tmp_path)) == 1
+    assert table.restore(jobs_on_disk(tmp_path)) == 0
+    found = table.get(job.id)
+    assert found.state is JobState.DONE
+    assert (found.shot, found.settings, found.calibration) == (7, job.settings, "cal-1")
+
+
+def test_an_unknown_job_is_named(table: JobTable) -> None:
+    with pytest.raises(NotFound, match="no job 'x'"):
+        table.get("x")
