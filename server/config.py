@@ -1,0 +1,230 @@
+"""Rig configuration from TOML: frozen, no unknown keys; an error names file, line, key, value and limit."""
+
+import ipaddress
+import tomllib
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, SecretStr, ValidationError, ValidationInfo, field_validator, model_validator
+
+from daq.run_plan import FrozenModel
+from server.toml_lines import line_of
+
+ViewName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,31}$")]
+CurrentA = Annotated[float, Field(gt=0, le=30)]
+
+
+class ConfigError(Exception):
+    """The configuration cannot be used; one line per problem, each with file, line, key, value and limit."""
+
+
+class CameraConfig(FrozenModel):
+    """Where the camera is, and the profile that makes a double-frame camera of it."""
+
+    ip: Annotated[str, Field(description="IPv4 address; cameras are opened by address, never by discovery")]
+    profile: Annotated[Path, Field(description="camera profile, relative to this file")]
+
+    @field_validator("ip")
+    @classmethod
+    def _is_an_address(cls, ip: str) -> str:
+        return str(ipaddress.IPv4Address(ip))
+
+    @field_validator("profile")
+    @classmethod
+    def _exists(cls, profile: Path, info: ValidationInfo) -> Path:
+        resolved = Path((info.context or {}).get("folder", "."), profile)
+        if not resolved.is_file():
+            raise ValueError(f"there is no file {resolved}")
+        return resolved
+
+
+class LensConfig(FrozenModel):
+    """Lens of a view (Table 1)."""
+
+    f_number: Annotated[float, Field(ge=0.7, le=64)]
+    focal_length_mm: Annotated[float, Field(gt=0, le=2000)]
+    magnification: Annotated[float, Field(gt=0, le=20)]
+
+
+class SensorConfig(FrozenModel):
+    """Sensor of a camera."""
+
+    pixel_pitch_um: Annotated[float, Field(gt=0, le=100)]
+    width_px: Annotated[int, Field(ge=64, le=16384)]
+    height_px: Annotated[int, Field(ge=64, le=16384)]
+
+
+class ViewConfig(FrozenModel):
+    """One line of sight: camera, lens and light."""
+
+    azimuth_deg: Annotated[float, Field(ge=-180, le=180, description="viewing angle phi around y")]
+    camera: CameraConfig
+    led_channel: Annotated[int, Field(ge=0, le=3, description="channel of the pulse generator, light and trigger")]
+    lens: LensConfig
+    sensor: SensorConfig
+    max_current_a: Annotated[CurrentA, Field(description="limit of this LED")]
+    nominal_current_a: Annotated[CurrentA, Field(description="what a new plan starts with")]
+
+    @model_validator(mode="after")
+    def _nominal_is_permitted(self) -> Self:
+        if self.nominal_current_a > self.max_current_a:
+            raise ValueError(f"nominal_current_a {self.nominal_current_a} is above max_current_a {self.max_current_a}")
+        return self
+
+
+class TargetConfig(FrozenModel):
+    """Calibration target: inner corners of a checkerboard, or dots."""
+
+    kind: Literal["checkerboard", "dots"] = "checkerboard"
+    columns: Annotated[int, Field(ge=3, le=200)] = 23
+    rows: Annotated[int, Field(ge=3, le=200)] = 17
+    pitch_mm: Annotated[float, Field(gt=0, le=100)] = 1.0
+
+
+class PulseGeneratorConfig(FrozenModel):
+    """The microcontroller that fires light and cameras."""
+
+    port: Annotated[str, Field(min_length=1)]
+
+
+class InterlockConfig(FrozenModel):
+    """Input line of the door and enclosure switches."""
+
+    chip: Annotated[str, Field(min_length=1, description="for example /dev/gpiochip0")]
+    line: Annotated[int, Field(ge=0, le=1023)]
+    active_low: Annotated[bool, Field(description="the closed chain connects the line to ground")] = False
+
+
+class StageConfig(FrozenModel):
+    """Motorised stage of the calibration target; absent from a rig that has none."""
+
+    port: Annotated[str, Field(min_length=1)]
+    range_mm: Annotated[tuple[float, float], Field(description="lowest and highest z")]
+    zero_mm: Annotated[float, Field(description="position on the stage's own scale where z is 0")] = 0.0
+    microstep_um: Annotated[float, Field(gt=0, le=100, description="data sheet of the stage")] = 0.047625
+
+    @field_validator("range_mm")
+    @classmethod
+    def _rises(cls, range_mm: tuple[float, float]) -> tuple[float, float]:
+        if not range_mm[0] < range_mm[1]:
+            raise ValueError("the first value must be below the second")
+        return range_mm
+
+
+class ServerConfig(FrozenModel):
+    """Where the server listens and where runs are kept."""
+
+    host: str = "127.0.0.1"
+    port: Annotated[int, Field(ge=1, le=65535)] = 8080
+    data_dir: Annotated[Path, Field(description="relative to the working directory")] = Path("runs")
+    token: Annotated[SecretStr | None, Field(description="asked of every browser and script")] = None
+
+    @model_validator(mode="after")
+    def _an_open_door_has_a_key(self) -> Self:
+        if self.token is None and self.host not in ("127.0.0.1", "::1", "localhost"):
+            raise ValueError(f"host {self.host} can be reached from the network: set a token")
+        return self
+
+
+class FaultKind(StrEnum):
+    """What the simulated bench can do wrong."""
+
+    PACKET_LOSS = "packet_loss"
+    DROP_A = "drop_a"
+    DROP_B = "drop_b"
+    MISSED_TRIGGER = "missed_trigger"
+    SWAPPED = "swapped"
+    LATE = "late"
+    FROZEN = "frozen"
+    KILLED = "killed"
+    WRONG_SIZE = "wrong_size"
+    TIMESTAMP_JUMP = "timestamp_jump"
+    CONTROL_TAKEN = "control_taken"
+    GENERATOR_RESET = "generator_reset"
+    SERIAL_GARBAGE = "serial_garbage"
+    INTERLOCK_OPEN = "interlock_open"
+    STAGE_STALL = "stage_stall"
+
+
+class FaultConfig(FrozenModel):
+    """A fault that happens when the generator fires the shot with this sequence number."""
+
+    sequence: Annotated[int, Field(ge=1, description="sequence number of the firing, from 1")]
+    kind: FaultKind
+    view: Annotated[str | None, Field(description="the camera it happens to; none for the generator and others")] = None
+    amount: Annotated[float, Field(ge=0, description="percent, packets or seconds, where the kind needs it")] = 1.0
+
+
+class SimulationConfig(FrozenModel):
+    """Makes the rig a simulated bench: real drivers, simulated devices at the other end of every wire."""
+
+    seed: int = 1
+    spray: Literal["hollow_cone", "flat_fan"] = "hollow_cone"
+    firmware: Literal["host"] = "host"
+    gpio: Annotated[
+        Literal["auto", "chip", "memory"], Field(description="simulated GPIO chip, interlock in memory, or what works")
+    ] = "auto"
+    faults: tuple[FaultConfig, ...] = ()
+
+
+class RigConfig(FrozenModel):
+    """Everything that is known about a rig before it is opened."""
+
+    name: Annotated[str, Field(min_length=1, max_length=80)]
+    views: Annotated[dict[ViewName, ViewConfig], Field(min_length=2, max_length=4)]
+    target: TargetConfig = TargetConfig()
+    pulse_generator: PulseGeneratorConfig | None = None
+    interlock: InterlockConfig | None = None
+    stage: StageConfig | None = None
+    server: ServerConfig = ServerConfig()
+    simulation: SimulationConfig | None = None
+
+    @model_validator(mode="after")
+    def _wires_are_not_shared(self) -> Self:
+        wires: dict[str, list[int | str]] = {
+            "led_channel": [view.led_channel for view in self.views.values()],
+            "camera.ip": [view.camera.ip for view in self.views.values()],
+        }
+        for what, used in wires.items():
+            if twice := {value for value in used if used.count(value) > 1}:
+                raise ValueError(f"views: {what} {sorted(twice)} is used by two views")
+        return self
+
+    @model_validator(mode="after")
+    def _devices_are_complete(self) -> Self:
+        if self.simulation is None:
+            if missing := [name for name in ("pulse_generator", "interlock") if getattr(self, name) is None]:
+                raise ValueError(f"{' and '.join(missing)}: missing; a rig without [simulation] needs it")
+            return self
+        outside = [v.camera.ip for v in self.views.values() if not ipaddress.IPv4Address(v.camera.ip).is_loopback]
+        if outside:
+            raise ValueError(f"camera.ip {outside}: cameras of a simulated bench have loopback addresses, 127.x.x.x")
+        if unknown := {fault.view for fault in self.simulation.faults} - {None, *self.views}:
+            raise ValueError(f"simulation.faults: there is no view {sorted(map(str, unknown))}")
+        return self
+
+
+def load_config(path: Path) -> RigConfig:
+    """Read a rig configuration.
+
+    Raises
+    ------
+    ConfigError
+        The file cannot be read, is no TOML, or has values that are out of range or unknown.
+    """
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+        return RigConfig.model_validate(tomllib.loads(text), context={"folder": Path(path).parent})
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise ConfigError(f"{path}: {error}") from error
+    except ValidationError as error:
+        raise ConfigError("\n".join(_problem(path, text, problem) for problem in error.errors())) from error
+
+
+def _problem(path: Path, text: str, problem: Any) -> str:
+    key = ".".join(map(str, problem["loc"]))
+    reason = problem["msg"].removeprefix("Value error, ")
+    value = "" if isinstance(problem["input"], dict | FrozenModel) else f" {problem['input']!r}"
+    line = line_of(text, problem["loc"])
+    return f"{path}{f':{line}' if line else ''}: {f'{key}:' if key else ''}{value} {reason}".replace(":  ", ": ")
