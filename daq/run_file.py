@@ -1,0 +1,184 @@
+"""RUN/run.h5: what the run is, its reference images, its outcome, and a view over all its shots.
+
+The view is written once, before the first shot, and grows by itself as ``shots/N.h5`` appear. References and
+outcome are added to a copy that replaces the file, so that a complete ``run.h5`` exists at every instant.
+"""
+
+import json
+import shutil
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Literal
+
+import h5py
+import numpy as np
+from h5py import h5d, h5p, h5s, h5t
+from numpy.typing import NDArray
+
+from daq.atomic_file import replacing
+from daq.errors import RecorderError, ShotFileError
+from daq.run_header import RunHeader
+from daq.shot_columns import columns_of, frames_path, view_path
+from daq.shot_encoding import encode_frame
+from daq.single_shot_file import LIBRARY_VERSIONS, SCHEMA_VERSION, create_groups
+
+RUN_FILE = "run.h5"
+SHOTS_FOLDER = "shots"
+RUN_SCHEMA = "tomoshadow-run"
+Reference = Literal["dark", "background"]
+ReferenceImages = Mapping[str, NDArray[np.float32]]
+
+
+def shot_path(run_dir: Path, index: int) -> Path:
+    """File of one shot."""
+    return run_dir / SHOTS_FOLDER / f"{index}.h5"
+
+
+def write_run_file(run_dir: Path, header: RunHeader) -> None:
+    """Write header and view of a run that has no shots yet."""
+    with replacing(run_dir / RUN_FILE) as part, h5py.File(part, "w", libver=LIBRARY_VERSIONS) as file:
+        file.attrs.update(schema=RUN_SCHEMA, schema_version=SCHEMA_VERSION, default="entry")
+        create_groups(file, header)
+        _write_entry(file.create_group("entry"), header)
+        _write_view(file, header)
+
+
+def read_header(run_dir: Path) -> RunHeader:
+    """Read what the run is.
+
+    Raises
+    ------
+    ShotFileError
+        The file is missing, damaged, or of a newer version.
+    """
+    with reading(run_dir) as file:
+        entry = file["entry"]
+        return RunHeader.model_validate({name: json.loads(entry[name].asstr()[()]) for name in RunHeader.model_fields})
+
+
+def add_outcome(run_dir: Path, outcome: str, cause: str) -> None:
+    """Close the run: how it ended, why, and when.
+
+    Raises
+    ------
+    RecorderError
+        The run has an outcome already.
+    """
+    with _amending(run_dir) as file:
+        if "outcome" in file["entry"]:
+            raise RecorderError(f"{run_dir}: has an outcome already, {file['entry/outcome'].asstr()[()]}")
+        file["entry/outcome"] = outcome
+        file["entry/cause"] = cause
+        file["entry/end_time"] = datetime.now(UTC).isoformat()
+
+
+def read_outcome(run_dir: Path) -> tuple[str, str] | None:
+    """Outcome and cause; None while the run is open, and for ever if its process was killed."""
+    with reading(run_dir) as file:
+        entry = file["entry"]
+        return (entry["outcome"].asstr()[()], entry["cause"].asstr()[()]) if "outcome" in entry else None
+
+
+def add_references(run_dir: Path, header: RunHeader, references: Mapping[Reference, ReferenceImages]) -> None:
+    """Store mean images, (frame, row, column) float32 per view.
+
+    Raises
+    ------
+    RecorderError
+        An image does not have the format of its view, or the run has such references already.
+    """
+    for name, images in references.items():
+        for view, stack in images.items():
+            _check_reference(run_dir, header, f"{name} of {view}", view, stack)
+    with _amending(run_dir) as file:
+        for name, images in references.items():
+            for view, stack in images.items():
+                if view_path(view, name) in file:
+                    raise RecorderError(f"{run_dir}: has a {name} of {view} already")
+                _create_reference(file, view_path(view, name), np.asarray(stack, "<f4"))
+
+
+def read_reference(run_dir: Path, view: str, name: Reference) -> NDArray[np.float32] | None:
+    """Mean image (frame, row, column) of a view; None if the run has none."""
+    with reading(run_dir) as file:
+        path = view_path(view, name)
+        return np.asarray(file[path][()], np.float32) if path in file else None
+
+
+@contextmanager
+def reading(run_dir: Path) -> Iterator[h5py.File]:
+    """Open ``run.h5`` and turn what can go wrong into ShotFileError."""
+    path = run_dir / RUN_FILE
+    try:
+        with h5py.File(path, "r") as file:
+            schema, version = file.attrs["schema"], file.attrs["schema_version"]
+            if schema != RUN_SCHEMA or version > SCHEMA_VERSION:
+                raise ShotFileError(f"{path}: {schema} {version}, this program reads {RUN_SCHEMA} {SCHEMA_VERSION}")
+            yield file
+    except (OSError, KeyError, ValueError, TypeError, RuntimeError) as error:
+        raise ShotFileError(f"{path}: cannot be read: {error}") from error
+
+
+@contextmanager
+def _amending(run_dir: Path) -> Iterator[h5py.File]:
+    path = run_dir / RUN_FILE
+    with replacing(path) as part:
+        shutil.copyfile(path, part)
+        with h5py.File(part, "r+", libver=LIBRARY_VERSIONS) as file:
+            yield file
+
+
+def _write_entry(entry: h5py.Group, header: RunHeader) -> None:
+    """Every field of the header as JSON, and what NeXus readers look for."""
+    entry.attrs["NX_class"] = "NXentry"
+    for name, value in header.model_dump(mode="json").items():
+        entry[name] = json.dumps(value, indent=1)
+    entry["entry_identifier"] = header.run_id
+    entry["start_time"] = header.created_utc
+    entry["instrument"] = h5py.SoftLink("/cameras")
+    for view in header.views:
+        data = entry.create_group(f"data_{view}")
+        data.attrs.update(NX_class="NXdata", signal="frames", axes=["index", ".", ".", "."])
+        data["frames"] = h5py.SoftLink(frames_path(view))
+        data["index"] = h5py.SoftLink("/shots/index")
+    entry.attrs["default"] = f"data_{next(iter(header.views))}"
+
+
+def _write_view(file: h5py.File, header: RunHeader) -> None:
+    for view, view_format in header.views.items():
+        frames = _create_virtual(
+            file, frames_path(view), view_format.dtype, (header.frames_per_shot, *view_format.shape)
+        )
+        frames.attrs.update(units="counts", axes="shot,frame,row,column", significant_bits=view_format.bits)
+    for path, column in columns_of(header).items():
+        dataset = _create_virtual(file, path, np.dtype(column.dtype), column.shape)
+        dataset.attrs.update(units=column.units, axes=column.axes)
+
+
+def _create_virtual(file: h5py.File, path: str, dtype: np.dtype[Any], shape: tuple[int, ...]) -> h5py.Dataset:
+    """Create a dataset (shot, ...) mapped to the same path in ``shots/%b.h5``; %b counts blocks of one shot."""
+    source, endless, zeros = (1, *shape), (h5s.UNLIMITED, *shape), (0,) * (1 + len(shape))
+    space = h5s.create_simple(source, endless)
+    space.select_hyperslab(zeros, (h5s.UNLIMITED, *(1,) * len(shape)), source, source)
+    layout = h5p.create(h5p.DATASET_CREATE)
+    layout.set_virtual(space, f"{SHOTS_FOLDER}/%b.h5".encode(), path.encode(), h5s.create_simple(source))
+    return h5py.Dataset(h5d.create(file.id, path.encode(), h5t.py_create(dtype, logical=True), space, layout))
+
+
+def _check_reference(run_dir: Path, header: RunHeader, what: str, view: str, stack: NDArray[np.float32]) -> None:
+    if view not in header.views:
+        raise RecorderError(f"{run_dir}: {what}: the run has views {sorted(header.views)}")
+    expected = (header.frames_per_shot, *header.views[view].shape)
+    if stack.shape != expected:
+        raise RecorderError(f"{run_dir}: {what} has shape {stack.shape}, the run stores {expected}")
+
+
+def _create_reference(file: h5py.File, path: str, stack: NDArray[np.float32]) -> None:
+    dataset = file.create_dataset(
+        path, stack.shape, stack.dtype, chunks=(1, *stack.shape[1:]), compression="gzip", shuffle=True
+    )
+    dataset.attrs.update(units="counts", axes="frame,row,column")
+    for number, image in enumerate(stack):
+        dataset.id.write_direct_chunk((number, 0, 0), encode_frame(image).chunk)

@@ -1,0 +1,164 @@
+"""RUN/shots/N.h5: one shot. Written to a part, fsynced, committed by rename; never written again."""
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from h5py import h5d, h5p, h5s, h5t
+from numpy.typing import NDArray
+
+from daq.errors import RecorderError, ShotFileError
+from daq.run_header import RunHeader, ViewFormat
+from daq.run_plan import ImageKey
+from daq.shot import Image, Shot
+from daq.shot_columns import Column, columns_of, crc32_path, frames_path, shot_from_columns, shot_to_columns, view_path
+from daq.shot_encoding import EncodedFrame, decode_frame, encode_frame, is_shuffled
+
+LIBRARY_VERSIONS = ("v110", "v110")
+"""Format of every file: newer formats cannot be opened by the HDF5 1.10 tools of current distributions."""
+SHOT_SCHEMA = "tomoshadow-shot"
+SCHEMA_VERSION = 1
+
+
+@dataclass(frozen=True)
+class EncodedShot:
+    """A shot as it goes to disk: frames as chunks, numbers as columns."""
+
+    frames: Mapping[str, list[EncodedFrame]]
+    columns: Mapping[str, NDArray[Any]]
+
+
+def encode_shot(shot: Shot, header: RunHeader) -> EncodedShot:
+    """Compress the frames of a shot; releases the GIL for most of the time.
+
+    Raises
+    ------
+    RecorderError
+        The shot does not have the format that the header of the run announces.
+    """
+    if set(shot.views) != set(header.views):
+        raise RecorderError(f"shot {shot.index} has views {sorted(shot.views)}, the run {sorted(header.views)}")
+    try:
+        columns = shot_to_columns(shot, header)
+    except ValueError as error:
+        raise RecorderError(f"shot {shot.index}: {error}") from error
+    frames: dict[str, list[EncodedFrame]] = {}
+    for view, view_format in header.views.items():
+        images = _checked_images(shot, view, view_format, header.frames_per_shot)
+        frames[view] = [encode_frame(image.astype(view_format.dtype, copy=False)) for image in images]
+        columns[crc32_path(view)] = np.array([frame.crc32 for frame in frames[view]], "u4")
+    return EncodedShot(frames, columns)
+
+
+def write_encoded_shot(path: Path, encoded: EncodedShot, header: RunHeader) -> None:
+    """Write one file; the caller syncs and commits it."""
+    described = columns_of(header)
+    with h5py.File(path, "w", libver=LIBRARY_VERSIONS) as file:
+        file.attrs.update(schema=SHOT_SCHEMA, schema_version=SCHEMA_VERSION, run_id=header.run_id)
+        create_groups(file, header)
+        for view, view_format in header.views.items():
+            frames = create_frames(file, view, view_format, (1, header.frames_per_shot))
+            for number, frame in enumerate(encoded.frames[view]):
+                frames.id.write_direct_chunk((0, number, 0, 0), frame.chunk)
+        for name, values in encoded.columns.items():
+            _create_column(file, name, described[name], values)
+
+
+@contextmanager
+def reading_shot(path: Path, header: RunHeader) -> Iterator[h5py.File]:
+    """Open a shot of this run and turn what can go wrong into ShotFileError."""
+    try:
+        with h5py.File(path, "r") as file:
+            if file.attrs["schema"] != SHOT_SCHEMA or file.attrs["run_id"] != header.run_id:
+                raise ShotFileError(f"{path}: not a shot of run {header.run_id}")
+            yield file
+    except (OSError, KeyError, ValueError, IndexError, TypeError, RuntimeError) as error:
+        raise ShotFileError(f"{path}: cannot be read: {error}") from error
+
+
+def read_shot_file(path: Path, header: RunHeader) -> Shot:
+    """Read one shot and check it against its checksums.
+
+    Raises
+    ------
+    ShotFileError
+        The file is missing, torn, damaged, or belongs to another run; the text names it.
+    """
+    with reading_shot(path, header) as file:
+        columns = {name: file[name][0] for name in columns_of(header)}
+        frames = {
+            view: _read_frames(file, view, view_format, columns[crc32_path(view)])
+            for view, view_format in header.views.items()
+        }
+        return shot_from_columns(columns, frames)
+
+
+def read_image_key(path: Path) -> ImageKey:
+    """Read what a shot shows; INVALID if its file cannot be read."""
+    try:
+        with h5py.File(path, "r") as file:
+            return ImageKey(int(file["/shots/image_key"][0]))
+    except (OSError, KeyError, ValueError, RuntimeError):
+        return ImageKey.INVALID
+
+
+def create_groups(file: h5py.File, header: RunHeader) -> None:
+    """Create the groups that shot files and ``run.h5`` have in common."""
+    file.attrs["NX_class"] = "NXroot"
+    file.create_group("shots").attrs["NX_class"] = "NXcollection"
+    file.create_group("cameras").attrs["NX_class"] = "NXinstrument"
+    for view in header.views:
+        file.create_group(view_path(view, "")).attrs["NX_class"] = "NXdetector"
+
+
+def create_frames(file: h5py.File, view: str, view_format: ViewFormat, leading: tuple[int, int]) -> h5py.Dataset:
+    """Create the dataset for the frames of one view, (shot, frame, row, column), one chunk per frame."""
+    dataset = file.create_dataset(
+        frames_path(view),
+        (*leading, *view_format.shape),
+        view_format.dtype,
+        chunks=(1, 1, *view_format.shape),
+        compression="gzip",
+        compression_opts=1,
+        shuffle=is_shuffled(view_format.dtype),
+    )
+    dataset.attrs.update(units="counts", axes="shot,frame,row,column", significant_bits=view_format.bits)
+    return dataset
+
+
+def _checked_images(shot: Shot, view: str, view_format: ViewFormat, count: int) -> list[Image]:
+    double_frame = shot.views[view]
+    images = [image for image in (double_frame.frame_a, double_frame.frame_b) if image is not None]
+    if len(images) != count:
+        raise RecorderError(f"shot {shot.index}, {view}: {len(images)} exposures, the run stores {count}")
+    for image in images:
+        if image.shape != view_format.shape or image.dtype.newbyteorder("<") != view_format.dtype:
+            raise RecorderError(
+                f"shot {shot.index}, {view}: frame {image.shape} {image.dtype}, "
+                f"the run stores {view_format.shape} {view_format.dtype}"
+            )
+    return images
+
+
+def _create_column(file: h5py.File, name: str, column: Column, values: NDArray[Any]) -> None:
+    """Compact storage: the values share the checksum of the object header."""
+    layout = h5p.create(h5p.DATASET_CREATE)
+    layout.set_layout(h5d.COMPACT)
+    space = h5s.create_simple((1, *values.shape))
+    kind = h5t.py_create(values.dtype, logical=True)
+    stored = h5d.create(file.id, name.encode(), kind, space, layout)
+    stored.write(h5s.ALL, h5s.ALL, np.ascontiguousarray(values[np.newaxis]))
+    h5py.Dataset(stored).attrs.update(units=column.units, axes=column.axes)
+
+
+def _read_frames(file: h5py.File, view: str, view_format: ViewFormat, crc32: NDArray[Any]) -> list[Image]:
+    dataset = file[frames_path(view)]
+    chunks = [dataset.id.read_direct_chunk((0, number, 0, 0))[1] for number in range(len(crc32))]
+    return [
+        decode_frame(EncodedFrame(chunk, int(check)), view_format.shape, view_format.dtype)
+        for chunk, check in zip(chunks, crc32, strict=True)
+    ]
