@@ -106,8 +106,12 @@ class RunWriter:
             write_encoded_shot(part, encoded, self.header)
             sync(part)
         except OSError:
-            part.unlink(missing_ok=True)
+            self.discard(index)
             raise
+
+    def discard(self, index: int) -> None:
+        """Remove a shot that was staged and shall not be committed."""
+        part_path(shot_path(self.run_dir, index)).unlink(missing_ok=True)
 
     def commit(self, index: int) -> None:
         """Make a staged shot part of the run; call in the order of indices, a gap would hide later shots."""
