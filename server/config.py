@@ -2,13 +2,13 @@
 
 import ipaddress
 import tomllib
-from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, SecretStr, ValidationError, ValidationInfo, field_validator, model_validator
 
 from daq.run_plan import FrozenModel
+from daq.simulation.faults import ScriptedFault
 from server.toml_lines import line_of
 
 ViewName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,31}$")]
@@ -28,7 +28,10 @@ class CameraConfig(FrozenModel):
     @field_validator("ip")
     @classmethod
     def _is_an_address(cls, ip: str) -> str:
-        return str(ipaddress.IPv4Address(ip))
+        try:
+            return str(ipaddress.IPv4Address(ip))
+        except ValueError as error:
+            raise ValueError("is no IPv4 address, for example 192.168.10.11") from error
 
     @field_validator("profile")
     @classmethod
@@ -127,35 +130,6 @@ class ServerConfig(FrozenModel):
         return self
 
 
-class FaultKind(StrEnum):
-    """What the simulated bench can do wrong."""
-
-    PACKET_LOSS = "packet_loss"
-    DROP_A = "drop_a"
-    DROP_B = "drop_b"
-    MISSED_TRIGGER = "missed_trigger"
-    SWAPPED = "swapped"
-    LATE = "late"
-    FROZEN = "frozen"
-    KILLED = "killed"
-    WRONG_SIZE = "wrong_size"
-    TIMESTAMP_JUMP = "timestamp_jump"
-    CONTROL_TAKEN = "control_taken"
-    GENERATOR_RESET = "generator_reset"
-    SERIAL_GARBAGE = "serial_garbage"
-    INTERLOCK_OPEN = "interlock_open"
-    STAGE_STALL = "stage_stall"
-
-
-class FaultConfig(FrozenModel):
-    """A fault that happens when the generator fires the shot with this sequence number."""
-
-    sequence: Annotated[int, Field(ge=1, description="sequence number of the firing, from 1")]
-    kind: FaultKind
-    view: Annotated[str | None, Field(description="the camera it happens to; none for the generator and others")] = None
-    amount: Annotated[float, Field(ge=0, description="percent, packets or seconds, where the kind needs it")] = 1.0
-
-
 class SimulationConfig(FrozenModel):
     """Makes the rig a simulated bench: real drivers, simulated devices at the other end of every wire."""
 
@@ -165,7 +139,7 @@ class SimulationConfig(FrozenModel):
     gpio: Annotated[
         Literal["auto", "chip", "memory"], Field(description="simulated GPIO chip, interlock in memory, or what works")
     ] = "auto"
-    faults: tuple[FaultConfig, ...] = ()
+    faults: tuple[ScriptedFault, ...] = ()
 
 
 class RigConfig(FrozenModel):

@@ -57,7 +57,7 @@ def test_both_examples_are_the_rig_of_table_1(name: str) -> None:
         (
             "f_number = 22",
             "f_number = 0",
-            r"rig\.toml:7: views\.view1\.lens\.f_number: 0 .* greater than or equal to 0\.7",
+            r"rig\.toml:8: views\.view1\.lens\.f_number: 0 .* greater than or equal to 0\.7",
         ),
         ("led_channel = 1", "led_channel = 4", r":16: views\.view2\.led_channel: 4 .* less than or equal to 3"),
         ("led_channel = 1", "led_channel = 0", r"led_channel \[0\] is used by two views"),
@@ -87,7 +87,7 @@ def test_all_mistakes_are_told_at_once(folder: Path) -> None:
 
 
 def test_a_fault_of_an_unknown_view_is_named(folder: Path) -> None:
-    fault = '[[simulation.faults]]\nsequence = 3\nkind = "drop_b"\nview = "view9"\n'
+    fault = '[[simulation.faults]]\nsequence = 3\nkind = "dropped_b"\nview = "view9"\n'
     path = mended(folder, "# Faults", fault + "# Faults")
     with pytest.raises(ConfigError, match=r"simulation\.faults: there is no view \['view9'\]"):
         load_config(path)
