@@ -1,0 +1,1 @@
+"""Synthetic sprays, targets and their views; they feed the tests, the studies and the simulated cameras."""
