@@ -1,0 +1,61 @@
+"""Shadow images of a spray: every ball is a dark disc, blurred by diffraction, defocus, pixel and motion.
+
+The focal plane of every view is the plane z = 0: its Scheimpflug adaptor is adjusted to the target at z = 0.
+"""
+
+import numpy as np
+
+from processing.geometry import PinholeCamera
+from processing.synthetic.spray import Spray
+from processing.synthetic.stamping import Discs, FloatArray, FloatImage, stamp_discs
+from processing.synthetic.view_optics import ViewOptics
+
+
+def render_transmittance(
+    camera: PinholeCamera, spray: Spray, optics: ViewOptics, exposure_s: float = 0.0
+) -> FloatImage:
+    """Transmittance of a spray as one view sees it.
+
+    Balls are opaque (1 - opacity) discs around their projected centres; overlapping shadows multiply. Refraction,
+    the bright spots in the middle of large droplets, and perspective's ellipticity (below 0.3 %) are left out.
+
+    Parameters
+    ----------
+    camera : PinholeCamera
+        Projection, distortion included.
+    spray : Spray
+        The liquid in the middle of the exposure.
+    optics : ViewOptics
+        Diffraction and defocus.
+    exposure_s : float
+        Duration of the light pulse: moving balls are smeared along their path.
+
+    Returns
+    -------
+    (row, column) float32 array
+        1 where light passes, 0 in full shadow.
+    """
+    path_mm = 0.5 * exposure_s * spray.velocities_mm_per_s
+    first_px = camera.project(spray.positions_mm - path_mm)[:, ::-1]
+    last_px = camera.project(spray.positions_mm + path_mm)[:, ::-1]
+    discs = Discs(
+        centres=0.5 * (first_px + last_px),
+        radii_px=0.5 * spray.diameters_mm * image_scale_px_per_mm(camera, spray.positions_mm),
+        sigmas_px=optics.blur_sigma_px(depth_out_of_focus_mm(camera, spray.positions_mm)),
+        opacities=spray.opacities,
+        smears=last_px - first_px,
+    )
+    width_px, height_px = camera.image_size_px
+    return stamp_discs(discs, (height_px, width_px))
+
+
+def image_scale_px_per_mm(camera: PinholeCamera, points_mm: FloatArray) -> FloatArray:
+    """Local image scale at points (N, 3), in the plane across the view axis; distortion changes it by < 1 %."""
+    depths_mm = points_mm @ camera.rotation[2] + camera.translation_mm[2]
+    return np.asarray(camera.camera_matrix[0, 0] / depths_mm, dtype=np.float64)
+
+
+def depth_out_of_focus_mm(camera: PinholeCamera, points_mm: FloatArray) -> FloatArray:
+    """Distance (N,) of points (N, 3) from the focal plane z = 0 along their line of sight, as depth of the view."""
+    rays = camera.ray_directions(points_mm)
+    return np.asarray(points_mm[:, 2] * (rays @ camera.rotation[2]) / rays[:, 2], dtype=np.float64)

@@ -1,0 +1,57 @@
+"""ViewOptics: lens, sensor pitch and light of one view (Table 1), and the blur they cause."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from processing.optics import GREEN_UM, airy_diameter_um
+from processing.synthetic.stamping import FloatArray
+
+_CORE_SIGMA = 0.42 / 2.44
+"""Sigma of the Gaussian with the core of the Airy pattern, relative to d_A."""
+_PIXEL_VARIANCE_PX2 = 1 / 12
+"""Variance of a pixel of full fill factor."""
+
+
+@dataclass(frozen=True)
+class ViewOptics:
+    """Lens, sensor and light of one view.
+
+    Parameters
+    ----------
+    f_number, focal_length_mm, magnification : float
+        Lens.
+    pixel_pitch_um : float
+        Pitch of the sensor.
+    nominal_current_a : float
+        LED current that exposes half of the dynamic range within 1 us.
+    wavelength_um : float
+        Wavelength of the light.
+    """
+
+    f_number: float
+    focal_length_mm: float
+    magnification: float
+    pixel_pitch_um: float
+    nominal_current_a: float
+    wavelength_um: float = GREEN_UM
+
+    @property
+    def diffraction_sigma_px(self) -> float:
+        """Gaussian of equal core for the Airy disk d_A of eq. 1, on the sensor."""
+        airy_um = airy_diameter_um(self.f_number, self.magnification, self.wavelength_um)
+        return _CORE_SIGMA * airy_um / self.pixel_pitch_um
+
+    def optical_sigma_px(self, depth_mm: FloatArray) -> FloatArray:
+        """Diffraction and defocus as one Gaussian, for points ``depth_mm`` (N,) out of focus along the view axis.
+
+        The blur circle in the object, depth x M / (f# (M + 1)), is a uniform disc: sigma = diameter / 4. The light
+        of a real, collimated LED fills less than the aperture, and blurs less.
+        """
+        circle_mm = np.abs(depth_mm) * self.magnification / (self.f_number * (self.magnification + 1))
+        defocus_px = circle_mm * self.magnification * 1000 / self.pixel_pitch_um / 4
+        return np.hypot(self.diffraction_sigma_px, defocus_px)
+
+    def blur_sigma_px(self, depth_mm: FloatArray) -> FloatArray:
+        """``optical_sigma_px`` with the area of the pixel, (N,)."""
+        return np.sqrt(self.optical_sigma_px(depth_mm) ** 2 + _PIXEL_VARIANCE_PX2)
