@@ -106,7 +106,7 @@ def _ligament(sheet: Sheet, rng: np.random.Generator) -> Spray:
     diameter_mm = rng.uniform(0.04, 0.085)
     step_mm = _CHAIN_STEP * diameter_mm
     path_mm = np.arange(0, length_mm, step_mm)
-    heading_rad = rng.uniform(0, np.pi) + np.cumsum(rng.normal(0, 0.25 * np.sqrt(step_mm), len(path_mm))) * 4
+    heading_rad = rng.uniform(0, np.pi) + np.cumsum(rng.normal(0, np.sqrt(step_mm), len(path_mm)))
     s_mm = start_mm + np.cumsum(step_mm * np.cos(heading_rad))
     angles_rad = angle_rad + np.cumsum(step_mm * np.sin(heading_rad)) / (start_mm * sheet.shape.arc_factor)
     across_mm = rng.normal(0, 0.05 + 0.1 * age) + rng.normal(0, 0.25) * path_mm

@@ -1,6 +1,7 @@
 """The paper's two nozzles as random sprays: a liquid sheet, ligaments where it breaks up, droplets beyond.
 
-Not modelled: air drag and turbulence, collisions, secondary break-up, and the body of the nozzle.
+Not modelled: air drag, collisions, secondary break-up, the body of the nozzle, and liquid that follows out of it
+between two exposures: at 25 mm/ms and 6.4 us the sheet of frame B begins 0.16 mm below the orifice.
 """
 
 from collections.abc import Sequence

@@ -5,8 +5,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from processing.synthetic.breakup import perforate, sheet_film
 from processing.synthetic.nozzles import FLAT_FAN_FLOW, HOLLOW_CONE_FLOW, flat_fan_spray, hollow_cone_spray
 from processing.synthetic.paper_rig import paper_cameras
+from processing.synthetic.sheet import FlatFan, Sheet
 from processing.synthetic.spray import LiquidKind, Spray
 from processing.synthetic.stamping import FloatArray
 
@@ -66,9 +68,6 @@ def test_fan_is_wide_in_x_and_thin_in_z() -> None:
 
 
 def test_fan_sheet_is_perforated() -> None:
-    from processing.synthetic.breakup import perforate, sheet_film
-    from processing.synthetic.sheet import FlatFan, Sheet
-
     rng = np.random.default_rng(5)
     sheet = Sheet(FlatFan(np.deg2rad(65)), FLAT_FAN_FLOW, rng)
     film = sheet_film(sheet, rng)
