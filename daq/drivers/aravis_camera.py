@@ -1,0 +1,200 @@
+"""GigE Vision double-frame camera: arms it by its profile, and proves that two frames are exposures A and B."""
+
+import logging
+from threading import Thread
+from types import TracebackType
+from typing import Self
+
+from daq.devices import DeviceIdentity
+from daq.drivers.aravis_device import AravisDevice
+from daq.drivers.camera_profile import CameraProfile, FeatureWrite
+from daq.drivers.exposure_pairing import ExposureFormat, double_frame
+from daq.drivers.frame_receiver import FrameReceiver, StreamCounters
+from daq.errors import DeviceError, DeviceRefused
+from daq.shot import DoubleFrame, Image
+from daq.timing import CameraTiming
+
+_log = logging.getLogger(__name__)
+
+
+class AravisCamera:
+    """Implements ``daq.devices.Camera``.
+
+    Every call ends within seconds: Aravis gives up on a register after 2.5 s, and ``collect`` has its own
+    deadline. A camera that was lost is opened anew by the next ``arm``.
+
+    Parameters
+    ----------
+    name : str
+        Name in the rig configuration.
+    ip : str
+        Address of the camera.
+    profile : CameraProfile
+        What it is told before each run, and its timing.
+    shape : tuple[int, int]
+        (rows, columns) of one exposure.
+    packet_bytes : int
+        Size of a stream packet: 9000 where the network carries jumbo frames, else 1500.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        ip: str,
+        profile: CameraProfile,
+        shape: tuple[int, int] = (1200, 1600),
+        packet_bytes: int = 9000,
+    ) -> None:
+        self._name = name
+        self._ip = ip
+        self._profile = profile
+        self._packet_bytes = packet_bytes
+        self._form = ExposureFormat(shape, profile.bits, profile.frames_per_trigger, profile.pair)
+        self._is_open = False
+        self._device: AravisDevice | None = None
+        self._receiver: FrameReceiver | None = None
+        self._last_id: int | None = None
+        self._latest: Image | None = None
+
+    def __enter__(self) -> Self:
+        self._device = AravisDevice(self._name, self._ip)
+        self._is_open = True
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.disarm()
+        self._is_open = False
+        self._let_go(None)
+
+    @property
+    def name(self) -> str:
+        """Name in the rig configuration."""
+        return self._name
+
+    @property
+    def timing(self) -> CameraTiming:
+        """Timing model of the profile."""
+        return self._profile.camera_timing
+
+    @property
+    def image_shape(self) -> tuple[int, int]:
+        """(rows, columns) of one exposure."""
+        return self._form.shape
+
+    @property
+    def bits(self) -> int:
+        """Significant bits of a grey value."""
+        return self._profile.bits
+
+    @property
+    def counters(self) -> StreamCounters:
+        """What the stream has done since the camera was armed."""
+        return StreamCounters() if self._receiver is None else self._receiver.counters
+
+    def identity(self) -> DeviceIdentity:
+        """Vendor, model, serial number and firmware version, as the device answers."""
+        return self._connected().identity()
+
+    def arm(self) -> None:
+        """Write the profile, start acquisition on a fresh stream, read every value back.
+
+        Raises
+        ------
+        DeviceUnavailable
+            The camera is gone, or held by another client.
+        DeviceRefused
+            A feature is unknown, out of range, or reads back differently.
+        """
+        self.disarm()
+        device = self._connected()
+        settings = self._settings(device)
+        for setting in settings:
+            device.write(setting)
+        device.set_packet_bytes(self._packet_bytes)
+        self._receiver = FrameReceiver(self._name, device.open_stream(self._form).pop)
+        self._receiver.start()
+        self._last_id = 0
+        device.start()
+        for setting in settings:
+            device.check(setting)
+
+    def begin_shot(self) -> None:
+        """Re-base: only frames that the camera stamps later than now belong to the next firing."""
+        receiver = self._armed()
+        receiver.open_shot(self._connected().clock_ns())
+
+    def collect(self, deadline_s: float) -> DoubleFrame:
+        """Exposures A and B of the firing since ``begin_shot``.
+
+        Returns
+        -------
+        DoubleFrame
+            A missing, incomplete or unproven exposure is black and flagged.
+
+        Raises
+        ------
+        DeviceUnavailable
+            An exposure is missing and the camera no longer answers.
+        """
+        arrivals = self._armed().take(self._form.frames, deadline_s)
+        shot = double_frame(arrivals, self._last_id, self._form)
+        self._last_id = arrivals[-1].frame_id if shot.valid else None
+        if not shot.valid:
+            self._connected().require_answer()
+        return shot
+
+    def disarm(self) -> None:
+        """Stop acquisition; a camera that does not answer is let go, and ``arm`` opens it anew."""
+        receiver, self._receiver = self._receiver, None
+        if receiver is None:
+            return
+        self._latest = receiver.latest
+        device = self._connected()
+        try:
+            device.stop()
+        except DeviceError as error:
+            _log.warning("disarm: %s", error)
+        if device.is_lost:
+            self._let_go(receiver)
+        else:
+            receiver.stop()
+
+    def latest(self) -> Image | None:
+        """Newest exposure seen, for the live view; None before the first."""
+        return self._latest if self._receiver is None else self._receiver.latest
+
+    def _settings(self, device: AravisDevice) -> list[FeatureWrite]:
+        rows, columns = self._form.shape
+        offsets = [FeatureWrite(feature=name, value=0) for name in ("OffsetX", "OffsetY") if device.has(name)]
+        image = [
+            FeatureWrite(feature="Width", value=columns),
+            FeatureWrite(feature="Height", value=rows),
+            FeatureWrite(feature="PixelFormat", value=self._profile.pixel_format),
+        ]
+        return [*offsets, *image, *self._profile.features]
+
+    def _connected(self) -> AravisDevice:
+        if not self._is_open:
+            raise DeviceRefused(self._name, "the camera is not open")
+        if self._device is None:
+            self._device = AravisDevice(self._name, self._ip)
+        return self._device
+
+    def _armed(self) -> FrameReceiver:
+        if self._receiver is None:
+            raise DeviceRefused(self._name, "the camera is not armed")
+        return self._receiver
+
+    def _let_go(self, receiver: FrameReceiver | None) -> None:
+        """Close stream and device. Aravis asks a silent camera for many seconds: nobody shall wait for that."""
+        device, self._device = self._device, None
+        if device is not None and device.is_lost:
+            Thread(target=_close, args=(receiver, device), name=f"{self._name} close", daemon=True).start()
+
+
+def _close(receiver: FrameReceiver | None, _device: AravisDevice) -> None:
+    """Hold the last references: stream and device end with this thread."""
+    if receiver is not None:
+        receiver.stop()

@@ -1,0 +1,113 @@
+"""The polling thread of a camera: takes frames out of its stream and keeps those of the present firing."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from threading import Condition, Event, Thread
+
+from daq.drivers.exposure_pairing import Arrival, frame_id_distance
+from daq.shot import Image
+
+
+@dataclass(frozen=True)
+class StreamCounters:
+    """What the stream of a camera has done since it was armed.
+
+    Parameters
+    ----------
+    frames : int
+        Frames received, incomplete ones included.
+    missing_frames : int
+        Gaps in the frame ids.
+    stale_frames : int
+        Frames older than the firing they came after.
+    missing_packets, resent_packets : int
+        Network packets that never came, and that came on the second request.
+    """
+
+    frames: int = 0
+    missing_frames: int = 0
+    stale_frames: int = 0
+    missing_packets: int = 0
+    resent_packets: int = 0
+
+
+class FrameReceiver:
+    """Polls a stream in its own thread.
+
+    Parameters
+    ----------
+    name : str
+        Device name, for the thread.
+    pop : Callable[[], Arrival | None]
+        Waits for the next frame for a fraction of a second; None if there was none.
+    """
+
+    def __init__(self, name: str, pop: Callable[[], Arrival | None]) -> None:
+        self._pop = pop
+        self._changed = Condition()
+        self._arrivals: list[Arrival] = []
+        self._opened_ns = 0
+        self._last_id: int | None = None
+        self._latest: Image | None = None
+        self._counters = StreamCounters()
+        self._stopping = Event()
+        self._thread = Thread(target=self._poll, name=f"{name} frames", daemon=True)
+
+    def start(self) -> None:
+        """Start polling."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End polling; returns after one poll interval at most."""
+        self._stopping.set()
+        self._thread.join()
+
+    def open_shot(self, opened_ns: int) -> None:
+        """Forget what has come; frames stamped before ``opened_ns`` (camera clock) belong to no later firing."""
+        with self._changed:
+            self._arrivals.clear()
+            self._opened_ns = opened_ns
+
+    def take(self, frames: int, deadline_s: float) -> Sequence[Arrival]:
+        """Frames of the firing: as soon as so many are there, at the deadline otherwise. They are handed out once."""
+        with self._changed:
+            self._changed.wait_for(lambda: len(self._arrivals) >= frames, deadline_s)
+            arrivals, self._arrivals = self._arrivals, []
+            return arrivals
+
+    @property
+    def latest(self) -> Image | None:
+        """Newest complete image."""
+        return self._latest
+
+    @property
+    def counters(self) -> StreamCounters:
+        """Counters since arming."""
+        return self._counters
+
+    def _poll(self) -> None:
+        while not self._stopping.is_set():
+            arrival = self._pop()
+            if arrival is not None:
+                self._take(arrival)
+
+    def _take(self, arrival: Arrival) -> None:
+        with self._changed:
+            stale = arrival.image is not None and arrival.device_timestamp_ns < self._opened_ns
+            self._count(arrival, stale)
+            self._latest = self._latest if arrival.image is None else arrival.image
+            if not stale:
+                self._arrivals.append(arrival)
+                self._changed.notify_all()
+
+    def _count(self, arrival: Arrival, stale: bool) -> None:
+        gap = 0 if self._last_id is None else frame_id_distance(self._last_id, arrival.frame_id) - 1
+        self._last_id = arrival.frame_id
+        self._counters = replace(
+            self._counters,
+            frames=self._counters.frames + 1,
+            missing_frames=self._counters.missing_frames + max(0, gap),
+            stale_frames=self._counters.stale_frames + stale,
+            missing_packets=self._counters.missing_packets + arrival.missing_packets,
+            resent_packets=self._counters.resent_packets + arrival.resent_packets,
+        )

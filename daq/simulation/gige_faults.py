@@ -1,0 +1,56 @@
+"""Faults of a simulated camera; each one happens on the wire, as it would in the laboratory."""
+
+from dataclasses import dataclass, field
+from threading import Lock
+from typing import Literal
+
+ShotFault = Literal["missed_triggers", "dropped_a", "dropped_b", "swapped", "late", "wrong_size"]
+
+
+@dataclass
+class CameraFaults:
+    """What goes wrong; every field may be set while the camera runs.
+
+    Parameters
+    ----------
+    packet_loss : float
+        Fraction of stream packets that never arrive, resent ones included.
+    missed_triggers : int
+        So many next trigger edges are not seen at all.
+    dropped_a, dropped_b : int
+        In so many next shots exposure A (B) consumes its block id, but no packet of it is sent.
+    swapped : int
+        In so many next shots B is sent before A.
+    late : int
+        So many next shots are sent only after ``late_s``.
+    late_s : float
+        How much later.
+    wrong_size : int
+        In so many next shots both images have half their rows.
+    timestamp_jump_ns : int
+        Added to the device clock; may be negative.
+    frozen : bool
+        The camera neither answers nor streams.
+    held_by_another : bool
+        Another client holds control, and keeps it.
+    """
+
+    packet_loss: float = 0.0
+    missed_triggers: int = 0
+    dropped_a: int = 0
+    dropped_b: int = 0
+    swapped: int = 0
+    late: int = 0
+    late_s: float = 0.0
+    wrong_size: int = 0
+    timestamp_jump_ns: int = 0
+    frozen: bool = False
+    held_by_another: bool = False
+    _lock: Lock = field(default_factory=Lock, repr=False, compare=False)
+
+    def take(self, fault: ShotFault) -> bool:
+        """True if the fault hits this shot; uses up one of its shots."""
+        with self._lock:
+            left = int(getattr(self, fault))
+            setattr(self, fault, max(0, left - 1))
+        return left > 0
