@@ -1,0 +1,32 @@
+from collections.abc import Sequence
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+@final
+class View:
+    """An image and where voxels are seen in it; immutable, keeps its arrays alive."""
+
+    @staticmethod
+    def rectified(
+        pixels: NDArray[np.float32],
+        scale: NDArray[np.float64],
+        shift_u: NDArray[np.float64],
+        shift_v: NDArray[np.float64],
+    ) -> View: ...
+    @staticmethod
+    def mapped(pixels: NDArray[np.float32], nodes: NDArray[np.float32], spacing: int) -> View: ...
+
+def line_of_sight(
+    views: Sequence[View], method: int, volume: NDArray[np.float32] | NDArray[np.float16], threads: int
+) -> None: ...
+def smart_pass(
+    views: Sequence[View],
+    update: Sequence[bool],
+    projections: Sequence[NDArray[np.float32] | None],
+    volume: NDArray[np.float32],
+    threads: int,
+) -> None: ...
+def available_isas() -> list[str]: ...
+def selected_isa() -> str: ...

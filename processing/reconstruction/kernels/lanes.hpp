@@ -1,0 +1,133 @@
+// Vectors of the width that the instruction set offers, and the one operation the compiler needs help with:
+// linear interpolation of a row at evenly spaced positions, without gathers.
+#pragma once
+
+#include <cstdint>
+#include <cstring>
+#if defined(__F16C__)
+#include <immintrin.h>
+#endif
+
+namespace tomoshadow::TOMOSHADOW_ISA {
+namespace {
+
+#if defined(__AVX512F__)
+constexpr int lanes = 16;
+#elif defined(__AVX2__)
+constexpr int lanes = 8;
+#else
+constexpr int lanes = 4;
+#endif
+
+// Tiles are as long as their intermediate results stay in the first-level cache.
+constexpr int tile_columns = 256;
+using Row = float[tile_columns];
+
+typedef float Floats __attribute__((vector_size(4 * lanes)));
+typedef int32_t Ints __attribute__((vector_size(4 * lanes)));
+
+template <class Vector, class Scalar>
+inline Vector load(const Scalar *from) {
+    Vector vector;
+    std::memcpy(&vector, from, sizeof vector);
+    return vector;
+}
+
+template <class Vector, class Scalar>
+inline void store(Scalar *to, Vector vector) {
+    std::memcpy(to, &vector, sizeof vector);
+}
+
+inline int smaller(int a, int b) { return a < b ? a : b; }
+inline int larger(int a, int b) { return a > b ? a : b; }
+inline int floor_of(double x) { return static_cast<int>(x) - (static_cast<int>(x) > x); }
+inline int ceil_of(double x) { return -floor_of(-x); }
+
+// Positions start + step k, k = 0 .. columns - 1, as integer parts (relative to the first one of each block of
+// `lanes`) and fractions. Positions are not negative and step is below `max_step`.
+struct Taps {
+    int columns;
+    double step;
+    int first[tile_columns / lanes];
+    alignas(64) int32_t index[tile_columns];
+    alignas(64) float fraction[tile_columns];
+};
+
+constexpr double max_step = 1.8;  // a block then spans less than two vectors, neighbours included
+
+inline void set_taps(Taps &taps, double start, double step, int columns) {
+    Floats lane;
+    for (int k = 0; k < lanes; ++k) lane[k] = static_cast<float>(k);
+    taps.columns = columns;
+    taps.step = step;
+    for (int k = 0; k < columns; k += lanes) {
+        const double position = start + step * k;
+        const int first = static_cast<int>(position);
+        const Floats offset = lane * static_cast<float>(step) + static_cast<float>(position - first);
+        const Ints index = __builtin_convertvector(offset, Ints);
+        taps.first[k / lanes] = first;
+        store(taps.index + k, index);
+        store(taps.fraction + k, offset - __builtin_convertvector(index, Floats));
+    }
+}
+
+// out[k] = row at position k, for whole blocks: up to `lanes` - 1 more than taps.columns.
+inline void interpolate(const float *row, const Taps &taps, float *out) {
+    for (int k = 0; k < taps.columns; k += lanes) {
+        const float *window = row + taps.first[k / lanes];
+#if defined(__AVX2__)
+        const Ints index = load<Ints>(taps.index + k);
+        Floats left, right;
+        if (taps.step <= 1.0) {
+            left = __builtin_shuffle(load<Floats>(window), index);
+            right = __builtin_shuffle(load<Floats>(window + 1), index);
+        } else {
+            const Floats low = load<Floats>(window), high = load<Floats>(window + lanes);
+            left = __builtin_shuffle(low, high, index);
+            right = __builtin_shuffle(low, high, index + 1);
+        }
+        store(out + k, left + load<Floats>(taps.fraction + k) * (right - left));
+#else
+        for (int j = k; j < k + lanes; ++j) {
+            const float *at = window + taps.index[j];
+            out[j] = at[0] + taps.fraction[j] * (at[1] - at[0]);
+        }
+#endif
+    }
+}
+
+inline uint16_t half_of(float value) {
+    const _Float16 half = static_cast<_Float16>(value);
+    uint16_t bits;
+    std::memcpy(&bits, &half, sizeof bits);
+    return bits;
+}
+
+inline void store_halves(uint16_t *to, const float *from, int count) {
+    int k = 0;
+#if defined(__F16C__)
+    for (; k + 8 <= count; k += 8)
+        _mm_storeu_si128(reinterpret_cast<__m128i *>(to + k),
+                         _mm256_cvtps_ph(_mm256_loadu_ps(from + k), _MM_FROUND_TO_NEAREST_INT));
+#endif
+    for (; k < count; ++k) to[k] = half_of(from[k]);
+}
+
+// Voxels that decay under SMART would end as subnormal numbers, a hundred times slower than others.
+class FlushSubnormals {
+public:
+#if defined(__SSE2__)
+    FlushSubnormals() : before_(__builtin_ia32_stmxcsr()) { __builtin_ia32_ldmxcsr(before_ | 0x8040); }
+    ~FlushSubnormals() { __builtin_ia32_ldmxcsr(before_); }
+    FlushSubnormals(const FlushSubnormals &) = delete;
+    FlushSubnormals &operator=(const FlushSubnormals &) = delete;
+
+private:
+    unsigned before_;
+#else
+    FlushSubnormals() {}
+#endif
+};
+
+}  // namespace
+}  // namespace tomoshadow::TOMOSHADOW_ISA

@@ -1,0 +1,160 @@
+// Python binding: checks everything the kernels rely on, holds every buffer they read, releases the GIL.
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <memory>
+#include <optional>
+#include <stdexcept>
+
+#include "bands.hpp"
+#include "instruction_set.hpp"
+
+namespace nb = nanobind;
+using namespace nb::literals;
+using namespace tomoshadow;
+
+namespace {
+
+using PixelArray = nb::ndarray<const float, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using PlaneArray = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using NodeArray = nb::ndarray<const float, nb::shape<3, -1, -1, -1>, nb::c_contig, nb::device::cpu>;
+using ImageArray = nb::ndarray<float, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using FloatVolume = nb::ndarray<float, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
+using AnyVolume = nb::ndarray<nb::ndim<3>, nb::c_contig, nb::device::cpu>;
+
+constexpr int max_views = 8;
+constexpr int overhang = 64;          // columns the widest vector may read beyond the last voxel
+constexpr double max_scale = 1.8;     // pixels per voxel, see lanes.hpp
+constexpr double min_scale = 1 / 1.8;
+
+void require(bool condition, const char *what) {
+    if (!condition) throw std::invalid_argument(what);
+}
+
+Image image_of(const PixelArray &pixels) {
+    require(pixels.shape(0) >= 3 && pixels.shape(1) >= 3 && pixels.size() < (1u << 31), "image: too small or too large");
+    return {pixels.data(), static_cast<int>(pixels.shape(0)), static_cast<int>(pixels.shape(1))};
+}
+
+// An image with its geometry; owns references to the arrays.
+class BoundView {
+public:
+    static BoundView rectified(PixelArray pixels, PlaneArray scale, PlaneArray shift_u, PlaneArray shift_v) {
+        require(scale.shape(0) == shift_u.shape(0) && scale.shape(0) == shift_v.shape(0),
+                "rectified view: scale and shifts differ in length");
+        BoundView bound(std::move(pixels));
+        bound.planes_ = {std::move(scale), std::move(shift_u), std::move(shift_v)};
+        bound.view_.scale = bound.planes_[0].data();
+        bound.view_.shift_u = bound.planes_[1].data();
+        bound.view_.shift_v = bound.planes_[2].data();
+        return bound;
+    }
+
+    static BoundView mapped(PixelArray pixels, NodeArray nodes, int spacing) {
+        require(spacing == 16 || spacing == 8 || spacing == 4 || spacing == 2, "nodes: spacing must be 2, 4, 8 or 16");
+        BoundView bound(std::move(pixels));
+        bound.view_.nodes = nodes.data();
+        bound.view_.nodes_z = static_cast<int>(nodes.shape(1));
+        bound.view_.nodes_y = static_cast<int>(nodes.shape(2));
+        bound.view_.nodes_x = static_cast<int>(nodes.shape(3));
+        bound.view_.spacing = spacing;
+        bound.nodes_ = std::move(nodes);
+        return bound;
+    }
+
+    // The view, once it is certain that no voxel of the grid leads outside its arrays.
+    const View &on(const Shape &shape) const {
+        if (view_.nodes) {
+            const int s = view_.spacing;
+            require(view_.nodes_z >= (shape.nz - 1) / s + 2 && view_.nodes_y >= (shape.ny - 1) / s + 2 &&
+                        view_.nodes_x >= (shape.nx - 1) / s + 2,
+                    "nodes: they do not cover the volume");
+            return view_;
+        }
+        require(planes_[0].shape(0) == static_cast<size_t>(shape.nz), "rectified view: one scale per plane, please");
+        for (int z = 0; z < shape.nz; ++z) {
+            const double scale = view_.scale[z], u = view_.shift_u[z], v = view_.shift_v[z];
+            require(scale >= min_scale && scale <= max_scale, "rectified view: scale outside 0.56 .. 1.8 pixels per voxel");
+            require(u >= 0 && v >= 0 && scale * (shape.nx - 1) + u + overhang < view_.image.columns &&
+                        scale * (shape.ny - 1) + v + 2 < view_.image.rows,
+                    "rectified view: the image does not cover the volume");
+        }
+        return view_;
+    }
+
+private:
+    explicit BoundView(PixelArray pixels) : pixels_(std::move(pixels)) { view_.image = image_of(pixels_); }
+
+    View view_{};
+    PixelArray pixels_;
+    std::vector<PlaneArray> planes_;
+    std::optional<NodeArray> nodes_;
+};
+
+std::vector<View> views_on(const std::vector<const BoundView *> &bound, const Shape &shape, int threads) {
+    require(!bound.empty() && bound.size() <= max_views, "1 to 8 views, please");
+    require(threads >= 1, "threads must be positive");
+    std::vector<View> views;
+    for (const BoundView *view : bound) views.push_back(view->on(shape));
+    return views;
+}
+
+template <class Array>
+Shape shape_of(const Array &volume) {
+    require(volume.size() > 0, "volume: empty");
+    return {static_cast<int>(volume.shape(0)), static_cast<int>(volume.shape(1)), static_cast<int>(volume.shape(2))};
+}
+
+void line_of_sight(const std::vector<const BoundView *> &bound, int method, const AnyVolume &volume, int threads) {
+    const Shape shape = shape_of(volume);
+    const auto views = views_on(bound, shape, threads);
+    require(method >= 0 && method <= 2, "method must be 0, 1 or 2");
+    const bool single = volume.dtype() == nb::dtype<float>();
+    const nb::dlpack::dtype half{static_cast<uint8_t>(nb::dlpack::dtype_code::Float), 16, 1};
+    require(single || volume.dtype() == half, "volume: float32 or float16, please");
+    const LineOfSight job{views.data(),
+                          static_cast<int>(views.size()),
+                          shape,
+                          static_cast<Method>(method),
+                          single ? static_cast<float *>(volume.data()) : nullptr,
+                          single ? nullptr : static_cast<uint16_t *>(volume.data())};
+    const Kernels &kernels = selected_kernels();
+    nb::gil_scoped_release release;
+    run_line_of_sight(kernels, job, threads);
+}
+
+void smart_pass(const std::vector<const BoundView *> &bound, const std::vector<bool> &update,
+                const std::vector<std::optional<ImageArray>> &projections, const FloatVolume &volume, int threads) {
+    const Shape shape = shape_of(volume);
+    const auto views = views_on(bound, shape, threads);
+    require(update.size() == views.size() && projections.size() == views.size(), "one flag and projection per view, please");
+    bool updates[max_views] = {}, projects[max_views] = {};
+    std::vector<float *> sums;
+    for (size_t i = 0; i < views.size(); ++i) {
+        updates[i] = update[i];
+        projects[i] = projections[i].has_value();
+        sums.push_back(projects[i] ? projections[i]->data() : nullptr);
+        require(!projects[i] || (static_cast<int>(projections[i]->shape(0)) == views[i].image.rows &&
+                                 static_cast<int>(projections[i]->shape(1)) == views[i].image.columns),
+                "projections and images differ in shape");
+    }
+    const SmartPass job{views.data(), updates, projects, static_cast<int>(views.size()), shape, volume.data()};
+    const Kernels &kernels = selected_kernels();
+    nb::gil_scoped_release release;
+    run_smart_pass(kernels, job, sums, threads);
+}
+
+}  // namespace
+
+NB_MODULE(_native, module) {
+    nb::class_<BoundView>(module, "View")
+        .def_static("rectified", &BoundView::rectified, "pixels"_a, "scale"_a, "shift_u"_a, "shift_v"_a)
+        .def_static("mapped", &BoundView::mapped, "pixels"_a, "nodes"_a, "spacing"_a);
+    module.def("line_of_sight", &line_of_sight, "views"_a, "method"_a, "volume"_a, "threads"_a);
+    module.def("smart_pass", &smart_pass, "views"_a, "update"_a, "projections"_a, "volume"_a, "threads"_a);
+    module.def("available_isas", &available_isas);
+    module.def("selected_isa", [] { return std::string(selected_kernels().name); });
+}

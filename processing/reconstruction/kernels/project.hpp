@@ -1,0 +1,84 @@
+// The way back: what the rows of a slab in one plane add to the image of a view.
+#pragma once
+
+#include "sample.hpp"
+
+namespace tomoshadow::TOMOSHADOW_ISA {
+namespace {
+
+constexpr int guard = 64;  // zeros before and after a row of voxels
+
+// Rows y0 .. y0 + rows - 1 of plane z, with `stride` floats from row to row and zeros around each.
+struct PlaneRows {
+    const float *voxels;
+    int64_t stride;
+    int z, y0, rows;
+    int begin, end;  // columns outside are zero
+};
+
+// Pixel-driven: every pixel adds the bilinear interpolation of the plane where its line of sight meets it.
+// Rows of other slabs count as zero: each slab adds its own share.
+inline void project_rectified(const View &view, const PlaneRows &plane, const Projection &to) {
+    const double scale = view.scale[plane.z], step = 1.0 / scale;
+    const double shift_u = view.shift_u[plane.z], shift_v = view.shift_v[plane.z];
+    const int u_begin = larger(0, ceil_of(scale * (plane.begin - 1) + shift_u));
+    const int u_end = smaller(to.columns, floor_of(scale * plane.end + shift_u) + 1);
+    const int v_begin = larger(to.first_row, ceil_of(scale * (plane.y0 - 1) + shift_v));
+    const int v_end = smaller(to.first_row + to.rows, floor_of(scale * (plane.y0 + plane.rows) + shift_v) + 1);
+    alignas(64) Row along_x[slab_rows + 2];
+    Taps taps;
+    for (int u = u_begin; u < u_end; u += tile_columns) {
+        const int columns = smaller(tile_columns, u_end - u);
+        set_taps(taps, (u - shift_u) * step + guard, step, columns);
+        std::memset(along_x[0], 0, sizeof(Row));
+        std::memset(along_x[plane.rows + 1], 0, sizeof(Row));
+        for (int row = 0; row < plane.rows; ++row)
+            interpolate(plane.voxels + row * plane.stride - guard, taps, along_x[row + 1]);
+        for (int v = v_begin; v < v_end; ++v) {
+            const double position = (v - shift_v) * step - plane.y0 + 1;
+            const int at = larger(0, smaller(plane.rows, static_cast<int>(position)));
+            const float fraction = static_cast<float>(position - at);
+            const float *above = along_x[at], *below = along_x[at + 1];
+            float *pixels = to.pixels + static_cast<int64_t>(v - to.first_row) * to.columns + u;
+            for (int k = 0; k < columns; ++k) pixels[k] += above[k] + fraction * (below[k] - above[k]);
+        }
+    }
+}
+
+// Voxel-driven, the adjoint of sampling: every voxel spreads its intensity, times the pixel area it covers, over
+// the four pixels it is sampled from.
+inline void project_nodes(const View &view, const PlaneRows &plane, const Projection &to) {
+    const Clamp last(view.image);
+    alignas(64) Row u, v, area;
+    for (int row = 0; row < plane.rows; ++row) {
+        const float *voxels = plane.voxels + row * plane.stride;
+        for (int x0 = plane.begin / tile_columns * tile_columns; x0 < plane.end; x0 += tile_columns) {
+            const int columns = smaller(tile_columns, plane.end - x0);
+            node_row(view, 0, plane.z, plane.y0 + row, x0, columns, u);
+            node_row(view, 1, plane.z, plane.y0 + row, x0, columns, v);
+            node_row(view, 2, plane.z, plane.y0 + row, x0, columns, area);
+            for (int k = 0; k < columns; ++k) {
+                if (voxels[x0 + k] == 0.0f) continue;
+                const float at_u = Clamp::between(u[k], last.u), at_v = Clamp::between(v[k], last.v);
+                const int iu = static_cast<int>(at_u), iv = static_cast<int>(at_v);
+                const float fu = at_u - static_cast<float>(iu), fv = at_v - static_cast<float>(iv);
+                const float value = voxels[x0 + k] * area[k], below = value * fv, above = value - below;
+                float *pixels = to.pixels + static_cast<int64_t>(iv - to.first_row) * to.columns + iu;
+                pixels[0] += above - above * fu;
+                pixels[1] += above * fu;
+                pixels[to.columns] += below - below * fu;
+                pixels[to.columns + 1] += below * fu;
+            }
+        }
+    }
+}
+
+inline void project(const View &view, const PlaneRows &plane, const Projection &to) {
+    if (view.nodes)
+        project_nodes(view, plane, to);
+    else
+        project_rectified(view, plane, to);
+}
+
+}  // namespace
+}  // namespace tomoshadow::TOMOSHADOW_ISA

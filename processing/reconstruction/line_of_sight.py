@@ -1,0 +1,71 @@
+"""Line-of-sight reconstruction: each voxel combines what the views see where it is projected to."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from processing.reconstruction.kernels import _native
+from processing.reconstruction.method import ReconstructionMethod
+from processing.reconstruction.plan import Plan
+from processing.reconstruction.rectified_view import Pixels
+
+DEFAULT_THREADS = 2
+
+_KERNEL_METHOD = {
+    ReconstructionMethod.GAVLOS: 0,
+    ReconstructionMethod.MINLOS: 1,
+    ReconstructionMethod.MLOS: 2,
+}
+
+
+def line_of_sight(
+    plan: Plan,
+    images: Sequence[Pixels],
+    method: ReconstructionMethod = ReconstructionMethod.MLOS,
+    out: NDArray[Any] | None = None,
+    *,
+    threads: int = DEFAULT_THREADS,
+) -> NDArray[Any]:
+    """Reconstruct a volume from one image per view.
+
+    Parameters
+    ----------
+    plan : Plan
+        Geometry of views and grid.
+    images : sequence of (rows, columns) float32 arrays
+        Inverted shadow intensities from 0 to 1; 0 outside of the images.
+    method : ReconstructionMethod
+        GAVLOS, MINLOS or MLOS: geometric average, minimum or product of the bilinear samples.
+    out : (z, y, x) float32 or float16 array, optional
+        Receives the volume. A reused volume is much faster than a new one: fresh memory costs more than the method.
+    threads : int
+        The result does not depend on it.
+
+    Returns
+    -------
+    (z, y, x) array
+        ``out``, or a new float32 volume.
+
+    Raises
+    ------
+    ValueError
+        Images or ``out`` do not fit the plan, or the method is an iterative one.
+    """
+    if method not in _KERNEL_METHOD:
+        raise ValueError(f"{method.value} is not a line-of-sight method: {[m.value for m in _KERNEL_METHOD]}")
+    volume = np.empty(plan.grid.shape, dtype=np.float32) if out is None else out
+    check_volume(volume, plan, (np.float32, np.float16))
+    views = plan.bind(plan.resample(images))
+    _native.line_of_sight(views, _KERNEL_METHOD[method], volume, threads)
+    return volume
+
+
+def check_volume(volume: NDArray[Any], plan: Plan, dtypes: tuple[type, ...]) -> None:
+    """Raise ValueError unless a volume has the shape of the plan, one of the types, and contiguous memory."""
+    if volume.shape != plan.grid.shape:
+        raise ValueError(f"volume has shape {volume.shape}, the plan {plan.grid.shape}")
+    if volume.dtype not in [np.dtype(dtype) for dtype in dtypes] or not volume.flags.c_contiguous:
+        names = " or ".join(np.dtype(dtype).name for dtype in dtypes)
+        raise ValueError(f"volume must be contiguous {names}, not {volume.dtype} with strides {volume.strides}")
