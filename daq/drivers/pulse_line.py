@@ -1,0 +1,221 @@
+"""The serial line of the pulse generator: numbered requests, repeated until answered or too late."""
+
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from enum import Enum, auto
+
+import serial
+
+from daq.drivers.pulse_protocol import (
+    ABORT_BYTE,
+    ERROR_TEXT,
+    FIELDS,
+    MAX_SEQUENCE,
+    PROTOCOL_VERSION,
+    Command,
+    DamagedLine,
+    Reply,
+    Request,
+    decode_reply,
+    encode_request,
+)
+from daq.errors import DeviceError, DeviceRefused, DeviceTimeout, DeviceUnavailable, ProtocolError
+
+LIMIT_S = 1.0
+OPENING_LIMIT_S = 3.0
+_REPEAT_S = 0.2
+_REPEAT_DAMAGED_S = 0.02
+_SLICE_S = 0.02
+_WRITE_LIMIT_S = 0.5
+_BAUD = 115_200
+_LONGEST_LINE = 512
+
+
+class _Heard(Enum):
+    NOTHING = auto()
+    DAMAGED = auto()
+
+
+class PulseLine:
+    """Asks one generator, one question at a time; ``off`` overtakes every question that was asked before it.
+
+    Parameters
+    ----------
+    name : str
+        Name of the device, for errors.
+    port : str
+        Path of the serial port.
+    """
+
+    def __init__(self, name: str, port: str) -> None:
+        self._name = name
+        self._path = port
+        self._port: serial.Serial | None = None
+        self._asking = threading.Lock()
+        self._counting = threading.Lock()
+        self._offs = 0
+        self._sequence = 0
+        self._boot = 0
+        self._received = b""
+
+    def open(self) -> Reply:
+        """Take the port for this process alone, end whatever was going on, and return the generator's identity."""
+        self._received = b""
+        with self._translated_errors():
+            # Opening alone raises DTR and RTS, which pyserial skips on a pseudo-terminal; nothing here touches them.
+            self._port = serial.Serial(
+                self._path, _BAUD, timeout=_SLICE_S, write_timeout=_WRITE_LIMIT_S, exclusive=True
+            )
+        try:
+            self._write(ABORT_BYTE + b"\n", Command.ID, OPENING_LIMIT_S)
+            return self._open_session()
+        except DeviceError:
+            self.close()
+            raise
+
+    def _open_session(self) -> Reply:
+        identity = self._converse(Request(0, Command.ID), OPENING_LIMIT_S, offs=None)
+        if identity.number("protocol") != PROTOCOL_VERSION:
+            raise ProtocolError(
+                self._name, f"speaks protocol {identity.fields['protocol']}, this driver speaks {PROTOCOL_VERSION}"
+            )
+        self._sequence = identity.number("last")
+        self._boot = identity.boot
+        return identity
+
+    def close(self) -> None:
+        """Give the port back; safe to call twice."""
+        port, self._port = self._port, None
+        if port is not None:
+            port.close()
+
+    def ask(self, command: Command, *fields: int) -> Reply:
+        """Answer to one command.
+
+        Raises
+        ------
+        DeviceRefused
+            The generator answered with a numbered error.
+        DeviceTimeout, ProtocolError
+            It answered nothing, or only damaged lines, within ``LIMIT_S``.
+        DeviceUnavailable
+            The port hung up.
+        DeviceError
+            The microcontroller was reset since the last answer, or `off` overtook the command.
+        """
+        offs = self._offs
+        with self._alone(command):
+            reply = self._converse(self._numbered(command, fields), LIMIT_S, offs)
+            self._check_boot(reply)
+        if reply.error is not None:
+            text = ERROR_TEXT[reply.error]
+            raise DeviceRefused(self._name, f"{command} refused: {text} (error {reply.error.value})")
+        return reply
+
+    def off(self) -> Reply:
+        """Send the abort byte past everybody who waits, then ask for confirmation."""
+        with self._counting:
+            self._offs += 1
+        self._write(ABORT_BYTE, Command.OFF, _WRITE_LIMIT_S)
+        with self._alone(Command.OFF):
+            return self._converse(self._numbered(Command.OFF, ()), LIMIT_S, offs=None)
+
+    @contextmanager
+    def _alone(self, command: Command) -> Iterator[None]:
+        if not self._asking.acquire(timeout=2 * LIMIT_S):
+            raise DeviceTimeout(self._name, command, 2 * LIMIT_S)
+        try:
+            yield
+        finally:
+            self._asking.release()
+
+    def _numbered(self, command: Command, fields: tuple[int, ...]) -> Request:
+        self._sequence = self._sequence % MAX_SEQUENCE + 1
+        return Request(self._sequence, command, fields)
+
+    def _converse(self, request: Request, limit_s: float, offs: int | None) -> Reply:
+        """Send until answered: the generator carries out a repeated line only once."""
+        deadline_s = time.monotonic() + limit_s
+        damaged = 0
+        while time.monotonic() < deadline_s:
+            self._check_not_overtaken(request.command, offs)
+            self._write(encode_request(request), request.command, limit_s)
+            repeat_s = min(deadline_s, time.monotonic() + _REPEAT_S)
+            while time.monotonic() < repeat_s:
+                self._check_not_overtaken(request.command, offs)
+                reply = self._next_reply(request)
+                if isinstance(reply, Reply):
+                    return reply
+                if reply is _Heard.DAMAGED:
+                    damaged += 1
+                    repeat_s = min(repeat_s, time.monotonic() + _REPEAT_DAMAGED_S)
+        if damaged:
+            raise ProtocolError(self._name, f"only damaged lines ({damaged}) in answer to {request.command!r}")
+        raise DeviceTimeout(self._name, request.command, limit_s)
+
+    def _next_reply(self, request: Request) -> Reply | _Heard:
+        """Reply to this request; an older one is NOTHING, one that cannot be read, here or there, is DAMAGED."""
+        line = self._next_line()
+        if line is None:
+            return _Heard.NOTHING
+        try:
+            reply = decode_reply(line)
+        except DamagedLine:
+            return _Heard.DAMAGED
+        if reply.sequence is None:
+            return _Heard.DAMAGED
+        if reply.sequence != request.sequence:
+            return _Heard.NOTHING
+        if reply.error is None and set(reply.fields) != set(FIELDS[request.command].reply):
+            raise ProtocolError(self._name, f"answered {request.command!r} with fields {sorted(reply.fields)}")
+        return reply
+
+    def _next_line(self) -> bytes | None:
+        """Next complete line; None if none is complete after a short wait."""
+        if b"\n" not in self._received:
+            with self._translated_errors():
+                port = self._opened()
+                self._received += port.read(1)
+                self._received += port.read(port.in_waiting)
+        line, end, rest = self._received.partition(b"\n")
+        if end:
+            self._received = rest
+            return line + end
+        self._received = line[-_LONGEST_LINE:]
+        return None
+
+    def _write(self, encoded: bytes, command: Command, limit_s: float) -> None:
+        try:
+            with self._translated_errors():
+                self._opened().write(encoded)
+        except serial.SerialTimeoutException as error:
+            raise DeviceTimeout(self._name, command, limit_s) from error
+
+    def _opened(self) -> serial.Serial:
+        port = self._port
+        if port is None:
+            raise DeviceUnavailable(self._name, f"{self._path} is not open")
+        return port
+
+    @contextmanager
+    def _translated_errors(self) -> Iterator[None]:
+        try:
+            yield
+        except serial.SerialTimeoutException:
+            raise
+        except OSError as error:
+            raise DeviceUnavailable(self._name, f"{self._path}: {error}") from error
+
+    def _check_not_overtaken(self, command: Command, offs: int | None) -> None:
+        if offs is not None and offs != self._offs:
+            raise DeviceError(self._name, f"{command} was overtaken by off")
+
+    def _check_boot(self, reply: Reply) -> None:
+        before, self._boot = self._boot, reply.boot
+        if reply.boot != before:
+            raise DeviceError(
+                self._name,
+                f"the microcontroller was reset (start {reply.boot}, was {before}); light is off, nothing is loaded",
+            )

@@ -1,0 +1,251 @@
+r"""The pulse generator's protocol: bytes <-> frozen values. Pure; ``firmware/README.md`` holds the table.
+
+::
+
+    request   SEQUENCE COMMAND [FIELD ...]*CRC\n
+    reply     SEQUENCE BOOT OK [NAME=VALUE ...]*CRC\n
+              SEQUENCE BOOT ERR NUMBER*CRC\n          SEQUENCE is ? where the request's could not be read
+"""
+
+import binascii
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import IntEnum, IntFlag, StrEnum
+
+PROTOCOL_VERSION = 1
+CHANNEL_COUNT = 4
+MAX_SEQUENCE = 65_535
+HEARTBEAT_MS = 3000
+ABORT_BYTE = b"\x18"
+
+
+class Command(StrEnum):
+    """What the generator can be asked."""
+
+    ID = "ID"
+    NEW = "NEW"
+    CHANNEL = "CHANNEL"
+    LOAD = "LOAD"
+    ARM = "ARM"
+    FIRE = "FIRE"
+    STATUS = "STATUS"
+    BEAT = "BEAT"
+    OFF = "OFF"
+    CLEAR = "CLEAR"
+
+
+@dataclass(frozen=True)
+class Fields:
+    """Names of the fields of a command: positional in the request, named in the reply."""
+
+    request: tuple[str, ...] = ()
+    reply: tuple[str, ...] = ()
+
+
+_EDGES = ("camera_ns", "a_start_ns", "a_width_ns", "b_start_ns", "b_width_ns", "current_ma")
+_COUNTERS = ("requested", "fired", "suppressed", "early", "crc_errors")
+
+FIELDS: Mapping[Command, Fields] = {
+    Command.ID: Fields(reply=("model", "version", "build", "serial", "protocol", "channels", "tick_ns", "last")),
+    Command.NEW: Fields(),
+    Command.CHANNEL: Fields(("channel", *_EDGES, "frame_a_close_ns", "frame_b_open_ns"), ("channel", *_EDGES)),
+    Command.LOAD: Fields(reply=("train", "length_ns", "period_us")),
+    Command.ARM: Fields(("shots",), ("train", "shots_left")),
+    Command.FIRE: Fields(reply=("fired", "train", "shots_left")),
+    Command.STATUS: Fields(reply=("state", "faults", "interlock", "shots_left", *_COUNTERS)),
+    Command.BEAT: Fields(reply=("state",)),
+    Command.OFF: Fields(reply=("state",)),
+    Command.CLEAR: Fields(reply=("state",)),
+}
+
+
+class State(IntEnum):
+    """State of the generator."""
+
+    SAFE = 0
+    ARMED = 1
+    FAULT = 2
+
+
+class Fault(IntFlag):
+    """Latched causes of the state FAULT."""
+
+    INTERLOCK = 1
+    HEARTBEAT = 2
+    WATCHDOG = 4
+    INTERNAL = 8
+
+
+class ErrorNumber(IntEnum):
+    """Numbers of the errors; ``ERROR_TEXT`` says them in words."""
+
+    CRC = 1
+    LINE_TOO_LONG = 2
+    UNKNOWN_COMMAND = 3
+    SYNTAX = 4
+    SEQUENCE = 5
+    NOT_SAFE = 6
+    NOT_ARMED = 7
+    FAULT_LATCHED = 8
+    INTERLOCK_OPEN = 9
+    EARLY = 10
+    NO_TRAIN = 11
+    CHANNEL = 12
+    WIDTH = 13
+    SEPARATION = 14
+    EDGE = 15
+    CURRENT = 16
+    STRADDLE = 17
+    SHOTS = 18
+    HARDWARE = 19
+
+
+ERROR_TEXT: Mapping[ErrorNumber, str] = {
+    ErrorNumber.CRC: "the line arrived damaged",
+    ErrorNumber.LINE_TOO_LONG: "the line is longer than 128 characters",
+    ErrorNumber.UNKNOWN_COMMAND: "there is no such command",
+    ErrorNumber.SYNTAX: "a field is missing, superfluous or no number",
+    ErrorNumber.SEQUENCE: "the sequence number was used for another line",
+    ErrorNumber.NOT_SAFE: "the generator is armed; switch it off first",
+    ErrorNumber.NOT_ARMED: "the generator is not armed",
+    ErrorNumber.FAULT_LATCHED: "a fault is latched; clear it first",
+    ErrorNumber.INTERLOCK_OPEN: "the generator's interlock is open",
+    ErrorNumber.EARLY: "the shot came before the shortest period was over; it was not fired",
+    ErrorNumber.NO_TRAIN: "no pulse train is loaded",
+    ErrorNumber.CHANNEL: "there is no such channel",
+    ErrorNumber.WIDTH: "a pulse is shorter than 200 ns or longer than 2000 ns",
+    ErrorNumber.SEPARATION: "pulse B starts less than 400 ns after the end of A or more than 200000 ns after its start",
+    ErrorNumber.EDGE: "an edge is later than 2000000 ns after the trigger",
+    ErrorNumber.CURRENT: "the current is above 30000 mA",
+    ErrorNumber.STRADDLE: "pulse A ends after frame A closes, or pulse B starts before frame B opens",
+    ErrorNumber.SHOTS: "the shot budget is not 1 to 1000000",
+    ErrorNumber.HARDWARE: "the hardware cannot produce this pulse train",
+}
+
+
+class DamagedLine(ValueError):
+    """The line is not one that the generator sends."""
+
+
+@dataclass(frozen=True)
+class Request:
+    """One line to the generator."""
+
+    sequence: int
+    command: Command
+    fields: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class Reply:
+    """One line from the generator.
+
+    Parameters
+    ----------
+    sequence : int | None
+        Number of the request; None where the generator could not read it.
+    boot : int
+        How often the microcontroller has started; a change means that it was reset.
+    error : ErrorNumber | None
+        Why it refused; None where it did not.
+    fields : Mapping[str, str]
+        Values by name.
+    """
+
+    sequence: int | None
+    boot: int
+    error: ErrorNumber | None = None
+    fields: Mapping[str, str] = field(default_factory=dict)
+
+    def number(self, name: str) -> int:
+        """Value of a numeric field."""
+        return int(self.fields[name])
+
+
+def encode_request(request: Request) -> bytes:
+    """Line of a request.
+
+    Raises
+    ------
+    ValueError
+        The number of fields is not that of the command, or a value does not fit.
+    """
+    if not 0 <= request.sequence <= MAX_SEQUENCE:
+        raise ValueError(f"sequence number {request.sequence} is not within 0 to {MAX_SEQUENCE}")
+    names = FIELDS[request.command].request
+    if len(request.fields) != len(names):
+        raise ValueError(f"{request.command}: {len(request.fields)} fields given, wants {', '.join(names) or 'none'}")
+    for name, value in zip(names, request.fields, strict=True):
+        if not 0 <= value < 2**32:
+            raise ValueError(f"{request.command}: {name} is {value}, not within 0 to {2**32 - 1}")
+    return _framed(" ".join(map(str, (request.sequence, request.command, *request.fields))))
+
+
+def decode_request(line: bytes) -> Request:
+    """Inverse of `encode_request`.
+
+    Raises
+    ------
+    DamagedLine
+        It is no such line.
+    """
+    sequence, command, *fields = _unframed(line)
+    try:
+        request = Request(int(sequence), Command(command), tuple(map(int, fields)))
+        if encode_request(request) == line:
+            return request
+    except ValueError as error:
+        raise DamagedLine(f"{line!r}: {error}") from error
+    raise DamagedLine(f"{line!r} is not written as the protocol writes it")
+
+
+def decode_reply(line: bytes) -> Reply:
+    """Reply of a line, its line feed included.
+
+    Raises
+    ------
+    DamagedLine
+        CRC or form is wrong.
+    """
+    try:
+        sequence, boot, verdict, *rest = _unframed(line)
+        number = None if sequence == "?" else int(sequence)
+        if verdict == "OK":
+            return Reply(number, int(boot), fields=_named(rest))
+        if verdict == "ERR" and len(rest) == 1:
+            return Reply(number, int(boot), ErrorNumber(int(rest[0])))
+    except ValueError as error:
+        raise DamagedLine(f"{line!r}: {error}") from error
+    raise DamagedLine(f"{line!r} is neither OK nor ERR")
+
+
+def encode_reply(reply: Reply) -> bytes:
+    """Inverse of `decode_reply`."""
+    head = f"{'?' if reply.sequence is None else reply.sequence} {reply.boot}"
+    if reply.error is not None:
+        return _framed(f"{head} ERR {reply.error.value}")
+    return _framed(" ".join([head, "OK", *(f"{name}={value}" for name, value in reply.fields.items())]))
+
+
+def _named(words: list[str]) -> dict[str, str]:
+    pairs = [word.partition("=") for word in words]
+    if not all(name and separator and value for name, separator, value in pairs):
+        raise ValueError("a field is not NAME=VALUE")
+    return {name: value for name, _, value in pairs}
+
+
+def _framed(body: str) -> bytes:
+    encoded = body.encode("ascii")
+    return encoded + b"*%04X\n" % _crc16(encoded)
+
+
+def _unframed(line: bytes) -> list[str]:
+    body, star, crc = line[:-6], line[-6:-5], line[-5:]
+    if star != b"*" or crc != b"%04X\n" % _crc16(body):
+        raise DamagedLine(f"{line!r}: the CRC is missing or wrong")
+    return body.decode("ascii").split(" ")
+
+
+def _crc16(body: bytes) -> int:
+    """CRC-16/CCITT-FALSE."""
+    return binascii.crc_hqx(body, 0xFFFF)

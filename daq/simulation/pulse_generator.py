@@ -1,0 +1,203 @@
+"""The simulated pulse generator: the firmware's own core as a process behind a pseudo-terminal.
+
+The real driver opens ``FirmwareProcess.port``; what the core fires arrives as a ``FiredTrain``, for the trigger line
+and the light of the simulated cameras.
+"""
+
+import queue
+import shutil
+import signal
+import subprocess  # the firmware's host build is a program of ours
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from daq.errors import DeviceTimeout, DeviceUnavailable
+from daq.shot import FiredTrain, LightPulse
+
+_DEVICE = "simulated pulse generator"
+_ROOT = Path(__file__).resolve().parents[2]
+_PROGRAM = _ROOT / "build" / "firmware" / "firmware_host"
+_BUILD_LIMIT_S = 60.0
+_ANSWER_LIMIT_S = 5.0
+_FIELDS_PER_CHANNEL = 7
+
+
+def build_firmware() -> Path:
+    """Path of the core's host build, compiled if its sources are newer or it is missing.
+
+    Raises
+    ------
+    DeviceUnavailable
+        It is missing and cannot be compiled here; the text says what is needed.
+    """
+    tools = [tool for tool in ("make", "cc") if shutil.which(tool) is None]
+    if tools and not _PROGRAM.exists():
+        raise DeviceUnavailable(
+            _DEVICE, f"{_PROGRAM} is missing, and {' and '.join(tools)} to build it (apt: gcc make)"
+        )
+    if not tools:
+        _compile()
+    return _PROGRAM
+
+
+def _compile() -> None:
+    command = ["make", "--no-print-directory", "-C", str(_ROOT / "firmware"), "host"]
+    try:
+        subprocess.run(command, check=True, capture_output=True, text=True, timeout=_BUILD_LIMIT_S)
+    except subprocess.CalledProcessError as error:
+        raise DeviceUnavailable(_DEVICE, f"{' '.join(command)} failed: {error.stderr.strip()}") from error
+    except subprocess.TimeoutExpired as error:
+        raise DeviceTimeout(_DEVICE, " ".join(command), _BUILD_LIMIT_S) from error
+
+
+class FirmwareProcess:
+    """A pulse generator that runs on this computer, in real time.
+
+    Parameters
+    ----------
+    channels : Mapping[str, int]
+        Channel of each view, as the driver has it.
+    on_fired : Callable[[FiredTrain], None]
+        Called from the reading thread for every shot. If it raises, the generator dies with it.
+    """
+
+    def __init__(self, channels: Mapping[str, int], on_fired: Callable[[FiredTrain], None]) -> None:
+        self._views = {number: view for view, number in channels.items()}
+        self._on_fired = on_fired
+        self._process: subprocess.Popen[str] | None = None
+        self._answers: queue.Queue[str] = queue.Queue()
+        self._instructing = threading.Lock()
+        self._reader: threading.Thread | None = None
+        self._port = ""
+
+    @property
+    def port(self) -> str:
+        """Path of the serial port."""
+        return self._port
+
+    @property
+    def pid(self) -> int:
+        """Process id, for tests that stop it."""
+        return self._running().pid
+
+    def __enter__(self) -> Self:
+        self._process = subprocess.Popen([build_firmware()], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        self._reader = threading.Thread(target=self._read_events, args=(self._process,), name=_DEVICE, daemon=True)
+        self._reader.start()
+        try:
+            self._port = self._answer("start").removeprefix("port ")
+        except DeviceTimeout:
+            self._process.kill()
+            raise
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        process = self._running()
+        process.kill()
+        process.wait(_ANSWER_LIMIT_S)
+        if self._reader is not None:
+            self._reader.join(_ANSWER_LIMIT_S)
+        for pipe in (process.stdin, process.stdout):
+            if pipe is not None:
+                with suppress(BrokenPipeError):  # an instruction to a generator that had died before
+                    pipe.close()
+
+    def set_interlock(self, closed: bool) -> None:
+        """Open or close the generator's interlock input."""
+        self._instruct(f"interlock {int(closed)}")
+
+    def reset(self, *, by_watchdog: bool = False) -> None:
+        """Restart the microcontroller."""
+        self._instruct("reset watchdog" if by_watchdog else "reset")
+
+    def advance(self, time_ms: int) -> None:
+        """Let time pass for the generator alone."""
+        self._instruct(f"advance {time_ms}")
+
+    def garbage(self, data: bytes) -> None:
+        """Put bytes on the line that the driver receives."""
+        self._instruct(f"garbage {data.hex()}")
+
+    def noise(self, data: bytes) -> None:
+        """Put bytes on the line that the generator receives."""
+        self._instruct(f"noise {data.hex()}")
+
+    def lose_replies(self, count: int) -> None:
+        """Let the next replies vanish."""
+        self._instruct(f"lose {count}")
+
+    def damage_replies(self, count: int) -> None:
+        """Flip a bit in each of the next replies."""
+        self._instruct(f"damage {count}")
+
+    def kill(self) -> None:
+        """End the generator without warning, as a pulled plug does."""
+        process = self._running()
+        process.send_signal(signal.SIGKILL)
+        process.wait(_ANSWER_LIMIT_S)
+
+    def _running(self) -> subprocess.Popen[str]:
+        if self._process is None:
+            raise DeviceUnavailable(_DEVICE, "has not been started")
+        return self._process
+
+    def _instruct(self, line: str) -> None:
+        process = self._running()
+        if process.stdin is None:
+            raise DeviceUnavailable(_DEVICE, "has no control channel")
+        with self._instructing:
+            try:
+                process.stdin.write(f"{line}\n")
+                process.stdin.flush()
+            except OSError as error:
+                raise DeviceUnavailable(_DEVICE, f"does not run any more: {error}") from error
+            if self._answer(line) != "done":
+                raise DeviceUnavailable(_DEVICE, f"does not know {line!r}")
+
+    def _answer(self, line: str) -> str:
+        try:
+            return self._answers.get(timeout=_ANSWER_LIMIT_S)
+        except queue.Empty:
+            raise DeviceTimeout(_DEVICE, line, _ANSWER_LIMIT_S) from None
+
+    def _read_events(self, process: subprocess.Popen[str]) -> None:
+        try:
+            for line in _lines(process):
+                if line.startswith("fired "):
+                    self._on_fired(self._fired_train(line))
+                else:
+                    self._answers.put(line)
+        finally:
+            process.kill()
+
+    def _fired_train(self, line: str) -> FiredTrain:
+        sequence, *numbers = map(int, line.split()[1:])
+        channels = [
+            numbers[start : start + _FIELDS_PER_CHANNEL] for start in range(0, len(numbers), _FIELDS_PER_CHANNEL)
+        ]
+        wired = {self._views[channel]: edges for channel, *edges in channels if channel in self._views}
+        return FiredTrain(
+            sequence,
+            camera_trigger_ns={view: edges[0] for view, edges in wired.items()},
+            pulses={view: _light(edges[1:]) for view, edges in wired.items()},
+        )
+
+
+def _light(edges: list[int]) -> tuple[LightPulse, ...]:
+    a_start_ns, a_width_ns, b_start_ns, b_width_ns, current_ma = edges
+    if not current_ma:
+        return ()
+    current_a = current_ma / 1000
+    return LightPulse(a_start_ns, a_width_ns, current_a), LightPulse(b_start_ns, b_width_ns, current_a)
+
+
+def _lines(process: subprocess.Popen[str]) -> Iterator[str]:
+    if process.stdout is not None:
+        for line in process.stdout:
+            yield line.rstrip("\n")

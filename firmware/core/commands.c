@@ -1,0 +1,165 @@
+#include "commands.h"
+
+#include "port.h"
+
+typedef enum error (*action)(struct safety *safety, const uint32_t *fields, struct text *reply);
+
+struct command {
+    const char *word;
+    uint32_t field_count;
+    action run;
+};
+
+void command_identity(struct text *reply, uint32_t last_sequence)
+{
+    text_word(reply, " model=" MODEL " version=" VERSION " build=");
+    text_word(reply, port_build);
+    text_word(reply, " serial=");
+    text_word(reply, port_serial);
+    text_field(reply, "protocol", PROTOCOL_VERSION);
+    text_field(reply, "channels", CHANNEL_COUNT);
+    text_field(reply, "tick_ns", port_tick_ns);
+    text_field(reply, "last", last_sequence);
+}
+
+static void state_field(struct text *reply, const struct safety *safety)
+{
+    text_field(reply, "state", (uint32_t)safety->state);
+}
+
+static enum error new_train(struct safety *safety, const uint32_t *fields, struct text *reply)
+{
+    (void)fields;
+    (void)reply;
+    return safety_new_train(safety);
+}
+
+static void channel_fields(struct text *reply, const struct channel *actual)
+{
+    text_field(reply, "camera_ns", actual->camera_ns);
+    text_field(reply, "a_start_ns", actual->a_start_ns);
+    text_field(reply, "a_width_ns", actual->a_width_ns);
+    text_field(reply, "b_start_ns", actual->b_start_ns);
+    text_field(reply, "b_width_ns", actual->b_width_ns);
+    text_field(reply, "current_ma", actual->current_ma);
+}
+
+static enum error set_channel(struct safety *safety, const uint32_t *fields, struct text *reply)
+{
+    const struct channel requested = {
+        .camera_ns = fields[1],
+        .a_start_ns = fields[2],
+        .a_width_ns = fields[3],
+        .b_start_ns = fields[4],
+        .b_width_ns = fields[5],
+        .current_ma = fields[6],
+        .frame_a_close_ns = fields[7],
+        .frame_b_open_ns = fields[8],
+    };
+    const enum error error = safety_set_channel(safety, fields[0], &requested);
+    if (error)
+        return error;
+    text_field(reply, "channel", fields[0]);
+    channel_fields(reply, &safety->train.channels[fields[0]]);
+    return ERROR_NONE;
+}
+
+static enum error load(struct safety *safety, const uint32_t *fields, struct text *reply)
+{
+    (void)fields;
+    const enum error error = safety_load(safety);
+    if (error)
+        return error;
+    text_field(reply, "train", safety->train_id);
+    text_field(reply, "length_ns", train_length_ns(&safety->train));
+    text_field(reply, "period_us", train_period_us(&safety->train));
+    return ERROR_NONE;
+}
+
+static enum error arm(struct safety *safety, const uint32_t *fields, struct text *reply)
+{
+    const enum error error = safety_arm(safety, fields[0]);
+    if (error)
+        return error;
+    text_field(reply, "train", safety->train_id);
+    text_field(reply, "shots_left", safety->shots_left);
+    return ERROR_NONE;
+}
+
+static enum error fire(struct safety *safety, const uint32_t *fields, struct text *reply)
+{
+    (void)fields;
+    const enum error error = safety_fire(safety);
+    if (error)
+        return error;
+    text_field(reply, "fired", safety->counters.fired);
+    text_field(reply, "train", safety->train_id);
+    text_field(reply, "shots_left", safety->shots_left);
+    return ERROR_NONE;
+}
+
+static enum error status(struct safety *safety, const uint32_t *fields, struct text *reply)
+{
+    (void)fields;
+    const bool interlock_closed = safety_interlock_closed(safety); /* before the state, which it may change */
+    state_field(reply, safety);
+    text_field(reply, "faults", safety->faults);
+    text_field(reply, "interlock", interlock_closed);
+    text_field(reply, "shots_left", safety->shots_left);
+    text_field(reply, "requested", safety->counters.requested);
+    text_field(reply, "fired", safety->counters.fired);
+    text_field(reply, "suppressed", safety->counters.suppressed);
+    text_field(reply, "early", safety->counters.early);
+    text_field(reply, "crc_errors", safety->counters.crc_errors);
+    return ERROR_NONE;
+}
+
+static enum error beat(struct safety *safety, const uint32_t *fields, struct text *reply)
+{
+    (void)fields;
+    state_field(reply, safety);
+    return ERROR_NONE;
+}
+
+static enum error off(struct safety *safety, const uint32_t *fields, struct text *reply)
+{
+    (void)fields;
+    safety_off(safety);
+    state_field(reply, safety);
+    return ERROR_NONE;
+}
+
+static enum error clear(struct safety *safety, const uint32_t *fields, struct text *reply)
+{
+    (void)fields;
+    const enum error error = safety_clear(safety);
+    if (error)
+        return error;
+    state_field(reply, safety);
+    return ERROR_NONE;
+}
+
+static const struct command COMMANDS[] = {
+    {"NEW", 0, new_train}, {"CHANNEL", 9, set_channel}, {"LOAD", 0, load}, {"ARM", 1, arm}, {"FIRE", 0, fire},
+    {"STATUS", 0, status}, {"BEAT", 0, beat},           {"OFF", 0, off},   {"CLEAR", 0, clear},
+};
+
+static const struct command *find(struct span word)
+{
+    for (size_t i = 0; i < sizeof COMMANDS / sizeof *COMMANDS; i++)
+        if (span_equals(word, COMMANDS[i].word))
+            return &COMMANDS[i];
+    return NULL;
+}
+
+enum error command_run(struct safety *safety, struct span word, struct span rest, struct text *reply)
+{
+    uint32_t fields[MAX_FIELDS] = {0};
+    const struct command *command = find(word);
+    if (!command)
+        return ERROR_UNKNOWN_COMMAND;
+    for (uint32_t i = 0; i < command->field_count; i++)
+        if (!span_number(span_next_word(&rest), &fields[i]))
+            return ERROR_SYNTAX;
+    return rest.length ? ERROR_SYNTAX : command->run(safety, fields, reply);
+}

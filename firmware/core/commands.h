@@ -1,0 +1,22 @@
+/* The commands of the protocol. firmware/README.md is their table; a test compares the two. */
+#ifndef COMMANDS_H
+#define COMMANDS_H
+
+#include <stdint.h>
+
+#include "error.h"
+#include "safety.h"
+#include "text.h"
+
+#define MODEL "tomoshadow-pulse"
+#define VERSION "1.0.0"
+
+enum { PROTOCOL_VERSION = 1, MAX_FIELDS = 9 };
+
+/* Carry out one command, given its word and the rest of the line; append the fields of the reply. */
+enum error command_run(struct safety *safety, struct span word, struct span rest, struct text *reply);
+
+/* Append what ID answers, the number of the last answered line included. */
+void command_identity(struct text *reply, uint32_t last_sequence);
+
+#endif

@@ -1,0 +1,29 @@
+/* Absolute limits. They are compiled in: nothing on the wire can widen them.
+ * firmware/README.md lists the same numbers; a test compares the two. */
+#ifndef LIMITS_H
+#define LIMITS_H
+
+#include <stdint.h>
+
+enum limits {
+    CHANNEL_COUNT = 4,
+    MIN_WIDTH_NS = 200,
+    MAX_WIDTH_NS = 2000,
+    MIN_DARK_NS = 400,          /* end of pulse A to start of pulse B: the LED driver recovers */
+    MAX_SEPARATION_NS = 200000, /* start of pulse A to start of pulse B */
+    MAX_EDGE_NS = 2000000,      /* latest rising edge after the trigger of the shot */
+    MAX_CURRENT_MA = 30000,
+    MIN_PERIOD_US = 10000,
+    MAX_DUTY_PPM = 200,         /* light on per channel; lengthens the period above 2 us of light per shot */
+    MAX_SHOTS = 1000000,
+    HEARTBEAT_MS = 3000,
+    CAMERA_PULSE_NS = 10000,    /* how long a camera trigger stays high */
+    MAX_LINE = 128,             /* characters of a request, CRC included, line feed excluded */
+};
+
+/* What the arithmetic of pulse_train.c relies on. */
+_Static_assert(MAX_WIDTH_NS + MIN_DARK_NS < MAX_SEPARATION_NS, "two pulses fit the longest separation");
+_Static_assert((uint64_t)MAX_EDGE_NS + MAX_WIDTH_NS + CAMERA_PULSE_NS < UINT32_MAX, "edges fit 32 bits");
+_Static_assert(2ull * MAX_WIDTH_NS * 1000u < UINT32_MAX, "the duty sum fits 32 bits");
+
+#endif

@@ -1,0 +1,137 @@
+#include "protocol.h"
+
+#include "commands.h"
+#include "crc16.h"
+#include "port.h"
+
+enum { CRC_LENGTH = 5 }; /* *1A2B */
+
+void protocol_boot(struct protocol *protocol, uint32_t boot, bool watchdog)
+{
+    *protocol = (struct protocol){.boot = boot};
+    safety_boot(&protocol->safety, watchdog);
+}
+
+/* Cut the CRC off the line; false where it is missing or wrong. */
+static bool take_crc(struct span *line, uint16_t *crc)
+{
+    if (line->length < CRC_LENGTH)
+        return false;
+    const size_t body = line->length - CRC_LENGTH;
+    const struct span digits = {line->start + body + 1, CRC_LENGTH - 1};
+    if (line->start[body] != '*' || !span_hex16(digits, crc) || *crc != crc16(line->start, body))
+        return false;
+    line->length = body;
+    return true;
+}
+
+static void write_error(struct text *reply, uint32_t boot, enum error error)
+{
+    text_word(reply, " ");
+    text_number(reply, boot);
+    text_word(reply, " ERR ");
+    text_number(reply, (uint32_t)error);
+}
+
+static void write_ok(struct text *reply, uint32_t boot)
+{
+    text_word(reply, " ");
+    text_number(reply, boot);
+    text_word(reply, " OK");
+}
+
+static void write_unreadable(struct protocol *protocol, struct text *reply, enum error error)
+{
+    text_word(reply, "?");
+    write_error(reply, protocol->boot, error);
+}
+
+static void run_command(struct protocol *protocol, struct span word, struct span rest, struct text *reply)
+{
+    const size_t after_sequence = reply->length;
+    write_ok(reply, protocol->boot);
+    const enum error error = command_run(&protocol->safety, word, rest, reply);
+    if (error) {
+        reply->length = after_sequence;
+        write_error(reply, protocol->boot, error);
+    }
+}
+
+static bool is_newest(const struct protocol *protocol, uint32_t sequence)
+{
+    return protocol->answered && protocol->sequence == sequence;
+}
+
+/* A line with a good CRC and a sequence number; the number already stands in the reply. */
+static void answer(struct protocol *protocol, uint32_t sequence, uint16_t crc, struct span rest, struct text *reply)
+{
+    const struct span word = span_next_word(&rest);
+    if (span_equals(word, "ID") && !rest.length) {
+        /* Opens a session: always answered afresh, and leaves the kept reply alone. */
+        write_ok(reply, protocol->boot);
+        command_identity(reply, protocol->sequence);
+    } else if (!is_newest(protocol, sequence)) {
+        run_command(protocol, word, rest, reply);
+        protocol->answered = true;
+        protocol->sequence = sequence;
+        protocol->crc = crc;
+        protocol->reply = *reply;
+    } else if (protocol->crc == crc) {
+        *reply = protocol->reply;
+    } else {
+        write_error(reply, protocol->boot, ERROR_SEQUENCE);
+    }
+}
+
+static void write_reply(struct protocol *protocol, struct text *reply)
+{
+    struct span rest = {protocol->line, protocol->length};
+    uint16_t crc = 0;
+    uint32_t sequence = 0;
+    if (protocol->overflow || !take_crc(&rest, &crc)) {
+        protocol->safety.counters.crc_errors++;
+        write_unreadable(protocol, reply, protocol->overflow ? ERROR_LINE_TOO_LONG : ERROR_CRC);
+        return;
+    }
+    safety_poll(&protocol->safety); /* a host that comes back too late still finds the fault */
+    safety_heard(&protocol->safety);
+    if (!span_number(span_next_word(&rest), &sequence) || sequence > MAX_SEQUENCE) {
+        write_unreadable(protocol, reply, ERROR_SYNTAX);
+        return;
+    }
+    text_number(reply, sequence);
+    answer(protocol, sequence, crc, rest, reply);
+}
+
+/* The one place that sends. */
+static void end_line(struct protocol *protocol)
+{
+    struct text reply = {.length = 0};
+    write_reply(protocol, &reply);
+    const uint16_t crc = crc16(reply.bytes, reply.length);
+    text_word(&reply, "*");
+    text_hex16(&reply, crc);
+    text_word(&reply, "\n");
+    port_send(reply.bytes, reply.length);
+    protocol->length = 0;
+    protocol->overflow = false;
+}
+
+void protocol_receive(struct protocol *protocol, char byte)
+{
+    if (byte == ABORT_BYTE) {
+        safety_off(&protocol->safety);
+    } else if (byte == '\n') {
+        if (protocol->length || protocol->overflow)
+            end_line(protocol); /* an empty line is no line: a host may send it to end a torn one */
+    } else if (protocol->length == MAX_LINE) {
+        protocol->overflow = true;
+    } else if (byte != '\r') {
+        protocol->line[protocol->length++] = byte;
+    }
+}
+
+void protocol_poll(struct protocol *protocol)
+{
+    safety_poll(&protocol->safety);
+}

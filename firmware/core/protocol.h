@@ -1,0 +1,41 @@
+/* Lines in, lines out.
+ *
+ *     request   SEQUENCE COMMAND [FIELD ...]*CRC\n
+ *     reply     SEQUENCE BOOT OK [NAME=VALUE ...]*CRC\n
+ *               SEQUENCE BOOT ERR NUMBER*CRC\n        SEQUENCE is ? where the request's could not be read
+ *
+ * Every line gets exactly one reply, sent from one place. The newest reply is kept: the same line again gets it
+ * again, without doing anything twice. */
+#ifndef PROTOCOL_H
+#define PROTOCOL_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "safety.h"
+#include "text.h"
+
+enum { ABORT_BYTE = 0x18, MAX_SEQUENCE = 65535 };
+
+struct protocol {
+    struct safety safety;
+    uint32_t boot; /* how often the microcontroller has started */
+    char line[MAX_LINE];
+    size_t length;
+    bool overflow;
+    bool answered;      /* the next three belong to the newest numbered line */
+    uint32_t sequence;
+    uint16_t crc;
+    struct text reply;
+};
+
+void protocol_boot(struct protocol *protocol, uint32_t boot, bool watchdog);
+
+/* Take one byte from the serial line. ABORT_BYTE switches the light off wherever it stands in the stream. */
+void protocol_receive(struct protocol *protocol, char byte);
+
+/* To be called all the time by the main loop. */
+void protocol_poll(struct protocol *protocol);
+
+#endif

@@ -1,0 +1,26 @@
+/* The laboratory around the host build: the serial line, the interlock switch, the clock, the light.
+ * Implements port.h; control.c lets somebody else play with it. */
+#ifndef BENCH_H
+#define BENCH_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+struct bench {
+    int serial;               /* file descriptor of the serial line */
+    bool interlock_closed;
+    bool interlock_opened;    /* since the core last asked */
+    int64_t clock_offset_us;  /* virtual time that has been skipped */
+    unsigned replies_to_lose; /* line faults that are still to come */
+    unsigned replies_to_damage;
+};
+
+extern struct bench bench;
+
+void bench_power_up(void); /* what a reset does to the hardware */
+void bench_set_interlock(bool closed);
+void bench_send(const char *bytes, size_t length);
+void bench_print_event(const char *format, ...) __attribute__((format(printf, 1, 2)));
+
+#endif

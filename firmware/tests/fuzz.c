@@ -1,0 +1,99 @@
+/* Hostile bytes, half-right lines, clock jumps and interlock flips, the same ones for the same seed.
+ * After every step: no light without permission, and counters that add up. usage: fuzz SEED STEPS */
+#include <string.h>
+
+#include "fake_port.h"
+
+static struct protocol protocol;
+static uint64_t random_state;
+static uint64_t last_shot_us;
+static unsigned fired_before;
+static unsigned sequence;
+
+static uint32_t random_below(uint32_t bound)
+{
+    random_state ^= random_state << 13;
+    random_state ^= random_state >> 7;
+    random_state ^= random_state << 17;
+    return (uint32_t)((random_state >> 32) % bound);
+}
+
+static void random_bytes(void)
+{
+    for (uint32_t count = random_below(200); count > 0; count--)
+        protocol_receive(&protocol, (char)random_below(256));
+    protocol_receive(&protocol, '\n');
+}
+
+static void random_channel(char *line, size_t size)
+{
+    const uint32_t jitter = random_below(4) ? random_below(3) : random_below(UINT32_MAX);
+    snprintf(line, size, "CHANNEL %u %u %u %u %u %u %u %u %u", random_below(5), random_below(2000), 20000 + jitter,
+             200 + random_below(1900), 26400 + random_below(300), 200 + random_below(1900), random_below(31000),
+             22100 + random_below(100), 23000 + random_below(3500));
+}
+
+static void random_command(void)
+{
+    static const char *const words[] = {"NEW", "LOAD", "FIRE", "FIRE", "FIRE", "STATUS", "BEAT", "OFF", "CLEAR", "ID"};
+    char command[MAX_LINE];
+    char body[2 * MAX_LINE];
+    const uint32_t choice = random_below(16);
+    if (choice < 4)
+        random_channel(command, sizeof command);
+    else if (choice < 6)
+        snprintf(command, sizeof command, "ARM %u", random_below(20));
+    else
+        snprintf(command, sizeof command, "%s", words[choice - 6]);
+    sequence += random_below(8) != 0; /* now and then the same number again */
+    snprintf(body, sizeof body, "%u %s", sequence % 65536, command);
+    exchange(&protocol, body);
+}
+
+static void let_time_pass(void)
+{
+    fake.now_us += random_below(30000);
+    if (random_below(50) == 0)
+        fake.now_us += random_below(4000000);
+}
+
+static void check_invariants(void)
+{
+    const struct safety *safety = &protocol.safety;
+    const struct counters *counters = &safety->counters;
+    CHECK(counters->requested == counters->fired + counters->suppressed && counters->fired == fake.fired);
+    CHECK((safety->state == STATE_FAULT) == (safety->faults != 0));
+    CHECK(safety->state != STATE_ARMED || (fake.live && safety->shots_left > 0 && !train_check(&safety->train)));
+    CHECK(safety->state != STATE_FAULT || !fake.live);
+    CHECK(fake.fired - fired_before <= 1);
+    if (fake.fired != fired_before) {
+        CHECK(fake.interlock_closed && (last_shot_us == 0 || fake.now_us - last_shot_us >= MIN_PERIOD_US));
+        last_shot_us = fake.now_us;
+        fired_before = fake.fired;
+    }
+}
+
+int main(int argument_count, char **arguments)
+{
+    CHECK(argument_count == 3);
+    random_state = strtoull(arguments[1], NULL, 10) * 2654435761u + 1;
+    fake_reset();
+    protocol_boot(&protocol, 1, false);
+    for (unsigned long step = strtoul(arguments[2], NULL, 10); step > 0; step--) {
+        const uint32_t choice = random_below(32);
+        if (choice == 0)
+            random_bytes();
+        else if (choice == 1)
+            protocol_receive(&protocol, ABORT_BYTE);
+        else if (choice < 8)
+            let_time_pass();
+        else
+            random_command();
+        check_invariants();
+        fake.interlock_closed = fake.interlock_closed ? random_below(100) != 0 : random_below(3) == 0;
+        protocol_poll(&protocol);
+        check_invariants();
+    }
+    printf("fired %u of %u, %u early\n", fake.fired, protocol.safety.counters.requested, protocol.safety.counters.early);
+    return fake.fired < 10;
+}

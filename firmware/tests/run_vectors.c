@@ -1,0 +1,55 @@
+/* Runs the golden vectors of stdin through the core, byte for byte. The format is told at the top of golden_vectors.txt. */
+#include <string.h>
+
+#include "fake_port.h"
+
+static struct protocol protocol;
+static unsigned checked;
+
+static void receive_line(const char *line)
+{
+    while (*line)
+        protocol_receive(&protocol, *line++);
+}
+
+static void change_world(const char *what)
+{
+    unsigned number = 0;
+    if (sscanf(what, "advance_us %u", &number) == 1)
+        fake.now_us += number;
+    else if (sscanf(what, "interlock %u", &number) == 1)
+        fake.interlock_closed = number != 0;
+    else if (!strcmp(what, "abort\n"))
+        protocol_receive(&protocol, ABORT_BYTE);
+    else if (!strcmp(what, "reset\n"))
+        protocol_boot(&protocol, protocol.boot + 1, false);
+    else
+        CHECK(!"a known change");
+    protocol_poll(&protocol);
+}
+
+static void check_reply(const char *expected)
+{
+    if (strcmp(fake.reply, expected)) {
+        fprintf(stderr, "expected %sreceived %s", expected, fake.reply);
+        exit(1);
+    }
+    checked++;
+}
+
+int main(void)
+{
+    char line[512];
+    fake_reset();
+    protocol_boot(&protocol, 1, false);
+    while (fgets(line, sizeof line, stdin)) {
+        if (line[0] == '>')
+            receive_line(line + 2);
+        else if (line[0] == '<')
+            check_reply(line + 2);
+        else if (line[0] == '!')
+            change_world(line + 2);
+    }
+    printf("%u\n", checked);
+    return 0;
+}

@@ -1,0 +1,178 @@
+/* Lines: framing, numbering, repetition, damage, the abort byte. */
+#include <string.h>
+
+#include "fake_port.h"
+
+static struct protocol protocol;
+
+#define CHANNEL_0 "CHANNEL 0 0 20000 1000 26400 1000 20000 22000 23000"
+#define ASK(body) exchange(&protocol, body)
+#define CHECK_REPLY(body, expected) CHECK(!strcmp(ASK(body), expected))
+
+static void boot(void)
+{
+    fake_reset();
+    protocol_boot(&protocol, 3, false);
+}
+
+static void boot_armed(void)
+{
+    boot();
+    CHECK_REPLY("1 NEW", "1 3 OK");
+    ASK("2 " CHANNEL_0);
+    CHECK_REPLY("3 LOAD", "3 3 OK train=1 length_ns=27400 period_us=10000");
+    CHECK_REPLY("4 ARM 5", "4 3 OK train=1 shots_left=5");
+}
+
+static void receive(const char *bytes)
+{
+    while (*bytes)
+        protocol_receive(&protocol, *bytes++);
+}
+
+static void test_a_shot_from_boot_to_off(void)
+{
+    boot_armed();
+    CHECK_REPLY("5 FIRE", "5 3 OK fired=1 train=1 shots_left=4");
+    CHECK_REPLY("6 FIRE", "6 3 ERR 10");
+    CHECK_REPLY("7 BEAT", "7 3 OK state=1");
+    CHECK_REPLY("8 OFF", "8 3 OK state=0");
+    CHECK(fake.fired == 1 && !fake.live);
+}
+
+static void test_a_repeated_line_is_answered_but_not_done_again(void)
+{
+    boot_armed();
+    const unsigned replies = fake.replies;
+    for (int i = 0; i < 3; i++) {
+        CHECK_REPLY("5 FIRE", "5 3 OK fired=1 train=1 shots_left=4");
+        fake.now_us += MIN_PERIOD_US;
+    }
+    CHECK(fake.fired == 1 && fake.replies == replies + 3);
+}
+
+static void test_a_number_cannot_be_used_for_another_line(void)
+{
+    boot_armed();
+    CHECK_REPLY("4 FIRE", "4 3 ERR 5");
+    CHECK_REPLY("4 ARM 5", "4 3 OK train=1 shots_left=5");
+    CHECK(fake.fired == 0);
+}
+
+static void test_id_is_fresh_and_leaves_the_kept_reply_alone(void)
+{
+    boot_armed();
+    CHECK(strstr(ASK("0 ID"), "0 3 OK model=tomoshadow-pulse ") && strstr(fake.reply, " last=4"));
+    CHECK(strstr(ASK("4 ID"), "4 3 OK model=") && strstr(fake.reply, " tick_ns=8 last=4"));
+    CHECK_REPLY("4 ARM 5", "4 3 OK train=1 shots_left=5");
+}
+
+static void test_malformed_lines_have_numbered_errors(void)
+{
+    boot();
+    CHECK_REPLY("1 FLY", "1 3 ERR 3");
+    CHECK_REPLY("2", "2 3 ERR 3");
+    CHECK_REPLY("3 ARM", "3 3 ERR 4");
+    CHECK_REPLY("4 ARM 1 2", "4 3 ERR 4");
+    CHECK_REPLY("5 ARM -1", "5 3 ERR 4");
+    CHECK_REPLY("6 OFF 1", "6 3 ERR 4");
+    CHECK_REPLY("7 ARM 4294967296", "7 3 ERR 4");
+    CHECK_REPLY("8 CHANNEL 4 0 20000 1000 26400 1000 20000 22000 23000", "8 3 ERR 12");
+    CHECK_REPLY("x ARM 1", "? 3 ERR 4");
+    CHECK_REPLY("65536 OFF", "? 3 ERR 4");
+    CHECK_REPLY("", "? 3 ERR 4");
+}
+
+static void test_damaged_lines_are_answered_and_counted(void)
+{
+    boot_armed();
+    const char *damaged[] = {"5 FIRE\n", "5 FIRE*0000\n", "5 FIRE*12\n", "*\n", "5 FIRE*zzzz\n"};
+    for (size_t i = 0; i < sizeof damaged / sizeof *damaged; i++) {
+        receive(damaged[i]);
+        CHECK(!strncmp(fake.reply, "? 3 ERR 1*", 10));
+    }
+    CHECK(protocol.safety.counters.crc_errors == 5 && fake.fired == 0);
+    CHECK_REPLY("5 FIRE", "5 3 OK fired=1 train=1 shots_left=4");
+}
+
+static void test_an_overlong_line_is_one_error(void)
+{
+    boot();
+    const unsigned replies = fake.replies;
+    for (int i = 0; i < 10 * MAX_LINE; i++)
+        protocol_receive(&protocol, 'A');
+    CHECK(fake.replies == replies);
+    receive("\n");
+    CHECK(fake.replies == replies + 1 && !strncmp(fake.reply, "? 3 ERR 2*", 10));
+    CHECK_REPLY("1 BEAT", "1 3 OK state=0");
+}
+
+static void test_empty_lines_and_carriage_returns_are_no_lines(void)
+{
+    boot();
+    receive("\n\r\n\n");
+    CHECK(fake.replies == 0);
+}
+
+static void test_the_abort_byte_works_inside_a_line(void)
+{
+    boot_armed();
+    CHECK_REPLY("5 FIRE", "5 3 OK fired=1 train=1 shots_left=4");
+    receive("6 OF");
+    protocol_receive(&protocol, ABORT_BYTE);
+    CHECK(!fake.live && protocol.safety.state == STATE_SAFE && protocol.length == 4);
+    receive("\n");
+    CHECK_REPLY("7 FIRE", "7 3 ERR 7");
+}
+
+static void test_only_valid_lines_feed_the_heartbeat(void)
+{
+    boot_armed();
+    fake.now_us += HEARTBEAT_MS * 1000u;
+    receive("nonsense\n");
+    protocol_poll(&protocol);
+    CHECK(protocol.safety.state == STATE_ARMED);
+    fake.now_us++;
+    CHECK_REPLY("5 BEAT", "5 3 OK state=2"); /* too late: the line itself finds the fault */
+    CHECK_REPLY("6 CLEAR", "6 3 OK state=0");
+}
+
+static void test_status_tells_everything(void)
+{
+    boot_armed();
+    ASK("5 FIRE");
+    ASK("6 FIRE");
+    fake.interlock_closed = false;
+    CHECK_REPLY("7 STATUS",
+                "7 3 OK state=2 faults=1 interlock=0 shots_left=0 requested=2 fired=1 suppressed=1 early=1 crc_errors=0");
+    CHECK_REPLY("8 CLEAR", "8 3 ERR 9");
+}
+
+static void test_the_longest_lines_fit(void)
+{
+    boot();
+    protocol.boot = protocol.safety.faults = UINT32_MAX;
+    protocol.safety.counters = (struct counters){UINT32_MAX, UINT32_MAX, UINT32_MAX, UINT32_MAX, UINT32_MAX};
+    ASK("65535 STATUS");
+    CHECK(strlen(fake.reply) < TEXT_SIZE - 64 && strstr(fake.reply, "crc_errors=4294967295"));
+    CHECK(strstr(ASK("65534 CHANNEL 4294967295 4294967295 4294967295 4294967295 4294967295 4294967295 4294967295 "
+                     "4294967295 4294967295"),
+                 " ERR 12"));
+}
+
+int main(void)
+{
+    test_a_shot_from_boot_to_off();
+    test_a_repeated_line_is_answered_but_not_done_again();
+    test_a_number_cannot_be_used_for_another_line();
+    test_id_is_fresh_and_leaves_the_kept_reply_alone();
+    test_malformed_lines_have_numbered_errors();
+    test_damaged_lines_are_answered_and_counted();
+    test_an_overlong_line_is_one_error();
+    test_empty_lines_and_carriage_returns_are_no_lines();
+    test_the_abort_byte_works_inside_a_line();
+    test_only_valid_lines_feed_the_heartbeat();
+    test_status_tells_everything();
+    test_the_longest_lines_fit();
+    return 0;
+}

@@ -1,0 +1,117 @@
+/* Limits and quantisation of the pulse train, at and beyond every bound. */
+#include "fake_port.h"
+#include "pulse_train.h"
+
+static const struct channel LEGAL = {
+    .camera_ns = 1000,
+    .a_start_ns = 20000,
+    .a_width_ns = 1000,
+    .b_start_ns = 26400,
+    .b_width_ns = 1000,
+    .current_ma = 20000,
+    .frame_a_close_ns = 22000,
+    .frame_b_open_ns = 23000,
+    .used = true,
+};
+
+static enum error check_with(size_t offset, uint32_t value)
+{
+    struct channel channel = LEGAL;
+    *(uint32_t *)(void *)((char *)&channel + offset) = value;
+    return channel_check(&channel);
+}
+
+#define WITH(member, value) check_with(offsetof(struct channel, member), value)
+
+static void test_each_limit_holds_to_the_nanosecond(void)
+{
+    CHECK(channel_check(&LEGAL) == ERROR_NONE);
+    CHECK(WITH(a_width_ns, MIN_WIDTH_NS) == ERROR_NONE && WITH(a_width_ns, MIN_WIDTH_NS - 1) == ERROR_WIDTH);
+    CHECK(WITH(a_width_ns, MAX_WIDTH_NS) == ERROR_NONE && WITH(a_width_ns, MAX_WIDTH_NS + 1) == ERROR_WIDTH);
+    CHECK(WITH(b_width_ns, MIN_WIDTH_NS) == ERROR_NONE && WITH(b_width_ns, MIN_WIDTH_NS - 1) == ERROR_WIDTH);
+    CHECK(WITH(b_width_ns, MAX_WIDTH_NS) == ERROR_NONE && WITH(b_width_ns, MAX_WIDTH_NS + 1) == ERROR_WIDTH);
+    CHECK(WITH(current_ma, MAX_CURRENT_MA) == ERROR_NONE && WITH(current_ma, MAX_CURRENT_MA + 1) == ERROR_CURRENT);
+    CHECK(WITH(current_ma, 0) == ERROR_NONE);
+    CHECK(WITH(b_start_ns, 20000 + MAX_SEPARATION_NS) == ERROR_NONE);
+    CHECK(WITH(b_start_ns, 20000 + MAX_SEPARATION_NS + 1) == ERROR_SEPARATION);
+    CHECK(WITH(camera_ns, MAX_EDGE_NS + 1) == ERROR_EDGE && WITH(b_start_ns, MAX_EDGE_NS + 1) == ERROR_EDGE);
+    CHECK(WITH(a_start_ns, MAX_EDGE_NS) == ERROR_SEPARATION && WITH(a_start_ns, MAX_EDGE_NS + 1) == ERROR_EDGE);
+}
+
+static void test_pulses_keep_their_dark_time_and_order(void)
+{
+    struct channel channel = LEGAL;
+    channel.frame_a_close_ns = channel.frame_b_open_ns = 20000; /* a boundary just where pulse A ends */
+    channel.b_start_ns = channel.a_start_ns + channel.a_width_ns + MIN_DARK_NS;
+    CHECK(channel_check(&channel) == ERROR_NONE);
+    channel.b_start_ns--;
+    CHECK(channel_check(&channel) == ERROR_SEPARATION);
+    channel.b_start_ns = 0;
+    CHECK(channel_check(&channel) == ERROR_SEPARATION);
+}
+
+static void test_frame_boundaries_count_from_the_camera_trigger(void)
+{
+    CHECK(WITH(frame_a_close_ns, 20000) == ERROR_NONE && WITH(frame_a_close_ns, 19999) == ERROR_STRADDLE);
+    CHECK(WITH(frame_b_open_ns, 25400) == ERROR_NONE && WITH(frame_b_open_ns, 25401) == ERROR_STRADDLE);
+    CHECK(WITH(camera_ns, 999) == ERROR_NONE && WITH(camera_ns, 4000) == ERROR_STRADDLE);
+    CHECK(WITH(frame_b_open_ns, 21999) == ERROR_STRADDLE);
+}
+
+static void test_no_field_can_overflow_a_sum(void)
+{
+    CHECK(WITH(camera_ns, UINT32_MAX) == ERROR_EDGE && WITH(a_start_ns, UINT32_MAX) == ERROR_EDGE);
+    CHECK(WITH(b_start_ns, UINT32_MAX) == ERROR_EDGE && WITH(a_width_ns, UINT32_MAX) == ERROR_WIDTH);
+    CHECK(WITH(b_width_ns, UINT32_MAX) == ERROR_WIDTH && WITH(current_ma, UINT32_MAX) == ERROR_CURRENT);
+    CHECK(WITH(frame_b_open_ns, UINT32_MAX) == ERROR_STRADDLE && WITH(frame_a_close_ns, UINT32_MAX) == ERROR_STRADDLE);
+    /* With 32 bit sums camera_ns + frame_b_open_ns would wrap to an early opening. */
+    CHECK(WITH(frame_b_open_ns, UINT32_MAX - 999) == ERROR_STRADDLE);
+}
+
+static void test_every_edge_goes_to_the_nearest_tick(void)
+{
+    for (uint32_t offset = 0; offset < 16; offset++) {
+        struct channel requested = LEGAL;
+        requested.a_start_ns += offset;
+        requested.b_start_ns += offset;
+        const struct channel actual = channel_quantised(&requested, 8);
+        const int32_t moved_ns = (int32_t)(actual.a_start_ns - requested.a_start_ns);
+        CHECK(actual.a_start_ns % 8 == 0 && moved_ns >= -4 && moved_ns <= 4);
+        CHECK(actual.b_start_ns - actual.a_start_ns == 6400); /* 800 ticks, wherever pulse A stands */
+    }
+}
+
+static void test_a_train_is_as_long_as_its_last_output(void)
+{
+    struct pulse_train train = {0};
+    CHECK(train_check(&train) == ERROR_NO_TRAIN && train_length_ns(&train) == 0);
+    train.channels[2] = LEGAL;
+    CHECK(train_check(&train) == ERROR_NONE && train_length_ns(&train) == 27400);
+    train.channels[2].camera_ns = 20000;
+    CHECK(train_length_ns(&train) == 20000 + CAMERA_PULSE_NS && train_check(&train) == ERROR_STRADDLE);
+}
+
+static void test_more_light_lengthens_the_period(void)
+{
+    struct pulse_train train = {0};
+    train.channels[0] = train.channels[3] = LEGAL;
+    CHECK(train_period_us(&train) == MIN_PERIOD_US); /* 2 us of light, 200 ppm */
+    train.channels[3].a_width_ns = 2000;
+    CHECK(train_period_us(&train) == 15000);
+    train.channels[3].a_width_ns = 2001 - 1000;
+    CHECK(train_period_us(&train) == 10005);
+    train.channels[3].current_ma = 0; /* dark: its widths do not count */
+    CHECK(train_period_us(&train) == MIN_PERIOD_US);
+}
+
+int main(void)
+{
+    test_each_limit_holds_to_the_nanosecond();
+    test_pulses_keep_their_dark_time_and_order();
+    test_frame_boundaries_count_from_the_camera_trigger();
+    test_no_field_can_overflow_a_sum();
+    test_every_edge_goes_to_the_nearest_tick();
+    test_a_train_is_as_long_as_its_last_output();
+    test_more_light_lengthens_the_period();
+    return 0;
+}

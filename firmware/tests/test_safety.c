@@ -1,0 +1,219 @@
+/* When light is allowed, and what takes the permission away. */
+#include "fake_port.h"
+#include "safety.h"
+
+static struct safety safety;
+
+static const struct channel LEGAL = {
+    .a_start_ns = 20000,
+    .a_width_ns = 1000,
+    .b_start_ns = 26400,
+    .b_width_ns = 1000,
+    .current_ma = 20000,
+    .frame_a_close_ns = 22000,
+    .frame_b_open_ns = 23000,
+};
+
+static void wait_us(uint32_t time_us)
+{
+    fake.now_us += time_us;
+    safety_heard(&safety);
+    safety_poll(&safety);
+}
+
+static void boot(void)
+{
+    fake_reset();
+    safety_boot(&safety, false);
+    wait_us(1000);
+}
+
+static void boot_armed(uint32_t shots)
+{
+    boot();
+    CHECK(!safety_new_train(&safety) && !safety_set_channel(&safety, 0, &LEGAL) && !safety_load(&safety));
+    CHECK(safety_arm(&safety, shots) == ERROR_NONE && safety.state == STATE_ARMED && fake.live);
+}
+
+static void check_counters_add_up(void)
+{
+    CHECK(safety.counters.requested == safety.counters.fired + safety.counters.suppressed);
+    CHECK(safety.counters.early <= safety.counters.suppressed && safety.counters.fired == fake.fired);
+}
+
+static void test_nothing_works_before_arming(void)
+{
+    boot();
+    CHECK(safety.state == STATE_SAFE && !fake.live);
+    CHECK(safety_fire(&safety) == ERROR_NOT_ARMED && safety_arm(&safety, 1) == ERROR_NO_TRAIN);
+    CHECK(safety_load(&safety) == ERROR_NO_TRAIN && fake.fired == 0);
+    check_counters_add_up();
+}
+
+static void test_the_budget_is_exact(void)
+{
+    boot_armed(3);
+    for (uint32_t left = 3; left-- > 0;) {
+        CHECK(safety_fire(&safety) == ERROR_NONE && safety.shots_left == left);
+        wait_us(MIN_PERIOD_US);
+    }
+    CHECK(safety.state == STATE_SAFE && safety_fire(&safety) == ERROR_NOT_ARMED && fake.fired == 3);
+    check_counters_add_up();
+}
+
+static void test_the_last_train_ends_before_the_outputs_are_cut(void)
+{
+    boot_armed(1);
+    CHECK(safety_fire(&safety) == ERROR_NONE && safety.state == STATE_SAFE);
+    wait_us(27);
+    CHECK(fake.live);
+    wait_us(1);
+    CHECK(!fake.live);
+}
+
+static void test_the_budget_has_bounds(void)
+{
+    boot_armed(MAX_SHOTS);
+    safety_off(&safety);
+    CHECK(safety_arm(&safety, 0) == ERROR_SHOTS && safety_arm(&safety, MAX_SHOTS + 1) == ERROR_SHOTS);
+}
+
+static void test_an_early_shot_is_ignored_and_counted(void)
+{
+    boot_armed(5);
+    CHECK(safety_fire(&safety) == ERROR_NONE);
+    wait_us(MIN_PERIOD_US - 1);
+    CHECK(safety_fire(&safety) == ERROR_EARLY && safety.state == STATE_ARMED && safety.shots_left == 4);
+    CHECK(fake.fired == 1 && safety.counters.early == 1);
+    wait_us(1);
+    CHECK(safety_fire(&safety) == ERROR_NONE && fake.fired == 2);
+    check_counters_add_up();
+}
+
+static void test_arming_again_does_not_shorten_the_period(void)
+{
+    boot_armed(1);
+    CHECK(safety_fire(&safety) == ERROR_NONE);
+    wait_us(5000);
+    CHECK(safety_arm(&safety, 1) == ERROR_NONE && safety_fire(&safety) == ERROR_EARLY);
+}
+
+static void test_an_armed_generator_takes_no_other_train(void)
+{
+    boot_armed(1);
+    CHECK(safety_new_train(&safety) == ERROR_NOT_SAFE && safety_set_channel(&safety, 1, &LEGAL) == ERROR_NOT_SAFE);
+    CHECK(safety_load(&safety) == ERROR_NOT_SAFE && safety_arm(&safety, 9) == ERROR_NOT_SAFE);
+    CHECK(safety_clear(&safety) == ERROR_NOT_SAFE && safety.shots_left == 1);
+}
+
+static void test_a_changed_channel_must_be_loaded_again(void)
+{
+    boot_armed(1);
+    safety_off(&safety);
+    CHECK(safety_set_channel(&safety, 1, &LEGAL) == ERROR_NONE && safety_arm(&safety, 1) == ERROR_NO_TRAIN);
+    CHECK(safety_set_channel(&safety, CHANNEL_COUNT, &LEGAL) == ERROR_CHANNEL);
+    CHECK(safety_load(&safety) == ERROR_NONE && safety_arm(&safety, 1) == ERROR_NONE && safety.train_id == 2);
+}
+
+static void test_off_disarms_and_forgets_the_budget(void)
+{
+    boot_armed(7);
+    safety_off(&safety);
+    CHECK(safety.state == STATE_SAFE && !fake.live && safety.shots_left == 0);
+    CHECK(safety_fire(&safety) == ERROR_NOT_ARMED);
+}
+
+static void test_an_open_interlock_trips_and_latches(void)
+{
+    boot_armed(2);
+    fake.interlock_closed = false;
+    safety_poll(&safety);
+    CHECK(safety.state == STATE_FAULT && safety.faults == FAULT_INTERLOCK && !fake.live);
+    CHECK(safety_clear(&safety) == ERROR_INTERLOCK_OPEN);
+    fake.interlock_closed = true;
+    safety_poll(&safety);
+    CHECK(safety.state == STATE_FAULT && safety_fire(&safety) == ERROR_FAULT_LATCHED);
+    CHECK(safety_arm(&safety, 1) == ERROR_FAULT_LATCHED && safety_new_train(&safety) == ERROR_FAULT_LATCHED);
+    CHECK(safety_clear(&safety) == ERROR_NONE && safety.state == STATE_SAFE && safety.shots_left == 0);
+    check_counters_add_up();
+}
+
+static void test_the_interlock_is_asked_at_the_moment_of_firing(void)
+{
+    boot_armed(2);
+    fake.interlock_closed = false;
+    CHECK(safety_fire(&safety) == ERROR_INTERLOCK_OPEN && fake.fired == 0 && safety.state == STATE_FAULT);
+}
+
+static void test_an_open_interlock_forbids_arming_without_a_fault(void)
+{
+    boot_armed(1);
+    safety_off(&safety);
+    fake.interlock_closed = false;
+    safety_poll(&safety);
+    CHECK(safety_arm(&safety, 1) == ERROR_INTERLOCK_OPEN && safety.state == STATE_SAFE && safety.faults == 0);
+}
+
+static void test_a_silent_host_trips(void)
+{
+    boot_armed(2);
+    fake.now_us += HEARTBEAT_MS * 1000u;
+    safety_poll(&safety);
+    CHECK(safety.state == STATE_ARMED);
+    fake.now_us++;
+    safety_poll(&safety);
+    CHECK(safety.state == STATE_FAULT && safety.faults == FAULT_HEARTBEAT && !fake.live);
+}
+
+static void test_a_safe_generator_needs_no_host(void)
+{
+    boot();
+    fake.now_us += HEARTBEAT_MS * 5000u;
+    safety_poll(&safety);
+    CHECK(safety.state == STATE_SAFE);
+}
+
+static void test_a_watchdog_reset_boots_into_a_fault(void)
+{
+    fake_reset();
+    safety_boot(&safety, true);
+    CHECK(safety.state == STATE_FAULT && safety.faults == FAULT_WATCHDOG && safety_load(&safety) == ERROR_FAULT_LATCHED);
+    CHECK(safety_clear(&safety) == ERROR_NONE && safety.state == STATE_SAFE);
+}
+
+static void test_a_train_that_changed_in_memory_is_not_fired(void)
+{
+    boot_armed(2);
+    safety.train.channels[0].a_width_ns = 1u << 20;
+    CHECK(safety_fire(&safety) == ERROR_FAULT_LATCHED && fake.fired == 0 && safety.faults == FAULT_INTERNAL);
+}
+
+static void test_hardware_that_cannot_produce_the_train_stays_dark(void)
+{
+    boot_armed(1);
+    safety_off(&safety);
+    fake.can_load = false;
+    CHECK(safety_arm(&safety, 1) == ERROR_HARDWARE && safety.state == STATE_SAFE && !fake.live);
+}
+
+int main(void)
+{
+    test_nothing_works_before_arming();
+    test_the_budget_is_exact();
+    test_the_last_train_ends_before_the_outputs_are_cut();
+    test_the_budget_has_bounds();
+    test_an_early_shot_is_ignored_and_counted();
+    test_arming_again_does_not_shorten_the_period();
+    test_an_armed_generator_takes_no_other_train();
+    test_a_changed_channel_must_be_loaded_again();
+    test_off_disarms_and_forgets_the_budget();
+    test_an_open_interlock_trips_and_latches();
+    test_the_interlock_is_asked_at_the_moment_of_firing();
+    test_an_open_interlock_forbids_arming_without_a_fault();
+    test_a_silent_host_trips();
+    test_a_safe_generator_needs_no_host();
+    test_a_watchdog_reset_boots_into_a_fault();
+    test_a_train_that_changed_in_memory_is_not_fired();
+    test_hardware_that_cannot_produce_the_train_stays_dark();
+    return 0;
+}

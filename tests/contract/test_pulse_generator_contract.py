@@ -1,0 +1,281 @@
+"""What every pulse generator does: the real driver against the firmware's core on a pseudo-terminal."""
+
+import threading
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+
+import pytest
+import serial
+
+from daq.devices import GeneratorState, PulseGenerator
+from daq.drivers.pulse_protocol import HEARTBEAT_MS, Command, Request, State, decode_reply, encode_request
+from daq.drivers.serial_pulse_generator import SerialPulseGenerator
+from daq.errors import DeviceError, DeviceRefused, PlanError
+from daq.run_plan import PulsePair, RunPlan
+from daq.shot import FiredTrain
+from daq.simulation.pulse_generator import FirmwareProcess
+from daq.timing import CameraTiming, ShotTiming, Window, plan_shot_timing
+
+CHANNELS = {"left": 0, "middle": 2, "right": 3}
+CAMERA = CameraTiming(
+    trigger_delay_ns=1_003, exposure_a_ns=20_000, gap_ns=500, exposure_b_ns=30_000_000, readout_ns=1_000_000
+)
+PERIOD_MS = 10
+LIMIT_S = 5.0
+
+
+def shot_timing(width_ns: int = 1000, separation_ns: int = 6400, **current_a: float) -> ShotTiming:
+    currents = dict.fromkeys(CHANNELS, 20.0) | current_a
+    pulse = PulsePair(width_ns=width_ns, separation_ns=separation_ns, current_a=currents)
+    return plan_shot_timing(RunPlan(name="contract", shots=1, pulse=pulse), dict.fromkeys(CHANNELS, CAMERA))
+
+
+@dataclass
+class Bench:
+    """A generator, the laboratory around it, and the light that it gave."""
+
+    firmware: FirmwareProcess
+    generator: PulseGenerator
+    light: list[FiredTrain]
+    changed: threading.Condition = field(default_factory=threading.Condition)
+
+    def wait_for_light(self, shots: int) -> list[FiredTrain]:
+        with self.changed:
+            assert self.changed.wait_for(lambda: len(self.light) >= shots, LIMIT_S), f"{len(self.light)} of {shots}"
+        return self.light
+
+    def let_period_pass(self) -> None:
+        self.firmware.advance(PERIOD_MS)
+
+
+@pytest.fixture
+def bench() -> Iterator[Bench]:
+    light: list[FiredTrain] = []
+    changed = threading.Condition()
+
+    def on_fired(train: FiredTrain) -> None:
+        with changed:
+            light.append(train)
+            changed.notify_all()
+
+    with (
+        FirmwareProcess(CHANNELS, on_fired) as firmware,
+        SerialPulseGenerator("generator", firmware.port, CHANNELS) as generator,
+    ):
+        yield Bench(firmware, generator, light, changed)
+
+
+@pytest.fixture
+def generator(bench: Bench) -> PulseGenerator:
+    return bench.generator
+
+
+@pytest.fixture
+def armed(bench: Bench) -> Bench:
+    bench.generator.configure(shot_timing())
+    bench.generator.arm(5)
+    return bench
+
+
+def test_light_is_off_after_opening(generator: PulseGenerator) -> None:
+    status = generator.status()
+    assert status.state is GeneratorState.SAFE
+    assert status.shots_left == 0
+    assert set(status.counters) == {"requested", "fired", "suppressed", "early", "crc_errors"}
+
+
+def test_it_says_who_it_is(generator: PulseGenerator) -> None:
+    identity = generator.identity()
+    assert identity.model == "tomoshadow-pulse"
+    assert identity.serial
+    assert identity.firmware.startswith("1.")
+
+
+def test_light_is_off_after_closing() -> None:
+    with FirmwareProcess(CHANNELS, lambda _: None) as firmware:
+        with SerialPulseGenerator("generator", firmware.port, CHANNELS) as generator:
+            generator.configure(shot_timing())
+            generator.arm(5)
+        with serial.Serial(firmware.port, timeout=LIMIT_S) as port:  # the driver would switch off by opening
+            port.write(encode_request(Request(60_000, Command.BEAT)))
+            assert decode_reply(port.read_until(b"\n")).number("state") == State.SAFE
+
+
+def test_actual_values_are_whole_ticks_and_the_separation_is_exact(generator: PulseGenerator) -> None:
+    actual = generator.configure(shot_timing(width_ns=1003))
+    assert actual.sequence == 0
+    for pulse_a, pulse_b in actual.pulses.values():
+        assert pulse_b.start_ns - pulse_a.start_ns == 6400
+        assert (pulse_a.width_ns, pulse_b.width_ns) == (1000, 1000)
+        assert pulse_a.current_a == 20.0
+    edges = [*actual.camera_trigger_ns.values(), *(p.start_ns for pair in actual.pulses.values() for p in pair)]
+    assert all(edge >= 0 and edge % 8 == 0 for edge in edges)
+
+
+def test_camera_trigger_keeps_its_distance_to_pulse_a(generator: PulseGenerator) -> None:
+    timing = shot_timing()
+    actual = generator.configure(timing)
+    for view, edges in timing.views.items():
+        distance_ns = actual.pulses[view][0].start_ns - actual.camera_trigger_ns[view]
+        assert abs(distance_ns + edges.camera_trigger_ns) <= 4
+
+
+def test_what_is_fired_is_what_was_answered(bench: Bench) -> None:
+    configured = bench.generator.configure(shot_timing(middle=12.5))
+    bench.generator.arm(1)
+    fired = bench.generator.fire()
+    assert fired == replace(configured, sequence=1)
+    assert bench.wait_for_light(1) == [fired]
+
+
+def test_a_dark_view_gets_its_trigger_and_no_light(bench: Bench) -> None:
+    bench.generator.configure(shot_timing(left=0.0, middle=0.0, right=0.0))
+    bench.generator.arm(1)
+    fired = bench.generator.fire()
+    assert set(fired.camera_trigger_ns) == set(CHANNELS)
+    assert all(pulses == () for pulses in fired.pulses.values())
+    assert bench.wait_for_light(1) == [fired]
+
+
+def test_the_budget_is_exact(armed: Bench) -> None:
+    for shot in range(5):
+        assert armed.generator.status().shots_left == 5 - shot
+        assert armed.generator.fire().sequence == shot + 1
+        armed.let_period_pass()
+    assert armed.generator.status().state is GeneratorState.SAFE
+    with pytest.raises(DeviceRefused, match="not armed"):
+        armed.generator.fire()
+    assert len(armed.wait_for_light(5)) == 5
+
+
+def test_nothing_fires_before_arming(bench: Bench) -> None:
+    with pytest.raises(DeviceRefused, match="not armed"):
+        bench.generator.fire()
+    with pytest.raises(DeviceRefused, match="no pulse train"):
+        bench.generator.arm(1)
+    bench.generator.configure(shot_timing())
+    with pytest.raises(DeviceRefused, match="not armed"):
+        bench.generator.fire()
+    assert bench.generator.status().counters == {
+        "requested": 2, "fired": 0, "suppressed": 2, "early": 0, "crc_errors": 0
+    }  # fmt: skip
+    assert bench.light == []
+
+
+@pytest.mark.parametrize("shots", [0, 1_000_001])
+def test_an_impossible_budget_is_refused(generator: PulseGenerator, shots: int) -> None:
+    generator.configure(shot_timing())
+    with pytest.raises(DeviceRefused, match="shot budget"):
+        generator.arm(shots)
+    assert generator.status().state is GeneratorState.SAFE
+
+
+def test_an_early_shot_is_not_fired_and_counted(armed: Bench) -> None:
+    armed.generator.fire()
+    with pytest.raises(DeviceRefused, match="shortest period"):
+        armed.generator.fire()
+    status = armed.generator.status()
+    assert status.state is GeneratorState.ARMED
+    assert status.shots_left == 4
+    assert (status.counters["fired"], status.counters["suppressed"], status.counters["early"]) == (1, 1, 1)
+    armed.let_period_pass()
+    assert armed.generator.fire().sequence == 2
+
+
+def test_configure_and_arm_are_refused_while_armed(armed: Bench) -> None:
+    with pytest.raises(DeviceRefused, match="armed"):
+        armed.generator.configure(shot_timing())
+    with pytest.raises(DeviceRefused, match="armed"):
+        armed.generator.arm(100)
+    assert armed.generator.status().shots_left == 5
+
+
+def test_a_refused_train_leaves_nothing_to_arm(generator: PulseGenerator) -> None:
+    generator.configure(shot_timing())
+    legal = shot_timing().views["left"]
+    late_a = replace(legal, pulse_a=Window(3_000, 4_000))
+    with pytest.raises(DeviceRefused, match="frame A closes"):
+        generator.configure(ShotTiming({"left": late_a}, 0))
+    with pytest.raises(DeviceRefused, match="no pulse train"):
+        generator.arm(1)
+
+
+def test_a_view_without_channel_is_named(generator: PulseGenerator) -> None:
+    views = shot_timing().views
+    with pytest.raises(PlanError, match="behind"):
+        generator.configure(ShotTiming({"behind": views["left"]}, 0))
+
+
+def test_off_disarms_in_every_state(armed: Bench) -> None:
+    armed.generator.off()
+    assert armed.generator.status().state is GeneratorState.SAFE
+    assert armed.generator.status().shots_left == 0
+    armed.generator.off()
+    with pytest.raises(DeviceRefused, match="not armed"):
+        armed.generator.fire()
+    armed.generator.arm(1)
+    armed.firmware.set_interlock(False)
+    armed.generator.off()
+    assert armed.generator.status().state is GeneratorState.FAULT
+
+
+def test_off_overtakes_a_busy_thread(armed: Bench) -> None:
+    """One thread asks without pause; light goes off in the middle of it, and stays off."""
+    outcomes: list[str] = []
+    asked = threading.Event()
+
+    def ask_without_pause() -> None:
+        try:
+            while True:
+                armed.generator.status()
+                armed.generator.arm(5) if armed.generator.status().state is GeneratorState.SAFE else asked.set()
+        except DeviceError as error:
+            outcomes.append(error.reason)
+
+    thread = threading.Thread(target=ask_without_pause)
+    thread.start()
+    assert asked.wait(LIMIT_S)
+    armed.firmware.lose_replies(1)
+    armed.generator.off()
+    thread.join(LIMIT_S)
+    assert outcomes in (["STATUS was overtaken by off"], ["ARM was overtaken by off"])
+    assert armed.generator.status().state is GeneratorState.SAFE
+
+
+def test_a_silent_host_trips_and_clear_acknowledges(armed: Bench) -> None:
+    armed.firmware.advance(HEARTBEAT_MS + 1)
+    status = armed.generator.status()
+    assert (status.state, status.faults) == (GeneratorState.FAULT, ("heartbeat",))
+    with pytest.raises(DeviceRefused, match="fault is latched"):
+        armed.generator.fire()
+    armed.generator.clear()
+    status = armed.generator.status()
+    assert (status.state, status.faults, status.shots_left) == (GeneratorState.SAFE, (), 0)
+
+
+def test_status_is_the_heartbeat(armed: Bench) -> None:
+    for _ in range(4):
+        armed.firmware.advance(HEARTBEAT_MS // 2)
+        assert armed.generator.status().state is GeneratorState.ARMED
+
+
+def test_an_opened_interlock_latches(armed: Bench) -> None:
+    armed.firmware.set_interlock(False)
+    status = armed.generator.status()
+    assert (status.state, status.faults, status.interlock_closed) == (GeneratorState.FAULT, ("interlock",), False)
+    with pytest.raises(DeviceRefused, match="interlock is open"):
+        armed.generator.clear()
+    armed.firmware.set_interlock(True)
+    assert armed.generator.status().state is GeneratorState.FAULT
+    armed.generator.clear()
+    assert armed.generator.status().state is GeneratorState.SAFE
+    assert armed.light == []
+
+
+def test_an_open_interlock_forbids_arming(bench: Bench) -> None:
+    bench.generator.configure(shot_timing())
+    bench.firmware.set_interlock(False)
+    with pytest.raises(DeviceRefused, match="interlock is open"):
+        bench.generator.arm(1)
+    bench.firmware.set_interlock(True)
+    bench.generator.arm(1)
