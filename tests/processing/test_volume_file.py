@@ -1,0 +1,108 @@
+"""Volume files: what is written comes back, ParaView's format is kept, broken files are named."""
+
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from processing.reconstruction.volume_file import VolumeFileError, read_volume, write_volume
+from processing.volume import VoxelGrid
+
+GRID = VoxelGrid((5, 7, 11), (-1.0, 2.0, -3.5), 1 / 60)
+
+
+def some_volume() -> NDArray[np.float32]:
+    return np.random.default_rng(3).random(GRID.shape).astype(np.float32)
+
+
+@settings(max_examples=20, deadline=None)
+@given(
+    shape=st.tuples(st.integers(1, 6), st.integers(1, 6), st.integers(1, 6)),
+    origin_mm=st.tuples(st.floats(-9, 9), st.floats(-9, 9), st.floats(-9, 9)),
+    pitch_mm=st.floats(1e-3, 1),
+    provenance=st.dictionaries(st.sampled_from(["run", "shot", "frame"]), st.text("abc -é") | st.integers(-9, 9)),
+)
+def test_everything_comes_back(
+    tmp_path_factory: pytest.TempPathFactory,
+    shape: tuple[int, int, int],
+    origin_mm: tuple[float, float, float],
+    pitch_mm: float,
+    provenance: dict[str, str | int],
+) -> None:
+    path = tmp_path_factory.mktemp("volume") / "one.vtkhdf"
+    volume = np.random.default_rng(1).normal(size=shape).astype(np.float32)
+    grid = VoxelGrid(shape, origin_mm, pitch_mm)
+    write_volume(path, volume, grid, provenance)
+    read, its_grid, its_provenance = read_volume(path)
+    np.testing.assert_array_equal(read, volume)
+    assert its_grid == grid
+    assert its_provenance == provenance
+
+
+def test_half_precision_comes_back_as_float32(tmp_path: Path) -> None:
+    half = some_volume().astype(np.float16)
+    write_volume(tmp_path / "half.vtkhdf", half, GRID, {})
+    volume, _, _ = read_volume(tmp_path / "half.vtkhdf")
+    assert volume.dtype == np.float32
+    np.testing.assert_array_equal(volume, half.astype(np.float32))
+
+
+def test_it_is_vtk_image_data(tmp_path: Path) -> None:
+    write_volume(tmp_path / "one.vtkhdf", some_volume(), GRID, {"run": "r1"})
+    with h5py.File(tmp_path / "one.vtkhdf") as file:
+        attributes = file["VTKHDF"].attrs
+        assert attributes["Type"] == b"ImageData"
+        assert list(attributes["Version"]) == [2, 0]
+        assert list(attributes["WholeExtent"]) == [0, 10, 0, 6, 0, 4]
+        np.testing.assert_allclose(attributes["Origin"], [-1, 2, -3.5])
+        np.testing.assert_allclose(attributes["Direction"], np.eye(3).ravel())
+        assert file["VTKHDF/PointData/intensity"].shape == GRID.shape
+        assert file["VTKHDF/PointData/intensity"].compression == "gzip"
+
+
+def test_a_failed_write_leaves_the_old_file_and_nothing_else(tmp_path: Path) -> None:
+    path = tmp_path / "one.vtkhdf"
+    write_volume(path, some_volume(), GRID, {})
+    with pytest.raises(TypeError):
+        write_volume(path, some_volume() * 2, GRID, {"run": object()})  # type: ignore[dict-item]
+    assert [file.name for file in tmp_path.iterdir()] == ["one.vtkhdf"]
+    np.testing.assert_array_equal(read_volume(path)[0], some_volume())
+
+
+def test_a_volume_of_another_shape_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"one\.vtkhdf: volume has shape \(2, 2, 2\)"):
+        write_volume(tmp_path / "one.vtkhdf", np.zeros((2, 2, 2), np.float32), GRID, {})
+
+
+@pytest.mark.parametrize("fraction", [0.0, 0.3, 0.7, 0.98])
+def test_a_truncated_file_is_named(tmp_path: Path, fraction: float) -> None:
+    path = tmp_path / "cut.vtkhdf"
+    write_volume(path, some_volume(), GRID, {})
+    path.write_bytes(path.read_bytes()[: int(fraction * path.stat().st_size)])
+    with pytest.raises(VolumeFileError, match=r"cut\.vtkhdf: not a readable volume"):
+        read_volume(path)
+
+
+def test_files_without_a_volume_are_named(tmp_path: Path) -> None:
+    with pytest.raises(VolumeFileError, match=r"absent\.vtkhdf"):
+        read_volume(tmp_path / "absent.vtkhdf")
+    with h5py.File(tmp_path / "other.h5", "w") as file:
+        file["x"] = 1
+    with pytest.raises(VolumeFileError, match=r"other\.h5"):
+        read_volume(tmp_path / "other.h5")
+
+
+def test_a_flipped_bit_is_noticed(tmp_path: Path) -> None:
+    path = tmp_path / "flipped.vtkhdf"
+    write_volume(path, some_volume(), GRID, {})
+    with h5py.File(path) as file:
+        chunk = file["VTKHDF/PointData/intensity"].id.get_chunk_info(2)
+    content = bytearray(path.read_bytes())
+    content[chunk.byte_offset + chunk.size // 2] ^= 16
+    path.write_bytes(content)
+    with pytest.raises(VolumeFileError, match=r"flipped\.vtkhdf"):
+        read_volume(path)
