@@ -255,6 +255,18 @@ int gpio_chip_redirect(const char *library)
     return dl_iterate_phdr(redirect_object, (void *)library);
 }
 
+/* Lowest line that nobody has requested; -1 where all are taken. */
+int gpio_chip_free_line(void)
+{
+    pthread_mutex_lock(&state);
+    int free_line = -1;
+    for (int i = LINES - 1; i >= 0; i--)
+        if (!lines[i].request)
+            free_line = i;
+    pthread_mutex_unlock(&state);
+    return free_line;
+}
+
 /* Drive the wire of one line: 0, 1, or -1 for a broken wire. Readers that asked for this edge get it. */
 int gpio_chip_drive(unsigned offset, int wire)
 {

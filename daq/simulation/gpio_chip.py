@@ -36,6 +36,20 @@ def _load() -> ctypes.CDLL:
     return chip
 
 
+def free_line() -> int:
+    """Lowest line of the chip that nobody reads.
+
+    Raises
+    ------
+    ChipUnsupported
+        The machine cannot have a simulated chip, or all its lines are taken.
+    """
+    line = int(_load().gpio_chip_free_line())
+    if line < 0:
+        raise ChipUnsupported(f"all lines of {CHIP_PATH} are taken")
+    return line
+
+
 class SimulatedSwitchLine:
     """The laboratory's side of an interlock: a door switch wired to one line of the simulated chip.
 

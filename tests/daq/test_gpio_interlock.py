@@ -4,7 +4,7 @@ import pytest
 
 from daq.drivers.gpio_interlock import GpioInterlock
 from daq.errors import DeviceUnavailable
-from daq.simulation.gpio_chip import CHIP_PATH, ChipUnsupported, SimulatedSwitchLine
+from daq.simulation.gpio_chip import CHIP_PATH, ChipUnsupported, SimulatedSwitchLine, free_line
 
 
 @pytest.fixture
@@ -64,6 +64,12 @@ def test_identity_names_chip_and_line(switch: SimulatedSwitchLine) -> None:
     identity = GpioInterlock("interlock", CHIP_PATH, 5).identity()
     assert identity.serial == "gpiochip-simulated line 5"
     assert identity.firmware.startswith("libgpiod 2")
+
+
+def test_the_simulated_chip_knows_its_free_lines(switch: SimulatedSwitchLine) -> None:
+    with GpioInterlock("interlock", CHIP_PATH, free := free_line()):
+        assert free_line() != free
+    assert free_line() == free
 
 
 def test_the_simulated_chip_has_eight_lines() -> None:
