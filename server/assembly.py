@@ -1,0 +1,193 @@
+"""Assembly: the only module that names concrete devices. Drivers are the same on a real and on a simulated rig."""
+
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from daq.acquisition_limits import AcquisitionLimits
+from daq.devices import Interlock, Rig
+from daq.drivers.aravis_camera import AravisCamera
+from daq.drivers.camera_profile import CameraProfile, load_camera_profile
+from daq.drivers.gpio_interlock import GpioInterlock
+from daq.drivers.serial_pulse_generator import SerialPulseGenerator
+from daq.drivers.serial_stage import SerialStage, StageScale
+from daq.errors import DeviceUnavailable
+from daq.run_plan import RunKind
+from daq.simulation.bench import BenchDevices, SimulatedBench
+from daq.simulation.gige_camera import SimulatedCamera
+from daq.simulation.gpio_chip import CHIP_PATH, ChipUnsupported, SimulatedSwitchLine, free_line
+from daq.simulation.interlock import DoorSwitch, MemoryInterlock
+from daq.simulation.pulse_generator import FirmwareProcess
+from daq.simulation.stage import SimulatedStage
+from server.config import (
+    PulseGeneratorConfig,
+    RigConfig,
+    SimulationConfig,
+    StageConfig,
+    ViewConfig,
+)
+from server.simulated_scene import SimulatedScene
+
+TRUTH_FILE = Path("truth", "truth.h5")
+"""Where a run on the simulated bench keeps what nobody could measure; relative to the run."""
+
+SIMULATION_LIMITS = AcquisitionLimits(frame_s=5.0)
+"""Rendering the eight exposures of a shot takes about 1 CPU-s at 1600 x 1200."""
+
+Profiles = Mapping[str, CameraProfile]
+
+_STAGE_SPEED_MM_S = 100.0
+
+
+@dataclass(frozen=True)
+class AssembledRig:
+    """An opened rig.
+
+    Parameters
+    ----------
+    rig : Rig
+        Its devices.
+    bench : SimulatedBench | None
+        Doors to open and faults to inject, where the rig is simulated.
+    scene : SimulatedScene | None
+        What stands before the simulated cameras.
+    limits : AcquisitionLimits
+        Deadlines for acquisition: simulated cameras must render what real ones just see.
+    """
+
+    rig: Rig
+    bench: SimulatedBench | None = None
+    scene: SimulatedScene | None = None
+    limits: AcquisitionLimits = field(default_factory=AcquisitionLimits)
+
+    def keep_truth(self, run_dir: Path) -> Path | None:
+        """Write into a run what nobody could measure; returns the file, None where the rig is real.
+
+        Belongs after every run: it keeps all that was fired since ``Rig.prepare_scene``.
+        """
+        if self.bench is None or self.scene is None:
+            return None
+        path = run_dir / TRUTH_FILE
+        self.scene.write_truth(path, self.bench.take_fired())
+        return path
+
+
+@contextmanager
+def open_rig(config: RigConfig) -> Iterator[AssembledRig]:
+    """Open all devices of a rig, real or simulated; the light goes off first when the block ends.
+
+    Raises
+    ------
+    DeviceError
+        A device is absent, held by somebody else, or does not answer; names it.
+    PlanError
+        A camera profile cannot be read.
+    """
+    profiles = {name: load_camera_profile(view.camera.profile) for name, view in config.views.items()}
+    with ExitStack() as devices:
+        if config.simulation is None:
+            yield AssembledRig(_open_rig(config, profiles, _gpio_interlock(config), devices))
+        else:
+            yield _open_simulation(config, config.simulation, profiles, devices)
+
+
+def _open_rig(config: RigConfig, profiles: Profiles, interlock: Interlock, devices: ExitStack) -> Rig:
+    stage = None if config.stage is None else devices.enter_context(_stage(config.stage))
+    cameras = {
+        name: devices.enter_context(
+            AravisCamera(name, view.camera.ip, profiles[name], (view.sensor.height_px, view.sensor.width_px))
+        )
+        for name, view in config.views.items()
+    }
+    devices.enter_context(interlock)
+    # Entered last and so left first: the light goes off before anything else is closed.
+    generator = devices.enter_context(_pulse_generator(config))
+    return Rig(cameras, generator, interlock, stage)
+
+
+def _pulse_generator(config: RigConfig) -> SerialPulseGenerator:
+    if config.pulse_generator is None:
+        raise ValueError(f"rig {config.name}: has no pulse generator")
+    return SerialPulseGenerator("pulse_generator", config.pulse_generator.port, channels_of(config))
+
+
+def _gpio_interlock(config: RigConfig) -> GpioInterlock:
+    if config.interlock is None:
+        raise ValueError(f"rig {config.name}: has no interlock")
+    wire = config.interlock
+    return GpioInterlock("interlock", wire.chip, wire.line, active_low=wire.active_low)
+
+
+def _stage(stage: StageConfig) -> SerialStage:
+    return SerialStage("stage", stage.port, stage.range_mm, scale=StageScale(stage.microstep_um, stage.zero_mm))
+
+
+def channels_of(config: RigConfig) -> dict[str, int]:
+    """Channel of the pulse generator by view."""
+    return {name: view.led_channel for name, view in config.views.items()}
+
+
+def _open_simulation(
+    config: RigConfig, simulation: SimulationConfig, profiles: Profiles, devices: ExitStack
+) -> AssembledRig:
+    """Simulated devices at the far ends of all wires, then the drivers of a real rig at the near ones."""
+    bench = devices.enter_context(SimulatedBench(simulation.faults))
+    interlock, switch = _interlock_and_switch(simulation)
+    stage = devices.enter_context(_simulated_stage(config, simulation))
+    zero_mm = 0.0 if config.stage is None else config.stage.zero_mm
+    scene = SimulatedScene(config, lambda: stage.position_mm - zero_mm)
+    cameras = {
+        name: devices.enter_context(_simulated_camera(name, view, profiles[name], scene))
+        for name, view in config.views.items()
+    }
+    generator = devices.enter_context(FirmwareProcess(channels_of(config), bench.on_fired))
+    bench.connect(BenchDevices(cameras, generator, switch, stage))
+    wired = config.model_copy(
+        update={
+            "pulse_generator": PulseGeneratorConfig(port=generator.port),
+            "stage": config.stage and config.stage.model_copy(update={"port": stage.port}),
+        }
+    )
+
+    def prepare(kind: RunKind) -> None:
+        bench.take_fired()
+        scene.prepare(kind)
+
+    rig = _open_rig(wired, profiles, interlock, devices)
+    return AssembledRig(replace(rig, prepare_scene=prepare), bench, scene, SIMULATION_LIMITS)
+
+
+def _interlock_and_switch(simulation: SimulationConfig) -> tuple[Interlock, DoorSwitch]:
+    if simulation.gpio != "memory":
+        try:
+            line = free_line()
+            return GpioInterlock("interlock", CHIP_PATH, line), SimulatedSwitchLine(line)
+        except ChipUnsupported as reason:
+            if simulation.gpio == "chip":
+                raise DeviceUnavailable("interlock", f"simulation.gpio is 'chip', but {reason}") from reason
+    memory = MemoryInterlock("interlock")
+    return memory, memory
+
+
+def _simulated_stage(config: RigConfig, simulation: SimulationConfig) -> SimulatedStage:
+    stage = config.stage
+    if stage is None:
+        return SimulatedStage(seed=simulation.seed)
+    return SimulatedStage(
+        travel_mm=2 * max(stage.zero_mm + stage.range_mm[1], 1.0),
+        speed_mm_s=_STAGE_SPEED_MM_S,
+        microstep_um=stage.microstep_um,
+        seed=simulation.seed,
+    )
+
+
+def _simulated_camera(name: str, view: ViewConfig, profile: CameraProfile, scene: SimulatedScene) -> SimulatedCamera:
+    return SimulatedCamera(
+        name,
+        view.camera.ip,
+        f"sim-{name}"[:15],
+        profile.camera_timing,
+        scene.expose,
+        (view.sensor.height_px, view.sensor.width_px),
+    )
