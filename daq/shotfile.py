@@ -46,6 +46,7 @@ __all__ = [
     "LightPulse",
     "PulsePair",
     "RecorderError",
+    "ReferenceImages",
     "RunHeader",
     "RunKind",
     "RunPlan",
@@ -55,6 +56,7 @@ __all__ = [
     "ShotFileError",
     "ViewFormat",
     "list_runs",
+    "open_runs",
     "pack",
 ]
 
@@ -219,3 +221,15 @@ def pack(run_dir: Path, out: Path) -> None:
     """Copy a run into one plain HDF5 file that needs no other file; ``out`` must not exist."""
     reader = RunReader(run_dir)
     pack_run(run_dir, reader.header, reader.shot_count, out)
+
+
+def open_runs(data_dir: Path) -> tuple[str, ...]:
+    """Ids of the runs without an outcome: active ones, and those whose process was killed."""
+    found = []
+    for run_dir in list_runs(data_dir):
+        try:
+            if RunReader(run_dir).outcome is None:
+                found.append(run_dir.name)
+        except ShotFileError:
+            continue
+    return tuple(found)

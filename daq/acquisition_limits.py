@@ -1,0 +1,32 @@
+"""AcquisitionLimits: every deadline of acquisition in one value."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class AcquisitionLimits:
+    """Deadlines and sizes of acquisition.
+
+    Parameters
+    ----------
+    frame_s : float
+        Time for the network, after the cycle of the slowest camera, until an exposure counts as missing.
+    light_off_s : float
+        Until the generator must have confirmed that the light is off.
+    disarm_s : float
+        Until cameras that are not disarmed are left alone.
+    drain_s : float
+        Until shots that wait must be on the disk.
+    heartbeat_s : float
+        Period of the status requests to the generator.
+    recorder_depth, recorder_threads : int
+        Shots that may wait for the disk, and threads that compress them.
+    """
+
+    frame_s: float = 1.0
+    light_off_s: float = 2.0
+    disarm_s: float = 5.0
+    drain_s: float = 60.0
+    heartbeat_s: float = 0.2
+    recorder_depth: int = 8
+    recorder_threads: int = 2

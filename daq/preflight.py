@@ -1,0 +1,119 @@
+"""Everything that can be checked before a run starts, so that it is refused with a reason instead of failing."""
+
+import shutil
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+
+from daq.devices import GeneratorState, Rig
+from daq.errors import DeviceRefused, InterlockOpen, PlanError
+from daq.references import find_references
+from daq.run_plan import RunKind, RunPlan
+from daq.shotfile import ViewFormat
+from daq.timing import ShotTiming, plan_shot_timing
+
+DISK_MARGIN_BYTES = 256 * 2**20
+"""What a run leaves free; room for its header, references and the operating system."""
+_FRAMES_PER_SHOT = 2
+_REFERENCE_ITEM_BYTES = 4
+
+
+@dataclass(frozen=True)
+class PreparedRun:
+    """A plan that was found to be possible.
+
+    Parameters
+    ----------
+    run_id : str
+        Name of the run directory.
+    plan : RunPlan
+        As the operator wrote it.
+    timing : ShotTiming
+        Edges of every shot; currents are 0 in a dark run.
+    views : Mapping[str, ViewFormat]
+        Frames of every view.
+    references : Mapping[RunKind, tuple[Path, ...]]
+        Dark and background runs that belong to it.
+    """
+
+    run_id: str
+    plan: RunPlan
+    timing: ShotTiming
+    views: Mapping[str, ViewFormat]
+    references: Mapping[RunKind, tuple[Path, ...]]
+
+
+def prepare_run(rig: Rig, data_dir: Path, plan: RunPlan, now: datetime) -> PreparedRun:
+    """Check a plan against rig, references, disk, generator and interlock.
+
+    Raises
+    ------
+    PlanError
+        The plan cannot run on this rig, a reference is missing, or the disk does not hold the run.
+    DeviceRefused
+        The pulse generator has a latched fault.
+    InterlockOpen
+        The light must not be switched on.
+    """
+    timing = _timing(rig, plan)
+    _check_stage(rig, plan)
+    views = {view: ViewFormat(camera.image_shape, camera.bits) for view, camera in rig.cameras.items()}
+    references = find_references(data_dir, plan.references, views)
+    _check_disk(data_dir, plan, views)
+    check_light_permitted(rig)
+    return PreparedRun(_new_run_id(data_dir, plan.name, now), plan, timing, views, references)
+
+
+def check_light_permitted(rig: Rig) -> None:
+    """Refuse while the interlock is open or the generator has a fault."""
+    if not rig.interlock.is_closed():
+        raise InterlockOpen(f"{rig.interlock.name}: the interlock is open")
+    status = rig.generator.status()
+    if status.state is GeneratorState.FAULT:
+        raise DeviceRefused(rig.generator.name, f"fault: {', '.join(status.faults)}; acknowledge it first")
+    if not status.interlock_closed:
+        raise InterlockOpen(f"{rig.generator.name}: the interlock input of the pulse generator is open")
+
+
+def _timing(rig: Rig, plan: RunPlan) -> ShotTiming:
+    pulse = plan.pulse
+    if plan.kind is RunKind.DARK:
+        pulse = pulse.model_copy(update={"current_a": dict.fromkeys(pulse.current_a, 0.0)})
+    cameras = {view: camera.timing for view, camera in rig.cameras.items()}
+    return plan_shot_timing(plan.model_copy(update={"pulse": pulse}), cameras)
+
+
+def _check_stage(rig: Rig, plan: RunPlan) -> None:
+    if not plan.stage_z_mm:
+        return
+    if rig.stage is None:
+        raise PlanError("stage_z_mm: the rig has no translation stage")
+    lowest_mm, highest_mm = rig.stage.range_mm
+    for z_mm in plan.stage_z_mm:
+        if not lowest_mm <= z_mm <= highest_mm:
+            raise PlanError(f"stage_z_mm: {z_mm:g} mm is outside of {lowest_mm:g} to {highest_mm:g} mm")
+
+
+def _check_disk(data_dir: Path, plan: RunPlan, views: Mapping[str, ViewFormat]) -> None:
+    """Compare with the uncompressed size: how well a spray compresses is not known before."""
+    shot_bytes = _FRAMES_PER_SHOT * sum(view.frame_bytes for view in views.values())
+    pixels = sum(view.shape[0] * view.shape[1] for view in views.values())
+    reference_bytes = 2 * _FRAMES_PER_SHOT * pixels * _REFERENCE_ITEM_BYTES if plan.references else 0
+    needed = plan.total_shots * shot_bytes + reference_bytes + DISK_MARGIN_BYTES
+    free = shutil.disk_usage(data_dir).free
+    if needed > free:
+        raise PlanError(
+            f"shots: {plan.total_shots} shots of {shot_bytes} bytes need {needed} bytes on the disk of {data_dir}, "
+            f"{free} bytes are free"
+        )
+
+
+def _new_run_id(data_dir: Path, name: str, now: datetime) -> str:
+    """Sortable by time, safe as a file name, unique in the data directory."""
+    stem = f"{now:%Y%m%dT%H%M%S}-{name.strip().replace(' ', '_')}"
+    run_id, number = stem, 1
+    while (data_dir / run_id).exists():
+        number += 1
+        run_id = f"{stem}-{number}"
+    return run_id

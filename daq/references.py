@@ -1,0 +1,67 @@
+"""Dark and background runs that belong to a run: found by id, checked, averaged."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq.errors import PlanError, ShotFileError
+from daq.run_plan import RunKind
+from daq.shotfile import ReferenceImages, RunReader, ViewFormat, list_runs
+
+REFERENCE_KINDS = (RunKind.DARK, RunKind.BACKGROUND)
+
+
+def find_references(
+    data_dir: Path, run_ids: tuple[str, ...], views: Mapping[str, ViewFormat]
+) -> dict[RunKind, tuple[Path, ...]]:
+    """Run directories by kind.
+
+    Raises
+    ------
+    PlanError
+        A run does not exist, is neither dark nor background, has no valid shot, or other views or formats.
+    """
+    known = {path.name: path for path in list_runs(data_dir)}
+    found: dict[RunKind, tuple[Path, ...]] = dict.fromkeys(REFERENCE_KINDS, ())
+    for run_id in run_ids:
+        if run_id not in known:
+            raise PlanError(f"references: no run {run_id!r} in {data_dir}")
+        kind = _checked_kind(run_id, RunReader(known[run_id]), views)
+        found[kind] = (*found[kind], known[run_id])
+    return found
+
+
+def mean_images(run_dirs: tuple[Path, ...]) -> ReferenceImages:
+    """Mean of all valid shots of some runs, by view, (frame, row, column) float32 in counts; summed in float64."""
+    sums: dict[str, NDArray[np.float64]] = {}
+    count = 0
+    for run_dir in run_dirs:
+        reader = RunReader(run_dir)
+        for index in range(reader.shot_count):
+            shot = reader.read_shot(index)
+            if not shot.valid:
+                continue
+            count += 1
+            for view, double_frame in shot.views.items():
+                frames = [frame for frame in (double_frame.frame_a, double_frame.frame_b) if frame is not None]
+                total = sums.setdefault(view, np.zeros((len(frames), *frames[0].shape)))
+                for number, frame in enumerate(frames):
+                    total[number] += frame
+    return {view: (total / count).astype(np.float32) for view, total in sums.items()}
+
+
+def _checked_kind(run_id: str, reader: RunReader, views: Mapping[str, ViewFormat]) -> RunKind:
+    try:
+        header, image_keys = reader.header, reader.image_keys()
+    except ShotFileError as error:
+        raise PlanError(f"references: {error}") from error
+    kind = header.plan.kind if header.plan else None
+    if kind not in REFERENCE_KINDS:
+        raise PlanError(f"references: run {run_id!r} is {kind or 'imported'}, not dark or background")
+    if header.views != views:
+        raise PlanError(f"references: run {run_id!r} has views {header.views}, the rig {dict(views)}")
+    if kind.image_key not in image_keys:
+        raise PlanError(f"references: run {run_id!r} has no valid shot")
+    return kind

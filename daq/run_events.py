@@ -1,0 +1,67 @@
+"""What acquisition tells the world: a snapshot on request, and events as they happen. Frozen values."""
+
+from dataclasses import dataclass
+
+from daq.run_state import RunOutcome, RunState
+
+
+@dataclass(frozen=True)
+class RunStatus:
+    """Snapshot of acquisition.
+
+    Parameters
+    ----------
+    state : RunState
+        Where acquisition stands.
+    outcome : RunOutcome | None
+        How the run named by ``run_id`` ended; None while it is active and before the first one.
+    run_id : str | None
+        The active run, or the last one.
+    shots_planned, shots_recorded, shots_valid : int
+        Recorded shots are on the disk; valid ones have every exposure, with light where it belongs.
+    message : str
+        What happened last; the cause if the run failed.
+    """
+
+    state: RunState = RunState.IDLE
+    outcome: RunOutcome | None = None
+    run_id: str | None = None
+    shots_planned: int = 0
+    shots_recorded: int = 0
+    shots_valid: int = 0
+    message: str = ""
+
+    @property
+    def active(self) -> bool:
+        """A run is under way."""
+        return self.state not in (RunState.IDLE, RunState.FAULT)
+
+
+@dataclass(frozen=True)
+class StateChanged:
+    """Acquisition moved to another state."""
+
+    run_id: str
+    state: RunState
+    outcome: RunOutcome | None
+    message: str
+
+
+@dataclass(frozen=True)
+class ShotRecorded:
+    """A shot reached the disk."""
+
+    run_id: str
+    index: int
+    valid: bool
+
+
+@dataclass(frozen=True)
+class RunMessage:
+    """Something worth a line in the log of the run."""
+
+    run_id: str
+    text: str
+
+
+RunEvent = StateChanged | ShotRecorded | RunMessage

@@ -1,0 +1,66 @@
+"""RunGuard: watches interlock and generator during a run, and is the generator's heartbeat.
+
+It has a thread of its own, because the acquisition thread waits for cameras, a stage and files: the light
+goes off when the interlock opens, whatever acquisition waits for. Firing stays with the acquisition thread,
+so a heartbeat without acquisition never makes light.
+"""
+
+import threading
+from types import TracebackType
+from typing import Self
+
+from daq.devices import Rig
+from daq.errors import DaqError, DeviceError
+from daq.preflight import check_light_permitted
+from daq.run_control import RunControl
+from daq.run_state import RunStep
+
+
+class RunGuard:
+    """Ends the run when light is no longer permitted.
+
+    Parameters
+    ----------
+    rig : Rig
+        Its interlock is watched; its generator gets a status request every ``period_s``.
+    control : RunControl
+        Told about the error, after the light is off.
+    period_s : float
+        Well below the heartbeat limit of the generator.
+    """
+
+    def __init__(self, rig: Rig, control: RunControl, period_s: float) -> None:
+        self._rig = rig
+        self._control = control
+        self._period_s = period_s
+        self._done = threading.Event()
+        self._thread = threading.Thread(target=self._watch, name="run-guard", daemon=True)
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._done.set()
+        self._thread.join()
+
+    def _watch(self) -> None:
+        """Thread: an edge of the interlock ends the wait at once."""
+        try:
+            while not self._done.is_set():
+                check_light_permitted(self._rig)
+                self._rig.interlock.wait_for_change(self._period_s)
+        except DaqError as error:
+            switch_off(self._rig)
+            self._control.end(RunStep.ERROR, str(error))
+
+
+def switch_off(rig: Rig) -> str | None:
+    """Ask for darkness now; returns why that failed, for whoever must make sure of it later."""
+    try:
+        rig.generator.off()
+    except DeviceError as error:
+        return str(error)
+    return None

@@ -1,0 +1,89 @@
+"""Is a shot what it should be: every exposure there, and light in each of them? Pure.
+
+A frame without light shows in its median. If A is bright and B dark, the second pulse was lost or fell into
+A; that is a fault of the light, not a lost frame, and firing again would not prove anything.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from daq.shot import DoubleFrame, Image
+from daq.shotfile import ReferenceImages
+
+LIT_FRACTION_OF_SCALE = 0.06
+"""Without references: a lit shadowgraph lies far above this part of full scale, the dark level of a sensor below."""
+LIT_FRACTION_OF_BACKGROUND = 0.1
+"""With references: part of the way from dark to background. Half of an image may lie behind a dense spray."""
+_STRIDE_PX = 8
+"""The median needs no more than every eighth row and column: 30 000 pixels of a 2 MP frame, 0.3 ms."""
+
+Thresholds = Mapping[str, tuple[float, float]]
+"""Counts per view, for frames A and B, above which a median means light."""
+
+
+@dataclass(frozen=True)
+class ShotFindings:
+    """What is wrong with a shot; all are empty if nothing is.
+
+    Parameters
+    ----------
+    missing : tuple[str, ...]
+        Exposures that did not arrive.
+    unlit : tuple[str, ...]
+        Exposures that arrived without light although their view should be lit.
+    misfired : str
+        How the fired pulse train differs from the one asked for.
+    """
+
+    missing: tuple[str, ...] = ()
+    unlit: tuple[str, ...] = ()
+    misfired: str = ""
+
+    @property
+    def good(self) -> bool:
+        """Nothing is wrong."""
+        return not (self.missing or self.unlit or self.misfired)
+
+    def __str__(self) -> str:
+        texts = [f"no exposure {name}" for name in self.missing] + [f"no light in {name}" for name in self.unlit]
+        return ", ".join(texts + ([f"fired otherwise: {self.misfired}"] if self.misfired else []))
+
+
+def light_thresholds(bits: Mapping[str, int], dark: ReferenceImages, background: ReferenceImages) -> Thresholds:
+    """Thresholds from the mean dark and background images, or from full scale where a view has no background."""
+    thresholds = {}
+    for view, depth in bits.items():
+        low = [median(image) for image in dark[view]] if view in dark else [0.0, 0.0]
+        if view in background:
+            high = [median(image) for image in background[view]]
+            levels = [a + LIT_FRACTION_OF_BACKGROUND * (b - a) for a, b in zip(low, high, strict=True)]
+        else:
+            levels = [LIT_FRACTION_OF_SCALE * (2**depth - 1)] * 2
+        thresholds[view] = (levels[0], levels[1])
+    return thresholds
+
+
+def check_exposures(
+    views: Mapping[str, DoubleFrame], lit: Mapping[str, bool], thresholds: Thresholds, misfired: str = ""
+) -> ShotFindings:
+    """Look for exposures that are missing, and for dark ones of the views that should be lit."""
+    missing: list[str] = []
+    unlit: list[str] = []
+    for view, double_frame in views.items():
+        exposures = (
+            ("A", double_frame.frame_a, double_frame.record_a),
+            ("B", double_frame.frame_b, double_frame.record_b),
+        )
+        for (name, image, record), threshold in zip(exposures, thresholds[view], strict=True):
+            if not record.valid:
+                missing.append(f"{name} of {view}")
+            elif lit[view] and image is not None and median(image) < threshold:
+                unlit.append(f"{name} of {view}")
+    return ShotFindings(tuple(missing), tuple(unlit), misfired)
+
+
+def median(image: Image | np.ndarray) -> float:
+    """Median grey value of a coarse sample of an image (row, column)."""
+    return float(np.median(image[::_STRIDE_PX, ::_STRIDE_PX]))

@@ -1,0 +1,126 @@
+"""ShotTaker: pace, fire, collect, check; and fire again where a frame is proven to be missing."""
+
+import time
+from collections.abc import Callable
+
+from daq.acquisition_limits import AcquisitionLimits
+from daq.devices import Rig
+from daq.errors import DeviceRefused
+from daq.preflight import PreparedRun
+from daq.run_control import RunControl
+from daq.run_plan import ImageKey
+from daq.shot import DoubleFrame, FiredTrain, Shot
+from daq.shot_check import ShotFindings, Thresholds, check_exposures
+from daq.train_check import train_deviation
+
+_LEAST_COLLECT_S = 0.05
+"""What a camera gets although another one used up the deadline: its frames lie in its buffers already."""
+
+
+class ShotTaker:
+    """Takes the shots of one run on armed cameras.
+
+    Parameters
+    ----------
+    rig : Rig
+        Open devices.
+    run : PreparedRun
+        What to do.
+    control : RunControl
+        Looked at before every shot, while waiting for its time, and between cameras.
+    limits : AcquisitionLimits
+        Deadlines.
+    thresholds : Mapping[str, tuple[float, float]]
+        Medians above which an exposure is lit.
+    say : Callable[[str], None]
+        Gets a line for everything that is worth one.
+    """
+
+    def __init__(
+        self,
+        rig: Rig,
+        run: PreparedRun,
+        control: RunControl,
+        limits: AcquisitionLimits,
+        thresholds: Thresholds,
+        say: Callable[[str], None],
+    ) -> None:
+        self._rig = rig
+        self._run = run
+        self._control = control
+        self._thresholds = thresholds
+        self._say = say
+        self._frame_deadline_s = run.timing.shortest_period_ns / 1e9 + limits.frame_s
+        self._refires_left = run.plan.refire_quota
+        self._due_s = 0.0
+        self._stage_z_mm: float | None = None
+
+    def load_position(self, position: int) -> None:
+        """Move the stage in the dark, load the pulse train, verify its echo, arm the generator for these shots.
+
+        Raises
+        ------
+        DeviceRefused
+            The generator did not load what it was asked to.
+        """
+        generator, plan = self._rig.generator, self._run.plan
+        if plan.stage_z_mm and self._rig.stage:
+            generator.off()
+            self._stage_z_mm = self._rig.stage.move_to(plan.stage_z_mm[position])
+        if deviation := train_deviation(self._run.timing, generator.configure(self._run.timing)):
+            raise DeviceRefused(generator.name, f"loaded another pulse train: {deviation}")
+        if not self._control.ending:
+            generator.arm(plan.shots + self._refires_left)
+
+    def take(self, index: int) -> Shot | None:
+        """Take one shot when it is due; None if the run is ended."""
+        position, number = divmod(index, self._run.plan.shots)
+        if position and not number:
+            self.load_position(position)
+        while self._wait_for_turn():
+            shot, findings = self._fire(index)
+            if shot is None or not findings.missing or not self._refires_left:
+                return shot
+            self._refires_left -= 1
+            self._say(f"shot {index} is fired again, {self._refires_left} more permitted")
+        return None
+
+    def _wait_for_turn(self) -> bool:
+        """Keep the rate by the clock, and never fall below the shortest period to catch up."""
+        if not self._control.wait_until(self._due_s):
+            return False
+        now = time.monotonic()
+        period_s, shortest_s = 1 / self._run.plan.rate_hz, self._run.timing.shortest_period_ns / 1e9
+        on_time_s = self._due_s if now - self._due_s < period_s else now
+        self._due_s = max(on_time_s + period_s, now + shortest_s)
+        return True
+
+    def _fire(self, index: int) -> tuple[Shot | None, ShotFindings]:
+        for camera in self._rig.cameras.values():
+            camera.begin_shot()
+        host_time_ns = time.time_ns()
+        fired = self._rig.generator.fire()
+        views = self._collect()
+        if views is None:
+            return None, ShotFindings()
+        findings = self._check(index, fired, views)
+        key = self._run.plan.kind.image_key if findings.good else ImageKey.INVALID
+        return Shot(index, key, views, fired, host_time_ns, self._stage_z_mm), findings
+
+    def _collect(self) -> dict[str, DoubleFrame] | None:
+        """Collect the exposures of all views before one common deadline; None if the run ends at once."""
+        deadline_s = time.monotonic() + self._frame_deadline_s
+        views = {}
+        for view, camera in self._rig.cameras.items():
+            views[view] = camera.collect(max(_LEAST_COLLECT_S, deadline_s - time.monotonic()))
+            if self._control.at_once:
+                return None
+        return views
+
+    def _check(self, index: int, fired: FiredTrain, views: dict[str, DoubleFrame]) -> ShotFindings:
+        lit = {view: one.current_a > 0 for view, one in self._run.timing.views.items()}
+        misfired = train_deviation(self._run.timing, fired) or ""
+        findings = check_exposures(views, lit, self._thresholds, misfired)
+        if not findings.good:
+            self._say(f"shot {index}: {findings}")
+        return findings
