@@ -8,11 +8,14 @@ import asyncio
 import threading
 from collections import deque
 from collections.abc import AsyncIterator, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from typing import Any
 
+from daq.run_events import RunEvent, RunMessage, ShotRecorded, StateChanged
+
 HISTORY = 2000
+RUN_EVENTS = {StateChanged: "run_state", ShotRecorded: "shot_recorded", RunMessage: "run_message"}
 _KEEP_ALIVE_S = 15.0
 
 
@@ -74,6 +77,10 @@ class EventPublisher:
             if self._loop is not None:
                 self._loop.call_soon_threadsafe(self._wake)
         return event
+
+    def publish_run_event(self, event: RunEvent) -> None:
+        """Add what acquisition says; ``daq.acquisition.Acquisition`` gets this as its ``publish``."""
+        self.publish(RUN_EVENTS[type(event)], **asdict(event))
 
     def since(self, last_id: int) -> list[Event]:
         """Events after ``last_id``; all that are kept if it comes from another life of the server."""

@@ -238,6 +238,6 @@ def jobs_on_disk(data_dir: Path) -> Iterator[Job]:
                 shot=int(volume.name.split("_")[1]),
                 calibration=str(written.get("calibration", "")),
                 results_id=record.parent.name,
-                settings=written.get("settings", {}),
+                settings=json.loads(written.get("settings", "{}")),
                 more={"state": JobState.DONE},
             )

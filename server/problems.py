@@ -9,7 +9,6 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from pydantic import BaseModel, ConfigDict, Field
 from starlette.exceptions import HTTPException
-from starlette.routing import Match
 
 from daq.errors import (
     BusyError,
@@ -103,6 +102,21 @@ def install(app: FastAPI) -> None:
     app.add_exception_handler(Exception, _on_unknown_error)
 
 
+def describe(app: FastAPI) -> None:
+    """Put the problem document into the OpenAPI schema, in the place of FastAPI's own error bodies."""
+    generate = app.openapi
+
+    def openapi() -> dict[str, Any]:
+        schema = generate()
+        schemas = schema["components"]["schemas"]
+        schemas["Problem"] = Problem.model_json_schema()
+        for name in ("HTTPValidationError", "ValidationError"):
+            schemas.pop(name, None)
+        return schema
+
+    app.openapi = openapi  # type: ignore[method-assign]
+
+
 async def _on_known_error(request: Request, error: Exception) -> JSONResponse:
     more = {"device": error.device} if isinstance(error, DeviceError) else {}
     return problem(request, status_of(error), str(error), f"urn:tomoshadow:{type(error).__name__}", **more)
@@ -116,17 +130,10 @@ async def _on_invalid_request(request: Request, error: RequestValidationError) -
 
 async def _on_http_error(request: Request, error: HTTPException) -> JSONResponse:
     answer = problem(request, error.status_code, error.detail)
-    if error.status_code == HTTPStatus.METHOD_NOT_ALLOWED:
-        answer.headers["Allow"] = ", ".join(_allowed_methods(request))
+    answer.headers.update(error.headers or {})
     return answer
 
 
 async def _on_unknown_error(request: Request, error: Exception) -> JSONResponse:
     _LOG.error("%s %s", request.method, request.url.path, exc_info=error)
     return problem(request, 500, None)
-
-
-def _allowed_methods(request: Request) -> list[str]:
-    """Methods of all routes of this path: FastAPI keeps one route per method."""
-    matching = (route for route in request.app.routes if route.matches(request.scope)[0] is Match.PARTIAL)
-    return sorted({method for route in matching for method in getattr(route, "methods", None) or ()})

@@ -1,0 +1,133 @@
+"""JobRunner: takes jobs from the table to the engine, and writes down what becomes of them.
+
+The table is the queue. Whatever is asked for while the server is down, or was running when it died, is done later.
+"""
+
+import asyncio
+from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from processing.engine import Engine, Task, TaskAborted, TaskError
+from server.calibrations import CalibrationStore
+from server.events import EventPublisher
+from server.jobs import Job, JobKind, JobState, JobTable
+from server.problems import Conflict
+
+
+class JobRunner:
+    """Runs queued jobs, as many at a time as the engine has workers.
+
+    Parameters
+    ----------
+    engine : Engine
+        Where they run; started.
+    table : JobTable
+        The queue and the account of all jobs.
+    tasks : Mapping[JobKind, Task]
+        Work function by kind of job.
+    events : EventPublisher
+        Gets ``job_changed`` and ``job_progress``.
+    data_dir : Path
+        Folder of the run directories.
+    calibrations : CalibrationStore
+        Where calibrations are read from and written to.
+    """
+
+    def __init__(
+        self,
+        engine: Engine,
+        table: JobTable,
+        tasks: Mapping[JobKind, Task],
+        events: EventPublisher,
+        data_dir: Path,
+        calibrations: CalibrationStore,
+    ) -> None:
+        self._engine = engine
+        self._table = table
+        self._tasks = tasks
+        self._events = events
+        self._data_dir = data_dir
+        self._calibrations = calibrations
+        self._loop = asyncio.get_running_loop()
+        self._changed = asyncio.Event()
+        self._running: set[str] = set()
+
+    def submit(self, job: Job) -> Job:
+        """Queue a job; from any thread. The same work is not done twice."""
+        queued = self._table.add(job)
+        self._tell(queued)
+        self._loop.call_soon_threadsafe(self._changed.set)
+        return queued
+
+    async def abort(self, job_id: str) -> Job:
+        """Abort a job: a waiting one at once, a running one at its next step.
+
+        Raises
+        ------
+        NotFound
+            There is no such job.
+        Conflict
+            It has ended already.
+        """
+        if job_id in self._running:
+            await self._engine.abort(job_id)
+            return await asyncio.to_thread(self._table.get, job_id)
+        return await self._move(job_id, JobState.ABORTED)
+
+    async def run(self) -> None:
+        """Work until cancelled; jobs that are then unfinished are taken up by the next start."""
+        await asyncio.to_thread(self._table.requeue_interrupted)
+        async with asyncio.TaskGroup() as group:
+            while True:
+                self._changed.clear()
+                for job in await asyncio.to_thread(self._table.oldest, JobState.QUEUED, self._engine.workers):
+                    if len(self._running) < self._engine.workers and job.id not in self._running:
+                        self._running.add(job.id)
+                        group.create_task(self._perform(job))
+                await self._changed.wait()
+
+    async def _perform(self, job: Job) -> None:
+        try:
+            await self._move(job.id, JobState.RUNNING)
+            await self._settle(job)
+        except Conflict:
+            return  # aborted between being read from the table and being started
+        finally:
+            self._running.discard(job.id)
+            self._changed.set()
+
+    async def _settle(self, job: Job) -> None:
+        try:
+            arguments = self._arguments(job)
+            result = await self._engine.submit(
+                job.id, self._tasks[job.kind], arguments, partial(self._tell_progress, job.id)
+            )
+        except TaskAborted:
+            await self._move(job.id, JobState.ABORTED)
+        except TaskError as error:
+            await self._move(job.id, JobState.FAILED, error=str(error))
+        else:
+            await self._move(job.id, JobState.DONE, result=result)
+
+    def _arguments(self, job: Job) -> dict[str, Any]:
+        run_dir = self._data_dir / job.run_id
+        return {
+            "run_dir": str(run_dir),
+            "shot": job.shot,
+            "calibration_file": str(self._calibrations.path(job.calibration)),
+            "results_dir": str(run_dir / "results" / job.results_id) if job.results_id else None,
+            "settings": job.settings,
+        }
+
+    async def _move(self, job_id: str, to: JobState, **more: Any) -> Job:
+        job = await asyncio.to_thread(partial(self._table.move, job_id, to, **more))
+        self._tell(job)
+        return job
+
+    def _tell(self, job: Job) -> None:
+        self._events.publish("job_changed", job=job.id, run=job.run_id, shot=job.shot, state=job.state, error=job.error)
+
+    def _tell_progress(self, job_id: str, steps: int) -> None:
+        self._events.publish("job_progress", job=job_id, steps=steps)

@@ -1,0 +1,61 @@
+// Live view: one binary websocket carries all cameras. Per view the newest picture wins; nothing queues.
+export default {
+  template: `
+    <div class="live-grid" :data-pictures="pictures">
+      <figure v-for="(view, number) in views" :key="view" class="live-tile">
+        <canvas :ref="canvas => canvases[number] = canvas" width="560" height="420" role="img" :aria-label="view + ' live view'"></canvas>
+        <figcaption>{{ view }}
+          <span :class="['lamp', lamps[number]]" role="status" :aria-label="view + ' ' + texts[lamps[number]]"></span>
+        </figcaption>
+      </figure>
+    </div>`,
+  props: { views: Array, path: String },
+  data() {
+    return { pictures: 0, lamps: this.views.map(() => "off"), texts: { ok: "live", warn: "no new picture", off: "no signal" } };
+  },
+  created() {
+    this.canvases = [];
+    this.busy = [];
+    this.seen = this.views.map(() => -Infinity);
+    this.leaving = false;
+  },
+  mounted() {
+    this.connect();
+    this.watch = setInterval(() => this.judge(), 500);
+  },
+  unmounted() {
+    this.leaving = true;
+    clearInterval(this.watch);
+    this.socket?.close();
+  },
+  methods: {
+    connect() {
+      const url = new URL(this.path, location.href);
+      url.protocol = url.protocol.replace("http", "ws");
+      this.socket = new WebSocket(url);
+      this.socket.binaryType = "arraybuffer";
+      this.socket.onmessage = (event) => this.draw(event.data);
+      this.socket.onclose = () => { if (!this.leaving) setTimeout(() => this.connect(), 1000); };
+    },
+    async draw(message) {
+      const number = new Uint8Array(message, 0, 1)[0];
+      const canvas = this.canvases[number];
+      this.seen[number] = performance.now();
+      if (!canvas || this.busy[number]) return;
+      this.busy[number] = true;
+      try {
+        const bitmap = await createImageBitmap(new Blob([new Uint8Array(message, 1)], { type: "image/jpeg" }));
+        if (canvas.width !== bitmap.width || canvas.height !== bitmap.height) [canvas.width, canvas.height] = [bitmap.width, bitmap.height];
+        canvas.getContext("2d").drawImage(bitmap, 0, 0);
+        bitmap.close();
+        this.pictures++;
+      } finally {
+        this.busy[number] = false;
+      }
+    },
+    judge() {
+      const connected = this.socket?.readyState === WebSocket.OPEN;
+      this.lamps = this.seen.map((time) => !connected || time === -Infinity ? "off" : performance.now() - time > 2500 ? "warn" : "ok");
+    },
+  },
+};

@@ -1,0 +1,129 @@
+"""Tables of the page: runs with their outcomes, jobs with their states."""
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+from nicegui import ui
+
+from daq.errors import DaqError
+from daq.run_plan import RunKind
+from processing.reconstruction.method import ReconstructionMethod
+from processing.reconstruction.settings import ReconstructionSettings
+from server.jobs import Job, JobState, calibration_job
+from server.problems import ServerError
+from server.reconstruction import request_reconstruction
+from server.runs import ACTIVE, RunSummary
+from server.services import Context
+from server.ui.run_panel import outcome_colour
+from server.ui.theme import panel
+
+_BADGE = '<q-td :props="props"><q-badge :color="props.row.colour" :label="props.value" /></q-td>'
+_ACTION = """<q-td :props="props" auto-width><q-btn v-if="props.value" dense flat no-caps size="sm" color="primary"
+:label="props.value" @click.stop="$parent.$emit('act', props.row)" /></q-td>"""
+_SHOWN = 60
+
+
+class RunTable:
+    """Runs, newest first; a calibration run can be fitted, a sample run reconstructed by a chosen method."""
+
+    def __init__(self, context: Context) -> None:
+        self._context = context
+        with panel("Runs", "flex-1"):
+            with ui.row().classes("w-full items-center justify-between no-wrap q-mt-none"):
+                ui.label("Reconstruct by").classes("text-xs opacity-70")
+                methods = {method.value: method.value.upper() for method in ReconstructionMethod}
+                self._method = ui.select(methods, value=context.services.settings.method.value)
+                self._method.props('dense borderless options-dense aria-label="Method"').classes("text-xs")
+            self._table = _table(
+                ("name", "Run"), ("kind", "Kind"), ("shots", "Valid / shots"), ("outcome", "Outcome"), ("action", "")
+            )
+            self._table.add_slot("body-cell-action", _ACTION)
+            self._table.on("act", self._on_act)
+
+    async def reload(self) -> None:
+        """Read the run directories again."""
+        runs = await asyncio.to_thread(self._context.runs.newest, _SHOWN)
+        self._table.rows = [_run_row(run) for run in runs]
+        self._table.update()
+
+    async def _on_act(self, event: Any) -> None:
+        run_id, kind = event.args["id"], event.args["kind"]
+        ask = self._calibrate if kind == RunKind.CALIBRATION else self._reconstruct
+        await _try(lambda: asyncio.to_thread(ask, run_id))
+
+    def _calibrate(self, run_id: str) -> None:
+        self._context.runner.submit(calibration_job(run_id, f"{run_id}-pinhole", "pinhole"))
+
+    def _reconstruct(self, run_id: str) -> None:
+        method = ReconstructionMethod(self._method.value)
+        settings: ReconstructionSettings = self._context.services.settings.model_copy(update={"method": method})
+        request_reconstruction(self._context, run_id, None, None, settings)
+
+
+class JobTableView:
+    """Jobs, newest first; an unfinished one can be aborted, a fitted calibration chosen."""
+
+    def __init__(self, context: Context) -> None:
+        self._context = context
+        with panel("Processing", "flex-1"):
+            self._table = _table(("job", "Job"), ("run", "Run"), ("outcome", "State"), ("detail", ""), ("action", ""))
+            self._table.add_slot("body-cell-action", _ACTION)
+            self._table.on("act", self._on_act)
+
+    async def reload(self) -> None:
+        """Read the job table again."""
+        jobs = await asyncio.to_thread(self._context.jobs.newest, None, JobState, _SHOWN)
+        self._table.rows = [_job_row(job) for job in jobs]
+        self._table.update()
+
+    async def _on_act(self, event: Any) -> None:
+        if event.args["action"] == "Abort":
+            await _try(lambda: self._context.runner.abort(event.args["id"]))
+        else:
+            await _try(lambda: asyncio.to_thread(self._context.calibrations.choose, event.args["calibration"]))
+            ui.notify(f"{event.args['calibration']} is the current calibration", type="positive")
+
+
+async def _try(action: Callable[[], Awaitable[Any]]) -> None:
+    try:
+        await action()
+    except (DaqError, ServerError) as error:
+        ui.notify(str(error), type="negative")
+
+
+def _table(*columns: tuple[str, str]) -> ui.table:
+    described = [{"name": name, "label": label, "field": name, "align": "left"} for name, label in columns]
+    table = ui.table(columns=described, rows=[], row_key="id").classes("w-full").props("dense flat hide-bottom")
+    table.props('rows-per-page-options="[0]" :pagination="{rowsPerPage: 0}"')
+    table.add_slot("body-cell-outcome", _BADGE)
+    return table
+
+
+def _run_row(run: RunSummary) -> dict[str, Any]:
+    valid = "…" if run.shots_valid is None else run.shots_valid
+    actions = {RunKind.CALIBRATION: "Calibrate", RunKind.SAMPLE: "Reconstruct"}
+    return {
+        "id": run.run_id,
+        "name": run.name,
+        "kind": run.kind,
+        "shots": f"{valid} / {run.shots_recorded}",
+        "outcome": run.outcome,
+        "colour": outcome_colour(run.outcome),
+        "action": "" if run.outcome == ACTIVE or run.kind is None else actions.get(run.kind, ""),
+    }
+
+
+def _job_row(job: Job) -> dict[str, Any]:
+    is_calibration = job.shot is None
+    choices = {JobState.QUEUED: "Abort", JobState.RUNNING: "Abort", JobState.DONE: "Use" if is_calibration else ""}
+    return {
+        "id": job.id,
+        "job": "calibration" if is_calibration else f"{str(job.settings.get('method', '')).upper()} shot {job.shot}",
+        "run": job.run_id,
+        "outcome": job.state,
+        "colour": outcome_colour(job.state),
+        "detail": job.error or "",
+        "action": choices.get(job.state, ""),
+        "calibration": job.calibration,
+    }
