@@ -125,7 +125,7 @@ class PulseLine:
     @contextmanager
     def _alone(self, command: Command) -> Iterator[None]:
         if not self._asking.acquire(timeout=2 * LIMIT_S):
-            raise DeviceTimeout(self._name, command, 2 * LIMIT_S)
+            raise DeviceTimeout(self._name, command.value, 2 * LIMIT_S)
         try:
             yield
         finally:
@@ -152,8 +152,8 @@ class PulseLine:
                     damaged += 1
                     repeat_s = min(repeat_s, time.monotonic() + _REPEAT_DAMAGED_S)
         if damaged:
-            raise ProtocolError(self._name, f"only damaged lines ({damaged}) in answer to {request.command!r}")
-        raise DeviceTimeout(self._name, request.command, limit_s)
+            raise ProtocolError(self._name, f"only damaged lines ({damaged}) in answer to {request.command}")
+        raise DeviceTimeout(self._name, request.command.value, limit_s)
 
     def _next_reply(self, request: Request) -> Reply | _Heard:
         """Reply to this request; an older one is NOTHING, one that cannot be read, here or there, is DAMAGED."""
@@ -169,7 +169,7 @@ class PulseLine:
         if reply.sequence != request.sequence:
             return _Heard.NOTHING
         if reply.error is None and set(reply.fields) != set(FIELDS[request.command].reply):
-            raise ProtocolError(self._name, f"answered {request.command!r} with fields {sorted(reply.fields)}")
+            raise ProtocolError(self._name, f"answered {request.command} with fields {sorted(reply.fields)}")
         return reply
 
     def _next_line(self) -> bytes | None:
@@ -191,7 +191,7 @@ class PulseLine:
             with self._translated_errors():
                 self._opened().write(encoded)
         except serial.SerialTimeoutException as error:
-            raise DeviceTimeout(self._name, command, limit_s) from error
+            raise DeviceTimeout(self._name, command.value, limit_s) from error
 
     def _opened(self) -> serial.Serial:
         port = self._port

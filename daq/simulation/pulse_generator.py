@@ -7,7 +7,7 @@ and the light of the simulated cameras.
 import queue
 import shutil
 import signal
-import subprocess  # the firmware's host build is a program of ours
+import subprocess
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
@@ -20,32 +20,33 @@ from daq.shot import FiredTrain, LightPulse
 
 _DEVICE = "simulated pulse generator"
 _ROOT = Path(__file__).resolve().parents[2]
-_PROGRAM = _ROOT / "build" / "firmware" / "firmware_host"
+_BUILD_DIR = _ROOT / "build" / "firmware"
 _BUILD_LIMIT_S = 60.0
 _ANSWER_LIMIT_S = 5.0
 _FIELDS_PER_CHANNEL = 7
 
 
-def build_firmware() -> Path:
-    """Path of the core's host build, compiled if its sources are newer or it is missing.
+def build_firmware(build_dir: Path = _BUILD_DIR) -> Path:
+    """Path of the core's host build, compiled if it is missing or older than its sources.
 
     Raises
     ------
     DeviceUnavailable
         It is missing and cannot be compiled here; the text says what is needed.
     """
-    tools = [tool for tool in ("make", "cc") if shutil.which(tool) is None]
-    if tools and not _PROGRAM.exists():
+    program = build_dir / "firmware_host"
+    missing = [tool for tool in ("make", "cc") if shutil.which(tool) is None]
+    if missing and not program.exists():
         raise DeviceUnavailable(
-            _DEVICE, f"{_PROGRAM} is missing, and {' and '.join(tools)} to build it (apt: gcc make)"
+            _DEVICE, f"{program} is missing, and so is {' and '.join(missing)} to build it (apt install gcc make)"
         )
-    if not tools:
-        _compile()
-    return _PROGRAM
+    if not missing:
+        _compile(build_dir)
+    return program
 
 
-def _compile() -> None:
-    command = ["make", "--no-print-directory", "-C", str(_ROOT / "firmware"), "host"]
+def _compile(build_dir: Path) -> None:
+    command = ["make", "--no-print-directory", "-C", str(_ROOT / "firmware"), "host", f"BUILD={build_dir}"]
     try:
         subprocess.run(command, check=True, capture_output=True, text=True, timeout=_BUILD_LIMIT_S)
     except subprocess.CalledProcessError as error:
