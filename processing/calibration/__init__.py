@@ -1,0 +1,1 @@
+"""From images of a target at known places to the camera of every view, and how far to trust it."""

@@ -1,0 +1,59 @@
+"""Calibration sets on disk: a recorded calibration run, or a folder of imported images and measured points.
+
+::
+
+    SET/set.json     target, planes and points; paths relative to SET
+    SET/images/...   the images as they came
+    SET/points/...   the tables of measured points as they came
+"""
+
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from processing.calibration.errors import CalibrationError
+from processing.calibration.imported_set import detect_imported
+from processing.calibration.observation import CalibrationSet
+from processing.calibration.recorded_set import detect_recorded
+from processing.calibration.set_record import CalibrationEntry, SetRecord
+
+SET_FILE = "set.json"
+
+
+def load_calibration_set(path: Path) -> CalibrationSet:
+    """Detect the target in a recorded calibration run or in an imported set.
+
+    Parameters
+    ----------
+    path : Path
+        Run directory, set directory, or the directory of an import that holds a set.
+
+    Raises
+    ------
+    CalibrationError
+        The path is neither, or an imported image does not show the target; names the file.
+    """
+    path = Path(path)
+    if (path / SET_FILE).exists():
+        return _read_imported(path)
+    if (path / "calibration" / SET_FILE).exists():
+        return _read_imported(path / "calibration")
+    if (path / "run.h5").exists():
+        return detect_recorded(path)
+    raise CalibrationError(f"{path}: neither a calibration run (run.h5) nor a calibration set ({SET_FILE})")
+
+
+def write_set_file(folder: Path, source: str, calibration: CalibrationEntry) -> None:
+    """Write ``set.json``; all paths in it are relative to the folder."""
+    record = SetRecord(source=source, calibration=calibration)
+    (folder / SET_FILE).write_text(record.model_dump_json(indent=2, by_alias=True) + "\n", encoding="utf-8")
+
+
+def _read_imported(folder: Path) -> CalibrationSet:
+    file = folder / SET_FILE
+    try:
+        record = SetRecord.model_validate_json(file.read_text(encoding="utf-8"))
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise CalibrationError(f"{file}: {'.'.join(str(part) for part in first['loc'])}: {first['msg']}") from error
+    return detect_imported(record.source, record.calibration, folder)

@@ -1,0 +1,15 @@
+"""The errors of calibration.
+
+::
+
+    CalibrationError        a calibration cannot be made, read or trusted; names view or file, value and limit
+    └── TargetNotFound      an image does not show the target well enough
+"""
+
+
+class CalibrationError(Exception):
+    """A calibration cannot be made, read or trusted; the text names view or file, value and limit."""
+
+
+class TargetNotFound(CalibrationError):
+    """An image does not show the target well enough to assign its points."""

@@ -1,0 +1,129 @@
+"""calibrate: all points of a view in one joint 3-D fit, judged by points it has not seen -> Calibration."""
+
+from collections.abc import Sequence
+from datetime import UTC, datetime
+
+import numpy as np
+from numpy.typing import NDArray
+
+from processing.calibration.calibration import Calibration, Model, ViewCalibration
+from processing.calibration.calibration_record import content_id
+from processing.calibration.errors import CalibrationError
+from processing.calibration.free_pose import board_errors_px, fit_free_poses, free_pose_holdout_px
+from processing.calibration.health import check_motion, errors_px, holdout_error_px, judge, outline_mm, plane_error
+from processing.calibration.observation import CalibrationSet, PlaneObservation, ViewObservations, stacked
+from processing.calibration.pinhole_fit import fit_pinhole
+from processing.calibration.polynomial import fit_polynomial
+from processing.geometry import FloatArray, ViewMapping
+
+
+def calibrate(
+    calibration_set: CalibrationSet, model: Model | str = Model.PINHOLE, *, created_utc: str | None = None
+) -> Calibration:
+    """Fit the camera of every view and judge it.
+
+    Parameters
+    ----------
+    calibration_set : CalibrationSet
+        Detected points.
+    model : Model
+        One joint fit per view: ``pinhole``, ``pinhole_tilted`` or ``polynomial``.
+    created_utc : str, optional
+        ISO 8601; now, if not given.
+
+    Raises
+    ------
+    CalibrationError
+        A view cannot be calibrated; names view, value and limit.
+    """
+    model = Model(model)
+    views = {}
+    for name, seen in calibration_set.views.items():
+        try:
+            views[name] = _free_view(seen, model) if seen.free_pose else _joint_view(name, seen, model)
+        except CalibrationError as error:
+            text = str(error)
+            raise CalibrationError(text if text.startswith(name) else f"{name}: {text}") from error
+    undated = Calibration(
+        id="",
+        created_utc=created_utc or datetime.now(UTC).isoformat(timespec="seconds"),
+        target=calibration_set.target,
+        views=views,
+        z_range_mm=_common_z_range_mm(calibration_set),
+        source=calibration_set.source,
+        notes=calibration_set.notes,
+    )
+    return undated.with_id(content_id(undated))
+
+
+def _joint_view(name: str, seen: ViewObservations, model: Model) -> ViewCalibration:
+    check_motion(name, seen.planes)
+    mapping, used = fit_mapping(seen.planes, seen.image_size_px, model)
+    planes = [plane.select(mask) for plane, mask in zip(seen.planes, _by_plane(seen.planes, used), strict=True)]
+    planes = [plane for plane in planes if len(plane)]
+    holdout_px = holdout_error_px(planes, lambda training: fit_mapping(training, seen.image_size_px, model)[0])
+    errors = [errors_px(mapping, plane) for plane in planes]
+    n_rejected = int((~used).sum())
+    return _summary(mapping, model, planes, errors, holdout_px, n_rejected, extent_mm=outline_mm(planes))
+
+
+def fit_mapping(
+    planes: Sequence[PlaneObservation], image_size_px: tuple[int, int], model: Model
+) -> tuple[ViewMapping, NDArray[np.bool_]]:
+    """Fit one mapping to all points of a view; also which of them (N,) it was fitted to."""
+    points_mm, image_px = stacked(planes)
+    if model is Model.POLYNOMIAL:
+        return fit_polynomial(points_mm, image_px, image_size_px)
+    fitted = fit_pinhole(points_mm, image_px, image_size_px, tilted=model is Model.PINHOLE_TILTED)
+    return fitted.camera, fitted.used
+
+
+def _free_view(seen: ViewObservations, model: Model) -> ViewCalibration:
+    if model is not Model.PINHOLE:
+        raise CalibrationError(f"boards in free poses give a pinhole camera, not {model.value}")
+    if not all(plane.free_pose for plane in seen.planes):
+        raise CalibrationError("some planes have z_mm, others have not: give all of them or none")
+    fitted = fit_free_poses(seen.planes, seen.image_size_px)
+    errors = [
+        board_errors_px(fitted.camera, board, pose) for board, pose in zip(seen.planes, fitted.poses, strict=True)
+    ]
+    holdout_px = free_pose_holdout_px(seen.planes, seen.image_size_px)
+    summary = _summary(fitted.camera, model, list(seen.planes), errors, holdout_px, 0, extent_mm=())
+    return summary.with_boards(fitted.poses)
+
+
+def _summary(
+    mapping: ViewMapping,
+    model: Model,
+    planes: list[PlaneObservation],
+    errors: list[FloatArray],
+    holdout_px: float,
+    n_rejected: int,
+    extent_mm: tuple[tuple[float, float], ...],
+) -> ViewCalibration:
+    distances_px = np.concatenate(errors)
+    return ViewCalibration(
+        mapping=mapping,
+        model=model,
+        n_points=len(distances_px),
+        mean_error_px=float(distances_px.mean()),
+        rms_px=float(np.sqrt((distances_px**2).mean())),
+        max_error_px=float(distances_px.max()),
+        holdout_error_px=holdout_px,
+        planes=tuple(plane_error(plane, distance_px) for plane, distance_px in zip(planes, errors, strict=True)),
+        verdict=judge(holdout_px, n_rejected / (n_rejected + len(distances_px))),
+        n_rejected=n_rejected,
+        extent_mm=extent_mm,
+    )
+
+
+def _by_plane(planes: Sequence[PlaneObservation], mask: NDArray[np.bool_]) -> list[NDArray[np.bool_]]:
+    return np.split(mask, np.cumsum([len(plane) for plane in planes])[:-1])
+
+
+def _common_z_range_mm(calibration_set: CalibrationSet) -> tuple[float, float]:
+    """Range that every view is calibrated for; (0, 0) where the world is not known."""
+    if any(seen.free_pose for seen in calibration_set.views.values()):
+        return (0.0, 0.0)
+    depths_mm = [stacked(seen.planes)[0][:, 2] for seen in calibration_set.views.values()]
+    return float(max(z.min() for z in depths_mm)), float(min(z.max() for z in depths_mm))

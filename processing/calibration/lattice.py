@@ -1,0 +1,230 @@
+"""Grid assignment: which detected point is which node of a regular target. Pure geometry, by neighbours."""
+
+import heapq
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import KDTree
+
+from processing.geometry import FloatArray
+
+Node = tuple[int, int]
+IdArray = NDArray[np.int64]
+
+TOLERANCE = 0.25
+"""How far a point may lie from where its neighbours expect it, in lattice steps."""
+
+MAX_DEVIATIONS = 8
+"""How many medians a point may lie beside the smooth grid."""
+MIN_DEVIATION_PX = 0.15
+"""Points this close to the smooth grid are never dropped."""
+MIN_SMOOTH_POINTS = 150
+"""Fewer points do not draw the grid finely enough to judge one of them; the fit of the camera does."""
+
+_DIRECTIONS: tuple[tuple[int, int], ...] = ((0, 1), (0, -1), (1, 1), (1, -1))
+
+
+@dataclass(frozen=True)
+class Lattice:
+    """Points that were assigned to nodes.
+
+    Parameters
+    ----------
+    ids : (N, 2) array
+        Column and row of each point.
+    indices : (N,) array
+        Which of the detected points it is.
+    """
+
+    ids: IdArray
+    indices: IdArray
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    def with_ids(self, ids: IdArray) -> "Lattice":
+        """The same points under other ids."""
+        return Lattice(np.asarray(ids, dtype=np.int64), self.indices)
+
+    def select(self, chosen: NDArray[np.bool_]) -> "Lattice":
+        """Some of the points."""
+        return Lattice(self.ids[chosen], self.indices[chosen])
+
+
+def _everything_fits(_parent: int, _child: int) -> bool:
+    return True
+
+
+@dataclass
+class _Growth:
+    points_px: FloatArray
+    fits: Callable[[int, int], bool]
+    tree: KDTree
+    nodes: dict[Node, int] = field(default_factory=dict)
+    taken: set[int] = field(default_factory=set)
+    steps: dict[Node, FloatArray] = field(default_factory=dict)
+    queue: list[tuple[float, Node, int, int, Node]] = field(default_factory=list)
+
+    def accept(self, node: Node, index: int, steps_px: FloatArray) -> None:
+        self.nodes[node] = index
+        self.taken.add(index)
+        self.steps[node] = steps_px
+        for axis, sign in _DIRECTIONS:
+            self._offer(node, axis, sign)
+
+    def _offer(self, node: Node, axis: int, sign: int) -> None:
+        """Queue the point that lies where the lattice continues from a node, if there is one."""
+        there, behind = _neighbour(node, axis, sign), _neighbour(node, axis, -sign)
+        if there in self.nodes:
+            return
+        here_px, step_px = self.points_px[self.nodes[node]], self.steps[node][axis]
+        if behind in self.nodes:
+            step_px = sign * (here_px - self.points_px[self.nodes[behind]])
+        length_px = float(np.linalg.norm(step_px))
+        distance_px, found = self.tree.query(here_px + sign * step_px)
+        index = int(found)
+        if distance_px < TOLERANCE * length_px and self.fits(self.nodes[node], index):
+            heapq.heappush(self.queue, (float(distance_px) / length_px, there, index, sign * (axis + 1), node))
+
+    def run(self) -> None:
+        """Take the best-fitting candidate until none is left."""
+        while self.queue:
+            _, node, index, direction, parent = heapq.heappop(self.queue)
+            if node in self.nodes or index in self.taken:
+                continue
+            axis, sign = abs(direction) - 1, 1 if direction > 0 else -1
+            steps_px = self.steps[parent].copy()
+            steps_px[axis] = sign * (self.points_px[index] - self.points_px[self.nodes[parent]])
+            self.accept(node, index, steps_px)
+
+
+def grow_lattice(
+    points_px: FloatArray,
+    start: int,
+    steps_px: FloatArray,
+    fits: Callable[[int, int], bool] = _everything_fits,
+) -> Lattice:
+    """Assign points to the nodes of a lattice, from one of them outwards, best fit first.
+
+    Parameters
+    ----------
+    points_px : (N, 2) array
+        Detected points.
+    start : int
+        Index of the point that becomes node (0, 0).
+    steps_px : (2, 2) array
+        Rows: step to the next column and to the next row, near the start.
+    fits : callable
+        Whether two points (indices) can be neighbours; rules out dust.
+
+    Returns
+    -------
+    Lattice
+        Nodes reached; at least the start.
+    """
+    growth = _Growth(points_px, fits, KDTree(points_px))
+    growth.accept((0, 0), start, np.asarray(steps_px, dtype=np.float64))
+    growth.run()
+    return Lattice(
+        np.array(list(growth.nodes), dtype=np.int64), np.fromiter(growth.nodes.values(), np.int64, len(growth.nodes))
+    )
+
+
+def orient(lattice: Lattice, points_px: FloatArray) -> Lattice:
+    """Turn ids so that columns run to the right and rows downwards, as seen from the front of the target."""
+    columns_step_px, rows_step_px = _mean_steps(lattice, points_px)
+    ids = lattice.ids
+    if np.linalg.det(np.array([columns_step_px, rows_step_px])) < 0:
+        ids, columns_step_px, rows_step_px = ids[:, ::-1], rows_step_px, columns_step_px
+    turns = max(range(4), key=lambda turn: _turned_step(columns_step_px, rows_step_px, turn)[0])
+    return lattice.with_ids(rotate_ids(ids, turns))
+
+
+def shortest_step_px(lattice: Lattice, points_px: FloatArray) -> float:
+    """Distance of neighbouring nodes along the tighter packed axis, in px."""
+    return float(min(np.linalg.norm(step) for step in _mean_steps(lattice, points_px)))
+
+
+def rotate_ids(ids: IdArray, quarter_turns: int) -> IdArray:
+    """Ids of the same points when the axes of the lattice are turned by quarter turns (columns become rows)."""
+    turn = np.linalg.matrix_power(np.array([[0, 1], [-1, 0]]), quarter_turns % 4)
+    return np.asarray(ids @ turn.T, dtype=np.int64)
+
+
+def on_smooth_grid(ids: IdArray, points_px: FloatArray) -> NDArray[np.bool_]:
+    """Which points lie where a smooth image of the grid has them; dust on a corner shifts it.
+
+    The smooth image is a homography times a cubic polynomial, fitted with outliers weighted down.
+    """
+    if len(ids) < MIN_SMOOTH_POINTS:
+        return np.ones(len(ids), dtype=np.bool_)
+    source = ids.astype(np.float64)
+    homography, _ = cv2.findHomography(source, points_px, cv2.LMEDS)
+    expected_px = cv2.perspectiveTransform(source.reshape(-1, 1, 2), homography).reshape(-1, 2)
+    residual_px = points_px - expected_px
+    x, y = ((source - source.mean(axis=0)) / np.maximum(np.ptp(source, axis=0), 1)).T
+    design = np.stack([x**i * y**j for i in range(4) for j in range(4 - i)], axis=1)
+    weights = np.ones(len(ids))
+    for _ in range(10):
+        solution, *_ = np.linalg.lstsq(design * weights[:, None], residual_px * weights[:, None], rcond=None)
+        distance_px = np.linalg.norm(residual_px - design @ solution, axis=1)
+        scale_px = max(float(np.median(distance_px)), 1e-6)
+        weights = 1 / (1 + (distance_px / (3 * scale_px)) ** 2)
+    return np.asarray(distance_px < max(MAX_DEVIATIONS * scale_px, MIN_DEVIATION_PX), dtype=np.bool_)
+
+
+def place_board(lattice: Lattice, strength: FloatArray, columns: int, rows: int) -> Lattice | None:
+    """Ids counted from the upper left corner of a board of known size; None where the board is not all there.
+
+    Parameters
+    ----------
+    lattice : Lattice
+        Oriented grid, possibly larger than the board: its printed frame can look like more corners.
+    strength : (N,) array
+        How strong each of the detected points is; the board is where the strong ones are.
+    columns, rows : int
+        Size of the board. A board turned by about 90 degrees is recognised by its shape.
+    """
+    turned = lattice.with_ids(rotate_ids(lattice.ids, 1))
+    windows = [_best_window(candidate, strength, columns, rows) for candidate in (lattice, turned)]
+    score, board = max(windows, key=lambda window: window[0])
+    return board if score > 0 else None
+
+
+def _best_window(lattice: Lattice, strength: FloatArray, columns: int, rows: int) -> tuple[float, Lattice]:
+    ids = lattice.ids - lattice.ids.min(axis=0)
+    weights = np.zeros(ids.max(axis=0) + 1)
+    weights[ids[:, 0], ids[:, 1]] = strength[lattice.indices]
+    if weights.shape[0] < columns or weights.shape[1] < rows:
+        return 0.0, lattice
+    windows = np.lib.stride_tricks.sliding_window_view(weights, (columns, rows))
+    scores = windows.sum(axis=(2, 3))
+    best = np.unravel_index(int(np.argmax(scores)), scores.shape)
+    if not _edges_present(windows[best] > 0):
+        return 0.0, lattice
+    ids = ids - best
+    inside = np.all((ids >= 0) & (ids < (columns, rows)), axis=1)
+    return float(scores[best]), lattice.with_ids(ids).select(inside)
+
+
+def _edges_present(window: NDArray[np.bool_]) -> bool:
+    edges = (window[0], window[-1], window[:, 0], window[:, -1])
+    return all(edge.sum() * 2 >= edge.size for edge in edges)
+
+
+def _mean_steps(lattice: Lattice, points_px: FloatArray) -> tuple[FloatArray, FloatArray]:
+    design = np.column_stack([lattice.ids, np.ones(len(lattice))])
+    solution, *_ = np.linalg.lstsq(design, points_px[lattice.indices], rcond=None)
+    return solution[0], solution[1]
+
+
+def _turned_step(columns_step_px: FloatArray, rows_step_px: FloatArray, turn: int) -> FloatArray:
+    """Direction in which column ids grow after so many quarter turns."""
+    return (columns_step_px, rows_step_px, -columns_step_px, -rows_step_px)[turn]
+
+
+def _neighbour(node: Node, axis: int, sign: int) -> Node:
+    return (node[0] + sign, node[1]) if axis == 0 else (node[0], node[1] + sign)

@@ -1,0 +1,90 @@
+"""What calibration starts from: points with known places, and where each view sees them."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from processing.calibration.targets import Target
+from processing.geometry import FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class PlaneObservation:
+    """Points of one target position as one view sees them.
+
+    Parameters
+    ----------
+    name : str
+        Name of the image, the board or the level; errors and reports use it.
+    points_mm : (N, 3) array
+        Where the points are, in world coordinates; on the board (z = 0) where its pose is free.
+    image_px : (N, 2) array
+        Where they are seen (u, v).
+    z_mm : float | None
+        Position of the plane; None for scattered points and for boards in a free pose.
+    free_pose : bool
+        Nobody knows where the board stood; the fit finds it.
+    """
+
+    name: str
+    points_mm: FloatArray
+    image_px: FloatArray
+    z_mm: float | None = None
+    free_pose: bool = False
+
+    def __len__(self) -> int:
+        return len(self.points_mm)
+
+    def select(self, chosen: NDArray[np.bool_]) -> "PlaneObservation":
+        """Some of the points."""
+        return PlaneObservation(self.name, self.points_mm[chosen], self.image_px[chosen], self.z_mm, self.free_pose)
+
+
+@dataclass(frozen=True)
+class ViewObservations:
+    """All that one view sees of the target.
+
+    Parameters
+    ----------
+    image_size_px : tuple[int, int]
+        (width, height).
+    planes : tuple[PlaneObservation, ...]
+        At least one; in order of z where that is known.
+    """
+
+    image_size_px: tuple[int, int]
+    planes: tuple[PlaneObservation, ...]
+
+    @property
+    def free_pose(self) -> bool:
+        """The boards stood anywhere: only the intrinsics of the camera can be found."""
+        return any(plane.free_pose for plane in self.planes)
+
+
+@dataclass(frozen=True)
+class CalibrationSet:
+    """Detected points of all views.
+
+    Parameters
+    ----------
+    source : str
+        Run id or name of the imported set.
+    target : Target | None
+        None where points were measured elsewhere.
+    views : Mapping[str, ViewObservations]
+        By view name.
+    notes : tuple[str, ...]
+        What was left out, and why; one line each.
+    """
+
+    source: str
+    target: Target | None
+    views: Mapping[str, ViewObservations]
+    notes: tuple[str, ...] = ()
+
+
+def stacked(planes: Sequence[PlaneObservation]) -> tuple[FloatArray, FloatArray]:
+    """World points (N, 3) in mm and image points (N, 2) in px of several planes."""
+    return np.concatenate([plane.points_mm for plane in planes]), np.concatenate([plane.image_px for plane in planes])

@@ -1,0 +1,176 @@
+"""Calibration targets: what they look like, and their points in an image as nodes of a grid.
+
+Ids (column, row) count from the target's origin node, which lies at x = y = 0: the marked dot, the node
+nearest to ``origin_px``, or, where a whole board of known size is seen, its middle. Columns run along +x
+(to the right in the image), rows along +y (downwards).
+"""
+
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from processing.calibration.checkerboard import corner_lattices, find_saddles, refine_corners
+from processing.calibration.dots import assign_dots, dot_signal, find_dots, marked_dot
+from processing.calibration.errors import TargetNotFound
+from processing.calibration.lattice import Lattice, on_smooth_grid, orient, place_board, shortest_step_px
+from processing.geometry import FloatArray
+
+MIN_POINTS = 9
+"""Fewer points than this are dust that happens to lie in rows."""
+
+
+class Target(BaseModel):
+    """A flat target with a regular pattern.
+
+    Board sizes count inner corners (checkerboard) or dots. A dot target without ``columns`` and
+    ``rows`` is larger than the image; it needs a marked origin or ``origin_px``.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    kind: Literal["checkerboard", "dots"]
+    columns: Annotated[int, Field(ge=2, le=1000, description="inner corners or dots along x")] | None = None
+    rows: Annotated[int, Field(ge=2, le=1000, description="inner corners or dots along y")] | None = None
+    pitch_mm: Annotated[float, Field(gt=0, description="distance of neighbouring points")]
+
+    @model_validator(mode="after")
+    def _has_both_or_none(self) -> "Target":
+        if (self.columns is None) != (self.rows is None):
+            raise ValueError("columns and rows belong together: give both or none")
+        if self.kind == "checkerboard" and self.columns is None:
+            raise ValueError("a checkerboard needs columns and rows, the number of its inner corners")
+        return self
+
+    def points_mm(self, ids: NDArray[np.int64]) -> FloatArray:
+        """Positions (N, 2) on the target, x and y in mm, of nodes (N, 2)."""
+        return np.asarray(ids, dtype=np.float64) * self.pitch_mm
+
+
+@dataclass(frozen=True, eq=False)
+class TargetPoints:
+    """Points of a target in one image.
+
+    Parameters
+    ----------
+    ids : (N, 2) array
+        Column and row, counted from the origin of the target.
+    image_px : (N, 2) array
+        Sub-pixel positions (u, v).
+    """
+
+    ids: NDArray[np.int64]
+    image_px: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+
+def detect_target(
+    image: NDArray[np.generic], target: Target, origin_px: tuple[float, float] | None = None
+) -> TargetPoints:
+    """Find the points of a target and assign them to its grid.
+
+    Parameters
+    ----------
+    image : (rows, columns) array
+        Grey values of any type.
+    target : Target
+        What to look for.
+    origin_px : tuple[float, float], optional
+        Where the target's origin is seen, roughly (u, v). Not needed where a marker or the shape of
+        the board tells; a marker wins.
+
+    Returns
+    -------
+    TargetPoints
+        Sorted by row, then column.
+
+    Raises
+    ------
+    TargetNotFound
+        There are too few points, or nothing tells which point is the origin.
+    """
+    pixels = np.ascontiguousarray(image, dtype=np.float32)
+    if target.kind == "checkerboard":
+        grid, points_px = _find_corners(pixels, target, origin_px)
+    else:
+        grid, points_px = _find_dots(pixels, target, origin_px)
+    ids, image_px = grid.ids, points_px[grid.indices]
+    smooth = on_smooth_grid(ids, image_px)
+    order = np.flatnonzero(smooth)[np.lexsort((ids[smooth, 0], ids[smooth, 1]))]
+    return TargetPoints(ids[order], image_px[order])
+
+
+def _find_corners(
+    pixels: NDArray[np.float32], target: Target, origin_px: tuple[float, float] | None
+) -> tuple[Lattice, FloatArray]:
+    """The grid that fits the board; several starts are tried, as dust can mislead one."""
+    saddles = find_saddles(pixels)
+    points_px, failure, grown = saddles.points_px, TargetNotFound("checkerboard: no corners in a grid"), 0
+    for lattice in corner_lattices(saddles):
+        if len(lattice) < MIN_POINTS or len(lattice) < 0.5 * grown:
+            continue
+        try:
+            grid = _with_origin(orient(lattice, points_px), points_px, saddles.strength, target, None, origin_px)
+        except TargetNotFound as error:
+            grown, failure = max((grown, failure), (len(lattice), error), key=lambda attempt: attempt[0])
+            continue
+        refined_px, converged = refine_corners(pixels, points_px[grid.indices], shortest_step_px(grid, points_px))
+        points_px = points_px.copy()
+        points_px[grid.indices] = refined_px
+        return grid.select(converged), points_px
+    raise failure
+
+
+def _find_dots(
+    pixels: NDArray[np.float32], target: Target, origin_px: tuple[float, float] | None
+) -> tuple[Lattice, FloatArray]:
+    signal = dot_signal(pixels)
+    points_px = find_dots(signal)
+    lattice = assign_dots(points_px)
+    if len(lattice) < MIN_POINTS:
+        raise TargetNotFound(f"dots: {len(lattice)} points lie in a grid, at least {MIN_POINTS} are needed")
+    found = marked_dot(signal, points_px[lattice.indices])
+    marked = None if found is None else int(lattice.indices[found])
+    strength = np.ones(len(points_px))
+    return _with_origin(orient(lattice, points_px), points_px, strength, target, marked, origin_px), points_px
+
+
+def _with_origin(
+    lattice: Lattice,
+    points_px: FloatArray,
+    strength: FloatArray,
+    target: Target,
+    marked: int | None,
+    origin_px: tuple[float, float] | None,
+) -> Lattice:
+    """Ids counted from the origin: a marker, a hint, or the middle of a board of known size."""
+    if marked is None and origin_px is not None:
+        marked = int(lattice.indices[_nearest(points_px[lattice.indices], origin_px, lattice, points_px)])
+    if marked is not None:
+        return lattice.with_ids(lattice.ids - lattice.ids[lattice.indices == marked])
+    if target.columns is None or target.rows is None:
+        raise TargetNotFound("dots: no dot carries a marker; say where the origin is seen (origin_px)")
+    board = place_board(lattice, strength, target.columns, target.rows)
+    if board is None:
+        seen_columns, seen_rows = np.ptp(lattice.ids, axis=0) + 1
+        raise TargetNotFound(
+            f"{target.kind}: a grid of {seen_columns} x {seen_rows} points is seen, not the whole board of "
+            f"{target.columns} x {target.rows}; say where its origin is seen (origin_px)"
+        )
+    return board.with_ids(board.ids - ((target.columns - 1) // 2, (target.rows - 1) // 2))
+
+
+def _nearest(candidates_px: FloatArray, origin_px: tuple[float, float], lattice: Lattice, points_px: FloatArray) -> int:
+    distance_px = np.linalg.norm(candidates_px - origin_px, axis=1)
+    nearest = int(np.argmin(distance_px))
+    limit_px = shortest_step_px(lattice, points_px)
+    if distance_px[nearest] > limit_px:
+        raise TargetNotFound(
+            f"origin_px: the nearest point of the target is {distance_px[nearest]:.1f} px away from "
+            f"{tuple(origin_px)}, more than one step of {limit_px:.1f} px"
+        )
+    return nearest
