@@ -31,7 +31,7 @@ class ShotTaker:
     limits : AcquisitionLimits
         Deadlines.
     thresholds : Mapping[str, tuple[float, float]]
-        Medians above which an exposure is lit.
+        Bright levels above which an exposure is lit.
     say : Callable[[str], None]
         Gets a line for everything that is worth one.
     """
@@ -52,6 +52,7 @@ class ShotTaker:
         self._say = say
         self._frame_deadline_s = run.timing.shortest_period_ns / 1e9 + limits.frame_s
         self._refires_left = run.plan.refire_quota
+        self._period_s = 1 / run.plan.rate_hz
         self._due_s = 0.0
         self._stage_z_mm: float | None = None
 
@@ -77,7 +78,7 @@ class ShotTaker:
         position, number = divmod(index, self._run.plan.shots)
         if position and not number:
             self.load_position(position)
-        while self._wait_for_turn():
+        while self._control.wait_until(self._due_s):
             shot, findings = self._fire(index)
             if shot is None or not findings.missing or not self._refires_left:
                 return shot
@@ -85,21 +86,17 @@ class ShotTaker:
             self._say(f"shot {index} is fired again, {self._refires_left} more permitted")
         return None
 
-    def _wait_for_turn(self) -> bool:
-        """Keep the rate by the clock, and never fall below the shortest period to catch up."""
-        if not self._control.wait_until(self._due_s):
-            return False
-        now = time.monotonic()
-        period_s, shortest_s = 1 / self._run.plan.rate_hz, self._run.timing.shortest_period_ns / 1e9
-        on_time_s = self._due_s if now - self._due_s < period_s else now
-        self._due_s = max(on_time_s + period_s, now + shortest_s)
-        return True
-
     def _fire(self, index: int) -> tuple[Shot | None, ShotFindings]:
+        """Fire and look at what came of it.
+
+        The period counts from shot to shot: catching up after a late one would break the limits of cameras
+        or generator, which refuse or, worse, ignore an early trigger.
+        """
         for camera in self._rig.cameras.values():
             camera.begin_shot()
         host_time_ns = time.time_ns()
         fired = self._rig.generator.fire()
+        self._due_s = time.monotonic() + self._period_s
         views = self._collect()
         if views is None:
             return None, ShotFindings()

@@ -17,7 +17,7 @@ from daq.run_events import RunEvent, RunMessage, ShotRecorded, StateChanged
 from daq.run_state import RunOutcome, RunState
 from daq.shotfile import ImageKey, PulsePair, RunKind, RunPlan, RunReader, RunWriter
 from daq.timing import CameraTiming
-from tests.daq.memory_bench import DARK_COUNTS, LIT_COUNTS, TIMING, MemoryBench
+from tests.daq.memory_bench import DARK_COUNTS, LIT_COUNTS, MemoryBench
 
 LIMITS = AcquisitionLimits(frame_s=0.1, light_off_s=0.2, disarm_s=0.3, drain_s=10, heartbeat_s=0.05)
 DEADLINE_S = 20.0
@@ -128,11 +128,12 @@ def test_runs_follow_each_other_and_never_share_a_directory(lab: Laboratory) -> 
     assert all(name.split("-", 1)[1].startswith("hollow_cone") for name in names)
 
 
-def test_shots_keep_the_rate(lab: Laboratory) -> None:
+def test_no_shot_comes_before_its_time(lab: Laboratory) -> None:
+    """Cameras ignore an early trigger, the generator refuses it: a late shot is never caught up with."""
     reader = lab.run(plan_of(6, rate_hz=25))
     times_s = np.array([reader.read_shot(index).host_time_ns for index in range(6)]) / 1e9
-    assert times_s[-1] - times_s[0] == pytest.approx(5 / 25, abs=0.035)
-    assert np.diff(times_s).min() > TIMING.cycle_ns / 1e9
+    assert np.all(np.diff(times_s) > 1 / 25 - 0.001)
+    assert times_s[-1] - times_s[0] < 3
 
 
 def test_the_light_goes_off_before_the_cameras(lab: Laboratory) -> None:
