@@ -1,0 +1,121 @@
+"""How good a reconstruction is, where the truth is known: quality factor, found and ghost droplets."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter
+from scipy.spatial import cKDTree
+
+Volume = NDArray[np.floating]
+Sums = NDArray[np.float64]
+
+
+def quality_factor(
+    truth: Volume, volume: Volume, window: int = 64, step: int = 32, mean_subtracted: bool = True
+) -> float:
+    """Cross-correlation coefficient c_II of truth and reconstruction, averaged over interrogation windows.
+
+    Parameters
+    ----------
+    truth, volume : (z, y, x) arrays
+        Intensities on the same grid; the scale of neither matters.
+    window : int
+        Edge length of the cubic windows in voxels, a multiple of ``step``.
+    step : int
+        Voxels from window to window.
+    mean_subtracted : bool
+        Whether the mean of each window is subtracted first. Say so wherever a number is published.
+
+    Returns
+    -------
+    float
+        1 for a perfect reconstruction. Windows in which either volume is constant have no say.
+
+    Raises
+    ------
+    ValueError
+        Shapes differ, no window fits in, ``window`` is no multiple of ``step``, or no window has a say.
+    """
+    if truth.shape != volume.shape:
+        raise ValueError(f"truth has shape {truth.shape}, volume {volume.shape}")
+    if step < 1 or window % step or window < step or min(truth.shape) < window:
+        raise ValueError(f"windows of {window} voxels at steps of {step} do not fit shape {truth.shape}")
+    first, second, products = _window_sums(truth, volume, window, step)
+    covariance, first_power, second_power = products
+    if mean_subtracted:
+        count = float(window) ** 3
+        covariance = covariance - first * second / count
+        first_power, second_power = first_power - first**2 / count, second_power - second**2 / count
+    # what is left of a constant window after the subtraction is rounding
+    varies = (first_power > 1e-9 * products[1]) & (second_power > 1e-9 * products[2])
+    if not varies.any():
+        raise ValueError("truth and volume vary together in no window")
+    return float(np.mean(covariance[varies] / np.sqrt(first_power[varies] * second_power[varies])))
+
+
+@dataclass(frozen=True)
+class DetectionRates:
+    """How many droplets a reconstruction shows.
+
+    Parameters
+    ----------
+    found : float
+        Share of true droplets that have a peak.
+    ghosts : float
+        Share of peaks that belong to no true droplet.
+    """
+
+    found: float
+    ghosts: float
+
+
+def detection_rates(
+    truth_voxel: NDArray[np.float64], volume: Volume, threshold: float, radius_voxel: float = 2.0
+) -> DetectionRates:
+    """Compare the peaks of a reconstruction with true positions.
+
+    Parameters
+    ----------
+    truth_voxel : (N, 3) array
+        True positions as voxel indices (z, y, x), N > 0.
+    volume : (z, y, x) array
+        Reconstruction.
+    threshold : float
+        Lower peaks do not count.
+    radius_voxel : float
+        How far a peak may lie from its droplet.
+    """
+    peaks = local_maxima(volume, threshold)
+    if not len(peaks):
+        return DetectionRates(found=0.0, ghosts=0.0)
+    to_peak, _ = cKDTree(peaks).query(truth_voxel)
+    to_truth, _ = cKDTree(truth_voxel).query(peaks)
+    return DetectionRates(float(np.mean(to_peak <= radius_voxel)), float(np.mean(to_truth > radius_voxel)))
+
+
+def local_maxima(volume: Volume, threshold: float) -> NDArray[np.intp]:
+    """Indices (N, 3) of voxels above a threshold that none of their 26 neighbours exceeds."""
+    highest = maximum_filter(volume, size=3, mode="constant", cval=-np.inf)
+    return np.argwhere((volume > threshold) & (volume == highest))
+
+
+def _window_sums(truth: Volume, volume: Volume, window: int, step: int) -> tuple[Sums, Sums, tuple[Sums, Sums, Sums]]:
+    """Sums over all windows of both volumes, and of the products (ab, aa, bb); one layer of blocks at a time."""
+    layers: list[list[Sums]] = []
+    for z in range(0, truth.shape[0] - step + 1, step):
+        a, b = truth[z : z + step], volume[z : z + step]
+        layers.append([_block_sums(layer, step) for layer in (a, b, a * b, a * a, b * b)])
+    first, second, *products = (_moving_sums(np.stack(layer), window // step) for layer in zip(*layers, strict=True))
+    return first, second, (products[0], products[1], products[2])
+
+
+def _block_sums(layer: Volume, step: int) -> Sums:
+    ny, nx = (n // step for n in layer.shape[1:])
+    columns = layer[:, : ny * step, : nx * step].sum(axis=0, dtype=np.float64)
+    return np.asarray(columns.reshape(ny, step, nx, step).sum(axis=(1, 3)))
+
+
+def _moving_sums(blocks: Sums, count: int) -> Sums:
+    windows = np.lib.stride_tricks.sliding_window_view(blocks, (count, count, count))
+    return np.asarray(windows.sum(axis=(3, 4, 5)))

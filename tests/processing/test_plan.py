@@ -1,0 +1,160 @@
+"""Plans: the fast way where it is exact, the general way elsewhere, and no way into memory that is not there."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from processing.geometry import FloatArray, PinholeCamera, view_camera
+from processing.reconstruction.kernels import _native
+from processing.reconstruction.node_view import NodeView, sample_mapping
+from processing.reconstruction.plan import MAX_DEVIATION_PX, plan_reconstruction, plan_view
+from processing.reconstruction.rectified_view import RectifiedView, rectify
+from processing.volume import VoxelGrid
+from tests.processing import oracle
+
+GRID = VoxelGrid.centred((40, 50, 60), 1 / 60)
+
+
+@dataclass(frozen=True)
+class Bent:
+    """A central camera behind a medium that bends lines of sight with depth."""
+
+    camera: PinholeCamera
+    bend_px_per_mm2: float
+    wavelength_mm: float = 0.0
+
+    @property
+    def image_size_px(self) -> tuple[int, int]:
+        return self.camera.image_size_px
+
+    @property
+    def centre_mm(self) -> FloatArray:
+        return self.camera.centre_mm
+
+    def project(self, points_mm: FloatArray) -> FloatArray:
+        image_px = self.camera.project(points_mm)
+        image_px[:, 0] += self.bend_px_per_mm2 * points_mm[:, 2] ** 2
+        if self.wavelength_mm:
+            image_px[:, 1] += np.sin(2 * np.pi * points_mm[:, 0] / self.wavelength_mm)
+        return image_px
+
+
+def camera(azimuth_deg: float = 30.0, **options: object) -> PinholeCamera:
+    return view_camera(azimuth_deg, focal_length_mm=85, magnification=0.43, scale_px_per_mm=60, **options)  # type: ignore[arg-type]
+
+
+@settings(max_examples=20, deadline=None)
+@given(
+    azimuth_deg=st.floats(-60, 60),
+    pitch_deg=st.floats(-20, 20),
+    roll_deg=st.floats(-180, 180),
+    offset_px=st.tuples(st.floats(-300, 300), st.floats(-300, 300)),
+    tilt_rad=st.tuples(st.floats(-0.1, 0.1), st.floats(-0.1, 0.1)),
+    k1=st.floats(-2, 2),
+)
+def test_any_pinhole_camera_is_rectified_exactly(
+    azimuth_deg: float,
+    pitch_deg: float,
+    roll_deg: float,
+    offset_px: tuple[float, float],
+    tilt_rad: tuple[float, float],
+    k1: float,
+) -> None:
+    mapping = replace(
+        camera(
+            azimuth_deg,
+            pitch_deg=pitch_deg,
+            roll_deg=roll_deg,
+            principal_offset_px=offset_px,
+            distortion=np.array([k1, 0, 0.002, -0.003, 0]),
+        ),
+        tilt_rad=tilt_rad,
+    )
+    view = rectify(mapping, GRID)
+    assert view is not None
+    assert view.deviation_px < 1e-6
+    recorded_px = np.stack([view.map_u_px, view.map_v_px])
+    u, v = oracle.planned_positions(view, GRID)
+    seen_u, seen_v = (oracle.bilinear(channel, u, v) for channel in recorded_px)
+    expected_u, expected_v = oracle.seen_by(mapping, GRID)
+    # the map itself is curved: bilinear interpolation of it is good to this
+    np.testing.assert_allclose(seen_u, expected_u, atol=5e-3)
+    np.testing.assert_allclose(seen_v, expected_v, atol=5e-3)
+
+
+def test_lines_of_sight_that_do_not_meet_take_the_nodes() -> None:
+    assert isinstance(plan_view(Bent(camera(), 0.0), GRID), RectifiedView)
+    assert isinstance(plan_view(Bent(camera(), 0.05), GRID), RectifiedView)
+    view = plan_view(Bent(camera(), 1.0), GRID)
+    assert isinstance(view, NodeView)
+    assert view.deviation_px <= MAX_DEVIATION_PX
+
+
+@settings(max_examples=10, deadline=None)
+@given(roll_deg=st.floats(-180, 180), bend=st.floats(-2, 2), wavelength_mm=st.floats(1.5, 9))
+def test_nodes_are_as_dense_as_it_takes(roll_deg: float, bend: float, wavelength_mm: float) -> None:
+    mapping = Bent(camera(roll_deg=roll_deg), bend, wavelength_mm)
+    view = sample_mapping(mapping, GRID, MAX_DEVIATION_PX)
+    u, v, _ = np.moveaxis(oracle.node_values(view, GRID), -1, 0)
+    expected_u, expected_v = oracle.seen_by(mapping, GRID)
+    assert np.hypot(u - 1 - expected_u, v - 1 - expected_v).max() < 2 * MAX_DEVIATION_PX
+
+
+def test_a_rough_mapping_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"not smooth: it bends by .* px within 2 voxels, limit 0.02 px"):
+        sample_mapping(Bent(camera(), 0, wavelength_mm=0.05), GRID, MAX_DEVIATION_PX)
+
+
+def test_the_node_area_is_that_of_a_voxel() -> None:
+    view = sample_mapping(camera(60.0), GRID, MAX_DEVIATION_PX)
+    assert view.binning == 1
+    np.testing.assert_allclose(view.nodes[2], np.cos(np.deg2rad(60)), rtol=0.02)
+
+
+def test_a_camera_beside_or_inside_the_volume_takes_the_nodes() -> None:
+    assert rectify(camera(90.0), VoxelGrid.centred((41, 8, 8), 1 / 60)) is None
+    assert isinstance(plan_view(camera(85.0), GRID), RectifiedView | NodeView)
+
+
+def test_two_to_eight_views() -> None:
+    plan = plan_reconstruction(oracle.cameras(8), GRID)
+    assert len(plan.views) == 8
+    assert plan.deviation_px <= MAX_DEVIATION_PX
+    for count in (1, 9):
+        with pytest.raises(ValueError, match=f"{count} views, a reconstruction takes 2 to 8"):
+            plan_reconstruction((oracle.cameras(8) * 2)[:count], GRID)
+
+
+def test_kernels_refuse_geometry_that_leads_outside() -> None:
+    volume, pixels = np.zeros((3, 4, 5), np.float32), np.zeros((20, 90), np.float32)
+    scale, shift = np.ones(3), np.full(3, 2.0)
+    _native.line_of_sight([_native.View.rectified(pixels, scale, shift, shift)], 2, volume, 1)
+    nodes = np.zeros((3, 2, 2, 2), np.float32)
+    _native.line_of_sight([_native.View.mapped(pixels, nodes, 16)], 2, volume, 1)
+    outside = [
+        _native.View.rectified(pixels, scale, shift + 30, shift),
+        _native.View.rectified(pixels, scale, shift, shift + 30),
+        _native.View.rectified(pixels, scale, shift, -shift),
+        _native.View.rectified(pixels, scale * 9, shift, shift),
+        _native.View.rectified(pixels, scale[:2], shift[:2], shift[:2]),
+        _native.View.rectified(pixels, scale, shift, np.full(3, np.nan)),
+        _native.View.mapped(pixels, nodes, 2),
+    ]
+    for view in outside:
+        with pytest.raises(ValueError, match=r"(view|nodes): "):
+            _native.line_of_sight([view], 2, volume, 1)
+    projection = np.zeros((19, 90), np.float32)
+    with pytest.raises(ValueError, match="projections and images differ in shape"):
+        _native.smart_pass([_native.View.rectified(pixels, scale, shift, shift)], [False], [projection], volume, 1)
+
+
+def test_views_keep_their_arrays_alive() -> None:
+    view = _native.View.rectified(np.ones((20, 90), np.float32), np.ones(3), np.full(3, 2.0), np.full(3, 2.0))
+    churn = [np.zeros((20, 90), np.float32) for _ in range(50)]
+    volume = np.zeros((3, 4, 5), np.float32)
+    _native.line_of_sight([view], 2, volume, 1)
+    np.testing.assert_array_equal(volume, 1)
+    assert len(churn) == 50

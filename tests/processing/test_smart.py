@@ -1,0 +1,161 @@
+"""SMART and MART: equal to the textbook, and better than a line of sight."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from processing.geometry import ViewMapping
+from processing.quality import detection_rates, quality_factor
+from processing.reconstruction.kernels import _native
+from processing.reconstruction.line_of_sight import line_of_sight
+from processing.reconstruction.node_view import sample_mapping
+from processing.reconstruction.plan import Plan, plan_reconstruction
+from processing.reconstruction.smart import mart, smart
+from processing.volume import VoxelGrid
+from tests.processing import oracle
+
+GRID = VoxelGrid.centred((17, 43, 261), 1 / 60)
+Images = list[NDArray[np.float32]]
+
+
+@pytest.fixture(params=_native.available_isas())
+def isa(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
+    monkeypatch.setenv("TOMOSHADOW_ISA", request.param)
+    return str(request.param)
+
+
+def make_plan(mappings: list[ViewMapping], by_nodes: bool, grid: VoxelGrid = GRID) -> Plan:
+    if by_nodes:
+        return Plan(grid, tuple(sample_mapping(mapping, grid, 0.02) for mapping in mappings))
+    return plan_reconstruction(mappings, grid)
+
+
+def droplets(count: int, seed: int = 5) -> NDArray[np.float64]:
+    """Positions as voxel indices (z, y, x), clear of the faces."""
+    return np.random.default_rng(seed).uniform(4, np.array(GRID.shape) - 5, (count, 3))
+
+
+def images_of(positions: NDArray[np.float64], mappings: list[ViewMapping], sigma_px: float = 1.5) -> Images:
+    images = []
+    for mapping in mappings:
+        width, height = mapping.image_size_px
+        image = np.zeros((height, width))
+        for u, v in mapping.project(GRID.to_mm(positions)):
+            along_u = np.exp(-((np.arange(width) - u) ** 2) / (2 * sigma_px**2))
+            image += np.exp(-((np.arange(height) - v) ** 2) / (2 * sigma_px**2))[:, None] * along_u
+        images.append(np.where(image < 1e-3, 0, image / 2).astype(np.float32))
+    return images
+
+
+@pytest.mark.parametrize(("by_nodes", "roll_deg"), [(False, 0.0), (False, 5.0), (True, 5.0), (True, 90.0)])
+def test_smart_equals_the_textbook(isa: str, by_nodes: bool, roll_deg: float) -> None:
+    mappings = oracle.cameras(4, roll_deg)
+    plan, images = make_plan(mappings, by_nodes), images_of(droplets(30), mappings)
+    expected, residuals = oracle.smart(plan, images, iterations=3)
+    result = smart(plan, images, iterations=3)
+    # ratios are steep at the edges of droplets: compare with the brightest voxel
+    np.testing.assert_allclose(result.volume, expected, atol=2e-3 * expected.max())
+    np.testing.assert_allclose(result.residuals, residuals, rtol=1e-3)
+
+
+@pytest.mark.parametrize("by_nodes", [False, True])
+@pytest.mark.parametrize("solve", [smart, mart])
+def test_the_residual_falls_with_every_iteration(solve: type(smart), by_nodes: bool) -> None:  # type: ignore[valid-type]
+    mappings = oracle.cameras(4)
+    residuals = solve(make_plan(mappings, by_nodes), images_of(droplets(40), mappings), iterations=8).residuals
+    assert len(residuals) == 9
+    assert (np.diff(residuals) < 0).all()
+    assert residuals[-1] < 0.5 * residuals[0]
+
+
+@pytest.mark.parametrize("by_nodes", [False, True])
+def test_every_droplet_is_found_and_ghosts_are_fewer_than_by_mlos(by_nodes: bool) -> None:
+    positions, mappings = droplets(20), oracle.cameras(4)  # 23 per cubic millimetre: none hides another
+    plan, images = make_plan(mappings, by_nodes), images_of(positions, mappings)
+    start, refined = line_of_sight(plan, images), smart(plan, images).volume
+    by_mlos, by_smart = (detection_rates(positions, v, 0.1 * float(v.max())) for v in (start, refined))
+    assert by_smart.found == 1
+    assert by_smart.ghosts <= by_mlos.ghosts
+    assert by_smart.ghosts < 0.05
+
+
+def test_more_views_show_fewer_ghosts() -> None:
+    positions, everything = droplets(150), oracle.cameras(6)
+    ghosts = []
+    for count in (2, 4, 6):
+        mappings = everything[:count]
+        volume = smart(make_plan(mappings, False), images_of(positions, mappings), iterations=10).volume
+        ghosts.append(detection_rates(positions, volume, 0.05 * float(volume.max())).ghosts)
+    assert ghosts[0] > ghosts[1] > ghosts[2]
+
+
+def test_smart_is_closer_to_the_truth_than_mlos() -> None:
+    positions, mappings = droplets(80), oracle.cameras(4)
+    z, y, x = np.moveaxis(oracle.voxel_indices(GRID), -1, 0)
+    truth = np.zeros(GRID.shape)
+    for at in positions:
+        truth += np.exp(-((z - at[0]) ** 2 + (y - at[1]) ** 2 + (x - at[2]) ** 2) / (2 * 1.5**2))
+    plan, images = make_plan(mappings, False), images_of(positions, mappings)
+    by_mlos, by_smart = line_of_sight(plan, images), smart(plan, images).volume
+    qualities = [quality_factor(truth, volume, window=16, step=8) for volume in (by_mlos, by_smart)]
+    assert qualities[1] > qualities[0] + 0.05
+
+
+def test_the_same_bits_with_any_number_of_threads() -> None:
+    mappings = oracle.cameras(3)
+    for by_nodes in (False, True):
+        plan, images = make_plan(mappings, by_nodes), images_of(droplets(40), mappings)
+        one, many = (smart(plan, images, iterations=3, threads=threads) for threads in (1, 3))
+        np.testing.assert_array_equal(one.volume, many.volume)
+        assert one.residuals == many.residuals
+
+
+def test_start_is_kept_and_its_zeros_stay() -> None:
+    mappings = oracle.cameras(3)
+    plan, images = make_plan(mappings, False), images_of(droplets(20), mappings)
+    start = np.ones(GRID.shape, np.float32)
+    start[:, :, :100] = 0
+    result = smart(plan, images, iterations=2, start=start)
+    assert (result.volume[:, :, :100] == 0).all()
+    assert result.volume[:, :, 100:].any()
+    np.testing.assert_array_equal(start[:, :, 100:], 1)
+
+
+def test_stop_ends_it_and_sees_the_residual() -> None:
+    mappings = oracle.cameras(2)
+    plan, images = make_plan(mappings, False), images_of(droplets(10), mappings)
+    seen: list[tuple[int, float]] = []
+
+    def stop(done: int, residual: float) -> bool:
+        seen.append((done, residual))
+        return done == 3
+
+    result = smart(plan, images, iterations=9, stop=stop)
+    assert [done for done, _ in seen] == [1, 2, 3]
+    assert result.residuals[1:] == tuple(residual for _, residual in seen)
+
+
+def test_less_relaxation_goes_slower() -> None:
+    mappings = oracle.cameras(3)
+    plan, images = make_plan(mappings, False), images_of(droplets(30), mappings)
+    slow, fast = (smart(plan, images, iterations=4, relaxation=r).residuals[-1] for r in (0.3, 1.0))
+    assert fast < slow
+
+
+def test_dark_images_give_an_empty_volume() -> None:
+    mappings = oracle.cameras(2)
+    dark = [np.zeros(mapping.image_size_px[::-1], np.float32) for mapping in mappings]
+    result = smart(make_plan(mappings, False), dark, iterations=2)
+    assert not result.volume.any()
+    assert result.residuals == (0.0, 0.0, 0.0)
+
+
+def test_what_cannot_be_done_is_refused() -> None:
+    mappings = oracle.cameras(2)
+    plan, images = make_plan(mappings, False), images_of(droplets(3), mappings)
+    with pytest.raises(ValueError, match=r"iterations 0 and relaxation 1\.0 must be positive"):
+        smart(plan, images, iterations=0)
+    with pytest.raises(ValueError, match=r"volume has shape \(1, 1, 1\)"):
+        mart(plan, images, start=np.ones((1, 1, 1), np.float32))
+    with pytest.raises(ValueError, match="contiguous float32, not float16"):
+        smart(plan, images, out=np.zeros(GRID.shape, np.float16))
