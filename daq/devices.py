@@ -5,7 +5,7 @@ an error and after closing. Every method has a deadline and raises ``daq.errors.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from types import TracebackType
 from typing import Protocol, Self
@@ -170,6 +170,8 @@ class Rig:
         Carries the calibration target, where there is one.
     prepare_scene : Callable[[RunKind], None]
         Called before a run; the simulated bench plays the operator here (spray on or off, target in).
+    max_current_a : Mapping[str, float]
+        Limit of each view's LED; a view that is not named has only the limit of the generator.
     """
 
     cameras: Mapping[str, Camera]
@@ -177,3 +179,4 @@ class Rig:
     interlock: Interlock
     stage: TranslationStage | None = None
     prepare_scene: Callable[[RunKind], None] = _nothing_to_prepare
+    max_current_a: Mapping[str, float] = field(default_factory=dict)

@@ -103,7 +103,8 @@ def _open_rig(config: RigConfig, profiles: Profiles, interlock: Interlock, devic
     devices.enter_context(interlock)
     # Entered last and so left first: the light goes off before anything else is closed.
     generator = devices.enter_context(_pulse_generator(config))
-    return Rig(cameras, generator, interlock, stage)
+    limits_a = {name: view.max_current_a for name, view in config.views.items()}
+    return Rig(cameras, generator, interlock, stage, max_current_a=limits_a)
 
 
 def _pulse_generator(config: RigConfig) -> SerialPulseGenerator:

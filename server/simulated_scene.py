@@ -1,5 +1,6 @@
 """The scene of a simulated bench: the views of its configuration, as imperfect as real ones, and the truth of them."""
 
+import threading
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -21,6 +22,10 @@ SPRAYS = {"hollow_cone": hollow_cone_spray, "flat_fan": flat_fan_spray}
 
 SCHEIMPFLUG_MM_PER_DEG = 0.03
 """Shift of the optical axis on the sensor that a Scheimpflug adaptor brings, per degree of viewing angle."""
+
+
+RENDERING_THREADS = 2
+"""Rendering holds the interpreter lock for much of its time: four cameras at once take twice as long as two."""
 
 
 class SimulatedScene:
@@ -47,6 +52,7 @@ class SimulatedScene:
             stage_z_mm=stage_z_mm,
         )
         self._kind = RunKind.BACKGROUND
+        self._rendering = threading.BoundedSemaphore(RENDERING_THREADS)
 
     def prepare(self, kind: RunKind) -> None:
         """Play the operator before a run: spray on or off, target in."""
@@ -56,9 +62,10 @@ class SimulatedScene:
     def expose(self, exposure: Exposure) -> Image:
         """Image of one exposure: the frame source of every camera."""
         pulses = [(pulse.start_ns, pulse.collected_ns, pulse.current_a) for pulse in exposure.pulses]
-        return self._scene.render(
-            exposure.view, exposure.sequence, exposure.frame, pulses, exposure.shape, exposure.bits
-        )
+        with self._rendering:
+            return self._scene.render(
+                exposure.view, exposure.sequence, exposure.frame, pulses, exposure.shape, exposure.bits
+            )
 
     def write_truth(self, path: Path, fired: Sequence[FiredTrain]) -> None:
         """Keep camera models and, if there is spray, the liquid at the middle of the first light pulse of firings."""

@@ -10,7 +10,7 @@ import pytest
 from daq.acquisition import Acquisition
 from daq.acquisition_limits import AcquisitionLimits
 from daq.devices import GeneratorState
-from daq.errors import InterlockOpen
+from daq.errors import InterlockOpen, PlanError
 from daq.run_events import RunEvent, RunStatus, ShotRecorded
 from daq.run_plan import ImageKey, PulsePair, RunKind, RunPlan
 from daq.run_state import RunOutcome, RunState
@@ -92,6 +92,14 @@ def test_a_sample_run_knows_its_references_and_its_truth(assembled: AssembledRig
     for shot in (first, second):
         assert shot.fired is not None
         assert len(read_true_spray(truth, shot.fired.sequence).spray) > 1000
+
+
+def test_a_current_above_the_limit_of_its_led_is_refused(assembled: AssembledRig, tmp_path: Path) -> None:
+    too_high = PulsePair(current_a=CURRENT_A | {"view2": 12.5})
+    with Acquisition(assembled.rig, tmp_path) as acquisition:
+        with pytest.raises(PlanError, match=r"pulse\.current_a: 12\.5 A is above 12 A, the limit of the LED of view2"):
+            acquisition.start(plan(RunKind.BACKGROUND, 1, pulse=too_high))
+        assert acquisition.status().run_id is None
 
 
 def test_a_dark_run_is_dark(assembled: AssembledRig, tmp_path: Path) -> None:
