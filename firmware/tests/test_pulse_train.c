@@ -64,8 +64,18 @@ static void test_no_field_can_overflow_a_sum(void)
     CHECK(WITH(b_start_ns, UINT32_MAX) == ERROR_EDGE && WITH(a_width_ns, UINT32_MAX) == ERROR_WIDTH);
     CHECK(WITH(b_width_ns, UINT32_MAX) == ERROR_WIDTH && WITH(current_ma, UINT32_MAX) == ERROR_CURRENT);
     CHECK(WITH(frame_b_open_ns, UINT32_MAX) == ERROR_STRADDLE && WITH(frame_a_close_ns, UINT32_MAX) == ERROR_STRADDLE);
-    /* With 32 bit sums camera_ns + frame_b_open_ns would wrap to an early opening. */
-    CHECK(WITH(frame_b_open_ns, UINT32_MAX - 999) == ERROR_STRADDLE);
+}
+
+static void test_a_frame_boundary_beyond_32_bits_does_not_wrap(void)
+{
+    struct channel channel = LEGAL;
+    channel.camera_ns = 30000;
+    channel.frame_a_close_ns = UINT32_MAX - 6000; /* in 32 bits: 23999, a fine place between the pulses */
+    channel.frame_b_open_ns = UINT32_MAX - 5000;
+    CHECK(channel_check(&channel) == ERROR_STRADDLE);
+    channel.frame_b_open_ns = 0;
+    channel.b_start_ns = 31000;
+    CHECK(channel_check(&channel) == ERROR_STRADDLE);
 }
 
 static void test_every_edge_goes_to_the_nearest_tick(void)
@@ -110,6 +120,7 @@ int main(void)
     test_pulses_keep_their_dark_time_and_order();
     test_frame_boundaries_count_from_the_camera_trigger();
     test_no_field_can_overflow_a_sum();
+    test_a_frame_boundary_beyond_32_bits_does_not_wrap();
     test_every_edge_goes_to_the_nearest_tick();
     test_a_train_is_as_long_as_its_last_output();
     test_more_light_lengthens_the_period();

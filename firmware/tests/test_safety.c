@@ -115,6 +115,19 @@ static void test_a_changed_channel_must_be_loaded_again(void)
     CHECK(safety_load(&safety) == ERROR_NONE && safety_arm(&safety, 1) == ERROR_NONE && safety.train_id == 2);
 }
 
+static void test_actual_values_must_keep_the_limits_too(void)
+{
+    boot();
+    struct channel channel = LEGAL;
+    channel.a_start_ns = 20004; /* each goes up by half a tick, */
+    channel.a_width_ns = 1004;
+    channel.b_start_ns = 20004 + 1004 + MIN_DARK_NS; /* and this one stays */
+    channel.frame_a_close_ns = 21100;
+    channel.frame_b_open_ns = 21200;
+    CHECK(channel_check(&channel) == ERROR_NONE);
+    CHECK(safety_set_channel(&safety, 0, &channel) == ERROR_SEPARATION);
+}
+
 static void test_off_disarms_and_forgets_the_budget(void)
 {
     boot_armed(7);
@@ -206,6 +219,7 @@ int main(void)
     test_arming_again_does_not_shorten_the_period();
     test_an_armed_generator_takes_no_other_train();
     test_a_changed_channel_must_be_loaded_again();
+    test_actual_values_must_keep_the_limits_too();
     test_off_disarms_and_forgets_the_budget();
     test_an_open_interlock_trips_and_latches();
     test_the_interlock_is_asked_at_the_moment_of_firing();
