@@ -58,7 +58,6 @@ def prepare_run(rig: Rig, data_dir: Path, plan: RunPlan, now: datetime) -> Prepa
     """
     timing = _timing(rig, plan)
     _check_currents(rig, plan)
-    _check_currents(rig, plan)
     _check_stage(rig, plan)
     views = {view: ViewFormat(camera.image_shape, camera.bits) for view, camera in rig.cameras.items()}
     references = find_references(data_dir, plan.references, views)
@@ -89,13 +88,6 @@ def _timing(rig: Rig, plan: RunPlan) -> ShotTiming:
 def _check_currents(rig: Rig, plan: RunPlan) -> None:
     for view, current_a in plan.pulse.current_a.items():
         limit_a = rig.max_current_a.get(view, current_a)
-        if current_a > limit_a:
-            raise PlanError(f"pulse.current_a: {current_a:g} A is above {limit_a:g} A, the limit of the LED of {view}")
-
-
-def _check_currents(rig: Rig, plan: RunPlan) -> None:
-    for view, limit_a in rig.max_current_a.items():
-        current_a = plan.pulse.current_a[view]
         if current_a > limit_a:
             raise PlanError(f"pulse.current_a: {current_a:g} A is above {limit_a:g} A, the limit of the LED of {view}")
 

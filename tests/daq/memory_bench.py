@@ -209,7 +209,12 @@ class MemoryBench:
         self.interlock.close_door()
         self.stage = MemoryStage("stage", self.journal, self.generator)
         self.rig = Rig(
-            self.cameras, self.generator, self.interlock, self.stage, lambda kind: self.journal.append(f"scene {kind}")
+            self.cameras,
+            self.generator,
+            self.interlock,
+            self.stage,
+            max_current_a={"view2": 26.0},
+            prepare_scene=lambda kind: self.journal.append(f"scene {kind}"),
         )
 
     def _fired(self, train: FiredTrain) -> None:

@@ -351,6 +351,11 @@ def test_only_one_run_at_a_time(lab: Laboratory) -> None:
 REFUSALS: dict[str, tuple[dict[str, Any], type[DaqError], str]] = {
     "views": ({"pulse": PulsePair(current_a={"view1": 1.0})}, PlanError, "pulse.current_a names views"),
     "rate": ({"pulse": PulsePair(current_a={"view1": 1.0, "view2": 1.0}, separation_ns=2000)}, PlanError, "2000 ns"),
+    "current": (
+        {"pulse": PulsePair(current_a={"view1": 30.0, "view2": 26.5})},
+        PlanError,
+        "pulse.current_a: 26.5 A is above 26 A, the limit of the LED of view2",
+    ),
     "position": ({"stage_z_mm": (0.0, 11.0)}, PlanError, "11 mm is outside of -10 to 10 mm"),
     "reference": ({"references": ("../secret",)}, PlanError, r"no run '\.\./secret'"),
 }
@@ -410,7 +415,7 @@ def test_a_bug_in_the_scene_is_a_failed_run_and_not_a_dead_thread(lab: Laborator
         raise ZeroDivisionError("no nozzle")
 
     bench = lab.bench
-    rig = Rig(bench.cameras, bench.generator, bench.interlock, bench.stage, break_down)
+    rig = Rig(bench.cameras, bench.generator, bench.interlock, prepare_scene=break_down)
     acquisition = Acquisition(rig, lab.data_dir, limits=LIMITS)
     acquisition.start(plan_of())
     status = acquisition.wait(DEADLINE_S)
