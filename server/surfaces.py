@@ -20,7 +20,7 @@ from server.previews import VolumePreview, make_preview
 _LONGEST_AXIS = 112  # keeps a dense spray below about 10 MB
 _ELEMENT_ARRAY_BUFFER, _ARRAY_BUFFER = 34963, 34962  # glTF 2.0, section 5.11.5
 _FLOAT, _UINT = 5126, 5125  # glTF 2.0, section 3.6.2.2
-_COLOUR = [0.16, 0.47, 0.93, 1.0]
+_COLOUR = [0.03, 0.2, 0.75, 1.0]  # linear light
 
 Array = NDArray[Any]
 
@@ -45,7 +45,7 @@ def surface_glb(preview: VolumePreview, level: float) -> bytes:
     if closed.max() <= 255 * level:
         return glb(np.zeros((3, 3), np.float32), np.zeros((3, 3), np.float32), np.array([[0, 1, 2]]))
     corners, faces, normals, _ = marching_cubes(closed, 255 * level)
-    return glb(_to_viewer_mm(corners - 1, coarse.grid), normals[:, ::-1] * (1, -1, -1), faces[:, ::-1])
+    return glb(_to_viewer_mm(corners - 1, coarse.grid), normals[:, ::-1] * (1, -1, -1), faces)
 
 
 def glb(positions: Array, normals: Array, faces: Array) -> bytes:
@@ -61,7 +61,7 @@ def glb(positions: Array, normals: Array, faces: Array) -> bytes:
         "meshes": [{"primitives": [{"indices": 0, "attributes": {"POSITION": 1, "NORMAL": 2}, "material": 0}]}],
         "materials": [
             {
-                "pbrMetallicRoughness": {"baseColorFactor": _COLOUR, "metallicFactor": 0.1, "roughnessFactor": 0.5},
+                "pbrMetallicRoughness": {"baseColorFactor": _COLOUR, "metallicFactor": 0.0, "roughnessFactor": 0.6},
                 "doubleSided": True,
             }
         ],

@@ -55,7 +55,7 @@ def problem_of(fields: dict[str, FieldInfo], name: str, value: Any) -> str | Non
         adapter: TypeAdapter[Any] = TypeAdapter(Annotated[field.annotation, field])  # type: ignore[arg-type]
         adapter.validate_python(value)
     except ValidationError as error:
-        return error.errors()[0]["msg"].removeprefix("Value error, ")
+        return error.errors()[0]["msg"].removeprefix("Input should be ")
     return None
 
 

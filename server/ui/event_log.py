@@ -34,7 +34,8 @@ def line_of(event: Event) -> str | None:
         case "run_message":
             text = data["text"]
         case "job_changed":
-            text = f"{data['job']}: {data['state']}" + (f", {data['error']}" if data["error"] else "")
+            what = "calibration" if data["shot"] is None else f"reconstruction of shot {data['shot']}"
+            text = f"{what}: {data['state']}" + (f", {data['error']}" if data["error"] else "")
         case _:
             return None
     return f"{datetime.fromisoformat(event.time_utc).astimezone():%H:%M:%S}  {text}"

@@ -25,14 +25,12 @@ class Header:
         with (
             ui.header(elevated=False)
             .classes("items-center q-py-xs q-px-md gap-3")
-            .style("background:#10161e;height:52px")
+            .style("background:#10161e;min-height:52px")
         ):
             ui.icon("blur_on", size="26px").classes("text-primary")
             ui.label("tomoshadow").classes("text-lg font-medium")
             ui.label(config.name).classes("text-sm opacity-60")
-            self._lamps = (
-                ui.row().classes("gap-2 items-center q-ml-md no-wrap").props('role=group aria-label="rig status"')
-            )
+            self._lamps = ui.row().classes("gap-2 items-center").props('role=group aria-label="rig status"')
             ui.space()
             self._state = (
                 ui.badge("").props('role=status aria-label="acquisition state"').classes("text-sm q-px-md q-py-xs")

@@ -47,7 +47,7 @@ class Page:
                 self._runs, self._jobs = RunTable(context), JobTableView(context)
             with ui.element("div").classes("column wide"):
                 self._volume = VolumePanel(context)
-            with ui.element("div").classes("column"):
+            with ui.element("div").classes("column controls"):
                 self._run, self._form, self._log = RunPanel(context), RunForm(context, draft), EventLog()
         ui.timer(_REFRESH_S, self._refresh)
 

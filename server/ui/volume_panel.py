@@ -64,13 +64,15 @@ class VolumePanel:
                 self._choice = ui.select({}, label="Volume", on_change=self._on_choice)
                 self._choice.props("dense outlined options-dense").classes("flex-1 min-w-0")
                 self._follow = ui.switch("newest", value=True).props("dense")
-                self._download = ui.link("file", "").classes("text-xs").props('aria-label="download volume"')
+                self._download = ui.button(icon="download").props(
+                    'flat dense round type=a aria-label="download volume"'
+                )
             with ui.grid(columns=3).classes("w-full gap-2"):
                 self._slices = [SliceView(axis) for axis in _PICTURES]
             self._scene = ui.scene(grid=False, background_color="#0b0f14", fps=15).classes("scene-box")
             self._scene.props('role=img aria-label="iso-surface"')
             with ui.row().classes("w-full items-center no-wrap gap-3"):
-                ui.label("Iso level").classes("text-xs opacity-80")
+                ui.label("Iso level").classes("text-xs opacity-80 whitespace-nowrap")
                 self._level = FreeSlider(min=0.05, max=0.95, step=0.05, value=0.3).props('dense aria-label="iso level"')
                 self._level.on("change", self._draw_surface)
 

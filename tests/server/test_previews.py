@@ -1,0 +1,51 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from processing.volume import VoxelGrid
+from server.previews import load_preview, make_preview, save_preview
+
+SHAPES = st.tuples(st.integers(1, 30), st.integers(1, 30), st.integers(1, 30))
+
+
+@given(SHAPES, st.integers(1, 12), st.integers(0, 2**31))
+def test_no_droplet_disappears_and_none_moves_by_more_than_a_block(
+    shape: tuple[int, int, int], longest: int, seed: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    voxel = tuple(int(rng.integers(size)) for size in shape)
+    volume = np.zeros(shape, np.float32)
+    volume[voxel] = 0.7
+    grid = VoxelGrid.centred(shape, 0.5)
+    preview = make_preview(volume, grid, longest)
+    assert max(preview.voxels.shape) <= longest
+    (found,) = np.argwhere(preview.voxels)
+    true_mm, found_mm = grid.to_mm(np.array([voxel], float)), preview.grid.to_mm(found[None].astype(float))
+    assert np.abs(true_mm - found_mm).max() <= 0.5 * preview.grid.pitch_mm
+    assert preview.limit == pytest.approx(0.7)
+
+
+def test_a_small_volume_is_its_own_preview(tmp_path: Path) -> None:
+    volume = np.linspace(0, 2, 4 * 5 * 6, dtype=np.float32).reshape(4, 5, 6)
+    grid = VoxelGrid((4, 5, 6), (1.0, 2.0, 3.0), 0.1)
+    save_preview(tmp_path / "v.npz", make_preview(volume, grid))
+    preview = load_preview(tmp_path / "v.npz")
+    assert (preview.grid, preview.limit, preview.full_shape) == (grid, 2.0, (4, 5, 6))
+    np.testing.assert_allclose(preview.voxels / 255 * 2, volume, atol=0.005)
+    np.testing.assert_array_equal(preview.plane("y", 3), preview.voxels[:, 3])
+    np.testing.assert_array_equal(preview.projection("x"), preview.voxels.max(axis=2))
+
+
+def test_an_empty_volume_has_an_empty_preview() -> None:
+    preview = make_preview(np.zeros((3, 3, 3), np.float32), VoxelGrid.centred((3, 3, 3), 1.0))
+    assert preview.limit == 0
+    assert not preview.voxels.any()
+
+
+def test_a_plane_outside_is_refused_with_its_limit() -> None:
+    preview = make_preview(np.ones((3, 4, 5), np.float32), VoxelGrid.centred((3, 4, 5), 1.0))
+    with pytest.raises(IndexError, match="planes 0 to 3"):
+        preview.plane("y", 4)
