@@ -93,7 +93,8 @@ def spoilt_channels(draw: st.DrawFn) -> Channel:
     """A legal channel with one or two fields moved a little, to a limit, or anywhere within 32 bits."""
     values = dict(zip(NAMES, astuple(draw(legal_channels())), strict=True))
     for name in draw(st.lists(st.sampled_from(NAMES), min_size=1, max_size=2)):
-        values[name] = draw(FAR) if draw(st.booleans()) else max(0, values[name] + draw(st.integers(-500, 500)))
+        moved = draw(FAR) if draw(st.booleans()) else values[name] + draw(st.integers(-500, 500))
+        values[name] = min(max(0, moved), 2**32 - 1)
     return Channel(**values)
 
 
