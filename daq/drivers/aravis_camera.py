@@ -16,12 +16,14 @@ from daq.timing import CameraTiming
 
 _log = logging.getLogger(__name__)
 
+_RELEASE_LIMIT_S = 2.0
+
 
 class AravisCamera:
     """Implements ``daq.devices.Camera``.
 
-    Every call ends within seconds: Aravis gives up on a register after 2.5 s, and ``collect`` has its own
-    deadline. A camera that was lost is opened anew by the next ``arm``.
+    Every call ends within seconds: Aravis gives up on a register after 2.5 s, ``collect`` has its own deadline,
+    and ``disarm`` takes 2 s at most. A camera that was lost is opened anew by the next ``arm``.
 
     Parameters
     ----------
@@ -66,7 +68,7 @@ class AravisCamera:
     ) -> None:
         self.disarm()
         self._is_open = False
-        self._let_go(None)
+        self._release(keep=False)
 
     @property
     def name(self) -> str:
@@ -113,7 +115,7 @@ class AravisCamera:
         for setting in settings:
             device.write(setting)
         device.set_packet_bytes(self._packet_bytes)
-        self._receiver = FrameReceiver(self._name, device.open_stream(self._form).pop)
+        self._receiver = FrameReceiver(self._name, device.open_stream(self._form))
         self._receiver.start()
         self._last_id = 0
         device.start()
@@ -146,20 +148,10 @@ class AravisCamera:
         return shot
 
     def disarm(self) -> None:
-        """Stop acquisition; a camera that does not answer is let go, and ``arm`` opens it anew."""
-        receiver, self._receiver = self._receiver, None
-        if receiver is None:
-            return
-        self._latest = receiver.latest
-        device = self._connected()
-        try:
-            device.stop()
-        except DeviceError as error:
-            _log.warning("disarm: %s", error)
-        if device.is_lost:
-            self._let_go(receiver)
-        else:
-            receiver.stop()
+        """Stop acquisition, within 2 s; a camera that does not answer is let go, and ``arm`` opens it anew."""
+        if self._receiver is not None:
+            self._latest = self._receiver.latest
+            self._release(keep=True)
 
     def latest(self) -> Image | None:
         """Newest exposure seen, for the live view; None before the first."""
@@ -187,14 +179,24 @@ class AravisCamera:
             raise DeviceRefused(self._name, "the camera is not armed")
         return self._receiver
 
-    def _let_go(self, receiver: FrameReceiver | None) -> None:
-        """Close stream and device. Aravis asks a silent camera for many seconds: nobody shall wait for that."""
-        device, self._device = self._device, None
-        if device is not None and device.is_lost:
-            Thread(target=_close, args=(receiver, device), name=f"{self._name} close", daemon=True).start()
+    def _release(self, *, keep: bool) -> None:
+        """Aravis asks a silent camera again and again, for up to ten seconds: the rig does not wait for that."""
+        device, receiver, self._receiver = self._device, self._receiver, None
+        if device is None:
+            return
+        release = Thread(target=_release, args=(device, receiver, keep), name=f"{self._name} release", daemon=True)
+        release.start()
+        release.join(0.0 if device.is_lost else _RELEASE_LIMIT_S)
+        if release.is_alive() or device.is_lost or not keep:
+            self._device = None
 
 
-def _close(receiver: FrameReceiver | None, _device: AravisDevice) -> None:
-    """Hold the last references: stream and device end with this thread."""
+def _release(device: AravisDevice, receiver: FrameReceiver | None, keep: bool) -> None:
     if receiver is not None:
+        try:
+            device.stop()
+        except DeviceError as error:
+            _log.warning("%s, while it was disarmed", error)
         receiver.stop()
+    if device.is_lost or not keep:
+        device.close()

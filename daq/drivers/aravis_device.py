@@ -57,10 +57,11 @@ class AravisDevice:
     def __init__(self, name: str, ip: str) -> None:
         self._name = name
         self._ip = ip
-        self._lost = Event()
+        self._lost = lost = Event()
         self._camera = self._connect()
         self._device = self._camera.get_device()
-        self._device.connect("control-lost", lambda *_: self._lost.set())
+        # Comes from a thread of Aravis. It must not refer to self: a cycle would put off the closing of the device.
+        self._device.connect("control-lost", lambda *_: lost.set())
         self._take_control()
         self._camera.set_range_check_policy(Aravis.RangeCheckPolicy.ENABLE)
         self._tick_hz = self._read_wide(_TICK_FREQUENCY_HIGH, _TICK_FREQUENCY_LOW)
@@ -139,6 +140,10 @@ class AravisDevice:
             self._device.write_register(_TIMESTAMP_CONTROL, _LATCH)
             ticks = self._read_wide(_TIMESTAMP_HIGH, _TIMESTAMP_LOW)
         return ticks * 1_000_000_000 // self._tick_hz
+
+    def close(self) -> None:
+        """Give up control. Takes long if the camera does not answer."""
+        self._device = self._camera = None
 
     def _connect(self) -> Any:
         try:
@@ -224,6 +229,10 @@ class AravisStream:
         arrival = self._arrival(buffer)
         self._stream.push_buffer(buffer)
         return arrival
+
+    def close(self) -> None:
+        """End the stream. Takes long if the camera does not answer."""
+        self._stream = None
 
     def _arrival(self, buffer: Any) -> Arrival:
         missing, resent = self._count("n_missing_packets"), self._count("n_resent_packets")

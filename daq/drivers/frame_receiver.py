@@ -1,8 +1,9 @@
 """The polling thread of a camera: takes frames out of its stream and keeps those of the present firing."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from threading import Condition, Event, Thread
+from typing import Protocol
 
 from daq.drivers.exposure_pairing import Arrival, frame_id_distance
 from daq.shot import Image
@@ -31,6 +32,16 @@ class StreamCounters:
     resent_packets: int = 0
 
 
+class FrameStream(Protocol):
+    """Frames of one acquisition."""
+
+    def pop(self) -> Arrival | None:
+        """Wait a fraction of a second for the next frame; None if there was none."""
+
+    def close(self) -> None:
+        """End the stream."""
+
+
 class FrameReceiver:
     """Polls a stream in its own thread.
 
@@ -38,12 +49,12 @@ class FrameReceiver:
     ----------
     name : str
         Device name, for the thread.
-    pop : Callable[[], Arrival | None]
-        Waits for the next frame for a fraction of a second; None if there was none.
+    stream : FrameStream
+        Where frames come from; belongs to the thread, which also closes it.
     """
 
-    def __init__(self, name: str, pop: Callable[[], Arrival | None]) -> None:
-        self._pop = pop
+    def __init__(self, name: str, stream: FrameStream) -> None:
+        self._stream = stream
         self._changed = Condition()
         self._arrivals: list[Arrival] = []
         self._opened_ns = 0
@@ -58,7 +69,7 @@ class FrameReceiver:
         self._thread.start()
 
     def stop(self) -> None:
-        """End polling; returns after one poll interval at most."""
+        """End polling and close the stream."""
         self._stopping.set()
         self._thread.join()
 
@@ -87,9 +98,10 @@ class FrameReceiver:
 
     def _poll(self) -> None:
         while not self._stopping.is_set():
-            arrival = self._pop()
+            arrival = self._stream.pop()
             if arrival is not None:
                 self._take(arrival)
+        self._stream.close()
 
     def _take(self, arrival: Arrival) -> None:
         with self._changed:

@@ -29,6 +29,7 @@ from daq.simulation.light import Exposure, FrameSource, exposures_of
 from daq.timing import CameraTiming
 
 _CONTROL_POLL_S = 0.2
+_WAKE_UP = b""
 _FIRINGS_BUFFERED = 2
 _POWER_ON_NS = 1_000_000_000
 _DROPS: dict[Literal["A", "B"], ShotFault] = {"A": "dropped_a", "B": "dropped_b"}
@@ -133,14 +134,16 @@ class SimulatedCamera:
 
     def kill(self) -> None:
         """Pull the plug: the address answers no more."""
+        if not self._threads:
+            return
         self._stopping.set()
         with self._changed:
             self._changed.notify_all()
+        self._stream_socket.sendto(_WAKE_UP, self._control_socket.getsockname())
         for thread in self._threads:
             thread.join()
-        if self._threads:
-            self._control_socket.close()
-            self._stream_socket.close()
+        self._control_socket.close()
+        self._stream_socket.close()
         self._threads = ()
 
     def trigger(self, train: FiredTrain) -> None:

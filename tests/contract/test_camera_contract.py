@@ -53,9 +53,9 @@ def train(sequence: int) -> FiredTrain:
     return FiredTrain(sequence, {VIEW: 0}, {VIEW: pulses})
 
 
-@pytest.fixture(params=["Mono8", "Mono12", "Mono16"])
+@pytest.fixture
 def bench(request: pytest.FixtureRequest) -> Iterator[CameraBench]:
-    profile = PROFILE.model_copy(update={"pixel_format": request.param})
+    profile = PROFILE.model_copy(update={"pixel_format": getattr(request, "param", "Mono8")})
     simulated = SimulatedCamera(VIEW, "127.0.0.31", "SN31", profile.camera_timing, signed, SHAPE)
     sequences = count(1)
 
@@ -83,6 +83,7 @@ def test_tells_the_timing_of_its_profile(bench: CameraBench) -> None:
     assert bench.camera.timing == PROFILE.camera_timing
 
 
+@pytest.mark.parametrize("bench", ["Mono8", "Mono12", "Mono16"], indirect=True)
 def test_delivers_both_exposures_of_a_firing_in_their_places(bench: CameraBench) -> None:
     bench.camera.arm()
     sequence, shot = bench.shoot()
@@ -116,7 +117,7 @@ def test_images_of_a_shot_stay_as_they_are(bench: CameraBench) -> None:
 def test_a_missing_exposure_keeps_its_slot(bench: CameraBench) -> None:
     bench.camera.arm()
     bench.lose_exposure_b()
-    sequence, shot = bench.shoot(0.3)
+    sequence, shot = bench.shoot(1.0)
     assert not shot.valid
     assert shot.record_a.valid
     assert shot.frame_a[0, 0] == sequence
