@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, SecretStr, ValidationError, ValidationInfo, field_validator, model_validator
 
+from daq.acquisition_limits import AcquisitionLimits
 from daq.run_plan import FrozenModel
 from daq.simulation.faults import ScriptedFault
 from server.toml_lines import line_of
@@ -123,11 +124,32 @@ class ServerConfig(FrozenModel):
     data_dir: Annotated[Path, Field(description="relative to the working directory")] = Path("runs")
     token: Annotated[SecretStr | None, Field(description="asked of every browser and script")] = None
 
+    def moved(self, host: str | None, port: int | None) -> "ServerConfig":
+        """The same at another address; ConfigError if that may not be served."""
+        changes = {name: value for name, value in (("host", host), ("port", port)) if value is not None}
+        try:
+            return ServerConfig.model_validate(self.model_dump() | changes)
+        except ValidationError as error:
+            raise ConfigError("; ".join(problem["msg"] for problem in error.errors())) from error
+
     @model_validator(mode="after")
     def _an_open_door_has_a_key(self) -> Self:
         if self.token is None and self.host not in ("127.0.0.1", "::1", "localhost"):
             raise ValueError(f"host {self.host} can be reached from the network: set a token")
         return self
+
+
+class AcquisitionConfig(FrozenModel):
+    """Deadlines of acquisition that depend on the rig."""
+
+    frame_deadline_s: Annotated[
+        float,
+        Field(gt=0, le=60, description="time for the network, after the cameras' cycle, until a frame is missing"),
+    ] = 1.0
+
+    def to_limits(self) -> AcquisitionLimits:
+        """The same as limits of acquisition."""
+        return AcquisitionLimits(frame_s=self.frame_deadline_s)
 
 
 class SimulationConfig(FrozenModel):
@@ -151,6 +173,7 @@ class RigConfig(FrozenModel):
     pulse_generator: PulseGeneratorConfig | None = None
     interlock: InterlockConfig | None = None
     stage: StageConfig | None = None
+    acquisition: AcquisitionConfig = AcquisitionConfig()
     server: ServerConfig = ServerConfig()
     simulation: SimulationConfig | None = None
 

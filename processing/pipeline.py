@@ -1,0 +1,222 @@
+"""One shot + one calibration + settings -> volumes on disk. Every shot by itself, whoever asks for it."""
+
+import resource
+import time
+from collections.abc import Callable
+from functools import lru_cache
+from importlib.metadata import version
+from pathlib import Path
+
+from daq.shotfile import RunReader, Shot
+from processing.calibration.calibration import Calibration, Verdict
+from processing.calibration.calibration_file import file_sha256, load_calibration
+from processing.calibration.errors import CalibrationError
+from processing.preprocessing import Intensity, Preprocessing, intensity
+from processing.reconstruction.common_volume import common_volume
+from processing.reconstruction.line_of_sight import line_of_sight
+from processing.reconstruction.method import ReconstructionMethod
+from processing.reconstruction.plan import Plan, plan_reconstruction
+from processing.reconstruction.settings import FrozenValue, GridSettings, ReconstructionSettings
+from processing.reconstruction.smart import mart, smart
+from processing.reconstruction.volume_file import write_volume
+from processing.results_file import FrameName, Provenance, claim_results, volume_path
+from processing.volume import VoxelGrid
+
+
+class PipelineError(Exception):
+    """A shot cannot be reconstructed; the text names run, shot and reason."""
+
+
+class Stopped(Exception):
+    """The reconstruction was told to stop."""
+
+
+class VolumeRecord(FrozenValue):
+    """One volume that was written; ``seconds`` is the wall time of its reconstruction."""
+
+    shot: int
+    frame: FrameName
+    file: str
+    seconds: float
+
+
+class ShotResult(FrozenValue):
+    """What became of one shot."""
+
+    shot: int
+    method: ReconstructionMethod
+    grid: GridSettings
+    volumes: tuple[VolumeRecord, ...]
+    cpu_s: float
+    peak_rss_mb: float
+
+
+def reconstruct_shot(
+    run_dir: Path,
+    shot: int,
+    calibration_file: Path,
+    settings: ReconstructionSettings,
+    results_dir: Path,
+    should_stop: Callable[[], bool] = lambda: False,
+) -> ShotResult:
+    """Reconstruct every exposure of one shot and write its volumes.
+
+    Parameters
+    ----------
+    run_dir : Path
+        The recorded run.
+    shot : int
+        Index of the shot.
+    calibration_file : Path
+        Calibration of the views of the run.
+    settings : ReconstructionSettings
+        Method, grid and preprocessing.
+    results_dir : Path
+        Receives the volumes; a volume of the same shot and settings is replaced atomically.
+    should_stop : callable
+        Asked between the steps.
+
+    Raises
+    ------
+    PipelineError
+        The shot is not valid, or run and calibration do not belong together.
+    CalibrationError
+        The calibration was refused.
+    Stopped
+        ``should_stop`` said so.
+    """
+    started_cpu_s = time.process_time()
+    calibration = load_calibration(calibration_file)
+    with RunReader(run_dir) as run:
+        recorded = run.read_shot(shot)
+        _check(run_dir.name, recorded, calibration)
+        images = {frame: shot_intensities(run, recorded, frame, settings) for frame in _frames(run)}
+        provenance = _provenance(run, calibration, calibration_file, settings)
+    plan = _cached_plan(calibration_file, str(provenance["calibration_sha256"]), settings, tuple(recorded.views))
+    claim_results(results_dir, provenance)
+    volumes = []
+    for frame, views in images.items():
+        if should_stop():
+            raise Stopped(f"{run_dir.name}, shot {shot}: stopped before exposure {frame}")
+        volumes.append(_reconstruct_frame(plan, views, settings, results_dir, shot, frame, provenance))
+    return ShotResult(
+        shot=shot,
+        method=settings.method,
+        grid=GridSettings.of(plan.grid),
+        volumes=tuple(volumes),
+        cpu_s=time.process_time() - started_cpu_s,
+        peak_rss_mb=resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+    )
+
+
+def reconstruct(plan: Plan, images: list[Intensity], settings: ReconstructionSettings) -> Intensity:
+    """Volume (z, y, x) of one exposure by the method of the settings."""
+    match settings.method:
+        case ReconstructionMethod.SMART:
+            return smart(plan, images, iterations=settings.iterations, relaxation=settings.relaxation).volume
+        case ReconstructionMethod.MART:
+            return mart(plan, images, iterations=settings.iterations, relaxation=settings.relaxation).volume
+        case method:
+            return line_of_sight(plan, images, method)
+
+
+def default_grid(calibration: Calibration, pitch_mm: float | None = None) -> VoxelGrid:
+    """The volume that all views see within the calibrated z range; x and y reach a quarter beyond the target."""
+    return common_volume(
+        [view.mapping for view in calibration.views.values()],
+        x_range_mm=_widened(calibration.x_range_mm),
+        y_range_mm=_widened(calibration.y_range_mm),
+        z_range_mm=calibration.z_range_mm,
+        pitch_mm=pitch_mm,
+    )
+
+
+def shot_intensities(run: RunReader, shot: Shot, frame: FrameName, settings: ReconstructionSettings) -> list[Intensity]:
+    """Preprocessed images of one exposure, in the order of the shot's views."""
+    preprocessing = Preprocessing(run.header.polarity, settings.minimum_window_px, settings.noise_floor)
+    number = "ab".index(frame)
+    images = []
+    for view, exposures in shot.views.items():
+        pixels = (exposures.frame_a, exposures.frame_b)[number]
+        if pixels is None:
+            raise PipelineError(f"{run.header.run_id}, shot {shot.index}: {view} has no exposure {frame}")
+        dark, background = run.dark(view), run.background(view)
+        images.append(
+            intensity(
+                pixels,
+                preprocessing,
+                bits=run.header.views[view].bits,
+                dark=None if dark is None else dark[number],
+                background=None if background is None else background[number],
+            )
+        )
+    return images
+
+
+def _reconstruct_frame(
+    plan: Plan,
+    views: list[Intensity],
+    settings: ReconstructionSettings,
+    results_dir: Path,
+    shot: int,
+    frame: FrameName,
+    provenance: Provenance,
+) -> VolumeRecord:
+    started_s = time.perf_counter()
+    volume = reconstruct(plan, views, settings)
+    seconds = round(time.perf_counter() - started_s, 4)
+    file = volume_path(results_dir, shot, frame)
+    write_volume(file, volume, plan.grid, {**provenance, "shot": shot, "frame": frame})
+    return VolumeRecord(shot=shot, frame=frame, file=file.name, seconds=seconds)
+
+
+def _frames(run: RunReader) -> tuple[FrameName, ...]:
+    return ("a", "b") if run.header.frames_per_shot == 2 else ("a",)
+
+
+def _check(run_name: str, shot: Shot, calibration: Calibration) -> None:
+    if not shot.valid:
+        raise PipelineError(f"{run_name}, shot {shot.index}: exposures are missing, nothing to reconstruct")
+    calibration.require_world()
+    unknown = sorted(set(shot.views) - set(calibration.views))
+    if unknown:
+        raise PipelineError(
+            f"{run_name}: views {unknown} are not in the calibration, it has {sorted(calibration.views)}"
+        )
+    for name, exposures in shot.views.items():
+        rows, columns = exposures.frame_a.shape
+        view = calibration.views[name]
+        if (columns, rows) != view.mapping.image_size_px:
+            raise PipelineError(
+                f"{run_name}, {name}: image of {columns} x {rows} px, calibrated for {view.mapping.image_size_px}"
+            )
+        if view.verdict is Verdict.REFUSE:
+            raise CalibrationError(
+                f"calibration {calibration.id}, {name}: hold-out error {view.holdout_error_px:.3g} px is refused"
+            )
+
+
+def _provenance(
+    run: RunReader, calibration: Calibration, calibration_file: Path, settings: ReconstructionSettings
+) -> Provenance:
+    return {
+        "run": run.header.run_id,
+        "calibration": calibration.id,
+        "calibration_sha256": file_sha256(calibration_file),
+        "settings": settings.model_dump_json(),
+        "tomoshadow": version("tomoshadow"),
+    }
+
+
+@lru_cache(maxsize=2)
+def _cached_plan(
+    calibration_file: Path, _sha256: str, settings: ReconstructionSettings, views: tuple[str, ...]
+) -> Plan:
+    calibration = load_calibration(calibration_file)
+    grid = settings.grid.to_grid() if settings.grid else default_grid(calibration)
+    return plan_reconstruction([calibration.views[view].mapping for view in views], grid)
+
+
+def _widened(span_mm: tuple[float, float]) -> tuple[float, float]:
+    quarter_mm = (span_mm[1] - span_mm[0]) / 4
+    return span_mm[0] - quarter_mm, span_mm[1] + quarter_mm

@@ -1,0 +1,51 @@
+"""ReconstructionSettings: how shots become volumes. The same frozen value in API, job and result."""
+
+import hashlib
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from processing.reconstruction.method import ReconstructionMethod
+from processing.volume import VoxelGrid
+
+
+class FrozenValue(BaseModel):
+    """A value: frozen, and a misspelt field is an error."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class GridSettings(FrozenValue):
+    """The grid to reconstruct on, see ``processing.volume.VoxelGrid``."""
+
+    shape: Annotated[
+        tuple[Annotated[int, Field(ge=1)], Annotated[int, Field(ge=1)], Annotated[int, Field(ge=1)]],
+        Field(description="voxels along z, y, x"),
+    ]
+    origin_mm: Annotated[tuple[float, float, float], Field(description="centre of voxel [0, 0, 0], x, y, z")]
+    pitch_mm: Annotated[float, Field(gt=0, description="voxel edge")]
+
+    @classmethod
+    def of(cls, grid: VoxelGrid) -> "GridSettings":
+        """Settings of a grid."""
+        return cls(shape=grid.shape, origin_mm=grid.origin_mm, pitch_mm=grid.pitch_mm)
+
+    def to_grid(self) -> VoxelGrid:
+        """The same as a VoxelGrid."""
+        return VoxelGrid(self.shape, self.origin_mm, self.pitch_mm)
+
+
+class ReconstructionSettings(FrozenValue):
+    """How shots become volumes; travels with every result."""
+
+    method: ReconstructionMethod = ReconstructionMethod.MLOS
+    iterations: Annotated[int, Field(ge=1, le=200, description="of SMART and MART")] = 20
+    relaxation: Annotated[float, Field(gt=0, le=2, description="of SMART and MART")] = 1.0
+    grid: Annotated[GridSettings | None, Field(description="default: what all views see, one voxel per pixel")] = None
+    minimum_window_px: Annotated[int, Field(ge=0, le=2001, description="sliding minimum; 0 leaves it out")] = 201
+    noise_floor: Annotated[float, Field(ge=0, lt=1, description="intensity that counts as nothing")] = 0.05
+
+    @property
+    def results_id(self) -> str:
+        """Name of the results directory: method and a hash of all settings."""
+        return f"{self.method.value}-{hashlib.sha256(self.model_dump_json().encode()).hexdigest()[:8]}"

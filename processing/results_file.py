@@ -1,0 +1,67 @@
+"""A results directory: ``settings.json`` and one volume per exposure, ``shot_00012_a.vtkhdf``."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from processing.preprocessing import Intensity
+from processing.reconstruction.volume_file import VolumeFileError, read_volume
+from processing.volume import VoxelGrid
+
+FrameName = Literal["a", "b"]
+Provenance = Mapping[str, str | int | float]
+
+
+def volume_path(results_dir: Path, shot: int, frame: FrameName) -> Path:
+    """Where the volume of one exposure lies."""
+    return results_dir / f"shot_{shot:05d}_{frame}.vtkhdf"
+
+
+def volume_files(results_dir: Path, frame: FrameName | None = None) -> list[Path]:
+    """Volumes in a results directory, by shot and frame."""
+    return sorted(results_dir.glob(f"shot_*_{frame or '[ab]'}.vtkhdf"))
+
+
+def claim_results(results_dir: Path, provenance: Provenance) -> None:
+    """Make the directory, or check that it holds results of the same run, calibration and settings.
+
+    Raises
+    ------
+    VolumeFileError
+        It holds results of something else; they stay as they are.
+    """
+    results_dir.mkdir(parents=True, exist_ok=True)
+    file, text = results_dir / "settings.json", json.dumps(dict(provenance), indent=2) + "\n"
+    if file.exists():
+        if file.read_text() != text:
+            raise VolumeFileError(
+                f"{results_dir}: holds results of another run, calibration or settings; choose another"
+            )
+        return
+    part = file.with_suffix(".part")
+    part.write_text(text)
+    part.replace(file)
+
+
+def average_volumes(files: list[Path]) -> tuple[Intensity, VoxelGrid]:
+    """Mean of volumes on one grid.
+
+    Raises
+    ------
+    VolumeFileError
+        There are none, or their grids differ.
+    """
+    if not files:
+        raise VolumeFileError("there are no volumes to average")
+    first, grid, _ = read_volume(files[0])
+    total = first.astype(np.float32)
+    for file in files[1:]:
+        volume, its_grid, _ = read_volume(file)
+        if its_grid != grid:
+            raise VolumeFileError(f"{file}: its grid {its_grid} differs from {grid}, that of {files[0].name}")
+        total += volume
+    total /= np.float32(len(files))
+    return total, grid

@@ -1,0 +1,132 @@
+"""The command line. ``--json`` prints one JSON object as the last line of stdout; progress goes to stderr.
+
+Exit status: 0 done, 1 failed, 2 bad usage or bad input.
+"""
+
+import argparse
+import json
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from daq.errors import DaqError, PlanError, ShotFileError
+from processing.calibration.errors import CalibrationError
+from processing.importing import ManifestError
+from processing.pipeline import PipelineError
+from processing.reconstruction.method import ReconstructionMethod
+from processing.reconstruction.volume_file import VolumeFileError
+from server import commands
+from server.config import ConfigError
+
+BAD_INPUT = (CalibrationError, ConfigError, ManifestError, PipelineError, PlanError, ShotFileError, VolumeFileError)
+Command = Callable[[argparse.Namespace], dict[str, Any]]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command; the exit status."""
+    options = _parser().parse_args(arguments)
+    command: Command = options.command
+    try:
+        result = command(options)
+    except BAD_INPUT as error:
+        return _fail(options, error, status=2)
+    except (DaqError, OSError) as error:
+        return _fail(options, error, status=1)
+    except KeyboardInterrupt:
+        return _fail(options, RuntimeError("interrupted"), status=1)
+    print(json.dumps(result) if options.json else commands.readable(result))  # noqa: T201
+    return 0
+
+
+def _fail(options: argparse.Namespace, error: BaseException, status: int) -> int:
+    print(f"tomoshadow: {error}", file=sys.stderr)  # noqa: T201
+    if options.json:
+        print(json.dumps({"error": str(error), "kind": type(error).__name__}))  # noqa: T201
+    return status
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="tomoshadow", description="Tomographic shadowgraphy, from trigger to volume.")
+    verbs = parser.add_subparsers(required=True, metavar="COMMAND")
+    _add_demo(verbs)
+    _add_serve(verbs)
+    _add_import(verbs)
+    _add_calibrate(verbs)
+    _add_reconstruct(verbs)
+    _add_average(verbs)
+    _add_study(verbs)
+    _add_optics(verbs)
+    return parser
+
+
+def _verb(verbs: Any, name: str, command: Command, summary: str) -> argparse.ArgumentParser:
+    parser: argparse.ArgumentParser = verbs.add_parser(name, help=summary, description=summary)
+    parser.add_argument("--json", action="store_true", help="print one JSON object as the last line")
+    parser.set_defaults(command=command)
+    return parser
+
+
+def _add_demo(verbs: Any) -> None:
+    parser = _verb(verbs, "demo", commands.demo, "run the whole chain on the simulated bench")
+    parser.add_argument("--out", type=Path, default=Path("demo-out"), help="where runs, results and report.html go")
+    parser.add_argument("--shots", type=int, default=8, help="double exposures to record")
+    parser.add_argument("--config", type=Path, default=Path("configs/simulated.toml"), help="a simulated rig")
+
+
+def _add_serve(verbs: Any) -> None:
+    parser = _verb(verbs, "serve", commands.serve, "start server and web page")
+    parser.add_argument("--config", type=Path, required=True, help="rig configuration")
+    parser.add_argument("--host", help="address to bind to, default 127.0.0.1")
+    parser.add_argument("--port", type=int, help="port to bind to, default 8080")
+
+
+def _add_import(verbs: Any) -> None:
+    parser = _verb(verbs, "import", commands.import_images, "images from elsewhere become a run or a calibration set")
+    parser.add_argument("manifest", type=Path, metavar="MANIFEST.toml")
+    parser.add_argument("-o", "--out", type=Path, required=True, help="directory to create")
+
+
+def _add_calibrate(verbs: Any) -> None:
+    parser = _verb(verbs, "calibrate", commands.calibrate_views, "fit the camera of every view to a calibration set")
+    parser.add_argument("set", type=Path, help="calibration run, or an imported set")
+    parser.add_argument("-o", "--out", type=Path, required=True, help="calibration file to write")
+    parser.add_argument("--model", choices=("pinhole", "pinhole_tilted", "polynomial"), default="pinhole")
+
+
+def _add_reconstruct(verbs: Any) -> None:
+    parser = _verb(verbs, "reconstruct", commands.reconstruct_run, "turn the shots of a run into volumes")
+    parser.add_argument("run", type=Path, help="run directory")
+    parser.add_argument("--calibration", type=Path, required=True)
+    parser.add_argument("-o", "--out", type=Path, required=True, help="directory of the results")
+    parser.add_argument("--method", choices=[method.value for method in ReconstructionMethod], default="mlos")
+    parser.add_argument("--iterations", type=int, default=20, help="of smart and mart")
+    parser.add_argument("--shots", metavar="A:B", help="shots A to B - 1; default all")
+    parser.add_argument(
+        "--grid",
+        metavar="X0:X1,Y0:Y1,Z0:Z1[@PITCH]",
+        help="box in mm, voxel edge in mm; default: what all views see within the calibrated z range, one pixel",
+    )
+
+
+def _add_average(verbs: Any) -> None:
+    parser = _verb(verbs, "average", commands.average, "mean volume and slices of results")
+    parser.add_argument("results", type=Path, help="directory of the results")
+    parser.add_argument("-o", "--out", type=Path, required=True, help="volume file to write; slices beside it")
+
+
+def _add_study(verbs: Any) -> None:
+    studies = verbs.add_parser("study", help="the paper's simulations").add_subparsers(required=True, metavar="STUDY")
+    parser = _verb(studies, "density", commands.study_density, "reconstruction quality against droplet density, Fig. 7")
+    parser.add_argument("-o", "--out", type=Path, default=Path("study-density"), help="directory of CSV and figure")
+    parser.add_argument("--sigma", type=float, default=1.5, help="blob width in voxel")
+    parser.add_argument("--iterations", type=int, default=20, help="of SMART")
+
+
+def _add_optics(verbs: Any) -> None:
+    parser = _verb(verbs, "optics", commands.optics, "optics of a rig: d_A, depth of field, blur, straddling window")
+    parser.add_argument("--config", type=Path, required=True, help="rig configuration")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

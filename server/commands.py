@@ -1,0 +1,208 @@
+"""What each command does: parsed arguments in, the JSON object of design out. Progress goes to stderr."""
+
+import json
+import re
+import resource
+import sys
+from argparse import Namespace
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from daq.shotfile import ImageKey, RunReader
+from processing.analysis.figures import PlaneResiduals, residuals_figure, slices_figure
+from processing.calibration.calibration import Calibration
+from processing.calibration.calibration_file import load_calibration, save_calibration
+from processing.calibration.calibration_set import load_calibration_set
+from processing.calibration.joint_fit import calibrate
+from processing.importing import import_manifest
+from processing.pipeline import (
+    PipelineError,
+    default_grid,
+    reconstruct_shot,
+)
+from processing.reconstruction.method import ReconstructionMethod
+from processing.reconstruction.settings import GridSettings, ReconstructionSettings
+from processing.reconstruction.volume_file import write_volume
+from processing.results_file import average_volumes, volume_files
+from processing.studies.density import DensityStudy, density_csv, density_figure, density_study
+from processing.volume import VoxelGrid
+from server.config import load_config
+from server.optics_table import optics_table
+
+
+def progress(text: str) -> None:
+    """Tell the user what happens, on stderr."""
+    print(text, file=sys.stderr, flush=True)  # noqa: T201
+
+
+def readable(result: dict[str, Any]) -> str:
+    """A result for a person."""
+    return json.dumps(result, indent=2)
+
+
+def import_images(options: Namespace) -> dict[str, Any]:
+    """``tomoshadow import``."""
+    return {"out": str(options.out), **import_manifest(options.manifest, options.out)}
+
+
+def calibrate_views(options: Namespace) -> dict[str, Any]:
+    """``tomoshadow calibrate``."""
+    calibration_set = load_calibration_set(options.set)
+    calibration = calibrate(calibration_set, model=options.model)
+    save_calibration(calibration, options.out)
+    figure = options.out.with_suffix(".png")
+    residuals_figure(plane_residuals(calibration)).savefig(figure, dpi=120)
+    return {"calibration": str(options.out), "id": calibration.id, "figure": str(figure), **view_errors(calibration)}
+
+
+def view_errors(calibration: Calibration) -> dict[str, Any]:
+    """Residuals of a calibration by view, as the JSON of ``calibrate`` has them."""
+    return {
+        "views": {
+            name: {
+                "n_points": view.n_points,
+                "mean_error_px": view.mean_error_px,
+                "rms_px": view.rms_px,
+                "max_error_px": view.max_error_px,
+                "holdout_error_px": view.holdout_error_px,
+                "planes": [
+                    {
+                        "name": plane.name,
+                        "z_mm": plane.z_mm,
+                        "mean_error_px": plane.mean_error_px,
+                        "rms_px": plane.rms_px,
+                    }
+                    for plane in view.planes
+                ],
+                "worst_plane": view.worst_plane.name,
+                "verdict": view.verdict.value,
+            }
+            for name, view in calibration.views.items()
+        }
+    }
+
+
+def plane_residuals(calibration: Calibration) -> dict[str, PlaneResiduals]:
+    """Residuals over z of all views whose planes have a known position."""
+    return {
+        name: PlaneResiduals(
+            np.array([plane.z_mm for plane in view.planes if plane.z_mm is not None]),
+            np.array([plane.mean_error_px for plane in view.planes if plane.z_mm is not None]),
+            view.holdout_error_px,
+        )
+        for name, view in calibration.views.items()
+    }
+
+
+def reconstruct_run(options: Namespace) -> dict[str, Any]:
+    """``tomoshadow reconstruct``."""
+    calibration = load_calibration(options.calibration)
+    grid = GridSettings.of(parse_grid(options.grid, calibration) if options.grid else default_grid(calibration))
+    settings = ReconstructionSettings(
+        method=ReconstructionMethod(options.method), iterations=options.iterations, grid=grid
+    )
+    shots = _selected_shots(options.run, options.shots)
+    results = []
+    for shot in shots:
+        progress(f"{options.run.name}: shot {shot} by {options.method}")
+        results.append(reconstruct_shot(options.run, shot, options.calibration, settings, options.out))
+    return {
+        "method": options.method,
+        "grid": grid.model_dump(mode="json"),
+        "volumes": [volume.model_dump(mode="json") for result in results for volume in result.volumes],
+        "cpu_s": sum(result.cpu_s for result in results),
+        "peak_rss_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+    }
+
+
+def parse_grid(text: str, calibration: Calibration) -> VoxelGrid:
+    """Grid of ``X0:X1,Y0:Y1,Z0:Z1[@PITCH]``, all in mm; without a pitch the default grid's.
+
+    Raises
+    ------
+    PipelineError
+        The text is not of that form, or the box is empty.
+    """
+    number = r"[-+]?\d*\.?\d+"
+    match = re.fullmatch(rf"({number}):({number}),({number}):({number}),({number}):({number})(?:@({number}))?", text)
+    if not match:
+        raise PipelineError(f"--grid {text!r} is not of the form X0:X1,Y0:Y1,Z0:Z1[@PITCH] in mm")
+    *bounds_mm, pitch = match.groups()
+    lower_mm, upper_mm = np.array(bounds_mm, dtype=float).reshape(3, 2).T
+    pitch_mm = float(pitch) if pitch else default_grid(calibration).pitch_mm
+    if (upper_mm <= lower_mm).any() or pitch_mm <= 0:
+        raise PipelineError(f"--grid {text!r}: every range must grow, and the pitch must be positive")
+    nx, ny, nz = (round(float(extent_mm) / pitch_mm) + 1 for extent_mm in upper_mm - lower_mm)
+    return VoxelGrid((nz, ny, nx), (float(lower_mm[0]), float(lower_mm[1]), float(lower_mm[2])), pitch_mm)
+
+
+def _selected_shots(run_dir: Path, selection: str | None) -> list[int]:
+    with RunReader(run_dir) as run:
+        samples = [index for index, key in enumerate(run.image_keys()) if key == ImageKey.SAMPLE]
+    if selection is None:
+        return samples
+    match = re.fullmatch(r"(\d*):(\d*)", selection)
+    if not match:
+        raise PipelineError(f"--shots {selection!r} is not of the form A:B")
+    first, last = (int(bound) if bound else None for bound in match.groups())
+    chosen = [index for index in samples if (first or 0) <= index and (last is None or index < last)]
+    if not chosen:
+        raise PipelineError(f"--shots {selection}: {run_dir} has no valid sample shots there, only {samples}")
+    return chosen
+
+
+def average(options: Namespace) -> dict[str, Any]:
+    """``tomoshadow average``."""
+    files = volume_files(options.results)
+    volume, grid = average_volumes(files)
+    write_volume(options.out, volume, grid, {"average_of": str(options.results), "volumes": len(files)})
+    figure = options.out.with_suffix(".png")
+    slices_figure(volume, grid, f"mean of {len(files)} volumes").savefig(figure, dpi=120)
+    return {
+        "file": str(options.out),
+        "figure": str(figure),
+        "volumes": len(files),
+        "grid": GridSettings.of(grid).model_dump(),
+    }
+
+
+def study_density(options: Namespace) -> dict[str, Any]:
+    """``tomoshadow study density``."""
+    options.out.mkdir(parents=True, exist_ok=True)
+    study = DensityStudy(sigma_voxel=options.sigma, iterations=options.iterations)
+    rows = []
+    for row in density_study(study):
+        progress(f"{row.density_per_mm3:5.1f} droplets/mm^3, {row.method}: Q = {row.quality_factor:.3f}")
+        rows.append(row)
+    csv, figure = options.out / "density.csv", options.out / "density.png"
+    csv.write_text(density_csv(rows))
+    density_figure(rows).savefig(figure, dpi=150)
+    return {"csv": str(csv), "figure": str(figure), "rows": [asdict(row) for row in rows]}
+
+
+def optics(options: Namespace) -> dict[str, Any]:
+    """``tomoshadow optics``."""
+    return optics_table(load_config(options.config))
+
+
+def serve(options: Namespace) -> dict[str, Any]:
+    """``tomoshadow serve``; the web framework is loaded only here."""
+    from server.serve import serve_rig
+
+    serve_rig(options.config, options.host, options.port)
+    return {}
+
+
+def demo(options: Namespace) -> dict[str, Any]:
+    """``tomoshadow demo``; the bench is loaded only here."""
+    from server.demo import demonstrate
+    from server.demo_report import summary, write_demo_report
+
+    options.out.mkdir(parents=True, exist_ok=True)
+    demonstration = demonstrate(options.config, options.out, options.shots, progress)
+    report = options.out / "report.html"
+    write_demo_report(demonstration, report)
+    return summary(demonstration, report)

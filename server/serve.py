@@ -1,0 +1,69 @@
+"""Open a rig and serve it: what ``tomoshadow serve`` does."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from daq.acquisition import Acquisition
+from daq.run_events import RunEvent, StateChanged
+from processing.calibration.calibration_file import file_sha256
+from processing.engine import DaskEngine
+from server.app import create_app, serve
+from server.assembly import AssembledRig, open_rig
+from server.calibrations import CalibrationStore
+from server.config import RigConfig, load_config
+from server.events import EventPublisher
+from server.services import Services
+from server.tasks import TASKS
+
+Publish = Callable[[RunEvent], None]
+
+
+def serve_rig(config_file: Path, host: str | None = None, port: int | None = None) -> None:
+    """Serve the rig of a configuration until SIGINT or SIGTERM; the light is off before and after.
+
+    Raises
+    ------
+    ConfigError
+        The configuration is wrong.
+    DeviceError
+        A device is absent or does not answer.
+    """
+    config = load_config(config_file)
+    config = config.model_copy(update={"server": config.server.moved(host, port)})
+    with open_rig(config) as bench:
+        events = EventPublisher()
+        with _acquisition(config, bench, events) as acquisition:
+            services = Services(
+                config=config,
+                rig=bench.rig,
+                acquisition=acquisition,
+                events=events,
+                engine=DaskEngine(),
+                tasks=TASKS,
+                bench=bench.bench,
+            )
+            serve(create_app(services), config.server.host, config.server.port)
+
+
+def _acquisition(config: RigConfig, bench: AssembledRig, events: EventPublisher) -> Acquisition:
+    data_dir = config.server.data_dir
+    calibrations = CalibrationStore(data_dir / "calibrations")
+    return Acquisition(
+        bench.rig,
+        data_dir,
+        _keeping_truth(bench, data_dir, events.publish_run_event),
+        configuration=config.model_dump(mode="json"),
+        hash_calibration=lambda name: file_sha256(calibrations.path(name)),
+        limits=config.acquisition.to_limits(),
+    )
+
+
+def _keeping_truth(bench: AssembledRig, data_dir: Path, publish: Publish) -> Publish:
+    """On the simulated bench every run keeps its ground truth, as soon as it has ended."""
+
+    def publish_and_keep(event: RunEvent) -> None:
+        if isinstance(event, StateChanged) and event.outcome is not None:
+            bench.keep_truth(data_dir / event.run_id)
+        publish(event)
+
+    return publish_and_keep
