@@ -2,10 +2,9 @@
 
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from daq.acquisition_limits import AcquisitionLimits
 from daq.devices import Interlock, Rig
 from daq.drivers.aravis_camera import AravisCamera
 from daq.drivers.camera_profile import CameraProfile, load_camera_profile
@@ -32,9 +31,6 @@ from server.simulated_scene import SimulatedScene
 TRUTH_FILE = Path("truth", "truth.h5")
 """Where a run on the simulated bench keeps what nobody could measure; relative to the run."""
 
-SIMULATION_LIMITS = AcquisitionLimits(frame_s=5.0)
-"""Rendering the eight exposures of a shot takes about 1 CPU-s at 1600 x 1200."""
-
 Profiles = Mapping[str, CameraProfile]
 
 _STAGE_SPEED_MM_S = 100.0
@@ -52,14 +48,11 @@ class AssembledRig:
         Doors to open and faults to inject, where the rig is simulated.
     scene : SimulatedScene | None
         What stands before the simulated cameras.
-    limits : AcquisitionLimits
-        Deadlines for acquisition: simulated cameras must render what real ones just see.
     """
 
     rig: Rig
     bench: SimulatedBench | None = None
     scene: SimulatedScene | None = None
-    limits: AcquisitionLimits = field(default_factory=AcquisitionLimits)
 
     def keep_truth(self, run_dir: Path) -> Path | None:
         """Write into a run what nobody could measure; returns the file, None where the rig is real.
@@ -156,7 +149,7 @@ def _open_simulation(
         scene.prepare(kind)
 
     rig = _open_rig(wired, profiles, interlock, devices)
-    return AssembledRig(replace(rig, prepare_scene=prepare), bench, scene, SIMULATION_LIMITS)
+    return AssembledRig(replace(rig, prepare_scene=prepare), bench, scene)
 
 
 def _interlock_and_switch(simulation: SimulationConfig) -> tuple[Interlock, DoorSwitch]:

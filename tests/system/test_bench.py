@@ -23,6 +23,7 @@ from server.config import load_config
 pytestmark = pytest.mark.network
 SMALL, FULL = (Path("configs") / name for name in ("simulated_small.toml", "simulated.toml"))
 LIMITS = AcquisitionLimits(frame_s=1.5)
+PATIENT = AcquisitionLimits(frame_s=10.0)
 CURRENT_A = {name: view.nominal_current_a for name, view in load_config(SMALL).views.items()}
 
 
@@ -202,7 +203,7 @@ def test_noise_on_the_serial_line_does_not_end_a_run(assembled: AssembledRig, tm
 
 def test_the_rig_of_the_paper_at_full_size(tmp_path: Path) -> None:
     with open_rig(load_config(FULL)) as assembled:
-        status, reader = record(assembled, tmp_path, plan(RunKind.SAMPLE, 1, rate_hz=1.0), assembled.limits)
+        status, reader = record(assembled, tmp_path, plan(RunKind.SAMPLE, 1, rate_hz=1.0), PATIENT)
         assert (status.outcome, status.shots_valid) == (RunOutcome.COMPLETED, 1)
         with reader:
             frames = reader.read_shot(0).views
