@@ -58,21 +58,24 @@ class MemoryCamera(MemoryDevice):
         self.frozen: threading.Event | None = None
         self.frames = 0
         self._train: FiredTrain | None = None
+        self._triggered = threading.Event()
 
     def arm(self) -> None:
         self.journal.append(f"{self.name} arm")
 
     def begin_shot(self) -> None:
         self._train = None
+        self._triggered.clear()
 
     def trigger(self, train: FiredTrain) -> None:
         self._train = train
+        self._triggered.set()
 
     def collect(self, deadline_s: float) -> DoubleFrame:
         if self.frozen:
             self.frozen.wait(deadline_s)
             return self._double_frame(None, None)
-        if self._train is None:
+        if not self._triggered.wait(deadline_s) or self._train is None:
             return self._double_frame(None, None)
         if self._train.sequence == self.broken_at:
             raise DeviceError(self.name, "control lost")
