@@ -22,6 +22,10 @@ GUARD_PX = 2
 """Pixels kept above and left of the volume."""
 OVERHANG_PX = 68
 """Columns kept right of the volume, which the widest vectors may read."""
+MAP_SPACING_PX = 8
+"""The camera model is evaluated at every eighth pixel of the resampled image; it is straight in between."""
+MAX_PIXELS_PER_VOXEL = 1.5
+"""Of the recorded image; coarser voxels would skip pixels."""
 MIN_RELATIVE_SCALE = 0.6
 """Smallest scale of any plane against the largest one; beyond it the volume is too deep for its distance."""
 
@@ -72,7 +76,7 @@ class RectifiedView:
 
 
 def rectify(mapping: ViewMapping, grid: VoxelGrid) -> RectifiedView | None:
-    """Rectify a view for a grid; None where its lines of sight do not meet, or meet too near.
+    """Rectify a view for a grid; None where its lines of sight do not meet, or too near, or voxels are coarse.
 
     The largest scale of all planes is one pixel per voxel.
     """
@@ -81,7 +85,7 @@ def rectify(mapping: ViewMapping, grid: VoxelGrid) -> RectifiedView | None:
     centre = grid.to_index(np.asarray(mapping.centre_mm)[None])[0]
     z_ref = 0.5 * (grid.shape[0] - 1)
     depth = np.arange(grid.shape[0]) - centre[0]
-    if depth[0] * depth[-1] <= 0 or (z_ref - centre[0]) == 0:
+    if depth[0] * depth[-1] <= 0:
         return None
     to_reference = (z_ref - centre[0]) / depth
     scale = to_reference / to_reference.max()
@@ -92,25 +96,53 @@ def rectify(mapping: ViewMapping, grid: VoxelGrid) -> RectifiedView | None:
     left, top = GUARD_PX - shift_u.min(), GUARD_PX - shift_v.min()
     columns = int(np.ceil((shift_u + scale * (grid.shape[2] - 1)).max() + left)) + OVERHANG_PX
     rows = int(np.ceil((shift_v + scale * (grid.shape[1] - 1)).max() + top)) + 2 * GUARD_PX
-    index_x, index_y = (np.arange(columns) - left) / reference_scale, (np.arange(rows) - top) / reference_scale
-    map_px = _project_plane(mapping, grid, index_x, index_y, z_ref)
+    origin = np.array([z_ref, -top / reference_scale, -left / reference_scale])
+    nodes_px, middle_px = (
+        _project_plane(mapping, grid, origin, 1 / reference_scale, (rows, columns), offset) for offset in (0.0, 0.5)
+    )
+    if np.linalg.norm(np.diff(nodes_px, axis=1), axis=-1).mean() > MAX_PIXELS_PER_VOXEL * MAP_SPACING_PX:
+        return None
+    bend_px = float(np.linalg.norm(_middle(nodes_px) - middle_px[:-1, :-1], axis=-1).max())
     return RectifiedView(
-        map_u_px=np.ascontiguousarray(map_px[..., 0], dtype=np.float32),
-        map_v_px=np.ascontiguousarray(map_px[..., 1], dtype=np.float32),
+        map_u_px=_spread(nodes_px[..., 0], rows, columns),
+        map_v_px=_spread(nodes_px[..., 1], rows, columns),
         scale=scale,
         shift_u_px=shift_u + left,
         shift_v_px=shift_v + top,
         image_size_px=mapping.image_size_px,
-        deviation_px=_deviation_px(mapping, grid, centre, to_reference),
+        deviation_px=bend_px + _deviation_px(mapping, grid, centre, to_reference),
     )
 
 
 def _project_plane(
-    mapping: ViewMapping, grid: VoxelGrid, index_x: FloatArray, index_y: FloatArray, index_z: float
+    mapping: ViewMapping,
+    grid: VoxelGrid,
+    origin: FloatArray,
+    voxels_per_px: float,
+    shape: tuple[int, int],
+    offset: float,
 ) -> FloatArray:
-    y, x = np.meshgrid(index_y, index_x, indexing="ij")
-    indices = np.stack([np.full(x.shape, index_z), y, x], axis=-1)
+    """Where nodes of the resampled image, whose pixel (0, 0) is the voxel index ``origin``, lie in the recorded one."""
+    along_v, along_u = (
+        voxels_per_px * MAP_SPACING_PX * (np.arange((n - 1) // MAP_SPACING_PX + 2) + offset) for n in shape
+    )
+    y, x = np.meshgrid(origin[1] + along_v, origin[2] + along_u, indexing="ij")
+    indices = np.stack([np.full(x.shape, origin[0]), y, x], axis=-1)
     return mapping.project(grid.to_mm(indices.reshape(-1, 3))).reshape(*x.shape, 2)
+
+
+def _middle(nodes: FloatArray) -> FloatArray:
+    return 0.25 * (nodes[:-1, :-1] + nodes[1:, :-1] + nodes[:-1, 1:] + nodes[1:, 1:])
+
+
+def _spread(nodes: FloatArray, rows: int, columns: int) -> Pixels:
+    """Interpolate nodes linearly onto every pixel."""
+    spread = nodes
+    for axis, count in enumerate((rows, columns)):
+        first, rest = np.divmod(np.arange(count), MAP_SPACING_PX)
+        weight = (rest / MAP_SPACING_PX).reshape((-1, 1) if axis == 0 else (1, -1))
+        spread = np.take(spread, first, axis) * (1 - weight) + np.take(spread, first + 1, axis) * weight
+    return np.ascontiguousarray(spread, dtype=np.float32)
 
 
 def _deviation_px(mapping: ViewMapping, grid: VoxelGrid, centre: FloatArray, to_reference: FloatArray) -> float:

@@ -23,7 +23,7 @@ GRID = VoxelGrid.centred((21, 37, 275), 1 / 60)
 """Longer than a tile, not a multiple of anything."""
 
 
-@pytest.fixture(params=_native.available_isas(), autouse=True)
+@pytest.fixture(params=_native.available_isas())
 def isa(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
     monkeypatch.setenv("TOMOSHADOW_ISA", request.param)
     return str(request.param)
@@ -44,7 +44,7 @@ def node_plan(mappings: list[ViewMapping], grid: VoxelGrid = GRID) -> Plan:
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("count", [2, 3, 8])
-def test_rectified_views_equal_the_textbook(count: int, method: ReconstructionMethod) -> None:
+def test_rectified_views_equal_the_textbook(isa: str, count: int, method: ReconstructionMethod) -> None:
     mappings = oracle.cameras(count)
     plan, images = plan_reconstruction(mappings, GRID), random_images(mappings)
     expected = oracle.planned_line_of_sight(plan, images, method)
@@ -53,7 +53,7 @@ def test_rectified_views_equal_the_textbook(count: int, method: ReconstructionMe
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("roll_deg", [0.0, 7.0, 90.0, 180.0])
-def test_mapped_views_equal_the_textbook(roll_deg: float, method: ReconstructionMethod) -> None:
+def test_mapped_views_equal_the_textbook(isa: str, roll_deg: float, method: ReconstructionMethod) -> None:
     mappings = oracle.cameras(4, roll_deg)
     plan, images = node_plan(mappings), random_images(mappings)
     expected = oracle.planned_line_of_sight(plan, images, method)
@@ -122,7 +122,7 @@ def test_one_droplet_peaks_at_its_voxel(
 
 
 @pytest.mark.parametrize("by_nodes", [False, True])
-def test_nothing_is_seen_outside_of_an_image(by_nodes: bool) -> None:
+def test_nothing_is_seen_outside_of_an_image(isa: str, by_nodes: bool) -> None:
     wide = VoxelGrid.centred((9, 17, 700), 1 / 60)
     mappings = oracle.cameras(2)
     plan = node_plan(mappings, wide) if by_nodes else plan_reconstruction(mappings, wide)
@@ -153,7 +153,7 @@ def test_a_slice_is_the_same_as_in_the_volume() -> None:
     np.testing.assert_allclose(line_of_sight(node_plan(mappings, part), images)[0], whole[10, 16:25, 32:132], atol=5e-3)
 
 
-def test_out_is_filled_and_returned_in_half_precision_too() -> None:
+def test_out_is_filled_and_returned_in_half_precision_too(isa: str) -> None:
     mappings = oracle.cameras(3)
     plan, images = plan_reconstruction(mappings, GRID), random_images(mappings)
     single, half = line_of_sight(plan, images), np.full(GRID.shape, 9, np.float16)
@@ -164,7 +164,7 @@ def test_out_is_filled_and_returned_in_half_precision_too() -> None:
 def test_coarse_voxels_see_droplets_between_them() -> None:
     coarse = VoxelGrid.centred((9, 9, 33), 8 / 60)
     mappings = oracle.cameras(3)
-    plan = node_plan(mappings, coarse)
+    plan = plan_reconstruction(mappings, coarse)
     assert all(isinstance(view, NodeView) and view.binning == 8 for view in plan.views)
     dotted = [np.zeros(m.image_size_px[::-1], np.float32) for m in mappings]
     for image in dotted:
