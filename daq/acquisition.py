@@ -11,7 +11,7 @@ from typing import Any, Self
 
 from daq.acquisition_limits import AcquisitionLimits
 from daq.devices import GeneratorState, Rig
-from daq.errors import BusyError, DeviceError
+from daq.errors import BusyError, DeviceError, PlanError
 from daq.preflight import PreparedRun, prepare_run
 from daq.run_control import RunControl
 from daq.run_events import RunEvent, RunMessage, RunStatus, ShotRecorded, StateChanged
@@ -114,9 +114,7 @@ class Acquisition:
         try:
             next_state(self.status().state, RunStep.START)
             self._control = RunControl()
-            self._data_dir.mkdir(parents=True, exist_ok=True)
-            run = prepare_run(self._rig, self._data_dir, plan, datetime.now(UTC))
-            calibration_sha256 = self._hash_calibration(plan.calibration) if plan.calibration else None
+            run, calibration_sha256 = self._prepare(plan)
             self._move(RunStep.START, **vars(RunStatus(run_id=run.run_id, shots_planned=plan.total_shots)))
             work = partial(self._work, run, self._control, calibration_sha256)
             threading.Thread(target=work, name="acquisition", daemon=True).start()
@@ -165,6 +163,14 @@ class Acquisition:
         with self._changed:
             self._changed.wait_for(lambda: not self._status.active, deadline_s)
             return self._status
+
+    def _prepare(self, plan: RunPlan) -> tuple[PreparedRun, str | None]:
+        try:
+            self._data_dir.mkdir(parents=True, exist_ok=True)
+            run = prepare_run(self._rig, self._data_dir, plan, datetime.now(UTC))
+            return run, self._hash_calibration(plan.calibration) if plan.calibration else None
+        except OSError as error:
+            raise PlanError(f"the run cannot be stored, or its calibration not be read: {error}") from error
 
     def _work(self, run: PreparedRun, control: RunControl, calibration_sha256: str | None) -> None:
         """Thread: one run from ARMING until it rests."""

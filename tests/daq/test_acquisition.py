@@ -379,6 +379,15 @@ def test_a_run_that_the_disk_does_not_hold_is_refused_with_both_numbers(lab: Lab
         lab.acquisition.start(plan_of(100_000))
 
 
+def test_a_calibration_that_does_not_exist_refuses_the_plan(lab: Laboratory) -> None:
+    acquisition = Acquisition(
+        lab.bench.rig, lab.data_dir, hash_calibration=lambda name: (lab.data_dir / name).read_text()
+    )
+    with pytest.raises(PlanError, match="No such file.*c9"):
+        acquisition.start(plan_of(calibration="c9"))
+    assert not acquisition.status().active
+
+
 def test_a_rig_without_a_stage_refuses_positions(lab: Laboratory) -> None:
     rig = lab.bench.rig
     acquisition = Acquisition(Rig(rig.cameras, rig.generator, rig.interlock), lab.data_dir)
