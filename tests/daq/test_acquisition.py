@@ -383,7 +383,7 @@ def test_a_calibration_that_does_not_exist_refuses_the_plan(lab: Laboratory) -> 
     acquisition = Acquisition(
         lab.bench.rig, lab.data_dir, hash_calibration=lambda name: (lab.data_dir / name).read_text()
     )
-    with pytest.raises(PlanError, match="No such file.*c9"):
+    with pytest.raises(PlanError, match=r"No such file.*c9"):
         acquisition.start(plan_of(calibration="c9"))
     assert not acquisition.status().active
 
