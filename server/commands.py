@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from daq.shotfile import ImageKey, RunReader
-from processing.analysis.figures import PlaneResiduals, residuals_figure, slices_figure
+from processing.analysis.figures import residuals_figure, slices_figure
 from processing.calibration.calibration import Calibration
 from processing.calibration.calibration_file import load_calibration, save_calibration
 from processing.calibration.calibration_set import load_calibration_set
@@ -54,7 +54,7 @@ def calibrate_views(options: Namespace) -> dict[str, Any]:
     calibration = calibrate(calibration_set, model=options.model)
     save_calibration(calibration, options.out)
     figure = options.out.with_suffix(".png")
-    residuals_figure(plane_residuals(calibration)).savefig(figure, dpi=120)
+    residuals_figure(calibration).savefig(figure, dpi=120)
     return {"calibration": str(options.out), "id": calibration.id, "figure": str(figure), **view_errors(calibration)}
 
 
@@ -82,18 +82,6 @@ def view_errors(calibration: Calibration) -> dict[str, Any]:
             }
             for name, view in calibration.views.items()
         }
-    }
-
-
-def plane_residuals(calibration: Calibration) -> dict[str, PlaneResiduals]:
-    """Residuals over z of all views whose planes have a known position."""
-    return {
-        name: PlaneResiduals(
-            np.array([plane.z_mm for plane in view.planes if plane.z_mm is not None]),
-            np.array([plane.mean_error_px for plane in view.planes if plane.z_mm is not None]),
-            view.holdout_error_px,
-        )
-        for name, view in calibration.views.items()
     }
 
 

@@ -6,14 +6,7 @@ from typing import Any
 import numpy as np
 
 from daq.shotfile import RunReader
-from processing.analysis.figures import (
-    PlaneResiduals,
-    isosurface_figure,
-    residuals_figure,
-    shadowgraph_figure,
-    slices_figure,
-)
-from processing.calibration.calibration import Calibration
+from processing.analysis.figures import isosurface_figure, residuals_figure, shadowgraph_figure, slices_figure
 from processing.preprocessing import Intensity
 from processing.reconstruction.volume_file import read_volume
 from processing.results_file import volume_path
@@ -64,13 +57,14 @@ def write_demo_report(demo: Demonstration, file: Path) -> None:
     """Write report.html."""
     first = demo.results[0].shot
     volumes = {
-        name: read_volume(volume_path(demo.results_dir, first, letter)) for name, letter in (("A", "a"), ("B", "b"))
+        "A": read_volume(volume_path(demo.results_dir, first, "a")),
+        "B": read_volume(volume_path(demo.results_dir, first, "b")),
     }
     volume, grid, _ = volumes["A"]
     title = f"shot {first}, exposure A, {demo.results[0].method.value.upper()}"
     sections = [
         Section("Summary", tables=[_steps(demo), _shots(demo)]),
-        Section("Calibration", _CALIBRATION_TEXT, [_views(demo)], [_residuals(demo.calibration)]),
+        Section("Calibration", _CALIBRATION_TEXT, [_views(demo)], [_residuals(demo)]),
         Section("Shadowgraphs", pictures=[_shadowgraphs(demo.sample_run, first)]),
         Section("Volume", pictures=[Picture(slices_figure(volume, grid, title), "Slices and maximum projections")]),
         Section("Detail", pictures=[_detail({name: entry[0] for name, entry in volumes.items()}, grid)]),
@@ -117,16 +111,8 @@ def _shots(demo: Demonstration) -> Table:
     return Table(["shot", "exposure", "reconstruction [s]", "quality factor"], rows)
 
 
-def _residuals(calibration: Calibration) -> Picture:
-    views = {
-        name: PlaneResiduals(
-            np.array([plane.z_mm for plane in view.planes]),
-            np.array([plane.mean_error_px for plane in view.planes]),
-            view.holdout_error_px,
-        )
-        for name, view in calibration.views.items()
-    }
-    return Picture(residuals_figure(views), "Mean back-projection error per plane (Fig. 3 of the paper)")
+def _residuals(demo: Demonstration) -> Picture:
+    return Picture(residuals_figure(demo.calibration), "Mean back-projection error per plane (Fig. 3 of the paper)")
 
 
 def _shadowgraphs(run_dir: Path, shot: int) -> Picture:

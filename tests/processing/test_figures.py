@@ -5,13 +5,9 @@ import io
 import numpy as np
 from matplotlib.figure import Figure
 
-from processing.analysis.figures import (
-    PlaneResiduals,
-    isosurface_figure,
-    residuals_figure,
-    shadowgraph_figure,
-    slices_figure,
-)
+from processing.analysis.figures import isosurface_figure, residuals_figure, shadowgraph_figure, slices_figure
+from processing.calibration.calibration import Calibration, Model, PlaneError, Verdict, ViewCalibration
+from processing.geometry import view_camera
 from processing.volume import VoxelGrid
 
 GRID = VoxelGrid.centred((20, 30, 40), 0.1)
@@ -29,9 +25,21 @@ def drawn(figure: Figure) -> int:
     return len(buffer.getvalue())
 
 
+def calibration_of(z_mm: list[float | None]) -> Calibration:
+    """Two views with an error of 0.01 and 0.02 px at every plane."""
+    camera = view_camera(0, focal_length_mm=85, magnification=0.43, scale_px_per_mm=60)
+    views = {}
+    for number in (1, 2):
+        error_px = 0.01 * number
+        planes = tuple(PlaneError(z, 391, error_px, error_px, f"plane {z}") for z in z_mm)
+        views[f"view{number}"] = ViewCalibration(
+            camera, Model.PINHOLE, 391, error_px, error_px, error_px, 2 * error_px, planes, Verdict.GOOD
+        )
+    return Calibration("id", "2026-01-01T00:00:00+00:00", None, views, (-4.5, 4.5), "test")
+
+
 def test_residuals_show_every_view_and_its_holdout_error() -> None:
-    z_mm = np.linspace(-4.5, 4.5, 10)
-    figure = residuals_figure({f"view{n}": PlaneResiduals(z_mm, np.full(10, 0.01 * n), 0.02 * n) for n in (1, 2)})
+    figure = residuals_figure(calibration_of([-4.5, 0.0, 4.5]))
     axes = figure.axes[0]
     legend = axes.get_legend()
     assert legend is not None
@@ -41,7 +49,14 @@ def test_residuals_show_every_view_and_its_holdout_error() -> None:
     ]
     assert axes.get_xlabel() == "plane z [mm]"
     assert axes.get_ylabel() == "mean back-projection error [px]"
+    np.testing.assert_allclose(np.asarray(axes.lines[1].get_ydata(), dtype=float), 0.02)
     assert drawn(figure) > 1000
+
+
+def test_boards_in_free_poses_are_numbered() -> None:
+    axes = residuals_figure(calibration_of([None, None])).axes[0]
+    assert axes.get_xlabel() == "board"
+    np.testing.assert_allclose(np.asarray(axes.lines[0].get_xdata(), dtype=float), [1, 2])
 
 
 def test_slices_have_the_extent_of_the_grid() -> None:
