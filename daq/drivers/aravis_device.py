@@ -28,6 +28,9 @@ _CONTROL_RETRY_S = 0.25
 _BUFFERS = 8
 _POLL_US = 50_000
 _SOCKET_BUFFER_BYTES = 4 << 20
+# Shots come one by one: rather late than incomplete. Aravis would give up after 0.1 s, or a tenth of the packets.
+_FRAME_RETENTION_US = 500_000
+_RESEND_RATIO = 1.0
 
 # Bootstrap registers of GigE Vision 1.2: every camera that has a clock has these.
 _TICK_FREQUENCY_HIGH, _TICK_FREQUENCY_LOW = 0x093C, 0x0940
@@ -214,6 +217,8 @@ class AravisStream:
         self._resent_packets = 0
         stream.set_property("socket-buffer", Aravis.GvStreamSocketBuffer.FIXED)
         stream.set_property("socket-buffer-size", _SOCKET_BUFFER_BYTES)
+        stream.set_property("frame-retention", _FRAME_RETENTION_US)
+        stream.set_property("packet-request-ratio", _RESEND_RATIO)
         self._memory: dict[Any, NDArray[np.uint8]] = {}
         for _ in range(_BUFFERS):
             memory = np.empty(payload_bytes, np.uint8)

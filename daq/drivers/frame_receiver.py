@@ -108,7 +108,9 @@ class FrameReceiver:
             stale = arrival.image is not None and arrival.device_timestamp_ns < self._opened_ns
             self._count(arrival, stale)
             self._latest = self._latest if arrival.image is None else arrival.image
-            if not stale:
+            if stale:
+                self._arrivals.clear()  # frames come in order: whatever came before a stale one is older still
+            else:
                 self._arrivals.append(arrival)
                 self._changed.notify_all()
 
