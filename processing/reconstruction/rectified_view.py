@@ -66,7 +66,10 @@ class RectifiedView:
     deviation_px: float
 
     def resample(self, image: Pixels) -> Pixels:
-        """The image on the plane z_ref: cubic, zero outside of the recorded image, never negative."""
+        """The image on the plane z_ref: cubic, zero outside of the recorded image, never negative.
+
+        OpenCV rounds positions to 1/32 px, which adds up to 0.016 px to ``deviation_px``.
+        """
         resampled = cv2.remap(image, self.map_u_px, self.map_v_px, cv2.INTER_CUBIC, borderMode=cv2.BORDER_CONSTANT)
         return np.maximum(resampled, np.float32(0), dtype=np.float32)
 
