@@ -107,7 +107,7 @@ class AravisCamera:
         DeviceUnavailable
             The camera is gone, or held by another client.
         DeviceRefused
-            A feature is unknown, out of range, or reads back differently.
+            A feature is unknown, out of range, or reads back differently; the camera is disarmed again.
         """
         self.disarm()
         device = self._connected()
@@ -118,9 +118,13 @@ class AravisCamera:
         self._receiver = FrameReceiver(self._name, device.open_stream(self._form))
         self._receiver.start()
         self._last_id = 0
-        device.start()
-        for setting in settings:
-            device.check(setting)
+        try:
+            device.start()
+            for setting in settings:
+                device.check(setting)
+        except DeviceError:
+            self.disarm()
+            raise
 
     def begin_shot(self) -> None:
         """Re-base: only frames that the camera stamps later than now belong to the next firing."""

@@ -8,6 +8,7 @@ import socket
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from threading import Condition, Event, Thread
 from time import monotonic, monotonic_ns
 from types import TracebackType
@@ -93,7 +94,8 @@ class SimulatedCamera:
         self._ip = ip
         self._timing = timing
         self._frame_source = frame_source
-        self._bank = RegisterBank(ip, serial, shape, timing.exposure_a_ns, camera_xml(shape))
+        self._factory_settings = partial(RegisterBank, ip, serial, shape, timing.exposure_a_ns, camera_xml(shape))
+        self._bank = self._factory_settings()
         self._link_bits_per_s = link_bits_per_s
         self._changed = Condition()
         self._pending: deque[_Firing] = deque()
@@ -106,6 +108,8 @@ class SimulatedCamera:
 
     def __enter__(self) -> Self:
         self._stopping.clear()
+        self._pending.clear()
+        self._bank = self._factory_settings()
         self._power_on_ns = monotonic_ns() - _POWER_ON_NS
         self._control_socket = self._bind(GVCP_PORT)
         self._stream_socket = self._bind(0)

@@ -275,6 +275,8 @@ def test_a_value_that_does_not_read_back_is_refused(wire: Wire) -> None:
     wire.camera._profile = PROFILE.model_copy(update={"features": features})
     with pytest.raises(DeviceRefused, match="view: TriggerMode reads 'On' after writing 'Off'"):
         wire.camera.arm()
+    with pytest.raises(DeviceRefused, match="view: the camera is not armed"):
+        wire.camera.begin_shot()
 
 
 def test_an_image_larger_than_the_sensor_is_refused() -> None:
