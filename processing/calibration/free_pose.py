@@ -13,6 +13,8 @@ from processing.geometry import FloatArray, PinholeCamera
 
 MIN_BOARDS = 3
 """Fewer boards do not determine all intrinsics (Zhang 2000)."""
+MIN_TILT_DEG = 5.0
+"""Largest angle between two boards; nearly parallel boards fit well and give a wrong camera."""
 FOLDS = 5
 
 
@@ -63,11 +65,22 @@ def fit_free_poses(boards: Sequence[PlaneObservation], image_size_px: tuple[int,
         image_size_px,
         np.asarray(coefficients, dtype=np.float64).ravel()[:5],
     )
-    poses = (
+    poses = tuple(
         BoardPose(board.name, np.asarray(cv2.Rodrigues(rotation)[0], np.float64), np.asarray(shift, np.float64).ravel())
         for board, rotation, shift in zip(boards, rotations, translations, strict=True)
     )
-    return FreePoseFit(camera, tuple(poses))
+    _check_tilts(poses)
+    return FreePoseFit(camera, poses)
+
+
+def _check_tilts(poses: Sequence[BoardPose]) -> None:
+    normals = np.array([pose.rotation[:, 2] for pose in poses])
+    tilt_deg = float(np.degrees(np.arccos(np.clip(normals @ normals.T, -1, 1)).max()))
+    if tilt_deg < MIN_TILT_DEG:
+        raise CalibrationError(
+            f"{len(poses)} boards in free poses are parallel within {tilt_deg:.2g} deg, at least {MIN_TILT_DEG:g} deg are "
+            "needed; if a stage moved the target, give z_mm"
+        )
 
 
 def board_errors_px(camera: PinholeCamera, board: PlaneObservation, pose: BoardPose) -> FloatArray:

@@ -19,6 +19,8 @@ MIN_DEPTH_RATIO = 0.02
 """Spread of the points along their flattest direction, relative to the widest one; less is as good as a plane."""
 MIN_POINTS = 12
 """Points that a joint fit needs at the very least."""
+MIN_PLANES = 4
+"""With fewer planes, holding one out leaves too little of the depth: single points are held out instead."""
 FOLDS = 5
 """Parts that are held out in turn."""
 
@@ -87,7 +89,7 @@ def holdout_error_px(planes: Sequence[PlaneObservation], fit: Fit) -> float:
         Fits a mapping to planes; may raise CalibrationError.
     """
     folds = list(_plane_folds(planes))
-    if len(planes) < 3 or any(degeneracy(training) for training, _ in folds):
+    if len(planes) < MIN_PLANES or any(degeneracy(training) for training, _ in folds):
         folds = list(_point_folds(planes))
     distances_px = []
     for training, held_out in folds:

@@ -10,9 +10,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import rq
-from scipy.optimize import least_squares
 
 from processing.calibration.errors import CalibrationError
+from processing.calibration.least_squares import minimise
 from processing.geometry import FloatArray, PinholeCamera
 
 PINHOLE_PARAMETERS = 15
@@ -66,14 +66,14 @@ def fit_pinhole(
         There are too few points.
     """
     n_parameters = PINHOLE_PARAMETERS + TILT_PARAMETERS * tilted
+    points_mm = np.ascontiguousarray(points_mm, dtype=np.float64)
     if 2 * len(points_mm) < n_parameters + 3:
         raise CalibrationError(f"{len(points_mm)} points for {n_parameters} parameters, need {(n_parameters + 4) // 2}")
     start = _pack(_first_guess(points_mm, image_px, image_size_px), tilted)
     scale_px = max(_spread_px(_residuals_px(start, points_mm, image_px)), 0.05)
     robust = _refine(start, points_mm, image_px, ROBUST_SCALE * scale_px)
-    for _ in range(2):
-        scale_px = max(_spread_px(_residuals_px(robust, points_mm, image_px)), 1e-4)
-        robust = _refine(robust, points_mm, image_px, ROBUST_SCALE * scale_px)
+    scale_px = max(_spread_px(_residuals_px(robust, points_mm, image_px)), 1e-4)
+    robust = _refine(robust, points_mm, image_px, ROBUST_SCALE * scale_px)
     residual_px = np.linalg.norm(_residuals_px(robust, points_mm, image_px), axis=1)
     used = np.asarray(residual_px < max(REJECT_SCALE * scale_px, REJECT_FLOOR_PX), dtype=np.bool_)
     if 2 * used.sum() < n_parameters + 3:
@@ -163,22 +163,8 @@ def _spread_px(residuals_px: FloatArray) -> float:
 
 
 def _refine(start: FloatArray, points_mm: FloatArray, image_px: FloatArray, robust_px: float | None) -> FloatArray:
-    points_mm = np.ascontiguousarray(points_mm, dtype=np.float64)
+    def model(parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
+        projected_px, jacobian = _project(parameters, points_mm)
+        return projected_px - image_px, jacobian
 
-    def residuals(parameters: FloatArray) -> FloatArray:
-        return _residuals_px(parameters, points_mm, image_px).ravel()
-
-    def jacobian(parameters: FloatArray) -> FloatArray:
-        return _project(parameters, points_mm)[1]
-
-    solution = least_squares(
-        residuals,
-        start,
-        jac=jacobian,
-        x_scale="jac",
-        loss="linear" if robust_px is None else "cauchy",
-        f_scale=robust_px or 1.0,
-        ftol=1e-7,
-        max_nfev=100,
-    )
-    return np.asarray(solution.x, dtype=np.float64)
+    return minimise(model, start, robust_px)

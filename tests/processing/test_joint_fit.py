@@ -1,0 +1,130 @@
+"""One joint fit per view finds the camera where planes fitted one by one cannot."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.processing.calibration_cases import (
+    calibration_set,
+    paper_camera,
+    seen_planes,
+    target_plane_mm,
+    true_errors_px,
+    volume_points_mm,
+)
+from processing.calibration.errors import CalibrationError
+from processing.calibration.joint_fit import calibrate
+from processing.calibration.observation import PlaneObservation, stacked
+from processing.calibration.pinhole_fit import fit_pinhole
+
+
+@pytest.mark.parametrize("azimuth_deg", [-45.0, -15.0, 0.0, 45.0])
+def test_true_error_in_the_volume_is_a_few_thousandths_of_a_pixel(azimuth_deg):
+    camera = paper_camera(azimuth_deg)
+    fitted = fit_pinhole(*stacked(seen_planes(camera)), camera.image_size_px)
+    assert true_errors_px(fitted.camera, camera).mean() < 0.004
+    assert fitted.used.mean() > 0.999
+
+
+def test_exact_points_give_the_exact_camera():
+    camera = paper_camera(30.0, distortion=(0.0, 0.0, 0.0, 0.0, 0.0))
+    fitted = fit_pinhole(*stacked(seen_planes(camera, noise_px=0)), camera.image_size_px)
+    assert true_errors_px(fitted.camera, camera).max() < 1e-4
+    assert fitted.camera.camera_matrix[0, 0] == pytest.approx(camera.camera_matrix[0, 0], rel=1e-3)
+
+
+def test_tilted_sensor_is_described_by_the_tilted_model():
+    camera = replace(paper_camera(45.0, distortion=(0.0,) * 5), tilt_rad=(0.02, 0.12))
+    points = stacked(seen_planes(camera))
+    tilted = fit_pinhole(*points, camera.image_size_px, tilted=True)
+    assert true_errors_px(tilted.camera, camera).mean() < 0.006
+    assert tilted.camera.tilt_rad != (0.0, 0.0)
+
+
+def test_wrong_corners_are_found_and_do_no_harm():
+    camera = paper_camera()
+    points_mm, image_px = stacked(seen_planes(camera))
+    wrong = np.random.default_rng(5).random(len(points_mm)) < 0.1
+    image_px[wrong] += 60.0
+    fitted = fit_pinhole(points_mm, image_px, camera.image_size_px)
+    np.testing.assert_array_equal(fitted.used, ~wrong)
+    assert true_errors_px(fitted.camera, camera).mean() < 0.005
+
+
+def test_camera_on_the_other_side_of_the_target_is_found():
+    camera = paper_camera(160.0)
+    fitted = fit_pinhole(*stacked(seen_planes(camera)), camera.image_size_px)
+    assert true_errors_px(fitted.camera, camera).mean() < 0.004
+
+
+def test_too_few_points_are_refused():
+    with pytest.raises(CalibrationError, match="8 points for 15 parameters, need 9"):
+        fit_pinhole(volume_points_mm(8), np.zeros((8, 2)), (100, 100))
+
+
+def test_views_are_calibrated_and_judged():
+    cameras = {"left": paper_camera(-45.0), "right": paper_camera(15.0)}
+    seen = {name: seen_planes(camera, noise_px=0.02) for name, camera in cameras.items()}
+    calibration = calibrate(calibration_set(**seen))
+    for name, camera in cameras.items():
+        view = calibration.views[name]
+        assert true_errors_px(view.mapping, camera).mean() < 0.002
+        assert view.verdict == "good"
+        assert view.mean_error_px == pytest.approx(0.02 * np.sqrt(np.pi / 2), rel=0.05)
+        assert view.rms_px == pytest.approx(0.02 * np.sqrt(2), rel=0.05)
+        assert view.mean_error_px < view.holdout_error_px < 1.05 * view.mean_error_px
+        assert [plane.z_mm for plane in view.planes] == pytest.approx(np.linspace(-4.5, 4.5, 10))
+    assert calibration.z_range_mm == (-4.5, 4.5)
+    assert calibration.x_range_mm == (-11.0, 11.0)
+    assert calibration.y_range_mm == (-8.0, 8.0)
+
+
+@pytest.mark.parametrize("model", ["pinhole", "pinhole_tilted", "polynomial"])
+def test_every_model_predicts_planes_it_has_not_seen(model):
+    camera = paper_camera(15.0)
+    view = calibrate(calibration_set(only=seen_planes(camera)), model=model).views["only"]
+    assert view.model == model
+    assert true_errors_px(view.mapping, camera).mean() < 0.01
+    assert view.holdout_error_px < 0.07
+
+
+def test_views_see_different_parts_of_the_range():
+    camera = paper_camera(0.0)
+    calibration = calibrate(
+        calibration_set(near=seen_planes(camera, z_mm=(-4, -3, -1, 1)), far=seen_planes(camera, z_mm=(-2, 0, 2, 4)))
+    )
+    assert calibration.z_range_mm == (-2.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("z_mm", "reason"), [((1.0,), "z range 0 mm"), ((0.0, 0.01, 0.02), "z range 0.02 mm"), ((-0.1, 0.1), "needs 2 %")]
+)
+def test_target_that_hardly_moved_is_refused(z_mm, reason):
+    still = calibration_set(fine=seen_planes(paper_camera()), still=seen_planes(paper_camera(), z_mm=z_mm))
+    with pytest.raises(CalibrationError, match=f"^still: the target hardly moved.*{reason}"):
+        calibrate(still)
+
+
+def test_handful_of_points_is_refused():
+    few = PlaneObservation("few", volume_points_mm(7), np.zeros((7, 2)))
+    with pytest.raises(CalibrationError, match="^view2: 7 points are too few, at least 12"):
+        calibrate(calibration_set(view2=(few,)))
+
+
+def test_boards_in_free_poses_cannot_be_reconstructed_with():
+    camera = paper_camera(0.0, principal_offset_px=(0, 0))
+    rng = np.random.default_rng(3)
+    boards = []
+    for number in range(8):
+        turn = np.linalg.qr(np.eye(3) + 0.35 * rng.normal(size=(3, 3)))[0]
+        turn *= np.sign(np.diag(turn))
+        board_mm = target_plane_mm(0.0)
+        image_px = camera.project(board_mm @ turn.T) + rng.normal(0, 0.02, (len(board_mm), 2))
+        boards.append(PlaneObservation(f"board {number}", board_mm, image_px, free_pose=True))
+    calibration = calibrate(calibration_set(only=tuple(boards)))
+    assert [pose.name for pose in calibration.views["only"].board_poses] == [board.name for board in boards]
+    with pytest.raises(CalibrationError, match="only: boards stood in free poses, so only the intrinsics are known"):
+        calibration.require_world()
+    with pytest.raises(CalibrationError, match="free poses give a pinhole camera, not polynomial"):
+        calibrate(calibration_set(only=tuple(boards)), model="polynomial")
