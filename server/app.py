@@ -2,6 +2,7 @@
 
 import asyncio
 import logging
+import signal
 from collections.abc import AsyncIterator, Coroutine, Iterator
 from contextlib import AsyncExitStack, asynccontextmanager, contextmanager
 from importlib.metadata import version
@@ -69,16 +70,22 @@ def create_api(services: Services) -> FastAPI:
 
 
 def serve(app: FastAPI, host: str = "127.0.0.1", port: int = 8080) -> None:
-    """Serve until SIGINT or SIGTERM. One process: acquisition, jobs and pages share its state."""
-    uvicorn.run(
-        app,
-        host=host,
-        port=port,
-        workers=1,
-        timeout_graceful_shutdown=_SHUTDOWN_S,
-        access_log=False,
-        log_level="warning",
-    )
+    """Serve until SIGINT or SIGTERM, then return. One process: acquisition, jobs and pages share its state."""
+    # The server passes a signal on once it has ended. By default SIGTERM would then kill the process before the caller
+    # has switched off the light and closed the devices.
+    previous = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        uvicorn.run(
+            app,
+            host=host,
+            port=port,
+            workers=1,
+            timeout_graceful_shutdown=_SHUTDOWN_S,
+            access_log=False,
+            log_level="warning",
+        )
+    finally:
+        signal.signal(signal.SIGTERM, previous)
 
 
 @asynccontextmanager

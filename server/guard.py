@@ -1,7 +1,8 @@
 """Guard: who may talk to the server. A pure ASGI layer, because middleware of Starlette does not see websockets.
 
-It checks three things on every request and every socket, pages included: the ``Host`` header (a foreign name pointing
-at this machine), the ``Origin`` header (another site's page in the operator's browser), and the token, if there is one.
+It checks every request and every socket, pages included. The ``Origin`` header: another site's page in the operator's
+browser stays outside. The token, if there is one. Without a token, the ``Host`` header: a foreign name that somebody
+points at this machine would make his page our own origin; with one, his page lacks the cookie.
 """
 
 import hmac
@@ -56,7 +57,7 @@ class Guard:
     def _refusal(self, scope: Scope) -> Response | None:
         headers = Headers(scope=scope)
         host = headers.get("host", "")
-        if not self._is_ours(host):
+        if self._token is None and not self._is_ours(host):
             return _refuse(403, f"host {host!r} is not a name of this server")
         origin = headers.get("origin")
         if origin is not None and urlsplit(origin).netloc.lower() != host.lower():

@@ -24,8 +24,8 @@ class Header:
         config = context.services.config
         with (
             ui.header(elevated=False)
-            .classes("items-center q-py-xs q-px-md gap-3")
-            .style("background:#10161e;min-height:52px")
+            .classes("items-center q-py-none q-px-md gap-3")
+            .style("background:#10161e;min-height:52px;padding:4px 16px")
         ):
             ui.icon("blur_on", size="26px").classes("text-primary")
             ui.label("tomoshadow").classes("text-lg font-medium")

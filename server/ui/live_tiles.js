@@ -11,7 +11,7 @@ export default {
     </div>`,
   props: { views: Array, path: String },
   data() {
-    return { pictures: 0, lamps: this.views.map(() => "off"), texts: { ok: "live", warn: "no new picture", off: "no signal" } };
+    return { pictures: 0, lamps: this.views.map(() => "off"), texts: { ok: "live", off: "no new picture", fault: "no connection" } };
   },
   created() {
     this.canvases = [];
@@ -55,7 +55,7 @@ export default {
     },
     judge() {
       const connected = this.socket?.readyState === WebSocket.OPEN;
-      this.lamps = this.seen.map((time) => !connected || time === -Infinity ? "off" : performance.now() - time > 2500 ? "warn" : "ok");
+      this.lamps = this.seen.map((time) => !connected ? "fault" : performance.now() - time > 2500 ? "off" : "ok");
     },
   },
 };

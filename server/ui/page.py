@@ -17,6 +17,7 @@ from server.ui.theme import panel
 from server.ui.volume_panel import VolumePanel
 
 _REFRESH_S = 0.25
+_EVENTS_SHOWN = 100
 _LISTS_CHANGED = {"run_state", "job_changed"}
 
 
@@ -35,7 +36,7 @@ class Page:
 
     def __init__(self, context: Context) -> None:
         self._events = context.services.events
-        self._seen = self._events.newest
+        self._seen = max(0, self._events.newest - _EVENTS_SHOWN)
         self._are_lists_old = True
         dark = theme.apply()
         draft = DraftStore(context.services.data_dir / "draft.json", context.services.config)

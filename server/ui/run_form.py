@@ -8,6 +8,7 @@ from nicegui import ui
 
 from daq.errors import DaqError
 from daq.run_plan import RunKind
+from daq.run_state import RunOutcome
 from daq.timing import plan_shot_timing
 from server.problems import ServerError
 from server.run_start import start_run
@@ -41,6 +42,7 @@ class RunForm:
     def __init__(self, context: Context, draft: DraftStore) -> None:
         self._context = context
         self._draft = draft
+        self._known_references: set[str] = set()
         self._fields: list[ui.input | ui.number] = []
         with panel("New run"):
             self._add_kind_and_name()
@@ -65,12 +67,22 @@ class RunForm:
         runs, calibrations = await asyncio.gather(
             asyncio.to_thread(self._context.runs.newest), asyncio.to_thread(self._context.calibrations.list)
         )
-        references = {run.run_id: _reference_label(run) for run in runs if run.kind in _REFERENCE_KINDS}
-        chosen = [run_id for run_id in self._draft.values["references"] if run_id in references]
-        self._references.set_options(references, value=chosen)
+        references = [run for run in runs if run.kind in _REFERENCE_KINDS and run.outcome == RunOutcome.COMPLETED]
+        self._references.set_options(
+            {run.run_id: _reference_label(run) for run in references}, value=self._proposed(references)
+        )
         known = {item.id: item.id + (" (current)" if item.current else "") for item in calibrations}
         calibration = self._draft.values["calibration"]
         self._calibration.set_options(known, value=calibration if calibration in known else None)
+
+    def _proposed(self, references: list[RunSummary]) -> list[str]:
+        """What the operator chose; the newest run of each kind where nothing is chosen or a new one has come."""
+        known, self._known_references = self._known_references, {run.run_id for run in references}
+        chosen = [run_id for run_id in self._draft.values["references"] if run_id in self._known_references]
+        if chosen and known >= self._known_references:
+            return chosen
+        newest = {run.kind: run.run_id for run in reversed(references)}
+        return sorted(newest.values())
 
     def _add_kind_and_name(self) -> None:
         kinds = {kind.value: kind.value.capitalize() for kind in RunKind}
@@ -126,7 +138,9 @@ class RunForm:
             .classes("w-full")
         )
         self._calibration = (
-            ui.select({}, label="Calibration", clearable=True, on_change=self._changed("calibration"))
+            ui.select(
+                {}, label="Calibration (none: the current one)", clearable=True, on_change=self._changed("calibration")
+            )
             .props("dense outlined options-dense")
             .classes("w-full")
         )

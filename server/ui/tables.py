@@ -1,6 +1,7 @@
 """Tables of the page: runs with their outcomes, jobs with their states."""
 
 import asyncio
+import math
 from collections.abc import Awaitable, Callable
 from typing import Any
 
@@ -123,7 +124,14 @@ def _job_row(job: Job) -> dict[str, Any]:
         "run": job.run_id,
         "outcome": job.state,
         "colour": outcome_colour(job.state),
-        "detail": job.error or "",
+        "detail": job.error or _quality(job),
         "action": choices.get(job.state, ""),
         "calibration": job.calibration,
     }
+
+
+def _quality(job: Job) -> str:
+    """Hold-out error and verdict of the worst view of a calibration; nothing for other jobs."""
+    views = (job.result or {}).get("views", {}).values()
+    worst = max(views, key=lambda view: view["holdout_error_px"] or math.inf, default=None)
+    return "" if worst is None else f"hold-out {worst['holdout_error_px'] or math.nan:.3f} px, {worst['verdict']}"

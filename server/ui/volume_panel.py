@@ -117,7 +117,7 @@ class VolumePanel:
             url = f"/api/runs/{run_id}/results/{results_id}/{name}/surface.glb?level={self._level.value:.2f}"
             self._scene.gltf(url).rotate(math.pi / 2, 0, 0)
             self._scene.box(width, depth, height, wireframe=True).move(x_mm, z_mm, -y_mm).material("#6b7a8d", 0.35)
-        reach = 1.15 * max(width, height, depth)
+        reach = 0.8 * max(width, height, depth)
         self._scene.move_camera(x_mm + reach, z_mm - reach, -y_mm + 0.5 * reach, x_mm, z_mm, -y_mm, duration=0)
 
 

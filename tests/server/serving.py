@@ -33,16 +33,20 @@ class Serving:
 
     http: httpx.Client
     port: int
-    laboratory: MemoryLaboratory
-    acquisition: Acquisition
     services: Services
 
     def run_to_its_end(self, plan: dict[str, Any]) -> tuple[str, RunStatus]:
         """Start a run and wait for it; its id and last status."""
         answer = self.http.post("/api/runs", json=plan)
         assert answer.status_code == 201, answer.text
-        status = self.acquisition.wait(DEADLINE_S)
+        status = self.wait()
         return answer.headers["location"].rsplit("/", 1)[-1], status
+
+    def wait(self) -> RunStatus:
+        """Status once no run is active."""
+        acquisition = self.services.acquisition
+        assert isinstance(acquisition, Acquisition)
+        return acquisition.wait(DEADLINE_S)
 
 
 def plan_of(**changes: Any) -> dict[str, Any]:
@@ -85,6 +89,24 @@ def write_calibration(job: dict[str, Any], should_stop: Callable[[], bool]) -> d
 
 
 @contextmanager
+def assembled(
+    data_dir: Path, *, engine: Engine | None = None, views: tuple[str, ...] = VIEWS, token: str | None = None
+) -> Iterator[Services]:
+    """A rig in memory with its acquisition, ready to be served."""
+    laboratory, events = MemoryLaboratory(views), EventPublisher()
+    with Acquisition(laboratory.rig, data_dir, events.publish_run_event) as acquisition:
+        yield Services(
+            config=memory_config(data_dir, views, token),
+            rig=laboratory.rig,
+            acquisition=acquisition,
+            events=events,
+            engine=engine or InlineEngine(),
+            tasks={JobKind.RECONSTRUCTION: write_spray, JobKind.CALIBRATION: write_calibration},
+            bench=laboratory,
+        )
+
+
+@contextmanager
 def serving(
     data_dir: Path,
     *,
@@ -94,20 +116,12 @@ def serving(
     token: str | None = None,
 ) -> Iterator[Serving]:
     """Serve a rig in memory until the block ends."""
-    laboratory, events = MemoryLaboratory(views), EventPublisher()
-    with Acquisition(laboratory.rig, data_dir, events.publish_run_event) as acquisition:
-        services = Services(
-            config=memory_config(data_dir, views, token),
-            rig=laboratory.rig,
-            acquisition=acquisition,
-            events=events,
-            engine=engine or InlineEngine(),
-            tasks={JobKind.RECONSTRUCTION: write_spray, JobKind.CALIBRATION: write_calibration},
-            bench=laboratory,
-        )
-        with _listening(build(services)) as port, httpx.Client(base_url=f"http://127.0.0.1:{port}") as http:
-            http.timeout = httpx.Timeout(DEADLINE_S)
-            yield Serving(http, port, laboratory, acquisition, services)
+    with (
+        assembled(data_dir, engine=engine, views=views, token=token) as services,
+        _listening(build(services)) as port,
+        httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=DEADLINE_S) as http,
+    ):
+        yield Serving(http, port, services)
 
 
 @contextmanager

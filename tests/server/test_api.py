@@ -96,7 +96,7 @@ def test_a_busy_rig_an_open_door_and_an_idle_rig_answer_conflicts(server: Servin
     busy = server.http.post("/api/runs", json=plan_of())
     assert (busy.status_code, busy.json()["type"]) == (409, "urn:tomoshadow:BusyError")
     assert server.http.post(f"{run}/abort").status_code == 202
-    assert server.acquisition.wait(DEADLINE_S).outcome == "aborted"
+    assert server.wait().outcome == "aborted"
     assert server.http.post(f"{run}/abort").status_code == 409
     server.http.put("/api/bench/door", json={"open": True})
     locked = server.http.post("/api/runs", json=plan_of())
@@ -106,7 +106,7 @@ def test_a_busy_rig_an_open_door_and_an_idle_rig_answer_conflicts(server: Servin
 def test_a_run_stops_at_the_shot_boundary(server: Serving) -> None:
     run = server.http.post("/api/runs", json=plan_of(shots=1000, rate_hz=20.0)).headers["location"]
     assert server.http.post(f"{run}/stop").status_code == 202
-    status = server.acquisition.wait(DEADLINE_S)
+    status = server.wait()
     assert status.outcome == "stopped"
     assert status.shots_valid == status.shots_recorded < 1000
 

@@ -89,10 +89,10 @@ def _is_refused(page: Page, shots: int) -> None:
     page.get_by_role("button", name="Start run").click()
     expect(page.get_by_text("greater than or equal to 1")).to_be_visible()
     page.get_by_label("Shots", exact=True).fill(str(shots))
-    page.get_by_label("Separation / ns").fill("2001")
-    expect(page.get_by_role("alert").filter(has_text="below")).to_be_visible()
-    page.get_by_label("Separation / ns").fill("6400")
-    expect(page.get_by_role("alert").filter(has_text="below")).to_have_count(0)
+    page.get_by_label("Rate / Hz").fill("99")
+    expect(page.get_by_role("alert").filter(has_text="the limit of the cameras")).to_be_visible()
+    page.get_by_label("Rate / Hz").fill("2")
+    expect(page.get_by_role("alert").filter(has_text="the limit of the cameras")).to_have_count(0)
 
 
 def _look_at_the_volume(page: Page) -> None:
