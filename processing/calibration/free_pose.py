@@ -78,8 +78,8 @@ def _check_tilts(poses: Sequence[BoardPose]) -> None:
     tilt_deg = float(np.degrees(np.arccos(np.clip(normals @ normals.T, -1, 1)).max()))
     if tilt_deg < MIN_TILT_DEG:
         raise CalibrationError(
-            f"{len(poses)} boards in free poses are parallel within {tilt_deg:.2g} deg, at least {MIN_TILT_DEG:g} deg are "
-            "needed; if a stage moved the target, give z_mm"
+            f"{len(poses)} boards in free poses are parallel within {tilt_deg:.2g} deg, "
+            f"at least {MIN_TILT_DEG:g} deg are needed; if a stage moved the target, give z_mm"
         )
 
 

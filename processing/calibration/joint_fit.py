@@ -59,11 +59,11 @@ def calibrate(
 def _joint_view(name: str, seen: ViewObservations, model: Model) -> ViewCalibration:
     check_motion(name, seen.planes)
     mapping, used = fit_mapping(seen.planes, seen.image_size_px, model)
-    planes = [plane.select(mask) for plane, mask in zip(seen.planes, _by_plane(seen.planes, used), strict=True)]
-    planes = [plane for plane in planes if len(plane)]
+    masks = [_counted(mask) for mask in _by_plane(seen.planes, used)]
+    planes = [plane.select(mask) for plane, mask in zip(seen.planes, masks, strict=True)]
     holdout_px = holdout_error_px(planes, lambda training: fit_mapping(training, seen.image_size_px, model)[0])
     errors = [errors_px(mapping, plane) for plane in planes]
-    n_rejected = int((~used).sum())
+    n_rejected = len(used) - sum(len(plane) for plane in planes)
     return _summary(mapping, model, planes, errors, holdout_px, n_rejected, extent_mm=outline_mm(planes))
 
 
@@ -115,6 +115,11 @@ def _summary(
         n_rejected=n_rejected,
         extent_mm=extent_mm,
     )
+
+
+def _counted(used: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Points of a plane that its error counts: a plane of which most points are wrong is itself wrong, and shows it."""
+    return np.ones_like(used) if 2 * used.sum() < len(used) else used
 
 
 def _by_plane(planes: Sequence[PlaneObservation], mask: NDArray[np.bool_]) -> list[NDArray[np.bool_]]:

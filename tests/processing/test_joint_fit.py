@@ -5,6 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from processing.calibration.errors import CalibrationError
+from processing.calibration.joint_fit import calibrate
+from processing.calibration.observation import PlaneObservation, stacked
+from processing.calibration.pinhole_fit import fit_pinhole
 from tests.processing.calibration_cases import (
     calibration_set,
     paper_camera,
@@ -13,28 +17,24 @@ from tests.processing.calibration_cases import (
     true_errors_px,
     volume_points_mm,
 )
-from processing.calibration.errors import CalibrationError
-from processing.calibration.joint_fit import calibrate
-from processing.calibration.observation import PlaneObservation, stacked
-from processing.calibration.pinhole_fit import fit_pinhole
 
 
 @pytest.mark.parametrize("azimuth_deg", [-45.0, -15.0, 0.0, 45.0])
-def test_true_error_in_the_volume_is_a_few_thousandths_of_a_pixel(azimuth_deg):
+def test_true_error_in_the_volume_is_a_few_thousandths_of_a_pixel(azimuth_deg: float) -> None:
     camera = paper_camera(azimuth_deg)
     fitted = fit_pinhole(*stacked(seen_planes(camera)), camera.image_size_px)
     assert true_errors_px(fitted.camera, camera).mean() < 0.004
     assert fitted.used.mean() > 0.999
 
 
-def test_exact_points_give_the_exact_camera():
+def test_exact_points_give_the_exact_camera() -> None:
     camera = paper_camera(30.0, distortion=(0.0, 0.0, 0.0, 0.0, 0.0))
     fitted = fit_pinhole(*stacked(seen_planes(camera, noise_px=0)), camera.image_size_px)
     assert true_errors_px(fitted.camera, camera).max() < 1e-4
     assert fitted.camera.camera_matrix[0, 0] == pytest.approx(camera.camera_matrix[0, 0], rel=1e-3)
 
 
-def test_tilted_sensor_is_described_by_the_tilted_model():
+def test_tilted_sensor_is_described_by_the_tilted_model() -> None:
     camera = replace(paper_camera(45.0, distortion=(0.0,) * 5), tilt_rad=(0.02, 0.12))
     points = stacked(seen_planes(camera))
     tilted = fit_pinhole(*points, camera.image_size_px, tilted=True)
@@ -42,7 +42,7 @@ def test_tilted_sensor_is_described_by_the_tilted_model():
     assert tilted.camera.tilt_rad != (0.0, 0.0)
 
 
-def test_wrong_corners_are_found_and_do_no_harm():
+def test_wrong_corners_are_found_and_do_no_harm() -> None:
     camera = paper_camera()
     points_mm, image_px = stacked(seen_planes(camera))
     wrong = np.random.default_rng(5).random(len(points_mm)) < 0.1
@@ -52,18 +52,18 @@ def test_wrong_corners_are_found_and_do_no_harm():
     assert true_errors_px(fitted.camera, camera).mean() < 0.005
 
 
-def test_camera_on_the_other_side_of_the_target_is_found():
+def test_camera_on_the_other_side_of_the_target_is_found() -> None:
     camera = paper_camera(160.0)
     fitted = fit_pinhole(*stacked(seen_planes(camera)), camera.image_size_px)
     assert true_errors_px(fitted.camera, camera).mean() < 0.004
 
 
-def test_too_few_points_are_refused():
+def test_too_few_points_are_refused() -> None:
     with pytest.raises(CalibrationError, match="8 points for 15 parameters, need 9"):
         fit_pinhole(volume_points_mm(8), np.zeros((8, 2)), (100, 100))
 
 
-def test_views_are_calibrated_and_judged():
+def test_views_are_calibrated_and_judged() -> None:
     cameras = {"left": paper_camera(-45.0), "right": paper_camera(15.0)}
     seen = {name: seen_planes(camera, noise_px=0.02) for name, camera in cameras.items()}
     calibration = calibrate(calibration_set(**seen))
@@ -81,7 +81,7 @@ def test_views_are_calibrated_and_judged():
 
 
 @pytest.mark.parametrize("model", ["pinhole", "pinhole_tilted", "polynomial"])
-def test_every_model_predicts_planes_it_has_not_seen(model):
+def test_every_model_predicts_planes_it_has_not_seen(model: str) -> None:
     camera = paper_camera(15.0)
     view = calibrate(calibration_set(only=seen_planes(camera)), model=model).views["only"]
     assert view.model == model
@@ -89,7 +89,7 @@ def test_every_model_predicts_planes_it_has_not_seen(model):
     assert view.holdout_error_px < 0.07
 
 
-def test_views_see_different_parts_of_the_range():
+def test_views_see_different_parts_of_the_range() -> None:
     camera = paper_camera(0.0)
     calibration = calibrate(
         calibration_set(near=seen_planes(camera, z_mm=(-4, -3, -1, 1)), far=seen_planes(camera, z_mm=(-2, 0, 2, 4)))
@@ -100,19 +100,19 @@ def test_views_see_different_parts_of_the_range():
 @pytest.mark.parametrize(
     ("z_mm", "reason"), [((1.0,), "z range 0 mm"), ((0.0, 0.01, 0.02), "z range 0.02 mm"), ((-0.1, 0.1), "needs 2 %")]
 )
-def test_target_that_hardly_moved_is_refused(z_mm, reason):
+def test_target_that_hardly_moved_is_refused(z_mm: tuple[float, ...], reason: str) -> None:
     still = calibration_set(fine=seen_planes(paper_camera()), still=seen_planes(paper_camera(), z_mm=z_mm))
     with pytest.raises(CalibrationError, match=f"^still: the target hardly moved.*{reason}"):
         calibrate(still)
 
 
-def test_handful_of_points_is_refused():
+def test_handful_of_points_is_refused() -> None:
     few = PlaneObservation("few", volume_points_mm(7), np.zeros((7, 2)))
-    with pytest.raises(CalibrationError, match="^view2: 7 points are too few, at least 12"):
+    with pytest.raises(CalibrationError, match=r"^view2: 7 points are too few, at least 12"):
         calibrate(calibration_set(view2=(few,)))
 
 
-def test_boards_in_free_poses_cannot_be_reconstructed_with():
+def test_boards_in_free_poses_cannot_be_reconstructed_with() -> None:
     camera = paper_camera(0.0, principal_offset_px=(0, 0))
     rng = np.random.default_rng(3)
     boards = []

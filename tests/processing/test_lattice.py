@@ -4,12 +4,21 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from processing.calibration.lattice import Lattice, grow_lattice, on_smooth_grid, orient, place_board, rotate_ids
+from processing.calibration.lattice import (
+    IdArray,
+    Lattice,
+    grow_lattice,
+    on_smooth_grid,
+    orient,
+    place_board,
+    rotate_ids,
+)
+from processing.geometry import FloatArray
 
 IDS = np.array([(column, row) for row in range(12) for column in range(15)])
 
 
-def perspective_px(ids, tilt, roll_rad):
+def perspective_px(ids: IdArray, tilt: float, roll_rad: float) -> FloatArray:
     x, y = (ids - [7, 6]).T * 30.0
     depth = 1 + tilt * x / 1000
     u, v = x * np.cos(tilt) / depth, y / depth
@@ -19,7 +28,7 @@ def perspective_px(ids, tilt, roll_rad):
 
 @settings(max_examples=40, deadline=None)
 @given(tilt=st.floats(-0.8, 0.8), roll_deg=st.floats(-40, 40), missing=st.floats(0, 0.15), seed=st.integers(0, 999))
-def test_every_reachable_point_gets_its_own_node(tilt, roll_deg, missing, seed):
+def test_every_reachable_point_gets_its_own_node(tilt: float, roll_deg: float, missing: float, seed: int) -> None:
     rng = np.random.default_rng(seed)
     points_px = perspective_px(IDS, tilt, np.deg2rad(roll_deg))
     start = int(np.flatnonzero((IDS == (7, 6)).all(axis=1))[0])
@@ -40,14 +49,14 @@ def test_every_reachable_point_gets_its_own_node(tilt, roll_deg, missing, seed):
 
 
 @given(turns=st.integers(0, 3), mirrored=st.booleans())
-def test_orientation_does_not_depend_on_how_the_grid_was_grown(turns, mirrored):
+def test_orientation_does_not_depend_on_how_the_grid_was_grown(turns: int, mirrored: bool) -> None:
     points_px = perspective_px(IDS, 0.3, 0.1)
     grown = rotate_ids(IDS[:, ::-1] if mirrored else IDS, turns)
     oriented = orient(Lattice(grown, np.arange(len(IDS))), points_px)
     np.testing.assert_array_equal(oriented.ids - oriented.ids.min(axis=0), IDS)
 
 
-def test_board_is_found_in_a_larger_grid_by_its_strength():
+def test_board_is_found_in_a_larger_grid_by_its_strength() -> None:
     strength = np.where((IDS >= 2).all(axis=1) & (IDS < (11, 8)).all(axis=1), 1.0, 0.4)
     board = place_board(Lattice(IDS, np.arange(len(IDS))), strength, 9, 6)
     assert board is not None
@@ -55,17 +64,17 @@ def test_board_is_found_in_a_larger_grid_by_its_strength():
     np.testing.assert_array_equal(IDS[board.indices] - board.ids, np.full((54, 2), 2))
 
 
-def test_board_turned_by_ninety_degrees_is_recognised_by_its_shape():
+def test_board_turned_by_ninety_degrees_is_recognised_by_its_shape() -> None:
     board = place_board(Lattice(IDS, np.arange(len(IDS))), np.ones(len(IDS)), 12, 15)
     assert board is not None
     np.testing.assert_array_equal(np.ptp(board.ids, axis=0) + 1, (12, 15))
 
 
-def test_board_that_is_not_all_there_is_not_guessed():
+def test_board_that_is_not_all_there_is_not_guessed() -> None:
     assert place_board(Lattice(IDS, np.arange(len(IDS))), np.ones(len(IDS)), 16, 12) is None
 
 
-def test_shifted_points_leave_the_smooth_grid_alone():
+def test_shifted_points_leave_the_smooth_grid_alone() -> None:
     points_px = perspective_px(IDS, 0.5, 0.1)
     points_px[[17, 80]] += (0.6, -0.5)
     np.testing.assert_array_equal(np.flatnonzero(~on_smooth_grid(IDS, points_px)), [17, 80])

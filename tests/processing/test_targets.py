@@ -3,10 +3,12 @@
 import cv2
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from processing.calibration.errors import TargetNotFound
-from processing.calibration.targets import Target, detect_target
+from processing.calibration.targets import Target, TargetPoints, detect_target
+from processing.geometry import FloatArray, PinholeCamera
 from processing.synthetic.paper_rig import paper_cameras, paper_optics
 from processing.synthetic.target import Checkerboard, DotTarget, render_target
 
@@ -15,7 +17,17 @@ DOTS = Target(kind="dots", columns=23, rows=17, pitch_mm=1.0)
 PATTERNS = {"checkerboard": Checkerboard(), "dots": DotTarget()}
 
 
-def photograph(view, target, z_mm, *, binning=2, blur_px=0.0, noise=0.004, dust=0, seed=1):
+def photograph(
+    view: str,
+    target: Target,
+    z_mm: float,
+    *,
+    binning: int = 2,
+    blur_px: float = 0.0,
+    noise: float = 0.004,
+    dust: int = 0,
+    seed: int = 1,
+) -> tuple[NDArray[np.uint16], PinholeCamera]:
     """12 bit image of a target: uneven light, noise, blur, dust; and the camera that sees it."""
     rng = np.random.default_rng(seed)
     camera = paper_cameras(binning)[view]
@@ -25,28 +37,28 @@ def photograph(view, target, z_mm, *, binning=2, blur_px=0.0, noise=0.004, dust=
     rows, columns = clear.shape
     for _ in range(dust):
         place = rng.uniform([0, 0], [columns, rows]).astype(int).tolist()
-        cv2.circle(clear, place, int(rng.integers(1, 6)), float(rng.uniform(0, 0.5)), -1)
+        cv2.circle(clear, (place[0], place[1]), int(rng.integers(1, 6)), float(rng.uniform(0, 0.5)), -1)
     y, x = np.mgrid[-1 : 1 : rows * 1j, -1 : 1 : columns * 1j]
     light = (1 - 0.3 * (x * x + y * y) + 0.15 * x) * clear
     return np.clip(rng.normal(3000 * light + 100, 4095 * noise), 0, 4095).astype(np.uint16), camera
 
 
-def errors_px(points, camera, target, z_mm):
+def errors_px(points: TargetPoints, camera: PinholeCamera, target: Target, z_mm: float) -> FloatArray:
     world_mm = np.column_stack([target.points_mm(points.ids), np.full(len(points), z_mm)])
-    return np.linalg.norm(points.image_px - camera.project(world_mm), axis=1)
+    return np.asarray(np.linalg.norm(points.image_px - camera.project(world_mm), axis=1), dtype=np.float64)
 
 
 @pytest.mark.parametrize("view", ["view1", "view3"])
 @pytest.mark.parametrize("z_mm", [-4.5, 3.0])
 @pytest.mark.parametrize("target", [BOARD, DOTS], ids=lambda target: target.kind)
-def test_points_are_accurate_in_oblique_views_and_uneven_light(view, z_mm, target):
+def test_points_are_accurate_in_oblique_views_and_uneven_light(view: str, z_mm: float, target: Target) -> None:
     image, camera = photograph(view, target, z_mm)
     points = detect_target(image, target)
     assert len(points) == 23 * 17
     assert np.sqrt((errors_px(points, camera, target, z_mm) ** 2).mean()) < 0.03
 
 
-def test_full_size_board_is_accurate():
+def test_full_size_board_is_accurate() -> None:
     image, camera = photograph("view1", BOARD, 2.0, binning=1)
     points = detect_target(image, BOARD)
     assert len(points) == 23 * 17
@@ -54,7 +66,7 @@ def test_full_size_board_is_accurate():
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_blur_noise_and_dust_cost_points_not_accuracy(seed):
+def test_blur_noise_and_dust_cost_points_not_accuracy(seed: int) -> None:
     image, camera = photograph("view4", BOARD, -3.0, blur_px=1.5, noise=0.01, dust=40, seed=seed)
     points = detect_target(image, BOARD)
     error_px = errors_px(points, camera, BOARD, -3.0)
@@ -63,7 +75,7 @@ def test_blur_noise_and_dust_cost_points_not_accuracy(seed):
     assert error_px.max() < 1.0
 
 
-def test_brightness_and_bit_depth_do_not_matter():
+def test_brightness_and_bit_depth_do_not_matter() -> None:
     image, _ = photograph("view2", BOARD, 0.0)
     points = detect_target(image, BOARD)
     darker = detect_target((image / 4095 * 120).astype(np.uint8), BOARD)
@@ -72,7 +84,7 @@ def test_brightness_and_bit_depth_do_not_matter():
 
 
 @pytest.mark.parametrize("target", [BOARD, DOTS], ids=lambda target: target.kind)
-def test_partly_visible_target_needs_to_be_told_its_origin(target):
+def test_partly_visible_target_needs_to_be_told_its_origin(target: Target) -> None:
     image, camera = photograph("view2", target, 0.0)
     cut_px = 320
     with pytest.raises(TargetNotFound, match=r"not the whole board of 23 x 17.*origin_px"):
@@ -84,13 +96,13 @@ def test_partly_visible_target_needs_to_be_told_its_origin(target):
     assert errors_px(points, camera, target, 0.0).max() < 0.2
 
 
-def test_origin_far_from_every_point_is_refused():
+def test_origin_far_from_every_point_is_refused() -> None:
     image, _ = photograph("view2", DOTS, 0.0)
     with pytest.raises(TargetNotFound, match="more than one step"):
         detect_target(image, DOTS, origin_px=(-300.0, 10.0))
 
 
-def bright_dots(marked, size=400, pitch_px=41.3):
+def bright_dots(marked: tuple[int, int] | None, size: int = 400, pitch_px: float = 41.3) -> NDArray[np.float32]:
     """Bright specks on black, larger than the image; a thin square around one of them."""
     image = np.zeros((size, size), np.float32)
     v, u = np.mgrid[:size, :size]
@@ -103,26 +115,26 @@ def bright_dots(marked, size=400, pitch_px=41.3):
     return image * 2000
 
 
-def test_marked_dot_is_the_origin_whatever_the_hint_says():
+def test_marked_dot_is_the_origin_whatever_the_hint_says() -> None:
     points = detect_target(bright_dots((4, 6)), Target(kind="dots", pitch_mm=3.0), origin_px=(20.0, 20.0))
     origin_px = points.image_px[(points.ids == 0).all(axis=1)]
     np.testing.assert_allclose(origin_px, [[11.3 + 4 * 41.3, 9.6 + 6 * 41.3]], atol=0.03)
 
 
-def test_dots_without_marker_or_hint_are_refused():
+def test_dots_without_marker_or_hint_are_refused() -> None:
     with pytest.raises(TargetNotFound, match="origin_px"):
         detect_target(bright_dots(None), Target(kind="dots", pitch_mm=3.0))
 
 
 @pytest.mark.parametrize("target", [BOARD, DOTS], ids=lambda target: target.kind)
 @pytest.mark.parametrize("noise", [0.0, 50.0])
-def test_image_without_target_is_refused(target, noise):
+def test_image_without_target_is_refused(target: Target, noise: float) -> None:
     image = np.random.default_rng(3).normal(1000, noise, (300, 400)) if noise else np.full((300, 400), 1000.0)
     with pytest.raises(TargetNotFound):
         detect_target(image, target)
 
 
-def test_another_board_is_refused():
+def test_another_board_is_refused() -> None:
     image, _ = photograph("view3", BOARD, 0.0)
     with pytest.raises(TargetNotFound, match=r"not the whole board of 30 x 20"):
         detect_target(image, Target(kind="checkerboard", columns=30, rows=20, pitch_mm=1.0))
@@ -137,6 +149,6 @@ def test_another_board_is_refused():
         {"kind": "rings", "pitch_mm": 1.0},
     ],
 )
-def test_impossible_targets_are_refused(wrong):
+def test_impossible_targets_are_refused(wrong: dict[str, object]) -> None:
     with pytest.raises(ValidationError):
         Target.model_validate(wrong)
