@@ -140,6 +140,7 @@ class InlineEngine:
         try:
             await asyncio.wait([future])
         finally:
+            asked.set()  # whoever waited may be gone: the task shall not stay behind
             del self._stops[job_id]
         return _settle(future.exception(), None if future.exception() else future.result())
 

@@ -1,0 +1,115 @@
+import asyncio
+import threading
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from processing.engine import InlineEngine
+from server.calibrations import CalibrationStore
+from server.events import EventPublisher
+from server.job_runner import JobRunner
+from server.jobs import Job, JobKind, JobState, JobTable, reconstruction_job
+from server.problems import Conflict
+
+DEADLINE_S = 10.0
+
+
+def job_of(shot: int) -> Job:
+    return reconstruction_job("run", shot, "cal", "mlos-0", {"method": "mlos"})
+
+
+def answer(job: dict[str, Any], should_stop: Callable[[], bool]) -> dict[str, Any]:
+    return {"shot": job["shot"], "in": Path(job["results_dir"]).name, "with": Path(job["calibration_file"]).name}
+
+
+def fail(job: dict[str, Any], should_stop: Callable[[], bool]) -> dict[str, Any]:
+    raise OSError(f"no light in shot {job['shot']}")
+
+
+def last_until_stopped(job: dict[str, Any], should_stop: Callable[[], bool]) -> dict[str, Any]:
+    tick = threading.Event()
+    while not should_stop():
+        tick.wait(0.01)
+    return {}
+
+
+class Laboratory:
+    """A runner at work, and a way to wait for the state of a job."""
+
+    def __init__(self, runner: JobRunner, table: JobTable, events: EventPublisher) -> None:
+        self.runner = runner
+        self.table = table
+        self._events = events
+
+    async def reach(self, job: Job, state: JobState) -> Job:
+        async with asyncio.timeout(DEADLINE_S):
+            async for event in self._events.follow(0):
+                data = event.data if event is not None and event.name == "job_changed" else {}
+                if (data.get("job"), data.get("state")) == (job.id, state):
+                    return self.table.get(job.id)
+        raise AssertionError("the events ended")
+
+
+@asynccontextmanager
+async def at_work(tmp_path: Path, task: Callable[..., dict[str, Any]]) -> AsyncIterator[Laboratory]:
+    events, table = EventPublisher(), JobTable(tmp_path / "jobs.sqlite")
+    events.attach()
+    async with InlineEngine() as engine:
+        store = CalibrationStore(tmp_path / "calibrations")
+        runner = JobRunner(engine, table, {JobKind.RECONSTRUCTION: task}, events, tmp_path, store)
+        work = asyncio.create_task(runner.run())
+        yield Laboratory(runner, table, events)
+        work.cancel()
+        await asyncio.wait([work])
+    table.close()
+
+
+def test_jobs_are_done_in_the_order_in_which_they_were_asked_for(tmp_path: Path) -> None:
+    async def go() -> None:
+        async with at_work(tmp_path, answer) as laboratory:
+            jobs = [laboratory.runner.submit(job_of(shot)) for shot in range(3)]
+            done = [await laboratory.reach(job, JobState.DONE) for job in jobs]
+        assert [job.result for job in done] == [
+            {"shot": shot, "in": "mlos-0-cal", "with": "cal.json"} for shot in range(3)
+        ]
+        assert [job.changed_utc for job in done] == sorted(job.changed_utc for job in done)
+
+    asyncio.run(go())
+
+
+def test_a_job_that_fails_says_why_and_stops_no_other(tmp_path: Path) -> None:
+    async def go() -> None:
+        async with at_work(tmp_path, fail) as laboratory:
+            jobs = [laboratory.runner.submit(job_of(shot)) for shot in range(2)]
+            failed = [await laboratory.reach(job, JobState.FAILED) for job in jobs]
+        assert [job.error for job in failed] == ["OSError: no light in shot 0", "OSError: no light in shot 1"]
+
+    asyncio.run(go())
+
+
+def test_running_and_waiting_jobs_are_aborted_and_ended_ones_are_not(tmp_path: Path) -> None:
+    async def go() -> None:
+        async with at_work(tmp_path, last_until_stopped) as laboratory:
+            running, waiting = (laboratory.runner.submit(job_of(shot)) for shot in range(2))
+            await laboratory.reach(running, JobState.RUNNING)
+            assert (await laboratory.runner.abort(waiting.id)).state is JobState.ABORTED
+            await laboratory.runner.abort(running.id)
+            await laboratory.reach(running, JobState.ABORTED)
+            with pytest.raises(Conflict, match="is aborted"):
+                await laboratory.runner.abort(running.id)
+
+    asyncio.run(go())
+
+
+def test_what_was_running_when_the_server_ended_is_done_by_the_next_one(tmp_path: Path) -> None:
+    async def go() -> None:
+        async with at_work(tmp_path, last_until_stopped) as first:
+            job = first.runner.submit(job_of(0))
+            await first.reach(job, JobState.RUNNING)
+        async with at_work(tmp_path, answer) as second:
+            assert (await second.reach(job, JobState.DONE)).result is not None
+
+    asyncio.run(go())
