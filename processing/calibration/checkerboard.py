@@ -13,8 +13,8 @@ from processing.geometry import FloatArray
 
 Image32 = NDArray[np.float32]
 
-SMOOTHING_PX = 2.0
-"""Scale of the derivatives; corners blurred up to about this much lose half of their strength."""
+SMOOTHINGS_PX = (2.0, 4.0, 1.0)
+"""Scales of the derivatives, tried in turn: for most boards, for blurred and noisy ones, for tiny squares."""
 MIN_STRENGTH = 0.2
 """Saddle strength that a corner needs; an ideal sharp corner has 1."""
 MIN_CONTRAST = 0.12
@@ -60,22 +60,24 @@ class Saddles:
         return bool(crossed and MIN_NEIGHBOUR_RATIO < self.strength[a] / self.strength[b] < 1 / MIN_NEIGHBOUR_RATIO)
 
 
-def find_saddles(image: Image32) -> Saddles:
+def find_saddles(image: Image32, smoothing_px: float) -> Saddles:
     """Candidates for checkerboard corners, to about half a pixel.
 
     Parameters
     ----------
     image : (rows, columns) float32 array
         Any brightness, uneven light allowed: strength is measured against the local contrast.
+    smoothing_px : float
+        Scale of the derivatives; corners blurred as much lose half of their strength.
     """
-    smooth = _smoothed(image, SMOOTHING_PX)
+    smooth = _smoothed(image, smoothing_px)
     uu, vv, uv = _second_derivatives(smooth)
     saddle = np.sqrt(np.maximum(uv * uv - uu * vv, 0))
-    window = cv2.getStructuringElement(cv2.MORPH_RECT, (2 * round(4 * SMOOTHING_PX) + 1,) * 2)
+    window = cv2.getStructuringElement(cv2.MORPH_RECT, (2 * round(4 * smoothing_px) + 1,) * 2)
     contrast = cv2.dilate(smooth, window) - cv2.erode(smooth, window)
     whole_contrast = float(np.percentile(smooth, 98) - np.percentile(smooth, 2))
-    strength = np.pi * SMOOTHING_PX**2 * saddle / np.maximum(contrast, 1e-6)
-    peak_window = cv2.getStructuringElement(cv2.MORPH_RECT, (2 * round(1.5 * SMOOTHING_PX) + 1,) * 2)
+    strength = np.pi * smoothing_px**2 * saddle / np.maximum(contrast, 1e-6)
+    peak_window = cv2.getStructuringElement(cv2.MORPH_RECT, (2 * round(1.5 * smoothing_px) + 1,) * 2)
     peaks = (saddle >= cv2.dilate(saddle, peak_window)) & (strength > MIN_STRENGTH)
     peaks &= contrast > MIN_CONTRAST * whole_contrast
     rows, columns = np.nonzero(peaks)

@@ -21,6 +21,8 @@ MAX_DEVIATIONS = 8
 """How many medians a point may lie beside the smooth grid."""
 MIN_DEVIATION_PX = 0.15
 """Points this close to the smooth grid are never dropped."""
+MIN_EDGE_STRENGTH = 0.75
+"""Outer corners of a board are at least this strong compared to the next line inside; T-junctions have 0.5."""
 MIN_SMOOTH_POINTS = 150
 """Fewer points do not draw the grid finely enough to judge one of them; the fit of the camera does."""
 
@@ -176,43 +178,53 @@ def on_smooth_grid(ids: IdArray, points_px: FloatArray) -> NDArray[np.bool_]:
     return np.asarray(distance_px < max(MAX_DEVIATIONS * scale_px, MIN_DEVIATION_PX), dtype=np.bool_)
 
 
-def place_board(lattice: Lattice, strength: FloatArray, columns: int, rows: int) -> Lattice | None:
-    """Ids counted from the upper left corner of a board of known size; None where the board is not all there.
+def trim_frame(lattice: Lattice, strength: FloatArray) -> Lattice:
+    """Drop outer lines that are not part of a pattern: stray points, and the printed frame of a board.
+
+    Where the squares of a checkerboard meet its frame, T-junctions look like corners of half the strength.
 
     Parameters
     ----------
     lattice : Lattice
-        Oriented grid, possibly larger than the board: its printed frame can look like more corners.
+        Grid, possibly larger than the pattern.
     strength : (N,) array
-        How strong each of the detected points is; the board is where the strong ones are.
-    columns, rows : int
-        Size of the board. A board turned by about 90 degrees is recognised by its shape.
+        How strong each of the detected points is.
     """
-    turned = lattice.with_ids(rotate_ids(lattice.ids, 1))
-    windows = [_best_window(candidate, strength, columns, rows) for candidate in (lattice, turned)]
-    score, board = max(windows, key=lambda window: window[0])
-    return board if score > 0 else None
+    frame = _frame_line(lattice, strength)
+    while frame is not None:
+        axis, line = frame
+        lattice = lattice.select(lattice.ids[:, axis] != line)
+        frame = _frame_line(lattice, strength)
+    return lattice
 
 
-def _best_window(lattice: Lattice, strength: FloatArray, columns: int, rows: int) -> tuple[float, Lattice]:
-    ids = lattice.ids - lattice.ids.min(axis=0)
-    weights = np.zeros(ids.max(axis=0) + 1)
-    weights[ids[:, 0], ids[:, 1]] = strength[lattice.indices]
-    if weights.shape[0] < columns or weights.shape[1] < rows:
-        return 0.0, lattice
-    windows = np.lib.stride_tricks.sliding_window_view(weights, (columns, rows))
-    scores = windows.sum(axis=(2, 3))
-    best = np.unravel_index(int(np.argmax(scores)), scores.shape)
-    if not _edges_present(windows[best] > 0):
-        return 0.0, lattice
-    ids = ids - best
-    inside = np.all((ids >= 0) & (ids < (columns, rows)), axis=1)
-    return float(scores[best]), lattice.with_ids(ids).select(inside)
+def _frame_line(lattice: Lattice, strength: FloatArray) -> tuple[int, int] | None:
+    """Axis and id of an outermost line that is sparse, or weak compared to the next one; None if all are fine."""
+    for axis in (0, 1):
+        lines, line_of_point = np.unique(lattice.ids[:, axis], return_inverse=True)
+        if len(lines) < 2:
+            continue
+        counts = np.bincount(line_of_point)
+        for edge, inner in ((0, 1), (len(lines) - 1, len(lines) - 2)):
+            outer_strength, inner_strength = (
+                float(np.median(strength[lattice.indices[line_of_point == line]])) for line in (edge, inner)
+            )
+            if 2 * counts[edge] < np.median(counts) or outer_strength < MIN_EDGE_STRENGTH * inner_strength:
+                return axis, int(lines[edge])
+    return None
 
 
-def _edges_present(window: NDArray[np.bool_]) -> bool:
-    edges = (window[0], window[-1], window[:, 0], window[:, -1])
-    return all(edge.sum() * 2 >= edge.size for edge in edges)
+def place_board(lattice: Lattice, columns: int, rows: int) -> Lattice | None:
+    """Ids counted from the upper left corner of a board of known size; None where the grid has another size.
+
+    A board turned by about 90 degrees is recognised by its shape.
+    """
+    for turns in (0, 1):
+        ids = rotate_ids(lattice.ids, turns)
+        ids = ids - ids.min(axis=0)
+        if tuple(ids.max(axis=0) + 1) == (columns, rows):
+            return lattice.with_ids(ids)
+    return None
 
 
 def _mean_steps(lattice: Lattice, points_px: FloatArray) -> tuple[FloatArray, FloatArray]:

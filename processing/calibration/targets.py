@@ -2,9 +2,10 @@
 
 Ids (column, row) count from the target's origin node, which lies at x = y = 0: the marked dot, the node
 nearest to ``origin_px``, or, where a whole board of known size is seen, its middle. Columns run along +x
-(to the right in the image), rows along +y (downwards).
+(to the right in the image), rows along +y (downwards; the target may say that its y points up).
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
@@ -12,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from processing.calibration.checkerboard import corner_lattices, find_saddles, refine_corners
+from processing.calibration.checkerboard import SMOOTHINGS_PX, corner_lattices, find_saddles, refine_corners
 from processing.calibration.dots import assign_dots, dot_signal, find_dots, marked_dot
 from processing.calibration.errors import TargetNotFound
-from processing.calibration.lattice import Lattice, on_smooth_grid, orient, place_board, shortest_step_px
+from processing.calibration.lattice import Lattice, on_smooth_grid, orient, place_board, shortest_step_px, trim_frame
 from processing.geometry import FloatArray
 
 MIN_POINTS = 9
@@ -35,6 +36,10 @@ class Target(BaseModel):
     columns: Annotated[int, Field(ge=2, le=1000, description="inner corners or dots along x")] | None = None
     rows: Annotated[int, Field(ge=2, le=1000, description="inner corners or dots along y")] | None = None
     pitch_mm: Annotated[float, Field(gt=0, description="distance of neighbouring points")]
+    y_axis: Annotated[
+        Literal["down", "up"],
+        Field(description="where y grows in the image; up with z away from the cameras is left-handed"),
+    ] = "down"
 
     @model_validator(mode="after")
     def _has_both_or_none(self) -> "Target":
@@ -46,7 +51,8 @@ class Target(BaseModel):
 
     def points_mm(self, ids: NDArray[np.int64]) -> FloatArray:
         """Positions (N, 2) on the target, x and y in mm, of nodes (N, 2)."""
-        return np.asarray(ids, dtype=np.float64) * self.pitch_mm
+        y_sign = -1 if self.y_axis == "up" else 1
+        return np.asarray(ids, dtype=np.float64) * (self.pitch_mm, y_sign * self.pitch_mm)
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,22 +113,30 @@ def detect_target(
 def _find_corners(
     pixels: NDArray[np.float32], target: Target, origin_px: tuple[float, float] | None
 ) -> tuple[Lattice, FloatArray]:
-    """The grid that fits the board; several starts are tried, as dust can mislead one."""
-    saddles = find_saddles(pixels)
-    points_px, failure, grown = saddles.points_px, TargetNotFound("checkerboard: no corners in a grid"), 0
-    for lattice in corner_lattices(saddles):
-        if len(lattice) < MIN_POINTS or len(lattice) < 0.5 * grown:
+    """The grid that fits the board, refined; the failure that came closest where none does."""
+    failure, grown = TargetNotFound("checkerboard: no corners in a grid"), 0
+    for board, points_px in _candidate_boards(pixels):
+        if len(board) < max(MIN_POINTS, grown // 2):
             continue
         try:
-            grid = _with_origin(orient(lattice, points_px), points_px, saddles.strength, target, None, origin_px)
+            grid = _with_origin(board, points_px, target, None, origin_px)
         except TargetNotFound as error:
-            grown, failure = max((grown, failure), (len(lattice), error), key=lambda attempt: attempt[0])
+            grown, failure = max((grown, failure), (len(board), error), key=lambda attempt: attempt[0])
             continue
-        refined_px, converged = refine_corners(pixels, points_px[grid.indices], shortest_step_px(grid, points_px))
         points_px = points_px.copy()
-        points_px[grid.indices] = refined_px
+        spacing_px = shortest_step_px(grid, points_px)
+        points_px[grid.indices], converged = refine_corners(pixels, points_px[grid.indices], spacing_px)
         return grid.select(converged), points_px
     raise failure
+
+
+def _candidate_boards(pixels: NDArray[np.float32]) -> Iterator[tuple[Lattice, FloatArray]]:
+    """Grids of corners and the corners; several scales and starts, as noise and dust can mislead one."""
+    for smoothing_px in SMOOTHINGS_PX:
+        saddles = find_saddles(pixels, smoothing_px)
+        for lattice in corner_lattices(saddles):
+            if len(lattice) >= MIN_POINTS:
+                yield trim_frame(orient(lattice, saddles.points_px), saddles.strength), saddles.points_px
 
 
 def _find_dots(
@@ -135,14 +149,12 @@ def _find_dots(
         raise TargetNotFound(f"dots: {len(lattice)} points lie in a grid, at least {MIN_POINTS} are needed")
     found = marked_dot(signal, points_px[lattice.indices])
     marked = None if found is None else int(lattice.indices[found])
-    strength = np.ones(len(points_px))
-    return _with_origin(orient(lattice, points_px), points_px, strength, target, marked, origin_px), points_px
+    return _with_origin(orient(lattice, points_px), points_px, target, marked, origin_px), points_px
 
 
 def _with_origin(
     lattice: Lattice,
     points_px: FloatArray,
-    strength: FloatArray,
     target: Target,
     marked: int | None,
     origin_px: tuple[float, float] | None,
@@ -154,7 +166,7 @@ def _with_origin(
         return lattice.with_ids(lattice.ids - lattice.ids[lattice.indices == marked])
     if target.columns is None or target.rows is None:
         raise TargetNotFound("dots: no dot carries a marker; say where the origin is seen (origin_px)")
-    board = place_board(lattice, strength, target.columns, target.rows)
+    board = place_board(lattice, target.columns, target.rows)
     if board is None:
         seen_columns, seen_rows = np.ptp(lattice.ids, axis=0) + 1
         raise TargetNotFound(

@@ -128,7 +128,7 @@ def test_coplanar_points_are_refused_however_they_lie(tilt_deg: float) -> None:
     points_mm = target_plane_mm(0.0) @ turn.T
     plane = PlaneObservation("flat", points_mm, points_mm[:, :2])
     assert degeneracy([plane]) is not None
-    with pytest.raises(CalibrationError, match="^view3: the target hardly moved.*one plane.*a camera needs 2 %"):
+    with pytest.raises(CalibrationError, match=r"^view3: the target hardly moved.*one plane.*a camera needs 2 %"):
         check_motion("view3", [plane])
     assert degeneracy(seen_planes(paper_camera(), z_mm=(-1.0, 1.0))) is None
 

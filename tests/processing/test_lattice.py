@@ -1,6 +1,7 @@
 """Grid assignment finds the nodes of any regular pattern, whatever lies between them."""
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -12,6 +13,7 @@ from processing.calibration.lattice import (
     orient,
     place_board,
     rotate_ids,
+    trim_frame,
 )
 from processing.geometry import FloatArray
 
@@ -56,22 +58,31 @@ def test_orientation_does_not_depend_on_how_the_grid_was_grown(turns: int, mirro
     np.testing.assert_array_equal(oriented.ids - oriented.ids.min(axis=0), IDS)
 
 
-def test_board_is_found_in_a_larger_grid_by_its_strength() -> None:
-    strength = np.where((IDS >= 2).all(axis=1) & (IDS < (11, 8)).all(axis=1), 1.0, 0.4)
-    board = place_board(Lattice(IDS, np.arange(len(IDS))), strength, 9, 6)
-    assert board is not None
-    assert len(board) == 54
-    np.testing.assert_array_equal(IDS[board.indices] - board.ids, np.full((54, 2), 2))
+def test_frame_and_stray_points_are_trimmed() -> None:
+    inside = (IDS >= 1).all(axis=1) & (IDS < (14, 11)).all(axis=1)
+    strength = np.where(inside, 1.0, 0.5)
+    stray = np.array([[20, 5], [7, -1]])
+    lattice = Lattice(np.concatenate([IDS, stray]), np.arange(len(IDS) + 2))
+    board = trim_frame(lattice, np.append(strength, [1.0, 1.0]))
+    np.testing.assert_array_equal(board.ids, IDS[inside])
+
+
+@given(missing=st.sets(st.integers(0, 179), max_size=12), light=st.floats(-0.04, 0.04))
+def test_uneven_light_and_missing_corners_are_not_trimmed(missing: set[int], light: float) -> None:
+    kept = np.array([index for index in range(len(IDS)) if index not in missing])
+    board = trim_frame(Lattice(IDS[kept], kept), np.exp(light * IDS.sum(axis=1)))
+    assert len(board) > 0.7 * len(kept)
 
 
 def test_board_turned_by_ninety_degrees_is_recognised_by_its_shape() -> None:
-    board = place_board(Lattice(IDS, np.arange(len(IDS))), np.ones(len(IDS)), 12, 15)
+    board = place_board(Lattice(IDS, np.arange(len(IDS))), 12, 15)
     assert board is not None
     np.testing.assert_array_equal(np.ptp(board.ids, axis=0) + 1, (12, 15))
 
 
-def test_board_that_is_not_all_there_is_not_guessed() -> None:
-    assert place_board(Lattice(IDS, np.arange(len(IDS))), np.ones(len(IDS)), 16, 12) is None
+@pytest.mark.parametrize("size", [(16, 12), (15, 11), (14, 12), (12, 12)])
+def test_board_of_another_size_is_not_guessed(size: tuple[int, int]) -> None:
+    assert place_board(Lattice(IDS, np.arange(len(IDS))), *size) is None
 
 
 def test_shifted_points_leave_the_smooth_grid_alone() -> None:

@@ -11,10 +11,11 @@ from processing.calibration.targets import Target, TargetPoints, detect_target
 from processing.geometry import FloatArray, PinholeCamera
 from processing.synthetic.paper_rig import paper_cameras, paper_optics
 from processing.synthetic.target import Checkerboard, DotTarget, render_target
+from processing.synthetic.target import Target as Pattern
 
 BOARD = Target(kind="checkerboard", columns=23, rows=17, pitch_mm=1.0)
 DOTS = Target(kind="dots", columns=23, rows=17, pitch_mm=1.0)
-PATTERNS = {"checkerboard": Checkerboard(), "dots": DotTarget()}
+PATTERNS: dict[str, Pattern] = {"checkerboard": Checkerboard(), "dots": DotTarget()}
 
 
 def photograph(
@@ -33,7 +34,7 @@ def photograph(
     camera = paper_cameras(binning)[view]
     clear = render_target(camera, PATTERNS[target.kind], z_mm, paper_optics(binning)[view])
     if blur_px:
-        clear = cv2.GaussianBlur(clear, (0, 0), blur_px)
+        clear = np.asarray(cv2.GaussianBlur(clear, (0, 0), blur_px), dtype=np.float32)
     rows, columns = clear.shape
     for _ in range(dust):
         place = rng.uniform([0, 0], [columns, rows]).astype(int).tolist()
@@ -134,10 +135,11 @@ def test_image_without_target_is_refused(target: Target, noise: float) -> None:
         detect_target(image, target)
 
 
-def test_another_board_is_refused() -> None:
+@pytest.mark.parametrize("size", [(24, 17), (22, 17), (23, 16), (25, 19), (30, 20)])
+def test_another_board_is_refused(size: tuple[int, int]) -> None:
     image, _ = photograph("view3", BOARD, 0.0)
-    with pytest.raises(TargetNotFound, match=r"not the whole board of 30 x 20"):
-        detect_target(image, Target(kind="checkerboard", columns=30, rows=20, pitch_mm=1.0))
+    with pytest.raises(TargetNotFound, match=f"not the whole board of {size[0]} x {size[1]}"):
+        detect_target(image, Target(kind="checkerboard", columns=size[0], rows=size[1], pitch_mm=1.0))
 
 
 @pytest.mark.parametrize(
