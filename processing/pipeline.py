@@ -2,10 +2,13 @@
 
 import resource
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
+
+import numpy as np
 
 from daq.shotfile import RunReader, Shot
 from processing.calibration.calibration import Calibration, Verdict
@@ -92,32 +95,31 @@ def reconstruct_shot(
         _check(run_dir.name, recorded, calibration)
         images = {frame: shot_intensities(run, recorded, frame, settings) for frame in _frames(run)}
         provenance = _provenance(run, calibration, calibration_file, settings)
-    plan = _cached_plan(calibration_file, str(provenance["calibration_sha256"]), settings, tuple(recorded.views))
+    bench = _workbench(calibration_file, str(provenance["calibration_sha256"]), settings, tuple(recorded.views))
     claim_results(results_dir, provenance)
     volumes = []
     for frame, views in images.items():
         if should_stop():
             raise Stopped(f"{run_dir.name}, shot {shot}: stopped before exposure {frame}")
-        volumes.append(_reconstruct_frame(plan, views, settings, results_dir, shot, frame, provenance))
+        volumes.append(_reconstruct_frame(bench, views, settings, results_dir, shot, frame, provenance))
     return ShotResult(
         shot=shot,
         method=settings.method,
-        grid=GridSettings.of(plan.grid),
+        grid=GridSettings.of(bench.plan.grid),
         volumes=tuple(volumes),
         cpu_s=time.process_time() - started_cpu_s,
         peak_rss_mb=resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
     )
 
 
-def reconstruct(plan: Plan, images: list[Intensity], settings: ReconstructionSettings) -> Intensity:
-    """Volume (z, y, x) of one exposure by the method of the settings."""
-    match settings.method:
-        case ReconstructionMethod.SMART:
-            return smart(plan, images, iterations=settings.iterations, relaxation=settings.relaxation).volume
-        case ReconstructionMethod.MART:
-            return mart(plan, images, iterations=settings.iterations, relaxation=settings.relaxation).volume
-        case method:
-            return line_of_sight(plan, images, method)
+def reconstruct(
+    plan: Plan, images: Sequence[Intensity], settings: ReconstructionSettings, out: Intensity | None = None
+) -> Intensity:
+    """Volume (z, y, x) of one exposure by the method of the settings, written into ``out`` where given."""
+    if not settings.method.iterative:
+        return np.asarray(line_of_sight(plan, images, settings.method, out), dtype=np.float32)
+    solve = smart if settings.method is ReconstructionMethod.SMART else mart
+    return solve(plan, images, iterations=settings.iterations, relaxation=settings.relaxation, out=out).volume
 
 
 def default_grid(calibration: Calibration, pitch_mm: float | None = None) -> VoxelGrid:
@@ -153,8 +155,16 @@ def shot_intensities(run: RunReader, shot: Shot, frame: FrameName, settings: Rec
     return images
 
 
+@dataclass(frozen=True, eq=False)
+class _Workbench:
+    """What the shots of a run share: first touch of fresh memory costs more than a reconstruction."""
+
+    plan: Plan
+    volume: Intensity
+
+
 def _reconstruct_frame(
-    plan: Plan,
+    bench: _Workbench,
     views: list[Intensity],
     settings: ReconstructionSettings,
     results_dir: Path,
@@ -163,10 +173,10 @@ def _reconstruct_frame(
     provenance: Provenance,
 ) -> VolumeRecord:
     started_s = time.perf_counter()
-    volume = reconstruct(plan, views, settings)
+    volume = reconstruct(bench.plan, views, settings, bench.volume)
     seconds = round(time.perf_counter() - started_s, 4)
     file = volume_path(results_dir, shot, frame)
-    write_volume(file, volume, plan.grid, {**provenance, "shot": shot, "frame": frame})
+    write_volume(file, volume, bench.plan.grid, {**provenance, "shot": shot, "frame": frame})
     return VolumeRecord(shot=shot, frame=frame, file=file.name, seconds=seconds)
 
 
@@ -208,13 +218,14 @@ def _provenance(
     }
 
 
-@lru_cache(maxsize=2)
-def _cached_plan(
+@lru_cache(maxsize=1)
+def _workbench(
     calibration_file: Path, _sha256: str, settings: ReconstructionSettings, views: tuple[str, ...]
-) -> Plan:
+) -> _Workbench:
     calibration = load_calibration(calibration_file)
     grid = settings.grid.to_grid() if settings.grid else default_grid(calibration)
-    return plan_reconstruction([calibration.views[view].mapping for view in views], grid)
+    plan = plan_reconstruction([calibration.views[view].mapping for view in views], grid)
+    return _Workbench(plan, np.empty(grid.shape, np.float32))
 
 
 def _widened(span_mm: tuple[float, float]) -> tuple[float, float]:

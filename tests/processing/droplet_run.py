@@ -1,0 +1,79 @@
+"""A run of two droplets seen by three known cameras, with its calibration, for tests of what follows recording."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq.shotfile import DoubleFrame, ExposureRecord, ImageKey, RunHeader, RunWriter, Shot, ViewFormat
+from processing.calibration.calibration import Calibration, Model, PlaneError, Verdict, ViewCalibration
+from processing.calibration.calibration_file import save_calibration
+from processing.calibration.calibration_record import content_id
+from processing.geometry import PinholeCamera, view_camera
+
+SHAPE = (120, 160)
+SCALE_PX_PER_MM = 20.0
+DROPLETS_A_MM = np.array([[0.5, -0.7, 0.3], [-1.2, 0.8, -0.6]])
+MOTION_MM = np.array([0.0, 0.2, 0.0])
+SEEN = ExposureRecord(valid=True, frame_id=1, device_timestamp_ns=1)
+MISSING = ExposureRecord(valid=False)
+
+
+def cameras() -> dict[str, PinholeCamera]:
+    return {
+        f"view{number}": view_camera(
+            azimuth_deg,
+            focal_length_mm=85,
+            magnification=0.43,
+            scale_px_per_mm=SCALE_PX_PER_MM,
+            image_size_px=(SHAPE[1], SHAPE[0]),
+        )
+        for number, azimuth_deg in enumerate((40, 0, -40), start=1)
+    }
+
+
+def shadowgraph(camera: PinholeCamera, droplets_mm: NDArray[np.float64]) -> NDArray[np.uint8]:
+    """Round shadows of 2 px radius before an even light of 200 counts."""
+    row, column = np.mgrid[: SHAPE[0], : SHAPE[1]]
+    light = np.full(SHAPE, 200.0)
+    for u, v in camera.project(droplets_mm):
+        light *= 1 - 0.9 * np.exp(-((column - u) ** 2 + (row - v) ** 2) / 4)
+    image: NDArray[np.uint8] = np.round(light).astype(np.uint8)
+    return image
+
+
+def write_run(run_dir: Path, shots: int = 1, invalid: tuple[int, ...] = ()) -> Path:
+    """Record shots; in the invalid ones exposure B of view2 is missing."""
+    views = {name: ViewFormat(SHAPE, 8) for name in cameras()}
+    header = RunHeader(run_id=run_dir.name, created_utc="2026-01-01T00:00:00+00:00", views=views, separation_ns=6400)
+    with RunWriter(run_dir, header) as writer:
+        for index in range(shots):
+            writer.write_shot(_shot(index, valid=index not in invalid))
+        writer.finish("completed")
+    return run_dir
+
+
+def _shot(index: int, *, valid: bool) -> Shot:
+    views = {}
+    for name, camera in cameras().items():
+        frame_a, frame_b = (shadowgraph(camera, DROPLETS_A_MM + step * MOTION_MM) for step in (0, 1))
+        views[name] = DoubleFrame(frame_a, frame_b, SEEN, SEEN)
+    if not valid:
+        views["view2"] = replace(views["view2"], frame_b=np.zeros(SHAPE, np.uint8), record_b=MISSING)
+    return Shot(index, ImageKey.SAMPLE if valid else ImageKey.INVALID, views)
+
+
+def write_calibration(path: Path, verdict: Verdict = Verdict.GOOD, holdout_px: float = 0.02) -> Path:
+    """Calibration with the true cameras."""
+    outline_mm = ((-3.0, -2.5), (3.0, -2.5), (3.0, 2.5), (-3.0, 2.5))
+    planes = (PlaneError(-1.5, 100, 0.01, 0.01, "low"), PlaneError(1.5, 100, 0.01, 0.01, "high"))
+    views = {
+        name: ViewCalibration(
+            camera, Model.PINHOLE, 200, 0.01, 0.01, 0.02, holdout_px, planes, verdict, extent_mm=outline_mm
+        )
+        for name, camera in cameras().items()
+    }
+    undated = Calibration("", "2026-01-01T00:00:00+00:00", None, views, (-1.5, 1.5), "test")
+    save_calibration(undated.with_id(content_id(undated)), path)
+    return path

@@ -1,0 +1,121 @@
+"""From a recorded shot to its volumes: each droplet peaks where it was, or one clear error says why not."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from processing.calibration.calibration import Verdict
+from processing.calibration.calibration_file import load_calibration
+from processing.calibration.errors import CalibrationError
+from processing.pipeline import PipelineError, ShotResult, Stopped, default_grid, reconstruct_shot
+from processing.reconstruction.method import ReconstructionMethod
+from processing.reconstruction.settings import GridSettings, ReconstructionSettings
+from processing.reconstruction.volume_file import VolumeFileError, read_volume
+from processing.results_file import average_volumes, volume_files, volume_path
+from processing.volume import VoxelGrid
+from tests.processing.droplet_run import DROPLETS_A_MM, MOTION_MM, write_calibration, write_run
+
+GRID = VoxelGrid.centred((61, 81, 81), 0.05)
+SETTINGS = ReconstructionSettings(grid=GridSettings.of(GRID), minimum_window_px=0)
+
+
+@pytest.fixture
+def run_dir(tmp_path: Path) -> Path:
+    return write_run(tmp_path / "run", shots=2, invalid=(1,))
+
+
+@pytest.fixture
+def calibration_file(tmp_path: Path) -> Path:
+    return write_calibration(tmp_path / "calibration.json")
+
+
+def reconstructed(run_dir: Path, calibration_file: Path, settings: ReconstructionSettings = SETTINGS) -> ShotResult:
+    return reconstruct_shot(run_dir, 0, calibration_file, settings, run_dir / "results")
+
+
+@pytest.mark.parametrize("method", list(ReconstructionMethod))
+def test_droplets_peak_where_they_were(run_dir: Path, calibration_file: Path, method: ReconstructionMethod) -> None:
+    reconstructed(run_dir, calibration_file, SETTINGS.model_copy(update={"method": method, "iterations": 3}))
+    for frame, moved_mm in (("a", 0 * MOTION_MM), ("b", MOTION_MM)):
+        volume, grid, _ = read_volume(run_dir / "results" / f"shot_00000_{frame}.vtkhdf")
+        for expected in np.rint(grid.to_index(DROPLETS_A_MM + moved_mm)).astype(int):
+            around = tuple(slice(index - 6, index + 7) for index in expected)
+            peak = np.array(np.unravel_index(volume[around].argmax(), (13, 13, 13))) - 6
+            assert np.abs(peak).max() <= 1, (frame, expected, peak)
+
+
+def test_result_and_volumes_name_their_origin(run_dir: Path, calibration_file: Path) -> None:
+    result = reconstructed(run_dir, calibration_file)
+    assert [(volume.shot, volume.frame, volume.file) for volume in result.volumes] == [
+        (0, "a", "shot_00000_a.vtkhdf"),
+        (0, "b", "shot_00000_b.vtkhdf"),
+    ]
+    assert result.grid.to_grid() == GRID
+    _, _, provenance = read_volume(volume_path(run_dir / "results", 0, "b"))
+    assert provenance["run"] == "run"
+    assert provenance["calibration"] == load_calibration(calibration_file).id
+    assert ReconstructionSettings.model_validate_json(str(provenance["settings"])) == SETTINGS
+    assert (provenance["shot"], provenance["frame"]) == (0, "b")
+
+
+def test_the_default_grid_is_the_calibrated_range_in_pixels(run_dir: Path, calibration_file: Path) -> None:
+    result = reconstructed(run_dir, calibration_file, ReconstructionSettings(minimum_window_px=0))
+    grid = result.grid.to_grid()
+    assert grid.pitch_mm == pytest.approx(1 / 20, rel=0.05)
+    assert grid.z_mm[[0, -1]] == pytest.approx([-1.5, 1.5], abs=0.05)
+    assert np.ptp(grid.x_mm) > 4
+
+
+def test_a_shot_with_missing_exposures_is_refused(run_dir: Path, calibration_file: Path) -> None:
+    with pytest.raises(PipelineError, match="run, shot 1: exposures are missing"):
+        reconstruct_shot(run_dir, 1, calibration_file, SETTINGS, run_dir / "results")
+    assert not (run_dir / "results").exists()
+
+
+def test_a_refused_calibration_makes_no_volumes(run_dir: Path, tmp_path: Path) -> None:
+    bad = write_calibration(tmp_path / "bad.json", Verdict.REFUSE, holdout_px=1.7)
+    with pytest.raises(CalibrationError, match=r"view1: hold-out error 1\.7 px is refused"):
+        reconstructed(run_dir, bad)
+
+
+def test_results_of_other_settings_are_not_mixed(run_dir: Path, calibration_file: Path) -> None:
+    reconstructed(run_dir, calibration_file)
+    with pytest.raises(VolumeFileError, match="results of another run, calibration or settings"):
+        reconstructed(run_dir, calibration_file, SETTINGS.model_copy(update={"noise_floor": 0.2}))
+
+
+def test_a_stop_is_honoured_between_exposures(run_dir: Path, calibration_file: Path) -> None:
+    answers = iter([False, True])
+    with pytest.raises(Stopped, match="before exposure b"):
+        reconstruct_shot(run_dir, 0, calibration_file, SETTINGS, run_dir / "results", lambda: next(answers))
+    assert [file.name for file in volume_files(run_dir / "results")] == ["shot_00000_a.vtkhdf"]
+
+
+def test_results_id_tells_settings_apart() -> None:
+    other = SETTINGS.model_copy(update={"noise_floor": 0.2})
+    assert SETTINGS.results_id != other.results_id
+    assert SETTINGS.results_id == SETTINGS.model_copy().results_id
+    assert SETTINGS.results_id.startswith("mlos-")
+
+
+def test_the_average_is_the_mean(run_dir: Path, calibration_file: Path) -> None:
+    reconstructed(run_dir, calibration_file)
+    files = volume_files(run_dir / "results")
+    mean, grid = average_volumes(files)
+    assert grid == GRID
+    np.testing.assert_allclose(mean, (read_volume(files[0])[0] + read_volume(files[1])[0]) / 2, atol=1e-7)
+
+
+def test_volumes_on_different_grids_have_no_average(run_dir: Path, calibration_file: Path) -> None:
+    reconstructed(run_dir, calibration_file)
+    smaller = SETTINGS.model_copy(update={"grid": GridSettings.of(VoxelGrid.centred((11, 11, 11), 0.05))})
+    reconstruct_shot(run_dir, 0, calibration_file, smaller, run_dir / "smaller")
+    with pytest.raises(VolumeFileError, match="differs from"):
+        average_volumes([volume_path(run_dir / "results", 0, "a"), volume_path(run_dir / "smaller", 0, "a")])
+    with pytest.raises(VolumeFileError, match="no volumes"):
+        average_volumes([])
+
+
+def test_default_grid_takes_a_stated_pitch(calibration_file: Path) -> None:
+    assert default_grid(load_calibration(calibration_file), pitch_mm=0.1).pitch_mm == 0.1
