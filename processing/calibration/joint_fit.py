@@ -1,6 +1,6 @@
 """calibrate: all points of a view in one joint 3-D fit, judged by points it has not seen -> Calibration."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 
 import numpy as np
@@ -14,7 +14,7 @@ from processing.calibration.health import check_motion, errors_px, holdout_error
 from processing.calibration.observation import CalibrationSet, PlaneObservation, ViewObservations, stacked
 from processing.calibration.pinhole_fit import fit_pinhole
 from processing.calibration.polynomial import fit_polynomial
-from processing.geometry import FloatArray, ViewMapping
+from processing.geometry import FloatArray, PinholeCamera, ViewMapping
 
 
 def calibrate(
@@ -51,9 +51,22 @@ def calibrate(
         views=views,
         z_range_mm=_common_z_range_mm(calibration_set),
         source=calibration_set.source,
-        notes=calibration_set.notes,
+        notes=(*calibration_set.notes, *_mirrored(calibration_set, views)),
     )
     return undated.with_id(content_id(undated))
+
+
+def _mirrored(calibration_set: CalibrationSet, views: Mapping[str, ViewCalibration]) -> Iterator[str]:
+    """Notes on views that a left-handed world puts behind the camera: volumes would come out mirrored."""
+    for name, view in views.items():
+        camera = view.mapping
+        if isinstance(camera, PinholeCamera) and not view.intrinsics_only:
+            points_mm, _ = stacked(calibration_set.views[name].planes)
+            if np.mean(points_mm @ camera.rotation[2] + camera.translation_mm[2]) < 0:
+                yield (
+                    f"{name}: the target lies behind the camera: its axes are left-handed, volumes come out mirrored; "
+                    'does y point up (y_axis = "up"), or z towards the views?'
+                )
 
 
 def _joint_view(name: str, seen: ViewObservations, model: Model) -> ViewCalibration:

@@ -58,6 +58,14 @@ def test_camera_on_the_other_side_of_the_target_is_found() -> None:
     assert true_errors_px(fitted.camera, camera).mean() < 0.004
 
 
+def test_left_handed_axes_are_noted() -> None:
+    planes = seen_planes(paper_camera(15.0))
+    mirrored = tuple(PlaneObservation(plane.name, plane.points_mm * (1, 1, -1), plane.image_px) for plane in planes)
+    assert calibrate(calibration_set(only=planes)).notes == ()
+    (note,) = calibrate(calibration_set(only=mirrored)).notes
+    assert note.startswith("only: the target lies behind the camera: its axes are left-handed")
+
+
 def test_too_few_points_are_refused() -> None:
     with pytest.raises(CalibrationError, match="8 points for 15 parameters, need 9"):
         fit_pinhole(volume_points_mm(8), np.zeros((8, 2)), (100, 100))
