@@ -32,6 +32,9 @@ lint: setup ## Run ruff, mypy and import-linter.
 serve: setup ## Start server and web page on the simulated bench, http://127.0.0.1:8080.
 	$(PYTHON) -m server.cli serve --config configs/simulated.toml
 
+bench: setup ## Measure kernels and recorder against plain numpy and OpenCV; writes bench.json.
+	@env -u OPENBLAS_CORETYPE -u OPENBLAS_L2_SIZE $(PYTHON) -m server.cli bench --json | tail -n 1 >bench.json
+
 firmware: $(FIRMWARE_SOURCES) | .venv/.debian ## Build the firmware core for this computer.
 	@$(MAKE) --no-print-directory -C firmware host
 

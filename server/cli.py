@@ -17,6 +17,7 @@ from processing.pipeline import PipelineError
 from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.volume_file import VolumeFileError
 from server import commands
+from server.bench_command import bench
 from server.config import ConfigError
 
 BAD_INPUT = (CalibrationError, ConfigError, ManifestError, PipelineError, PlanError, ShotFileError, VolumeFileError)
@@ -35,7 +36,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _fail(options, error, status=1)
     except KeyboardInterrupt:
         return _fail(options, RuntimeError("interrupted"), status=1)
-    print(json.dumps(result) if options.json else commands.readable(result))  # noqa: T201
+    if options.json or result:
+        print(json.dumps(result) if options.json else commands.readable(result))  # noqa: T201
     return 0
 
 
@@ -57,6 +59,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_average(verbs)
     _add_study(verbs)
     _add_optics(verbs)
+    _add_bench(verbs)
     return parser
 
 
@@ -126,6 +129,12 @@ def _add_study(verbs: Any) -> None:
 def _add_optics(verbs: Any) -> None:
     parser = _verb(verbs, "optics", commands.optics, "optics of a rig: d_A, depth of field, blur, straddling window")
     parser.add_argument("--config", type=Path, required=True, help="rig configuration")
+
+
+def _add_bench(verbs: Any) -> None:
+    parser = _verb(verbs, "bench", bench, "speed of kernels and recorder against plain numpy and OpenCV")
+    parser.add_argument("--quick", action="store_true", help="a small volume; the figures mean little")
+    parser.add_argument("--directory", type=Path, help="where the recorder writes; default: the temporary directory")
 
 
 if __name__ == "__main__":
