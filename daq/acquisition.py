@@ -115,7 +115,8 @@ class Acquisition:
             next_state(self.status().state, RunStep.START)
             self._control = RunControl()
             run, calibration_sha256 = self._prepare(plan)
-            self._move(RunStep.START, **vars(RunStatus(run_id=run.run_id, shots_planned=plan.total_shots)))
+            started = RunStatus(run_id=run.run_id, shots_planned=plan.total_shots, plan=plan)
+            self._move(RunStep.START, **vars(started))
             work = partial(self._work, run, self._control, calibration_sha256)
             threading.Thread(target=work, name="acquisition", daemon=True).start()
             return run.run_id

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from daq.run_plan import RunPlan
 from daq.run_state import RunOutcome, RunState
 
 
@@ -21,6 +22,8 @@ class RunStatus:
         Recorded shots are on the disk; valid ones have every exposure, with light where it belongs.
     message : str
         What happened last; the cause if the run failed.
+    plan : RunPlan | None
+        What the run named by ``run_id`` was asked to do; known before its directory exists.
     """
 
     state: RunState = RunState.IDLE
@@ -30,6 +33,7 @@ class RunStatus:
     shots_recorded: int = 0
     shots_valid: int = 0
     message: str = ""
+    plan: RunPlan | None = None
 
     @property
     def active(self) -> bool:

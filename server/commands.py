@@ -55,7 +55,15 @@ def calibrate_views(options: Namespace) -> dict[str, Any]:
     save_calibration(calibration, options.out)
     figure = options.out.with_suffix(".png")
     residuals_figure(calibration).savefig(figure, dpi=120)
-    return {"calibration": str(options.out), "id": calibration.id, "figure": str(figure), **view_errors(calibration)}
+    for note in calibration.notes:
+        progress(note)
+    return {
+        "calibration": str(options.out),
+        "id": calibration.id,
+        "figure": str(figure),
+        "notes": list(calibration.notes),
+        **view_errors(calibration),
+    }
 
 
 def view_errors(calibration: Calibration) -> dict[str, Any]:
@@ -128,18 +136,26 @@ def parse_grid(text: str, calibration: Calibration) -> VoxelGrid:
 
 
 def _selected_shots(run_dir: Path, selection: str | None) -> list[int]:
+    """Valid sample shots within A:B; one that was flagged while recording is left out, one that is torn is an error."""
+    first, last = _bounds(selection)
     with RunReader(run_dir) as run:
-        samples = [index for index, key in enumerate(run.image_keys()) if key == ImageKey.SAMPLE]
-    if selection is None:
-        return samples
-    match = re.fullmatch(r"(\d*):(\d*)", selection)
+        keys = dict(enumerate(run.image_keys().tolist()[:last]))
+        wanted = {index: key for index, key in keys.items() if index >= first}
+        for index in (index for index, key in wanted.items() if key == ImageKey.INVALID):
+            run.read_shot(index)
+            progress(f"{run_dir.name}: shot {index} is invalid, left out")
+    chosen = [index for index, key in wanted.items() if key == ImageKey.SAMPLE]
+    if not chosen:
+        raise PipelineError(f"{run_dir}: has no valid sample shots" + (f" in {selection}" if selection else ""))
+    return chosen
+
+
+def _bounds(selection: str | None) -> tuple[int, int | None]:
+    match = re.fullmatch(r"(\d*):(\d*)", selection or ":")
     if not match:
         raise PipelineError(f"--shots {selection!r} is not of the form A:B")
-    first, last = (int(bound) if bound else None for bound in match.groups())
-    chosen = [index for index in samples if (first or 0) <= index and (last is None or index < last)]
-    if not chosen:
-        raise PipelineError(f"--shots {selection}: {run_dir} has no valid sample shots there, only {samples}")
-    return chosen
+    first, last = match.groups()
+    return int(first or 0), int(last) if last else None
 
 
 def average(options: Namespace) -> dict[str, Any]:

@@ -1,6 +1,7 @@
 """RunStore: what lies in the run directories, for lists and pages. The directories are the truth; nothing is copied."""
 
 from collections.abc import Callable
+from datetime import UTC, datetime
 from functools import lru_cache
 from pathlib import Path
 from typing import Annotated
@@ -9,7 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from daq.run_events import RunStatus
-from daq.run_plan import FrozenModel, ImageKey, RunKind
+from daq.run_plan import FrozenModel, ImageKey, RunKind, RunPlan
 from daq.run_state import RunOutcome
 from daq.shotfile import RunReader, list_runs
 from server.problems import NotFound
@@ -62,7 +63,10 @@ class RunStore:
         return RunReader(self.directory(run_id))
 
     def summary(self, run_id: str) -> RunSummary:
-        """What a run is and how it went; NotFound if there is none."""
+        """What a run is and how it went, from the moment it was accepted; NotFound if there is none."""
+        status = self._status()
+        if status.run_id == run_id and status.plan and not (self._data_dir / run_id / "run.h5").is_file():
+            return _summary_of_beginning(run_id, status, status.plan)
         return self._summary_of(self.directory(run_id))
 
     def newest(self, limit: int = 100) -> list[RunSummary]:
@@ -77,6 +81,24 @@ class RunStore:
         if not (status.active and status.run_id == run_dir.name):
             return read
         return read.model_copy(update={"outcome": ACTIVE})
+
+
+def _summary_of_beginning(run_id: str, status: RunStatus, plan: RunPlan) -> RunSummary:
+    """A run that was accepted and has no directory yet, or failed before it could have one."""
+    return RunSummary(
+        run_id=run_id,
+        name=plan.name,
+        kind=plan.kind,
+        created_utc=datetime.now(UTC).isoformat(),
+        outcome=ACTIVE if status.active else status.outcome or RunOutcome.FAILED,
+        cause=status.message,
+        views=tuple(plan.pulse.current_a),
+        frames_per_shot=2,
+        shots_planned=plan.total_shots,
+        shots_recorded=0,
+        shots_valid=None,
+        calibration=plan.calibration,
+    )
 
 
 @lru_cache(maxsize=512)

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 from pydantic import ValidationError
 
+from processing.toml_lines import line_of
 from server.config import ConfigError, RigConfig, load_config
-from server.toml_lines import line_of
 
 CONFIGS = Path("configs")
 TABLE_1 = {

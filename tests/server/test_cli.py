@@ -1,0 +1,198 @@
+"""The command line: what it prints, and that bad input gets one clear error, an exit status, and loses nothing."""
+
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from processing.reconstruction.volume_file import read_volume
+from server.cli import main
+from tests.processing.droplet_run import cameras, write_calibration, write_run
+
+GRID = "-1:1,-1:1,-1:1@0.1"
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture
+def run_dir(tmp_path: Path) -> Path:
+    return write_run(tmp_path / "run", shots=3, invalid=(1,))
+
+
+@pytest.fixture
+def calibration_file(tmp_path: Path) -> Path:
+    return write_calibration(tmp_path / "calibration.json")
+
+
+def told(capsys: pytest.CaptureFixture[str], *arguments: object) -> dict[str, Any]:
+    """The JSON object of a command that worked: the last line of its output."""
+    assert main([*map(str, arguments), "--json"]) == 0
+    result: dict[str, Any] = json.loads(capsys.readouterr().out.splitlines()[-1])
+    return result
+
+
+def refused(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
+    """The error of a command that did not work: one line for a person, one object for a program."""
+    assert main([*map(str, arguments), "--json"]) == 2
+    output = capsys.readouterr()
+    error: str = json.loads(output.out.splitlines()[-1])["error"]
+    assert output.err.endswith(f"tomoshadow: {error}\n")
+    assert "Traceback" not in output.err
+    return error
+
+
+def test_reconstruct_tells_grid_and_volumes(
+    run_dir: Path, calibration_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["reconstruct", run_dir, "--calibration", calibration_file, "-o", tmp_path / "out", f"--grid={GRID}"]
+    result = told(capsys, *arguments)
+    assert result["method"] == "mlos"
+    assert result["grid"] == {"shape": [21, 21, 21], "origin_mm": [-1, -1, -1], "pitch_mm": 0.1}
+    assert [(volume["shot"], volume["frame"]) for volume in result["volumes"]] == [
+        (0, "a"),
+        (0, "b"),
+        (2, "a"),
+        (2, "b"),
+    ]
+    assert result["cpu_s"] > 0
+    assert result["peak_rss_mb"] > 0
+    assert all((tmp_path / "out" / volume["file"]).is_file() for volume in result["volumes"])
+
+
+def test_shots_can_be_chosen(
+    run_dir: Path, calibration_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    common = ["reconstruct", run_dir, "--calibration", calibration_file, f"--grid={GRID}", "--method", "minlos"]
+    result = told(capsys, *common, "-o", tmp_path / "out", "--shots", "1:3")
+    assert {volume["shot"] for volume in result["volumes"]} == {2}
+    assert "no valid sample shots" in refused(capsys, *common, "-o", tmp_path / "out", "--shots", "1:2")
+    assert "not of the form A:B" in refused(capsys, *common, "-o", tmp_path / "out", "--shots", "first")
+
+
+def test_average_of_results(
+    run_dir: Path, calibration_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    told(capsys, "reconstruct", run_dir, "--calibration", calibration_file, "-o", tmp_path / "out", f"--grid={GRID}")
+    result = told(capsys, "average", tmp_path / "out", "-o", tmp_path / "mean.vtkhdf")
+    assert result["volumes"] == 4
+    assert read_volume(tmp_path / "mean.vtkhdf")[0].shape == (21, 21, 21)
+    assert Path(result["figure"]).stat().st_size > 1000
+
+
+def test_average_of_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "empty").mkdir()
+    assert "no volumes" in refused(capsys, "average", tmp_path / "empty", "-o", tmp_path / "mean.vtkhdf")
+    assert not (tmp_path / "mean.vtkhdf").exists()
+
+
+@pytest.mark.parametrize(
+    ("grid", "reason"), [("1:2,3:4", "not of the form"), ("1:0,0:1,0:1", "must grow"), ("0:1,0:1,0:1@0", "positive")]
+)
+def test_impossible_grids(
+    grid: str, reason: str, run_dir: Path, calibration_file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["reconstruct", run_dir, "--calibration", calibration_file, "-o", run_dir / "x", f"--grid={grid}"]
+    assert reason in refused(capsys, *arguments)
+
+
+def test_a_truncated_shot_is_named_and_the_others_stay(
+    run_dir: Path, calibration_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    torn = run_dir / "shots" / "0.h5"
+    torn.write_bytes(torn.read_bytes()[: torn.stat().st_size // 2])
+    common = ["reconstruct", run_dir, "--calibration", calibration_file, f"--grid={GRID}", "-o", tmp_path / "out"]
+    assert str(torn) in refused(capsys, *common)
+    assert {volume["shot"] for volume in told(capsys, *common, "--shots", "2:3")["volumes"]} == {2}
+
+
+def test_a_run_that_is_none(calibration_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    message = refused(
+        capsys, "reconstruct", tmp_path / "nowhere", "--calibration", calibration_file, "-o", tmp_path / "out"
+    )
+    assert "nowhere" in message
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_calibration_that_is_none(run_dir: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "broken.json").write_text("{")
+    arguments = ["reconstruct", run_dir, "--calibration", tmp_path / "broken.json", "-o", tmp_path / "out"]
+    assert "broken.json" in refused(capsys, *arguments)
+
+
+def test_a_manifest_with_a_missing_image_writes_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    manifest = tmp_path / "manifest.toml"
+    manifest.write_text('[run]\npolarity = "bright"\n\n[[run.shot]]\nframe_a = { left = "a.png", right = "b.png" }\n')
+    message = refused(capsys, "import", manifest, "-o", tmp_path / "out")
+    assert f"{manifest}, line 5: " in message
+    assert "a.png" in message
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["manifest.toml"]
+
+
+def test_an_import_never_overwrites(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "precious").write_text("kept")
+    manifest = tmp_path / "manifest.toml"
+    manifest.write_text('[run]\npolarity = "bright"\n')
+    assert refused(capsys, "import", manifest, "-o", tmp_path / "out")
+    assert (tmp_path / "out" / "precious").read_text() == "kept"
+
+
+def test_degenerate_planes_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """All points in one plane: a fit would have a tiny residual and be wrong by millimetres."""
+    rows = [f"{100 + 20 * x} {80 + 20 * y} {x} {y} 0" for x in range(12) for y in range(9)]
+    (tmp_path / "points.txt").write_text("\n".join(rows) + "\n")
+    manifest = tmp_path / "manifest.toml"
+    manifest.write_text(
+        '[[calibration.points]]\ncamera = "view1"\nfile = "points.txt"\nimage_size_px = [640, 480]\n'
+        'columns = ["u_px", "v_px", "x_mm", "y_mm", "z_mm"]\n'
+    )
+    told(capsys, "import", manifest, "-o", tmp_path / "set")
+    message = refused(capsys, "calibrate", tmp_path / "set" / "calibration", "-o", tmp_path / "calibration.json")
+    assert "view1" in message
+    assert not (tmp_path / "calibration.json").exists()
+
+
+def test_calibrate_measured_points_and_never_overwrite(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    _write_points(tmp_path)
+    told(capsys, "import", tmp_path / "manifest.toml", "-o", tmp_path / "set")
+    arguments = ["calibrate", tmp_path / "set" / "calibration", "-o", tmp_path / "calibration.json"]
+    view = told(capsys, *arguments)["views"]["view1"]
+    assert view["n_points"] == 27 * 9
+    assert view["holdout_error_px"] < 0.01
+    assert view["verdict"] == "good"
+    assert [plane["z_mm"] for plane in view["planes"]] == [-1.5, 0, 1.5]
+    before = (tmp_path / "calibration.json").read_bytes()
+    assert "not overwritten" in refused(capsys, *arguments)
+    assert (tmp_path / "calibration.json").read_bytes() == before
+
+
+def _write_points(folder: Path) -> None:
+    """Three planes of exact points of a known camera, and the manifest that names them."""
+    x_mm, y_mm, z_mm = np.meshgrid(np.linspace(-3, 3, 9), np.linspace(-2, 2, 9), [-1.5, 0, 1.5])
+    points_mm = np.column_stack([x_mm.ravel(), y_mm.ravel(), z_mm.ravel()])
+    np.savetxt(folder / "points.txt", np.column_stack([cameras()["view1"].project(points_mm), points_mm]))
+    (folder / "manifest.toml").write_text(
+        '[[calibration.points]]\ncamera = "view1"\nfile = "points.txt"\nimage_size_px = [160, 120]\n'
+        'columns = ["u_px", "v_px", "x_mm", "y_mm", "z_mm"]\n'
+    )
+
+
+def test_optics_of_the_papers_rig(capsys: pytest.CaptureFixture[str]) -> None:
+    result = told(capsys, "optics", "--config", ROOT / "configs" / "spray4view.toml")
+    assert [round(view["airy_diameter_um"]) for view in result["views"].values()] == [39, 28, 28, 38]
+
+
+def test_a_misspelt_configuration_key_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    shutil.copytree(ROOT / "configs", tmp_path / "configs")
+    config = tmp_path / "configs" / "simulated.toml"
+    config.write_text(config.read_text().replace("led_channel = 0", "led_chanel = 0"))
+    assert "led_chanel" in refused(capsys, "optics", "--config", config)
+
+
+def test_unknown_usage_exits_with_2(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as stopped:
+        main(["reconstruct", "--method", "magic"])
+    assert stopped.value.code == 2
+    assert "usage" in capsys.readouterr().err

@@ -1,0 +1,50 @@
+"""What an operator does on the page; needs only an address, and so drives any rig."""
+
+import re
+
+from playwright.sync_api import Page, expect
+
+VIEWS = ("view1", "view2", "view3", "view4")
+
+
+def drive_the_page(page: Page, base_url: str, views: tuple[str, ...], shots: int) -> None:
+    """What an operator does: look, be refused, start a run, watch it end, see it, find its volume."""
+    page.goto(base_url)
+    for view in views:
+        expect(page.get_by_role("img", name=f"{view} live view")).to_be_visible()
+        expect(page.get_by_role("status", name=re.compile(f"^{view}: ok"))).to_be_visible()
+    expect(page.get_by_role("status", name="acquisition state")).to_have_text("IDLE")
+    _is_refused(page, shots)
+    page.get_by_role("button", name="Start run").click()
+    counts = page.get_by_role("status", name="run counts")
+    expect(counts).to_have_text(f"{shots} / {shots} shots recorded, {shots} valid", timeout=60_000)
+    expect(page.get_by_label("run outcome")).to_have_text("completed")
+    expect(page.get_by_role("log")).to_contain_text("shot 0 recorded")
+    for view in views:
+        expect(page.get_by_role("status", name=f"{view} live")).to_be_attached()
+    expect(page.get_by_role("region", name="Processing").get_by_text("done").first).to_be_visible(timeout=60_000)
+    _look_at_the_volume(page)
+
+
+def _is_refused(page: Page, shots: int) -> None:
+    page.get_by_label("Shots", exact=True).fill("0")
+    page.get_by_role("button", name="Start run").click()
+    expect(page.get_by_text("greater than or equal to 1")).to_be_visible()
+    page.get_by_label("Shots", exact=True).fill(str(shots))
+    page.get_by_label("Rate / Hz").fill("99")
+    expect(page.get_by_role("alert").filter(has_text="the limit of the cameras")).to_be_visible()
+    page.get_by_label("Rate / Hz").fill("2")
+    expect(page.get_by_role("alert").filter(has_text="the limit of the cameras")).to_have_count(0)
+
+
+def _look_at_the_volume(page: Page) -> None:
+    for axis in "xyz":
+        image = page.get_by_role("img", name=f"slice {axis}").locator("img")
+        expect(image).to_have_attribute("src", re.compile(rf"slices/{axis}/\d+\.png"))
+    slider = page.get_by_role("slider", name="slice y")
+    before = page.get_by_role("img", name="slice y").locator("img").get_attribute("src")
+    slider.locator("[tabindex='0']").first.focus()
+    for _ in range(5):
+        page.keyboard.press("ArrowRight")
+    expect(page.get_by_role("img", name="slice y").locator("img")).not_to_have_attribute("src", before or "")
+    expect(page.get_by_role("img", name="iso-surface").locator("canvas")).to_be_visible()
