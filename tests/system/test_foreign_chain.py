@@ -1,0 +1,72 @@
+"""Images of others through the whole chain of commands: import, calibrate, reconstruct."""
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.ndimage import maximum_filter
+from scipy.spatial import cKDTree
+
+from processing.reconstruction.volume_file import read_volume
+from server.cli import main
+
+ROOT = Path(__file__).parents[2]
+DATA = os.environ.get("TOMOSHADOW_DATA")
+
+pytestmark = pytest.mark.skipif(not DATA, reason="TOMOSHADOW_DATA is not set: no images from elsewhere")
+
+
+def told(capsys: pytest.CaptureFixture[str], *arguments: object) -> dict[str, Any]:
+    assert main([*map(str, arguments), "--json"]) == 0
+    result: dict[str, Any] = json.loads(capsys.readouterr().out.splitlines()[-1])
+    return result
+
+
+def imported_and_calibrated(name: str, out: Path, capsys: pytest.CaptureFixture[str]) -> dict[str, Any]:
+    told(capsys, "import", ROOT / "tests" / "manifests" / f"{name}.toml", "-o", out / "set")
+    return told(capsys, "calibrate", out / "set" / "calibration", "-o", out / "calibration.json")
+
+
+def test_particles_of_another_laboratory_are_found(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """fluidimage, four cameras: MLOS has a maximum within a voxel of the triangulated particles."""
+    name = "fluidimage_tomo_4cam_synth"
+    views = imported_and_calibrated(name, tmp_path, capsys)["views"]
+    assert len(views) == 4
+    assert all(view["mean_error_px"] <= 0.03 and view["verdict"] == "good" for view in views.values())
+    run, calibration = tmp_path / "set" / "run", tmp_path / "calibration.json"
+    told(capsys, "reconstruct", run, "--calibration", calibration, "-o", tmp_path / "volumes")
+    for frame in "ab":
+        volume, grid, _ = read_volume(tmp_path / "volumes" / f"shot_00000_{frame}.vtkhdf")
+        assert DATA is not None
+        listed_mm = np.loadtxt(Path(DATA, name, f"triangulated_frame_{frame}_xyz_mm.csv"), delimiter=",", skiprows=1)
+        maxima = np.argwhere((volume == maximum_filter(volume, 3)) & (volume > 0))
+        distance_voxel, _ = cKDTree(maxima).query(grid.to_index(listed_mm[:, :3]))
+        assert np.mean(distance_voxel <= 1.0) >= 0.95
+
+
+def test_measured_points_of_another_laboratory(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """MyPTV, three cameras: points without images calibrate, and real particle images reconstruct."""
+    views = imported_and_calibrated("myptv_3cam_dotplate", tmp_path, capsys)["views"]
+    for name, expected_px in (("cam1", 0.219), ("cam2", 0.490), ("cam3", 0.518)):
+        assert views[name]["rms_px"] == pytest.approx(expected_px, rel=0.2)
+    arguments = ["--calibration", tmp_path / "calibration.json", "-o", tmp_path / "volumes", "--shots", "0:1"]
+    result = told(capsys, "reconstruct", tmp_path / "set" / "run", *arguments, "--grid=-10:10,-7:7,-10:-2@0.2")
+    volume, _, _ = read_volume(tmp_path / "volumes" / result["volumes"][0]["file"])
+    assert volume.max() > 0
+
+
+def test_boards_in_free_poses_are_no_world(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """OpenCV's chessboards give lenses, not where the cameras stand."""
+    views = imported_and_calibrated("opencv_chessboard_stereo", tmp_path, capsys)["views"]
+    assert [len(view["planes"]) for view in views.values()] == [13, 13]
+    assert all(view["rms_px"] < 0.50 for view in views.values())
+
+
+def test_refraction_is_not_called_good(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    views = imported_and_calibrated("openptv_test_cavity", tmp_path, capsys)["views"]
+    assert len(views) == 4
+    assert all(view["verdict"] != "good" for view in views.values())
+    assert all(view["rms_px"] <= 1.5 for view in views.values())
