@@ -4,7 +4,7 @@ SHELL := /bin/bash
 .PHONY: help setup demo test lint serve firmware bench lock clean
 
 PYTHON := .venv/bin/python
-DEBIAN_PACKAGES := python3-venv python3-gi gir1.2-aravis-0.8 iproute2 gcc g++ make chromium fonts-dejavu-core
+DEBIAN_PACKAGES := python3-venv python3-dev python3-gi gir1.2-aravis-0.8 iproute2 gcc g++ make chromium fonts-dejavu-core
 AS_ROOT := $(shell [ "$$(id -u)" = 0 ] || echo sudo)
 KERNEL_SOURCES := $(wildcard processing/reconstruction/kernels/*.cpp processing/reconstruction/kernels/*.hpp processing/reconstruction/kernels/CMakeLists.txt)
 FIRMWARE_SOURCES := $(wildcard firmware/*/*.c firmware/*/*.h firmware/Makefile)
