@@ -7,6 +7,7 @@ import argparse
 import json
 import sys
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from processing.reconstruction.volume_file import VolumeFileError
 from server import commands
 from server.bench_command import bench
 from server.config import ConfigError
+from server.study_options import add_studies
 
 BAD_INPUT = (CalibrationError, ConfigError, ManifestError, PipelineError, PlanError, ShotFileError, VolumeFileError)
 Command = Callable[[argparse.Namespace], dict[str, Any]]
@@ -120,10 +122,7 @@ def _add_average(verbs: Any) -> None:
 
 def _add_study(verbs: Any) -> None:
     studies = verbs.add_parser("study", help="the paper's simulations").add_subparsers(required=True, metavar="STUDY")
-    parser = _verb(studies, "density", commands.study_density, "reconstruction quality against droplet density, Fig. 7")
-    parser.add_argument("-o", "--out", type=Path, default=Path("study-density"), help="directory of CSV and figure")
-    parser.add_argument("--sigma", type=float, default=1.5, help="blob width in voxel")
-    parser.add_argument("--iterations", type=int, default=20, help="of SMART")
+    add_studies(partial(_verb, studies))
 
 
 def _add_optics(verbs: Any) -> None:

@@ -5,7 +5,6 @@ import re
 import resource
 import sys
 from argparse import Namespace
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +26,6 @@ from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.settings import GridSettings, ReconstructionSettings
 from processing.reconstruction.volume_file import write_volume
 from processing.results_file import average_volumes, volume_files
-from processing.studies.density import DensityStudy, density_csv, density_figure, density_study
 from processing.volume import VoxelGrid
 from server.config import load_config
 from server.optics_table import optics_table
@@ -171,20 +169,6 @@ def average(options: Namespace) -> dict[str, Any]:
         "volumes": len(files),
         "grid": GridSettings.of(grid).model_dump(),
     }
-
-
-def study_density(options: Namespace) -> dict[str, Any]:
-    """``tomoshadow study density``."""
-    options.out.mkdir(parents=True, exist_ok=True)
-    study = DensityStudy(sigma_voxel=options.sigma, iterations=options.iterations)
-    rows = []
-    for row in density_study(study):
-        progress(f"{row.density_per_mm3:5.1f} droplets/mm^3, {row.method}: Q = {row.quality_factor:.3f}")
-        rows.append(row)
-    csv, figure = options.out / "density.csv", options.out / "density.png"
-    csv.write_text(density_csv(rows))
-    density_figure(rows).savefig(figure, dpi=150)
-    return {"csv": str(csv), "figure": str(figure), "rows": [asdict(row) for row in rows]}
 
 
 def optics(options: Namespace) -> dict[str, Any]:

@@ -1,0 +1,69 @@
+"""``tomoshadow study``: each study writes CSV and figure, and says what the paper says beside what it found."""
+
+from argparse import Namespace
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, TypeVar
+
+from matplotlib.figure import Figure
+
+from processing.studies.density import (
+    ALL_SIGMAS_VOXEL,
+    DensityRow,
+    DensityStudy,
+    density_figure,
+    density_statements,
+    density_study,
+)
+from processing.studies.recipe import ALL_RECIPES, PAPER_RECIPES, Recipe
+from processing.studies.report import Statement, csv_text
+from server.commands import progress
+
+Row = TypeVar("Row")
+
+
+def study_density(options: Namespace) -> dict[str, Any]:
+    """``tomoshadow study density``."""
+    if options.all:
+        study = DensityStudy(sigmas_voxel=ALL_SIGMAS_VOXEL, recipes=ALL_RECIPES)
+    else:
+        study = DensityStudy(sigmas_voxel=tuple(options.sigma or (1.5,)), recipes=_recipes(options))
+    rows = _collected(density_study(study), _density_line)
+    return _report(options.out, "density", rows, density_figure(rows, study), density_statements(rows))
+
+
+def _density_line(row: DensityRow) -> str:
+    place = f"sigma {row.sigma_voxel:g}, {row.density_per_mm3:5.1f} droplets/mm3"
+    return f"{place}, {row.method}: Q = {row.quality_factor:.3f}"
+
+
+def _recipes(options: Namespace) -> tuple[Recipe, ...]:
+    names = options.method or [recipe.method.value for recipe in PAPER_RECIPES]
+    return tuple(Recipe.named(name, options.iterations) for name in names)
+
+
+def _collected(rows: Iterable[Row], line: Any) -> list[Row]:
+    collected = []
+    for row in rows:
+        progress(line(row))
+        collected.append(row)
+    return collected
+
+
+def _report(
+    out: Path, name: str, rows: Sequence[Any], figure: Figure, statements: Sequence[Statement]
+) -> dict[str, Any]:
+    """Write CSV and figure; the JSON object of the study."""
+    out.mkdir(parents=True, exist_ok=True)
+    csv, picture = out / f"{name}.csv", out / f"{name}.png"
+    csv.write_text(csv_text(rows), encoding="utf-8")
+    figure.savefig(picture, dpi=150)
+    for statement in statements:
+        progress(str(statement))
+    return {
+        "csv": str(csv),
+        "figure": str(picture),
+        "rows": [asdict(row) for row in rows],
+        "statements": [asdict(statement) for statement in statements],
+    }

@@ -1,0 +1,64 @@
+"""Options of ``tomoshadow study``: one function per study, defaults are the paper's."""
+
+import argparse
+from collections.abc import Callable
+from pathlib import Path
+
+from processing.studies.recipe import PAPER_ITERATIONS, Recipe
+from server import study_commands
+
+AddVerb = Callable[..., argparse.ArgumentParser]
+"""Adds a command: name, function, summary."""
+
+
+def add_studies(add_verb: AddVerb) -> None:
+    """Add the command of every study."""
+    _add_density(add_verb)
+
+
+def _add_density(add_verb: AddVerb) -> None:
+    summary = "reconstruction quality against droplet density, Fig. 7"
+    parser = add_verb("density", study_commands.study_density, summary)
+    _add_out(parser, "density")
+    parser.add_argument("--sigma", type=positive, action="append", help="blob width in voxel, repeatable; default 1.5")
+    parser.add_argument("--iterations", type=count, default=PAPER_ITERATIONS, help="of smart and mart without -N")
+    _add_methods(parser, "mlos, minlos, gavlos and smart")
+    parser.add_argument("--all", action="store_true", help="sigma 0.75 to 2, all methods, SMART after 5, 10 and 20")
+
+
+def _add_out(parser: argparse.ArgumentParser, study: str) -> None:
+    default = Path(f"study-{study}")
+    parser.add_argument("-o", "--out", type=Path, default=default, help="directory of CSV and figure")
+
+
+def _add_methods(parser: argparse.ArgumentParser, default: str) -> None:
+    parser.add_argument(
+        "--method",
+        type=recipe_name,
+        action="append",
+        metavar="NAME[-N]",
+        help=f"mlos, minlos, gavlos, smart-N or mart-N with N iterations, repeatable; default {default}",
+    )
+
+
+def positive(text: str) -> float:
+    """A number above 0."""
+    if not (value := float(text)) > 0:
+        raise argparse.ArgumentTypeError(f"{text} must be above 0")
+    return value
+
+
+def count(text: str) -> int:
+    """A whole number from 1 on."""
+    if not (value := int(text)) > 0:
+        raise argparse.ArgumentTypeError(f"{text} must be 1 or more")
+    return value
+
+
+def recipe_name(text: str) -> str:
+    """The name of a recipe."""
+    try:
+        Recipe.named(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
+    return text
