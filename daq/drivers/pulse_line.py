@@ -85,6 +85,11 @@ class PulseLine:
         self._boot = identity.boot
         return identity
 
+    @property
+    def name(self) -> str:
+        """Name of the device."""
+        return self._name
+
     def close(self) -> None:
         """Give the port back; safe to call twice."""
         port, self._port = self._port, None
@@ -105,14 +110,37 @@ class PulseLine:
         DeviceError
             The microcontroller was reset since the last answer, or `off` overtook the command.
         """
-        offs = self._offs
-        with self._alone(command):
-            reply = self._converse(self._numbered(command, fields), LIMIT_S, offs)
-            self._check_boot(reply)
+        reply = self.answer(command, *fields)
         if reply.error is not None:
             text = ERROR_TEXT[reply.error]
             raise DeviceRefused(self._name, f"{command} refused: {text} (error {reply.error.value})")
         return reply
+
+    def answer(self, command: Command, *fields: int) -> Reply:
+        """Like `ask`, but a refusal is an answer, not an error."""
+        offs = self._offs
+        with self._alone(command):
+            reply = self._converse(self._numbered(command, fields), LIMIT_S, offs)
+            self._check_boot(reply)
+        return reply
+
+    def exchange(self, line: bytes) -> Reply:
+        """Send a line once and as it is, damaged or not, and return the next reply; for the self-test."""
+        what = repr(line)
+        deadline_s = time.monotonic() + LIMIT_S
+        with self._alone(what):
+            self._write(line, what, LIMIT_S)
+            while time.monotonic() < deadline_s:
+                received = self._next_line()
+                if received is not None:
+                    return self._decoded(received)
+        raise DeviceTimeout(self._name, what, LIMIT_S)
+
+    def _decoded(self, line: bytes) -> Reply:
+        try:
+            return decode_reply(line)
+        except DamagedLine as error:
+            raise ProtocolError(self._name, str(error)) from error
 
     def off(self) -> Reply:
         """Send the abort byte past everybody who waits, then ask for confirmation."""
@@ -123,9 +151,9 @@ class PulseLine:
             return self._converse(self._numbered(Command.OFF, ()), LIMIT_S, offs=None)
 
     @contextmanager
-    def _alone(self, command: Command) -> Iterator[None]:
+    def _alone(self, command: str) -> Iterator[None]:
         if not self._asking.acquire(timeout=2 * LIMIT_S):
-            raise DeviceTimeout(self._name, command.value, 2 * LIMIT_S)
+            raise DeviceTimeout(self._name, str(command), 2 * LIMIT_S)
         try:
             yield
         finally:
@@ -186,12 +214,12 @@ class PulseLine:
         self._received = line[-_LONGEST_LINE:]
         return None
 
-    def _write(self, encoded: bytes, command: Command, limit_s: float) -> None:
+    def _write(self, encoded: bytes, command: str, limit_s: float) -> None:
         try:
             with self._translated_errors():
                 self._opened().write(encoded)
         except serial.SerialTimeoutException as error:
-            raise DeviceTimeout(self._name, command.value, limit_s) from error
+            raise DeviceTimeout(self._name, str(command), limit_s) from error
 
     def _opened(self) -> serial.Serial:
         port = self._port

@@ -178,7 +178,7 @@ def encode_request(request: Request) -> bytes:
     for name, value in zip(names, request.fields, strict=True):
         if not 0 <= value < 2**32:
             raise ValueError(f"{request.command}: {name} is {value}, not within 0 to {2**32 - 1}")
-    return _framed(" ".join(map(str, (request.sequence, request.command, *request.fields))))
+    return framed(" ".join(map(str, (request.sequence, request.command, *request.fields))))
 
 
 def decode_request(line: bytes) -> Request:
@@ -223,8 +223,8 @@ def encode_reply(reply: Reply) -> bytes:
     """Inverse of `decode_reply`."""
     head = f"{'?' if reply.sequence is None else reply.sequence} {reply.boot}"
     if reply.error is not None:
-        return _framed(f"{head} ERR {reply.error.value}")
-    return _framed(" ".join([head, "OK", *(f"{name}={value}" for name, value in reply.fields.items())]))
+        return framed(f"{head} ERR {reply.error.value}")
+    return framed(" ".join([head, "OK", *(f"{name}={value}" for name, value in reply.fields.items())]))
 
 
 def _named(words: list[str]) -> dict[str, str]:
@@ -234,7 +234,8 @@ def _named(words: list[str]) -> dict[str, str]:
     return {name: value for name, _, value in pairs}
 
 
-def _framed(body: str) -> bytes:
+def framed(body: str) -> bytes:
+    """Line of any body: CRC and line feed appended."""
     encoded = body.encode("ascii")
     return encoded + b"*%04X\n" % _crc16(encoded)
 
