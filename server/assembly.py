@@ -9,6 +9,8 @@ from daq.devices import Interlock, Rig
 from daq.drivers.aravis_camera import AravisCamera
 from daq.drivers.camera_profile import CameraProfile, load_camera_profile
 from daq.drivers.gpio_interlock import GpioInterlock
+from daq.drivers.pulse_line import PulseLine
+from daq.drivers.pulse_protocol import Reply
 from daq.drivers.serial_pulse_generator import SerialPulseGenerator
 from daq.drivers.serial_stage import SerialStage, StageScale
 from daq.errors import DeviceUnavailable
@@ -33,6 +35,7 @@ TRUTH_FILE = Path("truth", "truth.h5")
 
 Profiles = Mapping[str, CameraProfile]
 
+_GENERATOR = "pulse_generator"
 _STAGE_SPEED_MM_S = 100.0
 
 
@@ -85,6 +88,36 @@ def open_rig(config: RigConfig) -> Iterator[AssembledRig]:
             yield _open_simulation(config, config.simulation, profiles, devices)
 
 
+@contextmanager
+def open_generator(config: RigConfig) -> Iterator[SerialPulseGenerator]:
+    """Open the pulse generator alone, without the cameras; on a simulated bench nobody sees its light."""
+    with _generator_wired(config) as wired, _pulse_generator(wired) as generator:
+        yield generator
+
+
+@contextmanager
+def open_pulse_line(config: RigConfig) -> Iterator[tuple[PulseLine, Reply]]:
+    """Open the line of the pulse generator and return what it says it is; the generator is off at the end."""
+    with _generator_wired(config) as wired:
+        line = PulseLine(_GENERATOR, _port_of(wired))
+        identity = line.open()
+        try:
+            yield line, identity
+            line.off()
+        finally:
+            line.close()
+
+
+@contextmanager
+def _generator_wired(config: RigConfig) -> Iterator[RigConfig]:
+    """Yield the configuration with the port of a simulated generator in it, where the rig is simulated."""
+    if config.simulation is None:
+        yield config
+        return
+    with FirmwareProcess(channels_of(config), lambda _: None) as firmware:
+        yield config.model_copy(update={"pulse_generator": PulseGeneratorConfig(port=firmware.port)})
+
+
 def _open_rig(config: RigConfig, profiles: Profiles, interlock: Interlock, devices: ExitStack) -> Rig:
     stage = None if config.stage is None else devices.enter_context(_stage(config.stage))
     cameras = {
@@ -101,9 +134,13 @@ def _open_rig(config: RigConfig, profiles: Profiles, interlock: Interlock, devic
 
 
 def _pulse_generator(config: RigConfig) -> SerialPulseGenerator:
+    return SerialPulseGenerator(_GENERATOR, _port_of(config), channels_of(config))
+
+
+def _port_of(config: RigConfig) -> str:
     if config.pulse_generator is None:
         raise ValueError(f"rig {config.name}: has no pulse generator")
-    return SerialPulseGenerator("pulse_generator", config.pulse_generator.port, channels_of(config))
+    return config.pulse_generator.port
 
 
 def _gpio_interlock(config: RigConfig) -> GpioInterlock:

@@ -1,6 +1,6 @@
 """The command line. ``--json`` prints one JSON object as the last line of stdout; progress goes to stderr.
 
-Exit status: 0 done, 1 failed, 2 bad usage or bad input.
+Exit status: 0 done, 1 failed (also a result that says ``passed: false``), 2 bad usage or bad input.
 """
 
 import argparse
@@ -20,9 +20,20 @@ from processing.reconstruction.volume_file import VolumeFileError
 from server import commands
 from server.bench_command import bench
 from server.config import ConfigError
+from server.firmware_image import ImageError
+from server.firmware_options import add_firmware_tools
 from server.study_options import add_studies
 
-BAD_INPUT = (CalibrationError, ConfigError, ManifestError, PipelineError, PlanError, ShotFileError, VolumeFileError)
+BAD_INPUT = (
+    CalibrationError,
+    ConfigError,
+    ImageError,
+    ManifestError,
+    PipelineError,
+    PlanError,
+    ShotFileError,
+    VolumeFileError,
+)
 Command = Callable[[argparse.Namespace], dict[str, Any]]
 
 
@@ -40,7 +51,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _fail(options, RuntimeError("interrupted"), status=1)
     if options.json or result:
         print(json.dumps(result) if options.json else commands.readable(result))  # noqa: T201
-    return 0
+    return 0 if result.get("passed", True) else 1
 
 
 def _fail(options: argparse.Namespace, error: BaseException, status: int) -> int:
@@ -62,6 +73,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_study(verbs)
     _add_optics(verbs)
     _add_bench(verbs)
+    _add_firmware(verbs)
     return parser
 
 
@@ -134,6 +146,11 @@ def _add_bench(verbs: Any) -> None:
     parser = _verb(verbs, "bench", bench, "speed of kernels and recorder against plain numpy and OpenCV")
     parser.add_argument("--quick", action="store_true", help="a small volume; the figures mean little")
     parser.add_argument("--directory", type=Path, help="where the recorder writes; default: the temporary directory")
+
+
+def _add_firmware(verbs: Any) -> None:
+    tools = verbs.add_parser("firmware", help="the pulse generator").add_subparsers(required=True, metavar="TOOL")
+    add_firmware_tools(partial(_verb, tools))
 
 
 if __name__ == "__main__":

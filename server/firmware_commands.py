@@ -1,0 +1,75 @@
+"""What ``tomoshadow firmware`` does: identity and limits, self-test, timing diagram, flashing."""
+
+from argparse import Namespace
+from dataclasses import asdict
+from typing import Any
+
+from daq.drivers.pulse_protocol import Command, Fault, State
+from daq.drivers.pulse_self_test import Verdict, self_test
+from daq.timing import plan_shot_timing
+from server.assembly import open_generator, open_pulse_line
+from server.commands import progress
+from server.config import load_config
+from server.firmware_image import find_drive, load_image, write_image
+from server.shot_timing import camera_timings, fired_timing, load_plan, nominal_plan, timing_table
+from server.timing_diagram import picture, timing_diagram
+
+_COUNTERS = ("requested", "fired", "suppressed", "early", "crc_errors")
+
+
+def info(options: Namespace) -> dict[str, Any]:
+    """``tomoshadow firmware info``."""
+    with open_pulse_line(load_config(options.config)) as (line, identity):
+        status = line.ask(Command.STATUS)
+        faults = Fault(status.number("faults"))
+        return {
+            "identity": dict(identity.fields),
+            "starts": identity.boot,
+            "state": State(status.number("state")).name,
+            "faults": [fault.name for fault in Fault if fault & faults],
+            "interlock_closed": status.number("interlock") == 1,
+            "shots_left": status.number("shots_left"),
+            "counters": {name: status.number(name) for name in _COUNTERS},
+        }
+
+
+def selftest(options: Namespace) -> dict[str, Any]:
+    """``tomoshadow firmware selftest``; no LED is lit."""
+    checks = []
+    with open_pulse_line(load_config(options.config)) as (line, identity):
+        for check in self_test(line, identity):
+            progress(f"{check.verdict:8}{check.name}: {check.detail}")
+            checks.append(check)
+    return {
+        "passed": all(check.verdict is not Verdict.FAIL for check in checks),
+        "checks": [asdict(check) for check in checks],
+    }
+
+
+def scope(options: Namespace) -> dict[str, Any]:
+    """``tomoshadow firmware scope``; the train is loaded and never armed, so there is no light."""
+    config = load_config(options.config)
+    plan = load_plan(options.plan) if options.plan else nominal_plan(config, options.width, options.separation)
+    cameras = camera_timings(config)
+    requested = plan_shot_timing(plan, cameras)
+    with open_generator(config) as generator:
+        identity = generator.identity()
+        actual = fired_timing(requested, cameras, generator.configure(requested))
+    figure = timing_diagram(actual, f"{config.name}: pulse train as loaded, {identity.model} {identity.firmware}")
+    files = {kind: options.out.with_suffix(f".{kind}") for kind in ("svg", "png")}
+    options.out.parent.mkdir(parents=True, exist_ok=True)
+    files["svg"].write_bytes(picture(figure, "svg"))
+    files["png"].write_bytes(picture(figure, "png"))
+    return {
+        **{kind: str(path) for kind, path in files.items()},
+        "shortest_period_ns": requested.shortest_period_ns,
+        "views": timing_table(requested, actual),
+    }
+
+
+def flash(options: Namespace) -> dict[str, Any]:
+    """``tomoshadow firmware flash``; nothing is written before image and board have been checked."""
+    image = load_image(options.image)
+    drive = find_drive(options.drive)
+    progress(f"{image.path}: version {image.version}, {image.blocks} blocks, to {drive}")
+    return {"written": str(write_image(image, drive)), "version": image.version, "blocks": image.blocks}
