@@ -187,10 +187,12 @@ def serve(options: Namespace) -> dict[str, Any]:
 def demo(options: Namespace) -> dict[str, Any]:
     """``tomoshadow demo``; the bench is loaded only here."""
     from server.demo import demonstrate
-    from server.demo_report import summary, write_demo_report
+    from server.demo_report import readable_summary, summary, write_demo_report
 
     options.out.mkdir(parents=True, exist_ok=True)
     demonstration = demonstrate(options.config, options.out, options.shots, progress)
     report = options.out / "report.html"
     write_demo_report(demonstration, report)
-    return summary(demonstration, report)
+    result = summary(demonstration, report)
+    progress(f"\n{readable_summary(result)}\n")
+    return result

@@ -51,7 +51,7 @@ def slices_figure(volume: Volume, grid: VoxelGrid, title: str = "") -> Figure:
 
     Colours follow the square root of the intensity, so that single droplets show beside dense liquid.
     """
-    figure = Figure(figsize=(11, 7.2), layout="constrained")
+    figure = Figure(figsize=(11, 5.8), layout="constrained")
     panels = figure.subplots(2, 3)
     scale = PowerNorm(0.5, vmin=0, vmax=float(np.quantile(volume.max(axis=0), 0.999)) or 1.0)
     for column, axis in enumerate((0, 1, 2)):
