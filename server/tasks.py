@@ -5,9 +5,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from processing.calibration.calibration_set import load_calibration_set
-
 from processing.calibration.calibration_file import save_calibration
+from processing.calibration.calibration_set import load_calibration_set
 from processing.calibration.joint_fit import calibrate
 from processing.engine import Task
 from processing.pipeline import reconstruct_shot
