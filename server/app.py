@@ -14,7 +14,7 @@ from starlette.exceptions import HTTPException
 from starlette.routing import Match
 
 from server import problems
-from server.api import bench, calibrations, events, jobs, live, results, rig, runs, shots, sign_in
+from server.api import bench, calibrations, events, jobs, live, results, rig, runs, shots, sign_in, timing
 from server.api.parameters import forbid_unknown_query
 from server.calibrations import CalibrationStore
 from server.guard import Guard
@@ -28,7 +28,7 @@ from server.services import Context, Services
 from server.ui.page import mount_page
 
 _LOG = logging.getLogger(__name__)
-_RESOURCES = (rig, runs, shots, results, calibrations, jobs, events, bench)
+_RESOURCES = (rig, runs, shots, results, calibrations, jobs, events, bench, timing)
 _METHODS = ["GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"]
 _SHUTDOWN_S = 3
 

@@ -6,7 +6,8 @@ surroundings of the frame boundary to scale, with all distances in ns.
 
 from collections.abc import Sequence
 from io import BytesIO
-from typing import Literal
+from threading import Lock
+from typing import Any, Literal
 
 from matplotlib import rc_context
 from matplotlib.axes import Axes
@@ -16,6 +17,8 @@ from daq.timing import ShotTiming, ViewTiming, Window
 from processing.analysis.figures import FRAME_COLOURS
 from server.shot_timing import guards_of
 
+_DRAWING = Lock()
+"""Settings and fonts of matplotlib belong to the process; the server draws in several threads."""
 _LIGHT = "#f2a900"
 _INK = "0.15"
 _SMALL = 8
@@ -51,7 +54,7 @@ def timing_diagram(timing: ShotTiming, title: str = "") -> Figure:
 def picture(figure: Figure, kind: Literal["svg", "png"]) -> bytes:
     """Render a figure; the same figure gives the same bytes."""
     target = BytesIO()
-    with rc_context({"svg.hashsalt": "tomoshadow", "svg.fonttype": "none"}):
+    with _DRAWING, rc_context({"svg.hashsalt": "tomoshadow", "svg.fonttype": "none"}):
         figure.savefig(target, format=kind, dpi=130, metadata={"Date": None} if kind == "svg" else None)
     return target.getvalue()
 
@@ -98,7 +101,7 @@ def _draw_overview(axes: Axes, timing: ShotTiming, zoom: Window) -> None:
 def _draw_boundary(axes: Axes, timing: ShotTiming, zoom: Window) -> None:
     ticks: list[float] = []
     labels: list[str] = []
-    for number, (name, view) in enumerate(reversed(timing.views.items())):
+    for number, (name, view) in enumerate(reversed(list(timing.views.items()))):
         base = number * _ROWS_PER_VIEW
         _draw_view(axes, view, base, zoom)
         ticks += [base + row for row in _ROWS.values()]
@@ -123,7 +126,7 @@ def _draw_view(axes: Axes, view: ViewTiming, base: float, zoom: Window) -> None:
     for edge_ns in (view.frame_a.close_ns, view.frame_b.open_ns):
         axes.plot([edge_ns, edge_ns], [light - 0.45, frames], color="0.45", linestyle=":", linewidth=1)
     _distance(axes, view.frame_a.close_ns, view.frame_b.open_ns, frames + 0.5, "gap ")
-    style = {"facecolor": _LIGHT} if view.current_a else {"facecolor": "none", "linestyle": "--"}
+    style: dict[str, Any] = {"facecolor": _LIGHT} if view.current_a else {"facecolor": "none", "linestyle": "--"}
     for pulse, outside in ((view.pulse_a, "right"), (view.pulse_b, "left")):
         width_ns = pulse.close_ns - pulse.open_ns
         axes.barh(light, width_ns, _LANE, pulse.open_ns, edgecolor=_INK, linewidth=0.8, **style)

@@ -14,6 +14,7 @@ from daq.shot import FiredTrain, LightPulse
 from daq.timing import CameraTiming, ShotTiming, plan_shot_timing
 from server.shot_timing import Guards, fired_timing, guards_of, timing_table
 from server.timing_diagram import picture, timing_diagram
+from tests.server.serving import Serving, plan_of
 
 FAST = CameraTiming(1_000, 8_000, 500, 30_000_000, 16_000_000)
 SLOW = CameraTiming(20_000, 1_500_000, 2_000, 60_000_000, 1_000_000)
@@ -116,3 +117,27 @@ def test_pulses_are_where_they_were_asked_for(separation_ns: int) -> None:
 
 def test_titles_may_hold_anything() -> None:
     assert re.search(rb"a &lt;b&gt; &amp; c", picture(timing_diagram(planned(), "a <b> & c"), "svg"))
+
+
+def test_the_api_draws_what_a_new_run_would_ask_for(server: Serving) -> None:
+    answer = server.http.get("/api/rig/timing.svg", params={"separation_ns": 9000})
+    assert answer.headers["content-type"] == "image/svg+xml"
+    assert "separation 9000 ns" in texts(answer.content)
+
+
+def test_the_api_refuses_pulses_that_the_cameras_cannot_separate(server: Serving) -> None:
+    for separation_ns, reason in ((2000, "is below"), (1, "greater than or equal")):
+        answer = server.http.get("/api/rig/timing.svg", params={"separation_ns": separation_ns})
+        assert answer.status_code == 422
+        assert reason in answer.json()["detail"]
+
+
+def test_the_api_draws_what_a_run_has_fired(server: Serving) -> None:
+    run_id, _ = server.run_to_its_end(plan_of(shots=1))
+    written = texts(server.http.get(f"/api/runs/{run_id}/timing.svg").content)
+    assert f"{run_id}: first shot as fired" in written
+    assert written.count("light, 5 A") == 2
+
+
+def test_the_api_has_no_diagram_of_an_absent_run(server: Serving) -> None:
+    assert server.http.get("/api/runs/absent/timing.svg").status_code == 404
