@@ -212,6 +212,7 @@ def _provenance(
     return {
         "run": run.header.run_id,
         "calibration": calibration.id,
+        "calibration_file": calibration_file.name,
         "calibration_sha256": file_sha256(calibration_file),
         "settings": settings.model_dump_json(),
         "tomoshadow": version("tomoshadow"),

@@ -107,7 +107,7 @@ def demonstrate(config_file: Path, out: Path, shots: int, progress: Progress) ->
     with watch.step("reconstruct"):
         grid = default_grid(calibration, PITCH_MM)
         settings = ReconstructionSettings(grid=GridSettings.of(grid))
-        results_dir = sample / "results" / settings.results_id
+        results_dir = sample / "results" / settings.results_id(calibration_file.stem)
         results = []
         for shot in valid:
             progress(f"reconstructing shot {shot} by {settings.method.value}")

@@ -236,8 +236,8 @@ def jobs_on_disk(data_dir: Path) -> Iterator[Job]:
             yield _reconstruction(
                 run_id=record.parents[2].name,
                 shot=int(volume.name.split("_")[1]),
-                calibration=str(written.get("calibration", "")),
+                calibration=Path(written["calibration_file"]).stem,
                 results_id=record.parent.name,
-                settings=json.loads(written.get("settings", "{}")),
+                settings=json.loads(written["settings"]),
                 more={"state": JobState.DONE},
             )

@@ -56,7 +56,7 @@ def request_reconstruction(
         raise Unprocessable(f"run {run_id} has {summary.shots_recorded} shots, not {absent}")
     described = settings.model_dump(mode="json")
     return [
-        context.runner.submit(reconstruction_job(run_id, shot, chosen, settings.results_id, described))
+        context.runner.submit(reconstruction_job(run_id, shot, chosen, settings.results_id(chosen), described))
         for shot in wanted
     ]
 

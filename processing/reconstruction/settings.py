@@ -45,7 +45,7 @@ class ReconstructionSettings(FrozenValue):
     minimum_window_px: Annotated[int, Field(ge=0, le=2001, description="sliding minimum; 0 leaves it out")] = 201
     noise_floor: Annotated[float, Field(ge=0, lt=1, description="intensity that counts as nothing")] = 0.05
 
-    @property
-    def results_id(self) -> str:
-        """Name of the results directory: method and a hash of all settings."""
-        return f"{self.method.value}-{hashlib.sha256(self.model_dump_json().encode()).hexdigest()[:8]}"
+    def results_id(self, calibration: str) -> str:
+        """Name of the results directory: method, and a hash of all settings and of the calibration's name."""
+        digest = hashlib.sha256(f"{calibration}\n{self.model_dump_json()}".encode()).hexdigest()
+        return f"{self.method.value}-{digest[:8]}"

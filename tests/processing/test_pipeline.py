@@ -92,11 +92,11 @@ def test_a_stop_is_honoured_between_exposures(run_dir: Path, calibration_file: P
     assert [file.name for file in volume_files(run_dir / "results")] == ["shot_00000_a.vtkhdf"]
 
 
-def test_results_id_tells_settings_apart() -> None:
+def test_results_id_tells_settings_and_calibrations_apart() -> None:
     other = SETTINGS.model_copy(update={"noise_floor": 0.2})
-    assert SETTINGS.results_id != other.results_id
-    assert SETTINGS.results_id == SETTINGS.model_copy().results_id
-    assert SETTINGS.results_id.startswith("mlos-")
+    assert len({SETTINGS.results_id("monday"), SETTINGS.results_id("tuesday"), other.results_id("monday")}) == 3
+    assert SETTINGS.results_id("monday") == SETTINGS.model_copy().results_id("monday")
+    assert SETTINGS.results_id("monday").startswith("mlos-")
 
 
 def test_the_average_is_the_mean(run_dir: Path, calibration_file: Path) -> None:

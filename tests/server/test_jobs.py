@@ -96,7 +96,7 @@ def test_a_lost_table_comes_back_from_the_run_directories(table: JobTable, tmp_p
     assert job.results_id is not None
     results = tmp_path / "run-1" / "results" / job.results_id
     results.mkdir(parents=True)
-    record = {"calibration": "cal-1", "settings": json.dumps({"method": "mlos"})}
+    record = {"calibration_file": "cal-1.json", "settings": json.dumps({"method": "mlos"})}
     (results / "settings.json").write_text(json.dumps(record))
     (results / "shot_00007_a.vtkhdf").touch()
     assert table.restore(jobs_on_disk(tmp_path)) == 1
