@@ -144,6 +144,8 @@ class Calibration:
         Run or set it was made from.
     notes : tuple[str, ...]
         Images that were left out, and why.
+    parent : str | None
+        Id of the calibration that this one corrects.
     """
 
     id: str
@@ -153,6 +155,7 @@ class Calibration:
     z_range_mm: tuple[float, float]
     source: str
     notes: tuple[str, ...] = ()
+    parent: str | None = None
 
     def with_id(self, calibration_id: str) -> "Calibration":
         """The same under another id."""

@@ -100,6 +100,7 @@ class CalibrationRecord(_Record):
     schema_name: Annotated[Literal["tomoshadow.calibration"], Field(alias="schema")] = SCHEMA
     version: Literal[1] = VERSION
     id: str
+    parent: str | None = None
     created_utc: str
     source: str
     software: dict[str, str]
@@ -114,6 +115,7 @@ def to_record(calibration: Calibration, software: dict[str, str]) -> Calibration
     """Calibration as the file says it."""
     return CalibrationRecord(
         id=calibration.id,
+        parent=calibration.parent,
         created_utc=calibration.created_utc,
         source=calibration.source,
         software=software,
@@ -128,6 +130,7 @@ def from_record(record: CalibrationRecord) -> Calibration:
     """Calibration that the file describes; floats are exact."""
     return Calibration(
         id=record.id,
+        parent=record.parent,
         created_utc=record.created_utc,
         target=record.target,
         views={name: _view(view) for name, view in record.views.items()},
@@ -147,8 +150,11 @@ def content_id(calibration: Calibration) -> str:
 
 
 def to_json(record: CalibrationRecord) -> dict[str, Any]:
-    """Record as JSON values."""
-    return record.model_dump(mode="json", by_alias=True)
+    """Record as JSON values; optional fields that are not known are left out, as in files older than they."""
+    content = record.model_dump(mode="json", by_alias=True)
+    if record.parent is None:
+        del content["parent"]
+    return content
 
 
 def _view_record(view: ViewCalibration) -> ViewRecord:

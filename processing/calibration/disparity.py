@@ -1,0 +1,183 @@
+"""Disparity: by how much the views of a shot disagree on where its droplets are.
+
+A droplet that n views see leaves 2 n - 3 residuals after triangulation. Combinations of droplets that are one
+agree on all of them; false combinations are spread over the whole range. So the highest peak of the joint
+histogram is the truth (Wieneke 2008 sums it view by view; seen jointly it stands out from far denser clouds).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from processing.calibration.calibration import Calibration
+from processing.calibration.droplet_matching import Box, Matches, match_droplets
+from processing.calibration.errors import CalibrationError
+from processing.calibration.sight_lines import linearise, unseen
+from processing.geometry import FloatArray, ViewMapping
+
+SEARCH_PX = 4.0
+"""Largest residual a drifted view may leave: room for drifts up to about 3 px."""
+PEAK_RADIUS_PX = 0.5
+"""Droplets of one peak lie so close to its middle, all views together: three times their scatter."""
+MIN_DROPLETS = 12
+"""A peak of fewer droplets may be chance."""
+SIGNIFICANCE = 8.0
+"""Standard deviations of the background by which a peak must exceed it."""
+MIN_VIEWS = 3
+"""Two views agree on every point of an epipolar line: they cannot tell a drift along it."""
+SHOT_DIVISIONS = (2, 2, 2)
+_MAX_CENTRES = 2000
+
+
+@dataclass(frozen=True, eq=False)
+class LocalDisparity:
+    """What the views disagree by in one sub-volume.
+
+    Parameters
+    ----------
+    point_mm : (3,) array
+        Mean position of its droplets.
+    disparity_px : (n, 2) array
+        Seen minus re-projected, by view; mean of the peak.
+    scatter_px : (n,) array
+        Standard deviation of single droplets, per coordinate.
+    n_droplets : int
+        Droplets in the peak.
+    """
+
+    point_mm: FloatArray
+    disparity_px: FloatArray
+    scatter_px: FloatArray
+    n_droplets: int
+
+
+@dataclass(frozen=True)
+class ViewDisparity:
+    """Distance between where a view sees droplets and where all other views put them.
+
+    Parameters
+    ----------
+    disparity_px : float
+        Median over the sub-volumes; of a single drifted view this is its drift.
+    uncertainty_px : float
+        Standard uncertainty of it.
+    """
+
+    disparity_px: float
+    uncertainty_px: float
+
+
+def measured_box(calibration: Calibration) -> Box:
+    """The calibrated volume."""
+    (x0, x1), (y0, y1), (z0, z1) = calibration.x_range_mm, calibration.y_range_mm, calibration.z_range_mm
+    return Box((x0, y0, z0), (x1, y1, z1))
+
+
+def local_disparities(
+    mappings: Sequence[ViewMapping], matches: Matches, box: Box, divisions: tuple[int, int, int]
+) -> list[LocalDisparity]:
+    """Disparity of every sub-volume whose peak is significant.
+
+    Parameters
+    ----------
+    mappings : sequence of ViewMapping
+        The n views of the matches.
+    matches : Matches
+        Candidates, of as many shots as there are.
+    box : Box
+        The volume.
+    divisions : tuple[int, int, int]
+        Sub-volumes along x, y and z.
+    """
+    cells = box.cells(matches.points_mm, divisions)
+    found = (_peak(matches, np.flatnonzero(cells == cell), len(mappings)) for cell in np.unique(cells))
+    return [disparity for disparity in found if disparity is not None]
+
+
+def shot_disparity(
+    mappings: Sequence[ViewMapping], droplets_px: Sequence[FloatArray], box: Box
+) -> tuple[ViewDisparity, ...]:
+    """Disparity of every view in one exposure.
+
+    Parameters
+    ----------
+    mappings : sequence of ViewMapping
+        The views as calibrated, at least three.
+    droplets_px : sequence of (N, 2) arrays
+        Droplets of each view.
+    box : Box
+        The measured volume.
+
+    Raises
+    ------
+    CalibrationError
+        There are too few views or droplets, or none agree.
+    """
+    require_views(len(mappings))
+    matches = match_droplets(mappings, droplets_px, box, SEARCH_PX)
+    local = local_disparities(mappings, matches, box, SHOT_DIVISIONS) or local_disparities(
+        mappings, matches, box, (1, 1, 1)
+    )
+    if not local:
+        seen = ", ".join(str(len(points)) for points in droplets_px)
+        raise CalibrationError(
+            f"the views see {seen} droplets, of which no {MIN_DROPLETS} agree within {SEARCH_PX:g} px: "
+            "too few droplets, too many, or a view has moved further"
+        )
+    factors = [against_others(mappings, disparity.point_mm) for disparity in local]
+    return tuple(
+        _median([(disparity, factor[view]) for disparity, factor in zip(local, factors, strict=True)], view)
+        for view in range(len(mappings))
+    )
+
+
+def require_views(n_views: int) -> None:
+    """Refuse fewer than three views."""
+    if n_views < MIN_VIEWS:
+        raise CalibrationError(f"{n_views} views cannot check each other, at least {MIN_VIEWS} are needed")
+
+
+def against_others(mappings: Sequence[ViewMapping], point_mm: FloatArray) -> FloatArray:
+    """Matrices (n, 2, 2) from the residual of each view to its distance from what the others see alone."""
+    slopes = np.stack([linearise(mapping, point_mm[None])[1][0] for mapping in mappings])
+    projector = unseen(slopes)
+    blocks = [projector[2 * view : 2 * view + 2, 2 * view : 2 * view + 2] for view in range(len(mappings))]
+    return np.stack([np.linalg.pinv(block) for block in blocks])
+
+
+def _median(local: Sequence[tuple[LocalDisparity, FloatArray]], view: int) -> ViewDisparity:
+    lengths_px = [float(np.linalg.norm(factor @ disparity.disparity_px[view])) for disparity, factor in local]
+    errors_px = [
+        float(np.linalg.norm(factor, 2)) * disparity.scatter_px[view] / np.sqrt(disparity.n_droplets)
+        for disparity, factor in local
+    ]
+    of_median = np.sqrt(np.pi / 2 / len(local)) if len(local) > 1 else 1.0
+    return ViewDisparity(float(np.median(lengths_px)), float(of_median * np.sqrt(np.mean(np.square(errors_px)))))
+
+
+def _peak(matches: Matches, rows: NDArray[np.intp], n_views: int) -> LocalDisparity | None:
+    """The densest spot of the joint disparities; None where it does not stand out."""
+    if len(rows) < MIN_DROPLETS:
+        return None
+    joint_px = matches.disparities_px[rows].reshape(len(rows), -1)
+    tree = cKDTree(joint_px)
+    candidates = joint_px[:: max(1, len(rows) // _MAX_CENTRES)]
+    counts = tree.query_ball_point(candidates, PEAK_RADIUS_PX, return_length=True)
+    centre_px = candidates[int(np.argmax(counts))]
+    for _ in range(10):
+        members = np.asarray(tree.query_ball_point(centre_px, PEAK_RADIUS_PX), dtype=np.intp)
+        moved_px = joint_px[members].mean(axis=0)
+        if np.abs(moved_px - centre_px).max() < 1e-4:
+            break
+        centre_px = moved_px
+    around = len(tree.query_ball_point(centre_px, 2 * PEAK_RADIUS_PX)) - len(members)
+    background = around / (2 ** (2 * n_views - 3) - 1)
+    if len(members) < max(MIN_DROPLETS, background + SIGNIFICANCE * np.sqrt(background)):
+        return None
+    deviation_px = joint_px[members].reshape(len(members), n_views, 2) - centre_px.reshape(n_views, 2)
+    scatter_px = np.sqrt((deviation_px**2).mean(axis=(0, 2)))
+    point_mm = matches.points_mm[rows[members]].mean(axis=0)
+    return LocalDisparity(point_mm, centre_px.reshape(n_views, 2), scatter_px, len(members))

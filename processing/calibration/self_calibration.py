@@ -1,0 +1,227 @@
+"""Volume self-calibration (Wieneke 2008): droplets in the shots themselves tell which view has moved.
+
+Droplets say how the views stand to each other, not to the world: any motion of all views together is invisible.
+Two rules keep the world where the target put it. If the motion of a single view explains the disparities, and of
+no other view as well, that view moved and the others did not. Otherwise all views are moved as little as possible.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+
+import numpy as np
+
+from processing.calibration.calibration import Calibration, Verdict, ViewCalibration
+from processing.calibration.calibration_record import content_id
+from processing.calibration.disparity import (
+    SEARCH_PX,
+    LocalDisparity,
+    against_others,
+    local_disparities,
+    measured_box,
+    require_views,
+)
+from processing.calibration.droplet_matching import Box, Matches, match_droplets
+from processing.calibration.errors import CalibrationError
+from processing.calibration.health import judge
+from processing.calibration.mapping_correction import corrected, correction_size, sensitivity
+from processing.calibration.sight_lines import linearise, unseen
+from processing.geometry import FloatArray, ViewMapping
+
+DIVISIONS = (3, 3, 3)
+MIN_SUB_VOLUMES = 8
+"""Fewer do not show how a correction varies over the volume."""
+FINE_SEARCH_PX = 1.5
+"""Tolerance once the views were corrected for the first time."""
+MAX_ROUNDS = 5
+CONVERGED_PX = 0.01
+AGREED_PX = 0.05
+"""Views that disagree by less are left as they are: a good calibration has this error."""
+FAINTEST = 0.2
+"""A common motion of the views that changes disparities by less than this share of it is left alone."""
+EXPLAINED_PX = 0.1
+"""A motion that leaves less than this explains the disparities."""
+CLEARER = 2.0
+"""The view that moved leaves so many times less than any other view would."""
+NOISE_PX = 0.02
+"""Disparity of a sub-volume that may be left by chance."""
+
+ShotDroplets = Sequence[FloatArray]
+
+
+@dataclass(frozen=True)
+class SelfCalibration:
+    """What became of it.
+
+    Parameters
+    ----------
+    calibration : Calibration
+        The new calibration; names its parent.
+    corrections_px : dict[str, float]
+        By view: largest distance in the volume between the old and the new mapping.
+    moved : str | None
+        The view that moved, if a single one did.
+    before_px, after_px : dict[str, float]
+        By view: rms distance from where the other views put the droplets, over the sub-volumes.
+    sub_volumes : int
+        Sub-volumes whose droplets told.
+    droplets : int
+        Droplets in their peaks.
+    """
+
+    calibration: Calibration
+    corrections_px: dict[str, float]
+    moved: str | None
+    before_px: dict[str, float]
+    after_px: dict[str, float]
+    sub_volumes: int
+    droplets: int
+
+
+def self_calibrate(
+    calibration: Calibration, shots: Sequence[ShotDroplets], source: str, *, created_utc: str | None = None
+) -> SelfCalibration:
+    """Correct the views of a calibration by the droplets of several shots.
+
+    Parameters
+    ----------
+    calibration : Calibration
+        At least three views that see a common volume.
+    shots : sequence of sequences of (N, 2) arrays
+        By exposure: the droplets of every view, in the order of the views of the calibration.
+    source : str
+        Run that the shots are from.
+    created_utc : str, optional
+        ISO 8601; now, if not given.
+
+    Raises
+    ------
+    CalibrationError
+        Droplets are too few or do not agree; names numbers and limits.
+    """
+    calibration.require_world()
+    names = list(calibration.views)
+    require_views(len(names))
+    original = [view.mapping for view in calibration.views.values()]
+    box = measured_box(calibration)
+    seen = _sub_volumes(original, shots, box, SEARCH_PX)
+    first, moved, mappings = seen, None, original
+    for _ in range(MAX_ROUNDS):
+        moved, corrections = _explain(original, mappings, seen)
+        previous, mappings = mappings, [corrected(*pair) for pair in zip(original, corrections, strict=True)]
+        seen = _sub_volumes(mappings, shots, box, FINE_SEARCH_PX)
+        if max(_distances_px(previous, mappings, box)) < CONVERGED_PX:
+            break
+    after_px = _disagreement_px(mappings, seen)
+    distances_px = _distances_px(original, mappings, box)
+    views = {
+        name: _corrected_view(view, mapping, distance_px, left_px)
+        for (name, view), mapping, distance_px, left_px in zip(
+            calibration.views.items(), mappings, distances_px, after_px, strict=True
+        )
+    }
+    moves = ", ".join(f"{name} by {px:.2f} px" for name, px in zip(names, distances_px, strict=True) if px)
+    note = f"self-calibration on {len(shots)} exposures of {source}: {moves or 'the views agree, nothing moved'}"
+    undated = replace(
+        calibration,
+        id="",
+        created_utc=created_utc or datetime.now(UTC).isoformat(timespec="seconds"),
+        views=views,
+        parent=calibration.id,
+        notes=(*calibration.notes, note),
+    )
+    return SelfCalibration(
+        calibration=undated.with_id(content_id(undated)),
+        corrections_px=dict(zip(names, distances_px, strict=True)),
+        moved=None if moved is None else names[moved],
+        before_px=dict(zip(names, _disagreement_px(original, first), strict=True)),
+        after_px=dict(zip(names, after_px, strict=True)),
+        sub_volumes=len(seen),
+        droplets=sum(disparity.n_droplets for disparity in seen),
+    )
+
+
+def _sub_volumes(
+    mappings: Sequence[ViewMapping], shots: Sequence[ShotDroplets], box: Box, tolerance_px: float
+) -> list[LocalDisparity]:
+    found = [match_droplets(mappings, droplets_px, box, tolerance_px) for droplets_px in shots]
+    matches = Matches(
+        np.concatenate([match.points_mm for match in found]), np.concatenate([match.disparities_px for match in found])
+    )
+    seen = local_disparities(mappings, matches, box, DIVISIONS)
+    if len(seen) < MIN_SUB_VOLUMES:
+        per_view = np.mean([[len(points) for points in droplets_px] for droplets_px in shots], axis=0)
+        raise CalibrationError(
+            f"droplets agree in {len(seen)} of {np.prod(DIVISIONS)} sub-volumes, {MIN_SUB_VOLUMES} are needed: "
+            f"{len(shots)} exposures with {', '.join(f'{count:.0f}' for count in per_view)} droplets by view give "
+            f"{len(matches)} combinations within {tolerance_px:g} px; take more shots, of fewer or smaller droplets"
+        )
+    return seen
+
+
+def _explain(
+    original: Sequence[ViewMapping], current: Sequence[ViewMapping], seen: Sequence[LocalDisparity]
+) -> tuple[int | None, list[FloatArray]]:
+    """The view that moved, if a single one did, and the corrections of the original mappings."""
+    points_mm = np.array([disparity.point_mm for disparity in seen])
+    projector = unseen(np.stack([linearise(mapping, points_mm)[1] for mapping in original], axis=1))
+    changed_px = np.stack(
+        [now.project(points_mm) - then.project(points_mm) for now, then in zip(current, original, strict=True)], axis=1
+    )
+    measured_px = np.array([disparity.disparity_px for disparity in seen]) + changed_px
+    target_px = (projector @ measured_px.reshape(len(seen), -1, 1))[..., 0]
+    blocks = [
+        projector[:, :, 2 * view : 2 * view + 2] @ sensitivity(mapping, points_mm)
+        for view, mapping in enumerate(original)
+    ]
+    none = [np.zeros(correction_size(mapping)) for mapping in original]
+    if _rms_px(target_px) < AGREED_PX:
+        return None, none
+    alone = [_solve(block, target_px, 0.0) for block in blocks]
+    left_px = [_rms_px(target_px - block @ correction) for block, correction in zip(blocks, alone, strict=True)]
+    best, second = np.argsort(left_px)[:2]
+    if left_px[best] < EXPLAINED_PX and left_px[second] > CLEARER * max(left_px[best], NOISE_PX):
+        return int(best), [*none[:best], alone[best], *none[best + 1 :]]
+    together = _solve(np.concatenate(blocks, axis=2), target_px, FAINTEST)
+    return None, np.split(together, np.cumsum([len(part) for part in none])[:-1])
+
+
+def _solve(block: FloatArray, target_px: FloatArray, faintest: float) -> FloatArray:
+    """Smallest correction (P,) of least squares, without the motions that disparities hardly show."""
+    matrix = block.reshape(-1, block.shape[-1])
+    left, strength, motions = np.linalg.svd(matrix, full_matrices=False)
+    shown = strength > max(faintest * np.sqrt(target_px.size / 2), 1e-4 * strength[0])
+    amounts = (left[:, shown].T @ target_px.ravel()) / strength[shown]
+    return np.asarray(motions[shown].T @ amounts, dtype=np.float64)
+
+
+def _rms_px(disparity_px: FloatArray) -> float:
+    """Root mean square length of disparities, given as (sub-volumes, 2 n)."""
+    return float(np.sqrt(2 * np.mean(disparity_px**2)))
+
+
+def _disagreement_px(mappings: Sequence[ViewMapping], seen: Sequence[LocalDisparity]) -> list[float]:
+    squared = [
+        ((against_others(mappings, one.point_mm) @ one.disparity_px[:, :, None]) ** 2).sum(axis=(1, 2)) for one in seen
+    ]
+    return [float(value) for value in np.sqrt(np.mean(squared, axis=0))]
+
+
+def _distances_px(before: Sequence[ViewMapping], after: Sequence[ViewMapping], box: Box) -> list[float]:
+    corners_mm = np.array(np.meshgrid(*zip(box.lower_mm, box.middle_mm, box.upper_mm, strict=True))).reshape(3, -1).T
+    return [
+        float(np.linalg.norm(new.project(corners_mm) - old.project(corners_mm), axis=1).max())
+        for old, new in zip(before, after, strict=True)
+    ]
+
+
+def _corrected_view(view: ViewCalibration, mapping: ViewMapping, distance_px: float, left_px: float) -> ViewCalibration:
+    """A view on its new mapping; what droplets then still disagree by counts as its hold-out error, if larger."""
+    if distance_px == 0:
+        return view
+    holdout_px = max(view.holdout_error_px, left_px)
+    return replace(view, mapping=mapping, holdout_error_px=holdout_px, verdict=_worse(view.verdict, judge(holdout_px)))
+
+
+def _worse(one: Verdict, other: Verdict) -> Verdict:
+    return max(one, other, key=list(Verdict).index)
