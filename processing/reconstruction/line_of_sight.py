@@ -8,10 +8,8 @@ from numpy.typing import NDArray
 
 from processing.reconstruction.kernels import _native
 from processing.reconstruction.method import ReconstructionMethod
+from processing.reconstruction.plan import DEFAULT_THREADS as DEFAULT_THREADS
 from processing.reconstruction.plan import Plan
-from processing.reconstruction.rectified_view import Pixels
-
-DEFAULT_THREADS = 2
 
 _KERNEL_METHOD = {
     ReconstructionMethod.GAVLOS: 0,
@@ -22,7 +20,7 @@ _KERNEL_METHOD = {
 
 def line_of_sight(
     plan: Plan,
-    images: Sequence[Pixels],
+    images: Sequence[NDArray[np.float32]],
     method: ReconstructionMethod = ReconstructionMethod.MLOS,
     out: NDArray[Any] | None = None,
     *,
@@ -35,11 +33,13 @@ def line_of_sight(
     plan : Plan
         Geometry of views and grid.
     images : sequence of (rows, columns) float32 arrays
-        Inverted shadow intensities from 0 to 1; 0 outside of the images.
+        Inverted shadow intensities from 0 to 1; 0 outside of the images. Samples are exact to 1e-4 of the
+        brightest pixel.
     method : ReconstructionMethod
         GAVLOS, MINLOS or MLOS: geometric average, minimum or product of the bilinear samples.
-    out : (z, y, x) float32 or float16 array, optional
-        Receives the volume. A reused volume is much faster than a new one: fresh memory costs more than the method.
+    out : (z, y, x) float32, float16 or uint8 array, optional
+        Receives the volume; 255 is 1 where it is of bytes.
+        A reused volume is much faster than a new one: fresh memory costs more than the method.
     threads : int
         The result does not depend on it.
 
@@ -56,8 +56,8 @@ def line_of_sight(
     if method not in _KERNEL_METHOD:
         raise ValueError(f"{method.value} is not a line-of-sight method: {[m.value for m in _KERNEL_METHOD]}")
     volume = np.empty(plan.grid.shape, dtype=np.float32) if out is None else out
-    check_volume(volume, plan, (np.float32, np.float16))
-    views = plan.bind(plan.resample(images))
+    check_volume(volume, plan, (np.float32, np.float16, np.uint8))
+    views = plan.bind(plan.resample(images, threads))
     _native.line_of_sight(views, _KERNEL_METHOD[method], volume, threads)
     return volume
 

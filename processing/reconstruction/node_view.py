@@ -5,15 +5,13 @@ Any smooth mapping will do: polynomials, refracting windows, any roll, mirrors.
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from processing.geometry import FloatArray, ViewMapping
+from processing.reconstruction.fixed_point import FixedPoint
 from processing.reconstruction.kernels import _native
 from processing.volume import VoxelGrid
-
-Pixels = NDArray[np.float32]
 
 SPACINGS = (16, 8, 4, 2)
 """Voxels from node to node that the kernels know."""
@@ -41,24 +39,24 @@ class NodeView:
         Largest distance to the mapping between the nodes, in the recorded image.
     """
 
-    nodes: Pixels
+    nodes: NDArray[np.float32]
     spacing: int
     binning: int
     image_size_px: tuple[int, int]
     deviation_px: float
 
-    def resample(self, image: Pixels) -> Pixels:
+    def resample(self, image: NDArray[np.float32], threads: int) -> FixedPoint:
         """The image, averaged and framed with zeros."""
         if self.binning > 1:
             height, width = (n // self.binning * self.binning for n in image.shape)
             blocks = image[:height, :width].reshape(height // self.binning, self.binning, -1, self.binning)
             image = blocks.mean(axis=(1, 3), dtype=np.float32)
-        frame = (FRAME_BEFORE_PX, FRAME_AFTER_PX) * 2
-        return np.asarray(cv2.copyMakeBorder(image, *frame, cv2.BORDER_CONSTANT, value=0), dtype=np.float32)
+        framed = np.empty([n + FRAME_BEFORE_PX + FRAME_AFTER_PX for n in image.shape], np.int16)
+        return FixedPoint(framed, _native.quantise(image, FRAME_BEFORE_PX, FRAME_AFTER_PX, framed, threads))
 
-    def bind(self, pixels: Pixels) -> _native.View:
+    def bind(self, image: FixedPoint, *, cull: bool) -> _native.View:  # noqa: ARG002
         """A resampled image with the geometry of this view, for the kernels."""
-        return _native.View.mapped(pixels, self.nodes, self.spacing)
+        return _native.View.mapped(image.pixels, image.unit, self.nodes, self.spacing)
 
 
 def sample_mapping(mapping: ViewMapping, grid: VoxelGrid, max_deviation_px: float) -> NodeView:

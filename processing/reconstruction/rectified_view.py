@@ -8,25 +8,23 @@ through the full camera model with all its distortion; from there on no camera m
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from processing.geometry import FloatArray, ViewMapping
+from processing.reconstruction.fixed_point import FixedPoint
 from processing.reconstruction.kernels import _native
 from processing.volume import VoxelGrid
 
-Pixels = NDArray[np.float32]
-
 GUARD_PX = 2
 """Pixels kept above and left of the volume."""
-OVERHANG_PX = 68
-"""Columns kept right of the volume, which the widest vectors may read."""
-MAP_SPACING_PX = 8
-"""The camera model is evaluated at every eighth pixel of the resampled image; it is straight in between."""
+BLOCK_COLUMNS, OVERHANG_PX = 32, 36
+"""Voxels that the kernels compute at once, and columns that the widest vectors may read beyond them."""
+MAP_SPACING_PX = 16
+"""The camera model is evaluated at every sixteenth pixel of the resampled image; it is straight in between."""
 MAX_PIXELS_PER_VOXEL = 1.5
 """Of the recorded image; coarser voxels would skip pixels."""
-MIN_RELATIVE_SCALE = 0.6
+MIN_RELATIVE_SCALE = 0.63
 """Smallest scale of any plane against the largest one; beyond it the volume is too deep for its distance."""
 
 
@@ -45,8 +43,10 @@ class RectifiedView:
 
     Parameters
     ----------
-    map_u_px, map_v_px : (rows, columns) float32 arrays
-        Where each pixel of the resampled image lies in the recorded one.
+    shape_px : tuple[int, int]
+        (rows, columns) of the resampled image.
+    nodes_px : (node rows, node columns, 2) float32 array
+        Where every ``MAP_SPACING_PX``-th pixel of the resampled image lies in the recorded one, (u, v).
     scale : (nz,) float64 array
         Pixels of the resampled image per voxel, for each plane.
     shift_u_px, shift_v_px : (nz,) float64 arrays
@@ -57,31 +57,28 @@ class RectifiedView:
         Largest distance to the full camera model, in the recorded image.
     """
 
-    map_u_px: Pixels
-    map_v_px: Pixels
+    shape_px: tuple[int, int]
+    nodes_px: NDArray[np.float32]
     scale: FloatArray
     shift_u_px: FloatArray
     shift_v_px: FloatArray
     image_size_px: tuple[int, int]
     deviation_px: float
 
-    def resample(self, image: Pixels) -> Pixels:
-        """The image on the plane z_ref: cubic, zero outside of the recorded image, never negative.
+    def resample(self, image: NDArray[np.float32], threads: int) -> FixedPoint:
+        """The image on the plane z_ref: cubic, zero outside of the recorded image, limited to what that contains."""
+        pixels = np.empty(self.shape_px, np.int16)
+        return FixedPoint(pixels, _native.resample(image, self.nodes_px, pixels, threads))
 
-        OpenCV rounds positions to 1/32 px, which adds up to 0.016 px to ``deviation_px``.
-        """
-        resampled = cv2.remap(image, self.map_u_px, self.map_v_px, cv2.INTER_CUBIC, borderMode=cv2.BORDER_CONSTANT)
-        return np.maximum(resampled, np.float32(0), dtype=np.float32)
-
-    def bind(self, pixels: Pixels) -> _native.View:
+    def bind(self, image: FixedPoint, *, cull: bool) -> _native.View:
         """A resampled image with the geometry of this view, for the kernels."""
-        return _native.View.rectified(pixels, self.scale, self.shift_u_px, self.shift_v_px)
+        return _native.View.rectified(image.pixels, image.unit, self.scale, self.shift_u_px, self.shift_v_px, cull)
 
 
-def rectify(mapping: ViewMapping, grid: VoxelGrid) -> RectifiedView | None:
+def rectify(mapping: ViewMapping, grid: VoxelGrid, pixels_per_voxel: float) -> RectifiedView | None:
     """Rectify a view for a grid; None where its lines of sight do not meet, or too near, or voxels are coarse.
 
-    The largest scale of all planes is one pixel per voxel.
+    The largest scale of all planes is ``pixels_per_voxel``.
     """
     if not isinstance(mapping, CentralMapping):
         return None
@@ -91,24 +88,27 @@ def rectify(mapping: ViewMapping, grid: VoxelGrid) -> RectifiedView | None:
     if depth[0] * depth[-1] <= 0:
         return None
     to_reference = (z_ref - centre[0]) / depth
-    scale = to_reference / to_reference.max()
-    if scale.min() < MIN_RELATIVE_SCALE:
+    reference_scale = pixels_per_voxel / to_reference.max()
+    scale = reference_scale * to_reference
+    if scale.min() < MIN_RELATIVE_SCALE * pixels_per_voxel:
         return None
-    reference_scale = 1 / to_reference.max()
     shift_v, shift_u = (reference_scale * centre[axis] * (1 - to_reference) for axis in (1, 2))
     left, top = GUARD_PX - shift_u.min(), GUARD_PX - shift_v.min()
-    columns = int(np.ceil((shift_u + scale * (grid.shape[2] - 1)).max() + left)) + OVERHANG_PX
+    last_column = -(-grid.shape[2] // BLOCK_COLUMNS) * BLOCK_COLUMNS - 1
+    columns = int(np.ceil((shift_u + scale * last_column).max() + left)) + OVERHANG_PX
+    columns += -columns % MAP_SPACING_PX
     rows = int(np.ceil((shift_v + scale * (grid.shape[1] - 1)).max() + top)) + 2 * GUARD_PX
     origin = np.array([z_ref, -top / reference_scale, -left / reference_scale])
     nodes_px, middle_px = (
         _project_plane(mapping, grid, origin, 1 / reference_scale, (rows, columns), offset) for offset in (0.0, 0.5)
     )
-    if np.linalg.norm(np.diff(nodes_px, axis=1), axis=-1).mean() > MAX_PIXELS_PER_VOXEL * MAP_SPACING_PX:
+    recorded_px_per_voxel = reference_scale * np.linalg.norm(np.diff(nodes_px, axis=1), axis=-1).mean() / MAP_SPACING_PX
+    if recorded_px_per_voxel > MAX_PIXELS_PER_VOXEL:
         return None
     bend_px = float(np.linalg.norm(_middle(nodes_px) - middle_px[:-1, :-1], axis=-1).max())
     return RectifiedView(
-        map_u_px=_spread(nodes_px[..., 0], rows, columns),
-        map_v_px=_spread(nodes_px[..., 1], rows, columns),
+        shape_px=(rows, columns),
+        nodes_px=np.ascontiguousarray(nodes_px, dtype=np.float32),
         scale=scale,
         shift_u_px=shift_u + left,
         shift_v_px=shift_v + top,
@@ -136,16 +136,6 @@ def _project_plane(
 
 def _middle(nodes: FloatArray) -> FloatArray:
     return 0.25 * (nodes[:-1, :-1] + nodes[1:, :-1] + nodes[:-1, 1:] + nodes[1:, 1:])
-
-
-def _spread(nodes: FloatArray, rows: int, columns: int) -> Pixels:
-    """Interpolate nodes linearly onto every pixel."""
-    spread = nodes
-    for axis, count in enumerate((rows, columns)):
-        first, rest = np.divmod(np.arange(count), MAP_SPACING_PX)
-        weight = (rest / MAP_SPACING_PX).reshape((-1, 1) if axis == 0 else (1, -1))
-        spread = np.take(spread, first, axis) * (1 - weight) + np.take(spread, first + 1, axis) * weight
-    return np.ascontiguousarray(spread, dtype=np.float32)
 
 
 def _deviation_px(mapping: ViewMapping, grid: VoxelGrid, centre: FloatArray, to_reference: FloatArray) -> float:

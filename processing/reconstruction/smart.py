@@ -6,17 +6,20 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from processing.reconstruction.fixed_point import FixedPoint
 from processing.reconstruction.kernels import _native
-from processing.reconstruction.line_of_sight import DEFAULT_THREADS, check_volume, line_of_sight
+from processing.reconstruction.line_of_sight import check_volume, line_of_sight
 from processing.reconstruction.method import ReconstructionMethod
-from processing.reconstruction.plan import Plan
-from processing.reconstruction.rectified_view import Pixels
+from processing.reconstruction.plan import DEFAULT_THREADS, Plan
 
 Volume = NDArray[np.float32]
+Pixels = NDArray[np.float32]
 Stop = Callable[[int, float], bool]
 
 NOTHING = np.float32(1e-7)
 """Projected intensity below which a pixel sees nothing."""
+RATIO_COUNTS = 4096
+"""Ratios are kept in 16 bit: up to 8, in steps of 1 / 4096. So much brighter a view makes a voxel at most at once."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +125,7 @@ class _Solver:
         self, plan: Plan, images: Sequence[Pixels], start: Volume | None, out: Volume | None, threads: int
     ) -> None:
         self._threads = threads
-        self._images = plan.resample(images)
+        self._images = [resampled.intensity for resampled in plan.resample(images, threads)]
         self.volume = np.empty(plan.grid.shape, dtype=np.float32) if out is None else out
         check_volume(self.volume, plan, (np.float32,))
         if start is None:
@@ -131,8 +134,8 @@ class _Solver:
             check_volume(start, plan, (np.float32,))
             np.copyto(self.volume, start)
         self._projections = [np.zeros_like(image) for image in self._images]
-        self._ratios = [np.zeros_like(image) for image in self._images]
-        self._views = plan.bind(self._ratios)
+        self._ratios = [np.zeros(image.shape, np.int16) for image in self._images]
+        self._views = plan.bind([FixedPoint(ratio, 1 / RATIO_COUNTS) for ratio in self._ratios], cull=False)
         self.advance(update=[], project=range(len(self._views)))
         self._match_scale()
 
@@ -147,10 +150,10 @@ class _Solver:
 
     def correct(self, view: int, exponent: float) -> None:
         """Set the ratio image of a view from its latest projection."""
-        projection, ratio = self._projections[view], self._ratios[view]
-        np.divide(self._images[view], np.maximum(projection, NOTHING), out=ratio)
-        np.power(ratio, np.float32(exponent), out=ratio)
+        projection = self._projections[view]
+        ratio = (self._images[view] / np.maximum(projection, NOTHING)) ** np.float32(exponent)
         ratio[projection <= NOTHING] = 0
+        self._ratios[view][:] = np.minimum(ratio * RATIO_COUNTS + np.float32(0.5), 32767)
 
     def advance(self, update: Sequence[int], project: Sequence[int]) -> None:
         """Multiply the volume by the ratios of some views, then project it onto some views."""

@@ -185,12 +185,15 @@ def _draw(points_px: NDArray[np.float64], diameters_px: NDArray[np.float64], ima
 
 
 def _planes(study: SpeedStudy) -> NDArray[np.float64]:
-    return study.grid.z_mm[np.linspace(0, study.shape[0] - 1, study.baseline_planes).astype(int)]
+    chosen = np.linspace(0, study.shape[0] - 1, study.baseline_planes).astype(np.intp)
+    return np.take(study.grid.z_mm, chosen)
 
 
 def _homography(camera: PinholeCamera, grid: VoxelGrid, z_mm: float) -> NDArray[np.float64]:
-    to_mm = np.array([[grid.pitch_mm, 0, grid.origin_mm[0]], [0, grid.pitch_mm, grid.origin_mm[1]], [0, 0, 1]])
-    return np.asarray(camera.plane_homography(z_mm) @ to_mm, dtype=np.float64)
+    to_mm: NDArray[np.float64] = np.array(
+        [[grid.pitch_mm, 0, grid.origin_mm[0]], [0, grid.pitch_mm, grid.origin_mm[1]], [0, 0, 1]]
+    )
+    return np.array(camera.plane_homography(z_mm) @ to_mm, dtype=np.float64)
 
 
 def naive_line_of_sight(study: SpeedStudy, cameras: Sequence[PinholeCamera], images: Sequence[Image]) -> float:

@@ -82,8 +82,8 @@ def node_values(view: NodeView, grid: VoxelGrid) -> Array:
 def planned_line_of_sight(plan: Plan, images: Sequence[NDArray[np.float32]], method: ReconstructionMethod) -> Array:
     """The same as the kernels compute, from resampled images."""
     samples = [
-        bilinear(pixels, *planned_positions(view, plan.grid))
-        for view, pixels in zip(plan.views, plan.resample(images), strict=True)
+        bilinear(image.intensity, *planned_positions(view, plan.grid))
+        for view, image in zip(plan.views, plan.resample(images), strict=True)
     ]
     return combine(samples, method)
 
@@ -119,7 +119,7 @@ def project(view: RectifiedView | NodeView, volume: Array, shape: tuple[int, int
 
 def smart(plan: Plan, images: Sequence[NDArray[np.float32]], iterations: int) -> tuple[Array, list[float]]:
     """SMART from MLOS; volume and relative residuals."""
-    recorded = [pixels.astype(np.float64) for pixels in plan.resample(images)]
+    recorded = [image.intensity.astype(np.float64) for image in plan.resample(images)]
     positions = [planned_positions(view, plan.grid) for view in plan.views]
     volume = planned_line_of_sight(plan, images, ReconstructionMethod.MLOS)
 

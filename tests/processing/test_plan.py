@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from processing.geometry import FloatArray, PinholeCamera, view_camera
 from processing.reconstruction.kernels import _native
 from processing.reconstruction.node_view import NodeView, sample_mapping
 from processing.reconstruction.plan import MAX_DEVIATION_PX, plan_reconstruction, plan_view
-from processing.reconstruction.rectified_view import RectifiedView, rectify
+from processing.reconstruction.rectified_view import MAP_SPACING_PX, RectifiedView, rectify
 from processing.volume import VoxelGrid
 from tests.processing import oracle
 
@@ -54,6 +55,7 @@ def camera(azimuth_deg: float = 30.0, **options: object) -> PinholeCamera:
     offset_px=st.tuples(st.floats(-300, 300), st.floats(-300, 300)),
     tilt_rad=st.tuples(st.floats(-0.1, 0.1), st.floats(-0.1, 0.1)),
     k1=st.floats(-2, 2),
+    pixels_per_voxel=st.sampled_from([0.95, 1.5]),
 )
 def test_any_pinhole_camera_is_rectified_exactly(
     azimuth_deg: float,
@@ -62,6 +64,7 @@ def test_any_pinhole_camera_is_rectified_exactly(
     offset_px: tuple[float, float],
     tilt_rad: tuple[float, float],
     k1: float,
+    pixels_per_voxel: float,
 ) -> None:
     mapping = replace(
         camera(
@@ -73,12 +76,12 @@ def test_any_pinhole_camera_is_rectified_exactly(
         ),
         tilt_rad=tilt_rad,
     )
-    view = rectify(mapping, GRID)
+    view = rectify(mapping, GRID, pixels_per_voxel)
     assert view is not None
-    assert view.deviation_px < MAX_DEVIATION_PX / 10
-    recorded_px = np.stack([view.map_u_px, view.map_v_px])
+    assert view.deviation_px < MAX_DEVIATION_PX / 5
     u, v = oracle.planned_positions(view, GRID)
-    seen_u, seen_v = (oracle.bilinear(channel, u, v) for channel in recorded_px)
+    channels = np.moveaxis(view.nodes_px, -1, 0)
+    seen_u, seen_v = (oracle.bilinear(channel, u / MAP_SPACING_PX, v / MAP_SPACING_PX) for channel in channels)
     expected_u, expected_v = oracle.seen_by(mapping, GRID)
     # the map itself is curved: bilinear interpolation of it is good to this
     np.testing.assert_allclose(seen_u, expected_u, atol=5e-3)
@@ -138,33 +141,51 @@ def test_two_to_eight_views() -> None:
             plan_reconstruction((oracle.cameras(8) * 2)[:count], GRID)
 
 
+def rectified(pixels: NDArray[np.int16], scale: FloatArray, shift_u: FloatArray, shift_v: FloatArray) -> _native.View:
+    return _native.View.rectified(pixels, 1.0, scale, shift_u, shift_v)
+
+
 def test_kernels_refuse_geometry_that_leads_outside() -> None:
-    volume, pixels = np.zeros((3, 4, 5), np.float32), np.zeros((20, 90), np.float32)
+    volume, pixels = np.zeros((3, 4, 5), np.float32), np.zeros((20, 90), np.int16)
     scale, shift = np.ones(3), np.full(3, 2.0)
-    _native.line_of_sight([_native.View.rectified(pixels, scale, shift, shift)], 2, volume, 1)
+    _native.line_of_sight([rectified(pixels, scale, shift, shift)], 2, volume, 1)
     nodes = np.zeros((3, 2, 2, 2), np.float32)
-    _native.line_of_sight([_native.View.mapped(pixels, nodes, 16)], 2, volume, 1)
+    _native.line_of_sight([_native.View.mapped(pixels, 1.0, nodes, 16)], 2, volume, 1)
     outside = [
-        _native.View.rectified(pixels, scale, shift + 30, shift),
-        _native.View.rectified(pixels, scale, shift, shift + 30),
-        _native.View.rectified(pixels, scale, shift, -shift),
-        _native.View.rectified(pixels, scale * 9, shift, shift),
-        _native.View.rectified(pixels, scale[:2], shift[:2], shift[:2]),
-        _native.View.rectified(pixels, scale, shift, np.full(3, np.nan)),
-        _native.View.mapped(pixels, nodes, 2),
+        rectified(pixels, scale, shift + 30, shift),
+        rectified(pixels, scale, shift, shift + 30),
+        rectified(pixels, scale, shift, -shift),
+        rectified(pixels, scale * 1.7, shift, shift + 30),
+        rectified(pixels, scale[:2], shift[:2], shift[:2]),
+        rectified(pixels, scale, shift, np.full(3, np.nan)),
+        _native.View.mapped(pixels, 1.0, nodes, 2),
     ]
     for view in outside:
         with pytest.raises(ValueError, match=r"(view|nodes): "):
             _native.line_of_sight([view], 2, volume, 1)
+    with pytest.raises(ValueError, match="scale outside"):
+        rectified(pixels, scale * 9, shift, shift)
     projection = np.zeros((19, 90), np.float32)
     with pytest.raises(ValueError, match="projections and images differ in shape"):
-        _native.smart_pass([_native.View.rectified(pixels, scale, shift, shift)], [False], [projection], volume, 1)
+        _native.smart_pass([rectified(pixels, scale, shift, shift)], [False], [projection], volume, 1)
+
+
+def test_resampling_refuses_what_does_not_fit() -> None:
+    image, nodes = np.zeros((9, 9), np.float32), np.zeros((2, 3, 2), np.float32)
+    _native.resample(image, nodes, np.zeros((16, 32), np.int16), 1)
+    for shape in ((17, 32), (16, 48)):
+        with pytest.raises(ValueError, match="nodes do not cover"):
+            _native.resample(image, nodes, np.zeros(shape, np.int16), 1)
+    with pytest.raises(ValueError, match="multiple of 16 columns"):
+        _native.resample(image, nodes, np.zeros((16, 31), np.int16), 1)
+    with pytest.raises(ValueError, match="do not fill the output"):
+        _native.quantise(image, 1, 2, np.zeros((12, 13), np.int16), 1)
 
 
 def test_views_keep_their_arrays_alive() -> None:
-    view = _native.View.rectified(np.ones((20, 90), np.float32), np.ones(3), np.full(3, 2.0), np.full(3, 2.0))
-    churn = [np.zeros((20, 90), np.float32) for _ in range(50)]
+    view = rectified(np.full((20, 90), 32767, np.int16), np.ones(3), np.full(3, 2.0), np.full(3, 2.0))
+    churn = [np.zeros((20, 90), np.int16) for _ in range(50)]
     volume = np.zeros((3, 4, 5), np.float32)
     _native.line_of_sight([view], 2, volume, 1)
-    np.testing.assert_array_equal(volume, 1)
+    np.testing.assert_array_equal(volume, 32767)
     assert len(churn) == 50

@@ -53,8 +53,8 @@ def test_smart_equals_the_textbook(isa: str, by_nodes: bool, roll_deg: float) ->
     plan, images = make_plan(mappings, by_nodes), images_of(droplets(30), mappings)
     expected, residuals = oracle.smart(plan, images, iterations=3)
     result = smart(plan, images, iterations=3)
-    # ratios are steep at the edges of droplets: compare with the brightest voxel
-    np.testing.assert_allclose(result.volume, expected, atol=2e-3 * expected.max())
+    # ratios have steps of 1 / 4096, and are steep at the edges of droplets: compare with the brightest voxel
+    np.testing.assert_allclose(result.volume, expected, atol=6e-3 * expected.max())
     np.testing.assert_allclose(result.residuals, residuals, rtol=1e-3)
 
 

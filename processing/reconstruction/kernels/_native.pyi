@@ -10,16 +10,23 @@ class View:
 
     @staticmethod
     def rectified(
-        pixels: NDArray[np.float32],
+        pixels: NDArray[np.int16],
+        unit: float,
         scale: NDArray[np.float64],
         shift_u: NDArray[np.float64],
         shift_v: NDArray[np.float64],
+        cull: bool = True,
     ) -> View: ...
     @staticmethod
-    def mapped(pixels: NDArray[np.float32], nodes: NDArray[np.float32], spacing: int) -> View: ...
+    def mapped(pixels: NDArray[np.int16], unit: float, nodes: NDArray[np.float32], spacing: int) -> View: ...
 
+def quantise(image: NDArray[np.float32], before: int, after: int, out: NDArray[np.int16], threads: int) -> float: ...
+def resample(image: NDArray[np.float32], nodes: NDArray[np.float32], out: NDArray[np.int16], threads: int) -> float: ...
 def line_of_sight(
-    views: Sequence[View], method: int, volume: NDArray[np.float32] | NDArray[np.float16], threads: int
+    views: Sequence[View],
+    method: int,
+    volume: NDArray[np.float32] | NDArray[np.float16] | NDArray[np.uint8],
+    threads: int,
 ) -> None: ...
 def smart_pass(
     views: Sequence[View],

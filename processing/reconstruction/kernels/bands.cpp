@@ -51,13 +51,13 @@ class BandImage {
 public:
     BandImage() = default;
     BandImage(const View &view, const Shape &shape, const Band &band) {
-        const int y1 = std::min(band.end_slab * slab_rows, shape.ny) - 1;
-        const Range seen = rows_seen(view, shape, band.first_slab * slab_rows, y1);
-        const int last = view.image.rows - 1;
+        const int y1 = std::min(band.end_slab * smart_rows, shape.ny) - 1;
+        const Range seen = rows_seen(view, shape, band.first_slab * smart_rows, y1);
+        const int last = view.rows - 1;
         const auto clamped = [last](double row) { return static_cast<int>(std::clamp(row, 0.0, double(last))); };
         const int first = clamped(std::floor(seen.low) - 1), end = clamped(std::ceil(seen.high) + 2) + 1;
-        pixels_.assign(static_cast<size_t>(end - first) * view.image.columns, 0.0f);
-        projection_ = {pixels_.data(), first, end - first, view.image.columns};
+        pixels_.assign(static_cast<size_t>(end - first) * view.columns, 0.0f);
+        projection_ = {pixels_.data(), first, end - first, view.columns};
     }
     const Projection &projection() const { return projection_; }
 
@@ -85,12 +85,12 @@ void for_each(int count, int threads, const std::function<void(int)> &work) {
 }
 
 void run_line_of_sight(const Kernels &kernels, const LineOfSight &job, int threads) {
-    const int slabs = (job.shape.ny + slab_rows - 1) / slab_rows;
+    const int slabs = (job.shape.ny + sight_rows - 1) / sight_rows;
     for_each(slabs, threads, [&](int slab) { kernels.line_of_sight(job, slab); });
 }
 
 void run_smart_pass(const Kernels &kernels, const SmartPass &job, const std::vector<float *> &sums, int threads) {
-    const auto bands = bands_of((job.shape.ny + slab_rows - 1) / slab_rows);
+    const auto bands = bands_of((job.shape.ny + smart_rows - 1) / smart_rows);
     const int n_bands = static_cast<int>(bands.size());
     std::vector<std::vector<BandImage>> images(bands.size());
     for_each(n_bands, threads, [&](int b) {
@@ -104,7 +104,7 @@ void run_smart_pass(const Kernels &kernels, const SmartPass &job, const std::vec
     });
     for_each(job.n_views, threads, [&](int i) {
         if (!job.project[i]) return;
-        std::memset(sums[i], 0, sizeof(float) * job.views[i].image.rows * job.views[i].image.columns);
+        std::memset(sums[i], 0, sizeof(float) * job.views[i].rows * job.views[i].columns);
         for (const auto &band : images) add(band[i].projection(), sums[i]);
     });
 }

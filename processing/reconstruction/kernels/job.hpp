@@ -10,30 +10,48 @@ struct Shape {
     int nz, ny, nx;
 };
 
-struct Image {
-    const float *pixels;
-    int rows, columns;
+// Kernels work on slabs of rows of constant y over all z, block by block.
+constexpr int block_columns = 32;
+constexpr int sight_rows = 16;  // rows of a slab for line of sight ...
+constexpr int smart_rows = 8;   // ... and for SMART, whose blocks come and go with the droplets
+
+// Where the image of a rectified view is not zero: one byte for every cell of pixels, set if anything that a
+// block may sample, seen from a position within this cell, is not zero.
+struct Occupancy {
+    static constexpr int cell_rows = 4, cell_columns = 8;
+    const uint8_t *cells;  // null: everywhere
+    int columns;
+    bool at(int row, int column) const {
+        return !cells || cells[static_cast<int64_t>(row / cell_rows) * columns + column / cell_columns];
+    }
 };
 
-// One view. Either rectified: voxel (x, y) of plane z is seen at column scale[z] x + shift_u[z] and row
-// scale[z] y + shift_v[z] of the image. Or mapped by nodes: channels u, v, area on a lattice of every
-// `spacing`-th voxel, linear in between; `area` is the pixel area of a voxel, seen along z.
+// One view: an image in fixed point, `unit` times a pixel (0 .. 32767) is an intensity; and where voxels are seen
+// in it. Either rectified: voxel (x, y) of plane z is seen at column scale[z] x + shift_u[z] and row
+// scale[z] y + shift_v[z]. Or mapped by nodes: channels u, v, area on a lattice of every `spacing`-th voxel,
+// linear in between; `area` is the pixel area of a voxel, seen along z.
 struct View {
-    Image image;
+    const int16_t *pixels;
+    int rows, columns;
+    float unit;
+    Occupancy occupancy;
     const double *scale, *shift_u, *shift_v;  // rectified, else null
     const float *nodes;                       // (3, nodes_z, nodes_y, nodes_x), else null
     int nodes_z, nodes_y, nodes_x, spacing;
 };
 
 enum class Method { geometric_mean, minimum, product };
+enum class Format { single, half, byte };  // float32, float16, or 0 .. 255 for 0 .. 1
+
+constexpr int bytes_of(Format format) { return format == Format::single ? 4 : format == Format::half ? 2 : 1; }
 
 struct LineOfSight {
     const View *views;
     int n_views;
     Shape shape;
     Method method;
-    float *volume;        // one of the two
-    uint16_t *volume_16;  // IEEE half precision
+    Format format;
+    void *volume;
 };
 
 // Rows [first_row, first_row + rows) of a view's image that a band of the volume projects onto.
@@ -52,13 +70,25 @@ struct SmartPass {
     float *volume;
 };
 
-// Kernels work on slabs of rows of constant y over all z; a band is a run of slabs.
-constexpr int slab_rows = 8;
+// Resample rows [first_row, end_row) of `to` from a recorded image in fixed point, by cubic convolution. Nodes are
+// pairs (u, v) for every node_spacing-th pixel of `to`, linear in between. The recorded image has a margin of zeros.
+struct Resampling {
+    static constexpr int node_spacing = 16, margin = 64;
+    const int16_t *from;
+    int from_rows, from_columns;  // with margins
+    const float *nodes;
+    int nodes_x;
+    int16_t *to;
+    int columns;  // of `to`, a multiple of node_spacing
+};
 
 struct Kernels {
     const char *name;
     void (*line_of_sight)(const LineOfSight &job, int slab);
     void (*smart_pass)(const SmartPass &job, int slab, const Projection *projections);
+    void (*resample)(const Resampling &job, int first_row, int end_row);
+    float (*brightest)(const float *pixels, int count);
+    void (*quantise)(const float *pixels, float counts_per_unit, int16_t *to, int count);
 };
 
 }  // namespace tomoshadow

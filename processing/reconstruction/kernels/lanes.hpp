@@ -45,7 +45,7 @@ inline int ceil_of(double x) { return -floor_of(-x); }
 
 // Positions start + step k, k = 0 .. columns - 1, as integer parts (relative to the first one of each block of
 // `lanes`) and fractions. Positions are not negative and step is below `max_step`.
-struct Taps {
+struct FloatTaps {
     int columns;
     double step;
     int first[tile_columns / lanes];
@@ -55,7 +55,7 @@ struct Taps {
 
 constexpr double max_step = 1.8;  // a block then spans less than two vectors, neighbours included
 
-inline void set_taps(Taps &taps, double start, double step, int columns) {
+inline void set_taps(FloatTaps &taps, double start, double step, int columns) {
     Floats lane;
     for (int k = 0; k < lanes; ++k) lane[k] = static_cast<float>(k);
     taps.columns = columns;
@@ -72,7 +72,7 @@ inline void set_taps(Taps &taps, double start, double step, int columns) {
 }
 
 // out[k] = row at position k, for whole blocks: up to `lanes` - 1 more than taps.columns.
-inline void interpolate(const float *row, const Taps &taps, float *out) {
+inline void interpolate(const float *row, const FloatTaps &taps, float *out) {
     for (int k = 0; k < taps.columns; k += lanes) {
         const float *window = row + taps.first[k / lanes];
 #if defined(__AVX2__)
@@ -94,6 +94,17 @@ inline void interpolate(const float *row, const Taps &taps, float *out) {
         }
 #endif
     }
+}
+
+inline Floats square_root(Floats x) {
+#if defined(__AVX512F__)
+    return reinterpret_cast<Floats>(_mm512_sqrt_ps(reinterpret_cast<__m512>(x)));
+#elif defined(__AVX2__)
+    return reinterpret_cast<Floats>(_mm256_sqrt_ps(reinterpret_cast<__m256>(x)));
+#else
+    for (int k = 0; k < lanes; ++k) x[k] = __builtin_sqrtf(x[k]);
+    return x;
+#endif
 }
 
 inline uint16_t half_of(float value) {

@@ -5,11 +5,13 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <stdexcept>
 
 #include "bands.hpp"
+#include "images.hpp"
 #include "instruction_set.hpp"
 
 namespace nb = nanobind;
@@ -18,7 +20,10 @@ using namespace tomoshadow;
 
 namespace {
 
-using PixelArray = nb::ndarray<const float, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using PixelArray = nb::ndarray<const int16_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using FilledPixels = nb::ndarray<int16_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using RecordedArray = nb::ndarray<const float, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using MapArray = nb::ndarray<const float, nb::shape<-1, -1, 2>, nb::c_contig, nb::device::cpu>;
 using PlaneArray = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using NodeArray = nb::ndarray<const float, nb::shape<3, -1, -1, -1>, nb::c_contig, nb::device::cpu>;
 using ImageArray = nb::ndarray<float, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
@@ -26,7 +31,7 @@ using FloatVolume = nb::ndarray<float, nb::ndim<3>, nb::c_contig, nb::device::cp
 using AnyVolume = nb::ndarray<nb::ndim<3>, nb::c_contig, nb::device::cpu>;
 
 constexpr int max_views = 8;
-constexpr int overhang = 64;          // columns the widest vector may read beyond the last voxel
+constexpr int overhang = 33;          // columns the widest vector may read beyond the last voxel of a block
 constexpr double max_scale = 1.8;     // pixels per voxel, see lanes.hpp
 constexpr double min_scale = 1 / 1.8;
 
@@ -34,28 +39,25 @@ void require(bool condition, const char *what) {
     if (!condition) throw std::invalid_argument(what);
 }
 
-Image image_of(const PixelArray &pixels) {
-    require(pixels.shape(0) >= 3 && pixels.shape(1) >= 3 && pixels.size() < (1u << 31), "image: too small or too large");
-    return {pixels.data(), static_cast<int>(pixels.shape(0)), static_cast<int>(pixels.shape(1))};
-}
-
 // An image with its geometry; owns references to the arrays.
 class BoundView {
 public:
-    static BoundView rectified(PixelArray pixels, PlaneArray scale, PlaneArray shift_u, PlaneArray shift_v) {
+    static BoundView rectified(PixelArray pixels, float unit, PlaneArray scale, PlaneArray shift_u, PlaneArray shift_v,
+                               bool cull) {
         require(scale.shape(0) == shift_u.shape(0) && scale.shape(0) == shift_v.shape(0),
                 "rectified view: scale and shifts differ in length");
-        BoundView bound(std::move(pixels));
+        BoundView bound(std::move(pixels), unit);
         bound.planes_ = {std::move(scale), std::move(shift_u), std::move(shift_v)};
         bound.view_.scale = bound.planes_[0].data();
         bound.view_.shift_u = bound.planes_[1].data();
         bound.view_.shift_v = bound.planes_[2].data();
+        if (cull) bound.find_occupied();
         return bound;
     }
 
-    static BoundView mapped(PixelArray pixels, NodeArray nodes, int spacing) {
+    static BoundView mapped(PixelArray pixels, float unit, NodeArray nodes, int spacing) {
         require(spacing == 16 || spacing == 8 || spacing == 4 || spacing == 2, "nodes: spacing must be 2, 4, 8 or 16");
-        BoundView bound(std::move(pixels));
+        BoundView bound(std::move(pixels), unit);
         bound.view_.nodes = nodes.data();
         bound.view_.nodes_z = static_cast<int>(nodes.shape(1));
         bound.view_.nodes_y = static_cast<int>(nodes.shape(2));
@@ -78,20 +80,38 @@ public:
         for (int z = 0; z < shape.nz; ++z) {
             const double scale = view_.scale[z], u = view_.shift_u[z], v = view_.shift_v[z];
             require(scale >= min_scale && scale <= max_scale, "rectified view: scale outside 0.56 .. 1.8 pixels per voxel");
-            require(u >= 0 && v >= 0 && scale * (shape.nx - 1) + u + overhang < view_.image.columns &&
-                        scale * (shape.ny - 1) + v + 2 < view_.image.rows,
+            require(u >= 0 && v >= 0 && scale * (last_of_blocks(shape.nx)) + u + overhang < view_.columns &&
+                        scale * (shape.ny - 1) + v + 2 < view_.rows,
                     "rectified view: the image does not cover the volume");
         }
         return view_;
     }
 
 private:
-    explicit BoundView(PixelArray pixels) : pixels_(std::move(pixels)) { view_.image = image_of(pixels_); }
+    BoundView(PixelArray pixels, float unit) : pixels_(std::move(pixels)) {
+        require(pixels_.shape(0) >= 3 && pixels_.shape(1) >= 3 && pixels_.size() < (1u << 30),
+                "view: image too small or too large");
+        view_.pixels = pixels_.data();
+        view_.rows = static_cast<int>(pixels_.shape(0));
+        view_.columns = static_cast<int>(pixels_.shape(1));
+        view_.unit = unit;
+    }
+
+    static int last_of_blocks(int nx) { return (nx + block_columns - 1) / block_columns * block_columns - 1; }
+
+    void find_occupied() {
+        const double *scale = view_.scale;
+        const double max_scale = *std::max_element(scale, scale + planes_[0].shape(0));
+        require(max_scale <= ::max_scale, "rectified view: scale outside 0.56 .. 1.8 pixels per voxel");
+        cells_ = occupied_cells(view_.pixels, view_.rows, view_.columns, max_scale);
+        view_.occupancy = {cells_.data(), (view_.columns + Occupancy::cell_columns - 1) / Occupancy::cell_columns};
+    }
 
     View view_{};
     PixelArray pixels_;
     std::vector<PlaneArray> planes_;
     std::optional<NodeArray> nodes_;
+    std::vector<uint8_t> cells_;
 };
 
 std::vector<View> views_on(const std::vector<const BoundView *> &bound, const Shape &shape, int threads) {
@@ -108,19 +128,20 @@ Shape shape_of(const Array &volume) {
     return {static_cast<int>(volume.shape(0)), static_cast<int>(volume.shape(1)), static_cast<int>(volume.shape(2))};
 }
 
+Format format_of(const AnyVolume &volume) {
+    if (volume.dtype() == nb::dtype<float>()) return Format::single;
+    if (volume.dtype() == nb::dtype<uint8_t>()) return Format::byte;
+    const nb::dlpack::dtype half{static_cast<uint8_t>(nb::dlpack::dtype_code::Float), 16, 1};
+    require(volume.dtype() == half, "volume: float32, float16 or uint8, please");
+    return Format::half;
+}
+
 void line_of_sight(const std::vector<const BoundView *> &bound, int method, const AnyVolume &volume, int threads) {
     const Shape shape = shape_of(volume);
     const auto views = views_on(bound, shape, threads);
     require(method >= 0 && method <= 2, "method must be 0, 1 or 2");
-    const bool single = volume.dtype() == nb::dtype<float>();
-    const nb::dlpack::dtype half{static_cast<uint8_t>(nb::dlpack::dtype_code::Float), 16, 1};
-    require(single || volume.dtype() == half, "volume: float32 or float16, please");
-    const LineOfSight job{views.data(),
-                          static_cast<int>(views.size()),
-                          shape,
-                          static_cast<Method>(method),
-                          single ? static_cast<float *>(volume.data()) : nullptr,
-                          single ? nullptr : static_cast<uint16_t *>(volume.data())};
+    const LineOfSight job{views.data(),    static_cast<int>(views.size()), shape, static_cast<Method>(method),
+                          format_of(volume), volume.data()};
     const Kernels &kernels = selected_kernels();
     nb::gil_scoped_release release;
     run_line_of_sight(kernels, job, threads);
@@ -137,8 +158,8 @@ void smart_pass(const std::vector<const BoundView *> &bound, const std::vector<b
         updates[i] = update[i];
         projects[i] = projections[i].has_value();
         sums.push_back(projects[i] ? projections[i]->data() : nullptr);
-        require(!projects[i] || (static_cast<int>(projections[i]->shape(0)) == views[i].image.rows &&
-                                 static_cast<int>(projections[i]->shape(1)) == views[i].image.columns),
+        require(!projects[i] || (static_cast<int>(projections[i]->shape(0)) == views[i].rows &&
+                                 static_cast<int>(projections[i]->shape(1)) == views[i].columns),
                 "projections and images differ in shape");
     }
     const SmartPass job{views.data(), updates, projects, static_cast<int>(views.size()), shape, volume.data()};
@@ -147,12 +168,45 @@ void smart_pass(const std::vector<const BoundView *> &bound, const std::vector<b
     run_smart_pass(kernels, job, sums, threads);
 }
 
+Recorded recorded(const RecordedArray &image) {
+    require(image.size() > 0 && image.size() < (1u << 30), "image: empty or too large");
+    return {image.data(), static_cast<int>(image.shape(0)), static_cast<int>(image.shape(1))};
+}
+
+float quantise_framed(const RecordedArray &image, int before, int after, const FilledPixels &out, int threads) {
+    const Recorded from = recorded(image);
+    require(before >= 0 && after >= 0 && static_cast<int64_t>(out.shape(0)) == from.rows + before + after &&
+                static_cast<int64_t>(out.shape(1)) == from.columns + before + after,
+            "quantise: image and frame do not fill the output");
+    require(threads >= 1, "threads must be positive");
+    const Kernels &kernels = selected_kernels();
+    nb::gil_scoped_release release;
+    return quantise(kernels, from, before, after, out.data(), threads);
+}
+
+float resample_image(const RecordedArray &image, const MapArray &nodes, const FilledPixels &out, int threads) {
+    constexpr int spacing = Resampling::node_spacing;
+    const Recorded from = recorded(image);
+    const int rows = static_cast<int>(out.shape(0)), columns = static_cast<int>(out.shape(1));
+    require(columns % spacing == 0 && rows > 0, "resample: the output must have a multiple of 16 columns");
+    require(static_cast<int>(nodes.shape(0)) >= (rows - 1) / spacing + 2 &&
+                static_cast<int>(nodes.shape(1)) >= columns / spacing + 1,
+            "resample: the nodes do not cover the output");
+    require(threads >= 1, "threads must be positive");
+    const Kernels &kernels = selected_kernels();
+    nb::gil_scoped_release release;
+    return resample(kernels, from, nodes.data(), static_cast<int>(nodes.shape(1)), out.data(), rows, columns, threads);
+}
+
 }  // namespace
 
 NB_MODULE(_native, module) {
     nb::class_<BoundView>(module, "View")
-        .def_static("rectified", &BoundView::rectified, "pixels"_a, "scale"_a, "shift_u"_a, "shift_v"_a)
-        .def_static("mapped", &BoundView::mapped, "pixels"_a, "nodes"_a, "spacing"_a);
+        .def_static("rectified", &BoundView::rectified, "pixels"_a, "unit"_a, "scale"_a, "shift_u"_a,
+                    "shift_v"_a, "cull"_a = true)
+        .def_static("mapped", &BoundView::mapped, "pixels"_a, "unit"_a, "nodes"_a, "spacing"_a);
+    module.def("quantise", &quantise_framed, "image"_a, "before"_a, "after"_a, "out"_a, "threads"_a);
+    module.def("resample", &resample_image, "image"_a, "nodes"_a, "out"_a, "threads"_a);
     module.def("line_of_sight", &line_of_sight, "views"_a, "method"_a, "volume"_a, "threads"_a);
     module.def("smart_pass", &smart_pass, "views"_a, "update"_a, "projections"_a, "volume"_a, "threads"_a);
     module.def("available_isas", &available_isas);

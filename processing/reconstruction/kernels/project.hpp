@@ -25,8 +25,8 @@ inline void project_rectified(const View &view, const PlaneRows &plane, const Pr
     const int u_end = smaller(to.columns, floor_of(scale * plane.end + shift_u) + 1);
     const int v_begin = larger(to.first_row, ceil_of(scale * (plane.y0 - 1) + shift_v));
     const int v_end = smaller(to.first_row + to.rows, floor_of(scale * (plane.y0 + plane.rows) + shift_v) + 1);
-    alignas(64) Row along_x[slab_rows + 2];
-    Taps taps;
+    alignas(64) Row along_x[smart_rows + 2];
+    FloatTaps taps;
     for (int u = u_begin; u < u_end; u += tile_columns) {
         const int columns = smaller(tile_columns, u_end - u);
         set_taps(taps, (u - shift_u) * step + guard, step, columns);
@@ -47,17 +47,16 @@ inline void project_rectified(const View &view, const PlaneRows &plane, const Pr
 
 // Voxel-driven, the adjoint of sampling: every voxel spreads its intensity, times the pixel area it covers, over
 // the four pixels it is sampled from.
-inline void project_nodes(const View &view, const PlaneRows &plane, const Projection &to) {
-    const Clamp last(view.image);
-    alignas(64) Row u, v, area;
+inline void project_nodes(const View &view, const PlaneRows &plane, const PlaneTaps &taps, const Projection &to) {
+    const Clamp last(view);
+    alignas(64) float u[block_columns], v[block_columns], area[block_columns];
     for (int row = 0; row < plane.rows; ++row) {
         const float *voxels = plane.voxels + row * plane.stride;
-        for (int x0 = plane.begin / tile_columns * tile_columns; x0 < plane.end; x0 += tile_columns) {
-            const int columns = smaller(tile_columns, plane.end - x0);
-            node_row(view, 0, plane.z, plane.y0 + row, x0, columns, u);
-            node_row(view, 1, plane.z, plane.y0 + row, x0, columns, v);
-            node_row(view, 2, plane.z, plane.y0 + row, x0, columns, area);
-            for (int k = 0; k < columns; ++k) {
+        for (int x0 = plane.begin / block_columns * block_columns; x0 < plane.end; x0 += block_columns) {
+            spread_line(taps.line(row, 0), view.spacing, x0, u);
+            spread_line(taps.line(row, 1), view.spacing, x0, v);
+            spread_line(taps.line(row, 2), view.spacing, x0, area);
+            for (int k = 0; k < smaller(block_columns, plane.end - x0); ++k) {
                 if (voxels[x0 + k] == 0.0f) continue;
                 const float at_u = Clamp::between(u[k], last.u), at_v = Clamp::between(v[k], last.v);
                 const int iu = static_cast<int>(at_u), iv = static_cast<int>(at_v);
@@ -73,9 +72,9 @@ inline void project_nodes(const View &view, const PlaneRows &plane, const Projec
     }
 }
 
-inline void project(const View &view, const PlaneRows &plane, const Projection &to) {
+inline void project(const View &view, const PlaneRows &plane, const PlaneTaps &taps, const Projection &to) {
     if (view.nodes)
-        project_nodes(view, plane, to);
+        project_nodes(view, plane, taps, to);
     else
         project_rectified(view, plane, to);
 }

@@ -1,108 +1,225 @@
-// What a view sees at the voxels of a tile: bilinear interpolation of its image, zero outside.
+// What a view sees at the voxels of a block: bilinear interpolation of its image, zero outside.
 #pragma once
 
 #include "job.hpp"
-#include "lanes.hpp"
+#include "windows.hpp"
 
 namespace tomoshadow::TOMOSHADOW_ISA {
 namespace {
 
-// Voxels (z, y0 .. y0 + rows - 1, x0 .. x0 + columns - 1).
+// Voxels (z, y0 .. y0 + rows - 1, x0 .. x0 + block_columns - 1); columns beyond the volume are computed, not kept.
 struct Tile {
-    int z, y0, rows, x0, columns;
+    int z, y0, rows, x0;
 };
 
+// Values of the voxels of a tile.
 struct alignas(64) Block {
-    Row rows[slab_rows];
+    float rows[sight_rows][block_columns];
 };
 
-// Image rows that the rows of a slab can touch: slab_rows steps of up to max_step, neighbours included.
-constexpr int touched_rows = 20;
+// How the samples of a view enter a block: they replace, multiply or limit what is there. Samples are in units of
+// the image times `factor`.
+enum class Combine { set, multiply, multiply_raw, limit };
 
-// Separable: first along x once per image row, then along y once per voxel row.
-inline void sample_rectified(const View &view, const Tile &tile, Block &out) {
-    const double scale = view.scale[tile.z];
-    Taps taps;
-    set_taps(taps, scale * tile.x0 + view.shift_u[tile.z], scale, tile.columns);
-    const double top = scale * tile.y0 + view.shift_v[tile.z];
-    const int first = static_cast<int>(top);
-    const int count = static_cast<int>(top + scale * (tile.rows - 1)) - first + 2;
-    alignas(64) Row along_x[touched_rows];
-    const float *pixels = view.image.pixels + static_cast<int64_t>(first) * view.image.columns;
-    for (int row = 0; row < count; ++row)
-        interpolate(pixels + static_cast<int64_t>(row) * view.image.columns, taps, along_x[row]);
-    for (int row = 0; row < tile.rows; ++row) {
-        const double position = top + scale * row;
+template <Combine how>
+inline void combine(float *at, Floats seen, float factor) {
+    if (how != Combine::multiply_raw) seen = seen * factor;
+    if (how != Combine::set) {
+        const Floats before = load<Floats>(at);
+        seen = how == Combine::limit ? (seen < before ? seen : before) : before * seen;
+    }
+    store(at, seen);
+}
+
+// Rows of an image between which the rows of a tile are seen, and the weight of the lower one.
+struct RowTaps {
+    const int16_t *above[sight_rows];
+    int32_t weight[sight_rows];
+    int first_row;
+};
+
+inline RowTaps row_taps(const View &view, int z, int y0, int rows) {
+    RowTaps taps;
+    for (int row = 0; row < rows; ++row) {
+        const double position = view.scale[z] * (y0 + row) + view.shift_v[z];
         const int at = static_cast<int>(position);
-        const float fraction = static_cast<float>(position - at);
-        const float *above = along_x[at - first], *below = along_x[at - first + 1];
-        for (int k = 0; k < tile.columns; ++k) out.rows[row][k] = above[k] + fraction * (below[k] - above[k]);
+        if (row == 0) taps.first_row = at;
+        taps.above[row] = view.pixels + static_cast<int64_t>(at) * view.columns;
+        taps.weight[row] = vertical_weight(static_cast<float>(position - at));
+    }
+    return taps;
+}
+
+// What a slab needs of a view in one plane, whatever the tile.
+struct PlaneTaps {
+    RowTaps rows;     // rectified
+    float *lines;     // by nodes: u, v and maybe area of every row
+    int line_length, channels;
+
+    const float *line(int row, int channel) const {
+        return lines + (static_cast<int64_t>(row) * channels + channel) * line_length;
+    }
+};
+
+template <Combine how, bool shared>
+inline void sample_windows(const View &view, const RowTaps &rows, const Tile &tile, float factor, Block &block) {
+    constexpr int parts = block_columns / lanes;
+    const double scale = view.scale[tile.z], start = scale * tile.x0 + view.shift_u[tile.z];
+    Taps taps[parts];
+    for (int part = 0; part < parts; ++part) {
+        const double position = start + scale * lanes * part;
+        taps[part] = shared ? taps_from(static_cast<int>(start), position, scale) : taps_at(position, scale);
+    }
+    for (int row = 0; row < tile.rows; ++row) {
+        const int16_t *above = rows.above[row], *below = above + view.columns;
+        Window window = blend(above, below, rows.weight[row], taps[0]);
+        combine<how>(block.rows[row], pick(window, taps[0]), factor);
+        for (int part = 1; part < parts; ++part) {
+            if (!shared) window = blend(above, below, rows.weight[row], taps[part]);
+            combine<how>(block.rows[row] + part * lanes, pick(window, taps[part]), factor);
+        }
     }
 }
 
-// One channel of the nodes along voxels (z, y, x0 ..), linear between nodes. x0 is a multiple of the spacing.
-inline void node_row(const View &view, int channel, int z, int y, int x0, int columns, float *out) {
-    const int spacing = view.spacing;
+template <Combine how>
+inline void sample_rectified(const View &view, const RowTaps &rows, const Tile &tile, float factor, Block &block) {
+    if (view.scale[tile.z] <= max_shared_scale)
+        sample_windows<how, true>(view, rows, tile, factor, block);
+    else
+        sample_windows<how, false>(view, rows, tile, factor, block);
+}
+
+// Nodes that whole blocks of a row need; those beyond the lattice repeat the last one.
+inline int line_length(const View &view, int nx) {
+    return (nx + block_columns - 1) / block_columns * block_columns / view.spacing + 1;
+}
+
+// One channel of the nodes of the row of constant z and y, linear between four nodes each.
+inline void node_line(const View &view, int channel, int z, int y, int length, float *line) {
+    const float step = 1.0f / static_cast<float>(view.spacing);
+    const float along_z = static_cast<float>(z % view.spacing) * step, along_y = static_cast<float>(y % view.spacing) * step;
+    const int n = view.nodes_x, known = smaller(n, length);
+    const int64_t plane = static_cast<int64_t>(view.nodes_y) * n;
+    const float *near = view.nodes + (static_cast<int64_t>(channel) * view.nodes_z + z / view.spacing) * plane +
+                        static_cast<int64_t>(y / view.spacing) * n;
+    for (int k = 0; k < known; ++k) {
+        const float front = near[k] + along_y * (near[k + n] - near[k]);
+        const float back = near[plane + k] + along_y * (near[plane + k + n] - near[plane + k]);
+        line[k] = front + along_z * (back - front);
+    }
+    for (int k = known; k < length; ++k) line[k] = line[known - 1];
+}
+
+// Values at the voxels of a block, linear between the nodes of a line.
+inline void spread_line(const float *line, int spacing, int x0, float *out) {
     const float step = 1.0f / static_cast<float>(spacing);
-    const float along_z = static_cast<float>(z % spacing) * step, along_y = static_cast<float>(y % spacing) * step;
-    const int64_t plane = static_cast<int64_t>(view.nodes_y) * view.nodes_x;
-    const float *near = view.nodes + (static_cast<int64_t>(channel) * view.nodes_z + z / spacing) * plane +
-                        static_cast<int64_t>(y / spacing) * view.nodes_x + x0 / spacing;
-    const auto node = [&](const float *at) {
-        const float front = at[0] + along_y * (at[view.nodes_x] - at[0]);
-        const float back = at[plane] + along_y * (at[plane + view.nodes_x] - at[plane]);
-        return front + along_z * (back - front);
-    };
-    float left = node(near);
-    for (int k = 0; k < columns; k += spacing) {
-        const float right = node(++near), slope = (right - left) * step;
-        for (int j = 0; j < spacing; ++j) out[k + j] = left + slope * static_cast<float>(j);
-        left = right;
+    line += x0 / spacing;
+    for (int k = 0; k < block_columns; k += spacing, ++line) {
+        const float slope = (line[1] - line[0]) * step;
+        for (int j = 0; j < spacing; ++j) out[k + j] = line[0] + slope * static_cast<float>(j);
     }
 }
 
 struct Clamp {
     float u, v;  // the last position that still has a right and a lower neighbour, both in the frame of zeros
-    explicit Clamp(const Image &image)
-        : u(static_cast<float>(image.columns - 2)), v(static_cast<float>(image.rows - 2)) {}
+    explicit Clamp(const View &view)
+        : u(static_cast<float>(view.columns - 2)), v(static_cast<float>(view.rows - 2)) {}
     static float between(float x, float last) {
         x = x > 0.0f ? x : 0.0f;  // not-a-number becomes 0
         return x < last ? x : last;
     }
+    static Floats between(Floats x, float last) {
+        const Floats zero{}, most = zero + last;
+        x = x > zero ? x : zero;
+        return x < most ? x : most;
+    }
 };
 
-// Any mapping: the position of every voxel, then its four pixels. Images carry a frame of zeros.
-inline void sample_nodes(const View &view, const Tile &tile, Block &out) {
-    const Clamp last(view.image);
-    const int columns = view.image.columns;
-    const float *pixels = view.image.pixels;
-    alignas(64) Row u, v;
+// Two neighbouring pixels, weighted: one 32-bit word is all that a voxel needs of a row.
+inline Floats weighted_pairs(const int16_t *pixels, Ints at, Ints weight) {
+#if defined(__AVX512BW__)
+    const __m512i pairs = _mm512_i32gather_epi32(reinterpret_cast<__m512i>(at), pixels, 2);
+    return reinterpret_cast<Floats>(_mm512_cvtepi32_ps(_mm512_madd_epi16(pairs, reinterpret_cast<__m512i>(weight))));
+#elif defined(__AVX2__)
+    const __m256i pairs =
+        _mm256_i32gather_epi32(reinterpret_cast<const int *>(pixels), reinterpret_cast<__m256i>(at), 2);
+    return reinterpret_cast<Floats>(_mm256_cvtepi32_ps(_mm256_madd_epi16(pairs, reinterpret_cast<__m256i>(weight))));
+#else
+    Ints sum;
+    for (int k = 0; k < lanes; ++k)
+        sum[k] = pixels[at[k]] * (weight[k] & 0xffff) + pixels[at[k] + 1] * (weight[k] >> 16);
+    return __builtin_convertvector(sum, Floats);
+#endif
+}
+
+// Any mapping: the position of every voxel from the `lines` of nodes (u, v by row), then its four pixels.
+// Images carry a frame of zeros.
+template <Combine how>
+inline void sample_nodes(const View &view, const PlaneTaps &taps, const Tile &tile, float factor, Block &block) {
+    const Clamp last(view);
+    alignas(64) float u[block_columns], v[block_columns];
     for (int row = 0; row < tile.rows; ++row) {
-        node_row(view, 0, tile.z, tile.y0 + row, tile.x0, tile.columns, u);
-        node_row(view, 1, tile.z, tile.y0 + row, tile.x0, tile.columns, v);
-        float *seen = out.rows[row];
-        for (int k = 0; k < tile.columns; ++k) {
-            const float at_u = Clamp::between(u[k], last.u), at_v = Clamp::between(v[k], last.v);
-            const int iu = static_cast<int>(at_u), iv = static_cast<int>(at_v), at = iv * columns + iu;
-            const float fu = at_u - static_cast<float>(iu), fv = at_v - static_cast<float>(iv);
-            const float above = pixels[at] + fu * (pixels[at + 1] - pixels[at]);
-            const float below = pixels[at + columns] + fu * (pixels[at + columns + 1] - pixels[at + columns]);
-            seen[k] = above + fv * (below - above);
+        spread_line(taps.line(row, 0), view.spacing, tile.x0, u);
+        spread_line(taps.line(row, 1), view.spacing, tile.x0, v);
+        for (int k = 0; k < block_columns; k += lanes) {
+            const Floats at_u = Clamp::between(load<Floats>(u + k), last.u);
+            const Floats at_v = Clamp::between(load<Floats>(v + k), last.v);
+            const Ints iu = __builtin_convertvector(at_u, Ints), iv = __builtin_convertvector(at_v, Ints);
+            const Ints weight = horizontal_weights(at_u - __builtin_convertvector(iu, Floats)), at = iv * view.columns + iu;
+            const Floats above = weighted_pairs(view.pixels, at, weight);
+            const Floats below = weighted_pairs(view.pixels, at + view.columns, weight);
+            const Floats down = at_v - __builtin_convertvector(iv, Floats);
+            combine<how>(block.rows[row] + k, above + down * (below - above), factor);
         }
     }
 }
 
-inline void sample(const View &view, const Tile &tile, Block &out) {
-    if (view.nodes)
-        sample_nodes(view, tile, out);
-    else
-        sample_rectified(view, tile, out);
+inline void set_plane(const View &view, int z, int y0, int rows, PlaneTaps &taps) {
+    if (!view.nodes) {
+        taps.rows = row_taps(view, z, y0, rows);
+        return;
+    }
+    float *line = taps.lines;
+    for (int row = 0; row < rows; ++row)
+        for (int channel = 0; channel < taps.channels; ++channel, line += taps.line_length)
+            node_line(view, channel, z, y0 + row, taps.line_length, line);
 }
 
-inline bool all_zero(const Block &block, const Tile &tile) {
-    for (int row = 0; row < tile.rows; ++row) {
+template <Combine how>
+inline void sample(const View &view, const PlaneTaps &taps, const Tile &tile, float factor, Block &block) {
+    if (view.nodes)
+        sample_nodes<how>(view, taps, tile, factor, block);
+    else
+        sample_rectified<how>(view, taps.rows, tile, factor, block);
+}
+
+// The product of what some views see. Samples have up to 29 bits, so that a float holds the product of two before it
+// is scaled: every other view does without.
+inline void sample_product(const View *views, const int *chosen, int count, const PlaneTaps *taps, const Tile &tile,
+                           Block &block) {
+    for (int n = 0; n < count; ++n) {
+        const int i = chosen[n];
+        float factor = views[i].unit * sample_unit;
+        if (n % 2 == 0 && n + 1 < count) factor *= views[chosen[n + 1]].unit * sample_unit;
+        if (n == 0)
+            sample<Combine::set>(views[i], taps[i], tile, factor, block);
+        else if (n % 2 == 0)
+            sample<Combine::multiply>(views[i], taps[i], tile, factor, block);
+        else
+            sample<Combine::multiply_raw>(views[i], taps[i], tile, factor, block);
+    }
+}
+
+inline void sample_minimum(const View *views, int n_views, const PlaneTaps *taps, const Tile &tile, Block &block) {
+    sample<Combine::set>(views[0], taps[0], tile, views[0].unit * sample_unit, block);
+    for (int i = 1; i < n_views; ++i)
+        sample<Combine::limit>(views[i], taps[i], tile, views[i].unit * sample_unit, block);
+}
+
+inline bool all_zero(const Block &block, int rows) {
+    for (int row = 0; row < rows; ++row) {
         int32_t any = 0;
-        for (int k = 0; k < tile.columns; ++k) any |= block.rows[row][k] != 0.0f;
+        for (int k = 0; k < block_columns; ++k) any |= block.rows[row][k] != 0.0f;
         if (any) return false;
     }
     return true;

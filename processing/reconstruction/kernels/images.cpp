@@ -1,0 +1,97 @@
+#include "images.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <memory>
+
+#include "bands.hpp"
+
+namespace tomoshadow {
+
+namespace {
+
+constexpr int rows_at_once = 16;
+
+void for_rows(int rows, int threads, const std::function<void(int, int)> &work) {
+    for_each((rows + rows_at_once - 1) / rows_at_once, threads, [&](int chunk) {
+        work(chunk * rows_at_once, std::min(rows, (chunk + 1) * rows_at_once));
+    });
+}
+
+// Reach of a block, in cells: a position anywhere in a cell, all further samples, and their right or lower neighbours.
+int reach(int cell, int voxels, double max_scale) {
+    return (cell - 1 + static_cast<int>(std::ceil((voxels - 1) * max_scale)) + 2) / cell + 1;
+}
+
+}  // namespace
+
+float quantise(const Kernels &kernels, const Recorded &image, int before, int after, int16_t *to, int threads) {
+    std::vector<float> brightest(static_cast<size_t>(image.rows), 0.0f);
+    for_rows(image.rows, threads, [&](int first, int end) {
+        for (int row = first; row < end; ++row)
+            brightest[row] =
+                kernels.brightest(image.pixels + static_cast<int64_t>(row) * image.columns, image.columns);
+    });
+    const float largest = *std::max_element(brightest.begin(), brightest.end());
+    const float unit = (largest > 0.0f ? largest : 1.0f) / 32767.0f;
+    const int64_t columns = image.columns + before + after;
+    for_rows(image.rows + before + after, threads, [&](int first, int end) {
+        for (int row = first; row < end; ++row) {
+            int16_t *line = to + row * columns;
+            const int from = row - before;
+            if (from < 0 || from >= image.rows) {
+                std::fill(line, line + columns, int16_t(0));
+                continue;
+            }
+            std::fill(line, line + before, int16_t(0));
+            kernels.quantise(image.pixels + static_cast<int64_t>(from) * image.columns, 1.0f / unit, line + before,
+                             image.columns);
+            std::fill(line + before + image.columns, line + columns, int16_t(0));
+        }
+    });
+    return unit;
+}
+
+float resample(const Kernels &kernels, const Recorded &image, const float *nodes, int nodes_x, int16_t *to, int rows,
+               int columns, int threads) {
+    constexpr int margin = Resampling::margin;
+    const int from_rows = image.rows + 2 * margin, from_columns = image.columns + 2 * margin;
+    // not a vector, which would write zeros first; the windows of the last pixels read beyond their row
+    const std::unique_ptr<int16_t[]> from(new int16_t[static_cast<size_t>(from_rows) * from_columns]);
+    const float unit = quantise(kernels, image, margin, margin, from.get(), threads);
+    const Resampling job{from.get(), from_rows, from_columns, nodes, nodes_x, to, columns};
+    for_rows(rows, threads, [&](int first, int end) { kernels.resample(job, first, end); });
+    return unit;
+}
+
+std::vector<uint8_t> occupied_cells(const int16_t *pixels, int rows, int columns, double max_scale) {
+    constexpr int cell_rows = Occupancy::cell_rows, cell_columns = Occupancy::cell_columns;
+    const int cells_y = (rows + cell_rows - 1) / cell_rows, cells_x = (columns + cell_columns - 1) / cell_columns;
+    std::vector<uint8_t> any(static_cast<size_t>(cells_y) * cells_x), along_x(any.size());
+    for (int row = 0; row < rows; ++row) {
+        const int16_t *line = pixels + static_cast<size_t>(row) * columns;
+        uint8_t *cells = any.data() + static_cast<size_t>(row / cell_rows) * cells_x;
+        for (int cell = 0; cell < columns / cell_columns; ++cell) {
+            uint64_t words[2];
+            std::memcpy(words, line + cell * cell_columns, sizeof words);
+            cells[cell] |= (words[0] | words[1]) != 0;
+        }
+        for (int column = columns / cell_columns * cell_columns; column < columns; ++column)
+            cells[column / cell_columns] |= line[column] != 0;
+    }
+    const int reach_x = reach(cell_columns, block_columns, max_scale), reach_y = reach(cell_rows, sight_rows, max_scale);
+    for (int y = 0; y < cells_y; ++y)
+        for (int x = 0; x < cells_x; ++x)
+            for (int k = x; k < std::min(cells_x, x + reach_x); ++k)
+                along_x[static_cast<size_t>(y) * cells_x + x] |= any[static_cast<size_t>(y) * cells_x + k];
+    for (int y = 0; y < cells_y; ++y) {
+        uint8_t *out = any.data() + static_cast<size_t>(y) * cells_x;
+        std::fill(out, out + cells_x, uint8_t(0));
+        for (int k = y; k < std::min(cells_y, y + reach_y); ++k)
+            for (int x = 0; x < cells_x; ++x) out[x] |= along_x[static_cast<size_t>(k) * cells_x + x];
+    }
+    return any;
+}
+
+}  // namespace tomoshadow

@@ -1,0 +1,27 @@
+// Images on their way to the kernels: fixed point, resampling, occupancy.
+#pragma once
+
+#include <vector>
+
+#include "job.hpp"
+
+namespace tomoshadow {
+
+// A recorded image of intensities, contiguous.
+struct Recorded {
+    const float *pixels;
+    int rows, columns;
+};
+
+// Write intensities in fixed point into the middle of an image of (rows + before + after) x (columns + before + after)
+// pixels; the frame is set to zero. Returns the intensity of one count. Negative intensities count as zero.
+float quantise(const Kernels &kernels, const Recorded &image, int before, int after, int16_t *to, int threads);
+
+// Resample a recorded image onto rows x columns pixels, see Resampling. Returns the intensity of one count.
+float resample(const Kernels &kernels, const Recorded &image, const float *nodes, int nodes_x, int16_t *to, int rows,
+               int columns, int threads);
+
+// Cells of a rectified image where a block of line of sight or SMART may see something, see Occupancy.
+std::vector<uint8_t> occupied_cells(const int16_t *pixels, int rows, int columns, double max_scale);
+
+}  // namespace tomoshadow

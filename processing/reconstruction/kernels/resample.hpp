@@ -1,0 +1,157 @@
+// A recorded image resampled by cubic convolution (Keys 1981), at positions that are linear between nodes.
+#pragma once
+
+#include "job.hpp"
+#include "lanes.hpp"
+
+namespace tomoshadow::TOMOSHADOW_ISA {
+namespace {
+
+constexpr int spacing = Resampling::node_spacing;
+constexpr float keys = -0.75f;  // slope of the kernel at distance 1
+
+// Weights of the four pixels around a position with this fraction.
+struct CubicWeights {
+    float w[4];
+    explicit CubicWeights(float f) {
+        const float g = 1.0f - f;
+        w[0] = keys * f * g * g;
+        w[1] = ((keys + 2) * f - (keys + 3)) * f * f + 1;
+        w[2] = ((keys + 2) * g - (keys + 3)) * g * g + 1;
+        w[3] = keys * g * f * f;
+    }
+};
+
+inline int16_t rounded(float value) {
+    value = value > 0.0f ? value : 0.0f;
+    return static_cast<int16_t>((value < 32767.0f ? value : 32767.0f) + 0.5f);
+}
+
+// Positions (u, v) of `spacing` pixels of the resampled image, in the recorded one with its margins.
+struct Segment {
+    float u, v, step_u, step_v;
+
+    Segment(const Resampling &job, int row, int column) {
+        const int from = row / spacing;
+        const float along = static_cast<float>(row % spacing) / spacing;
+        const float *upper = job.nodes + 2 * (static_cast<int64_t>(from) * job.nodes_x + column / spacing);
+        const float *lower = upper + 2 * job.nodes_x;
+        const auto node = [&](int k) { return upper[k] + along * (lower[k] - upper[k]); };
+        u = node(0) + Resampling::margin;
+        v = node(1) + Resampling::margin;
+        step_u = (node(2) - node(0)) / spacing;
+        step_v = (node(3) - node(1)) / spacing;
+    }
+    float last_u() const { return u + step_u * (spacing - 1); }
+    float last_v() const { return v + step_v * (spacing - 1); }
+};
+
+inline float lesser(float a, float b) { return a < b ? a : b; }
+inline float greater(float a, float b) { return a > b ? a : b; }
+
+// A box of pixels around all that a segment needs, one more on each side of the four.
+struct Box {
+    int left, top, bottom;
+    bool inside;
+
+    Box(const Resampling &job, const Segment &at) {
+        const float u0 = lesser(at.u, at.last_u()), u1 = greater(at.u, at.last_u());
+        const float v0 = lesser(at.v, at.last_v()), v1 = greater(at.v, at.last_v());
+        // also false for positions that are not numbers
+        inside = u0 >= 2 && v0 >= 2 && u1 < static_cast<float>(job.from_columns - 34) &&
+                 v1 < static_cast<float>(job.from_rows - 4);
+        left = inside ? static_cast<int>(u0) - 1 : 0;
+        top = inside ? static_cast<int>(v0) - 1 : 0;
+        bottom = inside ? static_cast<int>(v1) + 3 : 0;
+    }
+};
+
+inline void resample_one_by_one(const Resampling &job, const Segment &at, int16_t *to) {
+    for (int k = 0; k < spacing; ++k) {
+        const float u = at.u + at.step_u * static_cast<float>(k), v = at.v + at.step_v * static_cast<float>(k);
+        const int iu = static_cast<int>(u), iv = static_cast<int>(v);
+        const CubicWeights along(u - static_cast<float>(iu)), down(v - static_cast<float>(iv));
+        const int16_t *pixel = job.from + static_cast<int64_t>(iv - 1) * job.from_columns + iu - 1;
+        float sum = 0.0f;
+        for (int row = 0; row < 4; ++row, pixel += job.from_columns)
+            sum += down.w[row] * (along.w[0] * pixel[0] + along.w[1] * pixel[1] + along.w[2] * pixel[2] + along.w[3] * pixel[3]);
+        to[k] = rounded(sum);
+    }
+}
+
+#if defined(__AVX512BW__)
+
+constexpr float widest_window = 26.0f;  // columns that a segment may cross: 32 less the four taps and rounding
+
+inline Floats cubic_at(Floats distance) {
+    const Floats zero{};
+    const Floats d = distance < zero ? -distance : distance;
+    const Floats near = ((keys + 2) * d - (keys + 3)) * d * d + 1.0f, far = ((d - 5.0f) * d + 8.0f) * d * keys - 4.0f * keys;
+    return d < zero + 1.0f ? near : d < zero + 2.0f ? far : zero;
+}
+
+// All sixteen pixels of a segment at once, row by row of the window; no gathers.
+inline void resample_window(const Resampling &job, const Segment &at, const Box &box, int16_t *to) {
+    Floats lane;
+    for (int k = 0; k < lanes; ++k) lane[k] = static_cast<float>(k);
+    const Floats u = lane * at.step_u + (at.u - static_cast<float>(box.left + 1));
+    const Floats v = lane * at.step_v + (at.v - static_cast<float>(box.top));
+    const Ints index = __builtin_convertvector(u, Ints);
+    const Floats f = u - __builtin_convertvector(index, Floats);
+    const auto fixed = [](Floats weight) {
+        return reinterpret_cast<Ints>(_mm512_cvtps_epi32(reinterpret_cast<__m512>(weight * 16384.0f)));
+    };
+    const Ints w0 = fixed(cubic_at(f + 1.0f)), w1 = fixed(cubic_at(f)), w2 = fixed(cubic_at(1.0f - f));
+    const Ints w3 = 16384 - w0 - w1 - w2;
+    const auto weights_a = reinterpret_cast<__m512i>((w0 & 0xffff) | w1 << 16);
+    const auto weights_b = reinterpret_cast<__m512i>((w2 & 0xffff) | w3 << 16);
+    const Ints pairs = (index | index << 16) + 0x10000;
+    const auto taps_a = reinterpret_cast<__m512i>(pairs), taps_b = reinterpret_cast<__m512i>(pairs + 0x20002);
+    const int16_t *pixels = job.from + static_cast<int64_t>(box.top) * job.from_columns + box.left;
+    Floats sum{};
+    for (int row = 0; row <= box.bottom - box.top; ++row, pixels += job.from_columns) {
+        const __m512i window = _mm512_loadu_si512(pixels);
+        const __m512i a = _mm512_madd_epi16(_mm512_permutexvar_epi16(taps_a, window), weights_a);
+        const __m512i b = _mm512_madd_epi16(_mm512_permutexvar_epi16(taps_b, window), weights_b);
+        const auto seen = reinterpret_cast<Floats>(_mm512_cvtepi32_ps(_mm512_add_epi32(a, b)));
+        sum += cubic_at(v - static_cast<float>(row)) * seen;
+    }
+    const __m512 scaled = reinterpret_cast<__m512>(sum * (1.0f / 16384.0f));
+    const __m512 limited = _mm512_min_ps(_mm512_max_ps(scaled, _mm512_setzero_ps()), _mm512_set1_ps(32767.0f));
+    _mm256_storeu_si256(reinterpret_cast<__m256i *>(to), _mm512_cvtepi32_epi16(_mm512_cvtps_epi32(limited)));
+}
+
+#endif
+
+float brightest(const float *pixels, int count) {
+    float largest = 0.0f;
+    for (int k = 0; k < count; ++k) largest = pixels[k] > largest ? pixels[k] : largest;
+    return largest;
+}
+
+void quantise(const float *pixels, float counts_per_unit, int16_t *to, int count) {
+    for (int k = 0; k < count; ++k) to[k] = rounded(pixels[k] * counts_per_unit);
+}
+
+void resample(const Resampling &job, int first_row, int end_row) {
+    for (int row = first_row; row < end_row; ++row)
+        for (int column = 0; column < job.columns; column += spacing) {
+            int16_t *to = job.to + static_cast<int64_t>(row) * job.columns + column;
+            const Segment at(job, row, column);
+            const Box box(job, at);
+            if (!box.inside) {
+                std::memset(to, 0, sizeof(int16_t) * spacing);
+                continue;
+            }
+#if defined(__AVX512BW__)
+            if (at.step_u * (spacing - 1) < widest_window && at.step_u * (spacing - 1) > -widest_window) {
+                resample_window(job, at, box, to);
+                continue;
+            }
+#endif
+            resample_one_by_one(job, at, to);
+        }
+}
+
+}  // namespace
+}  // namespace tomoshadow::TOMOSHADOW_ISA
