@@ -16,6 +16,7 @@ from processing.studies.density import (
     density_statements,
     density_study,
 )
+from processing.studies.ghosts import GhostRow, GhostStudy, ghost_figure, ghost_statements, ghost_study
 from processing.studies.recipe import ALL_RECIPES, PAPER_RECIPES, Recipe
 from processing.studies.report import Statement, csv_text
 from server.commands import progress
@@ -36,6 +37,18 @@ def study_density(options: Namespace) -> dict[str, Any]:
 def _density_line(row: DensityRow) -> str:
     place = f"sigma {row.sigma_voxel:g}, {row.density_per_mm3:5.1f} droplets/mm3"
     return f"{place}, {row.method}: Q = {row.quality_factor:.3f}"
+
+
+def study_ghosts(options: Namespace) -> dict[str, Any]:
+    """``tomoshadow study ghosts``."""
+    recipes = tuple(Recipe.named(name) for name in options.method) if options.method else ALL_RECIPES
+    rows = _collected(ghost_study(GhostStudy(sigma_voxel=options.sigma, recipes=recipes)), _ghost_line)
+    return _report(options.out, "ghosts", rows, ghost_figure(rows), ghost_statements(rows))
+
+
+def _ghost_line(row: GhostRow) -> str:
+    place = f"{row.density_per_mm3:5.1f} droplets/mm3, {row.method}, {row.threshold_rule}"
+    return f"{place}: {100 * row.found:.1f} % found, {100 * row.ghosts:.1f} % ghosts"
 
 
 def _recipes(options: Namespace) -> tuple[Recipe, ...]:

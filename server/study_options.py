@@ -14,6 +14,7 @@ AddVerb = Callable[..., argparse.ArgumentParser]
 def add_studies(add_verb: AddVerb) -> None:
     """Add the command of every study."""
     _add_density(add_verb)
+    _add_ghosts(add_verb)
 
 
 def _add_density(add_verb: AddVerb) -> None:
@@ -24,6 +25,13 @@ def _add_density(add_verb: AddVerb) -> None:
     parser.add_argument("--iterations", type=count, default=PAPER_ITERATIONS, help="of smart and mart without -N")
     _add_methods(parser, "mlos, minlos, gavlos and smart")
     parser.add_argument("--all", action="store_true", help="sigma 0.75 to 2, all methods, SMART after 5, 10 and 20")
+
+
+def _add_ghosts(add_verb: AddVerb) -> None:
+    parser = add_verb("ghosts", study_commands.study_ghosts, "found and ghost droplets against droplet density")
+    _add_out(parser, "ghosts")
+    parser.add_argument("--sigma", type=positive, default=1.0, help="blob width in voxel")
+    _add_methods(parser, "all, SMART after 5, 10 and 20 iterations, MART after 5")
 
 
 def _add_out(parser: argparse.ArgumentParser, study: str) -> None:

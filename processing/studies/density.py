@@ -13,7 +13,6 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
 from processing.quality import quality_factor
-from processing.reconstruction.line_of_sight import DEFAULT_THREADS
 from processing.reconstruction.plan import plan_reconstruction
 from processing.studies.recipe import PAPER_RECIPES, Recipe, reconstruct_each
 from processing.studies.report import Statement
@@ -76,7 +75,7 @@ class DensityRow:
     sigma_voxel: float
 
 
-def density_study(study: DensityStudy | None = None, threads: int = DEFAULT_THREADS) -> Iterator[DensityRow]:
+def density_study(study: DensityStudy | None = None) -> Iterator[DensityRow]:
     """Simulate, reconstruct and compare; yields each result as soon as it is known.
 
     The same study gives the same rows: droplets are placed by a generator seeded with their number.
@@ -88,7 +87,7 @@ def density_study(study: DensityStudy | None = None, threads: int = DEFAULT_THRE
     for sigma_voxel in study.sigmas_voxel:
         for count in study.counts:
             shot = simulate_shot(study.grid, count, sigma_voxel, cameras)
-            for recipe in reconstruct_each(plan, shot.images, study.recipes, volume, threads):
+            for recipe in reconstruct_each(plan, shot.images, study.recipes, volume):
                 quality = quality_factor(shot.truth, volume, study.window, study.step)
                 yield DensityRow(count / study.grid.volume_mm3, recipe.name, quality, sigma_voxel)
 
@@ -153,6 +152,8 @@ def density_figure(rows: Sequence[DensityRow], study: DensityStudy | None = None
         _draw_panel(axes, [row for row in rows if row.sigma_voxel == sigma_voxel], sigma_voxel)
     for axes in panels.flat[len(sigmas_voxel) :]:
         axes.remove()
+    for axes in panels[:, 0]:
+        axes.set_ylabel("quality factor Q [-]")
     figure.suptitle(f"Q mean-subtracted in {study.window}³ windows at steps of {study.step}", fontsize="small")
     return figure
 
@@ -173,10 +174,10 @@ def _draw_panel(axes: Axes, rows: Sequence[DensityRow], sigma_voxel: float) -> N
         fontsize="small",
         color="0.3",
     )
-    axes.set(ylim=(0, 1.02), ylabel="quality factor Q [-]")
+    axes.set_ylim(0, 1.02)
     axes.set_title(rf"Gaussian droplets of $\sigma$ = {sigma_voxel:g} voxel", fontsize="medium")
     density_axis(axes, sorted({row.density_per_mm3 for row in rows}))
-    axes.legend(frameon=False, loc="upper right", fontsize="small")
+    axes.legend(frameon=False, loc="lower left", fontsize="small")
 
 
 def density_axis(axes: Axes, densities_per_mm3: Sequence[float]) -> None:

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from processing.reconstruction.line_of_sight import DEFAULT_THREADS, line_of_sight
+from processing.reconstruction.line_of_sight import line_of_sight
 from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.plan import Plan
 from processing.reconstruction.smart import mart, smart
@@ -78,9 +78,7 @@ ALL_RECIPES = tuple(Recipe.named(n) for n in ("mlos", "minlos", "gavlos", "smart
 """And how SMART gets there, and MART, which corrects four times per iteration."""
 
 
-def reconstruct_each(
-    plan: Plan, images: Sequence[Image], recipes: Sequence[Recipe], out: Volume, threads: int = DEFAULT_THREADS
-) -> Iterator[Recipe]:
+def reconstruct_each(plan: Plan, images: Sequence[Image], recipes: Sequence[Recipe], out: Volume) -> Iterator[Recipe]:
     """Reconstruct by one recipe after the other; ``out`` holds the volume of the recipe just yielded.
 
     Iterations go on from the recipe before where that is on the way, so ``out`` must not be changed in between.
@@ -89,10 +87,10 @@ def reconstruct_each(
     for recipe in recipes:
         start, done = (out, before.iterations) if before and recipe.continues(before) else (None, 0)
         if recipe.method is ReconstructionMethod.SMART:
-            smart(plan, images, iterations=recipe.iterations - done, start=start, out=out, threads=threads)
+            smart(plan, images, iterations=recipe.iterations - done, start=start, out=out)
         elif recipe.method is ReconstructionMethod.MART:
-            mart(plan, images, iterations=recipe.iterations - done, start=start, out=out, threads=threads)
+            mart(plan, images, iterations=recipe.iterations - done, start=start, out=out)
         else:
-            line_of_sight(plan, images, recipe.method, out, threads=threads)
+            line_of_sight(plan, images, recipe.method, out)
         before = recipe
         yield recipe

@@ -1,0 +1,171 @@
+"""Found and ghost droplets against droplet density: the question that the paper leaves open.
+
+The same simulation as for Fig. 7; every peak of the reconstruction above a threshold counts as a droplet.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from processing.reconstruction.plan import plan_reconstruction
+from processing.studies.density import density_axis
+from processing.studies.detection import (
+    RADIUS_VOXEL,
+    DetectionCurve,
+    best_threshold,
+    detection_curve,
+    half_median_threshold,
+)
+from processing.studies.recipe import ALL_RECIPES, Recipe, reconstruct_each
+from processing.studies.report import Statement
+from processing.studies.simulated_droplets import (
+    IMAGE_SIZE_PX,
+    PAPER_COUNTS,
+    PAPER_SHAPE,
+    simulate_shot,
+    study_cameras,
+    study_grid,
+)
+
+MIN_FOUND, MAX_GHOSTS = 0.97, 0.02
+"""What droplet tracking can live with."""
+
+
+class ThresholdRule(StrEnum):
+    """How high a peak must be to count as a droplet."""
+
+    HALF_MEDIAN = "half_median"
+    """Half the median height of the peaks that count. Needs no truth."""
+    BEST_WITH_TRUTH = "best_with_truth"
+    """Least missed droplets plus ghosts. Uses the truth: a bound for any rule."""
+
+
+_THRESHOLDS: dict[ThresholdRule, Callable[[DetectionCurve], float]] = {
+    ThresholdRule.HALF_MEDIAN: half_median_threshold,
+    ThresholdRule.BEST_WITH_TRUTH: best_threshold,
+}
+
+
+@dataclass(frozen=True)
+class GhostStudy:
+    """What to simulate; volume and densities are the paper's.
+
+    Parameters
+    ----------
+    shape : tuple[int, int, int]
+        Voxels (nz, ny, nx) at 60 voxel/mm.
+    counts : tuple of int
+        Numbers of droplets.
+    sigma_voxel : float
+        Width of the droplets.
+    recipes : tuple of Recipe
+        Methods; put fewer iterations of a method before more of them.
+    radius_voxel : float
+        How far a peak may lie from its droplet.
+    image_size_px : tuple[int, int]
+        (width, height) of every view.
+    """
+
+    shape: tuple[int, int, int] = PAPER_SHAPE
+    counts: tuple[int, ...] = PAPER_COUNTS
+    sigma_voxel: float = 1.0
+    recipes: tuple[Recipe, ...] = ALL_RECIPES
+    radius_voxel: float = RADIUS_VOXEL
+    image_size_px: tuple[int, int] = IMAGE_SIZE_PX
+
+
+@dataclass(frozen=True)
+class GhostRow:
+    """Found droplets (share of the true ones) and ghosts (share of the peaks) of a method at a density."""
+
+    density_per_mm3: float
+    method: str
+    threshold_rule: str
+    threshold: float
+    found: float
+    ghosts: float
+    sigma_voxel: float
+
+
+def ghost_study(study: GhostStudy | None = None) -> Iterator[GhostRow]:
+    """Simulate, reconstruct and count; yields each result as soon as it is known. The same study, the same rows."""
+    study = study or GhostStudy()
+    grid, cameras = study_grid(study.shape), study_cameras(study.image_size_px)
+    plan = plan_reconstruction(cameras, grid)
+    volume = np.empty(study.shape, dtype=np.float32)
+    for count in study.counts:
+        shot = simulate_shot(grid, count, study.sigma_voxel, cameras)
+        for recipe in reconstruct_each(plan, shot.images, study.recipes, volume):
+            curve = detection_curve(shot.centres_voxel, volume, study.radius_voxel)
+            for rule, choose in _THRESHOLDS.items():
+                threshold = choose(curve)
+                rates = curve.rates(threshold)
+                density = count / grid.volume_mm3
+                yield GhostRow(
+                    density, recipe.name, rule.value, threshold, rates.found, rates.ghosts, study.sigma_voxel
+                )
+
+
+def ghost_statements(rows: Sequence[GhostRow]) -> list[Statement]:
+    """Up to which density each method can be trusted, with and without truth in the choice of the threshold."""
+    topic = f"densities with >= {100 * MIN_FOUND:.0f} % found and <= {100 * MAX_GHOSTS:.0f} % ghosts"
+    return [
+        Statement(f"{Recipe.named(method).label}, {rule.value}: {topic}", "left open", _trusted(rows, method, rule))
+        for method in dict.fromkeys(row.method for row in rows)
+        for rule in ThresholdRule
+    ]
+
+
+def _trusted(rows: Sequence[GhostRow], method: str, rule: ThresholdRule) -> str:
+    trusted = None
+    for row in _curve(rows, method, rule):
+        if row.found < MIN_FOUND or row.ghosts > MAX_GHOSTS:
+            break
+        trusted = row
+    if trusted is None:
+        return "none of the simulated ones"
+    return (
+        f"up to {trusted.density_per_mm3:.1f} droplets/mm3 "
+        f"({100 * trusted.found:.1f} % found, {100 * trusted.ghosts:.1f} % ghosts)"
+    )
+
+
+def _curve(rows: Sequence[GhostRow], method: str, rule: ThresholdRule) -> list[GhostRow]:
+    chosen = [row for row in rows if row.method == method and row.threshold_rule == rule]
+    return sorted(chosen, key=lambda row: row.density_per_mm3)
+
+
+def ghost_figure(rows: Sequence[GhostRow]) -> Figure:
+    """Found droplets and ghosts against density; one line of panels per choice of the threshold."""
+    figure = Figure(figsize=(10, 8), layout="constrained")
+    panels = figure.subplots(2, 2, sharex=True)
+    titles = {
+        ThresholdRule.HALF_MEDIAN: "threshold: half the median of the peaks above it",
+        ThresholdRule.BEST_WITH_TRUTH: "best threshold, chosen with the truth",
+    }
+    for (found_axes, ghost_axes), (rule, title) in zip(panels, titles.items(), strict=True):
+        _draw(found_axes, rows, rule, "found")
+        _draw(ghost_axes, rows, rule, "ghosts")
+        found_axes.axhline(100 * MIN_FOUND, color="0.4", linestyle="--", linewidth=1)
+        ghost_axes.axhline(100 * MAX_GHOSTS, color="0.4", linestyle="--", linewidth=1)
+        found_axes.set(ylabel="found [% of the droplets]", title=title)
+        ghost_axes.set(ylabel="ghosts [% of the peaks]", title=title)
+    panels[0, 1].legend(frameon=False, loc="upper left", fontsize="small")
+    figure.suptitle(
+        rf"Gaussian droplets of $\sigma$ = {rows[0].sigma_voxel:g} voxel; dashed: "
+        f"{100 * MIN_FOUND:.0f} % found, {100 * MAX_GHOSTS:.0f} % ghosts"
+    )
+    return figure
+
+
+def _draw(axes: Axes, rows: Sequence[GhostRow], rule: ThresholdRule, quantity: str) -> None:
+    for method in dict.fromkeys(row.method for row in rows):
+        recipe, curve = Recipe.named(method), _curve(rows, method, rule)
+        shares = [100 * getattr(row, quantity) for row in curve]
+        axes.plot([row.density_per_mm3 for row in curve], shares, label=recipe.label, **recipe.style)
+    axes.set_ylim(-2, 102)
+    density_axis(axes, sorted({row.density_per_mm3 for row in rows}))
