@@ -4,10 +4,10 @@ SHELL := /bin/bash
 .PHONY: help setup demo test lint serve firmware bench lock clean
 
 PYTHON := .venv/bin/python
-DEBIAN_PACKAGES := python3-venv python3-dev python3-gi gir1.2-aravis-0.8 iproute2 gcc g++ make chromium fonts-dejavu-core
+DEBIAN_PACKAGES := python3-venv python3-dev python3-gi gir1.2-aravis-0.8 iproute2 gcc g++ gcc-arm-none-eabi make chromium fonts-dejavu-core
 AS_ROOT := $(shell [ "$$(id -u)" = 0 ] || echo sudo)
 KERNEL_SOURCES := $(wildcard processing/reconstruction/kernels/*.cpp processing/reconstruction/kernels/*.hpp processing/reconstruction/kernels/CMakeLists.txt)
-FIRMWARE_SOURCES := $(wildcard firmware/*/*.c firmware/*/*.h firmware/Makefile)
+FIRMWARE_SOURCES := $(wildcard firmware/*/*.[chS] firmware/rp2040/image.* firmware/Makefile)
 
 # A network of its own, so that no camera broadcast leaves the machine; without it where the machine forbids user namespaces.
 PRIVATE_NETWORK := $(shell unshare -rn true 2>/dev/null && echo "unshare -rn bash -c 'ip link set lo up && exec \"\$$@\"' --")
@@ -35,8 +35,10 @@ serve: setup ## Start server and web page on the simulated bench, http://127.0.0
 bench: setup ## Measure kernels and recorder against plain numpy and OpenCV; writes bench.json.
 	@env -u OPENBLAS_CORETYPE -u OPENBLAS_L2_SIZE $(PYTHON) -m server.cli bench --json | tail -n 1 >bench.json
 
-firmware: $(FIRMWARE_SOURCES) | .venv/.debian ## Build the firmware core for this computer.
+firmware: $(FIRMWARE_SOURCES) | .venv/.debian ## Build the firmware: image for the Pico, core for this computer.
 	@$(MAKE) --no-print-directory -C firmware host
+	@if command -v arm-none-eabi-gcc >/dev/null; then $(MAKE) --no-print-directory -C firmware image; \
+	else echo "No image for the Pico: arm-none-eabi-gcc is missing (apt install gcc-arm-none-eabi)"; fi
 
 lock: .venv/.python ## Pin the newest versions of all Python packages.
 	$(PYTHON) -m pip install --quiet uv

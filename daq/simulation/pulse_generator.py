@@ -5,54 +5,21 @@ and the light of the simulated cameras.
 """
 
 import queue
-import shutil
 import signal
 import subprocess
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
-from pathlib import Path
 from types import TracebackType
 from typing import Self
 
 from daq.errors import DeviceTimeout, DeviceUnavailable
 from daq.shot import FiredTrain, LightPulse
+from daq.simulation.firmware_build import build_firmware
 
 _DEVICE = "simulated pulse generator"
-_ROOT = Path(__file__).resolve().parents[2]
-_BUILD_DIR = _ROOT / "build" / "firmware"
-_BUILD_LIMIT_S = 60.0
 _ANSWER_LIMIT_S = 5.0
 _FIELDS_PER_CHANNEL = 7
-
-
-def build_firmware(build_dir: Path = _BUILD_DIR) -> Path:
-    """Path of the core's host build, compiled if it is missing or older than its sources.
-
-    Raises
-    ------
-    DeviceUnavailable
-        It is missing and cannot be compiled here; the text says what is needed.
-    """
-    program = build_dir / "firmware_host"
-    missing = [tool for tool in ("make", "cc") if shutil.which(tool) is None]
-    if missing and not program.exists():
-        raise DeviceUnavailable(
-            _DEVICE, f"{program} is missing, and so is {' and '.join(missing)} to build it (apt install gcc make)"
-        )
-    if not missing:
-        _compile(build_dir)
-    return program
-
-
-def _compile(build_dir: Path) -> None:
-    command = ["make", "--no-print-directory", "-C", str(_ROOT / "firmware"), "host", f"BUILD={build_dir}"]
-    try:
-        subprocess.run(command, check=True, capture_output=True, text=True, timeout=_BUILD_LIMIT_S)
-    except subprocess.CalledProcessError as error:
-        raise DeviceUnavailable(_DEVICE, f"{' '.join(command)} failed: {error.stderr.strip()}") from error
-    except subprocess.TimeoutExpired as error:
-        raise DeviceTimeout(_DEVICE, " ".join(command), _BUILD_LIMIT_S) from error
 
 
 class FirmwareProcess:

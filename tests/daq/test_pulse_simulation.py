@@ -14,7 +14,8 @@ from daq.drivers.serial_pulse_generator import SerialPulseGenerator
 from daq.errors import DeviceUnavailable
 from daq.run_plan import PulsePair, RunPlan
 from daq.shot import FiredTrain
-from daq.simulation.pulse_generator import FirmwareProcess, build_firmware
+from daq.simulation.firmware_build import build_firmware
+from daq.simulation.pulse_generator import FirmwareProcess
 from daq.timing import CameraTiming, plan_shot_timing
 
 CAMERA = CameraTiming(1_000, 20_000, 500, 30_000_000, 1_000_000)

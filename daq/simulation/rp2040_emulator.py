@@ -1,0 +1,221 @@
+"""A Raspberry Pi Pico in virtual time: runs the firmware's real image, from the boot ROM on, cycle by cycle.
+
+Built on rp2040py, whose own loop steps the PIO once per processor instruction; this one steps it once per cycle, so
+that every edge has its exact time. Not modelled there: clock tree, input synchronisers, flash timing.
+"""
+
+import math
+import random
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from daq.simulation.rp2040_chip import (
+    OUTPUT_PINS,
+    PIN_INTERLOCK,
+    PIN_TRIGGER,
+    TRIGGER,
+    is_high,
+    powered_chip,
+    set_points_ma,
+    start_boot_rom,
+)
+
+CYCLE_NS = 8
+CYCLES_PER_MS = 125_000
+START_CYCLES = 2
+"""From the rise of the trigger line to an output whose delay is 0; on the chip, the input synchroniser adds two."""
+
+_BYTE_CYCLES = 10 * CYCLES_PER_MS * 1000 // 115_200
+_NEVER = 1 << 62
+_HANG_ADDRESS, _HANG = 0x2003_0000, 0xE7FE  # b .
+
+
+@dataclass(frozen=True)
+class Edge:
+    """A change of an output.
+
+    Parameters
+    ----------
+    cycle : int
+        System clock cycles of 8 ns since construction of the emulator.
+    output : str
+        ``light0`` to ``light3``, ``camera0`` to ``camera3``, or ``trigger``, the inner line that starts a shot.
+    high : bool
+        Level after the change.
+    """
+
+    cycle: int
+    output: str
+    high: bool
+
+
+class EmulatedPico:
+    """One board with the firmware's image in its flash, powered up.
+
+    Parameters
+    ----------
+    image : bytes
+        The linked image, second boot stage first.
+
+    Attributes
+    ----------
+    cycle : int
+        System clock cycles since construction.
+    edges : list[Edge]
+        What the outputs did; the caller may clear it.
+    sent : bytearray
+        What the firmware sent on its serial line; the caller may clear it.
+    watchdog_resets : int
+        How often the watchdog has restarted the chip.
+    shot_set_points_ma : tuple[int, ...]
+        Set-points by channel when the trigger line rose last.
+    """
+
+    def __init__(self, image: bytes) -> None:
+        self._image = image
+        self._noise = random.Random(1)  # noqa: S311 - reproducible on purpose
+        self._interlock = True
+        self._received: deque[int] = deque()
+        self._next_byte_cycle = 0
+        self._visits: list[tuple[int, Callable[[], None]]] = []
+        self.cycle = 0
+        self.edges: list[Edge] = []
+        self.sent = bytearray()
+        self.watchdog_resets = 0
+        self.shot_set_points_ma: tuple[int, ...] = ()
+        self.power_up()
+
+    def power_up(self) -> None:
+        """Cut the power and give it back; RAM, registers and what is on the serial line are lost."""
+        self._received.clear()
+        self._restarting = False
+        self._chip = powered_chip(self._image, self._noise, self.sent.append, self._on_edge)
+        self._chip.watchdog.on_watchdog_trigger = self._on_watchdog
+        self.set_interlock(self._interlock)
+        self.set_trigger_pin(False)
+
+    def set_interlock(self, closed: bool) -> None:
+        """Level of the interlock input."""
+        self._interlock = closed
+        self._chip.gpio[PIN_INTERLOCK].set_input_value(closed)
+
+    def set_trigger_pin(self, high: bool) -> None:
+        """Level that somebody puts on the trigger pin from outside."""
+        self._chip.gpio[PIN_TRIGGER].set_input_value(high)
+
+    def receive(self, data: bytes) -> None:
+        """Bytes for the firmware's serial line; they arrive at 115200 baud."""
+        self._received.extend(data)
+
+    @property
+    def receiving(self) -> bool:
+        """Whether bytes are still on their way."""
+        return bool(self._received)
+
+    @property
+    def shooting(self) -> bool:
+        """Whether a state machine runs; false between shots, and when the outputs went off."""
+        return any(pio.next_due_fp < _NEVER for pio in self._chip.pio)
+
+    def levels(self) -> dict[str, bool]:
+        """Levels at the pads of all lights and cameras."""
+        return {output: is_high(self._chip, output) for output in OUTPUT_PINS}
+
+    def set_points_ma(self) -> tuple[int, ...]:
+        """What the set-point outputs ask of the LED drivers, by channel."""
+        return set_points_ma(self._chip)
+
+    def read_word(self, address: int) -> int:
+        """A word of RAM or a register."""
+        return int(self._chip.read_uint32(address))
+
+    def write_word(self, address: int, word: int) -> None:
+        """Change a word of RAM or a register behind the firmware's back."""
+        self._chip.write_uint32(address, word)
+
+    def hang(self) -> None:
+        """Let the processor run in a circle from now on, deaf to interrupts."""
+        self._chip.write_uint16(_HANG_ADDRESS, _HANG)
+        self._chip.core.waiting = False
+        self._chip.core.pc = _HANG_ADDRESS
+        self._chip.core.pm = True
+
+    def at(self, cycle: int, action: Callable[[], None]) -> None:
+        """Do something at a cycle that is still to come."""
+        self._visits.append((cycle, action))
+        self._visits.sort(key=lambda visit: visit[0])
+
+    def run(self, until_cycle: int, stop: Callable[[], bool] | None = None) -> bool:
+        """Let time pass, up to a cycle or, whenever the processor sleeps, until ``stop`` says so."""
+        while self.cycle < until_cycle:
+            self._deliver()
+            self._run_slice(self._next_from_outside(until_cycle))
+            if self._restarting:
+                self._restart()
+            if stop is not None and stop():
+                return True
+        return False
+
+    def run_ms(self, time_ms: float) -> None:
+        """Let time pass."""
+        self.run(self.cycle + round(time_ms * CYCLES_PER_MS))
+
+    def _deliver(self) -> None:
+        while self._visits and self._visits[0][0] <= self.cycle:
+            self._visits.pop(0)[1]()
+        if self._received and self.cycle >= self._next_byte_cycle:
+            self._next_byte_cycle = self.cycle + _BYTE_CYCLES
+            self._chip.uart[0].feed_byte(self._received.popleft())
+
+    def _next_from_outside(self, until_cycle: int) -> int:
+        next_byte = self._next_byte_cycle if self._received else _NEVER
+        next_visit = self._visits[0][0] if self._visits else _NEVER
+        return max(self.cycle + 1, min(until_cycle, next_byte, next_visit))
+
+    def _next_alarm(self) -> int:
+        return self.cycle + max(1, math.ceil(self._chip.clock.nanos_to_next_alarm / CYCLE_NS))
+
+    def _run_slice(self, end: int) -> None:
+        """Time in which nothing comes from outside: up to its end, or until the processor sleeps."""
+        core, tick, (pio0, pio1) = self._chip.core, self._chip.clock.tick, self._chip.pio
+        execute = core.execute_instruction
+        while self.cycle < end and not self._restarting:
+            start = self.cycle
+            cycles = min(end, self._next_alarm()) - start if core.waiting else execute()
+            if pio0.next_due_fp < _NEVER or pio1.next_due_fp < _NEVER:
+                self._advance_machines(cycles)
+            else:
+                self.cycle = start + cycles
+                pio0.cycle_fp = pio1.cycle_fp = self.cycle << 8
+            tick(float((self.cycle - start) * CYCLE_NS))
+            if core.waiting:
+                return
+
+    def _advance_machines(self, cycles: int) -> None:
+        """Cycle by cycle; while the processor sleeps, only until all state machines are stopped or stall."""
+        pio0, pio1 = self._chip.pio
+        for now in range(self.cycle + 1, self.cycle + cycles + 1):
+            self.cycle = now
+            pio0.advance(1)
+            pio1.advance(1)
+            if pio0.next_due_fp >= _NEVER and pio1.next_due_fp >= _NEVER and self._chip.core.waiting:
+                return
+
+    def _on_edge(self, output: str, high: bool) -> None:
+        self.edges.append(Edge(self.cycle, output, high))
+        if output == TRIGGER and high:
+            self.shot_set_points_ma = self.set_points_ma()
+
+    def _on_watchdog(self) -> None:
+        self._restarting = True
+
+    def _restart(self) -> None:
+        self._restarting = False
+        self.watchdog_resets += 1
+        before = self.levels()
+        self._chip.enter_reset(from_watchdog=True)
+        for output, high in self.levels().items():  # pins that were reset tell nobody
+            if high != before[output]:
+                self._on_edge(output, high)
+        start_boot_rom(self._chip)

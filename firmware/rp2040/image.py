@@ -1,0 +1,69 @@
+"""Linked image -> UF2 for the drive of the boot ROM.
+
+    image.py IMAGE.bin IMAGE.uf2
+
+Puts the CRC of the second boot stage into the image (RP2040 data sheet, 2.8.1.3.1), in place, and wraps the image
+into UF2 blocks (https://github.com/microsoft/uf2). The same image gives the same bytes.
+"""
+
+import struct
+import sys
+from pathlib import Path
+
+FLASH = 0x1000_0000
+BOOT2_SIZE = 256
+PAGE = 256
+FAMILY_RP2040 = 0xE48B_FF56
+FAMILY_PRESENT = 0x2000
+BLOCK = struct.Struct("<8I476sI")
+MAGICS = (0x0A32_4655, 0x9E5D_5157, 0x0AB1_6F30)
+
+
+def crc32_of_boot_rom(data: bytes) -> int:
+    """CRC-32/MPEG-2: polynomial 04C11DB7, not reflected, start at all ones."""
+    crc = 0xFFFF_FFFF
+    for byte in data:
+        crc ^= byte << 24
+        for _ in range(8):
+            crc = (crc << 1 ^ (0x04C1_1DB7 if crc & 0x8000_0000 else 0)) & 0xFFFF_FFFF
+    return crc
+
+
+def with_boot_crc(image: bytes) -> bytes:
+    """The image with the CRC behind its second boot stage, whose last word must be free."""
+    boot2, crc = image[: BOOT2_SIZE - 4], image[BOOT2_SIZE - 4 : BOOT2_SIZE]
+    if any(crc):
+        raise ValueError(f"the second boot stage is larger than {BOOT2_SIZE - 4} bytes")
+    return boot2 + struct.pack("<I", crc32_of_boot_rom(boot2)) + image[BOOT2_SIZE:]
+
+
+def uf2(image: bytes) -> bytes:
+    """One block of 512 bytes per flash page; the last page is filled with zeros."""
+    pages = [image[start : start + PAGE].ljust(PAGE, b"\0") for start in range(0, len(image), PAGE)]
+    start_magic, second_magic, end_magic = MAGICS
+    return b"".join(
+        BLOCK.pack(
+            start_magic,
+            second_magic,
+            FAMILY_PRESENT,
+            FLASH + PAGE * i,
+            PAGE,
+            i,
+            len(pages),
+            FAMILY_RP2040,
+            page,
+            end_magic,
+        )
+        for i, page in enumerate(pages)
+    )
+
+
+def main() -> None:
+    binary, drive_file = map(Path, sys.argv[1:])
+    image = with_boot_crc(binary.read_bytes())
+    binary.write_bytes(image)
+    drive_file.write_bytes(uf2(image))
+
+
+if __name__ == "__main__":
+    main()

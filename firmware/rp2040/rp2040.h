@@ -1,0 +1,143 @@
+/* The registers of the RP2040 that this port uses, by the names of its data sheet (build-date 2024-10-15). */
+#ifndef RP2040_H
+#define RP2040_H
+
+#include <stdint.h>
+
+#define REG(address) (*(volatile uint32_t *)(uintptr_t)(address))
+/* Atomic aliases of every peripheral register, section 2.1.2. */
+#define REG_SET(address) REG((address) + 0x2000u)
+#define REG_CLEAR(address) REG((address) + 0x3000u)
+
+/* 2.14.3 */
+#define RESETS_RESET 0x4000c000u
+#define RESETS_DONE 0x4000c008u
+enum reset_bits {
+    RESET_IO_BANK0 = 1 << 5,
+    RESET_PADS_BANK0 = 1 << 8,
+    RESET_PIO0 = 1 << 10,
+    RESET_PIO1 = 1 << 11,
+    RESET_PLL_SYS = 1 << 12,
+    RESET_PWM = 1 << 14,
+    RESET_TIMER = 1 << 21,
+    RESET_UART0 = 1 << 22,
+};
+
+/* 2.13.5: power-on state machine, which the watchdog restarts */
+#define PSM_WDSEL 0x40010008u
+
+/* 2.15.7, 2.16.7, 2.18.4 */
+#define CLK_REF_CTRL 0x40008030u
+#define CLK_REF_SELECTED 0x40008038u
+#define CLK_SYS_CTRL 0x4000803cu
+#define CLK_SYS_SELECTED 0x40008044u
+#define CLK_PERI_CTRL 0x40008048u
+#define CLK_SYS_RESUS_CTRL 0x40008078u
+#define XOSC_CTRL 0x40024000u
+#define XOSC_STATUS 0x40024004u
+#define XOSC_STARTUP 0x4002400cu
+#define PLL_SYS_CS 0x40028000u
+#define PLL_SYS_PWR 0x40028004u
+#define PLL_SYS_FBDIV 0x40028008u
+#define PLL_SYS_PRIM 0x4002800cu
+#define ROSC_RANDOMBIT 0x4006001cu
+
+/* 2.19.6: pin n has a control register and a pad */
+#define IO_CTRL(pin) (0x40014004u + 8u * (uint32_t)(pin))
+#define IO_INTR(pin) (0x400140f0u + 4u * ((uint32_t)(pin) / 8u))
+#define IO_INTE(pin) (0x40014100u + 4u * ((uint32_t)(pin) / 8u))
+#define IO_EDGE_LOW(pin) (4u << (4u * ((uint32_t)(pin) % 8u)))
+#define PAD(pin) (0x4001c004u + 4u * (uint32_t)(pin))
+#define SIO_GPIO_IN 0xd0000004u
+
+enum io_ctrl {
+    FUNCTION_UART = 2,
+    FUNCTION_PWM = 4,
+    FUNCTION_SIO = 5,
+    FUNCTION_PIO0 = 6,
+    FUNCTION_PIO1 = 7,
+    FUNCTION_NONE = 31,
+    OUTPUT_LOW = 2 << 8,      /* OUTOVER: whatever the peripheral drives */
+    OUTPUT_ENABLE = 3 << 12,  /* OEOVER */
+    INPUT_LOW = 2 << 16,      /* INOVER: whatever the pin sees */
+    INPUT_HIGH = 3 << 16,
+};
+
+enum pad {
+    PAD_SCHMITT = 1 << 1,
+    PAD_PULL_DOWN = 1 << 2,
+    PAD_PULL_UP = 1 << 3,
+    PAD_4_MA = 1 << 4,
+    PAD_INPUT = 1 << 6,
+};
+
+/* 3.7: pio is 0 or 1 */
+#define PIO(pio) (0x50200000u + 0x100000u * (uint32_t)(pio))
+#define PIO_CTRL(pio) PIO(pio)
+#define PIO_TXF(pio, machine) (PIO(pio) + 0x10u + 4u * (uint32_t)(machine))
+#define PIO_INSTR_MEM(pio, index) (PIO(pio) + 0x48u + 4u * (uint32_t)(index))
+#define PIO_CLKDIV(pio, machine) (PIO(pio) + 0xc8u + 0x18u * (uint32_t)(machine))
+#define PIO_EXECCTRL(pio, machine) (PIO_CLKDIV(pio, machine) + 0x04u)
+#define PIO_SHIFTCTRL(pio, machine) (PIO_CLKDIV(pio, machine) + 0x08u)
+#define PIO_ADDR(pio, machine) (PIO_CLKDIV(pio, machine) + 0x0cu)
+#define PIO_INSTR(pio, machine) (PIO_CLKDIV(pio, machine) + 0x10u)
+#define PIO_PINCTRL(pio, machine) (PIO_CLKDIV(pio, machine) + 0x14u)
+
+/* 4.2.8 */
+#define UART0_DR 0x40034000u
+#define UART0_FR 0x40034018u
+#define UART0_IBRD 0x40034024u
+#define UART0_FBRD 0x40034028u
+#define UART0_LCR_H 0x4003402cu
+#define UART0_CR 0x40034030u
+#define UART0_IMSC 0x40034038u
+enum uart {
+    UART_FR_RX_EMPTY = 1 << 4,
+    UART_FR_TX_FULL = 1 << 5,
+    UART_LCR_8_BITS = 3 << 5,
+    UART_CR_ENABLE = 1 << 0 | 1 << 8 | 1 << 9, /* UART, transmitter, receiver */
+    UART_INT_RX = 1 << 4,
+};
+
+/* 4.5.3: slice n drives pins 2n and 2n + 1, modulo 16 */
+#define PWM_CSR(slice) (0x40050000u + 0x14u * (uint32_t)(slice))
+#define PWM_CC(slice) (PWM_CSR(slice) + 0x0cu)
+#define PWM_TOP(slice) (PWM_CSR(slice) + 0x10u)
+
+/* 4.6.5 */
+#define TIMER_ALARM0 0x40054010u
+#define TIMER_RAWH 0x40054024u
+#define TIMER_RAWL 0x40054028u
+#define TIMER_INTR 0x40054034u
+#define TIMER_INTE 0x40054038u
+
+/* 4.7.6 */
+#define WATCHDOG_CTRL 0x40058000u
+#define WATCHDOG_LOAD 0x40058004u
+#define WATCHDOG_REASON 0x40058008u
+#define WATCHDOG_SCRATCH(index) (0x4005800cu + 4u * (uint32_t)(index))
+#define WATCHDOG_TICK 0x4005802cu
+
+/* ARMv6-M */
+#define NVIC_ENABLE 0xe000e100u
+#define NVIC_PRIORITY(interrupt) (0xe000e400u + ((uint32_t)(interrupt) & ~3u))
+#define SCB_VTOR 0xe000ed08u
+enum interrupt {
+    INTERRUPT_TIMER0 = 0,
+    INTERRUPT_IO_BANK0 = 13,
+    INTERRUPT_UART0 = 20,
+};
+
+static inline uint32_t interrupts_mask(void)
+{
+    uint32_t before;
+    __asm__ volatile("mrs %0, primask\n\tcpsid i" : "=r"(before)::"memory");
+    return before;
+}
+
+static inline void interrupts_restore(uint32_t before)
+{
+    __asm__ volatile("msr primask, %0" ::"r"(before) : "memory");
+}
+
+#endif

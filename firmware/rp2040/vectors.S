@@ -1,0 +1,23 @@
+/* Vector tables: the one that the second boot stage starts from, and the one in RAM. */
+    .section .flash_vectors, "a"
+    .word stack_top
+    .word reset
+
+    .section .vectors, "a"
+    .word stack_top
+    .word reset
+    .rept 14
+    .word fault
+    .endr
+    .word isr_timer0                                  /* interrupt 0 */
+    .rept 12
+    .word fault
+    .endr
+    .word isr_io_bank0                                /* 13 */
+    .rept 6
+    .word fault
+    .endr
+    .word isr_uart0                                   /* 20 */
+    .rept 11
+    .word fault
+    .endr

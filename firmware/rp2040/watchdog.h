@@ -1,0 +1,20 @@
+/* Restarts the whole chip, PIO and pads included, when the main loop does not come round; and knows of restarts. */
+#ifndef WATCHDOG_H
+#define WATCHDOG_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+enum { WATCHDOG_MS = 200 }; /* the longest reply takes 30 */
+
+struct start {
+    uint32_t boot;    /* differs from that of the start before */
+    bool by_watchdog; /* of this firmware, not of the boot loader */
+};
+
+/* Once, after a reset, before watchdog_start. */
+struct start watchdog_read_start(void);
+void watchdog_start(void);
+void watchdog_feed(void);
+
+#endif
