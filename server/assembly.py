@@ -129,12 +129,15 @@ def _open_rig(config: RigConfig, profiles: Profiles, interlock: Interlock, devic
     devices.enter_context(interlock)
     # Entered last and so left first: the light goes off before anything else is closed.
     generator = devices.enter_context(_pulse_generator(config))
-    limits_a = {name: view.max_current_a for name, view in config.views.items()}
-    return Rig(cameras, generator, interlock, stage, max_current_a=limits_a)
+    return Rig(cameras, generator, interlock, stage, max_current_a=_current_limits_a(config))
 
 
 def _pulse_generator(config: RigConfig) -> SerialPulseGenerator:
-    return SerialPulseGenerator(_GENERATOR, _port_of(config), channels_of(config))
+    return SerialPulseGenerator(_GENERATOR, _port_of(config), channels_of(config), _current_limits_a(config))
+
+
+def _current_limits_a(config: RigConfig) -> dict[str, float]:
+    return {name: view.max_current_a for name, view in config.views.items()}
 
 
 def _port_of(config: RigConfig) -> str:

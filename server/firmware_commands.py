@@ -1,10 +1,12 @@
 """What ``tomoshadow firmware`` does: identity and limits, self-test, timing diagram, flashing."""
 
 from argparse import Namespace
+from collections.abc import Iterator
 from dataclasses import asdict
 from typing import Any
 
-from daq.drivers.pulse_protocol import Command, Fault, State
+from daq.drivers.pulse_line import PulseLine
+from daq.drivers.pulse_protocol import CHANNEL_COUNT, FIELDS, UNCHANGED, Command, Fault, State
 from daq.drivers.pulse_self_test import Verdict, self_test
 from daq.timing import plan_shot_timing
 from server.assembly import open_generator, open_pulse_line
@@ -30,7 +32,14 @@ def info(options: Namespace) -> dict[str, Any]:
             "interlock_closed": status.number("interlock") == 1,
             "shots_left": status.number("shots_left"),
             "counters": {name: status.number(name) for name in _COUNTERS},
+            "limits": [dict(_limits(line, channel)) for channel in range(CHANNEL_COUNT)],
         }
+
+
+def _limits(line: PulseLine, channel: int) -> Iterator[tuple[str, int]]:
+    reply = line.ask(Command.LIMIT, channel, UNCHANGED, UNCHANGED)
+    for name in FIELDS[Command.LIMIT].reply:
+        yield name, reply.number(name)
 
 
 def selftest(options: Namespace) -> dict[str, Any]:

@@ -17,6 +17,8 @@ CHANNEL_COUNT = 4
 MAX_SEQUENCE = 65_535
 HEARTBEAT_MS = 3000
 ABORT_BYTE = b"\x18"
+UNCHANGED = 2**32 - 1
+"""Asks for a limit without tightening it."""
 
 
 class Command(StrEnum):
@@ -24,6 +26,7 @@ class Command(StrEnum):
 
     ID = "ID"
     NEW = "NEW"
+    LIMIT = "LIMIT"
     CHANNEL = "CHANNEL"
     LOAD = "LOAD"
     ARM = "ARM"
@@ -43,11 +46,13 @@ class Fields:
 
 
 _EDGES = ("camera_ns", "a_start_ns", "a_width_ns", "b_start_ns", "b_width_ns", "current_ma")
+_LIMITS = ("max_current_ma", "max_duty_ppm")
 _COUNTERS = ("requested", "fired", "suppressed", "early", "crc_errors")
 
 FIELDS: Mapping[Command, Fields] = {
     Command.ID: Fields(reply=("model", "version", "build", "serial", "protocol", "channels", "tick_ns", "last")),
     Command.NEW: Fields(),
+    Command.LIMIT: Fields(("channel", *_LIMITS), ("channel", *_LIMITS)),
     Command.CHANNEL: Fields(("channel", *_EDGES, "frame_a_close_ns", "frame_b_open_ns"), ("channel", *_EDGES)),
     Command.LOAD: Fields(reply=("train", "length_ns", "period_us")),
     Command.ARM: Fields(("shots",), ("train", "shots_left")),
@@ -98,6 +103,7 @@ class ErrorNumber(IntEnum):
     STRADDLE = 17
     SHOTS = 18
     HARDWARE = 19
+    LIMIT = 20
 
 
 ERROR_TEXT: Mapping[ErrorNumber, str] = {
@@ -120,6 +126,7 @@ ERROR_TEXT: Mapping[ErrorNumber, str] = {
     ErrorNumber.STRADDLE: "pulse A ends after frame A closes, or pulse B starts before frame B opens",
     ErrorNumber.SHOTS: "the shot budget is not 1 to 1000000",
     ErrorNumber.HARDWARE: "the hardware cannot produce this pulse train",
+    ErrorNumber.LIMIT: "the current is above the limit that was set for this channel, or its light was forbidden",
 }
 
 

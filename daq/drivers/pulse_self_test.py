@@ -14,6 +14,7 @@ from daq.drivers.pulse_protocol import (
     ABORT_BYTE,
     CHANNEL_COUNT,
     MAX_SEQUENCE,
+    UNCHANGED,
     Command,
     ErrorNumber,
     Fault,
@@ -141,6 +142,18 @@ def _limits(probe: Probe) -> str:
     return f"refused: {', '.join(error.name for error in _FORBIDDEN)}"
 
 
+def _led_limits(probe: Probe) -> str:
+    """Asks alone: a limit that was tightened would stay until the next start."""
+    limits = [probe.done(Command.LIMIT, channel, UNCHANGED, UNCHANGED) for channel in range(CHANNEL_COUNT)]
+    currents_a = [limit.number("max_current_ma") / 1000 for limit in limits]
+    for channel, current_a in enumerate(currents_a):
+        above = replace(DARK, channel=channel, current_ma=round(current_a * 1000) + 1)
+        reply = probe.line.answer(Command.CHANNEL, *above.fields())
+        refused = reply.error in (ErrorNumber.LIMIT, ErrorNumber.CURRENT)
+        expect(refused, f"channel {channel}: 1 mA above {current_a:g} A was answered by {outcome(reply)}")
+    return f"refused above {', '.join(f'{current_a:g}' for current_a in currents_a)} A"
+
+
 def _quantisation(probe: Probe) -> str:
     asked = replace(DARK, camera_ns=1003, a_start_ns=20_005, b_start_ns=26_411, b_width_ns=1005)
     reply = probe.done(Command.CHANNEL, *asked.fields())
@@ -204,6 +217,7 @@ _CHECKS: dict[str, Callable[[Probe], str]] = {
     "nonsense": _nonsense,
     "repeated line": _repeated_line,
     "limits": _limits,
+    "limits of the LEDs": _led_limits,
     "quantisation": _quantisation,
     "no shot unarmed": _no_shot_unarmed,
     "open interlock": _open_interlock,

@@ -11,7 +11,7 @@ from typing import Self
 
 from daq.devices import DeviceIdentity, GeneratorState, GeneratorStatus
 from daq.drivers.pulse_line import PulseLine
-from daq.drivers.pulse_protocol import CHANNEL_COUNT, Command, Fault, Reply, State
+from daq.drivers.pulse_protocol import CHANNEL_COUNT, UNCHANGED, Command, Fault, Reply, State
 from daq.errors import DeviceError, PlanError, ProtocolError
 from daq.shot import FiredTrain, LightPulse
 from daq.timing import ShotTiming, ViewTiming
@@ -38,6 +38,9 @@ class SerialPulseGenerator:
         Serial port, for example ``/dev/serial/by-id/...``.
     channels : Mapping[str, int]
         Channel of each view, 0 to 3.
+    max_current_a : Mapping[str, float]
+        Limit of the LED of each view, which the generator itself shall keep; views that are not named keep the
+        generator's own.
 
     Raises
     ------
@@ -45,12 +48,15 @@ class SerialPulseGenerator:
         Two views share a channel, or a channel does not exist.
     """
 
-    def __init__(self, name: str, port: str, channels: Mapping[str, int]) -> None:
+    def __init__(
+        self, name: str, port: str, channels: Mapping[str, int], max_current_a: Mapping[str, float] | None = None
+    ) -> None:
         numbers = list(channels.values())
         if len(set(numbers)) < len(numbers) or not set(numbers) <= set(range(CHANNEL_COUNT)):
             raise ValueError(f"{name}: channels {dict(channels)} must be distinct, 0 to {CHANNEL_COUNT - 1}")
         self._name = name
         self._channels = dict(channels)
+        self._max_current_a = dict(max_current_a or {})
         self._line = PulseLine(name, port)
         self._identity: Reply | None = None
         self._loaded: _LoadedTrain | None = None
@@ -101,6 +107,7 @@ class SerialPulseGenerator:
             raise PlanError(f"{self._name}: views {strangers} have no channel; there are {sorted(self._channels)}")
         self._loaded = None
         shift_ns = _shift_ns(timing, self._opened_identity().number("tick_ns"))
+        self._tighten_limits()
         self._line.ask(Command.NEW)
         replies = {view: self._set_channel(view, edges, shift_ns) for view, edges in timing.views.items()}
         number = self._line.ask(Command.LOAD).number("train")
@@ -155,6 +162,14 @@ class SerialPulseGenerator:
         if self._identity is None:
             raise DeviceError(self._name, "has not been opened")
         return self._identity
+
+    def _tighten_limits(self) -> None:
+        """Before every train: a generator that was reset has forgotten its limits, and every train with them."""
+        for view, limit_a in self._max_current_a.items():
+            limit_ma = round(limit_a * 1000)
+            reply = self._line.ask(Command.LIMIT, self._channels[view], limit_ma, UNCHANGED)
+            if reply.number("max_current_ma") > limit_ma:
+                raise ProtocolError(self._name, f"keeps {reply.number('max_current_ma')} mA as the limit of {view}")
 
     def _set_channel(self, view: str, edges: ViewTiming, shift_ns: int) -> Reply:
         return self._line.ask(

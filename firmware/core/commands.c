@@ -64,6 +64,18 @@ static enum error set_channel(struct safety *safety, const uint32_t *fields, str
     return ERROR_NONE;
 }
 
+static enum error limit(struct safety *safety, const uint32_t *fields, struct text *reply)
+{
+    const struct channel_limits asked = {.max_current_ma = fields[1], .max_duty_ppm = fields[2]};
+    const enum error error = safety_tighten(safety, fields[0], asked);
+    if (error)
+        return error;
+    text_field(reply, "channel", fields[0]);
+    text_field(reply, "max_current_ma", safety->limits[fields[0]].max_current_ma);
+    text_field(reply, "max_duty_ppm", safety->limits[fields[0]].max_duty_ppm);
+    return ERROR_NONE;
+}
+
 static enum error load(struct safety *safety, const uint32_t *fields, struct text *reply)
 {
     (void)fields;
@@ -72,7 +84,7 @@ static enum error load(struct safety *safety, const uint32_t *fields, struct tex
         return error;
     text_field(reply, "train", safety->train_id);
     text_field(reply, "length_ns", train_length_ns(&safety->train));
-    text_field(reply, "period_us", train_period_us(&safety->train));
+    text_field(reply, "period_us", train_period_us(&safety->train, safety->limits));
     return ERROR_NONE;
 }
 
@@ -140,8 +152,8 @@ static enum error clear(struct safety *safety, const uint32_t *fields, struct te
 }
 
 static const struct command COMMANDS[] = {
-    {"NEW", 0, new_train}, {"CHANNEL", 9, set_channel}, {"LOAD", 0, load}, {"ARM", 1, arm}, {"FIRE", 0, fire},
-    {"STATUS", 0, status}, {"BEAT", 0, beat},           {"OFF", 0, off},   {"CLEAR", 0, clear},
+    {"NEW", 0, new_train}, {"LIMIT", 3, limit},   {"CHANNEL", 9, set_channel}, {"LOAD", 0, load}, {"ARM", 1, arm},
+    {"FIRE", 0, fire},     {"STATUS", 0, status}, {"BEAT", 0, beat},           {"OFF", 0, off},   {"CLEAR", 0, clear},
 };
 
 static const struct command *find(struct span word)

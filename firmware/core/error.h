@@ -23,6 +23,7 @@ enum error {
     ERROR_STRADDLE = 17,
     ERROR_SHOTS = 18,
     ERROR_HARDWARE = 19,
+    ERROR_LIMIT = 20,
 };
 
 #endif

@@ -81,14 +81,3 @@ uint32_t train_length_ns(const struct pulse_train *train)
     }
     return length_ns;
 }
-
-uint32_t train_period_us(const struct pulse_train *train)
-{
-    uint32_t lit_ns = 0;
-    for (int i = 0; i < CHANNEL_COUNT; i++) {
-        const struct channel *channel = &train->channels[i];
-        if (channel->used && channel->current_ma)
-            lit_ns = larger(lit_ns, channel->a_width_ns + channel->b_width_ns);
-    }
-    return larger(MIN_PERIOD_US, (lit_ns * 1000u + MAX_DUTY_PPM - 1u) / MAX_DUTY_PPM);
-}

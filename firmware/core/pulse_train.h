@@ -36,7 +36,4 @@ enum error train_check(const struct pulse_train *train);
 /* Trigger of the shot until the last output has fallen. */
 uint32_t train_length_ns(const struct pulse_train *train);
 
-/* Shortest time to the next shot: minimum period, or the duty limit of the channel with most light. */
-uint32_t train_period_us(const struct pulse_train *train);
-
 #endif

@@ -34,6 +34,8 @@ static enum error must_be_safe(const struct safety *safety)
 void safety_boot(struct safety *safety, bool watchdog)
 {
     *safety = (struct safety){.state = STATE_SAFE};
+    for (int i = 0; i < CHANNEL_COUNT; i++)
+        safety->limits[i] = channel_limits_absolute();
     outputs_off(safety);
     if (watchdog)
         trip(safety, FAULT_WATCHDOG);
@@ -59,6 +61,8 @@ enum error safety_set_channel(struct safety *safety, uint32_t number, const stru
     error = channel_check(requested);
     if (error)
         return error;
+    if (!channel_within(requested, &safety->limits[number]))
+        return ERROR_LIMIT;
     struct channel actual = channel_quantised(requested, port_tick_ns);
     error = channel_check(&actual);
     if (error)
@@ -69,15 +73,35 @@ enum error safety_set_channel(struct safety *safety, uint32_t number, const stru
     return ERROR_NONE;
 }
 
+/* The absolute limits and those of the channels, which may have been tightened since a channel was set. */
+static enum error check_train(const struct safety *safety)
+{
+    const enum error error = train_check(&safety->train);
+    if (error)
+        return error;
+    return train_within(&safety->train, safety->limits) ? ERROR_NONE : ERROR_LIMIT;
+}
+
 enum error safety_load(struct safety *safety)
 {
     enum error error = must_be_safe(safety);
     if (!error)
-        error = train_check(&safety->train);
+        error = check_train(safety);
     if (error)
         return error;
     safety->loaded = true;
     safety->train_id++;
+    return ERROR_NONE;
+}
+
+enum error safety_tighten(struct safety *safety, uint32_t number, struct channel_limits asked)
+{
+    if (safety->state == STATE_ARMED)
+        return ERROR_NOT_SAFE;
+    if (number >= CHANNEL_COUNT)
+        return ERROR_CHANNEL;
+    safety->limits[number] = channel_limits_tightened(safety->limits[number], asked);
+    safety->loaded = false;
     return ERROR_NONE;
 }
 
@@ -116,7 +140,7 @@ static enum error fire_permission(struct safety *safety)
         return ERROR_NOT_ARMED;
     if (!safety_interlock_closed(safety))
         return ERROR_INTERLOCK_OPEN;
-    if (train_check(&safety->train) || !safety->shots_left) {
+    if (check_train(safety) || !safety->shots_left) {
         trip(safety, FAULT_INTERNAL); /* both were checked when arming: memory has changed since */
         return ERROR_FAULT_LATCHED;
     }
@@ -135,7 +159,7 @@ enum error safety_fire(struct safety *safety)
     const uint64_t now_us = port_now_us();
     safety->counters.fired++;
     port_fire();
-    safety->not_before_us = now_us + train_period_us(&safety->train);
+    safety->not_before_us = now_us + train_period_us(&safety->train, safety->limits);
     safety->train_over_us = now_us + train_length_ns(&safety->train) / 1000u + 1u;
     if (--safety->shots_left == 0)
         safety->state = STATE_SAFE; /* safety_poll switches the outputs off once this train is over */

@@ -13,6 +13,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "channel_limits.h"
 #include "pulse_train.h"
 
 enum state {
@@ -41,6 +42,7 @@ struct counters {
 struct safety {
     enum state state;
     uint32_t faults;
+    struct channel_limits limits[CHANNEL_COUNT];
     struct pulse_train train; /* actual values */
     bool loaded;
     bool outputs_live;
@@ -59,6 +61,10 @@ void safety_boot(struct safety *safety, bool watchdog);
 enum error safety_new_train(struct safety *safety);
 enum error safety_set_channel(struct safety *safety, uint32_t number, const struct channel *requested);
 enum error safety_load(struct safety *safety);
+
+/* Tighten the limits of a channel; what is larger than the present limit changes nothing. The train must be loaded
+ * again. Not while ARMED. */
+enum error safety_tighten(struct safety *safety, uint32_t number, struct channel_limits asked);
 
 enum error safety_arm(struct safety *safety, uint32_t shots);
 enum error safety_fire(struct safety *safety);

@@ -7,8 +7,10 @@
 static struct protocol protocol;
 static uint64_t random_state;
 static uint64_t last_shot_us;
+static uint64_t dark_until_us[CHANNEL_COUNT]; /* what the duty of each channel demands, reckoned without the core */
 static unsigned fired_before;
 static unsigned sequence;
+static unsigned shots;
 
 static uint32_t random_below(uint32_t bound)
 {
@@ -38,13 +40,16 @@ static void random_command(void)
     static const char *const words[] = {"NEW", "LOAD", "FIRE", "FIRE", "FIRE", "STATUS", "BEAT", "OFF", "CLEAR", "ID"};
     char command[MAX_LINE];
     char body[2 * MAX_LINE];
-    const uint32_t choice = random_below(16);
+    const uint32_t choice = random_below(17);
     if (choice < 4)
         random_channel(command, sizeof command);
     else if (choice < 6)
         snprintf(command, sizeof command, "ARM %u", random_below(20));
+    else if (choice == 6)
+        snprintf(command, sizeof command, "LIMIT %u %u %u", random_below(5), 25000 + random_below(10000),
+                 random_below(500));
     else
-        snprintf(command, sizeof command, "%s", words[choice - 6]);
+        snprintf(command, sizeof command, "%s", words[choice - 7]);
     sequence += random_below(8) != 0; /* now and then the same number again */
     snprintf(body, sizeof body, "%u %s", sequence % 65536, command);
     exchange(&protocol, body);
@@ -57,6 +62,30 @@ static void let_time_pass(void)
         fake.now_us += random_below(4000000);
 }
 
+/* A shot of L ns of light at a duty of D permits the next light of its channel L / D later. */
+static void check_duty(void)
+{
+    for (int i = 0; i < CHANNEL_COUNT; i++) {
+        const struct channel *channel = &fake.loaded.channels[i];
+        if (!channel->used || !channel->current_ma)
+            continue;
+        const struct channel_limits limits = protocol.safety.limits[i];
+        CHECK(fake.now_us >= dark_until_us[i] && channel->current_ma <= limits.max_current_ma);
+        CHECK(limits.max_duty_ppm <= MAX_DUTY_PPM);
+        const uint64_t lit_ns = (uint64_t)channel->a_width_ns + channel->b_width_ns;
+        dark_until_us[i] = fake.now_us + lit_ns * 1000 / limits.max_duty_ppm;
+    }
+}
+
+static void restart(void)
+{
+    protocol_boot(&protocol, protocol.boot + 1, false);
+    fake.fired = fired_before = 0;
+    last_shot_us = 0;
+    memset(dark_until_us, 0, sizeof dark_until_us);
+    CHECK(!fake.live);
+}
+
 static void check_invariants(void)
 {
     const struct safety *safety = &protocol.safety;
@@ -67,6 +96,7 @@ static void check_invariants(void)
     CHECK(safety->state != STATE_FAULT || !fake.live);
     CHECK(fake.fired - fired_before <= 1);
     if (fake.fired != fired_before) {
+        check_duty();
         CHECK(fake.interlock_closed && (last_shot_us == 0 || fake.now_us - last_shot_us >= MIN_PERIOD_US));
         last_shot_us = fake.now_us;
         fired_before = fake.fired;
@@ -90,10 +120,15 @@ int main(int argument_count, char **arguments)
         else
             random_command();
         check_invariants();
+        if (random_below(3000) == 0) {
+            shots += fake.fired;
+            restart();
+        }
         fake.interlock_closed = fake.interlock_closed ? random_below(100) != 0 : random_below(3) == 0;
         protocol_poll(&protocol);
         check_invariants();
     }
-    printf("fired %u of %u, %u early\n", fake.fired, protocol.safety.counters.requested, protocol.safety.counters.early);
-    return fake.fired < 10;
+    shots += fake.fired;
+    printf("%u shots, %u starts\n", shots, protocol.boot);
+    return shots < 10;
 }

@@ -1,5 +1,6 @@
 /* Limits and quantisation of the pulse train, at and beyond every bound. */
 #include "fake_port.h"
+#include "channel_limits.h"
 #include "pulse_train.h"
 
 static const struct channel LEGAL = {
@@ -104,14 +105,59 @@ static void test_a_train_is_as_long_as_its_last_output(void)
 static void test_more_light_lengthens_the_period(void)
 {
     struct pulse_train train = {0};
+    struct channel_limits limits[CHANNEL_COUNT];
+    for (int i = 0; i < CHANNEL_COUNT; i++)
+        limits[i] = channel_limits_absolute();
     train.channels[0] = train.channels[3] = LEGAL;
-    CHECK(train_period_us(&train) == MIN_PERIOD_US); /* 2 us of light, 200 ppm */
+    CHECK(train_period_us(&train, limits) == MIN_PERIOD_US); /* 2 us of light, 200 ppm */
     train.channels[3].a_width_ns = 2000;
-    CHECK(train_period_us(&train) == 15000);
+    CHECK(train_period_us(&train, limits) == 15000);
     train.channels[3].a_width_ns = 2001 - 1000;
-    CHECK(train_period_us(&train) == 10005);
+    CHECK(train_period_us(&train, limits) == 10005);
     train.channels[3].current_ma = 0; /* dark: its widths do not count */
-    CHECK(train_period_us(&train) == MIN_PERIOD_US);
+    CHECK(train_period_us(&train, limits) == MIN_PERIOD_US);
+    limits[3].max_duty_ppm = 0; /* forbids light, and is no divisor */
+    CHECK(train_period_us(&train, limits) == MIN_PERIOD_US);
+    limits[0].max_duty_ppm = 1;
+    CHECK(train_period_us(&train, limits) == 2000000);
+}
+
+static void test_limits_only_become_tighter(void)
+{
+    const struct channel_limits widest = {UINT32_MAX, UINT32_MAX};
+    struct channel_limits limits = channel_limits_tightened(channel_limits_absolute(), widest);
+    CHECK(limits.max_current_ma == MAX_CURRENT_MA && limits.max_duty_ppm == MAX_DUTY_PPM);
+    limits = channel_limits_tightened(limits, (struct channel_limits){12000, UINT32_MAX});
+    CHECK(limits.max_current_ma == 12000 && limits.max_duty_ppm == MAX_DUTY_PPM);
+    limits = channel_limits_tightened(limits, (struct channel_limits){12001, 50});
+    CHECK(limits.max_current_ma == 12000 && limits.max_duty_ppm == 50);
+}
+
+static void test_a_channel_keeps_its_own_limits(void)
+{
+    struct pulse_train train = {.channels = {[1] = LEGAL}};
+    struct channel_limits limits[CHANNEL_COUNT] = {{0, 0}, {20000, 1}, {0, 0}, {0, 0}};
+    CHECK(train_within(&train, limits)); /* unused channels have no light that could be forbidden */
+    limits[1].max_current_ma = 19999;
+    CHECK(!train_within(&train, limits));
+    limits[1] = (struct channel_limits){20000, 0};
+    CHECK(!train_within(&train, limits));
+    train.channels[1].current_ma = 0;
+    CHECK(train_within(&train, limits));
+}
+
+/* Self-protection of a published LED controller: longest pulse and highest duty up to a current. */
+static void test_the_absolute_limits_are_tighter_than_the_published_led_table(void)
+{
+    const struct {
+        uint32_t current_ma, pulse_ns, duty_ppm;
+    } rows[] = {{15000, 10000000, 200000}, {25000, 2000000, 100000}, {40000, 1000000, 50000}};
+    uint32_t covered_ma = 0;
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        CHECK(MAX_WIDTH_NS < rows[i].pulse_ns && MAX_DUTY_PPM < rows[i].duty_ppm);
+        covered_ma = rows[i].current_ma;
+    }
+    CHECK(covered_ma >= MAX_CURRENT_MA);
 }
 
 int main(void)
@@ -124,5 +170,8 @@ int main(void)
     test_every_edge_goes_to_the_nearest_tick();
     test_a_train_is_as_long_as_its_last_output();
     test_more_light_lengthens_the_period();
+    test_limits_only_become_tighter();
+    test_a_channel_keeps_its_own_limits();
+    test_the_absolute_limits_are_tighter_than_the_published_led_table();
     return 0;
 }

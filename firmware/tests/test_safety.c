@@ -128,6 +128,47 @@ static void test_actual_values_must_keep_the_limits_too(void)
     CHECK(safety_set_channel(&safety, 0, &channel) == ERROR_SEPARATION);
 }
 
+static void test_a_channel_refuses_more_than_its_own_limit(void)
+{
+    boot();
+    CHECK(safety_tighten(&safety, CHANNEL_COUNT, (struct channel_limits){1, 1}) == ERROR_CHANNEL);
+    CHECK(safety_tighten(&safety, 0, (struct channel_limits){19999, MAX_DUTY_PPM}) == ERROR_NONE);
+    CHECK(safety_set_channel(&safety, 0, &LEGAL) == ERROR_LIMIT && safety_load(&safety) == ERROR_NO_TRAIN);
+    CHECK(safety_set_channel(&safety, 1, &LEGAL) == ERROR_NONE);
+    CHECK(safety_tighten(&safety, 0, (struct channel_limits){UINT32_MAX, UINT32_MAX}) == ERROR_NONE);
+    CHECK(safety_set_channel(&safety, 0, &LEGAL) == ERROR_LIMIT);
+}
+
+static void test_a_loaded_train_does_not_survive_a_tighter_limit(void)
+{
+    boot_armed(5);
+    CHECK(safety_tighten(&safety, 0, (struct channel_limits){1, 1}) == ERROR_NOT_SAFE);
+    safety_off(&safety);
+    CHECK(safety_tighten(&safety, 0, (struct channel_limits){10000, MAX_DUTY_PPM}) == ERROR_NONE);
+    CHECK(safety_arm(&safety, 1) == ERROR_NO_TRAIN && safety_load(&safety) == ERROR_LIMIT);
+    safety_boot(&safety, false);
+    CHECK(safety.limits[0].max_current_ma == MAX_CURRENT_MA);
+}
+
+static void test_a_tighter_duty_lengthens_the_period(void)
+{
+    boot_armed(5);
+    safety_off(&safety);
+    CHECK(safety_tighten(&safety, 0, (struct channel_limits){30000, 20}) == ERROR_NONE && safety_load(&safety) == ERROR_NONE);
+    CHECK(safety_arm(&safety, 5) == ERROR_NONE && safety_fire(&safety) == ERROR_NONE);
+    wait_us(100000 - 1); /* 2 us of light at 20 ppm */
+    CHECK(safety_fire(&safety) == ERROR_EARLY);
+    wait_us(1);
+    CHECK(safety_fire(&safety) == ERROR_NONE);
+}
+
+static void test_a_limit_that_was_broken_in_memory_is_not_fired(void)
+{
+    boot_armed(2);
+    safety.limits[0].max_current_ma = 1;
+    CHECK(safety_fire(&safety) == ERROR_FAULT_LATCHED && fake.fired == 0 && safety.faults == FAULT_INTERNAL);
+}
+
 static void test_off_disarms_and_forgets_the_budget(void)
 {
     boot_armed(7);
@@ -220,6 +261,10 @@ int main(void)
     test_an_armed_generator_takes_no_other_train();
     test_a_changed_channel_must_be_loaded_again();
     test_actual_values_must_keep_the_limits_too();
+    test_a_channel_refuses_more_than_its_own_limit();
+    test_a_loaded_train_does_not_survive_a_tighter_limit();
+    test_a_tighter_duty_lengthens_the_period();
+    test_a_limit_that_was_broken_in_memory_is_not_fired();
     test_off_disarms_and_forgets_the_budget();
     test_an_open_interlock_trips_and_latches();
     test_the_interlock_is_asked_at_the_moment_of_firing();

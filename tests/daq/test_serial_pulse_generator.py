@@ -295,3 +295,25 @@ def test_a_reply_without_its_fields_is_named() -> None:
         SerialPulseGenerator("generator", port, CHANNELS),
     ):
         pass
+
+
+def test_the_generator_itself_keeps_the_limit_of_an_led(firmware: FirmwareProcess) -> None:
+    with SerialPulseGenerator("generator", firmware.port, CHANNELS, {"right": 19.9}) as limited:
+        with pytest.raises(DeviceRefused, match=r"CHANNEL refused: .* limit that was set for this channel"):
+            limited.configure(shot_timing())
+        firmware.reset()
+        with pytest.raises(DeviceError, match="was reset"):
+            limited.status()
+        with pytest.raises(DeviceRefused, match="limit"):
+            limited.configure(shot_timing())
+    with (
+        SerialPulseGenerator("generator", firmware.port, CHANNELS) as without_limits,
+        pytest.raises(DeviceRefused, match="limit"),
+    ):
+        without_limits.configure(shot_timing())
+
+
+def test_a_permitted_current_is_not_cut_by_its_own_limit(firmware: FirmwareProcess) -> None:
+    with SerialPulseGenerator("generator", firmware.port, CHANNELS, dict.fromkeys(CHANNELS, 20.0)) as limited:
+        train = limited.configure(shot_timing())
+        assert {pulse.current_a for pulses in train.pulses.values() for pulse in pulses} == {20.0}

@@ -22,6 +22,7 @@ def test_info_tells_identity_state_and_counters(capsys: pytest.CaptureFixture[st
     assert (info["identity"]["model"], info["identity"]["protocol"]) == ("tomoshadow-pulse", "1")
     assert (info["state"], info["faults"], info["interlock_closed"]) == ("SAFE", [], True)
     assert set(info["counters"].values()) == {0}
+    assert info["limits"] == [{"channel": n, "max_current_ma": 30_000, "max_duty_ppm": 200} for n in range(4)]
 
 
 def test_selftest_passes_and_lists_its_checks(capsys: pytest.CaptureFixture[str]) -> None:

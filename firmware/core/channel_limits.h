@@ -1,0 +1,30 @@
+/* Limits of one channel while the generator runs, for the LED that is connected to it. They start at the absolute
+ * ones of limits.h and can only be tightened, until the next start. */
+#ifndef CHANNEL_LIMITS_H
+#define CHANNEL_LIMITS_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "pulse_train.h"
+
+struct channel_limits {
+    uint32_t max_current_ma;
+    uint32_t max_duty_ppm; /* 0: no light at all */
+};
+
+struct channel_limits channel_limits_absolute(void);
+
+/* The tighter of both, field by field. */
+struct channel_limits channel_limits_tightened(struct channel_limits present, struct channel_limits asked);
+
+bool channel_within(const struct channel *channel, const struct channel_limits *limits);
+
+/* False if a used channel of the train is not within its limits. */
+bool train_within(const struct pulse_train *train, const struct channel_limits *limits);
+
+/* Shortest time to the next shot, so that no channel exceeds its duty over any length of time: the minimum period,
+ * or the light of this shot at the duty of its channel. For a train within these limits. */
+uint32_t train_period_us(const struct pulse_train *train, const struct channel_limits *limits);
+
+#endif
