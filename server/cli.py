@@ -19,6 +19,7 @@ from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.volume_file import VolumeFileError
 from server import commands
 from server.bench_command import bench
+from server.check_command import check, self_calibrate_views
 from server.config import ConfigError
 from server.firmware_image import ImageError
 from server.firmware_options import add_firmware_tools
@@ -68,6 +69,8 @@ def _parser() -> argparse.ArgumentParser:
     _add_serve(verbs)
     _add_import(verbs)
     _add_calibrate(verbs)
+    _add_check(verbs)
+    _add_self_calibrate(verbs)
     _add_reconstruct(verbs)
     _add_average(verbs)
     _add_study(verbs)
@@ -109,6 +112,23 @@ def _add_calibrate(verbs: Any) -> None:
     parser.add_argument("set", type=Path, help="calibration run, or an imported set")
     parser.add_argument("-o", "--out", type=Path, required=True, help="calibration file to write")
     parser.add_argument("--model", choices=("pinhole", "pinhole_tilted", "polynomial"), default="pinhole")
+
+
+def _add_check(verbs: Any) -> None:
+    parser = _verb(verbs, "check", check, "do the droplets in the shots of a run still agree with a calibration?")
+    _add_droplet_options(parser)
+
+
+def _add_self_calibrate(verbs: Any) -> None:
+    parser = _verb(verbs, "self-calibrate", self_calibrate_views, "correct a calibration by the droplets in shots")
+    _add_droplet_options(parser)
+    parser.add_argument("-o", "--out", type=Path, required=True, help="calibration file to write")
+
+
+def _add_droplet_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("run", type=Path, help="run directory")
+    parser.add_argument("--calibration", type=Path, required=True)
+    parser.add_argument("--shots", metavar="A:B", help="shots A to B - 1; default all")
 
 
 def _add_reconstruct(verbs: Any) -> None:

@@ -98,7 +98,7 @@ def reconstruct_run(options: Namespace) -> dict[str, Any]:
     settings = ReconstructionSettings(
         method=ReconstructionMethod(options.method), iterations=options.iterations, grid=grid
     )
-    shots = _selected_shots(options.run, options.shots)
+    shots = selected_shots(options.run, options.shots)
     results = []
     for shot in shots:
         progress(f"{options.run.name}: shot {shot} by {options.method}")
@@ -133,7 +133,7 @@ def parse_grid(text: str, calibration: Calibration) -> VoxelGrid:
     return VoxelGrid((nz, ny, nx), (float(lower_mm[0]), float(lower_mm[1]), float(lower_mm[2])), pitch_mm)
 
 
-def _selected_shots(run_dir: Path, selection: str | None) -> list[int]:
+def selected_shots(run_dir: Path, selection: str | None) -> list[int]:
     """Valid sample shots within A:B; one that was flagged while recording is left out, one that is torn is an error."""
     first, last = _bounds(selection)
     with RunReader(run_dir) as run:

@@ -13,8 +13,8 @@ from processing.calibration.calibration_record import (
     SCHEMA,
     VERSION,
     CalibrationRecord,
-    content_id,
     from_record,
+    json_id,
     to_json,
     to_record,
 )
@@ -80,7 +80,7 @@ def load_calibration(path: Path) -> Calibration:
         calibration = from_record(CalibrationRecord.model_validate_json(json.dumps(content)))
     except ValidationError as error:
         raise CalibrationError(f"{path}: {_first_problem(error)}") from error
-    if content_id(calibration) != calibration.id:
+    if json_id(content) != calibration.id:
         raise CalibrationError(f"{path}: id: {calibration.id} does not belong to this content; the file was changed")
     return calibration
 

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -142,10 +143,13 @@ def from_record(record: CalibrationRecord) -> Calibration:
 
 def content_id(calibration: Calibration) -> str:
     """Id from the content: everything but id, date and software versions."""
-    content = to_json(to_record(calibration, {}))
-    for changing in ("id", "created_utc", "software"):
-        del content[changing]
-    digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+    return json_id(to_json(to_record(calibration, {})))
+
+
+def json_id(content: Mapping[str, Any]) -> str:
+    """Id of a file's content as it stands there: fields that came later do not change the ids of older files."""
+    lasting = {key: value for key, value in content.items() if key not in ("id", "created_utc", "software")}
+    digest = hashlib.sha256(json.dumps(lasting, sort_keys=True).encode()).hexdigest()
     return f"cal-{digest[:12]}"
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from processing.calibration.calibration import Calibration
-from processing.calibration.droplet_matching import Box, Matches, match_droplets
+from processing.calibration.droplet_matching import Box, Matches, match_exposures
 from processing.calibration.errors import CalibrationError
 from processing.calibration.sight_lines import linearise, unseen
 from processing.geometry import FloatArray, ViewMapping
@@ -98,16 +98,16 @@ def local_disparities(
 
 
 def shot_disparity(
-    mappings: Sequence[ViewMapping], droplets_px: Sequence[FloatArray], box: Box
+    mappings: Sequence[ViewMapping], exposures: Sequence[Sequence[FloatArray]], box: Box
 ) -> tuple[ViewDisparity, ...]:
-    """Disparity of every view in one exposure.
+    """Disparity of every view in one shot.
 
     Parameters
     ----------
     mappings : sequence of ViewMapping
         The views as calibrated, at least three.
-    droplets_px : sequence of (N, 2) arrays
-        Droplets of each view.
+    exposures : sequence of sequences of (N, 2) arrays
+        By exposure: the droplets of each view.
     box : Box
         The measured volume.
 
@@ -117,12 +117,12 @@ def shot_disparity(
         There are too few views or droplets, or none agree.
     """
     require_views(len(mappings))
-    matches = match_droplets(mappings, droplets_px, box, SEARCH_PX)
+    matches = match_exposures(mappings, exposures, box, SEARCH_PX)
     local = local_disparities(mappings, matches, box, SHOT_DIVISIONS) or local_disparities(
         mappings, matches, box, (1, 1, 1)
     )
     if not local:
-        seen = ", ".join(str(len(points)) for points in droplets_px)
+        seen = ", ".join(str(sum(map(len, view))) for view in zip(*exposures, strict=True))
         raise CalibrationError(
             f"the views see {seen} droplets, of which no {MIN_DROPLETS} agree within {SEARCH_PX:g} px: "
             "too few droplets, too many, or a view has moved further"

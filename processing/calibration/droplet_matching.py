@@ -100,6 +100,15 @@ def match_droplets(
     return Matches(points_mm[inside], disparities_px[inside])
 
 
+def match_exposures(
+    mappings: Sequence[ViewMapping], exposures: Sequence[Sequence[FloatArray]], box: Box, tolerance_px: float
+) -> Matches:
+    """Match the droplets of several exposures, each by itself; ``exposures`` are the droplets by exposure and view."""
+    found = [match_droplets(mappings, droplets_px, box, tolerance_px) for droplets_px in exposures]
+    points_mm, disparities_px = [one.points_mm for one in found], [one.disparities_px for one in found]
+    return Matches(np.concatenate(points_mm), np.concatenate(disparities_px))
+
+
 def _widest_pair(mappings: Sequence[ViewMapping], box: Box) -> tuple[int, int]:
     angles_rad = crossing_angle_rad(mappings, box.middle_mm)
     first, second = np.unravel_index(int(angles_rad.argmax()), angles_rad.shape)

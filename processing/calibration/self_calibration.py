@@ -21,7 +21,7 @@ from processing.calibration.disparity import (
     measured_box,
     require_views,
 )
-from processing.calibration.droplet_matching import Box, Matches, match_droplets
+from processing.calibration.droplet_matching import Box, match_exposures
 from processing.calibration.errors import CalibrationError
 from processing.calibration.health import judge
 from processing.calibration.mapping_correction import corrected, correction_size, sensitivity
@@ -45,8 +45,6 @@ CLEARER = 2.0
 """The view that moved leaves so many times less than any other view would."""
 NOISE_PX = 0.02
 """Disparity of a sub-volume that may be left by chance."""
-
-ShotDroplets = Sequence[FloatArray]
 
 
 @dataclass(frozen=True)
@@ -79,15 +77,15 @@ class SelfCalibration:
 
 
 def self_calibrate(
-    calibration: Calibration, shots: Sequence[ShotDroplets], source: str, *, created_utc: str | None = None
+    calibration: Calibration, exposures: Sequence[Sequence[FloatArray]], source: str, *, created_utc: str | None = None
 ) -> SelfCalibration:
-    """Correct the views of a calibration by the droplets of several shots.
+    """Correct the views of a calibration by the droplets of several exposures.
 
     Parameters
     ----------
     calibration : Calibration
         At least three views that see a common volume.
-    shots : sequence of sequences of (N, 2) arrays
+    exposures : sequence of sequences of (N, 2) arrays
         By exposure: the droplets of every view, in the order of the views of the calibration.
     source : str
         Run that the shots are from.
@@ -104,12 +102,12 @@ def self_calibrate(
     require_views(len(names))
     original = [view.mapping for view in calibration.views.values()]
     box = measured_box(calibration)
-    seen = _sub_volumes(original, shots, box, SEARCH_PX)
+    seen = _sub_volumes(original, exposures, box, SEARCH_PX)
     first, moved, mappings = seen, None, original
     for _ in range(MAX_ROUNDS):
         moved, corrections = _explain(original, mappings, seen)
         previous, mappings = mappings, [corrected(*pair) for pair in zip(original, corrections, strict=True)]
-        seen = _sub_volumes(mappings, shots, box, FINE_SEARCH_PX)
+        seen = _sub_volumes(mappings, exposures, box, FINE_SEARCH_PX)
         if max(_distances_px(previous, mappings, box)) < CONVERGED_PX:
             break
     after_px = _disagreement_px(mappings, seen)
@@ -121,7 +119,7 @@ def self_calibrate(
         )
     }
     moves = ", ".join(f"{name} by {px:.2f} px" for name, px in zip(names, distances_px, strict=True) if px)
-    note = f"self-calibration on {len(shots)} exposures of {source}: {moves or 'the views agree, nothing moved'}"
+    note = f"self-calibration on {len(exposures)} exposures of {source}: {moves or 'the views agree, nothing moved'}"
     undated = replace(
         calibration,
         id="",
@@ -142,18 +140,15 @@ def self_calibrate(
 
 
 def _sub_volumes(
-    mappings: Sequence[ViewMapping], shots: Sequence[ShotDroplets], box: Box, tolerance_px: float
+    mappings: Sequence[ViewMapping], exposures: Sequence[Sequence[FloatArray]], box: Box, tolerance_px: float
 ) -> list[LocalDisparity]:
-    found = [match_droplets(mappings, droplets_px, box, tolerance_px) for droplets_px in shots]
-    matches = Matches(
-        np.concatenate([match.points_mm for match in found]), np.concatenate([match.disparities_px for match in found])
-    )
+    matches = match_exposures(mappings, exposures, box, tolerance_px)
     seen = local_disparities(mappings, matches, box, DIVISIONS)
     if len(seen) < MIN_SUB_VOLUMES:
-        per_view = np.mean([[len(points) for points in droplets_px] for droplets_px in shots], axis=0)
+        per_view = np.mean([[len(points) for points in droplets_px] for droplets_px in exposures], axis=0)
         raise CalibrationError(
             f"droplets agree in {len(seen)} of {np.prod(DIVISIONS)} sub-volumes, {MIN_SUB_VOLUMES} are needed: "
-            f"{len(shots)} exposures with {', '.join(f'{count:.0f}' for count in per_view)} droplets by view give "
+            f"{len(exposures)} exposures with {', '.join(f'{count:.0f}' for count in per_view)} droplets by view give "
             f"{len(matches)} combinations within {tolerance_px:g} px; take more shots, of fewer or smaller droplets"
         )
     return seen

@@ -10,6 +10,7 @@ import pytest
 
 from processing.calibration.calibration import Calibration
 from processing.calibration.calibration_file import file_sha256, load_calibration, save_calibration
+from processing.calibration.calibration_record import json_id
 from processing.calibration.errors import CalibrationError
 from processing.calibration.joint_fit import calibrate
 from processing.calibration.observation import PlaneObservation
@@ -136,3 +137,15 @@ def test_scattered_points_have_no_plane(tmp_path: Path) -> None:
     scattered = (PlaneObservation("table", points_mm, camera.project(points_mm)),)
     save_calibration(calibrate(calibration_set(only=scattered)), tmp_path / "c.json")
     assert load_calibration(tmp_path / "c.json").views["only"].planes[0].z_mm is None
+
+
+def test_files_from_before_a_field_existed_still_load(tmp_path: Path, calibration: Calibration) -> None:
+    path = tmp_path / "c.json"
+    save_calibration(calibration, path)
+    content = json.loads(path.read_text())
+    del content["target"]["y_axis"]
+    content["id"] = json_id(content)
+    path.write_text(json.dumps(content))
+    old = load_calibration(path)
+    assert old.target == TARGET
+    assert old.id == content["id"] != calibration.id

@@ -1,0 +1,120 @@
+"""Does a calibration still fit the shots of a run? Asked of the droplets in them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from daq.shotfile import RunReader
+from processing.calibration.calibration import Calibration, Verdict
+from processing.calibration.disparity import ViewDisparity, measured_box, shot_disparity
+from processing.calibration.droplet_images import find_droplets
+from processing.calibration.errors import CalibrationError
+from processing.calibration.health import LIMITS_PX, judge
+from processing.calibration.self_calibration import SelfCalibration, self_calibrate
+from processing.geometry import FloatArray
+from processing.pipeline import PipelineError, shot_intensities
+from processing.reconstruction.settings import ReconstructionSettings
+from processing.results_file import FrameName
+
+ALARM_PX, STOP_PX = LIMITS_PX[Verdict.USABLE], LIMITS_PX[Verdict.WARN]
+"""Disparity of a view above which an operator should know, and above which volumes are not worth having."""
+
+Exposure = list[FloatArray]
+_FRAMES: tuple[FrameName, ...] = ("a", "b")
+
+
+@dataclass(frozen=True)
+class ShotCheck:
+    """What the droplets of one shot say of a calibration.
+
+    Parameters
+    ----------
+    shot : int
+        Index of the shot.
+    views : dict[str, ViewDisparity]
+        By view; empty where the droplets do not tell.
+    problem : str
+        Why they do not tell.
+    """
+
+    shot: int
+    views: dict[str, ViewDisparity]
+    problem: str = ""
+
+    @property
+    def worst_px(self) -> float:
+        """Largest disparity of a view."""
+        return max(view.disparity_px for view in self.views.values())
+
+    @property
+    def verdict(self) -> Verdict | None:
+        """By the limits of a hold-out error: ``warn`` is an alarm, ``refuse`` stops reconstruction."""
+        return judge(self.worst_px) if self.views else None
+
+
+def check_shot(run_dir: Path, shot: int, calibration: Calibration) -> ShotCheck:
+    """Measure the disparity of every view in one recorded shot.
+
+    Raises
+    ------
+    CalibrationError
+        The calibration does not belong to the views of the run.
+    PipelineError
+        An exposure is missing.
+    """
+    (exposures,) = _droplets(run_dir, [shot], calibration)
+    mappings = [view.mapping for view in calibration.views.values()]
+    try:
+        measured = shot_disparity(mappings, exposures, measured_box(calibration))
+    except CalibrationError as error:
+        return ShotCheck(shot, {}, str(error))
+    return ShotCheck(shot, dict(zip(calibration.views, measured, strict=True)))
+
+
+def self_calibrate_run(run_dir: Path, shots: Sequence[int], calibration: Calibration) -> SelfCalibration:
+    """Correct a calibration by the droplets in recorded shots, exposures A and B alike.
+
+    Raises
+    ------
+    CalibrationError
+        The droplets do not tell, or the calibration does not belong to the views of the run.
+    PipelineError
+        An exposure is missing.
+    """
+    exposures = [exposure for of_shot in _droplets(run_dir, shots, calibration) for exposure in of_shot]
+    return self_calibrate(calibration, exposures, run_dir.name)
+
+
+def _droplets(run_dir: Path, shots: Sequence[int], calibration: Calibration) -> list[list[Exposure]]:
+    """Droplets by shot, exposure and view, in the order of the views of the calibration."""
+    calibration.require_world()
+    settings = ReconstructionSettings()
+    with RunReader(run_dir) as run:
+        _check_views(run, calibration)
+        found = []
+        for index in shots:
+            shot = run.read_shot(index)
+            if not shot.valid:
+                raise PipelineError(f"{run_dir.name}, shot {index}: exposures are missing, nothing to check")
+            exposures = []
+            for frame in _FRAMES[: run.header.frames_per_shot]:
+                images = dict(zip(shot.views, shot_intensities(run, shot, frame, settings), strict=True))
+                exposures.append([find_droplets(images[name]) for name in calibration.views])
+            found.append(exposures)
+    return found
+
+
+def _check_views(run: RunReader, calibration: Calibration) -> None:
+    formats = run.header.views
+    if set(formats) != set(calibration.views):
+        raise CalibrationError(
+            f"run {run.header.run_id} has views {sorted(formats)}, "
+            f"calibration {calibration.id} has {sorted(calibration.views)}"
+        )
+    for name, view in calibration.views.items():
+        rows, columns = formats[name].shape
+        if (columns, rows) != view.mapping.image_size_px:
+            raise CalibrationError(
+                f"run {run.header.run_id}, {name}: image of {columns} x {rows} px, "
+                f"calibrated for {view.mapping.image_size_px}"
+            )

@@ -1,0 +1,79 @@
+"""``tomoshadow check`` and ``tomoshadow self-calibrate``: what droplets say of a calibration."""
+
+from argparse import Namespace
+from typing import Any
+
+from processing.calibration.calibration import Verdict
+from processing.calibration.calibration_file import load_calibration, save_calibration
+from processing.run_check import ALARM_PX, STOP_PX, ShotCheck, check_shot, self_calibrate_run
+from server.commands import progress, selected_shots
+
+_MEANING = {Verdict.WARN: "ALARM", Verdict.REFUSE: "STOP: do not reconstruct with this calibration"}
+
+
+def check(options: Namespace) -> dict[str, Any]:
+    """``tomoshadow check``."""
+    calibration = load_calibration(options.calibration)
+    shots = []
+    for index in selected_shots(options.run, options.shots):
+        measured = check_shot(options.run, index, calibration)
+        progress(f"{options.run.name}: {check_line(measured)}")
+        shots.append(measured)
+    verdicts = [shot.verdict for shot in shots if shot.verdict is not None]
+    return {
+        "run": options.run.name,
+        "calibration": calibration.id,
+        "alarm_px": ALARM_PX,
+        "stop_px": STOP_PX,
+        "verdict": max(verdicts, key=list(Verdict).index) if verdicts else None,
+        "shots": [check_json(shot) for shot in shots],
+    }
+
+
+def check_line(measured: ShotCheck) -> str:
+    """One shot for a person."""
+    if not measured.views:
+        return f"shot {measured.shot}: {measured.problem}"
+    views = ", ".join(
+        f"{name} {view.disparity_px:.2f} ± {view.uncertainty_px:.2f} px" for name, view in measured.views.items()
+    )
+    meaning = _MEANING.get(measured.verdict) if measured.verdict else None
+    return f"shot {measured.shot}: {views}" + (f"  {meaning}" if meaning else "")
+
+
+def check_json(measured: ShotCheck) -> dict[str, Any]:
+    """One shot for a program."""
+    return {
+        "shot": measured.shot,
+        "verdict": measured.verdict,
+        "views": {name: view.disparity_px for name, view in measured.views.items()},
+        "uncertainty_px": {name: view.uncertainty_px for name, view in measured.views.items()},
+        "problem": measured.problem or None,
+    }
+
+
+def self_calibrate_views(options: Namespace) -> dict[str, Any]:
+    """``tomoshadow self-calibrate``."""
+    calibration = load_calibration(options.calibration)
+    shots = selected_shots(options.run, options.shots)
+    progress(f"{options.run.name}: droplets of {len(shots)} shots")
+    result = self_calibrate_run(options.run, shots, calibration)
+    save_calibration(result.calibration, options.out)
+    progress(result.calibration.notes[-1])
+    return {
+        "calibration": str(options.out),
+        "id": result.calibration.id,
+        "parent": calibration.id,
+        "moved": result.moved,
+        "sub_volumes": result.sub_volumes,
+        "droplets": result.droplets,
+        "views": {
+            name: {
+                "correction_px": result.corrections_px[name],
+                "disparity_before_px": result.before_px[name],
+                "disparity_after_px": result.after_px[name],
+                "verdict": result.calibration.views[name].verdict,
+            }
+            for name in result.calibration.views
+        },
+    }
