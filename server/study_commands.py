@@ -8,6 +8,14 @@ from typing import Any, TypeVar
 
 from matplotlib.figure import Figure
 
+from processing.studies.average import (
+    AverageStudy,
+    average_figure,
+    average_rows,
+    average_statements,
+    average_study,
+    profile_rows,
+)
 from processing.studies.density import (
     ALL_SIGMAS_VOXEL,
     DensityRow,
@@ -49,6 +57,17 @@ def study_ghosts(options: Namespace) -> dict[str, Any]:
 def _ghost_line(row: GhostRow) -> str:
     place = f"{row.density_per_mm3:5.1f} droplets/mm3, {row.method}, {row.threshold_rule}"
     return f"{place}: {100 * row.found:.1f} % found, {100 * row.ghosts:.1f} % ghosts"
+
+
+def study_average(options: Namespace) -> dict[str, Any]:
+    """``tomoshadow study average``."""
+    study = AverageStudy(shots=options.shots, binning=options.binning, seed=options.seed)
+    mean = average_study(study, lambda done: progress(f"shot {done} of {study.shots}"))
+    rows = average_rows(mean)
+    result = _report(options.out, "average", rows, average_figure(mean), average_statements(rows))
+    profiles = options.out / "average-profiles.csv"
+    profiles.write_text(csv_text(profile_rows(mean)), encoding="utf-8")
+    return {**result, "profiles": str(profiles)}
 
 
 def _recipes(options: Namespace) -> tuple[Recipe, ...]:

@@ -15,6 +15,7 @@ def add_studies(add_verb: AddVerb) -> None:
     """Add the command of every study."""
     _add_density(add_verb)
     _add_ghosts(add_verb)
+    _add_average(add_verb)
 
 
 def _add_density(add_verb: AddVerb) -> None:
@@ -32,6 +33,14 @@ def _add_ghosts(add_verb: AddVerb) -> None:
     _add_out(parser, "ghosts")
     parser.add_argument("--sigma", type=positive, default=1.0, help="blob width in voxel")
     _add_methods(parser, "all, SMART after 5, 10 and 20 iterations, MART after 5")
+
+
+def _add_average(add_verb: AddVerb) -> None:
+    parser = add_verb("average", study_commands.study_average, "mean of many shots of the hollow cone, Fig. 6")
+    _add_out(parser, "average")
+    parser.add_argument("--shots", type=count, default=266, help="realisations of the spray")
+    parser.add_argument("--binning", type=int, choices=(1, 2, 4), default=2, help="of pixels; 1 is the paper's")
+    parser.add_argument("--seed", type=int, default=0, help="of spray, dust and noise")
 
 
 def _add_out(parser: argparse.ArgumentParser, study: str) -> None:

@@ -1,0 +1,219 @@
+"""Mean of many shots of the hollow cone in a slice across its axis (Fig. 6 of the paper)."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
+from numpy.typing import NDArray
+
+from processing.reconstruction.plan import plan_reconstruction
+from processing.studies.hollow_cone_shots import cropped_cameras, height_mm, hollow_cone_images, slab_grid
+from processing.studies.recipe import COLOURS, Recipe, reconstruct_each
+from processing.studies.report import Statement
+from processing.studies.ring import RadialProfile, radial_profile
+from processing.volume import VoxelGrid
+
+Slice = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class AverageStudy:
+    """What to average; shots, methods and height are the paper's.
+
+    Parameters
+    ----------
+    shots : int
+        Realisations of the spray.
+    recipes : tuple of Recipe
+        Methods, in the order of the figure.
+    diameters_from_orifice : float
+        Height of the slice, in orifice diameters d0.
+    binning : int
+        Pixels binned in either direction, and voxels with them; 1 is the paper's resolution.
+    radius_mm : float
+        Half the edge of the reconstructed square. All liquid at the height of the slice must lie inside.
+    rows : int
+        Height of the reconstructed slab in voxels. SMART needs more than the slice: lines of sight are tilted.
+    seed : int
+        Of spray, dust and noise.
+    """
+
+    shots: int = 266
+    recipes: tuple[Recipe, ...] = tuple(Recipe.named(name) for name in ("gavlos", "minlos", "mlos", "smart"))
+    diameters_from_orifice: float = 25.0
+    binning: int = 2
+    radius_mm: float = 4.5
+    rows: int = 15
+    seed: int = 0
+
+    @property
+    def grid(self) -> VoxelGrid:
+        """The reconstructed slab."""
+        return slab_grid(height_mm(self.diameters_from_orifice), self.radius_mm, self.rows, self.binning)
+
+
+@dataclass(frozen=True, eq=False)
+class MeanSlices:
+    """Averages of a study.
+
+    Parameters
+    ----------
+    study : AverageStudy
+        What was averaged.
+    slices : Mapping[str, (nz, nx) array]
+        Mean intensity by name of the recipe.
+    """
+
+    study: AverageStudy
+    slices: Mapping[str, Slice]
+
+    def profile(self, method: str) -> RadialProfile:
+        """Radial profile of a method in bins of one voxel."""
+        grid = self.study.grid
+        return radial_profile(self.slices[method], grid.x_mm, grid.z_mm, grid.pitch_mm)
+
+
+@dataclass(frozen=True)
+class AverageRow:
+    """The ring of a method: radius, width at half maximum, steepest flanks relative to the maximum, smoothed."""
+
+    method: str
+    shots: int
+    ring_mm: float
+    width_mm: float
+    inner_gradient_per_mm: float
+    outer_gradient_per_mm: float
+    centre: float
+
+
+@dataclass(frozen=True)
+class ProfileRow:
+    """One point of a radial profile."""
+
+    method: str
+    radius_mm: float
+    intensity: float
+    gradient_per_mm: float
+
+
+def average_study(
+    study: AverageStudy | None = None,
+    done: Callable[[int], None] = lambda _: None,
+) -> MeanSlices:
+    """Reconstruct every shot by every method and average the slice in the middle of the slab.
+
+    Parameters
+    ----------
+    study : AverageStudy, optional
+        The paper's by default.
+    done : callable
+        Told the number of shots after each.
+    """
+    study = study or AverageStudy()
+    grid = study.grid
+    cameras = cropped_cameras(grid, study.binning)
+    plan = plan_reconstruction(list(cameras.values()), grid)
+    volume = np.empty(grid.shape, dtype=np.float32)
+    sums = {recipe.name: np.zeros((grid.shape[0], grid.shape[2])) for recipe in study.recipes}
+    for number, images in enumerate(hollow_cone_images(cameras, study.shots, study.binning, study.seed), 1):
+        for recipe in reconstruct_each(plan, images, study.recipes, volume):
+            sums[recipe.name] += volume[:, study.rows // 2]
+        done(number)
+    return MeanSlices(study, {name: total / study.shots for name, total in sums.items()})
+
+
+def average_rows(mean: MeanSlices) -> list[AverageRow]:
+    """The ring of every method."""
+    rows = []
+    for method in mean.slices:
+        profile = mean.profile(method)
+        rows.append(
+            AverageRow(
+                method=method,
+                shots=mean.study.shots,
+                ring_mm=profile.ring_mm,
+                width_mm=profile.width_mm,
+                inner_gradient_per_mm=profile.inner_gradient_per_mm,
+                outer_gradient_per_mm=profile.outer_gradient_per_mm,
+                centre=float(profile.intensities[profile.radii_mm < 0.5 * profile.ring_mm].mean()),
+            )
+        )
+    return rows
+
+
+def profile_rows(mean: MeanSlices) -> list[ProfileRow]:
+    """The radial profiles of all methods."""
+    return [
+        ProfileRow(method, float(radius), float(value), float(gradient))
+        for method in mean.slices
+        for radius, value, gradient in _points(mean.profile(method))
+    ]
+
+
+def _points(profile: RadialProfile) -> NDArray[np.float64]:
+    return np.column_stack([profile.radii_mm, profile.intensities, profile.gradients_per_mm])
+
+
+def average_statements(rows: Sequence[AverageRow]) -> list[Statement]:
+    """Whose flanks are steepest: the paper's order and ours."""
+    statements = []
+    for side in ("inner", "outer"):
+        steepest = sorted(rows, key=lambda row: -getattr(row, f"{side}_gradient_per_mm"))
+        found = ", ".join(
+            f"{Recipe.named(row.method).label} {getattr(row, f'{side}_gradient_per_mm'):.2f}/mm" for row in steepest
+        )
+        topic = f"steepest gradient on the {side} flank of the ring"
+        statements.append(Statement(topic, "SMART-20, then MLOS, then minimum and geometric average", found))
+    return statements
+
+
+def average_figure(mean: MeanSlices) -> Figure:
+    """Mean slices in the order of Fig. 6, and their radial profiles."""
+    figure = Figure(figsize=(13.4, 7.6), layout="constrained")
+    pictures, curves = figure.subfigures(1, 2, squeeze=False, width_ratios=(1, 1.1))[0]
+    panels = pictures.subplots(2, 2, sharex=True, sharey=True)
+    for axes, (method, slice_zx) in zip(panels.flat, mean.slices.items(), strict=False):
+        image = _draw_slice(axes, slice_zx, mean.study.grid, Recipe.named(method).label)
+    for axes in panels[-1]:
+        axes.set_xlabel("x [mm]")
+    for axes in panels[:, 0]:
+        axes.set_ylabel("z [mm]")
+    pictures.colorbar(
+        image, ax=panels, location="bottom", label="mean intensity, relative to the maximum [-]", shrink=0.8, aspect=40
+    )
+    upper, lower = curves.subplots(2, 1, sharex=True)
+    _draw_profiles(upper, lower, mean)
+    study = mean.study
+    figure.suptitle(
+        f"mean of {study.shots} synthetic shots of the hollow cone, "
+        rf"y = {study.diameters_from_orifice:g} $d_0$, voxel {1000 * study.grid.pitch_mm:.1f} µm"
+    )
+    return figure
+
+
+def _draw_slice(axes: Axes, slice_zx: Slice, grid: VoxelGrid, title: str) -> AxesImage:
+    half_mm = 0.5 * grid.pitch_mm
+    extent = (
+        grid.x_mm[0] - half_mm,
+        grid.x_mm[-1] + half_mm,
+        grid.z_mm[0] - half_mm,
+        grid.z_mm[-1] + half_mm,
+    )
+    axes.set_title(title, fontsize="medium")
+    return axes.imshow(slice_zx / slice_zx.max(), origin="lower", extent=extent, cmap="gray_r", vmin=0, vmax=1)
+
+
+def _draw_profiles(upper: Axes, lower: Axes, mean: MeanSlices) -> None:
+    for method in mean.slices:
+        profile, recipe = mean.profile(method), Recipe.named(method)
+        colour = COLOURS[recipe.method.value]
+        upper.plot(profile.radii_mm, profile.intensities, color=colour, label=recipe.label)
+        lower.plot(profile.radii_mm, profile.gradients_per_mm, color=colour)
+    upper.set(ylabel="radial profile, relative to its maximum [-]", ylim=(0, 1.05))
+    lower.set(xlabel="radius [mm]", ylabel="gradient of the profile [1/mm]")
+    upper.legend(frameon=False)
+    for axes in (upper, lower):
+        axes.grid(alpha=0.25)

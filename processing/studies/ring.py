@@ -1,0 +1,90 @@
+"""A ring in a slice: its profile over the radius, how steep its flanks are and how wide it is."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
+
+from processing.geometry import FloatArray
+
+Slice = NDArray[np.floating]
+
+SMOOTHING_MM = 0.1
+"""Sigma of the smoothing of gradients: without it, single droplets of a mean are steeper than the ring."""
+
+
+@dataclass(frozen=True, eq=False)
+class RadialProfile:
+    """Mean intensity over the azimuth, relative to its maximum.
+
+    Parameters
+    ----------
+    radii_mm : (N,) array
+        Middle of each bin, equally spaced.
+    intensities : (N,) array
+        0 to 1.
+    """
+
+    radii_mm: FloatArray
+    intensities: FloatArray
+
+    @property
+    def ring_mm(self) -> float:
+        """Radius of the maximum."""
+        return float(self.radii_mm[np.argmax(self.intensities)])
+
+    @property
+    def gradients_per_mm(self) -> FloatArray:
+        """Slope of the relative intensity over the radius, (N,), smoothed by a Gaussian of ``SMOOTHING_MM``."""
+        bin_mm = self.radii_mm[1] - self.radii_mm[0]
+        slope = gaussian_filter1d(self.intensities, SMOOTHING_MM / bin_mm, order=1, mode="nearest")
+        return np.asarray(slope / bin_mm, dtype=np.float64)
+
+    @property
+    def inner_gradient_per_mm(self) -> float:
+        """Steepest rise inside of the ring, from half its radius on: the few voxels in the middle are noisy."""
+        peak = int(np.argmax(self.intensities))
+        return float(self.gradients_per_mm[peak // 2 : peak + 1].max())
+
+    @property
+    def outer_gradient_per_mm(self) -> float:
+        """Steepest fall outside of it, as a positive number."""
+        return float(-self.gradients_per_mm[np.argmax(self.intensities) :].min())
+
+    @property
+    def width_mm(self) -> float:
+        """Full width at half maximum, from the maximum to both sides."""
+        peak = int(np.argmax(self.intensities))
+        inside = np.flatnonzero(self.intensities[:peak] < 0.5)
+        outside = np.flatnonzero(self.intensities[peak:] < 0.5)
+        first = self._half_mm(int(inside[-1])) if len(inside) else float(self.radii_mm[0])
+        last = self._half_mm(peak + int(outside[0]) - 1) if len(outside) else float(self.radii_mm[-1])
+        return last - first
+
+    def _half_mm(self, before: int) -> float:
+        """Radius at which the profile crosses one half between a bin and the next."""
+        a, b = self.intensities[before : before + 2]
+        share = (0.5 - a) / (b - a)
+        return float(self.radii_mm[before] + share * (self.radii_mm[before + 1] - self.radii_mm[before]))
+
+
+def radial_profile(slice_zx: Slice, x_mm: FloatArray, z_mm: FloatArray, bin_mm: float) -> RadialProfile:
+    """Profile of a slice around x = z = 0.
+
+    Parameters
+    ----------
+    slice_zx : (nz, nx) array
+        Intensities, not all zero.
+    x_mm, z_mm : (nx,) and (nz,) array
+        Where its voxels lie.
+    bin_mm : float
+        Width of a bin; the profile ends where the slice does.
+    """
+    radii_mm = np.hypot(x_mm[None, :], z_mm[:, None])
+    bins = np.rint(radii_mm / bin_mm).astype(np.intp)
+    last = int(min(np.abs(x_mm).max(), np.abs(z_mm).max()) / bin_mm)
+    within = bins <= last
+    sums = np.bincount(bins[within], weights=slice_zx[within].astype(np.float64), minlength=last + 1)
+    means = sums / np.maximum(np.bincount(bins[within], minlength=last + 1), 1)
+    return RadialProfile(bin_mm * np.arange(last + 1, dtype=np.float64), means / means.max())
