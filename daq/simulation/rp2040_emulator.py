@@ -64,6 +64,8 @@ class EmulatedPico:
         System clock cycles since construction.
     edges : list[Edge]
         What the outputs did; the caller may clear it.
+    on_edge : Callable[[Edge], None] | None
+        Told every edge when it happens.
     sent : bytearray
         What the firmware sent on its serial line; the caller may clear it.
     watchdog_resets : int
@@ -79,9 +81,11 @@ class EmulatedPico:
         self._received: deque[int] = deque()
         self._next_byte_cycle = 0
         self._visits: list[tuple[int, Callable[[], None]]] = []
+        self._next_visit = _NEVER
         self.cycle = 0
         self.edges: list[Edge] = []
         self.sent = bytearray()
+        self.on_edge: Callable[[Edge], None] | None = None
         self.watchdog_resets = 0
         self.shot_set_points_ma: tuple[int, ...] = ()
         self.power_up()
@@ -145,6 +149,7 @@ class EmulatedPico:
         """Do something at a cycle that is still to come."""
         self._visits.append((cycle, action))
         self._visits.sort(key=lambda visit: visit[0])
+        self._next_visit = self._visits[0][0]
 
     def run(self, until_cycle: int, stop: Callable[[], bool] | None = None) -> bool:
         """Let time pass, up to a cycle or, whenever the processor sleeps, until ``stop`` says so."""
@@ -162,16 +167,20 @@ class EmulatedPico:
         self.run(self.cycle + round(time_ms * CYCLES_PER_MS))
 
     def _deliver(self) -> None:
-        while self._visits and self._visits[0][0] <= self.cycle:
-            self._visits.pop(0)[1]()
+        if self.cycle >= self._next_visit:
+            self._visit()
         if self._received and self.cycle >= self._next_byte_cycle:
             self._next_byte_cycle = self.cycle + _BYTE_CYCLES
             self._chip.uart[0].feed_byte(self._received.popleft())
 
+    def _visit(self) -> None:
+        while self._visits and self._visits[0][0] <= self.cycle:
+            self._visits.pop(0)[1]()
+        self._next_visit = self._visits[0][0] if self._visits else _NEVER
+
     def _next_from_outside(self, until_cycle: int) -> int:
         next_byte = self._next_byte_cycle if self._received else _NEVER
-        next_visit = self._visits[0][0] if self._visits else _NEVER
-        return max(self.cycle + 1, min(until_cycle, next_byte, next_visit))
+        return max(self.cycle + 1, min(until_cycle, next_byte, self._next_visit))
 
     def _next_alarm(self) -> int:
         return self.cycle + max(1, math.ceil(self._chip.clock.nanos_to_next_alarm / CYCLE_NS))
@@ -193,19 +202,25 @@ class EmulatedPico:
                 return
 
     def _advance_machines(self, cycles: int) -> None:
-        """Cycle by cycle; while the processor sleeps, only until all state machines are stopped or stall."""
-        pio0, pio1 = self._chip.pio
+        """Cycle by cycle; while the processor sleeps, until it wakes or all state machines are stopped or stall."""
+        (pio0, pio1), core = self._chip.pio, self._chip.core
+        asleep = core.waiting
         for now in range(self.cycle + 1, self.cycle + cycles + 1):
             self.cycle = now
+            if now >= self._next_visit:
+                self._visit()
             pio0.advance(1)
             pio1.advance(1)
-            if pio0.next_due_fp >= _NEVER and pio1.next_due_fp >= _NEVER and self._chip.core.waiting:
+            if asleep and (not core.waiting or not self.shooting):
                 return
 
     def _on_edge(self, output: str, high: bool) -> None:
-        self.edges.append(Edge(self.cycle, output, high))
         if output == TRIGGER and high:
             self.shot_set_points_ma = self.set_points_ma()
+        edge = Edge(self.cycle, output, high)
+        self.edges.append(edge)
+        if self.on_edge is not None:
+            self.on_edge(edge)
 
     def _on_watchdog(self) -> None:
         self._restarting = True

@@ -156,11 +156,11 @@ enum error safety_fire(struct safety *safety)
         safety->counters.early += error == ERROR_EARLY;
         return error;
     }
-    const uint64_t now_us = port_now_us();
     safety->counters.fired++;
     port_fire();
+    const uint64_t now_us = port_now_us(); /* after it: starting takes time, and the end must not be cut off */
     safety->not_before_us = now_us + train_period_us(&safety->train, safety->limits);
-    safety->train_over_us = now_us + train_length_ns(&safety->train) / 1000u + 1u;
+    safety->train_over_us = now_us + train_length_ns(&safety->train) / 1000u + 2u; /* both terms are rounded down */
     if (--safety->shots_left == 0)
         safety->state = STATE_SAFE; /* safety_poll switches the outputs off once this train is over */
     return ERROR_NONE;

@@ -8,6 +8,8 @@
 #include "port.h"
 #include "protocol.h"
 
+enum { FIRING_US = 3 }; /* time that port_fire takes; the light may start at its end */
+
 struct fake_port {
     uint64_t now_us;
     bool interlock_closed;

@@ -1,0 +1,101 @@
+"""The firmware's real image on an emulated Pico, asked over its serial line; all time is virtual."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import astuple, dataclass, replace
+
+from daq.drivers.pulse_protocol import MAX_SEQUENCE, Command, Reply, Request, decode_reply, encode_request
+from daq.simulation.firmware_build import build_image
+from daq.simulation.rp2040_chip import TRIGGER
+from daq.simulation.rp2040_emulator import CYCLE_NS, CYCLES_PER_MS, START_CYCLES, Edge, EmulatedPico
+
+PERIOD_MS = 10
+CAMERA_PULSE_NS = 10_000
+BOOT_MS = 5
+REPLY_LIMIT_MS = 60
+
+Waveform = list[tuple[int, str, bool]]
+"""(time in ns after the trigger of the shot, output, level), in order of time and name."""
+
+
+@dataclass(frozen=True)
+class Channel:
+    """Fields of the command CHANNEL, after the number."""
+
+    camera_ns: int
+    a_start_ns: int
+    a_width_ns: int
+    b_start_ns: int
+    b_width_ns: int
+    current_ma: int = 20_000
+    frame_a_close_ns: int = 0
+    frame_b_open_ns: int = 0
+
+    def straddling(self) -> "Channel":
+        """The same, with a frame boundary amid the pulses."""
+        middle_ns = max(0, (self.a_start_ns + self.a_width_ns + self.b_start_ns) // 2 - self.camera_ns)
+        return replace(self, frame_a_close_ns=middle_ns, frame_b_open_ns=middle_ns)
+
+    def edges(self, number: int) -> Waveform:
+        """What the outputs of the channel have to do."""
+        camera = [(self.camera_ns, True), (self.camera_ns + CAMERA_PULSE_NS, False)]
+        starts = ((self.a_start_ns, self.a_width_ns), (self.b_start_ns, self.b_width_ns))
+        light = [edge for at, width in starts for edge in ((at, True), (at + width, False))] if self.current_ma else []
+        return [(at, f"camera{number}", high) for at, high in camera] + [(at, f"light{number}", h) for at, h in light]
+
+
+PAPER = Channel(0, 20_000, 1000, 26_400, 1000, frame_a_close_ns=23_500, frame_b_open_ns=23_800)
+"""The paper's pulse pair: 1 us, 6.4 us apart."""
+
+
+class Board:
+    """One board, and a host that neither checks nor repeats."""
+
+    def __init__(self) -> None:
+        self.pico = EmulatedPico(build_image().read_bytes())
+        self._sequence = 0
+        self.pico.run_ms(BOOT_MS)
+
+    def ask(self, command: Command, *fields: int) -> Reply:
+        self._sequence = self._sequence % MAX_SEQUENCE + 1
+        return decode_reply(self.say(encode_request(Request(self._sequence, command, fields))))
+
+    def say(self, line: bytes) -> bytes:
+        """One line to the board, and the line that it answers."""
+        sent = self.pico.sent
+        sent.clear()
+        self.pico.receive(line)
+        assert self.pico.run(self.pico.cycle + REPLY_LIMIT_MS * CYCLES_PER_MS, lambda: sent.endswith(b"\n")), sent
+        return bytes(sent)
+
+    def configure(self, channels: Sequence[Channel | None]) -> list[Reply]:
+        """NEW, CHANNEL for each one that is not None, LOAD; the replies to CHANNEL."""
+        self.ask(Command.NEW)
+        replies = [self.ask(Command.CHANNEL, i, *astuple(channel)) for i, channel in enumerate(channels) if channel]
+        assert self.ask(Command.LOAD).error is None
+        return replies
+
+    def arm(self, shots: int) -> None:
+        assert self.ask(Command.ARM, shots).error is None
+
+    def shoot(self) -> Waveform:
+        """Fire, let the period pass, and measure what the outputs did."""
+        self.pico.edges.clear()
+        reply = self.ask(Command.FIRE)
+        assert reply.error is None, reply
+        self.pico.run_ms(PERIOD_MS)
+        return self.waveform()
+
+    def waveform(self) -> Waveform:
+        edges = self.pico.edges
+        start = next(edge.cycle for edge in edges if edge.output == TRIGGER and edge.high) + START_CYCLES
+        return sorted(((e.cycle - start) * CYCLE_NS, e.output, e.high) for e in edges if e.output != TRIGGER)
+
+    def when(self, output: str, high: bool, after_cycles: int, action: Callable[[], None]) -> None:
+        """Do something once, some cycles after an output changes."""
+
+        def watch(edge: Edge) -> None:
+            if (edge.output, edge.high) == (output, high):
+                self.pico.on_edge = None
+                self.pico.at(edge.cycle + after_cycles, action)
+
+        self.pico.on_edge = watch
