@@ -28,7 +28,8 @@ START_CYCLES = 2
 
 _BYTE_CYCLES = 10 * CYCLES_PER_MS * 1000 // 115_200
 _NEVER = 1 << 62
-_HANG_ADDRESS, _HANG = 0x2003_0000, 0xE7FE  # b .
+_NVIC_DISABLE = 0xE000_E180
+_HANG_ADDRESS, _HANG = 0x2003_0000, 0xE7FD_BF30  # wfi; b .-2
 
 
 @dataclass(frozen=True)
@@ -112,6 +113,10 @@ class EmulatedPico:
         """Bytes for the firmware's serial line; they arrive at 115200 baud."""
         self._received.extend(data)
 
+    def feed(self, byte: int) -> None:
+        """A byte that arrives now."""
+        self._chip.uart[0].feed_byte(byte)
+
     @property
     def receiving(self) -> bool:
         """Whether bytes are still on their way."""
@@ -139,8 +144,9 @@ class EmulatedPico:
         self._chip.write_uint32(address, word)
 
     def hang(self) -> None:
-        """Let the processor run in a circle from now on, deaf to interrupts."""
-        self._chip.write_uint16(_HANG_ADDRESS, _HANG)
+        """Let the processor sleep from now on, deaf to interrupts."""
+        self._chip.write_uint32(_NVIC_DISABLE, 0xFFFF_FFFF)
+        self._chip.write_uint32(_HANG_ADDRESS, _HANG)
         self._chip.core.waiting = False
         self._chip.core.pc = _HANG_ADDRESS
         self._chip.core.pm = True
@@ -171,7 +177,7 @@ class EmulatedPico:
             self._visit()
         if self._received and self.cycle >= self._next_byte_cycle:
             self._next_byte_cycle = self.cycle + _BYTE_CYCLES
-            self._chip.uart[0].feed_byte(self._received.popleft())
+            self.feed(self._received.popleft())
 
     def _visit(self) -> None:
         while self._visits and self._visits[0][0] <= self.cycle:

@@ -1,0 +1,201 @@
+"""How the real image gets dark: abort, interlock, silent host, hung processor, overflowing stack; and stays dark."""
+
+from collections.abc import Iterator
+
+import pytest
+
+from daq.drivers.pulse_protocol import ABORT_BYTE, HEARTBEAT_MS, Command, ErrorNumber, Fault, State, decode_reply
+from daq.simulation.rp2040_emulator import CYCLE_NS
+from tests.firmware.rp2040_board import BOOT_MS, PAPER, PERIOD_MS, Board
+
+WATCHDOG_MS = 200
+ABORT_LATENCY_NS = 1000
+INTERLOCK_LATENCY_NS = 1000
+RAM, STACK_SIZE = 0x2000_0000, 2048
+PAINT = 0xA5A5_A5A5
+
+
+@pytest.fixture
+def board() -> Iterator[Board]:
+    """An armed board; whatever is done to it, no output stays high and no shot is left over."""
+    board = Board()
+    board.configure([PAPER] * 4)
+    board.arm(100)
+    board.pico.edges.clear()
+    yield board
+    board.pico.run_ms(PERIOD_MS)
+    assert not any(board.pico.levels().values())
+    counters = board.ask(Command.STATUS)
+    assert counters.number("requested") == counters.number("fired") + counters.number("suppressed")
+
+
+def fire(board: Board) -> None:
+    assert board.ask(Command.FIRE).error is None
+
+
+def lit_after(board: Board, cycle: int) -> list[int]:
+    """Cycles after that one, at which a light rose."""
+    return [e.cycle for e in board.pico.edges if e.output.startswith("light") and e.high and e.cycle > cycle]
+
+
+def dark_at(board: Board) -> int:
+    """Cycle of the last falling edge of a light."""
+    return max(edge.cycle for edge in board.pico.edges if edge.output.startswith("light") and not edge.high)
+
+
+def state_and_faults(board: Board) -> tuple[State, Fault]:
+    status = board.ask(Command.STATUS)
+    return State(status.number("state")), Fault(status.number("faults"))
+
+
+@pytest.mark.parametrize("into_pulse_cycles", [1, 40, 100])
+def test_the_interlock_ends_a_pulse_within_a_microsecond_and_latches(board: Board, into_pulse_cycles: int) -> None:
+    opened: list[int] = []
+
+    def open_door() -> None:
+        opened.append(board.pico.cycle)
+        board.pico.set_interlock(False)
+
+    board.when("light0", True, into_pulse_cycles, open_door)
+    fire(board)
+    board.pico.run_ms(1)
+    assert (dark_at(board) - opened[0]) * CYCLE_NS < INTERLOCK_LATENCY_NS
+    assert not lit_after(board, opened[0]), "pulse B is not given"
+    assert board.pico.set_points_ma() == (0, 0, 0, 0)
+    assert state_and_faults(board) == (State.FAULT, Fault.INTERLOCK)
+    assert board.ask(Command.CLEAR).error is ErrorNumber.INTERLOCK_OPEN
+    board.pico.set_interlock(True)
+    assert board.ask(Command.FIRE).error is ErrorNumber.FAULT_LATCHED
+    assert board.ask(Command.CLEAR).error is None
+    assert board.ask(Command.FIRE).error is ErrorNumber.NOT_ARMED
+
+
+def test_an_interlock_that_bounces_for_a_moment_trips_too(board: Board) -> None:
+    board.pico.set_interlock(False)
+    board.pico.set_interlock(True)
+    board.pico.run_ms(PERIOD_MS)
+    assert state_and_faults(board) == (State.FAULT, Fault.INTERLOCK)
+
+
+def test_the_abort_byte_disarms_from_inside_a_line(board: Board) -> None:
+    torn = board.say(b"9 FI" + ABORT_BYTE + b"\n")
+    assert decode_reply(torn).error is ErrorNumber.CRC
+    assert state_and_faults(board) == (State.SAFE, Fault(0))
+    assert board.pico.set_points_ma() == (0, 0, 0, 0)
+    assert board.ask(Command.FIRE).error is ErrorNumber.NOT_ARMED
+
+
+def test_the_abort_byte_needs_less_than_a_microsecond(board: Board) -> None:
+    arrived: list[int] = []
+
+    def abort() -> None:
+        arrived.append(board.pico.cycle)
+        board.pico.feed(ABORT_BYTE[0])
+
+    board.when("light2", True, 10, abort)
+    fire(board)
+    board.pico.run_ms(1)
+    assert (dark_at(board) - arrived[0]) * CYCLE_NS < ABORT_LATENCY_NS
+    assert not lit_after(board, arrived[0])
+
+
+def test_a_silent_host_ends_in_a_latched_fault(board: Board) -> None:
+    board.pico.run_ms(HEARTBEAT_MS - 50)
+    assert board.pico.set_points_ma() != (0, 0, 0, 0)
+    board.pico.run_ms(100)
+    assert board.pico.set_points_ma() == (0, 0, 0, 0)
+    assert state_and_faults(board) == (State.FAULT, Fault.HEARTBEAT)
+    assert board.ask(Command.FIRE).error is ErrorNumber.FAULT_LATCHED
+
+
+def test_the_trigger_pin_fires_nothing_whatever_its_level(board: Board) -> None:
+    board.ask(Command.OFF)
+    board.pico.set_trigger_pin(True)
+    board.arm(3)
+    board.pico.run_ms(PERIOD_MS)
+    for high in (False, True, False):
+        board.pico.set_trigger_pin(high)
+        board.pico.run_ms(1)
+    assert board.pico.edges == []
+    board.pico.set_trigger_pin(True)
+    fired = board.shoot()
+    assert len([edge for edge in fired if edge[1] == "light0"]) == 4, "FIRE still gives exactly one shot"
+
+
+def test_an_early_shot_is_ignored_counted_and_not_queued(board: Board) -> None:
+    assert board.ask(Command.FIRE).error is None
+    edges_of_a_shot = len(board.pico.edges)
+    assert board.ask(Command.FIRE).error is ErrorNumber.EARLY
+    board.pico.run_ms(3 * PERIOD_MS)
+    assert len(board.pico.edges) == edges_of_a_shot
+    status = board.ask(Command.STATUS)
+    assert [status.number(name) for name in ("requested", "fired", "suppressed", "early")] == [2, 1, 1, 1]
+
+
+def test_words_in_the_fifos_of_an_interrupted_shot_are_lost(board: Board) -> None:
+    board.when("light0", True, 10, lambda: board.pico.set_interlock(False))
+    fire(board)
+    board.pico.run_ms(1)
+    board.pico.set_interlock(True)
+    board.ask(Command.CLEAR)
+    board.configure([None, PAPER, None, None])
+    board.pico.run_ms(PERIOD_MS)
+    board.arm(1)
+    assert {output for _, output, _ in board.shoot()} == {"camera1", "light1"}
+
+
+def test_a_hung_processor_is_restarted_dark_and_says_so(board: Board) -> None:
+    before = board.ask(Command.ID).boot
+    fire(board)
+    board.pico.hang()
+    board.pico.run_ms(WATCHDOG_MS - 10)
+    assert board.pico.watchdog_resets == 0
+    board.pico.run_ms(20)
+    assert board.pico.watchdog_resets == 1
+    assert not any(board.pico.levels().values())
+    board.pico.run_ms(BOOT_MS)
+    reply = board.ask(Command.STATUS)
+    assert (State(reply.number("state")), Fault(reply.number("faults"))) == (State.FAULT, Fault.WATCHDOG)
+    assert reply.boot == before + 1
+    assert board.ask(Command.FIRE).error is ErrorNumber.FAULT_LATCHED
+
+
+def test_the_watchdog_takes_pio_and_pins_with_it(board: Board) -> None:
+    """The light is high when the processor dies; only reset domains that hold PIO and pins make it dark."""
+    high = 3 << 8
+    board.pico.write_word(0x4001_4000 + 8 * 2 + 4, high | 3 << 12 | 6)
+    assert board.pico.levels()["light0"]
+    board.pico.hang()
+    board.pico.run_ms(WATCHDOG_MS + BOOT_MS)
+    assert not any(board.pico.levels().values())
+
+
+def test_a_new_power_up_is_told_from_the_old_one(board: Board) -> None:
+    before = board.ask(Command.ID).boot
+    board.pico.power_up()
+    assert not any(board.pico.levels().values())
+    board.pico.run_ms(BOOT_MS)
+    reply = board.ask(Command.STATUS)
+    assert reply.boot != before
+    assert (State(reply.number("state")), reply.number("faults"), reply.number("fired")) == (State.SAFE, 0, 0)
+
+
+def test_the_outputs_never_move_while_it_starts() -> None:
+    board = Board()
+    assert board.pico.edges == []
+    assert not any(board.pico.levels().values())
+
+
+def test_the_stack_stays_far_from_its_end(board: Board) -> None:
+    words = range(RAM, RAM + STACK_SIZE - 512, 4)
+    for address in words:
+        board.pico.write_word(address, PAINT)
+    board.when("light0", True, 5, lambda: board.pico.set_interlock(False))
+    fire(board)
+    board.pico.set_interlock(True)
+    board.ask(Command.CLEAR)
+    board.configure([PAPER] * 4)
+    board.ask(Command.STATUS)
+    board.say(b"x" * 200 + b"\n")
+    untouched = next(address for address in words if board.pico.read_word(address) != PAINT) - RAM
+    assert untouched > STACK_SIZE // 2
