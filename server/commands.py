@@ -15,6 +15,7 @@ from processing.analysis.figures import residuals_figure, slices_figure
 from processing.calibration.calibration import Calibration
 from processing.calibration.calibration_file import load_calibration, save_calibration
 from processing.calibration.calibration_set import load_calibration_set
+from processing.calibration.covariance import worst_position_std_px
 from processing.calibration.joint_fit import calibrate
 from processing.importing import import_manifest
 from processing.pipeline import (
@@ -74,6 +75,7 @@ def view_errors(calibration: Calibration) -> dict[str, Any]:
                 "rms_px": view.rms_px,
                 "max_error_px": view.max_error_px,
                 "holdout_error_px": view.holdout_error_px,
+                "position_std_px": worst_position_std_px(view),
                 "planes": [
                     {
                         "name": plane.name,

@@ -71,6 +71,27 @@ class BoardPose:
 
 
 @dataclass(frozen=True, eq=False)
+class ParameterCovariance:
+    """How well the parameters of a fit are determined.
+
+    Parameters
+    ----------
+    names : tuple[str, ...]
+        The P parameters, with units.
+    root : (P, P) array
+        The covariance is ``root @ root.T``.
+    """
+
+    names: tuple[str, ...]
+    root: FloatArray
+
+    @property
+    def std(self) -> dict[str, float]:
+        """Standard deviation by parameter."""
+        return dict(zip(self.names, np.linalg.norm(self.root, axis=1).tolist(), strict=True))
+
+
+@dataclass(frozen=True, eq=False)
 class ViewCalibration:
     """One view.
 
@@ -94,6 +115,8 @@ class ViewCalibration:
         Convex outline (x, y) of the used points.
     board_poses : tuple[BoardPose, ...]
         Poses of the boards, where the fit had to find them.
+    covariance : ParameterCovariance | None
+        Of the parameters of a pinhole camera; None for other models, and after a correction.
     """
 
     mapping: ViewMapping
@@ -108,6 +131,7 @@ class ViewCalibration:
     n_rejected: int = 0
     extent_mm: tuple[tuple[float, float], ...] = ()
     board_poses: tuple[BoardPose, ...] = ()
+    covariance: ParameterCovariance | None = None
 
     def with_boards(self, board_poses: tuple[BoardPose, ...]) -> "ViewCalibration":
         """The same with the poses of boards."""

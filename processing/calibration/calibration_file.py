@@ -96,9 +96,11 @@ def _first_problem(error: ValidationError) -> str:
 
 
 def _readable(content: object, indent: int = 0) -> str:
-    """JSON with one key per line and short lists on one line."""
+    """JSON with one key per line; short lists and rows of numbers on one line."""
     pad = "  " * (indent + 1)
     compact = json.dumps(content)
+    if isinstance(content, list) and all(isinstance(value, float) for value in content):
+        return compact
     if len(compact) + len(pad) <= 118 and not (indent < 2 and isinstance(content, dict) and content):
         return compact
     if isinstance(content, dict):

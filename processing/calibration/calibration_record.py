@@ -6,12 +6,13 @@ from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
 from processing.calibration.calibration import (
     BoardPose,
     Calibration,
     Model,
+    ParameterCovariance,
     PlaneError,
     Verdict,
     ViewCalibration,
@@ -78,6 +79,19 @@ class BoardRecord(_Record):
     translation_mm: Vector
 
 
+class CovarianceRecord(_Record):
+    """Covariance of fitted parameters: root times its transpose."""
+
+    parameters: tuple[str, ...]
+    root: tuple[tuple[FiniteFloat, ...], ...]
+
+    @model_validator(mode="after")
+    def _is_square(self) -> "CovarianceRecord":
+        if {len(self.parameters)} != {len(self.root), *map(len, self.root)}:
+            raise ValueError("root: one row and one column for every parameter")
+        return self
+
+
 class ViewRecord(_Record):
     """One view."""
 
@@ -93,6 +107,7 @@ class ViewRecord(_Record):
     extent_mm: tuple[Pair, ...]
     boards_in_free_poses: tuple[BoardRecord, ...]
     planes: tuple[PlaneRecord, ...]
+    covariance: CovarianceRecord | None = None
 
 
 class CalibrationRecord(_Record):
@@ -156,8 +171,9 @@ def json_id(content: Mapping[str, Any]) -> str:
 def to_json(record: CalibrationRecord) -> dict[str, Any]:
     """Record as JSON values; optional fields that are not known are left out, as in files older than they."""
     content = record.model_dump(mode="json", by_alias=True)
-    if record.parent is None:
-        del content["parent"]
+    for described, optional in [(content, "parent"), *((view, "covariance") for view in content["views"].values())]:
+        if described[optional] is None:
+            del described[optional]
     return content
 
 
@@ -187,6 +203,7 @@ def _view_record(view: ViewCalibration) -> ViewRecord:
             )
             for plane in view.planes
         ),
+        covariance=_covariance_record(view.covariance),
     )
 
 
@@ -207,7 +224,18 @@ def _view(record: ViewRecord) -> ViewCalibration:
             BoardPose(board.name, np.array(board.rotation), np.array(board.translation_mm))
             for board in record.boards_in_free_poses
         ),
+        covariance=_covariance(record.covariance),
     )
+
+
+def _covariance_record(covariance: ParameterCovariance | None) -> CovarianceRecord | None:
+    if covariance is None:
+        return None
+    return CovarianceRecord(parameters=covariance.names, root=tuple(tuple(row) for row in covariance.root.tolist()))
+
+
+def _covariance(record: CovarianceRecord | None) -> ParameterCovariance | None:
+    return None if record is None else ParameterCovariance(record.parameters, np.array(record.root))
 
 
 def _mapping_record(mapping: ViewMapping) -> PinholeRecord | PolynomialRecord:

@@ -1,6 +1,7 @@
 """calibrate: all points of a view in one joint 3-D fit, judged by points it has not seen -> Calibration."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from datetime import UTC, datetime
 
 import numpy as np
@@ -8,6 +9,7 @@ from numpy.typing import NDArray
 
 from processing.calibration.calibration import Calibration, Model, ViewCalibration
 from processing.calibration.calibration_record import content_id
+from processing.calibration.covariance import parameter_covariance
 from processing.calibration.errors import CalibrationError
 from processing.calibration.free_pose import board_errors_px, fit_free_poses, free_pose_holdout_px
 from processing.calibration.health import check_motion, errors_px, holdout_error_px, judge, outline_mm, plane_error
@@ -77,7 +79,12 @@ def _joint_view(name: str, seen: ViewObservations, model: Model) -> ViewCalibrat
     holdout_px = holdout_error_px(planes, lambda training: fit_mapping(training, seen.image_size_px, model)[0])
     errors = [errors_px(mapping, plane) for plane in planes]
     n_rejected = len(used) - sum(len(plane) for plane in planes)
-    return _summary(mapping, model, planes, errors, holdout_px, n_rejected, extent_mm=outline_mm(planes))
+    summary = _summary(mapping, model, planes, errors, holdout_px, n_rejected, extent_mm=outline_mm(planes))
+    if not isinstance(mapping, PinholeCamera):
+        return summary
+    points_mm, image_px = (values[used] for values in stacked(seen.planes))
+    tilted = model is Model.PINHOLE_TILTED
+    return replace(summary, covariance=parameter_covariance(mapping, points_mm, image_px, tilted=tilted))
 
 
 def fit_mapping(

@@ -20,6 +20,13 @@ TILT_PARAMETERS = 2
 _TILT_COLUMNS = (22, 23)
 """Where OpenCV's Jacobian has the tilt: 3 rotation, 3 translation, 2 + 2 matrix, then 14 coefficients."""
 
+PARAMETER_NAMES = (
+    *("rotation_x_rad", "rotation_y_rad", "rotation_z_rad", "translation_x_mm", "translation_y_mm", "translation_z_mm"),
+    *("focal_u_px", "focal_v_px", "centre_u_px", "centre_v_px", "k1", "k2", "p1", "p2", "k3"),
+    *("tilt_x_rad", "tilt_y_rad"),
+)
+"""What is fitted, in order; the rotation as a Rodrigues vector."""
+
 ROBUST_SCALE = 3.0
 """Residuals beyond so many standard deviations count less in the first pass."""
 REJECT_SCALE = 6.0
@@ -80,6 +87,11 @@ def fit_pinhole(
         raise CalibrationError(f"only {used.sum()} of {len(used)} points agree with a pinhole camera")
     parameters = _refine(robust, points_mm[used], image_px[used], None)
     return FittedCamera(_unpack(parameters, image_size_px), used)
+
+
+def camera_derivatives(camera: PinholeCamera, points_mm: FloatArray, *, tilted: bool) -> FloatArray:
+    """Derivatives (2 N, parameters) of image points by the parameters of ``PARAMETER_NAMES``, u before v."""
+    return _project(_pack(camera, tilted), np.ascontiguousarray(points_mm, dtype=np.float64))[1]
 
 
 def direct_linear_transformation(points_mm: FloatArray, image_px: FloatArray, weights: FloatArray) -> FloatArray:

@@ -215,7 +215,8 @@ def _corrected_view(view: ViewCalibration, mapping: ViewMapping, distance_px: fl
     if distance_px == 0:
         return view
     holdout_px = max(view.holdout_error_px, left_px)
-    return replace(view, mapping=mapping, holdout_error_px=holdout_px, verdict=_worse(view.verdict, judge(holdout_px)))
+    verdict = _worse(view.verdict, judge(holdout_px))
+    return replace(view, mapping=mapping, holdout_error_px=holdout_px, verdict=verdict, covariance=None)
 
 
 def _worse(one: Verdict, other: Verdict) -> Verdict:
