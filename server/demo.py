@@ -11,6 +11,7 @@ import numpy as np
 
 from daq.acquisition import Acquisition
 from daq.errors import DaqError
+from daq.run_events import RunEvent, RunMessage
 from daq.run_plan import PulsePair, RunKind, RunPlan
 from daq.run_state import RunOutcome
 from daq.shotfile import RunReader
@@ -104,6 +105,8 @@ def demonstrate(config_file: Path, out: Path, shots: int, progress: Progress) ->
                 calibration=calibration.id,
             )
     recorded, valid = _recorded_and_valid(sample)
+    if not valid:
+        raise DaqError(f"{sample.name}: none of {recorded} shots is valid, nothing to reconstruct")
     with watch.step("reconstruct"):
         grid = default_grid(calibration, PITCH_MM)
         settings = ReconstructionSettings(grid=GridSettings.of(grid))
@@ -155,10 +158,15 @@ class _Runs:
         self._acquisition = Acquisition(
             bench.rig,
             data_dir,
+            self._tell,
             configuration=config.model_dump(mode="json"),
             hash_calibration=lambda name: file_sha256(calibration_path(data_dir.parent, name)),
             limits=config.acquisition.to_limits(),
         )
+
+    def _tell(self, event: RunEvent) -> None:
+        if isinstance(event, RunMessage):
+            self._progress(event.text)
 
     def record(self, kind: RunKind, shots: int, rate_hz: float, **details: Any) -> Path:
         plan = RunPlan(name=f"demo {kind.value}", kind=kind, shots=shots, rate_hz=rate_hz, pulse=self._pulse, **details)

@@ -4,6 +4,8 @@ import re
 
 from playwright.sync_api import Page, expect
 
+expect.set_options(timeout=30_000)
+
 VIEWS = ("view1", "view2", "view3", "view4")
 
 

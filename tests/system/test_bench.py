@@ -22,7 +22,7 @@ from server.config import load_config
 
 pytestmark = pytest.mark.network
 SMALL, FULL = (Path("configs") / name for name in ("simulated_small.toml", "simulated.toml"))
-LIMITS = AcquisitionLimits(frame_s=1.5)
+LIMITS = AcquisitionLimits(frame_s=2.5)
 PATIENT = AcquisitionLimits(frame_s=10.0)
 CURRENT_A = {name: view.nominal_current_a for name, view in load_config(SMALL).views.items()}
 
