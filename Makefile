@@ -1,7 +1,7 @@
 # Each target does its own set-up on a bare Debian 12 or 13 machine, is quick when that is done, and says what it does.
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint serve firmware bench lock clean
+.PHONY: help setup demo test lint serve firmware bench lock clean mutants fuzz
 
 PYTHON := .venv/bin/python
 DEBIAN_PACKAGES := python3-venv python3-dev python3-gi gir1.2-aravis-0.8 iproute2 gcc g++ gcc-arm-none-eabi make chromium fonts-dejavu-core
@@ -39,6 +39,12 @@ firmware: $(FIRMWARE_SOURCES) | .venv/.debian ## Build the firmware: image for t
 	@$(MAKE) --no-print-directory -C firmware host
 	@if command -v arm-none-eabi-gcc >/dev/null; then $(MAKE) --no-print-directory -C firmware image; \
 	else echo "No image for the Pico: arm-none-eabi-gcc is missing (apt install gcc-arm-none-eabi)"; fi
+
+mutants: | .venv/.debian ## Plant faults in the firmware's core and show that its tests find each; four minutes.
+	@$(MAKE) --no-print-directory -C firmware mutants
+
+fuzz: | .venv/.debian ## Feed the firmware's core hostile input for FUZZ_S=60 seconds.
+	@$(MAKE) --no-print-directory -C firmware fuzz
 
 lock: .venv/.python ## Pin the newest versions of all Python packages.
 	$(PYTHON) -m pip install --quiet uv

@@ -1,16 +1,33 @@
 /* Hostile bytes, half-right lines, clock jumps and interlock flips, the same ones for the same seed.
- * After every step: no light without permission, and counters that add up. usage: fuzz SEED STEPS */
+ * After every step: no light without permission, and counters that add up.
+ *
+ *     fuzz SEED STEPS       deterministic; with -DFUZZ_INPUT instead LLVMFuzzerTestOneInput, for libFuzzer and replay */
 #include <string.h>
 
 #include "fake_port.h"
 
 static struct protocol protocol;
-static uint64_t random_state;
 static uint64_t last_shot_us;
 static uint64_t dark_until_us[CHANNEL_COUNT]; /* what the duty of each channel demands, reckoned without the core */
 static unsigned fired_before;
 static unsigned sequence;
 static unsigned shots;
+
+#ifdef FUZZ_INPUT
+static const uint8_t *input; /* decides instead of chance, until it is used up */
+static size_t input_left;
+
+static uint32_t random_below(uint32_t bound)
+{
+    uint32_t number = 0;
+    for (uint32_t range = bound - 1; range > 0 && input_left > 0; range >>= 8) {
+        number = number << 8 | *input++;
+        input_left--;
+    }
+    return number % bound;
+}
+#else
+static uint64_t random_state;
 
 static uint32_t random_below(uint32_t bound)
 {
@@ -19,6 +36,7 @@ static uint32_t random_below(uint32_t bound)
     random_state ^= random_state << 17;
     return (uint32_t)((random_state >> 32) % bound);
 }
+#endif
 
 static void random_bytes(void)
 {
@@ -103,32 +121,57 @@ static void check_invariants(void)
     }
 }
 
+static void begin(void)
+{
+    fake_reset();
+    protocol_boot(&protocol, 0, false);
+    restart();
+    sequence = shots = 0;
+}
+
+static void step(void)
+{
+    const uint32_t choice = random_below(32);
+    if (choice == 0)
+        random_bytes();
+    else if (choice == 1)
+        protocol_receive(&protocol, ABORT_BYTE);
+    else if (choice < 8)
+        let_time_pass();
+    else
+        random_command();
+    check_invariants();
+    if (random_below(3000) == 1) {
+        shots += fake.fired;
+        restart();
+    }
+    fake.interlock_closed = fake.interlock_closed ? random_below(100) != 1 : random_below(3) == 0;
+    protocol_poll(&protocol);
+    check_invariants();
+}
+
+#ifdef FUZZ_INPUT
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    begin();
+    input = data;
+    input_left = size;
+    while (input_left > 0)
+        step();
+    return 0;
+}
+#else
 int main(int argument_count, char **arguments)
 {
     CHECK(argument_count == 3);
     random_state = strtoull(arguments[1], NULL, 10) * 2654435761u + 1;
-    fake_reset();
-    protocol_boot(&protocol, 1, false);
-    for (unsigned long step = strtoul(arguments[2], NULL, 10); step > 0; step--) {
-        const uint32_t choice = random_below(32);
-        if (choice == 0)
-            random_bytes();
-        else if (choice == 1)
-            protocol_receive(&protocol, ABORT_BYTE);
-        else if (choice < 8)
-            let_time_pass();
-        else
-            random_command();
-        check_invariants();
-        if (random_below(3000) == 0) {
-            shots += fake.fired;
-            restart();
-        }
-        fake.interlock_closed = fake.interlock_closed ? random_below(100) != 0 : random_below(3) == 0;
-        protocol_poll(&protocol);
-        check_invariants();
-    }
+    begin();
+    for (unsigned long left = strtoul(arguments[2], NULL, 10); left > 0; left--)
+        step();
     shots += fake.fired;
     printf("%u shots, %u starts\n", shots, protocol.boot);
     return shots < 10;
 }
+#endif

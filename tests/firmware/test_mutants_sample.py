@@ -1,0 +1,53 @@
+"""The core's tests find planted faults: a few of ``firmware/tests/mutants.toml`` here, all by ``make mutants``."""
+
+import random
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from firmware.tests.mutants import FIRMWARE, Mutant, MutantError, killer_of, load_mutants
+
+MUTANTS = {mutant.name: mutant for mutant in load_mutants()}
+SAMPLE = ("no rate limit", "interlock not asked at the moment of firing", "CLEAR arms again")
+BUILD = Path(__file__).resolve().parents[2] / "build" / "firmware"
+
+
+def test_there_are_many_different_ones() -> None:
+    assert len(MUTANTS) == len(load_mutants()) >= 50
+
+
+@pytest.mark.parametrize("mutant", MUTANTS.values(), ids=MUTANTS.keys())
+def test_each_can_be_planted(mutant: Mutant, tmp_path: Path) -> None:
+    core = shutil.copytree(FIRMWARE / "core", tmp_path / "core")
+    mutant.apply(core)
+    assert (core / mutant.file).read_text() != (FIRMWARE / "core" / mutant.file).read_text()
+
+
+@pytest.mark.parametrize("name", SAMPLE)
+def test_a_sample_is_found(name: str) -> None:
+    assert killer_of(MUTANTS[name], sanitizers="") is not None
+
+
+def test_a_fault_that_does_no_harm_would_survive() -> None:
+    harmless = Mutant("harmless", "limits.h", "CAMERA_PULSE_NS = 10000,", "CAMERA_PULSE_NS = 10000 + 0,")
+    assert killer_of(harmless, sanitizers="") is None
+
+
+def test_a_list_that_no_longer_fits_is_told(tmp_path: Path) -> None:
+    (tmp_path / "safety.c").write_text("")
+    with pytest.raises(MutantError, match=r"no rate limit: .* stands 0 times"):
+        MUTANTS["no rate limit"].apply(tmp_path)
+
+
+def test_the_fuzz_target_takes_any_bytes(tmp_path: Path) -> None:
+    """What libFuzzer would call, fed with the golden vectors and with noise."""
+    subprocess.run(["make", "-C", str(FIRMWARE), "tests"], check=True, capture_output=True, timeout=100)
+    inputs = [FIRMWARE / "tests" / "golden_vectors.txt"]
+    for seed in range(8):
+        inputs.append(tmp_path / f"noise{seed}")
+        inputs[-1].write_bytes(random.Random(seed).randbytes(20_000))
+    finished = subprocess.run([BUILD / "replay", *inputs], capture_output=True, text=True, timeout=60)
+    assert finished.returncode == 0, finished.stderr
+    assert finished.stdout == "9 inputs\n"
