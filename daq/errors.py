@@ -11,7 +11,6 @@
     │   ├── DeviceRefused       it answered, and said no
     │   └── ProtocolError       it answered something that makes no sense
     ├── InterlockOpen         the light must not be switched on
-    ├── FrameMiss             a shot lacks exposures, or has wrong ones
     ├── RecorderError         a shot could not be stored
     │   └── RecorderOverflow    the disk does not keep up
     └── ShotFileError         a run directory or a shot file cannot be read
@@ -80,10 +79,6 @@ class ProtocolError(DeviceError):
 
 class InterlockOpen(DaqError):
     """The interlock is open: the light must not be switched on."""
-
-
-class FrameMiss(DaqError):
-    """A shot lacks exposures, or has wrong ones."""
 
 
 class RecorderError(DaqError):
