@@ -28,6 +28,7 @@ from processing.reconstruction.settings import GridSettings, ReconstructionSetti
 from processing.reconstruction.volume_file import write_volume
 from processing.results_file import average_volumes, volume_files
 from processing.volume import VoxelGrid
+from server.calibration_pictures import calibration_pictures
 from server.config import load_config
 from server.optics_table import optics_table
 
@@ -54,12 +55,14 @@ def calibrate_views(options: Namespace) -> dict[str, Any]:
     save_calibration(calibration, options.out)
     figure = options.out.with_suffix(".png")
     residuals_figure(calibration).savefig(figure, dpi=120)
+    figures = calibration_pictures(options.set, calibration_set, calibration, options.out)
     for note in calibration.notes:
         progress(note)
     return {
         "calibration": str(options.out),
         "id": calibration.id,
         "figure": str(figure),
+        "figures": [str(picture) for picture in figures],
         "notes": list(calibration.notes),
         **view_errors(calibration),
     }

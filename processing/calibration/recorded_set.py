@@ -48,6 +48,12 @@ def detect_recorded(run_dir: Path) -> CalibrationSet:
     return CalibrationSet(source, target, views, tuple(notes))
 
 
+def mean_target_images(run_dir: Path, z_mm: float) -> dict[str, NDArray[np.float32]]:
+    """Exposures A of every view, averaged over the valid shots at one stage position."""
+    with RunReader(run_dir) as run:
+        return _mean_frames(run, _by_position(run)[z_mm])
+
+
 def _target(run_dir: Path, configuration: dict[str, object]) -> Target:
     if "target" not in configuration:
         raise CalibrationError(f"{run_dir}: configuration.target: the run does not say what its target is")

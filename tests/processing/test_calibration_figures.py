@@ -1,0 +1,54 @@
+"""Calibration figures show the points that were found, where they are, and their errors at one scale."""
+
+import io
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from matplotlib.quiver import Quiver
+
+from processing.analysis.calibration_figures import MAX_PLANES, error_vectors_figure, grid_figure
+from processing.calibration.joint_fit import calibrate
+from processing.calibration.observation import CalibrationSet
+from tests.processing.calibration_cases import calibration_set, paper_camera, seen_planes
+
+
+@pytest.fixture(scope="module")
+def seen() -> CalibrationSet:
+    return calibration_set(left=seen_planes(paper_camera(45)), right=seen_planes(paper_camera(-45), z_mm=(-2, 0, 1, 2)))
+
+
+def drawn(figure: Figure) -> int:
+    """Bytes of the picture: drawing it must work without a warning."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=50)
+    return len(buffer.getvalue())
+
+
+def test_grid_carries_world_coordinates_where_the_points_are(seen: CalibrationSet) -> None:
+    planes = {"left": seen.views["left"].planes[5]}
+    figure = grid_figure({"left": np.zeros((1200, 1600), np.uint8)}, planes)
+    (axes,) = figure.axes
+    labels = {text.get_text(): text.xy for text in axes.texts if hasattr(text, "xy")}
+    assert 20 <= len(labels) <= 60
+    for (x_mm, y_mm, _), place_px in zip(planes["left"].points_mm, planes["left"].image_px, strict=True):
+        if f"{x_mm:g}, {y_mm:g}" in labels:
+            np.testing.assert_allclose(labels[f"{x_mm:g}, {y_mm:g}"], place_px)
+    assert axes.get_title() == "left, z = 0.5 mm; x, y in mm"
+    assert axes.get_ylim()[0] > axes.get_ylim()[1]
+    assert drawn(figure) > 1000
+
+
+def test_arrows_are_the_errors_of_the_planes(seen: CalibrationSet) -> None:
+    calibration = calibrate(seen)
+    figure = error_vectors_figure(seen, calibration)
+    arrows = [[part for part in axes.collections if isinstance(part, Quiver)] for axes in figure.axes]
+    assert [len(part) for part in arrows] == [1] * MAX_PLANES + [1, 1, 1, 1, 0]
+    plane, first = seen.views["left"].planes[0], arrows[0][0]
+    errors_px = calibration.views["left"].mapping.project(plane.points_mm) - plane.image_px
+    np.testing.assert_allclose(np.column_stack([first.U, first.V]), errors_px)
+    assert len({part[0].scale for part in arrows if part}) == 1
+    assert (
+        figure.axes[0].get_title() == f"left, z = -4.5 mm: {calibration.views['left'].planes[0].mean_error_px:.3f} px"
+    )
+    assert drawn(figure) > 1000
