@@ -2,7 +2,7 @@
 
 from argparse import Namespace
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -27,6 +27,20 @@ from processing.studies.density import (
 from processing.studies.ghosts import GhostRow, GhostStudy, ghost_figure, ghost_statements, ghost_study
 from processing.studies.recipe import ALL_RECIPES, PAPER_RECIPES, Recipe
 from processing.studies.report import Statement, csv_text
+from processing.studies.residuals import (
+    ResidualRow,
+    ResidualStudy,
+    residual_figure,
+    residual_statements,
+    residual_study,
+)
+from processing.studies.sensitivity import (
+    SensitivityRow,
+    SensitivityStudy,
+    sensitivity_figure,
+    sensitivity_statements,
+    sensitivity_study,
+)
 from server.commands import progress
 
 Row = TypeVar("Row")
@@ -68,6 +82,30 @@ def study_average(options: Namespace) -> dict[str, Any]:
     profiles = options.out / "average-profiles.csv"
     profiles.write_text(csv_text(profile_rows(mean)), encoding="utf-8")
     return {**result, "profiles": str(profiles)}
+
+
+def study_residuals(options: Namespace) -> dict[str, Any]:
+    """``tomoshadow study residuals``."""
+    rows = _collected(residual_study(ResidualStudy(binning=options.binning, seed=options.seed)), _residual_line)
+    return _report(options.out, "residuals", rows, residual_figure(rows), residual_statements(rows))
+
+
+def _residual_line(row: ResidualRow) -> str:
+    return f"{row.view}, {row.points}, z = {row.z_mm:g} mm: {row.mean_error_px:.2g} px at {row.n_points} points"
+
+
+def study_sensitivity(options: Namespace) -> dict[str, Any]:
+    """``tomoshadow study sensitivity``."""
+    study = SensitivityStudy(density_per_mm3=options.density, sigma_voxel=options.sigma, repeats=options.repeats)
+    if options.method:
+        study = replace(study, recipes=tuple(Recipe.named(name) for name in options.method))
+    rows = _collected(sensitivity_study(study), _sensitivity_line)
+    return _report(options.out, "sensitivity", rows, sensitivity_figure(rows), sensitivity_statements(rows))
+
+
+def _sensitivity_line(row: SensitivityRow) -> str:
+    place = f"{row.influence} {row.value:g}, {row.method}"
+    return f"{place}: {100 * row.found:.1f} % found, {100 * row.ghosts:.1f} % ghosts"
 
 
 def _recipes(options: Namespace) -> tuple[Recipe, ...]:

@@ -16,6 +16,8 @@ def add_studies(add_verb: AddVerb) -> None:
     _add_density(add_verb)
     _add_ghosts(add_verb)
     _add_average(add_verb)
+    _add_residuals(add_verb)
+    _add_sensitivity(add_verb)
 
 
 def _add_density(add_verb: AddVerb) -> None:
@@ -41,6 +43,23 @@ def _add_average(add_verb: AddVerb) -> None:
     parser.add_argument("--shots", type=count, default=266, help="realisations of the spray")
     parser.add_argument("--binning", type=int, choices=(1, 2, 4), default=2, help="of pixels; 1 is the paper's")
     parser.add_argument("--seed", type=int, default=0, help="of spray, dust and noise")
+
+
+def _add_residuals(add_verb: AddVerb) -> None:
+    parser = add_verb("residuals", study_commands.study_residuals, "back-projection error plane by plane, Fig. 3")
+    _add_out(parser, "residuals")
+    parser.add_argument("--binning", type=int, choices=(1, 2), default=1, help="of pixels; 1 is the paper's")
+    parser.add_argument("--seed", type=int, default=0, help="of light, dust and noise")
+
+
+def _add_sensitivity(add_verb: AddVerb) -> None:
+    summary = "what calibration error, number and spread of views, and noise do to droplets found"
+    parser = add_verb("sensitivity", study_commands.study_sensitivity, summary)
+    _add_out(parser, "sensitivity")
+    parser.add_argument("--density", type=positive, default=13.8, help="droplets per mm^3")
+    parser.add_argument("--sigma", type=positive, default=1.0, help="blob width in voxel")
+    parser.add_argument("--repeats", type=count, default=3, help="realisations to average")
+    _add_methods(parser, "mlos and smart-10")
 
 
 def _add_out(parser: argparse.ArgumentParser, study: str) -> None:

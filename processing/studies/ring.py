@@ -10,7 +10,7 @@ from processing.geometry import FloatArray
 
 Slice = NDArray[np.floating]
 
-SMOOTHING_MM = 0.1
+SMOOTHING_MM = 0.05
 """Sigma of the smoothing of gradients: without it, single droplets of a mean are steeper than the ring."""
 
 

@@ -1,0 +1,175 @@
+"""Back-projection error of a calibration, plane by plane (Fig. 3 of the paper).
+
+The target is rendered as each view sees it, with blur, uneven light, dust and noise; the product's detector finds
+its corners, and the product's joint fit calibrates the view. Beside it stands what the same fit makes of ideal
+points of an ideal pinhole camera: the error that is left when nothing is wrong.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from processing.calibration.calibration import Calibration, Model
+from processing.calibration.imported_set import place_points
+from processing.calibration.joint_fit import calibrate
+from processing.calibration.observation import CalibrationSet, PlaneObservation, ViewObservations
+from processing.calibration.targets import Target, detect_target
+from processing.geometry import FloatArray, PinholeCamera
+from processing.studies.report import Statement
+from processing.synthetic.paper_rig import paper_cameras, paper_optics
+from processing.synthetic.scene import NOMINAL_WIDTH_NS, Scene, SceneKind
+from processing.synthetic.target import Checkerboard
+
+PAPER_LIMIT_PX = 0.05
+BITS = 12
+COLOURS = ("#0072b2", "#e69f00", "#009e73", "#cc79a7")
+
+
+class PointSource(StrEnum):
+    """Where the points of a calibration come from."""
+
+    DETECTED = "detected"
+    """Found in rendered images of distorted cameras."""
+    IDEAL = "ideal"
+    """Projected by the same cameras without distortion, exactly."""
+
+
+@dataclass(frozen=True)
+class ResidualStudy:
+    """What to calibrate; target and planes are the paper's.
+
+    Parameters
+    ----------
+    z_mm : tuple of float
+        Positions of the target.
+    columns, rows, pitch_mm : int, int, float
+        Inner corners of the checkerboard, and their distance.
+    views : tuple of str
+        Of the paper's rig. Its Fig. 3 shows view 2.
+    binning : int
+        Of the rendered images; 1 is the paper's resolution.
+    seed : int
+        Of light, dust and noise.
+    """
+
+    z_mm: tuple[float, ...] = tuple(float(z) for z in np.linspace(-4.5, 4.5, 10))
+    columns: int = 23
+    rows: int = 17
+    pitch_mm: float = 1.0
+    views: tuple[str, ...] = ("view1", "view2", "view3", "view4")
+    binning: int = 1
+    seed: int = 0
+
+    @property
+    def target(self) -> Target:
+        """What the detector looks for."""
+        return Target(kind="checkerboard", columns=self.columns, rows=self.rows, pitch_mm=self.pitch_mm)
+
+
+@dataclass(frozen=True)
+class ResidualRow:
+    """One point of Fig. 3: errors (eq. 2) of a plane, and the hold-out error of its view."""
+
+    view: str
+    points: str
+    z_mm: float
+    n_points: int
+    mean_error_px: float
+    rms_px: float
+    holdout_error_px: float
+
+
+def residual_study(study: ResidualStudy | None = None) -> Iterator[ResidualRow]:
+    """Calibrate view by view; yields the planes of each as soon as they are known. The same study, the same rows."""
+    study = study or ResidualStudy()
+    cameras = {view: paper_cameras(study.binning)[view] for view in study.views}
+    for view, camera in cameras.items():
+        ideal = replace(camera, distortion=np.zeros(5))
+        yield from _rows(PointSource.DETECTED, _calibrated(study, view, camera, detected_planes(study, view, camera)))
+        yield from _rows(PointSource.IDEAL, _calibrated(study, view, ideal, ideal_planes(study, ideal)))
+
+
+def detected_planes(study: ResidualStudy, view: str, camera: PinholeCamera) -> Iterator[PlaneObservation]:
+    """The corners that the detector finds in a rendered image of every plane."""
+    stage_z_mm = 0.0
+    optics = {view: paper_optics(study.binning)[view]}
+    board = Checkerboard(study.columns, study.rows, study.pitch_mm)
+    scene = Scene({view: camera}, optics, seed=study.seed, target=board, stage_z_mm=lambda: stage_z_mm)
+    scene.prepare(SceneKind.CALIBRATION)
+    width_px, height_px = camera.image_size_px
+    pulse = (0, NOMINAL_WIDTH_NS, optics[view].nominal_current_a)
+    for number, stage_z_mm in enumerate(study.z_mm):
+        image = scene.render(view, number, "A", [pulse], (height_px, width_px), BITS)
+        yield place_points(detect_target(image, study.target), study.target, f"z={stage_z_mm:g}", stage_z_mm)
+
+
+def ideal_planes(study: ResidualStudy, camera: PinholeCamera) -> Iterator[PlaneObservation]:
+    """The corners where a camera sees them, exactly."""
+    board_mm = Checkerboard(study.columns, study.rows, study.pitch_mm).points_mm
+    for z_mm in study.z_mm:
+        points_mm: FloatArray = board_mm + (0.0, 0.0, z_mm)
+        yield PlaneObservation(f"z={z_mm:g}", points_mm, camera.project(points_mm), z_mm)
+
+
+def _calibrated(
+    study: ResidualStudy, view: str, camera: PinholeCamera, planes: Iterable[PlaneObservation]
+) -> Calibration:
+    seen = {view: ViewObservations(camera.image_size_px, tuple(planes))}
+    return calibrate(CalibrationSet("study", study.target, seen), Model.PINHOLE)
+
+
+def _rows(points: PointSource, calibration: Calibration) -> Iterator[ResidualRow]:
+    for name, view in calibration.views.items():
+        for plane in view.planes:
+            z_mm = plane.z_mm or 0.0
+            yield ResidualRow(
+                name, points.value, z_mm, plane.n_points, plane.mean_error_px, plane.rms_px, view.holdout_error_px
+            )
+
+
+def residual_statements(rows: Sequence[ResidualRow]) -> list[Statement]:
+    """The worst plane of every view beside the paper's limit."""
+    return [
+        Statement(
+            f"{view}, {points}: mean back-projection error of the worst plane",
+            f"< {PAPER_LIMIT_PX} px",
+            f"{max(row.mean_error_px for row in chosen):.2g} px (hold-out {chosen[0].holdout_error_px:.2g} px)",
+        )
+        for (view, points), chosen in _by_curve(rows).items()
+    ]
+
+
+def _by_curve(rows: Sequence[ResidualRow]) -> Mapping[tuple[str, str], list[ResidualRow]]:
+    curves: dict[tuple[str, str], list[ResidualRow]] = {}
+    for row in rows:
+        curves.setdefault((row.view, row.points), []).append(row)
+    return curves
+
+
+def residual_figure(rows: Sequence[ResidualRow]) -> Figure:
+    """Mean back-projection error of every plane, by view and by source of the points."""
+    figure = Figure(figsize=(6.8, 4.4), layout="constrained")
+    axes = figure.subplots()
+    views = list(dict.fromkeys(row.view for row in rows))
+    for (view, points), curve in _by_curve(rows).items():
+        z_mm, errors_px = [row.z_mm for row in curve], [row.mean_error_px for row in curve]
+        if points == PointSource.DETECTED:
+            colour = COLOURS[views.index(view) % len(COLOURS)]
+            axes.plot(z_mm, errors_px, color=colour, marker="o", label=f"{view}, corners detected in images")
+        else:
+            label = "all views, ideal points" if view == views[-1] else None
+            axes.plot(z_mm, errors_px, color="0.2", linestyle=":", label=label)
+    axes.axhline(PAPER_LIMIT_PX, color="0.4", linestyle="--", linewidth=1)
+    axes.annotate(
+        "paper: < 0.05 px", (0.01, PAPER_LIMIT_PX), xycoords=("axes fraction", "data"), va="bottom", color="0.4"
+    )
+    highest_px = max(PAPER_LIMIT_PX, *(row.mean_error_px for row in rows))
+    axes.set(
+        xlabel="plane z [mm]", ylabel="mean back-projection error [px]", ylim=(-0.02 * highest_px, 1.15 * highest_px)
+    )
+    axes.grid(alpha=0.25)
+    axes.legend(frameon=False, fontsize="small", loc="center", bbox_to_anchor=(0.5, 0.6))
+    return figure
