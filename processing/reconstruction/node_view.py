@@ -54,9 +54,9 @@ class NodeView:
         framed = np.empty([n + FRAME_BEFORE_PX + FRAME_AFTER_PX for n in image.shape], np.int16)
         return FixedPoint(framed, _native.quantise(image, FRAME_BEFORE_PX, FRAME_AFTER_PX, framed, threads))
 
-    def bind(self, image: FixedPoint, *, cull: bool) -> _native.View:  # noqa: ARG002
+    def bind(self, image: FixedPoint, *, cull: bool) -> _native.View:
         """A resampled image with the geometry of this view, for the kernels."""
-        return _native.View.mapped(image.pixels, image.unit, self.nodes, self.spacing)
+        return _native.View.mapped(image.pixels, image.unit, self.nodes, self.spacing, cull)
 
 
 def sample_mapping(mapping: ViewMapping, grid: VoxelGrid, max_deviation_px: float) -> NodeView:

@@ -19,11 +19,6 @@ void for_rows(int rows, int threads, const std::function<void(int, int)> &work) 
     });
 }
 
-// Reach of a block, in cells: a position anywhere in a cell, all further samples, and their right or lower neighbours.
-int reach(int cell, int voxels, double max_scale) {
-    return (cell - 1 + static_cast<int>(std::ceil((voxels - 1) * max_scale)) + 2) / cell + 1;
-}
-
 }  // namespace
 
 float quantise(const Kernels &kernels, const Recorded &image, int before, int after, int16_t *to, int threads) {
@@ -65,13 +60,14 @@ float resample(const Kernels &kernels, const Recorded &image, const float *nodes
     return unit;
 }
 
-std::vector<uint8_t> occupied_cells(const int16_t *pixels, int rows, int columns, double max_scale) {
+OccupiedCells occupied_cells(const int16_t *pixels, int rows, int columns) {
     constexpr int cell_rows = Occupancy::cell_rows, cell_columns = Occupancy::cell_columns;
     const int cells_y = (rows + cell_rows - 1) / cell_rows, cells_x = (columns + cell_columns - 1) / cell_columns;
-    std::vector<uint8_t> any(static_cast<size_t>(cells_y) * cells_x), along_x(any.size());
+    const int stride = cells_x + 1;
+    std::vector<int32_t> sums(static_cast<size_t>(cells_y + 1) * stride, 0);
     for (int row = 0; row < rows; ++row) {
         const int16_t *line = pixels + static_cast<size_t>(row) * columns;
-        uint8_t *cells = any.data() + static_cast<size_t>(row / cell_rows) * cells_x;
+        int32_t *cells = sums.data() + static_cast<size_t>(row / cell_rows + 1) * stride + 1;
         for (int cell = 0; cell < columns / cell_columns; ++cell) {
             uint64_t words[2];
             std::memcpy(words, line + cell * cell_columns, sizeof words);
@@ -80,18 +76,11 @@ std::vector<uint8_t> occupied_cells(const int16_t *pixels, int rows, int columns
         for (int column = columns / cell_columns * cell_columns; column < columns; ++column)
             cells[column / cell_columns] |= line[column] != 0;
     }
-    const int reach_x = reach(cell_columns, block_columns, max_scale), reach_y = reach(cell_rows, sight_rows, max_scale);
-    for (int y = 0; y < cells_y; ++y)
-        for (int x = 0; x < cells_x; ++x)
-            for (int k = x; k < std::min(cells_x, x + reach_x); ++k)
-                along_x[static_cast<size_t>(y) * cells_x + x] |= any[static_cast<size_t>(y) * cells_x + k];
-    for (int y = 0; y < cells_y; ++y) {
-        uint8_t *out = any.data() + static_cast<size_t>(y) * cells_x;
-        std::fill(out, out + cells_x, uint8_t(0));
-        for (int k = y; k < std::min(cells_y, y + reach_y); ++k)
-            for (int x = 0; x < cells_x; ++x) out[x] |= along_x[static_cast<size_t>(k) * cells_x + x];
+    for (int y = 1; y <= cells_y; ++y) {
+        int32_t *line = sums.data() + static_cast<size_t>(y) * stride, along = 0;
+        for (int x = 1; x <= cells_x; ++x) line[x] = (along += line[x]) + line[x - stride];
     }
-    return any;
+    return {std::move(sums), stride};
 }
 
 }  // namespace tomoshadow

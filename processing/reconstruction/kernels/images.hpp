@@ -21,7 +21,11 @@ float quantise(const Kernels &kernels, const Recorded &image, int before, int af
 float resample(const Kernels &kernels, const Recorded &image, const float *nodes, int nodes_x, int16_t *to, int rows,
                int columns, int threads);
 
-// Cells of a rectified image where a block of line of sight or SMART may see something, see Occupancy.
-std::vector<uint8_t> occupied_cells(const int16_t *pixels, int rows, int columns, double max_scale);
+// Cells of an image and their sums, see Occupancy.
+struct OccupiedCells {
+    std::vector<int32_t> sums;
+    int columns;
+};
+OccupiedCells occupied_cells(const int16_t *pixels, int rows, int columns);
 
 }  // namespace tomoshadow

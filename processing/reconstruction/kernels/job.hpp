@@ -15,14 +15,18 @@ constexpr int block_columns = 32;
 constexpr int sight_rows = 16;  // rows of a slab for line of sight ...
 constexpr int smart_rows = 8;   // ... and for SMART, whose blocks come and go with the droplets
 
-// Where the image of a rectified view is not zero: one byte for every cell of pixels, set if anything that a
-// block may sample, seen from a position within this cell, is not zero.
+// Where an image is not zero: sums[y][x] counts the cells above y and left of x in which any pixel is not zero, so that
+// four of them tell whether a box of any size is empty.
 struct Occupancy {
     static constexpr int cell_rows = 4, cell_columns = 8;
-    const uint8_t *cells;  // null: everywhere
+    const int32_t *sums;  // null: nobody looked
     int columns;
-    bool at(int row, int column) const {
-        return !cells || cells[static_cast<int64_t>(row / cell_rows) * columns + column / cell_columns];
+    bool any(int first_row, int last_row, int first_column, int last_column) const {
+        if (!sums) return true;
+        const int32_t *top = sums + static_cast<int64_t>(first_row / cell_rows) * columns;
+        const int32_t *bottom = sums + static_cast<int64_t>(last_row / cell_rows + 1) * columns;
+        const int left = first_column / cell_columns, right = last_column / cell_columns + 1;
+        return bottom[right] - bottom[left] != top[right] - top[left];
     }
 };
 

@@ -116,6 +116,11 @@ inline uint16_t half_of(float value) {
 
 inline void store_halves(uint16_t *to, const float *from, int count) {
     int k = 0;
+#if defined(__AVX512F__)
+    for (; k + 16 <= count; k += 16)
+        _mm256_storeu_si256(reinterpret_cast<__m256i *>(to + k),
+                            _mm512_cvtps_ph(_mm512_loadu_ps(from + k), _MM_FROUND_TO_NEAREST_INT));
+#endif
 #if defined(__F16C__)
     for (; k + 8 <= count; k += 8)
         _mm_storeu_si128(reinterpret_cast<__m128i *>(to + k),

@@ -55,7 +55,7 @@ public:
         return bound;
     }
 
-    static BoundView mapped(PixelArray pixels, float unit, NodeArray nodes, int spacing) {
+    static BoundView mapped(PixelArray pixels, float unit, NodeArray nodes, int spacing, bool cull) {
         require(spacing == 16 || spacing == 8 || spacing == 4 || spacing == 2, "nodes: spacing must be 2, 4, 8 or 16");
         BoundView bound(std::move(pixels), unit);
         bound.view_.nodes = nodes.data();
@@ -64,6 +64,7 @@ public:
         bound.view_.nodes_x = static_cast<int>(nodes.shape(3));
         bound.view_.spacing = spacing;
         bound.nodes_ = std::move(nodes);
+        if (cull) bound.find_occupied();
         return bound;
     }
 
@@ -100,18 +101,15 @@ private:
     static int last_of_blocks(int nx) { return (nx + block_columns - 1) / block_columns * block_columns - 1; }
 
     void find_occupied() {
-        const double *scale = view_.scale;
-        const double max_scale = *std::max_element(scale, scale + planes_[0].shape(0));
-        require(max_scale <= ::max_scale, "rectified view: scale outside 0.56 .. 1.8 pixels per voxel");
-        cells_ = occupied_cells(view_.pixels, view_.rows, view_.columns, max_scale);
-        view_.occupancy = {cells_.data(), (view_.columns + Occupancy::cell_columns - 1) / Occupancy::cell_columns};
+        cells_ = occupied_cells(view_.pixels, view_.rows, view_.columns);
+        view_.occupancy = {cells_.sums.data(), cells_.columns};
     }
 
     View view_{};
     PixelArray pixels_;
     std::vector<PlaneArray> planes_;
     std::optional<NodeArray> nodes_;
-    std::vector<uint8_t> cells_;
+    OccupiedCells cells_;
 };
 
 std::vector<View> views_on(const std::vector<const BoundView *> &bound, const Shape &shape, int threads) {
@@ -204,7 +202,8 @@ NB_MODULE(_native, module) {
     nb::class_<BoundView>(module, "View")
         .def_static("rectified", &BoundView::rectified, "pixels"_a, "unit"_a, "scale"_a, "shift_u"_a,
                     "shift_v"_a, "cull"_a = true)
-        .def_static("mapped", &BoundView::mapped, "pixels"_a, "unit"_a, "nodes"_a, "spacing"_a);
+        .def_static("mapped", &BoundView::mapped, "pixels"_a, "unit"_a, "nodes"_a, "spacing"_a,
+                    "cull"_a = true);
     module.def("quantise", &quantise_framed, "image"_a, "before"_a, "after"_a, "out"_a, "threads"_a);
     module.def("resample", &resample_image, "image"_a, "nodes"_a, "out"_a, "threads"_a);
     module.def("line_of_sight", &line_of_sight, "views"_a, "method"_a, "volume"_a, "threads"_a);

@@ -84,9 +84,15 @@ inline void finish_streams() {
 class Staging {
 public:
     Staging(Format format, int nx, int rows)
-        : format_(format), nx_(nx), memory_(bytes_of(format) * static_cast<int64_t>(nx) * rows) {}
+        : format_(format),
+          nx_(nx),
+          memory_(bytes_of(format) * static_cast<int64_t>(nx) * rows),
+          empty_(nx / block_columns + 1) {
+        std::memset(empty_.as<bool>(), true, static_cast<size_t>(nx / block_columns + 1));
+    }
 
     void put(const Tile &tile, const Block &block) {
+        empty_.as<bool>()[tile.x0 / block_columns] = false;
         const int columns = smaller(block_columns, nx_ - tile.x0);
         for (int row = 0; row < tile.rows; ++row) {
             const int64_t at = static_cast<int64_t>(row) * nx_ + tile.x0;
@@ -97,6 +103,9 @@ public:
         }
     }
     void put_zeros(const Tile &tile) {
+        bool &empty = empty_.as<bool>()[tile.x0 / block_columns];
+        if (empty) return;
+        empty = true;
         const int64_t size = bytes_of(format_), columns = smaller(block_columns, nx_ - tile.x0);
         for (int row = 0; row < tile.rows; ++row)
             std::memset(memory_.as<uint8_t>() + size * (static_cast<int64_t>(row) * nx_ + tile.x0), 0,
@@ -110,7 +119,7 @@ public:
 private:
     Format format_;
     int nx_;
-    Memory memory_;
+    Memory memory_, empty_;  // empty_: whether a block of columns is zero already
 };
 
 }  // namespace

@@ -152,25 +152,82 @@ inline Floats weighted_pairs(const int16_t *pixels, Ints at, Ints weight) {
 #endif
 }
 
-// Any mapping: the position of every voxel from the `lines` of nodes (u, v by row), then its four pixels.
-// Images carry a frame of zeros.
+#if defined(__AVX512BW__)
+
+// A segment between two nodes sixteen voxels apart, where its pixels fit into a window of few rows: no gathers.
+// Each row adds with the weight 1 - |distance|. False where they do not fit.
+inline bool sample_segment(const View &view, const float *u, const float *v, const Clamp &last, Floats &seen) {
+    const float left = u[0] < u[1] ? u[0] : u[1], right = u[0] < u[1] ? u[1] : u[0];
+    const float top = v[0] < v[1] ? v[0] : v[1], bottom = v[0] < v[1] ? v[1] : v[0];
+    constexpr float most_columns = 29.0f, most_rows = 6.0f;
+    if (!(left >= 0 && right <= last.u && top >= 0 && bottom <= last.v - 2 && right - left <= most_columns &&
+          bottom - top <= most_rows))
+        return false;
+    const int first_column = static_cast<int>(left), first_row = static_cast<int>(top);
+    const Floats lane = lane_numbers() * (1.0f / lanes);
+    const Floats at_u = lane * (u[1] - u[0]) + (u[0] - static_cast<float>(first_column));
+    Floats distance = lane * (v[1] - v[0]) + (v[0] - static_cast<float>(first_row));
+    const Ints column = __builtin_convertvector(at_u, Ints);
+    const auto weight = reinterpret_cast<__m512i>(horizontal_weights(at_u - __builtin_convertvector(column, Floats)));
+    const auto index = reinterpret_cast<__m512i>((column | column << 16) + 0x10000);
+    const int16_t *pixels = view.pixels + static_cast<int64_t>(first_row) * view.columns + first_column;
+    const Floats zero{}, one = zero + 1.0f;
+    seen = zero;
+    const auto add_row = [&] {
+        const __m512i pairs = _mm512_permutexvar_epi16(index, _mm512_loadu_si512(pixels));
+        const auto along = reinterpret_cast<Floats>(_mm512_cvtepi32_ps(_mm512_madd_epi16(pairs, weight)));
+        const auto away = reinterpret_cast<Floats>(_mm512_abs_ps(reinterpret_cast<__m512>(distance)));
+        const auto share = _mm512_max_ps(reinterpret_cast<__m512>(one - away), _mm512_setzero_ps());
+        seen += reinterpret_cast<Floats>(share) * along;
+        pixels += view.columns;
+        distance -= one;
+    };
+    // almost always enough: a fixed number is quicker than the right one
+    add_row();
+    add_row();
+    add_row();
+    for (int row = 3; row < static_cast<int>(bottom) - first_row + 2; ++row) add_row();
+    return true;
+}
+
+#endif
+
+// Voxels of a row from `first` on, each by its four pixels. Images carry a frame of zeros.
+template <Combine how>
+inline void sample_gathered(const View &view, const float *line_u, const float *line_v, int x0, int first,
+                            const Clamp &last, float factor, float *row) {
+    alignas(64) float u[block_columns], v[block_columns];
+    spread_line(line_u, view.spacing, x0, u);
+    spread_line(line_v, view.spacing, x0, v);
+    for (int k = first; k < block_columns; k += lanes) {
+        const Floats at_u = Clamp::between(load<Floats>(u + k), last.u);
+        const Floats at_v = Clamp::between(load<Floats>(v + k), last.v);
+        const Ints iu = __builtin_convertvector(at_u, Ints), iv = __builtin_convertvector(at_v, Ints);
+        const Ints weight = horizontal_weights(at_u - __builtin_convertvector(iu, Floats)), at = iv * view.columns + iu;
+        const Floats above = weighted_pairs(view.pixels, at, weight);
+        const Floats below = weighted_pairs(view.pixels, at + view.columns, weight);
+        const Floats down = at_v - __builtin_convertvector(iv, Floats);
+        combine<how>(row + k, above + down * (below - above), factor);
+    }
+}
+
+// Any mapping, by the lines of nodes of a plane.
 template <Combine how>
 inline void sample_nodes(const View &view, const PlaneTaps &taps, const Tile &tile, float factor, Block &block) {
     const Clamp last(view);
-    alignas(64) float u[block_columns], v[block_columns];
     for (int row = 0; row < tile.rows; ++row) {
-        spread_line(taps.line(row, 0), view.spacing, tile.x0, u);
-        spread_line(taps.line(row, 1), view.spacing, tile.x0, v);
-        for (int k = 0; k < block_columns; k += lanes) {
-            const Floats at_u = Clamp::between(load<Floats>(u + k), last.u);
-            const Floats at_v = Clamp::between(load<Floats>(v + k), last.v);
-            const Ints iu = __builtin_convertvector(at_u, Ints), iv = __builtin_convertvector(at_v, Ints);
-            const Ints weight = horizontal_weights(at_u - __builtin_convertvector(iu, Floats)), at = iv * view.columns + iu;
-            const Floats above = weighted_pairs(view.pixels, at, weight);
-            const Floats below = weighted_pairs(view.pixels, at + view.columns, weight);
-            const Floats down = at_v - __builtin_convertvector(iv, Floats);
-            combine<how>(block.rows[row] + k, above + down * (below - above), factor);
+        const float *line_u = taps.line(row, 0), *line_v = taps.line(row, 1);
+#if defined(__AVX512BW__)
+        if (view.spacing == lanes) {
+            Floats seen;
+            int k = 0, node = tile.x0 / lanes;
+            for (; k < block_columns && sample_segment(view, line_u + node, line_v + node, last, seen); k += lanes, ++node)
+                combine<how>(block.rows[row] + k, seen, factor);
+            if (k < block_columns) sample_gathered<how>(view, line_u, line_v, tile.x0, k, last, factor, block.rows[row]);
+            continue;
         }
+#endif
+        sample_gathered<how>(view, line_u, line_v, tile.x0, 0, last, factor, block.rows[row]);
     }
 }
 

@@ -36,6 +36,24 @@ inline int64_t floats_of_lines(const View *views, int n_views, int nx, int lines
     return floats;
 }
 
+// Least and largest value of a channel in a tile; found at its edges and where it crosses nodes.
+struct Extent {
+    float least, most;
+};
+
+inline Extent extent_of(const PlaneTaps &taps, int channel, const Tile &tile, int spacing) {
+    Extent extent{taps.line(0, channel)[tile.x0 / spacing], taps.line(0, channel)[tile.x0 / spacing]};
+    for (int row = 0; row < tile.rows; ++row) {
+        if (row && row != tile.rows - 1 && (tile.y0 + row) % spacing) continue;
+        for (int k = tile.x0 / spacing; k <= (tile.x0 + block_columns) / spacing; ++k) {
+            const float value = taps.line(row, channel)[k];
+            extent.least = value < extent.least ? value : extent.least;
+            extent.most = value > extent.most ? value : extent.most;
+        }
+    }
+    return extent;
+}
+
 // Where all views see the rows of a slab, plane after plane. Channels of nodes: 2 (u, v), or 3 with the area.
 class SlabTaps {
 public:
@@ -65,14 +83,26 @@ private:
     Memory lines_;
 };
 
-// Whether every rectified view may see something in the tile.
-inline bool occupied(const View *views, int n_views, const SlabTaps &slab, const Tile &tile) {
-    for (int i = 0; i < n_views; ++i) {
-        const View &view = views[i];
-        if (view.nodes) continue;
-        const int column = static_cast<int>(view.scale[tile.z] * tile.x0 + view.shift_u[tile.z]);
-        if (!view.occupancy.at(slab.taps[i].rows.first_row, column)) return false;
+// A box of pixels around all samples of a tile.
+inline bool sees_anything(const View &view, const PlaneTaps &taps, const Tile &tile) {
+    if (!view.occupancy.sums) return true;
+    if (!view.nodes) {
+        const double scale = view.scale[tile.z];
+        const int column = static_cast<int>(scale * tile.x0 + view.shift_u[tile.z]), row = taps.rows.first_row;
+        return view.occupancy.any(row, row + static_cast<int>(scale * (tile.rows - 1)) + 2, column,
+                                  column + static_cast<int>(scale * (block_columns - 1)) + 2);
     }
+    const Clamp last(view);
+    const Extent u = extent_of(taps, 0, tile, view.spacing), v = extent_of(taps, 1, tile, view.spacing);
+    const auto pixel = [](float at, float limit) { return static_cast<int>(Clamp::between(at, limit)); };
+    return view.occupancy.any(pixel(v.least, last.v), pixel(v.most, last.v) + 1, pixel(u.least, last.u),
+                              pixel(u.most, last.u) + 1);
+}
+
+// Whether all views may see something in the tile: if not, the product and the minimum are zero.
+inline bool occupied(const View *views, int n_views, const SlabTaps &slab, const Tile &tile) {
+    for (int i = 0; i < n_views; ++i)
+        if (!sees_anything(views[i], slab.taps[i], tile)) return false;
     return true;
 }
 
