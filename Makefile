@@ -40,7 +40,7 @@ firmware: $(FIRMWARE_SOURCES) | .venv/.debian ## Build the firmware: image for t
 	@if command -v arm-none-eabi-gcc >/dev/null; then $(MAKE) --no-print-directory -C firmware image; \
 	else echo "No image for the Pico: arm-none-eabi-gcc is missing (apt install gcc-arm-none-eabi)"; fi
 
-mutants: | .venv/.debian ## Plant faults in the firmware's core and show that its tests find each; four minutes.
+mutants: | .venv/.debian ## Plant faults in the firmware's core and show that its tests find each; two minutes.
 	@$(MAKE) --no-print-directory -C firmware mutants
 
 fuzz: | .venv/.debian ## Feed the firmware's core hostile input for FUZZ_S=60 seconds.
