@@ -2,6 +2,9 @@
 
 #include "port.h"
 
+/* Of any train within the absolute limits. A start waits as long, because it has forgotten what was fired before. */
+enum { LONGEST_PERIOD_US = 2 * MAX_WIDTH_NS * 1000 / MAX_DUTY_PPM };
+
 static void outputs_off(struct safety *safety)
 {
     port_off();
@@ -33,7 +36,7 @@ static enum error must_be_safe(const struct safety *safety)
 
 void safety_boot(struct safety *safety, bool watchdog)
 {
-    *safety = (struct safety){.state = STATE_SAFE};
+    *safety = (struct safety){.state = STATE_SAFE, .not_before_us = port_now_us() + LONGEST_PERIOD_US};
     for (int i = 0; i < CHANNEL_COUNT; i++)
         safety->limits[i] = channel_limits_absolute();
     outputs_off(safety);

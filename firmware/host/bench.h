@@ -19,6 +19,7 @@ struct bench {
 extern struct bench bench;
 
 void bench_power_up(void); /* what a reset does to the hardware */
+void bench_find_port(void); /* lets the time pass that a host needs to find a board that has just started */
 void bench_set_interlock(bool closed);
 void bench_send(const char *bytes, size_t length);
 void bench_print_event(const char *format, ...) __attribute__((format(printf, 1, 2)));

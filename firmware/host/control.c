@@ -9,6 +9,7 @@ static void reset(struct protocol *protocol, bool watchdog)
 {
     bench_power_up();
     protocol_boot(protocol, protocol->boot + 1, watchdog);
+    bench_find_port();
 }
 
 static size_t read_hex(const char *text, char *bytes, size_t size)

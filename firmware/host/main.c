@@ -101,6 +101,7 @@ int main(int argument_count, char **arguments)
     bench.serial = open_serial(argument_count, arguments);
     fcntl(bench.serial, F_SETFL, fcntl(bench.serial, F_GETFL) | O_NONBLOCK);
     protocol_boot(&protocol, 1, false);
+    bench_find_port();
     run(&protocol);
     return 0;
 }

@@ -99,8 +99,9 @@ static void restart(void)
 {
     protocol_boot(&protocol, protocol.boot + 1, false);
     fake.fired = fired_before = 0;
-    last_shot_us = 0;
-    memset(dark_until_us, 0, sizeof dark_until_us);
+    for (int i = 0; i < CHANNEL_COUNT; i++) /* limits that were tightened are forgotten, the absolute ones are not */
+        if (dark_until_us[i] > fake.now_us + 2 * MAX_WIDTH_NS * 1000 / MAX_DUTY_PPM)
+            dark_until_us[i] = fake.now_us + 2 * MAX_WIDTH_NS * 1000 / MAX_DUTY_PPM;
     CHECK(!fake.live);
 }
 
@@ -124,9 +125,10 @@ static void check_invariants(void)
 static void begin(void)
 {
     fake_reset();
-    protocol_boot(&protocol, 0, false);
-    restart();
-    sequence = shots = 0;
+    protocol_boot(&protocol, 1, false);
+    fired_before = sequence = shots = 0;
+    last_shot_us = 0;
+    memset(dark_until_us, 0, sizeof dark_until_us);
 }
 
 static void step(void)

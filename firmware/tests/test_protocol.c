@@ -13,6 +13,7 @@ static void boot(void)
 {
     fake_reset();
     protocol_boot(&protocol, 3, false);
+    fake.now_us += 2 * MIN_PERIOD_US; /* the first shot after a start waits as long as the longest train demands */
 }
 
 static void boot_armed(void)

@@ -25,7 +25,7 @@ static void boot(void)
 {
     fake_reset();
     safety_boot(&safety, false);
-    wait_us(1000);
+    wait_us(2 * MIN_PERIOD_US);
 }
 
 static void boot_armed(uint32_t shots)
@@ -96,6 +96,19 @@ static void test_arming_again_does_not_shorten_the_period(void)
     CHECK(safety_fire(&safety) == ERROR_NONE);
     wait_us(5000);
     CHECK(safety_arm(&safety, 1) == ERROR_NONE && safety_fire(&safety) == ERROR_EARLY);
+}
+
+/* It does not know what was fired before: it waits as long as the longest train demands, 4 us of light at 200 ppm. */
+static void test_a_start_does_not_shorten_the_period(void)
+{
+    boot_armed(1);
+    CHECK(safety_fire(&safety) == ERROR_NONE);
+    safety_boot(&safety, false);
+    CHECK(!safety_set_channel(&safety, 0, &LEGAL) && !safety_load(&safety) && !safety_arm(&safety, 1));
+    wait_us(20000 - 1);
+    CHECK(safety_fire(&safety) == ERROR_EARLY);
+    wait_us(1);
+    CHECK(safety_fire(&safety) == ERROR_NONE);
 }
 
 static void test_an_armed_generator_takes_no_other_train(void)
@@ -258,6 +271,7 @@ int main(void)
     test_the_budget_has_bounds();
     test_an_early_shot_is_ignored_and_counted();
     test_arming_again_does_not_shorten_the_period();
+    test_a_start_does_not_shorten_the_period();
     test_an_armed_generator_takes_no_other_train();
     test_a_changed_channel_must_be_loaded_again();
     test_actual_values_must_keep_the_limits_too();
