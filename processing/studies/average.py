@@ -78,12 +78,16 @@ class MeanSlices:
 
 @dataclass(frozen=True)
 class AverageRow:
-    """The ring of a method: radius, width at half maximum, steepest flanks relative to the maximum, smoothed."""
+    """The ring of a method: radius, width at half maximum, height, steepest flanks, and what is left in its middle.
+
+    Height and gradients are relative to the mean intensity of the slice, the middle to the height.
+    """
 
     method: str
     shots: int
     ring_mm: float
     width_mm: float
+    height: float
     inner_gradient_per_mm: float
     outer_gradient_per_mm: float
     centre: float
@@ -136,9 +140,12 @@ def average_rows(mean: MeanSlices) -> list[AverageRow]:
                 shots=mean.study.shots,
                 ring_mm=profile.ring_mm,
                 width_mm=profile.width_mm,
+                height=float(profile.intensities.max()),
                 inner_gradient_per_mm=profile.inner_gradient_per_mm,
                 outer_gradient_per_mm=profile.outer_gradient_per_mm,
-                centre=float(profile.intensities[profile.radii_mm < 0.5 * profile.ring_mm].mean()),
+                centre=float(
+                    profile.intensities[profile.radii_mm < 0.5 * profile.ring_mm].mean() / profile.intensities.max()
+                ),
             )
         )
     return rows
@@ -165,8 +172,8 @@ def average_statements(rows: Sequence[AverageRow]) -> list[Statement]:
         found = ", ".join(
             f"{Recipe.named(row.method).label} {getattr(row, f'{side}_gradient_per_mm'):.2f}/mm" for row in steepest
         )
-        topic = f"steepest gradient on the {side} flank of the ring"
-        statements.append(Statement(topic, "SMART-20, then MLOS, then minimum and geometric average", found))
+        topic = f"steepest {side} flank of the ring"
+        statements.append(Statement(topic, "SMART-20, then MLOS, then MINLOS and GAVLOS", found))
     return statements
 
 
@@ -212,7 +219,8 @@ def _draw_profiles(upper: Axes, lower: Axes, mean: MeanSlices) -> None:
         colour = COLOURS[recipe.method.value]
         upper.plot(profile.radii_mm, profile.intensities, color=colour, label=recipe.label)
         lower.plot(profile.radii_mm, profile.gradients_per_mm, color=colour)
-    upper.set(ylabel="radial profile, relative to its maximum [-]", ylim=(0, 1.05))
+    upper.set(ylabel="radial profile, relative to the slice's mean [-]")
+    upper.set_ylim(bottom=0)
     lower.set(xlabel="radius [mm]", ylabel="gradient of the profile [1/mm]")
     upper.legend(frameon=False)
     for axes in (upper, lower):

@@ -1,4 +1,4 @@
-"""A ring in a slice: its profile over the radius, how steep its flanks are and how wide it is."""
+"""A ring in a slice: its profile over the radius, how high and wide it is, how steep its flanks are."""
 
 from dataclasses import dataclass
 
@@ -16,14 +16,16 @@ SMOOTHING_MM = 0.05
 
 @dataclass(frozen=True, eq=False)
 class RadialProfile:
-    """Mean intensity over the azimuth, relative to its maximum.
+    """Mean intensity over the azimuth, relative to the mean over the circle.
+
+    So every method is taken to have placed the same liquid: what it spreads elsewhere is missing in the ring.
 
     Parameters
     ----------
     radii_mm : (N,) array
         Middle of each bin, equally spaced.
     intensities : (N,) array
-        0 to 1.
+        1 everywhere where liquid is spread evenly.
     """
 
     radii_mm: FloatArray
@@ -56,16 +58,17 @@ class RadialProfile:
     def width_mm(self) -> float:
         """Full width at half maximum, from the maximum to both sides."""
         peak = int(np.argmax(self.intensities))
-        inside = np.flatnonzero(self.intensities[:peak] < 0.5)
-        outside = np.flatnonzero(self.intensities[peak:] < 0.5)
-        first = self._half_mm(int(inside[-1])) if len(inside) else float(self.radii_mm[0])
-        last = self._half_mm(peak + int(outside[0]) - 1) if len(outside) else float(self.radii_mm[-1])
+        half = 0.5 * float(self.intensities[peak])
+        inside = np.flatnonzero(self.intensities[:peak] < half)
+        outside = np.flatnonzero(self.intensities[peak:] < half)
+        first = self._crossing_mm(int(inside[-1]), half) if len(inside) else float(self.radii_mm[0])
+        last = self._crossing_mm(peak + int(outside[0]) - 1, half) if len(outside) else float(self.radii_mm[-1])
         return last - first
 
-    def _half_mm(self, before: int) -> float:
-        """Radius at which the profile crosses one half between a bin and the next."""
+    def _crossing_mm(self, before: int, level: float) -> float:
+        """Radius at which the profile crosses a level between a bin and the next."""
         a, b = self.intensities[before : before + 2]
-        share = (0.5 - a) / (b - a)
+        share = (level - a) / (b - a)
         return float(self.radii_mm[before] + share * (self.radii_mm[before + 1] - self.radii_mm[before]))
 
 
@@ -87,4 +90,4 @@ def radial_profile(slice_zx: Slice, x_mm: FloatArray, z_mm: FloatArray, bin_mm: 
     within = bins <= last
     sums = np.bincount(bins[within], weights=slice_zx[within].astype(np.float64), minlength=last + 1)
     means = sums / np.maximum(np.bincount(bins[within], minlength=last + 1), 1)
-    return RadialProfile(bin_mm * np.arange(last + 1, dtype=np.float64), means / means.max())
+    return RadialProfile(bin_mm * np.arange(last + 1, dtype=np.float64), means / float(slice_zx[within].mean()))

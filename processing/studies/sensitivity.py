@@ -236,6 +236,8 @@ def sensitivity_figure(rows: Sequence[SensitivityRow]) -> Figure:
                 values, [100 * row.ghosts for row in curve], label=f"{recipe.label}, ghosts", linestyle="--", **style
             )
         axes.set(xlabel=LABELS[influence], ylim=(-3, 103))
+        if influence in (Influence.VIEWS, Influence.YAW_SPREAD):
+            axes.set_xticks(values)
         axes.grid(alpha=0.25)
     for axes in panels[:, 0]:
         axes.set_ylabel("share [%]")

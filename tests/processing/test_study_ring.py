@@ -19,15 +19,26 @@ def test_a_gaussian_ring_has_its_width_and_its_gradients(sigma_mm: float) -> Non
     assert profile.ring_mm == pytest.approx(2.0, abs=0.02)
     assert profile.width_mm == pytest.approx(2.355 * sigma_mm, rel=0.02)
     smoothed_mm = np.hypot(sigma_mm, SMOOTHING_MM)
-    steepest = np.exp(-0.5) * sigma_mm / smoothed_mm**2
+    steepest = profile.intensities.max() * np.exp(-0.5) * sigma_mm / smoothed_mm**2
     assert profile.inner_gradient_per_mm == pytest.approx(steepest, rel=0.03)
     assert profile.outer_gradient_per_mm == pytest.approx(steepest, rel=0.03)
+
+
+def test_the_same_liquid_in_a_narrower_ring_is_higher_and_steeper() -> None:
+    narrow, wide = ring(2.0, 0.1), ring(2.0, 0.2)
+    assert narrow.intensities.max() == pytest.approx(2 * wide.intensities.max(), rel=0.01)
+    assert narrow.outer_gradient_per_mm > 2.5 * wide.outer_gradient_per_mm
+
+
+def test_evenly_spread_liquid_is_one_everywhere() -> None:
+    even = radial_profile(np.full((401, 401), 3.0), AXIS_MM, AXIS_MM, 0.02)
+    np.testing.assert_allclose(even.intensities, 1)
 
 
 def test_noise_in_the_few_voxels_of_the_middle_is_not_the_flank() -> None:
     clean = ring(2.0, 0.2)
     noisy = clean.intensities.copy()
-    noisy[::2][:20] = 0.9
+    noisy[::2][:20] = 0.9 * noisy.max()
     assert RadialProfile(clean.radii_mm, noisy).inner_gradient_per_mm == clean.inner_gradient_per_mm
 
 
