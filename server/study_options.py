@@ -64,7 +64,9 @@ def _add_sensitivity(add_verb: AddVerb) -> None:
 
 def _add_out(parser: argparse.ArgumentParser, study: str) -> None:
     default = Path(f"study-{study}")
-    parser.add_argument("-o", "--out", type=Path, default=default, help="directory of CSV and figure")
+    parser.add_argument(
+        "-o", "--out", type=Path, default=default, help=f"directory of CSV and figure; default {default}"
+    )
 
 
 def _add_methods(parser: argparse.ArgumentParser, default: str) -> None:

@@ -1,0 +1,51 @@
+"""``tomoshadow study``: files, JSON and usage."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from server.cli import main
+
+
+def test_a_study_writes_csv_and_figure_and_says_what_the_paper_says(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "nested" / "average"
+    assert main(["study", "average", "--shots", "1", "--binning", "4", "-o", str(out), "--json"]) == 0
+    output, progress = capsys.readouterr()
+    result = json.loads(output.splitlines()[-1])
+    assert [row["method"] for row in result["rows"]] == ["gavlos", "minlos", "mlos", "smart"]
+    assert Path(result["csv"]).read_text(encoding="utf-8").startswith("method,shots,ring_mm")
+    assert Path(result["profiles"]).read_text(encoding="utf-8").startswith("method,radius_mm,intensity")
+    assert Path(result["figure"]).read_bytes().startswith(b"\x89PNG")
+    assert [set(statement) for statement in result["statements"]] == [{"topic", "paper", "ours"}] * 2
+    assert "shot 1 of 1" in progress
+    assert "paper: SMART-20, then MLOS" in progress
+
+
+@pytest.mark.parametrize("study", ["density", "ghosts", "average", "residuals", "sensitivity"])
+def test_every_study_explains_itself(study: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as stopped:
+        main(["study", study, "--help"])
+    assert stopped.value.code == 0
+    assert f"study-{study}" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (["density", "--method", "smort"], "'smort' is none of gavlos"),
+        (["density", "--sigma", "-1"], "-1 must be above 0"),
+        (["density", "--sigma", "wide"], "invalid positive value: 'wide'"),
+        (["ghosts", "--method", "mlos-3"], "mlos does not take 3 iterations"),
+        (["average", "--shots", "0"], "0 must be 1 or more"),
+    ],
+)
+def test_bad_usage_exits_with_2_and_names_the_value(
+    arguments: list[str], complaint: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as stopped:
+        main(["study", *arguments])
+    assert stopped.value.code == 2
+    assert complaint in capsys.readouterr().err
