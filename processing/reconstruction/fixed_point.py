@@ -22,6 +22,11 @@ class FixedPoint:
     unit: float
 
     @property
+    def brightest(self) -> float:
+        """Largest intensity that the image could have."""
+        return 32767 * self.unit
+
+    @property
     def intensity(self) -> NDArray[np.float32]:
         """The image in floating point, (rows, columns)."""
         return self.pixels.astype(np.float32) * np.float32(self.unit)

@@ -163,9 +163,11 @@ def test_kernels_refuse_geometry_that_leads_outside() -> None:
     for view in outside:
         with pytest.raises(ValueError, match=r"(view|nodes): "):
             _native.line_of_sight([view], 2, volume, 1)
-    projection = np.zeros((19, 90), np.float32)
+    projection, blocks = np.zeros((19, 90), np.float32), _native.Blocks.of_volume(volume, 1)
     with pytest.raises(ValueError, match="projections and images differ in shape"):
-        _native.smart_pass([rectified(pixels, scale, shift, shift)], [False], [projection], volume, 1)
+        blocks.smart_pass([rectified(pixels, scale, shift, shift)], [False], [projection], 1)
+    with pytest.raises(ValueError, match="another shape than the blocks"):
+        blocks.write(np.zeros((3, 4, 6), np.float32), 1)
 
 
 def test_resampling_refuses_what_does_not_fit() -> None:

@@ -53,8 +53,9 @@ def test_smart_equals_the_textbook(isa: str, by_nodes: bool, roll_deg: float) ->
     plan, images = make_plan(mappings, by_nodes), images_of(droplets(30), mappings)
     expected, residuals = oracle.smart(plan, images, iterations=3)
     result = smart(plan, images, iterations=3)
-    # ratios have steps of 1 / 4096, and are steep at the edges of droplets: compare with the brightest voxel
-    np.testing.assert_allclose(result.volume, expected, atol=6e-3 * expected.max())
+    # samples and ratios have 16 bit, and a voxel that starts with nearly nothing may start with nothing
+    np.testing.assert_allclose(result.volume, expected, atol=2e-2 * expected.max())
+    assert np.sqrt(np.mean((result.volume - expected) ** 2)) < 2e-4 * expected.max()
     np.testing.assert_allclose(result.residuals, residuals, rtol=1e-3)
 
 
@@ -121,6 +122,27 @@ def test_start_is_kept_and_its_zeros_stay() -> None:
     np.testing.assert_array_equal(start[:, :, 100:], 1)
 
 
+def test_the_volume_comes_in_half_precision_too(isa: str) -> None:
+    mappings = oracle.cameras(3)
+    plan, images = make_plan(mappings, False), images_of(droplets(20), mappings)
+    half = np.full(GRID.shape, 9, np.float16)
+    assert smart(plan, images, iterations=2, out=half).volume is half
+    np.testing.assert_array_equal(half, smart(plan, images, iterations=2).volume.astype(np.float16))
+
+
+@pytest.mark.parametrize("by_nodes", [False, True])
+def test_blocks_are_few_and_lose_nothing(by_nodes: bool) -> None:
+    mappings = oracle.cameras(4)
+    plan, images = make_plan(mappings, by_nodes), images_of(droplets(12), mappings)
+    views = plan.bind(plan.resample(images))
+    dense = line_of_sight(plan, images)
+    for blocks in (_native.Blocks.of_views(views, GRID.shape, 0.0, 2), _native.Blocks.of_volume(dense, 2)):
+        assert 0 < blocks.count < 0.5 * 17 * 6 * 9
+        stored = np.full(GRID.shape, 9, np.float32)
+        blocks.write(stored, 2)
+        np.testing.assert_array_equal(stored, dense)
+
+
 def test_stop_ends_it_and_sees_the_residual() -> None:
     mappings = oracle.cameras(2)
     plan, images = make_plan(mappings, False), images_of(droplets(10), mappings)
@@ -157,5 +179,5 @@ def test_what_cannot_be_done_is_refused() -> None:
         smart(plan, images, iterations=0)
     with pytest.raises(ValueError, match=r"volume has shape \(1, 1, 1\)"):
         mart(plan, images, start=np.ones((1, 1, 1), np.float32))
-    with pytest.raises(ValueError, match="contiguous float32, not float16"):
-        smart(plan, images, out=np.zeros(GRID.shape, np.float16))
+    with pytest.raises(ValueError, match="contiguous float32 or float16, not uint8"):
+        smart(plan, images, out=np.zeros(GRID.shape, np.uint8))

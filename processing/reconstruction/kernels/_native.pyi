@@ -30,12 +30,26 @@ def line_of_sight(
     volume: NDArray[np.float32] | NDArray[np.float16] | NDArray[np.uint8],
     threads: int,
 ) -> None: ...
-def smart_pass(
-    views: Sequence[View],
-    update: Sequence[bool],
-    projections: Sequence[NDArray[np.float32] | None],
-    volume: NDArray[np.float32],
-    threads: int,
-) -> None: ...
+
+@final
+class Blocks:
+    """A volume that is stored where it is not empty."""
+
+    @staticmethod
+    def of_views(views: Sequence[View], shape: tuple[int, int, int], floor: float, threads: int) -> Blocks: ...
+    @staticmethod
+    def of_volume(volume: NDArray[np.float32], threads: int) -> Blocks: ...
+    def smart_pass(
+        self,
+        views: Sequence[View],
+        update: Sequence[bool],
+        projections: Sequence[NDArray[np.float32] | None],
+        threads: int,
+    ) -> None: ...
+    def scale(self, factor: float, threads: int) -> None: ...
+    def write(self, volume: NDArray[np.float32] | NDArray[np.float16] | NDArray[np.uint8], threads: int) -> None: ...
+    @property
+    def count(self) -> int: ...
+
 def available_isas() -> list[str]: ...
 def selected_isa() -> str: ...

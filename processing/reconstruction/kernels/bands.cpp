@@ -89,21 +89,20 @@ void run_line_of_sight(const Kernels &kernels, const LineOfSight &job, int threa
     for_each(slabs, threads, [&](int slab) { kernels.line_of_sight(job, slab); });
 }
 
-void run_smart_pass(const Kernels &kernels, const SmartPass &job, const std::vector<float *> &sums, int threads) {
+void run_bands(const SmartPass &job, const std::vector<float *> &sums, int threads,
+               const std::function<void(int slab, const Projection *projections)> &work) {
     const auto bands = bands_of((job.shape.ny + smart_rows - 1) / smart_rows);
-    const int n_bands = static_cast<int>(bands.size());
     std::vector<std::vector<BandImage>> images(bands.size());
-    for_each(n_bands, threads, [&](int b) {
+    for_each(static_cast<int>(bands.size()), threads, [&](int b) {
         std::vector<Projection> projections;
         for (int i = 0; i < job.n_views; ++i) {
-            images[b].push_back(job.project[i] ? BandImage(job.views[i], job.shape, bands[b]) : BandImage());
+            images[b].push_back(sums[i] ? BandImage(job.views[i], job.shape, bands[b]) : BandImage());
             projections.push_back(images[b].back().projection());
         }
-        for (int slab = bands[b].first_slab; slab < bands[b].end_slab; ++slab)
-            kernels.smart_pass(job, slab, projections.data());
+        for (int slab = bands[b].first_slab; slab < bands[b].end_slab; ++slab) work(slab, projections.data());
     });
     for_each(job.n_views, threads, [&](int i) {
-        if (!job.project[i]) return;
+        if (!sums[i]) return;
         std::memset(sums[i], 0, sizeof(float) * job.views[i].rows * job.views[i].columns);
         for (const auto &band : images) add(band[i].projection(), sums[i]);
     });

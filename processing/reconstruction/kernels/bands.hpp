@@ -13,8 +13,9 @@ void for_each(int count, int threads, const std::function<void(int)> &work);
 
 void run_line_of_sight(const Kernels &kernels, const LineOfSight &job, int threads);
 
-// Bands project into images of their own, which are added in order: results do not depend on `threads`.
-// sums[i] is the image of view i, or null where job.project[i] is false.
-void run_smart_pass(const Kernels &kernels, const SmartPass &job, const std::vector<float *> &sums, int threads);
+// Work through bands of slabs that project into images of their own, which are then added in order. sums[i] is the
+// image of view i, or null if that is not wanted.
+void run_bands(const SmartPass &job, const std::vector<float *> &sums, int threads,
+               const std::function<void(int slab, const Projection *projections)> &work);
 
 }  // namespace tomoshadow

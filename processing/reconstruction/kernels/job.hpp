@@ -58,20 +58,37 @@ struct LineOfSight {
     void *volume;
 };
 
-// Rows [first_row, first_row + rows) of a view's image that a band of the volume projects onto.
+// Rows [first_row, first_row + rows) of a view's image that a band of the volume projects onto; without pixels if
+// nobody asked for the view.
 struct Projection {
     float *pixels;
     int first_row, rows, columns;
 };
 
-// One SMART pass: multiply the volume by the samples of the ratio images, then project the result.
+// Blocks of a slab of SMART, ordered by plane and column; voxels beyond the volume are zero.
+struct BlockPosition {
+    int32_t z, x0;
+};
+struct BlockList {
+    const BlockPosition *positions;
+    int count;
+    float *values;  // (count, smart_rows, block_columns)
+};
+using KeepBlock = void (*)(void *owner, BlockPosition position, const float *values);
+
+struct SmartStart {
+    const View *views;
+    int n_views;
+    Shape shape;
+    float floor;
+};
+
+// One SMART pass: multiply the blocks by the samples of the ratio images, then project the result.
 struct SmartPass {
     const View *views;  // their images hold the ratios
     const bool *update;
-    const bool *project;
     int n_views;
     Shape shape;
-    float *volume;
 };
 
 // Resample rows [first_row, end_row) of `to` from a recorded image in fixed point, by cubic convolution. Nodes are
@@ -89,7 +106,9 @@ struct Resampling {
 struct Kernels {
     const char *name;
     void (*line_of_sight)(const LineOfSight &job, int slab);
-    void (*smart_pass)(const SmartPass &job, int slab, const Projection *projections);
+    void (*smart_start)(const SmartStart &job, int slab, KeepBlock keep, void *owner);
+    void (*smart_pass)(const SmartPass &job, int slab, const BlockList &blocks, const Projection *projections);
+    void (*write_blocks)(const Shape &shape, int slab, const BlockList &blocks, Format format, void *volume);
     void (*resample)(const Resampling &job, int first_row, int end_row);
     float (*brightest)(const float *pixels, int count);
     void (*quantise)(const float *pixels, float counts_per_unit, int16_t *to, int count);

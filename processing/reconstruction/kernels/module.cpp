@@ -3,6 +3,7 @@
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
 #include <algorithm>
@@ -11,6 +12,7 @@
 #include <stdexcept>
 
 #include "bands.hpp"
+#include "blocks.hpp"
 #include "images.hpp"
 #include "instruction_set.hpp"
 
@@ -145,25 +147,49 @@ void line_of_sight(const std::vector<const BoundView *> &bound, int method, cons
     run_line_of_sight(kernels, job, threads);
 }
 
-void smart_pass(const std::vector<const BoundView *> &bound, const std::vector<bool> &update,
-                const std::vector<std::optional<ImageArray>> &projections, const FloatVolume &volume, int threads) {
-    const Shape shape = shape_of(volume);
+Blocks blocks_of_views(const std::vector<const BoundView *> &bound, std::tuple<int, int, int> size, float floor,
+                       int threads) {
+    const Shape shape{std::get<0>(size), std::get<1>(size), std::get<2>(size)};
+    require(shape.nz > 0 && shape.ny > 0 && shape.nx > 0, "volume: empty");
     const auto views = views_on(bound, shape, threads);
+    const Kernels &kernels = selected_kernels();
+    nb::gil_scoped_release release;
+    return Blocks::of_views(kernels, views, shape, floor, threads);
+}
+
+Blocks blocks_of_volume(const FloatVolume &volume, int threads) {
+    require(threads >= 1, "threads must be positive");
+    const Shape shape = shape_of(volume);
+    nb::gil_scoped_release release;
+    return Blocks::of_volume(volume.data(), shape, threads);
+}
+
+void pass(Blocks &blocks, const std::vector<const BoundView *> &bound, const std::vector<bool> &update,
+          const std::vector<std::optional<ImageArray>> &projections, int threads) {
+    const auto views = views_on(bound, blocks.shape(), threads);
     require(update.size() == views.size() && projections.size() == views.size(), "one flag and projection per view, please");
-    bool updates[max_views] = {}, projects[max_views] = {};
+    bool updates[max_views] = {};
     std::vector<float *> sums;
     for (size_t i = 0; i < views.size(); ++i) {
         updates[i] = update[i];
-        projects[i] = projections[i].has_value();
-        sums.push_back(projects[i] ? projections[i]->data() : nullptr);
-        require(!projects[i] || (static_cast<int>(projections[i]->shape(0)) == views[i].rows &&
-                                 static_cast<int>(projections[i]->shape(1)) == views[i].columns),
+        sums.push_back(projections[i] ? projections[i]->data() : nullptr);
+        require(!projections[i] || (static_cast<int>(projections[i]->shape(0)) == views[i].rows &&
+                                    static_cast<int>(projections[i]->shape(1)) == views[i].columns),
                 "projections and images differ in shape");
     }
-    const SmartPass job{views.data(), updates, projects, static_cast<int>(views.size()), shape, volume.data()};
     const Kernels &kernels = selected_kernels();
     nb::gil_scoped_release release;
-    run_smart_pass(kernels, job, sums, threads);
+    blocks.pass(kernels, views, updates, sums, threads);
+}
+
+void fill_volume(Blocks &blocks, const AnyVolume &volume, int threads) {
+    const Shape shape = shape_of(volume), &stored = blocks.shape();
+    require(shape.nz == stored.nz && shape.ny == stored.ny && shape.nx == stored.nx, "volume: another shape than the blocks");
+    require(threads >= 1, "threads must be positive");
+    const Kernels &kernels = selected_kernels();
+    const Format format = format_of(volume);
+    nb::gil_scoped_release release;
+    blocks.write(kernels, format, volume.data(), threads);
 }
 
 Recorded recorded(const RecordedArray &image) {
@@ -207,7 +233,13 @@ NB_MODULE(_native, module) {
     module.def("quantise", &quantise_framed, "image"_a, "before"_a, "after"_a, "out"_a, "threads"_a);
     module.def("resample", &resample_image, "image"_a, "nodes"_a, "out"_a, "threads"_a);
     module.def("line_of_sight", &line_of_sight, "views"_a, "method"_a, "volume"_a, "threads"_a);
-    module.def("smart_pass", &smart_pass, "views"_a, "update"_a, "projections"_a, "volume"_a, "threads"_a);
+    nb::class_<Blocks>(module, "Blocks")
+        .def_static("of_views", &blocks_of_views, "views"_a, "shape"_a, "floor"_a, "threads"_a)
+        .def_static("of_volume", &blocks_of_volume, "volume"_a, "threads"_a)
+        .def("smart_pass", &pass, "views"_a, "update"_a, "projections"_a, "threads"_a)
+        .def("scale", &Blocks::scale, "factor"_a, "threads"_a, nb::call_guard<nb::gil_scoped_release>())
+        .def("write", &fill_volume, "volume"_a, "threads"_a)
+        .def_prop_ro("count", &Blocks::count);
     module.def("available_isas", &available_isas);
     module.def("selected_isa", [] { return std::string(selected_kernels().name); });
 }
