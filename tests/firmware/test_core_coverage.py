@@ -53,7 +53,7 @@ def coverage(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Coverage]:
 
 def _counted(folder: Path, objects: list[Path]) -> Iterator[tuple[str, Coverage]]:
     for compiled in objects:
-        command = ["gcov", "--json-format", "--stdout", "--branch-probabilities", compiled]
+        command: list[str | Path] = ["gcov", "--json-format", "--stdout", "--branch-probabilities", compiled]
         said = subprocess.run(command, cwd=folder, check=True, capture_output=True, text=True, timeout=60).stdout
         lines: list[dict[str, Any]] = [
             line
