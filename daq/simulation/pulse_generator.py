@@ -4,9 +4,11 @@ The real driver opens ``FirmwareProcess.port``; what the core fires arrives as a
 and the light of the simulated cameras.
 """
 
+import importlib.util
 import queue
 import signal
 import subprocess
+import sys
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
@@ -15,7 +17,7 @@ from typing import Self
 
 from daq.errors import DeviceTimeout, DeviceUnavailable
 from daq.shot import FiredTrain, LightPulse
-from daq.simulation.firmware_build import build_firmware
+from daq.simulation.firmware_build import build_firmware, build_image
 
 _DEVICE = "simulated pulse generator"
 _ANSWER_LIMIT_S = 5.0
@@ -31,9 +33,14 @@ class FirmwareProcess:
         Channel of each view, as the driver has it.
     on_fired : Callable[[FiredTrain], None]
         Called from the reading thread for every shot. If it raises, the generator dies with it.
+    emulated : bool
+        Run the image of the Raspberry Pi Pico in an emulator, instead of the core built for this computer.
     """
 
-    def __init__(self, channels: Mapping[str, int], on_fired: Callable[[FiredTrain], None]) -> None:
+    def __init__(
+        self, channels: Mapping[str, int], on_fired: Callable[[FiredTrain], None], *, emulated: bool = False
+    ) -> None:
+        self._command = _emulator_command if emulated else _host_command
         self._views = {number: view for view, number in channels.items()}
         self._on_fired = on_fired
         self._process: subprocess.Popen[str] | None = None
@@ -53,7 +60,7 @@ class FirmwareProcess:
         return self._running().pid
 
     def __enter__(self) -> Self:
-        self._process = subprocess.Popen([build_firmware()], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        self._process = subprocess.Popen(self._command(), stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         self._reader = threading.Thread(target=self._read_events, args=(self._process,), name=_DEVICE, daemon=True)
         self._reader.start()
         try:
@@ -161,8 +168,18 @@ def _light(edges: list[int]) -> tuple[LightPulse, ...]:
     a_start_ns, a_width_ns, b_start_ns, b_width_ns, current_ma = edges
     if not current_ma:
         return ()
-    current_a = current_ma / 1000
-    return LightPulse(a_start_ns, a_width_ns, current_a), LightPulse(b_start_ns, b_width_ns, current_a)
+    pulses = ((a_start_ns, a_width_ns), (b_start_ns, b_width_ns))
+    return tuple(LightPulse(start_ns, width_ns, current_ma / 1000) for start_ns, width_ns in pulses if width_ns)
+
+
+def _host_command() -> list[str]:
+    return [str(build_firmware())]
+
+
+def _emulator_command() -> list[str]:
+    if importlib.util.find_spec("rp2040py") is None:
+        raise DeviceUnavailable(_DEVICE, "rp2040py, which emulates the Pico, is missing (pip install rp2040py==0.3.6)")
+    return [sys.executable, "-m", "daq.simulation.emulated_firmware", str(build_image())]
 
 
 def _lines(process: subprocess.Popen[str]) -> Iterator[str]:

@@ -48,8 +48,16 @@ class Bench:
         self.firmware.advance(PERIOD_MS)
 
 
+on_the_real_image_too = pytest.mark.parametrize("emulated", [False, True], ids=["host", "emulated"])
+
+
 @pytest.fixture
-def bench() -> Iterator[Bench]:
+def emulated() -> bool:
+    return False
+
+
+@pytest.fixture
+def bench(emulated: bool) -> Iterator[Bench]:
     light: list[FiredTrain] = []
     changed = threading.Condition()
 
@@ -59,7 +67,7 @@ def bench() -> Iterator[Bench]:
             changed.notify_all()
 
     with (
-        FirmwareProcess(CHANNELS, on_fired) as firmware,
+        FirmwareProcess(CHANNELS, on_fired, emulated=emulated) as firmware,
         SerialPulseGenerator("generator", firmware.port, CHANNELS) as generator,
     ):
         yield Bench(firmware, generator, light, changed)
@@ -120,6 +128,7 @@ def test_camera_trigger_keeps_its_distance_to_pulse_a(generator: PulseGenerator)
         assert abs(distance_ns + edges.camera_trigger_ns) <= 4
 
 
+@on_the_real_image_too
 def test_what_is_fired_is_what_was_answered(bench: Bench) -> None:
     configured = bench.generator.configure(shot_timing(middle=12.5))
     bench.generator.arm(1)
@@ -128,6 +137,7 @@ def test_what_is_fired_is_what_was_answered(bench: Bench) -> None:
     assert bench.wait_for_light(1) == [fired]
 
 
+@on_the_real_image_too
 def test_a_dark_view_gets_its_trigger_and_no_light(bench: Bench) -> None:
     bench.generator.configure(shot_timing(left=0.0, middle=0.0, right=0.0))
     bench.generator.arm(1)
@@ -137,6 +147,7 @@ def test_a_dark_view_gets_its_trigger_and_no_light(bench: Bench) -> None:
     assert bench.wait_for_light(1) == [fired]
 
 
+@on_the_real_image_too
 def test_the_budget_is_exact(armed: Bench) -> None:
     for shot in range(5):
         assert armed.generator.status().shots_left == 5 - shot
@@ -170,6 +181,7 @@ def test_an_impossible_budget_is_refused(generator: PulseGenerator, shots: int) 
     assert generator.status().state is GeneratorState.SAFE
 
 
+@on_the_real_image_too
 def test_an_early_shot_is_not_fired_and_counted(armed: Bench) -> None:
     armed.generator.fire()
     with pytest.raises(DeviceRefused, match="shortest period"):
@@ -206,6 +218,7 @@ def test_a_view_without_channel_is_named(generator: PulseGenerator) -> None:
         generator.configure(ShotTiming({"behind": views["left"]}, 0))
 
 
+@on_the_real_image_too
 def test_off_disarms_in_every_state(armed: Bench) -> None:
     armed.generator.off()
     assert armed.generator.status().state is GeneratorState.SAFE
@@ -243,6 +256,7 @@ def test_off_works_while_another_thread_asks_without_pause(armed: Bench) -> None
     assert armed.generator.status().state is GeneratorState.SAFE
 
 
+@on_the_real_image_too
 def test_a_silent_host_trips_and_clear_acknowledges(armed: Bench) -> None:
     armed.firmware.advance(HEARTBEAT_MS + 1)
     status = armed.generator.status()
@@ -260,6 +274,7 @@ def test_status_is_the_heartbeat(armed: Bench) -> None:
         assert armed.generator.status().state is GeneratorState.ARMED
 
 
+@on_the_real_image_too
 def test_an_opened_interlock_latches(armed: Bench) -> None:
     armed.firmware.set_interlock(False)
     status = armed.generator.status()

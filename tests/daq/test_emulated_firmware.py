@@ -1,0 +1,87 @@
+"""The driver on the real image: an emulated Pico behind a pseudo-terminal, in the time of the wall clock."""
+
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import replace
+
+import pytest
+
+from daq.devices import GeneratorState
+from daq.drivers.serial_pulse_generator import SerialPulseGenerator
+from daq.errors import DeviceError, DeviceRefused, DeviceUnavailable
+from daq.run_plan import PulsePair, RunPlan
+from daq.shot import FiredTrain
+from daq.simulation.emulated_firmware import measured_shot
+from daq.simulation.pulse_generator import FirmwareProcess
+from daq.simulation.rp2040_chip import TRIGGER
+from daq.simulation.rp2040_emulator import START_CYCLES, Edge
+from daq.timing import CameraTiming, ShotTiming, plan_shot_timing
+
+CHANNELS = {"left": 1, "right": 3}
+CAMERA = CameraTiming(1_000, 20_000, 500, 30_000_000, 1_000_000)
+PERIOD_MS = 10
+SHOTS = 20
+
+
+def shot_timing() -> ShotTiming:
+    plan = RunPlan(name="emulated", shots=1, pulse=PulsePair(current_a={"left": 9.9, "right": 26.0}))
+    return plan_shot_timing(plan, dict.fromkeys(CHANNELS, CAMERA))
+
+
+@pytest.fixture
+def light() -> list[FiredTrain]:
+    return []
+
+
+@pytest.fixture
+def firmware(light: list[FiredTrain]) -> Iterator[FirmwareProcess]:
+    with FirmwareProcess(CHANNELS, light.append, emulated=True) as process:
+        yield process
+
+
+def test_twenty_shots_an_abort_and_a_watchdog(firmware: FirmwareProcess, light: list[FiredTrain]) -> None:
+    with SerialPulseGenerator("generator", firmware.port, CHANNELS) as generator:
+        assert generator.identity().firmware.endswith("rp2040")
+        configured = generator.configure(shot_timing())
+        generator.arm(SHOTS + 10)
+        for shot in range(1, SHOTS + 1):
+            assert generator.fire() == replace(configured, sequence=shot)
+            firmware.advance(PERIOD_MS)
+        assert light == [replace(configured, sequence=shot) for shot in range(1, SHOTS + 1)]
+        firmware.lose_replies(1)
+        assert generator.fire().sequence == SHOTS + 1
+        generator.off()
+        with pytest.raises(DeviceRefused, match="not armed"):
+            generator.fire()
+        firmware.reset(by_watchdog=True)
+        with pytest.raises(DeviceError, match="reset"):
+            generator.status()
+    assert len(light) == SHOTS + 1
+    with SerialPulseGenerator("generator", firmware.port, CHANNELS) as generator:
+        status = generator.status()
+        assert (status.state, status.faults) == (GeneratorState.FAULT, ("watchdog",))
+
+
+def test_a_pulled_plug_is_named(firmware: FirmwareProcess) -> None:
+    with suppress(DeviceError), SerialPulseGenerator("generator", firmware.port, CHANNELS) as generator:
+        generator.configure(shot_timing())
+        firmware.kill()
+        with pytest.raises(DeviceUnavailable):
+            generator.status()
+
+
+def test_a_shot_is_measured_at_the_pins() -> None:
+    def edges(output: str, *times_ns: int) -> list[Edge]:
+        return [Edge(1000 + START_CYCLES + at // 8, output, i % 2 == 0) for i, at in enumerate(times_ns)]
+
+    shot = [
+        Edge(1000, TRIGGER, True),
+        *edges("camera1", 0, 10_000),
+        *edges("camera2", 80, 10_080),
+        *edges("light1", 20_000, 21_000, 26_400, 27_400),
+        *edges("light2", 20_000, 20_400),
+    ]
+    assert measured_shot(shot, (0, 9900, 5000, 0)) == [
+        *(1, 0, 20_000, 1000, 26_400, 1000, 9900),
+        *(2, 80, 20_000, 400, 0, 0, 5000),
+    ]
