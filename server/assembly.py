@@ -1,6 +1,6 @@
 """Assembly: the only module that names concrete devices. Drivers are the same on a real and on a simulated rig."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,6 +15,7 @@ from daq.drivers.serial_pulse_generator import SerialPulseGenerator
 from daq.drivers.serial_stage import SerialStage, StageScale
 from daq.errors import DeviceUnavailable
 from daq.run_plan import RunKind
+from daq.shot import FiredTrain
 from daq.simulation.bench import BenchDevices, SimulatedBench
 from daq.simulation.gige_camera import SimulatedCamera
 from daq.simulation.gpio_chip import CHIP_PATH, ChipUnsupported, SimulatedSwitchLine, free_line
@@ -114,8 +115,12 @@ def _generator_wired(config: RigConfig) -> Iterator[RigConfig]:
     if config.simulation is None:
         yield config
         return
-    with FirmwareProcess(channels_of(config), lambda _: None) as firmware:
+    with _simulated_generator(config, lambda _: None) as firmware:
         yield config.model_copy(update={"pulse_generator": PulseGeneratorConfig(port=firmware.port)})
+
+
+def _simulated_generator(config: RigConfig, on_fired: Callable[[FiredTrain], None]) -> FirmwareProcess:
+    return FirmwareProcess(channels_of(config), on_fired)
 
 
 def _open_rig(config: RigConfig, profiles: Profiles, interlock: Interlock, devices: ExitStack) -> Rig:
@@ -175,7 +180,7 @@ def _open_simulation(
         name: devices.enter_context(_simulated_camera(name, view, profiles[name], scene))
         for name, view in config.views.items()
     }
-    generator = devices.enter_context(FirmwareProcess(channels_of(config), bench.on_fired))
+    generator = devices.enter_context(_simulated_generator(config, bench.on_fired))
     bench.connect(BenchDevices(cameras, generator, switch, stage))
     wired = config.model_copy(
         update={

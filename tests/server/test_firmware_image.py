@@ -1,5 +1,7 @@
 """Only the pulse generator's own image goes to a board, and only to the right board."""
 
+import errno
+import re
 import struct
 from collections.abc import Callable
 from pathlib import Path
@@ -7,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from daq.errors import DeviceError, DeviceUnavailable
+from daq.simulation.firmware_build import build_image
 from server.firmware_image import (
     BOOT_BYTES,
     FAMILY_FLAG,
@@ -70,6 +73,11 @@ def test_a_good_image_tells_its_version(tmp_path: Path) -> None:
     assert (image.version, image.blocks) == ("1.2.3", (BOOT_BYTES + len(PROGRAM)) // 256)
 
 
+def test_the_image_that_is_built_here_may_be_flashed() -> None:
+    image = load_image(build_image().with_suffix(".uf2"))
+    assert image.version == re.search(r'VERSION "([0-9.]+)"', Path("firmware/core/commands.h").read_text())[1]  # type: ignore[index]
+
+
 SPOILT: dict[str, tuple[Callable[[], bytes], str]] = {
     "empty": (lambda: b"", "0 bytes"),
     "cut": (lambda: uf2(bootable())[:-1], "whole number of UF2 blocks"),
@@ -124,6 +132,32 @@ def test_a_folder_that_is_no_board_is_refused(tmp_path: Path) -> None:
 def test_the_image_arrives_unchanged(tmp_path: Path, drive: Path) -> None:
     image = load_image(saved(tmp_path, uf2(bootable())))
     assert write_image(image, drive).read_bytes() == image.path.read_bytes()
+
+
+def lose_drive(monkeypatch: pytest.MonkeyPatch, drive: Path, *, restarted: bool) -> None:
+    def fail(_: int) -> None:
+        if restarted:
+            (drive / "INFO_UF2.TXT").unlink()
+        raise OSError(errno.EIO, "Input/output error")
+
+    monkeypatch.setattr("server.firmware_image.os.fsync", fail)
+
+
+def test_a_board_that_restarts_with_its_last_block_has_got_it(
+    tmp_path: Path, drive: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    image = load_image(saved(tmp_path, uf2(bootable())))
+    lose_drive(monkeypatch, drive, restarted=True)
+    assert write_image(image, drive).name == "pulse.uf2"
+
+
+def test_a_board_that_stays_has_not_taken_the_image(
+    tmp_path: Path, drive: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    image = load_image(saved(tmp_path, uf2(bootable())))
+    lose_drive(monkeypatch, drive, restarted=False)
+    with pytest.raises(DeviceError, match=r"1536 of 1536 bytes written: .* Input/output error"):
+        write_image(image, drive)
 
 
 def test_a_drive_that_refuses_is_an_error(tmp_path: Path, drive: Path) -> None:
