@@ -120,7 +120,8 @@ def _generator_wired(config: RigConfig) -> Iterator[RigConfig]:
 
 
 def _simulated_generator(config: RigConfig, on_fired: Callable[[FiredTrain], None]) -> FirmwareProcess:
-    return FirmwareProcess(channels_of(config), on_fired)
+    emulated = config.simulation is not None and config.simulation.firmware == "emulated"
+    return FirmwareProcess(channels_of(config), on_fired, emulated=emulated)
 
 
 def _open_rig(config: RigConfig, profiles: Profiles, interlock: Interlock, devices: ExitStack) -> Rig:

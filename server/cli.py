@@ -92,6 +92,7 @@ def _add_demo(verbs: Any) -> None:
     parser.add_argument("--out", type=Path, default=Path("demo-out"), help="where runs, results and report.html go")
     parser.add_argument("--shots", type=int, default=8, help="double exposures to record")
     parser.add_argument("--config", type=Path, default=Path("configs/simulated.toml"), help="a simulated rig")
+    parser.add_argument("--firmware", choices=("host", "emulated"), help="instead of the configuration's")
 
 
 def _add_serve(verbs: Any) -> None:

@@ -195,7 +195,7 @@ def demo(options: Namespace) -> dict[str, Any]:
     from server.demo_report import readable_summary, summary, write_demo_report
 
     options.out.mkdir(parents=True, exist_ok=True)
-    demonstration = demonstrate(options.config, options.out, options.shots, progress)
+    demonstration = demonstrate(options.config, options.out, options.shots, progress, options.firmware)
     report = options.out / "report.html"
     write_demo_report(demonstration, report)
     result = summary(demonstration, report)

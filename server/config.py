@@ -157,7 +157,10 @@ class SimulationConfig(FrozenModel):
 
     seed: int = 1
     spray: Literal["hollow_cone", "flat_fan"] = "hollow_cone"
-    firmware: Literal["host"] = "host"
+    firmware: Annotated[
+        Literal["host", "emulated"],
+        Field(description="core built for this computer, or the Pico's image in an emulator"),
+    ] = "host"
     gpio: Annotated[
         Literal["auto", "chip", "memory"], Field(description="simulated GPIO chip, interlock in memory, or what works")
     ] = "auto"

@@ -72,8 +72,12 @@ class Demonstration:
     seconds: dict[str, float]
 
 
-def demonstrate(config_file: Path, out: Path, shots: int, progress: Progress) -> Demonstration:
+def demonstrate(
+    config_file: Path, out: Path, shots: int, progress: Progress, firmware: str | None = None
+) -> Demonstration:
     """Calibrate, record dark, background and samples, reconstruct each shot, compare with the truth.
+
+    ``firmware`` stands for the configuration's ``simulation.firmware``.
 
     Raises
     ------
@@ -85,6 +89,9 @@ def demonstrate(config_file: Path, out: Path, shots: int, progress: Progress) ->
     config = load_config(config_file)
     if config.simulation is None:
         raise ConfigError(f"{config_file}: the demonstration needs a rig with [simulation]")
+    if firmware is not None:
+        simulation = config.simulation.model_copy(update={"firmware": firmware})
+        config = config.model_copy(update={"simulation": simulation})
     watch = Stopwatch()
     with open_rig(config) as bench:
         recorder = _Runs(config, bench, out / "runs", progress)
