@@ -69,8 +69,8 @@ class EmulatedPico:
         Told every edge when it happens.
     sent : bytearray
         What the firmware sent on its serial line; the caller may clear it.
-    watchdog_resets : int
-        How often the watchdog has restarted the chip.
+    watchdog_resets : list[int]
+        Cycles at which the watchdog restarted the chip.
     shot_set_points_ma : tuple[int, ...]
         Set-points by channel when the trigger line rose last.
     """
@@ -87,7 +87,7 @@ class EmulatedPico:
         self.edges: list[Edge] = []
         self.sent = bytearray()
         self.on_edge: Callable[[Edge], None] | None = None
-        self.watchdog_resets = 0
+        self.watchdog_resets: list[int] = []
         self.shot_set_points_ma: tuple[int, ...] = ()
         self.power_up()
 
@@ -233,7 +233,7 @@ class EmulatedPico:
 
     def _restart(self) -> None:
         self._restarting = False
-        self.watchdog_resets += 1
+        self.watchdog_resets.append(self.cycle)
         before = self.levels()
         self._chip.enter_reset(from_watchdog=True)
         for output, high in self.levels().items():  # pins that were reset tell nobody

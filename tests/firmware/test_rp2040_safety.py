@@ -1,6 +1,7 @@
 """How the real image gets dark: abort, interlock, silent host, hung processor, overflowing stack; and stays dark."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import pytest
 
@@ -9,17 +10,22 @@ from daq.simulation.rp2040_emulator import CYCLE_NS
 from tests.firmware.rp2040_board import BOOT_MS, PAPER, PERIOD_MS, Board
 
 WATCHDOG_MS = 200
-ABORT_LATENCY_NS = 1000
-INTERLOCK_LATENCY_NS = 1000
+DARK_WITHIN_NS = 300
+"""Measured: 264 ns for the last of four channels. The emulator leaves out entering the interrupt, about 20 cycles."""
 RAM, STACK_SIZE = 0x2000_0000, 2048
 PAINT = 0xA5A5_A5A5
+ABORT_WITHIN_NS = 600
+PIO_BLOCKS = (0x5020_0000, 0x5030_0000)
+FIRST_FIFO = 0x10
+LONG = replace(PAPER, camera_ns=15_000, a_width_ns=2000, b_width_ns=2000, frame_a_close_ns=8000, frame_b_open_ns=9000)
+"""The longest pulses, so that no end of a pulse is taken for the interlock's; the camera triggers overlap them."""
 
 
 @pytest.fixture
 def board() -> Iterator[Board]:
     """An armed board; whatever is done to it, no output stays high and no shot is left over."""
     board = Board()
-    board.configure([PAPER] * 4)
+    board.configure([LONG] * 4)
     board.arm(100)
     board.pico.edges.clear()
     yield board
@@ -48,8 +54,10 @@ def state_and_faults(board: Board) -> tuple[State, Fault]:
     return State(status.number("state")), Fault(status.number("faults"))
 
 
-@pytest.mark.parametrize("into_pulse_cycles", [1, 40, 100])
-def test_the_interlock_ends_a_pulse_within_a_microsecond_and_latches(board: Board, into_pulse_cycles: int) -> None:
+@pytest.mark.parametrize("into_pulse_cycles", [1, 30, 90, 150])
+def test_the_interlock_ends_a_pulse_in_less_than_a_microsecond_and_latches(
+    board: Board, into_pulse_cycles: int
+) -> None:
     opened: list[int] = []
 
     def open_door() -> None:
@@ -59,8 +67,10 @@ def test_the_interlock_ends_a_pulse_within_a_microsecond_and_latches(board: Boar
     board.when("light0", True, into_pulse_cycles, open_door)
     fire(board)
     board.pico.run_ms(1)
-    assert (dark_at(board) - opened[0]) * CYCLE_NS < INTERLOCK_LATENCY_NS
+    assert (dark_at(board) - opened[0]) * CYCLE_NS < DARK_WITHIN_NS
     assert not lit_after(board, opened[0]), "pulse B is not given"
+    assert not any(board.pico.levels().values()), "neither are the camera triggers, which were high"
+    assert [board.pico.read_word(block) for block in PIO_BLOCKS] == [0, 0], "and the state machines stand still"
     assert board.pico.set_points_ma() == (0, 0, 0, 0)
     assert state_and_faults(board) == (State.FAULT, Fault.INTERLOCK)
     assert board.ask(Command.CLEAR).error is ErrorNumber.INTERLOCK_OPEN
@@ -85,7 +95,7 @@ def test_the_abort_byte_disarms_from_inside_a_line(board: Board) -> None:
     assert board.ask(Command.FIRE).error is ErrorNumber.NOT_ARMED
 
 
-def test_the_abort_byte_needs_less_than_a_microsecond(board: Board) -> None:
+def test_the_abort_byte_ends_a_pulse_in_less_than_a_microsecond(board: Board) -> None:
     arrived: list[int] = []
 
     def abort() -> None:
@@ -95,7 +105,7 @@ def test_the_abort_byte_needs_less_than_a_microsecond(board: Board) -> None:
     board.when("light2", True, 10, abort)
     fire(board)
     board.pico.run_ms(1)
-    assert (dark_at(board) - arrived[0]) * CYCLE_NS < ABORT_LATENCY_NS
+    assert (dark_at(board) - arrived[0]) * CYCLE_NS < ABORT_WITHIN_NS
     assert not lit_after(board, arrived[0])
 
 
@@ -132,7 +142,18 @@ def test_an_early_shot_is_ignored_counted_and_not_queued(board: Board) -> None:
     assert [status.number(name) for name in ("requested", "fired", "suppressed", "early")] == [2, 1, 1, 1]
 
 
-def test_words_in_the_fifos_of_an_interrupted_shot_are_lost(board: Board) -> None:
+def test_words_left_in_the_fifos_are_no_part_of_the_next_shot(board: Board) -> None:
+    board.ask(Command.OFF)
+    for block in PIO_BLOCKS:
+        for machine in range(4):
+            board.pico.write_word(block + FIRST_FIFO + 4 * machine, 100 + machine)
+    board.configure([None, PAPER, None, None])
+    board.pico.run_ms(PERIOD_MS)
+    board.arm(1)
+    assert board.shoot() == sorted(PAPER.edges(1))
+
+
+def test_a_shot_that_was_cut_short_leaves_nothing_behind(board: Board) -> None:
     board.when("light0", True, 10, lambda: board.pico.set_interlock(False))
     fire(board)
     board.pico.run_ms(1)
@@ -141,7 +162,7 @@ def test_words_in_the_fifos_of_an_interrupted_shot_are_lost(board: Board) -> Non
     board.configure([None, PAPER, None, None])
     board.pico.run_ms(PERIOD_MS)
     board.arm(1)
-    assert {output for _, output, _ in board.shoot()} == {"camera1", "light1"}
+    assert board.shoot() == sorted(PAPER.edges(1))
 
 
 def test_a_hung_processor_is_restarted_dark_and_says_so(board: Board) -> None:
@@ -149,9 +170,9 @@ def test_a_hung_processor_is_restarted_dark_and_says_so(board: Board) -> None:
     fire(board)
     board.pico.hang()
     board.pico.run_ms(WATCHDOG_MS - 10)
-    assert board.pico.watchdog_resets == 0
+    assert board.pico.watchdog_resets == []
     board.pico.run_ms(20)
-    assert board.pico.watchdog_resets == 1
+    assert len(board.pico.watchdog_resets) == 1
     assert not any(board.pico.levels().values())
     board.pico.run_ms(BOOT_MS)
     reply = board.ask(Command.STATUS)
@@ -167,7 +188,7 @@ def test_the_watchdog_takes_pio_and_pins_with_it(board: Board) -> None:
     assert board.pico.levels()["light0"]
     board.pico.hang()
     board.pico.run_ms(WATCHDOG_MS + BOOT_MS)
-    assert not any(board.pico.levels().values())
+    assert [dark_at(board)] == board.pico.watchdog_resets, "by the reset itself, not by the firmware after it"
 
 
 def test_a_new_power_up_is_told_from_the_old_one(board: Board) -> None:
@@ -194,7 +215,7 @@ def test_the_stack_stays_far_from_its_end(board: Board) -> None:
     fire(board)
     board.pico.set_interlock(True)
     board.ask(Command.CLEAR)
-    board.configure([PAPER] * 4)
+    board.configure([LONG] * 4)
     board.ask(Command.STATUS)
     board.say(b"x" * 200 + b"\n")
     untouched = next(address for address in words if board.pico.read_word(address) != PAINT) - RAM
