@@ -19,10 +19,6 @@ constexpr int lanes = 8;
 constexpr int lanes = 4;
 #endif
 
-// Tiles are as long as their intermediate results stay in the first-level cache.
-constexpr int tile_columns = 256;
-using Row = float[tile_columns];
-
 typedef float Floats __attribute__((vector_size(4 * lanes)));
 typedef int32_t Ints __attribute__((vector_size(4 * lanes)));
 
@@ -43,57 +39,48 @@ inline int larger(int a, int b) { return a > b ? a : b; }
 inline int floor_of(double x) { return static_cast<int>(x) - (static_cast<int>(x) > x); }
 inline int ceil_of(double x) { return -floor_of(-x); }
 
-// Positions start + step k, k = 0 .. columns - 1, as integer parts (relative to the first one of each block of
-// `lanes`) and fractions. Positions are not negative and step is below `max_step`.
-struct FloatTaps {
-    int columns;
-    double step;
-    int first[tile_columns / lanes];
-    alignas(64) int32_t index[tile_columns];
-    alignas(64) float fraction[tile_columns];
-};
-
-constexpr double max_step = 1.8;  // a block then spans less than two vectors, neighbours included
-
-inline void set_taps(FloatTaps &taps, double start, double step, int columns) {
+inline Floats lane_numbers() {
     Floats lane;
     for (int k = 0; k < lanes; ++k) lane[k] = static_cast<float>(k);
-    taps.columns = columns;
-    taps.step = step;
-    for (int k = 0; k < columns; k += lanes) {
-        const double position = start + step * k;
-        const int first = static_cast<int>(position);
-        const Floats offset = lane * static_cast<float>(step) + static_cast<float>(position - first);
-        const Ints index = __builtin_convertvector(offset, Ints);
-        taps.first[k / lanes] = first;
-        store(taps.index + k, index);
-        store(taps.fraction + k, offset - __builtin_convertvector(index, Floats));
-    }
+    return lane;
 }
 
-// out[k] = row at position k, for whole blocks: up to `lanes` - 1 more than taps.columns.
-inline void interpolate(const float *row, const FloatTaps &taps, float *out) {
-    for (int k = 0; k < taps.columns; k += lanes) {
-        const float *window = row + taps.first[k / lanes];
+// Positions of a vector along a row of floats: evenly spaced, not negative, less than two vectors from first to last.
+struct FloatTaps {
+    int first;
+    bool narrow;
+    Ints index;
+    Floats fraction;
+};
+
+constexpr double max_step = 1.8;
+
+inline FloatTaps float_taps(double position, double step) {
+    const int first = static_cast<int>(position);
+    const Floats offset = lane_numbers() * static_cast<float>(step) + static_cast<float>(position - first);
+    const Ints index = __builtin_convertvector(offset, Ints);
+    return {first, step <= 1.0, index, offset - __builtin_convertvector(index, Floats)};
+}
+
+inline Floats interpolate(const float *row, const FloatTaps &taps) {
+    const float *window = row + taps.first;
+    Floats left, right;
 #if defined(__AVX2__)
-        const Ints index = load<Ints>(taps.index + k);
-        Floats left, right;
-        if (taps.step <= 1.0) {
-            left = __builtin_shuffle(load<Floats>(window), index);
-            right = __builtin_shuffle(load<Floats>(window + 1), index);
-        } else {
-            const Floats low = load<Floats>(window), high = load<Floats>(window + lanes);
-            left = __builtin_shuffle(low, high, index);
-            right = __builtin_shuffle(low, high, index + 1);
-        }
-        store(out + k, left + load<Floats>(taps.fraction + k) * (right - left));
-#else
-        for (int j = k; j < k + lanes; ++j) {
-            const float *at = window + taps.index[j];
-            out[j] = at[0] + taps.fraction[j] * (at[1] - at[0]);
-        }
-#endif
+    if (taps.narrow) {
+        left = __builtin_shuffle(load<Floats>(window), taps.index);
+        right = __builtin_shuffle(load<Floats>(window + 1), taps.index);
+    } else {
+        const Floats low = load<Floats>(window), high = load<Floats>(window + lanes);
+        left = __builtin_shuffle(low, high, taps.index);
+        right = __builtin_shuffle(low, high, taps.index + 1);
     }
+#else
+    for (int k = 0; k < lanes; ++k) {
+        left[k] = window[taps.index[k]];
+        right[k] = window[taps.index[k] + 1];
+    }
+#endif
+    return left + taps.fraction * (right - left);
 }
 
 inline Floats square_root(Floats x) {

@@ -16,6 +16,36 @@ struct PlaneRows {
     int begin, end;  // columns outside are zero
 };
 
+// Image rows that meet the rows of a slab: each lies a fraction below row above - 1 of the slab; rows -1 and `rows` are
+// zero.
+struct BetweenRows {
+    static constexpr int most = static_cast<int>((smart_rows + 1) * max_step) + 2;
+    int count;
+    int above[most];
+    float fraction[most];
+};
+
+// Add what a vector of pixels sees of the slab, image row by image row. Each row of voxels is interpolated once.
+inline void add_column(const PlaneRows &plane, const FloatTaps &taps, const BetweenRows &between, float *pixels,
+                       int64_t columns, int count) {
+    const float *next = plane.voxels - guard;
+    Floats above{}, below = interpolate(next, taps);
+    int row = 0;  // of `above`
+    for (int v = 0; v < between.count; ++v, pixels += columns) {
+        for (; row < between.above[v]; ++row) {
+            next += plane.stride;
+            above = below;
+            below = row + 1 < plane.rows ? interpolate(next, taps) : Floats{};
+        }
+        const Floats seen = above + between.fraction[v] * (below - above);
+        if (count == lanes) {
+            store(pixels, load<Floats>(pixels) + seen);
+            continue;
+        }
+        for (int k = 0; k < count; ++k) pixels[k] += seen[k];
+    }
+}
+
 // Pixel-driven: every pixel adds the bilinear interpolation of the plane where its line of sight meets it.
 // Rows of other slabs count as zero: each slab adds its own share.
 inline void project_rectified(const View &view, const PlaneRows &plane, const Projection &to) {
@@ -25,23 +55,18 @@ inline void project_rectified(const View &view, const PlaneRows &plane, const Pr
     const int u_end = smaller(to.columns, floor_of(scale * plane.end + shift_u) + 1);
     const int v_begin = larger(to.first_row, ceil_of(scale * (plane.y0 - 1) + shift_v));
     const int v_end = smaller(to.first_row + to.rows, floor_of(scale * (plane.y0 + plane.rows) + shift_v) + 1);
-    alignas(64) Row along_x[smart_rows + 2];
-    FloatTaps taps;
-    for (int u = u_begin; u < u_end; u += tile_columns) {
-        const int columns = smaller(tile_columns, u_end - u);
-        set_taps(taps, (u - shift_u) * step + guard, step, columns);
-        std::memset(along_x[0], 0, sizeof(Row));
-        std::memset(along_x[plane.rows + 1], 0, sizeof(Row));
-        for (int row = 0; row < plane.rows; ++row)
-            interpolate(plane.voxels + row * plane.stride - guard, taps, along_x[row + 1]);
-        for (int v = v_begin; v < v_end; ++v) {
-            const double position = (v - shift_v) * step - plane.y0 + 1;
-            const int at = larger(0, smaller(plane.rows, static_cast<int>(position)));
-            const float fraction = static_cast<float>(position - at);
-            const float *above = along_x[at], *below = along_x[at + 1];
-            float *pixels = to.pixels + static_cast<int64_t>(v - to.first_row) * to.columns + u;
-            for (int k = 0; k < columns; ++k) pixels[k] += above[k] + fraction * (below[k] - above[k]);
-        }
+    BetweenRows between;
+    between.count = 0;
+    for (int v = v_begin; v < v_end; ++v, ++between.count) {
+        const double position = (v - shift_v) * step - plane.y0 + 1;
+        const int above = larger(0, smaller(plane.rows, static_cast<int>(position)));
+        between.above[between.count] = above;
+        between.fraction[between.count] = static_cast<float>(position - above);
+    }
+    float *pixels = to.pixels + static_cast<int64_t>(v_begin - to.first_row) * to.columns;
+    for (int u = u_begin; u < u_end; u += lanes) {
+        const FloatTaps taps = float_taps((u - shift_u) * step + guard, step);
+        add_column(plane, taps, between, pixels + u, to.columns, smaller(lanes, u_end - u));
     }
 }
 

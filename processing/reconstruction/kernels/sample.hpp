@@ -61,21 +61,40 @@ struct PlaneTaps {
     }
 };
 
-template <Combine how, bool shared>
+#if defined(__AVX512BW__)
+
+// Both halves of a block from one window, which moves down by no more than one row: every row is read once.
+template <Combine how>
+inline void sample_shared(const View &view, const RowTaps &rows, const Tile &tile, float factor, Block &block) {
+    const double scale = view.scale[tile.z], start = scale * tile.x0 + view.shift_u[tile.z];
+    const int first = static_cast<int>(start);
+    const Taps left = taps_from(first, start, scale), right = taps_from(first, start + scale * lanes, scale);
+    const int16_t *above = rows.above[0];
+    Window top = _mm512_loadu_si512(above + first), bottom = _mm512_loadu_si512(above + view.columns + first);
+    for (int row = 0; row < tile.rows; ++row) {
+        if (rows.above[row] != above) {
+            above = rows.above[row];
+            top = bottom;
+            bottom = _mm512_loadu_si512(above + view.columns + first);
+        }
+        const Window window = between(top, bottom, rows.weight[row]);
+        combine<how>(block.rows[row], pick(window, left), factor);
+        combine<how>(block.rows[row] + lanes, pick(window, right), factor);
+    }
+}
+
+#endif
+
+template <Combine how>
 inline void sample_windows(const View &view, const RowTaps &rows, const Tile &tile, float factor, Block &block) {
     constexpr int parts = block_columns / lanes;
     const double scale = view.scale[tile.z], start = scale * tile.x0 + view.shift_u[tile.z];
     Taps taps[parts];
-    for (int part = 0; part < parts; ++part) {
-        const double position = start + scale * lanes * part;
-        taps[part] = shared ? taps_from(static_cast<int>(start), position, scale) : taps_at(position, scale);
-    }
+    for (int part = 0; part < parts; ++part) taps[part] = taps_at(start + scale * lanes * part, scale);
     for (int row = 0; row < tile.rows; ++row) {
         const int16_t *above = rows.above[row], *below = above + view.columns;
-        Window window = blend(above, below, rows.weight[row], taps[0]);
-        combine<how>(block.rows[row], pick(window, taps[0]), factor);
-        for (int part = 1; part < parts; ++part) {
-            if (!shared) window = blend(above, below, rows.weight[row], taps[part]);
+        for (int part = 0; part < parts; ++part) {
+            const Window window = blend(above, below, rows.weight[row], taps[part]);
             combine<how>(block.rows[row] + part * lanes, pick(window, taps[part]), factor);
         }
     }
@@ -83,10 +102,10 @@ inline void sample_windows(const View &view, const RowTaps &rows, const Tile &ti
 
 template <Combine how>
 inline void sample_rectified(const View &view, const RowTaps &rows, const Tile &tile, float factor, Block &block) {
-    if (view.scale[tile.z] <= max_shared_scale)
-        sample_windows<how, true>(view, rows, tile, factor, block);
-    else
-        sample_windows<how, false>(view, rows, tile, factor, block);
+#if defined(__AVX512BW__)
+    if (view.scale[tile.z] <= max_shared_scale) return sample_shared<how>(view, rows, tile, factor, block);
+#endif
+    sample_windows<how>(view, rows, tile, factor, block);
 }
 
 // Nodes that whole blocks of a row need; those beyond the lattice repeat the last one.

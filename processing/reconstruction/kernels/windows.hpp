@@ -13,13 +13,6 @@ namespace {
 constexpr int weight_bits = 14;
 constexpr float sample_unit = 1.0f / (1 << weight_bits);  // of a pixel, in the results of pick()
 
-// Voxels of a block are seen at scale x + shift: positions inside of windows that a vector of voxels needs.
-inline Floats lane_numbers() {
-    Floats lane;
-    for (int k = 0; k < lanes; ++k) lane[k] = static_cast<float>(k);
-    return lane;
-}
-
 // The lower row's share, 0 .. 32767, twice in one word: vectors of it are cheaper to make.
 inline int32_t vertical_weight(float fraction) {
     const int32_t weight = smaller(static_cast<int>(fraction * 32768.0f + 0.5f), 32767);
@@ -49,9 +42,12 @@ inline Taps taps_from(int first, double position, double scale) {
     return {first, reinterpret_cast<__m512i>(left | (left + 1) << 16), reinterpret_cast<__m512i>(weight)};
 }
 
-inline Window blend(const int16_t *above, const int16_t *below, int32_t weight, const Taps &taps) {
-    const __m512i top = _mm512_loadu_si512(above + taps.first), bottom = _mm512_loadu_si512(below + taps.first);
+inline Window between(const Window &top, const Window &bottom, int32_t weight) {
     return _mm512_add_epi16(top, _mm512_mulhrs_epi16(_mm512_sub_epi16(bottom, top), _mm512_set1_epi32(weight)));
+}
+
+inline Window blend(const int16_t *above, const int16_t *below, int32_t weight, const Taps &taps) {
+    return between(_mm512_loadu_si512(above + taps.first), _mm512_loadu_si512(below + taps.first), weight);
 }
 
 inline Floats pick(const Window &window, const Taps &taps) {
@@ -62,8 +58,6 @@ inline Floats pick(const Window &window, const Taps &taps) {
 #elif defined(__AVX2__)
 
 using Window = __m256i;  // two windows of 8 pixels, for 4 voxels each
-constexpr double max_shared_scale = 0.0;
-
 struct Taps {
     int first, second;
     __m256i bytes, weight;
@@ -94,8 +88,6 @@ inline Floats pick(const Window &window, const Taps &taps) {
 }
 
 #else
-
-constexpr double max_shared_scale = 0.0;
 
 struct Window {
     const int16_t *above, *below;
