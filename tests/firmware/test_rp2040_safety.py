@@ -1,5 +1,6 @@
 """How the real image gets dark: abort, interlock, silent host, hung processor, overflowing stack; and stays dark."""
 
+import itertools
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -144,9 +145,8 @@ def test_an_early_shot_is_ignored_counted_and_not_queued(board: Board) -> None:
 
 def test_words_left_in_the_fifos_are_no_part_of_the_next_shot(board: Board) -> None:
     board.ask(Command.OFF)
-    for block in PIO_BLOCKS:
-        for machine in range(4):
-            board.pico.write_word(block + FIRST_FIFO + 4 * machine, 100 + machine)
+    for block, machine, word in itertools.product(PIO_BLOCKS, range(4), range(3)):
+        board.pico.write_word(block + FIRST_FIFO + 4 * machine, word)
     board.configure([None, PAPER, None, None])
     board.pico.run_ms(PERIOD_MS)
     board.arm(1)
