@@ -89,3 +89,9 @@ def test_simulation_and_firmware_agree_on_the_pins() -> None:
     in_c = dict(re.findall(r"(PIN_\w+) = (\d+)", (FIRMWARE / "pins.h").read_text()))
     names = ("PIN_LIGHT", "PIN_CAMERA", "PIN_TRIGGER", "PIN_INTERLOCK", "PIN_SET_POINT")
     assert {name: int(in_c[name]) for name in names} == {name: getattr(rp2040_chip, name) for name in names}
+
+
+def test_the_wiring_guide_has_the_pins_of_the_firmware() -> None:
+    in_c = re.findall(r"(PIN_\w+) = (\d+)", (FIRMWARE / "pins.h").read_text())
+    guide = (ROOT / "docs" / "firmware" / "wiring.md").read_text()
+    assert re.findall(r"^\| (PIN_\w+) \| (\d+)", guide, re.MULTILINE) == in_c
