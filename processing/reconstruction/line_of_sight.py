@@ -11,11 +11,12 @@ from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.plan import DEFAULT_THREADS as DEFAULT_THREADS
 from processing.reconstruction.plan import Plan
 
-_KERNEL_METHOD = {
+KERNEL_METHOD = {
     ReconstructionMethod.GAVLOS: 0,
     ReconstructionMethod.MINLOS: 1,
     ReconstructionMethod.MLOS: 2,
 }
+"""How the kernels number the methods."""
 
 
 def line_of_sight(
@@ -53,12 +54,12 @@ def line_of_sight(
     ValueError
         Images or ``out`` do not fit the plan, or the method is an iterative one.
     """
-    if method not in _KERNEL_METHOD:
-        raise ValueError(f"{method.value} is not a line-of-sight method: {[m.value for m in _KERNEL_METHOD]}")
+    if method not in KERNEL_METHOD:
+        raise ValueError(f"{method.value} is not a line-of-sight method: {[m.value for m in KERNEL_METHOD]}")
     volume = np.empty(plan.grid.shape, dtype=np.float32) if out is None else out
     check_volume(volume, plan, (np.float32, np.float16, np.uint8))
     views = plan.bind(plan.resample(images, threads))
-    _native.line_of_sight(views, _KERNEL_METHOD[method], volume, threads)
+    _native.line_of_sight(views, KERNEL_METHOD[method], volume, threads)
     return volume
 
 

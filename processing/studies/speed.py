@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from processing.geometry import PinholeCamera, view_camera
 from processing.reconstruction.kernels import _native
-from processing.reconstruction.line_of_sight import line_of_sight
+from processing.reconstruction.line_of_sight import KERNEL_METHOD, line_of_sight
 from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.node_view import sample_mapping
-from processing.reconstruction.plan import MAX_DEVIATION_PX, Plan, plan_reconstruction
+from processing.reconstruction.plan import MAX_DEVIATION_PX, Accuracy, Plan, plan_reconstruction
 from processing.reconstruction.smart import smart
 from processing.volume import VoxelGrid
 
@@ -84,7 +84,7 @@ class Timing:
 
 @dataclass(frozen=True)
 class KernelSpeed:
-    """One kernel against its baseline: ``ratio_to_naive`` is CPU time of the baseline over its own."""
+    """One kernel. ``ratio_to_naive`` is the CPU time of the baseline, for as many voxels, by its own."""
 
     name: str
     wall_s: float
@@ -279,16 +279,40 @@ def _kernels(
         if isa in ("avx2", "avx512"):
             with _instruction_set(isa):
                 yield f"mlos float16 {isa}", mlos_cpu_s, measure(partial(by_sight, out=volume), study.repeats)
-    nodes = Plan(study.grid, tuple(sample_mapping(camera, study.grid, MAX_DEVIATION_PX) for camera in cameras))
-    exact = partial(line_of_sight, nodes, images, out=volume, threads=study.threads)
-    yield "mlos float16 exact", mlos_cpu_s, measure(exact, study.repeats)
+                dense = partial(_dense, plan, images, volume, study.threads)
+                yield f"mlos float16 {isa} dense", mlos_cpu_s, measure(dense, study.repeats)
+    for name, other in _other_plans(study, cameras):
+        work = partial(line_of_sight, other, images, out=volume, threads=study.threads)
+        yield f"mlos float16 {name}", mlos_cpu_s, measure(work, study.repeats)
+    yield "smart iteration float16", smart_cpu_s, _smart_iteration(study, plan, images, volume)
+    for name, grid in _parts(study.grid):
+        part, out = plan_reconstruction(cameras, grid), np.zeros(grid.shape, np.float16)
+        work = partial(line_of_sight, part, images, out=out, threads=study.threads)
+        yield f"mlos float16 {name}", mlos_cpu_s * out.size / volume.size, measure(work, study.repeats)
     del volume
-    refined = np.zeros(study.shape, np.float32)
-    yield "mlos float32", mlos_cpu_s, measure(partial(by_sight, out=refined), study.repeats)
-    yield "smart iteration float32", smart_cpu_s, _smart_iteration(study, plan, images, refined)
+    single = np.zeros(study.shape, np.float32)
+    yield "mlos float32", mlos_cpu_s, measure(partial(by_sight, out=single), study.repeats)
 
 
-def _smart_iteration(study: SpeedStudy, plan: Plan, images: Sequence[Image], out: NDArray[np.float32]) -> Timing:
+def _dense(plan: Plan, images: Sequence[Image], out: NDArray[np.float16], threads: int) -> None:
+    """MLOS of every block, empty or not."""
+    views = plan.bind(plan.resample(images, threads), cull=False)
+    _native.line_of_sight(views, KERNEL_METHOD[ReconstructionMethod.MLOS], out, threads)
+
+
+def _other_plans(study: SpeedStudy, cameras: Sequence[PinholeCamera]) -> Iterator[tuple[str, Plan]]:
+    yield "fine", plan_reconstruction(cameras, study.grid, Accuracy.FINE)
+    yield "exact", Plan(study.grid, tuple(sample_mapping(camera, study.grid, MAX_DEVIATION_PX) for camera in cameras))
+
+
+def _parts(grid: VoxelGrid) -> Iterator[tuple[str, VoxelGrid]]:
+    """One slice and a region of interest, from the middle of the volume."""
+    for name, shape in (("slice", (1, *grid.shape[1:])), ("256^3", (256, 256, 256))):
+        fitting = tuple(min(pair) for pair in zip(shape, grid.shape, strict=True))
+        yield name, VoxelGrid.centred((fitting[0], fitting[1], fitting[2]), grid.pitch_mm)
+
+
+def _smart_iteration(study: SpeedStudy, plan: Plan, images: Sequence[Image], out: NDArray[np.float16]) -> Timing:
     """One iteration: the time from stop criterion to stop criterion."""
     times: list[tuple[float, float]] = []
 

@@ -19,6 +19,19 @@ void for_rows(int rows, int threads, const std::function<void(int, int)> &work) 
     });
 }
 
+// The rows that nodes (u, v) point to, with what cubic convolution reads around; at least one. A region of interest
+// needs few.
+Recorded rows_needed(const Recorded &image, const float *nodes, int count) {
+    float first = INFINITY, last = -INFINITY;
+    for (int k = 0; k < count; ++k) {
+        first = std::min(first, nodes[2 * k + 1]);
+        last = std::max(last, nodes[2 * k + 1]);
+    }
+    const auto limited = [&](float row) { return static_cast<int>(std::clamp(row, 0.0f, image.rows - 1.0f)); };
+    const int begin = limited(first - 4.0f), end = limited(last + 4.0f) + 1;
+    return {image.pixels + static_cast<int64_t>(begin) * image.columns, std::max(1, end - begin), image.columns};
+}
+
 }  // namespace
 
 float quantise(const Kernels &kernels, const Recorded &image, int before, int after, int16_t *to, int threads) {
@@ -52,9 +65,11 @@ float resample(const Kernels &kernels, const Recorded &image, const float *nodes
                int columns, int threads) {
     constexpr int margin = Resampling::margin;
     const int from_rows = image.rows + 2 * margin, from_columns = image.columns + 2 * margin;
-    // not a vector, which would write zeros first; the windows of the last pixels read beyond their row
+    // not a vector, which would write zeros first; rows that nobody needs stay unwritten
     const std::unique_ptr<int16_t[]> from(new int16_t[static_cast<size_t>(from_rows) * from_columns]);
-    const float unit = quantise(kernels, image, margin, margin, from.get(), threads);
+    const Recorded needed = rows_needed(image, nodes, ((rows - 1) / Resampling::node_spacing + 2) * nodes_x);
+    const int64_t skipped = (needed.pixels - image.pixels) / image.columns;
+    const float unit = quantise(kernels, needed, margin, margin, from.get() + skipped * from_columns, threads);
     const Resampling job{from.get(), from_rows, from_columns, nodes, nodes_x, to, columns};
     for_rows(rows, threads, [&](int first, int end) { kernels.resample(job, first, end); });
     return unit;
