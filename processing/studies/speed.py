@@ -1,7 +1,6 @@
 """How fast reconstruction is, as ratios to plain numpy and OpenCV in the same process: the study behind ``bench``.
 
-Ratios compare CPU time, so that they mean the same on any number of cores. The baseline is what one would write
-with OpenCV: every plane of the volume is a homography of every image (no distortion, which it could not do).
+Ratios compare CPU time. The baseline is OpenCV plane by plane: homographies, so without distortion.
 """
 
 import os
