@@ -30,6 +30,9 @@ def line_of_sight(
     volume: NDArray[np.float32] | NDArray[np.float16] | NDArray[np.uint8],
     threads: int,
 ) -> None: ...
+def sum_of_sight(
+    exposures: Sequence[Sequence[View]], method: int, volume: NDArray[np.float32], threads: int
+) -> None: ...
 
 @final
 class Blocks:

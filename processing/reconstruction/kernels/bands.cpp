@@ -89,6 +89,11 @@ void run_line_of_sight(const Kernels &kernels, const LineOfSight &job, int threa
     for_each(slabs, threads, [&](int slab) { kernels.line_of_sight(job, slab); });
 }
 
+void run_sum_of_sight(const Kernels &kernels, const SumOfSight &job, int threads) {
+    const int slabs = (job.shape.ny + sight_rows - 1) / sight_rows;
+    for_each(slabs, threads, [&](int slab) { kernels.sum_of_sight(job, slab); });
+}
+
 void run_bands(const SmartPass &job, const std::vector<float *> &sums, int threads,
                const std::function<void(int slab, const Projection *projections)> &work) {
     const auto bands = bands_of((job.shape.ny + smart_rows - 1) / smart_rows);

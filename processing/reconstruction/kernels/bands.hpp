@@ -12,6 +12,7 @@ namespace tomoshadow {
 void for_each(int count, int threads, const std::function<void(int)> &work);
 
 void run_line_of_sight(const Kernels &kernels, const LineOfSight &job, int threads);
+void run_sum_of_sight(const Kernels &kernels, const SumOfSight &job, int threads);
 
 // Work through bands of slabs that project into images of their own, which are then added in order. sums[i] is the
 // image of view i, or null if that is not wanted.

@@ -58,6 +58,15 @@ struct LineOfSight {
     void *volume;
 };
 
+// The sum of many exposures of the same views: views[exposure * n_views + i].
+struct SumOfSight {
+    const View *views;
+    int n_views, n_exposures;
+    Shape shape;
+    Method method;
+    float *volume;  // is added to
+};
+
 // Rows [first_row, first_row + rows) of a view's image that a band of the volume projects onto; without pixels if
 // nobody asked for the view.
 struct Projection {
@@ -106,6 +115,7 @@ struct Resampling {
 struct Kernels {
     const char *name;
     void (*line_of_sight)(const LineOfSight &job, int slab);
+    void (*sum_of_sight)(const SumOfSight &job, int slab);
     void (*smart_start)(const SmartStart &job, int slab, KeepBlock keep, void *owner);
     void (*smart_pass)(const SmartPass &job, int slab, const BlockList &blocks, const Projection *projections);
     void (*write_blocks)(const Shape &shape, int slab, const BlockList &blocks, Format format, void *volume);

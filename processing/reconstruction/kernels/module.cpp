@@ -147,6 +147,23 @@ void line_of_sight(const std::vector<const BoundView *> &bound, int method, cons
     run_line_of_sight(kernels, job, threads);
 }
 
+void sum_of_sight(const std::vector<std::vector<const BoundView *>> &exposures, int method, const FloatVolume &volume,
+                  int threads) {
+    const Shape shape = shape_of(volume);
+    require(!exposures.empty(), "one exposure or more, please");
+    require(method >= 0 && method <= 2, "method must be 0, 1 or 2");
+    std::vector<View> views;
+    for (const auto &bound : exposures) {
+        require(bound.size() == exposures[0].size(), "exposures differ in their number of views");
+        for (const View &view : views_on(bound, shape, threads)) views.push_back(view);
+    }
+    const SumOfSight job{views.data(), static_cast<int>(exposures[0].size()), static_cast<int>(exposures.size()),
+                         shape,        static_cast<Method>(method),           volume.data()};
+    const Kernels &kernels = selected_kernels();
+    nb::gil_scoped_release release;
+    run_sum_of_sight(kernels, job, threads);
+}
+
 Blocks blocks_of_views(const std::vector<const BoundView *> &bound, std::tuple<int, int, int> size, float floor,
                        int threads) {
     const Shape shape{std::get<0>(size), std::get<1>(size), std::get<2>(size)};
@@ -233,6 +250,7 @@ NB_MODULE(_native, module) {
     module.def("quantise", &quantise_framed, "image"_a, "before"_a, "after"_a, "out"_a, "threads"_a);
     module.def("resample", &resample_image, "image"_a, "nodes"_a, "out"_a, "threads"_a);
     module.def("line_of_sight", &line_of_sight, "views"_a, "method"_a, "volume"_a, "threads"_a);
+    module.def("sum_of_sight", &sum_of_sight, "exposures"_a, "method"_a, "volume"_a, "threads"_a);
     nb::class_<Blocks>(module, "Blocks")
         .def_static("of_views", &blocks_of_views, "views"_a, "shape"_a, "floor"_a, "threads"_a)
         .def_static("of_volume", &blocks_of_volume, "volume"_a, "threads"_a)

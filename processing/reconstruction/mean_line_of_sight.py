@@ -1,0 +1,60 @@
+"""The mean volume of many exposures, without a volume for each of them."""
+
+from collections.abc import Iterable, Sequence
+from itertools import islice
+
+import numpy as np
+from numpy.typing import NDArray
+
+from processing.reconstruction.kernels import _native
+from processing.reconstruction.line_of_sight import DEFAULT_THREADS, KERNEL_METHOD, check_volume
+from processing.reconstruction.method import ReconstructionMethod
+from processing.reconstruction.plan import Plan
+
+BATCH = 24
+"""Exposures whose resampled images are in memory at the same time; the volume is read and written once for each."""
+
+Exposure = Sequence[NDArray[np.float32]]
+
+
+def mean_line_of_sight(
+    plan: Plan,
+    exposures: Iterable[Exposure],
+    method: ReconstructionMethod = ReconstructionMethod.MLOS,
+    out: NDArray[np.float32] | None = None,
+    *,
+    threads: int = DEFAULT_THREADS,
+) -> NDArray[np.float32]:
+    """Mean of the volumes that ``line_of_sight`` makes of single exposures.
+
+    Parameters
+    ----------
+    plan : Plan
+        Geometry of views and grid.
+    exposures : iterable
+        One image per view each, as ``line_of_sight`` takes them; may be read from disk as they are asked for.
+    method : ReconstructionMethod
+        GAVLOS, MINLOS or MLOS.
+    out : (z, y, x) float32 array, optional
+        Receives the mean.
+    threads : int
+        The result does not depend on it.
+
+    Raises
+    ------
+    ValueError
+        There is no exposure, images or ``out`` do not fit the plan, or the method is an iterative one.
+    """
+    if method not in KERNEL_METHOD:
+        raise ValueError(f"{method.value} is not a line-of-sight method: {[m.value for m in KERNEL_METHOD]}")
+    mean = np.empty(plan.grid.shape, np.float32) if out is None else out
+    check_volume(mean, plan, (np.float32,))
+    mean.fill(0)
+    count, coming = 0, iter(exposures)
+    while batch := [plan.bind(plan.resample(images, threads)) for images in islice(coming, BATCH)]:
+        _native.sum_of_sight(batch, KERNEL_METHOD[method], mean, threads)
+        count += len(batch)
+    if not count:
+        raise ValueError("a mean needs one exposure or more")
+    mean /= np.float32(count)
+    return mean

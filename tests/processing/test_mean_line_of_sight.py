@@ -1,0 +1,55 @@
+"""The mean of exposures: that of their volumes."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from processing.reconstruction import mean_line_of_sight as module
+from processing.reconstruction.kernels import _native
+from processing.reconstruction.line_of_sight import line_of_sight
+from processing.reconstruction.mean_line_of_sight import mean_line_of_sight
+from processing.reconstruction.method import ReconstructionMethod
+from processing.reconstruction.node_view import sample_mapping
+from processing.reconstruction.plan import Plan, plan_reconstruction
+from processing.volume import VoxelGrid
+from tests.processing import oracle
+
+GRID = VoxelGrid.centred((11, 21, 75), 1 / 60)
+
+
+def exposures(count: int) -> list[list[NDArray[np.float32]]]:
+    rng = np.random.default_rng(2)
+    sizes = [mapping.image_size_px[::-1] for mapping in oracle.cameras(3)]
+    return [[(rng.random(size) * (rng.random(size) > 0.9)).astype(np.float32) for size in sizes] for _ in range(count)]
+
+
+@pytest.mark.parametrize("isa", _native.available_isas())
+@pytest.mark.parametrize("by_nodes", [False, True])
+@pytest.mark.parametrize("method", list(ReconstructionMethod)[:3])
+def test_it_is_the_mean_of_the_volumes(
+    monkeypatch: pytest.MonkeyPatch, isa: str, by_nodes: bool, method: ReconstructionMethod
+) -> None:
+    monkeypatch.setenv("TOMOSHADOW_ISA", isa)
+    monkeypatch.setattr(module, "BATCH", 3)
+    mappings, shots = oracle.cameras(3), exposures(7)
+    plan = plan_reconstruction(mappings, GRID)
+    if by_nodes:
+        plan = Plan(GRID, tuple(sample_mapping(mapping, GRID, 0.02) for mapping in mappings))
+    expected = np.mean([line_of_sight(plan, images, method) for images in shots], axis=0, dtype=np.float64)
+    out = np.full(GRID.shape, 9, np.float32)
+    assert mean_line_of_sight(plan, iter(shots), method, out) is out
+    np.testing.assert_allclose(out, expected, rtol=1e-5, atol=1e-7)
+
+
+def test_the_same_bits_with_any_number_of_threads() -> None:
+    plan, shots = plan_reconstruction(oracle.cameras(3), GRID), exposures(3)
+    one, many = (mean_line_of_sight(plan, shots, threads=threads) for threads in (1, 3))
+    np.testing.assert_array_equal(one, many)
+
+
+def test_what_has_no_mean_is_refused() -> None:
+    plan = plan_reconstruction(oracle.cameras(3), GRID)
+    with pytest.raises(ValueError, match="a mean needs one exposure or more"):
+        mean_line_of_sight(plan, [])
+    with pytest.raises(ValueError, match="smart is not a line-of-sight method"):
+        mean_line_of_sight(plan, exposures(1), ReconstructionMethod.SMART)
