@@ -12,7 +12,8 @@ import numpy as np
 
 from daq.recorder import Recorder
 from daq.shotfile import DoubleFrame, ExposureRecord, ImageKey, RunHeader, RunWriter, Shot, ViewFormat
-from processing.studies.speed import SpeedResult, SpeedStudy, speed_study
+from processing.studies.speed import SpeedResult, speed_study
+from processing.studies.speed_scene import SpeedStudy
 from server.commands import progress
 
 MISTUNED = ("OPENBLAS_CORETYPE", "OPENBLAS_L2_SIZE")

@@ -9,7 +9,8 @@ import pytest
 from processing.reconstruction.kernels import _native
 from processing.reconstruction.line_of_sight import line_of_sight
 from processing.reconstruction.plan import plan_reconstruction
-from processing.studies.speed import measure, spray_images, study_cameras
+from processing.studies.speed_baseline import measure
+from processing.studies.speed_scene import spray_images, study_cameras
 from server.bench_command import QUICK
 from server.cli import main
 

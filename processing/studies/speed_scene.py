@@ -1,0 +1,99 @@
+"""What the speed study looks at: a hollow cone of droplets, seen by the paper's four views with real lenses."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from processing.geometry import PinholeCamera, view_camera
+from processing.volume import VoxelGrid
+
+Image = NDArray[np.float32]
+
+SCALE_PX_PER_MM = 60.0
+OPTICS = ((45.0, 100, 0.45, 3.0), (15.0, 85, 0.43, -2.0), (-15.0, 85, 0.44, 2.0), (-45.0, 100, 0.43, -3.0))
+"""Azimuth, focal length, magnification and pitch of the views (Table 1; angles in degrees, lengths in mm)."""
+DISTORTIONS = (
+    (2.0, 50, 0.004, -0.003, 0),
+    (-1.5, 20, -0.003, 0.004, 0),
+    (2.5, 0, 0.002, 0.005, 0),
+    (-2, 30, 0.005, 0.002, 0),
+)
+"""1.5 to 3 px in the corners, as macro lenses have."""
+
+
+@dataclass(frozen=True)
+class SpeedStudy:
+    """What is measured.
+
+    Parameters
+    ----------
+    shape : tuple[int, int, int]
+        The volume (nz, ny, nx), one voxel per pixel.
+    image_size_px : tuple[int, int]
+        (width, height) of every view.
+    droplets : int
+        In a hollow cone around the axis y.
+    repeats : int
+        Medians are taken over so many runs.
+    baseline_planes : int
+        The baseline computes so many planes, spread over the volume, and is scaled to all.
+    iterations : int
+        SMART runs for so many iterations, and is stated per iteration.
+    threads : int
+        Of the kernels; the baseline has one.
+    """
+
+    shape: tuple[int, int, int] = (541, 1036, 1081)
+    image_size_px: tuple[int, int] = (1600, 1200)
+    droplets: int = 12_000
+    repeats: int = 5
+    baseline_planes: int = 12
+    iterations: int = 5
+    threads: int = 2
+
+    @property
+    def grid(self) -> VoxelGrid:
+        """The volume, centred on the world origin."""
+        return VoxelGrid.centred(self.shape, 1 / SCALE_PX_PER_MM)
+
+
+def study_cameras(image_size_px: tuple[int, int]) -> list[PinholeCamera]:
+    """The four views of the experiment, pitched and distorted."""
+    return [
+        view_camera(
+            azimuth_deg,
+            focal_length_mm=focal_length_mm,
+            magnification=magnification,
+            scale_px_per_mm=SCALE_PX_PER_MM,
+            image_size_px=image_size_px,
+            pitch_deg=pitch_deg,
+            distortion=np.array(distortion),
+        )
+        for (azimuth_deg, focal_length_mm, magnification, pitch_deg), distortion in zip(
+            OPTICS, DISTORTIONS, strict=True
+        )
+    ]
+
+
+def spray_images(study: SpeedStudy, cameras: Sequence[PinholeCamera]) -> list[Image]:
+    """Shadow intensities of a hollow cone of droplets, preprocessed: nothing between the droplets."""
+    rng = np.random.default_rng(1)
+    depth_mm, height_mm, width_mm = (n / SCALE_PX_PER_MM for n in study.shape)
+    down = rng.uniform(0.02, 1, study.droplets)
+    angle_rad, radius = rng.uniform(0, 2 * np.pi, study.droplets), down * rng.normal(0.47, 0.04, study.droplets)
+    points_mm = np.column_stack(
+        [width_mm * radius * np.cos(angle_rad), height_mm * (down - 0.5), depth_mm * radius * np.sin(angle_rad)]
+    )
+    diameters_px = np.clip(rng.lognormal(np.log(2.7), 0.45, study.droplets), 0.9, 15)
+    return [_draw(camera.project(points_mm), diameters_px, study.image_size_px) for camera in cameras]
+
+
+def _draw(points_px: NDArray[np.float64], diameters_px: NDArray[np.float64], image_size_px: tuple[int, int]) -> Image:
+    canvas = np.zeros(image_size_px[::-1], np.uint8)
+    for centre, diameter_px in zip(np.rint(points_px * 16).astype(int), diameters_px, strict=True):
+        cv2.circle(canvas, tuple(centre.tolist()), int(diameter_px * 8), 255, cv2.FILLED, cv2.LINE_AA, shift=4)
+    blurred = cv2.GaussianBlur(canvas.astype(np.float32) / np.float32(255), (0, 0), 0.7)
+    return np.where(blurred < 0.02, np.float32(0), blurred)
