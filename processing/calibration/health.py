@@ -12,7 +12,10 @@ from processing.calibration.observation import PlaneObservation, stacked
 from processing.geometry import FloatArray, ViewMapping
 
 LIMITS_PX = {Verdict.GOOD: 0.05, Verdict.USABLE: 0.3, Verdict.WARN: 0.8}
-"""Largest hold-out error of each verdict. With 0.5 px 3 % of what is found are ghosts, with 1 px half of it (``study sensitivity``)."""
+"""Largest hold-out error of each verdict.
+
+Of the droplets that are found, 3 % are ghosts at 0.5 px and half of them at 1 px (``study sensitivity``).
+"""
 MAX_REJECTED = 0.1
 """With a larger part of the points left out as wrong, a view is at best usable with a warning."""
 MIN_DEPTH_RATIO = 0.02
