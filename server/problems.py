@@ -74,11 +74,16 @@ def status_of(error: Exception) -> HTTPStatus:
     return next((STATUS_OF[kind] for kind in type(error).__mro__ if kind in STATUS_OF), HTTPStatus(500))
 
 
+def _phrase(status: int) -> str:
+    """Phrase of RFC 9110; Python before 3.13 has an older one for 422."""
+    return "Unprocessable Content" if status == HTTPStatus.UNPROCESSABLE_ENTITY else HTTPStatus(status).phrase
+
+
 def responses(*statuses: int) -> dict[int | str, dict[str, Any]]:
     """Declare problem documents in the OpenAPI schema of a router or route."""
     return {
         status: {
-            "description": HTTPStatus(status).phrase,
+            "description": _phrase(status),
             "content": {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}},
         }
         for status in statuses
@@ -88,7 +93,7 @@ def responses(*statuses: int) -> dict[int | str, dict[str, Any]]:
 def problem(request: Request, status: int, detail: str | None, kind: str = "about:blank", **more: Any) -> JSONResponse:
     """Build the answer."""
     document = Problem(
-        type=kind, title=HTTPStatus(status).phrase, status=status, detail=detail, instance=request.url.path, **more
+        type=kind, title=_phrase(status), status=status, detail=detail, instance=request.url.path, **more
     )
     return JSONResponse(document.model_dump(exclude_none=True), status, media_type=MEDIA_TYPE)
 
