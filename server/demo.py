@@ -86,42 +86,24 @@ def demonstrate(
     DaqError
         A run did not complete.
     """
-    config = load_config(config_file)
-    if config.simulation is None:
-        raise ConfigError(f"{config_file}: the demonstration needs a rig with [simulation]")
-    if firmware is not None:
-        simulation = config.simulation.model_copy(update={"firmware": firmware})
-        config = config.model_copy(update={"simulation": simulation})
+    config = _simulated_rig(config_file, firmware)
     watch = Stopwatch()
     with open_rig(config) as bench:
         recorder = _Runs(config, bench, out / "runs", progress)
         with watch.step("calibrate"):
-            target_run = recorder.record(RunKind.CALIBRATION, 1, CALIBRATION_RATE_HZ, stage_z_mm=STAGE_Z_MM)
-            calibration = calibrate(load_calibration_set(target_run))
-            calibration_file = calibration_path(out, calibration.id)
-            calibration_file.parent.mkdir(parents=True, exist_ok=True)
-            save_calibration(calibration, calibration_file)
+            calibration = _calibrate(recorder, out)
         with watch.step("acquire"):
-            dark = recorder.record(RunKind.DARK, REFERENCE_SHOTS, SAMPLE_RATE_HZ)
-            background = recorder.record(RunKind.BACKGROUND, REFERENCE_SHOTS, SAMPLE_RATE_HZ)
-            sample = recorder.record(
-                RunKind.SAMPLE,
-                shots,
-                SAMPLE_RATE_HZ,
-                references=(dark.name, background.name),
-                calibration=calibration.id,
-            )
+            sample = _record_sample(recorder, shots, calibration)
     recorded, valid = _recorded_and_valid(sample)
-    if not valid:
-        raise DaqError(f"{sample.name}: none of {recorded} shots is valid, nothing to reconstruct")
+    grid = default_grid(calibration, PITCH_MM)
+    settings = ReconstructionSettings(grid=GridSettings.of(grid))
+    results_dir = sample / "results" / settings.results_id(calibration.id)
     with watch.step("reconstruct"):
-        grid = default_grid(calibration, PITCH_MM)
-        settings = ReconstructionSettings(grid=GridSettings.of(grid))
-        results_dir = sample / "results" / settings.results_id(calibration_file.stem)
         results = []
         for shot in valid:
             progress(f"reconstructing shot {shot} by {settings.method.value}")
-            results.append(reconstruct_shot(sample, shot, calibration_file, settings, results_dir))
+            file = calibration_path(out, calibration.id)
+            results.append(reconstruct_shot(sample, shot, file, settings, results_dir))
     with watch.step("judge"):
         progress("comparing with the truth")
         qualities = tuple(_quality(sample, results_dir, result.shot) for result in results)
@@ -136,6 +118,36 @@ def demonstrate(
         shots_recorded=recorded,
         shots_valid=len(results),
         seconds=watch.seconds,
+    )
+
+
+def _simulated_rig(config_file: Path, firmware: str | None) -> RigConfig:
+    config = load_config(config_file)
+    if config.simulation is None:
+        raise ConfigError(f"{config_file}: the demonstration needs a rig with [simulation]")
+    if firmware is None:
+        return config
+    simulation = config.simulation.model_copy(update={"firmware": firmware})
+    return config.model_copy(update={"simulation": simulation})
+
+
+def _calibrate(recorder: "_Runs", out: Path) -> Calibration:
+    """Record the target on its stage and calibrate all views."""
+    target_run = recorder.record(RunKind.CALIBRATION, 1, CALIBRATION_RATE_HZ, stage_z_mm=STAGE_Z_MM)
+    calibration = calibrate(load_calibration_set(target_run))
+    file = calibration_path(out, calibration.id)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    save_calibration(calibration, file)
+    return calibration
+
+
+def _record_sample(recorder: "_Runs", shots: int, calibration: Calibration) -> Path:
+    """Record dark and background, then the spray."""
+    references = [
+        recorder.record(kind, REFERENCE_SHOTS, SAMPLE_RATE_HZ).name for kind in (RunKind.DARK, RunKind.BACKGROUND)
+    ]
+    return recorder.record(
+        RunKind.SAMPLE, shots, SAMPLE_RATE_HZ, references=tuple(references), calibration=calibration.id
     )
 
 
@@ -188,8 +200,18 @@ class _Runs:
 
 
 def _recorded_and_valid(run_dir: Path) -> tuple[int, list[int]]:
+    """Number of recorded shots, and which of them are good.
+
+    Raises
+    ------
+    DaqError
+        None is.
+    """
     with RunReader(run_dir) as run:
-        return run.shot_count, [index for index in range(run.shot_count) if run.read_shot(index).valid]
+        recorded, valid = run.shot_count, [index for index in range(run.shot_count) if run.read_shot(index).valid]
+    if not valid:
+        raise DaqError(f"{run_dir.name}: none of {recorded} shots is valid, nothing to reconstruct")
+    return recorded, valid
 
 
 def _quality(run_dir: Path, results_dir: Path, shot: int) -> float:
