@@ -13,7 +13,7 @@ from daq.drivers.pulse_protocol import FIELDS, Command, ErrorNumber, Reply
 from tests.firmware.rp2040_board import CAMERA_PULSE_NS, PAPER, PERIOD_MS, Board, Channel, Waveform
 
 TICK_NS = 8
-SERIES_SHOTS = 200
+SERIES_SHOTS = 1000
 HEADER = (Path(__file__).resolve().parents[2] / "firmware" / "core" / "limits.h").read_text()
 LIMIT = {name: int(value) for name, value in re.findall(r"(\w+) = (\d+)", HEADER)}
 
@@ -119,8 +119,9 @@ def test_beyond_the_limits_nothing_is_loaded(board: Board, channel: Channel, err
 @st.composite
 def channels(draw: st.DrawFn) -> Channel:
     a_width_ns, b_width_ns = draw(st.integers(200, 2000)), draw(st.integers(200, 2000))
-    a_start_ns = draw(st.integers(0, 60_000))
-    gap_ns = draw(st.integers(LIMIT["MIN_DARK_NS"] + 2 * TICK_NS, 50_000))
+    a_start_ns = draw(st.integers(0, 150_000))
+    longest_ns = LIMIT["MAX_SEPARATION_NS"] - a_width_ns - TICK_NS
+    gap_ns = draw(st.integers(LIMIT["MIN_DARK_NS"] + 2 * TICK_NS, longest_ns))
     camera_ns = draw(st.integers(0, a_start_ns))
     current_ma = draw(st.sampled_from([0, 10, 9_900, LIMIT["MAX_CURRENT_MA"]]))
     return Channel(
@@ -128,7 +129,7 @@ def channels(draw: st.DrawFn) -> Channel:
     ).straddling()
 
 
-@settings(max_examples=15, deadline=None, derandomize=True)
+@settings(max_examples=30, deadline=None, derandomize=True)
 @given(plan=st.lists(st.none() | channels(), min_size=4, max_size=4).filter(any))
 def test_any_plan_is_fired_as_answered(shared: Board, plan: list[Channel | None]) -> None:
     replies = iter(shared.configure(plan))
