@@ -7,6 +7,7 @@ an error and after closing. Every method has a deadline and raises ``daq.errors.
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from pathlib import Path
 from types import TracebackType
 from typing import Protocol, Self
 
@@ -156,6 +157,10 @@ def _nothing_to_prepare(_: RunKind) -> None:
     """On a real rig the operator prepares the scene before pressing start."""
 
 
+def _no_truth_to_keep(_: Path) -> None:
+    """On a real rig nobody knows the truth."""
+
+
 @dataclass(frozen=True)
 class Rig:
     """All devices of one rig.
@@ -170,6 +175,8 @@ class Rig:
         Carries the calibration target, where there is one.
     prepare_scene : Callable[[RunKind], None]
         Called before a run; the simulated bench plays the operator here (spray on or off, target in).
+    keep_truth : Callable[[Path], None]
+        Called with the directory of a run after its last shot; the simulated bench writes what nobody could measure.
     max_current_a : Mapping[str, float]
         Limit of each view's LED; a view that is not named has only the limit of the generator.
     """
@@ -179,4 +186,5 @@ class Rig:
     interlock: Interlock
     stage: TranslationStage | None = None
     prepare_scene: Callable[[RunKind], None] = _nothing_to_prepare
+    keep_truth: Callable[[Path], None] = _no_truth_to_keep
     max_current_a: Mapping[str, float] = field(default_factory=dict)

@@ -130,6 +130,7 @@ class RunSession:
         dark, background = (mean_images(self._run.references[kind]) for kind in (RunKind.DARK, RunKind.BACKGROUND))
         if dark or background:
             writer.write_references(dark, background)
+        self._storage.callback(self._attempt, partial(self._rig.keep_truth, run_dir))
         recorder = Recorder(writer, self._limits.recorder_depth, self._limits.recorder_threads, on_commit)
         self._storage.enter_context(recorder)
         self._storage.callback(self._attempt, partial(recorder.close, self._limits.drain_s))

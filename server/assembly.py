@@ -50,24 +50,10 @@ class AssembledRig:
         Its devices.
     bench : SimulatedBench | None
         Doors to open and faults to inject, where the rig is simulated.
-    scene : SimulatedScene | None
-        What stands before the simulated cameras.
     """
 
     rig: Rig
     bench: SimulatedBench | None = None
-    scene: SimulatedScene | None = None
-
-    def keep_truth(self, run_dir: Path) -> Path | None:
-        """Write into a run what nobody could measure; returns the file, None where the rig is real.
-
-        Belongs after every run: it keeps all that was fired since ``Rig.prepare_scene``.
-        """
-        if self.bench is None or self.scene is None:
-            return None
-        path = run_dir / TRUTH_FILE
-        self.scene.write_truth(path, self.bench.take_fired())
-        return path
 
 
 @contextmanager
@@ -191,11 +177,14 @@ def _open_simulation(
     )
 
     def prepare(kind: RunKind) -> None:
-        bench.take_fired()
+        bench.forget_fired()
         scene.prepare(kind)
 
+    def keep_truth(run_dir: Path) -> None:
+        scene.write_truth(run_dir / TRUTH_FILE, bench.fired)
+
     rig = _open_rig(wired, profiles, interlock, devices)
-    return AssembledRig(replace(rig, prepare_scene=prepare), bench, scene)
+    return AssembledRig(replace(rig, prepare_scene=prepare, keep_truth=keep_truth), bench)
 
 
 def _interlock_and_switch(simulation: SimulationConfig) -> tuple[Interlock, DoorSwitch]:

@@ -170,7 +170,6 @@ class _Runs:
     """Records the runs of the demonstration one after the other."""
 
     def __init__(self, config: RigConfig, bench: AssembledRig, data_dir: Path, progress: Progress) -> None:
-        self._bench = bench
         self._data_dir = data_dir
         self._progress = progress
         self._pulse = PulsePair(current_a={name: view.nominal_current_a for name, view in config.views.items()})
@@ -194,7 +193,6 @@ class _Runs:
         status = self._acquisition.wait(RUN_DEADLINE_S)
         if status.outcome is not RunOutcome.COMPLETED:
             raise DaqError(f"{run_dir.name}: {status.outcome or status.state}, {status.message}")
-        self._bench.keep_truth(run_dir)
         self._progress(f"{run_dir.name}: {status.shots_valid} of {status.shots_planned} shots valid")
         return run_dir
 

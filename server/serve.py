@@ -1,10 +1,8 @@
 """Open a rig and serve it: what ``tomoshadow serve`` does."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 from daq.acquisition import Acquisition
-from daq.run_events import RunEvent, StateChanged
 from processing.calibration.calibration_file import file_sha256
 from processing.engine import DaskEngine
 from server.app import create_app, serve
@@ -14,8 +12,6 @@ from server.config import RigConfig, load_config
 from server.events import EventPublisher
 from server.services import Services
 from server.tasks import TASKS
-
-Publish = Callable[[RunEvent], None]
 
 
 def serve_rig(config_file: Path, host: str | None = None, port: int | None = None) -> None:
@@ -51,19 +47,8 @@ def _acquisition(config: RigConfig, bench: AssembledRig, events: EventPublisher)
     return Acquisition(
         bench.rig,
         data_dir,
-        _keeping_truth(bench, data_dir, events.publish_run_event),
+        events.publish_run_event,
         configuration=config.model_dump(mode="json"),
         hash_calibration=lambda name: file_sha256(calibrations.path(name)),
         limits=config.acquisition.to_limits(),
     )
-
-
-def _keeping_truth(bench: AssembledRig, data_dir: Path, publish: Publish) -> Publish:
-    """On the simulated bench every run keeps its ground truth, as soon as it has ended."""
-
-    def publish_and_keep(event: RunEvent) -> None:
-        if isinstance(event, StateChanged) and event.outcome is not None:
-            bench.keep_truth(data_dir / event.run_id)
-        publish(event)
-
-    return publish_and_keep

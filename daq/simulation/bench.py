@@ -87,11 +87,16 @@ class SimulatedBench:
         self.devices.generator.set_interlock(False)
         self.devices.switch.open_door()
 
-    def take_fired(self) -> tuple[FiredTrain, ...]:
-        """What was fired since the last call."""
+    @property
+    def fired(self) -> tuple[FiredTrain, ...]:
+        """What was fired since ``forget_fired``."""
         with self._firing:
-            fired, self._fired = tuple(self._fired), []
-        return fired
+            return tuple(self._fired)
+
+    def forget_fired(self) -> None:
+        """Start a new record of what is fired."""
+        with self._firing:
+            self._fired = []
 
     def inject(self, fault: Fault) -> None:
         """Let something go wrong, from now on or at the next shot; see ``FaultKind``.

@@ -135,8 +135,8 @@ def test_the_door_reaches_computer_and_generator(assembled: AssembledRig) -> Non
 def test_the_truth_of_fired_sprays_is_kept(assembled: AssembledRig, tmp_path: Path) -> None:
     before = assembled.rig.generator.status().counters["fired"]
     shoot(assembled, shots=2, kind=RunKind.SAMPLE)
-    path = assembled.keep_truth(tmp_path)
-    assert path == tmp_path / "truth" / "truth.h5"
+    assembled.rig.keep_truth(tmp_path)
+    path = tmp_path / "truth" / "truth.h5"
     for sequence in (before + 1, before + 2):
         assert len(read_true_spray(path, sequence).spray) > 1000
 

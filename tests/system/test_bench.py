@@ -17,7 +17,7 @@ from daq.run_state import RunOutcome, RunState
 from daq.shotfile import RunReader
 from daq.simulation.faults import Fault, FaultKind
 from processing.synthetic.truth_file import read_true_cameras, read_true_spray
-from server.assembly import AssembledRig, open_rig
+from server.assembly import TRUTH_FILE, AssembledRig, open_rig
 from server.config import load_config
 
 pytestmark = pytest.mark.network
@@ -87,8 +87,7 @@ def test_a_sample_run_knows_its_references_and_its_truth(assembled: AssembledRig
             shadows = lit[0] - first.views[view].frame_a
             assert np.percentile(shadows, 99.5) > 40
             assert np.any(first.views[view].frame_a != second.views[view].frame_a)
-    truth = assembled.keep_truth(tmp_path / reader.header.run_id)
-    assert truth is not None
+    truth = tmp_path / reader.header.run_id / TRUTH_FILE
     assert set(read_true_cameras(truth)) == set(CURRENT_A)
     for shot in (first, second):
         assert shot.fired is not None
@@ -127,7 +126,7 @@ def test_a_lost_exposure_is_fired_again(assembled: AssembledRig, tmp_path: Path)
     assert (status.outcome, status.shots_recorded, status.shots_valid) == (RunOutcome.COMPLETED, 2, 2)
     with reader:
         sequences = [shot.fired.sequence for shot in map(reader.read_shot, range(2)) if shot.fired]
-    assert len(assembled.bench.take_fired()) == 3
+    assert len(assembled.bench.fired) == 3
     assert sequences[1] == sequences[0] + 1
 
 

@@ -32,7 +32,7 @@ def test_a_run_with_the_image_of_the_pico(tmp_path: Path) -> None:
         with Acquisition(assembled.rig, tmp_path) as acquisition:
             run_id = acquisition.start(plan)
             status = acquisition.wait(60.0)
-        fired = [] if assembled.bench is None else assembled.bench.take_fired()
+        fired = [] if assembled.bench is None else assembled.bench.fired
     assert (status.outcome, status.shots_valid) == (RunOutcome.COMPLETED, SHOTS)
     assert [train.sequence for train in fired] == [1, 2, 3]
     with RunReader(tmp_path / run_id) as reader:
