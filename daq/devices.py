@@ -58,6 +58,10 @@ class Camera(Device, Protocol):
     def bits(self) -> int:
         """Significant bits of a grey value: 8, 12 or 16."""
 
+    @property
+    def is_lost(self) -> bool:
+        """The camera no longer answers, as far as is known; asking costs nothing and may come from any thread."""
+
     def arm(self) -> None:
         """Write the profile, read every value back, drain the stream, start acquisition."""
 

@@ -62,7 +62,8 @@ class RigMonitor:
 
     def _lamps(self) -> Iterator[Lamp]:
         for view, camera in self._rig.cameras.items():
-            yield self._identity_lamp(view, "camera", camera)
+            lost = Lamp(name=view, kind="camera", health=Health.FAULT, detail="has stopped answering")
+            yield lost if camera.is_lost else self._identity_lamp(view, "camera", camera)
         yield self._generator_lamp()
         yield self._interlock_lamp()
         if self._rig.stage is not None:

@@ -91,6 +91,12 @@ class AravisCamera:
         return self._profile.bits
 
     @property
+    def is_lost(self) -> bool:
+        """The camera has stopped answering, for up to 6 s unnoticed; it is opened anew by the next ``arm``."""
+        device = self._device
+        return self._is_open and (device is None or device.is_lost)
+
+    @property
     def counters(self) -> StreamCounters:
         """What the stream has done since the camera was armed."""
         return StreamCounters() if self._receiver is None else self._receiver.counters

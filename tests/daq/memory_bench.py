@@ -53,6 +53,7 @@ class MemoryCamera(MemoryDevice):
         self.timing = TIMING
         self.image_shape = shape
         self.bits = bits
+        self.is_lost = False
         self.lost: set[int] = set()
         self.broken_at: int | None = None
         self.frozen: threading.Event | None = None

@@ -7,7 +7,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field
 from itertools import count
 from pathlib import Path
-from time import monotonic
+from time import monotonic, sleep
 
 import numpy as np
 import pytest
@@ -27,6 +27,8 @@ pytestmark = pytest.mark.network
 IP, SHAPE = "127.0.0.32", (240, 320)
 PROFILE = load_camera_profile(Path(__file__).parents[2] / "configs" / "cameras" / "simulated.toml")
 TIMING = PROFILE.camera_timing
+HEARTBEAT_LIMIT_S = 9.0
+"""A silent camera is reported lost after 5.4 to 5.9 s."""
 ALL_LIGHT = (
     LightPulse(TIMING.frame_a_close_ns - 1500, 1000, 10.0),
     LightPulse(TIMING.frame_b_open_ns + 1500, 1000, 10.0),
@@ -213,10 +215,22 @@ def test_a_killed_camera_costs_the_shot_and_then_the_run(wire: Wire) -> None:
     wire.simulated.kill()
     with pytest.raises(DeviceTimeout, match="view"):
         wire.shoot(0.2)
+    assert wire.camera.is_lost
     wire.camera.disarm()
     with wire.simulated:
         wire.camera.arm()
+        assert not wire.camera.is_lost
         wire.assert_good_shot()
+
+
+def test_a_camera_that_dies_between_runs_is_noticed_by_its_heartbeat(wire: Wire) -> None:
+    wire.camera.disarm()
+    assert not wire.camera.is_lost
+    wire.simulated.kill()
+    deadline_s = monotonic() + HEARTBEAT_LIMIT_S
+    while not wire.camera.is_lost and monotonic() < deadline_s:
+        sleep(0.1)
+    assert wire.camera.is_lost
 
 
 def test_an_absent_camera_is_named() -> None:

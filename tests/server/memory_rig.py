@@ -48,6 +48,7 @@ class MemoryCamera(_MemoryDevice):
     timing = TIMING
     image_shape = SHAPE
     bits = 8
+    is_lost = False
 
     def __init__(self, name: str) -> None:
         super().__init__(name)

@@ -20,6 +20,14 @@ def test_an_open_door_is_a_red_lamp(tmp_path: Path) -> None:
     assert lamps_of(laboratory, tmp_path)["interlock"].health is Health.FAULT
 
 
+def test_a_camera_that_dies_between_runs_is_a_red_lamp(tmp_path: Path) -> None:
+    laboratory = MemoryLaboratory()
+    laboratory.cameras["view2"].is_lost = True
+    lamps = lamps_of(laboratory, tmp_path)
+    assert lamps["view2"] == Lamp(name="view2", kind="camera", health=Health.FAULT, detail="has stopped answering")
+    assert lamps["view1"].health is Health.OK
+
+
 def test_a_silent_device_is_a_red_lamp_and_hides_no_other(tmp_path: Path) -> None:
     laboratory = MemoryLaboratory()
 
