@@ -20,7 +20,7 @@ setup: .venv/.native firmware ## Install Debian packages, the Python environment
 demo: setup ## Run the whole chain on the simulated bench; writes demo-out/report.html.
 	$(PRIVATE_NETWORK) $(PYTHON) -m server.cli demo --out demo-out $(DEMO_OPTIONS)
 
-test: lint ## Run linters and all tests.
+test: lint build/rp2040js/node_modules ## Run linters and all tests.
 	$(PRIVATE_NETWORK) $(PYTHON) -m pytest $(TEST_OPTIONS)
 
 lint: setup ## Run ruff, mypy and import-linter.
@@ -45,6 +45,13 @@ mutants: | .venv/.debian ## Plant faults in the firmware's core and show that it
 
 fuzz: | .venv/.debian ## Feed the firmware's core hostile input for FUZZ_S=60 seconds.
 	@$(MAKE) --no-print-directory -C firmware fuzz
+
+# A second emulator of the Pico, for the tests alone; without it they skip what it would have to say.
+build/rp2040js/node_modules: firmware/tests/rp2040js/package-lock.json | .venv/.debian
+	@command -v npm >/dev/null || { echo "Installing Debian packages: nodejs npm"; $(AS_ROOT) env DEBIAN_FRONTEND=noninteractive \
+	    apt-get install -y -qq --no-install-recommends nodejs npm >/dev/null; }
+	@mkdir -p $(@D) && cp firmware/tests/rp2040js/package*.json $(@D)
+	@npm ci --prefix $(@D) --silent --no-audit --no-fund --ignore-scripts && touch $@ || echo "No rp2040js: npm cannot install it"
 
 lock: .venv/.python ## Pin the newest versions of all Python packages.
 	$(PYTHON) -m pip install --quiet uv
