@@ -51,7 +51,7 @@ class AravisCamera:
         self._ip = ip
         self._profile = profile
         self._packet_bytes = packet_bytes
-        self._form = ExposureFormat(shape, profile.bits, profile.frames_per_trigger, profile.pair)
+        self._form = ExposureFormat(shape, profile.bits, profile.frames_per_trigger, profile.pair, profile.stacked)
         self._is_open = False
         self._device: AravisDevice | None = None
         self._receiver: FrameReceiver | None = None
@@ -150,7 +150,7 @@ class AravisCamera:
         DeviceUnavailable
             An exposure is missing and the camera no longer answers.
         """
-        arrivals = self._armed().take(self._form.frames, deadline_s)
+        arrivals = self._armed().take(self._form.arrivals, deadline_s)
         shot = double_frame(arrivals, self._last_id, self._form)
         self._last_id = arrivals[-1].frame_id if shot.valid else None
         if not shot.valid:
@@ -165,7 +165,8 @@ class AravisCamera:
 
     def latest(self) -> Image | None:
         """Newest exposure seen, for the live view; None before the first."""
-        return self._latest if self._receiver is None else self._receiver.latest
+        frame = self._latest if self._receiver is None else self._receiver.latest
+        return None if frame is None else self._form.exposure_of(frame, -1)
 
     def _settings(self, device: AravisDevice) -> list[FeatureWrite]:
         rows, columns = self._form.shape
@@ -175,7 +176,9 @@ class AravisCamera:
             FeatureWrite(feature="Height", value=rows),
             FeatureWrite(feature="PixelFormat", value=self._profile.pixel_format),
         ]
-        return [*offsets, *image, *self._profile.features]
+        named = {setting.feature for setting in self._profile.features}
+        ours = [setting for setting in (*offsets, *image) if setting.feature not in named]
+        return [*ours, *self._profile.features]
 
     def _connected(self) -> AravisDevice:
         if not self._is_open:

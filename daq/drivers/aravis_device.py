@@ -253,7 +253,7 @@ class AravisStream:
         return arrival
 
     def _fits(self, buffer: Any) -> bool:
-        return (buffer.get_image_height(), buffer.get_image_width()) == self._form.shape
+        return (buffer.get_image_height(), buffer.get_image_width()) == self._form.arrival_shape
 
     def _count(self, name: str) -> int:
         return int(self._stream.get_info_uint64_by_name(name))

@@ -6,9 +6,9 @@ are written. So a profile is an ordered list of writes, each of which is read ba
 
 import tomllib
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import Field, ValidationError
+from pydantic import Field, ValidationError, model_validator
 
 from daq.errors import PlanError
 from daq.run_plan import FrozenModel
@@ -59,6 +59,13 @@ class CameraProfile(FrozenModel):
     features: Annotated[tuple[FeatureWrite, ...], Field(description="written in this order, then read back")]
     timing: TimingModel
     pair: Annotated[PairSpacing | None, Field(description="None: one exposure, or stamps that tell nothing")] = None
+    stacked: Annotated[bool, Field(description="A and B come as one image of twice the height, A above B")] = False
+
+    @model_validator(mode="after")
+    def _stacked_exposures_are_a_pair(self) -> Self:
+        if self.stacked and (self.frames_per_trigger != 2 or self.pair is not None):
+            raise ValueError("stacked exposures are two per trigger, and one image has one stamp: leave out pair")
+        return self
 
     @property
     def bits(self) -> int:

@@ -6,7 +6,7 @@ whose place cannot be proven is discarded, and its slot is flagged.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -59,18 +59,36 @@ class ExposureFormat:
         Exposures per trigger, 1 or 2.
     pair : PairSpacing | None
         Device time between A and B, where the camera's stamps tell it.
+    stacked : bool
+        A and B come as one frame, A above B.
     """
 
     shape: tuple[int, int]
     bits: int
     frames: int
     pair: PairSpacing | None
+    stacked: bool = False
+
+    @property
+    def arrivals(self) -> int:
+        """Frames per trigger as they come out of the stream."""
+        return 1 if self.stacked else self.frames
+
+    @property
+    def arrival_shape(self) -> tuple[int, int]:
+        """(rows, columns) of such a frame."""
+        rows, columns = self.shape
+        return (self.frames * rows if self.stacked else rows), columns
 
     def image_of(self, memory: NDArray[np.uint8]) -> Image:
-        """Copy of the image that lies in these bytes."""
+        """Copy of the frame that lies in these bytes."""
         if self.bits == 8:
-            return memory.reshape(self.shape).copy()
-        return memory.view(np.uint16).reshape(self.shape).copy()
+            return memory.reshape(self.arrival_shape).copy()
+        return memory.view(np.uint16).reshape(self.arrival_shape).copy()
+
+    def exposure_of(self, image: Image, index: int) -> Image:
+        """Exposure A (0) or B (1, -1) of a frame; the frame itself, unless it holds both."""
+        return image.reshape(-1, *self.shape)[index] if self.stacked else image
 
     def blank(self) -> Image:
         """The image of a missing exposure."""
@@ -114,12 +132,20 @@ def place_exposures(arrivals: Sequence[Arrival], last_id: int | None, frames: in
 
 def double_frame(arrivals: Sequence[Arrival], last_id: int | None, form: ExposureFormat) -> DoubleFrame:
     """Exposures of one firing; what is missing or unproven is black, and flagged."""
-    placed = place_exposures(arrivals, last_id, form.frames)
+    placed = place_exposures(arrivals, last_id, form.arrivals)
+    if form.stacked:
+        placed = [_half(placed[0], index, form) for index in range(form.frames)]
     trusted = _is_one_pair(placed, form.pair)
     images, records = zip(*(_exposure(arrival, trusted, form) for arrival in placed), strict=True)
     if form.frames == 1:
         return DoubleFrame(images[0], None, records[0], ExposureRecord(valid=False))
     return DoubleFrame(images[0], images[1], records[0], records[1])
+
+
+def _half(both: Arrival | None, index: int, form: ExposureFormat) -> Arrival | None:
+    if both is None or both.image is None:
+        return both
+    return replace(both, image=form.exposure_of(both.image, index))
 
 
 def _is_one_pair(placed: Sequence[Arrival | None], pair: PairSpacing | None) -> bool:

@@ -12,7 +12,10 @@ from functools import partial
 from threading import Condition, Event, Thread
 from time import monotonic, monotonic_ns
 from types import TracebackType
-from typing import Literal, Self
+from typing import Any, Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
 
 from daq.shot import FiredTrain, Image
 from daq.simulation.gige_control import GVCP_PORT, ControlChannel
@@ -215,6 +218,8 @@ class SimulatedCamera:
             size = (self._bank.image_shape, self._bank.pixel_format.bits)
             exposures = exposures_of(firing.train, self._view, self._timing, *size)[: self._bank.frames_per_trigger]
             images = [self._frame_source(exposure) for exposure in exposures]
+            if self._bank.is_stacked:
+                exposures, images = exposures[-1:], [_stacked(images)]
             if self.faults.take("late"):
                 self._stopping.wait(self.faults.late_s)
             for delivery in self._deliveries(firing, exposures, images):
@@ -268,3 +273,9 @@ class SimulatedCamera:
         port = self._bank[Register.STREAM_PORT] & 0xFFFF
         if firing.acquisition == self._acquisition and port and not self.faults.frozen:
             self._stream.send(delivery.block, (socket.inet_ntoa(address), port))
+
+
+def _stacked(images: Sequence[Image]) -> Image:
+    """One image above the other."""
+    both: NDArray[Any] = np.concatenate(images)
+    return both

@@ -77,10 +77,11 @@ _PIXEL_FORMATS = frozenset(int(pixel_format) for pixel_format in PixelFormat)
 
 
 class ExposureMode(IntEnum):
-    """One exposure per trigger edge, or two."""
+    """One exposure per trigger edge; two; or two that leave as one image, A above B."""
 
     Timed = 0
     DoubleFrame = 1
+    StackedDoubleFrame = 2
 
 
 class TriggerSource(IntEnum):
@@ -118,7 +119,7 @@ class RegisterBank:
     ip, serial : str
         Address and serial number the camera answers with.
     sensor_shape : tuple[int, int]
-        (rows, columns) of the sensor: the largest image.
+        (rows, columns) of the sensor: the largest exposure.
     exposure_ns : int
         Length of exposure A, as the ExposureTime feature reports it.
     xml : bytes
@@ -202,7 +203,12 @@ class RegisterBank:
     @property
     def frames_per_trigger(self) -> int:
         """Exposures that one trigger edge starts."""
-        return 2 if self[Register.EXPOSURE_MODE] == ExposureMode.DoubleFrame else 1
+        return 1 if self[Register.EXPOSURE_MODE] == ExposureMode.Timed else 2
+
+    @property
+    def is_stacked(self) -> bool:
+        """Both exposures leave as one image."""
+        return self[Register.EXPOSURE_MODE] == ExposureMode.StackedDoubleFrame
 
     def latch_timestamp(self, ticks: int) -> None:
         """Publish the device clock."""

@@ -92,10 +92,10 @@ def _image_format(root: Element, sensor_shape: tuple[int, int]) -> None:
     _integer(root, "OffsetY", Register.OFFSET_Y, 0, rows - 1)
     _enumeration(root, Register.PIXEL_FORMAT, PixelFormat)
     payload = _node(root, "IntSwissKnife", "PayloadSize")
-    for variable in ("Width", "Height", "PixelFormat"):
-        feature = "PixelFormatRegister" if variable == "PixelFormat" else variable
-        SubElement(payload, "pVariable", Name=variable.upper()).text = feature
-    SubElement(payload, "Formula").text = "WIDTH * HEIGHT * ((PIXELFORMAT >> 16) & 0xFF) / 8"
+    for variable in ("Width", "Height", "PixelFormat", "ExposureMode"):
+        SubElement(payload, "pVariable", Name=variable.upper()).text = f"{variable}Register"
+    images = f"(EXPOSUREMODE = {ExposureMode.StackedDoubleFrame:d} ? 2 : 1)"
+    SubElement(payload, "Formula").text = f"{images} * WIDTH * HEIGHT * ((PIXELFORMAT >> 16) & 0xFF) / 8"
 
 
 def _acquisition(root: Element) -> None:

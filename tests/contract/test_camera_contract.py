@@ -11,7 +11,7 @@ import pytest
 
 from daq.devices import Camera
 from daq.drivers.aravis_camera import AravisCamera
-from daq.drivers.camera_profile import load_camera_profile
+from daq.drivers.camera_profile import FeatureWrite, load_camera_profile
 from daq.errors import DeviceError
 from daq.shot import DoubleFrame, FiredTrain, Image, LightPulse
 from daq.simulation.gige_camera import SimulatedCamera
@@ -21,6 +21,12 @@ pytestmark = pytest.mark.network
 
 VIEW, SHAPE = "view2", (96, 160)
 PROFILE = load_camera_profile(Path(__file__).parents[2] / "configs" / "cameras" / "simulated.toml")
+STACKED = {
+    "features": (*PROFILE.features[:-1], FeatureWrite(feature="ExposureMode", value="StackedDoubleFrame")),
+    "pair": None,
+    "stacked": True,
+}
+"""Both exposures in one image, one above the other."""
 FRAME_MARK = {"A": 1, "B": 2}
 
 
@@ -55,7 +61,7 @@ def train(sequence: int) -> FiredTrain:
 
 @pytest.fixture
 def bench(request: pytest.FixtureRequest) -> Iterator[CameraBench]:
-    profile = PROFILE.model_copy(update={"pixel_format": getattr(request, "param", "Mono8")})
+    profile = PROFILE.model_copy(update=getattr(request, "param", {}))
     simulated = SimulatedCamera(VIEW, "127.0.0.31", "SN31", profile.camera_timing, signed, SHAPE)
     sequences = count(1)
 
@@ -83,7 +89,12 @@ def test_tells_the_timing_of_its_profile(bench: CameraBench) -> None:
     assert bench.camera.timing == PROFILE.camera_timing
 
 
-@pytest.mark.parametrize("bench", ["Mono8", "Mono12", "Mono16"], indirect=True)
+@pytest.mark.parametrize(
+    "bench",
+    [*({"pixel_format": name} for name in ("Mono8", "Mono12", "Mono16")), STACKED],
+    ids=["Mono8", "Mono12", "Mono16", "stacked"],
+    indirect=True,
+)
 def test_delivers_both_exposures_of_a_firing_in_their_places(bench: CameraBench) -> None:
     bench.camera.arm()
     sequence, shot = bench.shoot()
@@ -137,6 +148,7 @@ def test_collects_until_the_deadline_and_no_longer(bench: CameraBench) -> None:
     assert not shot.record_b.valid
 
 
+@pytest.mark.parametrize("bench", [{}, STACKED], ids=["two images", "stacked"], indirect=True)
 def test_shows_the_newest_exposure(bench: CameraBench) -> None:
     assert bench.camera.latest() is None
     bench.camera.arm()

@@ -45,6 +45,7 @@ def test_round_trip() -> None:
         ('"Mono8"', '"BayerRG8"', r"pixel_format: .*, got 'BayerRG8'"),
         ('feature = "TriggerMode", value', 'feature = "TriggerMode", vlaue', r"features\.1\.value: Field required"),
         ("[timing]", "[timing", r"line 1?\d"),
+        ('"Mono8"', '"Mono8"\nstacked = true', "stacked exposures are two per trigger, and one image has one stamp"),
     ],
 )
 def test_faults_name_file_and_key(tmp_path: Path, old: str, new: str, complaint: str) -> None:

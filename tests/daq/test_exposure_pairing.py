@@ -112,3 +112,21 @@ def test_a_single_exposure_has_no_frame_b() -> None:
     shot = double_frame([arrival(1)], 0, form)
     assert shot.frame_b is None
     assert shot.valid
+
+
+@given(frame_ids, st.one_of(st.none(), frame_ids), st.booleans())
+def test_stacked_exposures_come_and_go_together(frame_id: int, last_id: int | None, whole: bool) -> None:
+    rows, columns = SHAPE
+    image = np.arange(2 * rows * columns, dtype=np.uint8).reshape(2 * rows, columns)
+    stacked = ExposureFormat(SHAPE, 8, 2, None, stacked=True)
+    shot = double_frame([Arrival(frame_id, 1_000_000, image if whole else None)], last_id, stacked)
+    assert shot.frame_b is not None
+    assert (shot.record_a.valid, shot.record_b.valid) == (whole, whole)
+    np.testing.assert_array_equal(np.concatenate([shot.frame_a, shot.frame_b]), image if whole else 0 * image)
+
+
+def test_two_frames_for_one_stacked_pair_are_not_trusted() -> None:
+    image = np.ones((6, 4), np.uint8)
+    arrivals = [Arrival(number, 1_000_000, image) for number in (1, 2)]
+    shot = double_frame(arrivals, None, ExposureFormat(SHAPE, 8, 2, None, stacked=True))
+    assert not shot.valid
