@@ -56,7 +56,7 @@ class Camera(Device, Protocol):
 
     @property
     def bits(self) -> int:
-        """Significant bits of a grey value: 8, 12 or 16."""
+        """Significant bits of a grey value: 8 to 16."""
 
     @property
     def is_lost(self) -> bool:

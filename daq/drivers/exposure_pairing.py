@@ -54,7 +54,7 @@ class ExposureFormat:
     shape : tuple[int, int]
         (rows, columns) of one exposure.
     bits : int
-        Significant bits of a grey value: 8, 12 or 16.
+        Significant bits of a grey value: 8 to 16.
     frames : int
         Exposures per trigger, 1 or 2.
     pair : PairSpacing | None

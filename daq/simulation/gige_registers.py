@@ -57,10 +57,12 @@ class Register(IntEnum):
 
 
 class PixelFormat(IntEnum):
-    """PFNC codes; the unpacked formats carry 12 and 16 bits in little-endian words."""
+    """PFNC codes; the unpacked formats carry 10 to 16 bits in little-endian words."""
 
     Mono8 = 0x01080001
+    Mono10 = 0x01100003
     Mono12 = 0x01100005
+    Mono14 = 0x01100025
     Mono16 = 0x01100007
 
     @property

@@ -27,6 +27,7 @@ STACKED = {
     "stacked": True,
 }
 """Both exposures in one image, one above the other."""
+FORMATS = ("Mono8", "Mono10", "Mono12", "Mono14", "Mono16")
 FRAME_MARK = {"A": 1, "B": 2}
 
 
@@ -91,8 +92,8 @@ def test_tells_the_timing_of_its_profile(bench: CameraBench) -> None:
 
 @pytest.mark.parametrize(
     "bench",
-    [*({"pixel_format": name} for name in ("Mono8", "Mono12", "Mono16")), STACKED],
-    ids=["Mono8", "Mono12", "Mono16", "stacked"],
+    [*({"pixel_format": name} for name in FORMATS), STACKED],
+    ids=[*FORMATS, "stacked"],
     indirect=True,
 )
 def test_delivers_both_exposures_of_a_firing_in_their_places(bench: CameraBench) -> None:
