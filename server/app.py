@@ -16,6 +16,7 @@ from starlette.routing import Match
 from server import problems
 from server.api import bench, calibrations, events, jobs, live, results, rig, runs, shots, sign_in, timing
 from server.api.parameters import forbid_unknown_query
+from server.calibration_watch import CalibrationWatch
 from server.calibrations import CalibrationStore
 from server.guard import Guard
 from server.job_runner import JobRunner
@@ -118,12 +119,14 @@ def _job_table(services: Services) -> Iterator[JobTable]:
 
 def _context(services: Services, table: JobTable) -> Context:
     store = CalibrationStore(services.data_dir / "calibrations")
+    watch = CalibrationWatch(services.events)
     return Context(
         services=services,
         runs=RunStore(services.data_dir, services.acquisition.status),
         calibrations=store,
         jobs=table,
-        runner=JobRunner(services.engine, table, services.tasks, services.events, services.data_dir, store),
+        runner=JobRunner(services.engine, table, services.tasks, services.events, services.data_dir, store, watch),
+        watch=watch,
         monitor=RigMonitor(services.rig, services.data_dir),
         live=LiveFeed(services.rig.cameras),
     )

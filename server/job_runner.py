@@ -10,10 +10,13 @@ from pathlib import Path
 from typing import Any
 
 from processing.engine import Engine, Task, TaskAborted, TaskError
+from server.calibration_watch import CalibrationWatch
 from server.calibrations import CalibrationStore
 from server.events import EventPublisher
 from server.jobs import Job, JobKind, JobState, JobTable
 from server.problems import Conflict
+
+_CHECKS_REMEMBERED = 1000
 
 
 class JobRunner:
@@ -33,6 +36,8 @@ class JobRunner:
         Folder of the run directories.
     calibrations : CalibrationStore
         Where calibrations are read from and written to.
+    watch : CalibrationWatch
+        Learns from checks; may hold a reconstruction back, or refuse it.
     """
 
     def __init__(
@@ -43,6 +48,7 @@ class JobRunner:
         events: EventPublisher,
         data_dir: Path,
         calibrations: CalibrationStore,
+        watch: CalibrationWatch,
     ) -> None:
         self._engine = engine
         self._table = table
@@ -50,6 +56,7 @@ class JobRunner:
         self._events = events
         self._data_dir = data_dir
         self._calibrations = calibrations
+        self._watch = watch
         self._loop = asyncio.get_running_loop()
         self._changed = asyncio.Event()
         self._running: set[str] = set()
@@ -59,7 +66,14 @@ class JobRunner:
         queued = self._table.add(job)
         self._tell(queued)
         self._loop.call_soon_threadsafe(self._changed.set)
+        if following := self._watch.learn(queued):
+            self.submit(following)
         return queued
+
+    def check(self, run_id: str, calibration: str, shot: int) -> None:
+        """Queue a check of a shot, or see to it after the one of this run that is under way; from any thread."""
+        if job := self._watch.next_check(run_id, calibration, shot):
+            self.submit(job)
 
     async def abort(self, job_id: str) -> Job:
         """Abort a job: a waiting one at once, a running one at its next step.
@@ -78,15 +92,24 @@ class JobRunner:
 
     async def run(self) -> None:
         """Work until cancelled; jobs that are then unfinished are taken up by the next start."""
-        await asyncio.to_thread(self._table.requeue_interrupted)
+        await asyncio.to_thread(self._take_up)
         async with asyncio.TaskGroup() as group:
             while True:
                 self._changed.clear()
                 for job in await asyncio.to_thread(self._table.oldest, JobState.QUEUED, self._engine.workers):
-                    if len(self._running) < self._engine.workers and job.id not in self._running:
+                    if self._may_start(job):
                         self._running.add(job.id)
                         group.create_task(self._perform(job))
                 await self._changed.wait()
+
+    def _take_up(self) -> None:
+        self._table.requeue_interrupted()
+        for job in reversed(self._table.newest(limit=_CHECKS_REMEMBERED, kind=JobKind.CHECK)):
+            self._watch.learn(job)
+
+    def _may_start(self, job: Job) -> bool:
+        has_room = len(self._running) < self._engine.workers
+        return has_room and job.id not in self._running and not self._watch.holds(job)
 
     async def _perform(self, job: Job) -> None:
         try:
@@ -99,6 +122,9 @@ class JobRunner:
             self._changed.set()
 
     async def _settle(self, job: Job) -> None:
+        if refusal := self._watch.refusal(job):
+            await self._move(job.id, JobState.FAILED, error=refusal)
+            return
         try:
             arguments = self._arguments(job)
             result = await self._engine.submit(
@@ -124,10 +150,20 @@ class JobRunner:
     async def _move(self, job_id: str, to: JobState, **more: Any) -> Job:
         job = await asyncio.to_thread(partial(self._table.move, job_id, to, **more))
         self._tell(job)
+        if following := self._watch.learn(job):
+            await asyncio.to_thread(self.submit, following)
         return job
 
     def _tell(self, job: Job) -> None:
-        self._events.publish("job_changed", job=job.id, run=job.run_id, shot=job.shot, state=job.state, error=job.error)
+        self._events.publish(
+            "job_changed",
+            job=job.id,
+            kind=job.kind,
+            run=job.run_id,
+            shot=job.shot,
+            state=job.state,
+            error=job.error,
+        )
 
     def _tell_progress(self, job_id: str, steps: int) -> None:
         self._events.publish("job_progress", job=job_id, steps=steps)

@@ -30,6 +30,7 @@ class JobKind(StrEnum):
 
     RECONSTRUCTION = "reconstruction"
     CALIBRATION = "calibration"
+    CHECK = "check"
 
 
 class JobState(StrEnum):
@@ -51,6 +52,8 @@ TRANSITIONS: Mapping[JobState, frozenset[JobState]] = {
 }
 """State -> states that may follow."""
 _UNSUCCESSFUL = (JobState.FAILED, JobState.ABORTED)
+ENDED = (JobState.DONE, *_UNSUCCESSFUL)
+"""States of jobs that do not run or wait."""
 
 
 def now_utc() -> str:
@@ -66,7 +69,9 @@ class Job(FrozenModel):
     run_id: str
     shot: Annotated[int | None, Field(description="index of the shot; null for a calibration")] = None
     calibration: Annotated[str, Field(description="id of the calibration that is used, or made")]
-    results_id: Annotated[str | None, Field(description="directory of the results in the run; null for a calibration")]
+    results_id: Annotated[
+        str | None, Field(description="directory of the results in the run; null if there are none")
+    ]
     settings: Annotated[dict[str, Any], Field(description="what the work function is told")]
     state: JobState = JobState.QUEUED
     result: Annotated[dict[str, Any] | None, Field(description="what it said when done")] = None
@@ -94,6 +99,19 @@ def calibration_job(run_id: str, calibration: str, model: str) -> Job:
     )
 
 
+def check_job(run_id: str, shot: int, calibration: str) -> Job:
+    """Job that measures how well a calibration fits a shot."""
+    return Job(
+        id=f"{run_id}.check-{calibration}.{shot:05d}",
+        kind=JobKind.CHECK,
+        run_id=run_id,
+        shot=shot,
+        calibration=calibration,
+        results_id=None,
+        settings={},
+    )
+
+
 def _reconstruction(
     run_id: str, shot: int, calibration: str, results_id: str, settings: Mapping[str, Any], more: Mapping[str, Any]
 ) -> Job:
@@ -110,8 +128,13 @@ def _reconstruction(
 
 
 _SELECT = """
-    SELECT document FROM job WHERE state IN (SELECT value FROM json_each(?1)) AND (?2 IS NULL OR run_id = ?2)
+    SELECT document FROM job
+    WHERE state IN (SELECT value FROM json_each(?1)) AND (?2 IS NULL OR run_id = ?2)
+        AND (?3 IS NULL OR json_extract(document, '$.kind') = ?3)
 """
+
+
+_CHECKS_FIRST = f"ORDER BY json_extract(document, '$.kind') = '{JobKind.CHECK}' DESC, number"
 
 
 class JobTable:
@@ -174,14 +197,18 @@ class JobTable:
             return self._known(job_id)
 
     def newest(
-        self, run_id: str | None = None, states: Iterable[JobState] = tuple(JobState), limit: int = 200
+        self,
+        run_id: str | None = None,
+        states: Iterable[JobState] = tuple(JobState),
+        limit: int = 200,
+        kind: JobKind | None = None,
     ) -> list[Job]:
-        """Jobs of one run or all, newest first."""
-        return self._select(f"{_SELECT} ORDER BY number DESC LIMIT ?3", run_id, states, limit)
+        """Jobs of one run or all, of one kind or all, newest first."""
+        return self._select(f"{_SELECT} ORDER BY number DESC LIMIT ?4", run_id, states, limit, kind)
 
     def oldest(self, state: JobState, limit: int = -1) -> list[Job]:
-        """Jobs in one state, the longest waiting first; -1 for all of them."""
-        return self._select(f"{_SELECT} ORDER BY number LIMIT ?3", None, [state], limit)
+        """Jobs in one state, checks before all others, the longest waiting first; -1 for all of them."""
+        return self._select(f"{_SELECT} {_CHECKS_FIRST} LIMIT ?4", None, [state], limit)
 
     def requeue_interrupted(self) -> int:
         """Queue again what was running when the server died; how many jobs that were."""
@@ -198,10 +225,12 @@ class JobTable:
                 self._insert(job)
         return len(new)
 
-    def _select(self, query: str, run_id: str | None, states: Iterable[JobState], limit: int) -> list[Job]:
+    def _select(
+        self, query: str, run_id: str | None, states: Iterable[JobState], limit: int, kind: JobKind | None = None
+    ) -> list[Job]:
         chosen = json.dumps([state.value for state in states])
         with self._lock:
-            rows = self._database.execute(query, (chosen, run_id, limit)).fetchall()
+            rows = self._database.execute(query, (chosen, run_id, kind, limit)).fetchall()
         return [Job.model_validate_json(document) for (document,) in rows]
 
     def _find(self, job_id: str) -> Job | None:

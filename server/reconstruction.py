@@ -39,6 +39,8 @@ def request_reconstruction(
 ) -> list[Job]:
     """Queue shots of a run; without ``shots`` all valid ones, without ``calibration`` the run's own or the current one.
 
+    The last of them is checked first: whether its droplets still agree with the calibration.
+
     Raises
     ------
     NotFound
@@ -54,6 +56,8 @@ def request_reconstruction(
     wanted = _valid_shots(context, run_id) if shots is None else list(shots)
     if absent := [shot for shot in wanted if shot >= summary.shots_recorded]:
         raise Unprocessable(f"run {run_id} has {summary.shots_recorded} shots, not {absent}")
+    if wanted:
+        context.runner.check(run_id, chosen, wanted[-1])
     described = settings.model_dump(mode="json")
     return [
         context.runner.submit(reconstruction_job(run_id, shot, chosen, settings.results_id(chosen), described))

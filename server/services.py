@@ -11,6 +11,7 @@ from daq.run_plan import RunPlan
 from daq.simulation.faults import Fault
 from processing.engine import Engine, Task
 from processing.reconstruction.settings import ReconstructionSettings
+from server.calibration_watch import CalibrationStanding, CalibrationWatch
 from server.calibrations import CalibrationStore
 from server.config import RigConfig
 from server.events import EventPublisher
@@ -95,5 +96,14 @@ class Context:
     calibrations: CalibrationStore
     jobs: JobTable
     runner: JobRunner
+    watch: CalibrationWatch
     monitor: RigMonitor
     live: LiveFeed
+
+    @property
+    def standing(self) -> CalibrationStanding | None:
+        """How the calibration in use stood at the last check; None once another one has been chosen."""
+        status, standing = self.services.acquisition.status(), self.watch.standing
+        running = status.plan.calibration if status.active and status.plan else None
+        in_use = (running, self.calibrations.current)
+        return standing if standing is not None and standing.calibration in in_use else None

@@ -5,12 +5,14 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from processing.calibration.calibration_file import save_calibration
+from processing.calibration.calibration_file import load_calibration, save_calibration
 from processing.calibration.calibration_set import load_calibration_set
 from processing.calibration.joint_fit import calibrate
 from processing.engine import Task
 from processing.pipeline import reconstruct_shot
 from processing.reconstruction.settings import ReconstructionSettings
+from processing.run_check import check_shot
+from server.check_command import check_json
 from server.jobs import JobKind
 from server.results import write_preview
 
@@ -46,7 +48,14 @@ def calibrate_run(job: dict[str, Any], should_stop: Callable[[], bool]) -> dict[
     }
 
 
+def check_run(job: dict[str, Any], should_stop: Callable[[], bool]) -> dict[str, Any]:
+    """Measure how well the calibration still fits one shot."""
+    calibration = load_calibration(Path(job["calibration_file"]))
+    should_stop()
+    return check_json(check_shot(Path(job["run_dir"]), job["shot"], calibration))
+
+
 TASKS: Mapping[JobKind, Task] = MappingProxyType(
-    {JobKind.RECONSTRUCTION: reconstruct, JobKind.CALIBRATION: calibrate_run}
+    {JobKind.RECONSTRUCTION: reconstruct, JobKind.CALIBRATION: calibrate_run, JobKind.CHECK: check_run}
 )
 """Work function of every kind of job."""

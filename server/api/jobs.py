@@ -1,4 +1,4 @@
-"""/api/jobs: reconstructions and calibrations, waiting, running and done."""
+"""/api/jobs: reconstructions, checks and calibrations, waiting, running and done."""
 
 from typing import Annotated
 
@@ -8,7 +8,7 @@ from pydantic import Field
 from daq.run_plan import FrozenModel
 from processing.reconstruction.settings import ReconstructionSettings
 from server.api.parameters import ContextOf, JobId
-from server.jobs import Job, JobState
+from server.jobs import Job, JobKind, JobState
 from server.problems import responses
 from server.reconstruction import request_reconstruction
 
@@ -31,10 +31,11 @@ def list_jobs(
     context: ContextOf,
     run_id: str | None = None,
     state: JobState | None = None,
+    kind: JobKind | None = None,
     limit: Annotated[int, Query(ge=1, le=10_000)] = 200,
 ) -> list[Job]:
     """Jobs, newest first."""
-    return context.jobs.newest(run_id, [state] if state else JobState, limit)
+    return context.jobs.newest(run_id, [state] if state else JobState, limit, kind)
 
 
 @router.post("", status_code=202, responses=responses(404))

@@ -8,6 +8,7 @@ from pydantic import ConfigDict, Field
 from daq.run_plan import FrozenModel
 from daq.run_state import RunOutcome, RunState
 from server.api.parameters import ContextOf
+from server.calibration_watch import CalibrationStanding
 from server.monitor import Lamp
 from server.problems import responses
 
@@ -36,6 +37,10 @@ class RigView(FrozenModel):
     views: list[str]
     lamps: tuple[Lamp, ...]
     acquisition: AcquisitionView
+    calibration: Annotated[
+        CalibrationStanding | None,
+        Field(description="how the calibration in use fitted the last shot that was checked; null: nothing is known"),
+    ]
 
 
 @router.get("")
@@ -48,6 +53,7 @@ async def show_rig(context: ContextOf) -> RigView:
         views=list(config.views),
         lamps=context.monitor.lamps,
         acquisition=view_of_acquisition(context),
+        calibration=context.standing,
     )
 
 

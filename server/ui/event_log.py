@@ -34,8 +34,10 @@ def line_of(event: Event) -> str | None:
         case "run_message":
             text = data["text"]
         case "job_changed":
-            what = "calibration" if data["shot"] is None else f"reconstruction of shot {data['shot']}"
+            what = data["kind"] if data["shot"] is None else f"{data['kind']} of shot {data['shot']}"
             text = f"{what}: {data['state']}" + (f", {data['error']}" if data["error"] else "")
+        case "calibration_alarm":
+            text = data["message"] or f"calibration {data['calibration']} fits run {data['run']} again"
         case _:
             return None
     return f"{datetime.fromisoformat(event.time_utc).astimezone():%H:%M:%S}  {text}"

@@ -6,6 +6,7 @@ from nicegui import ui
 from server.config import RigConfig
 from server.services import Context
 from server.ui import theme
+from server.ui.alarm_banner import AlarmBanner
 from server.ui.draft import DraftStore
 from server.ui.event_log import EventLog
 from server.ui.header import Header
@@ -41,6 +42,7 @@ class Page:
         dark = theme.apply()
         draft = DraftStore(context.services.data_dir / "draft.json", context.services.config)
         self._header = Header(context, dark)
+        self._alarm = AlarmBanner(context)
         with ui.element("div").classes("screen"):
             with ui.element("div").classes("column"):
                 with panel("Live"):
@@ -55,7 +57,7 @@ class Page:
     async def _refresh(self) -> None:
         events = self._events.since(self._seen)
         self._log.add(events)
-        for part in (self._header, self._run, self._form):
+        for part in (self._header, self._alarm, self._run, self._form):
             part.refresh()
         if events:
             self._seen = events[-1].id

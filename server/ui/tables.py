@@ -11,7 +11,7 @@ from daq.errors import DaqError
 from daq.run_plan import RunKind
 from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.settings import ReconstructionSettings
-from server.jobs import Job, JobState, calibration_job
+from server.jobs import Job, JobKind, JobState, calibration_job
 from server.problems import ServerError
 from server.reconstruction import request_reconstruction
 from server.runs import ACTIVE, RunSummary
@@ -116,18 +116,36 @@ def _run_row(run: RunSummary) -> dict[str, Any]:
 
 
 def _job_row(job: Job) -> dict[str, Any]:
-    is_calibration = job.shot is None
+    is_calibration = job.kind is JobKind.CALIBRATION
     choices = {JobState.QUEUED: "Abort", JobState.RUNNING: "Abort", JobState.DONE: "Use" if is_calibration else ""}
     return {
         "id": job.id,
-        "job": "calibration" if is_calibration else f"{str(job.settings.get('method', '')).upper()} shot {job.shot}",
+        "job": _name(job),
         "run": job.run_id,
         "outcome": job.state,
         "colour": outcome_colour(job.state),
-        "detail": job.error or _quality(job),
+        "detail": job.error or (_disparity(job) if job.kind is JobKind.CHECK else _quality(job)),
         "action": choices.get(job.state, ""),
         "calibration": job.calibration,
     }
+
+
+def _name(job: Job) -> str:
+    method = str(job.settings.get("method", "")).upper()
+    return {
+        JobKind.CALIBRATION: "calibration",
+        JobKind.CHECK: f"check of shot {job.shot}",
+        JobKind.RECONSTRUCTION: f"{method} shot {job.shot}",
+    }[job.kind]
+
+
+def _disparity(job: Job) -> str:
+    """The view that disagrees most, or why the droplets do not tell; nothing before the check has ended."""
+    result = job.result or {"views": {}}
+    if not result["views"]:
+        return str(result.get("problem") or "")
+    worst = max(result["views"], key=result["views"].__getitem__)
+    return f"{worst} {result['views'][worst]:.2f} px, {result['verdict']}"
 
 
 def _quality(job: Job) -> str:

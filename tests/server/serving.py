@@ -88,6 +88,11 @@ def write_calibration(job: dict[str, Any], should_stop: Callable[[], bool]) -> d
     return {"calibration": "made"}
 
 
+def tell_nothing(job: dict[str, Any], should_stop: Callable[[], bool]) -> dict[str, Any]:
+    """Work function: a check of a shot without droplets."""
+    return {"shot": job["shot"], "verdict": None, "views": {}, "uncertainty_px": {}, "problem": "too few droplets"}
+
+
 @contextmanager
 def assembled(
     data_dir: Path, *, engine: Engine | None = None, views: tuple[str, ...] = VIEWS, token: str | None = None
@@ -101,7 +106,11 @@ def assembled(
             acquisition=acquisition,
             events=events,
             engine=engine or InlineEngine(),
-            tasks={JobKind.RECONSTRUCTION: write_spray, JobKind.CALIBRATION: write_calibration},
+            tasks={
+                JobKind.RECONSTRUCTION: write_spray,
+                JobKind.CALIBRATION: write_calibration,
+                JobKind.CHECK: tell_nothing,
+            },
             bench=laboratory,
         )
 

@@ -17,14 +17,14 @@ def decode(png: bytes) -> NDArray[Any]:
     return pixels
 
 
-def wait_for_jobs(server: Serving, count: int) -> list[dict[str, object]]:
-    """Jobs, once that many have ended."""
+def wait_for_jobs(server: Serving, count: int, kind: str = "reconstruction") -> list[dict[str, object]]:
+    """Jobs of a kind, once that many have ended."""
     events = server.services.events
     changed = threading.Event()
     deadline = threading.Timer(DEADLINE_S, changed.set)
     deadline.start()
     while not changed.wait(0.02):
-        jobs = server.http.get("/api/jobs").json()
+        jobs = server.http.get("/api/jobs", params={"kind": kind}).json()
         if sum(job["state"] in ("done", "failed", "aborted") for job in jobs) >= count:
             deadline.cancel()
             return list(jobs)
@@ -120,7 +120,7 @@ def test_recorded_shots_are_reconstructed_by_themselves(server: Serving) -> None
         (1, "done", "cal"),
     ]
     assert server.http.get(f"/api/runs/{run_id}").json()["calibration"] == "cal"
-    assert len(server.http.get("/api/jobs", params={"run_id": run_id, "state": "done"}).json()) == 2
+    assert len(server.http.get("/api/jobs", params={"run_id": run_id, "kind": "reconstruction"}).json()) == 2
     again = server.http.post("/api/jobs", json={"run_id": run_id})
     assert [job["state"] for job in again.json()] == ["done", "done"]
 
@@ -163,7 +163,7 @@ def test_a_calibration_is_made_from_a_run_and_chosen(server: Serving) -> None:
     run_id, _ = server.run_to_its_end(plan_of(kind="calibration"))
     job = server.http.post("/api/calibrations", json={"run_id": run_id})
     assert (job.status_code, job.headers["location"]) == (202, f"/api/jobs/{job.json()['id']}")
-    wait_for_jobs(server, 1)
+    wait_for_jobs(server, 1, "calibration")
     name = f"{run_id}-pinhole"
     assert server.http.get(f"/api/calibrations/{name}").json()["model"] == "pinhole"
     server.http.put("/api/calibrations/current", json={"id": name})

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from processing.engine import InlineEngine
+from server.calibration_watch import CalibrationWatch
 from server.calibrations import CalibrationStore
 from server.events import EventPublisher
 from server.job_runner import JobRunner
@@ -59,7 +60,8 @@ async def at_work(tmp_path: Path, task: Callable[..., dict[str, Any]]) -> AsyncI
     events.attach()
     async with InlineEngine() as engine:
         store = CalibrationStore(tmp_path / "calibrations")
-        runner = JobRunner(engine, table, {JobKind.RECONSTRUCTION: task}, events, tmp_path, store)
+        watch = CalibrationWatch(events)
+        runner = JobRunner(engine, table, {JobKind.RECONSTRUCTION: task}, events, tmp_path, store, watch)
         work = asyncio.create_task(runner.run())
         yield Laboratory(runner, table, events)
         work.cancel()

@@ -1,22 +1,43 @@
 """The operator's page in a real browser: headless Chromium, a real server, every device honest."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import pytest
-from playwright.sync_api import Page
+from fastapi import FastAPI
+from playwright.sync_api import Page, expect
 
+from processing.calibration.calibration import Calibration
+from processing.calibration.calibration_file import save_calibration
 from server.app import create_app
-from tests.server.serving import Serving, serving
+from server.jobs import JobKind
+from server.services import Services
+from server.tasks import check_run
+from tests.processing.drifting_views import calibration_of, views
+from tests.server.serving import Serving, serving, tell_nothing
+from tests.server.test_check_command import DRIFT_PX, write_droplet_run
 from tests.system.operator import VIEWS, drive_the_page
 
 PICTURES = os.environ.get("TOMOSHADOW_PICTURES")
+DRIFTED = "drifted"
+
+
+def check_drifted(job: dict[str, Any], should_stop: Callable[[], bool]) -> dict[str, Any]:
+    """Work function: the product's check for the run with droplets in it."""
+    return (check_run if Path(job["run_dir"]).name == DRIFTED else tell_nothing)(job, should_stop)
+
+
+def build(services: Services) -> FastAPI:
+    return create_app(replace(services, tasks={**services.tasks, JobKind.CHECK: check_drifted}))
 
 
 @pytest.fixture(scope="module")
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
     data_dir = tmp_path_factory.mktemp("browser") / "runs"
-    with serving(data_dir, build=create_app, views=VIEWS) as server:
+    with serving(data_dir, build=build, views=VIEWS) as server:
         (data_dir / "calibrations" / "paper.json").write_text('{"id": "paper"}')
         server.http.put("/api/calibrations/current", json={"id": "paper"})
         yield server
@@ -35,3 +56,36 @@ def test_an_operator_records_a_run_and_sees_its_volume(page: Page, server: Servi
     _take_picture(page, "page-light")
     page.set_viewport_size({"width": 480, "height": 950})
     _take_picture(page, "page-narrow")
+
+
+def test_a_drift_raises_an_alarm_and_a_larger_one_stops_reconstruction(page: Page, server: Serving) -> None:
+    write_droplet_run(server.services.data_dir / DRIFTED)
+    page.goto(str(server.http.base_url))
+    alarm = page.locator(".alarm-banner")
+    expect(alarm).to_be_hidden()
+    _reconstruct(server, "drifting", _calibration_off_by(0.45))
+    expect(alarm).to_contain_text("CALIBRATION ALARM: view")
+    _take_picture(page, "page-calibration-alarm")
+    _reconstruct(server, "moved", _calibration_off_by(2))
+    expect(alarm).to_contain_text("RECONSTRUCTION STOPPED: view")
+    expect(alarm).to_contain_text("self-calibrate")
+    expect(page.get_by_role("region", name="Processing").get_by_text("failed").first).to_be_visible()
+    expect(page.get_by_role("log")).to_contain_text(f"calibration moved does not fit run {DRIFTED}")
+    _take_picture(page, "page-calibration-stop")
+    _reconstruct(server, "good", _calibration_off_by(0))
+    expect(alarm).to_be_hidden()
+
+
+def _calibration_off_by(error_px: float) -> Calibration:
+    """Calibration of the run with droplets whose view2 is wrong by so much."""
+    cameras = views()
+    matrix = cameras[1].camera_matrix.copy()
+    matrix[0, 2] += DRIFT_PX - error_px
+    cameras[1] = replace(cameras[1], camera_matrix=matrix)
+    return calibration_of(cameras)
+
+
+def _reconstruct(server: Serving, name: str, calibration: Calibration) -> None:
+    save_calibration(calibration, server.services.data_dir / "calibrations" / f"{name}.json")
+    server.http.put("/api/calibrations/current", json={"id": name})
+    server.http.post("/api/jobs", json={"run_id": DRIFTED})

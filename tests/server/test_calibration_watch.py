@@ -1,0 +1,114 @@
+"""Checks of shots raise an alarm, stop reconstruction, and let it go on when a calibration fits again."""
+
+from collections.abc import Sequence
+
+import pytest
+
+from processing.calibration.calibration import Verdict
+from processing.calibration.health import judge
+from server.calibration_watch import CalibrationWatch
+from server.events import EventPublisher
+from server.jobs import Job, JobState, check_job, reconstruction_job
+
+RUN, CALIBRATION = "run", "cal"
+
+
+def reconstruction(shot: int = 0, calibration: str = CALIBRATION) -> Job:
+    return reconstruction_job(RUN, shot, calibration, "mlos-0", {"method": "mlos"})
+
+
+def ended(shot: int, disparity_px: float | None, state: JobState = JobState.DONE) -> Job:
+    """A check that found view2 off by so much; None: the droplets do not tell."""
+    views = {} if disparity_px is None else {"view1": 0.01, "view2": disparity_px}
+    verdict = None if disparity_px is None else judge(disparity_px)
+    result = {"shot": shot, "verdict": verdict, "views": views, "uncertainty_px": dict.fromkeys(views, 0.01)}
+    return check_job(RUN, shot, CALIBRATION).model_copy(update={"state": state, "result": result})
+
+
+def watch_of(disparities_px: Sequence[float | None]) -> tuple[CalibrationWatch, EventPublisher]:
+    """A watch after checks of one shot after the other."""
+    events = EventPublisher()
+    watch = CalibrationWatch(events)
+    for shot, disparity_px in enumerate(disparities_px):
+        assert watch.next_check(RUN, CALIBRATION, shot) is not None
+        watch.learn(ended(shot, disparity_px))
+    return watch, events
+
+
+@pytest.mark.parametrize(
+    ("disparity_px", "verdict", "alarms", "refused"),
+    [
+        (0.04, Verdict.GOOD, False, False),
+        (0.3, Verdict.USABLE, False, False),
+        (0.31, Verdict.WARN, True, False),
+        (0.8, Verdict.WARN, True, False),
+        (0.81, Verdict.REFUSE, True, True),
+    ],
+)
+def test_limits_are_those_of_the_check(disparity_px: float, verdict: Verdict, alarms: bool, refused: bool) -> None:
+    watch, events = watch_of([disparity_px])
+    assert watch.standing is not None
+    assert (watch.standing.verdict, watch.standing.worst_view) == (verdict, "view2")
+    assert watch.standing.is_alarm is alarms
+    assert [event.name for event in events.since(0)] == ["calibration_alarm"] * alarms
+    assert (watch.refusal(reconstruction(5)) is not None) is refused
+
+
+def test_a_refusal_names_run_shot_views_limit_and_remedy() -> None:
+    watch, _ = watch_of([1.234])
+    refusal = watch.refusal(reconstruction())
+    assert refusal is not None
+    for part in ("calibration cal", "run run, shot 0", "view2 1.23", "stop above 0.8 px", "self-calibrate", "kept"):
+        assert part in refusal
+    assert watch.refusal(reconstruction(calibration="another")) is None
+    assert watch.refusal(check_job(RUN, 1, CALIBRATION)) is None
+
+
+def test_the_newest_shot_that_tells_decides_and_a_change_is_told_once() -> None:
+    watch, events = watch_of([0.9, 0.9, None, 0.1, 0.4])
+    told = [(event.data["shot"], event.data["verdict"]) for event in events.since(0)]
+    assert told == [(0, "refuse"), (3, "usable"), (4, "warn")]
+    watch.learn(ended(1, 0.9))
+    assert watch.standing is not None
+    assert (watch.standing.shot, watch.standing.shots_checked) == (4, 4)
+
+
+def test_one_check_at_a_time_and_the_newest_shot_is_next() -> None:
+    watch = CalibrationWatch(EventPublisher())
+    first = watch.next_check(RUN, CALIBRATION, 0)
+    assert first is not None
+    assert [watch.next_check(RUN, CALIBRATION, shot) for shot in (1, 2, 3)] == [None] * 3
+    following = watch.learn(ended(0, 0.1))
+    assert following is not None
+    assert following.shot == 3
+    assert watch.learn(ended(3, 0.1)) is None
+    assert watch.next_check(RUN, CALIBRATION, 4) is not None
+
+
+@pytest.mark.parametrize("state", [JobState.DONE, JobState.FAILED, JobState.ABORTED])
+def test_reconstructions_wait_for_the_first_check_however_it_ends(state: JobState) -> None:
+    watch = CalibrationWatch(EventPublisher())
+    assert not watch.holds(reconstruction())
+    watch.next_check(RUN, CALIBRATION, 0)
+    assert watch.holds(reconstruction())
+    assert not watch.holds(check_job(RUN, 0, CALIBRATION))
+    assert not watch.holds(reconstruction(calibration="another"))
+    watch.learn(ended(0, None, state))
+    assert not watch.holds(reconstruction())
+    watch.next_check(RUN, CALIBRATION, 1)
+    assert not watch.holds(reconstruction())
+
+
+def test_a_failed_check_says_nothing() -> None:
+    watch, events = watch_of([])
+    watch.learn(ended(0, 2.0, JobState.FAILED))
+    assert watch.standing is None
+    assert events.newest == 0
+
+
+def test_checks_of_an_earlier_life_of_the_server_still_stop_a_run() -> None:
+    watch = CalibrationWatch(EventPublisher())
+    for job in (ended(0, 0.1), ended(1, 0.95), check_job(RUN, 2, CALIBRATION)):
+        watch.learn(job)
+    assert watch.refusal(reconstruction(3)) is not None
+    assert watch.next_check(RUN, CALIBRATION, 3) is None
