@@ -37,7 +37,7 @@ bench: setup ## Measure kernels and recorder against plain numpy and OpenCV; wri
 
 firmware: $(FIRMWARE_SOURCES) | .venv/.debian ## Build the firmware: image for the Pico, core for this computer.
 	@$(MAKE) --no-print-directory -C firmware host
-	@if command -v arm-none-eabi-gcc >/dev/null; then $(MAKE) --no-print-directory -C firmware image; \
+	@if command -v arm-none-eabi-gcc >/dev/null; then $(MAKE) --no-print-directory -C firmware images; \
 	else echo "No image for the Pico: arm-none-eabi-gcc is missing (apt install gcc-arm-none-eabi)"; fi
 
 mutants: | .venv/.debian ## Plant faults in the firmware's core and show that its tests find each; two minutes.

@@ -3,6 +3,7 @@
 import shutil
 import subprocess
 from dataclasses import dataclass
+from enum import StrEnum
 from pathlib import Path
 
 from daq.errors import DeviceTimeout, DeviceUnavailable
@@ -11,6 +12,13 @@ _DEVICE = "simulated pulse generator"
 _ROOT = Path(__file__).resolve().parents[2]
 _BUILD_DIR = _ROOT / "build" / "firmware"
 _BUILD_LIMIT_S = 60.0
+
+
+class ImageKind(StrEnum):
+    """What sets the currents on the board that an image is for; the value is the name of the image's files."""
+
+    CONVERTER = "tomoshadow-rp2040"
+    PWM = "tomoshadow-rp2040-pwm"
 
 
 @dataclass(frozen=True)
@@ -22,7 +30,6 @@ class _Target:
 
 
 _HOST = _Target("host", "firmware_host", ("make", "cc"), "gcc make")
-_IMAGE = _Target("image", "tomoshadow-rp2040.bin", ("make", "arm-none-eabi-gcc"), "gcc-arm-none-eabi make")
 
 
 def build_firmware(build_dir: Path = _BUILD_DIR) -> Path:
@@ -36,15 +43,15 @@ def build_firmware(build_dir: Path = _BUILD_DIR) -> Path:
     return _built(_HOST, build_dir)
 
 
-def build_image(build_dir: Path = _BUILD_DIR) -> Path:
-    """Path of the binary image of the RP2040, linked if it is missing or older than its sources; UF2 and ELF beside it.
+def build_image(build_dir: Path = _BUILD_DIR, kind: ImageKind = ImageKind.CONVERTER) -> Path:
+    """Path of a binary image of the RP2040, linked if it is missing or older than its sources; UF2 and ELF beside it.
 
     Raises
     ------
     DeviceUnavailable
         It is missing and cannot be compiled here; the text says what is needed.
     """
-    return _built(_IMAGE, build_dir)
+    return _built(_Target("images", f"{kind}.bin", ("make", "arm-none-eabi-gcc"), "gcc-arm-none-eabi make"), build_dir)
 
 
 def _built(target: _Target, build_dir: Path) -> Path:

@@ -13,6 +13,7 @@ from rp2040py.utils.logging import ConsoleLogger, LogLevel
 
 CHANNELS = 4
 PIN_LIGHT, PIN_CAMERA, PIN_TRIGGER, PIN_INTERLOCK, PIN_SET_POINT = 2, 6, 11, 12, 16
+PIN_I2C_SCL = 21
 OUTPUT_PINS = {f"light{i}": PIN_LIGHT + i for i in range(CHANNELS)} | {
     f"camera{i}": PIN_CAMERA + i for i in range(CHANNELS)
 }
@@ -21,7 +22,9 @@ TRIGGER = "trigger"
 
 OnEdge = Callable[[str, bool], None]
 
-_IO_BANK0, _PWM, _ROSC = 0x40014, 0x40050, 0x40060
+_RESETS, _IO_BANK0, _PWM, _ROSC = 0x4000C, 0x40014, 0x40050, 0x40060
+_RESET_I2C0 = 1 << 3
+_FUNCTION_PWM = 4
 _CTRL_TRIGGER = 8 * PIN_TRIGGER + 4
 _PWM_COMPARE = (0x4005_000C, 0x4005_0020)
 _SET_POINT_STEP_MA = 10
@@ -55,6 +58,7 @@ def powered_chip(image: bytes, noise: random.Random, on_byte: Callable[[int], No
     for name, pin in OUTPUT_PINS.items():
         chip.gpio[pin].add_listener(partial(_tell_output, on_edge, name))
     _watch_trigger(chip, on_edge)
+    _watch_resets(chip)
     start_boot_rom(chip)
     return chip
 
@@ -70,8 +74,13 @@ def is_high(chip: RP2040, output: str) -> bool:
     return chip.gpio[OUTPUT_PINS[output]].value is GPIOPinState.HIGH
 
 
-def set_points_ma(chip: RP2040) -> tuple[int, ...]:
-    """What the set-point outputs ask of the LED drivers, by channel."""
+def has_pwm_set_points(chip: RP2040) -> bool:
+    """Whether the firmware sets the currents by PWM, not by a converter."""
+    return bool(chip.gpio[PIN_SET_POINT].function_select == _FUNCTION_PWM)
+
+
+def pwm_set_points_ma(chip: RP2040) -> tuple[int, ...]:
+    """What the PWM outputs ask of the LED drivers, by channel."""
     levels = [chip.read_uint32(address) >> shift & 0xFFFF for address in _PWM_COMPARE for shift in (0, 16)]
     pins = [chip.gpio[PIN_SET_POINT + i] for i in range(CHANNELS)]
     return tuple(
@@ -98,6 +107,19 @@ def _watch_trigger(chip: RP2040, on_edge: OnEdge) -> None:
             _tell_machines(chip)
 
     block.write_uint32 = write_and_tell  # type: ignore[method-assign]
+
+
+def _watch_resets(chip: RP2040) -> None:
+    """rp2040py does not reset a block that is put into reset by software: do it for the one with a bus."""
+    block = chip.peripherals[_RESETS]
+    write = block.write_uint32
+
+    def write_and_reset(offset: int, value: int) -> None:
+        write(offset, value)
+        if offset == 0 and value & _RESET_I2C0:
+            chip.i2c[0].reset()
+
+    block.write_uint32 = write_and_reset  # type: ignore[method-assign]
 
 
 def _tell_machines(chip: RP2040) -> None:

@@ -10,14 +10,17 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from daq.simulation.mcp4728 import Mcp4728
 from daq.simulation.rp2040_chip import (
     OUTPUT_PINS,
+    PIN_I2C_SCL,
     PIN_INTERLOCK,
     PIN_TRIGGER,
     TRIGGER,
+    has_pwm_set_points,
     is_high,
     powered_chip,
-    set_points_ma,
+    pwm_set_points_ma,
     start_boot_rom,
 )
 
@@ -73,6 +76,8 @@ class EmulatedPico:
         Cycles at which the watchdog restarted the chip.
     shot_set_points_ma : tuple[int, ...]
         Set-points by channel when the trigger line rose last.
+    converter : Mcp4728
+        On the I2C bus of the board; an image with PWM leaves it alone.
     """
 
     def __init__(self, image: bytes) -> None:
@@ -89,6 +94,7 @@ class EmulatedPico:
         self.on_edge: Callable[[Edge], None] | None = None
         self.watchdog_resets: list[int] = []
         self.shot_set_points_ma: tuple[int, ...] = ()
+        self.converter = Mcp4728()
         self.power_up()
 
     def power_up(self) -> None:
@@ -97,6 +103,7 @@ class EmulatedPico:
         self._restarting = False
         self._chip = powered_chip(self._image, self._noise, self.sent.append, self._on_edge)
         self._chip.watchdog.on_watchdog_trigger = self._on_watchdog
+        self.converter.power_up(self._chip, PIN_I2C_SCL)
         self.set_interlock(self._interlock)
         self.set_trigger_pin(False)
 
@@ -133,7 +140,7 @@ class EmulatedPico:
 
     def set_points_ma(self) -> tuple[int, ...]:
         """What the set-point outputs ask of the LED drivers, by channel."""
-        return set_points_ma(self._chip)
+        return pwm_set_points_ma(self._chip) if has_pwm_set_points(self._chip) else self.converter.outputs_ma()
 
     def read_word(self, address: int) -> int:
         """A word of RAM or a register."""

@@ -7,6 +7,7 @@
 #include "protocol.h"
 #include "rp2040.h"
 #include "serial.h"
+#include "set_points.h"
 #include "vectors.h"
 #include "watchdog.h"
 
@@ -93,6 +94,7 @@ int main(void)
     blocks_restart(RESET_TIMER);
     const struct start start = watchdog_read_start();
     watchdog_start();
+    set_points_start();
     interlock_start();
     serial_start();
     protocol_boot(&protocol, start.boot, start.by_watchdog);
@@ -102,6 +104,7 @@ int main(void)
         while (serial_take(&byte))
             protocol_receive(&protocol, byte);
         protocol_poll(&protocol);
+        (void)set_points_confirmed();
         sleep();
     }
 }

@@ -30,6 +30,7 @@ struct words {
 
 static struct words light[CHANNEL_COUNT];
 static struct words camera[CHANNEL_COUNT];
+static volatile uint32_t off_count;
 
 void outputs_off(void)
 {
@@ -38,9 +39,10 @@ void outputs_off(void)
     for (uint32_t i = 0; i < CHANNEL_COUNT; i++)
         REG(IO_CTRL(PIN_CAMERA + i)) = FUNCTION_PIO1 | OUTPUT_OFF;
     REG(IO_CTRL(PIN_TRIGGER)) = FUNCTION_NONE | INPUT_LOW;
-    set_points_zero();
     REG(PIO_CTRL(LIGHT)) = 0;
     REG(PIO_CTRL(CAMERA)) = 0;
+    set_points_zero();
+    off_count++;
 }
 
 static void set_pad(uint32_t pin)
@@ -50,14 +52,13 @@ static void set_pad(uint32_t pin)
 
 void outputs_start(void)
 {
-    blocks_restart(RESET_IO_BANK0 | RESET_PADS_BANK0 | RESET_PIO0 | RESET_PIO1 | RESET_PWM);
+    blocks_restart(RESET_IO_BANK0 | RESET_PADS_BANK0 | RESET_PIO0 | RESET_PIO1);
     outputs_off();
     for (uint32_t i = 0; i < CHANNEL_COUNT; i++) {
         set_pad(PIN_LIGHT + i);
         set_pad(PIN_CAMERA + i);
     }
     set_pad(PIN_TRIGGER);
-    set_points_start();
 }
 
 static bool encode(uint32_t time_ns, uint32_t limit_cycles, uint32_t *count)
@@ -130,20 +131,35 @@ static void give_pins(void)
     }
 }
 
+static void give_outputs(void)
+{
+    set_up_block(LIGHT, LIGHT_PROGRAM, sizeof LIGHT_PROGRAM / sizeof *LIGHT_PROGRAM, PIN_LIGHT);
+    set_up_block(CAMERA, CAMERA_PROGRAM, sizeof CAMERA_PROGRAM / sizeof *CAMERA_PROGRAM, PIN_CAMERA);
+    give_pins();
+}
+
+static bool set_currents(const struct pulse_train *train)
+{
+    uint32_t current_ma[CHANNEL_COUNT];
+    for (uint32_t i = 0; i < CHANNEL_COUNT; i++)
+        current_ma[i] = train->channels[i].used ? train->channels[i].current_ma : 0;
+    return set_points_set(current_ma);
+}
+
 bool outputs_load(const struct pulse_train *train)
 {
-    /* An interlock that opens meanwhile must come after this, or its OFF would be undone. */
-    const uint32_t before = interrupts_mask();
+    uint32_t before = interrupts_mask();
     outputs_off();
-    const bool fits = encode_train(train);
-    if (fits) {
-        set_up_block(LIGHT, LIGHT_PROGRAM, sizeof LIGHT_PROGRAM / sizeof *LIGHT_PROGRAM, PIN_LIGHT);
-        set_up_block(CAMERA, CAMERA_PROGRAM, sizeof CAMERA_PROGRAM / sizeof *CAMERA_PROGRAM, PIN_CAMERA);
-        set_points_set(train);
-        give_pins();
-    }
+    const uint32_t off_before = off_count;
     interrupts_restore(before);
-    return fits;
+    if (!encode_train(train) || !set_currents(train)) /* the set-points take their time, with interrupts on */
+        return false;
+    before = interrupts_mask();
+    const bool still_wanted = off_count == off_before; /* or an OFF that came meanwhile would be undone */
+    if (still_wanted)
+        give_outputs();
+    interrupts_restore(before);
+    return still_wanted;
 }
 
 static void push_words(uint32_t pio, const struct words *words)

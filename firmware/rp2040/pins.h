@@ -9,7 +9,9 @@ enum pins {
     PIN_CAMERA = 6,    /* to 9: camera trigger of channel 0 to 3, rising edge */
     PIN_TRIGGER = 11,  /* the line that starts all state machines; driven from inside alone */
     PIN_INTERLOCK = 12, /* high while the interlock chain is closed */
-    PIN_SET_POINT = 16, /* to 19: PWM of the current set-point of channel 0 to 3 */
+    PIN_SET_POINT = 16, /* to 19: PWM of the current set-point of channel 0 to 3, on a board without converter */
+    PIN_I2C_SDA = 20,   /* converter of the current set-points */
+    PIN_I2C_SCL = 21,
 };
 
 #endif

@@ -13,6 +13,7 @@
 #define RESETS_RESET 0x4000c000u
 #define RESETS_DONE 0x4000c008u
 enum reset_bits {
+    RESET_I2C0 = 1 << 3,
     RESET_IO_BANK0 = 1 << 5,
     RESET_PADS_BANK0 = 1 << 8,
     RESET_PIO0 = 1 << 10,
@@ -49,9 +50,13 @@ enum reset_bits {
 #define IO_EDGE_LOW(pin) (4u << (4u * ((uint32_t)(pin) % 8u)))
 #define PAD(pin) (0x4001c004u + 4u * (uint32_t)(pin))
 #define SIO_GPIO_IN 0xd0000004u
+#define SIO_GPIO_OUT_CLR 0xd0000018u
+#define SIO_GPIO_OE_SET 0xd0000024u
+#define SIO_GPIO_OE_CLR 0xd0000028u
 
 enum io_ctrl {
     FUNCTION_UART = 2,
+    FUNCTION_I2C = 3,
     FUNCTION_PWM = 4,
     FUNCTION_SIO = 5,
     FUNCTION_PIO0 = 6,
@@ -97,6 +102,30 @@ enum uart {
     UART_LCR_8_BITS = 3 << 5,
     UART_CR_ENABLE = 1 << 0 | 1 << 8 | 1 << 9, /* UART, transmitter, receiver */
     UART_INT_RX = 1 << 4,
+};
+
+/* 4.3.17 */
+#define I2C_CON 0x40044000u
+#define I2C_TAR 0x40044004u
+#define I2C_DATA_CMD 0x40044010u
+#define I2C_FS_SCL_HCNT 0x4004401cu
+#define I2C_FS_SCL_LCNT 0x40044020u
+#define I2C_INTR_MASK 0x40044030u
+#define I2C_RAW_INTR_STAT 0x40044034u
+#define I2C_CLR_TX_ABRT 0x40044054u
+#define I2C_ENABLE 0x4004406cu
+#define I2C_STATUS 0x40044070u
+#define I2C_SDA_HOLD 0x4004407cu
+#define I2C_FS_SPKLEN 0x400440a0u
+enum i2c {
+    I2C_CON_MASTER = 1 << 0 | 2 << 1 | 1 << 5 | 1 << 6, /* master, fast mode, restarts, no slave */
+    I2C_CMD_READ = 1 << 8,
+    I2C_CMD_STOP = 1 << 9,
+    I2C_INTR_TX_ABRT = 1 << 6,
+    I2C_STATUS_TX_NOT_FULL = 1 << 1,
+    I2C_STATUS_TX_EMPTY = 1 << 2,
+    I2C_STATUS_RX_ANY = 1 << 3,
+    I2C_STATUS_MASTER_ACTIVE = 1 << 5,
 };
 
 /* 4.5.3: slice n drives pins 2n and 2n + 1, modulo 16 */

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import astuple, dataclass, replace
 
 from daq.drivers.pulse_protocol import MAX_SEQUENCE, Command, Reply, Request, decode_reply, encode_request
-from daq.simulation.firmware_build import build_image
+from daq.simulation.firmware_build import ImageKind, build_image
 from daq.simulation.rp2040_chip import TRIGGER
 from daq.simulation.rp2040_emulator import CYCLE_NS, CYCLES_PER_MS, START_CYCLES, Edge, EmulatedPico
 
@@ -50,8 +50,8 @@ PAPER = Channel(0, 20_000, 1000, 26_400, 1000, frame_a_close_ns=23_500, frame_b_
 class Board:
     """One board, and a host that neither checks nor repeats."""
 
-    def __init__(self) -> None:
-        self.pico = EmulatedPico(build_image().read_bytes())
+    def __init__(self, kind: ImageKind = ImageKind.CONVERTER) -> None:
+        self.pico = EmulatedPico(build_image(kind=kind).read_bytes())
         self._sequence = 0
         self.pico.run_ms(BOOT_MS)
 

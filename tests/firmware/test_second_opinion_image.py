@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 
 from daq.drivers.pulse_protocol import Command, Reply, Request, decode_reply, encode_request
-from daq.simulation.firmware_build import build_image
+from daq.simulation.firmware_build import ImageKind, build_image
 from daq.simulation.rp2040_chip import OUTPUT_PINS, PIN_INTERLOCK, PIN_SET_POINT, PIN_TRIGGER
 from daq.simulation.rp2040_emulator import CYCLE_NS, START_CYCLES
 from tests.firmware.rp2040_board import BOOT_MS, PAPER, PERIOD_MS, Board, Channel, Waveform
@@ -24,6 +24,8 @@ from tests.firmware.rp2040_board import BOOT_MS, PAPER, PERIOD_MS, Board, Channe
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAM = ROOT / "firmware" / "tests" / "rp2040js" / "board.cjs"
 MODULES = ROOT / "build" / "rp2040js" / "node_modules"
+IMAGE = ImageKind.PWM
+"""Nothing stands on the I2C bus of rp2040js."""
 TRIGGER_LINE = -1
 FIRST_SHOT_MS = 20
 """After a start nothing is fired for so long."""
@@ -72,7 +74,7 @@ def in_rp2040js(requests: Sequence[Request]) -> Told:
     steps += [["say", encode_request(request).decode()] for request in requests]
     steps += [["run", PERIOD_MS]]
     finished = subprocess.run(
-        ["node", PROGRAM, build_image(), str(PIN_TRIGGER)],
+        ["node", PROGRAM, build_image(kind=IMAGE), str(PIN_TRIGGER)],
         input=json.dumps(steps),
         capture_output=True,
         text=True,
@@ -86,7 +88,7 @@ def in_rp2040js(requests: Sequence[Request]) -> Told:
 
 
 def in_rp2040py(requests: Sequence[Request]) -> tuple[list[Reply], Waveform]:
-    board = Board()
+    board = Board(IMAGE)
     board.pico.run_ms(FIRST_SHOT_MS)
     replies = [decode_reply(board.say(encode_request(request))) for request in requests]
     board.pico.run_ms(PERIOD_MS)

@@ -1,17 +1,17 @@
-#include "set_points.h"
-
+/* PWM at 41.7 kHz, full scale is MAX_CURRENT_MA; nothing comes back from it. */
+#include "clocks.h"
 #include "pins.h"
 #include "rp2040.h"
+#include "set_points.h"
 
 enum {
-    STEP_MA = 10,
-    FULL_SCALE = MAX_CURRENT_MA / STEP_MA, /* clock cycles of one period */
+    FULL_SCALE = MAX_CURRENT_MA / SET_POINT_STEP_MA, /* clock cycles of one period */
     SLICES = CHANNEL_COUNT / 2,
     SLICE_ENABLE = 1,
 };
 
 _Static_assert(PIN_SET_POINT % 16 == 0, "channel 0 and 1 are slice 0, channel 2 and 3 slice 1");
-_Static_assert(MAX_CURRENT_MA % STEP_MA == 0 && FULL_SCALE <= UINT16_MAX, "full scale is a compare value");
+_Static_assert(MAX_CURRENT_MA % SET_POINT_STEP_MA == 0 && FULL_SCALE <= UINT16_MAX, "full scale is a compare value");
 
 static void drive_pins(uint32_t override)
 {
@@ -28,6 +28,7 @@ void set_points_zero(void)
 
 void set_points_start(void)
 {
+    blocks_restart(RESET_PWM);
     set_points_zero();
     for (uint32_t slice = 0; slice < SLICES; slice++) {
         REG(PWM_TOP(slice)) = FULL_SCALE - 1;
@@ -37,14 +38,22 @@ void set_points_start(void)
         REG(PAD(PIN_SET_POINT + i)) = PAD_INPUT | PAD_4_MA | PAD_PULL_DOWN | PAD_SCHMITT;
 }
 
-static uint32_t level(const struct channel *channel)
+static uint32_t level(uint32_t current_ma)
 {
-    return channel->used ? (channel->current_ma + STEP_MA / 2u) / STEP_MA : 0;
+    return (current_ma + SET_POINT_STEP_MA / 2u) / SET_POINT_STEP_MA;
 }
 
-void set_points_set(const struct pulse_train *train)
+bool set_points_set(const uint32_t current_ma[CHANNEL_COUNT])
 {
+    const uint32_t before = interrupts_mask(); /* or an OFF that comes meanwhile would be undone */
     for (uint32_t slice = 0; slice < SLICES; slice++)
-        REG(PWM_CC(slice)) = level(&train->channels[2 * slice]) | level(&train->channels[2 * slice + 1]) << 16;
+        REG(PWM_CC(slice)) = level(current_ma[2 * slice]) | level(current_ma[2 * slice + 1]) << 16;
     drive_pins(0);
+    interrupts_restore(before);
+    return true;
+}
+
+bool set_points_confirmed(void)
+{
+    return true;
 }
