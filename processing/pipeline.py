@@ -93,15 +93,15 @@ def reconstruct_shot(
     with RunReader(run_dir) as run:
         recorded = run.read_shot(shot)
         _check(run_dir.name, recorded, calibration)
-        images = {frame: shot_intensities(run, recorded, frame, settings) for frame in _frames(run)}
         provenance = _provenance(run, calibration, calibration_file, settings)
-    bench = _workbench(calibration_file, str(provenance["calibration_sha256"]), settings, tuple(recorded.views))
-    claim_results(results_dir, provenance)
-    volumes = []
-    for frame, views in images.items():
-        if should_stop():
-            raise Stopped(f"{run_dir.name}, shot {shot}: stopped before exposure {frame}")
-        volumes.append(_reconstruct_frame(bench, views, settings, results_dir, shot, frame, provenance))
+        bench = _workbench(calibration_file, str(provenance["calibration_sha256"]), settings, tuple(recorded.views))
+        claim_results(results_dir, provenance)
+        volumes = []
+        for frame in _frames(run):
+            if should_stop():
+                raise Stopped(f"{run_dir.name}, shot {shot}: stopped before exposure {frame}")
+            views = shot_intensities(run, recorded, frame, settings, bench.images)
+            volumes.append(_reconstruct_frame(bench, views, settings, results_dir, shot, frame, provenance))
     return ShotResult(
         shot=shot,
         method=settings.method,
@@ -133,12 +133,18 @@ def default_grid(calibration: Calibration, pitch_mm: float | None = None) -> Vox
     )
 
 
-def shot_intensities(run: RunReader, shot: Shot, frame: FrameName, settings: ReconstructionSettings) -> list[Intensity]:
-    """Preprocessed images of one exposure, in the order of the shot's views."""
+def shot_intensities(
+    run: RunReader,
+    shot: Shot,
+    frame: FrameName,
+    settings: ReconstructionSettings,
+    out: Sequence[Intensity | None] | None = None,
+) -> list[Intensity]:
+    """Preprocessed images of one exposure, in the order of the shot's views; ``out`` receives them where given."""
     preprocessing = Preprocessing(run.header.polarity, settings.minimum_window_px, settings.noise_floor)
     number = "ab".index(frame)
     images = []
-    for view, exposures in shot.views.items():
+    for (view, exposures), image in zip(shot.views.items(), out or [None] * len(shot.views), strict=True):
         pixels = (exposures.frame_a, exposures.frame_b)[number]
         if pixels is None:
             raise PipelineError(f"{run.header.run_id}, shot {shot.index}: {view} has no exposure {frame}")
@@ -150,6 +156,7 @@ def shot_intensities(run: RunReader, shot: Shot, frame: FrameName, settings: Rec
                 bits=run.header.views[view].bits,
                 dark=None if dark is None else dark[number],
                 background=None if background is None else background[number],
+                out=image,
             )
         )
     return images
@@ -160,6 +167,7 @@ class _Workbench:
     """What the shots of a run share: first touch of fresh memory costs more than a reconstruction."""
 
     plan: Plan
+    images: tuple[Intensity, ...]
     volume: Intensity
 
 
@@ -226,7 +234,8 @@ def _workbench(
     calibration = load_calibration(calibration_file)
     grid = settings.grid.to_grid() if settings.grid else default_grid(calibration)
     plan = plan_reconstruction([calibration.views[view].mapping for view in views], grid)
-    return _Workbench(plan, np.empty(grid.shape, np.float32))
+    images = tuple(np.empty(view.image_size_px[::-1], np.float32) for view in plan.views)
+    return _Workbench(plan, images, np.empty(grid.shape, np.float32))
 
 
 def _widened(span_mm: tuple[float, float]) -> tuple[float, float]:

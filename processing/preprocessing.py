@@ -12,11 +12,15 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from processing.reconstruction.kernels import _native
+from processing.reconstruction.plan import DEFAULT_THREADS
+
 Polarity = Literal["shadow", "bright"]
 Intensity = NDArray[np.float32]
+Frame = NDArray[np.uint8] | NDArray[np.uint16]
 
-DARKEST_BACKGROUND = 1e-3
-"""Share of the full scale below which a background pixel carries no light; its shadow is unknown, hence 0."""
+FIELD_WINDOW_PX = 201
+"""Over which the light field is estimated where the settings state no window."""
 
 
 @dataclass(frozen=True)
@@ -39,70 +43,88 @@ class Preprocessing:
 
 
 def intensity(
-    frame: NDArray[np.uint8] | NDArray[np.uint16],
+    frame: Frame,
     settings: Preprocessing,
     *,
     bits: int,
     dark: Intensity | None = None,
     background: Intensity | None = None,
+    out: Intensity | None = None,
+    threads: int = DEFAULT_THREADS,
 ) -> Intensity:
     """Droplet intensity of one exposure.
 
     Parameters
     ----------
-    frame : (rows, columns) array
+    frame : (rows, columns) uint8 or uint16 array
         Grey values.
     settings : Preprocessing
         Polarity, sliding minimum and noise floor.
     bits : int
         Significant bits of a grey value.
-    dark, background : (rows, columns) array, optional
+    dark, background : (rows, columns) float32 array, optional
         Mean image without light, and with light but without spray, of the same exposure (A or B). Without
-        a background the light field is estimated from the frame itself.
+        a background the light field is estimated from the frame itself. Where the background has less than a
+        thousandth of the full scale, nobody knows what was in the way: 0.
+    out : (rows, columns) float32 array, optional
+        Receives the intensities; reused memory is faster than new.
+    threads : int
+        The result does not depend on it.
 
     Returns
     -------
     (rows, columns) float32 array
-        0 where the view is free, 1 where it is blocked.
+        0 where the view is free, 1 where it is blocked; ``out`` where given.
 
     Raises
     ------
     ValueError
-        A reference image has another shape than the frame.
+        A reference image or ``out`` has another shape than the frame, or an array another type than stated.
     """
-    for name, reference in (("dark", dark), ("background", background)):
+    for name, reference in (("dark", dark), ("background", background), ("output", out)):
         if reference is not None and reference.shape != frame.shape:
             raise ValueError(f"{name} image {reference.shape} does not fit the frame {frame.shape}")
-    full_scale = np.float32(2**bits - 1)
-    light = (frame.astype(np.float32) - (0 if dark is None else dark)) / full_scale
-    if settings.polarity == "shadow":
-        light = opacity(light, _light_field(light, dark, background, full_scale, settings.minimum_window_px))
-    if settings.minimum_window_px:
-        light = light - sliding_minimum(light, settings.minimum_window_px)
-    above_noise: Intensity = np.clip((light - settings.noise_floor) / (1 - settings.noise_floor), 0, 1)
-    return above_noise
+    if frame.dtype not in (np.uint8, np.uint16):
+        raise ValueError(f"a frame has grey values of uint8 or uint16, not {frame.dtype}")
+    result = _result(frame.shape, out)
+    if settings.polarity == "shadow" and background is None:
+        background = _estimated_background(frame, dark, settings.minimum_window_px or FIELD_WINDOW_PX, threads)
+    _native.preprocess(
+        frame if frame.flags.c_contiguous else frame.copy(),
+        dark,
+        background if settings.polarity == "shadow" else None,
+        2**bits - 1,
+        settings.minimum_window_px,
+        settings.noise_floor,
+        result,
+        threads,
+    )
+    return result
 
 
-def opacity(light: Intensity, light_field: Intensity) -> Intensity:
-    """Share of the light that a pixel lost, 1 - I / I0; 0 where the field itself is dark."""
-    lit = light_field > DARKEST_BACKGROUND
-    transmittance = np.divide(light, light_field, out=np.ones_like(light), where=lit)
-    lost: Intensity = np.clip(1 - transmittance, 0, 1)
-    return lost
-
-
-def sliding_minimum(image: Intensity, window_px: int) -> Intensity:
-    """Smallest value in a square window around each pixel, smoothed over the window."""
-    kernel = cv2.getStructuringElement(cv2.MORPH_RECT, (window_px, window_px))
-    eroded = cv2.erode(image, kernel, borderType=cv2.BORDER_REPLICATE)
-    smoothed: Intensity = np.asarray(cv2.blur(eroded, (window_px, window_px), borderType=cv2.BORDER_REPLICATE))
-    return smoothed
-
-
-def _light_field(
-    light: Intensity, dark: Intensity | None, background: Intensity | None, full_scale: np.float32, window_px: int
+def sliding_minimum(
+    image: Intensity, window_px: int, out: Intensity | None = None, *, threads: int = DEFAULT_THREADS
 ) -> Intensity:
-    if background is not None:
-        return (background - (0 if dark is None else dark)) / full_scale
-    smooth: Intensity = np.asarray(cv2.medianBlur(light, 5))
-    return -sliding_minimum(-smooth, window_px or 201)
+    """Smallest value in a square window around each pixel, averaged over the same window.
+
+    Beyond its edges an image continues as it ends. Its cost hardly depends on the window.
+    """
+    result = _result(image.shape, out)
+    _native.sliding_minimum(np.ascontiguousarray(image, dtype=np.float32), window_px, result, threads)
+    return result
+
+
+def _estimated_background(frame: Frame, dark: Intensity | None, window_px: int, threads: int) -> Intensity:
+    """What the frame would be without droplets: its sliding maximum, once single bright pixels are gone."""
+    light = frame.astype(np.float32) - (0 if dark is None else dark)
+    smooth = np.asarray(cv2.medianBlur(light, 5), dtype=np.float32)
+    background: Intensity = (0 if dark is None else dark) - sliding_minimum(-smooth, window_px, threads=threads)
+    return background
+
+
+def _result(shape: tuple[int, ...], out: Intensity | None) -> Intensity:
+    if out is None:
+        return np.empty(shape, np.float32)
+    if out.dtype != np.float32 or not out.flags.c_contiguous:
+        raise ValueError(f"output must be contiguous float32, not {out.dtype} with strides {out.strides}")
+    return out

@@ -24,6 +24,17 @@ class View:
 
 def quantise(image: NDArray[np.float32], before: int, after: int, out: NDArray[np.int16], threads: int) -> float: ...
 def resample(image: NDArray[np.float32], nodes: NDArray[np.float32], out: NDArray[np.int16], threads: int) -> float: ...
+def preprocess(
+    pixels: NDArray[np.uint8] | NDArray[np.uint16],
+    dark: NDArray[np.float32] | None,
+    background: NDArray[np.float32] | None,
+    full_scale: float,
+    window: int,
+    noise_floor: float,
+    out: NDArray[np.float32],
+    threads: int,
+) -> None: ...
+def sliding_minimum(image: NDArray[np.float32], window: int, out: NDArray[np.float32], threads: int) -> None: ...
 def line_of_sight(
     views: Sequence[View],
     method: int,

@@ -3,6 +3,8 @@
 
 #include <cstdint>
 
+#include "exposure.hpp"
+
 namespace tomoshadow {
 
 // Volumes are (z, y, x), images (row, column), both contiguous.
@@ -122,6 +124,10 @@ struct Kernels {
     void (*resample)(const Resampling &job, int first_row, int end_row);
     float (*brightest)(const float *pixels, int count);
     void (*quantise)(const float *pixels, float counts_per_unit, int16_t *to, int count);
+    void (*row_minima)(const Exposure &job, int first_row, int end_row);
+    void (*column_minima)(const Exposure &job, int strip);
+    void (*row_means)(const Exposure &job, int first_row, int end_row);
+    void (*subtract_veil)(const Exposure &job, int first_row, int end_row);
 };
 
 }  // namespace tomoshadow

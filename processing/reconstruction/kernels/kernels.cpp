@@ -3,6 +3,7 @@
 // code for a newer processor to an older one.
 #include "instruction_set.hpp"
 #include "output.hpp"
+#include "preprocess.hpp"
 #include "resample.hpp"
 #include "smart.hpp"
 
@@ -90,6 +91,7 @@ void sum_of_sight(const SumOfSight &job, int slab) {
 
 extern const Kernels kernels;
 const Kernels kernels{
-    TOMOSHADOW_TEXT(TOMOSHADOW_ISA), line_of_sight, sum_of_sight, smart_start, smart_pass, write_blocks, resample, brightest, quantise};
+    TOMOSHADOW_TEXT(TOMOSHADOW_ISA), line_of_sight, sum_of_sight, smart_start, smart_pass, write_blocks, resample, brightest, quantise,
+    row_minima, column_minima, row_means, subtract_veil};
 
 }  // namespace tomoshadow::TOMOSHADOW_ISA

@@ -30,6 +30,7 @@ using PlaneArray = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::devi
 using NodeArray = nb::ndarray<const float, nb::shape<3, -1, -1, -1>, nb::c_contig, nb::device::cpu>;
 using ImageArray = nb::ndarray<float, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 using FloatVolume = nb::ndarray<float, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
+using AnyImage = nb::ndarray<nb::ndim<2>, nb::c_contig, nb::device::cpu, nb::ro>;
 using AnyVolume = nb::ndarray<nb::ndim<3>, nb::c_contig, nb::device::cpu>;
 
 constexpr int max_views = 8;
@@ -239,6 +240,54 @@ float resample_image(const RecordedArray &image, const MapArray &nodes, const Fi
     return resample(kernels, from, nodes.data(), static_cast<int>(nodes.shape(1)), out.data(), rows, columns, threads);
 }
 
+Exposure exposure_of(const AnyImage &pixels, int window, const ImageArray &out, int threads) {
+    require(pixels.size() > 0 && pixels.size() < (1u << 30), "image: empty or too large");
+    require(pixels.shape(0) == out.shape(0) && pixels.shape(1) == out.shape(1), "image and output differ in shape");
+    require(window >= 0 && window <= (1 << 14), "window: 0 to 16384 pixels, please");
+    require(threads >= 1, "threads must be positive");
+    Exposure exposure{};
+    exposure.pixels = pixels.data();
+    exposure.grey = pixels.dtype() == nb::dtype<uint8_t>()    ? Exposure::Grey::byte
+                    : pixels.dtype() == nb::dtype<uint16_t>() ? Exposure::Grey::word
+                                                              : Exposure::Grey::single;
+    require(exposure.grey != Exposure::Grey::single || pixels.dtype() == nb::dtype<float>(),
+            "image: uint8, uint16 or float32, please");
+    exposure.rows = static_cast<int>(pixels.shape(0));
+    exposure.columns = static_cast<int>(pixels.shape(1));
+    exposure.full_scale = 1.0f;
+    exposure.window = window;
+    exposure.intensity = out.data();
+    return exposure;
+}
+
+const float *reference(const std::optional<RecordedArray> &image, const ImageArray &out) {
+    if (!image) return nullptr;
+    require(image->shape(0) == out.shape(0) && image->shape(1) == out.shape(1), "image and reference differ in shape");
+    return image->data();
+}
+
+void preprocess_exposure(const AnyImage &pixels, const std::optional<RecordedArray> &dark,
+                         const std::optional<RecordedArray> &background, float full_scale, int window,
+                         float noise_floor, const ImageArray &out, int threads) {
+    require(full_scale > 0 && noise_floor >= 0 && noise_floor < 1, "full scale or noise floor out of range");
+    Exposure exposure = exposure_of(pixels, window, out, threads);
+    exposure.dark = reference(dark, out);
+    exposure.background = reference(background, out);
+    exposure.full_scale = full_scale;
+    exposure.noise_floor = noise_floor;
+    const Kernels &kernels = selected_kernels();
+    nb::gil_scoped_release release;
+    preprocess(kernels, exposure, threads);
+}
+
+void sliding_minimum_of(const RecordedArray &image, int window, const ImageArray &out, int threads) {
+    require(window >= 1, "window must be positive");
+    const Exposure exposure = exposure_of(AnyImage(image), window, out, threads);
+    const Kernels &kernels = selected_kernels();
+    nb::gil_scoped_release release;
+    sliding_minimum(kernels, exposure, threads);
+}
+
 }  // namespace
 
 NB_MODULE(_native, module) {
@@ -249,6 +298,9 @@ NB_MODULE(_native, module) {
                     "cull"_a = true);
     module.def("quantise", &quantise_framed, "image"_a, "before"_a, "after"_a, "out"_a, "threads"_a);
     module.def("resample", &resample_image, "image"_a, "nodes"_a, "out"_a, "threads"_a);
+    module.def("preprocess", &preprocess_exposure, "pixels"_a, "dark"_a.none(), "background"_a.none(), "full_scale"_a,
+               "window"_a, "noise_floor"_a, "out"_a.noconvert(), "threads"_a);
+    module.def("sliding_minimum", &sliding_minimum_of, "image"_a, "window"_a, "out"_a.noconvert(), "threads"_a);
     module.def("line_of_sight", &line_of_sight, "views"_a, "method"_a, "volume"_a, "threads"_a);
     module.def("sum_of_sight", &sum_of_sight, "exposures"_a, "method"_a, "volume"_a, "threads"_a);
     nb::class_<Blocks>(module, "Blocks")

@@ -1,0 +1,46 @@
+#include "exposure.hpp"
+
+#include <algorithm>
+
+#include "bands.hpp"
+
+namespace tomoshadow {
+
+namespace {
+
+constexpr int rows_at_once = 16;
+
+template <class Work>
+void for_rows(int rows, int threads, const Work &work) {
+    for_each((rows + rows_at_once - 1) / rows_at_once, threads, [&](int chunk) {
+        work(chunk * rows_at_once, std::min(rows, (chunk + 1) * rows_at_once));
+    });
+}
+
+// Minima along rows and columns, then means along columns; those along rows are left to whoever wants them.
+void minima(const Kernels &kernels, const Exposure &job, int threads) {
+    for_rows(job.rows, threads, [&](int first, int end) { kernels.row_minima(job, first, end); });
+    for_each((job.columns + strip_columns - 1) / strip_columns, threads,
+             [&](int strip) { kernels.column_minima(job, strip); });
+}
+
+}  // namespace
+
+void sliding_minimum(const Kernels &kernels, const Exposure &job, int threads) {
+    minima(kernels, job, threads);
+    for_rows(job.rows, threads, [&](int first, int end) { kernels.row_means(job, first, end); });
+}
+
+void preprocess(const Kernels &kernels, const Exposure &job, int threads) {
+    if (job.window) minima(kernels, job, threads);
+    for_rows(job.rows, threads, [&](int first, int end) {
+        float *veil = job.intensity + static_cast<int64_t>(first) * job.columns;
+        if (job.window)
+            kernels.row_means(job, first, end);
+        else
+            std::fill(veil, veil + static_cast<int64_t>(end - first) * job.columns, 0.0f);
+        kernels.subtract_veil(job, first, end);
+    });
+}
+
+}  // namespace tomoshadow
