@@ -10,20 +10,29 @@ import numpy as np
 
 from processing.geometry import FloatArray
 
-MAX_STEPS = 100
+MAX_TRIALS = 150
+"""Steps that are tried, those that lead upwards included."""
 TOLERANCE = 1e-8
 """Relative fall of the cost below which the fit has converged."""
+HARDER, EASIER = 2.0, 5.0
+"""Change of the damping after a bad and a good step; the fit creeps along valleys where it rises faster."""
+MAX_DAMPING = 1e8
+"""Where even the shortest steps lead upwards, the fit is at the bottom."""
 
-Model = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
+Function = Callable[[FloatArray], FloatArray]
 
 
-def minimise(model: Model, start: FloatArray, robust_scale: float | None = None) -> FloatArray:
+def minimise(
+    residuals_at: Function, derivatives_at: Function, start: FloatArray, robust_scale: float | None = None
+) -> FloatArray:
     """Parameters of least residuals.
 
     Parameters
     ----------
-    model : callable
-        Parameters (P,) to residuals (N, 2) and their derivatives (2 N, P).
+    residuals_at : callable
+        Parameters (P,) to residuals (N, 2).
+    derivatives_at : callable
+        Parameters (P,) to the derivatives (2 N, P) of the residuals.
     start : (P,) array
         First guess.
     robust_scale : float, optional
@@ -35,27 +44,34 @@ def minimise(model: Model, start: FloatArray, robust_scale: float | None = None)
         The best parameters found.
     """
     parameters, damping = np.array(start, dtype=np.float64), 1e-3
-    residuals, jacobian = model(parameters)
+    residuals = residuals_at(parameters)
     cost, weights = _cost_and_weights(residuals, robust_scale)
-    for _ in range(MAX_STEPS):
-        weighted = jacobian * np.repeat(weights, 2)[:, None]
-        matrix, gradient = weighted.T @ jacobian, weighted.T @ residuals.ravel()
-        scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-        matrix, gradient = matrix / np.outer(scale, scale), gradient / scale
+    matrix, gradient, scale = _normal_equations(residuals, derivatives_at(parameters), weights)
+    for _ in range(MAX_TRIALS):
         step = np.linalg.solve(matrix + damping * np.eye(len(matrix)), gradient) / scale
-        new_residuals, new_jacobian = model(parameters - step)
-        new_cost, new_weights = _cost_and_weights(new_residuals, robust_scale)
-        if new_cost > cost or not np.isfinite(new_cost):
-            damping *= 10
-            if damping > 1e8:
+        residuals = residuals_at(parameters - step)
+        new_cost, weights = _cost_and_weights(residuals, robust_scale)
+        if not new_cost <= cost:
+            damping *= HARDER
+            if damping > MAX_DAMPING:
                 break
             continue
         converged = cost - new_cost <= TOLERANCE * cost
-        parameters, residuals, jacobian, weights = parameters - step, new_residuals, new_jacobian, new_weights
-        cost, damping = new_cost, max(damping / 10, 1e-14)
+        parameters, cost, damping = parameters - step, new_cost, max(damping / EASIER, 1e-14)
         if converged:
             break
+        matrix, gradient, scale = _normal_equations(residuals, derivatives_at(parameters), weights)
     return parameters
+
+
+def _normal_equations(
+    residuals: FloatArray, jacobian: FloatArray, weights: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Matrix (P, P) and right side (P,) for steps in units of 1 / scale (P,)."""
+    weighted = jacobian * np.repeat(weights, 2)[:, None]
+    matrix, gradient = weighted.T @ jacobian, weighted.T @ residuals.ravel()
+    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    return matrix / np.outer(scale, scale), gradient / scale, scale
 
 
 def _cost_and_weights(residuals: FloatArray, robust_scale: float | None) -> tuple[float, FloatArray]:

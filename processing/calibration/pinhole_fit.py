@@ -1,7 +1,9 @@
 """A pinhole camera fitted to points at known places (eq. 3): one pose, all intrinsics free, all points at once.
 
 Planes fitted one by one cannot tell the principal point from a tilt of the plane; the known travel of the
-stage can. The fit starts from a direct linear transformation and refines all parameters together.
+stage can. The fit starts from a direct linear transformation and refines all parameters together, told as what
+the image shows (``processing.calibration.aim``). What looks like a principal point far off may as well be a tilted
+sensor: with tilt, the fit starts from a principal point in the middle of the image.
 """
 
 from dataclasses import dataclass
@@ -11,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import rq
 
+from processing.calibration.aim import Aim
 from processing.calibration.errors import CalibrationError
 from processing.calibration.least_squares import minimise
 from processing.geometry import FloatArray, PinholeCamera
@@ -77,6 +80,8 @@ def fit_pinhole(
     if 2 * len(points_mm) < n_parameters + 3:
         raise CalibrationError(f"{len(points_mm)} points for {n_parameters} parameters, need {(n_parameters + 4) // 2}")
     start = _pack(_first_guess(points_mm, image_px, image_size_px), tilted)
+    if tilted:
+        start = Aim.at(start, points_mm.mean(axis=0)).with_centre(start, (np.array(image_size_px) - 1) / 2)
     scale_px = max(_spread_px(_residuals_px(start, points_mm, image_px)), 0.05)
     robust = _refine(start, points_mm, image_px, ROBUST_SCALE * scale_px)
     scale_px = max(_spread_px(_residuals_px(robust, points_mm, image_px)), 1e-4)
@@ -166,7 +171,7 @@ def _project(parameters: FloatArray, points_mm: FloatArray) -> tuple[FloatArray,
 
 
 def _residuals_px(parameters: FloatArray, points_mm: FloatArray, image_px: FloatArray) -> FloatArray:
-    return _project(parameters, points_mm)[0] - image_px
+    return _unpack(parameters, (0, 0)).project(points_mm) - image_px
 
 
 def _spread_px(residuals_px: FloatArray) -> float:
@@ -175,8 +180,12 @@ def _spread_px(residuals_px: FloatArray) -> float:
 
 
 def _refine(start: FloatArray, points_mm: FloatArray, image_px: FloatArray, robust_px: float | None) -> FloatArray:
-    def model(parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
-        projected_px, jacobian = _project(parameters, points_mm)
-        return projected_px - image_px, jacobian
+    aim = Aim.at(start, points_mm.mean(axis=0))
 
-    return minimise(model, start, robust_px)
+    def residuals_px(values: FloatArray) -> FloatArray:
+        return _residuals_px(aim.parameters(values), points_mm, image_px)
+
+    def derivatives(values: FloatArray) -> FloatArray:
+        return _project(aim.parameters(values), points_mm)[1] @ aim.derivatives(values)
+
+    return aim.parameters(minimise(residuals_px, derivatives, aim.values(start), robust_px))
