@@ -112,7 +112,12 @@ def _add_calibrate(verbs: Any) -> None:
     parser = _verb(verbs, "calibrate", commands.calibrate_views, "fit the camera of every view to a calibration set")
     parser.add_argument("set", type=Path, help="calibration run, or an imported set")
     parser.add_argument("-o", "--out", type=Path, required=True, help="calibration file to write")
-    parser.add_argument("--model", choices=("pinhole", "pinhole_tilted", "polynomial"), default="pinhole")
+    parser.add_argument(
+        "--model",
+        choices=("pinhole", "pinhole_tilted", "polynomial", "auto"),
+        default="pinhole",
+        help="auto: for each view the simplest one, unless another predicts unseen points clearly better",
+    )
 
 
 def _add_check(verbs: Any) -> None:

@@ -73,11 +73,13 @@ def view_errors(calibration: Calibration) -> dict[str, Any]:
     return {
         "views": {
             name: {
+                "model": view.model.value,
                 "n_points": view.n_points,
                 "mean_error_px": view.mean_error_px,
                 "rms_px": view.rms_px,
                 "max_error_px": view.max_error_px,
                 "holdout_error_px": view.holdout_error_px,
+                "candidates_holdout_error_px": dict(view.candidates_px),
                 "position_std_px": worst_position_std_px(view),
                 "planes": [
                     {

@@ -1,7 +1,7 @@
 """Calibration: the camera of every view, and how well it describes what was seen. Values only."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 import numpy as np
@@ -117,6 +117,8 @@ class ViewCalibration:
         Poses of the boards, where the fit had to find them.
     covariance : ParameterCovariance | None
         Of the parameters of a pinhole camera; None for other models, and after a correction.
+    candidates_px : Mapping[Model, float]
+        Where the model was chosen among several: the hold-out error of each, all on the same points.
     """
 
     mapping: ViewMapping
@@ -132,6 +134,7 @@ class ViewCalibration:
     extent_mm: tuple[tuple[float, float], ...] = ()
     board_poses: tuple[BoardPose, ...] = ()
     covariance: ParameterCovariance | None = None
+    candidates_px: Mapping[Model, float] = field(default_factory=dict)
 
     def with_boards(self, board_poses: tuple[BoardPose, ...]) -> "ViewCalibration":
         """The same with the poses of boards."""

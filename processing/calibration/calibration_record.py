@@ -108,6 +108,7 @@ class ViewRecord(_Record):
     boards_in_free_poses: tuple[BoardRecord, ...]
     planes: tuple[PlaneRecord, ...]
     covariance: CovarianceRecord | None = None
+    candidates_holdout_error_px: dict[Model, NonNegative] | None = None
 
 
 class CalibrationRecord(_Record):
@@ -171,9 +172,10 @@ def json_id(content: Mapping[str, Any]) -> str:
 def to_json(record: CalibrationRecord) -> dict[str, Any]:
     """Record as JSON values; optional fields that are not known are left out, as in files older than they."""
     content = record.model_dump(mode="json", by_alias=True)
-    for described, optional in [(content, "parent"), *((view, "covariance") for view in content["views"].values())]:
-        if described[optional] is None:
-            del described[optional]
+    for described in (content, *content["views"].values()):
+        for optional in ("parent", "covariance", "candidates_holdout_error_px"):
+            if optional in described and described[optional] is None:
+                del described[optional]
     return content
 
 
@@ -204,6 +206,7 @@ def _view_record(view: ViewCalibration) -> ViewRecord:
             for plane in view.planes
         ),
         covariance=_covariance_record(view.covariance),
+        candidates_holdout_error_px=dict(view.candidates_px) or None,
     )
 
 
@@ -225,6 +228,7 @@ def _view(record: ViewRecord) -> ViewCalibration:
             for board in record.boards_in_free_poses
         ),
         covariance=_covariance(record.covariance),
+        candidates_px=record.candidates_holdout_error_px or {},
     )
 
 

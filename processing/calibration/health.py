@@ -80,7 +80,12 @@ def degeneracy(planes: Sequence[PlaneObservation]) -> str | None:
 
 
 def holdout_error_px(planes: Sequence[PlaneObservation], fit: Fit) -> float:
-    """Mean error of points that were held out of the fit, each point once.
+    """Mean error of points that were held out of the fit, each point once; see ``holdout_distances_px``."""
+    return float(holdout_distances_px(planes, fit).mean())
+
+
+def holdout_distances_px(planes: Sequence[PlaneObservation], fit: Fit) -> FloatArray:
+    """Errors (N,) of points that were held out of the fit, each point once, in an order that the planes alone decide.
 
     Whole planes are held out where the others still determine the camera, else every fifth point.
 
@@ -98,7 +103,7 @@ def holdout_error_px(planes: Sequence[PlaneObservation], fit: Fit) -> float:
     for training, held_out in folds:
         mapping = fit(training)
         distances_px += [errors_px(mapping, plane) for plane in held_out if len(plane)]
-    return float(np.concatenate(distances_px).mean())
+    return np.concatenate(distances_px)
 
 
 def outline_mm(planes: Sequence[PlaneObservation]) -> tuple[tuple[float, float], ...]:

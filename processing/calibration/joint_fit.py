@@ -13,9 +13,8 @@ from processing.calibration.covariance import parameter_covariance
 from processing.calibration.errors import CalibrationError
 from processing.calibration.free_pose import board_errors_px, fit_free_poses, free_pose_holdout_px
 from processing.calibration.health import check_motion, errors_px, holdout_error_px, judge, outline_mm, plane_error
+from processing.calibration.model_choice import AUTO, fit_mapping, holdout_by_model, simplest_that_holds
 from processing.calibration.observation import CalibrationSet, PlaneObservation, ViewObservations, stacked
-from processing.calibration.pinhole_fit import fit_pinhole
-from processing.calibration.polynomial import fit_polynomial
 from processing.geometry import FloatArray, PinholeCamera, ViewMapping
 
 
@@ -28,8 +27,9 @@ def calibrate(
     ----------
     calibration_set : CalibrationSet
         Detected points.
-    model : Model
-        One joint fit per view: ``pinhole``, ``pinhole_tilted`` or ``polynomial``.
+    model : Model | str
+        One joint fit per view: ``pinhole``, ``pinhole_tilted`` or ``polynomial``; or ``auto``: each view gets the
+        simplest of them unless another predicts unseen points clearly better (boards in free poses: ``pinhole``).
     created_utc : str, optional
         ISO 8601; now, if not given.
 
@@ -38,11 +38,11 @@ def calibrate(
     CalibrationError
         A view cannot be calibrated; names view, value and limit.
     """
-    model = Model(model)
+    wanted = None if model == AUTO else Model(model)
     views = {}
     for name, seen in calibration_set.views.items():
         try:
-            views[name] = _free_view(seen, model) if seen.free_pose else _joint_view(name, seen, model)
+            views[name] = _free_view(seen, wanted) if seen.free_pose else _joint_view(name, seen, wanted)
         except CalibrationError as error:
             text = str(error)
             raise CalibrationError(text if text.startswith(name) else f"{name}: {text}") from error
@@ -71,8 +71,17 @@ def _mirrored(calibration_set: CalibrationSet, views: Mapping[str, ViewCalibrati
                 )
 
 
-def _joint_view(name: str, seen: ViewObservations, model: Model) -> ViewCalibration:
+def _joint_view(name: str, seen: ViewObservations, wanted: Model | None) -> ViewCalibration:
+    """Fit the model that is wanted; None: all models, and the one to keep."""
     check_motion(name, seen.planes)
+    if wanted is not None:
+        return _fitted_view(seen, wanted)
+    distances_px = holdout_by_model(seen.planes, seen.image_size_px)
+    chosen = _fitted_view(seen, simplest_that_holds(distances_px))
+    return replace(chosen, candidates_px={model: float(px.mean()) for model, px in distances_px.items()})
+
+
+def _fitted_view(seen: ViewObservations, model: Model) -> ViewCalibration:
     mapping, used = fit_mapping(seen.planes, seen.image_size_px, model)
     masks = [_counted(mask) for mask in _by_plane(seen.planes, used)]
     planes = [plane.select(mask) for plane, mask in zip(seen.planes, masks, strict=True)]
@@ -87,20 +96,9 @@ def _joint_view(name: str, seen: ViewObservations, model: Model) -> ViewCalibrat
     return replace(summary, covariance=parameter_covariance(mapping, points_mm, image_px, tilted=tilted))
 
 
-def fit_mapping(
-    planes: Sequence[PlaneObservation], image_size_px: tuple[int, int], model: Model
-) -> tuple[ViewMapping, NDArray[np.bool_]]:
-    """Fit one mapping to all points of a view; also which of them (N,) it was fitted to."""
-    points_mm, image_px = stacked(planes)
-    if model is Model.POLYNOMIAL:
-        return fit_polynomial(points_mm, image_px, image_size_px)
-    fitted = fit_pinhole(points_mm, image_px, image_size_px, tilted=model is Model.PINHOLE_TILTED)
-    return fitted.camera, fitted.used
-
-
-def _free_view(seen: ViewObservations, model: Model) -> ViewCalibration:
-    if model is not Model.PINHOLE:
-        raise CalibrationError(f"boards in free poses give a pinhole camera, not {model.value}")
+def _free_view(seen: ViewObservations, wanted: Model | None) -> ViewCalibration:
+    if wanted not in (None, Model.PINHOLE):
+        raise CalibrationError(f"boards in free poses give a pinhole camera, not {wanted}")
     if not all(plane.free_pose for plane in seen.planes):
         raise CalibrationError("some planes have z_mm, others have not: give all of them or none")
     fitted = fit_free_poses(seen.planes, seen.image_size_px)
@@ -108,7 +106,7 @@ def _free_view(seen: ViewObservations, model: Model) -> ViewCalibration:
         board_errors_px(fitted.camera, board, pose) for board, pose in zip(seen.planes, fitted.poses, strict=True)
     ]
     holdout_px = free_pose_holdout_px(seen.planes, seen.image_size_px)
-    summary = _summary(fitted.camera, model, list(seen.planes), errors, holdout_px, 0, extent_mm=())
+    summary = _summary(fitted.camera, Model.PINHOLE, list(seen.planes), errors, holdout_px, 0, extent_mm=())
     return summary.with_boards(fitted.poses)
 
 

@@ -18,7 +18,7 @@ class CalibrationRequest(FrozenModel):
     """Make a calibration from a run."""
 
     run_id: Annotated[str, Field(description="a run of kind calibration")]
-    model: Literal["pinhole", "pinhole_tilted", "polynomial"] = "pinhole"
+    model: Literal["pinhole", "pinhole_tilted", "polynomial", "auto"] = "pinhole"
 
 
 class CurrentCalibration(FrozenModel):
