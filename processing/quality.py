@@ -102,18 +102,22 @@ def local_maxima(volume: Volume, threshold: float) -> NDArray[np.intp]:
 
 def _window_sums(truth: Volume, volume: Volume, window: int, step: int) -> tuple[Sums, Sums, tuple[Sums, Sums, Sums]]:
     """Sums over all windows of both volumes, and of the products (ab, aa, bb); one layer of blocks at a time."""
-    layers: list[list[Sums]] = []
-    for z in range(0, truth.shape[0] - step + 1, step):
-        a, b = truth[z : z + step], volume[z : z + step]
-        layers.append([_block_sums(layer, step) for layer in (a, b, a * b, a * a, b * b)])
-    first, second, *products = (_moving_sums(np.stack(layer), window // step) for layer in zip(*layers, strict=True))
+    starts = range(0, truth.shape[0] - step + 1, step)
+    layers = [_layer_sums(truth[z : z + step], volume[z : z + step], step) for z in starts]
+    first, second, *products = (_moving_sums(blocks, window // step) for blocks in np.stack(layers, axis=1))
     return first, second, (products[0], products[1], products[2])
 
 
-def _block_sums(layer: Volume, step: int) -> Sums:
-    ny, nx = (n // step for n in layer.shape[1:])
-    columns = layer[:, : ny * step, : nx * step].sum(axis=0, dtype=np.float64)
-    return np.asarray(columns.reshape(ny, step, nx, step).sum(axis=(1, 3)))
+def _layer_sums(truth: Volume, volume: Volume, step: int) -> Sums:
+    """Sums (5, ny, nx) of a, b, ab, aa and bb over the blocks of a layer; row by row, so that a row stays in cache."""
+    ny, nx = (n // step for n in truth.shape[1:])
+    sums = np.empty((5, ny, nx))
+    for row in range(ny):
+        span = np.s_[:, row * step : (row + 1) * step, : nx * step]
+        a, b = (values[span].astype(np.float64).reshape(-1, nx * step) for values in (truth, volume))
+        columns = [a.sum(axis=0), b.sum(axis=0), *(np.einsum("ij,ij->j", *pair) for pair in ((a, b), (a, a), (b, b)))]
+        sums[:, row] = np.stack(columns).reshape(5, nx, step).sum(axis=2)
+    return sums
 
 
 def _moving_sums(blocks: Sums, count: int) -> Sums:

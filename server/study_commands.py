@@ -1,8 +1,10 @@
 """``tomoshadow study``: each study writes CSV and figure, and says what the paper says beside what it found."""
 
+import time
 from argparse import Namespace
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, replace
+from functools import wraps
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -24,8 +26,18 @@ from processing.studies.density import (
     density_statements,
     density_study,
 )
-from processing.studies.ghosts import GhostRow, GhostStudy, ghost_figure, ghost_statements, ghost_study
-from processing.studies.recipe import ALL_RECIPES, PAPER_RECIPES, Recipe
+from processing.studies.ghosts import (
+    MAX_GHOSTS,
+    MIN_FOUND,
+    TARGET_DENSITY_PER_MM3,
+    GhostRow,
+    GhostStudy,
+    ghost_figure,
+    ghost_statements,
+    ghost_study,
+    meets_target,
+)
+from processing.studies.recipe import ALL_RECIPES, PAPER_ITERATIONS, PAPER_RECIPES, Recipe
 from processing.studies.report import Statement, csv_text
 from processing.studies.residuals import (
     ResidualRow,
@@ -44,16 +56,32 @@ from processing.studies.sensitivity import (
 from server.commands import progress
 
 Row = TypeVar("Row")
+Command = Callable[[Namespace], dict[str, Any]]
 
 
+def timed(study: Command) -> Command:
+    """Say how long a study took."""
+
+    @wraps(study)
+    def run(options: Namespace) -> dict[str, Any]:
+        wall_s, cpu_s = time.perf_counter(), time.process_time()
+        result = study(options)
+        seconds = {"wall": time.perf_counter() - wall_s, "cpu": time.process_time() - cpu_s}
+        progress(f"took {seconds['wall']:.0f} s, {seconds['cpu']:.0f} CPU-s")
+        return {**result, "seconds": seconds}
+
+    return run
+
+
+@timed
 def study_density(options: Namespace) -> dict[str, Any]:
     """``tomoshadow study density``."""
-    if options.all:
-        study = DensityStudy(sigmas_voxel=ALL_SIGMAS_VOXEL, recipes=ALL_RECIPES)
-    else:
-        study = DensityStudy(sigmas_voxel=tuple(options.sigma or (1.5,)), recipes=_recipes(options))
+    sigmas_voxel = ALL_SIGMAS_VOXEL if options.all else tuple(options.sigma or (1.5,))
+    study = DensityStudy(sigmas_voxel=sigmas_voxel, recipes=_recipes(options))
     rows = _collected(density_study(study), _density_line)
-    return _report(options.out, "density", rows, density_figure(rows, study), density_statements(rows))
+    progress(f"Q is mean-subtracted in windows of {study.window}^3 voxel at steps of {study.step}")
+    result = _report(options.out, "density", rows, density_figure(rows, study), density_statements(rows))
+    return {**result, "window_voxel": study.window, "step_voxel": study.step, "mean_subtracted": True}
 
 
 def _density_line(row: DensityRow) -> str:
@@ -61,11 +89,18 @@ def _density_line(row: DensityRow) -> str:
     return f"{place}, {row.method}: Q = {row.quality_factor:.3f}"
 
 
+@timed
 def study_ghosts(options: Namespace) -> dict[str, Any]:
     """``tomoshadow study ghosts``."""
     recipes = tuple(Recipe.named(name) for name in options.method) if options.method else ALL_RECIPES
     rows = _collected(ghost_study(GhostStudy(sigma_voxel=options.sigma, recipes=recipes)), _ghost_line)
-    return _report(options.out, "ghosts", rows, ghost_figure(rows), ghost_statements(rows))
+    result = _report(options.out, "ghosts", rows, ghost_figure(rows), ghost_statements(rows))
+    passed = meets_target(rows)
+    if passed is None:
+        return result
+    limits = f">= {100 * MIN_FOUND:.0f} % found and <= {100 * MAX_GHOSTS:.0f} % ghosts"
+    progress(f"SMART-20, {limits} up to {TARGET_DENSITY_PER_MM3:g} droplets/mm3: {'PASSED' if passed else 'FAILED'}")
+    return {**result, "passed": passed}
 
 
 def _ghost_line(row: GhostRow) -> str:
@@ -73,6 +108,7 @@ def _ghost_line(row: GhostRow) -> str:
     return f"{place}: {100 * row.found:.1f} % found, {100 * row.ghosts:.1f} % ghosts"
 
 
+@timed
 def study_average(options: Namespace) -> dict[str, Any]:
     """``tomoshadow study average``."""
     study = AverageStudy(shots=options.shots, binning=options.binning, seed=options.seed)
@@ -84,6 +120,7 @@ def study_average(options: Namespace) -> dict[str, Any]:
     return {**result, "profiles": str(profiles)}
 
 
+@timed
 def study_residuals(options: Namespace) -> dict[str, Any]:
     """``tomoshadow study residuals``."""
     rows = _collected(residual_study(ResidualStudy(binning=options.binning, seed=options.seed)), _residual_line)
@@ -94,6 +131,7 @@ def _residual_line(row: ResidualRow) -> str:
     return f"{row.view}, {row.points}, z = {row.z_mm:g} mm: {row.mean_error_px:.2g} px at {row.n_points} points"
 
 
+@timed
 def study_sensitivity(options: Namespace) -> dict[str, Any]:
     """``tomoshadow study sensitivity``."""
     study = SensitivityStudy(density_per_mm3=options.density, sigma_voxel=options.sigma, repeats=options.repeats)
@@ -109,8 +147,10 @@ def _sensitivity_line(row: SensitivityRow) -> str:
 
 
 def _recipes(options: Namespace) -> tuple[Recipe, ...]:
+    if not options.method and options.iterations is None:
+        return ALL_RECIPES
     names = options.method or [recipe.method.value for recipe in PAPER_RECIPES]
-    return tuple(Recipe.named(name, options.iterations) for name in names)
+    return tuple(Recipe.named(name, options.iterations or PAPER_ITERATIONS) for name in names)
 
 
 def _collected(rows: Iterable[Row], line: Any) -> list[Row]:

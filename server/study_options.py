@@ -7,6 +7,7 @@ from pathlib import Path
 from processing.studies.recipe import PAPER_ITERATIONS, Recipe
 from server import study_commands
 
+_EVERY_METHOD = "all, SMART after 5, 10 and 20 iterations, MART after 5"
 AddVerb = Callable[..., argparse.ArgumentParser]
 """Adds a command: name, function, summary."""
 
@@ -25,16 +26,16 @@ def _add_density(add_verb: AddVerb) -> None:
     parser = add_verb("density", study_commands.study_density, summary)
     _add_out(parser, "density")
     parser.add_argument("--sigma", type=positive, action="append", help="blob width in voxel, repeatable; default 1.5")
-    parser.add_argument("--iterations", type=count, default=PAPER_ITERATIONS, help="of smart and mart without -N")
-    _add_methods(parser, "mlos, minlos, gavlos and smart")
-    parser.add_argument("--all", action="store_true", help="sigma 0.75 to 2, all methods, SMART after 5, 10 and 20")
+    parser.add_argument("--iterations", type=count, help=f"of smart and mart without -N, {PAPER_ITERATIONS} by default")
+    _add_methods(parser, _EVERY_METHOD)
+    parser.add_argument("--all", action="store_true", help="sigma 0.75, 1.27, 1.5 and 2")
 
 
 def _add_ghosts(add_verb: AddVerb) -> None:
     parser = add_verb("ghosts", study_commands.study_ghosts, "found and ghost droplets against droplet density")
     _add_out(parser, "ghosts")
     parser.add_argument("--sigma", type=positive, default=1.0, help="blob width in voxel")
-    _add_methods(parser, "all, SMART after 5, 10 and 20 iterations, MART after 5")
+    _add_methods(parser, _EVERY_METHOD)
 
 
 def _add_average(add_verb: AddVerb) -> None:

@@ -33,6 +33,8 @@ from processing.studies.simulated_droplets import (
 
 MIN_FOUND, MAX_GHOSTS = 0.97, 0.02
 """What droplet tracking can live with."""
+TARGET_SIGMA_VOXEL, TARGET_DENSITY_PER_MM3 = 1.0, 28.0
+"""Droplets of this width, up to this density: SMART-20 is to find so many with so few ghosts."""
 
 
 class ThresholdRule(StrEnum):
@@ -118,6 +120,21 @@ def ghost_statements(rows: Sequence[GhostRow]) -> list[Statement]:
         for method in dict.fromkeys(row.method for row in rows)
         for rule in ThresholdRule
     ]
+
+
+def meets_target(rows: Sequence[GhostRow]) -> bool | None:
+    """Whether SMART-20 keeps both limits up to the target's density, without truth in the choice of the threshold.
+
+    None where SMART-20, the width of the droplets, or a density of at least half the target's is not among the rows.
+    """
+    judged = [
+        row
+        for row in _curve(rows, "smart", ThresholdRule.HALF_MEDIAN)
+        if row.density_per_mm3 <= TARGET_DENSITY_PER_MM3 and row.sigma_voxel == TARGET_SIGMA_VOXEL
+    ]
+    if not judged or judged[-1].density_per_mm3 < 0.5 * TARGET_DENSITY_PER_MM3:
+        return None
+    return all(row.found >= MIN_FOUND and row.ghosts <= MAX_GHOSTS for row in judged)
 
 
 def _trusted(rows: Sequence[GhostRow], method: str, rule: ThresholdRule) -> str:

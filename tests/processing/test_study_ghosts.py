@@ -2,7 +2,15 @@
 
 import pytest
 
-from processing.studies.ghosts import GhostRow, GhostStudy, ThresholdRule, ghost_figure, ghost_statements, ghost_study
+from processing.studies.ghosts import (
+    GhostRow,
+    GhostStudy,
+    ThresholdRule,
+    ghost_figure,
+    ghost_statements,
+    ghost_study,
+    meets_target,
+)
 from processing.studies.recipe import PAPER_RECIPES, Recipe
 
 SMALL = GhostStudy(shape=(250, 40, 300), counts=(83, 333, 666), recipes=PAPER_RECIPES, image_size_px=(440, 90))
@@ -59,6 +67,31 @@ def test_statements_say_up_to_which_density_a_method_holds() -> None:
     assert with_rule.ours == "up to 14.0 droplets/mm3 (98.0 % found, 1.9 % ghosts)"
     assert with_rule.topic.startswith("SMART-20, half_median")
     assert without_rows.ours == "none of the simulated ones"
+
+
+@pytest.mark.parametrize(
+    ("points", "sigma_voxel", "expected"),
+    [
+        (((14, 0.99, 0.0), (27.6, 0.97, 0.02), (55, 0.5, 0.9)), 1.0, True),
+        (((14, 0.99, 0.0), (27.6, 0.969, 0.0)), 1.0, False),
+        (((14, 0.99, 0.021), (27.6, 0.99, 0.0)), 1.0, False),
+        (((14, 0.99, 0.0), (27.6, 0.99, 0.0)), 1.5, None),
+        (((7, 0.99, 0.0), (55, 0.99, 0.0)), 1.0, None),
+    ],
+)
+def test_the_target_is_met_by_every_density_below_its_own_or_not_at_all(
+    points: tuple[tuple[float, float, float], ...], sigma_voxel: float, expected: bool | None
+) -> None:
+    rows = [
+        GhostRow(density, "smart", ThresholdRule.HALF_MEDIAN, 0.5, found, ghosts, sigma_voxel)
+        for density, found, ghosts in points
+    ]
+    worthless = GhostRow(14, "mlos", ThresholdRule.HALF_MEDIAN, 0.5, 0.1, 0.9, sigma_voxel)
+    assert meets_target([*rows, worthless]) is expected
+
+
+def test_smart_meets_the_target_in_the_reduced_volume(rows: list[GhostRow]) -> None:
+    assert meets_target(rows)
 
 
 def test_the_figure_shows_both_quantities_for_both_rules(rows: list[GhostRow]) -> None:

@@ -1,10 +1,13 @@
 """``tomoshadow study``: files, JSON and usage."""
 
 import json
+from functools import partial
 from pathlib import Path
 
 import pytest
 
+from processing.studies.density import DensityStudy
+from server import study_commands
 from server.cli import main
 
 
@@ -49,3 +52,19 @@ def test_bad_usage_exits_with_2_and_names_the_value(
         main(["study", *arguments])
     assert stopped.value.code == 2
     assert complaint in capsys.readouterr().err
+
+
+def test_the_density_study_states_widths_windows_and_subtraction(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    small = partial(DensityStudy, shape=(64, 64, 64), counts=(10, 20), image_size_px=(128, 104))
+    monkeypatch.setattr(study_commands, "DensityStudy", small)
+    assert main(["study", "density", "--sigma", "1", "--sigma", "2", "-o", str(tmp_path), "--json"]) == 0
+    output, progress = capsys.readouterr()
+    result = json.loads(output.splitlines()[-1])
+    assert (result["window_voxel"], result["step_voxel"], result["mean_subtracted"]) == (64, 32, True)
+    assert {row["sigma_voxel"] for row in result["rows"]} == {1, 2}
+    methods = list(dict.fromkeys(row["method"] for row in result["rows"]))
+    assert methods == ["mlos", "minlos", "gavlos", "smart-5", "smart-10", "smart", "mart-5"]
+    assert 0 < result["seconds"]["cpu"] < 60
+    assert "mean-subtracted in windows of 64^3 voxel at steps of 32" in progress
