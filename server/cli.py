@@ -118,6 +118,13 @@ def _add_calibrate(verbs: Any) -> None:
         default="pinhole",
         help="auto: for each view the simplest one, unless another predicts unseen points clearly better",
     )
+    parser.add_argument(
+        "--origin",
+        type=commands.stated_origin,
+        action="append",
+        metavar="VIEW@Z=U,V",
+        help="where a view of a run sees the target's origin at position Z in mm, if no image shows all of it",
+    )
 
 
 def _add_check(verbs: Any) -> None:

@@ -4,7 +4,7 @@ import json
 import re
 import resource
 import sys
-from argparse import Namespace
+from argparse import ArgumentTypeError, Namespace
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +32,8 @@ from server.calibration_pictures import calibration_pictures
 from server.config import load_config
 from server.optics_table import optics_table
 
+_NUMBER = r"[-+]?\d*\.?\d+"
+
 
 def progress(text: str) -> None:
     """Tell the user what happens, on stderr."""
@@ -50,7 +52,7 @@ def import_images(options: Namespace) -> dict[str, Any]:
 
 def calibrate_views(options: Namespace) -> dict[str, Any]:
     """``tomoshadow calibrate``."""
-    calibration_set = load_calibration_set(options.set)
+    calibration_set = load_calibration_set(options.set, dict(options.origin or ()))
     calibration = calibrate(calibration_set, model=options.model)
     save_calibration(calibration, options.out)
     figure = options.out.with_suffix(".png")
@@ -66,6 +68,15 @@ def calibrate_views(options: Namespace) -> dict[str, Any]:
         "notes": list(calibration.notes),
         **view_errors(calibration),
     }
+
+
+def stated_origin(text: str) -> tuple[tuple[str, float], tuple[float, float]]:
+    """View, position in mm and image point of ``VIEW@Z=U,V``."""
+    match = re.fullmatch(rf"(.+)@({_NUMBER})=({_NUMBER}),({_NUMBER})", text)
+    if not match:
+        raise ArgumentTypeError(f"{text!r} is not of the form VIEW@Z=U,V, for example view1@-4.5=812,604")
+    view, z_mm, u_px, v_px = match.groups()
+    return (view, float(z_mm)), (float(u_px), float(v_px))
 
 
 def view_errors(calibration: Calibration) -> dict[str, Any]:
@@ -127,8 +138,8 @@ def parse_grid(text: str, calibration: Calibration) -> VoxelGrid:
     PipelineError
         The text is not of that form, or the box is empty.
     """
-    number = r"[-+]?\d*\.?\d+"
-    match = re.fullmatch(rf"({number}):({number}),({number}):({number}),({number}):({number})(?:@({number}))?", text)
+    extent = rf"({_NUMBER}):({_NUMBER})"
+    match = re.fullmatch(rf"{extent},{extent},{extent}(?:@({_NUMBER}))?", text)
     if not match:
         raise PipelineError(f"--grid {text!r} is not of the form X0:X1,Y0:Y1,Z0:Z1[@PITCH] in mm")
     *bounds_mm, pitch = match.groups()

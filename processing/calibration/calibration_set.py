@@ -14,32 +14,37 @@ from pydantic import ValidationError
 from processing.calibration.errors import CalibrationError
 from processing.calibration.imported_set import detect_imported
 from processing.calibration.observation import CalibrationSet
-from processing.calibration.recorded_set import detect_recorded
+from processing.calibration.recorded_set import NO_ORIGINS, Origins, detect_recorded
 from processing.calibration.set_record import CalibrationEntry, SetRecord
 
 SET_FILE = "set.json"
 
 
-def load_calibration_set(path: Path) -> CalibrationSet:
+def load_calibration_set(path: Path, origins: Origins = NO_ORIGINS) -> CalibrationSet:
     """Detect the target in a recorded calibration run or in an imported set.
 
     Parameters
     ----------
     path : Path
         Run directory, set directory, or the directory of an import that holds a set.
+    origins : mapping of (view, z_mm) to (u, v)
+        Where views of a run see the target's origin, roughly; needed where no image shows the whole target.
+        An imported set states them itself.
 
     Raises
     ------
     CalibrationError
-        The path is neither, or an imported image does not show the target; names the file.
+        The path is neither, an imported image does not show the target, or an origin is stated where it cannot be;
+        names the file.
     """
     path = Path(path)
-    if (path / SET_FILE).exists():
-        return _read_imported(path)
-    if (path / "calibration" / SET_FILE).exists():
-        return _read_imported(path / "calibration")
+    folder = next((one for one in (path, path / "calibration") if (one / SET_FILE).exists()), None)
+    if folder is not None and origins:
+        raise CalibrationError(f"{folder / SET_FILE}: an imported set states its origins itself (origin_px)")
+    if folder is not None:
+        return _read_imported(folder)
     if (path / "run.h5").exists():
-        return detect_recorded(path)
+        return detect_recorded(path, origins)
     raise CalibrationError(f"{path}: neither a calibration run (run.h5) nor a calibration set ({SET_FILE})")
 
 

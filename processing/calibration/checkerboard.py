@@ -27,6 +27,8 @@ MIN_RELATIVE_STRENGTH = 0.03
 """Candidates weaker than this part of the strongest one are clutter."""
 SEEDS = 12
 """How many of the strongest corners are tried as the start of the grid."""
+SAME_GRID = 3
+"""How often a grid is grown from corners that lie in it."""
 REFINE_STEPS = 6
 """Steps of the refinement; three are enough for a clean corner."""
 MAX_REFINE_PX = 2.5
@@ -90,11 +92,17 @@ def find_saddles(image: Image32, smoothing_px: float) -> Saddles:
 
 
 def corner_lattices(saddles: Saddles) -> Iterator[Lattice]:
-    """Grids among the candidates, each grown from another strong corner; ids count from there."""
+    """Grids among the candidates, each grown from another strong corner; ids count from there.
+
+    Corners of one board lead to one grid; it is grown a few times over only, in case that dust misled it.
+    """
+    grown = np.zeros(len(saddles.points_px), dtype=np.int64)
     for start in range(0, min(len(saddles.points_px), 3 * SEEDS), 3):
-        steps_px = _steps_at(saddles, start)
+        steps_px = _steps_at(saddles, start) if grown[start] < SAME_GRID else None
         if steps_px is not None:
-            yield grow_lattice(saddles.points_px, start, steps_px, saddles.can_be_neighbours)
+            lattice = grow_lattice(saddles.points_px, start, steps_px, saddles.can_be_neighbours)
+            grown[lattice.indices] += 1
+            yield lattice
 
 
 def refine_corners(image: Image32, corners_px: FloatArray, spacing_px: float) -> tuple[FloatArray, NDArray[np.bool_]]:

@@ -4,6 +4,7 @@
 
     CalibrationError        a calibration cannot be made, read or trusted; names view or file, value and limit
     └── TargetNotFound      an image does not show the target well enough
+        └── OriginUnknown   it shows a grid, but not which of the target's points these are
 """
 
 
@@ -13,3 +14,7 @@ class CalibrationError(Exception):
 
 class TargetNotFound(CalibrationError):
     """An image does not show the target well enough to assign its points."""
+
+
+class OriginUnknown(TargetNotFound):
+    """An image shows a grid, but nothing tells which points of the target these are."""

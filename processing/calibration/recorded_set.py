@@ -1,51 +1,114 @@
 """Calibration sets from recorded runs: the target at known positions of the stage."""
 
 from collections import defaultdict
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from daq.shotfile import ImageKey, RunReader, Shot
-from processing.calibration.errors import CalibrationError, TargetNotFound
+from processing.calibration.errors import CalibrationError, OriginUnknown, TargetNotFound
 from processing.calibration.imported_set import place_points
 from processing.calibration.observation import CalibrationSet, PlaneObservation, ViewObservations
+from processing.calibration.partial_views import detect_by_others
 from processing.calibration.targets import Target, detect_target
+
+Place = tuple[str, float]
+"""A view, and a position of the stage in mm."""
+Origins = Mapping[Place, tuple[float, float]]
+"""Where the target's origin is seen (u, v)."""
+Found = dict[Place, PlaneObservation]
+Positions = Mapping[float, list[int]]
+"""Indices of shots by stage position in mm."""
+
+NO_ORIGINS: Origins = MappingProxyType({})
 
 _SHOWS_TARGET = (ImageKey.SAMPLE, ImageKey.FLAT)
 
 
-def detect_recorded(run_dir: Path) -> CalibrationSet:
+def detect_recorded(run_dir: Path, origins: Origins = NO_ORIGINS) -> CalibrationSet:
     """Detect the target in exposures A, averaged over the valid shots of each stage position.
 
-    A view that does not see the target at some position goes without it; the set notes that.
+    Where a view sees a part of the target only, the positions at which it is told which points these are (the whole
+    board, a marker, a stated origin) tell it for the others. A view that does not see the target at some position
+    goes without it; the set notes both.
+
+    Parameters
+    ----------
+    run_dir : Path
+        A calibration run.
+    origins : mapping of (view, z_mm) to (u, v)
+        Where the target's origin is seen, roughly.
 
     Raises
     ------
     CalibrationError
-        The run does not say what its target is, has no stage positions, or a view never sees the target.
+        The run does not say what its target is, has no stage positions, a view never sees the target, or an origin
+        is stated for a view or a position that the run does not have.
     """
     with RunReader(run_dir) as run:
         target = _target(run_dir, run.header.configuration)
-        positions = _by_position(run)
+        positions = dict(sorted(_by_position(run).items()))
         if not positions:
             raise CalibrationError(f"{run_dir}: no valid shot has a stage position; is it a calibration run?")
-        planes: dict[str, list[PlaneObservation]] = {view: [] for view in run.header.views}
-        notes = []
-        for z_mm, shots in sorted(positions.items()):
-            for view, image in _mean_frames(run, shots).items():
-                try:
-                    points = detect_target(image, target)
-                except TargetNotFound as error:
-                    notes.append(f"{view}, z {z_mm:g} mm left out: {error}")
-                    continue
-                planes[view].append(place_points(points, target, f"z={z_mm:g}", z_mm))
-        sizes = {view: (form.shape[1], form.shape[0]) for view, form in run.header.views.items()}
+        views, sizes = list(run.header.views), {name: form.shape[::-1] for name, form in run.header.views.items()}
+        _check_origins(run_dir, origins, views, list(positions))
+        found, missed = _first_look(run, target, positions, origins)
+        more, notes = _second_look(run, target, positions, found, missed)
         source = run.header.run_id
+    points = found | more
+    planes = {view: [points[place] for place in sorted(points) if place[0] == view] for view in views}
     _check_seen(run_dir, planes, notes)
-    views = {view: ViewObservations(sizes[view], tuple(seen)) for view, seen in planes.items()}
-    return CalibrationSet(source, target, views, tuple(notes))
+    seen = {view: ViewObservations(sizes[view], tuple(planes[view])) for view in views}
+    return CalibrationSet(source, target, seen, tuple(notes))
+
+
+def _first_look(
+    run: RunReader, target: Target, positions: Positions, origins: Origins
+) -> tuple[Found, dict[Place, TargetNotFound]]:
+    """What each image tells by itself, and why the others do not."""
+    found, missed = {}, {}
+    for z_mm, shots in positions.items():
+        for view, image in _mean_frames(run, shots).items():
+            try:
+                points = detect_target(image, target, origins.get((view, z_mm)))
+                found[view, z_mm] = place_points(points, target, f"z={z_mm:g}", z_mm)
+            except TargetNotFound as error:
+                missed[view, z_mm] = error
+    return found, missed
+
+
+def _second_look(
+    run: RunReader, target: Target, positions: Positions, found: Found, missed: Mapping[Place, TargetNotFound]
+) -> tuple[Found, list[str]]:
+    """What the other positions of a view tell of images that show a part of the target; notes on all of these."""
+    more, notes = {}, []
+    for (view, z_mm), reason in missed.items():
+        known = [plane for (name, _), plane in found.items() if name == view]
+        try:
+            if not isinstance(reason, OriginUnknown):
+                raise reason
+            image = _mean_frames(run, positions[z_mm])[view]
+            points = detect_by_others(image, target, z_mm, known)
+        except TargetNotFound as error:
+            also = "" if error is reason else f"; {error}"
+            notes.append(f"{view}, z {z_mm:g} mm left out: {reason}{also}")
+            continue
+        more[view, z_mm] = place_points(points, target, f"z={z_mm:g}", z_mm)
+        notes.append(f"{view}, z {z_mm:g} mm: {len(points)} points of the target; other positions tell which")
+    return more, notes
+
+
+def _check_origins(run_dir: Path, origins: Origins, views: Sequence[str], positions_mm: Sequence[float]) -> None:
+    for view, z_mm in origins:
+        if view not in views or z_mm not in positions_mm:
+            raise CalibrationError(
+                f"{run_dir}: an origin is stated for {view} at z {z_mm:g} mm; views are {', '.join(views)}, "
+                f"positions {', '.join(f'{one_mm:g}' for one_mm in positions_mm)} mm"
+            )
 
 
 def mean_target_images(run_dir: Path, z_mm: float) -> dict[str, NDArray[np.float32]]:
@@ -63,7 +126,7 @@ def _target(run_dir: Path, configuration: dict[str, object]) -> Target:
         raise CalibrationError(f"{run_dir}: configuration.target: {error.errors()[0]['msg']}") from error
 
 
-def _by_position(run: RunReader) -> dict[float, list[int]]:
+def _by_position(run: RunReader) -> Positions:
     """Indices of valid shots by stage position."""
     positions: dict[float, list[int]] = defaultdict(list)
     for index in np.flatnonzero(np.isin(run.image_keys(), _SHOWS_TARGET)):
@@ -83,7 +146,7 @@ def _mean_frames(run: RunReader, shots: list[int]) -> dict[str, NDArray[np.float
     return {view: total / np.float32(len(shots)) for view, total in totals.items()}
 
 
-def _check_seen(run_dir: Path, planes: dict[str, list[PlaneObservation]], notes: list[str]) -> None:
+def _check_seen(run_dir: Path, planes: Mapping[str, Sequence[PlaneObservation]], notes: Sequence[str]) -> None:
     for view, seen in planes.items():
         if not seen:
             reason = next(note for note in notes if note.startswith(view))

@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from processing.calibration.checkerboard import SMOOTHINGS_PX, corner_lattices, find_saddles, refine_corners
 from processing.calibration.dots import assign_dots, dot_signal, find_dots, marked_dot
-from processing.calibration.errors import TargetNotFound
+from processing.calibration.errors import OriginUnknown, TargetNotFound
 from processing.calibration.lattice import Lattice, on_smooth_grid, orient, place_board, shortest_step_px, trim_frame
 from processing.geometry import FloatArray
 
@@ -53,6 +53,12 @@ class Target(BaseModel):
         """Positions (N, 2) on the target, x and y in mm, of nodes (N, 2)."""
         y_sign = -1 if self.y_axis == "up" else 1
         return np.asarray(ids, dtype=np.float64) * (self.pitch_mm, y_sign * self.pitch_mm)
+
+    def board_ids(self) -> NDArray[np.int64]:
+        """Nodes (N, 2) of a board of known size, row by row, counted from the node in its middle; else none."""
+        columns, rows = self.columns or 0, self.rows or 0
+        row, column = np.divmod(np.arange(columns * rows), max(columns, 1))
+        return np.column_stack([column - (columns - 1) // 2, row - (rows - 1) // 2])
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +103,7 @@ def detect_target(
     Raises
     ------
     TargetNotFound
-        There are too few points, or nothing tells which point is the origin.
+        There are too few points; OriginUnknown where nothing tells which of them is the origin.
     """
     pixels = np.ascontiguousarray(image, dtype=np.float32)
     if target.kind == "checkerboard":
@@ -165,11 +171,11 @@ def _with_origin(
     if marked is not None:
         return lattice.with_ids(lattice.ids - lattice.ids[lattice.indices == marked])
     if target.columns is None or target.rows is None:
-        raise TargetNotFound("dots: no dot carries a marker; say where the origin is seen (origin_px)")
+        raise OriginUnknown("dots: no dot carries a marker; say where the origin is seen (origin_px)")
     board = place_board(lattice, target.columns, target.rows)
     if board is None:
         seen_columns, seen_rows = np.ptp(lattice.ids, axis=0) + 1
-        raise TargetNotFound(
+        raise OriginUnknown(
             f"{target.kind}: a grid of {seen_columns} x {seen_rows} points is seen, not the whole board of "
             f"{target.columns} x {target.rows}; say where its origin is seen (origin_px)"
         )

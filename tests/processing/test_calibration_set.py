@@ -37,10 +37,11 @@ def see(view: str, z_mm: float, seed: int) -> Frame:
     return np.clip(np.random.default_rng(seed).normal(3000 * clear + 80, 20), 0, 4095).astype(np.uint16)
 
 
-def record(run_dir: Path, planned: list[Planned], configuration: dict[str, object]) -> Path:
-    """A run of these shots; exposures B, and shots that do not count, show nothing."""
-    cameras = paper_cameras(BINNING)
-    shape = cameras["view1"].image_size_px[::-1]
+def record(
+    run_dir: Path, planned: list[Planned], configuration: dict[str, object], columns: slice = slice(None)
+) -> Path:
+    """A run of these shots, of some columns of the images; exposures B, and shots that do not count, show nothing."""
+    shape = see("view1", 0.0, 0)[:, columns].shape
     dark, fine = np.zeros(shape, np.uint16), ExposureRecord(valid=True, frame_id=1)
     header = RunHeader(
         run_id=run_dir.name,
@@ -51,7 +52,7 @@ def record(run_dir: Path, planned: list[Planned], configuration: dict[str, objec
     with RunWriter(run_dir, header) as writer:
         for index, shot in enumerate(planned):
             lit = shot.key is ImageKey.SAMPLE and shot.z_mm is not None
-            frames = {view: see(view, shot.z_mm or 0.0, index) if lit else dark for view in VIEWS}
+            frames = {view: see(view, shot.z_mm or 0.0, index)[:, columns] if lit else dark for view in VIEWS}
             exposures = {view: DoubleFrame(frame, dark, fine, fine) for view, frame in frames.items()}
             writer.write_shot(Shot(index, shot.key, exposures, stage_z_mm=shot.z_mm))
         writer.finish("completed")

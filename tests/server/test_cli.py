@@ -81,6 +81,26 @@ def test_average_of_results(
     assert Path(result["figure"]).stat().st_size > 1000
 
 
+@pytest.mark.parametrize("method", ["mlos", "gavlos", "smart"])
+def test_average_of_a_run_is_the_average_of_its_results(
+    method: str, run_dir: Path, calibration_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    options = ["--calibration", calibration_file, f"--grid={GRID}", "--method", method, "--iterations", 2]
+    told(capsys, "reconstruct", run_dir, *options, "-o", tmp_path / "out")
+    stored = told(capsys, "average", tmp_path / "out", "-o", tmp_path / "stored.vtkhdf")
+    straight = told(capsys, "average", run_dir, *options, "-o", tmp_path / "straight.vtkhdf")
+    assert (straight["volumes"], straight["grid"]) == (stored["volumes"], stored["grid"])
+    volumes = [read_volume(tmp_path / f"{name}.vtkhdf")[0].astype(np.float64) for name in ("stored", "straight")]
+    assert volumes[0].max() > 0
+    np.testing.assert_allclose(volumes[1], volumes[0], atol=2e-3 * volumes[0].max())
+
+
+def test_a_run_is_averaged_with_a_calibration_only(
+    run_dir: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert "name its --calibration" in refused(capsys, "average", run_dir, "-o", tmp_path / "mean.vtkhdf")
+
+
 def test_average_of_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "empty").mkdir()
     assert "no volumes" in refused(capsys, "average", tmp_path / "empty", "-o", tmp_path / "mean.vtkhdf")
@@ -166,6 +186,17 @@ def test_calibrate_measured_points_and_never_overwrite(tmp_path: Path, capsys: p
     before = (tmp_path / "calibration.json").read_bytes()
     assert "not overwritten" in refused(capsys, *arguments)
     assert (tmp_path / "calibration.json").read_bytes() == before
+
+
+def test_origins_are_stated_for_runs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    _write_points(tmp_path)
+    told(capsys, "import", tmp_path / "manifest.toml", "-o", tmp_path / "set")
+    arguments = ["calibrate", tmp_path / "set", "-o", tmp_path / "calibration.json", "--origin"]
+    message = refused(capsys, *arguments, "view1@-4.5=812,604.5")
+    assert "set.json: an imported set states its origins itself" in message
+    with pytest.raises(SystemExit):
+        main([*map(str, arguments), "view1=812,604"])
+    assert "not of the form VIEW@Z=U,V" in capsys.readouterr().err
 
 
 def _write_points(folder: Path) -> None:
