@@ -1,9 +1,10 @@
 # ruff: noqa: T201
-"""Plants faults in a copy of the core, one at a time, and shows that its tests find each.
+"""Plants faults in a copy of the firmware, one at a time, and shows that the tests find each.
 
-    mutants.py [NAME ...]      all of mutants.toml, or those whose name contains one of the words
+    mutants.py [NAME ...]      all of mutants*.toml, or those whose name contains one of the words
 
-Prints a table; exit status 1 if a fault survives.
+Faults of the core are found by its own tests; those of the port to the Pico by tests of the real image in an emulator,
+run by pytest. Prints a table; exit status 1 if a fault survives.
 """
 
 import os
@@ -18,27 +19,41 @@ from dataclasses import dataclass
 from pathlib import Path
 
 FIRMWARE = Path(__file__).resolve().parents[1]
+IMAGES_VARIABLE = "TOMOSHADOW_IMAGES"
 FUZZ_STEPS = "100000"
 LIMIT_S = 60
 _WIDTH = 100
 
 
 class MutantError(Exception):
-    """The list does not fit the core any more; names the mutant."""
+    """The list does not fit the firmware any more; names the mutant."""
 
 
 @dataclass(frozen=True)
 class Mutant:
-    """A planted fault: in this file of the core, this text instead of that."""
+    """A planted fault: in this file, this text instead of that.
+
+    Parameters
+    ----------
+    name : str
+        What goes wrong.
+    file : str
+        File in ``core``; with a folder before it, in the firmware.
+    old, new : str
+        The text to replace, which stands once in the file, and what takes its place.
+    tests : str
+        Node of pytest, below ``tests/firmware``, that has to find a fault of the port; empty for one of the core.
+    """
 
     name: str
     file: str
     old: str
     new: str
+    tests: str = ""
 
-    def apply(self, core: Path) -> None:
-        """Plant the fault in a copy of the core."""
-        path = core / self.file
+    def apply(self, firmware: Path) -> None:
+        """Plant the fault in a copy of the firmware."""
+        path = firmware / (self.file if "/" in self.file else f"core/{self.file}")
         text = path.read_text()
         if text.count(self.old) != 1:
             raise MutantError(f"{self.name}: the text to replace stands {text.count(self.old)} times in {self.file}")
@@ -47,8 +62,8 @@ class Mutant:
 
 def load_mutants() -> list[Mutant]:
     """All planted faults."""
-    table = tomllib.loads(Path(__file__).with_suffix(".toml").read_text())
-    return [Mutant(**entry) for entry in table["mutant"]]
+    files = sorted(Path(__file__).parent.glob("mutants*.toml"))
+    return [Mutant(**entry) for file in files for entry in tomllib.loads(file.read_text())["mutant"]]
 
 
 def killer_of(mutant: Mutant | None, sanitizers: str | None = None) -> str | None:
@@ -70,15 +85,52 @@ def killer_of(mutant: Mutant | None, sanitizers: str | None = None) -> str | Non
         copy = Path(folder, "firmware")
         shutil.copytree(FIRMWARE, copy)
         if mutant is not None:
-            mutant.apply(copy / "core")
-        tests = copy / "tests"
-        vectors = (tests / "golden_vectors.txt").read_text()
-        programs = [(source.stem, (), "") for source in sorted(tests.glob("test_*.c"))]
-        for program, arguments, stdin in [*programs, ("run_vectors", (), vectors), ("fuzz", ("1", FUZZ_STEPS), "")]:
-            built = _build(copy, program, sanitizers)
-            if failure := _failure(built, arguments, stdin):
-                return failure
+            mutant.apply(copy)
+            if mutant.tests:
+                return _killer_of_image(copy, mutant)
+        return _killer_of_core(copy, sanitizers)
+
+
+def _killer_of_core(firmware: Path, sanitizers: str | None) -> str | None:
+    tests = firmware / "tests"
+    vectors = (tests / "golden_vectors.txt").read_text()
+    programs = [(source.stem, (), "") for source in sorted(tests.glob("test_*.c"))]
+    for program, arguments, stdin in [*programs, ("run_vectors", (), vectors), ("fuzz", ("1", FUZZ_STEPS), "")]:
+        built = _build(firmware, program, sanitizers)
+        if failure := _failure(built, arguments, stdin):
+            return failure
     return None
+
+
+def _killer_of_image(firmware: Path, mutant: Mutant) -> str | None:
+    """The compiler's static assertions are tests too."""
+    build = firmware.parent / "build"
+    made = _run("make", "-C", str(firmware), "images", f"BUILD={build}")
+    if made.returncode:
+        asserted = next((line for line in made.stderr.splitlines() if "static assertion failed" in line), None)
+        if asserted is None:
+            raise MutantError(f"{mutant.name}: the image does not compile: {made.stderr.strip()}")
+        return asserted.partition("error: ")[2][:_WIDTH]
+    node = f"{FIRMWARE.parent}/tests/firmware/{mutant.tests}"
+    command = (
+        sys.executable,
+        "-m",
+        "pytest",
+        "-x",
+        "-q",
+        "-p",
+        "no:cacheprovider",
+        f"--rootdir={FIRMWARE.parent}",
+        node,
+    )
+    try:
+        finished = _run(*command, images=str(build))
+    except subprocess.TimeoutExpired:
+        return f"{mutant.tests}: does not end"
+    if finished.returncode not in (0, 1):  # neither passed nor failed
+        raise MutantError(f"{mutant.name}: {node} cannot be run: {(finished.stderr + finished.stdout).strip()}")
+    failed = (line for line in finished.stdout.splitlines() if line.startswith(("FAILED", "ERROR")))
+    return next((line.partition("::")[2][:_WIDTH] for line in failed), None) if finished.returncode else None
 
 
 def _build(firmware: Path, program: str, sanitizers: str | None) -> Path:
@@ -102,10 +154,17 @@ def _failure(program: Path, arguments: Sequence[str], stdin: str) -> str | None:
     return said.strip().removeprefix("tests/")[:_WIDTH]
 
 
-def _run(*command: str, stdin: str = "") -> subprocess.CompletedProcess[str]:
-    environment = {name: value for name, value in os.environ.items() if name != "MAKEFLAGS"}
+def _run(*command: str, stdin: str = "", images: str = "") -> subprocess.CompletedProcess[str]:
+    environment = {name: value for name, value in os.environ.items() if name != "MAKEFLAGS"} | {IMAGES_VARIABLE: images}
     return subprocess.run(
-        command, input=stdin, capture_output=True, text=True, timeout=LIMIT_S, check=False, env=environment
+        command,
+        cwd=FIRMWARE.parent,
+        input=stdin,
+        capture_output=True,
+        text=True,
+        timeout=LIMIT_S,
+        check=False,
+        env=environment,
     )
 
 

@@ -1,7 +1,9 @@
 """The firmware's real image on an emulated Pico, asked over its serial line; all time is virtual."""
 
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import astuple, dataclass, replace
+from pathlib import Path
 
 from daq.drivers.pulse_protocol import MAX_SEQUENCE, Command, Reply, Request, decode_reply, encode_request
 from daq.simulation.firmware_build import ImageKind, build_image
@@ -12,6 +14,9 @@ PERIOD_MS = 10
 CAMERA_PULSE_NS = 10_000
 BOOT_MS = 5
 REPLY_LIMIT_MS = 60
+
+IMAGES_VARIABLE = "TOMOSHADOW_IMAGES"
+"""Names a folder with the images to test, instead of those that are built here; mutants.py does."""
 
 Waveform = list[tuple[int, str, bool]]
 """(time in ns after the trigger of the shot, output, level), in order of time and name."""
@@ -47,11 +52,17 @@ PAPER = Channel(0, 20_000, 1000, 26_400, 1000, frame_a_close_ns=23_500, frame_b_
 """The paper's pulse pair: 1 us, 6.4 us apart."""
 
 
+def image(kind: ImageKind = ImageKind.CONVERTER) -> Path:
+    """The image under test."""
+    folder = os.environ.get(IMAGES_VARIABLE)
+    return Path(folder, f"{kind}.bin") if folder else build_image(kind=kind)
+
+
 class Board:
     """One board, and a host that neither checks nor repeats."""
 
     def __init__(self, kind: ImageKind = ImageKind.CONVERTER) -> None:
-        self.pico = EmulatedPico(build_image(kind=kind).read_bytes())
+        self.pico = EmulatedPico(image(kind).read_bytes())
         self._sequence = 0
         self.pico.run_ms(BOOT_MS)
 

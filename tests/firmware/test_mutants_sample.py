@@ -10,7 +10,12 @@ import pytest
 from firmware.tests.mutants import FIRMWARE, Mutant, MutantError, killer_of, load_mutants
 
 MUTANTS = {mutant.name: mutant for mutant in load_mutants()}
-SAMPLE = ("no rate limit", "interlock not asked at the moment of firing", "CLEAR arms again")
+SAMPLE = (
+    "no rate limit",
+    "interlock not asked at the moment of firing",
+    "CLEAR arms again",
+    "lights are not forced low",
+)
 BUILD = Path(__file__).resolve().parents[2] / "build" / "firmware"
 
 
@@ -20,9 +25,20 @@ def test_there_are_many_different_ones() -> None:
 
 @pytest.mark.parametrize("mutant", MUTANTS.values(), ids=MUTANTS.keys())
 def test_each_can_be_planted(mutant: Mutant, tmp_path: Path) -> None:
-    core = shutil.copytree(FIRMWARE / "core", tmp_path / "core")
-    mutant.apply(core)
-    assert (core / mutant.file).read_text() != (FIRMWARE / "core" / mutant.file).read_text()
+    copy = shutil.copytree(FIRMWARE, tmp_path / "firmware")
+    mutant.apply(copy)
+    changed = [path for path in copy.rglob("*.[chS]") if path.read_text() != source_of(path, copy).read_text()]
+    assert [path.name for path in changed] == [Path(mutant.file).name]
+
+
+def source_of(path: Path, copy: Path) -> Path:
+    return FIRMWARE / path.relative_to(copy)
+
+
+@pytest.mark.parametrize("mutant", [m for m in MUTANTS.values() if m.tests], ids=lambda mutant: mutant.name)
+def test_the_test_of_each_fault_of_the_port_exists(mutant: Mutant) -> None:
+    file, _, rest = mutant.tests.partition("::")
+    assert f"\ndef {rest.partition('[')[0]}(" in (Path(__file__).parent / file).read_text()
 
 
 @pytest.mark.parametrize("name", SAMPLE)
@@ -36,7 +52,8 @@ def test_a_fault_that_does_no_harm_would_survive() -> None:
 
 
 def test_a_list_that_no_longer_fits_is_told(tmp_path: Path) -> None:
-    (tmp_path / "safety.c").write_text("")
+    (tmp_path / "core").mkdir()
+    (tmp_path / "core" / "safety.c").write_text("")
     with pytest.raises(MutantError, match=r"no rate limit: .* stands 0 times"):
         MUTANTS["no rate limit"].apply(tmp_path)
 

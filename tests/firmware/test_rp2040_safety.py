@@ -6,8 +6,19 @@ from dataclasses import replace
 
 import pytest
 
-from daq.drivers.pulse_protocol import ABORT_BYTE, HEARTBEAT_MS, Command, ErrorNumber, Fault, State, decode_reply
-from daq.simulation.rp2040_emulator import CYCLE_NS
+from daq.drivers.pulse_protocol import (
+    ABORT_BYTE,
+    HEARTBEAT_MS,
+    Command,
+    ErrorNumber,
+    Fault,
+    Request,
+    State,
+    decode_reply,
+    encode_request,
+)
+from daq.simulation.rp2040_chip import PIN_CAMERA, PIN_INTERLOCK, PIN_LIGHT, PIN_TRIGGER
+from daq.simulation.rp2040_emulator import CYCLE_NS, CYCLES_PER_MS
 from tests.firmware.rp2040_board import BOOT_MS, PAPER, PERIOD_MS, Board
 
 WATCHDOG_MS = 200
@@ -18,6 +29,11 @@ PAINT = 0xA5A5_A5A5
 ABORT_WITHIN_NS = 600
 PIO_BLOCKS = (0x5020_0000, 0x5030_0000)
 FIRST_FIFO = 0x10
+OUTPUT_CTRL = [0x4001_4004 + 8 * pin for pin in range(PIN_LIGHT, PIN_LIGHT + 8)]
+FORCED_LOW = 2
+ARM_LIMIT_MS, LOOK_CYCLES = 4, 40
+LOADING_CYCLES = 500
+"""The last instructions of loading, which an interrupt waits for; nothing can start a shot meanwhile."""
 LONG = replace(PAPER, camera_ns=15_000, a_width_ns=2000, b_width_ns=2000, frame_a_close_ns=8000, frame_b_open_ns=9000)
 """The longest pulses, so that no end of a pulse is taken for the interlock's; the camera triggers overlap them."""
 
@@ -86,6 +102,84 @@ def test_an_interlock_that_bounces_for_a_moment_trips_too(board: Board) -> None:
     board.pico.set_interlock(True)
     board.pico.run_ms(PERIOD_MS)
     assert state_and_faults(board) == (State.FAULT, Fault.INTERLOCK)
+
+
+def test_the_interlock_is_served_before_the_serial_line(board: Board) -> None:
+    """A byte's interrupt is interrupted, wherever it is."""
+    late_ns = []
+    for delay_cycles in range(0, 60, 4):
+        opened = shoot_into_open_interlock(board, delay_cycles)
+        late_ns.append((dark_at(board) - opened) * CYCLE_NS)
+        board.pico.set_interlock(True)
+        assert board.ask(Command.CLEAR).error is None
+        board.pico.run_ms(2 * PERIOD_MS)
+        board.arm(100)
+    assert max(late_ns) < DARK_WITHIN_NS, late_ns
+
+
+def shoot_into_open_interlock(board: Board, delay_cycles: int) -> int:
+    """A byte arrives in mid-pulse, and some cycles later the interlock opens; the cycle of that."""
+    opened: list[int] = []
+
+    def open_door() -> None:
+        opened.append(board.pico.cycle)
+        board.pico.set_interlock(False)
+
+    def receive_byte() -> None:
+        board.pico.feed(ord("x"))
+        board.pico.at(board.pico.cycle + delay_cycles, open_door)
+
+    board.pico.edges.clear()
+    board.when("light0", True, 10, receive_byte)
+    fire(board)
+    board.pico.run_ms(1)
+    board.say(b"\n")
+    return opened[0]
+
+
+def live_while_arming(board: Board, watched_cycles: range, opened_after_cycles: int) -> list[int]:
+    """Of these cycles after the last byte of ARM, those at which an output is not forced low; the interlock opens."""
+    line = encode_request(Request(60_000, Command.ARM, (1,)))
+    board.pico.receive(line[:-1])
+    board.pico.run_ms(PERIOD_MS)
+    start = board.pico.cycle
+    live: list[int] = []
+
+    def look() -> None:
+        if any(board.pico.read_word(ctrl) >> 8 & 3 != FORCED_LOW for ctrl in OUTPUT_CTRL):
+            live.append(board.pico.cycle - start)
+
+    for cycles in watched_cycles:
+        board.pico.at(start + cycles, look)
+    board.pico.at(start + opened_after_cycles, lambda: board.pico.set_interlock(False))
+    board.pico.feed(line[-1])
+    board.pico.run(start + watched_cycles.stop)
+    board.pico.run_ms(PERIOD_MS)
+    assert state_and_faults(board)[0] is not State.ARMED
+    assert board.pico.set_points_ma() == (0, 0, 0, 0)
+    board.pico.set_interlock(True)
+    board.ask(Command.OFF)
+    assert board.ask(Command.CLEAR).error is None
+    return live
+
+
+def test_an_interlock_that_opens_at_any_moment_of_arming_leaves_the_outputs_cut(board: Board) -> None:
+    """Whether before, while or after the train is loaded into the hardware."""
+    board.ask(Command.OFF)
+    longest = CYCLES_PER_MS * ARM_LIMIT_MS
+    given = live_while_arming(board, range(0, longest, LOADING_CYCLES), longest)[0]
+    early = range(given // 6, given, given // 6)
+    late = range(given - 4 * LOADING_CYCLES, given + LOADING_CYCLES, LOADING_CYCLES // 2)
+    for moment in (*early, *late):
+        watched = range(given - LOADING_CYCLES, given + 10 * LOADING_CYCLES, LOOK_CYCLES)
+        live = [cycle for cycle in live_while_arming(board, watched, moment) if cycle > moment]
+        assert len(live) * LOOK_CYCLES < LOADING_CYCLES, moment
+
+
+def test_the_pads_of_all_outputs_pull_down(board: Board) -> None:
+    for pin in (*range(PIN_LIGHT, PIN_LIGHT + 4), *range(PIN_CAMERA, PIN_CAMERA + 4), PIN_INTERLOCK, PIN_TRIGGER):
+        pad = board.pico.read_word(0x4001_C004 + 4 * pin)
+        assert (pad >> 2 & 1, pad >> 3 & 1) == (1, 0), pin
 
 
 def test_the_abort_byte_disarms_from_inside_a_line(board: Board) -> None:

@@ -16,16 +16,14 @@ from typing import Any
 import pytest
 
 from daq.drivers.pulse_protocol import Command, Reply, Request, decode_reply, encode_request
-from daq.simulation.firmware_build import ImageKind, build_image
+from daq.simulation.firmware_build import ImageKind
 from daq.simulation.rp2040_chip import OUTPUT_PINS, PIN_INTERLOCK, PIN_SET_POINT, PIN_TRIGGER
 from daq.simulation.rp2040_emulator import CYCLE_NS, START_CYCLES
-from tests.firmware.rp2040_board import BOOT_MS, PAPER, PERIOD_MS, Board, Channel, Waveform
+from tests.firmware.rp2040_board import BOOT_MS, PAPER, PERIOD_MS, Board, Channel, Waveform, image
 
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAM = ROOT / "firmware" / "tests" / "rp2040js" / "board.cjs"
 MODULES = ROOT / "build" / "rp2040js" / "node_modules"
-IMAGE = ImageKind.PWM
-"""Nothing stands on the I2C bus of rp2040js."""
 TRIGGER_LINE = -1
 FIRST_SHOT_MS = 20
 """After a start nothing is fired for so long."""
@@ -41,6 +39,7 @@ class Told:
 
     replies: list[Reply]
     edges: list[tuple[int, int, bool]]
+    set_points: list[int]
     clocks: dict[str, float]
 
     def waveform(self) -> Waveform:
@@ -57,6 +56,8 @@ class Told:
     def duty(self, pin: int) -> float:
         """Part of a period that a pin with PWM is high."""
         changes = [(cycle, high) for cycle, number, high in self.edges if number == pin]
+        if not changes:
+            return 0.0
         (on, _), (off, _), (again, _) = changes[2 if changes[0][1] else 3 :][:3]
         return (off - on) / (again - on)
 
@@ -69,12 +70,12 @@ def session(channels: Sequence[Channel | None]) -> list[Request]:
     return [Request(number, command, fields) for number, (command, fields) in enumerate(lines, 1)]
 
 
-def in_rp2040js(requests: Sequence[Request]) -> Told:
+def in_rp2040js(requests: Sequence[Request], kind: ImageKind = ImageKind.CONVERTER) -> Told:
     steps: list[list[Any]] = [["pin", PIN_INTERLOCK, 1], ["run", BOOT_MS + FIRST_SHOT_MS]]
     steps += [["say", encode_request(request).decode()] for request in requests]
     steps += [["run", PERIOD_MS]]
     finished = subprocess.run(
-        ["node", PROGRAM, build_image(kind=IMAGE), str(PIN_TRIGGER)],
+        ["node", PROGRAM, image(kind), str(PIN_TRIGGER)],
         input=json.dumps(steps),
         capture_output=True,
         text=True,
@@ -84,11 +85,11 @@ def in_rp2040js(requests: Sequence[Request]) -> Told:
     assert finished.returncode == 0, finished.stderr
     told = json.loads(finished.stdout)
     edges = [(cycle, pin, bool(level)) for cycle, pin, level in told["edges"]]
-    return Told([decode_reply(line.encode()) for line in told["replies"]], edges, told["clocks"])
+    return Told([decode_reply(line.encode()) for line in told["replies"]], edges, told["set_points"], told["clocks"])
 
 
 def in_rp2040py(requests: Sequence[Request]) -> tuple[list[Reply], Waveform]:
-    board = Board(IMAGE)
+    board = Board()
     board.pico.run_ms(FIRST_SHOT_MS)
     replies = [decode_reply(board.say(encode_request(request))) for request in requests]
     board.pico.run_ms(PERIOD_MS)
@@ -134,8 +135,18 @@ def test_the_clock_tree_gives_8_ns_from_a_crystal_of_12_mhz() -> None:
     assert clocks["baud"] == pytest.approx(115_200, rel=1e-3)
 
 
-def test_set_points_are_the_duty_of_their_pins() -> None:
-    currents_ma = (300, 9_900, 20_000, 29_990)
-    told = in_rp2040js(session([replace(PAPER, current_ma=current_ma) for current_ma in currents_ma])[:-1])
-    for i, current_ma in enumerate(currents_ma):
+CURRENTS_MA = (0, 9_900, 20_000, 29_990)
+LIT = [replace(PAPER, current_ma=current_ma) for current_ma in CURRENTS_MA]
+
+
+def test_set_points_are_in_the_converter_when_the_shot_starts() -> None:
+    on, off = 0x8000, 0x2000
+    assert in_rp2040js(session(LIT)).set_points == [
+        on | current_ma // 10 if current_ma else off for current_ma in CURRENTS_MA
+    ]
+
+
+def test_without_a_converter_set_points_are_the_duty_of_their_pins() -> None:
+    told = in_rp2040js(session(LIT)[:-1], ImageKind.PWM)
+    for i, current_ma in enumerate(CURRENTS_MA):
         assert told.duty(PIN_SET_POINT + i) == pytest.approx(current_ma / 30_000, abs=2e-3)

@@ -14,9 +14,8 @@ from itertools import pairwise
 import pytest
 from pioemu import State, emulate
 
-from daq.simulation.firmware_build import build_image
 from daq.simulation.rp2040_emulator import CYCLE_NS, START_CYCLES
-from tests.firmware.rp2040_board import PAPER, PERIOD_MS, Board, Channel, Waveform
+from tests.firmware.rp2040_board import PAPER, PERIOD_MS, Board, Channel, Waveform, image
 
 OUTPUTS = ("light", "camera")
 TRIGGER_BIT, OUTPUT_BIT = 0, 1
@@ -42,7 +41,7 @@ def board() -> Board:
 def symbols() -> dict[str, tuple[int, int]]:
     """Address and size of everything in the image."""
     listing = subprocess.run(
-        ["arm-none-eabi-nm", "-S", build_image().with_suffix(".elf")], check=True, capture_output=True, text=True
+        ["arm-none-eabi-nm", "-S", image().with_suffix(".elf")], check=True, capture_output=True, text=True
     ).stdout
     found = re.findall(r"^(\w+) (\w+) \w (\w+)$", listing, re.MULTILINE)
     return {name: (int(address, 16), int(size, 16)) for address, size, name in found}

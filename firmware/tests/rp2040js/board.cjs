@@ -7,8 +7,8 @@
  *     ["say", TEXT]        a line to the firmware at 115200 baud; waits for the line that it answers
  *     ["run", MS]          time passes
  *     ["pin", NUMBER, 0|1] level that the world gives to an input
- * RESULT has `replies`, `edges` ([cycle, pin, level] of every pin that moved, pin -1 is the inner trigger line), and what
- * became of the clock tree. */
+ * RESULT has `replies`, `edges` ([cycle, pin, level] of every pin that moved, pin -1 is the inner trigger line), the
+ * converter's registers at the last shot as `set_points`, and what became of the clock tree. */
 "use strict";
 const fs = require("node:fs");
 const { RP2040, ConsoleLogger, LogLevel } = require("rp2040js");
@@ -20,6 +20,50 @@ const REPLY_LIMIT_MS = 60;
 const SLEEP_MAX_CYCLES = 2000;
 const WAITS_FOR_PIN = 1;
 const FLASH = 0x1000_0000;
+const CHANNELS = 4;
+const CONVERTER = 0x60; // its address
+const FACTORY = 0x8000; // its registers after power-up: on, at 0 V
+const BYTE_BITS = 9;
+const READ = 1;
+
+/* The MCP4728 that sets the currents: fast write, multi-write and read back of its four registers. */
+class Converter {
+  constructor(chip) {
+    const bus = chip.i2c[0];
+    this.registers = Array(CHANNELS).fill(FACTORY);
+    this.written = [];
+    this.unread = [];
+    const alarm = chip.clock.createAlarm(() => this.next());
+    const after = (bits, next) => {
+      this.next = next;
+      alarm.schedule(bits * (bus.sclHighPeriod + bus.sclLowPeriod) * CYCLE_NS);
+    };
+    bus.onStart = () => after(1, () => bus.completeStart());
+    bus.onConnect = (address, mode) => {
+      this.written = [];
+      this.unread = mode === READ ? this.contents() : [];
+      after(BYTE_BITS, () => bus.completeConnect(address === CONVERTER));
+    };
+    bus.onWriteByte = (value) => after(BYTE_BITS, () => bus.completeWrite(this.take(value)));
+    bus.onReadByte = () => after(BYTE_BITS, () => bus.completeRead(this.unread.shift() ?? 0xff));
+    bus.onStop = () => after(1, () => bus.completeStop());
+  }
+
+  contents() {
+    return this.registers.flatMap((value, i) => [0xc0 | (i << 4), value >> 8, value & 0xff, 0xc8 | (i << 4), FACTORY >> 8, 0]);
+  }
+
+  take(value) {
+    this.written.push(value);
+    const { length } = this.written;
+    const [upper, lower] = this.written.slice(-2);
+    const fast = this.written[0] >> 5 <= 1;
+    if (fast && length % 2 === 0)
+      this.registers[length / 2 - 1] = (this.registers[length / 2 - 1] & 0x9000) | ((upper & 0x30) << 9) | ((upper & 0xf) << 8) | lower;
+    if (!fast && length % 3 === 0) this.registers[(this.written.at(-3) >> 1) & 3] = (upper << 8) | lower;
+    return fast || this.written[0] >> 5 === 2;
+  }
+}
 
 class Board {
   constructor(image, triggerPin) {
@@ -34,6 +78,8 @@ class Board {
     this.chip.uart[0].onByte = (byte) => this.sent.push(byte);
     this.chip.gpio.forEach((pin, number) => pin.addListener((now, before) => this.onPin(number, now, before)));
     this.machines = this.chip.pio.flatMap((pio) => pio.machines.map((machine) => ({ machine, stalled: false })));
+    this.converter = new Converter(this.chip);
+    this.setPoints = [];
     for (const pio of this.chip.pio) pio.run = () => {}; // in a loop of its own, out of step with the processor
     this.chip.core.PC = FLASH;
   }
@@ -58,7 +104,10 @@ class Board {
   /* rp2040js tells no machine of an input override; all see it in their next cycle. */
   watchTrigger() {
     const level = this.chip.gpio[this.triggerPin].inputValue;
-    if (level !== this.trigger) this.edges.push([this.cycle + 1, -1, level ? 1 : 0]);
+    if (level !== this.trigger) {
+      this.edges.push([this.cycle + 1, -1, level ? 1 : 0]);
+      this.setPoints = [...this.converter.registers];
+    }
     this.trigger = level;
   }
 
@@ -135,7 +184,7 @@ function main() {
     else if (what === "run") board.run(board.cycle + rest[0] * CYCLES_PER_MS);
     else board.chip.gpio[rest[0]].setInputValue(rest[1] === 1);
   }
-  process.stdout.write(JSON.stringify({ replies, edges: board.edges, clocks: board.clocks() }));
+  process.stdout.write(JSON.stringify({ replies, edges: board.edges, set_points: board.setPoints, clocks: board.clocks() }));
 }
 
 main();
