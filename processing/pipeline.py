@@ -92,12 +92,12 @@ def reconstruct_shot(
     calibration = load_calibration(calibration_file)
     with RunReader(run_dir) as run:
         recorded = run.read_shot(shot)
-        _check(run_dir.name, recorded, calibration)
+        require_match(run_dir.name, recorded, calibration)
         provenance = _provenance(run, calibration, calibration_file, settings)
         bench = _workbench(calibration_file, str(provenance["calibration_sha256"]), settings, tuple(recorded.views))
         claim_results(results_dir, provenance)
         volumes = []
-        for frame in _frames(run):
+        for frame in frame_names(run):
             if should_stop():
                 raise Stopped(f"{run_dir.name}, shot {shot}: stopped before exposure {frame}")
             views = shot_intensities(run, recorded, frame, settings, bench.images)
@@ -188,11 +188,13 @@ def _reconstruct_frame(
     return VolumeRecord(shot=shot, frame=frame, file=file.name, seconds=seconds)
 
 
-def _frames(run: RunReader) -> tuple[FrameName, ...]:
+def frame_names(run: RunReader) -> tuple[FrameName, ...]:
+    """Exposures of every shot of a run."""
     return ("a", "b") if run.header.frames_per_shot == 2 else ("a",)
 
 
-def _check(run_name: str, shot: Shot, calibration: Calibration) -> None:
+def require_match(run_name: str, shot: Shot, calibration: Calibration) -> None:
+    """Refuse a shot that is not whole, and a calibration that is not made for it or not good enough."""
     if not shot.valid:
         raise PipelineError(f"{run_name}, shot {shot.index}: exposures are missing, nothing to reconstruct")
     calibration.require_world()

@@ -18,6 +18,7 @@ from processing.pipeline import PipelineError
 from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.volume_file import VolumeFileError
 from server import commands
+from server.average_command import average
 from server.bench_command import bench
 from server.check_command import check, self_calibrate_views
 from server.config import ConfigError
@@ -149,6 +150,10 @@ def _add_reconstruct(verbs: Any) -> None:
     parser.add_argument("run", type=Path, help="run directory")
     parser.add_argument("--calibration", type=Path, required=True)
     parser.add_argument("-o", "--out", type=Path, required=True, help="directory of the results")
+    _add_reconstruction_options(parser)
+
+
+def _add_reconstruction_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--method", choices=[method.value for method in ReconstructionMethod], default="mlos")
     parser.add_argument("--iterations", type=int, default=20, help="of smart and mart")
     parser.add_argument("--shots", metavar="A:B", help="shots A to B - 1; default all")
@@ -160,9 +165,11 @@ def _add_reconstruct(verbs: Any) -> None:
 
 
 def _add_average(verbs: Any) -> None:
-    parser = _verb(verbs, "average", commands.average, "mean volume and slices of results")
-    parser.add_argument("results", type=Path, help="directory of the results")
+    parser = _verb(verbs, "average", average, "mean volume and slices of results, or straight from the shots of a run")
+    parser.add_argument("results", type=Path, help="directory of results; or a run, with --calibration")
     parser.add_argument("-o", "--out", type=Path, required=True, help="volume file to write; slices beside it")
+    parser.add_argument("--calibration", type=Path, help="of the run; no volume of a single exposure is stored")
+    _add_reconstruction_options(parser)
 
 
 def _add_study(verbs: Any) -> None:

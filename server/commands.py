@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from daq.shotfile import ImageKey, RunReader
-from processing.analysis.figures import residuals_figure, slices_figure
+from processing.analysis.figures import residuals_figure
 from processing.calibration.calibration import Calibration
 from processing.calibration.calibration_file import load_calibration, save_calibration
 from processing.calibration.calibration_set import load_calibration_set
@@ -25,8 +25,6 @@ from processing.pipeline import (
 )
 from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.settings import GridSettings, ReconstructionSettings
-from processing.reconstruction.volume_file import write_volume
-from processing.results_file import average_volumes, volume_files
 from processing.volume import VoxelGrid
 from server.calibration_pictures import calibration_pictures
 from server.config import load_config
@@ -172,21 +170,6 @@ def _bounds(selection: str | None) -> tuple[int, int | None]:
         raise PipelineError(f"--shots {selection!r} is not of the form A:B")
     first, last = match.groups()
     return int(first or 0), int(last) if last else None
-
-
-def average(options: Namespace) -> dict[str, Any]:
-    """``tomoshadow average``."""
-    files = volume_files(options.results)
-    volume, grid = average_volumes(files)
-    write_volume(options.out, volume, grid, {"average_of": str(options.results), "volumes": len(files)})
-    figure = options.out.with_suffix(".png")
-    slices_figure(volume, grid, f"mean of {len(files)} volumes").savefig(figure, dpi=120)
-    return {
-        "file": str(options.out),
-        "figure": str(figure),
-        "volumes": len(files),
-        "grid": GridSettings.of(grid).model_dump(),
-    }
 
 
 def optics(options: Namespace) -> dict[str, Any]:

@@ -1,0 +1,106 @@
+"""The mean volume of recorded shots, straight from their images: no volume of a single exposure is kept."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from daq.shotfile import RunReader
+from processing.calibration.calibration import Calibration
+from processing.pipeline import default_grid, frame_names, reconstruct, require_match, shot_intensities
+from processing.preprocessing import Intensity
+from processing.reconstruction.mean_line_of_sight import mean_line_of_sight
+from processing.reconstruction.plan import Plan, plan_reconstruction
+from processing.reconstruction.settings import ReconstructionSettings
+from processing.volume import VoxelGrid
+
+Exposures = Iterator[list[Intensity]]
+
+
+@dataclass(frozen=True, eq=False)
+class RunAverage:
+    """Mean of the volumes of many exposures.
+
+    Parameters
+    ----------
+    volume : (z, y, x) float32 array
+        The mean.
+    grid : VoxelGrid
+        Where it lies.
+    exposures : int
+        How many; A and B count apart.
+    """
+
+    volume: Intensity
+    grid: VoxelGrid
+    exposures: int
+
+
+def average_run(
+    run_dir: Path,
+    shots: Sequence[int],
+    calibration: Calibration,
+    settings: ReconstructionSettings,
+    done: Callable[[int], None] = lambda _: None,
+) -> RunAverage:
+    """Mean of what ``reconstruct_shot`` makes of every exposure of some shots.
+
+    Parameters
+    ----------
+    run_dir : Path
+        The recorded run.
+    shots : sequence of int
+        At least one.
+    calibration : Calibration
+        Of the views of the run.
+    settings : ReconstructionSettings
+        Method, grid and preprocessing.
+    done : callable
+        Told the number of exposures that have been read, after each.
+
+    Raises
+    ------
+    PipelineError
+        A shot is not valid, or run and calibration do not belong together.
+    CalibrationError
+        The calibration was refused.
+    """
+    grid = settings.grid.to_grid() if settings.grid else default_grid(calibration)
+    with RunReader(run_dir) as run:
+        first = run.read_shot(shots[0])
+        require_match(run_dir.name, first, calibration)
+        plan = plan_reconstruction([calibration.views[view].mapping for view in first.views], grid)
+        exposures = _exposures(run, shots, calibration, settings, done)
+        if settings.method.iterative:
+            volume = _mean_of_each(plan, exposures, settings)
+        else:
+            volume = mean_line_of_sight(plan, exposures, settings.method)
+        return RunAverage(volume, grid, len(shots) * len(frame_names(run)))
+
+
+def _exposures(
+    run: RunReader,
+    shots: Sequence[int],
+    calibration: Calibration,
+    settings: ReconstructionSettings,
+    done: Callable[[int], None],
+) -> Exposures:
+    count = 0
+    for index in shots:
+        shot = run.read_shot(index)
+        require_match(run.header.run_id, shot, calibration)
+        for frame in frame_names(run):
+            yield shot_intensities(run, shot, frame, settings)
+            count += 1
+            done(count)
+
+
+def _mean_of_each(plan: Plan, exposures: Exposures, settings: ReconstructionSettings) -> Intensity:
+    mean, volume = np.zeros(plan.grid.shape, np.float32), np.empty(plan.grid.shape, np.float32)
+    count = 0
+    for images in exposures:
+        mean += reconstruct(plan, images, settings, volume)
+        count += 1
+    mean /= np.float32(count)
+    return mean
