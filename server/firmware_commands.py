@@ -37,7 +37,7 @@ def info(options: Namespace) -> dict[str, Any]:
 
 
 def _limits(line: PulseLine, channel: int) -> Iterator[tuple[str, int]]:
-    reply = line.ask(Command.LIMIT, channel, UNCHANGED, UNCHANGED)
+    reply = line.ask(Command.LIMIT, channel, UNCHANGED, UNCHANGED, UNCHANGED)
     for name in FIELDS[Command.LIMIT].reply:
         yield name, reply.number(name)
 

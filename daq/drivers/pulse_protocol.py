@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum, IntFlag, StrEnum
 
-PROTOCOL_VERSION = 1
+PROTOCOL_VERSION = 2
 CHANNEL_COUNT = 4
 MAX_SEQUENCE = 65_535
 HEARTBEAT_MS = 3000
@@ -31,6 +31,8 @@ class Command(StrEnum):
     LOAD = "LOAD"
     ARM = "ARM"
     FIRE = "FIRE"
+    LIGHT = "LIGHT"
+    SHOT = "SHOT"
     STATUS = "STATUS"
     BEAT = "BEAT"
     OFF = "OFF"
@@ -46,18 +48,24 @@ class Fields:
 
 
 _EDGES = ("camera_ns", "a_start_ns", "a_width_ns", "b_start_ns", "b_width_ns", "current_ma")
-_LIMITS = ("max_current_ma", "max_duty_ppm")
-_COUNTERS = ("requested", "fired", "suppressed", "early", "crc_errors")
+_TICKS = ("camera_ticks", "a_start_ticks", "a_width_ticks", "b_start_ticks", "b_width_ticks", "current_ma")
+_LIMITS = ("max_current_ma", "max_duty_ppm", "max_light_ma")
+COUNTERS = ("requested", "fired", "suppressed", "early", "cameras", "crc_errors")
+"""Counters of STATUS, since start."""
 
 FIELDS: Mapping[Command, Fields] = {
-    Command.ID: Fields(reply=("model", "version", "build", "serial", "protocol", "channels", "tick_ns", "last")),
+    Command.ID: Fields(
+        reply=("model", "version", "build", "git", "serial", "protocol", "channels", "tick_ns", "cause", "last")
+    ),
     Command.NEW: Fields(),
     Command.LIMIT: Fields(("channel", *_LIMITS), ("channel", *_LIMITS)),
     Command.CHANNEL: Fields(("channel", *_EDGES, "frame_a_close_ns", "frame_b_open_ns"), ("channel", *_EDGES)),
     Command.LOAD: Fields(reply=("train", "length_ns", "period_us")),
-    Command.ARM: Fields(("shots",), ("train", "shots_left")),
+    Command.ARM: Fields(("shots", "source", "period_us"), ("train", "shots_left")),
     Command.FIRE: Fields(reply=("fired", "train", "shots_left")),
-    Command.STATUS: Fields(reply=("state", "faults", "interlock", "shots_left", *_COUNTERS)),
+    Command.LIGHT: Fields(("time_ms", *(f"current_{i}_ma" for i in range(CHANNEL_COUNT))), ("state",)),
+    Command.SHOT: Fields(("channel",), ("fired", "channel", *_TICKS)),
+    Command.STATUS: Fields(reply=("state", "faults", "interlock", "estop", "source", "shots_left", *COUNTERS)),
     Command.BEAT: Fields(reply=("state",)),
     Command.OFF: Fields(reply=("state",)),
     Command.CLEAR: Fields(reply=("state",)),
@@ -70,6 +78,26 @@ class State(IntEnum):
     SAFE = 0
     ARMED = 1
     FAULT = 2
+    LIT = 3
+
+
+class Source(IntEnum):
+    """What starts the shots of an armed generator."""
+
+    COMMAND = 0
+    EXTERNAL = 1
+    TIMER = 2
+
+
+class Cause(IntEnum):
+    """Why the microcontroller has started."""
+
+    UNKNOWN = 0
+    POWER = 1
+    PIN = 2
+    DEBUG = 3
+    WATCHDOG = 4
+    SOFTWARE = 5
 
 
 class Fault(IntFlag):
@@ -79,6 +107,7 @@ class Fault(IntFlag):
     HEARTBEAT = 2
     WATCHDOG = 4
     INTERNAL = 8
+    ESTOP = 16
 
 
 class ErrorNumber(IntEnum):
@@ -104,6 +133,12 @@ class ErrorNumber(IntEnum):
     SHOTS = 18
     HARDWARE = 19
     LIMIT = 20
+    LIGHT = 21
+    ESTOP_OPEN = 22
+    SOURCE = 23
+    PERIOD = 24
+    OTHER_SOURCE = 25
+    NO_SHOT = 26
 
 
 ERROR_TEXT: Mapping[ErrorNumber, str] = {
@@ -112,21 +147,27 @@ ERROR_TEXT: Mapping[ErrorNumber, str] = {
     ErrorNumber.UNKNOWN_COMMAND: "there is no such command",
     ErrorNumber.SYNTAX: "a field is missing, superfluous or no number",
     ErrorNumber.SEQUENCE: "the sequence number was used for another line",
-    ErrorNumber.NOT_SAFE: "the generator is armed; switch it off first",
+    ErrorNumber.NOT_SAFE: "the generator is armed or lit; switch it off first",
     ErrorNumber.NOT_ARMED: "the generator is not armed",
     ErrorNumber.FAULT_LATCHED: "a fault is latched; clear it first",
     ErrorNumber.INTERLOCK_OPEN: "the generator's interlock is open",
-    ErrorNumber.EARLY: "the shot came before the shortest period was over; it was not fired",
+    ErrorNumber.EARLY: "it came before the shortest period was over; there was no light",
     ErrorNumber.NO_TRAIN: "no pulse train is loaded",
     ErrorNumber.CHANNEL: "there is no such channel",
     ErrorNumber.WIDTH: "a pulse is shorter than 200 ns or longer than 2000 ns",
     ErrorNumber.SEPARATION: "pulse B starts less than 400 ns after the end of A or more than 200000 ns after its start",
-    ErrorNumber.EDGE: "an edge is later than 2000000 ns after the trigger",
+    ErrorNumber.EDGE: "an edge is later than 20000000 ns after the trigger",
     ErrorNumber.CURRENT: "the current is above 30000 mA",
     ErrorNumber.STRADDLE: "pulse A ends after frame A closes, or pulse B starts before frame B opens",
     ErrorNumber.SHOTS: "the shot budget is not 1 to 1000000",
-    ErrorNumber.HARDWARE: "the hardware cannot produce this pulse train",
+    ErrorNumber.HARDWARE: "the hardware cannot produce this, or a set-point does not read as it was set",
     ErrorNumber.LIMIT: "the current is above the limit that was set for this channel, or its light was forbidden",
+    ErrorNumber.LIGHT: "continuous light is not 1 to 500 mA on any channel, or not for 1 to 600000 ms",
+    ErrorNumber.ESTOP_OPEN: "the emergency stop is open",
+    ErrorNumber.SOURCE: "there is no such trigger source",
+    ErrorNumber.PERIOD: "the period is shorter than the train permits, or longer than 10000000 us",
+    ErrorNumber.OTHER_SOURCE: "the generator is armed for another trigger source",
+    ErrorNumber.NO_SHOT: "no shot has been fired on this channel",
 }
 
 

@@ -19,6 +19,7 @@ from daq.drivers.pulse_protocol import (
     ErrorNumber,
     Fault,
     Reply,
+    Source,
     State,
     decode_request,
     encode_request,
@@ -117,7 +118,7 @@ def _damaged_lines(probe: Probe) -> str:
 
 def _nonsense(probe: Probe) -> str:
     number = decode_request(probe.numbered(Command.BEAT)).sequence
-    for body, error in (("FLY", ErrorNumber.UNKNOWN_COMMAND), ("ARM many", ErrorNumber.SYNTAX)):
+    for body, error in (("FLY", ErrorNumber.UNKNOWN_COMMAND), ("ARM many 0 0", ErrorNumber.SYNTAX)):
         number = number % MAX_SEQUENCE + 1
         reply = probe.line.exchange(framed(f"{number} {body}"))
         expect(reply.error is error, f"{body} was answered by {outcome(reply)} instead of {error.name}")
@@ -144,7 +145,7 @@ def _limits(probe: Probe) -> str:
 
 def _led_limits(probe: Probe) -> str:
     """Asks alone: a limit that was tightened would stay until the next start."""
-    limits = [probe.done(Command.LIMIT, channel, UNCHANGED, UNCHANGED) for channel in range(CHANNEL_COUNT)]
+    limits = [probe.done(Command.LIMIT, channel, UNCHANGED, UNCHANGED, UNCHANGED) for channel in range(CHANNEL_COUNT)]
     currents_a = [limit.number("max_current_ma") / 1000 for limit in limits]
     for channel, current_a in enumerate(currents_a):
         above = replace(DARK, channel=channel, current_ma=round(current_a * 1000) + 1)
@@ -174,8 +175,8 @@ def _budget(probe: Probe) -> str:
     probe.require_interlock(closed=True)
     probe.load_dark_train()
     before = probe.done(Command.STATUS)
-    probe.refused(ErrorNumber.SHOTS, Command.ARM, 0)
-    probe.done(Command.ARM, 2)
+    probe.refused(ErrorNumber.SHOTS, Command.ARM, 0, Source.COMMAND, 0)
+    probe.done(Command.ARM, 2, Source.COMMAND, 0)
     early = probe.fire_when_allowed() + probe.fire_when_allowed()
     probe.refused(ErrorNumber.NOT_ARMED, Command.FIRE)
     after = probe.done(Command.STATUS)
@@ -188,10 +189,10 @@ def _budget(probe: Probe) -> str:
 def _off(probe: Probe) -> str:
     probe.require_interlock(closed=True)
     probe.load_dark_train()
-    probe.done(Command.ARM, 5)
+    probe.done(Command.ARM, 5, Source.COMMAND, 0)
     probe.done(Command.OFF)
     probe.refused(ErrorNumber.NOT_ARMED, Command.FIRE)
-    probe.done(Command.ARM, 5)
+    probe.done(Command.ARM, 5, Source.COMMAND, 0)
     beat = probe.numbered(Command.BEAT)
     reply = probe.line.exchange(beat[:3] + ABORT_BYTE + beat[3:])
     expect(reply.error is None and reply.number("state") == State.SAFE, f"the abort byte left {outcome(reply)}")
@@ -201,7 +202,7 @@ def _off(probe: Probe) -> str:
 def _open_interlock(probe: Probe) -> str:
     probe.require_interlock(closed=False)
     probe.load_dark_train()
-    probe.refused(ErrorNumber.INTERLOCK_OPEN, Command.ARM, 1)
+    probe.refused(ErrorNumber.INTERLOCK_OPEN, Command.ARM, 1, Source.COMMAND, 0)
     return "ARM refused"
 
 

@@ -11,12 +11,10 @@ from typing import Self
 
 from daq.devices import DeviceIdentity, GeneratorState, GeneratorStatus
 from daq.drivers.pulse_line import PulseLine
-from daq.drivers.pulse_protocol import CHANNEL_COUNT, UNCHANGED, Command, Fault, Reply, State
+from daq.drivers.pulse_protocol import CHANNEL_COUNT, COUNTERS, UNCHANGED, Command, Fault, Reply, Source, State
 from daq.errors import DeviceError, PlanError, ProtocolError
 from daq.shot import FiredTrain, LightPulse
 from daq.timing import ShotTiming, ViewTiming
-
-_COUNTERS = ("requested", "fired", "suppressed", "early", "crc_errors")
 
 
 @dataclass(frozen=True)
@@ -116,7 +114,7 @@ class SerialPulseGenerator:
 
     def arm(self, shots: int) -> None:
         """Permit this many shots; refused without a train, while armed, or with an open interlock."""
-        self._line.ask(Command.ARM, shots)
+        self._line.ask(Command.ARM, shots, Source.COMMAND, 0)
 
     def fire(self) -> FiredTrain:
         """Fire one shot; its sequence is the generator's count of shots since it was powered up.
@@ -139,7 +137,7 @@ class SerialPulseGenerator:
             faults=tuple(fault.name.lower() for fault in Fault if fault & reply.number("faults") and fault.name),
             interlock_closed=reply.number("interlock") == 1,
             shots_left=reply.number("shots_left"),
-            counters={name: reply.number(name) for name in _COUNTERS},
+            counters={name: reply.number(name) for name in COUNTERS},
         )
 
     def off(self) -> None:
@@ -167,7 +165,7 @@ class SerialPulseGenerator:
         """Before every train: a generator that was reset has forgotten its limits, and every train with them."""
         for view, limit_a in self._max_current_a.items():
             limit_ma = round(limit_a * 1000)
-            reply = self._line.ask(Command.LIMIT, self._channels[view], limit_ma, UNCHANGED)
+            reply = self._line.ask(Command.LIMIT, self._channels[view], limit_ma, UNCHANGED, UNCHANGED)
             if reply.number("max_current_ma") > limit_ma:
                 raise ProtocolError(self._name, f"keeps {reply.number('max_current_ma')} mA as the limit of {view}")
 

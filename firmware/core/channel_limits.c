@@ -2,6 +2,8 @@
 
 #include "limits.h"
 
+enum { START_US = 10 }; /* more than it takes to start a shot */
+
 static uint32_t smaller(uint32_t a, uint32_t b)
 {
     return a < b ? a : b;
@@ -9,7 +11,8 @@ static uint32_t smaller(uint32_t a, uint32_t b)
 
 struct channel_limits channel_limits_absolute(void)
 {
-    return (struct channel_limits){.max_current_ma = MAX_CURRENT_MA, .max_duty_ppm = MAX_DUTY_PPM};
+    return (struct channel_limits){
+        .max_current_ma = MAX_CURRENT_MA, .max_duty_ppm = MAX_DUTY_PPM, .max_light_ma = MAX_LIGHT_MA};
 }
 
 struct channel_limits channel_limits_tightened(struct channel_limits present, struct channel_limits asked)
@@ -17,6 +20,7 @@ struct channel_limits channel_limits_tightened(struct channel_limits present, st
     return (struct channel_limits){
         .max_current_ma = smaller(present.max_current_ma, asked.max_current_ma),
         .max_duty_ppm = smaller(present.max_duty_ppm, asked.max_duty_ppm),
+        .max_light_ma = smaller(present.max_light_ma, asked.max_light_ma),
     };
 }
 
@@ -35,6 +39,12 @@ bool train_within(const struct pulse_train *train, const struct channel_limits *
     return true;
 }
 
+bool light_within(uint32_t current_ma, const struct channel_limits *limits)
+{
+    const struct channel_limits light = {smaller(limits->max_current_ma, limits->max_light_ma), limits->max_duty_ppm, 0};
+    return channel_within(&(struct channel){.current_ma = current_ma}, &light);
+}
+
 static uint32_t channel_period_us(const struct channel *channel, uint32_t max_duty_ppm)
 {
     if (!channel->used || !channel->current_ma)
@@ -45,7 +55,8 @@ static uint32_t channel_period_us(const struct channel *channel, uint32_t max_du
 
 uint32_t train_period_us(const struct pulse_train *train, const struct channel_limits *limits)
 {
-    uint32_t period_us = MIN_PERIOD_US;
+    const uint32_t busy_us = train_length_ns(train) / 1000u + START_US;
+    uint32_t period_us = busy_us > MIN_PERIOD_US ? busy_us : MIN_PERIOD_US;
     for (int i = 0; i < CHANNEL_COUNT; i++) {
         const uint32_t needed_us = channel_period_us(&train->channels[i], limits[i].max_duty_ppm);
         if (needed_us > period_us)

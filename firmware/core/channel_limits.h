@@ -10,7 +10,8 @@
 
 struct channel_limits {
     uint32_t max_current_ma;
-    uint32_t max_duty_ppm; /* 0: no light at all */
+    uint32_t max_duty_ppm; /* of the pulses; 0: no light at all */
+    uint32_t max_light_ma; /* continuous light */
 };
 
 struct channel_limits channel_limits_absolute(void);
@@ -23,8 +24,11 @@ bool channel_within(const struct channel *channel, const struct channel_limits *
 /* False if a used channel of the train is not within its limits. */
 bool train_within(const struct pulse_train *train, const struct channel_limits *limits);
 
+/* Whether a channel may give continuous light of this current. */
+bool light_within(uint32_t current_ma, const struct channel_limits *limits);
+
 /* Shortest time to the next shot, so that no channel exceeds its duty over any length of time: the minimum period,
- * or the light of this shot at the duty of its channel. For a train within these limits. */
+ * the light of this shot at the duty of its channel, or the shot itself. For a train within these limits. */
 uint32_t train_period_us(const struct pulse_train *train, const struct channel_limits *limits);
 
 #endif

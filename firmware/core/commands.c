@@ -1,6 +1,8 @@
 #include "commands.h"
 
+#include "light.h"
 #include "port.h"
+#include "shooting.h"
 
 typedef enum error (*action)(struct safety *safety, const uint32_t *fields, struct text *reply);
 
@@ -10,15 +12,18 @@ struct command {
     action run;
 };
 
-void command_identity(struct text *reply, uint32_t last_sequence)
+void command_identity(struct text *reply, enum cause cause, uint32_t last_sequence)
 {
     text_word(reply, " model=" MODEL " version=" VERSION " build=");
     text_word(reply, port_build);
+    text_word(reply, " git=");
+    text_word(reply, port_git);
     text_word(reply, " serial=");
-    text_word(reply, port_serial);
+    text_word(reply, port_serial());
     text_field(reply, "protocol", PROTOCOL_VERSION);
     text_field(reply, "channels", CHANNEL_COUNT);
     text_field(reply, "tick_ns", port_tick_ns);
+    text_field(reply, "cause", (uint32_t)cause);
     text_field(reply, "last", last_sequence);
 }
 
@@ -66,13 +71,14 @@ static enum error set_channel(struct safety *safety, const uint32_t *fields, str
 
 static enum error limit(struct safety *safety, const uint32_t *fields, struct text *reply)
 {
-    const struct channel_limits asked = {.max_current_ma = fields[1], .max_duty_ppm = fields[2]};
+    const struct channel_limits asked = {fields[1], fields[2], fields[3]};
     const enum error error = safety_tighten(safety, fields[0], asked);
     if (error)
         return error;
     text_field(reply, "channel", fields[0]);
     text_field(reply, "max_current_ma", safety->limits[fields[0]].max_current_ma);
     text_field(reply, "max_duty_ppm", safety->limits[fields[0]].max_duty_ppm);
+    text_field(reply, "max_light_ma", safety->limits[fields[0]].max_light_ma);
     return ERROR_NONE;
 }
 
@@ -90,7 +96,7 @@ static enum error load(struct safety *safety, const uint32_t *fields, struct tex
 
 static enum error arm(struct safety *safety, const uint32_t *fields, struct text *reply)
 {
-    const enum error error = safety_arm(safety, fields[0]);
+    const enum error error = safety_arm(safety, fields[0], fields[1], fields[2]);
     if (error)
         return error;
     text_field(reply, "train", safety->train_id);
@@ -110,18 +116,47 @@ static enum error fire(struct safety *safety, const uint32_t *fields, struct tex
     return ERROR_NONE;
 }
 
+static enum error light(struct safety *safety, const uint32_t *fields, struct text *reply)
+{
+    const enum error error = safety_light(safety, fields[0], fields + 1);
+    if (error)
+        return error;
+    state_field(reply, safety);
+    return ERROR_NONE;
+}
+
+static enum error shot(struct safety *safety, const uint32_t *fields, struct text *reply)
+{
+    if (fields[0] >= CHANNEL_COUNT)
+        return ERROR_CHANNEL;
+    const struct channel *fired = &safety->fired_train.channels[fields[0]];
+    if (!fired->used)
+        return ERROR_NO_SHOT;
+    text_field(reply, "fired", safety->counters.fired);
+    text_field(reply, "channel", fields[0]);
+    text_field(reply, "camera_ticks", fired->camera_ns / port_tick_ns);
+    text_field(reply, "a_start_ticks", fired->a_start_ns / port_tick_ns);
+    text_field(reply, "a_width_ticks", fired->a_width_ns / port_tick_ns);
+    text_field(reply, "b_start_ticks", fired->b_start_ns / port_tick_ns);
+    text_field(reply, "b_width_ticks", fired->b_width_ns / port_tick_ns);
+    text_field(reply, "current_ma", fired->current_ma);
+    return ERROR_NONE;
+}
+
 static enum error status(struct safety *safety, const uint32_t *fields, struct text *reply)
 {
     (void)fields;
-    const bool interlock_closed = safety_interlock_closed(safety); /* before the state, which it may change */
     state_field(reply, safety);
     text_field(reply, "faults", safety->faults);
-    text_field(reply, "interlock", interlock_closed);
+    text_field(reply, "interlock", safety->interlock_closed);
+    text_field(reply, "estop", safety->estop_closed);
+    text_field(reply, "source", (uint32_t)safety->source);
     text_field(reply, "shots_left", safety->shots_left);
     text_field(reply, "requested", safety->counters.requested);
     text_field(reply, "fired", safety->counters.fired);
     text_field(reply, "suppressed", safety->counters.suppressed);
     text_field(reply, "early", safety->counters.early);
+    text_field(reply, "cameras", safety->counters.cameras);
     text_field(reply, "crc_errors", safety->counters.crc_errors);
     return ERROR_NONE;
 }
@@ -152,8 +187,9 @@ static enum error clear(struct safety *safety, const uint32_t *fields, struct te
 }
 
 static const struct command COMMANDS[] = {
-    {"NEW", 0, new_train}, {"LIMIT", 3, limit},   {"CHANNEL", 9, set_channel}, {"LOAD", 0, load}, {"ARM", 1, arm},
-    {"FIRE", 0, fire},     {"STATUS", 0, status}, {"BEAT", 0, beat},           {"OFF", 0, off},   {"CLEAR", 0, clear},
+    {"NEW", 0, new_train}, {"LIMIT", 4, limit}, {"CHANNEL", 9, set_channel}, {"LOAD", 0, load},
+    {"ARM", 3, arm},       {"FIRE", 0, fire},   {"LIGHT", 5, light},         {"SHOT", 1, shot},
+    {"STATUS", 0, status}, {"BEAT", 0, beat},   {"OFF", 0, off},             {"CLEAR", 0, clear},
 };
 
 static const struct command *find(struct span word)

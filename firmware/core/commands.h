@@ -9,14 +9,14 @@
 #include "text.h"
 
 #define MODEL "tomoshadow-pulse"
-#define VERSION "1.0.0"
+#define VERSION "2.0.0"
 
-enum { PROTOCOL_VERSION = 1, MAX_FIELDS = 9 };
+enum { PROTOCOL_VERSION = 2, MAX_FIELDS = 9 };
 
 /* Carry out one command, given its word and the rest of the line; append the fields of the reply. */
 enum error command_run(struct safety *safety, struct span word, struct span rest, struct text *reply);
 
-/* Append what ID answers, the number of the last answered line included. */
-void command_identity(struct text *reply, uint32_t last_sequence);
+/* Append what ID answers: the cause of the newest start and the number of the last answered line among it. */
+void command_identity(struct text *reply, enum cause cause, uint32_t last_sequence);
 
 #endif

@@ -24,6 +24,12 @@ enum error {
     ERROR_SHOTS = 18,
     ERROR_HARDWARE = 19,
     ERROR_LIMIT = 20,
+    ERROR_LIGHT = 21,
+    ERROR_ESTOP_OPEN = 22,
+    ERROR_SOURCE = 23,
+    ERROR_PERIOD = 24,
+    ERROR_OTHER_SOURCE = 25,
+    ERROR_NO_SHOT = 26,
 };
 
 #endif

@@ -11,13 +11,19 @@ enum limits {
     MAX_WIDTH_NS = 2000,
     MIN_DARK_NS = 400,          /* end of pulse A to start of pulse B: the LED driver recovers */
     MAX_SEPARATION_NS = 200000, /* start of pulse A to start of pulse B */
-    MAX_EDGE_NS = 2000000,      /* latest rising edge after the trigger of the shot */
+    MAX_EDGE_NS = 20000000,     /* latest rising edge after the trigger of the shot */
     MAX_CURRENT_MA = 30000,
     MIN_PERIOD_US = 10000,
+    MAX_PERIOD_US = 10000000,
     MAX_DUTY_PPM = 200,         /* light on per channel; lengthens the period above 2 us of light per shot */
     MAX_SHOTS = 1000000,
     HEARTBEAT_MS = 3000,
     CAMERA_PULSE_NS = 10000,    /* how long a camera trigger stays high */
+    MAX_LIGHT_MA = 500,         /* continuous light */
+    MAX_LIGHT_MS = 600000,
+    MAX_LIGHT_DUTY_PPM = 50000, /* it is made of pulses of at most MAX_WIDTH_NS; this part of the time they are on */
+    LIGHT_SUSTAIN_MS = 60,      /* it ends by itself if the core does not ask for more */
+    SETTLE_MS = 20,             /* from the set-points of pulses to those of continuous light */
     MAX_LINE = 128,             /* characters of a request, CRC included, line feed excluded */
 };
 

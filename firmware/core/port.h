@@ -13,21 +13,47 @@
 #include "pulse_train.h"
 
 extern const char port_build[];     /* one word: which port this is */
-extern const char port_serial[];    /* one word: serial number of the board */
+extern const char port_git[];       /* one word, up to 40 characters: revision of the sources */
 extern const uint32_t port_tick_ns; /* all edges are multiples of it */
+
+/* One word, up to 16 characters: which board this is; no other one answers the same. */
+const char *port_serial(void);
 
 /* Monotonic time since boot. */
 uint64_t port_now_us(void);
 
-/* False while the interlock is open, and once after it has been open since the last call, however briefly. */
+/* False while the input is open, and once after it has been open since the last call, however briefly. */
 bool port_interlock_closed(void);
+bool port_estop_closed(void);
 
-/* Make ready for port_fire: set-points and edges. False where this machine cannot produce the train. */
+/* Make ready for shots: set-points, read back, and edges. False where this machine cannot produce the train, or a
+ * set-point does not read as it was set. */
 bool port_load(const struct pulse_train *train);
 
-/* Start the loaded train and return. It ends by itself with every output at its safe level, and does not
- * repeat without another port_fire. A channel whose current is 0 triggers its camera and gives no light. */
-void port_fire(void);
+/* Start one shot of the loaded train and return. It ends by itself with every output at its safe level, and does
+ * not repeat. A channel whose current is 0 triggers its camera and gives no light. False if nothing has started,
+ * because an interrupt had switched the outputs off before. */
+bool port_fire(void);
+
+/* Let the next rising edge of the trigger input start one shot of the loaded train, without the processor. A line that
+ * is already high starts nothing. Until the shot has started, and after it, no other edge does anything. */
+void port_permit(void);
+
+/* What the trigger input did since the last call, from the first port_permit after port_load on. */
+struct port_edges {
+    uint32_t rises;
+    bool fired; /* the permitted shot has started; the one of port_fire does not count here */
+};
+struct port_edges port_take_edges(void);
+
+/* Camera triggers that were really given since the last call: rises of the outputs. */
+uint32_t port_take_cameras(void);
+
+/* Make ready for light for adjustment: set-points, read back; still dark. False as port_load. */
+bool port_prepare_light(const uint32_t *current_ma);
+
+/* Light on the prepared channels from now on, for LIGHT_SUSTAIN_MS: without another call it ends by itself. */
+void port_sustain_light(void);
 
 /* Every light and trigger output to its safe level, set-points to zero, at once; also in mid-pulse. */
 void port_off(void);

@@ -6,10 +6,10 @@
 
 enum { CRC_LENGTH = 5 }; /* *1A2B */
 
-void protocol_boot(struct protocol *protocol, uint32_t boot, bool watchdog)
+void protocol_boot(struct protocol *protocol, uint32_t boot, enum cause cause)
 {
-    *protocol = (struct protocol){.boot = boot};
-    safety_boot(&protocol->safety, watchdog);
+    *protocol = (struct protocol){.boot = boot, .cause = cause};
+    safety_boot(&protocol->safety, cause);
 }
 
 /* Cut the CRC off the line; false where it is missing or wrong. */
@@ -69,7 +69,7 @@ static void answer(struct protocol *protocol, uint32_t sequence, uint16_t crc, s
     if (span_equals(word, "ID") && !rest.length) {
         /* Opens a session: always answered afresh, and leaves the kept reply alone. */
         write_ok(reply, protocol->boot);
-        command_identity(reply, protocol->sequence);
+        command_identity(reply, protocol->cause, protocol->sequence);
     } else if (!is_newest(protocol, sequence)) {
         run_command(protocol, word, rest, reply);
         protocol->answered = true;

@@ -21,6 +21,7 @@ enum { ABORT_BYTE = 0x18, MAX_SEQUENCE = 65535 };
 struct protocol {
     struct safety safety;
     uint32_t boot; /* how often the microcontroller has started */
+    enum cause cause;
     char line[MAX_LINE];
     size_t length;
     bool overflow;
@@ -30,12 +31,13 @@ struct protocol {
     struct text reply;
 };
 
-void protocol_boot(struct protocol *protocol, uint32_t boot, bool watchdog);
+void protocol_boot(struct protocol *protocol, uint32_t boot, enum cause cause);
 
 /* Take one byte from the serial line. ABORT_BYTE switches the light off wherever it stands in the stream. */
 void protocol_receive(struct protocol *protocol, char byte);
 
-/* To be called all the time by the main loop. */
+/* To be called all the time by the main loop, also while port_send waits for its line; safety_idle_us tells how long
+ * that may take. */
 void protocol_poll(struct protocol *protocol);
 
 #endif

@@ -10,8 +10,20 @@ static bool width_allowed(uint32_t width_ns)
     return width_ns >= MIN_WIDTH_NS && width_ns <= MAX_WIDTH_NS;
 }
 
+bool channel_is_single(const struct channel *channel)
+{
+    return !channel->b_start_ns && !channel->b_width_ns;
+}
+
+static bool widths_allowed(const struct channel *channel)
+{
+    return width_allowed(channel->a_width_ns) && (channel_is_single(channel) || width_allowed(channel->b_width_ns));
+}
+
 static bool separation_allowed(const struct channel *channel)
 {
+    if (channel_is_single(channel))
+        return true;
     /* Sums of bounded values: edges and widths were checked before. */
     const uint32_t a_end_ns = channel->a_start_ns + channel->a_width_ns;
     return channel->b_start_ns >= a_end_ns + MIN_DARK_NS &&
@@ -23,15 +35,16 @@ static bool straddles(const struct channel *channel)
     /* The frame boundaries are any 32 bit numbers. */
     const uint64_t a_close_ns = (uint64_t)channel->camera_ns + channel->frame_a_close_ns;
     const uint64_t b_open_ns = (uint64_t)channel->camera_ns + channel->frame_b_open_ns;
-    return a_close_ns <= b_open_ns && (uint64_t)channel->a_start_ns + channel->a_width_ns <= a_close_ns &&
-           channel->b_start_ns >= b_open_ns;
+    if ((uint64_t)channel->a_start_ns + channel->a_width_ns > a_close_ns)
+        return false;
+    return channel_is_single(channel) || (a_close_ns <= b_open_ns && channel->b_start_ns >= b_open_ns);
 }
 
 enum error channel_check(const struct channel *channel)
 {
     if (channel->camera_ns > MAX_EDGE_NS || channel->a_start_ns > MAX_EDGE_NS || channel->b_start_ns > MAX_EDGE_NS)
         return ERROR_EDGE;
-    if (!width_allowed(channel->a_width_ns) || !width_allowed(channel->b_width_ns))
+    if (!widths_allowed(channel))
         return ERROR_WIDTH;
     if (!separation_allowed(channel))
         return ERROR_SEPARATION;
@@ -77,6 +90,7 @@ uint32_t train_length_ns(const struct pulse_train *train)
         if (!channel->used)
             continue;
         length_ns = larger(length_ns, channel->camera_ns + CAMERA_PULSE_NS);
+        length_ns = larger(length_ns, channel->a_start_ns + channel->a_width_ns);
         length_ns = larger(length_ns, channel->b_start_ns + channel->b_width_ns);
     }
     return length_ns;

@@ -1,4 +1,5 @@
-/* The pulse train of one shot: values, limits, quantisation. Pure; all times in ns from the trigger of the shot. */
+/* The pulse train of one shot: values, limits, quantisation. Pure; all times in ns from the trigger of the shot.
+ * A channel gives two light pulses, or one: then start and width of B are 0. */
 #ifndef PULSE_TRAIN_H
 #define PULSE_TRAIN_H
 
@@ -29,6 +30,9 @@ enum error channel_check(const struct channel *channel);
 
 /* Every edge and width at the nearest multiple of the tick. Only for a channel that passed channel_check. */
 struct channel channel_quantised(const struct channel *channel, uint32_t tick_ns);
+
+/* Whether it gives pulse A alone. */
+bool channel_is_single(const struct channel *channel);
 
 /* ERROR_NO_TRAIN if no channel is used, else the first limit that a used channel breaks. */
 enum error train_check(const struct pulse_train *train);

@@ -8,19 +8,25 @@
 
 #include "port.h"
 
-struct bench bench = {.serial = -1, .interlock_closed = true};
+struct bench bench = {.serial = -1, .interlock_closed = true, .estop_closed = true};
 
 const char port_build[] = "host";
-const char port_serial[] = "simulated";
+const char port_git[] = "unknown";
 const uint32_t port_tick_ns = 8; /* as the RP2040 at 125 MHz */
 
 static struct pulse_train loaded;
 static uint32_t fired;
+static bool permitted;
+static struct port_edges edges;
+static uint32_t cameras;
+static uint32_t light_ma[CHANNEL_COUNT];
+static bool lit;
 
 void bench_power_up(void)
 {
-    loaded = (struct pulse_train){0};
-    fired = 0;
+    port_off();
+    fired = cameras = 0;
+    edges = (struct port_edges){0};
 }
 
 void bench_find_port(void)
@@ -32,6 +38,12 @@ void bench_set_interlock(bool closed)
 {
     bench.interlock_closed = closed;
     bench.interlock_opened |= !closed;
+}
+
+void bench_set_estop(bool closed)
+{
+    bench.estop_closed = closed;
+    bench.estop_opened |= !closed;
 }
 
 void bench_print_event(const char *format, ...)
@@ -50,6 +62,11 @@ void bench_send(const char *bytes, size_t length)
     (void)written;
 }
 
+const char *port_serial(void)
+{
+    return "simulated";
+}
+
 uint64_t port_now_us(void)
 {
     struct timespec now;
@@ -64,13 +81,22 @@ bool port_interlock_closed(void)
     return closed;
 }
 
+bool port_estop_closed(void)
+{
+    const bool closed = bench.estop_closed && !bench.estop_opened;
+    bench.estop_opened = false;
+    return closed;
+}
+
 bool port_load(const struct pulse_train *train)
 {
     loaded = *train;
+    permitted = false;
+    edges = (struct port_edges){0};
     return true;
 }
 
-void port_fire(void)
+static void give_shot(void)
 {
     char line[512];
     size_t length = 0;
@@ -82,13 +108,66 @@ void port_fire(void)
                                    channel->a_start_ns, channel->a_width_ns, channel->b_start_ns, channel->b_width_ns,
                                    channel->current_ma);
         length += (size_t)added;
+        cameras++;
     }
     bench_print_event("fired %u%.*s\n", ++fired, (int)length, line);
+}
+
+bool port_fire(void)
+{
+    give_shot();
+    return true;
+}
+
+void port_permit(void)
+{
+    permitted = true;
+}
+
+void bench_trigger(void)
+{
+    edges.rises++;
+    if (permitted) {
+        permitted = false;
+        edges.fired = true;
+        give_shot();
+    }
+}
+
+struct port_edges port_take_edges(void)
+{
+    const struct port_edges taken = edges;
+    edges = (struct port_edges){0};
+    return taken;
+}
+
+uint32_t port_take_cameras(void)
+{
+    const uint32_t taken = cameras;
+    cameras = 0;
+    return taken;
+}
+
+bool port_prepare_light(const uint32_t *current_ma)
+{
+    memcpy(light_ma, current_ma, sizeof light_ma);
+    return true;
+}
+
+void port_sustain_light(void)
+{
+    if (!lit)
+        bench_print_event("lit 0 %u 1 %u 2 %u 3 %u\n", light_ma[0], light_ma[1], light_ma[2], light_ma[3]);
+    lit = true;
 }
 
 void port_off(void)
 {
     loaded = (struct pulse_train){0};
+    permitted = false;
+    if (lit)
+        bench_print_event("dark\n");
+    lit = false;
 }
 
 void port_send(const char *bytes, size_t length)

@@ -8,7 +8,7 @@
 static void reset(struct protocol *protocol, bool watchdog)
 {
     bench_power_up();
-    protocol_boot(protocol, protocol->boot + 1, watchdog);
+    protocol_boot(protocol, protocol->boot + 1, watchdog ? CAUSE_WATCHDOG : CAUSE_PIN);
     bench_find_port();
 }
 
@@ -37,6 +37,10 @@ static bool run(struct protocol *protocol, const char *line)
     sscanf(rest, "%u", &number);
     if (!strcmp(word, "interlock"))
         bench_set_interlock(number != 0);
+    else if (!strcmp(word, "estop"))
+        bench_set_estop(number != 0);
+    else if (!strcmp(word, "trigger"))
+        bench_trigger();
     else if (!strcmp(word, "reset"))
         reset(protocol, !strcmp(rest, "watchdog"));
     else if (!strcmp(word, "advance"))

@@ -1,6 +1,8 @@
 /* What somebody may do to the laboratory while the core runs; one line each, answered by "done" or "unknown".
  *
  *     interlock 0|1       open or close the interlock
+ *     estop 0|1           open or close the emergency stop
+ *     trigger             a rising edge on the trigger input
  *     reset [watchdog]    restart the microcontroller
  *     advance MS          let time pass
  *     garbage HEX         bytes that reach the host computer, from nowhere

@@ -4,6 +4,8 @@
  *
  * stdout says "port PATH" (or "port fd") first, then one line per shot:
  *     fired COUNT {CHANNEL CAMERA_NS A_START_NS A_WIDTH_NS B_START_NS B_WIDTH_NS CURRENT_MA}...
+ * and for continuous light
+ *     lit {CHANNEL CURRENT_MA}...      dark
  * stdin takes the lines of control.h; its end ends the program, so that it never outlives its owner. */
 #include <errno.h>
 #include <fcntl.h>
@@ -86,7 +88,7 @@ static void run(struct protocol *protocol)
     struct pollfd waiting[2] = {{bench.serial, POLLIN, 0}, {STDIN_FILENO, POLLIN, 0}};
     bool open = true;
     while (open) {
-        poll(waiting, 2, POLL_MS);
+        poll(waiting, 2, protocol->safety.state == STATE_ARMED ? (int)safety_idle_us(&protocol->safety) / 1000 : POLL_MS);
         if (waiting[1].revents)
             open = read_control(protocol);
         if (open && waiting[0].revents)
@@ -100,7 +102,7 @@ int main(int argument_count, char **arguments)
     static struct protocol protocol;
     bench.serial = open_serial(argument_count, arguments);
     fcntl(bench.serial, F_SETFL, fcntl(bench.serial, F_GETFL) | O_NONBLOCK);
-    protocol_boot(&protocol, 1, false);
+    protocol_boot(&protocol, 1, CAUSE_POWER);
     bench_find_port();
     run(&protocol);
     return 0;

@@ -12,16 +12,21 @@
 #include "watchdog.h"
 
 const char port_build[] = "rp2040";
-const char port_serial[] = "unset";
+const char port_git[] = "unknown";
 const uint32_t port_tick_ns = TICK_NS;
 
 enum {
-    POLL_US = 2000, /* the core wants to be polled every few milliseconds */
+    SLEEP_AT_LEAST_US = 5, /* an alarm that is set too late never comes */
     ALARM0 = 1,
     PRIORITY_LOWEST = 3 << 6,
 };
 
 static struct protocol protocol;
+
+const char *port_serial(void)
+{
+    return "unset";
+}
 
 uint64_t port_now_us(void)
 {
@@ -44,9 +49,39 @@ bool port_load(const struct pulse_train *train)
     return outputs_load(train);
 }
 
-void port_fire(void)
+bool port_estop_closed(void)
+{
+    return true;
+}
+
+bool port_fire(void)
 {
     outputs_fire();
+    return true;
+}
+
+void port_permit(void)
+{
+}
+
+struct port_edges port_take_edges(void)
+{
+    return (struct port_edges){0};
+}
+
+uint32_t port_take_cameras(void)
+{
+    return 0;
+}
+
+bool port_prepare_light(const uint32_t *current_ma)
+{
+    (void)current_ma;
+    return false;
+}
+
+void port_sustain_light(void)
+{
 }
 
 void port_off(void)
@@ -56,7 +91,10 @@ void port_off(void)
 
 void port_send(const char *bytes, size_t length)
 {
-    serial_send(bytes, length);
+    for (size_t i = 0; i < length; i++) { /* triggers and light do not wait for a reply */
+        serial_send(bytes + i, 1);
+        protocol_poll(&protocol);
+    }
 }
 
 void isr_timer0(void)
@@ -74,13 +112,13 @@ static void start_interrupts(void)
     __asm__ volatile("cpsie i" ::: "memory");
 }
 
-/* Until a byte, the interlock or the next poll. Masked, so that none of them slips in between look and sleep; the
+/* Until a byte, an edge, or something is due. Masked, so that none of them slips in between look and sleep; the
  * alarm is set afresh each time, because one that lies in the past would never come. */
-static void sleep(void)
+static void sleep(uint32_t time_us)
 {
     const uint32_t before = interrupts_mask();
-    if (!serial_waiting()) {
-        REG(TIMER_ALARM0) = REG(TIMER_RAWL) + POLL_US;
+    if (!serial_waiting() && time_us >= SLEEP_AT_LEAST_US) {
+        REG(TIMER_ALARM0) = REG(TIMER_RAWL) + time_us;
         __asm__ volatile("wfi" ::: "memory");
     }
     interrupts_restore(before);
@@ -97,7 +135,7 @@ int main(void)
     set_points_start();
     interlock_start();
     serial_start();
-    protocol_boot(&protocol, start.boot, start.by_watchdog);
+    protocol_boot(&protocol, start.boot, start.by_watchdog ? CAUSE_WATCHDOG : CAUSE_UNKNOWN);
     start_interrupts();
     for (;;) {
         watchdog_feed();
@@ -105,6 +143,6 @@ int main(void)
             protocol_receive(&protocol, byte);
         protocol_poll(&protocol);
         (void)set_points_confirmed();
-        sleep();
+        sleep(safety_idle_us(&protocol.safety));
     }
 }

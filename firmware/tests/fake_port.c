@@ -7,12 +7,39 @@
 struct fake_port fake;
 
 const char port_build[] = "test";
-const char port_serial[] = "0";
+const char port_git[] = "unknown";
 const uint32_t port_tick_ns = 8;
 
 void fake_reset(void)
 {
-    fake = (struct fake_port){.interlock_closed = true, .can_load = true};
+    fake = (struct fake_port){.interlock_closed = true, .estop_closed = true, .can_load = true};
+}
+
+static void start_shot(void)
+{
+    fake.fired++;
+    for (int i = 0; i < CHANNEL_COUNT; i++)
+        fake.cameras += fake.loaded.channels[i].used;
+}
+
+void fake_edge(void)
+{
+    fake.rises++;
+    if (fake.permitted) {
+        fake.permitted = false;
+        fake.edge_fired = true;
+        start_shot();
+    }
+}
+
+bool fake_lit(void)
+{
+    return fake.live && fake.now_us < fake.lit_until_us;
+}
+
+const char *port_serial(void)
+{
+    return "0";
 }
 
 uint64_t port_now_us(void)
@@ -25,24 +52,77 @@ bool port_interlock_closed(void)
     return fake.interlock_closed;
 }
 
+bool port_estop_closed(void)
+{
+    return fake.estop_closed;
+}
+
 bool port_load(const struct pulse_train *train)
 {
     CHECK(train_check(train) == ERROR_NONE);
     fake.loaded = *train;
+    fake.prepared = false;
+    fake.edge_fired = false;
+    fake.rises = 0;
     fake.live = true; /* also where only a part could be loaded */
     return fake.can_load;
 }
 
-void port_fire(void)
+bool port_fire(void)
 {
-    CHECK(fake.live);
-    fake.fired++;
+    CHECK(fake.live && !fake.prepared && !fake.permitted);
+    fake.live = fake.live && !fake.interrupted;
+    fake.interrupted = false;
+    if (!fake.live)
+        return false;
+    start_shot();
     fake.now_us += FIRING_US;
+    return true;
+}
+
+void port_permit(void)
+{
+    CHECK(fake.live && !fake.prepared && !fake.permitted && !fake.edge_fired);
+    fake.permitted = true;
+}
+
+struct port_edges port_take_edges(void)
+{
+    const struct port_edges edges = {fake.rises, fake.edge_fired};
+    fake.rises = 0;
+    fake.edge_fired = false;
+    return edges;
+}
+
+uint32_t port_take_cameras(void)
+{
+    const uint32_t cameras = fake.cameras;
+    fake.cameras = 0;
+    return cameras;
+}
+
+bool port_prepare_light(const uint32_t *current_ma)
+{
+    CHECK(!fake.live && !fake.permitted);
+    for (int i = 0; i < CHANNEL_COUNT; i++) {
+        CHECK(current_ma[i] <= MAX_LIGHT_MA);
+        fake.light_ma[i] = current_ma[i];
+    }
+    fake.live = fake.prepared = true;
+    fake.lit_until_us = 0;
+    return fake.can_load;
+}
+
+void port_sustain_light(void)
+{
+    CHECK(fake.live && fake.prepared);
+    fake.lit_until_us = fake.now_us + LIGHT_SUSTAIN_MS * 1000u;
 }
 
 void port_off(void)
 {
-    fake.live = false;
+    fake.live = fake.permitted = fake.prepared = false;
+    fake.lit_until_us = 0;
 }
 
 void port_send(const char *bytes, size_t length)

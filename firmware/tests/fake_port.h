@@ -13,9 +13,18 @@ enum { FIRING_US = 3 }; /* time that port_fire takes; the light may start at its
 struct fake_port {
     uint64_t now_us;
     bool interlock_closed;
+    bool estop_closed;
     bool can_load;
+    bool interrupted; /* an interrupt switches the outputs off just before the next shot */
     struct pulse_train loaded;
     bool live; /* between port_load and port_off */
+    bool permitted;
+    bool edge_fired;   /* since the core last asked */
+    uint32_t rises;    /* likewise */
+    uint32_t cameras;  /* likewise */
+    uint32_t light_ma[CHANNEL_COUNT];
+    bool prepared;     /* for light */
+    uint64_t lit_until_us;
     unsigned fired;
     unsigned replies;
     char reply[TEXT_SIZE]; /* newest, terminated by zero */
@@ -24,6 +33,11 @@ struct fake_port {
 extern struct fake_port fake;
 
 void fake_reset(void);
+
+/* A rising edge on the trigger input. */
+void fake_edge(void);
+
+bool fake_lit(void);
 
 /* Send a body as a line with its CRC; returns the body of the reply, without CRC and line feed. */
 const char *exchange(struct protocol *protocol, const char *body);

@@ -62,10 +62,10 @@ static void random_command(void)
     if (choice < 4)
         random_channel(command, sizeof command);
     else if (choice < 6)
-        snprintf(command, sizeof command, "ARM %u", random_below(20));
+        snprintf(command, sizeof command, "ARM %u %u %u", random_below(20), random_below(4), random_below(3) ? 0 : random_below(50000));
     else if (choice == 6)
-        snprintf(command, sizeof command, "LIMIT %u %u %u", random_below(5), 25000 + random_below(10000),
-                 random_below(500));
+        snprintf(command, sizeof command, "LIMIT %u %u %u %u", random_below(5), 25000 + random_below(10000),
+                 random_below(500), 200 + random_below(1000));
     else
         snprintf(command, sizeof command, "%s", words[choice - 7]);
     sequence += random_below(8) != 0; /* now and then the same number again */
@@ -97,7 +97,7 @@ static void check_duty(void)
 
 static void restart(void)
 {
-    protocol_boot(&protocol, protocol.boot + 1, false);
+    protocol_boot(&protocol, protocol.boot + 1, CAUSE_POWER);
     fake.fired = fired_before = 0;
     for (int i = 0; i < CHANNEL_COUNT; i++) /* limits that were tightened are forgotten, the absolute ones are not */
         if (dark_until_us[i] > fake.now_us + 2 * MAX_WIDTH_NS * 1000 / MAX_DUTY_PPM)
@@ -125,7 +125,7 @@ static void check_invariants(void)
 static void begin(void)
 {
     fake_reset();
-    protocol_boot(&protocol, 1, false);
+    protocol_boot(&protocol, 1, CAUSE_POWER);
     fired_before = sequence = shots = 0;
     last_shot_us = 0;
     memset(dark_until_us, 0, sizeof dark_until_us);

@@ -19,10 +19,14 @@ static void change_world(const char *what)
         fake.now_us += number;
     else if (sscanf(what, "interlock %u", &number) == 1)
         fake.interlock_closed = number != 0;
+    else if (sscanf(what, "estop %u", &number) == 1)
+        fake.estop_closed = number != 0;
+    else if (!strcmp(what, "edge\n"))
+        fake_edge();
     else if (!strcmp(what, "abort\n"))
         protocol_receive(&protocol, ABORT_BYTE);
     else if (!strcmp(what, "reset\n"))
-        protocol_boot(&protocol, protocol.boot + 1, false);
+        protocol_boot(&protocol, protocol.boot + 1, CAUSE_POWER);
     else
         CHECK(!"a known change");
     protocol_poll(&protocol);
@@ -41,7 +45,7 @@ int main(void)
 {
     char line[512];
     fake_reset();
-    protocol_boot(&protocol, 1, false);
+    protocol_boot(&protocol, 1, CAUSE_POWER);
     while (fgets(line, sizeof line, stdin)) {
         if (line[0] == '>')
             receive_line(line + 2);

@@ -12,7 +12,7 @@ static struct protocol protocol;
 static void boot(void)
 {
     fake_reset();
-    protocol_boot(&protocol, 3, false);
+    protocol_boot(&protocol, 3, CAUSE_POWER);
     fake.now_us += 2 * MIN_PERIOD_US; /* the first shot after a start waits as long as the longest train demands */
 }
 
@@ -22,7 +22,7 @@ static void boot_armed(void)
     CHECK_REPLY("1 NEW", "1 3 OK");
     ASK("2 " CHANNEL_0);
     CHECK_REPLY("3 LOAD", "3 3 OK train=1 length_ns=27400 period_us=10000");
-    CHECK_REPLY("4 ARM 5", "4 3 OK train=1 shots_left=5");
+    CHECK_REPLY("4 ARM 5 0 0", "4 3 OK train=1 shots_left=5");
 }
 
 static void receive(const char *bytes)
@@ -56,7 +56,7 @@ static void test_a_number_cannot_be_used_for_another_line(void)
 {
     boot_armed();
     CHECK_REPLY("4 FIRE", "4 3 ERR 5");
-    CHECK_REPLY("4 ARM 5", "4 3 OK train=1 shots_left=5");
+    CHECK_REPLY("4 ARM 5 0 0", "4 3 OK train=1 shots_left=5");
     CHECK(fake.fired == 0);
 }
 
@@ -64,8 +64,8 @@ static void test_id_is_fresh_and_leaves_the_kept_reply_alone(void)
 {
     boot_armed();
     CHECK(strstr(ASK("0 ID"), "0 3 OK model=tomoshadow-pulse ") && strstr(fake.reply, " last=4"));
-    CHECK(strstr(ASK("4 ID"), "4 3 OK model=") && strstr(fake.reply, " tick_ns=8 last=4"));
-    CHECK_REPLY("4 ARM 5", "4 3 OK train=1 shots_left=5");
+    CHECK(strstr(ASK("4 ID"), "4 3 OK model=") && strstr(fake.reply, " tick_ns=8 cause=1 last=4"));
+    CHECK_REPLY("4 ARM 5 0 0", "4 3 OK train=1 shots_left=5");
 }
 
 static void test_malformed_lines_have_numbered_errors(void)
@@ -74,12 +74,12 @@ static void test_malformed_lines_have_numbered_errors(void)
     CHECK_REPLY("1 FLY", "1 3 ERR 3");
     CHECK_REPLY("2", "2 3 ERR 3");
     CHECK_REPLY("3 ARM", "3 3 ERR 4");
-    CHECK_REPLY("4 ARM 1 2", "4 3 ERR 4");
-    CHECK_REPLY("5 ARM -1", "5 3 ERR 4");
+    CHECK_REPLY("4 ARM 1 2 3 4", "4 3 ERR 4");
+    CHECK_REPLY("5 ARM -1 0 0", "5 3 ERR 4");
     CHECK_REPLY("6 OFF 1", "6 3 ERR 4");
-    CHECK_REPLY("7 ARM 4294967296", "7 3 ERR 4");
+    CHECK_REPLY("7 ARM 4294967296 0 0", "7 3 ERR 4");
     CHECK_REPLY("8 CHANNEL 4 0 20000 1000 26400 1000 20000 22000 23000", "8 3 ERR 12");
-    CHECK_REPLY("x ARM 1", "? 3 ERR 4");
+    CHECK_REPLY("x OFF", "? 3 ERR 4");
     CHECK_REPLY("65536 OFF", "? 3 ERR 4");
     CHECK_REPLY("", "? 3 ERR 4");
 }
@@ -145,7 +145,7 @@ static void test_status_tells_everything(void)
     ASK("6 FIRE");
     fake.interlock_closed = false;
     CHECK_REPLY("7 STATUS",
-                "7 3 OK state=2 faults=1 interlock=0 shots_left=0 requested=2 fired=1 suppressed=1 early=1 crc_errors=0");
+                "7 3 OK state=2 faults=1 interlock=0 estop=1 source=0 shots_left=0 requested=2 fired=1 suppressed=1 early=1 cameras=1 crc_errors=0");
     CHECK_REPLY("8 CLEAR", "8 3 ERR 9");
 }
 
@@ -153,7 +153,7 @@ static void test_the_longest_lines_fit(void)
 {
     boot();
     protocol.boot = protocol.safety.faults = UINT32_MAX;
-    protocol.safety.counters = (struct counters){UINT32_MAX, UINT32_MAX, UINT32_MAX, UINT32_MAX, UINT32_MAX};
+    protocol.safety.counters = (struct counters){UINT32_MAX, UINT32_MAX, UINT32_MAX, UINT32_MAX, UINT32_MAX, UINT32_MAX};
     ASK("65535 STATUS");
     CHECK(strlen(fake.reply) < TEXT_SIZE - 64 && strstr(fake.reply, "crc_errors=4294967295"));
     CHECK(strstr(ASK("65534 CHANNEL 4294967295 4294967295 4294967295 4294967295 4294967295 4294967295 4294967295 "

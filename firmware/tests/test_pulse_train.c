@@ -124,23 +124,23 @@ static void test_more_light_lengthens_the_period(void)
 
 static void test_limits_only_become_tighter(void)
 {
-    const struct channel_limits widest = {UINT32_MAX, UINT32_MAX};
+    const struct channel_limits widest = {UINT32_MAX, UINT32_MAX, UINT32_MAX};
     struct channel_limits limits = channel_limits_tightened(channel_limits_absolute(), widest);
     CHECK(limits.max_current_ma == MAX_CURRENT_MA && limits.max_duty_ppm == MAX_DUTY_PPM);
-    limits = channel_limits_tightened(limits, (struct channel_limits){12000, UINT32_MAX});
+    limits = channel_limits_tightened(limits, (struct channel_limits){12000, UINT32_MAX, UINT32_MAX});
     CHECK(limits.max_current_ma == 12000 && limits.max_duty_ppm == MAX_DUTY_PPM);
-    limits = channel_limits_tightened(limits, (struct channel_limits){12001, 50});
-    CHECK(limits.max_current_ma == 12000 && limits.max_duty_ppm == 50);
+    limits = channel_limits_tightened(limits, (struct channel_limits){12001, 50, 7});
+    CHECK(limits.max_current_ma == 12000 && limits.max_duty_ppm == 50 && limits.max_light_ma == 7);
 }
 
 static void test_a_channel_keeps_its_own_limits(void)
 {
     struct pulse_train train = {.channels = {[1] = LEGAL}};
-    struct channel_limits limits[CHANNEL_COUNT] = {{0, 0}, {20000, 1}, {0, 0}, {0, 0}};
+    struct channel_limits limits[CHANNEL_COUNT] = {[1] = {20000, 1, 0}};
     CHECK(train_within(&train, limits)); /* unused channels have no light that could be forbidden */
     limits[1].max_current_ma = 19999;
     CHECK(!train_within(&train, limits));
-    limits[1] = (struct channel_limits){20000, 0};
+    limits[1] = (struct channel_limits){20000, 0, 0};
     CHECK(!train_within(&train, limits));
     train.channels[1].current_ma = 0;
     CHECK(train_within(&train, limits));

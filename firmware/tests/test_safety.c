@@ -1,6 +1,7 @@
 /* When light is allowed, and what takes the permission away. */
 #include "fake_port.h"
 #include "safety.h"
+#include "shooting.h"
 
 static struct safety safety;
 
@@ -21,10 +22,15 @@ static void wait_us(uint32_t time_us)
     safety_poll(&safety);
 }
 
+static enum error arm(uint32_t shots)
+{
+    return safety_arm(&safety, shots, SOURCE_COMMAND, 0);
+}
+
 static void boot(void)
 {
     fake_reset();
-    safety_boot(&safety, false);
+    safety_boot(&safety, CAUSE_POWER);
     wait_us(2 * MIN_PERIOD_US);
 }
 
@@ -32,7 +38,7 @@ static void boot_armed(uint32_t shots)
 {
     boot();
     CHECK(!safety_new_train(&safety) && !safety_set_channel(&safety, 0, &LEGAL) && !safety_load(&safety));
-    CHECK(safety_arm(&safety, shots) == ERROR_NONE && safety.state == STATE_ARMED && fake.live);
+    CHECK(arm(shots) == ERROR_NONE && safety.state == STATE_ARMED && fake.live);
 }
 
 static void check_counters_add_up(void)
@@ -45,7 +51,7 @@ static void test_nothing_works_before_arming(void)
 {
     boot();
     CHECK(safety.state == STATE_SAFE && !fake.live);
-    CHECK(safety_fire(&safety) == ERROR_NOT_ARMED && safety_arm(&safety, 1) == ERROR_NO_TRAIN);
+    CHECK(safety_fire(&safety) == ERROR_NOT_ARMED && arm(1) == ERROR_NO_TRAIN);
     CHECK(safety_load(&safety) == ERROR_NO_TRAIN && fake.fired == 0);
     check_counters_add_up();
 }
@@ -75,7 +81,7 @@ static void test_the_budget_has_bounds(void)
 {
     boot_armed(MAX_SHOTS);
     safety_off(&safety);
-    CHECK(safety_arm(&safety, 0) == ERROR_SHOTS && safety_arm(&safety, MAX_SHOTS + 1) == ERROR_SHOTS);
+    CHECK(arm(0) == ERROR_SHOTS && arm(MAX_SHOTS + 1) == ERROR_SHOTS);
 }
 
 static void test_an_early_shot_is_ignored_and_counted(void)
@@ -95,7 +101,7 @@ static void test_arming_again_does_not_shorten_the_period(void)
     boot_armed(1);
     CHECK(safety_fire(&safety) == ERROR_NONE);
     wait_us(5000);
-    CHECK(safety_arm(&safety, 1) == ERROR_NONE && safety_fire(&safety) == ERROR_EARLY);
+    CHECK(arm(1) == ERROR_NONE && safety_fire(&safety) == ERROR_EARLY);
 }
 
 /* It does not know what was fired before: it waits as long as the longest train demands, 4 us of light at 200 ppm. */
@@ -103,8 +109,8 @@ static void test_a_start_does_not_shorten_the_period(void)
 {
     boot_armed(1);
     CHECK(safety_fire(&safety) == ERROR_NONE);
-    safety_boot(&safety, false);
-    CHECK(!safety_set_channel(&safety, 0, &LEGAL) && !safety_load(&safety) && !safety_arm(&safety, 1));
+    safety_boot(&safety, CAUSE_POWER);
+    CHECK(!safety_set_channel(&safety, 0, &LEGAL) && !safety_load(&safety) && !arm(1));
     wait_us(20000 - 1);
     CHECK(safety_fire(&safety) == ERROR_EARLY);
     wait_us(1);
@@ -115,7 +121,7 @@ static void test_an_armed_generator_takes_no_other_train(void)
 {
     boot_armed(1);
     CHECK(safety_new_train(&safety) == ERROR_NOT_SAFE && safety_set_channel(&safety, 1, &LEGAL) == ERROR_NOT_SAFE);
-    CHECK(safety_load(&safety) == ERROR_NOT_SAFE && safety_arm(&safety, 9) == ERROR_NOT_SAFE);
+    CHECK(safety_load(&safety) == ERROR_NOT_SAFE && arm(9) == ERROR_NOT_SAFE);
     CHECK(safety_clear(&safety) == ERROR_NOT_SAFE && safety.shots_left == 1);
 }
 
@@ -123,9 +129,9 @@ static void test_a_changed_channel_must_be_loaded_again(void)
 {
     boot_armed(1);
     safety_off(&safety);
-    CHECK(safety_set_channel(&safety, 1, &LEGAL) == ERROR_NONE && safety_arm(&safety, 1) == ERROR_NO_TRAIN);
+    CHECK(safety_set_channel(&safety, 1, &LEGAL) == ERROR_NONE && arm(1) == ERROR_NO_TRAIN);
     CHECK(safety_set_channel(&safety, CHANNEL_COUNT, &LEGAL) == ERROR_CHANNEL);
-    CHECK(safety_load(&safety) == ERROR_NONE && safety_arm(&safety, 1) == ERROR_NONE && safety.train_id == 2);
+    CHECK(safety_load(&safety) == ERROR_NONE && arm(1) == ERROR_NONE && safety.train_id == 2);
 }
 
 static void test_actual_values_must_keep_the_limits_too(void)
@@ -144,22 +150,22 @@ static void test_actual_values_must_keep_the_limits_too(void)
 static void test_a_channel_refuses_more_than_its_own_limit(void)
 {
     boot();
-    CHECK(safety_tighten(&safety, CHANNEL_COUNT, (struct channel_limits){1, 1}) == ERROR_CHANNEL);
-    CHECK(safety_tighten(&safety, 0, (struct channel_limits){19999, MAX_DUTY_PPM}) == ERROR_NONE);
+    CHECK(safety_tighten(&safety, CHANNEL_COUNT, (struct channel_limits){1, 1, UINT32_MAX}) == ERROR_CHANNEL);
+    CHECK(safety_tighten(&safety, 0, (struct channel_limits){19999, MAX_DUTY_PPM, UINT32_MAX}) == ERROR_NONE);
     CHECK(safety_set_channel(&safety, 0, &LEGAL) == ERROR_LIMIT && safety_load(&safety) == ERROR_NO_TRAIN);
     CHECK(safety_set_channel(&safety, 1, &LEGAL) == ERROR_NONE);
-    CHECK(safety_tighten(&safety, 0, (struct channel_limits){UINT32_MAX, UINT32_MAX}) == ERROR_NONE);
+    CHECK(safety_tighten(&safety, 0, (struct channel_limits){UINT32_MAX, UINT32_MAX, UINT32_MAX}) == ERROR_NONE);
     CHECK(safety_set_channel(&safety, 0, &LEGAL) == ERROR_LIMIT);
 }
 
 static void test_a_loaded_train_does_not_survive_a_tighter_limit(void)
 {
     boot_armed(5);
-    CHECK(safety_tighten(&safety, 0, (struct channel_limits){1, 1}) == ERROR_NOT_SAFE);
+    CHECK(safety_tighten(&safety, 0, (struct channel_limits){1, 1, UINT32_MAX}) == ERROR_NOT_SAFE);
     safety_off(&safety);
-    CHECK(safety_tighten(&safety, 0, (struct channel_limits){10000, MAX_DUTY_PPM}) == ERROR_NONE);
-    CHECK(safety_arm(&safety, 1) == ERROR_NO_TRAIN && safety_load(&safety) == ERROR_LIMIT);
-    safety_boot(&safety, false);
+    CHECK(safety_tighten(&safety, 0, (struct channel_limits){10000, MAX_DUTY_PPM, UINT32_MAX}) == ERROR_NONE);
+    CHECK(arm(1) == ERROR_NO_TRAIN && safety_load(&safety) == ERROR_LIMIT);
+    safety_boot(&safety, CAUSE_POWER);
     CHECK(safety.limits[0].max_current_ma == MAX_CURRENT_MA);
 }
 
@@ -167,8 +173,8 @@ static void test_a_tighter_duty_lengthens_the_period(void)
 {
     boot_armed(5);
     safety_off(&safety);
-    CHECK(safety_tighten(&safety, 0, (struct channel_limits){30000, 20}) == ERROR_NONE && safety_load(&safety) == ERROR_NONE);
-    CHECK(safety_arm(&safety, 5) == ERROR_NONE && safety_fire(&safety) == ERROR_NONE);
+    CHECK(safety_tighten(&safety, 0, (struct channel_limits){30000, 20, UINT32_MAX}) == ERROR_NONE && safety_load(&safety) == ERROR_NONE);
+    CHECK(arm(5) == ERROR_NONE && safety_fire(&safety) == ERROR_NONE);
     wait_us(100000 - 1); /* 2 us of light at 20 ppm */
     CHECK(safety_fire(&safety) == ERROR_EARLY);
     wait_us(1);
@@ -200,7 +206,7 @@ static void test_an_open_interlock_trips_and_latches(void)
     fake.interlock_closed = true;
     safety_poll(&safety);
     CHECK(safety.state == STATE_FAULT && safety_fire(&safety) == ERROR_FAULT_LATCHED);
-    CHECK(safety_arm(&safety, 1) == ERROR_FAULT_LATCHED && safety_new_train(&safety) == ERROR_FAULT_LATCHED);
+    CHECK(arm(1) == ERROR_FAULT_LATCHED && safety_new_train(&safety) == ERROR_FAULT_LATCHED);
     CHECK(safety_clear(&safety) == ERROR_NONE && safety.state == STATE_SAFE && safety.shots_left == 0);
     check_counters_add_up();
 }
@@ -218,7 +224,7 @@ static void test_an_open_interlock_forbids_arming_without_a_fault(void)
     safety_off(&safety);
     fake.interlock_closed = false;
     safety_poll(&safety);
-    CHECK(safety_arm(&safety, 1) == ERROR_INTERLOCK_OPEN && safety.state == STATE_SAFE && safety.faults == 0);
+    CHECK(arm(1) == ERROR_INTERLOCK_OPEN && safety.state == STATE_SAFE && safety.faults == 0);
 }
 
 static void test_a_silent_host_trips(void)
@@ -243,7 +249,7 @@ static void test_a_safe_generator_needs_no_host(void)
 static void test_a_watchdog_reset_boots_into_a_fault(void)
 {
     fake_reset();
-    safety_boot(&safety, true);
+    safety_boot(&safety, CAUSE_WATCHDOG);
     CHECK(safety.state == STATE_FAULT && safety.faults == FAULT_WATCHDOG && safety_load(&safety) == ERROR_FAULT_LATCHED);
     CHECK(safety_clear(&safety) == ERROR_NONE && safety.state == STATE_SAFE);
 }
@@ -260,7 +266,7 @@ static void test_hardware_that_cannot_produce_the_train_stays_dark(void)
     boot_armed(1);
     safety_off(&safety);
     fake.can_load = false;
-    CHECK(safety_arm(&safety, 1) == ERROR_HARDWARE && safety.state == STATE_SAFE && !fake.live);
+    CHECK(arm(1) == ERROR_HARDWARE && safety.state == STATE_SAFE && !fake.live);
 }
 
 int main(void)

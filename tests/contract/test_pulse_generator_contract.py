@@ -90,14 +90,14 @@ def test_light_is_off_after_opening(generator: PulseGenerator) -> None:
     status = generator.status()
     assert status.state is GeneratorState.SAFE
     assert status.shots_left == 0
-    assert set(status.counters) == {"requested", "fired", "suppressed", "early", "crc_errors"}
+    assert set(status.counters) == {"requested", "fired", "suppressed", "early", "cameras", "crc_errors"}
 
 
 def test_it_says_who_it_is(generator: PulseGenerator) -> None:
     identity = generator.identity()
     assert identity.model == "tomoshadow-pulse"
     assert identity.serial
-    assert identity.firmware.startswith("1.")
+    assert identity.firmware.startswith("2.")
 
 
 def test_light_is_off_after_closing() -> None:
@@ -169,7 +169,7 @@ def test_nothing_fires_before_arming(bench: Bench) -> None:
     with pytest.raises(DeviceRefused, match="not armed"):
         bench.generator.fire()
     assert bench.generator.status().counters == {
-        "requested": 2, "fired": 0, "suppressed": 2, "early": 0, "crc_errors": 0
+        "requested": 2, "fired": 0, "suppressed": 2, "early": 0, "cameras": 0, "crc_errors": 0
     }  # fmt: skip
     assert bench.light == []
 

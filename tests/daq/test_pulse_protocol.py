@@ -93,8 +93,8 @@ def _framed(body: bytes) -> bytes:
     [
         Request(1, Command.ARM),
         Request(1, Command.OFF, (1,)),
-        Request(1, Command.ARM, (-1,)),
-        Request(1, Command.ARM, (2**32,)),
+        Request(1, Command.ARM, (-1, 0, 0)),
+        Request(1, Command.ARM, (2**32, 0, 0)),
         Request(MAX_SEQUENCE + 1, Command.OFF),
     ],
 )

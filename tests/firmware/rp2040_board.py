@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import astuple, dataclass, replace
 from pathlib import Path
 
-from daq.drivers.pulse_protocol import MAX_SEQUENCE, Command, Reply, Request, decode_reply, encode_request
+from daq.drivers.pulse_protocol import MAX_SEQUENCE, Command, Reply, Request, Source, decode_reply, encode_request
 from daq.simulation.firmware_build import ImageKind, build_image
 from daq.simulation.rp2040_chip import TRIGGER
 from daq.simulation.rp2040_emulator import CYCLE_NS, CYCLES_PER_MS, START_CYCLES, Edge, EmulatedPico
@@ -86,7 +86,7 @@ class Board:
         return replies
 
     def arm(self, shots: int) -> None:
-        assert self.ask(Command.ARM, shots).error is None
+        assert self.ask(Command.ARM, shots, Source.COMMAND, 0).error is None
 
     def shoot(self) -> Waveform:
         """Fire, let the period pass, and measure what the outputs did."""

@@ -11,10 +11,12 @@ from daq.drivers import pulse_protocol
 from daq.drivers.pulse_protocol import (
     ERROR_TEXT,
     FIELDS,
+    Cause,
     Command,
     DamagedLine,
     ErrorNumber,
     Fault,
+    Source,
     State,
     decode_reply,
     decode_request,
@@ -62,6 +64,13 @@ def test_states_and_faults_agree() -> None:
     assert in_c == named_numbers("Faults") == {str(fault.name): fault.value for fault in Fault}
 
 
+def test_sources_and_causes_agree() -> None:
+    in_c = without("SOURCE_", c_enum("safety.h", "source"))
+    assert in_c == named_numbers("Sources") == {source.name: source.value for source in Source}
+    in_c = without("CAUSE_", c_enum("safety.h", "cause"))
+    assert in_c == named_numbers("Causes") == {cause.name: cause.value for cause in Cause}
+
+
 def test_limits_agree() -> None:
     in_c = c_enum("limits.h", "limits")
     assert in_c == {name: int(value) for name, value, _ in table("Limits")}
@@ -78,6 +87,8 @@ def test_error_texts_state_the_limits() -> None:
         ErrorNumber.EDGE: ["MAX_EDGE_NS"],
         ErrorNumber.CURRENT: ["MAX_CURRENT_MA"],
         ErrorNumber.SHOTS: ["MAX_SHOTS"],
+        ErrorNumber.LIGHT: ["MAX_LIGHT_MA", "MAX_LIGHT_MS"],
+        ErrorNumber.PERIOD: ["MAX_PERIOD_US"],
     }.items():
         assert [int(number) for number in re.findall(r"\d{3,}", ERROR_TEXT[error])] == [limits[name] for name in names]
 

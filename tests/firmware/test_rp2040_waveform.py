@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from daq.drivers.pulse_protocol import FIELDS, Command, ErrorNumber, Reply
+from daq.drivers.pulse_protocol import COUNTERS, FIELDS, Command, ErrorNumber, Reply
 from tests.firmware.rp2040_board import CAMERA_PULSE_NS, PAPER, PERIOD_MS, Board, Channel, Waveform
 
 TICK_NS = 8
@@ -51,8 +51,8 @@ def test_it_boots_through_the_boot_rom_and_says_who_it_is(board: Board) -> None:
     assert identity.fields["model"] == "tomoshadow-pulse"
     assert (identity.fields["build"], identity.number("channels"), identity.number("tick_ns")) == ("rp2040", 4, TICK_NS)
     assert identity.boot >= 1
-    assert board.ask(Command.STATUS).fields == {"state": "0", "faults": "0", "interlock": "1", "shots_left": "0"} | (
-        dict.fromkeys(("requested", "fired", "suppressed", "early", "crc_errors"), "0")
+    assert board.ask(Command.STATUS).fields == (
+        {"interlock": "1", "estop": "1"} | dict.fromkeys(("state", "faults", "source", "shots_left", *COUNTERS), "0")
     )
 
 

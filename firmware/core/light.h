@@ -1,0 +1,15 @@
+/* Continuous light of low current, for adjusting cameras and for the calibration target. Made of short pulses with
+ * dark between them: docs/decisions tells why. */
+#ifndef LIGHT_H
+#define LIGHT_H
+
+#include "safety.h"
+
+/* Light on the channels whose current is not 0, for this time at most. Only while SAFE, with the set-points of pulses
+ * long gone. */
+enum error safety_light(struct safety *safety, uint32_t time_ms, const uint32_t *current_ma);
+
+/* Keep it on, or end it; for safety_poll. */
+void light_poll(struct safety *safety);
+
+#endif
