@@ -6,7 +6,7 @@ from dataclasses import asdict
 from typing import Any
 
 from daq.drivers.pulse_line import PulseLine
-from daq.drivers.pulse_protocol import CHANNEL_COUNT, FIELDS, UNCHANGED, Command, Fault, State
+from daq.drivers.pulse_protocol import CHANNEL_COUNT, COUNTERS, FIELDS, UNCHANGED, Cause, Command, Fault, State
 from daq.drivers.pulse_self_test import Verdict, self_test
 from daq.timing import plan_shot_timing
 from server.assembly import open_generator, open_pulse_line
@@ -15,8 +15,6 @@ from server.config import load_config
 from server.firmware_image import find_drive, load_image, write_image
 from server.shot_timing import camera_timings, fired_timing, load_plan, nominal_plan, timing_table
 from server.timing_diagram import picture, timing_diagram
-
-_COUNTERS = ("requested", "fired", "suppressed", "early", "crc_errors")
 
 
 def info(options: Namespace) -> dict[str, Any]:
@@ -27,11 +25,13 @@ def info(options: Namespace) -> dict[str, Any]:
         return {
             "identity": dict(identity.fields),
             "starts": identity.boot,
+            "start_cause": Cause(identity.number("cause")).name,
             "state": State(status.number("state")).name,
             "faults": [fault.name for fault in Fault if fault & faults],
             "interlock_closed": status.number("interlock") == 1,
+            "estop_closed": status.number("estop") == 1,
             "shots_left": status.number("shots_left"),
-            "counters": {name: status.number(name) for name in _COUNTERS},
+            "counters": {name: status.number(name) for name in COUNTERS},
             "limits": [dict(_limits(line, channel)) for channel in range(CHANNEL_COUNT)],
         }
 

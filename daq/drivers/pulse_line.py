@@ -77,10 +77,10 @@ class PulseLine:
 
     def _open_session(self) -> Reply:
         identity = self._converse(Request(0, Command.ID), OPENING_LIMIT_S, offs=None)
-        if identity.number("protocol") != PROTOCOL_VERSION:
-            raise ProtocolError(
-                self._name, f"speaks protocol {identity.fields['protocol']}, this driver speaks {PROTOCOL_VERSION}"
-            )
+        spoken = identity.fields.get("protocol")
+        if spoken is not None and spoken != str(PROTOCOL_VERSION):
+            raise ProtocolError(self._name, f"speaks protocol {spoken}, this driver speaks {PROTOCOL_VERSION}")
+        self._check_fields(Command.ID, identity)
         self._sequence = identity.number("last")
         self._boot = identity.boot
         return identity
@@ -196,9 +196,13 @@ class PulseLine:
             return _Heard.DAMAGED
         if reply.sequence != request.sequence:
             return _Heard.NOTHING
-        if reply.error is None and set(reply.fields) != set(FIELDS[request.command].reply):
-            raise ProtocolError(self._name, f"answered {request.command} with fields {sorted(reply.fields)}")
+        if request.command is not Command.ID:  # another protocol may answer it with other fields
+            self._check_fields(request.command, reply)
         return reply
+
+    def _check_fields(self, command: Command, reply: Reply) -> None:
+        if reply.error is None and set(reply.fields) != set(FIELDS[command].reply):
+            raise ProtocolError(self._name, f"answered {command} with fields {sorted(reply.fields)}")
 
     def _next_line(self) -> bytes | None:
         """Next complete line; None if none is complete after a short wait."""

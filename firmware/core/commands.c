@@ -116,7 +116,7 @@ static enum error fire(struct safety *safety, const uint32_t *fields, struct tex
     return ERROR_NONE;
 }
 
-static enum error light(struct safety *safety, const uint32_t *fields, struct text *reply)
+static enum error give_light(struct safety *safety, const uint32_t *fields, struct text *reply)
 {
     const enum error error = safety_light(safety, fields[0], fields + 1);
     if (error)
@@ -188,7 +188,7 @@ static enum error clear(struct safety *safety, const uint32_t *fields, struct te
 
 static const struct command COMMANDS[] = {
     {"NEW", 0, new_train}, {"LIMIT", 4, limit}, {"CHANNEL", 9, set_channel}, {"LOAD", 0, load},
-    {"ARM", 3, arm},       {"FIRE", 0, fire},   {"LIGHT", 5, light},         {"SHOT", 1, shot},
+    {"ARM", 3, arm},       {"FIRE", 0, fire},   {"LIGHT", 5, give_light},         {"SHOT", 1, shot},
     {"STATUS", 0, status}, {"BEAT", 0, beat},   {"OFF", 0, off},             {"CLEAR", 0, clear},
 };
 

@@ -279,10 +279,10 @@ def answering(**fields: str) -> Callable[[bytes], bytes]:
 
 def test_another_protocol_is_named() -> None:
     fields = dict.fromkeys(("model", "version", "build", "serial"), "x")
-    numbers = {"protocol": "2", "channels": "4", "tick_ns": "8", "last": "0"}
+    numbers = {"protocol": "1", "channels": "4", "tick_ns": "8", "last": "0"}
     with (
         instrument(answering(**fields, **numbers)) as port,
-        pytest.raises(ProtocolError, match="speaks protocol 2, this driver speaks 1"),
+        pytest.raises(ProtocolError, match="speaks protocol 1, this driver speaks 2"),
         SerialPulseGenerator("generator", port, CHANNELS),
     ):
         pass

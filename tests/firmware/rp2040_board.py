@@ -88,12 +88,12 @@ class Board:
     def arm(self, shots: int) -> None:
         assert self.ask(Command.ARM, shots, Source.COMMAND, 0).error is None
 
-    def shoot(self) -> Waveform:
+    def shoot(self, time_ms: float = PERIOD_MS) -> Waveform:
         """Fire, let the period pass, and measure what the outputs did."""
         self.pico.edges.clear()
         reply = self.ask(Command.FIRE)
         assert reply.error is None, reply
-        self.pico.run_ms(PERIOD_MS)
+        self.pico.run_ms(time_ms)
         return self.waveform()
 
     def waveform(self) -> Waveform:

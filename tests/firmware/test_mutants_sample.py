@@ -53,7 +53,7 @@ def test_a_fault_that_does_no_harm_would_survive() -> None:
 
 def test_a_list_that_no_longer_fits_is_told(tmp_path: Path) -> None:
     (tmp_path / "core").mkdir()
-    (tmp_path / "core" / "safety.c").write_text("")
+    (tmp_path / "core" / "shooting.c").write_text("")
     with pytest.raises(MutantError, match=r"no rate limit: .* stands 0 times"):
         MUTANTS["no rate limit"].apply(tmp_path)
 

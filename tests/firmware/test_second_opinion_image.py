@@ -66,7 +66,7 @@ def session(channels: Sequence[Channel | None]) -> list[Request]:
     """Load, permit and fire one shot."""
     lines: list[tuple[Command, tuple[int, ...]]] = [(Command.ID, ()), (Command.NEW, ())]
     lines += [(Command.CHANNEL, (i, *astuple(channel))) for i, channel in enumerate(channels) if channel]
-    lines += [(Command.LOAD, ()), (Command.ARM, (1,)), (Command.STATUS, ()), (Command.FIRE, ())]
+    lines += [(Command.LOAD, ()), (Command.ARM, (1, 0, 0)), (Command.STATUS, ()), (Command.FIRE, ())]
     return [Request(number, command, fields) for number, (command, fields) in enumerate(lines, 1)]
 
 

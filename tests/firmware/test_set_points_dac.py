@@ -38,12 +38,12 @@ def is_off(board: Board) -> bool:
 
 
 def arm(board: Board) -> Reply:
-    return board.ask(Command.ARM, 1)
+    return board.ask(Command.ARM, 1, 0, 0)
 
 
 def start_arming(board: Board, time_us: int) -> None:
     """Up to this time after the last byte of the line."""
-    board.pico.receive(encode_request(Request(60_000, Command.ARM, (1,))))
+    board.pico.receive(encode_request(Request(60_000, Command.ARM, (1, 0, 0))))
     while board.pico.receiving:
         board.pico.run(board.pico.cycle + 1)
     board.pico.run(board.pico.cycle + time_us * CYCLES_PER_MS // 1000)

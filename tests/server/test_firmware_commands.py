@@ -19,10 +19,14 @@ def result_of(capsys: pytest.CaptureFixture[str], *arguments: str, status: int =
 
 def test_info_tells_identity_state_and_counters(capsys: pytest.CaptureFixture[str]) -> None:
     info = result_of(capsys, "info", *CONFIG)
-    assert (info["identity"]["model"], info["identity"]["protocol"]) == ("tomoshadow-pulse", "1")
-    assert (info["state"], info["faults"], info["interlock_closed"]) == ("SAFE", [], True)
+    assert (info["identity"]["model"], info["identity"]["protocol"]) == ("tomoshadow-pulse", "2")
+    assert (info["state"], info["faults"], info["start_cause"]) == ("SAFE", [], "POWER")
+    assert info["interlock_closed"]
+    assert info["estop_closed"]
     assert set(info["counters"].values()) == {0}
-    assert info["limits"] == [{"channel": n, "max_current_ma": 30_000, "max_duty_ppm": 200} for n in range(4)]
+    assert info["limits"] == [
+        {"channel": n, "max_current_ma": 30_000, "max_duty_ppm": 200, "max_light_ma": 500} for n in range(4)
+    ]
 
 
 def test_selftest_passes_and_lists_its_checks(capsys: pytest.CaptureFixture[str]) -> None:
