@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -9,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from numpy.typing import NDArray
 
+from processing.reconstruction.mean_line_of_sight import mean_line_of_sight
 from processing.reconstruction.plan import plan_reconstruction
 from processing.studies.hollow_cone_shots import cropped_cameras, height_mm, hollow_cone_images, slab_grid
 from processing.studies.recipe import COLOURS, Recipe, reconstruct_each
@@ -17,6 +19,9 @@ from processing.studies.ring import RadialProfile, radial_profile
 from processing.volume import VoxelGrid
 
 Slice = NDArray[np.float64]
+
+_BATCH = 8
+"""Shots whose images are in memory at the same time."""
 
 
 @dataclass(frozen=True)
@@ -122,10 +127,17 @@ def average_study(
     plan = plan_reconstruction(list(cameras.values()), grid)
     volume = np.empty(grid.shape, dtype=np.float32)
     sums = {recipe.name: np.zeros((grid.shape[0], grid.shape[2])) for recipe in study.recipes}
-    for number, images in enumerate(hollow_cone_images(cameras, study.shots, study.binning, study.seed), 1):
-        for recipe in reconstruct_each(plan, images, study.recipes, volume):
-            sums[recipe.name] += volume[:, study.rows // 2]
-        done(number)
+    iterating = [recipe for recipe in study.recipes if recipe.method.iterative]
+    shots = enumerate(hollow_cone_images(cameras, study.shots, study.binning, study.seed), 1)
+    while batch := list(islice(shots, _BATCH)):
+        exposures = [images for _, images in batch]
+        for recipe in (recipe for recipe in study.recipes if not recipe.method.iterative):
+            mean = mean_line_of_sight(plan, exposures, recipe.method, volume)
+            sums[recipe.name] += len(batch) * mean[:, study.rows // 2]
+        for number, images in batch:
+            for recipe in reconstruct_each(plan, images, iterating, volume):
+                sums[recipe.name] += volume[:, study.rows // 2]
+            done(number)
     return MeanSlices(study, {name: total / study.shots for name, total in sums.items()})
 
 
