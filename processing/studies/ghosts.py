@@ -171,6 +171,8 @@ def ghost_figure(rows: Sequence[GhostRow]) -> Figure:
         ghost_axes.axhline(100 * MAX_GHOSTS, color="0.4", linestyle="--", linewidth=1)
         found_axes.set(ylabel="found [% of the droplets]", title=title)
         ghost_axes.set(ylabel="ghosts [% of the peaks]", title=title)
+    for axes in panels[0]:
+        axes.set_xlabel("")
     panels[0, 1].legend(frameon=False, loc="upper left", fontsize="small")
     figure.suptitle(
         rf"Gaussian droplets of $\sigma$ = {rows[0].sigma_voxel:g} voxel; dashed: "
