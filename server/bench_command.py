@@ -14,17 +14,33 @@ from daq.recorder import Recorder
 from daq.shotfile import DoubleFrame, ExposureRecord, ImageKey, RunHeader, RunWriter, Shot, ViewFormat
 from processing.studies.speed import SpeedResult, speed_study
 from processing.studies.speed_scene import SpeedStudy
+from processing.studies.speed_targets import Measured, markdown_table
 from server.commands import progress
 
 MISTUNED = ("OPENBLAS_CORETYPE", "OPENBLAS_L2_SIZE")
 """Variables that change the speed of the numpy baseline."""
+TABLE_BEGIN, TABLE_END = "<!-- bench -->", "<!-- /bench -->"
 RECORDED_SHOTS = 24
-QUICK = SpeedStudy((48, 160, 200), (320, 240), droplets=200, repeats=2, baseline_planes=3, iterations=1)
+QUICK = SpeedStudy(
+    (48, 160, 200),
+    (320, 240),
+    droplets=200,
+    repeats=2,
+    baseline_planes=3,
+    iterations=2,
+    sparse_droplets=50,
+    mean_exposures=10,
+)
 RECORDER_DEADLINE_S = 120.0
+
+
+class BenchError(Exception):
+    """The table has no place to go; the text names the file."""
 
 
 def bench(options: Namespace) -> dict[str, Any]:
     """``tomoshadow bench``."""
+    around_table = split_at_table(options.table) if options.table else None
     for name in MISTUNED:
         if name in os.environ:
             progress(f"{name} is set: the baseline is not what others measure; unset it")
@@ -32,7 +48,10 @@ def bench(options: Namespace) -> dict[str, Any]:
     progress("recorder")
     size_px = QUICK.image_size_px if options.quick else SpeedStudy().image_size_px
     recorder = recorder_speed(options.directory, size_px, result.views)
-    progress(speed_table(result))
+    table = markdown_table(result.targets)
+    progress(f"{kernel_table(result)}\n\n{table}")
+    if around_table:
+        options.table.write_text(f"\n{table}\n\n".join(around_table))
     return speed_json(result) | {"recorder": recorder}
 
 
@@ -44,11 +63,32 @@ def speed_json(result: SpeedResult) -> dict[str, Any]:
         "views": result.views,
         "naive": {"mlos_cpu_s": result.naive_mlos_cpu_s, "smart_iteration_cpu_s": result.naive_smart_iteration_cpu_s},
         "kernels": [asdict(kernel) for kernel in result.kernels],
+        "targets": [_target_json(one) for one in result.targets],
     }
 
 
-def speed_table(result: SpeedResult) -> str:
-    """The same as a table for people."""
+def _target_json(one: Measured) -> dict[str, Any]:
+    stated = {"measured": one.value, "reached": one.target.verdict(one.value), "how": one.how}
+    return asdict(one.target) | stated | (asdict(one.timing) if one.timing else {})
+
+
+def split_at_table(report: Path) -> tuple[str, str]:
+    """What a Markdown file says before and after its table, marks included.
+
+    Raises
+    ------
+    BenchError
+        The file marks no place for the table.
+    """
+    before, begin, rest = report.read_text().partition(TABLE_BEGIN + "\n")
+    _old, end, after = rest.partition(TABLE_END + "\n")
+    if not begin or not end:
+        raise BenchError(f"{report}: no lines {TABLE_BEGIN} and {TABLE_END} to put the table between")
+    return before + begin, end + after
+
+
+def kernel_table(result: SpeedResult) -> str:
+    """The kernels as a table for people."""
     rows = [f"{'kernel':<28}{'wall s':>9}{'CPU s':>9}{'times naive':>13}"]
     rows += [
         f"{kernel.name:<28}{kernel.wall_s:>9.4f}{kernel.cpu_s:>9.4f}{kernel.ratio_to_naive:>13.1f}"

@@ -19,7 +19,7 @@ from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.volume_file import VolumeFileError
 from server import commands
 from server.average_command import average
-from server.bench_command import bench
+from server.bench_command import BenchError, bench
 from server.check_command import check, self_calibrate_views
 from server.config import ConfigError
 from server.firmware_image import ImageError
@@ -27,6 +27,7 @@ from server.firmware_options import add_firmware_tools
 from server.study_options import add_studies
 
 BAD_INPUT = (
+    BenchError,
     CalibrationError,
     ConfigError,
     ImageError,
@@ -186,6 +187,7 @@ def _add_bench(verbs: Any) -> None:
     parser = _verb(verbs, "bench", bench, "speed of kernels and recorder against plain numpy and OpenCV")
     parser.add_argument("--quick", action="store_true", help="a small volume; the figures mean little")
     parser.add_argument("--directory", type=Path, help="where the recorder writes; default: the temporary directory")
+    parser.add_argument("--table", type=Path, help="Markdown file whose table, between <!-- bench --> marks, to renew")
 
 
 def _add_firmware(verbs: Any) -> None:

@@ -3,10 +3,8 @@
 Ratios compare CPU time, so that they mean the same on any number of cores.
 """
 
-import os
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 
@@ -20,8 +18,11 @@ from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.node_view import sample_mapping
 from processing.reconstruction.plan import MAX_DEVIATION_PX, Accuracy, Plan, plan_reconstruction
 from processing.reconstruction.smart import smart
+from processing.studies import speed_targets as targets
 from processing.studies.speed_baseline import Timing, measure, naive_line_of_sight, naive_smart_iteration
+from processing.studies.speed_chain import chain_speeds, instruction_set
 from processing.studies.speed_scene import Image, SpeedStudy, spray_images, study_cameras
+from processing.studies.speed_targets import Measured
 from processing.volume import VoxelGrid
 
 
@@ -45,6 +46,18 @@ class SpeedResult:
     naive_mlos_cpu_s: float
     naive_smart_iteration_cpu_s: float
     kernels: tuple[KernelSpeed, ...]
+    targets: tuple[Measured, ...]
+
+
+KERNEL_TARGETS = {
+    "mlos float16 dense": targets.MLOS_DENSE,
+    "mlos float16": targets.MLOS_CULLED,
+    "mlos float16 exact": targets.EXACT,
+    "mlos float16 avx2 dense": targets.AVX2_MLOS,
+    "mlos float16 slice": targets.SLICE,
+    "mlos float16 256^3": targets.REGION,
+}
+"""Lines of the table that are one kernel each."""
 
 
 def speed_study(study: SpeedStudy, progress: Callable[[str], None]) -> SpeedResult:
@@ -66,6 +79,10 @@ def speed_study(study: SpeedStudy, progress: Callable[[str], None]) -> SpeedResu
     for name, baseline_cpu_s, timing in _kernels(study, cameras, images, naive_mlos_cpu_s, naive_smart_cpu_s):
         progress(f"{name}: {timing.cpu_s:.3f} CPU-s, {baseline_cpu_s / timing.cpu_s:.1f} times the baseline")
         kernels.append(KernelSpeed(name, timing.wall_s, timing.cpu_s, baseline_cpu_s / timing.cpu_s))
+    measured = [_against_target(kernel) for kernel in kernels if kernel.name in KERNEL_TARGETS]
+    for one in chain_speeds(study, cameras):
+        progress(f"{one.target.work}: {one.value:.3g} {one.target.unit}")
+        measured.append(one)
     return SpeedResult(
         isa=_native.selected_isa(),
         volume=study.shape,
@@ -73,20 +90,13 @@ def speed_study(study: SpeedStudy, progress: Callable[[str], None]) -> SpeedResu
         naive_mlos_cpu_s=naive_mlos_cpu_s,
         naive_smart_iteration_cpu_s=naive_smart_cpu_s,
         kernels=tuple(kernels),
+        targets=tuple(measured),
     )
 
 
-@contextmanager
-def _instruction_set(name: str) -> Iterator[None]:
-    before = os.environ.get("TOMOSHADOW_ISA")
-    os.environ["TOMOSHADOW_ISA"] = name
-    try:
-        yield
-    finally:
-        if before is None:
-            del os.environ["TOMOSHADOW_ISA"]
-        else:
-            os.environ["TOMOSHADOW_ISA"] = before
+def _against_target(kernel: KernelSpeed) -> Measured:
+    target, timing = KERNEL_TARGETS[kernel.name], Timing(kernel.wall_s, kernel.cpu_s)
+    return Measured(target, kernel.ratio_to_naive if target.unit == "x" else 1e3 * kernel.wall_s, timing)
 
 
 def _kernels(
@@ -100,12 +110,12 @@ def _kernels(
     for method in (ReconstructionMethod.MLOS, ReconstructionMethod.MINLOS, ReconstructionMethod.GAVLOS):
         timing = measure(partial(by_sight, method, out=volume), study.repeats)
         yield f"{method.value} float16", mlos_cpu_s, timing
-    for isa in _native.available_isas():
-        if isa in ("avx2", "avx512"):
-            with _instruction_set(isa):
-                yield f"mlos float16 {isa}", mlos_cpu_s, measure(partial(by_sight, out=volume), study.repeats)
-                dense = partial(_dense, plan, images, volume, study.threads)
-                yield f"mlos float16 {isa} dense", mlos_cpu_s, measure(dense, study.repeats)
+    yield "mlos float16 dense", mlos_cpu_s, measure(partial(_dense, plan, images, volume, study.threads), study.repeats)
+    if "avx2" in _native.available_isas():
+        with instruction_set("avx2"):
+            yield "mlos float16 avx2", mlos_cpu_s, measure(partial(by_sight, out=volume), study.repeats)
+            dense = partial(_dense, plan, images, volume, study.threads)
+            yield "mlos float16 avx2 dense", mlos_cpu_s, measure(dense, study.repeats)
     for name, other in _other_plans(study, cameras):
         work = partial(line_of_sight, other, images, out=volume, threads=study.threads)
         yield f"mlos float16 {name}", mlos_cpu_s, measure(work, study.repeats)
@@ -145,6 +155,6 @@ def _smart_iteration(study: SpeedStudy, plan: Plan, images: Sequence[Image], out
         times.append((time.perf_counter(), time.process_time()))
         return False
 
-    smart(plan, images, iterations=1 + study.iterations, stop=note, out=out, threads=study.threads)
+    smart(plan, images, iterations=1 + study.repeats, stop=note, out=out, threads=study.threads)
     wall_s, cpu_s = np.median(np.diff(times, axis=0), axis=0)
     return Timing(float(wall_s), float(cpu_s))

@@ -6,7 +6,7 @@ Every plane of the volume is a homography of every image; lens distortion it cou
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 
 import cv2
 import numpy as np
@@ -19,7 +19,7 @@ from processing.volume import VoxelGrid
 
 @dataclass(frozen=True)
 class Timing:
-    """Median of several runs."""
+    """Of one run, or the median of several."""
 
     wall_s: float
     cpu_s: float
@@ -28,13 +28,16 @@ class Timing:
 def measure(work: Callable[[], object], repeats: int) -> Timing:
     """Run something once to warm up, then ``repeats`` times for the median wall and CPU time."""
     work()
-    times = []
-    for _ in range(repeats):
-        wall_s, cpu_s = time.perf_counter(), time.process_time()
-        work()
-        times.append((time.perf_counter() - wall_s, time.process_time() - cpu_s))
+    times = [astuple(measure_once(work)) for _ in range(repeats)]
     wall_s, cpu_s = np.median(times, axis=0)
     return Timing(float(wall_s), float(cpu_s))
+
+
+def measure_once(work: Callable[[], object]) -> Timing:
+    """Run something that takes long, once."""
+    wall_s, cpu_s = time.perf_counter(), time.process_time()
+    work()
+    return Timing(time.perf_counter() - wall_s, time.process_time() - cpu_s)
 
 
 def _planes(study: SpeedStudy) -> NDArray[np.float64]:

@@ -1,13 +1,14 @@
 """What the speed study looks at: a hollow cone of droplets, seen by the paper's four views with real lenses."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from processing.geometry import PinholeCamera, view_camera
+from processing.preprocessing import Frame
 from processing.volume import VoxelGrid
 
 Image = NDArray[np.float32]
@@ -41,7 +42,11 @@ class SpeedStudy:
     baseline_planes : int
         The baseline computes so many planes, spread over the volume, and is scaled to all.
     iterations : int
-        SMART runs for so many iterations, and is stated per iteration.
+        Of SMART.
+    sparse_droplets : int
+        As many as it takes for a spray of 4 % occupancy.
+    mean_exposures : int
+        Exposures of the mean volume.
     threads : int
         Of the kernels; the baseline has one.
     """
@@ -51,7 +56,9 @@ class SpeedStudy:
     droplets: int = 12_000
     repeats: int = 5
     baseline_planes: int = 12
-    iterations: int = 5
+    iterations: int = 20
+    sparse_droplets: int = 6_000
+    mean_exposures: int = 266
     threads: int = 2
 
     @property
@@ -78,9 +85,9 @@ def study_cameras(image_size_px: tuple[int, int]) -> list[PinholeCamera]:
     ]
 
 
-def spray_images(study: SpeedStudy, cameras: Sequence[PinholeCamera]) -> list[Image]:
+def spray_images(study: SpeedStudy, cameras: Sequence[PinholeCamera], seed: int = 1) -> list[Image]:
     """Shadow intensities of a hollow cone of droplets, preprocessed: nothing between the droplets."""
-    rng = np.random.default_rng(1)
+    rng = np.random.default_rng(seed)
     depth_mm, height_mm, width_mm = (n / SCALE_PX_PER_MM for n in study.shape)
     down = rng.uniform(0.02, 1, study.droplets)
     angle_rad, radius = rng.uniform(0, 2 * np.pi, study.droplets), down * rng.normal(0.47, 0.04, study.droplets)
@@ -89,6 +96,42 @@ def spray_images(study: SpeedStudy, cameras: Sequence[PinholeCamera]) -> list[Im
     )
     diameters_px = np.clip(rng.lognormal(np.log(2.7), 0.45, study.droplets), 0.9, 15)
     return [_draw(camera.project(points_mm), diameters_px, study.image_size_px) for camera in cameras]
+
+
+def sparse_images(study: SpeedStudy, cameras: Sequence[PinholeCamera], seed: int = 1) -> list[Image]:
+    """As ``spray_images``, of fewer droplets."""
+    return spray_images(replace(study, droplets=study.sparse_droplets), cameras, seed)
+
+
+def dense_images(study: SpeedStudy, cameras: Sequence[PinholeCamera], seed: int = 1) -> list[Image]:
+    """As ``spray_images``, behind a veil: no voxel is empty."""
+    return [image + np.float32(0.02) for image in spray_images(study, cameras, seed)]
+
+
+@dataclass(frozen=True, eq=False)
+class RawExposure:
+    """What a camera recorded of one exposure, and its references."""
+
+    frame: Frame
+    bits: int
+    dark: Image
+    background: Image
+
+
+def raw_exposures(images: Sequence[Image], bits: int) -> list[RawExposure]:
+    """Exposures that become given intensities, under uneven light and with noise; above 8 bits in words of 16."""
+    rng = np.random.default_rng(2)
+    full_scale = 2**bits - 1
+    exposures = []
+    for image in images:
+        rows, columns = (np.linspace(-1, 1, n, dtype=np.float32) for n in image.shape)
+        dark = np.full(image.shape, 0.02 * full_scale, np.float32)
+        field = np.float32(0.75 * full_scale) * (1 - 0.2 * (rows[:, None] ** 2 + columns**2))
+        noise = rng.normal(0, 0.005 * full_scale, image.shape)
+        light = np.clip(dark + field * (1 - image) + noise, 0, full_scale)
+        frame = light.astype(np.uint8) if bits == 8 else light.astype(np.uint16)
+        exposures.append(RawExposure(frame, bits, dark, dark + field))
+    return exposures
 
 
 def _draw(points_px: NDArray[np.float64], diameters_px: NDArray[np.float64], image_size_px: tuple[int, int]) -> Image:

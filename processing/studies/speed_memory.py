@@ -1,0 +1,48 @@
+"""Peak memory of a whole reconstruction, in a process of its own: ``python -m processing.studies.speed_memory``."""
+
+import json
+import subprocess
+import sys
+from dataclasses import asdict
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from processing.reconstruction.line_of_sight import line_of_sight
+from processing.reconstruction.plan import plan_reconstruction
+from processing.reconstruction.smart import smart
+from processing.studies.speed_scene import SpeedStudy, sparse_images, spray_images, study_cameras
+
+Work = Literal["mlos", "smart"]
+DEADLINE_S = 300.0
+
+
+def peak_memory_gb(work: Work, study: SpeedStudy) -> float:
+    """Most memory that Python, libraries, images, plan and float16 volume of one exposure occupied together."""
+    command = [sys.executable, "-m", __name__, work, json.dumps(asdict(study))]
+    done = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True, timeout=DEADLINE_S)
+    return float(done.stdout) / 1e9
+
+
+def _reconstruct(work: Work, study: SpeedStudy) -> None:
+    cameras = study_cameras(study.image_size_px)
+    plan, volume = plan_reconstruction(cameras, study.grid), np.empty(study.shape, np.float16)
+    if work == "mlos":
+        line_of_sight(plan, spray_images(study, cameras), out=volume, threads=study.threads)
+    else:
+        images = sparse_images(study, cameras)
+        smart(plan, images, iterations=study.iterations, out=volume, threads=study.threads)
+
+
+def _peak_bytes() -> int:
+    """Of this program alone; ``ru_maxrss`` would also know the one that started it."""
+    lines = dict(line.split(":", 1) for line in Path("/proc/self/status").read_text().splitlines())
+    return int(lines["VmHWM"].split()[0]) * 1024
+
+
+if __name__ == "__main__":
+    settings = json.loads(sys.argv[2])
+    settings |= {name: tuple(settings[name]) for name in ("shape", "image_size_px")}
+    _reconstruct("smart" if sys.argv[1] == "smart" else "mlos", SpeedStudy(**settings))
+    sys.stdout.write(str(_peak_bytes()))
