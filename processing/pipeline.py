@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from daq.run_file import RUN_FILE
 from daq.shotfile import RunReader, Shot
 from processing.calibration.calibration import Calibration, Verdict
 from processing.calibration.calibration_file import file_sha256, load_calibration
@@ -24,6 +25,8 @@ from processing.reconstruction.smart import mart, smart
 from processing.reconstruction.volume_file import write_volume
 from processing.results_file import FrameName, Provenance, claim_results, volume_path
 from processing.volume import VoxelGrid
+
+_References = dict[str, tuple[Intensity | None, Intensity | None]]
 
 
 class PipelineError(Exception):
@@ -141,25 +144,36 @@ def shot_intensities(
     out: Sequence[Intensity | None] | None = None,
 ) -> list[Intensity]:
     """Preprocessed images of one exposure, in the order of the shot's views; ``out`` receives them where given."""
-    preprocessing = Preprocessing(run.header.polarity, settings.minimum_window_px, settings.noise_floor)
-    number = "ab".index(frame)
+    header, references, number = run.header, _references(run), "ab".index(frame)
+    preprocessing = Preprocessing(header.polarity, settings.minimum_window_px, settings.noise_floor)
     images = []
     for (view, exposures), image in zip(shot.views.items(), out or [None] * len(shot.views), strict=True):
         pixels = (exposures.frame_a, exposures.frame_b)[number]
         if pixels is None:
-            raise PipelineError(f"{run.header.run_id}, shot {shot.index}: {view} has no exposure {frame}")
-        dark, background = run.dark(view), run.background(view)
+            raise PipelineError(f"{header.run_id}, shot {shot.index}: {view} has no exposure {frame}")
+        dark, background = references[view]
         images.append(
             intensity(
                 pixels,
                 preprocessing,
-                bits=run.header.views[view].bits,
+                bits=header.views[view].bits,
                 dark=None if dark is None else dark[number],
                 background=None if background is None else background[number],
                 out=image,
             )
         )
     return images
+
+
+def _references(run: RunReader) -> _References:
+    return _read_references(run.run_dir, (run.run_dir / RUN_FILE).stat().st_mtime_ns)
+
+
+@lru_cache(maxsize=1)
+def _read_references(run_dir: Path, _written_ns: int) -> _References:
+    """Dark and background of every view; to unpack them takes longer than to reconstruct a shot."""
+    with RunReader(run_dir) as run:
+        return {view: (run.dark(view), run.background(view)) for view in run.header.views}
 
 
 @dataclass(frozen=True, eq=False)

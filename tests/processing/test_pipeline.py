@@ -5,16 +5,25 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from daq.run_file import add_references
+from daq.shotfile import RunReader
 from processing.calibration.calibration import Verdict
 from processing.calibration.calibration_file import load_calibration
 from processing.calibration.errors import CalibrationError
-from processing.pipeline import PipelineError, ShotResult, Stopped, default_grid, reconstruct_shot
+from processing.pipeline import (
+    PipelineError,
+    ShotResult,
+    Stopped,
+    default_grid,
+    reconstruct_shot,
+    shot_intensities,
+)
 from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.settings import GridSettings, ReconstructionSettings
 from processing.reconstruction.volume_file import VolumeFileError, read_volume
 from processing.results_file import average_volumes, volume_files, volume_path
 from processing.volume import VoxelGrid
-from tests.processing.droplet_run import DROPLETS_A_MM, MOTION_MM, write_calibration, write_run
+from tests.processing.droplet_run import DROPLETS_A_MM, MOTION_MM, SHAPE, write_calibration, write_run
 
 GRID = VoxelGrid.centred((61, 81, 81), 0.05)
 SETTINGS = ReconstructionSettings(grid=GridSettings.of(GRID), minimum_window_px=0)
@@ -57,6 +66,19 @@ def test_result_and_volumes_name_their_origin(run_dir: Path, calibration_file: P
     assert provenance["calibration"] == load_calibration(calibration_file).id
     assert ReconstructionSettings.model_validate_json(str(provenance["settings"])) == SETTINGS
     assert (provenance["shot"], provenance["frame"]) == (0, "b")
+
+
+def test_references_that_are_written_later_count(run_dir: Path) -> None:
+    with RunReader(run_dir) as run:
+        shot, views = run.read_shot(0), run.header.views
+        without = shot_intensities(run, shot, "a", SETTINGS)
+        levels = {"dark": 0.0, "background": 400.0}
+        images = {name: dict.fromkeys(views, np.full((2, *SHAPE), level, np.float32)) for name, level in levels.items()}
+        add_references(run_dir, run.header, {"dark": images["dark"], "background": images["background"]})
+        half_lit = shot_intensities(run, shot, "a", SETTINGS)
+    for before, after in zip(without, half_lit, strict=True):
+        assert np.median(before) == pytest.approx(0, abs=1e-6)
+        assert np.median(after) == pytest.approx((0.5 - 0.05) / 0.95, abs=1e-6)
 
 
 def test_the_default_grid_is_the_calibrated_range_in_pixels(run_dir: Path, calibration_file: Path) -> None:
