@@ -40,7 +40,7 @@ static void write_ok(struct text *reply, uint32_t boot)
     text_word(reply, " OK");
 }
 
-static void write_unreadable(struct protocol *protocol, struct text *reply, enum error error)
+static void write_unreadable(const struct protocol *protocol, struct text *reply, enum error error)
 {
     text_word(reply, "?");
     write_error(reply, protocol->boot, error);

@@ -1,5 +1,5 @@
-/* Hostile bytes, half-right lines, clock jumps and interlock flips, the same ones for the same seed.
- * After every step: no light without permission, and counters that add up.
+/* Hostile bytes, half-right lines, clock jumps, edges of the trigger input and stops that open, the same ones for the same
+ * seed. After every step: no light without permission, and counters that add up.
  *
  *     fuzz SEED STEPS       deterministic; with -DFUZZ_INPUT instead LLVMFuzzerTestOneInput, for libFuzzer and replay */
 #include <string.h>
@@ -12,6 +12,8 @@ static uint64_t dark_until_us[CHANNEL_COUNT]; /* what the duty of each channel d
 static unsigned fired_before;
 static unsigned sequence;
 static unsigned shots;
+static unsigned lights;
+static bool was_lit;
 
 #ifdef FUZZ_INPUT
 static const uint8_t *input; /* decides instead of chance, until it is used up */
@@ -48,9 +50,27 @@ static void random_bytes(void)
 static void random_channel(char *line, size_t size)
 {
     const uint32_t jitter = random_below(4) ? random_below(3) : random_below(UINT32_MAX);
+    const bool single = random_below(8) == 1;
     snprintf(line, size, "CHANNEL %u %u %u %u %u %u %u %u %u", random_below(5), random_below(2000), 20000 + jitter,
-             200 + random_below(1900), 26400 + random_below(300), 200 + random_below(1900), random_below(31000),
-             22100 + random_below(100), 23000 + random_below(3500));
+             200 + random_below(1900), single ? 0u : 26400 + random_below(300), single ? 0u : 200 + random_below(1900),
+             random_below(31000), 22100 + random_below(100), 23000 + random_below(3500));
+}
+
+static void random_arm(char *line, size_t size)
+{
+    snprintf(line, size, "ARM %u %u %u", random_below(20), random_below(4), random_below(3) ? 0u : random_below(50000));
+}
+
+static void random_limit(char *line, size_t size)
+{
+    snprintf(line, size, "LIMIT %u %u %u %u", random_below(5), 25000 + random_below(10000), random_below(500),
+             200 + random_below(1000));
+}
+
+static void random_light(char *line, size_t size)
+{
+    snprintf(line, size, "LIGHT %u %u %u %u %u", random_below(3000), random_below(520), random_below(2) * 400,
+             random_below(520), random_below(3) * 100);
 }
 
 static void random_command(void)
@@ -58,16 +78,19 @@ static void random_command(void)
     static const char *const words[] = {"NEW", "LOAD", "FIRE", "FIRE", "FIRE", "STATUS", "BEAT", "OFF", "CLEAR", "ID"};
     char command[MAX_LINE];
     char body[2 * MAX_LINE];
-    const uint32_t choice = random_below(17);
+    const uint32_t choice = random_below(19);
     if (choice < 4)
         random_channel(command, sizeof command);
     else if (choice < 6)
-        snprintf(command, sizeof command, "ARM %u %u %u", random_below(20), random_below(4), random_below(3) ? 0 : random_below(50000));
+        random_arm(command, sizeof command);
     else if (choice == 6)
-        snprintf(command, sizeof command, "LIMIT %u %u %u %u", random_below(5), 25000 + random_below(10000),
-                 random_below(500), 200 + random_below(1000));
+        random_limit(command, sizeof command);
+    else if (choice == 7)
+        random_light(command, sizeof command);
+    else if (choice == 8)
+        snprintf(command, sizeof command, "SHOT %u", random_below(5));
     else
-        snprintf(command, sizeof command, "%s", words[choice - 7]);
+        snprintf(command, sizeof command, "%s", words[choice - 9]);
     sequence += random_below(8) != 0; /* now and then the same number again */
     snprintf(body, sizeof body, "%u %s", sequence % 65536, command);
     exchange(&protocol, body);
@@ -95,6 +118,20 @@ static void check_duty(void)
     }
 }
 
+/* Continuous light makes its channels wait like the train with most light. */
+static void check_light(void)
+{
+    CHECK(protocol.safety.state == STATE_LIT && fake.prepared);
+    for (int i = 0; i < CHANNEL_COUNT; i++) {
+        if (!fake.light_ma[i])
+            continue;
+        const struct channel_limits limits = protocol.safety.limits[i];
+        CHECK(fake.light_ma[i] <= limits.max_light_ma && fake.light_ma[i] <= limits.max_current_ma);
+        CHECK(limits.max_duty_ppm > 0 && (was_lit || fake.now_us >= dark_until_us[i]));
+        dark_until_us[i] = fake.now_us + 2 * MAX_WIDTH_NS * 1000 / MAX_DUTY_PPM;
+    }
+}
+
 static void restart(void)
 {
     protocol_boot(&protocol, protocol.boot + 1, CAUSE_POWER);
@@ -113,10 +150,16 @@ static void check_invariants(void)
     CHECK((safety->state == STATE_FAULT) == (safety->faults != 0));
     CHECK(safety->state != STATE_ARMED || (fake.live && safety->shots_left > 0 && !train_check(&safety->train)));
     CHECK(safety->state != STATE_FAULT || !fake.live);
+    CHECK(!fake.permitted || (safety->state == STATE_ARMED && safety->source == SOURCE_EXTERNAL));
+    CHECK(safety->state != STATE_LIT || (fake.live && fake.prepared));
     CHECK(fake.fired - fired_before <= 1);
+    if (fake_lit())
+        check_light();
+    lights += fake_lit() && !was_lit;
+    was_lit = fake_lit();
     if (fake.fired != fired_before) {
         check_duty();
-        CHECK(fake.interlock_closed && (last_shot_us == 0 || fake.now_us - last_shot_us >= MIN_PERIOD_US));
+        CHECK(fake.interlock_closed && fake.estop_closed && (last_shot_us == 0 || fake.now_us - last_shot_us >= MIN_PERIOD_US));
         last_shot_us = fake.now_us;
         fired_before = fake.fired;
     }
@@ -126,20 +169,38 @@ static void begin(void)
 {
     fake_reset();
     protocol_boot(&protocol, 1, CAUSE_POWER);
-    fired_before = sequence = shots = 0;
+    fired_before = sequence = shots = lights = 0;
+    was_lit = false;
     last_shot_us = 0;
     memset(dark_until_us, 0, sizeof dark_until_us);
 }
 
+/* The port's interrupt is quicker than the core. */
+static bool random_stop(bool closed)
+{
+    const bool stays = closed ? random_below(100) != 1 : random_below(3) == 0;
+    if (closed && !stays)
+        port_off();
+    return stays;
+}
+
+static void trigger_edge(void)
+{
+    fake_edge();
+    protocol_poll(&protocol); /* counts it */
+}
+
 static void step(void)
 {
-    const uint32_t choice = random_below(32);
+    const uint32_t choice = random_below(36);
     if (choice == 0)
         random_bytes();
     else if (choice == 1)
         protocol_receive(&protocol, ABORT_BYTE);
     else if (choice < 8)
         let_time_pass();
+    else if (choice < 12)
+        trigger_edge();
     else
         random_command();
     check_invariants();
@@ -147,7 +208,9 @@ static void step(void)
         shots += fake.fired;
         restart();
     }
-    fake.interlock_closed = fake.interlock_closed ? random_below(100) != 1 : random_below(3) == 0;
+    fake.can_load = random_below(50) != 1;
+    fake.interlock_closed = random_stop(fake.interlock_closed);
+    fake.estop_closed = random_below(3) ? fake.estop_closed : random_stop(fake.estop_closed);
     protocol_poll(&protocol);
     check_invariants();
 }
@@ -173,7 +236,7 @@ int main(int argument_count, char **arguments)
     for (unsigned long left = strtoul(arguments[2], NULL, 10); left > 0; left--)
         step();
     shots += fake.fired;
-    printf("%u shots, %u starts\n", shots, protocol.boot);
-    return shots < 10;
+    printf("%u shots, %u lights, %u starts\n", shots, lights, protocol.boot);
+    return shots < 10 || lights < 10;
 }
 #endif

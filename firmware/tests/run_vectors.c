@@ -12,6 +12,12 @@ static void receive_line(const char *line)
         protocol_receive(&protocol, *line++);
 }
 
+static void fail(const char *what, const char *line)
+{
+    fprintf(stderr, "%s: %s", what, line);
+    exit(1);
+}
+
 static void change_world(const char *what)
 {
     unsigned number = 0;
@@ -28,7 +34,7 @@ static void change_world(const char *what)
     else if (!strcmp(what, "reset\n"))
         protocol_boot(&protocol, protocol.boot + 1, CAUSE_POWER);
     else
-        CHECK(!"a known change");
+        fail("unknown change", what);
     protocol_poll(&protocol);
 }
 

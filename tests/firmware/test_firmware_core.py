@@ -1,5 +1,7 @@
 """The core's own tests, compiled with address and undefined-behaviour sanitizers."""
 
+import random
+import shutil
 import subprocess
 from pathlib import Path
 
@@ -8,6 +10,8 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 FIRMWARE = ROOT / "firmware"
 BUILD = ROOT / "build" / "firmware"
+CORPUS = FIRMWARE / "tests" / "corpus"
+FUZZ_S = 4
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -29,6 +33,45 @@ def test_unit_tests_pass(program: str) -> None:
 def test_hostile_input_never_breaks_an_invariant(seed: str) -> None:
     finished = run("fuzz", seed, "400000")
     assert finished.returncode == 0, finished.stderr + finished.stdout
+
+
+def test_the_fuzz_target_takes_its_corpus_and_any_bytes(tmp_path: Path) -> None:
+    """The inputs that libFuzzer found worth keeping, the golden vectors, and noise."""
+    inputs = [*CORPUS.iterdir(), FIRMWARE / "tests" / "golden_vectors.txt"]
+    assert len(inputs) > 100
+    for seed in range(8):
+        inputs.append(tmp_path / f"noise{seed}")
+        inputs[-1].write_bytes(random.Random(seed).randbytes(20_000))
+    finished = run("replay", *(str(path) for path in inputs))
+    assert finished.returncode == 0, finished.stderr
+    assert finished.stdout == f"{len(inputs)} inputs\n"
+
+
+def clang_can_fuzz() -> bool:
+    """Debian's clang comes without libFuzzer, which is in another package."""
+    if shutil.which("clang") is None:
+        return False
+    source = "#include <stddef.h>\nint LLVMFuzzerTestOneInput(const void *d, size_t n) { return d && n ? 0 : 0; }"
+    compiled = subprocess.run(
+        ["clang", "-fsanitize=fuzzer", "-x", "c", "-", "-o", "/dev/null"], input=source, capture_output=True, text=True
+    )
+    return compiled.returncode == 0
+
+
+@pytest.mark.skipif(not clang_can_fuzz(), reason="clang and libclang-rt-dev are not installed (make fuzz)")
+def test_libfuzzer_finds_nothing_in_some_seconds(tmp_path: Path) -> None:
+    subprocess.run(["make", "-C", str(FIRMWARE), "../build/firmware/libfuzzer"], check=True, capture_output=True)
+    found = tmp_path / "new"
+    found.mkdir()
+    finished = run(
+        "libfuzzer",
+        f"-max_total_time={FUZZ_S}",
+        "-max_len=2048",
+        f"-artifact_prefix={tmp_path}/",
+        str(found),
+        str(CORPUS),
+    )
+    assert finished.returncode == 0, finished.stderr[-3000:]
 
 
 def test_core_answers_the_golden_vectors() -> None:

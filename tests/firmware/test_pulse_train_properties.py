@@ -1,9 +1,7 @@
 """Random trains through the core, over the wire: legal ones come back quantised, others with the right error."""
 
-import re
 from collections.abc import Iterator
-from dataclasses import astuple, dataclass, fields, replace
-from pathlib import Path
+from dataclasses import astuple, fields
 
 import pytest
 import serial
@@ -12,53 +10,8 @@ from hypothesis import strategies as st
 
 from daq.drivers.pulse_protocol import Command, ErrorNumber, Reply, Request, decode_reply, encode_request
 from daq.simulation.pulse_generator import FirmwareProcess
-
-TICK_NS = 8
-HEADER = (Path(__file__).resolve().parents[2] / "firmware" / "core" / "limits.h").read_text()
-LIMIT = {name: int(value) for name, value in re.findall(r"(\w+) = (\d+)", HEADER)}
-
-
-@dataclass(frozen=True)
-class Channel:
-    camera_ns: int
-    a_start_ns: int
-    a_width_ns: int
-    b_start_ns: int
-    b_width_ns: int
-    current_ma: int
-    frame_a_close_ns: int
-    frame_b_open_ns: int
-
-    def quantised(self) -> "Channel":
-        def nearest(time_ns: int) -> int:
-            return (time_ns + TICK_NS // 2) // TICK_NS * TICK_NS
-
-        return replace(
-            self,
-            camera_ns=nearest(self.camera_ns),
-            a_start_ns=nearest(self.a_start_ns),
-            a_width_ns=nearest(self.a_width_ns),
-            b_start_ns=nearest(self.b_start_ns),
-            b_width_ns=nearest(self.b_width_ns),
-        )
-
-    def error(self) -> ErrorNumber | None:
-        """The limits once more, in the unbounded integers of Python."""
-        a_end_ns = self.a_start_ns + self.a_width_ns
-        a_close_ns = self.camera_ns + self.frame_a_close_ns
-        b_open_ns = self.camera_ns + self.frame_b_open_ns
-        if max(self.camera_ns, self.a_start_ns, self.b_start_ns) > LIMIT["MAX_EDGE_NS"]:
-            return ErrorNumber.EDGE
-        if any(not LIMIT["MIN_WIDTH_NS"] <= w <= LIMIT["MAX_WIDTH_NS"] for w in (self.a_width_ns, self.b_width_ns)):
-            return ErrorNumber.WIDTH
-        dark_ns, separation_ns = self.b_start_ns - a_end_ns, self.b_start_ns - self.a_start_ns
-        if dark_ns < LIMIT["MIN_DARK_NS"] or separation_ns > LIMIT["MAX_SEPARATION_NS"]:
-            return ErrorNumber.SEPARATION
-        if self.current_ma > LIMIT["MAX_CURRENT_MA"]:
-            return ErrorNumber.CURRENT
-        if not a_end_ns <= a_close_ns <= b_open_ns <= self.b_start_ns:
-            return ErrorNumber.STRADDLE
-        return None
+from tests.firmware.train_oracle import LIMIT, TICK_NS
+from tests.firmware.train_oracle import OracleChannel as Channel
 
 
 @st.composite
@@ -130,11 +83,8 @@ def test_a_legal_train_comes_back_quantised(wire: Wire, channel: Channel, number
         **{name: getattr(actual, name) for name in NAMES if not name.startswith("frame")},
     }
     loaded = wire.ask(Command.LOAD)
-    assert loaded.number("length_ns") == max(
-        actual.camera_ns + LIMIT["CAMERA_PULSE_NS"], actual.b_start_ns + actual.b_width_ns
-    )
-    lit_ns = (actual.a_width_ns + actual.b_width_ns) if actual.current_ma else 0
-    assert loaded.number("period_us") == max(LIMIT["MIN_PERIOD_US"], -(-lit_ns * 1000 // LIMIT["MAX_DUTY_PPM"]))
+    assert loaded.number("length_ns") == actual.length_ns
+    assert loaded.number("period_us") == actual.period_us(LIMIT["MAX_DUTY_PPM"])
 
 
 @settings(max_examples=400, deadline=None)
