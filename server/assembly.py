@@ -67,12 +67,32 @@ def open_rig(config: RigConfig) -> Iterator[AssembledRig]:
     PlanError
         A camera profile cannot be read.
     """
+    with wire_rig(config) as wired, ExitStack() as devices:
+        rig = wired.rig
+        # The generator is entered last and so left first: the light goes off before anything else is closed.
+        for device in (rig.stage, *rig.cameras.values(), rig.interlock, rig.generator):
+            if device is not None:
+                devices.enter_context(device)
+        yield wired
+
+
+@contextmanager
+def wire_rig(config: RigConfig) -> Iterator[AssembledRig]:
+    """All devices of a rig, not yet opened; of a simulated one, the far ends run until the block ends.
+
+    Raises
+    ------
+    DeviceError
+        A simulated far end cannot run.
+    PlanError
+        A camera profile cannot be read.
+    """
     profiles = {name: load_camera_profile(view.camera.profile) for name, view in config.views.items()}
-    with ExitStack() as devices:
+    with ExitStack() as far_ends:
         if config.simulation is None:
-            yield AssembledRig(_open_rig(config, profiles, _gpio_interlock(config), devices))
+            yield AssembledRig(_rig(config, profiles, _gpio_interlock(config)))
         else:
-            yield _open_simulation(config, config.simulation, profiles, devices)
+            yield _simulation(config, config.simulation, profiles, far_ends)
 
 
 @contextmanager
@@ -110,18 +130,13 @@ def _simulated_generator(config: RigConfig, on_fired: Callable[[FiredTrain], Non
     return FirmwareProcess(channels_of(config), on_fired, emulated=emulated)
 
 
-def _open_rig(config: RigConfig, profiles: Profiles, interlock: Interlock, devices: ExitStack) -> Rig:
-    stage = None if config.stage is None else devices.enter_context(_stage(config.stage))
+def _rig(config: RigConfig, profiles: Profiles, interlock: Interlock) -> Rig:
+    stage = None if config.stage is None else _stage(config.stage)
     cameras = {
-        name: devices.enter_context(
-            AravisCamera(name, view.camera.ip, profiles[name], (view.sensor.height_px, view.sensor.width_px))
-        )
+        name: AravisCamera(name, view.camera.ip, profiles[name], (view.sensor.height_px, view.sensor.width_px))
         for name, view in config.views.items()
     }
-    devices.enter_context(interlock)
-    # Entered last and so left first: the light goes off before anything else is closed.
-    generator = devices.enter_context(_pulse_generator(config))
-    return Rig(cameras, generator, interlock, stage, max_current_a=_current_limits_a(config))
+    return Rig(cameras, _pulse_generator(config), interlock, stage, max_current_a=_current_limits_a(config))
 
 
 def _pulse_generator(config: RigConfig) -> SerialPulseGenerator:
@@ -154,20 +169,20 @@ def channels_of(config: RigConfig) -> dict[str, int]:
     return {name: view.led_channel for name, view in config.views.items()}
 
 
-def _open_simulation(
-    config: RigConfig, simulation: SimulationConfig, profiles: Profiles, devices: ExitStack
+def _simulation(
+    config: RigConfig, simulation: SimulationConfig, profiles: Profiles, far_ends: ExitStack
 ) -> AssembledRig:
     """Simulated devices at the far ends of all wires, then the drivers of a real rig at the near ones."""
-    bench = devices.enter_context(SimulatedBench(simulation.faults))
+    bench = far_ends.enter_context(SimulatedBench(simulation.faults))
     interlock, switch = _interlock_and_switch(simulation)
-    stage = devices.enter_context(_simulated_stage(config, simulation))
+    stage = far_ends.enter_context(_simulated_stage(config, simulation))
     zero_mm = 0.0 if config.stage is None else config.stage.zero_mm
     scene = SimulatedScene(config, lambda: stage.position_mm - zero_mm)
     cameras = {
-        name: devices.enter_context(_simulated_camera(name, view, profiles[name], scene))
+        name: far_ends.enter_context(_simulated_camera(name, view, profiles[name], scene))
         for name, view in config.views.items()
     }
-    generator = devices.enter_context(_simulated_generator(config, bench.on_fired))
+    generator = far_ends.enter_context(_simulated_generator(config, bench.on_fired))
     bench.connect(BenchDevices(cameras, generator, switch, stage))
     wired = config.model_copy(
         update={
@@ -183,7 +198,7 @@ def _open_simulation(
     def keep_truth(run_dir: Path) -> None:
         scene.write_truth(run_dir / TRUTH_FILE, bench.fired)
 
-    rig = _open_rig(wired, profiles, interlock, devices)
+    rig = _rig(wired, profiles, interlock)
     return AssembledRig(replace(rig, prepare_scene=prepare, keep_truth=keep_truth), bench)
 
 

@@ -22,6 +22,7 @@ from server.average_command import average
 from server.bench_command import BenchError, bench
 from server.check_command import check, self_calibrate_views
 from server.config import ConfigError
+from server.doctor import doctor
 from server.firmware_image import ImageError
 from server.firmware_options import add_firmware_tools
 from server.study_options import add_studies
@@ -69,6 +70,7 @@ def _parser() -> argparse.ArgumentParser:
     verbs = parser.add_subparsers(required=True, metavar="COMMAND")
     _add_demo(verbs)
     _add_serve(verbs)
+    _add_doctor(verbs)
     _add_import(verbs)
     _add_calibrate(verbs)
     _add_check(verbs)
@@ -102,6 +104,11 @@ def _add_serve(verbs: Any) -> None:
     parser.add_argument("--config", type=Path, required=True, help="rig configuration")
     parser.add_argument("--host", help="address to bind to, default 127.0.0.1")
     parser.add_argument("--port", type=int, help="port to bind to, default 8080")
+
+
+def _add_doctor(verbs: Any) -> None:
+    parser = _verb(verbs, "doctor", doctor, "what is wrong with this computer and the rig, and how to mend it")
+    parser.add_argument("--config", type=Path, help="rig configuration; without it only the computer is looked at")
 
 
 def _add_import(verbs: Any) -> None:
