@@ -69,19 +69,19 @@ public:
     const float *fold() {
         continue_beyond_edges();
         float *const halves = ahead(), *const folded = memory_.as<float>() + length_;
-        for (int width = 1, done = 0;; width *= 2) {
+        for (int width = 1; width <= window_; width *= 2) {
+            const int behind = window_ & -2 * width;  // wider parts of the window come first: they begin on vectors
             if (window_ & width) {
-                if (done == 0)
-                    std::memcpy(folded, halves, sizeof(float) * static_cast<size_t>(columns_));
+                if ((window_ & (width - 1)) == 0)
+                    std::memcpy(folded, halves + behind, sizeof(float) * static_cast<size_t>(columns_));
                 else
                     for (int k = 0; k < columns_; k += lanes)
-                        store(folded + k, Fold::of(load<Floats>(folded + k), load<Floats>(halves + k + done)));
-                done += width;
+                        store(folded + k, Fold::of(load<Floats>(folded + k), load<Floats>(halves + k + behind)));
             }
-            if (done == window_) return folded;
-            for (int k = 0; k < columns_ + window_ - 2 * width; k += lanes)
+            for (int k = 0; k < columns_ + behind - 2 * width; k += lanes)
                 store(halves + k, Fold::of(load<Floats>(halves + k), load<Floats>(halves + k + width)));
         }
+        return folded;
     }
 
 private:
