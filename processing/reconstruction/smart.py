@@ -2,29 +2,51 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
+from typing import Any, TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
-from processing.reconstruction.fixed_point import FixedPoint
 from processing.reconstruction.kernels import _native
 from processing.reconstruction.line_of_sight import check_volume
 from processing.reconstruction.plan import DEFAULT_THREADS, Plan
+from processing.reconstruction.smart_state import SmartState
 
 Volume = NDArray[np.float32]
 Pixels = NDArray[np.float32]
 Output = NDArray[Any]
 Stop = Callable[[int, float], bool]
 
-NOTHING = np.float32(1e-7)
-"""Projected intensity below which a pixel sees nothing."""
-NEGLIGIBLE = 1e-8
-"""Blocks in which MLOS is nowhere brighter than this share of what it could be stay empty."""
-QUARTER = 0.25
-"""The exponent of four views without relaxation."""
-RATIO_COUNTS = 4096
-"""Ratios are kept in 16 bit: up to 8, in steps of 1 / 4096. So much brighter a view makes a voxel at most at once."""
+
+class SmartOptions(TypedDict, total=False):
+    """What ``smart`` and ``mart`` take, all of it optional.
+
+    Parameters
+    ----------
+    iterations : int
+        At most so many; 20 by default, which the paper found to be enough.
+    relaxation : float
+        1, the default, is the method of the paper; less converges slower and follows noise less.
+    least_gain : float
+        Stop after an iteration that lowered the residual by less than this share of it; 0, the default, never does.
+    stop : callable
+        Called with number of iterations done and residual; ends the iteration by returning True.
+    start : (z, y, x) float32 array
+        First guess, not negative; MLOS by default. Its scale does not matter; where it is zero, the result is zero.
+    out : (z, y, x) float32 or float16 array
+        Receives the volume. Without it only the blocks that are not empty are in memory until somebody asks for more.
+    threads : int
+        The result does not depend on it.
+    """
+
+    iterations: int
+    relaxation: float
+    least_gain: float
+    stop: Stop
+    start: Volume | None
+    out: Output | None
+    threads: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,27 +55,29 @@ class SmartResult:
 
     Parameters
     ----------
-    volume : (z, y, x) float32 or float16 array
-        Intensities; their sum along a line of sight is the intensity of the image.
+    blocks : Blocks
+        The volume where it is not empty, in float16: ``blocks.nbytes`` of memory; ``blocks.write`` makes it dense.
     residuals : tuple of float
         Norm of projections minus images over norm of the images: of the scaled start, then after every iteration.
+    out : (z, y, x) array, optional
+        The volume, where the caller wanted it to be.
     """
 
-    volume: Output
+    blocks: _native.Blocks
     residuals: tuple[float, ...]
+    out: Output | None = None
+
+    @cached_property
+    def volume(self) -> Output:
+        """Intensities (z, y, x), ``out`` or float32; their sum along a line of sight is the intensity of the image."""
+        if self.out is not None:
+            return self.out
+        volume = np.empty(self.blocks.shape, np.float32)
+        self.blocks.write(volume, DEFAULT_THREADS)
+        return volume
 
 
-def smart(
-    plan: Plan,
-    images: Sequence[Pixels],
-    *,
-    iterations: int = 20,
-    start: Volume | None = None,
-    relaxation: float = 1.0,
-    stop: Stop | None = None,
-    out: Output | None = None,
-    threads: int = DEFAULT_THREADS,
-) -> SmartResult:
+def smart(plan: Plan, images: Sequence[Pixels], **options: Unpack[SmartOptions]) -> SmartResult:
     """Simultaneous MART: all views correct the volume at once.
 
     Each iteration multiplies every voxel by the product over the views of (I / P)^(relaxation / n_views),
@@ -65,140 +89,54 @@ def smart(
         Geometry of views and grid.
     images : sequence of (rows, columns) float32 arrays
         Inverted shadow intensities, not negative; one image per view.
-    iterations : int
-        The paper found 20 to be enough.
-    start : (z, y, x) float32 array, optional
-        First guess, MLOS by default. Its scale does not matter; where it is zero, the result is zero.
-    relaxation : float
-        1 is the method of the paper; less converges slower and follows noise less.
-    stop : callable, optional
-        Called with number of iterations done and residual; ends the iteration by returning True.
-    out : (z, y, x) float32 or float16 array, optional
-        Receives the volume. Until the end only blocks that are not empty are in memory, in float32.
-    threads : int
-        The result does not depend on it.
+    **options
+        See ``SmartOptions``.
 
     Raises
     ------
     ValueError
-        Images, ``start`` or ``out`` do not fit the plan, or ``iterations`` or ``relaxation`` is not positive.
+        Images, ``start`` or ``out`` do not fit the plan, or an option is out of range.
     """
-    solver = _Solver(plan, images, start, out, threads)
-    exponent = _checked(iterations, relaxation) / len(plan.views)
-    everything = range(len(plan.views))
 
-    def iterate() -> None:
-        for view in everything:
-            solver.correct(view, exponent)
-        solver.advance(update=everything, project=everything)
+    def iterate(state: SmartState) -> None:
+        state.advance(update=state.views, project=state.views)
 
-    return solver.run(iterate, iterations, stop)
+    return _run(plan, images, iterate, 1 / len(plan.views), options)
 
 
-def mart(
-    plan: Plan,
-    images: Sequence[Pixels],
-    *,
-    iterations: int = 20,
-    start: Volume | None = None,
-    relaxation: float = 1.0,
-    stop: Stop | None = None,
-    out: Output | None = None,
-    threads: int = DEFAULT_THREADS,
-) -> SmartResult:
+def mart(plan: Plan, images: Sequence[Pixels], **options: Unpack[SmartOptions]) -> SmartResult:
     """MART by views: one after the other corrects the volume by (I / P)^relaxation, P projected anew for each.
 
-    An iteration corrects by every view once. Parameters and errors are those of ``smart``.
+    An iteration corrects by every view once. All else is as in ``smart``.
     """
-    solver = _Solver(plan, images, start, out, threads)
-    exponent = _checked(iterations, relaxation)
-    views = range(len(plan.views))
 
-    def iterate() -> None:
-        for view in views:
-            solver.correct(view, exponent)
-            following = [view + 1] if view + 1 < len(views) else views
-            solver.advance(update=[view], project=following)
+    def iterate(state: SmartState) -> None:
+        for view in state.views:
+            following = [view + 1] if view + 1 < len(state.views) else state.views
+            state.advance(update=[view], project=following)
 
-    return solver.run(iterate, iterations, stop)
+    return _run(plan, images, iterate, 1.0, options)
 
 
-class _Solver:
-    """The state of an iteration: blocks of the volume that are not empty, projections, ratio images."""
-
-    def __init__(
-        self, plan: Plan, images: Sequence[Pixels], start: Volume | None, out: Output | None, threads: int
-    ) -> None:
-        self._threads, self._plan, self._out = threads, plan, out
-        if out is not None:
-            check_volume(out, plan, (np.float32, np.float16))
-        resampled = plan.resample(images, threads)
-        self._images = [image.intensity for image in resampled]
-        self._blocks = _first_guess(plan, resampled, threads) if start is None else _blocks_of(plan, start, threads)
-        self._projections = [np.zeros_like(image) for image in self._images]
-        self._ratios = [np.zeros(image.shape, np.int16) for image in self._images]
-        self._views = plan.bind([FixedPoint(ratio, 1 / RATIO_COUNTS) for ratio in self._ratios], cull=False)
-        self.advance(update=[], project=range(len(self._views)))
-        self._match_scale()
-
-    def _match_scale(self) -> None:
-        projected = sum(float(projection.sum(dtype=np.float64)) for projection in self._projections)
-        if projected <= 0:
-            return
-        factor = np.float32(sum(float(image.sum(dtype=np.float64)) for image in self._images) / projected)
-        self._blocks.scale(float(factor), self._threads)
-        for projection in self._projections:
-            projection *= factor
-
-    def correct(self, view: int, exponent: float) -> None:
-        """Set the ratio image of a view from its latest projection."""
-        projection = self._projections[view]
-        ratio = self._images[view] / np.maximum(projection, NOTHING)
-        if exponent == QUARTER:  # a hundred times faster than powers
-            ratio = np.sqrt(np.sqrt(ratio, out=ratio), out=ratio)
-        else:
-            ratio **= np.float32(exponent)
-        ratio *= projection > NOTHING
-        self._ratios[view][:] = np.minimum(ratio * np.float32(RATIO_COUNTS) + np.float32(0.5), np.float32(32767))
-
-    def advance(self, update: Sequence[int], project: Sequence[int]) -> None:
-        """Multiply the volume by the ratios of some views, then project it onto some views."""
-        numbers = range(len(self._views))
-        projections = [self._projections[view] if view in project else None for view in numbers]
-        self._blocks.smart_pass(self._views, [view in update for view in numbers], projections, self._threads)
-
-    def residual(self) -> float:
-        """Norm of the difference between projections and images, relative to the images."""
-        pairs = list(zip(self._projections, self._images, strict=True))
-        recorded = sum(float(np.vdot(image, image)) for _, image in pairs)
-        missed = sum(float(np.sum((projection - image) ** 2, dtype=np.float64)) for projection, image in pairs)
-        return float(np.sqrt(missed / recorded)) if recorded else 0.0
-
-    def run(self, iterate: Callable[[], None], iterations: int, stop: Stop | None) -> SmartResult:
-        """Iterate until done or stopped."""
-        residuals = [self.residual()]
-        for done in range(1, iterations + 1):
-            iterate()
-            residuals.append(self.residual())
-            if stop is not None and stop(done, residuals[-1]):
-                break
-        volume = np.empty(self._plan.grid.shape, np.float32) if self._out is None else self._out
-        self._blocks.write(volume, self._threads)
-        return SmartResult(volume, tuple(residuals))
-
-
-def _first_guess(plan: Plan, resampled: Sequence[FixedPoint], threads: int) -> _native.Blocks:
-    """MLOS, where it is not negligible."""
-    brightest = float(np.prod([image.brightest for image in resampled]))
-    return _native.Blocks.of_views(plan.bind(resampled), plan.grid.shape, NEGLIGIBLE * brightest, threads)
-
-
-def _blocks_of(plan: Plan, start: Volume, threads: int) -> _native.Blocks:
-    check_volume(start, plan, (np.float32,))
-    return _native.Blocks.of_volume(start, threads)
-
-
-def _checked(iterations: int, relaxation: float) -> float:
+def _run(
+    plan: Plan, images: Sequence[Pixels], iterate: Callable[[SmartState], None], share: float, options: SmartOptions
+) -> SmartResult:
+    iterations, threads = options.get("iterations", 20), options.get("threads", DEFAULT_THREADS)
+    relaxation, least_gain = options.get("relaxation", 1.0), options.get("least_gain", 0.0)
     if iterations < 1 or relaxation <= 0:
         raise ValueError(f"iterations {iterations} and relaxation {relaxation} must be positive")
-    return relaxation
+    if not 0 <= least_gain < 1:
+        raise ValueError(f"least_gain {least_gain} must be a share, 0 to 1")
+    stop, out = options.get("stop"), options.get("out")
+    if out is not None:
+        check_volume(out, plan, (np.float32, np.float16))
+    state = SmartState(plan, images, options.get("start"), relaxation * share, threads)
+    residuals = [state.residual]
+    for done in range(1, iterations + 1):
+        iterate(state)
+        residuals.append(state.residual)
+        if (stop is not None and stop(done, residuals[-1])) or residuals[-1] > (1 - least_gain) * residuals[-2]:
+            break
+    if out is not None:
+        state.blocks.write(out, threads)
+    return SmartResult(state.blocks, tuple(residuals), out)

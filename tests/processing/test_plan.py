@@ -148,7 +148,8 @@ def rectified(pixels: NDArray[np.int16], scale: FloatArray, shift_u: FloatArray,
 def test_kernels_refuse_geometry_that_leads_outside() -> None:
     volume, pixels = np.zeros((3, 4, 5), np.float32), np.zeros((20, 90), np.int16)
     scale, shift = np.ones(3), np.full(3, 2.0)
-    _native.line_of_sight([rectified(pixels, scale, shift, shift)], 2, volume, 1)
+    inside = rectified(pixels, scale, shift, shift)
+    _native.line_of_sight([inside], 2, volume, 1)
     nodes = np.zeros((3, 2, 2, 2), np.float32)
     _native.line_of_sight([_native.View.mapped(pixels, 1.0, nodes, 16)], 2, volume, 1)
     outside = [
@@ -163,9 +164,16 @@ def test_kernels_refuse_geometry_that_leads_outside() -> None:
     for view in outside:
         with pytest.raises(ValueError, match=r"(view|nodes): "):
             _native.line_of_sight([view], 2, volume, 1)
-    projection, blocks = np.zeros((19, 90), np.float32), _native.Blocks.of_volume(volume, 1)
+    blocks, projections = _native.Blocks.of_volume(volume, 1.0, 1), _native.Projections([inside], volume.shape)
+    narrow = np.zeros((19, 90), np.int16)
     with pytest.raises(ValueError, match="projections and images differ in shape"):
-        blocks.smart_pass([rectified(pixels, scale, shift, shift)], [False], [projection], 1)
+        projections.correct(0, 1.0, narrow, 1.0, 0.25, 4096, np.zeros_like(pixels), 1)
+    with pytest.raises(ValueError, match="no such view"):
+        projections.correct(1, 1.0, pixels, 1.0, 0.25, 4096, np.zeros_like(pixels), 1)
+    with pytest.raises(ValueError, match="of another shape than the blocks"):
+        projections.smart_pass(_native.Blocks.of_volume(volume[1:], 1.0, 1), [False], [True], 1)
+    with pytest.raises(ValueError, match="two flags per view"):
+        projections.smart_pass(blocks, [False], [True, True], 1)
     with pytest.raises(ValueError, match="another shape than the blocks"):
         blocks.write(np.zeros((3, 4, 6), np.float32), 1)
 

@@ -136,11 +136,16 @@ def test_blocks_are_few_and_lose_nothing(by_nodes: bool) -> None:
     plan, images = make_plan(mappings, by_nodes), images_of(droplets(12), mappings)
     views = plan.bind(plan.resample(images))
     dense = line_of_sight(plan, images)
-    for blocks in (_native.Blocks.of_views(views, GRID.shape, 0.0, 2), _native.Blocks.of_volume(dense, 2)):
+    most = float(dense.max())
+    for blocks in (
+        _native.Blocks.of_views(views, GRID.shape, 0.0, most, 2),
+        _native.Blocks.of_volume(dense, most, 2),
+    ):
         assert 0 < blocks.count < 0.5 * 17 * 6 * 9
+        assert blocks.nbytes == blocks.count * (8 * 32 * 2 + 8)
         stored = np.full(GRID.shape, 9, np.float32)
         blocks.write(stored, 2)
-        np.testing.assert_array_equal(stored, dense)
+        np.testing.assert_allclose(stored, dense, rtol=2**-11, atol=most * 2**-32)
 
 
 def test_stop_ends_it_and_sees_the_residual() -> None:

@@ -46,32 +46,6 @@ Range rows_seen(const View &view, const Shape &shape, int y0, int y1) {
     return rows;
 }
 
-// Storage of the image rows that one band projects onto.
-class BandImage {
-public:
-    BandImage() = default;
-    BandImage(const View &view, const Shape &shape, const Band &band) {
-        const int y1 = std::min(band.end_slab * smart_rows, shape.ny) - 1;
-        const Range seen = rows_seen(view, shape, band.first_slab * smart_rows, y1);
-        const int last = view.rows - 1;
-        const auto clamped = [last](double row) { return static_cast<int>(std::clamp(row, 0.0, double(last))); };
-        const int first = clamped(std::floor(seen.low) - 1), end = clamped(std::ceil(seen.high) + 2) + 1;
-        pixels_.assign(static_cast<size_t>(end - first) * view.columns, 0.0f);
-        projection_ = {pixels_.data(), first, end - first, view.columns};
-    }
-    const Projection &projection() const { return projection_; }
-
-private:
-    std::vector<float> pixels_;
-    Projection projection_{};
-};
-
-void add(const Projection &part, float *image) {
-    float *to = image + static_cast<size_t>(part.first_row) * part.columns;
-    const size_t count = static_cast<size_t>(part.rows) * part.columns;
-    for (size_t i = 0; i < count; ++i) to[i] += part.pixels[i];
-}
-
 }  // namespace
 
 void for_each(int count, int threads, const std::function<void(int)> &work) {
@@ -94,23 +68,62 @@ void run_sum_of_sight(const Kernels &kernels, const SumOfSight &job, int threads
     for_each(slabs, threads, [&](int slab) { kernels.sum_of_sight(job, slab); });
 }
 
-void run_bands(const SmartPass &job, const std::vector<float *> &sums, int threads,
-               const std::function<void(int slab, const Projection *projections)> &work) {
-    const auto bands = bands_of((job.shape.ny + smart_rows - 1) / smart_rows);
-    std::vector<std::vector<BandImage>> images(bands.size());
-    for_each(static_cast<int>(bands.size()), threads, [&](int b) {
-        std::vector<Projection> projections;
-        for (int i = 0; i < job.n_views; ++i) {
-            images[b].push_back(sums[i] ? BandImage(job.views[i], job.shape, bands[b]) : BandImage());
-            projections.push_back(images[b].back().projection());
+BandImages::BandImages(const std::vector<View> &views, const Shape &shape) {
+    constexpr int pixels_per_line = sizeof(Line) / sizeof(float);
+    for (const Band &band : bands_of((shape.ny + smart_rows - 1) / smart_rows)) {
+        Images images{band.first_slab, band.end_slab, {}, {}};
+        for (const View &view : views) {
+            const int y1 = std::min(band.end_slab * smart_rows, shape.ny) - 1;
+            const Range seen = rows_seen(view, shape, band.first_slab * smart_rows, y1);
+            const int last = view.rows - 1;
+            const auto clamped = [last](double row) { return static_cast<int>(std::clamp(row, 0.0, double(last))); };
+            const int first = clamped(std::floor(seen.low) - 1), end = clamped(std::ceil(seen.high) + 2) + 1;
+            const size_t lines = (view.columns + pixels_per_line - 1) / pixels_per_line;
+            images.memory.emplace_back(static_cast<size_t>(end - first + 1) * lines);
+            images.parts.push_back({images.memory.back().data()->pixels, first, end - first,
+                                    static_cast<int64_t>(lines * pixels_per_line)});
         }
-        for (int slab = bands[b].first_slab; slab < bands[b].end_slab; ++slab) work(slab, projections.data());
+        bands_.push_back(std::move(images));
+    }
+}
+
+void BandImages::project(const std::vector<bool> &wanted, int threads,
+                         const std::function<void(int slab, const Projection *projections)> &work) {
+    for_each(static_cast<int>(bands_.size()), threads, [&](int b) {
+        Images &images = bands_[b];
+        std::vector<Projection> projections = images.parts;
+        for (size_t i = 0; i < wanted.size(); ++i) {
+            if (wanted[i])
+                std::fill(images.memory[i].begin(), images.memory[i].end(), Line{});
+            else
+                projections[i].pixels = nullptr;
+        }
+        for (int slab = images.first_slab; slab < images.end_slab; ++slab) work(slab, projections.data());
     });
-    for_each(job.n_views, threads, [&](int i) {
-        if (!sums[i]) return;
-        std::memset(sums[i], 0, sizeof(float) * job.views[i].rows * job.views[i].columns);
-        for (const auto &band : images) add(band[i].projection(), sums[i]);
-    });
+}
+
+double BandImages::sum(int view) const {
+    double sum = 0;
+    for (const Projection &part : parts(view))
+        for (int64_t i = 0; i < part.rows * part.stride; ++i) sum += part.pixels[i];
+    return sum;
+}
+
+double BandImages::correct(const Kernels &kernels, int view, Correction job, int threads) const {
+    const auto found = parts(view);
+    job.parts = found.data();
+    job.n_parts = static_cast<int>(found.size());
+    std::vector<double> missed(job.rows);
+    for_each(job.rows, threads, [&](int row) { missed[row] = kernels.correct(job, row); });
+    double sum = 0;
+    for (double row : missed) sum += row;
+    return sum;
+}
+
+std::vector<Projection> BandImages::parts(int view) const {
+    std::vector<Projection> parts;
+    for (const Images &images : bands_) parts.push_back(images.parts[view]);
+    return parts;
 }
 
 }  // namespace tomoshadow

@@ -14,9 +14,32 @@ void for_each(int count, int threads, const std::function<void(int)> &work);
 void run_line_of_sight(const Kernels &kernels, const LineOfSight &job, int threads);
 void run_sum_of_sight(const Kernels &kernels, const SumOfSight &job, int threads);
 
-// Work through bands of slabs that project into images of their own, which are then added in order. sums[i] is the
-// image of view i, or null if that is not wanted.
-void run_bands(const SmartPass &job, const std::vector<float *> &sums, int threads,
-               const std::function<void(int slab, const Projection *projections)> &work);
+// What the volume looks like from each view, in parts: bands of slabs project into images of their own.
+class BandImages {
+public:
+    BandImages(const std::vector<View> &views, const Shape &shape);
+
+    // Let `work` project slab after slab, band by band, onto the wanted views.
+    void project(const std::vector<bool> &wanted, int threads,
+                 const std::function<void(int slab, const Projection *projections)> &work);
+    // The sum of the latest projection onto a view, in units of the volume.
+    double sum(int view) const;
+    // Set the ratio image of a view from its latest projection: the parts that `job` lacks, in order. Returns the sum
+    // of (projected - recorded)^2.
+    double correct(const Kernels &kernels, int view, Correction job, int threads) const;
+
+private:
+    std::vector<Projection> parts(int view) const;
+
+    struct alignas(64) Line {
+        float pixels[16];
+    };
+    struct Images {
+        int first_slab, end_slab;
+        std::vector<std::vector<Line>> memory;
+        std::vector<Projection> parts;
+    };
+    std::vector<Images> bands_;
+};
 
 }  // namespace tomoshadow

@@ -1,71 +1,61 @@
 #include "blocks.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
-
-#include "bands.hpp"
+#include <memory>
 
 namespace tomoshadow {
 
-void Blocks::Slab::keep(BlockPosition position, const float *from) {
-    positions.push_back(position);
-    values.emplace_back();
-    std::memcpy(&values.back(), from, sizeof(Values));
-}
+namespace {
 
-Blocks::Blocks(const Shape &shape) : shape_(shape), slabs_((shape.ny + smart_rows - 1) / smart_rows) {}
+// The largest voxel of the start is stored as 128 to 256. Above it float16 has room for 8 bits of growth, below it
+// for 21 of full precision and 10 more. A power of two, so that blocks become a volume and blocks again unchanged.
+float unit_for(float most) { return most > 0.0f ? std::ldexp(1.0f, std::ilogb(most) - 7) : 1.0f; }
+
+}  // namespace
+
+Blocks::Blocks(const Kernels &kernels, const SmartStart &start, float most, int threads)
+    : shape_(start.shape), unit_(unit_for(most)), slabs_((start.shape.ny + smart_rows - 1) / smart_rows) {
+    SmartStart job = start;
+    job.gain = 1.0f / unit_;
+    const auto keep = [](void *owner, BlockPosition position, const uint16_t *values) {
+        Slab &slab = *static_cast<Slab *>(owner);
+        slab.positions.push_back(position);
+        slab.values.emplace_back();
+        std::memcpy(&slab.values.back(), values, sizeof(Values));
+    };
+    for_each(static_cast<int>(slabs_.size()), threads, [&](int number) {
+        Slab &slab = slabs_[number];
+        kernels.smart_start(job, number, keep, &slab);
+        slab.positions.shrink_to_fit();
+        slab.values.shrink_to_fit();
+    });
+}
 
 Blocks Blocks::of_views(const Kernels &kernels, const std::vector<View> &views, const Shape &shape, float floor,
-                        int threads) {
-    Blocks blocks(shape);
-    const auto keep = [](void *slab, BlockPosition position, const float *values) {
-        static_cast<Slab *>(slab)->keep(position, values);
-    };
-    const SmartStart job{views.data(), static_cast<int>(views.size()), shape, floor};
-    for_each(static_cast<int>(blocks.slabs_.size()), threads,
-             [&](int slab) { kernels.smart_start(job, slab, keep, &blocks.slabs_[slab]); });
-    return blocks;
+                        float most, int threads) {
+    return {kernels, {views.data(), static_cast<int>(views.size()), nullptr, shape, floor, 0.0f}, most, threads};
 }
 
-Blocks Blocks::of_volume(const float *volume, const Shape &shape, int threads) {
-    Blocks blocks(shape);
-    for_each(static_cast<int>(blocks.slabs_.size()), threads, [&](int slab) {
-        const int y0 = slab * smart_rows, rows = std::min(smart_rows, shape.ny - y0);
-        for (int z = 0; z < shape.nz; ++z)
-            for (int x0 = 0; x0 < shape.nx; x0 += block_columns) {
-                Values values{};
-                const int columns = std::min(block_columns, shape.nx - x0);
-                bool any = false;
-                for (int row = 0; row < rows; ++row) {
-                    const float *from = volume + (static_cast<int64_t>(z) * shape.ny + y0 + row) * shape.nx + x0;
-                    std::copy(from, from + columns, values.rows[row]);
-                    any |= std::any_of(from, from + columns, [](float value) { return value != 0.0f; });
-                }
-                if (any) blocks.slabs_[slab].keep({z, x0}, values.rows[0]);
-            }
-    });
-    return blocks;
+Blocks Blocks::of_volume(const Kernels &kernels, const float *volume, const Shape &shape, float most, int threads) {
+    return {kernels, {nullptr, 0, volume, shape, 0.0f, 0.0f}, most, threads};
 }
 
-void Blocks::pass(const Kernels &kernels, const std::vector<View> &views, const bool *update,
-                  const std::vector<float *> &sums, int threads) {
-    const SmartPass job{views.data(), update, static_cast<int>(views.size()), shape_};
-    run_bands(job, sums, threads, [&](int slab, const Projection *projections) {
+void Blocks::pass(const Kernels &kernels, const std::vector<View> &views, const std::vector<bool> &update,
+                  const std::vector<bool> &project, BandImages &images, int threads) {
+    const auto updated = std::make_unique<bool[]>(update.size());
+    std::copy(update.begin(), update.end(), updated.get());
+    const SmartPass job{views.data(), updated.get(), gain_, static_cast<int>(views.size()), shape_};
+    images.project(project, threads, [&](int slab, const Projection *projections) {
         kernels.smart_pass(job, slab, slabs_[slab].list(), projections);
     });
-}
-
-void Blocks::scale(float factor, int threads) {
-    for_each(static_cast<int>(slabs_.size()), threads, [&](int slab) {
-        for (Values &values : slabs_[slab].values)
-            for (auto &row : values.rows)
-                for (float &value : row) value *= factor;
-    });
+    if (std::find(update.begin(), update.end(), true) != update.end()) gain_ = 1.0f;
 }
 
 void Blocks::write(const Kernels &kernels, Format format, void *volume, int threads) {
     for_each(static_cast<int>(slabs_.size()), threads, [&](int slab) {
-        kernels.write_blocks(shape_, slab, slabs_[slab].list(), format, volume);
+        kernels.write_blocks(shape_, slab, slabs_[slab].list(), unit(), format, volume);
     });
 }
 

@@ -17,6 +17,9 @@ constexpr int block_columns = 32;
 constexpr int sight_rows = 16;  // rows of a slab for line of sight ...
 constexpr int smart_rows = 8;   // ... and for SMART, whose blocks come and go with the droplets
 
+// SMART works through a slab tile by tile: what the views see of a tile stays in the nearest cache for all its planes.
+constexpr int smart_planes = 16, smart_columns = 128;
+
 // Where an image is not zero: sums[y][x] counts the cells above y and left of x in which any pixel is not zero, so that
 // four of them tell whether a box of any size is empty.
 struct Occupancy {
@@ -69,37 +72,53 @@ struct SumOfSight {
     float *volume;  // is added to
 };
 
-// Rows [first_row, first_row + rows) of a view's image that a band of the volume projects onto; without pixels if
-// nobody asked for the view.
+// Rows [first_row, first_row + rows) of a view's image that a band of the volume projects onto, and a spare one;
+// without pixels if nobody asked for the view.
 struct Projection {
     float *pixels;
-    int first_row, rows, columns;
+    int first_row, rows;
+    int64_t stride;  // floats from row to row, a multiple of the widest vector
 };
 
-// Blocks of a slab of SMART, ordered by plane and column; voxels beyond the volume are zero.
+// Blocks of a slab of SMART, ordered by tile, in it by plane and column. Voxels are float16; those beyond the volume
+// are zero.
 struct BlockPosition {
     int32_t z, x0;
 };
 struct BlockList {
     const BlockPosition *positions;
     int count;
-    float *values;  // (count, smart_rows, block_columns)
+    uint16_t *values;  // (count, smart_rows, block_columns)
 };
-using KeepBlock = void (*)(void *owner, BlockPosition position, const float *values);
+using KeepBlock = void (*)(void *owner, BlockPosition position, const uint16_t *values);
 
+// Find the blocks that exceed `floor` somewhere, in a volume or, where that is null, in the product of what views see.
+// They are stored times `gain`.
 struct SmartStart {
     const View *views;
     int n_views;
+    const float *volume;
     Shape shape;
-    float floor;
+    float floor, gain;
 };
 
-// One SMART pass: multiply the blocks by the samples of the ratio images, then project the result.
+// One SMART pass: multiply the blocks by the samples of the ratio images and a gain, then project the result.
 struct SmartPass {
     const View *views;  // their images hold the ratios
     const bool *update;
+    float gain;  // of the volume, in an update
     int n_views;
     Shape shape;
+};
+
+// The ratio image of a view: (recorded / projected)^exponent; the projection is the sum of its parts, times `unit`.
+struct Correction {
+    const int16_t *recorded;
+    float recorded_unit, unit, exponent, ratio_counts;  // ratio_counts: of the ratio 1
+    int rows, columns;
+    const Projection *parts;
+    int n_parts;
+    int16_t *ratio;
 };
 
 // Resample rows [first_row, end_row) of `to` from a recorded image in fixed point, by cubic convolution. Nodes are
@@ -120,7 +139,8 @@ struct Kernels {
     void (*sum_of_sight)(const SumOfSight &job, int slab);
     void (*smart_start)(const SmartStart &job, int slab, KeepBlock keep, void *owner);
     void (*smart_pass)(const SmartPass &job, int slab, const BlockList &blocks, const Projection *projections);
-    void (*write_blocks)(const Shape &shape, int slab, const BlockList &blocks, Format format, void *volume);
+    void (*write_blocks)(const Shape &shape, int slab, const BlockList &blocks, float unit, Format format, void *volume);
+    double (*correct)(const Correction &job, int row);  // returns the sum of (projected - recorded)^2
     void (*resample)(const Resampling &job, int first_row, int end_row);
     float (*brightest)(const float *pixels, int count);
     void (*quantise)(const float *pixels, float counts_per_unit, int16_t *to, int count);

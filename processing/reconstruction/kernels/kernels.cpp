@@ -4,6 +4,7 @@
 #include "instruction_set.hpp"
 #include "output.hpp"
 #include "preprocess.hpp"
+#include "ratios.hpp"
 #include "resample.hpp"
 #include "smart.hpp"
 
@@ -91,7 +92,7 @@ void sum_of_sight(const SumOfSight &job, int slab) {
 
 extern const Kernels kernels;
 const Kernels kernels{
-    TOMOSHADOW_TEXT(TOMOSHADOW_ISA), line_of_sight, sum_of_sight, smart_start, smart_pass, write_blocks, resample, brightest, quantise,
-    row_minima, column_minima, row_means, subtract_veil};
+    TOMOSHADOW_TEXT(TOMOSHADOW_ISA), line_of_sight, sum_of_sight, smart_start, smart_pass, write_blocks, correct, resample,
+    brightest, quantise, row_minima, column_minima, row_means, subtract_veil};
 
 }  // namespace tomoshadow::TOMOSHADOW_ISA

@@ -129,6 +129,12 @@ Shape shape_of(const Array &volume) {
     return {static_cast<int>(volume.shape(0)), static_cast<int>(volume.shape(1)), static_cast<int>(volume.shape(2))};
 }
 
+Shape volume_shape(std::tuple<int, int, int> size) {
+    const Shape shape{std::get<0>(size), std::get<1>(size), std::get<2>(size)};
+    require(shape.nz > 0 && shape.ny > 0 && shape.nx > 0, "volume: empty");
+    return shape;
+}
+
 Format format_of(const AnyVolume &volume) {
     if (volume.dtype() == nb::dtype<float>()) return Format::single;
     if (volume.dtype() == nb::dtype<uint8_t>()) return Format::byte;
@@ -165,40 +171,73 @@ void sum_of_sight(const std::vector<std::vector<const BoundView *>> &exposures, 
     run_sum_of_sight(kernels, job, threads);
 }
 
-Blocks blocks_of_views(const std::vector<const BoundView *> &bound, std::tuple<int, int, int> size, float floor,
+Blocks blocks_of_views(const std::vector<const BoundView *> &bound, std::tuple<int, int, int> size, float floor, float most,
                        int threads) {
-    const Shape shape{std::get<0>(size), std::get<1>(size), std::get<2>(size)};
-    require(shape.nz > 0 && shape.ny > 0 && shape.nx > 0, "volume: empty");
+    const Shape shape = volume_shape(size);
     const auto views = views_on(bound, shape, threads);
     const Kernels &kernels = selected_kernels();
     nb::gil_scoped_release release;
-    return Blocks::of_views(kernels, views, shape, floor, threads);
+    return Blocks::of_views(kernels, views, shape, floor, most, threads);
 }
 
-Blocks blocks_of_volume(const FloatVolume &volume, int threads) {
+Blocks blocks_of_volume(const FloatVolume &volume, float most, int threads) {
     require(threads >= 1, "threads must be positive");
     const Shape shape = shape_of(volume);
-    nb::gil_scoped_release release;
-    return Blocks::of_volume(volume.data(), shape, threads);
-}
-
-void pass(Blocks &blocks, const std::vector<const BoundView *> &bound, const std::vector<bool> &update,
-          const std::vector<std::optional<ImageArray>> &projections, int threads) {
-    const auto views = views_on(bound, blocks.shape(), threads);
-    require(update.size() == views.size() && projections.size() == views.size(), "one flag and projection per view, please");
-    bool updates[max_views] = {};
-    std::vector<float *> sums;
-    for (size_t i = 0; i < views.size(); ++i) {
-        updates[i] = update[i];
-        sums.push_back(projections[i] ? projections[i]->data() : nullptr);
-        require(!projections[i] || (static_cast<int>(projections[i]->shape(0)) == views[i].rows &&
-                                    static_cast<int>(projections[i]->shape(1)) == views[i].columns),
-                "projections and images differ in shape");
-    }
     const Kernels &kernels = selected_kernels();
     nb::gil_scoped_release release;
-    blocks.pass(kernels, views, updates, sums, threads);
+    return Blocks::of_volume(kernels, volume.data(), shape, most, threads);
 }
+
+// What blocks look like from some views, whose images hold the ratios; keeps the views alive.
+class Projections {
+public:
+    Projections(const std::vector<nb::object> &bound, std::tuple<int, int, int> size)
+        : shape_(volume_shape(size)), bound_(bound), views_(views_of(bound, shape_)), images_(views_, shape_) {}
+
+    void pass(Blocks &blocks, const std::vector<bool> &update, const std::vector<bool> &project, int threads) {
+        const Shape &other = blocks.shape();
+        require(shape_.nz == other.nz && shape_.ny == other.ny && shape_.nx == other.nx,
+                "projections: of another shape than the blocks");
+        require(update.size() == views_.size() && project.size() == views_.size(), "two flags per view, please");
+        require(threads >= 1, "threads must be positive");
+        const Kernels &kernels = selected_kernels();
+        nb::gil_scoped_release release;
+        blocks.pass(kernels, views_, update, project, images_, threads);
+    }
+
+    double sum(int view) const { return images_.sum(checked(view)); }
+
+    double correct(int view, float unit, const PixelArray &recorded, float recorded_unit, float exponent,
+                   float ratio_counts, const FilledPixels &ratio, int threads) const {
+        const View &seen = views_[static_cast<size_t>(checked(view))];
+        for (size_t axis : {0, 1}) {
+            const auto size = static_cast<size_t>(axis ? seen.columns : seen.rows);
+            require(recorded.shape(axis) == size && ratio.shape(axis) == size, "projections and images differ in shape");
+        }
+        require(threads >= 1, "threads must be positive");
+        const Correction job{recorded.data(), recorded_unit, unit, exponent, ratio_counts, seen.rows,
+                             seen.columns, nullptr, 0, ratio.data()};
+        const Kernels &kernels = selected_kernels();
+        nb::gil_scoped_release release;
+        return images_.correct(kernels, view, job, threads);
+    }
+
+private:
+    int checked(int view) const {
+        require(view >= 0 && view < static_cast<int>(views_.size()), "no such view");
+        return view;
+    }
+    static std::vector<View> views_of(const std::vector<nb::object> &bound, const Shape &shape) {
+        std::vector<const BoundView *> views;
+        for (const nb::object &view : bound) views.push_back(nb::cast<const BoundView *>(view));
+        return views_on(views, shape, 1);
+    }
+
+    Shape shape_;
+    std::vector<nb::object> bound_;
+    std::vector<View> views_;
+    BandImages images_;
+};
 
 void fill_volume(Blocks &blocks, const AnyVolume &volume, int threads) {
     const Shape shape = shape_of(volume), &stored = blocks.shape();
@@ -304,12 +343,22 @@ NB_MODULE(_native, module) {
     module.def("line_of_sight", &line_of_sight, "views"_a, "method"_a, "volume"_a, "threads"_a);
     module.def("sum_of_sight", &sum_of_sight, "exposures"_a, "method"_a, "volume"_a, "threads"_a);
     nb::class_<Blocks>(module, "Blocks")
-        .def_static("of_views", &blocks_of_views, "views"_a, "shape"_a, "floor"_a, "threads"_a)
-        .def_static("of_volume", &blocks_of_volume, "volume"_a, "threads"_a)
-        .def("smart_pass", &pass, "views"_a, "update"_a, "projections"_a, "threads"_a)
-        .def("scale", &Blocks::scale, "factor"_a, "threads"_a, nb::call_guard<nb::gil_scoped_release>())
+        .def_static("of_views", &blocks_of_views, "views"_a, "shape"_a, "floor"_a, "most"_a, "threads"_a)
+        .def_static("of_volume", &blocks_of_volume, "volume"_a, "most"_a, "threads"_a)
+        .def("scale", &Blocks::scale, "factor"_a)
+        .def_prop_ro("unit", &Blocks::unit)
         .def("write", &fill_volume, "volume"_a, "threads"_a)
+        .def_prop_ro("shape", [](const Blocks &blocks) {
+            return std::make_tuple(blocks.shape().nz, blocks.shape().ny, blocks.shape().nx);
+        })
+        .def_prop_ro("nbytes", &Blocks::bytes)
         .def_prop_ro("count", &Blocks::count);
+    nb::class_<Projections>(module, "Projections")
+        .def(nb::init<const std::vector<nb::object> &, std::tuple<int, int, int>>(), "views"_a, "shape"_a)
+        .def("smart_pass", &Projections::pass, "blocks"_a, "update"_a, "project"_a, "threads"_a)
+        .def("sum", &Projections::sum, "view"_a)
+        .def("correct", &Projections::correct, "view"_a, "unit"_a, "recorded"_a, "recorded_unit"_a, "exponent"_a,
+             "ratio_counts"_a, "ratio"_a, "threads"_a);
     module.def("available_isas", &available_isas);
     module.def("selected_isa", [] { return std::string(selected_kernels().name); });
 }

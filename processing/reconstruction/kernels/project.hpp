@@ -8,100 +8,167 @@ namespace {
 
 constexpr int guard = 64;  // zeros before and after a row of voxels
 
-// Rows y0 .. y0 + rows - 1 of plane z, with `stride` floats from row to row and zeros around each.
+// Rows y0 .. y0 + rows - 1 of plane z, columns x0 .. x0 + smart_columns - 1, with zeros where there are no blocks and
+// around.
 struct PlaneRows {
-    const float *voxels;
-    int64_t stride;
-    int z, y0, rows;
-    int begin, end;  // columns outside are zero
+    static constexpr int stride = smart_columns + 2 * guard;
+    const float *voxels;  // of row y0, guard first
+    int z, y0, rows, x0;
 };
 
-// Image rows that meet the rows of a slab: each lies a fraction below row above - 1 of the slab; rows -1 and `rows` are
-// zero.
-struct BetweenRows {
+// Image rows that meet the rows of a slab. Row number t lies between rows t - 1 and t of the slab, whose shares it
+// takes; rows -1 and `rows` are zero. Where image rows are no denser than rows of voxels, one at most lies
+// between two of them: then each t has its image row, or the spare one and no shares.
+struct ImageRows {
     static constexpr int most = static_cast<int>((smart_rows + 1) * max_step) + 2;
+    bool one_each;
     int count;
-    int above[most];
-    float fraction[most];
+    int64_t offset[most];  // from the first pixel of the projection
+    int32_t below[most];
+    float upper[most], lower[most];
 };
 
-// Add what a vector of pixels sees of the slab, image row by image row. Each row of voxels is interpolated once.
-inline void add_column(const PlaneRows &plane, const FloatTaps &taps, const BetweenRows &between, float *pixels,
-                       int64_t columns, int count) {
-    const float *next = plane.voxels - guard;
-    Floats above{}, below = interpolate(next, taps);
-    int row = 0;  // of `above`
-    for (int v = 0; v < between.count; ++v, pixels += columns) {
-        for (; row < between.above[v]; ++row) {
-            next += plane.stride;
+inline ImageRows image_rows(const View &view, int z, int y0, int rows, const Projection &to) {
+    const double scale = view.scale[z], step = 1.0 / scale, shift = view.shift_v[z];
+    const int begin = larger(to.first_row, ceil_of(scale * (y0 - 1) + shift));
+    const int end = smaller(to.first_row + to.rows, floor_of(scale * (y0 + rows) + shift) + 1);
+    ImageRows image;
+    image.one_each = step >= 1.0 && rows == smart_rows;
+    image.count = 0;
+    if (image.one_each) {
+        image.count = rows + 1;
+        for (int t = 0; t < image.count; ++t) {
+            image.offset[t] = static_cast<int64_t>(to.rows) * to.stride;
+            image.upper[t] = image.lower[t] = 0.0f;
+        }
+    }
+    for (int v = begin; v < end; ++v) {
+        const double position = (v - shift) * step - y0 + 1;
+        const int below = larger(0, static_cast<int>(position));
+        if (below > rows) break;
+        const int t = image.one_each ? below : image.count++;
+        image.below[t] = below;
+        image.offset[t] = static_cast<int64_t>(v - to.first_row) * to.stride;
+        image.lower[t] = static_cast<float>(position - below);
+        image.upper[t] = 1.0f - image.lower[t];
+    }
+    return image;
+}
+
+// What a vector of pixels sees of a row of voxels.
+template <bool narrow>
+inline Floats interpolate_row(const float *row, const FloatTaps &taps) {
+#if defined(__AVX512F__)
+    const float *window = row + taps.first;
+    const auto index = reinterpret_cast<__m512i>(taps.index);
+    const __m512 low = _mm512_loadu_ps(window), high = _mm512_loadu_ps(window + (narrow ? 1 : lanes));
+    __m512 left, right;
+    if (narrow) {
+        left = _mm512_permutexvar_ps(index, low);
+        right = _mm512_permutexvar_ps(index, high);
+    } else {
+        left = _mm512_permutex2var_ps(low, index, high);
+        right = _mm512_permutex2var_ps(low, _mm512_add_epi32(index, _mm512_set1_epi32(1)), high);
+    }
+    return reinterpret_cast<Floats>(left) + taps.fraction * reinterpret_cast<Floats>(_mm512_sub_ps(right, left));
+#else
+    return interpolate(row, taps);
+#endif
+}
+
+// Add what some vectors of pixels, side by side, see of the slab, image row by image row. Each row of voxels is
+// interpolated once.
+template <bool narrow, int vectors>
+inline void add_columns(const float *voxels, const FloatTaps *taps, const ImageRows &image, float *pixels) {
+    Floats above[vectors] = {};
+#pragma GCC unroll 8
+    for (int t = 0; t < smart_rows; ++t, voxels += PlaneRows::stride) {
+        float *to = pixels + image.offset[t];
+        const Floats upper = Floats{} + image.upper[t], lower = Floats{} + image.lower[t];
+#pragma GCC unroll 2
+        for (int n = 0; n < vectors; ++n) {
+            const Floats below = interpolate_row<narrow>(voxels, taps[n]);
+            store(to + n * lanes, load<Floats>(to + n * lanes) + upper * above[n] + lower * below);
+            above[n] = below;
+        }
+    }
+    float *to = pixels + image.offset[smart_rows];
+    for (int n = 0; n < vectors; ++n)
+        store(to + n * lanes, load<Floats>(to + n * lanes) + image.upper[smart_rows] * above[n]);
+}
+
+inline void add_to(float *pixels, float upper, Floats above, float lower, Floats below) {
+    store(pixels, load<Floats>(pixels) + upper * above + lower * below);
+}
+
+inline void add_column(const float *voxels, const FloatTaps &taps, const ImageRows &image, float *pixels) {
+    Floats above{}, below = interpolate(voxels, taps);
+    for (int n = 0, row = 0; n < image.count; ++n) {
+        for (; row < image.below[n]; ++row) {
+            voxels += PlaneRows::stride;
             above = below;
-            below = row + 1 < plane.rows ? interpolate(next, taps) : Floats{};
+            below = row + 1 < smart_rows ? interpolate(voxels, taps) : Floats{};
         }
-        const Floats seen = above + between.fraction[v] * (below - above);
-        if (count == lanes) {
-            store(pixels, load<Floats>(pixels) + seen);
-            continue;
-        }
-        for (int k = 0; k < count; ++k) pixels[k] += seen[k];
+        add_to(pixels + image.offset[n], image.upper[n], above, image.lower[n], below);
     }
 }
 
-// Pixel-driven: every pixel adds the bilinear interpolation of the plane where its line of sight meets it.
-// Rows of other slabs count as zero: each slab adds its own share.
-inline void project_rectified(const View &view, const PlaneRows &plane, const Projection &to) {
-    const double scale = view.scale[plane.z], step = 1.0 / scale;
-    const double shift_u = view.shift_u[plane.z], shift_v = view.shift_v[plane.z];
-    const int u_begin = larger(0, ceil_of(scale * (plane.begin - 1) + shift_u));
-    const int u_end = smaller(to.columns, floor_of(scale * plane.end + shift_u) + 1);
-    const int v_begin = larger(to.first_row, ceil_of(scale * (plane.y0 - 1) + shift_v));
-    const int v_end = smaller(to.first_row + to.rows, floor_of(scale * (plane.y0 + plane.rows) + shift_v) + 1);
-    BetweenRows between;
-    between.count = 0;
-    for (int v = v_begin; v < v_end; ++v, ++between.count) {
-        const double position = (v - shift_v) * step - plane.y0 + 1;
-        const int above = larger(0, smaller(plane.rows, static_cast<int>(position)));
-        between.above[between.count] = above;
-        between.fraction[between.count] = static_cast<float>(position - above);
+template <bool narrow>
+inline int add_all_columns(const PlaneRows &plane, const ImageRows &image, double step, double origin, int u, int u_end,
+                           const Projection &to) {
+    for (; u + lanes < u_end; u += 2 * lanes) {
+        const FloatTaps taps[2] = {float_taps(u * step + origin, step), float_taps((u + lanes) * step + origin, step)};
+        add_columns<narrow, 2>(plane.voxels, taps, image, to.pixels + u);
     }
-    float *pixels = to.pixels + static_cast<int64_t>(v_begin - to.first_row) * to.columns;
-    for (int u = u_begin; u < u_end; u += lanes) {
-        const FloatTaps taps = float_taps((u - shift_u) * step + guard, step);
-        add_column(plane, taps, between, pixels + u, to.columns, smaller(lanes, u_end - u));
-    }
+    if (u >= u_end) return u;
+    const FloatTaps taps = float_taps(u * step + origin, step);
+    add_columns<narrow, 1>(plane.voxels, &taps, image, to.pixels + u);
+    return u + lanes;
+}
+
+// Pixel-driven: every pixel adds the bilinear interpolation of the plane where its line of sight meets it, for
+// columns begin .. end - 1. Rows of other slabs count as zero: each slab adds its own share. Returns the first pixel
+// that is left for the next run of columns in the same rows, of which `first` is the pixel to start at.
+inline int project_rectified(const View &view, const PlaneRows &plane, const ImageRows &image, int begin, int end, int first,
+                             const Projection &to) {
+    const double scale = view.scale[plane.z], step = 1.0 / scale, shift = view.shift_u[plane.z];
+    const int u_begin = larger(first, larger(0, ceil_of(scale * (begin - 1) + shift)) / lanes * lanes);
+    const int u_end = smaller(view.columns, floor_of(scale * end + shift) + 1);
+    const double origin = guard - plane.x0 - shift * step;
+    if (image.one_each)
+        return step <= 1.0 ? add_all_columns<true>(plane, image, step, origin, u_begin, u_end, to)
+                           : add_all_columns<false>(plane, image, step, origin, u_begin, u_end, to);
+    int u = u_begin;
+    for (; u < u_end; u += lanes) add_column(plane.voxels, float_taps(u * step + origin, step), image, to.pixels + u);
+    return u;
 }
 
 // Voxel-driven, the adjoint of sampling: every voxel spreads its intensity, times the pixel area it covers, over
 // the four pixels it is sampled from.
-inline void project_nodes(const View &view, const PlaneRows &plane, const PlaneTaps &taps, const Projection &to) {
+inline void project_nodes(const View &view, const PlaneRows &plane, const PlaneTaps &taps, int begin, int end,
+                          const Projection &to) {
     const Clamp last(view);
     alignas(64) float u[block_columns], v[block_columns], area[block_columns];
     for (int row = 0; row < plane.rows; ++row) {
-        const float *voxels = plane.voxels + row * plane.stride;
-        for (int x0 = plane.begin / block_columns * block_columns; x0 < plane.end; x0 += block_columns) {
+        for (int x0 = begin; x0 < end; x0 += block_columns) {
+            const float *voxels = plane.voxels + row * PlaneRows::stride + guard + x0 - plane.x0;
             spread_line(taps.line(row, 0), view.spacing, x0, u);
             spread_line(taps.line(row, 1), view.spacing, x0, v);
             spread_line(taps.line(row, 2), view.spacing, x0, area);
-            for (int k = 0; k < smaller(block_columns, plane.end - x0); ++k) {
-                if (voxels[x0 + k] == 0.0f) continue;
+            for (int k = 0; k < smaller(block_columns, end - x0); ++k) {
+                if (voxels[k] == 0.0f) continue;
                 const float at_u = Clamp::between(u[k], last.u), at_v = Clamp::between(v[k], last.v);
                 const int iu = static_cast<int>(at_u), iv = static_cast<int>(at_v);
                 const float fu = at_u - static_cast<float>(iu), fv = at_v - static_cast<float>(iv);
-                const float value = voxels[x0 + k] * area[k], below = value * fv, above = value - below;
-                float *pixels = to.pixels + static_cast<int64_t>(iv - to.first_row) * to.columns + iu;
+                const float value = voxels[k] * area[k], below = value * fv, above = value - below;
+                float *pixels = to.pixels + static_cast<int64_t>(iv - to.first_row) * to.stride + iu;
                 pixels[0] += above - above * fu;
                 pixels[1] += above * fu;
-                pixels[to.columns] += below - below * fu;
-                pixels[to.columns + 1] += below * fu;
+                pixels[to.stride] += below - below * fu;
+                pixels[to.stride + 1] += below * fu;
             }
         }
     }
-}
-
-inline void project(const View &view, const PlaneRows &plane, const PlaneTaps &taps, const Projection &to) {
-    if (view.nodes)
-        project_nodes(view, plane, taps, to);
-    else
-        project_rectified(view, plane, to);
 }
 
 }  // namespace

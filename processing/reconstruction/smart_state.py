@@ -1,0 +1,104 @@
+"""SmartState: what an iteration of SMART changes. ``smart`` says which views correct, and when."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from processing.reconstruction.fixed_point import FixedPoint
+from processing.reconstruction.kernels import _native
+from processing.reconstruction.line_of_sight import check_volume
+from processing.reconstruction.plan import Plan
+
+Image = NDArray[np.float32]
+
+NEGLIGIBLE = 1e-8
+"""Blocks in which MLOS is nowhere brighter than this share of what it could be stay empty."""
+RATIO_COUNTS = 4096
+"""Ratios are kept in 16 bit: up to 8, in steps of 1 / 4096. So much brighter a view makes a voxel at most at once."""
+
+
+class SmartState:
+    """Blocks of the volume that are not empty, its projections, and the ratio images that correct it.
+
+    Parameters
+    ----------
+    plan : Plan
+        Geometry of views and grid.
+    images : sequence of (rows, columns) float32 arrays
+        One per view.
+    start : (z, y, x) float32 array, optional
+        First guess, MLOS by default; it is scaled to the sum of the images.
+    exponent : float
+        A voxel is multiplied by (I / P)^exponent.
+    threads : int
+        The result does not depend on it.
+    """
+
+    def __init__(self, plan: Plan, images: Sequence[Image], start: Image | None, exponent: float, threads: int) -> None:
+        self._exponent, self._threads = exponent, threads
+        self._images = plan.resample(images, threads)
+        self.blocks = _first_guess(plan, self._images, start, threads)
+        self._ratios = [np.zeros(image.pixels.shape, np.int16) for image in self._images]
+        views = plan.bind([FixedPoint(ratio, 1 / RATIO_COUNTS) for ratio in self._ratios], cull=False)
+        self._projections = _native.Projections(views, plan.grid.shape)
+        self._missed = [0.0] * len(views)
+        self._recorded = sum(_energy(image) for image in self._images)
+        self._project(update=[], project=self.views)
+        self._match_scale()
+        self._correct(self.views)
+
+    @property
+    def views(self) -> range:
+        """Numbers of the views."""
+        return range(len(self._images))
+
+    @property
+    def residual(self) -> float:
+        """Norm of the difference between the latest projections and the images, relative to the images."""
+        return float(np.sqrt(sum(self._missed) / self._recorded)) if self._recorded else 0.0
+
+    def advance(self, update: Sequence[int], project: Sequence[int]) -> None:
+        """Multiply the volume by the ratios of some views, then set the ratios of some from its new projections."""
+        self._project(update, project)
+        self._correct(project)
+
+    def _project(self, update: Sequence[int], project: Sequence[int]) -> None:
+        updated, projected = ([view in chosen for view in self.views] for chosen in (update, project))
+        self._projections.smart_pass(self.blocks, updated, projected, self._threads)
+
+    def _match_scale(self) -> None:
+        projected = self.blocks.unit * sum(self._projections.sum(view) for view in self.views)
+        recorded = sum(image.unit * float(image.pixels.sum(dtype=np.int64)) for image in self._images)
+        if projected > 0 and recorded > 0:
+            self.blocks.scale(recorded / projected)
+
+    def _correct(self, views: Sequence[int]) -> None:
+        for view in views:
+            image, ratio = self._images[view], self._ratios[view]
+            self._missed[view] = self._projections.correct(
+                view,
+                self.blocks.unit,
+                image.pixels,
+                image.unit,
+                exponent=self._exponent,
+                ratio_counts=RATIO_COUNTS,
+                ratio=ratio,
+                threads=self._threads,
+            )
+
+
+def _energy(image: FixedPoint) -> float:
+    rows = (float(np.vdot(row, row)) for row in image.pixels.astype(np.float64))
+    return image.unit**2 * sum(rows)
+
+
+def _first_guess(plan: Plan, resampled: Sequence[FixedPoint], start: Image | None, threads: int) -> _native.Blocks:
+    if start is None:
+        most = float(np.prod([image.brightest for image in resampled]))
+        return _native.Blocks.of_views(plan.bind(resampled), plan.grid.shape, NEGLIGIBLE * most, most, threads)
+    check_volume(start, plan, (np.float32,))
+    least, most = float(start.min()), float(start.max())
+    if not (least >= 0 and np.isfinite(most)):
+        raise ValueError(f"start must not be negative and finite, its values are {least} to {most}")
+    return _native.Blocks.of_volume(start, most, threads)
