@@ -39,7 +39,8 @@ def test_iterations_go_on_as_if_never_stopped(method: str, reconstruct: type) ->
     recipes = [Recipe.named(f"{method}-{iterations}") for iterations in (2, 5)]
     for recipe in reconstruct_each(plan, shot.images, recipes, volume):
         straight = reconstruct(plan, shot.images, iterations=recipe.iterations).volume
-        np.testing.assert_allclose(volume, straight, atol=1e-3 * float(straight.max()))
+        # each correction rounds to float16, and MART corrects twelve times after the stop
+        np.testing.assert_allclose(volume, straight, rtol=4 * 2**-11, atol=1e-3 * float(straight.max()))
 
 
 def test_other_recipes_start_anew() -> None:
