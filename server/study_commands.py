@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 
 from matplotlib.figure import Figure
 
+from processing.studies.accuracy_report import accuracy_figure, accuracy_line, accuracy_statements
 from processing.studies.average import (
     AverageStudy,
     average_figure,
@@ -18,6 +19,7 @@ from processing.studies.average import (
     average_study,
     profile_rows,
 )
+from processing.studies.calibration_accuracy import CalibrationStudy, calibration_study
 from processing.studies.density import (
     ALL_SIGMAS_VOXEL,
     DensityRow,
@@ -129,6 +131,16 @@ def study_residuals(options: Namespace) -> dict[str, Any]:
 
 def _residual_line(row: ResidualRow) -> str:
     return f"{row.view}, {row.points}, z = {row.z_mm:g} mm: {row.mean_error_px:.2g} px at {row.n_points} points"
+
+
+@timed
+def study_calibration(options: Namespace) -> dict[str, Any]:
+    """``tomoshadow study calibration``."""
+    study = CalibrationStudy(shots=options.shots, seed=options.seed)
+    if options.density:
+        study = replace(study, densities_per_mm3=tuple(options.density))
+    rows = _collected(calibration_study(study), accuracy_line)
+    return _report(options.out, "calibration", rows, accuracy_figure(rows), accuracy_statements(rows))
 
 
 @timed

@@ -18,6 +18,7 @@ def add_studies(add_verb: AddVerb) -> None:
     _add_ghosts(add_verb)
     _add_average(add_verb)
     _add_residuals(add_verb)
+    _add_calibration(add_verb)
     _add_sensitivity(add_verb)
 
 
@@ -51,6 +52,20 @@ def _add_residuals(add_verb: AddVerb) -> None:
     _add_out(parser, "residuals")
     parser.add_argument("--binning", type=int, choices=(1, 2), default=1, help="of pixels; 1 is the paper's")
     parser.add_argument("--seed", type=int, default=0, help="of light, dust and noise")
+
+
+def _add_calibration(add_verb: AddVerb) -> None:
+    summary = "true errors of cameras, corners and self-calibration, beside their limits"
+    parser = add_verb("calibration", study_commands.study_calibration, summary)
+    _add_out(parser, "calibration")
+    parser.add_argument(
+        "--density",
+        type=positive,
+        action="append",
+        help="droplets/mm3 for self-calibration, repeatable; default 3.5, 7",
+    )
+    parser.add_argument("--shots", type=count, default=4, help="shots of droplets for self-calibration")
+    parser.add_argument("--seed", type=int, default=0, help="of all noise")
 
 
 def _add_sensitivity(add_verb: AddVerb) -> None:

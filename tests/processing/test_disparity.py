@@ -11,7 +11,8 @@ from processing.calibration.droplet_images import find_droplets
 from processing.calibration.droplet_matching import Box, Matches, match_droplets
 from processing.calibration.errors import CalibrationError
 from processing.calibration.sight_lines import back_project, triangulate
-from tests.processing.drifting_views import HALF_MM, calibration_of, droplet_shots, inside_mm, picture, views
+from processing.studies.seen_droplets import droplet_image
+from tests.processing.drifting_views import HALF_MM, calibration_of, droplet_shots, inside_mm, views
 
 BOX = Box((-2.5, -2.0, -1.5), (2.5, 2.0, 1.5))
 
@@ -23,7 +24,7 @@ def test_box_is_the_calibrated_volume() -> None:
 def test_droplets_are_found_where_they_are() -> None:
     camera, points_mm = views()[0], inside_mm(40)
     true_px = camera.project(points_mm)
-    found_px = find_droplets(picture(camera, points_mm, np.random.default_rng(0)))
+    found_px = find_droplets(droplet_image(camera, points_mm, np.random.default_rng(0)))
     distance_px = np.linalg.norm(found_px[:, None] - true_px, axis=2).min(axis=1)
     assert len(found_px) >= 36
     assert np.median(distance_px) < 0.1

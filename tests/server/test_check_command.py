@@ -12,9 +12,10 @@ from processing.calibration.calibration import Verdict
 from processing.calibration.calibration_file import load_calibration, save_calibration
 from processing.calibration.disparity import ViewDisparity
 from processing.run_check import ShotCheck
+from processing.studies.seen_droplets import droplet_image
 from server.check_command import check_line
 from server.cli import main
-from tests.processing.drifting_views import DENSITY_PER_MM3, HALF_MM, SIZE_PX, calibration_of, inside_mm, picture, views
+from tests.processing.drifting_views import DENSITY_PER_MM3, HALF_MM, SIZE_PX, calibration_of, inside_mm, views
 
 SEEN = ExposureRecord(valid=True, frame_id=1, device_timestamp_ns=1)
 DRIFT_PX = 2
@@ -37,7 +38,7 @@ def write_droplet_run(run_dir: Path, density_per_mm3: float = DENSITY_PER_MM3, v
             exposures = []
             for _ in "ab":
                 points_mm = rng.uniform(-HALF_MM, HALF_MM, (int(density_per_mm3 * np.prod(2 * HALF_MM)), 3))
-                images = {name: picture(camera, points_mm, rng) for name, camera in cameras.items()}
+                images = {name: droplet_image(camera, points_mm, rng) for name, camera in cameras.items()}
                 images["view2"] = np.roll(images["view2"], DRIFT_PX, axis=1)
                 exposures.append({name: np.round(200 * image).astype(np.uint8) for name, image in images.items()})
             shot_views = {name: DoubleFrame(exposures[0][name], exposures[1][name], SEEN, SEEN) for name in cameras}

@@ -27,7 +27,7 @@ def test_a_study_writes_csv_and_figure_and_says_what_the_paper_says(
     assert "paper: SMART-20, then MLOS" in progress
 
 
-@pytest.mark.parametrize("study", ["density", "ghosts", "average", "residuals", "sensitivity"])
+@pytest.mark.parametrize("study", ["density", "ghosts", "average", "residuals", "calibration", "sensitivity"])
 def test_every_study_explains_itself(study: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as stopped:
         main(["study", study, "--help"])
