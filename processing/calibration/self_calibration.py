@@ -28,9 +28,12 @@ from processing.calibration.mapping_correction import corrected, correction_size
 from processing.calibration.sight_lines import linearise, unseen
 from processing.geometry import FloatArray, ViewMapping
 
-DIVISIONS = (3, 3, 3)
+DIVISIONS = ((3, 3, 3), (2, 2, 2))
+"""Sub-volumes along x, y and z; larger ones where droplets are too dense for a peak in small ones."""
 MIN_SUB_VOLUMES = 8
 """Fewer do not show how a correction varies over the volume."""
+CROWDED_PX = 12.0
+"""Where the droplets that are found are closer to each other than this, on average, many more hide each other."""
 FINE_SEARCH_PX = 1.5
 """Tolerance once the views were corrected for the first time."""
 MAX_ROUNDS = 5
@@ -143,15 +146,31 @@ def _sub_volumes(
     mappings: Sequence[ViewMapping], exposures: Sequence[Sequence[FloatArray]], box: Box, tolerance_px: float
 ) -> list[LocalDisparity]:
     matches = match_exposures(mappings, exposures, box, tolerance_px)
-    seen = local_disparities(mappings, matches, box, DIVISIONS)
-    if len(seen) < MIN_SUB_VOLUMES:
-        per_view = np.mean([[len(points) for points in droplets_px] for droplets_px in exposures], axis=0)
-        raise CalibrationError(
-            f"droplets agree in {len(seen)} of {np.prod(DIVISIONS)} sub-volumes, {MIN_SUB_VOLUMES} are needed: "
-            f"{len(exposures)} exposures with {', '.join(f'{count:.0f}' for count in per_view)} droplets by view give "
-            f"{len(matches)} combinations within {tolerance_px:g} px; take more shots, of fewer or smaller droplets"
+    seen: list[LocalDisparity] = []
+    for divisions in DIVISIONS:
+        seen = max(seen, local_disparities(mappings, matches, box, divisions), key=len)
+        if len(seen) >= MIN_SUB_VOLUMES:
+            return seen
+    per_view = np.mean([[len(points) for points in droplets_px] for droplets_px in exposures], axis=0)
+    raise CalibrationError(
+        f"droplets agree in {len(seen)} of {np.prod(DIVISIONS[0])} sub-volumes, {MIN_SUB_VOLUMES} are needed: "
+        f"{len(exposures)} exposures with {', '.join(f'{count:.0f}' for count in per_view)} droplets by view give "
+        f"{len(matches)} combinations within {tolerance_px:g} px; {_advice(mappings, exposures, box)}"
+    )
+
+
+def _advice(mappings: Sequence[ViewMapping], exposures: Sequence[Sequence[FloatArray]], box: Box) -> str:
+    """What would help: the distance of neighbouring droplets in the fullest view tells."""
+    corners_mm = np.array(np.meshgrid(*zip(box.lower_mm, box.upper_mm, strict=True))).reshape(3, -1).T
+    sizes_px = [np.ptp(mapping.project(corners_mm), axis=0) for mapping in mappings]
+    counts = np.mean([[len(points) for points in droplets_px] for droplets_px in exposures], axis=0)
+    apart_px = min(float(np.sqrt(size.prod() / max(count, 1))) for size, count in zip(sizes_px, counts, strict=True))
+    if apart_px < CROWDED_PX:
+        return (
+            f"droplets are {apart_px:.1f} px apart on average and hide each other; below {CROWDED_PX:g} px few are "
+            "seen alone: take many more shots, or shots of a thinner spray (lower pressure, start of the injection)"
         )
-    return seen
+    return "take more shots; if the spray is thin enough, a view has moved further than 3 px: calibrate again"
 
 
 def _explain(
