@@ -57,7 +57,7 @@ class SpeedStudy:
     repeats: int = 5
     baseline_planes: int = 12
     iterations: int = 20
-    sparse_droplets: int = 6_000
+    sparse_droplets: int = 7_700
     mean_exposures: int = 266
     threads: int = 2
 
