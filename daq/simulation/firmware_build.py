@@ -15,10 +15,15 @@ _BUILD_LIMIT_S = 60.0
 
 
 class ImageKind(StrEnum):
-    """What sets the currents on the board that an image is for; the value is the name of the image's files."""
+    """For which board an image is; the value is the name of its files.
+
+    With a converter for the currents and a serial line to the host, or with PWM instead of the converter, or with USB
+    instead of the line.
+    """
 
     CONVERTER = "tomoshadow-rp2040"
     PWM = "tomoshadow-rp2040-pwm"
+    USB = "tomoshadow-rp2040-usb"
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,7 @@ from daq.simulation.rp2040_chip import (
     pwm_set_points_ma,
     start_boot_rom,
 )
+from daq.simulation.usb_host import UsbHost
 
 CYCLE_NS = 8
 CYCLES_PER_MS = 125_000
@@ -78,6 +79,8 @@ class EmulatedPico:
         Set-points by channel when the trigger line rose last.
     converter : Mcp4728
         On the I2C bus of the board; an image with PWM leaves it alone.
+    usb : UsbHost
+        At its USB socket; an image with a serial line leaves it alone.
     """
 
     def __init__(self, image: bytes) -> None:
@@ -104,6 +107,7 @@ class EmulatedPico:
         self._chip = powered_chip(self._image, self._noise, self.sent.append, self._on_edge)
         self._chip.watchdog.on_watchdog_trigger = self._on_watchdog
         self.converter.power_up(self._chip, PIN_I2C_SCL)
+        self.usb = UsbHost(self._chip)
         self.set_interlock(self._interlock)
         self.set_trigger_pin(False)
 

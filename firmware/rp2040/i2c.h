@@ -7,8 +7,8 @@
 
 enum { I2C_FIFO = 16 };
 
-/* From the main loop, at start and after an error. A device that was cut off in the middle of a byte holds the data line
- * low until it has had its clocks: it gets them here. */
+/* From the main loop, at start and after an error. A device that was cut off in the middle of a byte holds the data
+ * line low until it has had its clocks: it gets them here. */
 void i2c_restart(void);
 
 /* Is nothing queued and nothing on the wires? False before i2c_restart. From any context. */

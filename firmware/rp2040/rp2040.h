@@ -19,9 +19,11 @@ enum reset_bits {
     RESET_PIO0 = 1 << 10,
     RESET_PIO1 = 1 << 11,
     RESET_PLL_SYS = 1 << 12,
+    RESET_PLL_USB = 1 << 13,
     RESET_PWM = 1 << 14,
     RESET_TIMER = 1 << 21,
     RESET_UART0 = 1 << 22,
+    RESET_USB = 1 << 24,
 };
 
 /* 2.13.5: power-on state machine, which the watchdog restarts */
@@ -33,14 +35,17 @@ enum reset_bits {
 #define CLK_SYS_CTRL 0x4000803cu
 #define CLK_SYS_SELECTED 0x40008044u
 #define CLK_PERI_CTRL 0x40008048u
+#define CLK_USB_CTRL 0x40008054u
 #define CLK_SYS_RESUS_CTRL 0x40008078u
 #define XOSC_CTRL 0x40024000u
 #define XOSC_STATUS 0x40024004u
 #define XOSC_STARTUP 0x4002400cu
-#define PLL_SYS_CS 0x40028000u
-#define PLL_SYS_PWR 0x40028004u
-#define PLL_SYS_FBDIV 0x40028008u
-#define PLL_SYS_PRIM 0x4002800cu
+#define PLL_SYS 0x40028000u
+#define PLL_USB 0x4002c000u
+#define PLL_CS(pll) ((pll) + 0x0u)
+#define PLL_PWR(pll) ((pll) + 0x4u)
+#define PLL_FBDIV(pll) ((pll) + 0x8u)
+#define PLL_PRIM(pll) ((pll) + 0xcu)
 #define ROSC_RANDOMBIT 0x4006001cu
 
 /* 2.19.6: pin n has a control register and a pad */
@@ -87,6 +92,49 @@ enum pad {
 #define PIO_ADDR(pio, machine) (PIO_CLKDIV(pio, machine) + 0x0cu)
 #define PIO_INSTR(pio, machine) (PIO_CLKDIV(pio, machine) + 0x10u)
 #define PIO_PINCTRL(pio, machine) (PIO_CLKDIV(pio, machine) + 0x14u)
+
+/* 4.1.3, 4.1.4: memory with setup packet, controls and buffers; direction 0 is out, from the host */
+#define USB_SETUP_PACKET 0x50100000u
+#define USB_ENDPOINT_CONTROL(endpoint, direction) \
+    (0x50100000u + 8u * (uint32_t)(endpoint) + 4u * (1u - (uint32_t)(direction)))
+#define USB_BUFFER_CONTROL(endpoint, direction) \
+    (0x50100080u + 8u * (uint32_t)(endpoint) + 4u * (1u - (uint32_t)(direction)))
+#define USB_BUFFERS 0x50100100u
+#define USB_ADDR_ENDP 0x50110000u
+#define USB_MAIN_CTRL 0x50110040u
+#define USB_SIE_CTRL 0x5011004cu
+#define USB_SIE_STATUS 0x50110050u
+#define USB_BUFF_STATUS 0x50110058u
+#define USB_EP_STALL_ARM 0x50110068u
+#define USB_MUXING 0x50110074u
+#define USB_PWR 0x50110078u
+#define USB_INTE 0x50110090u
+#define USB_INTF 0x50110094u
+#define USB_INTS 0x50110098u
+#define USB_ENDPOINT_ENABLE (1u << 31)
+enum usb {
+    USB_ENDPOINT_INTERRUPT = 1 << 29, /* for every buffer */
+    USB_ENDPOINT_BULK = 2 << 26,
+    USB_ENDPOINT_OF_INTERRUPTS = 3 << 26,
+    USB_BUFFER_FULL = 1 << 15,
+    USB_BUFFER_DATA1 = 1 << 13,
+    USB_BUFFER_STALL = 1 << 11,
+    USB_BUFFER_AVAILABLE = 1 << 10,
+    USB_BUFFER_LENGTH = 0x3ff,
+    USB_CONTROLLER_ENABLE = 1 << 0,
+    USB_SIE_INTERRUPT_PER_BUFFER = 1 << 29, /* of endpoint 0 */
+    USB_SIE_PULL_UP = 1 << 16,
+    USB_SIE_BUS_RESET = 1 << 19,
+    USB_SIE_SETUP = 1 << 17,
+    USB_STALL_CONTROL = 3,
+    USB_TO_PHY = 1 << 0,
+    USB_SOFTCON = 1 << 3,
+    USB_VBUS_DETECT = 1 << 3,
+    USB_VBUS_OVERRIDE = 1 << 2,
+    USB_INT_SETUP = 1 << 16,
+    USB_INT_BUS_RESET = 1 << 12,
+    USB_INT_BUFFER = 1 << 4,
+};
 
 /* 4.2.8 */
 #define UART0_DR 0x40034000u
@@ -153,6 +201,7 @@ enum i2c {
 #define SCB_VTOR 0xe000ed08u
 enum interrupt {
     INTERRUPT_TIMER0 = 0,
+    INTERRUPT_USB = 5,
     INTERRUPT_IO_BANK0 = 13,
     INTERRUPT_UART0 = 20,
 };

@@ -1,4 +1,5 @@
-/* The line to the host: UART0, 115200 baud, 8N1. The abort byte acts in the receive interrupt. */
+/* The line to the host. Two implementations of start and send: serial_uart.c, and serial_usb.c, a virtual serial port.
+ * The abort byte acts in the receive interrupt of either. */
 #ifndef SERIAL_H
 #define SERIAL_H
 
@@ -9,5 +10,8 @@ void serial_start(void);
 bool serial_waiting(void); /* is there a byte? */
 bool serial_take(char *byte);
 void serial_send(const char *bytes, size_t length);
+
+/* From the receive interrupt. A byte that finds no room is lost; the CRC of its line tells. */
+void serial_received(char byte);
 
 #endif

@@ -1,5 +1,5 @@
-/* MCP4728: four channels of 12 bits, 0.5 mV per step from its own reference, 20 A/V at the drivers. Zero is its power-down,
- * which pulls the output to ground by 1 kOhm: an amplifier that is set to 0 V may have 20 mV. Data sheet DS22187E. */
+/* MCP4728: four channels of 12 bits, 0.5 mV per step from its own reference, 20 A/V at the drivers. Zero is its
+ * power-down, which pulls the output to ground by 1 kOhm: an amplifier set to 0 V may give 20 mV. DS22187E. */
 #include "i2c.h"
 #include "rp2040.h"
 #include "set_points.h"

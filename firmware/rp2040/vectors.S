@@ -10,7 +10,11 @@
     .word fault
     .endr
     .word isr_timer0                                  /* interrupt 0 */
-    .rept 12
+    .rept 4
+    .word fault
+    .endr
+    .word isr_usb                                     /* 5 */
+    .rept 7
     .word fault
     .endr
     .word isr_io_bank0                                /* 13 */
@@ -21,3 +25,16 @@
     .rept 11
     .word fault
     .endr
+
+/* An image has one of these two; the other one would be a fault. */
+    .syntax unified
+    .cpu cortex-m0plus
+    .thumb
+    .section .text.absent, "ax"
+    .weak isr_usb
+    .weak isr_uart0
+    .thumb_func
+isr_usb:
+    .thumb_func
+isr_uart0:
+    bl fault

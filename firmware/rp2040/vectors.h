@@ -7,5 +7,6 @@ _Noreturn void fault(void);
 void isr_timer0(void);
 void isr_io_bank0(void);
 void isr_uart0(void);
+void isr_usb(void);
 
 #endif

@@ -1,0 +1,41 @@
+/* UART0, 115200 baud, 8N1. */
+#include <stdint.h>
+
+#include "clocks.h"
+#include "pins.h"
+#include "rp2040.h"
+#include "serial.h"
+#include "vectors.h"
+
+enum {
+    BAUD = 115200,
+    DIVIDER_64 = (CLOCK_MHZ * 1000000 * 4 + BAUD / 2) / BAUD, /* clock / (16 x baud), in 1/64 */
+};
+
+void serial_start(void)
+{
+    blocks_restart(RESET_UART0);
+    REG(UART0_IBRD) = DIVIDER_64 / 64;
+    REG(UART0_FBRD) = DIVIDER_64 % 64;
+    REG(UART0_LCR_H) = UART_LCR_8_BITS; /* no FIFO: the abort byte interrupts when it arrives, not 32 bits later */
+    REG(UART0_CR) = UART_CR_ENABLE;
+    REG(UART0_IMSC) = UART_INT_RX;
+    REG(PAD(PIN_UART_RX)) = PAD_INPUT | PAD_PULL_UP | PAD_SCHMITT; /* an open line is silent */
+    REG(IO_CTRL(PIN_UART_TX)) = FUNCTION_UART;
+    REG(IO_CTRL(PIN_UART_RX)) = FUNCTION_UART;
+}
+
+void isr_uart0(void)
+{
+    while (!(REG(UART0_FR) & UART_FR_RX_EMPTY))
+        serial_received((char)(REG(UART0_DR) & 0xffu));
+}
+
+void serial_send(const char *bytes, size_t length)
+{
+    for (size_t i = 0; i < length; i++) {
+        while (REG(UART0_FR) & UART_FR_TX_FULL)
+            ;
+        REG(UART0_DR) = (uint8_t)bytes[i];
+    }
+}

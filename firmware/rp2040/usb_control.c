@@ -1,0 +1,198 @@
+/* Requests on the control endpoint: USB 2.0, chapter 9, and PSTN 1.2, section 6.3. */
+#include <stddef.h>
+
+#include "usb.h"
+#include "usb_controller.h"
+#include "usb_descriptors.h"
+
+enum { LINE_CODING_SIZE = 7 };
+
+/* bmRequestType << 8 | bRequest; requests to interfaces do not need their number, both interfaces are one port. */
+enum request {
+    GET_DESCRIPTOR = 0x8006,
+    GET_STATUS_DEVICE = 0x8000,
+    GET_STATUS_INTERFACE = 0x8100,
+    GET_STATUS_ENDPOINT = 0x8200,
+    GET_CONFIGURATION = 0x8008,
+    GET_LINE_CODING = 0xa121,
+    SET_ADDRESS = 0x0005,
+    SET_CONFIGURATION = 0x0009,
+    CLEAR_HALT = 0x0201,
+    SET_LINE_CODING = 0x2120,
+    SET_CONTROL_LINES = 0x2122,
+    TERMINAL_READY = 1, /* in the value of SET_CONTROL_LINES */
+};
+
+/* Of a control transfer. */
+enum stage {
+    STAGE_IDLE,
+    STAGE_DATA_IN,
+    STAGE_DATA_OUT,
+    STAGE_STATUS,
+};
+
+struct setup {
+    uint32_t request;
+    uint32_t value;
+    uint32_t index;
+    uint32_t length;
+};
+
+static enum stage stage;
+static struct usb_bytes left; /* to be sent in STAGE_DATA_IN */
+static uint8_t configuration;
+static uint8_t new_address;
+static uint8_t line_coding[LINE_CODING_SIZE] = {0x00, 0xc2, 0x01, 0x00, 0, 0, 8}; /* 115200, 8N1; means nothing */
+
+static void refuse(void)
+{
+    stage = STAGE_IDLE;
+    usb_stall_control();
+}
+
+static void acknowledge(void)
+{
+    stage = STAGE_STATUS;
+    usb_restart_control(USB_IN);
+    usb_transmit(USB_CONTROL, NULL, 0);
+}
+
+static void send_left(void)
+{
+    const uint32_t count = left.count < USB_PACKET ? left.count : USB_PACKET;
+    usb_transmit(USB_CONTROL, left.bytes, count);
+    left.bytes += count;
+    left.count -= count;
+}
+
+/* As much of it as the host has asked for. */
+static void answer(struct usb_bytes bytes, uint32_t length)
+{
+    stage = STAGE_DATA_IN;
+    left = bytes;
+    left.count = bytes.count < length ? bytes.count : length;
+    send_left();
+}
+
+static void take_line_coding(void)
+{
+    const volatile uint8_t *from = usb_buffer(USB_CONTROL, USB_OUT);
+    for (uint32_t i = 0; i < sizeof line_coding; i++)
+        line_coding[i] = from[i];
+    acknowledge();
+}
+
+static struct setup parsed(uint32_t first, uint32_t second)
+{
+    return (struct setup){
+        .request = (first & 0xffu) << 8 | (first >> 8 & 0xffu),
+        .value = first >> 16,
+        .index = second & 0xffffu,
+        .length = second >> 16,
+    };
+}
+
+static void answer_question(const struct setup *setup)
+{
+    static const uint8_t STATUS[2];
+    const struct usb_bytes descriptor = usb_descriptor(setup->value >> 8, setup->value & 0xffu);
+    switch (setup->request) {
+    case GET_DESCRIPTOR:
+        if (descriptor.bytes)
+            answer(descriptor, setup->length);
+        else
+            refuse();
+        break;
+    case GET_STATUS_DEVICE:
+    case GET_STATUS_INTERFACE:
+    case GET_STATUS_ENDPOINT:
+        answer((struct usb_bytes){STATUS, sizeof STATUS}, setup->length);
+        break;
+    case GET_CONFIGURATION:
+        answer((struct usb_bytes){&configuration, sizeof configuration}, setup->length);
+        break;
+    case GET_LINE_CODING:
+        answer((struct usb_bytes){line_coding, sizeof line_coding}, setup->length);
+        break;
+    default:
+        refuse();
+    }
+}
+
+static void carry_out(const struct setup *setup)
+{
+    switch (setup->request) {
+    case SET_ADDRESS:
+        new_address = (uint8_t)(setup->value & 0x7fu); /* counts from the end of this transfer on */
+        acknowledge();
+        break;
+    case SET_CONFIGURATION:
+        if (setup->value > 1) {
+            refuse();
+            break;
+        }
+        configuration = (uint8_t)setup->value;
+        usb_configure(configuration);
+        acknowledge();
+        break;
+    case CLEAR_HALT:
+        usb_configure(configuration);
+        acknowledge();
+        break;
+    case SET_CONTROL_LINES:
+        if (setup->value & TERMINAL_READY)
+            usb_opened();
+        acknowledge();
+        break;
+    case SET_LINE_CODING:
+        if (setup->length != LINE_CODING_SIZE) {
+            refuse();
+            break;
+        }
+        stage = STAGE_DATA_OUT;
+        usb_restart_control(USB_OUT);
+        usb_expect(USB_CONTROL);
+        break;
+    default:
+        refuse();
+    }
+}
+
+void usb_control_setup(uint32_t first, uint32_t second)
+{
+    const struct setup setup = parsed(first, second);
+    usb_forget_control(); /* whatever was before, the host has given it up */
+    usb_restart_control(USB_IN);
+    new_address = 0;
+    if (setup.request & 0x8000u)
+        answer_question(&setup);
+    else
+        carry_out(&setup);
+}
+
+void usb_control_sent(void)
+{
+    if (stage == STAGE_DATA_IN && left.count) {
+        send_left();
+    } else if (stage == STAGE_DATA_IN) {
+        stage = STAGE_STATUS;
+        usb_restart_control(USB_OUT);
+        usb_expect(USB_CONTROL);
+    } else if (new_address) {
+        usb_set_address(new_address);
+        new_address = 0;
+    }
+}
+
+void usb_control_received(void)
+{
+    if (stage == STAGE_DATA_OUT && usb_received_count(USB_CONTROL) == LINE_CODING_SIZE)
+        take_line_coding();
+}
+
+void usb_control_reset(void)
+{
+    stage = STAGE_IDLE;
+    configuration = 0;
+    new_address = 0;
+}

@@ -1,0 +1,19 @@
+/* What the device says of itself: USB 2.0, chapter 9; CDC 1.2; PSTN 1.2. */
+#ifndef USB_DESCRIPTORS_H
+#define USB_DESCRIPTORS_H
+
+#include <stdint.h>
+
+enum usb_endpoints {
+    USB_NOTIFICATIONS = 1, /* in; required by the class, silent */
+    USB_DATA = 2,          /* in and out */
+};
+
+struct usb_bytes {
+    const uint8_t *bytes; /* NULL: there is none */
+    uint32_t count;
+};
+
+struct usb_bytes usb_descriptor(uint32_t type, uint32_t index);
+
+#endif
