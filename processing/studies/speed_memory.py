@@ -19,7 +19,10 @@ DEADLINE_S = 300.0
 
 
 def peak_memory_gb(work: Work, study: SpeedStudy) -> float:
-    """Most memory that Python, libraries, images, plan and float16 volume of one exposure occupied together."""
+    """Most memory that Python, libraries, images, plan and result of one exposure occupied together.
+
+    The result is a whole volume of float16 for ``mlos``, the blocks of a sparse one for ``smart``.
+    """
     command = [sys.executable, "-m", __name__, work, json.dumps(asdict(study))]
     done = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True, timeout=DEADLINE_S)
     return float(done.stdout) / 1e9
@@ -27,12 +30,12 @@ def peak_memory_gb(work: Work, study: SpeedStudy) -> float:
 
 def _reconstruct(work: Work, study: SpeedStudy) -> None:
     cameras = study_cameras(study.image_size_px)
-    plan, volume = plan_reconstruction(cameras, study.grid), np.empty(study.shape, np.float16)
+    plan = plan_reconstruction(cameras, study.grid)
     if work == "mlos":
+        volume = np.empty(study.shape, np.float16)
         line_of_sight(plan, spray_images(study, cameras), out=volume, threads=study.threads)
     else:
-        images = sparse_images(study, cameras)
-        smart(plan, images, iterations=study.iterations, out=volume, threads=study.threads)
+        smart(plan, sparse_images(study, cameras), iterations=study.iterations, threads=study.threads)
 
 
 def _peak_bytes() -> int:
