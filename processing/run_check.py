@@ -10,7 +10,7 @@ from processing.calibration.disparity import ViewDisparity, measured_box, shot_d
 from processing.calibration.droplet_images import find_droplets
 from processing.calibration.errors import CalibrationError
 from processing.calibration.health import LIMITS_PX, judge
-from processing.calibration.self_calibration import SelfCalibration, self_calibrate
+from processing.calibration.self_calibration import CLEARER, NOISE_PX, SelfCalibration, self_calibrate
 from processing.geometry import FloatArray
 from processing.pipeline import PipelineError, shot_intensities
 from processing.reconstruction.settings import ReconstructionSettings
@@ -45,6 +45,15 @@ class ShotCheck:
     def worst_px(self) -> float:
         """Largest disparity of a view."""
         return max(view.disparity_px for view in self.views.values())
+
+    @property
+    def moved(self) -> str | None:
+        """The view whose motion alone explains an alarm, clearly better than that of any other would."""
+        if len(self.views) < 2 or self.worst_px <= ALARM_PX:
+            return None
+        best, second = sorted(self.views, key=lambda name: self.views[name].left_px)[:2]
+        clearly = self.views[second].left_px > CLEARER * max(self.views[best].left_px, NOISE_PX)
+        return best if clearly else None
 
     @property
     def verdict(self) -> Verdict | None:

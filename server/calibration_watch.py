@@ -30,14 +30,15 @@ class CalibrationStanding(FrozenModel):
     calibration: str
     shot: Annotated[int, Field(description="the shot that was checked")]
     verdict: Annotated[Verdict, Field(description="warn: an alarm; refuse: nothing is reconstructed")]
+    moved: Annotated[str | None, Field(description="the view whose motion alone explains the disparities")]
     views: Annotated[dict[str, float], Field(description="disparity by view, px")]
     uncertainty_px: dict[str, float]
     shots_checked: Annotated[int, Field(description="of this run with this calibration")]
 
     @property
     def worst_view(self) -> str:
-        """The view that disagrees most with the others: it has moved, or faces the one that has."""
-        return max(self.views, key=lambda name: self.views[name])
+        """The view that has moved; where that is not clear, the one that disagrees most with the others."""
+        return self.moved or max(self.views, key=lambda name: self.views[name])
 
     @property
     def is_alarm(self) -> bool:
@@ -48,9 +49,10 @@ class CalibrationStanding(FrozenModel):
     def message(self) -> str:
         """What is wrong and how to mend it."""
         limit = f"stop above {STOP_PX:g} px" if self.verdict is Verdict.REFUSE else f"alarm above {ALARM_PX:g} px"
+        moved = f"{self.moved} has moved; " if self.moved else ""
         views = ", ".join(f"{name} {disparity_px:.2f}" for name, disparity_px in self.views.items())
         return (
-            f"calibration {self.calibration} does not fit run {self.run_id}, shot {self.shot}: "
+            f"calibration {self.calibration} does not fit run {self.run_id}, shot {self.shot}: {moved}"
             f"views are off the others by {views} px ({limit}). {_REMEDY}"
         )
 
@@ -142,6 +144,7 @@ class CalibrationWatch:
             calibration=job.calibration,
             shot=shot,
             verdict=result["verdict"],
+            moved=result["moved"],
             views=result["views"],
             uncertainty_px=result["uncertainty_px"],
             shots_checked=len(account.told),

@@ -38,7 +38,8 @@ def check_line(measured: ShotCheck) -> str:
         f"{name} {view.disparity_px:.2f} ± {view.uncertainty_px:.2f} px" for name, view in measured.views.items()
     )
     meaning = _MEANING.get(measured.verdict) if measured.verdict else None
-    return f"shot {measured.shot}: {views}" + (f"  {meaning}" if meaning else "")
+    moved = f", {measured.moved} has moved" if measured.moved else ""
+    return f"shot {measured.shot}: {views}{moved}" + (f"  {meaning}" if meaning else "")
 
 
 def check_json(measured: ShotCheck) -> dict[str, Any]:
@@ -46,6 +47,7 @@ def check_json(measured: ShotCheck) -> dict[str, Any]:
     return {
         "shot": measured.shot,
         "verdict": measured.verdict,
+        "moved": measured.moved,
         "views": {name: view.disparity_px for name, view in measured.views.items()},
         "uncertainty_px": {name: view.uncertainty_px for name, view in measured.views.items()},
         "problem": measured.problem or None,

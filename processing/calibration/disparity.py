@@ -5,6 +5,7 @@ agree on all of them; false combinations are spread over the whole range. So the
 histogram is the truth (Wieneke 2008 sums it view by view; seen jointly it stands out from far denser clouds).
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -64,10 +65,13 @@ class ViewDisparity:
         Median over the sub-volumes; of a single drifted view this is its drift.
     uncertainty_px : float
         Standard uncertainty of it.
+    left_px : float
+        Rms disagreement of all views that would be left if this one alone had moved, and were put right.
     """
 
     disparity_px: float
     uncertainty_px: float
+    left_px: float = math.nan
 
 
 def measured_box(calibration: Calibration) -> Box:
@@ -127,11 +131,8 @@ def shot_disparity(
             f"the views see {seen} droplets, of which no {MIN_DROPLETS} agree within {SEARCH_PX:g} px: "
             "too few droplets, too many, or a view has moved further"
         )
-    factors = [against_others(mappings, disparity.point_mm) for disparity in local]
-    return tuple(
-        _median([(disparity, factor[view]) for disparity, factor in zip(local, factors, strict=True)], view)
-        for view in range(len(mappings))
-    )
+    projectors = [_projector(mappings, disparity.point_mm) for disparity in local]
+    return tuple(_of_view(view, local, projectors) for view in range(len(mappings)))
 
 
 def require_views(n_views: int) -> None:
@@ -142,20 +143,36 @@ def require_views(n_views: int) -> None:
 
 def against_others(mappings: Sequence[ViewMapping], point_mm: FloatArray) -> FloatArray:
     """Matrices (n, 2, 2) from the residual of each view to its distance from what the others see alone."""
-    slopes = np.stack([linearise(mapping, point_mm[None])[1][0] for mapping in mappings])
-    projector = unseen(slopes)
-    blocks = [projector[2 * view : 2 * view + 2, 2 * view : 2 * view + 2] for view in range(len(mappings))]
-    return np.stack([np.linalg.pinv(block) for block in blocks])
+    projector = _projector(mappings, point_mm)
+    return np.stack([_against_others(projector, view) for view in range(len(mappings))])
 
 
-def _median(local: Sequence[tuple[LocalDisparity, FloatArray]], view: int) -> ViewDisparity:
-    lengths_px = [float(np.linalg.norm(factor @ disparity.disparity_px[view])) for disparity, factor in local]
+def _projector(mappings: Sequence[ViewMapping], point_mm: FloatArray) -> FloatArray:
+    return unseen(np.stack([linearise(mapping, point_mm[None])[1][0] for mapping in mappings]))
+
+
+def _against_others(projector: FloatArray, view: int) -> FloatArray:
+    span = slice(2 * view, 2 * view + 2)
+    return np.asarray(np.linalg.pinv(projector[span, span]), dtype=np.float64)
+
+
+def _of_view(view: int, local: Sequence[LocalDisparity], projectors: Sequence[FloatArray]) -> ViewDisparity:
+    factors = [_against_others(projector, view) for projector in projectors]
+    moved_px = [factor @ disparity.disparity_px[view] for disparity, factor in zip(local, factors, strict=True)]
     errors_px = [
         float(np.linalg.norm(factor, 2)) * disparity.scatter_px[view] / np.sqrt(disparity.n_droplets)
-        for disparity, factor in local
+        for disparity, factor in zip(local, factors, strict=True)
+    ]
+    left_px = [
+        disparity.disparity_px.ravel() - projector[:, 2 * view : 2 * view + 2] @ motion_px
+        for disparity, projector, motion_px in zip(local, projectors, moved_px, strict=True)
     ]
     of_median = np.sqrt(np.pi / 2 / len(local)) if len(local) > 1 else 1.0
-    return ViewDisparity(float(np.median(lengths_px)), float(of_median * np.sqrt(np.mean(np.square(errors_px)))))
+    return ViewDisparity(
+        disparity_px=float(np.median(np.linalg.norm(moved_px, axis=1))),
+        uncertainty_px=float(of_median * np.sqrt(np.mean(np.square(errors_px)))),
+        left_px=float(np.sqrt(np.mean(np.square(left_px)))),
+    )
 
 
 def _peak(matches: Matches, rows: NDArray[np.intp], n_views: int) -> LocalDisparity | None:

@@ -144,7 +144,7 @@ def _disparity(job: Job) -> str:
     result = job.result or {"views": {}}
     if not result["views"]:
         return str(result.get("problem") or "")
-    worst = max(result["views"], key=result["views"].__getitem__)
+    worst = result["moved"] or max(result["views"], key=result["views"].__getitem__)
     return f"{worst} {result['views'][worst]:.2f} px, {result['verdict']}"
 
 

@@ -90,7 +90,8 @@ def write_calibration(job: dict[str, Any], should_stop: Callable[[], bool]) -> d
 
 def tell_nothing(job: dict[str, Any], should_stop: Callable[[], bool]) -> dict[str, Any]:
     """Work function: a check of a shot without droplets."""
-    return {"shot": job["shot"], "verdict": None, "views": {}, "uncertainty_px": {}, "problem": "too few droplets"}
+    nothing: dict[str, Any] = {"verdict": None, "moved": None, "views": {}, "uncertainty_px": {}}
+    return {"shot": job["shot"], **nothing, "problem": "too few droplets"}
 
 
 @contextmanager

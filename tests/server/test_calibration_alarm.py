@@ -55,9 +55,10 @@ def test_a_moved_view_stops_reconstruction_until_the_droplets_have_put_it_right(
     standing = server.http.get("/api/rig").json()["calibration"]
     assert (standing["calibration"], standing["run_id"], standing["shot"]) == ("old", RUN, 1)
     assert (standing["verdict"], standing["shots_checked"]) == ("refuse", 1)
+    assert standing["moved"] == "view2"
     assert standing["views"]["view2"] == pytest.approx(DRIFT_PX, abs=0.15)
     (alarm,) = [event for event in server.services.events.since(0) if event.name == "calibration_alarm"]
-    assert alarm.data["verdict"] == "refuse"
+    assert (alarm.data["verdict"], alarm.data["view"]) == ("refuse", "view2")
     assert not list((server.services.data_dir / RUN).glob("results/*"))
 
     calibrations = server.services.data_dir / "calibrations"

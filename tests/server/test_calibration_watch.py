@@ -6,6 +6,7 @@ import pytest
 
 from processing.calibration.calibration import Verdict
 from processing.calibration.health import judge
+from processing.run_check import ALARM_PX
 from server.calibration_watch import CalibrationWatch
 from server.events import EventPublisher
 from server.jobs import Job, JobState, check_job, reconstruction_job
@@ -21,7 +22,9 @@ def ended(shot: int, disparity_px: float | None, state: JobState = JobState.DONE
     """A check that found view2 off by so much; None: the droplets do not tell."""
     views = {} if disparity_px is None else {"view1": 0.01, "view2": disparity_px}
     verdict = None if disparity_px is None else judge(disparity_px)
-    result = {"shot": shot, "verdict": verdict, "views": views, "uncertainty_px": dict.fromkeys(views, 0.01)}
+    moved = "view2" if disparity_px and disparity_px > ALARM_PX else None
+    uncertainty_px = dict.fromkeys(views, 0.01)
+    result = {"shot": shot, "verdict": verdict, "moved": moved, "views": views, "uncertainty_px": uncertainty_px}
     return check_job(RUN, shot, CALIBRATION).model_copy(update={"state": state, "result": result})
 
 
@@ -58,7 +61,15 @@ def test_a_refusal_names_run_shot_views_limit_and_remedy() -> None:
     watch, _ = watch_of([1.234])
     refusal = watch.refusal(reconstruction())
     assert refusal is not None
-    for part in ("calibration cal", "run run, shot 0", "view2 1.23", "stop above 0.8 px", "self-calibrate", "kept"):
+    for part in (
+        "calibration cal",
+        "run run, shot 0",
+        "view2 has moved",
+        "view2 1.23",
+        "stop above 0.8 px",
+        "self-calibrate",
+        "kept",
+    ):
         assert part in refusal
     assert watch.refusal(reconstruction(calibration="another")) is None
     assert watch.refusal(check_job(RUN, 1, CALIBRATION)) is None
