@@ -116,7 +116,7 @@ class ViewCalibration:
     board_poses : tuple[BoardPose, ...]
         Poses of the boards, where the fit had to find them.
     covariance : ParameterCovariance | None
-        Of the parameters of a pinhole camera; None for other models, and after a correction.
+        Of the parameters of the mapping; None for boards in free poses, and after a correction.
     candidates_px : Mapping[Model, float]
         Where the model was chosen among several: the hold-out error of each, all on the same points.
     """

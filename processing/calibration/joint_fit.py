@@ -89,11 +89,8 @@ def _fitted_view(seen: ViewObservations, model: Model) -> ViewCalibration:
     errors = [errors_px(mapping, plane) for plane in planes]
     n_rejected = len(used) - sum(len(plane) for plane in planes)
     summary = _summary(mapping, model, planes, errors, holdout_px, n_rejected, extent_mm=outline_mm(planes))
-    if not isinstance(mapping, PinholeCamera):
-        return summary
     points_mm, image_px = (values[used] for values in stacked(seen.planes))
-    tilted = model is Model.PINHOLE_TILTED
-    return replace(summary, covariance=parameter_covariance(mapping, points_mm, image_px, tilted=tilted))
+    return replace(summary, covariance=parameter_covariance(mapping, points_mm, image_px, model))
 
 
 def _free_view(seen: ViewObservations, wanted: Model | None) -> ViewCalibration:

@@ -13,6 +13,8 @@ EXPONENTS = tuple(
     (i, j, k) for k in range(ORDER_Z + 1) for j in range(ORDER + 1) for i in range(ORDER + 1) if i + j + k <= ORDER
 )
 """Powers of x, y and z of the 19 terms (Soloff, Adrian and Liu 1997)."""
+COEFFICIENT_NAMES = tuple(f"{axis}_x{i}_y{j}_z{k}_px" for axis in "uv" for i, j, k in EXPONENTS)
+"""Of all 38 coefficients, those of u before those of v."""
 ROBUST_SCALE, REJECT_SCALE, REJECT_FLOOR_PX = 3.0, 6.0, 0.1
 
 
@@ -37,8 +39,12 @@ class PolynomialMapping:
 
     def project(self, points_mm: FloatArray) -> FloatArray:
         """Image points (N, 2) in px of world points (N, 3) in mm."""
+        return np.asarray(self.terms(points_mm) @ self.coefficients, dtype=np.float64)
+
+    def terms(self, points_mm: FloatArray) -> FloatArray:
+        """The 19 terms (N, 19) at world points (N, 3) in mm."""
         points_mm = np.asarray(points_mm, dtype=np.float64).reshape(-1, 3)
-        return np.asarray(_terms((points_mm - self.centre_mm) / self.scale_mm) @ self.coefficients, dtype=np.float64)
+        return _terms((points_mm - self.centre_mm) / self.scale_mm)
 
 
 def fit_polynomial(
@@ -83,6 +89,14 @@ def fit_polynomial(
     used = residual_px < max(REJECT_SCALE * scale_px, REJECT_FLOOR_PX)
     coefficients = _solve(terms[used], image_px[used], np.ones(int(used.sum())))
     return PolynomialMapping(coefficients, centre_mm, scale_mm, image_size_px), np.asarray(used, dtype=np.bool_)
+
+
+def polynomial_derivatives(mapping: PolynomialMapping, points_mm: FloatArray) -> FloatArray:
+    """Derivatives (2 N, 38) of image points by the coefficients of ``COEFFICIENT_NAMES``, u before v."""
+    terms = mapping.terms(points_mm)
+    derivatives = np.zeros((len(terms), 2, 2, len(EXPONENTS)))
+    derivatives[:, 0, 0] = derivatives[:, 1, 1] = terms
+    return derivatives.reshape(2 * len(terms), len(COEFFICIENT_NAMES))
 
 
 def _terms(normalised: FloatArray) -> FloatArray:

@@ -13,6 +13,7 @@ from processing.calibration.errors import CalibrationError
 from processing.calibration.joint_fit import calibrate
 from processing.calibration.observation import PlaneObservation, stacked
 from processing.calibration.pinhole_fit import fit_pinhole
+from processing.calibration.polynomial import fit_polynomial
 from processing.geometry import PinholeCamera
 from tests.processing.calibration_cases import calibration_set, paper_camera, seen_planes
 from tests.processing.test_self_calibration import recalibrate, shifted
@@ -66,13 +67,26 @@ def test_tilted_camera_has_two_parameters_more() -> None:
     assert covariance.root.shape == (17, 17)
 
 
+def test_coefficients_of_a_polynomial_scatter_as_predicted() -> None:
+    view = calibrated("polynomial").views["only"]
+    points_mm = np.random.default_rng(5).uniform([-8, -6, -4], [8, 6, 4], (50, 3))
+    fits = [fit_polynomial(*stacked(planes(seed)), (1600, 1200))[0] for seed in range(REPEATS)]
+    assert view.covariance is not None
+    assert view.covariance.names[:2] == ("u_x0_y0_z0_px", "u_x1_y0_z0_px")
+    std_px = np.array(list(view.covariance.std.values())).reshape(2, -1).T
+    found_px = np.std([fit.coefficients for fit in fits], axis=0, ddof=1)
+    np.testing.assert_allclose(np.median(found_px / std_px, axis=0), 1.0, atol=0.2)
+    scatter_px = np.sqrt(np.var([fit.project(points_mm) for fit in fits], axis=0, ddof=1).sum(axis=1))
+    predicted_px = position_std_px(view, points_mm)
+    assert predicted_px is not None
+    np.testing.assert_allclose(np.median(scatter_px / predicted_px), 1.0, atol=0.2)
+
+
 def test_what_is_not_known_is_not_told() -> None:
-    polynomial = calibrated("polynomial").views["only"]
-    assert polynomial.covariance is None
-    assert position_std_px(polynomial, np.zeros((1, 3))) is None
-    assert worst_position_std_px(polynomial) is None
     corrected = recalibrate({0: shifted(2.0, 0.0)}).calibration.views["view1"]
     assert corrected.covariance is None
+    assert position_std_px(corrected, np.zeros((1, 3))) is None
+    assert worst_position_std_px(corrected) is None
 
 
 def test_file_keeps_it(tmp_path: Path) -> None:

@@ -49,9 +49,9 @@ def test_a_pinhole_camera_is_one() -> None:
 
 def test_tilt_is_seen_behind_a_distorting_lens() -> None:
     camera = tilted_camera()
-    view = chosen(seen_planes(camera, z_mm=Z_MM, columns=19, rows=15))
+    view = chosen(seen_planes(camera, z_mm=Z_MM, columns=13, rows=11))
     assert view.model is Model.PINHOLE_TILTED
-    assert true_errors_px(view.mapping, camera).mean() < 0.02
+    assert true_errors_px(view.mapping, camera).mean() < 0.05
 
 
 def test_what_no_camera_describes_gets_a_polynomial() -> None:
