@@ -4,10 +4,21 @@ SHELL := /bin/bash
 .PHONY: help setup demo test lint serve firmware bench lock clean mutants fuzz
 
 PYTHON := .venv/bin/python
-DEBIAN_PACKAGES := python3-venv python3-dev python3-gi gir1.2-aravis-0.8 iproute2 gcc g++ gcc-arm-none-eabi make chromium fonts-dejavu-core
+DEBIAN_PACKAGES := python3-venv python3-dev python3-gi gir1.2-aravis-0.8 iproute2 gcc g++ gcc-arm-none-eabi cppcheck make chromium fonts-dejavu-core
+FIRMWARE_PACKAGES := gcc gcc-arm-none-eabi libc6-dev make python3
 AS_ROOT := $(shell [ "$$(id -u)" = 0 ] || echo sudo)
 KERNEL_SOURCES := $(wildcard processing/reconstruction/kernels/*.cpp processing/reconstruction/kernels/*.hpp processing/reconstruction/kernels/CMakeLists.txt)
 FIRMWARE_SOURCES := $(wildcard firmware/*/*.[chS] firmware/rp2040/image.* firmware/Makefile)
+
+# Those of the Debian packages that are missing.
+define install
+missing=$$(for name in $(1); do dpkg-query -W -f='$${db:Status-Status}' $$name 2>/dev/null | grep -qx installed || echo $$name; done); \
+	if [ -n "$$missing" ]; then \
+	    echo "Installing Debian packages:" $$missing; \
+	    $(AS_ROOT) apt-get update -qq && \
+	    $(AS_ROOT) env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $$missing >/dev/null; \
+	fi
+endef
 
 # A network of its own, so that no camera broadcast leaves the machine; without it where the machine forbids user namespaces.
 PRIVATE_NETWORK := $(shell unshare -rn true 2>/dev/null && echo "unshare -rn bash -c 'ip link set lo up && exec \"\$$@\"' --")
@@ -23,7 +34,7 @@ demo: setup ## Run the whole chain on the simulated bench; writes demo-out/repor
 test: lint build/rp2040js/node_modules ## Run linters and all tests.
 	$(PRIVATE_NETWORK) $(PYTHON) -m pytest $(TEST_OPTIONS)
 
-lint: setup ## Run ruff, mypy and import-linter.
+lint: setup ## Run ruff, mypy, import-linter.
 	.venv/bin/ruff check .
 	.venv/bin/ruff format --check .
 	.venv/bin/mypy
@@ -35,7 +46,7 @@ serve: setup ## Start server and web page on the simulated bench, http://127.0.0
 bench: setup ## Measure kernels and recorder, four minutes; writes bench.json. BENCH_OPTIONS="--table README.md" renews its table.
 	@env -u OPENBLAS_CORETYPE -u OPENBLAS_L2_SIZE $(PYTHON) -m server.cli bench --json $(BENCH_OPTIONS) | tail -n 1 >bench.json
 
-firmware: $(FIRMWARE_SOURCES) | .venv/.debian ## Build the firmware: image for the Pico, core for this computer.
+firmware: $(FIRMWARE_SOURCES) | build/.toolchain ## Build the firmware: image for the Pico, core for this computer.
 	@$(MAKE) --no-print-directory -C firmware host
 	@if command -v arm-none-eabi-gcc >/dev/null; then $(MAKE) --no-print-directory -C firmware images; \
 	else echo "No image for the Pico: arm-none-eabi-gcc is missing (apt install gcc-arm-none-eabi)"; fi
@@ -43,13 +54,13 @@ firmware: $(FIRMWARE_SOURCES) | .venv/.debian ## Build the firmware: image for t
 mutants: setup build/rp2040js/node_modules ## Plant faults in the firmware and show that its tests find each; five minutes.
 	@$(PYTHON) firmware/tests/mutants.py $(MUTANTS)
 
-fuzz: | .venv/.debian ## Feed the firmware's core hostile input for FUZZ_S=60 seconds.
+fuzz: | build/.toolchain ## Feed the firmware's core hostile input by libFuzzer, for FUZZ_S=60 seconds.
+	@$(call install,clang libclang-rt-dev)
 	@$(MAKE) --no-print-directory -C firmware fuzz
 
 # A second emulator of the Pico, for the tests alone; without it they skip what it would have to say.
 build/rp2040js/node_modules: firmware/tests/rp2040js/package-lock.json | .venv/.debian
-	@command -v npm >/dev/null || { echo "Installing Debian packages: nodejs npm"; $(AS_ROOT) env DEBIAN_FRONTEND=noninteractive \
-	    apt-get install -y -qq --no-install-recommends nodejs npm >/dev/null; }
+	@command -v npm >/dev/null || { $(call install,nodejs npm); }
 	@mkdir -p $(@D) && cp firmware/tests/rp2040js/package*.json $(@D)
 	@npm ci --prefix $(@D) --silent --no-audit --no-fund --ignore-scripts && touch $@ || echo "No rp2040js: npm cannot install it"
 
@@ -62,12 +73,12 @@ clean: ## Remove everything that was built.
 
 .venv/.debian: Makefile
 	@mkdir -p .venv
-	@missing=$$(for name in $(DEBIAN_PACKAGES); do dpkg-query -W -f='$${db:Status-Status}' $$name 2>/dev/null | grep -qx installed || echo $$name; done); \
-	if [ -n "$$missing" ]; then \
-	    echo "Installing Debian packages:" $$missing; \
-	    $(AS_ROOT) apt-get update -qq && \
-	    $(AS_ROOT) env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $$missing >/dev/null; \
-	fi
+	@$(call install,$(DEBIAN_PACKAGES))
+	@touch $@
+
+build/.toolchain: Makefile
+	@mkdir -p build
+	@$(call install,$(FIRMWARE_PACKAGES))
 	@touch $@
 
 .venv/.python: requirements.lock | .venv/.debian
