@@ -69,9 +69,7 @@ class Job(FrozenModel):
     run_id: str
     shot: Annotated[int | None, Field(description="index of the shot; null for a calibration")] = None
     calibration: Annotated[str, Field(description="id of the calibration that is used, or made")]
-    results_id: Annotated[
-        str | None, Field(description="directory of the results in the run; null if there are none")
-    ]
+    results_id: Annotated[str | None, Field(description="directory of the results in the run; null if there are none")]
     settings: Annotated[dict[str, Any], Field(description="what the work function is told")]
     state: JobState = JobState.QUEUED
     result: Annotated[dict[str, Any] | None, Field(description="what it said when done")] = None
