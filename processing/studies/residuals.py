@@ -108,9 +108,9 @@ def detected_planes(study: ResidualStudy, view: str, camera: PinholeCamera) -> I
 
 def ideal_planes(study: ResidualStudy, camera: PinholeCamera) -> Iterator[PlaneObservation]:
     """The corners where a camera sees them, exactly."""
-    board_mm = Checkerboard(study.columns, study.rows, study.pitch_mm).points_mm
+    board_mm = study.target.points_mm(study.target.board_ids())
     for z_mm in study.z_mm:
-        points_mm: FloatArray = board_mm + (0.0, 0.0, z_mm)
+        points_mm: FloatArray = np.column_stack([board_mm, np.full(len(board_mm), z_mm)])
         yield PlaneObservation(f"z={z_mm:g}", points_mm, camera.project(points_mm), z_mm)
 
 

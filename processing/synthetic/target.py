@@ -5,12 +5,11 @@ from typing import Protocol
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import RectBivariateSpline
 
 from processing.geometry import PinholeCamera
 from processing.synthetic.rendering import depth_out_of_focus_mm
-from processing.synthetic.stamping import FloatArray, FloatImage
+from processing.synthetic.stamping import FloatImage
 from processing.synthetic.view_optics import ViewOptics
 
 _NODE_PITCH_PX = 16
@@ -19,14 +18,6 @@ _NODE_PITCH_PX = 16
 
 class Target(Protocol):
     """A flat calibration target across z, its origin in the middle."""
-
-    @property
-    def points_mm(self) -> FloatArray:
-        """Known points (N, 3) at z = 0."""
-
-    @property
-    def point_ids(self) -> NDArray[np.int64]:
-        """(column, row) of each point, (N, 2)."""
 
     def transmittance(self, x_mm: FloatImage, y_mm: FloatImage) -> FloatImage:
         """Transmittance of the glass at every pixel, averaged over its area.
@@ -40,7 +31,7 @@ class Target(Protocol):
 
 @dataclass(frozen=True)
 class Checkerboard:
-    """Chromium squares on clear glass; the points are the inner corners.
+    """Chromium squares on clear glass; its points are the inner corners, the middle one at x = y = 0.
 
     Parameters
     ----------
@@ -53,16 +44,6 @@ class Checkerboard:
     columns: int = 23
     rows: int = 17
     pitch_mm: float = 1.0
-
-    @property
-    def points_mm(self) -> FloatArray:
-        """Inner corners (N, 3) at z = 0, row by row."""
-        return _lattice_mm(self.columns, self.rows, self.pitch_mm)
-
-    @property
-    def point_ids(self) -> NDArray[np.int64]:
-        """(column, row) of each corner, (N, 2)."""
-        return _lattice_ids(self.columns, self.rows)
 
     def transmittance(self, x_mm: FloatImage, y_mm: FloatImage) -> FloatImage:
         """Transmittance of the glass at every pixel, averaged over its area."""
@@ -97,16 +78,6 @@ class DotTarget:
     rows: int = 17
     pitch_mm: float = 1.0
     diameter_mm: float = 0.4
-
-    @property
-    def points_mm(self) -> FloatArray:
-        """Centres of the dots (N, 3) at z = 0, row by row."""
-        return _lattice_mm(self.columns, self.rows, self.pitch_mm)
-
-    @property
-    def point_ids(self) -> NDArray[np.int64]:
-        """(column, row) of each dot, (N, 2)."""
-        return _lattice_ids(self.columns, self.rows)
 
     def transmittance(self, x_mm: FloatImage, y_mm: FloatImage) -> FloatImage:
         """Transmittance of the glass at every pixel, averaged over its area."""
@@ -171,13 +142,3 @@ def _coverage(inside: FloatImage) -> FloatImage:
     down, right = np.gradient(inside)
     distance_px = inside / np.maximum(np.hypot(down, right), np.float32(1e-9))
     return np.asarray(np.clip(distance_px + np.float32(0.5), 0, 1), dtype=np.float32)
-
-
-def _lattice_mm(columns: int, rows: int, pitch_mm: float) -> FloatArray:
-    ids = _lattice_ids(columns, rows) - 0.5 * (np.array([columns, rows]) - 1)
-    return np.column_stack([ids * pitch_mm, np.zeros(len(ids))])
-
-
-def _lattice_ids(columns: int, rows: int) -> NDArray[np.int64]:
-    row, column = np.divmod(np.arange(columns * rows), columns)
-    return np.column_stack([column, row]).astype(np.int64)

@@ -37,14 +37,6 @@ class Mounted:
     mounting: NDArray[np.int64]
     marked: bool
 
-    @property
-    def points_mm(self) -> FloatArray:
-        return self.pattern.points_mm
-
-    @property
-    def point_ids(self) -> NDArray[np.int64]:
-        return self.pattern.point_ids
-
     def transmittance(self, x_mm: FloatImage, y_mm: FloatImage) -> FloatImage:
         (a, b), (c, d) = self.mounting
         x, y = a * x_mm + b * y_mm, c * x_mm + d * y_mm

@@ -1,4 +1,4 @@
-"""Targets: their points, and edges that are seen where the camera projects them."""
+"""Targets: edges and dots are seen where the camera projects them."""
 
 import numpy as np
 import pytest
@@ -8,6 +8,7 @@ from processing.geometry import PinholeCamera, view_camera
 from processing.synthetic.paper_rig import paper_cameras, paper_optics
 from processing.synthetic.stamping import FloatArray
 from processing.synthetic.target import Checkerboard, DotTarget, plane_coordinates, render_target
+from tests.processing.calibration_cases import target_plane_mm
 
 CAMERAS, OPTICS = paper_cameras(), paper_optics()
 BOARD = Checkerboard()
@@ -31,7 +32,7 @@ def edges_px(image: FloatArray, middles_px: FloatArray, slopes: FloatArray) -> t
 def test_edges_are_seen_within_a_hundredth_pixel(view: str, z_mm: float) -> None:
     camera = CAMERAS[view]
     image = render_target(camera, BOARD, z_mm, OPTICS[view]).astype(float)
-    corners_mm = BOARD.points_mm + [0, 0, z_mm]
+    corners_mm = target_plane_mm(z_mm)
     for turned, along in ((slice(None), np.array([0, 0.5, 0])), (slice(None, None, -1), np.array([0.5, 0, 0]))):
         middles_px = camera.project(corners_mm + along)[:, turned]
         steps_px = camera.project(corners_mm + 1.1 * along)[:, turned] - middles_px
@@ -44,7 +45,7 @@ def test_edges_are_seen_within_a_hundredth_pixel(view: str, z_mm: float) -> None
 def test_corners_are_points_of_symmetry(view: str) -> None:
     image = render_target(CAMERAS[view], BOARD, 2.0, OPTICS[view]).astype(float)
     offsets_px = np.stack(np.meshgrid(*[np.arange(-5, 6)] * 2), axis=-1).reshape(-1, 2)
-    for corner_px in CAMERAS[view].project(BOARD.points_mm + [0, 0, 2.0])[::17]:
+    for corner_px in CAMERAS[view].project(target_plane_mm(2.0))[::17]:
         around = map_coordinates(image, (corner_px + offsets_px)[:, ::-1].T, order=5)
         np.testing.assert_allclose(around, around[::-1], atol=0.03)
 
@@ -52,7 +53,7 @@ def test_corners_are_points_of_symmetry(view: str) -> None:
 def test_dots_are_seen_at_their_projected_centres() -> None:
     target, camera = DotTarget(), CAMERAS["view1"]
     dark = 1 - render_target(camera, target, -3.0, OPTICS["view1"]).astype(float)
-    for expected_px in camera.project(target.points_mm + [0, 0, -3.0])[::13]:
+    for expected_px in camera.project(target_plane_mm(-3.0))[::13]:
         column, row = np.rint(expected_px).astype(int)
         patch = dark[row - 18 : row + 19, column - 18 : column + 19]
         rows, columns = np.indices(patch.shape)
@@ -73,15 +74,6 @@ def test_board_is_half_dark_and_clear_around() -> None:
     assert (1 - image).sum() == pytest.approx(0.5 * 24 * 18 * 60**2, rel=0.005)
     assert image[:, :60].min() > 0.999
     assert image.min() < 1e-3
-
-
-@pytest.mark.parametrize("target", [BOARD, DotTarget(7, 5, 2.0)])
-def test_points_are_centred_and_numbered(target: Checkerboard | DotTarget) -> None:
-    middle = (target.point_ids == [(target.columns - 1) // 2, (target.rows - 1) // 2]).all(axis=1)
-    np.testing.assert_allclose(target.points_mm[middle], [[0, 0, 0]])
-    pitch_mm = np.diff(target.points_mm[: target.columns], axis=0)
-    np.testing.assert_allclose(pitch_mm, np.tile([target.pitch_mm, 0, 0], (target.columns - 1, 1)), atol=1e-12)
-    np.testing.assert_array_equal(target.point_ids[target.columns], [0, 1])
 
 
 def test_plane_coordinates_invert_the_projection_of_a_tilted_camera() -> None:

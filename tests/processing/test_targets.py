@@ -142,6 +142,15 @@ def test_another_board_is_refused(size: tuple[int, int]) -> None:
         detect_target(image, Target(kind="checkerboard", columns=size[0], rows=size[1], pitch_mm=1.0))
 
 
+@pytest.mark.parametrize(("columns", "rows"), [(23, 17), (7, 6)])
+def test_boards_count_from_their_middle(columns: int, rows: int) -> None:
+    ids = Target(kind="dots", columns=columns, rows=rows, pitch_mm=2.0).board_ids()
+    assert len(np.unique(ids, axis=0)) == columns * rows
+    np.testing.assert_array_equal(np.abs(ids.min(axis=0)), [(columns - 1) // 2, (rows - 1) // 2])
+    np.testing.assert_array_equal(ids[1] - ids[0], [1, 0])
+    assert not len(Target(kind="dots", pitch_mm=2.0).board_ids())
+
+
 @pytest.mark.parametrize(
     "wrong",
     [
