@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from processing.studies.calibration_accuracy import AccuracyRow, of_quantity
 from processing.studies.report import Statement
@@ -47,23 +48,27 @@ def accuracy_figure(rows: Sequence[AccuracyRow]) -> Figure:
     for axes, (quantity, title) in zip(figure.subplots(2, 2).flat, TITLES.items(), strict=True):
         _panel(axes, of_quantity(rows, quantity))
         axes.set_title(title, fontsize="medium", loc="left")
+    views = list(dict.fromkeys(row.view for row in rows))
+    points = [
+        Line2D([], [], color=colour, marker="o", label=view) for view, colour in zip(views, COLOURS, strict=False)
+    ]
+    figure.legend(handles=points, frameon=False, ncols=4, loc="outside lower center", title="rms to largest error")
     return figure
 
 
 def _panel(axes: Axes, rows: Sequence[AccuracyRow]) -> None:
+    axes.set_yscale("log")
     cases, views = list(_by_case(rows)), list(dict.fromkeys(row.view for row in rows))
-    for view, colour in zip(views, COLOURS, strict=False):
-        axes.plot([], [], "o", color=colour, label=view)
     for row in rows:
         number = views.index(row.view)
         place, colour = cases.index(row.case) + 0.12 * (number - 1.5), COLOURS[number % len(COLOURS)]
         reach = [value for value in (row.value, row.maximum) if value is not None]
         axes.plot([place] * len(reach), reach, "-o", color=colour, linewidth=1, markevery=[0] if reach else None)
     if rows:
-        axes.legend(frameon=False, fontsize="small", ncols=4, loc="lower center", bbox_to_anchor=(0.5, -0.42))
+        axes.set_xlim(-0.5, len(cases) - 0.5)
+        axes.set_ylim(top=2 * max(rows[0].limit, *(row.maximum or 0 for row in rows)))
         axes.axhline(rows[0].limit, color="0.4", linestyle="--", linewidth=1)
         axes.annotate("limit", (0.01, rows[0].limit), xycoords=("axes fraction", "data"), va="bottom", color="0.4")
-    axes.set_yscale("log")
     axes.set_xticks(range(len(cases)), [case.replace(" and ", "\nand ").replace(" ", "\n", 1) for case in cases])
     axes.tick_params(axis="x", labelsize="small")
     axes.grid(alpha=0.25, axis="y")
