@@ -10,6 +10,9 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from rp2040py.peripherals.vreg_and_chip_reset import HAD_RUN
+
+from daq.simulation.board_number import give_number
 from daq.simulation.mcp4728 import Mcp4728
 from daq.simulation.rp2040_chip import (
     OUTPUT_PINS,
@@ -108,8 +111,15 @@ class EmulatedPico:
         self._chip.watchdog.on_watchdog_trigger = self._on_watchdog
         self.converter.power_up(self._chip, PIN_I2C_SCL)
         self.usb = UsbHost(self._chip)
+        give_number(self._chip)
         self.set_interlock(self._interlock)
         self.set_trigger_pin(False)
+
+    def press_run(self) -> None:
+        """Pull the pin RUN low and let it go; the power stays."""
+        self._restart(from_watchdog=False)
+        self._chip.watchdog.reset()
+        self._chip.vreg_and_chip_reset.record_reset_cause(HAD_RUN)
 
     def set_interlock(self, closed: bool) -> None:
         """Level of the interlock input."""
@@ -174,7 +184,9 @@ class EmulatedPico:
             self._deliver()
             self._run_slice(self._next_from_outside(until_cycle))
             if self._restarting:
-                self._restart()
+                self._restarting = False
+                self.watchdog_resets.append(self.cycle)
+                self._restart(from_watchdog=True)
             if stop is not None and stop():
                 return True
         return False
@@ -242,11 +254,9 @@ class EmulatedPico:
     def _on_watchdog(self) -> None:
         self._restarting = True
 
-    def _restart(self) -> None:
-        self._restarting = False
-        self.watchdog_resets.append(self.cycle)
+    def _restart(self, from_watchdog: bool) -> None:
         before = self.levels()
-        self._chip.enter_reset(from_watchdog=True)
+        self._chip.enter_reset(from_watchdog=from_watchdog)
         for output, high in self.levels().items():  # pins that were reset tell nobody
             if high != before[output]:
                 self._on_edge(output, high)

@@ -1,5 +1,6 @@
 /* The port of the core to the RP2040, and its main loop. */
 #include "clocks.h"
+#include "identity.h"
 #include "interlock.h"
 #include "outputs.h"
 #include "pins.h"
@@ -11,10 +12,6 @@
 #include "vectors.h"
 #include "watchdog.h"
 
-const char port_build[] = "rp2040";
-const char port_git[] = "unknown";
-const uint32_t port_tick_ns = TICK_NS;
-
 enum {
     SLEEP_AT_LEAST_US = 5, /* an alarm that is set too late never comes */
     ALARM0 = 1,
@@ -22,11 +19,6 @@ enum {
 };
 
 static struct protocol protocol;
-
-const char *port_serial(void)
-{
-    return "unset";
-}
 
 uint64_t port_now_us(void)
 {
@@ -129,13 +121,14 @@ int main(void)
     char byte = 0;
     outputs_start();
     clocks_start();
+    identity_read_board();
     blocks_restart(RESET_TIMER);
     const struct start start = watchdog_read_start();
     watchdog_start();
     set_points_start();
     interlock_start();
     serial_start();
-    protocol_boot(&protocol, start.boot, start.by_watchdog ? CAUSE_WATCHDOG : CAUSE_UNKNOWN);
+    protocol_boot(&protocol, start.boot, start.cause);
     start_interrupts();
     for (;;) {
         watchdog_feed();

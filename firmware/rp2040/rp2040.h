@@ -54,6 +54,7 @@ enum reset_bits {
 #define IO_INTE(pin) (0x40014100u + 4u * ((uint32_t)(pin) / 8u))
 #define IO_EDGE_LOW(pin) (4u << (4u * ((uint32_t)(pin) % 8u)))
 #define PAD(pin) (0x4001c004u + 4u * (uint32_t)(pin))
+#define IO_QSPI_SS_CTRL 0x4001800cu
 #define SIO_GPIO_IN 0xd0000004u
 #define SIO_GPIO_OUT_CLR 0xd0000018u
 #define SIO_GPIO_OE_SET 0xd0000024u
@@ -68,6 +69,7 @@ enum io_ctrl {
     FUNCTION_PIO1 = 7,
     FUNCTION_NONE = 31,
     OUTPUT_LOW = 2 << 8,      /* OUTOVER: whatever the peripheral drives */
+    OUTPUT_HIGH = 3 << 8,
     OUTPUT_ENABLE = 3 << 12,  /* OEOVER */
     INPUT_LOW = 2 << 16,      /* INOVER: whatever the pin sees */
     INPUT_HIGH = 3 << 16,
@@ -194,6 +196,21 @@ enum i2c {
 #define WATCHDOG_REASON 0x40058008u
 #define WATCHDOG_SCRATCH(index) (0x4005800cu + 4u * (uint32_t)(index))
 #define WATCHDOG_TICK 0x4005802cu
+
+/* 4.10.13 */
+#define SSI_CTRLR0 0x18000000u
+#define SSI_SSIENR 0x18000008u
+#define SSI_SER 0x18000010u
+#define SSI_BAUDR 0x18000014u
+#define SSI_SR 0x18000028u
+#define SSI_DR0 0x18000060u
+enum ssi {
+    SSI_CTRLR0_BYTES_BOTH_WAYS = 7 << 16, /* frames of 8 bits, sent and received */
+    SSI_SR_RX_ANY = 1 << 3,
+};
+
+/* 2.10.7 */
+#define CHIP_RESET 0x40064008u
 
 /* ARMv6-M */
 #define NVIC_ENABLE 0xe000e100u

@@ -1,9 +1,15 @@
 #include "watchdog.h"
 
+#include <stdbool.h>
+
 #include "rp2040.h"
 
 enum {
     REASON_TIMER = 1,
+    REASON_FORCE = 2,
+    HAD_POWER = 1 << 8, /* switched on, or a brown-out */
+    HAD_RUN_PIN = 1 << 16,
+    HAD_DEBUGGER = 1 << 20,
     ENABLE = 1 << 30,
     TICKS = WATCHDOG_MS * 1000 * 2, /* it counts twice per microsecond: erratum RP2040-E1 */
     /* All but the two oscillators, section 2.13.5. The reset controller among them holds PIO, pins and pads. */
@@ -25,12 +31,29 @@ static uint32_t random_number(void)
     return number;
 }
 
+/* The watchdog leaves the register of the chip as it was. Its own registers survive its resets, and no others. The boot
+ * loader ends with a watchdog reset too, but leaves no mark. */
+static enum cause read_cause(bool marked)
+{
+    const uint32_t reason = REG(WATCHDOG_REASON);
+    const uint32_t chip = REG(CHIP_RESET);
+    if (reason & REASON_TIMER && marked)
+        return CAUSE_WATCHDOG;
+    if (reason & (REASON_TIMER | REASON_FORCE))
+        return CAUSE_SOFTWARE;
+    if (chip & HAD_DEBUGGER)
+        return CAUSE_DEBUG;
+    if (chip & HAD_RUN_PIN)
+        return CAUSE_PIN;
+    return chip & HAD_POWER ? CAUSE_POWER : CAUSE_UNKNOWN;
+}
+
 struct start watchdog_read_start(void)
 {
     const bool marked = REG(WATCHDOG_SCRATCH(SCRATCH_MARK)) == MARK;
     const struct start start = {
         .boot = marked ? REG(WATCHDOG_SCRATCH(SCRATCH_BOOT)) + 1u : 1u + random_number(),
-        .by_watchdog = marked && REG(WATCHDOG_REASON) & REASON_TIMER,
+        .cause = read_cause(marked),
     };
     REG(WATCHDOG_SCRATCH(SCRATCH_BOOT)) = start.boot;
     REG(WATCHDOG_SCRATCH(SCRATCH_MARK)) = MARK;

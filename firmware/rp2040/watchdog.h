@@ -2,14 +2,15 @@
 #ifndef WATCHDOG_H
 #define WATCHDOG_H
 
-#include <stdbool.h>
 #include <stdint.h>
+
+#include "safety.h"
 
 enum { WATCHDOG_MS = 200 }; /* the longest reply takes 30 */
 
 struct start {
-    uint32_t boot;    /* differs from that of the start before */
-    bool by_watchdog; /* of this firmware, not of the boot loader */
+    uint32_t boot; /* differs from that of the start before */
+    enum cause cause;
 };
 
 /* Once, after a reset, before watchdog_start. */

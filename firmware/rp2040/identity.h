@@ -1,0 +1,8 @@
+/* Which image this is, and on which board. */
+#ifndef IDENTITY_H
+#define IDENTITY_H
+
+/* Once, by the code that runs in RAM: while it asks the flash for its number, nobody can read from it. */
+void identity_read_board(void);
+
+#endif

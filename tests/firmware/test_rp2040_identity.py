@@ -1,0 +1,109 @@
+"""What the real image says of itself: board, revision, and why it has started."""
+
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from daq.drivers.pulse_protocol import Command
+from daq.simulation.board_number import BOARD_NUMBER
+from daq.simulation.firmware_build import ImageKind, build_image
+from tests.firmware.rp2040_board import BOOT_MS, Board
+
+FIRMWARE = Path(__file__).resolve().parents[2] / "firmware"
+KIB = 1024
+WATCHDOG_MS = 200
+POWER, RUN_PIN, WATCHDOG, SOFTWARE = 1, 2, 4, 5
+SCRATCH_0, FORCED_RESET = 0x4005_800C, (0x4005_8000, 1 << 31)
+WHOLE_LIMIT = {ImageKind.CONVERTER: 16 * KIB, ImageKind.PWM: 16 * KIB}
+
+
+def cause(board: Board) -> int:
+    return board.ask(Command.ID).number("cause")
+
+
+def test_it_has_the_number_of_its_flash() -> None:
+    assert Board().ask(Command.ID).fields["serial"] == BOARD_NUMBER.hex().upper()
+
+
+def test_every_image_says_which_one_it_is() -> None:
+    builds = {kind: Board(kind).ask(Command.ID).fields["build"] for kind in (ImageKind.CONVERTER, ImageKind.PWM)}
+    assert builds == {ImageKind.CONVERTER: "rp2040", ImageKind.PWM: "rp2040-pwm"}
+    assert b"build=" in build_image(kind=ImageKind.USB).read_bytes()
+    assert b"rp2040-usb" in build_image(kind=ImageKind.USB).read_bytes()
+
+
+def test_it_knows_why_it_has_started() -> None:
+    board = Board()
+    first = board.ask(Command.ID)
+    assert first.number("cause") == POWER
+    board.pico.press_run()
+    board.pico.run_ms(BOOT_MS)
+    assert cause(board) == RUN_PIN
+    before = board.ask(Command.ID).boot
+    assert before != first.boot
+    board.pico.hang()
+    board.pico.run_ms(WATCHDOG_MS + BOOT_MS)
+    again = board.ask(Command.ID)
+    assert (again.number("cause"), again.boot) == (WATCHDOG, before + 1)
+    board.pico.write_word(SCRATCH_0, 0)
+    board.pico.write_word(*FORCED_RESET)
+    board.pico.run_ms(BOOT_MS)
+    assert cause(board) == SOFTWARE, "as after the boot loader has written an image"
+
+
+def revision(image: Path) -> str:
+    return (image.parent / "revision").read_text().strip()
+
+
+def test_the_revision_is_the_commit_that_changed_the_firmware_last() -> None:
+    image = build_image()
+    answered = Board().ask(Command.ID).fields["git"]
+    assert re.fullmatch(r"[0-9a-f]{12}(-modified)?|unknown", answered)
+    assert answered == revision(image)
+
+
+@pytest.fixture(scope="module")
+def copies(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    """Built from the same sources, outside version control, in two folders of different length."""
+    images = []
+    for name in ("a", "another/place"):
+        folder = tmp_path_factory.mktemp("copy") / name
+        shutil.copytree(FIRMWARE, folder / "firmware")
+        command = ["make", "-s", "-C", str(folder / "firmware"), "images", f"BUILD={folder / 'build'}"]
+        subprocess.run(command, check=True, capture_output=True, env={"PATH": "/usr/bin:/bin"})
+        images.append(folder / "build")
+    return images
+
+
+@pytest.mark.parametrize("kind", ImageKind)
+def test_images_of_the_same_sources_are_the_same_bytes(copies: list[Path], kind: ImageKind) -> None:
+    one, other = (folder / f"{kind}.uf2" for folder in copies)
+    assert one.read_bytes() == other.read_bytes()
+    assert (copies[0] / "revision").read_text() == "unknown\n"
+    assert str(copies[0]).encode() not in one.read_bytes()
+
+
+def sections(image: Path) -> dict[str, tuple[int, int]]:
+    """(size, address) by name."""
+    told = subprocess.run(
+        ["arm-none-eabi-size", "-A", image.with_suffix(".elf")], check=True, capture_output=True, text=True
+    ).stdout
+    return {name: (int(size), int(at)) for name, size, at in re.findall(r"^(\.\S+)\s+(\d+)\s+(\d+)", told, re.M)}
+
+
+@pytest.mark.parametrize("kind", ImageKind)
+def test_every_image_keeps_its_budget(kind: ImageKind) -> None:
+    image = build_image(kind=kind)
+    assert image.stat().st_size < 24 * KIB
+    parts = sections(image)
+    in_ram = {name: size for name, (size, at) in parts.items() if at >= 0x2000_0000}
+    assert sum(in_ram.values()) < WHOLE_LIMIT.get(kind, (16 + 24) * KIB)
+    assert sum(size for name, size in in_ram.items() if name != ".image") < 16 * KIB
+    symbols = subprocess.run(
+        ["arm-none-eabi-nm", image.with_suffix(".elf")], check=True, capture_output=True, text=True
+    ).stdout
+    assert "outputs_off" in symbols
+    assert not re.findall(r"malloc|__aeabi_[df](?!iv)\w+|__aeabi_[ui]2[fd]", symbols)
