@@ -11,8 +11,8 @@ from processing.reconstruction.line_of_sight import DEFAULT_THREADS, KERNEL_METH
 from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.plan import Plan
 
-BATCH = 24
-"""Exposures whose resampled images are in memory at the same time; the volume is read and written once for each."""
+BATCH_BYTES = 1 << 30
+"""Of resampled images in memory at the same time; the volume is read and written once for each batch."""
 
 Exposure = Sequence[NDArray[np.float32]]
 
@@ -51,7 +51,8 @@ def mean_line_of_sight(
     check_volume(mean, plan, (np.float32,))
     mean.fill(0)
     count, coming = 0, iter(exposures)
-    while batch := [plan.bind(plan.resample(images, threads)) for images in islice(coming, BATCH)]:
+    batch_size = max(1, BATCH_BYTES // plan.resampled_bytes)
+    while batch := [plan.bind(plan.resample(images, threads)) for images in islice(coming, batch_size)]:
         _native.sum_of_sight(batch, KERNEL_METHOD[method], mean, threads)
         count += len(batch)
     if not count:

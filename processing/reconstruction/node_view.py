@@ -45,13 +45,19 @@ class NodeView:
     image_size_px: tuple[int, int]
     deviation_px: float
 
+    @property
+    def shape_px(self) -> tuple[int, int]:
+        """(rows, columns) of the averaged image with its frame."""
+        width, height = (n // self.binning + FRAME_BEFORE_PX + FRAME_AFTER_PX for n in self.image_size_px)
+        return height, width
+
     def resample(self, image: NDArray[np.float32], threads: int) -> FixedPoint:
         """The image, averaged and framed with zeros."""
         if self.binning > 1:
             height, width = (n // self.binning * self.binning for n in image.shape)
             blocks = image[:height, :width].reshape(height // self.binning, self.binning, -1, self.binning)
             image = blocks.mean(axis=(1, 3), dtype=np.float32)
-        framed = np.empty([n + FRAME_BEFORE_PX + FRAME_AFTER_PX for n in image.shape], np.int16)
+        framed = np.empty(self.shape_px, np.int16)
         return FixedPoint(framed, _native.quantise(image, FRAME_BEFORE_PX, FRAME_AFTER_PX, framed, threads))
 
     def bind(self, image: FixedPoint, *, cull: bool) -> _native.View:

@@ -51,6 +51,11 @@ class Plan:
         """Largest distance between the plan and the mappings it was made from."""
         return max(view.deviation_px for view in self.views)
 
+    @property
+    def resampled_bytes(self) -> int:
+        """Memory that the resampled images of one exposure take."""
+        return sum(2 * view.shape_px[0] * view.shape_px[1] for view in self.views)
+
     def resample(self, images: Sequence[NDArray[np.float32]], threads: int = DEFAULT_THREADS) -> list[FixedPoint]:
         """Bring recorded images into the form that the kernels sample.
 

@@ -30,11 +30,11 @@ def test_it_is_the_mean_of_the_volumes(
     monkeypatch: pytest.MonkeyPatch, isa: str, by_nodes: bool, method: ReconstructionMethod
 ) -> None:
     monkeypatch.setenv("TOMOSHADOW_ISA", isa)
-    monkeypatch.setattr(module, "BATCH", 3)
-    mappings, shots = oracle.cameras(3), exposures(7)
+    mappings, shots = oracle.cameras(3), exposures(17)
     plan = plan_reconstruction(mappings, GRID)
     if by_nodes:
         plan = Plan(GRID, tuple(sample_mapping(mapping, GRID, 0.02) for mapping in mappings))
+    monkeypatch.setattr(module, "BATCH_BYTES", 6 * plan.resampled_bytes)
     expected = np.mean([line_of_sight(plan, images, method) for images in shots], axis=0, dtype=np.float64)
     out = np.full(GRID.shape, 9, np.float32)
     assert mean_line_of_sight(plan, iter(shots), method, out) is out
@@ -51,5 +51,9 @@ def test_what_has_no_mean_is_refused() -> None:
     plan = plan_reconstruction(oracle.cameras(3), GRID)
     with pytest.raises(ValueError, match="a mean needs one exposure or more"):
         mean_line_of_sight(plan, [])
+    other = plan_reconstruction(oracle.cameras(3), GRID)
+    views = [each.bind(each.resample(exposures(1)[0])) for each in (plan, other)]
+    with pytest.raises(ValueError, match="exposures must be of the same views"):
+        _native.sum_of_sight(views, 2, np.zeros(GRID.shape, np.float32), 1)
     with pytest.raises(ValueError, match="smart is not a line-of-sight method"):
         mean_line_of_sight(plan, exposures(1), ReconstructionMethod.SMART)

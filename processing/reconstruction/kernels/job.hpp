@@ -20,17 +20,22 @@ constexpr int smart_rows = 8;   // ... and for SMART, whose blocks come and go w
 // SMART works through a slab tile by tile: what the views see of a tile stays in the nearest cache for all its planes.
 constexpr int smart_planes = 16, smart_columns = 128;
 
+// Rows and columns of an image, ends included.
+struct PixelBox {
+    int top, bottom, left, right;
+};
+
 // Where an image is not zero: sums[y][x] counts the cells above y and left of x in which any pixel is not zero, so that
 // four of them tell whether a box of any size is empty.
 struct Occupancy {
     static constexpr int cell_rows = 4, cell_columns = 8;
     const int32_t *sums;  // null: nobody looked
     int columns;
-    bool any(int first_row, int last_row, int first_column, int last_column) const {
+    bool any(const PixelBox &box) const {
         if (!sums) return true;
-        const int32_t *top = sums + static_cast<int64_t>(first_row / cell_rows) * columns;
-        const int32_t *bottom = sums + static_cast<int64_t>(last_row / cell_rows + 1) * columns;
-        const int left = first_column / cell_columns, right = last_column / cell_columns + 1;
+        const int32_t *top = sums + static_cast<int64_t>(box.top / cell_rows) * columns;
+        const int32_t *bottom = sums + static_cast<int64_t>(box.bottom / cell_rows + 1) * columns;
+        const int left = box.left / cell_columns, right = box.right / cell_columns + 1;
         return bottom[right] - bottom[left] != top[right] - top[left];
     }
 };
@@ -63,7 +68,7 @@ struct LineOfSight {
     void *volume;
 };
 
-// The sum of many exposures of the same views: views[exposure * n_views + i].
+// The sum of many exposures of the same views, which share their geometry: views[exposure * n_views + i].
 struct SumOfSight {
     const View *views;
     int n_views, n_exposures;

@@ -6,6 +6,7 @@
 #include "preprocess.hpp"
 #include "ratios.hpp"
 #include "resample.hpp"
+#include "sight.hpp"
 #include "smart.hpp"
 
 #define TOMOSHADOW_TEXT_(name) #name
@@ -14,40 +15,33 @@
 namespace tomoshadow::TOMOSHADOW_ISA {
 namespace {
 
-inline void see(const View *views, int n_views, Method method, const SlabTaps &slab, const Tile &tile, Block &block) {
-    if (method == Method::minimum)
-        sample_minimum(views, n_views, slab.taps, tile, block);
-    else
-        sample_product(views, every_view, n_views, slab.taps, tile, block);
-    if (method == Method::geometric_mean) take_root(block, tile.rows, n_views);
-}
-
 void line_of_sight(const LineOfSight &job, int slab) {
     const FlushSubnormals flush;
     const int nx = job.shape.nx, y0 = slab * sight_rows, rows = smaller(sight_rows, job.shape.ny - y0);
-    SlabTaps slab_taps(job.views, job.n_views, nx, y0, rows, 2);
-    Staging staging(job.format, nx, rows);
+    const Exposures exposure{job.views, job.n_views, 1, job.method};
+    PlaneStack planes(job.views, job.n_views, nx, y0, rows);
+    Staging banks[2] = {{job.format, nx, rows, planes.depth()}, {job.format, nx, rows, planes.depth()}};
+    Drain drain;
+    const int64_t piece = static_cast<int64_t>(bytes_of(job.format)) * rows * block_columns;
     Block block;
-    for (int z = 0; z < job.shape.nz; ++z) {
-        slab_taps.set(z);
-        for (int x0 = 0; x0 < nx; x0 += block_columns) {
-            const Tile tile{z, y0, rows, x0};
-            if (!occupied(job.views, job.n_views, slab_taps, tile)) {
-                staging.put_zeros(tile);
-                continue;
+    const auto take = [&](int row, int column, Floats values) { store(block.rows[row] + column, values); };
+    for (int z0 = 0, bank = 0; z0 < job.shape.nz; z0 += planes.depth(), bank = 1 - bank) {
+        const int z_end = smaller(z0 + planes.depth(), job.shape.nz);
+        planes.set(z0, z_end);
+        for (int x0 = 0; x0 < nx; x0 += block_columns)
+            for (int z = z0; z < z_end; ++z) {
+                const Tile tile{z, y0, rows, x0};
+                if (see(exposure, planes.plane(z - z0), tile, take))
+                    banks[bank].put(tile, block, z - z0);
+                else
+                    banks[bank].put_zeros(tile, z - z0);
+                drain.write(piece);
             }
-            see(job.views, job.n_views, job.method, slab_taps, tile, block);
-            staging.put(tile, block);
-        }
-        staging.write(job.shape, z, y0, rows, job.volume);
+        drain.finish();
+        drain = Drain(banks[bank], job.shape, z0, z_end, y0, job.volume);
     }
+    drain.finish();
     finish_streams();
-}
-
-inline void add(Block &sum, const Block &block, int rows) {
-    for (int row = 0; row < rows; ++row)
-        for (int k = 0; k < block_columns; k += lanes)
-            store(sum.rows[row] + k, load<Floats>(sum.rows[row] + k) + load<Floats>(block.rows[row] + k));
 }
 
 inline void add_to_volume(const SumOfSight &job, const Tile &tile, const Block &sum) {
@@ -57,34 +51,43 @@ inline void add_to_volume(const SumOfSight &job, const Tile &tile, const Block &
     }
 }
 
-// A few planes at a time, whose sums stay in the cache while exposure after exposure is added.
+// The sums of a few blocks of columns, through all planes of a stack, stay in the cache while exposure after exposure
+// is added; a few exposures at a time share what is known of the geometry.
+struct SumTile {
+    static constexpr int blocks = 16;
+    int z0, depth, x0, x_end;
+};
+
+inline void add_exposures(const SumOfSight &job, const PlaneStack &planes, const SumTile &over, int y0, int rows, Block *sums) {
+    for (int n = 0; n < job.n_exposures; n += most_at_once) {
+        const Exposures some{job.views + static_cast<int64_t>(n) * job.n_views, job.n_views,
+                             smaller(most_at_once, job.n_exposures - n), job.method};
+        Block *sum = sums;
+        for (int x0 = over.x0; x0 < over.x_end; x0 += block_columns)
+            for (int plane = 0; plane < over.depth; ++plane, ++sum)
+                see(some, planes.plane(plane), {over.z0 + plane, y0, rows, x0}, [&](int row, int column, Floats values) {
+                    store(sum->rows[row] + column, load<Floats>(sum->rows[row] + column) + values);
+                });
+    }
+}
+
 void sum_of_sight(const SumOfSight &job, int slab) {
     const FlushSubnormals flush;
-    const int nx = job.shape.nx, nz = job.shape.nz, y0 = slab * sight_rows, rows = smaller(sight_rows, job.shape.ny - y0);
-    constexpr int planes = 16;
-    const int across = (nx + block_columns - 1) / block_columns;
-    const Memory memory(static_cast<int64_t>(sizeof(Block)) * planes * across);
-    Block *const sums = memory.as<Block>();
-    Block block;
-    for (int z0 = 0; z0 < nz; z0 += planes) {
-        const int z_end = smaller(z0 + planes, nz);
-        std::memset(static_cast<void *>(sums), 0, sizeof(Block) * static_cast<size_t>(planes * across));
-        for (int n = 0; n < job.n_exposures; ++n) {
-            const View *views = job.views + static_cast<int64_t>(n) * job.n_views;
-            SlabTaps slab_taps(views, job.n_views, nx, y0, rows, 2);
-            for (int z = z0; z < z_end; ++z) {
-                slab_taps.set(z);
-                for (int column = 0; column < across; ++column) {
-                    const Tile tile{z, y0, rows, column * block_columns};
-                    if (!occupied(views, job.n_views, slab_taps, tile)) continue;
-                    see(views, job.n_views, job.method, slab_taps, tile, block);
-                    add(sums[(z - z0) * across + column], block, rows);
-                }
-            }
+    const int nx = job.shape.nx, y0 = slab * sight_rows, rows = smaller(sight_rows, job.shape.ny - y0);
+    PlaneStack planes(job.views, job.n_views, nx, y0, rows);
+    const int64_t bytes = static_cast<int64_t>(sizeof(Block)) * planes.depth() * SumTile::blocks;
+    const Memory sums(bytes);
+    for (int z0 = 0; z0 < job.shape.nz; z0 += planes.depth()) {
+        const int depth = smaller(planes.depth(), job.shape.nz - z0);
+        planes.set(z0, z0 + depth);
+        for (int first = 0; first < nx; first += SumTile::blocks * block_columns) {
+            const SumTile over{z0, depth, first, smaller(nx, first + SumTile::blocks * block_columns)};
+            std::memset(sums.as<void>(), 0, static_cast<size_t>(bytes));
+            add_exposures(job, planes, over, y0, rows, sums.as<Block>());
+            const Block *sum = sums.as<Block>();
+            for (int x0 = over.x0; x0 < over.x_end; x0 += block_columns)
+                for (int plane = 0; plane < depth; ++plane) add_to_volume(job, {z0 + plane, y0, rows, x0}, *sum++);
         }
-        for (int z = z0; z < z_end; ++z)
-            for (int column = 0; column < across; ++column)
-                add_to_volume(job, {z, y0, rows, column * block_columns}, sums[(z - z0) * across + column]);
     }
 }
 

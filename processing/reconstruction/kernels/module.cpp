@@ -123,6 +123,12 @@ std::vector<View> views_on(const std::vector<const BoundView *> &bound, const Sh
     return views;
 }
 
+// Kernels look up once where the views of all exposures see a voxel.
+bool same_geometry(const View &a, const View &b) {
+    return a.rows == b.rows && a.columns == b.columns && a.scale == b.scale && a.shift_u == b.shift_u &&
+           a.shift_v == b.shift_v && a.nodes == b.nodes && a.spacing == b.spacing;
+}
+
 template <class Array>
 Shape shape_of(const Array &volume) {
     require(volume.size() > 0, "volume: empty");
@@ -162,7 +168,11 @@ void sum_of_sight(const std::vector<std::vector<const BoundView *>> &exposures, 
     std::vector<View> views;
     for (const auto &bound : exposures) {
         require(bound.size() == exposures[0].size(), "exposures differ in their number of views");
-        for (const View &view : views_on(bound, shape, threads)) views.push_back(view);
+        for (const View &view : views_on(bound, shape, threads)) {
+            require(same_geometry(view, views.size() < bound.size() ? view : views[views.size() % bound.size()]),
+                    "exposures must be of the same views");
+            views.push_back(view);
+        }
     }
     const SumOfSight job{views.data(), static_cast<int>(exposures[0].size()), static_cast<int>(exposures.size()),
                          shape,        static_cast<Method>(method),           volume.data()};

@@ -80,46 +80,82 @@ inline void finish_streams() {
 #endif
 }
 
-// The rows of a slab in one plane, which lie side by side in the volume; whole blocks may overhang the last one.
+// The rows of a slab in a few planes, which lie side by side in the volume; whole blocks may overhang the last one.
 class Staging {
 public:
-    Staging(Format format, int nx, int rows)
+    Staging(Format format, int nx, int rows, int planes = 1)
         : format_(format),
           nx_(nx),
-          memory_(bytes_of(format) * static_cast<int64_t>(nx) * rows),
-          empty_(nx / block_columns + 1) {
-        std::memset(empty_.as<bool>(), true, static_cast<size_t>(nx / block_columns + 1));
+          blocks_(nx / block_columns + 1),
+          bytes_(bytes_of(format) * static_cast<int64_t>(nx) * rows),
+          memory_(bytes_ * planes),
+          empty_(static_cast<int64_t>(blocks_) * planes) {
+        std::memset(empty_.as<bool>(), true, static_cast<size_t>(blocks_) * static_cast<size_t>(planes));
     }
 
-    void put(const Tile &tile, const Block &block) {
-        empty_.as<bool>()[tile.x0 / block_columns] = false;
+    void put(const Tile &tile, const Block &block, int plane = 0) {
+        empty(tile, plane) = false;
         const int columns = smaller(block_columns, nx_ - tile.x0);
         for (int row = 0; row < tile.rows; ++row) {
             const int64_t at = static_cast<int64_t>(row) * nx_ + tile.x0;
             if (columns == block_columns)
-                store_values(format_, memory_.as<void>(), at, block.rows[row], block_columns);
+                store_values(format_, start(plane), at, block.rows[row], block_columns);
             else
-                store_values(format_, memory_.as<void>(), at, block.rows[row], columns);
+                store_values(format_, start(plane), at, block.rows[row], columns);
         }
     }
-    void put_zeros(const Tile &tile) {
-        bool &empty = empty_.as<bool>()[tile.x0 / block_columns];
-        if (empty) return;
-        empty = true;
+    void put_zeros(const Tile &tile, int plane = 0) {
+        if (empty(tile, plane)) return;
+        empty(tile, plane) = true;
         const int64_t size = bytes_of(format_), columns = smaller(block_columns, nx_ - tile.x0);
         for (int row = 0; row < tile.rows; ++row)
-            std::memset(memory_.as<uint8_t>() + size * (static_cast<int64_t>(row) * nx_ + tile.x0), 0,
-                        static_cast<size_t>(size * columns));
+            std::memset(start(plane) + size * (static_cast<int64_t>(row) * nx_ + tile.x0), 0, static_cast<size_t>(size * columns));
     }
-    void write(const Shape &shape, int z, int y0, int rows, void *volume) const {
-        const int64_t size = bytes_of(format_), at = (static_cast<int64_t>(z) * shape.ny + y0) * nx_;
-        stream(static_cast<uint8_t *>(volume) + size * at, memory_.as<void>(), size * rows * nx_);
+    void write(const Shape &shape, int z, int y0, void *volume, int plane = 0) const {
+        stream(target(shape, z, y0, volume), start(plane), bytes_);
     }
 
+    uint8_t *start(int plane) const { return memory_.as<uint8_t>() + bytes_ * plane; }
+    uint8_t *target(const Shape &shape, int z, int y0, void *volume) const {
+        return static_cast<uint8_t *>(volume) + bytes_of(format_) * (static_cast<int64_t>(z) * shape.ny + y0) * nx_;
+    }
+    int64_t bytes() const { return bytes_; }
+
 private:
+    bool &empty(const Tile &tile, int plane) const { return empty_.as<bool>()[plane * blocks_ + tile.x0 / block_columns]; }
+
     Format format_;
-    int nx_;
+    int nx_, blocks_;
+    int64_t bytes_;  // of a plane
     Memory memory_, empty_;  // empty_: whether a block of columns is zero already
+};
+
+// Writes finished planes piece by piece while others are computed, so that nobody waits for the memory.
+class Drain {
+public:
+    Drain() = default;
+    Drain(const Staging &staging, const Shape &shape, int z0, int z_end, int y0, void *volume)
+        : staging_(&staging), shape_(shape), z_(z0), z0_(z0), z_end_(z_end), y0_(y0), volume_(volume) {}
+    void write(int64_t bytes) {
+        while (bytes > 0 && z_ < z_end_) {
+            uint8_t *to = staging_->target(shape_, z_, y0_, volume_) + done_;
+            int64_t count = bytes + (-reinterpret_cast<int64_t>(to + bytes) & 63);  // up to the next cache line
+            const int64_t left = staging_->bytes() - done_;
+            if (count > left) count = left;
+            stream(to, staging_->start(z_ - z0_) + done_, count);
+            bytes -= count;
+            done_ += count;
+            if (done_ == staging_->bytes()) ++z_, done_ = 0;
+        }
+    }
+    void finish() { write(staging_ ? staging_->bytes() * (z_end_ - z_) : 0); }
+
+private:
+    const Staging *staging_ = nullptr;
+    Shape shape_{};
+    int z_ = 0, z0_ = 0, z_end_ = 0, y0_ = 0;
+    void *volume_ = nullptr;
+    int64_t done_ = 0;  // bytes of plane z_
 };
 
 }  // namespace

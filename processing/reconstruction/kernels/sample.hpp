@@ -31,9 +31,10 @@ inline void combine(float *at, Floats seen, float factor) {
     store(at, seen);
 }
 
-// Rows of an image between which the rows of a tile are seen, and the weight of the lower one.
+// Rows of an image between which the rows of a tile are seen: where the upper one starts, and the weight of the lower
+// one. The same for all images of a view.
 struct RowTaps {
-    const int16_t *above[sight_rows];
+    int32_t above[sight_rows];
     int32_t weight[sight_rows];
     int first_row;
 };
@@ -44,7 +45,7 @@ inline RowTaps row_taps(const View &view, int z, int y0, int rows) {
         const double position = view.scale[z] * (y0 + row) + view.shift_v[z];
         const int at = static_cast<int>(position);
         if (row == 0) taps.first_row = at;
-        taps.above[row] = view.pixels + static_cast<int64_t>(at) * view.columns;
+        taps.above[row] = at * view.columns;
         taps.weight[row] = vertical_weight(static_cast<float>(position - at));
     }
     return taps;
@@ -69,11 +70,11 @@ inline void sample_shared(const View &view, const RowTaps &rows, const Tile &til
     const double scale = view.scale[tile.z], start = scale * tile.x0 + view.shift_u[tile.z];
     const int first = static_cast<int>(start);
     const Taps left = taps_from(first, start, scale), right = taps_from(first, start + scale * lanes, scale);
-    const int16_t *above = rows.above[0];
+    const int16_t *above = view.pixels + rows.above[0];
     Window top = _mm512_loadu_si512(above + first), bottom = _mm512_loadu_si512(above + view.columns + first);
     for (int row = 0; row < tile.rows; ++row) {
-        if (rows.above[row] != above) {
-            above = rows.above[row];
+        if (view.pixels + rows.above[row] != above) {
+            above = view.pixels + rows.above[row];
             top = bottom;
             bottom = _mm512_loadu_si512(above + view.columns + first);
         }
@@ -92,7 +93,7 @@ inline void sample_windows(const View &view, const RowTaps &rows, const Tile &ti
     Taps taps[parts];
     for (int part = 0; part < parts; ++part) taps[part] = taps_at(start + scale * lanes * part, scale);
     for (int row = 0; row < tile.rows; ++row) {
-        const int16_t *above = rows.above[row], *below = above + view.columns;
+        const int16_t *above = view.pixels + rows.above[row], *below = above + view.columns;
         for (int part = 0; part < parts; ++part) {
             const Window window = blend(above, below, rows.weight[row], taps[part]);
             combine<how>(block.rows[row] + part * lanes, pick(window, taps[part]), factor);

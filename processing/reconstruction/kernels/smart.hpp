@@ -298,7 +298,7 @@ void write_blocks(const Shape &shape, int slab, const BlockList &blocks, float u
             decode(blocks.values + found * block_size, unit, block);
             staging.put(tile, block);
         }
-        staging.write(shape, z, y0, rows, volume);
+        staging.write(shape, z, y0, volume);
     }
     finish_streams();
 }

@@ -25,9 +25,15 @@ inline Ints horizontal_weights(Floats fraction) {
 }
 
 #if defined(__AVX512BW__)
+constexpr double max_shared_scale = 0.967;  // two vectors of voxels then see no more than 32 pixels, which is one window
+#else
+constexpr double max_shared_scale = 0.0;
+#endif
+constexpr bool may_share_window = max_shared_scale > 0.0;
+
+#if defined(__AVX512BW__)
 
 using Window = __m512i;
-constexpr double max_shared_scale = 0.967;  // two vectors of voxels then see no more than 32 pixels
 
 struct Taps {
     int first;

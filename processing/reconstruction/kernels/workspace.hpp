@@ -84,27 +84,71 @@ private:
     Memory lines_;
 };
 
-// A box of pixels around all samples of a tile.
-inline bool sees_anything(const View &view, const PlaneTaps &taps, const Tile &tile) {
-    if (!view.occupancy.sums) return true;
+// The same for a few planes at once, for kernels that go through the planes of a column of blocks: neighbouring planes
+// see almost the same pixels. Mappings by nodes need much memory for each plane, and get fewer.
+class PlaneStack {
+public:
+    static constexpr int rectified_depth = 8, mapped_depth = 4;
+    PlaneStack(const View *views, int n_views, int nx, int y0, int rows)
+        : views_(views),
+          n_views_(n_views),
+          y0_(y0),
+          rows_(rows),
+          line_floats_(floats_of_lines(views, n_views, nx, rows * channels)),
+          depth_(line_floats_ ? mapped_depth : rectified_depth),
+          lines_(4 * line_floats_ * depth_),
+          taps_(static_cast<int64_t>(sizeof(PlaneTaps)) * depth_ * n_views) {
+        for (int plane = 0; plane < depth_; ++plane) {
+            float *lines = lines_.as<float>() + line_floats_ * plane;
+            for (int i = 0; i < n_views; ++i) {
+                PlaneTaps &taps = taps_.as<PlaneTaps>()[plane * n_views + i];
+                taps.lines = lines;
+                taps.line_length = views[i].nodes ? line_length(views[i], nx) : 0;
+                taps.channels = channels;
+                lines += static_cast<int64_t>(rows) * channels * taps.line_length;
+            }
+        }
+    }
+    int depth() const { return depth_; }
+    void set(int z0, int z_end) {
+        for (int z = z0; z < z_end; ++z)
+            for (int i = 0; i < n_views_; ++i)
+                set_plane(views_[i], z, y0_, rows_, taps_.as<PlaneTaps>()[(z - z0) * n_views_ + i]);
+    }
+    const PlaneTaps *plane(int number) const { return taps_.as<PlaneTaps>() + number * n_views_; }
+
+private:
+    static constexpr int channels = 2;
+    const View *views_;
+    int n_views_, y0_, rows_;
+    int64_t line_floats_;
+    int depth_;
+    Memory lines_, taps_;
+};
+
+// A box of pixels around all samples of a tile, the same for all images of a view.
+inline PixelBox box_around(const View &view, const PlaneTaps &taps, const Tile &tile) {
     if (!view.nodes) {
         const double scale = view.scale[tile.z];
         const int column = static_cast<int>(scale * tile.x0 + view.shift_u[tile.z]), row = taps.rows.first_row;
-        return view.occupancy.any(row, row + static_cast<int>(scale * (tile.rows - 1)) + 2, column,
-                                  column + static_cast<int>(scale * (block_columns - 1)) + 2);
+        return {row, row + static_cast<int>(scale * (tile.rows - 1)) + 2, column,
+                column + static_cast<int>(scale * (block_columns - 1)) + 2};
     }
     const Clamp last(view);
     const Extent u = extent_of(taps, 0, tile, view.spacing), v = extent_of(taps, 1, tile, view.spacing);
     const auto pixel = [](float at, float limit) { return static_cast<int>(Clamp::between(at, limit)); };
-    return view.occupancy.any(pixel(v.least, last.v), pixel(v.most, last.v) + 1, pixel(u.least, last.u),
-                              pixel(u.most, last.u) + 1);
+    return {pixel(v.least, last.v), pixel(v.most, last.v) + 1, pixel(u.least, last.u), pixel(u.most, last.u) + 1};
 }
 
 // Whether all views may see something in the tile: if not, the product and the minimum are zero.
-inline bool occupied(const View *views, int n_views, const SlabTaps &slab, const Tile &tile) {
+inline bool occupied(const View *views, int n_views, const PlaneTaps *taps, const Tile &tile) {
     for (int i = 0; i < n_views; ++i)
-        if (!sees_anything(views[i], slab.taps[i], tile)) return false;
+        if (views[i].occupancy.sums && !views[i].occupancy.any(box_around(views[i], taps[i], tile))) return false;
     return true;
+}
+
+inline bool occupied(const View *views, int n_views, const SlabTaps &slab, const Tile &tile) {
+    return occupied(views, n_views, slab.taps, tile);
 }
 
 }  // namespace

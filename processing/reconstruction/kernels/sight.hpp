@@ -1,0 +1,161 @@
+// What a tile is in all exposures: of two to four rectified views at once, row by row in registers; of others view
+// by view.
+#pragma once
+
+#include "output.hpp"
+
+namespace tomoshadow::TOMOSHADOW_ISA {
+namespace {
+
+constexpr int parts = block_columns / lanes;
+constexpr int most_at_once = 4;  // exposures whose rows stay in the cache together
+
+// One or more exposures of the same views, which share their geometry.
+struct Exposures {
+    const View *views;  // views[exposure * n_views + i]
+    int n_views, count;
+    Method method;
+    const View *exposure(int e) const { return views + static_cast<int64_t>(e) * n_views; }
+};
+
+// Where the columns of a tile are seen in n views.
+template <int n>
+struct ColumnTaps {
+    Taps taps[n][parts];
+    ColumnTaps(const View *views, const Tile &tile) {
+        for (int i = 0; i < n; ++i) {
+            const double scale = views[i].scale[tile.z], start = scale * tile.x0 + views[i].shift_u[tile.z];
+            for (int part = 0; part < parts; ++part) {
+                const double at = start + scale * lanes * part;
+                taps[i][part] = taps_from(static_cast<int>(scale <= max_shared_scale ? start : at), at, scale);
+            }
+        }
+    }
+};
+
+// From samples to intensities, all views at once; in the same order as sample_product and sample_minimum.
+template <int n, bool minimum>
+struct Combination {
+    float factor[n];
+    explicit Combination(const View *views) {
+        for (int i = 0; i < n; ++i) {
+            factor[i] = views[i].unit * sample_unit;
+            if (!minimum && i % 2 == 0 && i + 1 < n) factor[i] *= views[i + 1].unit * sample_unit;
+        }
+    }
+    Floats add(Floats before, Floats seen, int i) const {
+        if (minimum || i % 2 == 0) seen = seen * factor[i];
+        if (i == 0) return seen;
+        return minimum ? (seen < before ? seen : before) : before * seen;
+    }
+};
+
+// Hand every vector of a tile to take(row, first column, values). With `one_window` all columns of
+// a view are picked from the same window of pixels.
+template <int n, bool minimum, bool one_window, class Take>
+inline void see_rows(const View *views, const PlaneTaps *planes, const ColumnTaps<n> &columns, int rows, const Take &take) {
+    const Combination<n, minimum> combination(views);
+    for (int row = 0; row < rows; ++row) {
+        Floats seen[parts];
+#pragma GCC unroll 4
+        for (int i = 0; i < n; ++i) {
+            const RowTaps &between = planes[i].rows;
+            const int16_t *above = views[i].pixels + between.above[row], *below = above + views[i].columns;
+            Window window;
+#pragma GCC unroll 8
+            for (int part = 0; part < parts; ++part) {
+                const Taps &taps = columns.taps[i][part];
+                if (!one_window || part == 0) window = blend(above, below, between.weight[row], taps);
+                seen[part] = combination.add(seen[part], pick(window, taps), i);
+            }
+        }
+#pragma GCC unroll 8
+        for (int part = 0; part < parts; ++part) take(row, part * lanes, seen[part]);
+    }
+}
+
+// The exposures that may see something in a tile.
+struct Seen {
+    int count = 0, exposures[most_at_once];
+    Seen(const Exposures &from, const PlaneTaps *planes, const Tile &tile) {
+        PixelBox boxes[max_views];
+        int known = 0;
+        for (int e = 0; e < from.count; ++e) {
+            const View *views = from.exposure(e);
+            int i = 0;
+            for (; i < from.n_views; ++i) {
+                if (!views[i].occupancy.sums) continue;
+                for (; known <= i; ++known) boxes[known] = box_around(views[known], planes[known], tile);
+                if (!views[i].occupancy.any(boxes[i])) break;
+            }
+            if (i == from.n_views) exposures[count++] = e;
+        }
+    }
+};
+
+template <int n, class Take>
+inline void see_together(const Exposures &from, const Seen &seen, const PlaneTaps *planes, const Tile &tile, const Take &take) {
+    bool one_window = may_share_window;
+    for (int i = 0; i < n; ++i) one_window = one_window && from.views[i].scale[tile.z] <= max_shared_scale;
+    const ColumnTaps<n> columns(from.views, tile);
+    const bool minimum = from.method == Method::minimum;
+    for (int k = 0; k < seen.count; ++k) {
+        const View *views = from.exposure(seen.exposures[k]);
+        if (one_window && minimum)
+            see_rows<n, true, may_share_window>(views, planes, columns, tile.rows, take);
+        else if (one_window)
+            see_rows<n, false, may_share_window>(views, planes, columns, tile.rows, take);
+        else if (minimum)
+            see_rows<n, true, false>(views, planes, columns, tile.rows, take);
+        else
+            see_rows<n, false, false>(views, planes, columns, tile.rows, take);
+    }
+}
+
+template <class Take>
+inline void see_one_by_one(const Exposures &from, const Seen &seen, const PlaneTaps *planes, const Tile &tile,
+                           const Take &take) {
+    Block block;
+    for (int k = 0; k < seen.count; ++k) {
+        const View *views = from.exposure(seen.exposures[k]);
+        if (from.method == Method::minimum)
+            sample_minimum(views, from.n_views, planes, tile, block);
+        else
+            sample_product(views, every_view, from.n_views, planes, tile, block);
+        for (int row = 0; row < tile.rows; ++row)
+            for (int column = 0; column < block_columns; column += lanes)
+                take(row, column, load<Floats>(block.rows[row] + column));
+    }
+}
+
+template <class Take>
+inline void see_exposures(const Exposures &from, const Seen &seen, const PlaneTaps *planes, const Tile &tile,
+                          const Take &take) {
+    bool rectified = true;
+    for (int i = 0; i < from.n_views; ++i) rectified = rectified && !from.views[i].nodes;
+    if (rectified && from.n_views == 4)
+        see_together<4>(from, seen, planes, tile, take);
+    else if (rectified && from.n_views == 3)
+        see_together<3>(from, seen, planes, tile, take);
+    else if (rectified && from.n_views == 2)
+        see_together<2>(from, seen, planes, tile, take);
+    else
+        see_one_by_one(from, seen, planes, tile, take);
+}
+
+// Hand every vector of the tile in every exposure that may not be empty there to take(row, first column, values).
+// Returns whether there was any.
+template <class Take>
+inline bool see(const Exposures &from, const PlaneTaps *planes, const Tile &tile, const Take &take) {
+    const Seen seen(from, planes, tile);
+    if (!seen.count) return false;
+    if (from.method == Method::geometric_mean)
+        see_exposures(from, seen, planes, tile,
+                      [&](int row, int column, Floats values) { take(row, column, root(values, from.n_views)); });
+    else
+        see_exposures(from, seen, planes, tile, take);
+    return true;
+}
+
+}  // namespace
+}  // namespace tomoshadow::TOMOSHADOW_ISA
