@@ -54,13 +54,19 @@ def line_of_sight(
     ValueError
         Images or ``out`` do not fit the plan, or the method is an iterative one.
     """
-    if method not in KERNEL_METHOD:
-        raise ValueError(f"{method.value} is not a line-of-sight method: {[m.value for m in KERNEL_METHOD]}")
+    number = kernel_method(method)
     volume = np.empty(plan.grid.shape, dtype=np.float32) if out is None else out
     check_volume(volume, plan, (np.float32, np.float16, np.uint8))
     views = plan.bind(plan.resample(images, threads))
-    _native.line_of_sight(views, KERNEL_METHOD[method], volume, threads)
+    _native.line_of_sight(views, number, volume, threads)
     return volume
+
+
+def kernel_method(method: ReconstructionMethod) -> int:
+    """Number of a method for the kernels; raise ValueError for an iterative one."""
+    if method not in KERNEL_METHOD:
+        raise ValueError(f"{method.value} is not a line-of-sight method: {[m.value for m in KERNEL_METHOD]}")
+    return KERNEL_METHOD[method]
 
 
 def check_volume(volume: NDArray[Any], plan: Plan, dtypes: tuple[type, ...]) -> None:

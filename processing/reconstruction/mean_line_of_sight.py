@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from processing.reconstruction.kernels import _native
-from processing.reconstruction.line_of_sight import DEFAULT_THREADS, KERNEL_METHOD, check_volume
+from processing.reconstruction.line_of_sight import DEFAULT_THREADS, check_volume, kernel_method
 from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.plan import Plan
 
@@ -45,15 +45,14 @@ def mean_line_of_sight(
     ValueError
         There is no exposure, images or ``out`` do not fit the plan, or the method is an iterative one.
     """
-    if method not in KERNEL_METHOD:
-        raise ValueError(f"{method.value} is not a line-of-sight method: {[m.value for m in KERNEL_METHOD]}")
+    number = kernel_method(method)
     mean = np.empty(plan.grid.shape, np.float32) if out is None else out
     check_volume(mean, plan, (np.float32,))
     mean.fill(0)
     count, coming = 0, iter(exposures)
     batch_size = max(1, BATCH_BYTES // plan.resampled_bytes)
     while batch := [plan.bind(plan.resample(images, threads)) for images in islice(coming, batch_size)]:
-        _native.sum_of_sight(batch, KERNEL_METHOD[method], mean, threads)
+        _native.sum_of_sight(batch, number, mean, threads)
         count += len(batch)
     if not count:
         raise ValueError("a mean needs one exposure or more")

@@ -63,10 +63,22 @@ struct LineOfSight {
     const View *views;
     int n_views;
     Shape shape;
+    int first_row;  // of the grid, in the volume: which may be a part of its rows
     Method method;
     Format format;
     void *volume;
 };
+
+// The same, but only blocks of which a voxel exceeds `floor` are kept, in float16: values are (sight_rows, block_columns),
+// zero beyond the volume.
+struct SparseSight {
+    const View *views;
+    int n_views;
+    Shape shape;
+    Method method;
+    float floor;
+};
+using KeepBrick = void (*)(void *owner, int z, int x0, const uint16_t *values);
 
 // The sum of many exposures of the same views, which share their geometry: views[exposure * n_views + i].
 struct SumOfSight {
@@ -141,6 +153,7 @@ struct Resampling {
 struct Kernels {
     const char *name;
     void (*line_of_sight)(const LineOfSight &job, int slab);
+    void (*sparse_sight)(const SparseSight &job, int slab, KeepBrick keep, void *owner);
     void (*sum_of_sight)(const SumOfSight &job, int slab);
     void (*smart_start)(const SmartStart &job, int slab, KeepBlock keep, void *owner);
     void (*smart_pass)(const SmartPass &job, int slab, const BlockList &blocks, const Projection *projections);

@@ -19,7 +19,7 @@ void line_of_sight(const LineOfSight &job, int slab) {
     const FlushSubnormals flush;
     const int nx = job.shape.nx, y0 = slab * sight_rows, rows = smaller(sight_rows, job.shape.ny - y0);
     const Exposures exposure{job.views, job.n_views, 1, job.method};
-    PlaneStack planes(job.views, job.n_views, nx, y0, rows);
+    PlaneStack planes(job.views, job.n_views, nx, job.first_row + y0, rows);
     Staging banks[2] = {{job.format, nx, rows, planes.depth()}, {job.format, nx, rows, planes.depth()}};
     Drain drain;
     const int64_t piece = static_cast<int64_t>(bytes_of(job.format)) * rows * block_columns;
@@ -30,7 +30,7 @@ void line_of_sight(const LineOfSight &job, int slab) {
         planes.set(z0, z_end);
         for (int x0 = 0; x0 < nx; x0 += block_columns)
             for (int z = z0; z < z_end; ++z) {
-                const Tile tile{z, y0, rows, x0};
+                const Tile tile{z, job.first_row + y0, rows, x0};
                 if (see(exposure, planes.plane(z - z0), tile, take))
                     banks[bank].put(tile, block, z - z0);
                 else
@@ -42,6 +42,36 @@ void line_of_sight(const LineOfSight &job, int slab) {
     }
     drain.finish();
     finish_streams();
+}
+
+inline bool any_above(const Block &block, const Tile &tile, int columns, float floor) {
+    int32_t any = 0;
+    for (int row = 0; row < tile.rows; ++row)
+        for (int k = 0; k < columns; ++k) any |= block.rows[row][k] > floor;
+    return any != 0;
+}
+
+void sparse_sight(const SparseSight &job, int slab, KeepBrick keep, void *owner) {
+    const FlushSubnormals flush;
+    const int nx = job.shape.nx, y0 = slab * sight_rows, rows = smaller(sight_rows, job.shape.ny - y0);
+    const Exposures exposure{job.views, job.n_views, 1, job.method};
+    PlaneStack planes(job.views, job.n_views, nx, y0, rows);
+    Block block;
+    const auto take = [&](int row, int column, Floats values) { store(block.rows[row] + column, values); };
+    alignas(64) uint16_t brick[sight_rows * block_columns];
+    for (int z0 = 0; z0 < job.shape.nz; z0 += planes.depth()) {
+        const int z_end = smaller(z0 + planes.depth(), job.shape.nz);
+        planes.set(z0, z_end);
+        for (int x0 = 0; x0 < nx; x0 += block_columns)
+            for (int z = z0; z < z_end; ++z) {
+                const Tile tile{z, y0, rows, x0};
+                const int columns = smaller(block_columns, nx - x0);
+                if (!see(exposure, planes.plane(z - z0), tile, take) || !any_above(block, tile, columns, job.floor)) continue;
+                std::memset(brick, 0, sizeof brick);
+                for (int row = 0; row < rows; ++row) store_halves(brick + row * block_columns, block.rows[row], columns);
+                keep(owner, z, x0, brick);
+            }
+    }
 }
 
 inline void add_to_volume(const SumOfSight &job, const Tile &tile, const Block &sum) {
@@ -95,7 +125,7 @@ void sum_of_sight(const SumOfSight &job, int slab) {
 
 extern const Kernels kernels;
 const Kernels kernels{
-    TOMOSHADOW_TEXT(TOMOSHADOW_ISA), line_of_sight, sum_of_sight, smart_start, smart_pass, write_blocks, correct, resample,
-    brightest, quantise, row_minima, column_minima, row_means, subtract_veil};
+    TOMOSHADOW_TEXT(TOMOSHADOW_ISA), line_of_sight, sparse_sight, sum_of_sight, smart_start, smart_pass, write_blocks, correct,
+    resample, brightest, quantise, row_minima, column_minima, row_means, subtract_veil};
 
 }  // namespace tomoshadow::TOMOSHADOW_ISA

@@ -45,6 +45,22 @@ inline Floats lane_numbers() {
     return lane;
 }
 
+// a b + c, rounded once wherever the instruction set can: the same bits in every kernel, however compilers arrange it.
+inline Floats multiply_add(Floats a, Floats b, Floats c) {
+#if defined(__AVX512F__)
+    return reinterpret_cast<Floats>(
+        _mm512_fmadd_ps(reinterpret_cast<__m512>(a), reinterpret_cast<__m512>(b), reinterpret_cast<__m512>(c)));
+#elif defined(__FMA__)
+    return reinterpret_cast<Floats>(
+        _mm256_fmadd_ps(reinterpret_cast<__m256>(a), reinterpret_cast<__m256>(b), reinterpret_cast<__m256>(c)));
+#elif defined(__FP_FAST_FMAF)
+    for (int k = 0; k < lanes; ++k) c[k] = __builtin_fmaf(a[k], b[k], c[k]);
+    return c;
+#else
+    return a * b + c;
+#endif
+}
+
 // Positions of a vector along a row of floats: evenly spaced, not negative, less than two vectors from first to last.
 struct FloatTaps {
     int first;

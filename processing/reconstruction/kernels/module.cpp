@@ -13,6 +13,7 @@
 
 #include "bands.hpp"
 #include "blocks.hpp"
+#include "bricks.hpp"
 #include "images.hpp"
 #include "instruction_set.hpp"
 
@@ -149,22 +150,53 @@ Format format_of(const AnyVolume &volume) {
     return Format::half;
 }
 
-void line_of_sight(const std::vector<const BoundView *> &bound, int method, const AnyVolume &volume, int threads) {
+Method method_of(int number) {
+    require(number >= 0 && number <= 2, "method must be 0, 1 or 2");
+    return static_cast<Method>(number);
+}
+
+void line_of_sight(const std::vector<const BoundView *> &bound, int method, const AnyVolume &volume, int threads,
+                   int first_row, int grid_rows) {
     const Shape shape = shape_of(volume);
-    const auto views = views_on(bound, shape, threads);
-    require(method >= 0 && method <= 2, "method must be 0, 1 or 2");
-    const LineOfSight job{views.data(),    static_cast<int>(views.size()), shape, static_cast<Method>(method),
+    if (!grid_rows) grid_rows = shape.ny;
+    require(first_row >= 0 && first_row <= grid_rows - shape.ny, "volume: more rows than the grid");
+    const auto views = views_on(bound, {shape.nz, grid_rows, shape.nx}, threads);
+    const LineOfSight job{views.data(), static_cast<int>(views.size()), shape, first_row, method_of(method),
                           format_of(volume), volume.data()};
     const Kernels &kernels = selected_kernels();
     nb::gil_scoped_release release;
     run_line_of_sight(kernels, job, threads);
 }
 
+// Memory that numpy frees.
+template <class T, class... Size>
+nb::ndarray<nb::numpy, T> given_away(std::vector<T> &&values, Size... size) {
+    auto *owned = new std::vector<T>(std::move(values));
+    const nb::capsule owner(owned, [](void *memory) noexcept { delete static_cast<std::vector<T> *>(memory); });
+    return nb::ndarray<nb::numpy, T>(owned->data(), {static_cast<size_t>(size)...}, owner);
+}
+
+nb::tuple sparse_sight(const std::vector<const BoundView *> &bound, int method, std::tuple<int, int, int> size, float floor,
+                       int threads) {
+    const Shape shape{std::get<0>(size), std::get<1>(size), std::get<2>(size)};
+    require(shape.nz > 0 && shape.ny > 0 && shape.nx > 0, "volume: empty");
+    const auto views = views_on(bound, shape, threads);
+    const SparseSight job{views.data(), static_cast<int>(views.size()), shape, method_of(method), floor};
+    const Kernels &kernels = selected_kernels();
+    Bricks bricks;
+    {
+        nb::gil_scoped_release release;
+        bricks = bricks_of_sight(kernels, job, threads);
+    }
+    const size_t count = bricks.positions.size() / 3;
+    return nb::make_tuple(given_away(std::move(bricks.positions), count, 3),
+                          given_away(std::move(bricks.values), count, sight_rows, block_columns));
+}
+
 void sum_of_sight(const std::vector<std::vector<const BoundView *>> &exposures, int method, const FloatVolume &volume,
                   int threads) {
     const Shape shape = shape_of(volume);
     require(!exposures.empty(), "one exposure or more, please");
-    require(method >= 0 && method <= 2, "method must be 0, 1 or 2");
     std::vector<View> views;
     for (const auto &bound : exposures) {
         require(bound.size() == exposures[0].size(), "exposures differ in their number of views");
@@ -175,7 +207,7 @@ void sum_of_sight(const std::vector<std::vector<const BoundView *>> &exposures, 
         }
     }
     const SumOfSight job{views.data(), static_cast<int>(exposures[0].size()), static_cast<int>(exposures.size()),
-                         shape,        static_cast<Method>(method),           volume.data()};
+                         shape,        method_of(method),                      volume.data()};
     const Kernels &kernels = selected_kernels();
     nb::gil_scoped_release release;
     run_sum_of_sight(kernels, job, threads);
@@ -350,7 +382,9 @@ NB_MODULE(_native, module) {
     module.def("preprocess", &preprocess_exposure, "pixels"_a, "dark"_a.none(), "background"_a.none(), "full_scale"_a,
                "window"_a, "noise_floor"_a, "out"_a.noconvert(), "threads"_a);
     module.def("sliding_minimum", &sliding_minimum_of, "image"_a, "window"_a, "out"_a.noconvert(), "threads"_a);
-    module.def("line_of_sight", &line_of_sight, "views"_a, "method"_a, "volume"_a, "threads"_a);
+    module.def("line_of_sight", &line_of_sight, "views"_a, "method"_a, "volume"_a, "threads"_a,
+               "first_row"_a = 0, "grid_rows"_a = 0);
+    module.def("sparse_sight", &sparse_sight, "views"_a, "method"_a, "shape"_a, "floor"_a, "threads"_a);
     module.def("sum_of_sight", &sum_of_sight, "exposures"_a, "method"_a, "volume"_a, "threads"_a);
     nb::class_<Blocks>(module, "Blocks")
         .def_static("of_views", &blocks_of_views, "views"_a, "shape"_a, "floor"_a, "most"_a, "threads"_a)

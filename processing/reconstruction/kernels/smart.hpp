@@ -106,8 +106,7 @@ void smart_start(const SmartStart &job, int slab, KeepBlock keep, void *owner) {
             copy(job.volume, job.shape, tile, block);
         } else {
             const PlaneTaps *taps = planes.taps[z % smart_planes];
-            for (int i = 0; i < job.n_views; ++i)
-                if (!sees_anything(job.views[i], taps[i], tile)) return;
+            if (!occupied(job.views, job.n_views, taps, tile)) return;
             sample_product(job.views, every_view, job.n_views, taps, tile, block);
         }
         clear_overhang(block, rows, nx - x0);
@@ -136,6 +135,7 @@ template <int count>
 inline void update_windows(const View *views, float gain, const int *chosen, const PlaneTaps *planes, const Tile &tile, const Updated &to) {
     Taps left[count], right[count];
     const RowTaps *rows[count];
+    const int16_t *pixels[count];
     int64_t columns[count];
     for (int n = 0; n < count; ++n) {
         const View &view = views[chosen[n]];
@@ -144,6 +144,7 @@ inline void update_windows(const View *views, float gain, const int *chosen, con
         left[n] = taps_from(first, start, scale);
         right[n] = taps_from(first, start + scale * lanes, scale);
         rows[n] = &planes[chosen[n]].rows;
+        pixels[n] = view.pixels;
         columns[n] = view.columns;
     }
     float factor[(count + 1) / 2 + 1];
@@ -154,7 +155,7 @@ inline void update_windows(const View *views, float gain, const int *chosen, con
         Floats near = load_halves(to.values + row * block_columns), far = load_halves(to.values + row * block_columns + lanes);
 #pragma GCC unroll 4
         for (int n = 0; n < count; ++n) {
-            const int16_t *above = rows[n]->above[row], *below = above + columns[n];
+            const int16_t *above = pixels[n] + rows[n]->above[row], *below = above + columns[n];
             const Window window = blend(above, below, rows[n]->weight[row], left[n]);
             if (n % 2 == 0) {
                 near *= factor[n / 2];

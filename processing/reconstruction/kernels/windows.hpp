@@ -20,7 +20,8 @@ inline int32_t vertical_weight(float fraction) {
 }
 
 inline Ints horizontal_weights(Floats fraction) {
-    const Ints right = __builtin_convertvector(fraction * static_cast<float>(1 << weight_bits) + 0.5f, Ints);
+    const Floats zero{}, rounding = zero + 0.5f;
+    const Ints right = __builtin_convertvector(multiply_add(fraction, zero + static_cast<float>(1 << weight_bits), rounding), Ints);
     return right << 16 | ((1 << weight_bits) - right);
 }
 
@@ -42,7 +43,8 @@ struct Taps {
 
 // Taps of `lanes` voxels seen from `position` on, in the window that starts at column `first`.
 inline Taps taps_from(int first, double position, double scale) {
-    const Floats at = lane_numbers() * static_cast<float>(scale) + static_cast<float>(position - first);
+    const Floats zero{};
+    const Floats at = multiply_add(lane_numbers(), zero + static_cast<float>(scale), zero + static_cast<float>(position - first));
     const Ints left = __builtin_convertvector(at, Ints);
     const Ints weight = horizontal_weights(at - __builtin_convertvector(left, Floats));
     return {first, reinterpret_cast<__m512i>(left | (left + 1) << 16), reinterpret_cast<__m512i>(weight)};
@@ -70,7 +72,8 @@ struct Taps {
 };
 
 inline Taps taps_from(int first, double position, double scale) {
-    const Floats at = lane_numbers() * static_cast<float>(scale) + static_cast<float>(position - first);
+    const Floats zero{};
+    const Floats at = multiply_add(lane_numbers(), zero + static_cast<float>(scale), zero + static_cast<float>(position - first));
     const Ints left = __builtin_convertvector(at, Ints);
     const Ints start = {left[0], left[0], left[0], left[0], left[4], left[4], left[4], left[4]};
     const Ints bytes = (left - start) * 0x02020202 + 0x03020100;
@@ -106,7 +109,8 @@ struct Taps {
 };
 
 inline Taps taps_from(int first, double position, double scale) {
-    const Floats at = lane_numbers() * static_cast<float>(scale) + static_cast<float>(position - first);
+    const Floats zero{};
+    const Floats at = multiply_add(lane_numbers(), zero + static_cast<float>(scale), zero + static_cast<float>(position - first));
     const Ints left = __builtin_convertvector(at, Ints);
     return {first, left, horizontal_weights(at - __builtin_convertvector(left, Floats)) >> 16};
 }

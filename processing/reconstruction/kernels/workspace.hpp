@@ -147,9 +147,5 @@ inline bool occupied(const View *views, int n_views, const PlaneTaps *taps, cons
     return true;
 }
 
-inline bool occupied(const View *views, int n_views, const SlabTaps &slab, const Tile &tile) {
-    return occupied(views, n_views, slab.taps, tile);
-}
-
 }  // namespace
 }  // namespace tomoshadow::TOMOSHADOW_ISA

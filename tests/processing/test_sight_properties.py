@@ -1,0 +1,185 @@
+"""Line of sight equals the textbook for any geometry, on every instruction set, in every form of output."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from processing.geometry import FloatArray, PinholeCamera, ViewMapping, view_camera
+from processing.reconstruction.kernels import _native
+from processing.reconstruction.line_of_sight import line_of_sight
+from processing.reconstruction.mean_line_of_sight import mean_line_of_sight
+from processing.reconstruction.method import ReconstructionMethod
+from processing.reconstruction.node_view import sample_mapping
+from processing.reconstruction.plan import Accuracy, Plan, plan_reconstruction
+from processing.reconstruction.sparse_line_of_sight import slabs_of_sight, sparse_line_of_sight
+from processing.volume import VoxelGrid
+from tests.processing import oracle
+
+METHODS = [ReconstructionMethod.GAVLOS, ReconstructionMethod.MINLOS, ReconstructionMethod.MLOS]
+PITCH_MM = 1 / 60
+Images = list[NDArray[np.float32]]
+
+
+@dataclass(frozen=True)
+class Mirrored:
+    """A central camera that looks into a mirror."""
+
+    camera: PinholeCamera
+
+    @property
+    def image_size_px(self) -> tuple[int, int]:
+        return self.camera.image_size_px
+
+    @property
+    def centre_mm(self) -> FloatArray:
+        return self.camera.centre_mm
+
+    def project(self, points_mm: FloatArray) -> FloatArray:
+        image_px = self.camera.project(points_mm)
+        return np.column_stack([self.image_size_px[0] - 1 - image_px[:, 0], image_px[:, 1]])
+
+
+@st.composite
+def views(draw: st.DrawFn) -> ViewMapping:
+    """Any azimuth, pitch and roll, distortion, and maybe a mirror."""
+    camera = view_camera(
+        draw(st.floats(-60, 60)),
+        focal_length_mm=85,
+        magnification=0.43,
+        scale_px_per_mm=60,
+        image_size_px=(draw(st.integers(70, 120)), draw(st.integers(50, 90))),
+        pitch_deg=draw(st.floats(-15, 15)),
+        roll_deg=draw(st.floats(-180, 180)),
+        distortion=np.array([draw(st.floats(-2, 2)), 0, draw(st.floats(-0.005, 0.005)), 0.003, 0]),
+    )
+    return Mirrored(camera) if draw(st.booleans()) else camera
+
+
+@st.composite
+def cases(draw: st.DrawFn) -> tuple[Plan, Images]:
+    """A plan of 2 to 8 views, rectified or by nodes, and images with empty regions."""
+    shape = (draw(st.integers(1, 12)), draw(st.integers(1, 40)), draw(st.integers(1, 70)))
+    mappings = draw(st.lists(views(), min_size=2, max_size=8))
+    grid = VoxelGrid.centred(shape, PITCH_MM)
+    by_nodes = draw(st.lists(st.booleans(), min_size=len(mappings), max_size=len(mappings)))
+    plan = plan_reconstruction(mappings, grid, draw(st.sampled_from(Accuracy)))
+    mixed = [
+        sample_mapping(mapping, grid, 0.02) if nodes else view
+        for mapping, nodes, view in zip(mappings, by_nodes, plan.views, strict=True)
+    ]
+    rng = np.random.default_rng(draw(st.integers(0, 99)))
+    images = [(0.2 + 0.8 * rng.random(mapping.image_size_px[::-1])).astype(np.float32) for mapping in mappings]
+    for image in images:
+        image[: draw(st.integers(0, 30))] = 0
+        image[:, : draw(st.integers(0, 50))] = 0
+    return Plan(grid, tuple(mixed)), images
+
+
+@contextmanager
+def instruction_set(name: str) -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("TOMOSHADOW_ISA", name)
+        yield
+
+
+def tolerance(method: ReconstructionMethod, count: int) -> float:
+    """Every sample is exact to 1e-4 of the brightest pixel, which is 1."""
+    return 1e-4 * (1 if method is ReconstructionMethod.MINLOS else count)
+
+
+def assert_close(volume: NDArray[Any], expected: FloatArray, method: ReconstructionMethod, count: int) -> None:
+    """Roots are compared by their powers: the root of nearly nothing is sensitive."""
+    power = count if method is ReconstructionMethod.GAVLOS else 1
+    resolution = {"float32": 0.0, "float16": 2.0**-11, "uint8": 0.5 / 255}[volume.dtype.name]
+    values = volume.astype(float) / (255 if volume.dtype == np.uint8 else 1)
+    np.testing.assert_allclose(values**power, expected**power, atol=tolerance(method, count) + power * resolution)
+
+
+@pytest.mark.parametrize("isa", _native.available_isas())
+@settings(max_examples=20, deadline=None)
+@given(case=cases(), method=st.sampled_from(METHODS), dtype=st.sampled_from(["float32", "float16", "uint8"]))
+def test_volumes_equal_the_textbook(
+    isa: str, case: tuple[Plan, Images], method: ReconstructionMethod, dtype: str
+) -> None:
+    plan, images = case
+    expected = oracle.planned_line_of_sight(plan, images, method)
+    with instruction_set(isa):
+        volume = line_of_sight(plan, images, method, np.empty(plan.grid.shape, dtype))
+    assert_close(volume, expected, method, len(images))
+
+
+@pytest.mark.parametrize("isa", _native.available_isas())
+@settings(max_examples=15, deadline=None)
+@given(case=cases(), method=st.sampled_from(METHODS), floor=st.sampled_from([0.0, 0.3]), rows=st.integers(1, 50))
+def test_bricks_slabs_and_means_are_the_same_volume(
+    isa: str, case: tuple[Plan, Images], method: ReconstructionMethod, floor: float, rows: int
+) -> None:
+    plan, images = case
+    with instruction_set(isa):
+        volume = line_of_sight(plan, images, method, np.empty(plan.grid.shape, np.float16))
+        bricks = sparse_line_of_sight(plan, images, method, floor=floor)
+        slabs = np.concatenate([slab.copy() for _, slab in slabs_of_sight(plan, images, method, rows=rows)], axis=1)
+        mean = mean_line_of_sight(plan, [images, images, images], method)
+    dense = bricks.dense()
+    np.testing.assert_array_equal(dense[dense != 0], volume[dense != 0])
+    assert (volume[dense == 0] <= floor).all()
+    np.testing.assert_array_equal(slabs, volume)
+    np.testing.assert_allclose(mean, volume, rtol=2e-3, atol=1e-7)
+
+
+@settings(max_examples=10, deadline=None)
+@given(case=cases(), method=st.sampled_from(METHODS))
+def test_instruction_sets_agree(case: tuple[Plan, Images], method: ReconstructionMethod) -> None:
+    plan, images = case
+    volumes = []
+    for isa in _native.available_isas():
+        with instruction_set(isa):
+            volumes.append(line_of_sight(plan, images, method))
+    for volume in volumes[1:]:
+        assert_close(volume, volumes[0].astype(float), method, len(images))
+
+
+def empty_but(image: NDArray[np.float32], box: Sequence[slice]) -> NDArray[np.float32]:
+    kept = np.zeros_like(image)
+    kept[tuple(box)] = image[tuple(box)]
+    return kept
+
+
+def test_bricks_take_little_memory_and_come_in_any_format() -> None:
+    grid = VoxelGrid.centred((21, 37, 275), PITCH_MM)
+    mappings = oracle.cameras(3)
+    plan = plan_reconstruction(mappings, grid)
+    images = [
+        empty_but(np.ones(m.image_size_px[::-1], np.float32), [slice(120, 150), slice(150, 180)]) for m in mappings
+    ]
+    bricks = sparse_line_of_sight(plan, images)
+    assert 0 < bricks.occupancy < 0.3
+    assert bricks.nbytes < 0.5 * 2 * np.prod(grid.shape)
+    for dtype in ("float32", "float16", "uint8"):
+        out = np.full(grid.shape, 9, dtype)
+        assert bricks.dense(out) is out
+        expected = line_of_sight(plan, images, out=np.empty(grid.shape, dtype))
+        # bricks have float16, whose smallest step is 6e-8; a byte of them is rounded twice
+        np.testing.assert_allclose(out.astype(float), expected, rtol=1e-3, atol=1 if dtype == "uint8" else 6e-8)
+    with pytest.raises(ValueError, match=r"volume has shape \(2, 2, 2\), the bricks are of \(21, 37, 275\)"):
+        bricks.dense(np.zeros((2, 2, 2), np.float16))
+
+
+def test_streams_and_bricks_refuse_what_does_not_fit() -> None:
+    grid, mappings = VoxelGrid.centred((3, 4, 5), PITCH_MM), oracle.cameras(2)
+    plan, images = plan_reconstruction(mappings, grid), [np.ones(m.image_size_px[::-1], np.float32) for m in mappings]
+    with pytest.raises(ValueError, match="slabs of 0 rows"):
+        next(slabs_of_sight(plan, images, rows=0))
+    for make in (sparse_line_of_sight, lambda *given: next(slabs_of_sight(*given))):
+        with pytest.raises(ValueError, match="smart is not a line-of-sight method"):
+            make(plan, images, ReconstructionMethod.SMART)
+    views = plan.bind(plan.resample(images))
+    with pytest.raises(ValueError, match="more rows than the grid"):
+        _native.line_of_sight(views, 2, np.zeros((3, 3, 5), np.float32), 1, 2, 4)
