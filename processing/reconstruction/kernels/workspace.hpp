@@ -55,37 +55,8 @@ inline Extent extent_of(const PlaneTaps &taps, int channel, const Tile &tile, in
     return extent;
 }
 
-// Where all views see the rows of a slab, plane after plane. Channels of nodes: 2 (u, v), or 3 with the area.
-class SlabTaps {
-public:
-    SlabTaps(const View *views, int n_views, int nx, int y0, int rows, int channels)
-        : views_(views),
-          n_views_(n_views),
-          y0_(y0),
-          rows_(rows),
-          lines_(4 * floats_of_lines(views, n_views, nx, rows * channels)) {
-        float *lines = lines_.as<float>();
-        for (int i = 0; i < n_views; ++i) {
-            taps[i].lines = lines;
-            taps[i].line_length = views[i].nodes ? line_length(views[i], nx) : 0;
-            taps[i].channels = channels;
-            lines += static_cast<int64_t>(rows) * channels * taps[i].line_length;
-        }
-    }
-    void set(int z) {
-        for (int i = 0; i < n_views_; ++i) set_plane(views_[i], z, y0_, rows_, taps[i]);
-    }
-
-    PlaneTaps taps[max_views];
-
-private:
-    const View *views_;
-    int n_views_, y0_, rows_;
-    Memory lines_;
-};
-
-// The same for a few planes at once, for kernels that go through the planes of a column of blocks: neighbouring planes
-// see almost the same pixels. Mappings by nodes need much memory for each plane, and get fewer.
+// Where all views see the rows of a slab, in a few planes at once: kernels go through the planes of a column of blocks,
+// because neighbouring planes see almost the same pixels. Mappings by nodes need much memory for each plane, and get fewer.
 class PlaneStack {
 public:
     static constexpr int rectified_depth = 8, mapped_depth = 4;
