@@ -21,7 +21,7 @@ from pathlib import Path
 FIRMWARE = Path(__file__).resolve().parents[1]
 IMAGES_VARIABLE = "TOMOSHADOW_IMAGES"
 FUZZ_STEPS = "100000"
-LIMIT_S = 60
+LIMIT_S = 200
 _WIDTH = 100
 
 
@@ -105,7 +105,7 @@ def _killer_of_core(firmware: Path, sanitizers: str | None) -> str | None:
 def _killer_of_image(firmware: Path, mutant: Mutant) -> str | None:
     """The compiler's static assertions are tests too."""
     build = firmware.parent / "build"
-    made = _run("make", "-C", str(firmware), "images", f"BUILD={build}")
+    made = _run("make", "-C", str(firmware), "image", f"BUILD={build}")
     if made.returncode:
         asserted = next((line for line in made.stderr.splitlines() if "static assertion failed" in line), None)
         if asserted is None:

@@ -139,7 +139,7 @@ def shoot_into_open_interlock(board: Board, delay_cycles: int) -> int:
 
 def live_while_arming(board: Board, watched_cycles: range, opened_after_cycles: int) -> list[int]:
     """Of these cycles after the last byte of ARM, those at which an output is not forced low; the interlock opens."""
-    line = encode_request(Request(60_000, Command.ARM, (1,)))
+    line = encode_request(Request(60_000, Command.ARM, (1, 0, 0)))
     board.pico.receive(line[:-1])
     board.pico.run_ms(PERIOD_MS)
     start = board.pico.cycle
