@@ -60,6 +60,7 @@ class JobRunner:
         self._loop = asyncio.get_running_loop()
         self._changed = asyncio.Event()
         self._running: set[str] = set()
+        self._checked_last = False
 
     def submit(self, job: Job) -> Job:
         """Queue a job; from any thread. The same work is not done twice."""
@@ -96,16 +97,23 @@ class JobRunner:
         async with asyncio.TaskGroup() as group:
             while True:
                 self._changed.clear()
-                for job in await asyncio.to_thread(self._table.oldest, JobState.QUEUED, self._engine.workers):
+                for job in await asyncio.to_thread(self._waiting):
                     if self._may_start(job):
                         self._running.add(job.id)
+                        self._checked_last = job.kind is JobKind.CHECK
                         group.create_task(self._perform(job))
                 await self._changed.wait()
 
     def _take_up(self) -> None:
         self._table.requeue_interrupted()
-        for job in reversed(self._table.newest(limit=_CHECKS_REMEMBERED, kind=JobKind.CHECK)):
+        for job in reversed(self._table.newest(limit=_CHECKS_REMEMBERED, kinds=[JobKind.CHECK])):
             self._watch.learn(job)
+
+    def _waiting(self) -> list[Job]:
+        """Who may be next: checks and all else take turns, so that neither keeps the other waiting."""
+        checks = self._table.oldest(JobState.QUEUED, self._engine.workers, [JobKind.CHECK])
+        others = self._table.oldest(JobState.QUEUED, self._engine.workers, set(JobKind) - {JobKind.CHECK})
+        return [*others, *checks] if self._checked_last else [*checks, *others]
 
     def _may_start(self, job: Job) -> bool:
         has_room = len(self._running) < self._engine.workers

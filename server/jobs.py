@@ -128,11 +128,8 @@ def _reconstruction(
 _SELECT = """
     SELECT document FROM job
     WHERE state IN (SELECT value FROM json_each(?1)) AND (?2 IS NULL OR run_id = ?2)
-        AND (?3 IS NULL OR json_extract(document, '$.kind') = ?3)
+        AND json_extract(document, '$.kind') IN (SELECT value FROM json_each(?3))
 """
-
-
-_CHECKS_FIRST = f"ORDER BY json_extract(document, '$.kind') = '{JobKind.CHECK}' DESC, number"
 
 
 class JobTable:
@@ -199,14 +196,14 @@ class JobTable:
         run_id: str | None = None,
         states: Iterable[JobState] = tuple(JobState),
         limit: int = 200,
-        kind: JobKind | None = None,
+        kinds: Iterable[JobKind] = tuple(JobKind),
     ) -> list[Job]:
-        """Jobs of one run or all, of one kind or all, newest first."""
-        return self._select(f"{_SELECT} ORDER BY number DESC LIMIT ?4", run_id, states, limit, kind)
+        """Jobs of one run or all, of some kinds or all, newest first."""
+        return self._select(f"{_SELECT} ORDER BY number DESC LIMIT ?4", run_id, states, limit, kinds)
 
-    def oldest(self, state: JobState, limit: int = -1) -> list[Job]:
-        """Jobs in one state, checks before all others, the longest waiting first; -1 for all of them."""
-        return self._select(f"{_SELECT} {_CHECKS_FIRST} LIMIT ?4", None, [state], limit)
+    def oldest(self, state: JobState, limit: int = -1, kinds: Iterable[JobKind] = tuple(JobKind)) -> list[Job]:
+        """Jobs in one state, the longest waiting first; -1 for all of them."""
+        return self._select(f"{_SELECT} ORDER BY number LIMIT ?4", None, [state], limit, kinds)
 
     def requeue_interrupted(self) -> int:
         """Queue again what was running when the server died; how many jobs that were."""
@@ -224,11 +221,10 @@ class JobTable:
         return len(new)
 
     def _select(
-        self, query: str, run_id: str | None, states: Iterable[JobState], limit: int, kind: JobKind | None = None
+        self, query: str, run_id: str | None, states: Iterable[JobState], limit: int, kinds: Iterable[JobKind]
     ) -> list[Job]:
-        chosen = json.dumps([state.value for state in states])
         with self._lock:
-            rows = self._database.execute(query, (chosen, run_id, kind, limit)).fetchall()
+            rows = self._database.execute(query, (_listed(states), run_id, _listed(kinds), limit)).fetchall()
         return [Job.model_validate_json(document) for (document,) in rows]
 
     def _find(self, job_id: str) -> Job | None:
@@ -253,6 +249,10 @@ class JobTable:
             "UPDATE job SET state = ?, document = ? WHERE id = ?", (state, changed.model_dump_json(), job.id)
         )
         return changed
+
+
+def _listed(names: Iterable[StrEnum]) -> str:
+    return json.dumps([name.value for name in names])
 
 
 def jobs_on_disk(data_dir: Path) -> Iterator[Job]:

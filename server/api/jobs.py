@@ -35,7 +35,7 @@ def list_jobs(
     limit: Annotated[int, Query(ge=1, le=10_000)] = 200,
 ) -> list[Job]:
     """Jobs, newest first."""
-    return context.jobs.newest(run_id, [state] if state else JobState, limit, kind)
+    return context.jobs.newest(run_id, [state] if state else JobState, limit, [kind] if kind else JobKind)
 
 
 @router.post("", status_code=202, responses=responses(404))

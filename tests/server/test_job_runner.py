@@ -12,7 +12,7 @@ from server.calibration_watch import CalibrationWatch
 from server.calibrations import CalibrationStore
 from server.events import EventPublisher
 from server.job_runner import JobRunner
-from server.jobs import Job, JobKind, JobState, JobTable, reconstruction_job
+from server.jobs import Job, JobKind, JobState, JobTable, check_job, reconstruction_job
 from server.problems import Conflict
 
 DEADLINE_S = 10.0
@@ -61,7 +61,8 @@ async def at_work(tmp_path: Path, task: Callable[..., dict[str, Any]]) -> AsyncI
     async with InlineEngine() as engine:
         store = CalibrationStore(tmp_path / "calibrations")
         watch = CalibrationWatch(events)
-        runner = JobRunner(engine, table, {JobKind.RECONSTRUCTION: task}, events, tmp_path, store, watch)
+        tasks = dict.fromkeys((JobKind.RECONSTRUCTION, JobKind.CHECK), task)
+        runner = JobRunner(engine, table, tasks, events, tmp_path, store, watch)
         work = asyncio.create_task(runner.run())
         yield Laboratory(runner, table, events)
         work.cancel()
@@ -80,6 +81,24 @@ def test_jobs_are_done_in_the_order_in_which_they_were_asked_for(tmp_path: Path)
         assert [job.changed_utc for job in done] == sorted(job.changed_utc for job in done)
 
     asyncio.run(go())
+
+
+def test_checks_and_reconstructions_take_turns_beginning_with_a_check(tmp_path: Path) -> None:
+    order: list[tuple[str, int]] = []
+
+    def note(job: dict[str, Any], should_stop: Callable[[], bool]) -> dict[str, Any]:
+        order.append(("reconstruction" if job["results_dir"] else "check", job["shot"]))
+        return {"shot": job["shot"], "views": {}}
+
+    async def go() -> None:
+        async with at_work(tmp_path, note) as laboratory:
+            jobs = [laboratory.runner.submit(job_of(shot)) for shot in range(3)]
+            checks = [laboratory.runner.submit(check_job("run", shot, "cal")) for shot in range(3)]
+            for job in (*jobs, *checks):
+                await laboratory.reach(job, JobState.DONE)
+
+    asyncio.run(go())
+    assert order == [(kind, shot) for shot in range(3) for kind in ("check", "reconstruction")]
 
 
 def test_a_job_that_fails_says_why_and_stops_no_other(tmp_path: Path) -> None:
