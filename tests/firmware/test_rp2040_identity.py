@@ -86,6 +86,19 @@ def test_images_of_the_same_sources_are_the_same_bytes(copies: list[Path], kind:
     assert str(copies[0]).encode() not in one.read_bytes()
 
 
+def test_an_image_that_might_overflow_its_stack_is_not_built(tmp_path: Path) -> None:
+    command = ["make", "-s", "-C", str(FIRMWARE), "image", f"BUILD={tmp_path}"]
+    built = subprocess.run(command, check=True, capture_output=True, text=True)
+    told = re.search(r"STACK:\s+(\d+) B of 2048 B at worst", built.stdout)
+    assert told is not None
+    (tmp_path / f"{ImageKind.CONVERTER}.uf2").unlink()
+    less = [*command, f"STACK_SIZE={int(told[1]) - 4}"]
+    refused = subprocess.run(less, check=False, capture_output=True, text=True)
+    assert refused.returncode != 0
+    assert f"{told[1]} bytes of stack do not fit {int(told[1]) - 4}" in refused.stderr
+    assert not (tmp_path / f"{ImageKind.CONVERTER}.uf2").exists()
+
+
 def sections(image: Path) -> dict[str, tuple[int, int]]:
     """(size, address) by name."""
     told = subprocess.run(
