@@ -34,11 +34,12 @@ demo: setup ## Run the whole chain on the simulated bench; writes demo-out/repor
 test: lint build/rp2040js/node_modules ## Run linters and all tests.
 	$(PRIVATE_NETWORK) $(PYTHON) -m pytest $(TEST_OPTIONS)
 
-lint: setup ## Run ruff, mypy, import-linter.
+lint: setup ## Run ruff, mypy, import-linter and cppcheck.
 	.venv/bin/ruff check .
 	.venv/bin/ruff format --check .
 	.venv/bin/mypy
 	.venv/bin/lint-imports --no-cache
+	@$(MAKE) --no-print-directory -C firmware lint
 
 serve: setup ## Start server and web page on the simulated bench, http://127.0.0.1:8080.
 	$(PYTHON) -m server.cli serve --config configs/simulated.toml
