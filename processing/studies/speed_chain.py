@@ -45,8 +45,9 @@ def chain_speeds(study: SpeedStudy, cameras: Sequence[PinholeCamera]) -> Iterato
     yield from _by_smart(study, cameras, plan, volumes)
     del volumes
     yield _of_many(study, cameras, plan)
-    yield Measured(targets.MLOS_MEMORY, peak_memory_gb("mlos", study), how="the whole volume")
-    yield Measured(targets.SMART_MEMORY, peak_memory_gb("smart", study), how="blocks that are not empty")
+    yield Measured(targets.VOLUME_MEMORY, peak_memory_gb("volume", study))
+    yield Measured(targets.SLABS_MEMORY, peak_memory_gb("slabs", study))
+    yield Measured(targets.SMART_MEMORY, peak_memory_gb("smart", study))
 
 
 @contextmanager

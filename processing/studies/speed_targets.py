@@ -61,8 +61,9 @@ AVX2_SMART = Target("SMART of a double exposure with AVX2 only, no voxel empty",
 MEAN = Target("mean volume of single exposures, images in RAM", "s", 40, 12)
 SLICE = Target("one slice, images in RAM", "ms", 20, 5)
 REGION = Target("256^3 voxels, images in RAM", "ms", 20, 5)
-MLOS_MEMORY = Target("peak resident memory, MLOS", "GB", 1.6, 0.4)
-SMART_MEMORY = Target("peak resident memory, SMART of a sparse spray", "GB", 1.6, 0.4)
+VOLUME_MEMORY = Target("peak resident memory, MLOS of the whole volume", "GB", 1.6, 0.4)
+SLABS_MEMORY = Target("peak resident memory, MLOS slab by slab", "GB", 1.6, 0.4)
+SMART_MEMORY = Target("peak resident memory, SMART of a sparse spray, filled blocks", "GB", 1.6, 0.4)
 
 
 def markdown_table(measured: tuple[Measured, ...]) -> str:

@@ -111,11 +111,13 @@ def test_scenes_are_as_dense_as_they_say() -> None:
 
 def test_peak_memory_holds_the_volume_and_not_the_process_that_asked() -> None:
     ballast = np.ones(50_000_000)
-    small = peak_memory_gb("mlos", QUICK)
-    larger = peak_memory_gb("mlos", replace(QUICK, shape=(480, 160, 200)))
+    small = peak_memory_gb("volume", QUICK)
+    deeper = replace(QUICK, shape=(480, 160, 200))
+    larger = peak_memory_gb("volume", deeper)
     volume_gb = 9 * 2 * np.prod(QUICK.shape) / 1e9
     assert small < ballast.nbytes / 1e9
     assert volume_gb * 0.8 < larger - small < volume_gb * 2
+    assert peak_memory_gb("slabs", deeper) < larger - 0.3 * volume_gb
 
 
 def test_measure_is_the_median_of_warm_runs() -> None:
