@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from daq.errors import DeviceError, DeviceUnavailable
-from daq.simulation.firmware_build import build_image
+from daq.simulation.firmware_build import ImageKind, build_image
 from server.firmware_image import (
     BOOT_BYTES,
     FAMILY_FLAG,
@@ -73,8 +73,9 @@ def test_a_good_image_tells_its_version(tmp_path: Path) -> None:
     assert (image.version, image.blocks) == ("1.2.3", (BOOT_BYTES + len(PROGRAM)) // 256)
 
 
-def test_the_image_that_is_built_here_may_be_flashed() -> None:
-    image = load_image(build_image().with_suffix(".uf2"))
+@pytest.mark.parametrize("kind", ImageKind)
+def test_the_images_that_are_built_here_may_be_flashed(kind: ImageKind) -> None:
+    image = load_image(build_image(kind=kind).with_suffix(".uf2"))
     assert image.version == re.search(r'VERSION "([0-9.]+)"', Path("firmware/core/commands.h").read_text())[1]  # type: ignore[index]
 
 
