@@ -51,6 +51,23 @@ static void test_pulses_keep_their_dark_time_and_order(void)
     CHECK(channel_check(&channel) == ERROR_SEPARATION);
 }
 
+static enum error check_single(uint32_t a_start_ns, uint32_t a_width_ns)
+{
+    struct channel channel = LEGAL;
+    channel.a_start_ns = a_start_ns;
+    channel.a_width_ns = a_width_ns;
+    channel.b_start_ns = channel.b_width_ns = channel.frame_b_open_ns = 0;
+    return channel_check(&channel);
+}
+
+static void test_a_single_pulse_keeps_the_limits_of_pulse_a(void)
+{
+    CHECK(check_single(20000, MIN_WIDTH_NS) == ERROR_NONE && check_single(20000, MIN_WIDTH_NS - 1) == ERROR_WIDTH);
+    CHECK(check_single(20000, MAX_WIDTH_NS) == ERROR_NONE && check_single(20000, MAX_WIDTH_NS + 1) == ERROR_WIDTH);
+    CHECK(check_single(22000, 1000) == ERROR_NONE && check_single(22001, 1000) == ERROR_STRADDLE);
+    CHECK(WITH(b_width_ns, 0) == ERROR_WIDTH && WITH(b_start_ns, 0) == ERROR_SEPARATION);
+}
+
 static void test_frame_boundaries_count_from_the_camera_trigger(void)
 {
     CHECK(WITH(frame_a_close_ns, 20000) == ERROR_NONE && WITH(frame_a_close_ns, 19999) == ERROR_STRADDLE);
@@ -164,6 +181,7 @@ int main(void)
 {
     test_each_limit_holds_to_the_nanosecond();
     test_pulses_keep_their_dark_time_and_order();
+    test_a_single_pulse_keeps_the_limits_of_pulse_a();
     test_frame_boundaries_count_from_the_camera_trigger();
     test_no_field_can_overflow_a_sum();
     test_a_frame_boundary_beyond_32_bits_does_not_wrap();

@@ -161,6 +161,18 @@ static void test_whatever_disarms_takes_the_permission_away(void)
     }
 }
 
+static void test_an_edge_is_permitted_anew_after_an_off(void)
+{
+    boot_armed(3, SOURCE_EXTERNAL, 0);
+    safety_off(&safety);
+    CHECK(safety_arm(&safety, 3, SOURCE_EXTERNAL, 0) == ERROR_NONE);
+    wait_us(PERIOD_US);
+    CHECK(fake.permitted);
+    fake_edge();
+    wait_us(0);
+    check_counters(1, 0, 0);
+}
+
 static void test_a_shot_that_started_before_an_off_counts(void)
 {
     boot_armed(3, SOURCE_EXTERNAL, 0);
@@ -284,6 +296,7 @@ int main(void)
     test_the_budget_binds_the_trigger_input();
     test_a_late_processor_gives_the_full_period();
     test_whatever_disarms_takes_the_permission_away();
+    test_an_edge_is_permitted_anew_after_an_off();
     test_a_shot_that_started_before_an_off_counts();
     test_edges_count_from_arming_on();
     test_the_timer_fires_every_period_and_stops_by_itself();
