@@ -1,5 +1,6 @@
 """One shot + one calibration + settings -> volumes on disk. Every shot by itself, whoever asks for it."""
 
+import json
 import resource
 import time
 from collections.abc import Callable, Sequence
@@ -38,12 +39,16 @@ class Stopped(Exception):
 
 
 class VolumeRecord(FrozenValue):
-    """One volume that was written; ``seconds`` is the wall time of its reconstruction."""
+    """One volume that was written; ``seconds`` is the wall time of its reconstruction.
+
+    ``residuals`` are those of SMART and MART, see ``processing.reconstruction.smart.SmartResult``.
+    """
 
     shot: int
     frame: FrameName
     file: str
     seconds: float
+    residuals: tuple[float, ...] = ()
 
 
 class ShotResult(FrozenValue):
@@ -116,13 +121,22 @@ def reconstruct_shot(
 
 
 def reconstruct(
-    plan: Plan, images: Sequence[Intensity], settings: ReconstructionSettings, out: Intensity | None = None
-) -> Intensity:
-    """Volume (z, y, x) of one exposure by the method of the settings, written into ``out`` where given."""
+    plan: Plan, images: Sequence[Intensity], settings: ReconstructionSettings, out: Intensity
+) -> tuple[float, ...]:
+    """Reconstruct one exposure by the method of the settings; ``out`` (z, y, x) receives it. Returns the residuals."""
     if not settings.method.iterative:
-        return np.asarray(line_of_sight(plan, images, settings.method, out), dtype=np.float32)
+        line_of_sight(plan, images, settings.method, out)
+        return ()
     solve = smart if settings.method is ReconstructionMethod.SMART else mart
-    return solve(plan, images, iterations=settings.iterations, relaxation=settings.relaxation, out=out).volume
+    result = solve(
+        plan,
+        images,
+        iterations=settings.iterations,
+        relaxation=settings.relaxation,
+        least_gain=settings.least_gain,
+        out=out,
+    )
+    return result.residuals
 
 
 def default_grid(calibration: Calibration, pitch_mm: float | None = None) -> VoxelGrid:
@@ -195,11 +209,12 @@ def _reconstruct_frame(
     provenance: Provenance,
 ) -> VolumeRecord:
     started_s = time.perf_counter()
-    volume = reconstruct(bench.plan, views, settings, bench.volume)
+    residuals = reconstruct(bench.plan, views, settings, bench.volume)
     seconds = round(time.perf_counter() - started_s, 4)
     file = volume_path(results_dir, shot, frame)
-    write_volume(file, volume, bench.plan.grid, {**provenance, "shot": shot, "frame": frame})
-    return VolumeRecord(shot=shot, frame=frame, file=file.name, seconds=seconds)
+    convergence = {"residuals": json.dumps(residuals)} if residuals else {}
+    write_volume(file, bench.volume, bench.plan.grid, {**provenance, "shot": shot, "frame": frame, **convergence})
+    return VolumeRecord(shot=shot, frame=frame, file=file.name, seconds=seconds, residuals=residuals)
 
 
 def frame_names(run: RunReader) -> tuple[FrameName, ...]:

@@ -100,7 +100,8 @@ def _mean_of_each(plan: Plan, exposures: Exposures, settings: ReconstructionSett
     mean, volume = np.zeros(plan.grid.shape, np.float32), np.empty(plan.grid.shape, np.float32)
     count = 0
     for images in exposures:
-        mean += reconstruct(plan, images, settings, volume)
+        reconstruct(plan, images, settings, volume)
+        mean += volume
         count += 1
     mean /= np.float32(count)
     return mean

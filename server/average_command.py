@@ -6,13 +6,12 @@ from typing import Any
 from processing.analysis.figures import slices_figure
 from processing.calibration.calibration_file import load_calibration
 from processing.pipeline import PipelineError, default_grid
-from processing.reconstruction.method import ReconstructionMethod
-from processing.reconstruction.settings import GridSettings, ReconstructionSettings
+from processing.reconstruction.settings import GridSettings
 from processing.reconstruction.volume_file import write_volume
 from processing.results_file import Provenance, average_volumes, volume_files
 from processing.run_average import average_run
 from processing.volume import VoxelGrid
-from server.commands import parse_grid, progress, selected_shots
+from server.commands import parse_grid, progress, reconstruction_settings, selected_shots
 
 
 def average(options: Namespace) -> dict[str, Any]:
@@ -31,9 +30,7 @@ def _average_results(options: Namespace) -> dict[str, Any]:
 def _average_run(options: Namespace) -> dict[str, Any]:
     calibration = load_calibration(options.calibration)
     grid = parse_grid(options.grid, calibration) if options.grid else default_grid(calibration)
-    settings = ReconstructionSettings(
-        method=ReconstructionMethod(options.method), iterations=options.iterations, grid=GridSettings.of(grid)
-    )
+    settings = reconstruction_settings(options, GridSettings.of(grid))
     shots = selected_shots(options.results, options.shots)
     name = options.results.name
     mean = average_run(

@@ -16,6 +16,7 @@ from processing.calibration.errors import CalibrationError
 from processing.importing import ManifestError
 from processing.pipeline import PipelineError
 from processing.reconstruction.method import ReconstructionMethod
+from processing.reconstruction.settings import ReconstructionSettings
 from processing.reconstruction.volume_file import VolumeFileError
 from server import commands
 from server.average_command import average
@@ -163,7 +164,15 @@ def _add_reconstruct(verbs: Any) -> None:
 
 def _add_reconstruction_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--method", choices=[method.value for method in ReconstructionMethod], default="mlos")
-    parser.add_argument("--iterations", type=int, default=20, help="of smart and mart")
+    for name in ("iterations", "relaxation", "least_gain"):
+        field = ReconstructionSettings.model_fields[name]
+        parser.add_argument(
+            f"--{name.replace('_', '-')}",
+            type=partial(commands.setting, name),
+            default=field.default,
+            metavar="N" if isinstance(field.default, int) else "X",
+            help=field.description,
+        )
     parser.add_argument("--shots", metavar="A:B", help="shots A to B - 1; default all")
     parser.add_argument(
         "--grid",

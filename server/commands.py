@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import ValidationError
 
 from daq.shotfile import ImageKey, RunReader
 from processing.analysis.figures import residuals_figure
@@ -107,13 +108,30 @@ def view_errors(calibration: Calibration) -> dict[str, Any]:
     }
 
 
+def setting(name: str, text: str) -> Any:
+    """The value of an option, with the limits of the setting of that name."""
+    try:
+        return getattr(ReconstructionSettings.model_validate({name: text}), name)
+    except ValidationError as error:
+        raise ArgumentTypeError(f"{text}: {error.errors()[0]['msg']}") from error
+
+
+def reconstruction_settings(options: Namespace, grid: GridSettings) -> ReconstructionSettings:
+    """Method and options of a command as settings."""
+    return ReconstructionSettings(
+        method=ReconstructionMethod(options.method),
+        iterations=options.iterations,
+        relaxation=options.relaxation,
+        least_gain=options.least_gain,
+        grid=grid,
+    )
+
+
 def reconstruct_run(options: Namespace) -> dict[str, Any]:
     """``tomoshadow reconstruct``."""
     calibration = load_calibration(options.calibration)
     grid = GridSettings.of(parse_grid(options.grid, calibration) if options.grid else default_grid(calibration))
-    settings = ReconstructionSettings(
-        method=ReconstructionMethod(options.method), iterations=options.iterations, grid=grid
-    )
+    settings = reconstruction_settings(options, grid)
     shots = selected_shots(options.run, options.shots)
     results = []
     for shot in shots:

@@ -39,8 +39,14 @@ class ReconstructionSettings(FrozenValue):
     """How shots become volumes; travels with every result."""
 
     method: ReconstructionMethod = ReconstructionMethod.MLOS
-    iterations: Annotated[int, Field(ge=1, le=200, description="of SMART and MART")] = 20
-    relaxation: Annotated[float, Field(gt=0, le=2, description="of SMART and MART")] = 1.0
+    iterations: Annotated[int, Field(ge=1, le=200, description="of SMART and MART, at most")] = 20
+    relaxation: Annotated[float, Field(gt=0, le=2, description="exponent of SMART and MART; the paper's is 1")] = 1.0
+    least_gain: Annotated[
+        float,
+        Field(
+            ge=0, lt=1, description="SMART and MART stop when an iteration lowers the residual by less than this share"
+        ),
+    ] = 0.0
     grid: Annotated[GridSettings | None, Field(description="default: what all views see, one voxel per pixel")] = None
     minimum_window_px: Annotated[int, Field(ge=0, le=2001, description="sliding minimum; 0 leaves it out")] = 201
     noise_floor: Annotated[float, Field(ge=0, lt=1, description="intensity that counts as nothing")] = 0.05

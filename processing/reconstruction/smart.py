@@ -33,7 +33,8 @@ class SmartOptions(TypedDict, total=False):
     stop : callable
         Called with number of iterations done and residual; ends the iteration by returning True.
     start : (z, y, x) float32 array
-        First guess, not negative; MLOS by default. Its scale does not matter; where it is zero, the result is zero.
+        First guess, not negative; MLOS by default, or its power 4 / n_views where there are more views.
+        Its scale does not matter; where it is zero, the result is zero.
     out : (z, y, x) float32 or float16 array
         Receives the volume. Without it only the blocks that are not empty are in memory until somebody asks for more.
     threads : int
@@ -81,7 +82,11 @@ def smart(plan: Plan, images: Sequence[Pixels], **options: Unpack[SmartOptions])
     """Simultaneous MART: all views correct the volume at once.
 
     Each iteration multiplies every voxel by the product over the views of (I / P)^(relaxation / n_views),
-    where I is the image and P the projection of the volume, both sampled where the view sees the voxel.
+    where I is the image and P the projection of the volume, both sampled where the view sees the voxel; by 16 at most.
+
+    Three iterations differ from float64 by less than 5e-5 of the brightest voxel (rms), and nowhere by more than 1e-2:
+    ratios have steps of 1 / 2048, and each correction rounds to float16. From MLOS, where blocks below 1e-8 of the
+    brightest are not followed, it is 1e-4 and 2e-2.
 
     Parameters
     ----------

@@ -14,8 +14,11 @@ Image = NDArray[np.float32]
 
 NEGLIGIBLE = 1e-8
 """Blocks in which MLOS is nowhere brighter than this share of what it could be stay empty."""
-RATIO_COUNTS = 4096
-"""Ratios are kept in 16 bit: up to 8, in steps of 1 / 4096. So much brighter a view makes a voxel at most at once."""
+START_VIEWS = 4
+"""The product of more views spans more than float16 does; the power 4 / n_views of it is as bright as that of four."""
+RATIO_COUNTS = 2048
+"""Ratios are kept in 16 bit: up to 16, in steps of 1 / 2048. So much brighter a view makes a voxel at most at once:
+with 8 and finer steps, voxels that start with nearly nothing lag behind, which costs more than the steps do."""
 
 
 class SmartState:
@@ -95,8 +98,10 @@ def _energy(image: FixedPoint) -> float:
 
 def _first_guess(plan: Plan, resampled: Sequence[FixedPoint], start: Image | None, threads: int) -> _native.Blocks:
     if start is None:
-        most = float(np.prod([image.brightest for image in resampled]))
-        return _native.Blocks.of_views(plan.bind(resampled), plan.grid.shape, NEGLIGIBLE * most, most, threads)
+        exponent = min(1.0, START_VIEWS / len(resampled))
+        most = float(np.prod([image.brightest for image in resampled])) ** exponent
+        views = plan.bind(resampled)
+        return _native.Blocks.of_views(views, plan.grid.shape, exponent, NEGLIGIBLE * most, most, threads)
     check_volume(start, plan, (np.float32,))
     least, most = float(start.min()), float(start.max())
     if not (least >= 0 and np.isfinite(most)):

@@ -117,11 +117,22 @@ def project(view: RectifiedView | NodeView, volume: Array, shape: tuple[int, int
     return project_nodes(view, volume, shape)
 
 
-def smart(plan: Plan, images: Sequence[NDArray[np.float32]], iterations: int) -> tuple[Array, list[float]]:
-    """SMART from MLOS; volume and relative residuals."""
+MOST_RATIO = 16
+"""How much brighter a view may make a voxel at once."""
+
+
+def start_of(plan: Plan, images: Sequence[NDArray[np.float32]]) -> Array:
+    """MLOS; of more than four views as bright as of four."""
+    return planned_line_of_sight(plan, images, ReconstructionMethod.MLOS) ** min(1.0, 4 / len(images))
+
+
+def smart(
+    plan: Plan, images: Sequence[NDArray[np.float32]], iterations: int, *, relaxation: float = 1, by_views: bool = False
+) -> tuple[Array, list[float]]:
+    """SMART, or MART by views, from MLOS; volume and relative residuals."""
     recorded = [image.intensity.astype(np.float64) for image in plan.resample(images)]
     positions = [planned_positions(view, plan.grid) for view in plan.views]
-    volume = planned_line_of_sight(plan, images, ReconstructionMethod.MLOS)
+    volume = start_of(plan, images)
 
     def projections() -> list[Array]:
         return [project(view, volume, image.shape) for view, image in zip(plan.views, recorded, strict=True)]
@@ -135,9 +146,11 @@ def smart(plan: Plan, images: Sequence[NDArray[np.float32]], iterations: int) ->
     volume, projected = volume * factor, [p * factor for p in projected]
     residuals = [residual(projected)]
     for _ in range(iterations):
-        for image, p, position in zip(recorded, projected, positions, strict=True):
-            ratio = np.where(p > 1e-7, (image / np.maximum(p, 1e-7)) ** (1 / len(recorded)), 0)
-            volume = volume * bilinear(ratio, *position)
+        for number, (image, position) in enumerate(zip(recorded, positions, strict=True)):
+            p = projections()[number] if by_views else projected[number]
+            exponent = relaxation if by_views else relaxation / len(recorded)
+            ratio = np.where(p > 1e-7, (image / np.maximum(p, 1e-7)) ** exponent, 0)
+            volume = volume * bilinear(np.minimum(ratio, MOST_RATIO), *position)
         projected = projections()
         residuals.append(residual(projected))
     return volume, residuals

@@ -1,5 +1,6 @@
 """From a recorded shot to its volumes: each droplet peaks where it was, or one clear error says why not."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -52,6 +53,17 @@ def test_droplets_peak_where_they_were(run_dir: Path, calibration_file: Path, me
             around = tuple(slice(index - 6, index + 7) for index in expected)
             peak = np.array(np.unravel_index(volume[around].argmax(), (13, 13, 13))) - 6
             assert np.abs(peak).max() <= 1, (frame, expected, peak)
+
+
+def test_smart_records_how_it_converged_and_stops_when_told(run_dir: Path, calibration_file: Path) -> None:
+    settings = SETTINGS.model_copy(update={"method": ReconstructionMethod.SMART, "iterations": 30, "least_gain": 0.2})
+    for volume in reconstructed(run_dir, calibration_file, settings).volumes:
+        gains = 1 - np.divide(volume.residuals[1:], volume.residuals[:-1])
+        assert 1 <= len(gains) < 30
+        assert (gains[:-1] >= 0.2).all()
+        assert gains[-1] < 0.2
+        _, _, provenance = read_volume(run_dir / "results" / volume.file)
+        assert json.loads(str(provenance["residuals"])) == list(volume.residuals)
 
 
 def test_result_and_volumes_name_their_origin(run_dir: Path, calibration_file: Path) -> None:

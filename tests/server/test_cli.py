@@ -71,6 +71,20 @@ def test_shots_can_be_chosen(
     assert "not of the form A:B" in refused(capsys, *common, "-o", tmp_path / "out", "--shots", "first")
 
 
+def test_smart_is_told_how_to_iterate(
+    run_dir: Path, calibration_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    common = ["reconstruct", run_dir, "--calibration", calibration_file, f"--grid={GRID}", "--method", "smart"]
+    options = ["--iterations", "9", "--relaxation", "0.5", "--least-gain", "0.9"]
+    result = told(capsys, *common, "-o", tmp_path / "out", "--shots", "0:1", *options)
+    assert {len(volume["residuals"]) for volume in result["volumes"]} == {2}  # no iteration gains that much
+    for option, limit in (("--iterations", "200"), ("--relaxation", "2"), ("--least-gain", "1")):
+        with pytest.raises(SystemExit):
+            main([*map(str, common), "-o", str(tmp_path / "out"), option, "201"])
+        assert f"argument {option}: 201: Input should be less than" in (error := capsys.readouterr().err)
+        assert limit in error
+
+
 def test_average_of_results(
     run_dir: Path, calibration_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

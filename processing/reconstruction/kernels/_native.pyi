@@ -56,7 +56,7 @@ class Blocks:
 
     @staticmethod
     def of_views(
-        views: Sequence[View], shape: tuple[int, int, int], floor: float, most: float, threads: int
+        views: Sequence[View], shape: tuple[int, int, int], exponent: float, floor: float, most: float, threads: int
     ) -> Blocks: ...
     @staticmethod
     def of_volume(volume: NDArray[np.float32], most: float, threads: int) -> Blocks: ...

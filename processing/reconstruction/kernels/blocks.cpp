@@ -33,13 +33,14 @@ Blocks::Blocks(const Kernels &kernels, const SmartStart &start, float most, int 
     });
 }
 
-Blocks Blocks::of_views(const Kernels &kernels, const std::vector<View> &views, const Shape &shape, float floor,
-                        float most, int threads) {
-    return {kernels, {views.data(), static_cast<int>(views.size()), nullptr, shape, floor, 0.0f}, most, threads};
+Blocks Blocks::of_views(const Kernels &kernels, const std::vector<View> &views, const Shape &shape,
+                        float exponent, float floor, float most, int threads) {
+    const SmartStart start{views.data(), static_cast<int>(views.size()), nullptr, shape, exponent, floor, 0.0f};
+    return {kernels, start, most, threads};
 }
 
 Blocks Blocks::of_volume(const Kernels &kernels, const float *volume, const Shape &shape, float most, int threads) {
-    return {kernels, {nullptr, 0, volume, shape, 0.0f, 0.0f}, most, threads};
+    return {kernels, {nullptr, 0, volume, shape, 1.0f, 0.0f, 0.0f}, most, threads};
 }
 
 void Blocks::pass(const Kernels &kernels, const std::vector<View> &views, const std::vector<bool> &update,

@@ -12,9 +12,10 @@ namespace tomoshadow {
 // SMART, so blocks are found once.
 class Blocks {
 public:
-    // The product of what all views see, where it exceeds `floor` somewhere in a block. `most` is what it could be.
-    static Blocks of_views(const Kernels &kernels, const std::vector<View> &views, const Shape &shape, float floor,
-                           float most, int threads);
+    // A power of the product of what all views see, where it exceeds `floor` somewhere in a block. `most` is what it
+    // could be.
+    static Blocks of_views(const Kernels &kernels, const std::vector<View> &views, const Shape &shape, float exponent,
+                           float floor, float most, int threads);
     // A volume (z, y, x) of float32, not negative, nowhere above `most`.
     static Blocks of_volume(const Kernels &kernels, const float *volume, const Shape &shape, float most, int threads);
 

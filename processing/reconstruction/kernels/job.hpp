@@ -109,14 +109,14 @@ struct BlockList {
 };
 using KeepBlock = void (*)(void *owner, BlockPosition position, const uint16_t *values);
 
-// Find the blocks that exceed `floor` somewhere, in a volume or, where that is null, in the product of what views see.
-// They are stored times `gain`.
+// Find the blocks that exceed `floor` somewhere, in a volume or, where that is null, in a power of the product of what
+// views see. They are stored times `gain`.
 struct SmartStart {
     const View *views;
     int n_views;
     const float *volume;
     Shape shape;
-    float floor, gain;
+    float exponent, floor, gain;
 };
 
 // One SMART pass: multiply the blocks by the samples of the ratio images and a gain, then project the result.

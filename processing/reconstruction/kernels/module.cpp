@@ -213,13 +213,13 @@ void sum_of_sight(const std::vector<std::vector<const BoundView *>> &exposures, 
     run_sum_of_sight(kernels, job, threads);
 }
 
-Blocks blocks_of_views(const std::vector<const BoundView *> &bound, std::tuple<int, int, int> size, float floor, float most,
-                       int threads) {
+Blocks blocks_of_views(const std::vector<const BoundView *> &bound, std::tuple<int, int, int> size, float exponent,
+                       float floor, float most, int threads) {
     const Shape shape = volume_shape(size);
     const auto views = views_on(bound, shape, threads);
     const Kernels &kernels = selected_kernels();
     nb::gil_scoped_release release;
-    return Blocks::of_views(kernels, views, shape, floor, most, threads);
+    return Blocks::of_views(kernels, views, shape, exponent, floor, most, threads);
 }
 
 Blocks blocks_of_volume(const FloatVolume &volume, float most, int threads) {
@@ -387,7 +387,8 @@ NB_MODULE(_native, module) {
     module.def("sparse_sight", &sparse_sight, "views"_a, "method"_a, "shape"_a, "floor"_a, "threads"_a);
     module.def("sum_of_sight", &sum_of_sight, "exposures"_a, "method"_a, "volume"_a, "threads"_a);
     nb::class_<Blocks>(module, "Blocks")
-        .def_static("of_views", &blocks_of_views, "views"_a, "shape"_a, "floor"_a, "most"_a, "threads"_a)
+        .def_static("of_views", &blocks_of_views, "views"_a, "shape"_a, "exponent"_a, "floor"_a, "most"_a,
+                    "threads"_a)
         .def_static("of_volume", &blocks_of_volume, "volume"_a, "most"_a, "threads"_a)
         .def("scale", &Blocks::scale, "factor"_a)
         .def_prop_ro("unit", &Blocks::unit)

@@ -41,6 +41,12 @@ inline Floats power_of_2(Floats x) {
     return same_bits<Floats>(same_bits<Ints>(series) + (whole << 23));
 }
 
+// Zero stays zero.
+inline Floats power(Floats x, float exponent) {
+    const Floats zero{}, least = zero + 1e-36f;
+    return x > least ? power_of_2(exponent * logarithm_2(x > least ? x : least)) : zero;
+}
+
 inline Floats sum_of_parts(const Correction &job, int row, int column) {
     Floats sum{};
     for (int i = 0; i < job.n_parts; ++i) {
@@ -53,7 +59,7 @@ inline Floats sum_of_parts(const Correction &job, int row, int column) {
 
 double correct(const Correction &job, int row) {
     const FlushSubnormals flush;
-    const Floats zero{}, floor = zero + nothing, least = zero + 1e-30f, most = zero + 32767.0f;
+    const Floats zero{}, floor = zero + nothing, most = zero + 32767.0f;
     Floats missed{};
     for (int column = 0; column < job.columns; column += lanes) {
         const int64_t at = static_cast<int64_t>(row) * job.columns + column;
@@ -64,10 +70,10 @@ double correct(const Correction &job, int row) {
         const Floats projected = sum_of_parts(job, row, column), difference = projected - recorded;
         missed += difference * difference;
         const Floats ratio = recorded / (projected > floor ? projected : floor);
-        Floats power = power_of_2(job.exponent * logarithm_2(ratio > least ? ratio : least)) * job.ratio_counts + 0.5f;
-        power = power < most ? power : most;
-        const Ints valid = (recorded > zero) & (projected > floor);
-        counts = __builtin_convertvector(__builtin_convertvector(power, Ints) & valid, Shorts);
+        Floats scaled = power(ratio, job.exponent) * job.ratio_counts + 0.5f;
+        scaled = scaled < most ? scaled : most;
+        const Ints seen = projected > floor;
+        counts = __builtin_convertvector(__builtin_convertvector(scaled, Ints) & seen, Shorts);
         std::memcpy(job.ratio + at, &counts, bytes);
     }
     double sum = 0;

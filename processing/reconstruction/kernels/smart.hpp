@@ -4,6 +4,7 @@
 #include "halves.hpp"
 #include "output.hpp"
 #include "project.hpp"
+#include "ratios.hpp"
 
 namespace tomoshadow::TOMOSHADOW_ISA {
 namespace {
@@ -34,6 +35,12 @@ inline bool exceeds(const Block &block, int rows, float floor) {
     for (int row = 0; row < rows; ++row)
         for (int k = 0; k < block_columns; ++k) any |= block.rows[row][k] > floor;
     return any != 0;
+}
+
+inline void take_power(Block &block, int rows, float exponent) {
+    for (int row = 0; row < rows; ++row)
+        for (int k = 0; k < block_columns; k += lanes)
+            store(block.rows[row] + k, power(load<Floats>(block.rows[row] + k), exponent));
 }
 
 // Read a volume where a view would be sampled.
@@ -108,6 +115,7 @@ void smart_start(const SmartStart &job, int slab, KeepBlock keep, void *owner) {
             const PlaneTaps *taps = planes.taps[z % smart_planes];
             if (!occupied(job.views, job.n_views, taps, tile)) return;
             sample_product(job.views, every_view, job.n_views, taps, tile, block);
+            if (job.exponent != 1.0f) take_power(block, rows, job.exponent);
         }
         clear_overhang(block, rows, nx - x0);
         if (!exceeds(block, rows, job.floor)) return;
