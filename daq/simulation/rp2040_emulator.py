@@ -212,7 +212,10 @@ class EmulatedPico:
         return max(self.cycle + 1, min(until_cycle, next_byte, self._next_visit))
 
     def _next_alarm(self) -> int:
-        return self.cycle + max(1, math.ceil(self._chip.clock.nanos_to_next_alarm / CYCLE_NS))
+        clock = self._chip.clock
+        if not clock.has_scheduled_alarm:
+            return _NEVER
+        return self.cycle + max(1, math.ceil(clock.nanos_to_next_alarm / CYCLE_NS))
 
     def _run_slice(self, end: int) -> None:
         """Time in which nothing comes from outside: up to its end, or until the processor sleeps."""
