@@ -25,6 +25,7 @@ _NOTICE_MS = 5
 _WATCHDOG_MS = 250
 _SLICE_MS = 2
 _LAG_FORGIVEN_MS = 100
+_TRIGGER_MS = 0.1
 _CYCLES_PER_S = 1000 * CYCLES_PER_MS
 
 
@@ -53,6 +54,8 @@ class EmulatedFirmware:
         self._zero_s = time.monotonic() - self._pico.cycle / _CYCLES_PER_S
         self._instructions: Mapping[str, Callable[[str], None]] = {
             "interlock": lambda level: self._pico.set_interlock(level == "1"),
+            "estop": lambda level: self._pico.set_estop(level == "1"),
+            "trigger": self._trigger,
             "reset": self._reset,
             "advance": lambda time_ms: self._skip_ms(int(time_ms)),
             "garbage": lambda data: self._write(bytes.fromhex(data)),
@@ -111,6 +114,11 @@ class EmulatedFirmware:
         self._fired = 0
         self._skip_ms(_BOOT_MS)
 
+    def _trigger(self, _: str) -> None:
+        self._pico.set_trigger_pin(True)
+        self._pico.run_ms(_TRIGGER_MS)
+        self._pico.set_trigger_pin(False)
+
     def _noise(self, data: str) -> None:
         for byte in bytes.fromhex(data):
             self._pico.feed(byte)
@@ -126,7 +134,7 @@ class EmulatedFirmware:
         edges = self._pico.edges
         if self._pico.shooting or not edges:
             return
-        if any(edge.output == TRIGGER for edge in edges):
+        if any(edge.output.startswith("camera") for edge in edges):
             self._fired += 1
             words = (str(number) for number in measured_shot(edges, self._pico.shot_set_points_ma))
             self._tell(" ".join(("fired", str(self._fired), *words)))
@@ -159,7 +167,8 @@ def measured_shot(edges: Iterable[Edge], set_points_ma: tuple[int, ...]) -> list
     falls: dict[str, list[int]] = {}
     for edge in edges:
         (rises if edge.high else falls).setdefault(edge.output, []).append(edge.cycle)
-    zero = rises[TRIGGER][0] + START_CYCLES
+    first = min(cycles[0] for output, cycles in rises.items() if output != TRIGGER)
+    zero = max(cycle for cycle in rises[TRIGGER] if cycle <= first) + START_CYCLES
     numbers: list[int] = []
     for i in range(CHANNELS):
         pulses = list(zip(rises.get(f"light{i}", []), falls.get(f"light{i}", []), strict=True))

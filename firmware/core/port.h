@@ -39,7 +39,7 @@ bool port_fire(void);
  * is already high starts nothing. Until the shot has started, and after it, no other edge does anything. */
 void port_permit(void);
 
-/* What the trigger input did since the last call, from the first port_permit after port_load on. */
+/* What the trigger input did since the last call, or since port_load. */
 struct port_edges {
     uint32_t rises;
     bool fired; /* the permitted shot has started; the one of port_fire does not count here */

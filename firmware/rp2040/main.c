@@ -38,42 +38,43 @@ bool port_interlock_closed(void)
 
 bool port_load(const struct pulse_train *train)
 {
+    (void)interlock_take_edges(); /* they are of no concern to this train */
     return outputs_load(train);
 }
 
 bool port_estop_closed(void)
 {
-    return true;
+    return interlock_take_estop_closed();
 }
 
 bool port_fire(void)
 {
-    outputs_fire();
-    return true;
+    return outputs_fire();
 }
 
 void port_permit(void)
 {
+    outputs_permit();
 }
 
 struct port_edges port_take_edges(void)
 {
-    return (struct port_edges){0};
+    return interlock_take_edges();
 }
 
 uint32_t port_take_cameras(void)
 {
-    return 0;
+    return outputs_take_cameras();
 }
 
 bool port_prepare_light(const uint32_t *current_ma)
 {
-    (void)current_ma;
-    return false;
+    return outputs_prepare_light(current_ma);
 }
 
 void port_sustain_light(void)
 {
+    outputs_sustain_light();
 }
 
 void port_off(void)

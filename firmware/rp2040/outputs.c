@@ -6,6 +6,9 @@
 #include "rp2040.h"
 #include "set_points.h"
 
+#define LENGTH(program) (uint32_t)(sizeof(program) / sizeof *(program))
+#define CLOCK_DIVIDER(cycles) ((uint32_t)(cycles) << 16)
+
 enum {
     LIGHT = 0, /* number of the PIO block */
     CAMERA = 1,
@@ -15,15 +18,16 @@ enum {
     FIFO_DEPTH = 4,
     OUTPUT_OFF = OUTPUT_ENABLE | OUTPUT_LOW,
     OUTPUT_LIVE = OUTPUT_ENABLE,
-    CLOCK_DIVIDER_1 = 1 << 16,
     SHIFT_RIGHT = 1 << 18 | 1 << 19,
     SIDE_SET_1 = 1 << 29,
     READY_POLLS = 16,
+    LAST_PULSE = (1 << LIT_COUNT_BITS) - 1,
 };
 
 /* The two words of a machine; a machine without a shot stays without words. */
 struct words {
     bool used;
+    bool single; /* pulse A alone */
     uint32_t delay;
     uint32_t pattern;
 };
@@ -31,6 +35,8 @@ struct words {
 static struct words light[CHANNEL_COUNT];
 static struct words camera[CHANNEL_COUNT];
 static volatile uint32_t off_count;
+static volatile bool permitted; /* until the shot has started */
+static bool lit[CHANNEL_COUNT];
 
 void outputs_off(void)
 {
@@ -75,11 +81,13 @@ static bool encode_light(const struct channel *channel, struct words *words)
     uint32_t b = 0;
     const uint32_t gap_ns = channel->b_start_ns - channel->a_start_ns - channel->a_width_ns;
     words->used = channel->used && channel->current_ma;
+    words->single = channel_is_single(channel);
     words->delay = channel->a_start_ns / TICK_NS;
     if (!words->used)
         return true;
-    const bool fits = channel->a_start_ns % TICK_NS == 0 && encode(channel->a_width_ns, PULSE_CYCLES_MAX, &a) &&
-                      encode(gap_ns, GAP_CYCLES_MAX, &gap) && encode(channel->b_width_ns, PULSE_CYCLES_MAX, &b);
+    bool fits = channel->a_start_ns % TICK_NS == 0 && encode(channel->a_width_ns, PULSE_CYCLES_MAX, &a);
+    if (!words->single)
+        fits = fits && encode(gap_ns, GAP_CYCLES_MAX, &gap) && encode(channel->b_width_ns, PULSE_CYCLES_MAX, &b);
     words->pattern = a | gap << WIDTH_BITS | b << (WIDTH_BITS + GAP_BITS);
     return fits;
 }
@@ -101,7 +109,7 @@ static bool encode_train(const struct pulse_train *train)
 
 static void set_up_machine(uint32_t pio, uint32_t machine, uint32_t pin, uint32_t length)
 {
-    REG(PIO_CLKDIV(pio, machine)) = CLOCK_DIVIDER_1;
+    REG(PIO_CLKDIV(pio, machine)) = CLOCK_DIVIDER(1);
     REG(PIO_EXECCTRL(pio, machine)) = (length - 1) << 12; /* wrap after the last instruction */
     REG(PIO_SHIFTCTRL(pio, machine)) = SHIFT_RIGHT;
     REG(PIO_PINCTRL(pio, machine)) = SIDE_SET_1 | PIN_TRIGGER << 15 | pin << 10;
@@ -110,14 +118,27 @@ static void set_up_machine(uint32_t pio, uint32_t machine, uint32_t pin, uint32_
     REG(PIO_INSTR(pio, machine)) = PIO_LOW | PIO_JMP(0);
 }
 
-static void set_up_block(uint32_t pio, const uint16_t *program, uint32_t length, uint32_t first_pin)
+static void write_program(uint32_t pio, const uint16_t *program, uint32_t length)
 {
     REG(PIO_CTRL(pio)) = RESTART_ALL;
     for (uint32_t i = 0; i < length; i++)
         REG(PIO_INSTR_MEM(pio, i)) = program[i];
+}
+
+static void set_up_light(void)
+{
+    write_program(LIGHT, LIGHT_PROGRAM, LENGTH(LIGHT_PROGRAM));
     for (uint32_t i = 0; i < MACHINES; i++)
-        set_up_machine(pio, i, first_pin + i, length);
-    REG(PIO_CTRL(pio)) = ENABLE_ALL;
+        set_up_machine(LIGHT, i, PIN_LIGHT + i, light[i].single ? LIGHT_SINGLE_LENGTH : LENGTH(LIGHT_PROGRAM));
+    REG(PIO_CTRL(LIGHT)) = ENABLE_ALL;
+}
+
+static void set_up_cameras(void)
+{
+    write_program(CAMERA, CAMERA_PROGRAM, LENGTH(CAMERA_PROGRAM));
+    for (uint32_t i = 0; i < MACHINES; i++)
+        set_up_machine(CAMERA, i, PIN_CAMERA + i, LENGTH(CAMERA_PROGRAM));
+    REG(PIO_CTRL(CAMERA)) = ENABLE_ALL;
 }
 
 /* Only the pins that the train uses; the others stay forced low. */
@@ -133,8 +154,8 @@ static void give_pins(void)
 
 static void give_outputs(void)
 {
-    set_up_block(LIGHT, LIGHT_PROGRAM, sizeof LIGHT_PROGRAM / sizeof *LIGHT_PROGRAM, PIN_LIGHT);
-    set_up_block(CAMERA, CAMERA_PROGRAM, sizeof CAMERA_PROGRAM / sizeof *CAMERA_PROGRAM, PIN_CAMERA);
+    set_up_light();
+    set_up_cameras();
     give_pins();
 }
 
@@ -146,20 +167,34 @@ static bool set_currents(const struct pulse_train *train)
     return set_points_set(current_ma);
 }
 
-bool outputs_load(const struct pulse_train *train)
+/* Off, and how often it was off until then. */
+static uint32_t switch_off(void)
 {
-    uint32_t before = interrupts_mask();
+    const uint32_t before = interrupts_mask();
     outputs_off();
-    const uint32_t off_before = off_count;
+    permitted = false;
+    const uint32_t count = off_count;
     interrupts_restore(before);
-    if (!encode_train(train) || !set_currents(train)) /* the set-points take their time, with interrupts on */
-        return false;
-    before = interrupts_mask();
-    const bool still_wanted = off_count == off_before; /* or an OFF that came meanwhile would be undone */
+    return count;
+}
+
+/* Unless an OFF came meanwhile, which would be undone. */
+static bool give_unless_off(uint32_t off_before, void (*give)(void))
+{
+    const uint32_t before = interrupts_mask();
+    const bool still_wanted = off_count == off_before;
     if (still_wanted)
-        give_outputs();
+        give();
     interrupts_restore(before);
     return still_wanted;
+}
+
+bool outputs_load(const struct pulse_train *train)
+{
+    const uint32_t off_before = switch_off();
+    if (!encode_train(train) || !set_currents(train)) /* the set-points take their time, with interrupts on */
+        return false;
+    return give_unless_off(off_before, give_outputs);
 }
 
 static void push_words(uint32_t pio, const struct words *words)
@@ -172,24 +207,112 @@ static void push_words(uint32_t pio, const struct words *words)
     }
 }
 
-static bool waits_for_trigger(uint32_t pio, const struct words *words)
+static bool all_stand_at(uint32_t pio, const struct words *words, uint32_t address)
 {
     for (uint32_t i = 0; i < CHANNEL_COUNT; i++)
-        if (words[i].used && REG(PIO_ADDR(pio, i)) != PIO_TRIGGER_ADDRESS)
+        if (words[i].used && REG(PIO_ADDR(pio, i)) != address)
             return false;
     return true;
 }
 
-void outputs_fire(void)
+/* Words for one shot, and wait until all machines stand at the wait for the trigger line: a few cycles, or for ever if
+ * an interrupt has stopped them. */
+static bool push_shot(uint32_t address)
 {
     bool ready = false;
     push_words(LIGHT, light);
     push_words(CAMERA, camera);
-    for (int i = 0; i < READY_POLLS && !ready; i++) /* a few cycles; for ever if an interrupt has stopped them */
-        ready = waits_for_trigger(LIGHT, light) && waits_for_trigger(CAMERA, camera);
-    if (!ready)
-        return;
+    for (int i = 0; i < READY_POLLS && !ready; i++)
+        ready = all_stand_at(LIGHT, light, address) && all_stand_at(CAMERA, camera, address);
+    return ready;
+}
+
+static void pulse_trigger_line(void)
+{
     REG(IO_CTRL(PIN_TRIGGER)) = FUNCTION_NONE | INPUT_HIGH;
     REG(IO_CTRL(PIN_TRIGGER)) = FUNCTION_NONE | INPUT_HIGH; /* long enough for the input synchroniser */
     REG(IO_CTRL(PIN_TRIGGER)) = FUNCTION_NONE | INPUT_LOW;
+}
+
+bool outputs_fire(void)
+{
+    const uint32_t off_before = off_count;
+    return push_shot(PIO_TRIGGER_ADDRESS) && give_unless_off(off_before, pulse_trigger_line);
+}
+
+static void open_trigger_line(void)
+{
+    permitted = true;
+    REG(IO_CTRL(PIN_TRIGGER)) = FUNCTION_NONE;
+}
+
+/* All machines have to see the same edge. So the line is held high while they get their words, one after the other:
+ * they stand and wait for it to fall. Then one write hands it to the pin. If that is low they all go on to wait for its
+ * rise; if it is high they all wait for it to fall first. */
+void outputs_permit(void)
+{
+    const uint32_t off_before = off_count;
+    REG(IO_CTRL(PIN_TRIGGER)) = FUNCTION_NONE | INPUT_HIGH;
+    if (push_shot(PIO_TRIGGER_LOW_ADDRESS))
+        (void)give_unless_off(off_before, open_trigger_line);
+}
+
+/* They run in step: the first camera tells of all. */
+static bool has_started(void)
+{
+    uint32_t machine = 0;
+    while (machine < CHANNEL_COUNT - 1 && !camera[machine].used)
+        machine++;
+    const uint32_t address = REG(PIO_ADDR(CAMERA, machine));
+    return address != PIO_TRIGGER_LOW_ADDRESS && address != PIO_TRIGGER_ADDRESS;
+}
+
+bool outputs_take_start(void)
+{
+    const bool started = permitted && has_started();
+    if (started)
+        permitted = false;
+    return started;
+}
+
+/* The edges are latched by the pins themselves, without an interrupt. */
+uint32_t outputs_take_cameras(void)
+{
+    uint32_t rises = 0;
+    for (uint32_t i = 0; i < CHANNEL_COUNT; i++) {
+        const uint32_t edge = IO_EDGE_HIGH(PIN_CAMERA + i);
+        rises += (REG(IO_INTR(PIN_CAMERA + i)) & edge) != 0;
+        REG(IO_INTR(PIN_CAMERA + i)) = edge;
+    }
+    return rises;
+}
+
+static void give_light_pins(void)
+{
+    write_program(LIGHT, LIT_PROGRAM, LENGTH(LIT_PROGRAM));
+    for (uint32_t i = 0; i < MACHINES; i++) {
+        set_up_machine(LIGHT, i, PIN_LIGHT + i, LENGTH(LIT_PROGRAM));
+        REG(PIO_CLKDIV(LIGHT, i)) = CLOCK_DIVIDER(LIT_DIVIDER);
+        if (lit[i])
+            REG(IO_CTRL(PIN_LIGHT + i)) = FUNCTION_PIO0 | OUTPUT_LIVE;
+    }
+    REG(PIO_CTRL(LIGHT)) = ENABLE_ALL;
+}
+
+bool outputs_prepare_light(const uint32_t *current_ma)
+{
+    const uint32_t off_before = switch_off();
+    for (uint32_t i = 0; i < CHANNEL_COUNT; i++) {
+        lit[i] = current_ma[i] > 0;
+        if (current_ma[i] > MAX_LIGHT_MA) /* the core has checked; this is the last place to ask */
+            return false;
+    }
+    return set_points_set(current_ma) && give_unless_off(off_before, give_light_pins);
+}
+
+void outputs_sustain_light(void)
+{
+    for (uint32_t i = 0; i < CHANNEL_COUNT; i++)
+        if (lit[i] && REG(PIO_FSTAT(LIGHT)) & PIO_TX_EMPTY(i))
+            REG(PIO_TXF(LIGHT, i)) = LAST_PULSE;
 }

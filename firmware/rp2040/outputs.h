@@ -2,6 +2,9 @@
 #ifndef OUTPUTS_H
 #define OUTPUTS_H
 
+#include <stdbool.h>
+#include <stdint.h>
+
 #include "pulse_train.h"
 
 /* Every output driven low; the first thing after a reset. */
@@ -12,8 +15,23 @@ void outputs_start(void);
  * between; then the caller switches off. */
 bool outputs_load(const struct pulse_train *train);
 
-/* Start one shot of the loaded train; nothing happens if outputs_off came in between. */
-void outputs_fire(void);
+/* Start one shot of the loaded train; false, and no shot, if outputs_off came in between. */
+bool outputs_fire(void);
+
+/* Let the next rising edge of the trigger pin start one shot. */
+void outputs_permit(void);
+
+/* True once, when the permitted shot has started; also after outputs_off. */
+bool outputs_take_start(void);
+
+/* Rises of the camera outputs since the last call. */
+uint32_t outputs_take_cameras(void);
+
+/* Make ready for continuous light, dark until words come; false as outputs_load. */
+bool outputs_prepare_light(const uint32_t *current_ma);
+
+/* Permit the next few milliseconds of it. */
+void outputs_sustain_light(void);
 
 /* All low, from any context, interrupts included: light pins first, then cameras, trigger, machines, set-points. */
 void outputs_off(void);

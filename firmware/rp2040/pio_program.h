@@ -8,7 +8,11 @@
  *     camera  word 1: cycles from trigger to the edge     word 2: width
  *
  * A width w is encoded as w - 2, because OUT takes one cycle and the loop one more than its count. The width field
- * is the last limit of a light pulse: whatever is written into the FIFO, none can outlast PULSE_CYCLES_MAX. */
+ * is the last limit of a light pulse: whatever is written into the FIFO, none can outlast PULSE_CYCLES_MAX.
+ * A machine that gives pulse A alone returns to the start after it.
+ *
+ * Continuous light has a program of its own: pulses with dark between them, both as long as the program says, not
+ * its words. A word permits up to 2^LIT_COUNT_BITS pulses. So a dead processor ends it, and no word can change it. */
 #ifndef PIO_PROGRAM_H
 #define PIO_PROGRAM_H
 
@@ -46,8 +50,17 @@ _Static_assert(MIN_WIDTH_NS >= COUNT_OFFSET * TICK_NS && MIN_DARK_NS >= COUNT_OF
 #define PIO_PULL 0x80a0u /* stalls while the FIFO is empty */
 #define PIO_PULL_IF_ANY 0x8080u
 #define PIO_MOV_X_OSR 0xa027u
+#define PIO_OUT_Y(bits) (0x6040u | ((bits) & 31u))
+#define PIO_SET_X(value) (0xe020u | (value))
+#define PIO_JMP_Y_DEC(address) (0x0080u | (address))
+#define PIO_NOP 0xa042u
+#define PIO_DELAY(cycles) ((cycles) << 8) /* after the instruction; up to 15 */
 
-enum { PIO_TRIGGER_ADDRESS = 4 };
+enum {
+    PIO_TRIGGER_LOW_ADDRESS = 3,
+    PIO_TRIGGER_ADDRESS = 4,
+    LIGHT_SINGLE_LENGTH = 8, /* instructions up to the end of pulse A */
+};
 
 static const uint16_t LIGHT_PROGRAM[] = {
     PIO_LOW | PIO_PULL,
@@ -74,5 +87,29 @@ static const uint16_t CAMERA_PROGRAM[] = {
     PIO_HIGH | PIO_OUT_X(CAMERA_BITS),
     PIO_HIGH | PIO_JMP_X_DEC(7u),
 };
+
+enum {
+    LIT_COUNT_BITS = 8,
+    LIT_DIVIDER = 10, /* system clocks per cycle */
+    LIT_ON_CYCLES = 24,
+    LIT_PERIOD_CYCLES = 1 + 32 * 16 + LIT_ON_CYCLES + 1,
+    LIT_WORDS_MAX = 5, /* four in the FIFO, one under way */
+};
+
+static const uint16_t LIT_PROGRAM[] = {
+    PIO_LOW | PIO_PULL,
+    PIO_LOW | PIO_OUT_Y(LIT_COUNT_BITS),
+    PIO_LOW | PIO_SET_X(31u),
+    PIO_LOW | PIO_JMP_X_DEC(3u) | PIO_DELAY(15u),
+    PIO_HIGH | PIO_NOP | PIO_DELAY(15u),
+    PIO_HIGH | PIO_NOP | PIO_DELAY(7u),
+    PIO_LOW | PIO_JMP_Y_DEC(2u),
+};
+
+_Static_assert(LIT_ON_CYCLES * LIT_DIVIDER * TICK_NS <= MAX_WIDTH_NS, "no pulse of continuous light is longer either");
+_Static_assert(LIT_ON_CYCLES * 1000000ll <= MAX_LIGHT_DUTY_PPM * (long long)LIT_PERIOD_CYCLES, "and most of it is dark");
+_Static_assert((long long)LIT_WORDS_MAX * (LIT_PERIOD_CYCLES << LIT_COUNT_BITS) * LIT_DIVIDER * TICK_NS <=
+                   LIGHT_SUSTAIN_MS * 1000000ll,
+               "whatever the FIFO holds, it ends in time");
 
 #endif

@@ -52,7 +52,9 @@ enum reset_bits {
 #define IO_CTRL(pin) (0x40014004u + 8u * (uint32_t)(pin))
 #define IO_INTR(pin) (0x400140f0u + 4u * ((uint32_t)(pin) / 8u))
 #define IO_INTE(pin) (0x40014100u + 4u * ((uint32_t)(pin) / 8u))
+#define IO_INTS(pin) (0x40014120u + 4u * ((uint32_t)(pin) / 8u))
 #define IO_EDGE_LOW(pin) (4u << (4u * ((uint32_t)(pin) % 8u)))
+#define IO_EDGE_HIGH(pin) (8u << (4u * ((uint32_t)(pin) % 8u)))
 #define PAD(pin) (0x4001c004u + 4u * (uint32_t)(pin))
 #define IO_QSPI_SS_CTRL 0x4001800cu
 #define SIO_GPIO_IN 0xd0000004u
@@ -86,6 +88,8 @@ enum pad {
 /* 3.7: pio is 0 or 1 */
 #define PIO(pio) (0x50200000u + 0x100000u * (uint32_t)(pio))
 #define PIO_CTRL(pio) PIO(pio)
+#define PIO_FSTAT(pio) (PIO(pio) + 0x04u)
+#define PIO_TX_EMPTY(machine) (1u << (24u + (uint32_t)(machine)))
 #define PIO_TXF(pio, machine) (PIO(pio) + 0x10u + 4u * (uint32_t)(machine))
 #define PIO_INSTR_MEM(pio, index) (PIO(pio) + 0x48u + 4u * (uint32_t)(index))
 #define PIO_CLKDIV(pio, machine) (PIO(pio) + 0xc8u + 0x18u * (uint32_t)(machine))

@@ -67,8 +67,15 @@ class Board:
         self.pico.run_ms(BOOT_MS)
 
     def ask(self, command: Command, *fields: int) -> Reply:
+        return decode_reply(self.say(self._line(command, *fields)))
+
+    def send(self, command: Command, *fields: int) -> None:
+        """Ask, and let nothing pass yet."""
+        self.pico.receive(self._line(command, *fields))
+
+    def _line(self, command: Command, *fields: int) -> bytes:
         self._sequence = self._sequence % MAX_SEQUENCE + 1
-        return decode_reply(self.say(encode_request(Request(self._sequence, command, fields))))
+        return encode_request(Request(self._sequence, command, fields))
 
     def say(self, line: bytes) -> bytes:
         """One line to the board, and the line that it answers."""
@@ -85,8 +92,8 @@ class Board:
         assert self.ask(Command.LOAD).error is None
         return replies
 
-    def arm(self, shots: int) -> None:
-        assert self.ask(Command.ARM, shots, Source.COMMAND, 0).error is None
+    def arm(self, shots: int, source: Source = Source.COMMAND, period_us: int = 0) -> None:
+        assert self.ask(Command.ARM, shots, source, period_us).error is None
 
     def shoot(self, time_ms: float = PERIOD_MS) -> Waveform:
         """Fire, let the period pass, and measure what the outputs did."""
@@ -98,7 +105,8 @@ class Board:
 
     def waveform(self) -> Waveform:
         edges = self.pico.edges
-        start = next(edge.cycle for edge in edges if edge.output == TRIGGER and edge.high) + START_CYCLES
+        first = next(edge.cycle for edge in edges if edge.output != TRIGGER)
+        start = max(e.cycle for e in edges if e.output == TRIGGER and e.high and e.cycle <= first) + START_CYCLES
         return sorted(((e.cycle - start) * CYCLE_NS, e.output, e.high) for e in edges if e.output != TRIGGER)
 
     def when(self, output: str, high: bool, after_cycles: int, action: Callable[[], None]) -> None:

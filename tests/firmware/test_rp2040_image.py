@@ -87,7 +87,7 @@ def test_there_is_neither_heap_nor_floating_point(image: Path) -> None:
 
 def test_simulation_and_firmware_agree_on_the_pins() -> None:
     in_c = dict(re.findall(r"(PIN_\w+) = (\d+)", (FIRMWARE / "pins.h").read_text()))
-    names = ("PIN_LIGHT", "PIN_CAMERA", "PIN_TRIGGER", "PIN_INTERLOCK", "PIN_SET_POINT")
+    names = ("PIN_LIGHT", "PIN_CAMERA", "PIN_TRIGGER", "PIN_INTERLOCK", "PIN_ESTOP", "PIN_SET_POINT")
     assert {name: int(in_c[name]) for name in names} == {name: getattr(rp2040_chip, name) for name in names}
 
 

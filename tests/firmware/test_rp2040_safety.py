@@ -17,7 +17,7 @@ from daq.drivers.pulse_protocol import (
     decode_reply,
     encode_request,
 )
-from daq.simulation.rp2040_chip import PIN_CAMERA, PIN_INTERLOCK, PIN_LIGHT, PIN_TRIGGER
+from daq.simulation.rp2040_chip import PIN_CAMERA, PIN_ESTOP, PIN_INTERLOCK, PIN_LIGHT, PIN_TRIGGER
 from daq.simulation.rp2040_emulator import CYCLE_NS, CYCLES_PER_MS
 from tests.firmware.rp2040_board import BOOT_MS, PAPER, PERIOD_MS, Board
 
@@ -177,7 +177,7 @@ def test_an_interlock_that_opens_at_any_moment_of_arming_leaves_the_outputs_cut(
 
 
 def test_the_pads_of_all_outputs_pull_down(board: Board) -> None:
-    for pin in (*range(PIN_LIGHT, PIN_LIGHT + 4), *range(PIN_CAMERA, PIN_CAMERA + 4), PIN_INTERLOCK, PIN_TRIGGER):
+    for pin in (*range(PIN_LIGHT, PIN_LIGHT + 4), *range(PIN_CAMERA, PIN_CAMERA + 4), PIN_INTERLOCK, PIN_ESTOP, PIN_TRIGGER):
         pad = board.pico.read_word(0x4001_C004 + 4 * pin)
         assert (pad >> 2 & 1, pad >> 3 & 1) == (1, 0), pin
 

@@ -17,7 +17,7 @@ import pytest
 
 from daq.drivers.pulse_protocol import Command, Reply, Request, decode_reply, encode_request
 from daq.simulation.firmware_build import ImageKind
-from daq.simulation.rp2040_chip import OUTPUT_PINS, PIN_INTERLOCK, PIN_SET_POINT, PIN_TRIGGER
+from daq.simulation.rp2040_chip import OUTPUT_PINS, PIN_ESTOP, PIN_INTERLOCK, PIN_SET_POINT, PIN_TRIGGER
 from daq.simulation.rp2040_emulator import CYCLE_NS, START_CYCLES
 from tests.firmware.rp2040_board import BOOT_MS, PAPER, PERIOD_MS, Board, Channel, Waveform, image
 
@@ -71,7 +71,7 @@ def session(channels: Sequence[Channel | None]) -> list[Request]:
 
 
 def in_rp2040js(requests: Sequence[Request], kind: ImageKind = ImageKind.CONVERTER) -> Told:
-    steps: list[list[Any]] = [["pin", PIN_INTERLOCK, 1], ["run", BOOT_MS + FIRST_SHOT_MS]]
+    steps: list[list[Any]] = [["pin", PIN_INTERLOCK, 1], ["pin", PIN_ESTOP, 1], ["run", BOOT_MS + FIRST_SHOT_MS]]
     steps += [["say", encode_request(request).decode()] for request in requests]
     steps += [["run", PERIOD_MS]]
     finished = subprocess.run(
