@@ -154,8 +154,9 @@ class Acquisition:
         generator = self._rig.generator
         generator.off()
         generator.clear()
-        if generator.status().state is GeneratorState.ARMED:
-            raise DeviceError(generator.name, "still armed after off")
+        after = generator.status().state
+        if after in (GeneratorState.ARMED, GeneratorState.LIT):
+            raise DeviceError(generator.name, f"still {after} after off")
         if state is RunState.FAULT:
             self._move(RunStep.ACKNOWLEDGE)
 

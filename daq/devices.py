@@ -84,6 +84,15 @@ class GeneratorState(StrEnum):
     SAFE = "safe"
     ARMED = "armed"
     FAULT = "fault"
+    LIT = "lit"
+
+
+class TriggerSource(StrEnum):
+    """What starts the shots of an armed pulse generator."""
+
+    COMMAND = "command"
+    EXTERNAL = "external"
+    TIMER = "timer"
 
 
 @dataclass(frozen=True)
@@ -93,7 +102,7 @@ class GeneratorStatus:
     Parameters
     ----------
     state : GeneratorState
-        SAFE, ARMED or FAULT.
+        SAFE, ARMED, FAULT or LIT, which is continuous light.
     faults : tuple[str, ...]
         Names of the latched faults.
     interlock_closed : bool
@@ -101,7 +110,9 @@ class GeneratorStatus:
     shots_left : int
         Shot budget that remains.
     counters : Mapping[str, int]
-        ``requested, fired, suppressed, early, crc_errors``, since boot.
+        ``requested, fired, suppressed, early, cameras, crc_errors``, since boot.
+    estop_closed : bool
+        The generator's own emergency stop.
     """
 
     state: GeneratorState
@@ -109,6 +120,7 @@ class GeneratorStatus:
     interlock_closed: bool
     shots_left: int
     counters: Mapping[str, int]
+    estop_closed: bool = True
 
 
 class PulseGenerator(Device, Protocol):
@@ -117,14 +129,21 @@ class PulseGenerator(Device, Protocol):
     def configure(self, timing: ShotTiming) -> FiredTrain:
         """Load a pulse train; returns the actual, quantised one (sequence 0). Refused while armed."""
 
-    def arm(self, shots: int) -> None:
-        """Permit this many shots, not one more."""
+    def arm(self, shots: int, source: TriggerSource = TriggerSource.COMMAND, period_us: int = 0) -> None:
+        """Permit this many shots, not one more, to one source.
+
+        The period is the timer's; for the other sources the shortest that is intended, 0 if that is not known. One that
+        the loaded train does not permit is refused.
+        """
 
     def fire(self) -> FiredTrain:
         """Fire one shot; returns what was really fired."""
 
     def status(self) -> GeneratorStatus:
         """State, faults, counters; also the host heartbeat."""
+
+    def light(self, current_a: Mapping[str, float], time_s: float) -> None:
+        """Continuous light of low current on these views, for this time at most; the heartbeat keeps it on."""
 
     def off(self) -> None:
         """Light off, disarm; may be called from any thread at any time, and never waits for another command."""

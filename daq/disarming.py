@@ -46,7 +46,8 @@ def _still_armed(rig: Rig) -> str | None:
         state = rig.generator.status().state
     except DeviceError as error:
         return str(error)
-    return f"{rig.generator.name}: still armed after off" if state is GeneratorState.ARMED else None
+    lights = state in (GeneratorState.ARMED, GeneratorState.LIT)
+    return f"{rig.generator.name}: still {state} after off" if lights else None
 
 
 def _disarm(view: str, camera: Camera, problems: dict[str, str]) -> None:

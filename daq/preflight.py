@@ -75,6 +75,8 @@ def check_light_permitted(rig: Rig) -> None:
         raise DeviceRefused(rig.generator.name, f"fault: {', '.join(status.faults)}; acknowledge it first")
     if not status.interlock_closed:
         raise InterlockOpen(f"{rig.generator.name}: the interlock input of the pulse generator is open")
+    if not status.estop_closed:
+        raise InterlockOpen(f"{rig.generator.name}: the emergency stop of the pulse generator is open")
 
 
 def _timing(rig: Rig, plan: RunPlan) -> ShotTiming:

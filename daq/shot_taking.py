@@ -71,7 +71,7 @@ class ShotTaker:
         if deviation := train_deviation(self._run.timing, generator.configure(self._run.timing)):
             raise DeviceRefused(generator.name, f"loaded another pulse train: {deviation}")
         if not self._control.ending:
-            generator.arm(plan.shots + self._refires_left)
+            generator.arm(plan.shots + self._refires_left, period_us=int(1e6 * self._period_s))
 
     def take(self, index: int) -> Shot | None:
         """Take one shot when it is due; None if the run is ended."""

@@ -76,7 +76,10 @@ class Window:
 
 @dataclass(frozen=True)
 class ViewTiming:
-    """Edges of one view: camera trigger, both exposures, both pulses; zero is the start of pulse A."""
+    """Edges of one view: camera trigger, both exposures, both pulses; zero is the start of pulse A.
+
+    A pulse B that ends where it begins is none: the light flashes once.
+    """
 
     camera_trigger_ns: int
     frame_a: Window

@@ -4,24 +4,36 @@
 the trigger of the shot, where nothing can be. All edges are shifted by the same whole number of ticks.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from types import TracebackType
 from typing import Self
 
-from daq.devices import DeviceIdentity, GeneratorState, GeneratorStatus
+from daq.devices import DeviceIdentity, GeneratorState, GeneratorStatus, TriggerSource
 from daq.drivers.pulse_line import PulseLine
-from daq.drivers.pulse_protocol import CHANNEL_COUNT, COUNTERS, UNCHANGED, Command, Fault, Reply, Source, State
+from daq.drivers.pulse_protocol import (
+    CHANNEL_COUNT,
+    COUNTERS,
+    UNCHANGED,
+    Command,
+    Fault,
+    Reply,
+    Source,
+    State,
+)
 from daq.errors import DeviceError, PlanError, ProtocolError
 from daq.shot import FiredTrain, LightPulse
 from daq.timing import ShotTiming, ViewTiming
 
+MAX_PERIOD_US = 10_000_000
+
 
 @dataclass(frozen=True)
 class _LoadedTrain:
-    """The train that the generator holds: its number there, and its actual edges."""
+    """The train that the generator holds: its number there, its shortest period, and its actual edges."""
 
     number: int
+    period_us: int
     actual: FiredTrain
 
 
@@ -100,21 +112,51 @@ class SerialPulseGenerator:
         DeviceRefused
             The generator is armed, or the train breaks one of its limits.
         """
-        strangers = sorted(set(timing.views) - set(self._channels))
-        if strangers:
-            raise PlanError(f"{self._name}: views {strangers} have no channel; there are {sorted(self._channels)}")
+        self._check_views(timing.views)
         self._loaded = None
         shift_ns = _shift_ns(timing, self._opened_identity().number("tick_ns"))
         self._tighten_limits()
         self._line.ask(Command.NEW)
         replies = {view: self._set_channel(view, edges, shift_ns) for view, edges in timing.views.items()}
-        number = self._line.ask(Command.LOAD).number("train")
-        self._loaded = _LoadedTrain(number, _actual_train(replies))
+        loaded = self._line.ask(Command.LOAD)
+        self._loaded = _LoadedTrain(loaded.number("train"), loaded.number("period_us"), _actual_train(replies))
         return self._loaded.actual
 
-    def arm(self, shots: int) -> None:
-        """Permit this many shots; refused without a train, while armed, or with an open interlock."""
-        self._line.ask(Command.ARM, shots, Source.COMMAND, 0)
+    def arm(self, shots: int, source: TriggerSource = TriggerSource.COMMAND, period_us: int = 0) -> None:
+        """Permit this many shots to one source.
+
+        Raises
+        ------
+        PlanError
+            The shots are to follow each other faster than the loaded train permits.
+        DeviceRefused
+            Without a train, while armed, with an open interlock or emergency stop.
+        """
+        if self._loaded is not None and 0 < period_us < self._loaded.period_us:
+            raise PlanError(
+                f"{self._name}: a shot every {period_us} us is too fast for this pulse train, which its duty limit "
+                f"permits every {self._loaded.period_us} us"
+            )
+        if source is not TriggerSource.TIMER:
+            period_us = min(period_us, MAX_PERIOD_US)
+        self._line.ask(Command.ARM, shots, Source[source.name], period_us)
+
+    def light(self, current_a: Mapping[str, float], time_s: float) -> None:
+        """Continuous light of low current, until `off` or the time is over; `status` is the heartbeat that keeps it on.
+
+        Raises
+        ------
+        PlanError
+            A view has no channel.
+        DeviceRefused
+            A current is above the limit of continuous light; armed; just after pulses; open interlock.
+        """
+        self._check_views(current_a)
+        currents_ma = [0] * CHANNEL_COUNT
+        for view, limit in current_a.items():
+            currents_ma[self._channels[view]] = round(limit * 1000)
+        self._tighten_limits()
+        self._line.ask(Command.LIGHT, round(time_s * 1000), *currents_ma)
 
     def fire(self) -> FiredTrain:
         """Fire one shot; its sequence is the generator's count of shots since it was powered up.
@@ -129,6 +171,22 @@ class SerialPulseGenerator:
             raise ProtocolError(self._name, f"fired train {reply.number('train')}, which this driver did not load")
         return replace(self._loaded.actual, sequence=reply.number("fired"))
 
+    def last_fired(self) -> FiredTrain:
+        """Newest shot of any source, as the generator counts and times it in its own ticks.
+
+        Raises
+        ------
+        DeviceRefused
+            A view of this driver had no part in it, or there was none.
+        """
+        tick_ns = self._opened_identity().number("tick_ns")
+        replies = {view: self._line.ask(Command.SHOT, channel) for view, channel in self._channels.items()}
+        return FiredTrain(
+            sequence=max(reply.number("fired") for reply in replies.values()),
+            camera_trigger_ns={view: tick_ns * reply.number("camera_ticks") for view, reply in replies.items()},
+            pulses={view: _pulses(reply, "ticks", tick_ns) for view, reply in replies.items()},
+        )
+
     def status(self) -> GeneratorStatus:
         """State, faults and counters; also the heartbeat that keeps the generator armed."""
         reply = self._line.ask(Command.STATUS)
@@ -138,6 +196,7 @@ class SerialPulseGenerator:
             interlock_closed=reply.number("interlock") == 1,
             shots_left=reply.number("shots_left"),
             counters={name: reply.number(name) for name in COUNTERS},
+            estop_closed=reply.number("estop") == 1,
         )
 
     def off(self) -> None:
@@ -149,8 +208,9 @@ class SerialPulseGenerator:
             The abort byte was sent, but the generator did not confirm within the limit.
         """
         reply = self._line.off()
-        if State(reply.number("state")) is State.ARMED:
-            raise ProtocolError(self._name, "is still armed after off")
+        state = State(reply.number("state"))
+        if state in (State.ARMED, State.LIT):
+            raise ProtocolError(self._name, f"is still {state.name.lower()} after off")
 
     def clear(self) -> None:
         """Acknowledge latched faults; refused while the interlock is open."""
@@ -161,6 +221,11 @@ class SerialPulseGenerator:
             raise DeviceError(self._name, "has not been opened")
         return self._identity
 
+    def _check_views(self, views: Iterable[str]) -> None:
+        strangers = sorted(set(views) - set(self._channels))
+        if strangers:
+            raise PlanError(f"{self._name}: views {strangers} have no channel; there are {sorted(self._channels)}")
+
     def _tighten_limits(self) -> None:
         """Before every train: a generator that was reset has forgotten its limits, and every train with them."""
         for view, limit_a in self._max_current_a.items():
@@ -170,14 +235,16 @@ class SerialPulseGenerator:
                 raise ProtocolError(self._name, f"keeps {reply.number('max_current_ma')} mA as the limit of {view}")
 
     def _set_channel(self, view: str, edges: ViewTiming, shift_ns: int) -> Reply:
+        pulse_b = edges.pulse_b
+        single = pulse_b.open_ns == pulse_b.close_ns
         return self._line.ask(
             Command.CHANNEL,
             self._channels[view],
             edges.camera_trigger_ns + shift_ns,
             edges.pulse_a.open_ns + shift_ns,
             edges.pulse_a.close_ns - edges.pulse_a.open_ns,
-            edges.pulse_b.open_ns + shift_ns,
-            edges.pulse_b.close_ns - edges.pulse_b.open_ns,
+            0 if single else pulse_b.open_ns + shift_ns,
+            pulse_b.close_ns - pulse_b.open_ns,
             round(edges.current_a * 1000),
             edges.frame_a.close_ns - edges.camera_trigger_ns,
             edges.frame_b.open_ns - edges.camera_trigger_ns,
@@ -194,14 +261,14 @@ def _actual_train(replies: Mapping[str, Reply]) -> FiredTrain:
     return FiredTrain(
         sequence=0,
         camera_trigger_ns={view: reply.number("camera_ns") for view, reply in replies.items()},
-        pulses={view: _actual_pulses(reply) for view, reply in replies.items()},
+        pulses={view: _pulses(reply, "ns", 1) for view, reply in replies.items()},
     )
 
 
-def _actual_pulses(reply: Reply) -> tuple[LightPulse, ...]:
+def _pulses(reply: Reply, unit: str, unit_ns: int) -> tuple[LightPulse, ...]:
+    """Pulses of a channel that has current; one of no width is none."""
     current_a = reply.number("current_ma") / 1000
-    if not current_a:
-        return ()
+    edges = ((reply.number(f"{pulse}_start_{unit}"), reply.number(f"{pulse}_width_{unit}")) for pulse in "ab")
     return tuple(
-        LightPulse(reply.number(f"{pulse}_start_ns"), reply.number(f"{pulse}_width_ns"), current_a) for pulse in "ab"
+        LightPulse(start * unit_ns, width * unit_ns, current_a) for start, width in edges if current_a and width
     )

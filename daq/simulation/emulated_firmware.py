@@ -40,7 +40,8 @@ class EmulatedFirmware:
         File descriptor of the serial line.
     tell : Callable[[str], None]
         Told one line per shot: ``fired COUNT {CHANNEL CAMERA_NS A_START_NS A_WIDTH_NS B_START_NS B_WIDTH_NS
-        CURRENT_MA}...``; a pulse that was not given has width 0.
+        CURRENT_MA}...``; a pulse that was not given has width 0. ``lit {CHANNEL CURRENT_MA}...`` and ``dark`` when
+        continuous light begins and ends.
     """
 
     def __init__(self, image: bytes, serial_line: int, tell: Callable[[str], None]) -> None:
@@ -48,6 +49,7 @@ class EmulatedFirmware:
         self._serial_line = serial_line
         self._tell = tell
         self._fired = 0
+        self._lit = False
         self._to_lose = 0
         self._to_damage = 0
         self._pico.run_ms(_BOOT_MS)
@@ -102,6 +104,7 @@ class EmulatedFirmware:
     def _run(self, until_cycle: int) -> None:
         while self._pico.cycle < until_cycle:
             self._pico.run(until_cycle, lambda: bool(self._pico.sent or self._pico.edges))
+            self._report_light()
             self._report_shot()
             self._forward_replies()
 
@@ -129,6 +132,18 @@ class EmulatedFirmware:
 
     def _damage(self, count: str) -> None:
         self._to_damage = int(count)
+
+    def _report_light(self) -> None:
+        """Continuous light has no trigger."""
+        edges = self._pico.edges
+        lit = self._pico.shooting and (self._lit or (bool(edges) and not any(edge.output == TRIGGER for edge in edges)))
+        if lit != self._lit:
+            self._lit = lit
+            words = (f"{i} {current_ma}" for i, current_ma in enumerate(self._pico.set_points_ma()))
+            self._tell(" ".join(("lit", *words)) if lit else "dark")
+            edges.clear()
+        if lit:
+            edges.clear()
 
     def _report_shot(self) -> None:
         edges = self._pico.edges

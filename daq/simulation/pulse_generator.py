@@ -48,6 +48,7 @@ class FirmwareProcess:
         self._instructing = threading.Lock()
         self._reader: threading.Thread | None = None
         self._port = ""
+        self._light_a: Mapping[str, float] = {}
 
     @property
     def port(self) -> str:
@@ -86,6 +87,19 @@ class FirmwareProcess:
     def set_interlock(self, closed: bool) -> None:
         """Open or close the generator's interlock input."""
         self._instruct(f"interlock {int(closed)}")
+
+    def set_estop(self, closed: bool) -> None:
+        """Open or close the input of the generator's emergency stop."""
+        self._instruct(f"estop {int(closed)}")
+
+    def trigger(self) -> None:
+        """Give a rising edge to the generator's trigger input."""
+        self._instruct("trigger")
+
+    @property
+    def light_a(self) -> Mapping[str, float]:
+        """Current of the continuous light of each view; empty while there is none."""
+        return self._light_a
 
     def reset(self, *, by_watchdog: bool = False) -> None:
         """Restart the microcontroller."""
@@ -146,10 +160,17 @@ class FirmwareProcess:
             for line in _lines(process):
                 if line.startswith("fired "):
                     self._on_fired(self._fired_train(line))
+                elif line == "dark" or line.startswith("lit "):
+                    self._light_a = self._continuous_light(line)
                 else:
                     self._answers.put(line)
         finally:
             process.kill()
+
+    def _continuous_light(self, line: str) -> Mapping[str, float]:
+        numbers = iter(map(int, line.split()[1:]))
+        currents_ma = dict(zip(numbers, numbers, strict=True))
+        return {view: currents_ma[channel] / 1000 for channel, view in self._views.items() if currents_ma.get(channel)}
 
     def _fired_train(self, line: str) -> FiredTrain:
         sequence, *numbers = map(int, line.split()[1:])

@@ -16,8 +16,8 @@ from daq.simulation.board_number import give_number
 from daq.simulation.mcp4728 import Mcp4728
 from daq.simulation.rp2040_chip import (
     OUTPUT_PINS,
-    PIN_I2C_SCL,
     PIN_ESTOP,
+    PIN_I2C_SCL,
     PIN_INTERLOCK,
     TRIGGER,
     drive_trigger,

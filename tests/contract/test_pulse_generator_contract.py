@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import pytest
 import serial
 
-from daq.devices import GeneratorState, PulseGenerator
+from daq.devices import GeneratorState, PulseGenerator, TriggerSource
 from daq.drivers.pulse_protocol import HEARTBEAT_MS, Command, Request, State, decode_reply, encode_request
 from daq.drivers.serial_pulse_generator import SerialPulseGenerator
 from daq.errors import DeviceError, DeviceRefused, PlanError
@@ -35,7 +35,7 @@ class Bench:
     """A generator, the laboratory around it, and the light that it gave."""
 
     firmware: FirmwareProcess
-    generator: PulseGenerator
+    generator: SerialPulseGenerator
     light: list[FiredTrain]
     changed: threading.Condition = field(default_factory=threading.Condition)
 
@@ -295,3 +295,152 @@ def test_an_open_interlock_forbids_arming(bench: Bench) -> None:
         bench.generator.arm(1)
     bench.firmware.set_interlock(True)
     bench.generator.arm(1)
+
+
+@on_the_real_image_too
+def test_the_emergency_stop_latches_in_every_state(bench: Bench) -> None:
+    bench.firmware.set_estop(False)
+    status = bench.generator.status()
+    assert (status.state, status.faults, status.estop_closed) == (GeneratorState.FAULT, ("estop",), False)
+    with pytest.raises(DeviceRefused, match="emergency stop is open"):
+        bench.generator.clear()
+    bench.firmware.set_estop(True)
+    with pytest.raises(DeviceRefused, match="fault is latched"):
+        bench.generator.configure(shot_timing())
+    bench.generator.clear()
+    status = bench.generator.status()
+    assert (status.state, status.faults, status.estop_closed) == (GeneratorState.SAFE, (), True)
+
+
+@on_the_real_image_too
+def test_an_external_edge_fires(bench: Bench) -> None:
+    configured = bench.generator.configure(shot_timing())
+    bench.generator.arm(2, TriggerSource.EXTERNAL)
+    bench.let_period_pass()
+    bench.firmware.trigger()
+    assert bench.wait_for_light(1) == [replace(configured, sequence=1)]
+    assert bench.generator.status().shots_left == 1
+
+
+def test_external_edges_fire_within_period_and_budget(bench: Bench) -> None:
+    configured = bench.generator.configure(shot_timing())
+    bench.generator.arm(2, TriggerSource.EXTERNAL)
+    bench.let_period_pass()
+    bench.firmware.trigger()
+    bench.firmware.trigger()  # early
+    bench.let_period_pass()
+    bench.firmware.trigger()
+    bench.let_period_pass()
+    bench.firmware.trigger()  # beyond the budget
+    assert [replace(train, sequence=0) for train in bench.wait_for_light(2)] == [configured] * 2
+    status = bench.generator.status()
+    assert (status.state, status.shots_left) == (GeneratorState.SAFE, 0)
+    assert (status.counters["fired"], status.counters["early"], status.counters["cameras"]) == (2, 1, 6)
+    assert len(bench.light) == 2
+
+
+def test_the_last_shot_is_told_whoever_fired_it(bench: Bench) -> None:
+    configured = bench.generator.configure(shot_timing(width_ns=1003, left=0.0))
+    with pytest.raises(DeviceRefused, match="no shot"):
+        bench.generator.last_fired()
+    bench.generator.arm(1, TriggerSource.EXTERNAL)
+    bench.let_period_pass()
+    bench.firmware.trigger()
+    assert bench.generator.last_fired() == replace(configured, sequence=1) == bench.wait_for_light(1)[0]
+
+
+def test_external_edges_do_nothing_when_armed_for_commands(armed: Bench) -> None:
+    armed.firmware.trigger()
+    assert armed.generator.status().counters["requested"] == 0
+    assert armed.light == []
+
+
+def test_the_timer_fires_by_itself(bench: Bench) -> None:
+    bench.generator.configure(shot_timing())
+    bench.generator.arm(3, TriggerSource.TIMER, 20_000)
+    with pytest.raises(DeviceRefused, match="another trigger source"):
+        bench.generator.fire()
+    assert len(bench.wait_for_light(3)) == 3
+    assert bench.generator.status().state is GeneratorState.SAFE
+
+
+@pytest.mark.parametrize("source", TriggerSource)
+def test_a_period_that_the_duty_forbids_is_refused_when_arming(bench: Bench, source: TriggerSource) -> None:
+    bench.generator.configure(shot_timing(width_ns=2000))  # 4 us at 200 ppm: 20 ms
+    with pytest.raises(PlanError, match=r"every 19999 us is too fast .* every 20000 us"):
+        bench.generator.arm(1, source, 19_999)
+    bench.generator.arm(1, source, 20_000)
+    bench.generator.off()
+
+
+def test_a_very_slow_plan_is_armed(bench: Bench) -> None:
+    bench.generator.configure(shot_timing())
+    bench.generator.arm(1, period_us=3_600_000_000)
+    assert bench.generator.status().state is GeneratorState.ARMED
+
+
+def test_a_view_may_flash_once(bench: Bench) -> None:
+    timing = shot_timing()
+    once = {view: replace(edges, pulse_b=Window(0, 0)) for view, edges in timing.views.items()}
+    configured = bench.generator.configure(ShotTiming(once, timing.shortest_period_ns))
+    assert all(len(pulses) == 1 for pulses in configured.pulses.values())
+    bench.generator.arm(1)
+    assert bench.generator.fire() == replace(configured, sequence=1)
+    assert bench.wait_for_light(1)[0].pulses == configured.pulses
+
+
+def wait_until_lit(bench: Bench, current_a: dict[str, float]) -> None:
+    for _ in range(100):
+        bench.firmware.advance(1)
+        if bench.firmware.light_a == current_a:
+            return
+    pytest.fail(f"{bench.firmware.light_a} instead of {current_a}")
+
+
+@on_the_real_image_too
+def test_continuous_light_comes_and_goes(bench: Bench) -> None:
+    bench.firmware.advance(20)
+    bench.generator.light({"left": 0.1, "right": 0.5}, 60.0)
+    assert bench.generator.status().state is GeneratorState.LIT
+    wait_until_lit(bench, {"left": 0.1, "right": 0.5})
+    bench.generator.off()
+    assert bench.generator.status().state is GeneratorState.SAFE
+    wait_until_lit(bench, {})
+
+
+def test_continuous_light_ends_with_its_time(bench: Bench) -> None:
+    bench.generator.light({"left": 0.1}, 0.05)
+    bench.firmware.advance(100)
+    assert bench.generator.status().state is GeneratorState.SAFE
+    wait_until_lit(bench, {})
+
+
+@pytest.mark.parametrize("current_a", [0.0, 0.501, 20.0])
+def test_continuous_light_has_a_limit_of_its_own(bench: Bench, current_a: float) -> None:
+    with pytest.raises(DeviceRefused, match="continuous light is not 1 to 500 mA"):
+        bench.generator.light({"left": current_a}, 1.0)
+    with pytest.raises(PlanError, match="behind"):
+        bench.generator.light({"behind": 0.1}, 1.0)
+    assert bench.generator.status().state is GeneratorState.SAFE
+
+
+def test_continuous_light_and_pulses_exclude_each_other(armed: Bench) -> None:
+    with pytest.raises(DeviceRefused, match="armed or lit"):
+        armed.generator.light({"left": 0.1}, 1.0)
+    armed.generator.off()
+    with pytest.raises(DeviceRefused, match="before the shortest period"):
+        armed.generator.light({"left": 0.1}, 1.0)
+    armed.firmware.advance(30)
+    armed.generator.light({"left": 0.1}, 60.0)
+    with pytest.raises(DeviceRefused, match="armed or lit"):
+        armed.generator.arm(1)
+    with pytest.raises(DeviceRefused, match="armed or lit"):
+        armed.generator.configure(shot_timing())
+
+
+def test_a_silent_host_ends_continuous_light(bench: Bench) -> None:
+    bench.generator.light({"left": 0.1}, 60.0)
+    wait_until_lit(bench, {"left": 0.1})
+    bench.firmware.advance(HEARTBEAT_MS + 1)
+    assert bench.generator.status().faults == ("heartbeat",)
+    wait_until_lit(bench, {})

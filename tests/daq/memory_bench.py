@@ -1,14 +1,14 @@
 """A bench in memory: devices that keep their Protocol honestly, and fail when a test tells them to."""
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from types import TracebackType
 from typing import Self
 
 import numpy as np
 
-from daq.devices import DeviceIdentity, GeneratorState, GeneratorStatus, Rig
+from daq.devices import DeviceIdentity, GeneratorState, GeneratorStatus, Rig, TriggerSource
 from daq.errors import DeviceError, DeviceRefused, DeviceTimeout
 from daq.shot import DoubleFrame, ExposureRecord, FiredTrain, Image, LightPulse
 from daq.simulation.interlock import MemoryInterlock
@@ -141,7 +141,10 @@ class MemoryGenerator(MemoryDevice):
         self._loaded = FiredTrain(0, triggers, pulses)
         return self._loaded
 
-    def arm(self, shots: int) -> None:
+    def light(self, current_a: Mapping[str, float], time_s: float) -> None:
+        raise DeviceRefused(self.name, f"no continuous light: {dict(current_a)} for {time_s} s")
+
+    def arm(self, shots: int, source: TriggerSource = TriggerSource.COMMAND, period_us: int = 0) -> None:
         if self._loaded is None or self.state is GeneratorState.FAULT:
             raise DeviceRefused(self.name, f"arm while {self.state.value}, train {self._loaded}")
         self.journal.append(f"arm {shots}")

@@ -23,6 +23,7 @@ from daq.drivers.pulse_protocol import (
     encode_reply,
     encode_request,
 )
+from daq.drivers.serial_pulse_generator import MAX_PERIOD_US
 from daq.run_plan import PulsePair
 
 FIRMWARE = Path(__file__).resolve().parents[2] / "firmware"
@@ -76,6 +77,7 @@ def test_limits_agree() -> None:
     assert in_c == {name: int(value) for name, value, _ in table("Limits")}
     assert in_c["CHANNEL_COUNT"] == pulse_protocol.CHANNEL_COUNT
     assert in_c["HEARTBEAT_MS"] == pulse_protocol.HEARTBEAT_MS
+    assert in_c["MAX_PERIOD_US"] == MAX_PERIOD_US
 
 
 def test_error_texts_state_the_limits() -> None:

@@ -1,5 +1,6 @@
 """Continuous light of the real image: how it is made, and that nothing keeps it on."""
 
+import itertools
 from collections.abc import Callable, Iterator
 
 import pytest
@@ -41,7 +42,7 @@ def test_it_is_made_of_pulses_that_are_short_and_far_apart(board: Board) -> None
     for output in ("light0", "light3"):
         ups, downs = ([cycle for cycle, high in edges(board, output) if high is level] for level in (True, False))
         widths_ns = {(down - up) * CYCLE_NS for up, down in zip(ups, downs, strict=False)}
-        periods_ns = {(b - a) * CYCLE_NS for a, b in zip(ups, ups[1:], strict=False)}
+        periods_ns = {(b - a) * CYCLE_NS for a, b in itertools.pairwise(ups)}
         assert len(ups) > 100
         assert max(widths_ns) <= LIMIT["MAX_WIDTH_NS"]
         assert max(widths_ns) / min(periods_ns) <= LIMIT["MAX_LIGHT_DUTY_PPM"] / 1e6
@@ -108,7 +109,7 @@ def test_a_reply_does_not_let_it_flicker(board: Board) -> None:
     board.ask(Command.STATUS)
     board.ask(Command.ID)
     ups = [cycle for cycle, high in edges(board, "light0") if high]
-    assert max(b - a for a, b in zip(ups, ups[1:], strict=False)) * CYCLE_NS < 50_000
+    assert max(b - a for a, b in itertools.pairwise(ups)) * CYCLE_NS < 50_000
     board.ask(Command.OFF)
 
 

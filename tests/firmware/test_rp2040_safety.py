@@ -177,7 +177,13 @@ def test_an_interlock_that_opens_at_any_moment_of_arming_leaves_the_outputs_cut(
 
 
 def test_the_pads_of_all_outputs_pull_down(board: Board) -> None:
-    for pin in (*range(PIN_LIGHT, PIN_LIGHT + 4), *range(PIN_CAMERA, PIN_CAMERA + 4), PIN_INTERLOCK, PIN_ESTOP, PIN_TRIGGER):
+    for pin in (
+        *range(PIN_LIGHT, PIN_LIGHT + 4),
+        *range(PIN_CAMERA, PIN_CAMERA + 4),
+        PIN_INTERLOCK,
+        PIN_ESTOP,
+        PIN_TRIGGER,
+    ):
         pad = board.pico.read_word(0x4001_C004 + 4 * pin)
         assert (pad >> 2 & 1, pad >> 3 & 1) == (1, 0), pin
 

@@ -8,7 +8,7 @@ from typing import Self
 
 import numpy as np
 
-from daq.devices import DeviceIdentity, GeneratorState, GeneratorStatus, Rig
+from daq.devices import DeviceIdentity, GeneratorState, GeneratorStatus, Rig, TriggerSource
 from daq.errors import DeviceRefused, InterlockOpen
 from daq.shot import DoubleFrame, ExposureRecord, FiredTrain, Image, LightPulse
 from daq.simulation.faults import Fault
@@ -118,7 +118,10 @@ class MemoryGenerator(_MemoryDevice):
         self._train = FiredTrain(0, triggers, pulses)
         return self._train
 
-    def arm(self, shots: int) -> None:
+    def light(self, current_a: Mapping[str, float], time_s: float) -> None:
+        raise DeviceRefused(self.name, f"no continuous light: {dict(current_a)} for {time_s} s")
+
+    def arm(self, shots: int, source: TriggerSource = TriggerSource.COMMAND, period_us: int = 0) -> None:
         if not self._interlock.is_closed():
             raise InterlockOpen("the door is open")
         with self._lock:
