@@ -167,7 +167,7 @@ ERROR_TEXT: Mapping[ErrorNumber, str] = {
     ErrorNumber.SOURCE: "there is no such trigger source",
     ErrorNumber.PERIOD: "the period is shorter than the train permits, or longer than 10000000 us",
     ErrorNumber.OTHER_SOURCE: "the generator is armed for another trigger source",
-    ErrorNumber.NO_SHOT: "no shot has been fired on this channel",
+    ErrorNumber.NO_SHOT: "no shot of this train has been fired on this channel",
 }
 
 

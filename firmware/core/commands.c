@@ -39,14 +39,20 @@ static enum error new_train(struct safety *safety, const uint32_t *fields, struc
     return safety_new_train(safety);
 }
 
-static void channel_fields(struct text *reply, const struct channel *actual)
+/* In units of the tick or of 1 ns; the name says which. */
+static void channel_fields(struct text *reply, uint32_t number, const struct channel *channel, const char *unit,
+                           uint32_t unit_ns)
 {
-    text_field(reply, "camera_ns", actual->camera_ns);
-    text_field(reply, "a_start_ns", actual->a_start_ns);
-    text_field(reply, "a_width_ns", actual->a_width_ns);
-    text_field(reply, "b_start_ns", actual->b_start_ns);
-    text_field(reply, "b_width_ns", actual->b_width_ns);
-    text_field(reply, "current_ma", actual->current_ma);
+    static const char *const names[] = {" camera", " a_start", " a_width", " b_start", " b_width"};
+    const uint32_t times_ns[] = {channel->camera_ns, channel->a_start_ns, channel->a_width_ns, channel->b_start_ns,
+                                 channel->b_width_ns};
+    text_field(reply, "channel", number);
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
+        text_word(reply, names[i]);
+        text_word(reply, unit);
+        text_number(reply, times_ns[i] / unit_ns);
+    }
+    text_field(reply, "current_ma", channel->current_ma);
 }
 
 static enum error set_channel(struct safety *safety, const uint32_t *fields, struct text *reply)
@@ -64,8 +70,7 @@ static enum error set_channel(struct safety *safety, const uint32_t *fields, str
     const enum error error = safety_set_channel(safety, fields[0], &requested);
     if (error)
         return error;
-    text_field(reply, "channel", fields[0]);
-    channel_fields(reply, &safety->train.channels[fields[0]]);
+    channel_fields(reply, fields[0], &safety->train.channels[fields[0]], "_ns=", 1);
     return ERROR_NONE;
 }
 
@@ -129,18 +134,21 @@ static enum error shot(struct safety *safety, const uint32_t *fields, struct tex
 {
     if (fields[0] >= CHANNEL_COUNT)
         return ERROR_CHANNEL;
-    const struct channel *fired = &safety->fired_train.channels[fields[0]];
-    if (!fired->used)
+    const struct channel *fired = &safety->train.channels[fields[0]];
+    if (!safety->fired || !fired->used)
         return ERROR_NO_SHOT;
     text_field(reply, "fired", safety->counters.fired);
-    text_field(reply, "channel", fields[0]);
-    text_field(reply, "camera_ticks", fired->camera_ns / port_tick_ns);
-    text_field(reply, "a_start_ticks", fired->a_start_ns / port_tick_ns);
-    text_field(reply, "a_width_ticks", fired->a_width_ns / port_tick_ns);
-    text_field(reply, "b_start_ticks", fired->b_start_ns / port_tick_ns);
-    text_field(reply, "b_width_ticks", fired->b_width_ns / port_tick_ns);
-    text_field(reply, "current_ma", fired->current_ma);
+    channel_fields(reply, fields[0], fired, "_ticks=", port_tick_ns);
     return ERROR_NONE;
+}
+
+static void counter_fields(struct text *reply, const struct counters *counters)
+{
+    static const char *const names[] = {"requested", "fired", "suppressed", "early", "cameras", "crc_errors"};
+    const uint32_t counts[] = {counters->requested, counters->fired,   counters->suppressed,
+                               counters->early,     counters->cameras, counters->crc_errors};
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
+        text_field(reply, names[i], counts[i]);
 }
 
 static enum error status(struct safety *safety, const uint32_t *fields, struct text *reply)
@@ -152,12 +160,7 @@ static enum error status(struct safety *safety, const uint32_t *fields, struct t
     text_field(reply, "estop", safety->estop_closed);
     text_field(reply, "source", (uint32_t)safety->source);
     text_field(reply, "shots_left", safety->shots_left);
-    text_field(reply, "requested", safety->counters.requested);
-    text_field(reply, "fired", safety->counters.fired);
-    text_field(reply, "suppressed", safety->counters.suppressed);
-    text_field(reply, "early", safety->counters.early);
-    text_field(reply, "cameras", safety->counters.cameras);
-    text_field(reply, "crc_errors", safety->counters.crc_errors);
+    counter_fields(reply, &safety->counters);
     return ERROR_NONE;
 }
 

@@ -42,7 +42,7 @@ enum error safety_light(struct safety *safety, uint32_t time_ms, const uint32_t 
         safety_outputs_off(safety);
         return ERROR_HARDWARE;
     }
-    safety->light_over_us = port_now_us() + (uint64_t)time_ms * 1000u;
+    safety->light_over_us = port_now_us() + time_ms * 1000u;
     safety->state = STATE_LIT; /* safety_poll lights */
     return ERROR_NONE;
 }

@@ -32,5 +32,6 @@ _Static_assert(MAX_WIDTH_NS + MIN_DARK_NS < MAX_SEPARATION_NS, "two pulses fit t
 _Static_assert((uint64_t)MAX_EDGE_NS + MAX_WIDTH_NS + CAMERA_PULSE_NS < UINT32_MAX, "edges fit 32 bits");
 _Static_assert(2ull * MAX_WIDTH_NS * 1000u / MAX_DUTY_PPM >= MIN_PERIOD_US, "a start waits for the period of any train");
 _Static_assert(2ull * MAX_WIDTH_NS * 1000u < UINT32_MAX, "the duty sum fits 32 bits");
+_Static_assert(MAX_LIGHT_MS * 1000ull < UINT32_MAX, "and the time of continuous light, in us");
 
 #endif

@@ -69,7 +69,7 @@ enum error safety_new_train(struct safety *safety)
     if (error)
         return error;
     safety->train = (struct pulse_train){0};
-    safety->loaded = false;
+    safety->loaded = safety->fired = false;
     return ERROR_NONE;
 }
 
@@ -91,7 +91,7 @@ enum error safety_set_channel(struct safety *safety, uint32_t number, const stru
         return error;
     actual.used = true;
     safety->train.channels[number] = actual;
-    safety->loaded = false;
+    safety->loaded = safety->fired = false;
     return ERROR_NONE;
 }
 

@@ -73,6 +73,7 @@ struct safety {
     struct channel_limits limits[CHANNEL_COUNT];
     struct pulse_train train; /* actual values */
     bool loaded;
+    bool fired; /* the train as it is now is that of the newest shot */
     bool outputs_live;
     uint32_t train_id; /* counts the trains loaded since boot */
     enum source source;
@@ -80,7 +81,6 @@ struct safety {
     bool permitted;           /* the trigger input may start a shot */
     uint32_t timer_period_us;
     uint64_t timer_due_us;
-    struct pulse_train fired_train; /* the newest one */
     struct counters counters;
     uint64_t not_before_us;   /* the next light */
     uint64_t train_over_us;   /* the latest one */

@@ -63,7 +63,7 @@ static void count_shot(struct safety *safety)
 {
     const uint64_t now_us = port_now_us();
     safety->counters.fired++;
-    safety->fired_train = safety->train;
+    safety->fired = true;
     safety->permitted = false;
     safety->not_before_us = now_us + train_period_us(&safety->train, safety->limits);
     safety->train_over_us = now_us + train_length_ns(&safety->train) / 1000u + 2u; /* both terms are rounded down */

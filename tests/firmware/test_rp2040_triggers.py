@@ -200,11 +200,11 @@ def test_the_timer_keeps_its_period(board: Board) -> None:
     board.arm(20, Source.TIMER, 12_345)
     armed = board.pico.cycle
     board.pico.edges.clear()
-    for _ in range(8):
+    for _ in range(12):
         board.ask(Command.STATUS)
         board.pico.run_ms(5)
     shots = rises(board, "camera0")
-    assert len(shots) >= 8
+    assert len(shots) >= 5
     period = 12_345 * CYCLES_PER_MS // 1000
     late_us = [(cycle - armed - (i + 1) * period) * CYCLE_NS / 1000 for i, cycle in enumerate(shots)]
     assert max(late_us) - min(late_us) < TIMER_JITTER_US
@@ -231,7 +231,7 @@ def test_an_abort_between_the_words_and_the_start_is_no_shot(board: Board) -> No
     fires_after = rises(board, "trigger")[0] - asked
     board.ask(Command.OFF)
     given = []
-    for early_cycles in range(0, 240, 24):
+    for early_cycles in range(-160, 240, 40):
         before = counters(board)
         asked = ask_to_fire(board)
         board.pico.run(asked + fires_after - early_cycles)
