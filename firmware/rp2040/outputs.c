@@ -178,15 +178,11 @@ static uint32_t switch_off(void)
     return count;
 }
 
-/* Unless an OFF came meanwhile, which would be undone. */
-static bool give_unless_off(uint32_t off_before, void (*give)(void))
+/* Mask the interrupts; true unless an OFF came meanwhile, which must not be undone. */
+static bool mask_unless_off(uint32_t off_before, uint32_t *before)
 {
-    const uint32_t before = interrupts_mask();
-    const bool still_wanted = off_count == off_before;
-    if (still_wanted)
-        give();
-    interrupts_restore(before);
-    return still_wanted;
+    *before = interrupts_mask();
+    return off_count == off_before;
 }
 
 bool outputs_load(const struct pulse_train *train)
@@ -194,7 +190,12 @@ bool outputs_load(const struct pulse_train *train)
     const uint32_t off_before = switch_off();
     if (!encode_train(train) || !set_currents(train)) /* the set-points take their time, with interrupts on */
         return false;
-    return give_unless_off(off_before, give_outputs);
+    uint32_t before = 0;
+    const bool still_wanted = mask_unless_off(off_before, &before);
+    if (still_wanted)
+        give_outputs();
+    interrupts_restore(before);
+    return still_wanted;
 }
 
 static void push_words(uint32_t pio, const struct words *words)
@@ -237,13 +238,13 @@ static void pulse_trigger_line(void)
 bool outputs_fire(void)
 {
     const uint32_t off_before = off_count;
-    return push_shot(PIO_TRIGGER_ADDRESS) && give_unless_off(off_before, pulse_trigger_line);
-}
-
-static void open_trigger_line(void)
-{
-    permitted = true;
-    REG(IO_CTRL(PIN_TRIGGER)) = FUNCTION_NONE;
+    const bool ready = push_shot(PIO_TRIGGER_ADDRESS);
+    uint32_t before = 0;
+    const bool start = mask_unless_off(off_before, &before) && ready;
+    if (start)
+        pulse_trigger_line();
+    interrupts_restore(before);
+    return start;
 }
 
 /* All machines have to see the same edge. So the line is held high while they get their words, one after the other:
@@ -253,8 +254,13 @@ void outputs_permit(void)
 {
     const uint32_t off_before = off_count;
     REG(IO_CTRL(PIN_TRIGGER)) = FUNCTION_NONE | INPUT_HIGH;
-    if (push_shot(PIO_TRIGGER_LOW_ADDRESS))
-        (void)give_unless_off(off_before, open_trigger_line);
+    const bool ready = push_shot(PIO_TRIGGER_LOW_ADDRESS);
+    uint32_t before = 0;
+    if (mask_unless_off(off_before, &before) && ready) {
+        permitted = true;
+        REG(IO_CTRL(PIN_TRIGGER)) = FUNCTION_NONE;
+    }
+    interrupts_restore(before);
 }
 
 /* They run in step: the first camera tells of all. */
@@ -307,7 +313,14 @@ bool outputs_prepare_light(const uint32_t *current_ma)
         if (current_ma[i] > MAX_LIGHT_MA) /* the core has checked; this is the last place to ask */
             return false;
     }
-    return set_points_set(current_ma) && give_unless_off(off_before, give_light_pins);
+    if (!set_points_set(current_ma))
+        return false;
+    uint32_t before = 0;
+    const bool still_wanted = mask_unless_off(off_before, &before);
+    if (still_wanted)
+        give_light_pins();
+    interrupts_restore(before);
+    return still_wanted;
 }
 
 void outputs_sustain_light(void)
