@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from daq.devices import GeneratorState
+from daq.devices import GeneratorState, TriggerSource
 from daq.drivers.serial_pulse_generator import SerialPulseGenerator
 from daq.errors import DeviceError, DeviceRefused, DeviceUnavailable
 from daq.run_plan import PulsePair, RunPlan
@@ -21,6 +21,7 @@ CHANNELS = {"left": 1, "right": 3}
 CAMERA = CameraTiming(1_000, 20_000, 500, 30_000_000, 1_000_000)
 PERIOD_MS = 10
 SHOTS = 20
+EDGES = 3
 
 
 def shot_timing() -> ShotTiming:
@@ -39,9 +40,10 @@ def firmware(light: list[FiredTrain]) -> Iterator[FirmwareProcess]:
         yield process
 
 
-def test_twenty_shots_an_abort_and_a_watchdog(firmware: FirmwareProcess, light: list[FiredTrain]) -> None:
+def test_a_day_at_the_bench(firmware: FirmwareProcess, light: list[FiredTrain]) -> None:
+    """Twenty shots, a lost reply, an abort, external triggers, the interlock, the emergency stop, the watchdog."""
     with SerialPulseGenerator("generator", firmware.port, CHANNELS) as generator:
-        assert generator.identity().firmware.endswith("rp2040")
+        assert generator.identity().firmware.split()[-1].startswith("rp2040")
         configured = generator.configure(shot_timing())
         generator.arm(SHOTS + 10)
         for shot in range(1, SHOTS + 1):
@@ -53,13 +55,56 @@ def test_twenty_shots_an_abort_and_a_watchdog(firmware: FirmwareProcess, light: 
         generator.off()
         with pytest.raises(DeviceRefused, match="not armed"):
             generator.fire()
+        trigger_from_outside(firmware, generator)
+        open_the_interlock(firmware, generator)
+        press_the_stop(firmware, generator)
+        fired = generator.last_fired()
+        assert light == [replace(configured, sequence=shot) for shot in range(1, fired.sequence + 1)]
         firmware.reset(by_watchdog=True)
         with pytest.raises(DeviceError, match="reset"):
             generator.status()
-    assert len(light) == SHOTS + 1
     with SerialPulseGenerator("generator", firmware.port, CHANNELS) as generator:
         status = generator.status()
         assert (status.state, status.faults) == (GeneratorState.FAULT, ("watchdog",))
+
+
+def trigger_from_outside(firmware: FirmwareProcess, generator: SerialPulseGenerator) -> None:
+    """Three permitted shots by edges; the one after them does nothing, and neither does FIRE."""
+    before = generator.status().counters["fired"]
+    generator.arm(EDGES, TriggerSource.EXTERNAL)
+    with pytest.raises(DeviceRefused, match="another trigger source"):
+        generator.fire()
+    for _ in range(EDGES + 1):
+        firmware.advance(PERIOD_MS)
+        firmware.trigger()
+    status = generator.status()
+    assert (status.state, status.shots_left) == (GeneratorState.SAFE, 0)
+    assert status.counters["fired"] == before + EDGES
+
+
+def open_the_interlock(firmware: FirmwareProcess, generator: SerialPulseGenerator) -> None:
+    """It latches, forbids CLEAR while it is open, and nothing arms by itself."""
+    generator.arm(1)
+    firmware.set_interlock(False)
+    status = generator.status()
+    assert (status.state, status.faults, status.interlock_closed) == (GeneratorState.FAULT, ("interlock",), False)
+    with pytest.raises(DeviceRefused, match="interlock"):
+        generator.clear()
+    firmware.set_interlock(True)
+    generator.clear()
+    with pytest.raises(DeviceRefused, match="not armed"):
+        generator.fire()
+
+
+def press_the_stop(firmware: FirmwareProcess, generator: SerialPulseGenerator) -> None:
+    """It trips a generator that is safe, too."""
+    firmware.set_estop(False)
+    assert generator.status().faults == ("estop",)
+    with pytest.raises(DeviceRefused, match="stop"):
+        generator.clear()
+    firmware.set_estop(True)
+    generator.clear()
+    assert generator.status().state is GeneratorState.SAFE
 
 
 def test_a_pulled_plug_is_named(firmware: FirmwareProcess) -> None:
