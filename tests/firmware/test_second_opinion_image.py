@@ -114,12 +114,18 @@ PLANS: dict[str, list[Channel | None]] = {
 }
 
 
+def comparable(reply: Reply) -> Reply:
+    """rp2040js has neither the number of the flash nor the register that tells why the chip has started."""
+    fields = {name: value for name, value in reply.fields.items() if name not in ("serial", "cause")}
+    return replace(reply, boot=0, fields=fields)
+
+
 @pytest.mark.parametrize("name", PLANS)
 def test_both_emulators_see_the_same_edges_and_answers(name: str) -> None:
     requests = session(PLANS[name])
     replies, waveform = in_rp2040py(requests)
     other = in_rp2040js(requests)
-    assert [replace(reply, boot=0) for reply in other.replies] == [replace(reply, boot=0) for reply in replies]
+    assert [comparable(reply) for reply in other.replies] == [comparable(reply) for reply in replies]
     assert waveform
     assert other.waveform() == waveform
 
