@@ -1,7 +1,7 @@
 # Each target does its own set-up on a bare Debian 12 or 13 machine, is quick when that is done, and says what it does.
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint serve firmware bench lock clean mutants fuzz
+.PHONY: help setup demo test lint serve firmware bench lock clean mutants fuzz kernels-arm64
 
 PYTHON := .venv/bin/python
 DEBIAN_PACKAGES := python3-venv python3-dev python3-gi gir1.2-aravis-0.8 iproute2 gcc g++ gcc-arm-none-eabi cppcheck make chromium fonts-dejavu-core
@@ -24,7 +24,7 @@ endef
 PRIVATE_NETWORK := $(shell unshare -rn true 2>/dev/null && echo "unshare -rn bash -c 'ip link set lo up && exec \"\$$@\"' --")
 
 help: ## Show this list.
-	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /  make \1\t/' | expand -t 18
+	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z0-9-]+):.*## /  make \1\t/' | expand -t 22
 
 setup: .venv/.native firmware ## Install Debian packages, the Python environment and the native parts.
 
@@ -64,6 +64,10 @@ build/rp2040js/node_modules: firmware/tests/rp2040js/package-lock.json | .venv/.
 	@command -v npm >/dev/null || { $(call install,nodejs npm); }
 	@mkdir -p $(@D) && cp firmware/tests/rp2040js/package*.json $(@D)
 	@npm ci --prefix $(@D) --silent --no-audit --no-fund --ignore-scripts && touch $@ || echo "No rp2040js: npm cannot install it"
+
+kernels-arm64: setup ## Build the kernels for arm64 and run them in an emulator; downloads 69 MB once.
+	@$(AS_ROOT) apt-get install -y -qq --no-install-recommends g++-aarch64-linux-gnu qemu-user >/dev/null
+	$(PYTHON) -m pytest tests/processing/test_kernel_driver.py
 
 lock: .venv/.python ## Pin the newest versions of all Python packages.
 	$(PYTHON) -m pip install --quiet uv

@@ -110,8 +110,14 @@ inline Floats square_root(Floats x) {
 #endif
 }
 
+#if defined(__ARM_FP16_FORMAT_IEEE)
+typedef __fp16 Half;  // compilers of Debian 12 know no other name in C++
+#else
+typedef _Float16 Half;
+#endif
+
 inline uint16_t half_of(float value) {
-    const _Float16 half = static_cast<_Float16>(value);
+    const Half half = static_cast<Half>(value);
     uint16_t bits;
     std::memcpy(&bits, &half, sizeof bits);
     return bits;
