@@ -108,6 +108,7 @@ class Fault(IntFlag):
     WATCHDOG = 4
     INTERNAL = 8
     ESTOP = 16
+    SETPOINT = 32
 
 
 class ErrorNumber(IntEnum):

@@ -213,7 +213,7 @@ class SerialPulseGenerator:
             raise ProtocolError(self._name, f"is still {state.name.lower()} after off")
 
     def clear(self) -> None:
-        """Acknowledge latched faults; refused while the interlock is open."""
+        """Acknowledge latched faults; refused while its cause lasts."""
         self._line.ask(Command.CLEAR)
 
     def _opened_identity(self) -> Reply:

@@ -57,6 +57,7 @@ class EmulatedFirmware:
         self._instructions: Mapping[str, Callable[[str], None]] = {
             "interlock": lambda level: self._pico.set_interlock(level == "1"),
             "estop": lambda level: self._pico.set_estop(level == "1"),
+            "converter": self._set_converter,
             "trigger": self._trigger,
             "reset": self._reset,
             "advance": lambda time_ms: self._skip_ms(int(time_ms)),
@@ -116,6 +117,9 @@ class EmulatedFirmware:
             self._pico.power_up()
         self._fired = 0
         self._skip_ms(_BOOT_MS)
+
+    def _set_converter(self, working: str) -> None:
+        self._pico.converter.connected = working == "1"
 
     def _trigger(self, _: str) -> None:
         self._pico.set_trigger_pin(True)

@@ -92,6 +92,10 @@ class FirmwareProcess:
         """Open or close the input of the generator's emergency stop."""
         self._instruct(f"estop {int(closed)}")
 
+    def set_converter(self, working: bool) -> None:
+        """Let the set-points of the currents be confirmed as zero, or not."""
+        self._instruct(f"converter {int(working)}")
+
     def trigger(self) -> None:
         """Give a rising edge to the generator's trigger input."""
         self._instruct("trigger")

@@ -26,6 +26,9 @@ uint64_t port_now_us(void);
 bool port_interlock_closed(void);
 bool port_estop_closed(void);
 
+/* False while the set-points shall be zero and the hardware does not confirm that they are; the port goes on trying. */
+bool port_set_points_confirmed(void);
+
 /* Make ready for shots: set-points, read back, and edges. False where this machine cannot produce the train, or a
  * set-point does not read as it was set. */
 bool port_load(const struct pulse_train *train);

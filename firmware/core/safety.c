@@ -141,6 +141,8 @@ enum error safety_clear(struct safety *safety)
     const enum error error = safety_check_stops(safety);
     if (error)
         return error;
+    if (!port_set_points_confirmed())
+        return ERROR_HARDWARE;
     safety->faults = 0;
     safety->state = STATE_SAFE;
     return ERROR_NONE;
@@ -155,6 +157,8 @@ void safety_poll(struct safety *safety)
 {
     const uint64_t now_us = port_now_us();
     (void)safety_check_stops(safety); /* what it finds, it latches */
+    if (!port_set_points_confirmed() && !(safety->faults & FAULT_SETPOINT))
+        safety_trip(safety, FAULT_SETPOINT);
     safety->counters.cameras += port_take_cameras();
     if (gives_light(safety) && now_us - safety->heard_us > HEARTBEAT_MS * 1000u)
         safety_trip(safety, FAULT_HEARTBEAT);

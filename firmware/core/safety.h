@@ -11,8 +11,8 @@
  *      │  off, time is over                                                        │
  *      └──────────────────────── safety_clear, stops closed ───────────────────────┘
  *
- * Nothing but safety_arm leads to ARMED, nothing but safety_light to LIT. The emergency stop leads to FAULT from
- * everywhere. */
+ * Nothing but safety_arm leads to ARMED, nothing but safety_light to LIT. The emergency stop, and set-points that are
+ * not known to be zero, lead to FAULT from everywhere. */
 #ifndef SAFETY_H
 #define SAFETY_H
 
@@ -36,6 +36,7 @@ enum fault {
     FAULT_WATCHDOG = 4,
     FAULT_INTERNAL = 8,
     FAULT_ESTOP = 16,
+    FAULT_SETPOINT = 32,
 };
 
 /* What starts the shots of an armed generator. */

@@ -88,6 +88,11 @@ bool port_estop_closed(void)
     return closed;
 }
 
+bool port_set_points_confirmed(void)
+{
+    return !bench.converter_stuck;
+}
+
 bool port_load(const struct pulse_train *train)
 {
     loaded = *train;

@@ -13,6 +13,7 @@ struct bench {
     bool interlock_opened;    /* since the core last asked */
     bool estop_closed;
     bool estop_opened;
+    bool converter_stuck;     /* zero is not confirmed */
     int64_t clock_offset_us;  /* virtual time that has been skipped */
     unsigned replies_to_lose; /* line faults that are still to come */
     unsigned replies_to_damage;

@@ -39,6 +39,8 @@ static bool run(struct protocol *protocol, const char *line)
         bench_set_interlock(number != 0);
     else if (!strcmp(word, "estop"))
         bench_set_estop(number != 0);
+    else if (!strcmp(word, "converter"))
+        bench.converter_stuck = number == 0;
     else if (!strcmp(word, "trigger"))
         bench_trigger();
     else if (!strcmp(word, "reset"))

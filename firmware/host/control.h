@@ -2,6 +2,7 @@
  *
  *     interlock 0|1       open or close the interlock
  *     estop 0|1           open or close the emergency stop
+ *     converter 0|1       the set-points cannot be confirmed as zero, or can be again
  *     trigger             a rising edge on the trigger input
  *     reset [watchdog]    restart the microcontroller
  *     advance MS          let time pass

@@ -47,6 +47,11 @@ bool port_estop_closed(void)
     return interlock_take_estop_closed();
 }
 
+bool port_set_points_confirmed(void)
+{
+    return set_points_confirmed();
+}
+
 bool port_fire(void)
 {
     return outputs_fire();
@@ -135,8 +140,8 @@ int main(void)
         watchdog_feed();
         while (serial_take(&byte))
             protocol_receive(&protocol, byte);
+        set_points_poll();
         protocol_poll(&protocol);
-        (void)set_points_confirmed();
         sleep(safety_idle_us(&protocol.safety));
     }
 }

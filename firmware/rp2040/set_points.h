@@ -21,7 +21,10 @@ bool set_points_set(const uint32_t current_ma[CHANNEL_COUNT]);
 /* To zero, from any context, without waiting. */
 void set_points_zero(void);
 
-/* From the main loop, all the time: false while zero was asked for and the converter does not confirm it. */
+/* From the main loop, all the time: goes on until the zero that was asked for reads back. */
+void set_points_poll(void);
+
+/* False from a zero that does not read back to the first set-points that do. */
 bool set_points_confirmed(void);
 
 #endif

@@ -24,7 +24,7 @@ _Static_assert(WRITE_BYTES * CHANNEL_COUNT <= I2C_FIFO && sizeof ALL_ZERO <= I2C
 _Static_assert(MAX_CURRENT_MA / SET_POINT_STEP_MA < 1 << 12, "full scale fits 12 bits");
 
 static volatile bool zero_due; /* asked for, not confirmed yet */
-static bool failed;
+static bool failed;            /* the newest attempt to confirm it; tried again after a pause */
 static uint32_t failed_us;
 
 void set_points_zero(void)
@@ -87,16 +87,22 @@ static bool set_and_read_back(const uint32_t current_ma[CHANNEL_COUNT])
 bool set_points_set(const uint32_t current_ma[CHANNEL_COUNT])
 {
     zero_due = false;
-    return set_and_read_back(current_ma);
+    const bool set = set_and_read_back(current_ma);
+    failed = failed && !set;
+    return set;
+}
+
+void set_points_poll(void)
+{
+    static const uint32_t zero_ma[CHANNEL_COUNT];
+    if (!zero_due || (failed && REG(TIMER_RAWL) - failed_us < PAUSE_US))
+        return;
+    failed = !set_and_read_back(zero_ma);
+    failed_us = REG(TIMER_RAWL);
+    zero_due = failed;
 }
 
 bool set_points_confirmed(void)
 {
-    static const uint32_t zero_ma[CHANNEL_COUNT];
-    if (!zero_due || (failed && REG(TIMER_RAWL) - failed_us < PAUSE_US))
-        return !failed;
-    failed = !set_and_read_back(zero_ma);
-    failed_us = REG(TIMER_RAWL);
-    zero_due = failed;
     return !failed;
 }

@@ -53,6 +53,10 @@ bool set_points_set(const uint32_t current_ma[CHANNEL_COUNT])
     return true;
 }
 
+void set_points_poll(void)
+{
+}
+
 bool set_points_confirmed(void)
 {
     return true;

@@ -57,6 +57,11 @@ bool port_estop_closed(void)
     return fake.estop_closed;
 }
 
+bool port_set_points_confirmed(void)
+{
+    return !fake.set_points_stuck;
+}
+
 bool port_load(const struct pulse_train *train)
 {
     CHECK(train_check(train) == ERROR_NONE);

@@ -15,6 +15,7 @@ struct fake_port {
     bool interlock_closed;
     bool estop_closed;
     bool can_load;
+    bool set_points_stuck; /* cannot be confirmed as zero */
     bool interrupted; /* an interrupt switches the outputs off just before the next shot */
     struct pulse_train loaded;
     bool live; /* between port_load and port_off */

@@ -27,6 +27,8 @@ static void change_world(const char *what)
         fake.interlock_closed = number != 0;
     else if (sscanf(what, "estop %u", &number) == 1)
         fake.estop_closed = number != 0;
+    else if (sscanf(what, "converter %u", &number) == 1)
+        fake.set_points_stuck = number == 0;
     else if (!strcmp(what, "edge\n"))
         fake_edge();
     else if (!strcmp(what, "abort\n"))

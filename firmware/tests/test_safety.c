@@ -246,6 +246,28 @@ static void test_a_safe_generator_needs_no_host(void)
     CHECK(safety.state == STATE_SAFE);
 }
 
+static void test_set_points_that_are_not_confirmed_as_zero_trip_and_latch(void)
+{
+    boot_armed(2);
+    safety_off(&safety);
+    fake.set_points_stuck = true;
+    safety_poll(&safety);
+    CHECK(safety.state == STATE_FAULT && safety.faults == FAULT_SETPOINT && !fake.live);
+    CHECK(arm(1) == ERROR_FAULT_LATCHED && safety_clear(&safety) == ERROR_HARDWARE);
+    fake.set_points_stuck = false;
+    safety_poll(&safety);
+    CHECK(safety.state == STATE_FAULT && arm(1) == ERROR_FAULT_LATCHED);
+    CHECK(safety_clear(&safety) == ERROR_NONE && safety.state == STATE_SAFE && arm(1) == ERROR_NONE);
+}
+
+static void test_set_points_that_stay_after_the_last_shot_trip_too(void)
+{
+    boot_armed(2);
+    fake.set_points_stuck = true;
+    safety_poll(&safety);
+    CHECK(safety.state == STATE_FAULT && safety.shots_left == 0 && !fake.live);
+}
+
 static void test_a_watchdog_reset_boots_into_a_fault(void)
 {
     fake_reset();
@@ -291,6 +313,8 @@ int main(void)
     test_an_open_interlock_forbids_arming_without_a_fault();
     test_a_silent_host_trips();
     test_a_safe_generator_needs_no_host();
+    test_set_points_that_are_not_confirmed_as_zero_trip_and_latch();
+    test_set_points_that_stay_after_the_last_shot_trip_too();
     test_a_watchdog_reset_boots_into_a_fault();
     test_a_train_that_changed_in_memory_is_not_fired();
     test_hardware_that_cannot_produce_the_train_stays_dark();

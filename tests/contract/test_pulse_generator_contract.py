@@ -21,6 +21,8 @@ CAMERA = CameraTiming(
     trigger_delay_ns=1_003, exposure_a_ns=20_000, gap_ns=500, exposure_b_ns=30_000_000, readout_ns=1_000_000
 )
 PERIOD_MS = 10
+CONVERTER_FOUND_MS = 150
+"""A converter that failed is tried ten times a second."""
 LIMIT_S = 5.0
 
 
@@ -310,6 +312,23 @@ def test_the_emergency_stop_latches_in_every_state(bench: Bench) -> None:
     bench.generator.clear()
     status = bench.generator.status()
     assert (status.state, status.faults, status.estop_closed) == (GeneratorState.SAFE, (), True)
+
+
+@on_the_real_image_too
+def test_set_points_that_are_not_confirmed_as_zero_are_a_fault(bench: Bench) -> None:
+    bench.firmware.set_converter(False)
+    bench.generator.off()
+    bench.firmware.advance(CONVERTER_FOUND_MS)
+    status = bench.generator.status()
+    assert (status.state, status.faults) == (GeneratorState.FAULT, ("setpoint",))
+    with pytest.raises(DeviceRefused, match="a set-point does not read as it was set"):
+        bench.generator.clear()
+    bench.firmware.set_converter(True)
+    bench.firmware.advance(CONVERTER_FOUND_MS)
+    with pytest.raises(DeviceRefused, match="fault is latched"):
+        bench.generator.configure(shot_timing())
+    bench.generator.clear()
+    assert bench.generator.status().state is GeneratorState.SAFE
 
 
 @on_the_real_image_too

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from daq.drivers.pulse_protocol import ABORT_BYTE, Command, ErrorNumber, Reply, Request, encode_request
+from daq.drivers.pulse_protocol import ABORT_BYTE, Command, ErrorNumber, Fault, Reply, Request, State, encode_request
 from daq.simulation.firmware_build import ImageKind
 from daq.simulation.mcp4728 import MA_PER_MV, Mcp4728, Register
 from daq.simulation.rp2040_emulator import CYCLES_PER_MS
@@ -18,6 +18,7 @@ OFF = 1
 ZEROED_WITHIN_MS = 0.25
 """A fast write: nine bytes at 400 kHz."""
 WATCHDOG_MS = 200
+TRIED_AGAIN_MS = 150
 HALF_SCALE = Register(internal=False, power_down=0, double=True, steps=2048)
 
 
@@ -39,6 +40,11 @@ def is_off(board: Board) -> bool:
 
 def arm(board: Board) -> Reply:
     return board.ask(Command.ARM, 1, 0, 0)
+
+
+def set_point_fault(board: Board) -> bool:
+    status = board.ask(Command.STATUS)
+    return (status.number("state"), status.number("faults")) == (State.FAULT, Fault.SETPOINT)
 
 
 def start_arming(board: Board, time_us: int) -> None:
@@ -120,11 +126,38 @@ def test_an_abort_while_they_are_being_set_leaves_them_zero_and_the_board_safe(b
 def test_without_a_converter_it_does_not_arm(board: Board) -> None:
     converter(board).connected = False
     assert arm(board).error is ErrorNumber.HARDWARE
-    assert board.ask(Command.FIRE).error is ErrorNumber.NOT_ARMED
+    assert board.ask(Command.FIRE).error is ErrorNumber.FAULT_LATCHED
+    assert set_point_fault(board)
     converter(board).connected = True
-    board.pico.run_ms(PERIOD_MS)
+    board.pico.run_ms(TRIED_AGAIN_MS)
     assert board.ask(Command.CLEAR).error is None
     assert arm(board).error is None
+
+
+def test_a_zero_that_is_not_confirmed_is_a_fault_that_lasts_as_long(board: Board) -> None:
+    assert arm(board).error is None
+    converter(board).frozen = True
+    board.ask(Command.OFF)
+    board.pico.run_ms(PERIOD_MS)
+    assert board.pico.set_points_ma() == CURRENTS_MA, "they are stuck"
+    assert set_point_fault(board)
+    assert arm(board).error is ErrorNumber.FAULT_LATCHED
+    assert board.ask(Command.LIGHT, 1000, 100, 0, 0, 0).error is ErrorNumber.FAULT_LATCHED
+    assert board.ask(Command.CLEAR).error is ErrorNumber.HARDWARE
+    converter(board).frozen = False
+    board.pico.run_ms(TRIED_AGAIN_MS)
+    assert is_off(board)
+    assert set_point_fault(board), "it latches"
+    assert board.ask(Command.CLEAR).error is None
+    assert arm(board).error is None
+
+
+def test_it_starts_with_a_fault_where_no_converter_answers() -> None:
+    board = Board()
+    converter(board).connected = False
+    board.pico.power_up()
+    board.pico.run_ms(BOOT_MS)
+    assert set_point_fault(board)
 
 
 def test_a_converter_that_does_not_take_its_values_is_found_by_reading_back(board: Board) -> None:
@@ -146,6 +179,7 @@ def test_a_bus_that_stays_stuck_is_an_error_in_time(board: Board) -> None:
     assert (board.pico.cycle - start) / CYCLES_PER_MS < 60
     board.pico.run_ms(PERIOD_MS)
     assert board.pico.watchdog_resets == []
+    assert set_point_fault(board)
     converter(board).wedged = False
 
 
