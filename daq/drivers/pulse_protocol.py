@@ -17,8 +17,7 @@ CHANNEL_COUNT = 4
 MAX_SEQUENCE = 65_535
 HEARTBEAT_MS = 3000
 ABORT_BYTE = b"\x18"
-UNCHANGED = 2**32 - 1
-"""Asks for a limit without tightening it."""
+UNCHANGED = 2**32 - 1  # asks for a limit without tightening it
 
 
 class Command(StrEnum):
