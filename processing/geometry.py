@@ -11,6 +11,7 @@ from typing import Protocol
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 FloatArray = NDArray[np.float64]
 
@@ -35,6 +36,11 @@ def rotation_from_angles(yaw_rad: float, pitch_rad: float = 0.0, roll_rad: float
     pitch = np.array([[1, 0, 0], [0, cp, sp], [0, -sp, cp]])
     roll = np.array([[cr, sr, 0], [-sr, cr, 0], [0, 0, 1]])
     return np.asarray(roll @ pitch @ yaw, dtype=np.float64)
+
+
+def rotation_vector_of(rotation: FloatArray) -> FloatArray:
+    """Axis times angle (3,) of a rotation (3, 3), however small; OpenCV's own takes angles below 1e-5 for none."""
+    return np.asarray(Rotation.from_matrix(rotation).as_rotvec(), dtype=np.float64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,9 +85,8 @@ class PinholeCamera:
         points_mm = np.ascontiguousarray(points_mm, dtype=np.float64).reshape(-1, 3)
         if not len(points_mm):
             return np.empty((0, 2))
-        rotation_vector, _ = cv2.Rodrigues(self.rotation)
         image_px, _ = cv2.projectPoints(
-            points_mm, rotation_vector, self.translation_mm, self.camera_matrix, self.coefficients
+            points_mm, rotation_vector_of(self.rotation), self.translation_mm, self.camera_matrix, self.coefficients
         )
         return np.asarray(image_px, dtype=np.float64).reshape(-1, 2)
 

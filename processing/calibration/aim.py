@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from processing.geometry import FloatArray
+from processing.geometry import FloatArray, rotation_vector_of
 
 _KILO_PX = 1000.0
 """Image positions count in units of so many px, so that all values are of the order of 1."""
@@ -84,7 +84,7 @@ class Aim:
         roll = np.array(cv2.Rodrigues(np.array([0.0, 0.0, values[2]]))[0])
         rotation = _to_axis(ray).T @ roll @ _to_axis(_unit(np.append(values[:2], 1.0))) @ self.frame
         translation_mm = distance_mm * ray - rotation @ self.middle_mm
-        turn = cv2.Rodrigues(rotation)[0].ravel()
+        turn = rotation_vector_of(rotation)
         return np.concatenate([turn, translation_mm, focal_px, centre_px, values[_LENS], tilt_rad])
 
     def derivatives(self, values: FloatArray) -> FloatArray:

@@ -16,7 +16,7 @@ from scipy.linalg import rq
 from processing.calibration.aim import Aim
 from processing.calibration.errors import CalibrationError
 from processing.calibration.least_squares import minimise
-from processing.geometry import FloatArray, PinholeCamera
+from processing.geometry import FloatArray, PinholeCamera, rotation_vector_of
 
 PINHOLE_PARAMETERS = 15
 TILT_PARAMETERS = 2
@@ -142,7 +142,7 @@ def _decompose(projection: FloatArray, image_size_px: tuple[int, int]) -> Pinhol
 
 def _pack(camera: PinholeCamera, tilted: bool) -> FloatArray:
     matrix = camera.camera_matrix
-    rotation_vector = cv2.Rodrigues(camera.rotation)[0].ravel()
+    rotation_vector = rotation_vector_of(camera.rotation)
     lens = [matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2], *camera.distortion]
     return np.concatenate([rotation_vector, camera.translation_mm, lens, camera.tilt_rad if tilted else ()])
 

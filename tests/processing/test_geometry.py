@@ -1,11 +1,12 @@
 """The pinhole camera: eqs. 3 to 5, distortion, tilt, and their inverses."""
 
+import cv2
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from processing.geometry import PinholeCamera, rotation_from_angles, view_camera
+from processing.geometry import PinholeCamera, rotation_from_angles, rotation_vector_of, view_camera
 
 DISTORTION = np.array([2.0, 50.0, 0.004, -0.003, 0.0])
 
@@ -64,3 +65,10 @@ def test_projection_follows_the_ray() -> None:
 
 def test_no_points_project_to_no_points() -> None:
     assert camera().project(np.empty((0, 3))).shape == (0, 2)
+
+
+@given(st.lists(st.floats(-3, 3), min_size=3, max_size=3), st.floats(0, 7))
+def test_rotation_vectors_keep_the_smallest_turns(axis: list[float], decades: float) -> None:
+    vector = 10**-decades * np.array(axis) / np.linalg.norm([*axis, 1.0])
+    rotation = np.asarray(cv2.Rodrigues(vector)[0], dtype=np.float64)
+    np.testing.assert_allclose(rotation_vector_of(rotation), vector, rtol=1e-9, atol=1e-15)
