@@ -1,10 +1,12 @@
 # Each target does its own set-up on a bare Debian 12 or 13 machine, is quick when that is done, and says what it does.
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint serve firmware bench lock clean mutants fuzz kernels-arm64
+.PHONY: help setup demo test lint serve firmware bench lock clean mutants fuzz
 
 PYTHON := .venv/bin/python
-DEBIAN_PACKAGES := python3-venv python3-dev python3-gi gir1.2-aravis-0.8 iproute2 gcc g++ gcc-arm-none-eabi cppcheck make chromium fonts-dejavu-core
+DEBIAN_PACKAGES := python3-venv python3-dev python3-gi gir1.2-aravis-0.8 iproute2 gcc g++ gcc-arm-none-eabi make chromium fonts-dejavu-core
+# For tests and linters alone: compiler and emulator of another processor, and npm, from wherever it came.
+TEST_PACKAGES := cppcheck g++-aarch64-linux-gnu qemu-user $(shell command -v npm >/dev/null || echo nodejs npm)
 FIRMWARE_PACKAGES := gcc gcc-arm-none-eabi libc6-dev make python3
 AS_ROOT := $(shell [ "$$(id -u)" = 0 ] || echo sudo)
 KERNEL_SOURCES := $(wildcard processing/reconstruction/kernels/*.cpp processing/reconstruction/kernels/*.hpp processing/reconstruction/kernels/CMakeLists.txt)
@@ -34,7 +36,7 @@ demo: setup ## Run the whole chain on the simulated bench; writes demo-out/repor
 test: lint build/rp2040js/node_modules ## Run linters and all tests.
 	$(PRIVATE_NETWORK) $(PYTHON) -m pytest $(TEST_OPTIONS)
 
-lint: setup ## Run ruff, mypy, import-linter and cppcheck.
+lint: setup build/.test-packages ## Run ruff, mypy, import-linter and cppcheck.
 	.venv/bin/ruff check .
 	.venv/bin/ruff format --check .
 	.venv/bin/mypy
@@ -60,14 +62,9 @@ fuzz: | build/.toolchain ## Feed the firmware's core hostile input by libFuzzer,
 	@$(MAKE) --no-print-directory -C firmware fuzz
 
 # A second emulator of the Pico, for the tests alone; without it they skip what it would have to say.
-build/rp2040js/node_modules: firmware/tests/rp2040js/package-lock.json | .venv/.debian
-	@command -v npm >/dev/null || { $(call install,nodejs npm); }
+build/rp2040js/node_modules: firmware/tests/rp2040js/package-lock.json | build/.test-packages
 	@mkdir -p $(@D) && cp firmware/tests/rp2040js/package*.json $(@D)
 	@npm ci --prefix $(@D) --silent --no-audit --no-fund --ignore-scripts && touch $@ || echo "No rp2040js: npm cannot install it"
-
-kernels-arm64: setup ## Build the kernels for arm64 and run them in an emulator; downloads 69 MB once.
-	@$(AS_ROOT) apt-get install -y -qq --no-install-recommends g++-aarch64-linux-gnu qemu-user >/dev/null
-	$(PYTHON) -m pytest tests/processing/test_kernel_driver.py
 
 lock: .venv/.python ## Pin the newest versions of all Python packages.
 	$(PYTHON) -m pip install --quiet uv
@@ -79,6 +76,11 @@ clean: ## Remove everything that was built.
 .venv/.debian: Makefile
 	@mkdir -p .venv
 	@$(call install,$(DEBIAN_PACKAGES))
+	@touch $@
+
+build/.test-packages: Makefile
+	@mkdir -p build
+	@$(call install,$(TEST_PACKAGES))
 	@touch $@
 
 build/.toolchain: Makefile

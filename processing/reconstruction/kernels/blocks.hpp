@@ -38,7 +38,9 @@ private:
     struct Slab {
         std::vector<BlockPosition> positions;
         std::vector<Values> values;
-        BlockList list() { return {positions.data(), static_cast<int>(positions.size()), values.data()->rows[0]}; }
+        BlockList list() {
+            return {positions.data(), static_cast<int>(positions.size()), reinterpret_cast<uint16_t *>(values.data())};
+        }
     };
     Blocks(const Kernels &kernels, const SmartStart &job, float most, int threads);
 

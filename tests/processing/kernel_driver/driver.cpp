@@ -1,10 +1,13 @@
-// Runs line of sight on small random cases without Python, for sanitizers and other processors: prints what comes out.
+// Runs all kernels on small random cases without Python, for sanitizers and other processors: prints what comes out.
 // All memory is on the heap and no larger than the binding demands, so that a sanitizer sees every step beyond it.
+#include <cmath>
 #include <cstdio>
 #include <memory>
 
 #include "bands.hpp"
+#include "blocks.hpp"
 #include "bricks.hpp"
+#include "exposure.hpp"
 #include "images.hpp"
 #include "instruction_set.hpp"
 
@@ -99,22 +102,24 @@ private:
     }
 };
 
-double sum_of(const Shape &shape, const float *values) {
+template <class Value>
+double sum_of(const Value *values, size_t count) {
     double sum = 0;
-    for (int64_t k = 0; k < static_cast<int64_t>(shape.nz) * shape.ny * shape.nx; ++k) sum += values[k];
+    for (size_t k = 0; k < count; ++k) sum += values[k];
     return sum;
 }
 
-void run(const Kernels &kernels, int number) {
+size_t voxels(const Shape &shape) { return static_cast<size_t>(shape.nz) * shape.ny * shape.nx; }
+
+void look(const Kernels &kernels, int number) {
     Random random(static_cast<uint32_t>(number) * 2654435761u + 1);
     const int n_views = 2 + number % 7;
     const Scene scene(random, n_views);
     const Shape &shape = scene.shape;
     const auto method = static_cast<Method>(random.below(3));
-    const size_t voxels = static_cast<size_t>(shape.nz) * shape.ny * shape.nx;
-    const std::unique_ptr<float[]> volume(new float[voxels]), sum(new float[voxels]());
+    const std::unique_ptr<float[]> volume(new float[voxels(shape)]), sum(new float[voxels(shape)]());
     for (Format format : {Format::half, Format::byte}) {
-        const std::unique_ptr<uint8_t[]> bytes(new uint8_t[voxels * bytes_of(format)]);
+        const std::unique_ptr<uint8_t[]> bytes(new uint8_t[voxels(shape) * bytes_of(format)]);
         run_line_of_sight(kernels, {scene.views.data(), n_views, shape, 0, method, format, bytes.get()}, 2);
     }
     run_line_of_sight(kernels, {scene.views.data(), n_views, shape, 0, method, Format::single, volume.get()}, 2);
@@ -122,13 +127,103 @@ void run(const Kernels &kernels, int number) {
     for (int e = 0; e < 5; ++e) exposures.insert(exposures.end(), scene.views.begin(), scene.views.end());
     run_sum_of_sight(kernels, {exposures.data(), n_views, 5, shape, method, sum.get()}, 2);
     const Bricks bricks = bricks_of_sight(kernels, {scene.views.data(), n_views, shape, method, 0.0f}, 2);
-    std::printf("%d %s %.6f %.6f %zu\n", number, kernels.name, sum_of(shape, volume.get()), sum_of(shape, sum.get()),
-                bricks.positions.size() / 3);
+    std::printf("sight %d %.6f %.6f\n", number, sum_of(volume.get(), voxels(shape)), sum_of(sum.get(), voxels(shape)));
+    if (bricks.positions.size() > 3 * voxels(shape)) std::abort();
+}
+
+// Two iterations, from MLOS or from a volume.
+void iterate(const Kernels &kernels, int number) {
+    Random random(static_cast<uint32_t>(number) * 2246822519u + 7);
+    const int n_views = 2 + number % 7;
+    const Scene scene(random, n_views);
+    const Shape &shape = scene.shape;
+    const std::unique_ptr<float[]> volume(new float[voxels(shape)]);
+    for (size_t k = 0; k < voxels(shape); ++k) volume[k] = static_cast<float>(random.uniform(0, 2));
+    Blocks blocks = number % 2 ? Blocks::of_volume(kernels, volume.get(), shape, 2.0f, 2)
+                               : Blocks::of_views(kernels, scene.views, shape, std::fmin(1.0f, 4.0f / n_views), 1e-8f, 1.0f, 2);
+    std::vector<std::vector<int16_t>> ratios;
+    std::vector<View> corrected = scene.views;
+    for (View &view : corrected) {
+        ratios.emplace_back(static_cast<size_t>(view.rows) * view.columns);
+        view.pixels = ratios.back().data();
+        view.unit = 1.0f / 2048;
+        view.occupancy = {};
+    }
+    BandImages images(corrected, shape);
+    const std::vector<bool> all(n_views, true), none(n_views, false);
+    double projected = 0, missed = 0;
+    blocks.pass(kernels, corrected, none, all, images, 2);
+    for (int i = 0; i < n_views; ++i) projected += images.sum(i);
+    if (projected > 0) blocks.scale(1000.0f / static_cast<float>(projected * blocks.unit()));
+    for (int done = 0; done < 3; ++done) {
+        if (done) blocks.pass(kernels, corrected, all, all, images, 2);
+        missed = 0;
+        for (int i = 0; i < n_views; ++i) {
+            const View &seen = scene.views[i];
+            missed += images.correct(kernels, i,
+                                     {seen.pixels, seen.unit, blocks.unit(), 1.0f / static_cast<float>(n_views), 2048.0f,
+                                      seen.rows, seen.columns, nullptr, 0, ratios[i].data()},
+                                     2);
+        }
+    }
+    blocks.write(kernels, Format::single, volume.get(), 2);
+    std::printf("smart %d %.6f %.6f\n", number, sum_of(volume.get(), voxels(shape)), missed);
+}
+
+// Positions all over the image, beyond its edges, and such that are not numbers.
+void resample(const Kernels &kernels, int number) {
+    Random random(static_cast<uint32_t>(number) * 3266489917u + 3);
+    const int rows = 1 + random.below(60), columns = 1 + random.below(150);
+    std::vector<float> image(static_cast<size_t>(rows) * columns);
+    for (float &pixel : image) pixel = random.below(2) ? static_cast<float>(random.uniform(-0.1, 1)) : 0.0f;
+    const int to_rows = 1 + random.below(70), nodes_y = (to_rows - 1) / 16 + 2, nodes_x = 2 + random.below(8);
+    const double roll[] = {random.uniform(-0.5, 2), random.uniform(-0.5, 0.5)};
+    const double at[] = {random.uniform(-10, 0.5 * columns), random.uniform(-10, 0.5 * rows)};
+    std::vector<float> nodes;
+    for (int y = 0; y < nodes_y; ++y)
+        for (int x = 0; x < nodes_x; ++x) {
+            nodes.push_back(static_cast<float>(at[0] + 16 * (roll[0] * x - roll[1] * y) + random.uniform(-2, 2)));
+            nodes.push_back(random.below(40) ? static_cast<float>(at[1] + 16 * (roll[1] * x + roll[0] * y)) : NAN);
+        }
+    const int to_columns = 16 * (nodes_x - 1);
+    const std::unique_ptr<int16_t[]> to(new int16_t[static_cast<size_t>(to_rows) * to_columns]);
+    const float unit = tomoshadow::resample(kernels, {image.data(), rows, columns}, nodes.data(), nodes_x, to.get(), to_rows, to_columns, 2);
+    const size_t pixels = static_cast<size_t>(to_rows) * to_columns;
+    std::printf("resample %d %.6f %.6f\n", number, unit * sum_of(to.get(), pixels), unit * 32767.0);
+}
+
+template <class Grey>
+std::vector<Grey> grey_image(Random &random, size_t pixels) {
+    std::vector<Grey> image(pixels);
+    for (Grey &pixel : image) pixel = static_cast<Grey>(random.uniform(0, 255));
+    return image;
+}
+
+void prepare(const Kernels &kernels, int number) {
+    Random random(static_cast<uint32_t>(number) * 668265263u + 5);
+    const int rows = 1 + random.below(70), columns = 1 + random.below(150);
+    const size_t pixels = static_cast<size_t>(rows) * columns;
+    const auto bytes = grey_image<uint8_t>(random, pixels);
+    const auto words = grey_image<uint16_t>(random, pixels);
+    const auto singles = grey_image<float>(random, pixels);
+    const auto dark = grey_image<float>(random, pixels), background = grey_image<float>(random, pixels);
+    const std::unique_ptr<float[]> intensity(new float[pixels]), minimum(new float[pixels]);
+    const void *const recorded[] = {bytes.data(), words.data(), singles.data()};
+    const Exposure job{recorded[number % 3], static_cast<Exposure::Grey>(number % 3), rows, columns,
+                       random.below(2) ? dark.data() : nullptr, random.below(2) ? background.data() : nullptr, 255.0f,
+                       random.below(20), 0.02f, intensity.get()};
+    preprocess(kernels, job, 2);
+    Exposure alone{singles.data(), Exposure::Grey::single, rows, columns, nullptr, nullptr, 1.0f, 1 + job.window, 0.0f, minimum.get()};
+    sliding_minimum(kernels, alone, 2);
+    std::printf("prepare %d %.6f %.6f\n", number, sum_of(intensity.get(), pixels), sum_of(minimum.get(), pixels));
 }
 
 }  // namespace
 
 int main() {
     const Kernels &kernels = selected_kernels();
-    for (int number = 0; number < 60; ++number) run(kernels, number);
+    for (int number = 0; number < 60; ++number) look(kernels, number);
+    for (int number = 0; number < 14; ++number) iterate(kernels, number);
+    for (int number = 0; number < 60; ++number) resample(kernels, number);
+    for (int number = 0; number < 60; ++number) prepare(kernels, number);
 }
