@@ -118,6 +118,11 @@ class EmulatedPico:
         self.set_estop(self._estop)
         self.set_trigger_pin(self._trigger)
 
+    @property
+    def interrupts_masked(self) -> bool:
+        """Whether the processor lets no interrupt through."""
+        return bool(self._chip.core.pm)
+
     def press_run(self) -> None:
         """Pull the pin RUN low and let it go; the power stays."""
         self._restart(from_watchdog=False)

@@ -1,5 +1,6 @@
 /* The port of the core to the RP2040, and its main loop. */
 #include "clocks.h"
+#include "continuous_light.h"
 #include "identity.h"
 #include "interlock.h"
 #include "outputs.h"
@@ -74,12 +75,12 @@ uint32_t port_take_cameras(void)
 
 bool port_prepare_light(const uint32_t *current_ma)
 {
-    return outputs_prepare_light(current_ma);
+    return continuous_light_prepare(current_ma);
 }
 
 void port_sustain_light(void)
 {
-    outputs_sustain_light();
+    continuous_light_sustain();
 }
 
 void port_off(void)

@@ -5,23 +5,12 @@
 #include "pio_program.h"
 #include "rp2040.h"
 #include "set_points.h"
-
-#define LENGTH(program) (uint32_t)(sizeof(program) / sizeof *(program))
-#define CLOCK_DIVIDER(cycles) ((uint32_t)(cycles) << 16)
+#include "state_machines.h"
 
 enum {
-    LIGHT = 0, /* number of the PIO block */
-    CAMERA = 1,
-    MACHINES = CHANNEL_COUNT,
-    ENABLE_ALL = 0x00f,
-    RESTART_ALL = 0x0f0,
-    FIFO_DEPTH = 4,
     OUTPUT_OFF = OUTPUT_ENABLE | OUTPUT_LOW,
     OUTPUT_LIVE = OUTPUT_ENABLE,
-    SHIFT_RIGHT = 1 << 18 | 1 << 19,
-    SIDE_SET_1 = 1 << 29,
     READY_POLLS = 16,
-    LAST_PULSE = (1 << LIT_COUNT_BITS) - 1,
 };
 
 /* The two words of a machine; a machine without a shot stays without words. */
@@ -36,7 +25,6 @@ static struct words light[CHANNEL_COUNT];
 static struct words camera[CHANNEL_COUNT];
 static volatile uint32_t off_count;
 static volatile bool permitted; /* until the shot has started */
-static bool lit[CHANNEL_COUNT];
 
 void outputs_off(void)
 {
@@ -107,38 +95,25 @@ static bool encode_train(const struct pulse_train *train)
     return fits;
 }
 
-static void set_up_machine(uint32_t pio, uint32_t machine, uint32_t pin, uint32_t length)
-{
-    REG(PIO_CLKDIV(pio, machine)) = CLOCK_DIVIDER(1);
-    REG(PIO_EXECCTRL(pio, machine)) = (length - 1) << 12; /* wrap after the last instruction */
-    REG(PIO_SHIFTCTRL(pio, machine)) = SHIFT_RIGHT;
-    REG(PIO_PINCTRL(pio, machine)) = SIDE_SET_1 | PIN_TRIGGER << 15 | pin << 10;
-    for (int i = 0; i < FIFO_DEPTH; i++)
-        REG(PIO_INSTR(pio, machine)) = PIO_LOW | PIO_PULL_IF_ANY; /* no word of an interrupted shot survives */
-    REG(PIO_INSTR(pio, machine)) = PIO_LOW | PIO_JMP(0);
-}
-
-static void write_program(uint32_t pio, const uint16_t *program, uint32_t length)
-{
-    REG(PIO_CTRL(pio)) = RESTART_ALL;
-    for (uint32_t i = 0; i < length; i++)
-        REG(PIO_INSTR_MEM(pio, i)) = program[i];
-}
-
 static void set_up_light(void)
 {
-    write_program(LIGHT, LIGHT_PROGRAM, LENGTH(LIGHT_PROGRAM));
+    machines_write_program(LIGHT, LIGHT_PROGRAM, PROGRAM_LENGTH(LIGHT_PROGRAM));
     for (uint32_t i = 0; i < MACHINES; i++)
-        set_up_machine(LIGHT, i, PIN_LIGHT + i, light[i].single ? LIGHT_SINGLE_LENGTH : LENGTH(LIGHT_PROGRAM));
-    REG(PIO_CTRL(LIGHT)) = ENABLE_ALL;
+        machine_set_up(LIGHT, i, PIN_LIGHT + i, light[i].single ? LIGHT_SINGLE_LENGTH : PROGRAM_LENGTH(LIGHT_PROGRAM));
+    machines_enable(LIGHT);
 }
 
 static void set_up_cameras(void)
 {
-    write_program(CAMERA, CAMERA_PROGRAM, LENGTH(CAMERA_PROGRAM));
+    machines_write_program(CAMERA, CAMERA_PROGRAM, PROGRAM_LENGTH(CAMERA_PROGRAM));
     for (uint32_t i = 0; i < MACHINES; i++)
-        set_up_machine(CAMERA, i, PIN_CAMERA + i, LENGTH(CAMERA_PROGRAM));
-    REG(PIO_CTRL(CAMERA)) = ENABLE_ALL;
+        machine_set_up(CAMERA, i, PIN_CAMERA + i, PROGRAM_LENGTH(CAMERA_PROGRAM));
+    machines_enable(CAMERA);
+}
+
+void outputs_give_light(uint32_t channel)
+{
+    REG(IO_CTRL(PIN_LIGHT + channel)) = FUNCTION_PIO0 | OUTPUT_LIVE;
 }
 
 /* Only the pins that the train uses; the others stay forced low. */
@@ -146,7 +121,7 @@ static void give_pins(void)
 {
     for (uint32_t i = 0; i < CHANNEL_COUNT; i++) {
         if (light[i].used)
-            REG(IO_CTRL(PIN_LIGHT + i)) = FUNCTION_PIO0 | OUTPUT_LIVE;
+            outputs_give_light(i);
         if (camera[i].used)
             REG(IO_CTRL(PIN_CAMERA + i)) = FUNCTION_PIO1 | OUTPUT_LIVE;
     }
@@ -167,8 +142,7 @@ static bool set_currents(const struct pulse_train *train)
     return set_points_set(current_ma);
 }
 
-/* Off, and how often it was off until then. */
-static uint32_t switch_off(void)
+uint32_t outputs_switch_off(void)
 {
     const uint32_t before = interrupts_mask();
     outputs_off();
@@ -178,8 +152,7 @@ static uint32_t switch_off(void)
     return count;
 }
 
-/* Mask the interrupts; true unless an OFF came meanwhile, which must not be undone. */
-static bool mask_unless_off(uint32_t off_before, uint32_t *before)
+bool outputs_mask_unless_off(uint32_t off_before, uint32_t *before)
 {
     *before = interrupts_mask();
     return off_count == off_before;
@@ -187,11 +160,11 @@ static bool mask_unless_off(uint32_t off_before, uint32_t *before)
 
 bool outputs_load(const struct pulse_train *train)
 {
-    const uint32_t off_before = switch_off();
+    const uint32_t off_before = outputs_switch_off();
     if (!encode_train(train) || !set_currents(train)) /* the set-points take their time, with interrupts on */
         return false;
     uint32_t before = 0;
-    const bool still_wanted = mask_unless_off(off_before, &before);
+    const bool still_wanted = outputs_mask_unless_off(off_before, &before);
     if (still_wanted)
         give_outputs();
     interrupts_restore(before);
@@ -240,7 +213,7 @@ bool outputs_fire(void)
     const uint32_t off_before = off_count;
     const bool ready = push_shot(PIO_TRIGGER_ADDRESS);
     uint32_t before = 0;
-    const bool start = mask_unless_off(off_before, &before) && ready;
+    const bool start = outputs_mask_unless_off(off_before, &before) && ready;
     if (start)
         pulse_trigger_line();
     interrupts_restore(before);
@@ -256,7 +229,7 @@ void outputs_permit(void)
     REG(IO_CTRL(PIN_TRIGGER)) = FUNCTION_NONE | INPUT_HIGH;
     const bool ready = push_shot(PIO_TRIGGER_LOW_ADDRESS);
     uint32_t before = 0;
-    if (mask_unless_off(off_before, &before) && ready) {
+    if (outputs_mask_unless_off(off_before, &before) && ready) {
         permitted = true;
         REG(IO_CTRL(PIN_TRIGGER)) = FUNCTION_NONE;
     }
@@ -291,41 +264,4 @@ uint32_t outputs_take_cameras(void)
         REG(IO_INTR(PIN_CAMERA + i)) = edge;
     }
     return rises;
-}
-
-static void give_light_pins(void)
-{
-    write_program(LIGHT, LIT_PROGRAM, LENGTH(LIT_PROGRAM));
-    for (uint32_t i = 0; i < MACHINES; i++) {
-        set_up_machine(LIGHT, i, PIN_LIGHT + i, LENGTH(LIT_PROGRAM));
-        REG(PIO_CLKDIV(LIGHT, i)) = CLOCK_DIVIDER(LIT_DIVIDER);
-        if (lit[i])
-            REG(IO_CTRL(PIN_LIGHT + i)) = FUNCTION_PIO0 | OUTPUT_LIVE;
-    }
-    REG(PIO_CTRL(LIGHT)) = ENABLE_ALL;
-}
-
-bool outputs_prepare_light(const uint32_t *current_ma)
-{
-    const uint32_t off_before = switch_off();
-    for (uint32_t i = 0; i < CHANNEL_COUNT; i++) {
-        lit[i] = current_ma[i] > 0;
-        if (current_ma[i] > MAX_LIGHT_MA) /* the core has checked; this is the last place to ask */
-            return false;
-    }
-    if (!set_points_set(current_ma))
-        return false;
-    uint32_t before = 0;
-    const bool still_wanted = mask_unless_off(off_before, &before);
-    if (still_wanted)
-        give_light_pins();
-    interrupts_restore(before);
-    return still_wanted;
-}
-
-void outputs_sustain_light(void)
-{
-    for (uint32_t i = 0; i < CHANNEL_COUNT; i++)
-        if (lit[i] && REG(PIO_FSTAT(LIGHT)) & PIO_TX_EMPTY(i))
-            REG(PIO_TXF(LIGHT, i)) = LAST_PULSE;
 }

@@ -27,13 +27,15 @@ bool outputs_take_start(void);
 /* Rises of the camera outputs since the last call. */
 uint32_t outputs_take_cameras(void);
 
-/* Make ready for continuous light, dark until words come; false as outputs_load. */
-bool outputs_prepare_light(const uint32_t *current_ma);
-
-/* Permit the next few milliseconds of it. */
-void outputs_sustain_light(void);
-
 /* All low, from any context, interrupts included: light pins first, then cameras, trigger, machines, set-points. */
 void outputs_off(void);
+
+/* What has to wait before it gives an output, as for set-points, asks how often the outputs were off, waits, and masks
+ * the interrupts: true unless an OFF came meanwhile, which must not be undone. */
+uint32_t outputs_switch_off(void);
+bool outputs_mask_unless_off(uint32_t off_before, uint32_t *before);
+
+/* With interrupts masked: the light pin of a channel to its state machine. */
+void outputs_give_light(uint32_t channel);
 
 #endif

@@ -1,7 +1,7 @@
 """How the real image gets dark: abort, interlock, silent host, hung processor, overflowing stack; and stays dark."""
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import pytest
@@ -138,17 +138,23 @@ def shoot_into_open_interlock(board: Board, delay_cycles: int) -> int:
     return opened[0]
 
 
-def live_while_arming(board: Board, watched_cycles: range, opened_after_cycles: int) -> list[int]:
-    """Of these cycles after the last byte of ARM, those at which an output is not forced low; the interlock opens."""
+def is_live(board: Board) -> bool:
+    return any(board.pico.read_word(ctrl) >> 8 & 3 != FORCED_LOW for ctrl in OUTPUT_CTRL)
+
+
+def while_arming(
+    board: Board, watched_cycles: range, opened_after_cycles: int, seen: Callable[[Board], bool] = is_live
+) -> list[int]:
+    """Of these cycles after the last byte of ARM, those at which it is so: an output is live. The interlock opens."""
     line = encode_request(Request(60_000, Command.ARM, (1, 0, 0)))
     board.pico.receive(line[:-1])
     board.pico.run_ms(PERIOD_MS)
     start = board.pico.cycle
-    live: list[int] = []
+    found: list[int] = []
 
     def look() -> None:
-        if any(board.pico.read_word(ctrl) >> 8 & 3 != FORCED_LOW for ctrl in OUTPUT_CTRL):
-            live.append(board.pico.cycle - start)
+        if seen(board):
+            found.append(board.pico.cycle - start)
 
     for cycles in watched_cycles:
         board.pico.at(start + cycles, look)
@@ -161,20 +167,32 @@ def live_while_arming(board: Board, watched_cycles: range, opened_after_cycles: 
     board.pico.set_interlock(True)
     board.ask(Command.OFF)
     assert board.ask(Command.CLEAR).error is None
-    return live
+    return found
 
 
 def test_an_interlock_that_opens_at_any_moment_of_arming_leaves_the_outputs_cut(board: Board) -> None:
     """Whether before, while or after the train is loaded into the hardware."""
     board.ask(Command.OFF)
     longest = CYCLES_PER_MS * ARM_LIMIT_MS
-    given = live_while_arming(board, range(0, longest, LOADING_CYCLES), longest)[0]
+    given = while_arming(board, range(0, longest, LOADING_CYCLES), longest)[0]
     early = range(given // 6, given, given // 6)
     late = range(given - 4 * LOADING_CYCLES, given + LOADING_CYCLES, LOADING_CYCLES // 2)
     for moment in (*early, *late):
         watched = range(given - LOADING_CYCLES, given + 10 * LOADING_CYCLES, LOOK_CYCLES)
-        live = [cycle for cycle in live_while_arming(board, watched, moment) if cycle > moment]
+        live = [cycle for cycle in while_arming(board, watched, moment) if cycle > moment]
         assert len(live) * LOOK_CYCLES < LOADING_CYCLES, moment
+
+
+def test_an_interlock_that_opens_just_before_interrupts_are_masked_cuts_the_outputs(board: Board) -> None:
+    """Whether the outputs are still wanted is asked with interrupts masked; in no cycle before can it be too late."""
+    board.ask(Command.OFF)
+    longest = CYCLES_PER_MS * ARM_LIMIT_MS
+    given = while_arming(board, range(0, longest, LOADING_CYCLES), longest)[0]
+    before_live = range(given - 4 * LOADING_CYCLES, given - LOADING_CYCLES)
+    masked = while_arming(board, before_live, longest, lambda board: not board.pico.interrupts_masked)[-1]
+    for moment in range(masked - 16, masked + 2):
+        watched = range(given, given + 4 * LOADING_CYCLES, LOOK_CYCLES)
+        assert len(while_arming(board, watched, moment)) * LOOK_CYCLES < LOADING_CYCLES, moment
 
 
 def test_the_pads_of_all_outputs_pull_down(board: Board) -> None:
