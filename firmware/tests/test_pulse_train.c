@@ -139,6 +139,18 @@ static void test_more_light_lengthens_the_period(void)
     CHECK(train_period_us(&train, limits) == 2000000);
 }
 
+static void test_a_train_is_over_before_the_next_one(void)
+{
+    struct pulse_train train = {0};
+    struct channel_limits limits[CHANNEL_COUNT];
+    for (int i = 0; i < CHANNEL_COUNT; i++)
+        limits[i] = channel_limits_absolute();
+    train.channels[1] = LEGAL;
+    train.channels[1].camera_ns = 15000000;
+    const uint32_t length_us = train_length_ns(&train) / 1000u;
+    CHECK(length_us == 15010 && train_period_us(&train, limits) > length_us);
+}
+
 static void test_limits_only_become_tighter(void)
 {
     const struct channel_limits widest = {UINT32_MAX, UINT32_MAX, UINT32_MAX};
@@ -188,6 +200,7 @@ int main(void)
     test_every_edge_goes_to_the_nearest_tick();
     test_a_train_is_as_long_as_its_last_output();
     test_more_light_lengthens_the_period();
+    test_a_train_is_over_before_the_next_one();
     test_limits_only_become_tighter();
     test_a_channel_keeps_its_own_limits();
     test_the_absolute_limits_are_tighter_than_the_published_led_table();

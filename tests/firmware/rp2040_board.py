@@ -5,6 +5,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import astuple, dataclass, replace
 from pathlib import Path
 
+import pytest
+
 from daq.drivers.pulse_protocol import MAX_SEQUENCE, Command, Reply, Request, Source, decode_reply, encode_request
 from daq.simulation.firmware_build import ImageKind, build_image
 from daq.simulation.rp2040_chip import TRIGGER
@@ -55,7 +57,12 @@ PAPER = Channel(0, 20_000, 1000, 26_400, 1000, frame_a_close_ns=23_500, frame_b_
 def image(kind: ImageKind = ImageKind.CONVERTER) -> Path:
     """The image under test."""
     folder = os.environ.get(IMAGES_VARIABLE)
-    return Path(folder, f"{kind}.bin") if folder else build_image(kind=kind)
+    if not folder:
+        return build_image(kind=kind)
+    path = Path(folder, f"{kind}.bin")
+    if not path.exists():
+        pytest.exit(f"there is no {path}", returncode=pytest.ExitCode.USAGE_ERROR)
+    return path
 
 
 class Board:
