@@ -140,7 +140,10 @@ def _rig(config: RigConfig, profiles: Profiles, interlock: Interlock) -> Rig:
 
 
 def _pulse_generator(config: RigConfig) -> SerialPulseGenerator:
-    return SerialPulseGenerator(_GENERATOR, _port_of(config), channels_of(config), _current_limits_a(config))
+    max_light_a = {name: view.max_light_a for name, view in config.views.items()}
+    return SerialPulseGenerator(
+        _GENERATOR, _port_of(config), channels_of(config), _current_limits_a(config), max_light_a
+    )
 
 
 def _current_limits_a(config: RigConfig) -> dict[str, float]:

@@ -69,6 +69,7 @@ class ViewConfig(FrozenModel):
     sensor: SensorConfig
     max_current_a: Annotated[CurrentA, Field(description="limit of this LED")]
     nominal_current_a: Annotated[CurrentA, Field(description="what a new plan starts with")]
+    max_light_a: Annotated[float, Field(ge=0, le=0.5, description="limit of its continuous light; 0 forbids it")] = 0.0
 
     @model_validator(mode="after")
     def _nominal_is_permitted(self) -> Self:

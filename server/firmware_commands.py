@@ -1,13 +1,16 @@
-"""What ``tomoshadow firmware`` does: identity and limits, self-test, timing diagram, flashing."""
+"""What ``tomoshadow firmware`` does: identity and limits, self-test, timing diagram, continuous light, flashing."""
 
+import threading
 from argparse import Namespace
 from collections.abc import Iterator
 from dataclasses import asdict
 from typing import Any
 
+from daq.devices import GeneratorState, GeneratorStatus, PulseGenerator
 from daq.drivers.pulse_line import PulseLine
 from daq.drivers.pulse_protocol import CHANNEL_COUNT, COUNTERS, FIELDS, UNCHANGED, Cause, Command, Fault, State
 from daq.drivers.pulse_self_test import Verdict, self_test
+from daq.errors import DeviceError, PlanError
 from daq.timing import plan_shot_timing
 from server.assembly import open_generator, open_pulse_line
 from server.commands import progress
@@ -15,6 +18,8 @@ from server.config import load_config
 from server.firmware_image import find_drive, load_image, write_image
 from server.shot_timing import camera_timings, fired_timing, load_plan, nominal_plan, timing_table
 from server.timing_diagram import picture, timing_diagram
+
+_HEARTBEAT_S = 0.5
 
 
 def info(options: Namespace) -> dict[str, Any]:
@@ -74,6 +79,29 @@ def scope(options: Namespace) -> dict[str, Any]:
         "shortest_period_ns": requested.shortest_period_ns,
         "views": timing_table(requested, actual),
     }
+
+
+def light(options: Namespace) -> dict[str, Any]:
+    """``tomoshadow firmware light``: until its time is over, or Ctrl-C; whatever ends it, the generator is off then."""
+    config = load_config(options.config)
+    views = options.view or [name for name, view in config.views.items() if view.max_light_a]
+    if not views:
+        raise PlanError(f"{options.config}: no view permits continuous light, none has max_light_a")
+    with open_generator(config) as generator:
+        generator.light(dict.fromkeys(views, options.current_a), options.time_s)
+        progress(f"{', '.join(views)}: lit for {options.time_s:g} s at most; Ctrl-C ends it")
+        status = _wait_while_lit(generator)
+    if status.faults:
+        raise DeviceError(generator.name, f"the light was ended by a fault: {', '.join(status.faults)}")
+    return {"views": views, "current_a": options.current_a, "time_s": options.time_s}
+
+
+def _wait_while_lit(generator: PulseGenerator) -> GeneratorStatus:
+    """Asking is the heartbeat without which the light ends."""
+    never = threading.Event()
+    while (status := generator.status()).state is GeneratorState.LIT:
+        never.wait(_HEARTBEAT_S)
+    return status
 
 
 def flash(options: Namespace) -> dict[str, Any]:

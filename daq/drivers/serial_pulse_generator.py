@@ -48,9 +48,9 @@ class SerialPulseGenerator:
         Serial port, for example ``/dev/serial/by-id/...``.
     channels : Mapping[str, int]
         Channel of each view, 0 to 3.
-    max_current_a : Mapping[str, float]
-        Limit of the LED of each view, which the generator itself shall keep; views that are not named keep the
-        generator's own.
+    max_current_a, max_light_a : Mapping[str, float]
+        Limits of the LED of each view, for its pulses and its continuous light, which the generator itself shall keep;
+        views that are not named keep the generator's own.
 
     Raises
     ------
@@ -59,7 +59,12 @@ class SerialPulseGenerator:
     """
 
     def __init__(
-        self, name: str, port: str, channels: Mapping[str, int], max_current_a: Mapping[str, float] | None = None
+        self,
+        name: str,
+        port: str,
+        channels: Mapping[str, int],
+        max_current_a: Mapping[str, float] | None = None,
+        max_light_a: Mapping[str, float] | None = None,
     ) -> None:
         numbers = list(channels.values())
         if len(set(numbers)) < len(numbers) or not set(numbers) <= set(range(CHANNEL_COUNT)):
@@ -67,6 +72,7 @@ class SerialPulseGenerator:
         self._name = name
         self._channels = dict(channels)
         self._max_current_a = dict(max_current_a or {})
+        self._max_light_a = dict(max_light_a or {})
         self._line = PulseLine(name, port)
         self._identity: Reply | None = None
         self._loaded: _LoadedTrain | None = None
@@ -228,11 +234,12 @@ class SerialPulseGenerator:
 
     def _tighten_limits(self) -> None:
         """Before every train: a generator that was reset has forgotten its limits, and every train with them."""
-        for view, limit_a in self._max_current_a.items():
-            limit_ma = round(limit_a * 1000)
-            reply = self._line.ask(Command.LIMIT, self._channels[view], limit_ma, UNCHANGED, UNCHANGED)
-            if reply.number("max_current_ma") > limit_ma:
-                raise ProtocolError(self._name, f"keeps {reply.number('max_current_ma')} mA as the limit of {view}")
+        for view in sorted(self._max_current_a.keys() | self._max_light_a.keys()):
+            pulse_ma, light_ma = _limit_ma(self._max_current_a, view), _limit_ma(self._max_light_a, view)
+            reply = self._line.ask(Command.LIMIT, self._channels[view], pulse_ma, UNCHANGED, light_ma)
+            for name, limit_ma in (("max_current_ma", pulse_ma), ("max_light_ma", light_ma)):
+                if reply.number(name) > limit_ma:
+                    raise ProtocolError(self._name, f"keeps {reply.number(name)} mA as {name} of {view}")
 
     def _set_channel(self, view: str, edges: ViewTiming, shift_ns: int) -> Reply:
         pulse_b = edges.pulse_b
@@ -249,6 +256,10 @@ class SerialPulseGenerator:
             edges.frame_a.close_ns - edges.camera_trigger_ns,
             edges.frame_b.open_ns - edges.camera_trigger_ns,
         )
+
+
+def _limit_ma(limits_a: Mapping[str, float], view: str) -> int:
+    return round(limits_a[view] * 1000) if view in limits_a else UNCHANGED
 
 
 def _shift_ns(timing: ShotTiming, tick_ns: int) -> int:

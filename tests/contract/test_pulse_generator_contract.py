@@ -463,3 +463,17 @@ def test_a_silent_host_ends_continuous_light(bench: Bench) -> None:
     bench.firmware.advance(HEARTBEAT_MS + 1)
     assert bench.generator.status().faults == ("heartbeat",)
     wait_until_lit(bench, {})
+
+
+def test_the_generator_keeps_the_limit_of_an_led_for_continuous_light() -> None:
+    with (
+        FirmwareProcess(CHANNELS, lambda _: None) as firmware,
+        SerialPulseGenerator(
+            "generator", firmware.port, CHANNELS, max_light_a={"left": 0.2, "right": 0.0}
+        ) as generator,
+    ):
+        for view, current_a in (("left", 0.201), ("right", 0.001)):
+            with pytest.raises(DeviceRefused, match="above the limit that was set"):
+                generator.light({view: current_a}, 1.0)
+        generator.light({"left": 0.2}, 1.0)
+        assert generator.status().state is GeneratorState.LIT

@@ -1,6 +1,10 @@
 """``tomoshadow firmware`` on the simulated bench, through the command line."""
 
 import json
+import shutil
+import signal
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -90,3 +94,55 @@ def test_flash_writes_nothing_that_it_would_not_start(capsys: pytest.CaptureFixt
     result = result_of(capsys, "flash", str(image), "--drive", str(drive), "--json", status=2)
     assert "no UF2 block" in result["error"]
     assert [path.name for path in drive.iterdir()] == ["INFO_UF2.TXT"]
+
+
+@pytest.fixture
+def permissive(tmp_path: Path) -> list[str]:
+    """The simulated rig with an LED whose data sheet permits continuous light."""
+    text = (
+        Path("configs/simulated_small.toml")
+        .read_text()
+        .replace("led_channel = 1\n", "led_channel = 1\nmax_light_a = 0.2\n")
+    )
+    config = Path(shutil.copytree("configs", tmp_path / "configs"), "permissive.toml")
+    config.write_text(text)
+    return ["--config", str(config), "--json"]
+
+
+def test_light_lasts_as_long_as_asked(capsys: pytest.CaptureFixture[str], permissive: list[str]) -> None:
+    result = result_of(capsys, "light", *permissive, "--current-a", "0.2", "--time-s", "0.05")
+    assert result["views"] == ["view2"]
+
+
+@pytest.mark.parametrize(
+    ("options", "reason"),
+    [
+        (["--current-a", "0.21"], "above the limit that was set for this channel"),
+        (["--current-a", "0.1", "--view", "view1"], "above the limit that was set for this channel"),
+        (["--current-a", "0.1", "--view", "view9"], "view9"),
+        (["--current-a", "0.1", "--time-s", "601"], "not for 1 to 600000 ms"),
+    ],
+)
+def test_light_is_refused_beyond_what_the_rig_permits(
+    capsys: pytest.CaptureFixture[str], permissive: list[str], options: list[str], reason: str
+) -> None:
+    assert main(["firmware", "light", *permissive, *options]) != 0
+    assert reason in "".join(capsys.readouterr())
+
+
+def test_no_led_gives_continuous_light_unless_its_limit_is_stated(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["firmware", "light", *CONFIG, "--current-a", "0.1"]) != 0
+    assert "none has max_light_a" in "".join(capsys.readouterr())
+
+
+def test_ctrl_c_ends_the_light(permissive: list[str]) -> None:
+    """What would not be confirmed off is added to the error."""
+    command = [sys.executable, "-m", "server.cli", "firmware", "light", *permissive, "--current-a", "0.1"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as tool:
+        assert tool.stderr is not None
+        assert "lit for 60 s at most" in tool.stderr.readline()
+        tool.send_signal(signal.SIGINT)
+        output, errors = tool.communicate(timeout=20)
+    assert tool.returncode == 1
+    assert "interrupted" in output + errors
+    assert "not confirmed" not in output + errors
