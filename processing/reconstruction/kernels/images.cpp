@@ -19,18 +19,51 @@ void for_rows(int rows, int threads, const std::function<void(int, int)> &work) 
     });
 }
 
-// The rows that nodes (u, v) point to, with what cubic convolution reads around; at least one. A region of interest
-// needs few.
-Recorded rows_needed(const Recorded &image, const float *nodes, int count) {
-    float first = INFINITY, last = -INFINITY;
-    for (int k = 0; k < count; ++k) {
-        first = std::min(first, nodes[2 * k + 1]);
-        last = std::max(last, nodes[2 * k + 1]);
+struct Range {
+    float low = INFINITY, high = -INFINITY;
+    void include(float value) {
+        low = std::min(low, value);
+        high = std::max(high, value);
     }
-    const auto limited = [&](float row) { return static_cast<int>(std::clamp(row, 0.0f, image.rows - 1.0f)); };
-    const int begin = limited(first - 4.0f), end = limited(last + 4.0f) + 1;
-    return {image.pixels + static_cast<int64_t>(begin) * image.columns, std::max(1, end - begin), image.columns};
+    // With what cubic convolution reads around; at least one pixel.
+    int begin(int pixels) const { return limited(low - 4.0f, pixels); }
+    int end(int pixels) const { return std::max(begin(pixels), limited(high + 4.0f, pixels)) + 1; }
+
+private:
+    static int limited(float at, int pixels) {
+        return static_cast<int>(std::clamp(at, 0.0f, static_cast<float>(pixels - 1)));
+    }
+};
+
+// The pixels that nodes (u, v) point to. A region of interest needs few.
+PixelBox pixels_needed(const Recorded &image, const float *nodes, int count) {
+    Range u, v;
+    for (int k = 0; k < count; ++k) {
+        u.include(nodes[2 * k]);
+        v.include(nodes[2 * k + 1]);
+    }
+    return {v.begin(image.rows), v.end(image.rows), u.begin(image.columns), u.end(image.columns)};
 }
+
+Recorded part(const Recorded &image, const PixelBox &box) {
+    return {image.row(box.top) + box.left, box.bottom - box.top, box.right - box.left, image.stride};
+}
+
+// Memory that waits for the next image: fresh memory costs more than what is written to it.
+class Scratch {
+public:
+    int16_t *of(size_t count) {
+        if (count > count_) {
+            memory_.reset(new int16_t[count]);  // not a vector, which would write zeros first
+            count_ = count;
+        }
+        return memory_.get();
+    }
+
+private:
+    std::unique_ptr<int16_t[]> memory_;
+    size_t count_ = 0;
+};
 
 }  // namespace
 
@@ -38,8 +71,7 @@ float quantise(const Kernels &kernels, const Recorded &image, int before, int af
     std::vector<float> brightest(static_cast<size_t>(image.rows), 0.0f);
     for_rows(image.rows, threads, [&](int first, int end) {
         for (int row = first; row < end; ++row)
-            brightest[row] =
-                kernels.brightest(image.pixels + static_cast<int64_t>(row) * image.columns, image.columns);
+            brightest[row] = kernels.brightest(image.row(row), image.columns);
     });
     const float largest = *std::max_element(brightest.begin(), brightest.end());
     const float unit = (largest > 0.0f ? largest : 1.0f) / 32767.0f;
@@ -53,8 +85,7 @@ float quantise(const Kernels &kernels, const Recorded &image, int before, int af
                 continue;
             }
             std::fill(line, line + before, int16_t(0));
-            kernels.quantise(image.pixels + static_cast<int64_t>(from) * image.columns, 1.0f / unit, line + before,
-                             image.columns);
+            kernels.quantise(image.row(from), 1.0f / unit, line + before, image.columns);
             std::fill(line + before + image.columns, line + columns, int16_t(0));
         }
     });
@@ -64,13 +95,21 @@ float quantise(const Kernels &kernels, const Recorded &image, int before, int af
 float resample(const Kernels &kernels, const Recorded &image, const float *nodes, int nodes_x, int16_t *to, int rows,
                int columns, int threads) {
     constexpr int margin = Resampling::margin;
-    const int from_rows = image.rows + 2 * margin, from_columns = image.columns + 2 * margin;
-    // not a vector, which would write zeros first; rows that nobody needs stay unwritten
-    const std::unique_ptr<int16_t[]> from(new int16_t[static_cast<size_t>(from_rows) * from_columns]);
-    const Recorded needed = rows_needed(image, nodes, ((rows - 1) / Resampling::node_spacing + 2) * nodes_x);
-    const int64_t skipped = (needed.pixels - image.pixels) / image.columns;
-    const float unit = quantise(kernels, needed, margin, margin, from.get() + skipped * from_columns, threads);
-    const Resampling job{from.get(), from_rows, from_columns, nodes, nodes_x, to, columns};
+    const PixelBox box = pixels_needed(image, nodes, ((rows - 1) / Resampling::node_spacing + 2) * nodes_x);
+    const Recorded needed = part(image, box);
+    const int from_rows = needed.rows + 2 * margin, from_columns = needed.columns + 2 * margin;
+    thread_local Scratch scratch;
+    int16_t *const from = scratch.of(static_cast<size_t>(from_rows) * from_columns);
+    const float unit = quantise(kernels, needed, margin, margin, from, threads);
+    const Resampling job{from,
+                         from_rows,
+                         from_columns,
+                         static_cast<float>(margin - box.left),
+                         static_cast<float>(margin - box.top),
+                         nodes,
+                         nodes_x,
+                         to,
+                         columns};
     for_rows(rows, threads, [&](int first, int end) { kernels.resample(job, first, end); });
     return unit;
 }

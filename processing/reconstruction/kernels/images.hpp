@@ -7,10 +7,12 @@
 
 namespace tomoshadow {
 
-// A recorded image of intensities, contiguous.
+// A recorded image of intensities, or a part of one.
 struct Recorded {
     const float *pixels;
     int rows, columns;
+    int64_t stride;  // from row to row
+    const float *row(int number) const { return pixels + number * stride; }
 };
 
 // Write intensities in fixed point into the middle of an image of (rows + before + after) x (columns + before + after)

@@ -144,6 +144,7 @@ struct Resampling {
     static constexpr int node_spacing = 16, margin = 64;
     const int16_t *from;
     int from_rows, from_columns;  // with margins
+    float origin_u, origin_v;  // of the recorded image, in `from`
     const float *nodes;
     int nodes_x;
     int16_t *to;

@@ -293,7 +293,8 @@ void fill_volume(Blocks &blocks, const AnyVolume &volume, int threads) {
 
 Recorded recorded(const RecordedArray &image) {
     require(image.size() > 0 && image.size() < (1u << 30), "image: empty or too large");
-    return {image.data(), static_cast<int>(image.shape(0)), static_cast<int>(image.shape(1))};
+    const int rows = static_cast<int>(image.shape(0)), columns = static_cast<int>(image.shape(1));
+    return {image.data(), rows, columns, columns};
 }
 
 float quantise_framed(const RecordedArray &image, int before, int after, const FilledPixels &out, int threads) {

@@ -37,8 +37,8 @@ struct Segment {
         const float *upper = job.nodes + 2 * (static_cast<int64_t>(from) * job.nodes_x + column / spacing);
         const float *lower = upper + 2 * job.nodes_x;
         const auto node = [&](int k) { return upper[k] + along * (lower[k] - upper[k]); };
-        u = node(0) + Resampling::margin;
-        v = node(1) + Resampling::margin;
+        u = node(0) + job.origin_u;
+        v = node(1) + job.origin_v;
         step_u = (node(2) - node(0)) / spacing;
         step_v = (node(3) - node(1)) / spacing;
     }
@@ -51,7 +51,7 @@ inline float greater(float a, float b) { return a > b ? a : b; }
 
 // A box of pixels around all that a segment needs, one more on each side of the four.
 struct Box {
-    int left, top, bottom;
+    int left, right, top, bottom;
     bool inside;
 
     Box(const Resampling &job, const Segment &at) {
@@ -61,10 +61,22 @@ struct Box {
         inside = u0 >= 2 && v0 >= 2 && u1 < static_cast<float>(job.from_columns - 34) &&
                  v1 < static_cast<float>(job.from_rows - 4);
         left = inside ? static_cast<int>(u0) - 1 : 0;
+        right = inside ? static_cast<int>(u1) + 3 : 0;
         top = inside ? static_cast<int>(v0) - 1 : 0;
         bottom = inside ? static_cast<int>(v1) + 3 : 0;
     }
 };
+
+// Most boxes of a spray are; a few columns more are looked at.
+inline bool empty(const Resampling &job, const Box &box) {
+    Ints any{};
+    for (int row = box.top; row <= box.bottom; ++row)
+        for (int column = box.left; column <= box.right; column += 2 * lanes)
+            any |= load<Ints>(job.from + static_cast<int64_t>(row) * job.from_columns + column);
+    int32_t bits = 0;
+    for (int lane = 0; lane < lanes; ++lane) bits |= any[lane];
+    return bits == 0;
+}
 
 inline void resample_one_by_one(const Resampling &job, const Segment &at, int16_t *to) {
     for (int k = 0; k < spacing; ++k) {
@@ -123,9 +135,20 @@ inline void resample_window(const Resampling &job, const Segment &at, const Box 
 
 #endif
 
+// In four chains, because one would wait for itself.
 float brightest(const float *pixels, int count) {
+    constexpr int chains = 4, at_once = chains * lanes;
+    Floats most[chains] = {};
+    int k = 0;
+    for (; k + at_once <= count; k += at_once)
+        for (int chain = 0; chain < chains; ++chain) {
+            const Floats some = load<Floats>(pixels + k + chain * lanes);
+            most[chain] = some > most[chain] ? some : most[chain];
+        }
     float largest = 0.0f;
-    for (int k = 0; k < count; ++k) largest = pixels[k] > largest ? pixels[k] : largest;
+    for (; k < count; ++k) largest = greater(pixels[k], largest);
+    for (const Floats &some : most)
+        for (int lane = 0; lane < lanes; ++lane) largest = greater(some[lane], largest);
     return largest;
 }
 
@@ -139,7 +162,7 @@ void resample(const Resampling &job, int first_row, int end_row) {
             int16_t *to = job.to + static_cast<int64_t>(row) * job.columns + column;
             const Segment at(job, row, column);
             const Box box(job, at);
-            if (!box.inside) {
+            if (!box.inside || empty(job, box)) {
                 std::memset(to, 0, sizeof(int16_t) * spacing);
                 continue;
             }

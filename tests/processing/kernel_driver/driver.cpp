@@ -187,7 +187,7 @@ void resample(const Kernels &kernels, int number) {
         }
     const int to_columns = 16 * (nodes_x - 1);
     const std::unique_ptr<int16_t[]> to(new int16_t[static_cast<size_t>(to_rows) * to_columns]);
-    const float unit = tomoshadow::resample(kernels, {image.data(), rows, columns}, nodes.data(), nodes_x, to.get(), to_rows, to_columns, 2);
+    const float unit = tomoshadow::resample(kernels, {image.data(), rows, columns, columns}, nodes.data(), nodes_x, to.get(), to_rows, to_columns, 2);
     const size_t pixels = static_cast<size_t>(to_rows) * to_columns;
     std::printf("resample %d %.6f %.6f\n", number, unit * sum_of(to.get(), pixels), unit * 32767.0);
 }
