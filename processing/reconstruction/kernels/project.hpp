@@ -55,39 +55,74 @@ inline ImageRows image_rows(const View &view, int z, int y0, int rows, const Pro
     return image;
 }
 
-// What a vector of pixels sees of a row of voxels.
-template <bool narrow>
-inline Floats interpolate_row(const float *row, const FloatTaps &taps) {
-#if defined(__AVX512F__)
-    const float *window = row + taps.first;
-    const auto index = reinterpret_cast<__m512i>(taps.index);
-    const __m512 low = _mm512_loadu_ps(window), high = _mm512_loadu_ps(window + (narrow ? 1 : lanes));
-    __m512 left, right;
-    if (narrow) {
-        left = _mm512_permutexvar_ps(index, low);
-        right = _mm512_permutexvar_ps(index, high);
-    } else {
-        left = _mm512_permutex2var_ps(low, index, high);
-        right = _mm512_permutex2var_ps(low, _mm512_add_epi32(index, _mm512_set1_epi32(1)), high);
+// Where vectors of pixels, side by side, see a row of voxels: at first[n] + fraction[n] and on.
+struct PixelPositions {
+    static constexpr int most = 2 * (smart_columns / lanes + lanes);
+    int32_t first[most];
+    float fraction[most];
+    // Image rows are no denser than rows of voxels.
+    PixelPositions(double start, double step, int vectors) {
+        for (int n = 0; n < vectors; n += lanes) {
+            const Floats at = lane_numbers() * static_cast<float>(step * lanes) + static_cast<float>(start + n * step * lanes);
+            const Ints whole = __builtin_convertvector(at, Ints);
+            store(first + n, whole);
+            store(fraction + n, at - __builtin_convertvector(whole, Floats));
+        }
     }
-    return reinterpret_cast<Floats>(left) + taps.fraction * reinterpret_cast<Floats>(_mm512_sub_ps(right, left));
-#else
-    return interpolate(row, taps);
-#endif
-}
+};
+
+// What a vector of pixels sees of a row of voxels, by permutation of two vectors; these start at a boundary between
+// cache lines where they then reach far enough ...
+struct Picked {
+    int first;
+    Ints left;
+    Floats fraction;
+    Picked(int at, const Floats &offsets, double step) {
+        const int beyond = at % lanes;
+        const bool aligned = beyond + step * (lanes - 1) + 2 < 2 * lanes;
+        first = aligned ? at - beyond : at;
+        left = __builtin_convertvector(offsets, Ints);
+        fraction = offsets - __builtin_convertvector(left, Floats);
+        left += aligned ? beyond : 0;
+    }
+    Floats of(const float *row) const {
+        const FloatTaps taps{first, false, left, fraction};
+        return interpolate(row, taps);
+    }
+};
+
+// ... or where pixels are nearly as dense as voxels, so that pixel k lies between the voxels k and k + 2 of a window:
+// each of three neighbours adds with the weight 1 - |distance|. Vectors of 16 would need a fourth, and permute well.
+struct Weighted {
+    int first;
+    Floats weights[3];
+    static bool fits(double step) { return lanes < 16 && (lanes - 1) * (step - 1.0) < 0.999; }
+    Weighted(int first_voxel, Floats at, double) : first(first_voxel) {
+        const Floats zero{}, one = zero + 1.0f, beyond = at - lane_numbers();
+        const Floats inner = beyond < one ? one - beyond : zero, outer = beyond > one ? beyond - one : zero;
+        weights[0] = inner;
+        weights[1] = one - inner - outer;
+        weights[2] = outer;
+    }
+    Floats of(const float *row) const {
+        const float *window = row + first;
+        const Floats near = weights[0] * load<Floats>(window);
+        return multiply_add(weights[2], load<Floats>(window + 2), multiply_add(weights[1], load<Floats>(window + 1), near));
+    }
+};
 
 // Add what some vectors of pixels, side by side, see of the slab, image row by image row. Each row of voxels is
 // interpolated once.
-template <bool narrow, int vectors>
-inline void add_columns(const float *voxels, const FloatTaps *taps, const ImageRows &image, float *pixels) {
+template <int vectors, class Seen>
+inline void add_columns(const float *voxels, const Seen *seen, const ImageRows &image, float *pixels) {
     Floats above[vectors] = {};
 #pragma GCC unroll 8
     for (int t = 0; t < smart_rows; ++t, voxels += PlaneRows::stride) {
         float *to = pixels + image.offset[t];
         const Floats upper = Floats{} + image.upper[t], lower = Floats{} + image.lower[t];
-#pragma GCC unroll 2
+#pragma GCC unroll 4
         for (int n = 0; n < vectors; ++n) {
-            const Floats below = interpolate_row<narrow>(voxels, taps[n]);
+            const Floats below = seen[n].of(voxels);
             store(to + n * lanes, load<Floats>(to + n * lanes) + upper * above[n] + lower * below);
             above[n] = below;
         }
@@ -113,16 +148,21 @@ inline void add_column(const float *voxels, const FloatTaps &taps, const ImageRo
     }
 }
 
-template <bool narrow>
+template <class Seen>
 inline int add_all_columns(const PlaneRows &plane, const ImageRows &image, double step, double origin, int u, int u_end,
                            const Projection &to) {
-    for (; u + lanes < u_end; u += 2 * lanes) {
-        const FloatTaps taps[2] = {float_taps(u * step + origin, step), float_taps((u + lanes) * step + origin, step)};
-        add_columns<narrow, 2>(plane.voxels, taps, image, to.pixels + u);
+    const int vectors = larger(0, u_end - u + lanes - 1) / lanes;
+    const PixelPositions positions(u * step + origin, step, vectors);
+    const Floats steps = lane_numbers() * static_cast<float>(step);
+    int n = 0;
+    for (; n + 1 < vectors; n += 2, u += 2 * lanes) {
+        const Seen seen[2] = {{positions.first[n], steps + positions.fraction[n], step},
+                              {positions.first[n + 1], steps + positions.fraction[n + 1], step}};
+        add_columns<2>(plane.voxels, seen, image, to.pixels + u);
     }
-    if (u >= u_end) return u;
-    const FloatTaps taps = float_taps(u * step + origin, step);
-    add_columns<narrow, 1>(plane.voxels, &taps, image, to.pixels + u);
+    if (n >= vectors) return u;
+    const Seen seen{positions.first[n], steps + positions.fraction[n], step};
+    add_columns<1>(plane.voxels, &seen, image, to.pixels + u);
     return u + lanes;
 }
 
@@ -136,8 +176,8 @@ inline int project_rectified(const View &view, const PlaneRows &plane, const Ima
     const int u_end = smaller(view.columns, floor_of(scale * end + shift) + 1);
     const double origin = guard - plane.x0 - shift * step;
     if (image.one_each)
-        return step <= 1.0 ? add_all_columns<true>(plane, image, step, origin, u_begin, u_end, to)
-                           : add_all_columns<false>(plane, image, step, origin, u_begin, u_end, to);
+        return Weighted::fits(step) ? add_all_columns<Weighted>(plane, image, step, origin, u_begin, u_end, to)
+                                    : add_all_columns<Picked>(plane, image, step, origin, u_begin, u_end, to);
     int u = u_begin;
     for (; u < u_end; u += lanes) add_column(plane.voxels, float_taps(u * step + origin, step), image, to.pixels + u);
     return u;

@@ -124,6 +124,12 @@ void smart_start(const SmartStart &job, int slab, KeepBlock keep, void *owner) {
     });
 }
 
+// Blocks come one after the other, but with so much work between them that processors do not fetch them in time.
+inline void fetch(const uint16_t *row) {
+    constexpr int blocks_ahead = 4;
+    __builtin_prefetch(row + blocks_ahead * block_size, 1);
+}
+
 // Where the updated voxels of a block go: back to memory, and in single precision into the rows to be projected.
 struct Updated {
     uint16_t *values;
@@ -161,6 +167,7 @@ inline void update_windows(const View *views, float gain, const int *chosen, con
     factor[0] *= gain;
     for (int row = 0; row < tile.rows; ++row) {
         Floats near = load_halves(to.values + row * block_columns), far = load_halves(to.values + row * block_columns + lanes);
+        fetch(to.values + row * block_columns);
 #pragma GCC unroll 4
         for (int n = 0; n < count; ++n) {
             const int16_t *above = pixels[n] + rows[n]->above[row], *below = above + columns[n];
@@ -200,11 +207,13 @@ inline void update(const SmartPass &job, const int *chosen, int count, const Pla
 #endif
     Block ratio;
     if (count) sample_product(job.views, chosen, count, taps, tile, ratio);
-    for (int row = 0; row < tile.rows; ++row)
+    for (int row = 0; row < tile.rows; ++row) {
+        fetch(to.values + row * block_columns);
         for (int k = 0; k < block_columns; k += lanes) {
             const Floats value = load_halves(to.values + row * block_columns + k);
             to.put(row, k, count ? value * (load<Floats>(ratio.rows[row] + k) * job.gain) : value);
         }
+    }
 }
 
 // The blocks of one plane in a tile, side by side, with zeros where there are none and around.
