@@ -174,25 +174,35 @@ inline Floats weighted_pairs(const int16_t *pixels, Ints at, Ints weight) {
 
 #if defined(__AVX512BW__)
 
-// A segment between two nodes sixteen voxels apart, where its pixels fit into a window of few rows: no gathers.
-// Each row adds with the weight 1 - |distance|. False where they do not fit.
-inline bool sample_segment(const View &view, const float *u, const float *v, const Clamp &last, Floats &seen) {
-    const float left = u[0] < u[1] ? u[0] : u[1], right = u[0] < u[1] ? u[1] : u[0];
-    const float top = v[0] < v[1] ? v[0] : v[1], bottom = v[0] < v[1] ? v[1] : v[0];
-    constexpr float most_columns = 29.0f, most_rows = 6.0f;
-    if (!(left >= 0 && right <= last.u && top >= 0 && bottom <= last.v - 2 && right - left <= most_columns &&
-          bottom - top <= most_rows))
-        return false;
+// A segment between two nodes sixteen voxels apart. Without gathers, where its pixels fit into a window of few rows.
+struct NodeSegment {
+    float u0, u1, v0, v1;
+    NodeSegment(const float *u, const float *v) : u0(u[0]), u1(u[1]), v0(v[0]), v1(v[1]) {}
+    float left() const { return u0 < u1 ? u0 : u1; }
+    float right() const { return u0 < u1 ? u1 : u0; }
+    float top() const { return v0 < v1 ? v0 : v1; }
+    float bottom() const { return v0 < v1 ? v1 : v0; }
+    bool fits(const Clamp &last) const {
+        constexpr float most_columns = 29.0f, most_rows = 6.0f;
+        return left() >= 0 && right() <= last.u && top() >= 0 && bottom() <= last.v - 2 &&
+               right() - left() <= most_columns && bottom() - top() <= most_rows;
+    }
+};
+
+// What a view sees along a segment that fits: each row adds with the weight 1 - |distance|. Not inline: with the
+// registers of its caller it would need more than there are.
+[[gnu::noinline]] Floats sample_segment(const View &view, const NodeSegment &at) {
+    const float left = at.left(), top = at.top(), bottom = at.bottom();
     const int first_column = static_cast<int>(left), first_row = static_cast<int>(top);
     const Floats lane = lane_numbers() * (1.0f / lanes);
-    const Floats at_u = lane * (u[1] - u[0]) + (u[0] - static_cast<float>(first_column));
-    Floats distance = lane * (v[1] - v[0]) + (v[0] - static_cast<float>(first_row));
+    const Floats at_u = lane * (at.u1 - at.u0) + (at.u0 - static_cast<float>(first_column));
+    Floats distance = lane * (at.v1 - at.v0) + (at.v0 - static_cast<float>(first_row));
     const Ints column = __builtin_convertvector(at_u, Ints);
     const auto weight = reinterpret_cast<__m512i>(horizontal_weights(at_u - __builtin_convertvector(column, Floats)));
     const auto index = reinterpret_cast<__m512i>((column | column << 16) + 0x10000);
     const int16_t *pixels = view.pixels + static_cast<int64_t>(first_row) * view.columns + first_column;
     const Floats zero{}, one = zero + 1.0f;
-    seen = zero;
+    Floats seen{};
     const auto add_row = [&] {
         const __m512i pairs = _mm512_permutexvar_epi16(index, _mm512_loadu_si512(pixels));
         const auto along = reinterpret_cast<Floats>(_mm512_cvtepi32_ps(_mm512_madd_epi16(pairs, weight)));
@@ -207,7 +217,7 @@ inline bool sample_segment(const View &view, const float *u, const float *v, con
     add_row();
     add_row();
     for (int row = 3; row < static_cast<int>(bottom) - first_row + 2; ++row) add_row();
-    return true;
+    return seen;
 }
 
 #endif
@@ -239,10 +249,12 @@ inline void sample_nodes(const View &view, const PlaneTaps &taps, const Tile &ti
         const float *line_u = taps.line(row, 0), *line_v = taps.line(row, 1);
 #if defined(__AVX512BW__)
         if (view.spacing == lanes) {
-            Floats seen;
-            int k = 0, node = tile.x0 / lanes;
-            for (; k < block_columns && sample_segment(view, line_u + node, line_v + node, last, seen); k += lanes, ++node)
-                combine<how>(block.rows[row] + k, seen, factor);
+            int k = 0;
+            for (int node = tile.x0 / lanes; k < block_columns; k += lanes, ++node) {
+                const NodeSegment at(line_u + node, line_v + node);
+                if (!at.fits(last)) break;
+                combine<how>(block.rows[row] + k, sample_segment(view, at), factor);
+            }
             if (k < block_columns) sample_gathered<how>(view, line_u, line_v, tile.x0, k, last, factor, block.rows[row]);
             continue;
         }

@@ -44,13 +44,14 @@ struct Extent {
 
 inline Extent extent_of(const PlaneTaps &taps, int channel, const Tile &tile, int spacing) {
     Extent extent{taps.line(0, channel)[tile.x0 / spacing], taps.line(0, channel)[tile.x0 / spacing]};
-    for (int row = 0; row < tile.rows; ++row) {
-        if (row && row != tile.rows - 1 && (tile.y0 + row) % spacing) continue;
+    for (int row = 0; row < tile.rows;) {
+        const float *line = taps.line(row, channel);
         for (int k = tile.x0 / spacing; k <= (tile.x0 + block_columns) / spacing; ++k) {
-            const float value = taps.line(row, channel)[k];
-            extent.least = value < extent.least ? value : extent.least;
-            extent.most = value > extent.most ? value : extent.most;
+            extent.least = line[k] < extent.least ? line[k] : extent.least;
+            extent.most = line[k] > extent.most ? line[k] : extent.most;
         }
+        const int next_node = row + spacing - ((tile.y0 + row) & (spacing - 1));
+        row = row == tile.rows - 1 ? tile.rows : smaller(next_node, tile.rows - 1);
     }
     return extent;
 }
