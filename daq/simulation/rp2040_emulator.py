@@ -27,6 +27,7 @@ from daq.simulation.rp2040_chip import (
     pwm_set_points_ma,
     start_boot_rom,
 )
+from daq.simulation.serial_pace import pace_serial_line
 from daq.simulation.usb_host import UsbHost
 
 CYCLE_NS = 8
@@ -147,6 +148,10 @@ class EmulatedPico:
     def receive(self, data: bytes) -> None:
         """Bytes for the firmware's serial line; they arrive at 115200 baud."""
         self._received.extend(data)
+
+    def pace_serial_line(self) -> None:
+        """Let the bytes of replies take their time too, until the next power-up."""
+        pace_serial_line(self._chip)
 
     def feed(self, byte: int) -> None:
         """A byte that arrives now."""
