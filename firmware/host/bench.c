@@ -11,7 +11,7 @@
 struct bench bench = {.serial = -1, .interlock_closed = true, .estop_closed = true};
 
 const char port_build[] = "host";
-const char port_git[] = "unknown";
+const char port_git[] = REVISION;
 const uint32_t port_tick_ns = 8; /* as the RP2040 at 125 MHz */
 
 static struct pulse_train loaded;

@@ -3,6 +3,7 @@
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import astuple, dataclass, replace
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -54,6 +55,7 @@ PAPER = Channel(0, 20_000, 1000, 26_400, 1000, frame_a_close_ns=23_500, frame_b_
 """The paper's pulse pair: 1 us, 6.4 us apart."""
 
 
+@cache
 def image(kind: ImageKind = ImageKind.CONVERTER) -> Path:
     """The image under test."""
     folder = os.environ.get(IMAGES_VARIABLE)

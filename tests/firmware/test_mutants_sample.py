@@ -10,8 +10,6 @@ from firmware.tests.mutants import FIRMWARE, Mutant, MutantError, killer_of, loa
 MUTANTS = {mutant.name: mutant for mutant in load_mutants()}
 SAMPLE = (
     "no rate limit",
-    "interlock not asked at the moment of firing",
-    "CLEAR arms again",
     "lights are not forced low",
 )
 

@@ -25,6 +25,7 @@ def test_info_tells_identity_state_and_counters(capsys: pytest.CaptureFixture[st
     info = result_of(capsys, "info", *CONFIG)
     assert (info["identity"]["model"], info["identity"]["protocol"]) == ("tomoshadow-pulse", "2")
     assert (info["state"], info["faults"], info["start_cause"]) == ("SAFE", [], "POWER")
+    assert info["identity"]["git"] == Path("build/firmware/revision").read_text().strip()
     assert info["interlock_closed"]
     assert info["estop_closed"]
     assert set(info["counters"].values()) == {0}
