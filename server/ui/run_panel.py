@@ -1,6 +1,6 @@
 """RunPanel: what the run is doing, and the buttons that end it. ABORT is always there and always enabled."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from nicegui import ui
 from starlette.concurrency import run_in_threadpool
@@ -8,6 +8,7 @@ from starlette.concurrency import run_in_threadpool
 from daq.errors import DaqError
 from daq.run_events import RunStatus
 from daq.run_state import RunState
+from server.monitor import Health, Lamp
 from server.services import Context
 from server.ui.theme import panel
 
@@ -17,6 +18,7 @@ class RunPanel:
 
     def __init__(self, context: Context) -> None:
         self._acquisition = context.services.acquisition
+        self._monitor = context.monitor
         with panel("Run"):
             with ui.row().classes("w-full items-baseline justify-between no-wrap"):
                 self._name = ui.label("no run yet").classes("text-base font-medium ellipsis")
@@ -44,7 +46,7 @@ class RunPanel:
         self._outcome.props(f"color={outcome_colour(status.outcome)}")
         self._outcome.set_visibility(bool(self._outcome.text))
         self._stop.set_enabled(status.active)
-        self._acknowledge.set_visibility(status.state is RunState.FAULT)
+        self._acknowledge.set_visibility(waits_for_acknowledgement(status, self._monitor.lamps))
 
     async def _on_abort(self) -> None:
         await _notify_failure(self._acquisition.abort)
@@ -59,6 +61,12 @@ async def _notify_failure(command: Callable[[], None]) -> None:
         await run_in_threadpool(command)
     except DaqError as error:
         ui.notify(str(error), type="negative")
+
+
+def waits_for_acknowledgement(status: RunStatus, lamps: Sequence[Lamp]) -> bool:
+    """True where an operator must clear a fault: of acquisition, or latched by a generator that is at rest."""
+    latched = any(lamp.kind == "generator" and lamp.health is Health.FAULT for lamp in lamps)
+    return status.state is RunState.FAULT or (latched and not status.active)
 
 
 def counts_text(status: RunStatus) -> str:

@@ -1,0 +1,29 @@
+import pytest
+
+from daq.run_events import RunStatus
+from daq.run_state import RunState
+from server.monitor import Health, Lamp
+from server.ui.run_panel import counts_text, waits_for_acknowledgement
+
+
+def generator_lamp(health: Health) -> Lamp:
+    return Lamp(name="pulse generator", kind="generator", health=health, detail="")
+
+
+@pytest.mark.parametrize(
+    ("state", "generator", "waits"),
+    [
+        (RunState.IDLE, Health.OK, False),
+        (RunState.IDLE, Health.FAULT, True),
+        (RunState.ACQUIRING, Health.FAULT, False),
+        (RunState.FAULT, Health.OK, True),
+    ],
+)
+def test_a_fault_can_be_acknowledged_wherever_it_is_latched(state: RunState, generator: Health, waits: bool) -> None:
+    door = Lamp(name="interlock", kind="interlock", health=Health.FAULT, detail="open")
+    assert waits_for_acknowledgement(RunStatus(state=state), (door, generator_lamp(generator))) is waits
+
+
+def test_invalid_shots_are_never_left_out() -> None:
+    status = RunStatus(run_id="run", shots_planned=5, shots_recorded=4, shots_valid=3)
+    assert counts_text(status) == "4 / 5 shots recorded, 3 valid, 1 INVALID"
