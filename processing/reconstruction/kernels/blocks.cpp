@@ -25,11 +25,14 @@ Blocks::Blocks(const Kernels &kernels, const SmartStart &start, float most, int 
         slab.values.emplace_back();
         std::memcpy(&slab.values.back(), values, sizeof(Values));
     };
+    // Grown in memory that is warm, then copied: fresh memory costs more than the copy, and a slab keeps none to spare.
+    std::vector<Slab> found(threads);
     for_each(static_cast<int>(slabs_.size()), threads, [&](int number) {
-        Slab &slab = slabs_[number];
+        Slab &slab = found[number % threads];  // for_each deals the same to the same thread
+        slab.positions.clear();
+        slab.values.clear();
         kernels.smart_start(job, number, keep, &slab);
-        slab.positions.shrink_to_fit();
-        slab.values.shrink_to_fit();
+        slabs_[number] = slab;
     });
 }
 

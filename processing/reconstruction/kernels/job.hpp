@@ -18,7 +18,7 @@ constexpr int sight_rows = 16;  // rows of a slab for line of sight ...
 constexpr int smart_rows = 8;   // ... and for SMART, whose blocks come and go with the droplets
 
 // SMART works through a slab tile by tile: what the views see of a tile stays in the nearest cache for all its planes.
-constexpr int smart_planes = 16, smart_columns = 128;
+constexpr int smart_planes = 16, smart_columns = 256;
 
 // Rows and columns of an image, ends included.
 struct PixelBox {
