@@ -9,6 +9,7 @@
     │   ├── DeviceUnavailable   it is absent, or held by somebody else
     │   ├── DeviceTimeout       it did not answer before the deadline
     │   ├── DeviceRefused       it answered, and said no
+    │   ├── DeviceOvertaken     it was switched off while it was asked
     │   └── ProtocolError       it answered something that makes no sense
     ├── InterlockOpen         the light must not be switched on
     ├── RecorderError         a shot could not be stored
@@ -71,6 +72,10 @@ class DeviceTimeout(DeviceError):
 
 class DeviceRefused(DeviceError):
     """The device answered, and refused."""
+
+
+class DeviceOvertaken(DeviceError):
+    """The device was switched off while it was asked: nobody knows what it did with the command, and it is dark."""
 
 
 class ProtocolError(DeviceError):

@@ -6,11 +6,12 @@ so a heartbeat without acquisition never makes light.
 """
 
 import threading
+from contextlib import suppress
 from types import TracebackType
 from typing import Self
 
 from daq.devices import Rig
-from daq.errors import DaqError, DeviceError
+from daq.errors import DaqError, DeviceError, DeviceOvertaken
 from daq.preflight import check_light_permitted
 from daq.run_control import RunControl
 from daq.run_state import RunStep
@@ -50,7 +51,8 @@ class RunGuard:
         """Thread: an edge of the interlock ends the wait at once."""
         try:
             while not self._done.is_set():
-                check_light_permitted(self._rig)
+                with suppress(DeviceOvertaken):  # switched off between two positions of the stage: dark, ask again
+                    check_light_permitted(self._rig)
                 self._rig.interlock.wait_for_change(self._period_s)
         except DaqError as error:
             switch_off(self._rig)

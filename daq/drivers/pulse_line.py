@@ -21,7 +21,14 @@ from daq.drivers.pulse_protocol import (
     decode_reply,
     encode_request,
 )
-from daq.errors import DeviceError, DeviceRefused, DeviceTimeout, DeviceUnavailable, ProtocolError
+from daq.errors import (
+    DeviceError,
+    DeviceOvertaken,
+    DeviceRefused,
+    DeviceTimeout,
+    DeviceUnavailable,
+    ProtocolError,
+)
 
 LIMIT_S = 1.0
 OPENING_LIMIT_S = 3.0
@@ -242,7 +249,7 @@ class PulseLine:
 
     def _check_not_overtaken(self, command: Command, offs: int | None) -> None:
         if offs is not None and offs != self._offs:
-            raise DeviceError(self._name, f"{command} was overtaken by off")
+            raise DeviceOvertaken(self._name, f"{command} was overtaken by off")
 
     def _check_boot(self, reply: Reply) -> None:
         before, self._boot = self._boot, reply.boot

@@ -44,3 +44,20 @@ def test_a_run_with_the_image_of_the_pico(tmp_path: Path) -> None:
                 assert view.frame_b is not None
                 assert 90 < np.median(view.frame_a) < 170
                 assert 90 < np.median(view.frame_b) < 170
+
+
+def test_a_target_moves_under_the_eyes_of_the_guard(tmp_path: Path) -> None:
+    config = emulated_config()
+    current_a = {name: view.nominal_current_a for name, view in config.views.items()}
+    plan = RunPlan(
+        name="emulated",
+        kind=RunKind.CALIBRATION,
+        shots=1,
+        rate_hz=2.0,
+        pulse=PulsePair(current_a=current_a),
+        stage_z_mm=(-4.0, -2.0, 0.0, 2.0, 4.0),
+    )
+    with open_rig(config) as assembled, Acquisition(assembled.rig, tmp_path) as acquisition:
+        acquisition.start(plan)
+        status = acquisition.wait(60.0)
+    assert (status.outcome, status.shots_valid) == (RunOutcome.COMPLETED, 5), status.message
