@@ -11,8 +11,8 @@ import pytest
 
 from daq.acquisition import Acquisition
 from daq.acquisition_limits import AcquisitionLimits
-from daq.devices import GeneratorState, Rig
-from daq.errors import BusyError, DaqError, DeviceError, DeviceRefused, InterlockOpen, PlanError
+from daq.devices import GeneratorState, GeneratorStatus, Rig
+from daq.errors import BusyError, DaqError, DeviceError, DeviceOvertaken, DeviceRefused, InterlockOpen, PlanError
 from daq.run_events import RunEvent, RunMessage, ShotRecorded, StateChanged
 from daq.run_state import RunOutcome, RunState
 from daq.shotfile import ImageKey, PulsePair, RunKind, RunPlan, RunReader, RunWriter
@@ -417,6 +417,24 @@ def test_no_light_while_an_interlock_is_open(lab: Laboratory, which: str) -> Non
     with pytest.raises(InterlockOpen, match=f"^{which}"):
         lab.acquisition.start(plan_of())
     assert not lab.bench.journal
+
+
+def test_the_guard_asks_again_when_the_light_goes_off_under_its_question(
+    lab: Laboratory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    generator, overtaken = lab.bench.generator, threading.Event()
+    status = generator.status
+
+    def overtaken_once() -> GeneratorStatus:
+        if threading.current_thread().name == "run-guard" and not overtaken.is_set():
+            overtaken.set()
+            raise DeviceOvertaken(generator.name, "STATUS was overtaken by off")
+        return status()
+
+    monkeypatch.setattr(generator, "status", overtaken_once)
+    with lab.run(plan_of(2)) as run:
+        assert run.outcome == RunOutcome.COMPLETED
+    assert overtaken.is_set()
 
 
 def test_a_bug_in_the_scene_is_a_failed_run_and_not_a_dead_thread(lab: Laboratory) -> None:
