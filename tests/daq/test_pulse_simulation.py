@@ -101,6 +101,7 @@ def test_many_instructions_at_once_keep_their_answers() -> None:
             thread.start()
         for thread in threads:
             thread.join(5.0)
+        assert not any(thread.is_alive() for thread in threads)
         firmware.reset()
 
 
