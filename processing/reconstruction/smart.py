@@ -57,7 +57,7 @@ class SmartResult:
     Parameters
     ----------
     blocks : Blocks
-        The volume where it is not empty, in float16: ``blocks.nbytes`` of memory; ``blocks.write`` makes it dense.
+        The volume where it is not empty, as exact as float16: ``blocks.nbytes`` of memory; ``blocks.write`` makes it dense.
     residuals : tuple of float
         Norm of projections minus images over norm of the images: of the scaled start, then after every iteration.
     out : (z, y, x) array, optional
@@ -85,7 +85,7 @@ def smart(plan: Plan, images: Sequence[Pixels], **options: Unpack[SmartOptions])
     where I is the image and P the projection of the volume, both sampled where the view sees the voxel; by 16 at most.
 
     Three iterations differ from float64 by less than 5e-5 of the brightest voxel (rms), and nowhere by more than 1e-2:
-    ratios have steps of 1 / 2048, and each correction rounds to float16. From MLOS, where blocks below 1e-8 of the
+    ratios have steps of 1 / 2048, and each correction rounds as float16 does. From MLOS, where blocks below 1e-8 of the
     brightest are not followed, it is 1e-4 and 2e-2.
 
     Parameters

@@ -9,8 +9,6 @@ namespace tomoshadow {
 
 namespace {
 
-constexpr int max_bands = 16;
-
 struct Band {
     int first_slab, end_slab;
 };

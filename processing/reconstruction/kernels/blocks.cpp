@@ -9,9 +9,9 @@ namespace tomoshadow {
 
 namespace {
 
-// The largest voxel of the start is stored as 128 to 256. Above it float16 has room for 8 bits of growth, below it
-// for 21 of full precision and 10 more. A power of two, so that blocks become a volume and blocks again unchanged.
-float unit_for(float most) { return most > 0.0f ? std::ldexp(1.0f, std::ilogb(most) - 7) : 1.0f; }
+// A power of two, so that blocks become a volume and blocks again unchanged. The largest voxel of the start is stored as
+// 1 to 2: voxels.hpp has room for 16 more bits above it, and for 45 below.
+float unit_for(float most) { return most > 0.0f ? std::ldexp(1.0f, std::ilogb(most)) : 1.0f; }
 
 }  // namespace
 

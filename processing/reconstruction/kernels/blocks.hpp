@@ -8,8 +8,8 @@
 
 namespace tomoshadow {
 
-// Blocks of a volume in which any voxel is not zero, slab by slab, in float16. Once zero, a voxel stays zero under
-// SMART, so blocks are found once.
+// Blocks of a volume in which any voxel is not zero, slab by slab, in 16 bits (voxels.hpp). Once zero, a voxel stays zero
+// under SMART, so blocks are found once.
 class Blocks {
 public:
     // A power of the product of what all views see, where it exceeds `floor` somewhere in a block. `most` is what it

@@ -89,6 +89,8 @@ struct SumOfSight {
     float *volume;  // is added to
 };
 
+constexpr int max_bands = 16;  // of slabs, which project into images of their own
+
 // Rows [first_row, first_row + rows) of a view's image that a band of the volume projects onto, and a spare one;
 // without pixels if nobody asked for the view.
 struct Projection {
@@ -97,7 +99,7 @@ struct Projection {
     int64_t stride;  // floats from row to row, a multiple of the widest vector
 };
 
-// Blocks of a slab of SMART, ordered by tile, in it by plane and column. Voxels are float16; those beyond the volume
+// Blocks of a slab of SMART, ordered by tile, in it by plane and column. Voxels are as in voxels.hpp; those beyond the volume
 // are zero.
 struct BlockPosition {
     int32_t z, x0;

@@ -24,7 +24,7 @@ void line_of_sight(const LineOfSight &job, int slab) {
     Drain drain;
     const int64_t piece = static_cast<int64_t>(bytes_of(job.format)) * rows * block_columns;
     Block block;
-    const auto take = [&](int row, int column, Floats values) { store(block.rows[row] + column, values); };
+    const auto take = [&](int row, const Floats (&values)[parts]) { std::memcpy(block.vectors[row], values, sizeof values); };
     for (int z0 = 0, bank = 0; z0 < job.shape.nz; z0 += planes.depth(), bank = 1 - bank) {
         const int z_end = smaller(z0 + planes.depth(), job.shape.nz);
         planes.set(z0, z_end);
@@ -57,7 +57,7 @@ void sparse_sight(const SparseSight &job, int slab, KeepBrick keep, void *owner)
     const Exposures exposure{job.views, job.n_views, 1, job.method};
     PlaneStack planes(job.views, job.n_views, nx, y0, rows);
     Block block;
-    const auto take = [&](int row, int column, Floats values) { store(block.rows[row] + column, values); };
+    const auto take = [&](int row, const Floats (&values)[parts]) { std::memcpy(block.vectors[row], values, sizeof values); };
     alignas(64) uint16_t brick[sight_rows * block_columns];
     for (int z0 = 0; z0 < job.shape.nz; z0 += planes.depth()) {
         const int z_end = smaller(z0 + planes.depth(), job.shape.nz);
@@ -95,8 +95,8 @@ inline void add_exposures(const SumOfSight &job, const PlaneStack &planes, const
         Block *sum = sums;
         for (int x0 = over.x0; x0 < over.x_end; x0 += block_columns)
             for (int plane = 0; plane < over.depth; ++plane, ++sum)
-                see(some, planes.plane(plane), {over.z0 + plane, y0, rows, x0}, [&](int row, int column, Floats values) {
-                    store(sum->rows[row] + column, load<Floats>(sum->rows[row] + column) + values);
+                see(some, planes.plane(plane), {over.z0 + plane, y0, rows, x0}, [&](int row, const Floats (&values)[parts]) {
+                    for (int part = 0; part < parts; ++part) sum->vectors[row][part] += values[part];
                 });
     }
 }

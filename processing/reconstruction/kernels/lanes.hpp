@@ -1,5 +1,4 @@
-// Vectors of the width that the instruction set offers, and the one operation the compiler needs help with:
-// linear interpolation of a row at evenly spaced positions, without gathers.
+// Vectors of the width that the instruction set offers, and the operations that compilers need help with.
 #pragma once
 
 #include <cstdint>
@@ -7,6 +6,8 @@
 #if defined(__F16C__)
 #include <immintrin.h>
 #endif
+
+#include "job.hpp"
 
 namespace tomoshadow::TOMOSHADOW_ISA {
 namespace {
@@ -18,6 +19,8 @@ constexpr int lanes = 8;
 #else
 constexpr int lanes = 4;
 #endif
+
+constexpr int parts = block_columns / lanes;  // vectors in a row of a block
 
 typedef float Floats __attribute__((vector_size(4 * lanes)));
 typedef int32_t Ints __attribute__((vector_size(4 * lanes)));
@@ -32,6 +35,17 @@ inline Vector load(const Scalar *from) {
 template <class Vector, class Scalar>
 inline void store(Scalar *to, Vector vector) {
     std::memcpy(to, &vector, sizeof vector);
+}
+
+// In all lanes. Compilers leave out the subtraction of zero, but not its addition, which makes zero of minus zero.
+inline Floats all(float value) { return value - Floats{}; }
+
+template <class To, class From>
+inline To same_bits(From from) {
+    To to;
+    static_assert(sizeof to == sizeof from, "values of one size");
+    std::memcpy(&to, &from, sizeof to);
+    return to;
 }
 
 inline int smaller(int a, int b) { return a < b ? a : b; }
@@ -61,42 +75,17 @@ inline Floats multiply_add(Floats a, Floats b, Floats c) {
 #endif
 }
 
-// Positions of a vector along a row of floats: evenly spaced, not negative, less than two vectors from first to last.
-struct FloatTaps {
-    int first;
-    bool narrow;
-    Ints index;
-    Floats fraction;
-};
+constexpr double max_step = 1.8;  // voxels from pixel to pixel, or pixels from voxel to voxel
 
-constexpr double max_step = 1.8;
-
-inline FloatTaps float_taps(double position, double step) {
-    const int first = static_cast<int>(position);
-    const Floats offset = lane_numbers() * static_cast<float>(step) + static_cast<float>(position - first);
-    const Ints index = __builtin_convertvector(offset, Ints);
-    return {first, step <= 1.0, index, offset - __builtin_convertvector(index, Floats)};
-}
-
-inline Floats interpolate(const float *row, const FloatTaps &taps) {
-    const float *window = row + taps.first;
-    Floats left, right;
-#if defined(__AVX2__)
-    if (taps.narrow) {
-        left = __builtin_shuffle(load<Floats>(window), taps.index);
-        right = __builtin_shuffle(load<Floats>(window + 1), taps.index);
-    } else {
-        const Floats low = load<Floats>(window), high = load<Floats>(window + lanes);
-        left = __builtin_shuffle(low, high, taps.index);
-        right = __builtin_shuffle(low, high, taps.index + 1);
-    }
+// The lesser of a and b, b where one of them is not a number. Compilers do not find the instruction.
+inline Floats lesser(Floats a, Floats b) {
+#if defined(__AVX512F__)
+    return reinterpret_cast<Floats>(_mm512_min_ps(reinterpret_cast<__m512>(a), reinterpret_cast<__m512>(b)));
+#elif defined(__AVX2__)
+    return reinterpret_cast<Floats>(_mm256_min_ps(reinterpret_cast<__m256>(a), reinterpret_cast<__m256>(b)));
 #else
-    for (int k = 0; k < lanes; ++k) {
-        left[k] = window[taps.index[k]];
-        right[k] = window[taps.index[k] + 1];
-    }
+    return a < b ? a : b;
 #endif
-    return left + taps.fraction * (right - left);
 }
 
 inline Floats square_root(Floats x) {

@@ -11,14 +11,6 @@ constexpr float nothing = 1e-7f;  // projected intensity below which a pixel see
 
 typedef int16_t Shorts __attribute__((vector_size(2 * lanes)));
 
-template <class To, class From>
-inline To same_bits(From from) {
-    To to;
-    static_assert(sizeof to == sizeof from, "vectors of one size");
-    std::memcpy(&to, &from, sizeof to);
-    return to;
-}
-
 // By the series of artanh, for positive normal numbers; exact to 4e-8, or to the rounding of the result.
 inline Floats logarithm_2(Floats x) {
     constexpr int32_t root_of_half = 0x3f3504f3;
@@ -47,34 +39,65 @@ inline Floats power(Floats x, float exponent) {
     return x > least ? power_of_2(exponent * logarithm_2(x > least ? x : least)) : zero;
 }
 
-inline Floats sum_of_parts(const Correction &job, int row, int column) {
-    Floats sum{};
-    for (int i = 0; i < job.n_parts; ++i) {
-        const Projection &part = job.parts[i];
-        if (row < part.first_row || row >= part.first_row + part.rows) continue;
-        sum += load<Floats>(part.pixels + (row - part.first_row) * part.stride + column);
+// What the bands of the volume add to a row of an image.
+class RowOfParts {
+public:
+    RowOfParts(const Correction &job, int row) : unit_(job.unit) {
+        for (int i = 0; i < job.n_parts; ++i) {
+            const Projection &part = job.parts[i];
+            if (row >= part.first_row && row < part.first_row + part.rows)
+                rows_[count_++] = part.pixels + (row - part.first_row) * part.stride;
+        }
     }
-    return sum * job.unit;
+    Floats sum(int column) const {
+        Floats sum{};
+        for (int i = 0; i < count_; ++i) sum += load<Floats>(rows_[i] + column);
+        return sum * unit_;
+    }
+
+private:
+    float unit_;
+    int count_ = 0;
+    const float *rows_[max_bands];
+};
+
+inline bool all_zero(const Shorts &counts) {
+    uint64_t words[sizeof counts / sizeof(uint64_t)], any = 0;
+    std::memcpy(words, &counts, sizeof counts);
+    for (uint64_t word : words) any |= word;
+    return !any;
+}
+
+// Ratios in counts, of the exponent's power.
+inline Shorts ratio_counts(const Correction &job, Floats recorded, Floats projected) {
+    const Floats zero{}, floor = zero + nothing, most = zero + 32767.0f;
+    const Floats ratio = recorded / (projected > floor ? projected : floor);
+    const Floats scaled = power(ratio, job.exponent) * job.ratio_counts + 0.5f;
+    const Ints seen = projected > floor;
+    return __builtin_convertvector(__builtin_convertvector(lesser(scaled, most), Ints) & seen, Shorts);
 }
 
 double correct(const Correction &job, int row) {
     const FlushSubnormals flush;
-    const Floats zero{}, floor = zero + nothing, most = zero + 32767.0f;
+    const RowOfParts parts(job, row);
+    const int16_t *recorded = job.recorded + static_cast<int64_t>(row) * job.columns;
+    int16_t *ratio = job.ratio + static_cast<int64_t>(row) * job.columns;
     Floats missed{};
-    for (int column = 0; column < job.columns; column += lanes) {
-        const int64_t at = static_cast<int64_t>(row) * job.columns + column;
-        const size_t bytes = sizeof(int16_t) * static_cast<size_t>(smaller(lanes, job.columns - column));
-        Shorts counts{};
-        std::memcpy(&counts, job.recorded + at, bytes);
-        const Floats recorded = __builtin_convertvector(__builtin_convertvector(counts, Ints), Floats) * job.recorded_unit;
-        const Floats projected = sum_of_parts(job, row, column), difference = projected - recorded;
+    const auto correct_vector = [&](const int16_t *from, int16_t *to, int column) {
+        const Shorts counts = load<Shorts>(from);
+        const Floats seen = __builtin_convertvector(__builtin_convertvector(counts, Ints), Floats) * job.recorded_unit;
+        const Floats projected = parts.sum(column), difference = projected - seen;
         missed += difference * difference;
-        const Floats ratio = recorded / (projected > floor ? projected : floor);
-        Floats scaled = power(ratio, job.exponent) * job.ratio_counts + 0.5f;
-        scaled = scaled < most ? scaled : most;
-        const Ints seen = projected > floor;
-        counts = __builtin_convertvector(__builtin_convertvector(scaled, Ints) & seen, Shorts);
-        std::memcpy(job.ratio + at, &counts, bytes);
+        store(to, all_zero(counts) ? counts : ratio_counts(job, seen, projected));
+    };
+    int column = 0;
+    for (; column + lanes <= job.columns; column += lanes) correct_vector(recorded + column, ratio + column, column);
+    if (column < job.columns) {
+        const size_t bytes = sizeof(int16_t) * static_cast<size_t>(job.columns - column);
+        int16_t last[lanes] = {};
+        std::memcpy(last, recorded + column, bytes);
+        correct_vector(last, last, column);
+        std::memcpy(ratio + column, last, bytes);
     }
     double sum = 0;
     for (int k = 0; k < lanes; ++k) sum += missed[k];

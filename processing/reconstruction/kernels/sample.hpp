@@ -13,8 +13,9 @@ struct Tile {
 };
 
 // Values of the voxels of a tile.
-struct alignas(64) Block {
+union alignas(64) Block {
     float rows[sight_rows][block_columns];
+    Floats vectors[sight_rows][parts];
 };
 
 // How the samples of a view enter a block: they replace, multiply or limit what is there. Samples are in units of
@@ -54,6 +55,7 @@ inline RowTaps row_taps(const View &view, int z, int y0, int rows) {
 // What a slab needs of a view in one plane, whatever the tile.
 struct PlaneTaps {
     RowTaps rows;     // rectified
+    Columns columns;  // rectified
     float *lines;     // by nodes: u, v and maybe area of every row
     int line_length, channels;
 
@@ -66,32 +68,26 @@ struct PlaneTaps {
 
 // Both halves of a block from one window, which moves down by no more than one row: every row is read once.
 template <Combine how>
-inline void sample_shared(const View &view, const RowTaps &rows, const Tile &tile, float factor, Block &block) {
-    const double scale = view.scale[tile.z], start = scale * tile.x0 + view.shift_u[tile.z];
-    const int first = static_cast<int>(start);
-    const Taps left = taps_from(first, start, scale), right = taps_from(first, start + scale * lanes, scale);
-    const int16_t *above = view.pixels + rows.above[0];
-    Window top = _mm512_loadu_si512(above + first), bottom = _mm512_loadu_si512(above + view.columns + first);
+inline void sample_shared(const View &view, const RowTaps &rows, const Taps (&taps)[parts], const Tile &tile, float factor, Block &block) {
+    const int16_t *above = view.pixels + taps[0].first + rows.above[0];
+    Window top = _mm512_loadu_si512(above), bottom = _mm512_loadu_si512(above + view.columns);
     for (int row = 0; row < tile.rows; ++row) {
-        if (view.pixels + rows.above[row] != above) {
-            above = view.pixels + rows.above[row];
+        const int16_t *at = view.pixels + taps[0].first + rows.above[row];
+        if (at != above) {
+            above = at;
             top = bottom;
-            bottom = _mm512_loadu_si512(above + view.columns + first);
+            bottom = _mm512_loadu_si512(above + view.columns);
         }
         const Window window = between(top, bottom, rows.weight[row]);
-        combine<how>(block.rows[row], pick(window, left), factor);
-        combine<how>(block.rows[row] + lanes, pick(window, right), factor);
+        for (int part = 0; part < parts; ++part)
+            combine<how>(block.rows[row] + part * lanes, pick(window, taps[part]), factor);
     }
 }
 
 #endif
 
 template <Combine how>
-inline void sample_windows(const View &view, const RowTaps &rows, const Tile &tile, float factor, Block &block) {
-    constexpr int parts = block_columns / lanes;
-    const double scale = view.scale[tile.z], start = scale * tile.x0 + view.shift_u[tile.z];
-    Taps taps[parts];
-    for (int part = 0; part < parts; ++part) taps[part] = taps_at(start + scale * lanes * part, scale);
+inline void sample_windows(const View &view, const RowTaps &rows, const Taps (&taps)[parts], const Tile &tile, float factor, Block &block) {
     for (int row = 0; row < tile.rows; ++row) {
         const int16_t *above = view.pixels + rows.above[row], *below = above + view.columns;
         for (int part = 0; part < parts; ++part) {
@@ -102,11 +98,13 @@ inline void sample_windows(const View &view, const RowTaps &rows, const Tile &ti
 }
 
 template <Combine how>
-inline void sample_rectified(const View &view, const RowTaps &rows, const Tile &tile, float factor, Block &block) {
+inline void sample_rectified(const View &view, const PlaneTaps &plane, const Tile &tile, float factor, Block &block) {
+    Taps taps[parts];
+    plane.columns.taps(tile.x0, taps);
 #if defined(__AVX512BW__)
-    if (view.scale[tile.z] <= max_shared_scale) return sample_shared<how>(view, rows, tile, factor, block);
+    if (plane.columns.share_window()) return sample_shared<how>(view, plane.rows, taps, tile, factor, block);
 #endif
-    sample_windows<how>(view, rows, tile, factor, block);
+    sample_windows<how>(view, plane.rows, taps, tile, factor, block);
 }
 
 // Nodes that whole blocks of a row need; those beyond the lattice repeat the last one.
@@ -266,6 +264,7 @@ inline void sample_nodes(const View &view, const PlaneTaps &taps, const Tile &ti
 inline void set_plane(const View &view, int z, int y0, int rows, PlaneTaps &taps) {
     if (!view.nodes) {
         taps.rows = row_taps(view, z, y0, rows);
+        taps.columns = Columns({view.shift_u[z], view.scale[z]});
         return;
     }
     float *line = taps.lines;
@@ -279,7 +278,7 @@ inline void sample(const View &view, const PlaneTaps &taps, const Tile &tile, fl
     if (view.nodes)
         sample_nodes<how>(view, taps, tile, factor, block);
     else
-        sample_rectified<how>(view, taps.rows, tile, factor, block);
+        sample_rectified<how>(view, taps, tile, factor, block);
 }
 
 // The product of what some views see. Samples have up to 29 bits, so that a float holds the product of two before it

@@ -7,7 +7,6 @@
 namespace tomoshadow::TOMOSHADOW_ISA {
 namespace {
 
-constexpr int parts = block_columns / lanes;
 constexpr int most_at_once = 4;  // exposures whose rows stay in the cache together
 
 // One or more exposures of the same views, which share their geometry.
@@ -22,55 +21,56 @@ struct Exposures {
 template <int n>
 struct ColumnTaps {
     Taps taps[n][parts];
-    ColumnTaps(const View *views, const Tile &tile) {
-        for (int i = 0; i < n; ++i) {
-            const double scale = views[i].scale[tile.z], start = scale * tile.x0 + views[i].shift_u[tile.z];
-            for (int part = 0; part < parts; ++part) {
-                const double at = start + scale * lanes * part;
-                taps[i][part] = taps_from(static_cast<int>(scale <= max_shared_scale ? start : at), at, scale);
-            }
-        }
+    [[gnu::always_inline]] ColumnTaps(const PlaneTaps *planes, const Tile &tile) {
+#pragma GCC unroll 4
+        for (int i = 0; i < n; ++i) planes[i].columns.taps(tile.x0, taps[i]);
     }
 };
 
-// From samples to intensities, all views at once; in the same order as sample_product and sample_minimum.
+// From samples to intensities, all views at once.
 template <int n, bool minimum>
 struct Combination {
     float factor[n];
-    explicit Combination(const View *views) {
-        for (int i = 0; i < n; ++i) {
-            factor[i] = views[i].unit * sample_unit;
-            if (!minimum && i % 2 == 0 && i + 1 < n) factor[i] *= views[i + 1].unit * sample_unit;
-        }
+    // Samples have up to 29 bits: a float holds the product of two before it is scaled.
+    [[gnu::always_inline]] Combination(const View *views, float gain) {
+        for (int i = 0; i < n; ++i) factor[i] = views[i].unit * sample_unit;
+        factor[0] *= gain;
+        if (!minimum)
+            for (int i = 0; i + 1 < n; i += 2) factor[i] *= factor[i + 1];
     }
-    Floats add(Floats before, Floats seen, int i) const {
+    [[gnu::always_inline]] Floats add(Floats before, Floats seen, int i) const {
         if (minimum || i % 2 == 0) seen = seen * factor[i];
         if (i == 0) return seen;
-        return minimum ? (seen < before ? seen : before) : before * seen;
+        return minimum ? lesser(seen, before) : before * seen;
     }
 };
 
-// Hand every vector of a tile to take(row, first column, values). With `one_window` all columns of
-// a view are picked from the same window of pixels.
+// Hand every row of a tile to take(row, values), `parts` vectors. With `one_window` all columns of a view are picked from
+// the same window of pixels. What is in memory is read first: compilers cannot know that `take` leaves it alone.
 template <int n, bool minimum, bool one_window, class Take>
-inline void see_rows(const View *views, const PlaneTaps *planes, const ColumnTaps<n> &columns, int rows, const Take &take) {
-    const Combination<n, minimum> combination(views);
+inline void see_rows(const View *views, const PlaneTaps *planes, const ColumnTaps<n> &columns, int rows, float gain, const Take &take) {
+    const Combination<n, minimum> combination(views, gain);
+    const int16_t *above[n], *below[n];
+    for (int i = 0; i < n; ++i) {
+        above[i] = views[i].pixels + (one_window ? columns.taps[i][0].first : 0);
+        below[i] = above[i] + views[i].columns;
+    }
     for (int row = 0; row < rows; ++row) {
         Floats seen[parts];
 #pragma GCC unroll 4
         for (int i = 0; i < n; ++i) {
             const RowTaps &between = planes[i].rows;
-            const int16_t *above = views[i].pixels + between.above[row], *below = above + views[i].columns;
+            const int64_t offset = between.above[row];
             Window window;
+            if constexpr (one_window) window = blend(above[i] + offset, below[i] + offset, between.weight[row]);
 #pragma GCC unroll 8
             for (int part = 0; part < parts; ++part) {
                 const Taps &taps = columns.taps[i][part];
-                if (!one_window || part == 0) window = blend(above, below, between.weight[row], taps);
+                if constexpr (!one_window) window = blend(above[i] + offset, below[i] + offset, between.weight[row], taps);
                 seen[part] = combination.add(seen[part], pick(window, taps), i);
             }
         }
-#pragma GCC unroll 8
-        for (int part = 0; part < parts; ++part) take(row, part * lanes, seen[part]);
+        take(row, seen);
     }
 }
 
@@ -93,22 +93,36 @@ struct Seen {
     }
 };
 
+template <int n>
+inline bool share_window(const PlaneTaps *planes) {
+    bool one_window = may_share_window;
+    for (int i = 0; i < n; ++i) one_window = one_window && planes[i].columns.share_window();
+    return one_window;
+}
+
+template <int n, class Take>
+inline void see_product(const View *views, const PlaneTaps *planes, const Tile &tile, float gain, const Take &take) {
+    const ColumnTaps<n> columns(planes, tile);
+    if (share_window<n>(planes))
+        see_rows<n, false, may_share_window>(views, planes, columns, tile.rows, gain, take);
+    else
+        see_rows<n, false, false>(views, planes, columns, tile.rows, gain, take);
+}
+
 template <int n, class Take>
 inline void see_together(const Exposures &from, const Seen &seen, const PlaneTaps *planes, const Tile &tile, const Take &take) {
-    bool one_window = may_share_window;
-    for (int i = 0; i < n; ++i) one_window = one_window && from.views[i].scale[tile.z] <= max_shared_scale;
-    const ColumnTaps<n> columns(from.views, tile);
-    const bool minimum = from.method == Method::minimum;
+    const bool one_window = share_window<n>(planes), minimum = from.method == Method::minimum;
+    const ColumnTaps<n> columns(planes, tile);
     for (int k = 0; k < seen.count; ++k) {
         const View *views = from.exposure(seen.exposures[k]);
         if (one_window && minimum)
-            see_rows<n, true, may_share_window>(views, planes, columns, tile.rows, take);
+            see_rows<n, true, may_share_window>(views, planes, columns, tile.rows, 1.0f, take);
         else if (one_window)
-            see_rows<n, false, may_share_window>(views, planes, columns, tile.rows, take);
+            see_rows<n, false, may_share_window>(views, planes, columns, tile.rows, 1.0f, take);
         else if (minimum)
-            see_rows<n, true, false>(views, planes, columns, tile.rows, take);
+            see_rows<n, true, false>(views, planes, columns, tile.rows, 1.0f, take);
         else
-            see_rows<n, false, false>(views, planes, columns, tile.rows, take);
+            see_rows<n, false, false>(views, planes, columns, tile.rows, 1.0f, take);
     }
 }
 
@@ -122,9 +136,7 @@ inline void see_one_by_one(const Exposures &from, const Seen &seen, const PlaneT
             sample_minimum(views, from.n_views, planes, tile, block);
         else
             sample_product(views, every_view, from.n_views, planes, tile, block);
-        for (int row = 0; row < tile.rows; ++row)
-            for (int column = 0; column < block_columns; column += lanes)
-                take(row, column, load<Floats>(block.rows[row] + column));
+        for (int row = 0; row < tile.rows; ++row) take(row, block.vectors[row]);
     }
 }
 
@@ -143,15 +155,17 @@ inline void see_exposures(const Exposures &from, const Seen &seen, const PlaneTa
         see_one_by_one(from, seen, planes, tile, take);
 }
 
-// Hand every vector of the tile in every exposure that may not be empty there to take(row, first column, values).
+// Hand every row of the tile in every exposure that may not be empty there to take(row, values), `parts` vectors.
 // Returns whether there was any.
 template <class Take>
 inline bool see(const Exposures &from, const PlaneTaps *planes, const Tile &tile, const Take &take) {
     const Seen seen(from, planes, tile);
     if (!seen.count) return false;
     if (from.method == Method::geometric_mean)
-        see_exposures(from, seen, planes, tile,
-                      [&](int row, int column, Floats values) { take(row, column, root(values, from.n_views)); });
+        see_exposures(from, seen, planes, tile, [&](int row, Floats (&values)[parts]) {
+            for (Floats &value : values) value = root(value, from.n_views);
+            take(row, values);
+        });
     else
         see_exposures(from, seen, planes, tile, take);
     return true;

@@ -1,28 +1,28 @@
 // SMART: blocks found by MLOS, then multiplied by ratios and projected, pass by pass.
 #pragma once
 
-#include "halves.hpp"
 #include "output.hpp"
 #include "project.hpp"
 #include "ratios.hpp"
+#include "sight.hpp"
 
 namespace tomoshadow::TOMOSHADOW_ISA {
 namespace {
 
 constexpr int64_t block_size = smart_rows * block_columns;
 
-inline void encode(const Block &block, float gain, uint16_t *values) {
-    for (int row = 0; row < smart_rows; ++row)
-        for (int k = 0; k < block_columns; k += lanes) {
-            const Floats value = load<Floats>(block.rows[row] + k) * gain, most = Floats{} + largest_half;
-            store_half_lanes(values + row * block_columns + k, value < most ? value : most);
-        }
+inline void encode(const Block &block, float gain, Voxel *voxels) {
+    for (int row = 0; row < smart_rows; ++row) {
+        Floats values[parts];
+        for (int n = 0; n < parts; ++n) values[n] = limited(load<Floats>(block.rows[row] + n * lanes) * (gain * voxel_unit));
+        RowWords(values).store(voxels + row * block_columns);
+    }
 }
 
-inline void decode(const uint16_t *values, float unit, Block &block) {
+inline void decode(const Voxel *voxels, float unit, Block &block) {
     for (int row = 0; row < smart_rows; ++row)
         for (int k = 0; k < block_columns; k += lanes)
-            store(block.rows[row] + k, load_halves(values + row * block_columns + k) * unit);
+            store(block.rows[row] + k, load_voxels(voxels + row * block_columns + k) * (unit / voxel_unit));
 }
 
 inline void clear_overhang(Block &block, int rows, int columns) {
@@ -76,13 +76,15 @@ public:
         for (int z = first; z < smaller(first + smart_planes, nz_); ++z)
             for (int i = 0; i < n_views_; ++i) {
                 set_plane(views_[i], z, y0_, rows_, taps[z - first][i]);
-                if (!views_[i].nodes && projections[i].pixels)
-                    image[z - first][i] = image_rows(views_[i], z, y0_, rows_, projections[i]);
+                if (views_[i].nodes || !projections[i].pixels) continue;
+                ImageRows *rows = image[i] + z - first;
+                image_rows(views_[i], z, y0_, rows_, projections[i], *rows);
+                rows->changed = z > first ? changes(rows[-1], *rows) : 0;
             }
     }
 
     PlaneTaps taps[smart_planes][max_views];
-    ImageRows image[smart_planes][max_views];
+    ImageRows image[max_views][smart_planes];
 
 private:
     const View *views_;
@@ -130,155 +132,134 @@ inline void fetch(const uint16_t *row) {
     __builtin_prefetch(row + blocks_ahead * block_size, 1);
 }
 
-// Where the updated voxels of a block go: back to memory, and in single precision into the rows to be projected.
+// Where the updated voxels of a block go: back to memory, and into the rows to be projected.
 struct Updated {
-    uint16_t *values;
-    float *rows;
-    void put(int row, int k, Floats value) const {
-        const Floats most = Floats{} + largest_half;
-        value = value < most ? value : most;
-        store_half_lanes(values + row * block_columns + k, value);
-        store(rows + row * PlaneRows::stride + k, value);
+    Voxel *voxels;
+    RowVoxel *rows;
+    [[gnu::always_inline]] void put(int row, Floats (&values)[parts]) const {
+        for (int n = 0; n < parts; ++n) values[n] = limited(values[n]);
+        const RowWords words(values);
+        words.store(voxels + row * block_columns);
+        store_row(rows + row * TileRows::stride, values, words);
     }
 };
 
-#if defined(__AVX512BW__)
-
-// All in registers, for views whose rows need one window per block.
-template <int count>
-inline void update_windows(const View *views, float gain, const int *chosen, const PlaneTaps *planes, const Tile &tile, const Updated &to) {
-    Taps left[count], right[count];
-    const RowTaps *rows[count];
-    const int16_t *pixels[count];
-    int64_t columns[count];
-    for (int n = 0; n < count; ++n) {
-        const View &view = views[chosen[n]];
-        const double scale = view.scale[tile.z], start = scale * tile.x0 + view.shift_u[tile.z];
-        const int first = static_cast<int>(start);
-        left[n] = taps_from(first, start, scale);
-        right[n] = taps_from(first, start + scale * lanes, scale);
-        rows[n] = &planes[chosen[n]].rows;
-        pixels[n] = view.pixels;
-        columns[n] = view.columns;
-    }
-    float factor[(count + 1) / 2 + 1];
-    for (int n = 0; n < count; n += 2)
-        factor[n / 2] = views[chosen[n]].unit * sample_unit * (n + 1 < count ? views[chosen[n + 1]].unit * sample_unit : 1.0f);
-    factor[0] *= gain;
-    for (int row = 0; row < tile.rows; ++row) {
-        Floats near = load_halves(to.values + row * block_columns), far = load_halves(to.values + row * block_columns + lanes);
-        fetch(to.values + row * block_columns);
-#pragma GCC unroll 4
-        for (int n = 0; n < count; ++n) {
-            const int16_t *above = pixels[n] + rows[n]->above[row], *below = above + columns[n];
-            const Window window = blend(above, below, rows[n]->weight[row], left[n]);
-            if (n % 2 == 0) {
-                near *= factor[n / 2];
-                far *= factor[n / 2];
-            }
-            near *= pick(window, left[n]);
-            far *= pick(window, right[n]);
+// The views whose ratios multiply the volume: all of them in SMART, one in MART.
+struct Chosen {
+    int views[max_views], count = 0;
+    bool rectified = true;
+    explicit Chosen(const SmartPass &job) {
+        for (int i = 0; i < job.n_views; ++i) {
+            if (!job.update[i]) continue;
+            views[count++] = i;
+            rectified = rectified && !job.views[i].nodes;
         }
-        to.put(row, 0, near);
-        to.put(row, lanes, far);
     }
-}
-
-inline bool fit_windows(const SmartPass &job, const int *chosen, int count, int z) {
-    for (int n = 0; n < count; ++n) {
-        const View &view = job.views[chosen[n]];
-        if (view.nodes || view.scale[z] > max_shared_scale) return false;
-    }
-    return true;
-}
-
-#endif
+    bool side_by_side() const { return count > 0 && views[count - 1] - views[0] == count - 1; }
+};
 
 // Multiply a block by the ratios of the chosen views.
-inline void update(const SmartPass &job, const int *chosen, int count, const PlaneTaps *taps, const Tile &tile,
-                   const Updated &to) {
+inline void update(const SmartPass &job, const Chosen &chosen, const PlaneTaps *planes, const Tile &tile, const Updated &to) {
+    const auto multiply = [&](int row, Floats (&ratios)[parts]) __attribute__((always_inline)) {
+        Voxel *voxels = to.voxels + row * block_columns;
+        fetch(voxels);
+        for (int part = 0; part < parts; ++part) ratios[part] *= load_voxels(voxels + part * lanes);
+        to.put(row, ratios);
+    };
 #if defined(__AVX512BW__)
-    if (count >= 1 && count <= 4 && fit_windows(job, chosen, count, tile.z)) {
-        if (count == 4) return update_windows<4>(job.views, job.gain, chosen, taps, tile, to);
-        if (count == 3) return update_windows<3>(job.views, job.gain, chosen, taps, tile, to);
-        if (count == 2) return update_windows<2>(job.views, job.gain, chosen, taps, tile, to);
-        if (count == 1) return update_windows<1>(job.views, job.gain, chosen, taps, tile, to);
+    if (chosen.rectified && chosen.side_by_side()) {
+        const View *views = job.views + chosen.views[0];
+        const PlaneTaps *taps = planes + chosen.views[0];
+        if (chosen.count == 4) return see_product<4>(views, taps, tile, job.gain, multiply);
+        if (chosen.count == 3) return see_product<3>(views, taps, tile, job.gain, multiply);
+        if (chosen.count == 2) return see_product<2>(views, taps, tile, job.gain, multiply);
+        if (chosen.count == 1) return see_product<1>(views, taps, tile, job.gain, multiply);
     }
 #endif
     Block ratio;
-    if (count) sample_product(job.views, chosen, count, taps, tile, ratio);
+    if (chosen.count) sample_product(job.views, chosen.views, chosen.count, planes, tile, ratio);
     for (int row = 0; row < tile.rows; ++row) {
-        fetch(to.values + row * block_columns);
-        for (int k = 0; k < block_columns; k += lanes) {
-            const Floats value = load_halves(to.values + row * block_columns + k);
-            to.put(row, k, count ? value * (load<Floats>(ratio.rows[row] + k) * job.gain) : value);
-        }
+        Floats ratios[parts];
+        for (int part = 0; part < parts; ++part) ratios[part] = chosen.count ? ratio.vectors[row][part] * job.gain : all(1.0f);
+        multiply(row, ratios);
     }
 }
 
-// The blocks of one plane in a tile, side by side, with zeros where there are none and around.
-class PaddedRows {
+// The blocks of a tile, to be projected.
+class TileBlocks {
 public:
-    PaddedRows() : memory_(4 * PlaneRows::stride * smart_rows) {}
-    float *voxels() const { return memory_.as<float>(); }
-    float *at(int x) const { return voxels() + guard + x % smart_columns; }
-    // Nothing shall remain of other planes where there is no block.
-    void keep_only(uint32_t blocks) {
-        for (int k = 0; k < smart_columns / block_columns; ++k)
-            if ((filled_ & ~blocks) >> k & 1)
-                for (int row = 0; row < smart_rows; ++row)
-                    std::memset(at(k * block_columns) + row * PlaneRows::stride, 0, sizeof(float) * block_columns);
-        filled_ = blocks;
+    TileBlocks(int y0, int rows) : memory_(sizeof(RowVoxel) * TileRows::plane_stride * smart_planes) {
+        tile_.voxels = memory_.as<RowVoxel>();
+        tile_.y0 = y0;
+        tile_.rows = rows;
+    }
+    // The tile that a block lies in; nothing of it is there yet.
+    void begin(const BlockPosition &block, const Shape &shape) {
+        tile_.z0 = block.z / smart_planes * smart_planes;
+        tile_.x0 = block.x0 / smart_columns * smart_columns;
+        tile_.planes = smaller(smart_planes, shape.nz - tile_.z0);
+        for (int z = 0; z < smart_planes; ++z) {
+            stale_[z] = tile_.filled[z];
+            tile_.filled[z] = 0;
+        }
+    }
+    bool contains(const BlockPosition &block) const {
+        return block.z >= tile_.z0 && block.z < tile_.z0 + smart_planes && block.x0 >= tile_.x0 &&
+               block.x0 < tile_.x0 + smart_columns;
+    }
+    // Where the voxels of a block belong.
+    RowVoxel *add(const BlockPosition &block) {
+        const int z = block.z - tile_.z0, column = guard + block.x0 - tile_.x0;
+        tile_.filled[z] |= 1 << column / block_columns;
+        return memory_.as<RowVoxel>() + z * TileRows::plane_stride + column;
+    }
+    // Nothing remains of the tile before.
+    const TileRows &complete() {
+        for (int z = 0; z < smart_planes; ++z)
+            for (int32_t stale = stale_[z] & ~tile_.filled[z]; stale; stale &= stale - 1) clear(z, __builtin_ctz(static_cast<uint32_t>(stale)));
+        return tile_;
     }
 
 private:
+    void clear(int z, int block) const {
+        RowVoxel *voxels = memory_.as<RowVoxel>() + z * TileRows::plane_stride + block * block_columns;
+        for (int row = 0; row < smart_rows; ++row, voxels += TileRows::stride)
+            std::memset(voxels, 0, sizeof(RowVoxel) * block_columns);
+    }
+
     Memory memory_;
-    uint32_t filled_ = 0;
+    TileRows tile_{};
+    int32_t stale_[smart_planes];
 };
 
-// Project blocks first .. end - 1, all of one plane of a tile: together, where they touch.
-inline void project_blocks(const SmartPass &job, const BlockList &blocks, int first, int end, const PlaneRows &plane,
-                           const PlaneTaps *taps, const ImageRows *image, const Projection *projections) {
+inline void project(const SmartPass &job, const TileRows &tile, const TilePlanes &planes, const Projection *projections) {
     for (int i = 0; i < job.n_views; ++i) {
         if (!projections[i].pixels) continue;
-        for (int b = first, u = 0; b < end;) {
-            const int begin = blocks.positions[b].x0;
-            int next = begin;
-            for (; b < end && blocks.positions[b].x0 == next; ++b) next += block_columns;
-            const int last = smaller(next, job.shape.nx);
-            if (job.views[i].nodes)
-                project_nodes(job.views[i], plane, taps[i], begin, last, projections[i]);
-            else
-                u = project_rectified(job.views[i], plane, image[i], begin, last, u, projections[i]);
-        }
+        if (!job.views[i].nodes)
+            project_rectified(job.views[i], tile, planes.image[i], projections[i]);
+        else
+            for (int z = 0; z < tile.planes; ++z)
+                project_nodes(job.views[i], tile, z, job.shape.nx, planes.taps[z][i], projections[i]);
     }
 }
 
 void smart_pass(const SmartPass &job, int slab, const BlockList &blocks, const Projection *projections) {
     const FlushSubnormals flush;
     const int y0 = slab * smart_rows, rows = smaller(smart_rows, job.shape.ny - y0);
-    PaddedRows padded;
+    TileBlocks tile(y0, rows);
     TilePlanes planes(job.views, job.n_views, job.shape, y0, rows, 3);
-    int chosen[max_views], count = 0, top = -1;
-    for (int i = 0; i < job.n_views; ++i)
-        if (job.update[i]) chosen[count++] = i;
-    for (int first = 0, end = 0; first < blocks.count; first = end) {
-        const int z = blocks.positions[first].z, left = blocks.positions[first].x0 / smart_columns * smart_columns;
-        if (top != z / smart_planes) {
-            top = z / smart_planes;
-            planes.set(top * smart_planes, projections);
+    const Chosen chosen(job);
+    int top = -1;
+    for (int b = 0; b < blocks.count;) {
+        tile.begin(blocks.positions[b], job.shape);
+        const int z0 = blocks.positions[b].z / smart_planes * smart_planes;
+        if (top != z0) planes.set(top = z0, projections);
+        for (; b < blocks.count && tile.contains(blocks.positions[b]); ++b) {
+            const BlockPosition &at = blocks.positions[b];
+            update(job, chosen, planes.taps[at.z - z0], {at.z, y0, rows, at.x0},
+                   {blocks.values + b * block_size, tile.add(at)});
         }
-        const PlaneTaps *taps = planes.taps[z % smart_planes];
-        uint32_t present = 0;
-        for (; end < blocks.count && blocks.positions[end].z == z; ++end) {
-            const int x0 = blocks.positions[end].x0;
-            if (x0 < left || x0 >= left + smart_columns) break;
-            update(job, chosen, count, taps, {z, y0, rows, x0}, {blocks.values + end * block_size, padded.at(x0)});
-            present |= 1u << (x0 - left) / block_columns;
-        }
-        padded.keep_only(present);
-        const PlaneRows plane{padded.voxels(), z, y0, rows, left};
-        project_blocks(job, blocks, first, end, plane, taps, planes.image[z % smart_planes], projections);
+        project(job, tile.complete(), planes, projections);
     }
 }
 
