@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from processing.reconstruction.kernels import _native
 from processing.reconstruction.line_of_sight import check_volume
 from processing.reconstruction.plan import DEFAULT_THREADS, Plan
-from processing.reconstruction.smart_state import SmartState
+from processing.reconstruction.smart_state import FirstGuess, SmartState
 
 Volume = NDArray[np.float32]
 Pixels = NDArray[np.float32]
@@ -37,6 +37,9 @@ class SmartOptions(TypedDict, total=False):
         Its scale does not matter; where it is zero, the result is zero.
     out : (z, y, x) float32 or float16 array
         Receives the volume. Without it only the blocks that are not empty are in memory until somebody asks for more.
+    memory : SmartResult, optional
+        An earlier result that nobody needs any more: its blocks lose their voxels and lend their memory, because fresh
+        memory costs as much time as some iterations.
     threads : int
         The result does not depend on it.
     """
@@ -47,6 +50,7 @@ class SmartOptions(TypedDict, total=False):
     stop: Stop
     start: Volume | None
     out: Output | None
+    memory: "SmartResult | None"
     threads: int
 
 
@@ -57,7 +61,8 @@ class SmartResult:
     Parameters
     ----------
     blocks : Blocks
-        The volume where it is not empty, as exact as float16: ``blocks.nbytes`` of memory; ``blocks.write`` makes it dense.
+        The volume where it is not empty, as fine as float16: ``blocks.nbytes`` of memory; ``blocks.write`` makes it
+        dense.
     residuals : tuple of float
         Norm of projections minus images over norm of the images: of the scaled start, then after every iteration.
     out : (z, y, x) array, optional
@@ -135,7 +140,9 @@ def _run(
     stop, out = options.get("stop"), options.get("out")
     if out is not None:
         check_volume(out, plan, (np.float32, np.float16))
-    state = SmartState(plan, images, options.get("start"), relaxation * share, threads)
+    memory = options.get("memory")
+    start = FirstGuess(options.get("start"), memory.blocks if memory else None)
+    state = SmartState(plan, images, start, relaxation * share, threads)
     residuals = [state.residual]
     for done in range(1, iterations + 1):
         iterate(state)

@@ -1,6 +1,7 @@
 """SmartState: what an iteration of SMART changes. ``smart`` says which views correct, and when."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,22 @@ RATIO_COUNTS = 2048
 with 8 and finer steps, voxels that start with nearly nothing lag behind, which costs more than the steps do."""
 
 
+@dataclass(frozen=True, eq=False)
+class FirstGuess:
+    """What SMART starts from.
+
+    Parameters
+    ----------
+    volume : (z, y, x) float32 array, optional
+        MLOS by default; it is scaled to the sum of the images.
+    memory : Blocks, optional
+        They become empty, and the start uses their memory.
+    """
+
+    volume: Image | None = None
+    memory: _native.Blocks | None = None
+
+
 class SmartState:
     """Blocks of the volume that are not empty, its projections, and the ratio images that correct it.
 
@@ -30,15 +47,15 @@ class SmartState:
         Geometry of views and grid.
     images : sequence of (rows, columns) float32 arrays
         One per view.
-    start : (z, y, x) float32 array, optional
-        First guess, MLOS by default; it is scaled to the sum of the images.
+    start : FirstGuess
+        Of the volume.
     exponent : float
         A voxel is multiplied by (I / P)^exponent.
     threads : int
         The result does not depend on it.
     """
 
-    def __init__(self, plan: Plan, images: Sequence[Image], start: Image | None, exponent: float, threads: int) -> None:
+    def __init__(self, plan: Plan, images: Sequence[Image], start: FirstGuess, exponent: float, threads: int) -> None:
         self._exponent, self._threads = exponent, threads
         self._images = plan.resample(images, threads)
         self.blocks = _first_guess(plan, self._images, start, threads)
@@ -96,14 +113,15 @@ def _energy(image: FixedPoint) -> float:
     return image.unit**2 * sum(rows)
 
 
-def _first_guess(plan: Plan, resampled: Sequence[FixedPoint], start: Image | None, threads: int) -> _native.Blocks:
-    if start is None:
+def _first_guess(plan: Plan, resampled: Sequence[FixedPoint], start: FirstGuess, threads: int) -> _native.Blocks:
+    volume, memory = start.volume, start.memory
+    if volume is None:
         exponent = min(1.0, START_VIEWS / len(resampled))
         most = float(np.prod([image.brightest for image in resampled])) ** exponent
         views = plan.bind(resampled)
-        return _native.Blocks.of_views(views, plan.grid.shape, exponent, NEGLIGIBLE * most, most, threads)
-    check_volume(start, plan, (np.float32,))
-    least, most = float(start.min()), float(start.max())
+        return _native.Blocks.of_views(views, plan.grid.shape, exponent, NEGLIGIBLE * most, most, threads, memory)
+    check_volume(volume, plan, (np.float32,))
+    least, most = float(volume.min()), float(volume.max())
     if not (least >= 0 and np.isfinite(most)):
         raise ValueError(f"start must not be negative and finite, its values are {least} to {most}")
-    return _native.Blocks.of_volume(start, most, threads)
+    return _native.Blocks.of_volume(volume, most, threads, memory)

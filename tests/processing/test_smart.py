@@ -168,6 +168,28 @@ def test_the_volume_comes_in_half_precision_too(isa: str) -> None:
     np.testing.assert_array_equal(half, smart(plan, images, iterations=2).volume.astype(np.float16))
 
 
+def test_an_earlier_result_lends_its_memory_and_nothing_else() -> None:
+    mappings = oracle.cameras(3)
+    plan, images = make_plan(mappings, False), images_of(droplets(40), mappings)
+    fewer = images_of(droplets(40)[:15], mappings)
+    fresh = smart(plan, fewer, iterations=2)
+    earlier = smart(plan, images, iterations=2)
+    again = smart(plan, fewer, iterations=2, memory=earlier)
+    np.testing.assert_array_equal(again.volume, fresh.volume)
+    assert again.residuals == fresh.residuals
+    assert earlier.blocks.count == 0
+    assert not earlier.volume.any()
+
+
+def test_memory_of_another_grid_serves_too() -> None:
+    mappings = oracle.cameras(3)
+    small = plan_reconstruction(mappings, VoxelGrid.centred((20, 21, 45), GRID.pitch_mm))
+    plan, images = make_plan(mappings, False), images_of(droplets(40), mappings)
+    for one, other in ((plan, small), (small, plan)):
+        lent = smart(other, images, iterations=1, memory=smart(one, images, iterations=1))
+        np.testing.assert_array_equal(lent.volume, smart(other, images, iterations=1).volume)
+
+
 @pytest.mark.parametrize("by_nodes", [False, True])
 def test_blocks_are_few_and_lose_nothing(by_nodes: bool) -> None:
     mappings = oracle.cameras(4)

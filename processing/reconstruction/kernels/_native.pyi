@@ -56,10 +56,16 @@ class Blocks:
 
     @staticmethod
     def of_views(
-        views: Sequence[View], shape: tuple[int, int, int], exponent: float, floor: float, most: float, threads: int
+        views: Sequence[View],
+        shape: tuple[int, int, int],
+        exponent: float,
+        floor: float,
+        most: float,
+        threads: int,
+        memory: Blocks | None = None,
     ) -> Blocks: ...
     @staticmethod
-    def of_volume(volume: NDArray[np.float32], most: float, threads: int) -> Blocks: ...
+    def of_volume(volume: NDArray[np.float32], most: float, threads: int, memory: Blocks | None = None) -> Blocks: ...
     def scale(self, factor: float) -> None: ...
     @property
     def unit(self) -> float: ...

@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
-#include <memory>
+#include <cstdlib>
+#include <new>
+#include <utility>
 
 namespace tomoshadow {
 
@@ -15,46 +16,59 @@ float unit_for(float most) { return most > 0.0f ? std::ldexp(1.0f, std::ilogb(mo
 
 }  // namespace
 
-Blocks::Blocks(const Kernels &kernels, const SmartStart &start, float most, int threads)
-    : shape_(start.shape), unit_(unit_for(most)), slabs_((start.shape.ny + smart_rows - 1) / smart_rows) {
+void Blocks::Slab::Free::operator()(uint16_t *chunk) const { std::free(chunk); }
+
+uint16_t *Blocks::Slab::next() {
+    const size_t count = positions_.size();
+    if (count == chunks_.size() * BlockList::per_chunk) {
+        constexpr size_t bytes = sizeof(uint16_t) * BlockList::per_chunk * BlockList::size;
+        memory_.emplace_back(static_cast<uint16_t *>(std::aligned_alloc(64, bytes)));
+        if (!memory_.back()) throw std::bad_alloc();
+        chunks_.push_back(memory_.back().get());
+    }
+    return list().voxels(static_cast<int>(count));
+}
+
+NewBlocks Blocks::Slab::growing() {
+    return {this, [](void *slab) { return static_cast<Slab *>(slab)->next(); },
+            [](void *slab, BlockPosition position) { static_cast<Slab *>(slab)->positions_.push_back(position); }};
+}
+
+std::vector<Blocks::Slab> Blocks::slabs_in(Blocks *memory, int count) {
+    std::vector<Slab> slabs;
+    if (memory) slabs = std::exchange(memory->slabs_, std::vector<Slab>(memory->slabs_.size()));
+    slabs.resize(count);
+    for (Slab &slab : slabs) slab.forget();
+    return slabs;
+}
+
+Blocks::Blocks(const Kernels &kernels, const SmartStart &start, float most, int threads, Blocks *memory)
+    : shape_(start.shape), unit_(unit_for(most)), slabs_(slabs_in(memory, (start.shape.ny + smart_rows - 1) / smart_rows)) {
     SmartStart job = start;
     job.gain = 1.0f / unit_;
-    const auto keep = [](void *owner, BlockPosition position, const uint16_t *values) {
-        Slab &slab = *static_cast<Slab *>(owner);
-        slab.positions.push_back(position);
-        slab.values.emplace_back();
-        std::memcpy(&slab.values.back(), values, sizeof(Values));
-    };
-    // Grown in memory that is warm, then copied: fresh memory costs more than the copy, and a slab keeps none to spare.
-    std::vector<Slab> found(threads);
-    for_each(static_cast<int>(slabs_.size()), threads, [&](int number) {
-        Slab &slab = found[number % threads];  // for_each deals the same to the same thread
-        slab.positions.clear();
-        slab.values.clear();
-        kernels.smart_start(job, number, keep, &slab);
-        slabs_[number] = slab;
-    });
+    for_each(static_cast<int>(slabs_.size()), threads, [&](int slab) { kernels.smart_start(job, slab, slabs_[slab].growing()); });
 }
 
 Blocks Blocks::of_views(const Kernels &kernels, const std::vector<View> &views, const Shape &shape,
-                        float exponent, float floor, float most, int threads) {
+                        float exponent, float floor, float most, int threads, Blocks *memory) {
     const SmartStart start{views.data(), static_cast<int>(views.size()), nullptr, shape, exponent, floor, 0.0f};
-    return {kernels, start, most, threads};
+    return {kernels, start, most, threads, memory};
 }
 
-Blocks Blocks::of_volume(const Kernels &kernels, const float *volume, const Shape &shape, float most, int threads) {
-    return {kernels, {nullptr, 0, volume, shape, 1.0f, 0.0f, 0.0f}, most, threads};
+Blocks Blocks::of_volume(const Kernels &kernels, const float *volume, const Shape &shape, float most, int threads,
+                         Blocks *memory) {
+    return {kernels, {nullptr, 0, volume, shape, 1.0f, 0.0f, 0.0f}, most, threads, memory};
 }
 
 void Blocks::pass(const Kernels &kernels, const std::vector<View> &views, const std::vector<bool> &update,
                   const std::vector<bool> &project, BandImages &images, int threads) {
-    const auto updated = std::make_unique<bool[]>(update.size());
-    std::copy(update.begin(), update.end(), updated.get());
-    const SmartPass job{views.data(), updated.get(), gain_, static_cast<int>(views.size()), shape_};
+    const auto first = std::find(update.begin(), update.end(), true), end = std::find(first, update.end(), false);
+    const SmartPass job{views.data(), static_cast<int>(views.size()), static_cast<int>(first - update.begin()),
+                        static_cast<int>(end - first), gain_, shape_};
     images.project(project, threads, [&](int slab, const Projection *projections) {
         kernels.smart_pass(job, slab, slabs_[slab].list(), projections);
     });
-    if (std::find(update.begin(), update.end(), true) != update.end()) gain_ = 1.0f;
+    if (job.n_updates) gain_ = 1.0f;
 }
 
 void Blocks::write(const Kernels &kernels, Format format, void *volume, int threads) {
@@ -65,7 +79,7 @@ void Blocks::write(const Kernels &kernels, Format format, void *volume, int thre
 
 int64_t Blocks::count() const {
     int64_t count = 0;
-    for (const Slab &slab : slabs_) count += static_cast<int64_t>(slab.positions.size());
+    for (const Slab &slab : slabs_) count += slab.count();
     return count;
 }
 

@@ -1,6 +1,7 @@
 // A volume that is stored where it is not empty: what SMART works on.
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "bands.hpp"
@@ -12,14 +13,17 @@ namespace tomoshadow {
 // under SMART, so blocks are found once.
 class Blocks {
 public:
+    Blocks(Blocks &&) = default;
     // A power of the product of what all views see, where it exceeds `floor` somewhere in a block. `most` is what it
-    // could be.
+    // could be. Other blocks may become empty and give their memory.
     static Blocks of_views(const Kernels &kernels, const std::vector<View> &views, const Shape &shape, float exponent,
-                           float floor, float most, int threads);
+                           float floor, float most, int threads, Blocks *memory = nullptr);
     // A volume (z, y, x) of float32, not negative, nowhere above `most`.
-    static Blocks of_volume(const Kernels &kernels, const float *volume, const Shape &shape, float most, int threads);
+    static Blocks of_volume(const Kernels &kernels, const float *volume, const Shape &shape, float most, int threads,
+                            Blocks *memory = nullptr);
 
-    // Multiply by the samples of the ratio images of the views to update, then project onto the views to project.
+    // Multiply by the samples of the ratio images of the views to update, which are neighbours, then project onto the
+    // views to project.
     void pass(const Kernels &kernels, const std::vector<View> &views, const std::vector<bool> &update,
               const std::vector<bool> &project, BandImages &images, int threads);
     // Intensity of a stored 1, in which projections come.
@@ -29,20 +33,29 @@ public:
 
     const Shape &shape() const { return shape_; }
     int64_t count() const;
-    int64_t bytes() const { return count() * static_cast<int64_t>(sizeof(Values) + sizeof(BlockPosition)); }
+    int64_t bytes() const { return count() * static_cast<int64_t>(sizeof(uint16_t) * BlockList::size + sizeof(BlockPosition)); }
 
 private:
-    struct Values {
-        uint16_t rows[smart_rows][block_columns];
+    // The blocks of a slab. Their memory comes in chunks, so that nothing is copied when it grows; it is kept for later
+    // when blocks are forgotten.
+    class Slab {
+    public:
+        BlockList list() const { return {positions_.data(), static_cast<int>(positions_.size()), chunks_.data()}; }
+        int count() const { return static_cast<int>(positions_.size()); }
+        void forget() { positions_.clear(); }
+        NewBlocks growing();
+
+    private:
+        struct Free {
+            void operator()(uint16_t *chunk) const;
+        };
+        uint16_t *next();
+        std::vector<BlockPosition> positions_;
+        std::vector<std::unique_ptr<uint16_t[], Free>> memory_;
+        std::vector<uint16_t *> chunks_;
     };
-    struct Slab {
-        std::vector<BlockPosition> positions;
-        std::vector<Values> values;
-        BlockList list() {
-            return {positions.data(), static_cast<int>(positions.size()), reinterpret_cast<uint16_t *>(values.data())};
-        }
-    };
-    Blocks(const Kernels &kernels, const SmartStart &job, float most, int threads);
+    Blocks(const Kernels &kernels, const SmartStart &job, float most, int threads, Blocks *memory);
+    static std::vector<Slab> slabs_in(Blocks *memory, int count);
 
     Shape shape_;
     float unit_, gain_ = 1.0f;  // the gain waits for the next update

@@ -105,11 +105,20 @@ struct BlockPosition {
     int32_t z, x0;
 };
 struct BlockList {
+    static constexpr int per_chunk = 2048;
+    static constexpr int64_t size = smart_rows * block_columns;
     const BlockPosition *positions;
     int count;
-    uint16_t *values;  // (count, smart_rows, block_columns)
+    uint16_t *const *chunks;  // each (per_chunk, smart_rows, block_columns)
+    uint16_t *voxels(int block) const { return chunks[block / per_chunk] + block % per_chunk * size; }
 };
-using KeepBlock = void (*)(void *owner, BlockPosition position, const uint16_t *values);
+
+// A list that grows: voxels are written to the next block, which is kept or not.
+struct NewBlocks {
+    void *owner;
+    uint16_t *(*next)(void *owner);
+    void (*keep)(void *owner, BlockPosition position);
+};
 
 // Find the blocks that exceed `floor` somewhere, in a volume or, where that is null, in a power of the product of what
 // views see. They are stored times `gain`.
@@ -124,9 +133,9 @@ struct SmartStart {
 // One SMART pass: multiply the blocks by the samples of the ratio images and a gain, then project the result.
 struct SmartPass {
     const View *views;  // their images hold the ratios
-    const bool *update;
-    float gain;  // of the volume, in an update
     int n_views;
+    int first_update, n_updates;  // whose ratios multiply the blocks
+    float gain;                   // of the volume, in an update
     Shape shape;
 };
 
@@ -158,7 +167,7 @@ struct Kernels {
     void (*line_of_sight)(const LineOfSight &job, int slab);
     void (*sparse_sight)(const SparseSight &job, int slab, KeepBrick keep, void *owner);
     void (*sum_of_sight)(const SumOfSight &job, int slab);
-    void (*smart_start)(const SmartStart &job, int slab, KeepBlock keep, void *owner);
+    void (*smart_start)(const SmartStart &job, int slab, const NewBlocks &blocks);
     void (*smart_pass)(const SmartPass &job, int slab, const BlockList &blocks, const Projection *projections);
     void (*write_blocks)(const Shape &shape, int slab, const BlockList &blocks, float unit, Format format, void *volume);
     double (*correct)(const Correction &job, int row);  // returns the sum of (projected - recorded)^2

@@ -214,20 +214,20 @@ void sum_of_sight(const std::vector<std::vector<const BoundView *>> &exposures, 
 }
 
 Blocks blocks_of_views(const std::vector<const BoundView *> &bound, std::tuple<int, int, int> size, float exponent,
-                       float floor, float most, int threads) {
+                       float floor, float most, int threads, Blocks *memory) {
     const Shape shape = volume_shape(size);
     const auto views = views_on(bound, shape, threads);
     const Kernels &kernels = selected_kernels();
     nb::gil_scoped_release release;
-    return Blocks::of_views(kernels, views, shape, exponent, floor, most, threads);
+    return Blocks::of_views(kernels, views, shape, exponent, floor, most, threads, memory);
 }
 
-Blocks blocks_of_volume(const FloatVolume &volume, float most, int threads) {
+Blocks blocks_of_volume(const FloatVolume &volume, float most, int threads, Blocks *memory) {
     require(threads >= 1, "threads must be positive");
     const Shape shape = shape_of(volume);
     const Kernels &kernels = selected_kernels();
     nb::gil_scoped_release release;
-    return Blocks::of_volume(kernels, volume.data(), shape, most, threads);
+    return Blocks::of_volume(kernels, volume.data(), shape, most, threads, memory);
 }
 
 // What blocks look like from some views, whose images hold the ratios; keeps the views alive.
@@ -241,6 +241,8 @@ public:
         require(shape_.nz == other.nz && shape_.ny == other.ny && shape_.nx == other.nx,
                 "projections: of another shape than the blocks");
         require(update.size() == views_.size() && project.size() == views_.size(), "two flags per view, please");
+        const auto first = std::find(update.begin(), update.end(), true), end = std::find(first, update.end(), false);
+        require(std::find(end, update.end(), true) == update.end(), "views to update must be neighbours");
         require(threads >= 1, "threads must be positive");
         const Kernels &kernels = selected_kernels();
         nb::gil_scoped_release release;
@@ -389,8 +391,8 @@ NB_MODULE(_native, module) {
     module.def("sum_of_sight", &sum_of_sight, "exposures"_a, "method"_a, "volume"_a, "threads"_a);
     nb::class_<Blocks>(module, "Blocks")
         .def_static("of_views", &blocks_of_views, "views"_a, "shape"_a, "exponent"_a, "floor"_a, "most"_a,
-                    "threads"_a)
-        .def_static("of_volume", &blocks_of_volume, "volume"_a, "most"_a, "threads"_a)
+                    "threads"_a, "memory"_a = nb::none())
+        .def_static("of_volume", &blocks_of_volume, "volume"_a, "most"_a, "threads"_a, "memory"_a = nb::none())
         .def("scale", &Blocks::scale, "factor"_a)
         .def_prop_ro("unit", &Blocks::unit)
         .def("write", &fill_volume, "volume"_a, "threads"_a)

@@ -283,15 +283,13 @@ inline void sample(const View &view, const PlaneTaps &taps, const Tile &tile, fl
 
 // The product of what some views see. Samples have up to 29 bits, so that a float holds the product of two before it
 // is scaled: every other view does without.
-inline void sample_product(const View *views, const int *chosen, int count, const PlaneTaps *taps, const Tile &tile,
-                           Block &block) {
-    for (int n = 0; n < count; ++n) {
-        const int i = chosen[n];
+inline void sample_product(const View *views, int n_views, const PlaneTaps *taps, const Tile &tile, Block &block) {
+    for (int i = 0; i < n_views; ++i) {
         float factor = views[i].unit * sample_unit;
-        if (n % 2 == 0 && n + 1 < count) factor *= views[chosen[n + 1]].unit * sample_unit;
-        if (n == 0)
+        if (i % 2 == 0 && i + 1 < n_views) factor *= views[i + 1].unit * sample_unit;
+        if (i == 0)
             sample<Combine::set>(views[i], taps[i], tile, factor, block);
-        else if (n % 2 == 0)
+        else if (i % 2 == 0)
             sample<Combine::multiply>(views[i], taps[i], tile, factor, block);
         else
             sample<Combine::multiply_raw>(views[i], taps[i], tile, factor, block);

@@ -93,6 +93,12 @@ struct Seen {
     }
 };
 
+inline bool all_rectified(const View *views, int n_views) {
+    for (int i = 0; i < n_views; ++i)
+        if (views[i].nodes) return false;
+    return true;
+}
+
 template <int n>
 inline bool share_window(const PlaneTaps *planes) {
     bool one_window = may_share_window;
@@ -107,6 +113,29 @@ inline void see_product(const View *views, const PlaneTaps *planes, const Tile &
         see_rows<n, false, may_share_window>(views, planes, columns, tile.rows, gain, take);
     else
         see_rows<n, false, false>(views, planes, columns, tile.rows, gain, take);
+}
+
+// Some views, one after the other in memory.
+struct Together {
+    const View *views;
+    const PlaneTaps *planes;
+    int count;
+    bool rectified;
+};
+
+// Hand every row of the product of what some views see of a tile, times `gain`, to take(row, values), `parts` vectors.
+template <class Take>
+inline void see_product(const Together &from, const Tile &tile, float gain, const Take &take) {
+    if (from.rectified && from.count == 4) return see_product<4>(from.views, from.planes, tile, gain, take);
+    if (from.rectified && from.count == 3) return see_product<3>(from.views, from.planes, tile, gain, take);
+    if (from.rectified && from.count == 2) return see_product<2>(from.views, from.planes, tile, gain, take);
+    if (from.rectified && from.count == 1) return see_product<1>(from.views, from.planes, tile, gain, take);
+    Block block;
+    sample_product(from.views, from.count, from.planes, tile, block);
+    for (int row = 0; row < tile.rows; ++row) {
+        for (Floats &value : block.vectors[row]) value *= gain;
+        take(row, block.vectors[row]);
+    }
 }
 
 template <int n, class Take>
@@ -135,7 +164,7 @@ inline void see_one_by_one(const Exposures &from, const Seen &seen, const PlaneT
         if (from.method == Method::minimum)
             sample_minimum(views, from.n_views, planes, tile, block);
         else
-            sample_product(views, every_view, from.n_views, planes, tile, block);
+            sample_product(views, from.n_views, planes, tile, block);
         for (int row = 0; row < tile.rows; ++row) take(row, block.vectors[row]);
     }
 }
@@ -143,8 +172,7 @@ inline void see_one_by_one(const Exposures &from, const Seen &seen, const PlaneT
 template <class Take>
 inline void see_exposures(const Exposures &from, const Seen &seen, const PlaneTaps *planes, const Tile &tile,
                           const Take &take) {
-    bool rectified = true;
-    for (int i = 0; i < from.n_views; ++i) rectified = rectified && !from.views[i].nodes;
+    const bool rectified = all_rectified(from.views, from.n_views);
     if (rectified && from.n_views == 4)
         see_together<4>(from, seen, planes, tile, take);
     else if (rectified && from.n_views == 3)

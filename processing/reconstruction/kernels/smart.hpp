@@ -9,39 +9,44 @@
 namespace tomoshadow::TOMOSHADOW_ISA {
 namespace {
 
-constexpr int64_t block_size = smart_rows * block_columns;
-
-inline void encode(const Block &block, float gain, Voxel *voxels) {
-    for (int row = 0; row < smart_rows; ++row) {
-        Floats values[parts];
-        for (int n = 0; n < parts; ++n) values[n] = limited(load<Floats>(block.rows[row] + n * lanes) * (gain * voxel_unit));
-        RowWords(values).store(voxels + row * block_columns);
-    }
-}
-
 inline void decode(const Voxel *voxels, float unit, Block &block) {
     for (int row = 0; row < smart_rows; ++row)
         for (int k = 0; k < block_columns; k += lanes)
             store(block.rows[row] + k, load_voxels(voxels + row * block_columns + k) * (unit / voxel_unit));
 }
 
-inline void clear_overhang(Block &block, int rows, int columns) {
-    for (int row = 0; row < smart_rows; ++row)
-        for (int k = row < rows ? columns : 0; k < block_columns; ++k) block.rows[row][k] = 0.0f;
-}
+// Makes a block of rows of intensities.
+class NewBlock {
+public:
+    NewBlock(const SmartStart &job, const Tile &tile, Voxel *voxels)
+        : job_(job), columns_(job.shape.nx - tile.x0), voxels_(voxels) {
+        if (tile.rows < smart_rows) std::memset(voxels, 0, sizeof(Voxel) * BlockList::size);
+    }
+    [[gnu::always_inline]] void put(int row, const Floats (&values)[parts]) {
+        Floats kept[parts];
+#pragma GCC unroll 8
+        for (int part = 0; part < parts; ++part) {
+            const Ints inside = __builtin_convertvector(lane_numbers() + static_cast<float>(part * lanes), Ints) < columns_;
+            kept[part] = same_bits<Floats>(same_bits<Ints>(values[part]) & inside);
+            if (job_.exponent != 1.0f) kept[part] = power(kept[part], job_.exponent);
+            greatest_ = greatest_ > kept[part] ? greatest_ : kept[part];
+            kept[part] = limited(kept[part] * (job_.gain * voxel_unit));
+        }
+        RowWords(kept).store(voxels_ + row * block_columns);
+    }
+    // Whether any voxel exceeds the floor.
+    bool filled() const {
+        int32_t any = 0;
+        for (int k = 0; k < lanes; ++k) any |= greatest_[k] > job_.floor;
+        return any != 0;
+    }
 
-inline bool exceeds(const Block &block, int rows, float floor) {
-    int32_t any = 0;
-    for (int row = 0; row < rows; ++row)
-        for (int k = 0; k < block_columns; ++k) any |= block.rows[row][k] > floor;
-    return any != 0;
-}
-
-inline void take_power(Block &block, int rows, float exponent) {
-    for (int row = 0; row < rows; ++row)
-        for (int k = 0; k < block_columns; k += lanes)
-            store(block.rows[row] + k, power(load<Floats>(block.rows[row] + k), exponent));
-}
+private:
+    const SmartStart &job_;
+    int32_t columns_;
+    Voxel *voxels_;
+    Floats greatest_{};
+};
 
 // Read a volume where a view would be sampled.
 inline void copy(const float *volume, const Shape &shape, const Tile &tile, Block &block) {
@@ -101,35 +106,34 @@ inline void for_tiles(const Shape &shape, Visit visit) {
                 for (int x0 = left; x0 < smaller(left + smart_columns, shape.nx); x0 += block_columns) visit(z, x0);
 }
 
-void smart_start(const SmartStart &job, int slab, KeepBlock keep, void *owner) {
+void smart_start(const SmartStart &job, int slab, const NewBlocks &blocks) {
     const FlushSubnormals flush;
-    const int nx = job.shape.nx, y0 = slab * smart_rows, rows = smaller(smart_rows, job.shape.ny - y0);
+    const int y0 = slab * smart_rows, rows = smaller(smart_rows, job.shape.ny - y0);
     const Projection nowhere[max_views] = {};
     TilePlanes planes(job.views, job.n_views, job.shape, y0, rows, 2);
-    Block block;
-    alignas(64) uint16_t values[block_size];
+    const bool rectified = all_rectified(job.views, job.n_views);
+    Block copied;
     for_tiles(job.shape, [&](int z, int x0) {
         const Tile tile{z, y0, rows, x0};
         if (z % smart_planes == 0 && x0 == 0) planes.set(z, nowhere);
+        const PlaneTaps *taps = planes.taps[z % smart_planes];
+        if (!job.volume && !occupied(job.views, job.n_views, taps, tile)) return;
+        NewBlock block(job, tile, blocks.next(blocks.owner));
         if (job.volume) {
-            copy(job.volume, job.shape, tile, block);
+            copy(job.volume, job.shape, tile, copied);
+            for (int row = 0; row < rows; ++row) block.put(row, copied.vectors[row]);
         } else {
-            const PlaneTaps *taps = planes.taps[z % smart_planes];
-            if (!occupied(job.views, job.n_views, taps, tile)) return;
-            sample_product(job.views, every_view, job.n_views, taps, tile, block);
-            if (job.exponent != 1.0f) take_power(block, rows, job.exponent);
+            const auto put = [&](int row, const Floats (&values)[parts]) __attribute__((always_inline)) { block.put(row, values); };
+            see_product({job.views, taps, job.n_views, rectified}, tile, 1.0f, put);
         }
-        clear_overhang(block, rows, nx - x0);
-        if (!exceeds(block, rows, job.floor)) return;
-        encode(block, job.gain, values);
-        keep(owner, {z, x0}, values);
+        if (block.filled()) blocks.keep(blocks.owner, {z, x0});
     });
 }
 
 // Blocks come one after the other, but with so much work between them that processors do not fetch them in time.
 inline void fetch(const uint16_t *row) {
-    constexpr int blocks_ahead = 4;
-    __builtin_prefetch(row + blocks_ahead * block_size, 1);
+    constexpr int blocks_ahead = 8;
+    __builtin_prefetch(row + blocks_ahead * BlockList::size, 1);
 }
 
 // Where the updated voxels of a block go: back to memory, and into the rows to be projected.
@@ -144,43 +148,18 @@ struct Updated {
     }
 };
 
-// The views whose ratios multiply the volume: all of them in SMART, one in MART.
-struct Chosen {
-    int views[max_views], count = 0;
-    bool rectified = true;
-    explicit Chosen(const SmartPass &job) {
-        for (int i = 0; i < job.n_views; ++i) {
-            if (!job.update[i]) continue;
-            views[count++] = i;
-            rectified = rectified && !job.views[i].nodes;
-        }
-    }
-    bool side_by_side() const { return count > 0 && views[count - 1] - views[0] == count - 1; }
-};
-
-// Multiply a block by the ratios of the chosen views.
-inline void update(const SmartPass &job, const Chosen &chosen, const PlaneTaps *planes, const Tile &tile, const Updated &to) {
+// Multiply a block by the ratios of the chosen views: all of them in SMART, one in MART.
+inline void update(const Together &chosen, const Tile &tile, float gain, const Updated &to) {
     const auto multiply = [&](int row, Floats (&ratios)[parts]) __attribute__((always_inline)) {
         Voxel *voxels = to.voxels + row * block_columns;
         fetch(voxels);
         for (int part = 0; part < parts; ++part) ratios[part] *= load_voxels(voxels + part * lanes);
         to.put(row, ratios);
     };
-#if defined(__AVX512BW__)
-    if (chosen.rectified && chosen.side_by_side()) {
-        const View *views = job.views + chosen.views[0];
-        const PlaneTaps *taps = planes + chosen.views[0];
-        if (chosen.count == 4) return see_product<4>(views, taps, tile, job.gain, multiply);
-        if (chosen.count == 3) return see_product<3>(views, taps, tile, job.gain, multiply);
-        if (chosen.count == 2) return see_product<2>(views, taps, tile, job.gain, multiply);
-        if (chosen.count == 1) return see_product<1>(views, taps, tile, job.gain, multiply);
-    }
-#endif
-    Block ratio;
-    if (chosen.count) sample_product(job.views, chosen.views, chosen.count, planes, tile, ratio);
+    if (chosen.count) return see_product(chosen, tile, gain, multiply);
     for (int row = 0; row < tile.rows; ++row) {
         Floats ratios[parts];
-        for (int part = 0; part < parts; ++part) ratios[part] = chosen.count ? ratio.vectors[row][part] * job.gain : all(1.0f);
+        for (Floats &ratio : ratios) ratio = all(1.0f);
         multiply(row, ratios);
     }
 }
@@ -248,7 +227,8 @@ void smart_pass(const SmartPass &job, int slab, const BlockList &blocks, const P
     const int y0 = slab * smart_rows, rows = smaller(smart_rows, job.shape.ny - y0);
     TileBlocks tile(y0, rows);
     TilePlanes planes(job.views, job.n_views, job.shape, y0, rows, 3);
-    const Chosen chosen(job);
+    const View *views = job.views + job.first_update;
+    const bool rectified = all_rectified(views, job.n_updates);
     int top = -1;
     for (int b = 0; b < blocks.count;) {
         tile.begin(blocks.positions[b], job.shape);
@@ -256,8 +236,8 @@ void smart_pass(const SmartPass &job, int slab, const BlockList &blocks, const P
         if (top != z0) planes.set(top = z0, projections);
         for (; b < blocks.count && tile.contains(blocks.positions[b]); ++b) {
             const BlockPosition &at = blocks.positions[b];
-            update(job, chosen, planes.taps[at.z - z0], {at.z, y0, rows, at.x0},
-                   {blocks.values + b * block_size, tile.add(at)});
+            const Together chosen{views, planes.taps[at.z - z0] + job.first_update, job.n_updates, rectified};
+            update(chosen, {at.z, y0, rows, at.x0}, job.gain, {blocks.voxels(b), tile.add(at)});
         }
         project(job, tile.complete(), planes, projections);
     }
@@ -294,7 +274,7 @@ void write_blocks(const Shape &shape, int slab, const BlockList &blocks, float u
                 staging.put_zeros(tile);
                 continue;
             }
-            decode(blocks.values + found * block_size, unit, block);
+            decode(blocks.voxels(found), unit, block);
             staging.put(tile, block);
         }
         staging.write(shape, z, y0, volume);

@@ -9,7 +9,6 @@ namespace tomoshadow::TOMOSHADOW_ISA {
 namespace {
 
 constexpr int max_views = 8;
-constexpr int every_view[max_views] = {0, 1, 2, 3, 4, 5, 6, 7};
 
 // Zeroed memory, aligned to cache lines.
 class Memory {

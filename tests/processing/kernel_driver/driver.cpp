@@ -139,8 +139,10 @@ void iterate(const Kernels &kernels, int number) {
     const Shape &shape = scene.shape;
     const std::unique_ptr<float[]> volume(new float[voxels(shape)]);
     for (size_t k = 0; k < voxels(shape); ++k) volume[k] = static_cast<float>(random.uniform(0, 2));
+    const float exponent = std::fmin(1.0f, 4.0f / n_views);
+    Blocks memory = Blocks::of_volume(kernels, volume.get(), {shape.nx, shape.ny, shape.nz}, 2.0f, 1);
     Blocks blocks = number % 2 ? Blocks::of_volume(kernels, volume.get(), shape, 2.0f, 2)
-                               : Blocks::of_views(kernels, scene.views, shape, std::fmin(1.0f, 4.0f / n_views), 1e-8f, 1.0f, 2);
+                               : Blocks::of_views(kernels, scene.views, shape, exponent, 1e-8f, 1.0f, 2, &memory);
     std::vector<std::vector<int16_t>> ratios;
     std::vector<View> corrected = scene.views;
     for (View &view : corrected) {
