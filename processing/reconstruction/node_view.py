@@ -37,6 +37,8 @@ class NodeView:
         (width, height) of the recorded image.
     deviation_px : float
         Largest distance to the mapping between the nodes, in the recorded image.
+    reason : str
+        Why the view is not rectified.
     """
 
     nodes: NDArray[np.float32]
@@ -44,6 +46,7 @@ class NodeView:
     binning: int
     image_size_px: tuple[int, int]
     deviation_px: float
+    reason: str = "asked for"
 
     @property
     def shape_px(self) -> tuple[int, int]:

@@ -1,7 +1,7 @@
 """Plan: all of a reconstruction that does not depend on the images, computed once per calibration and grid."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
@@ -11,7 +11,7 @@ from processing.geometry import ViewMapping
 from processing.reconstruction.fixed_point import FixedPoint
 from processing.reconstruction.kernels import _native
 from processing.reconstruction.node_view import NodeView, sample_mapping
-from processing.reconstruction.rectified_view import RectifiedView, rectify
+from processing.reconstruction.rectified_view import NotRectifiable, RectifiedView, rectify
 from processing.volume import VoxelGrid
 
 MIN_VIEWS, MAX_VIEWS = 2, 8
@@ -115,7 +115,7 @@ def plan_reconstruction(
 
 def plan_view(mapping: ViewMapping, grid: VoxelGrid, accuracy: Accuracy = Accuracy.NOMINAL) -> RectifiedView | NodeView:
     """Rectify the view where that is exact to ``MAX_DEVIATION_PX``; sample its mapping otherwise."""
-    rectified = rectify(mapping, grid, accuracy.value)
-    if rectified is not None and rectified.deviation_px <= MAX_DEVIATION_PX:
-        return rectified
-    return sample_mapping(mapping, grid, MAX_DEVIATION_PX)
+    try:
+        return rectify(mapping, grid, accuracy.value, MAX_DEVIATION_PX)
+    except NotRectifiable as why:
+        return replace(sample_mapping(mapping, grid, MAX_DEVIATION_PX), reason=str(why))

@@ -28,6 +28,10 @@ MIN_RELATIVE_SCALE = 0.63
 """Smallest scale of any plane against the largest one; beyond it the volume is too deep for its distance."""
 
 
+class NotRectifiable(Exception):
+    """A view cannot be rectified for a grid, or not exactly; the text says why."""
+
+
 @runtime_checkable
 class CentralMapping(ViewMapping, Protocol):
     """A mapping whose lines of sight meet in one point."""
@@ -75,23 +79,19 @@ class RectifiedView:
         return _native.View.rectified(image.pixels, image.unit, self.scale, self.shift_u_px, self.shift_v_px, cull)
 
 
-def rectify(mapping: ViewMapping, grid: VoxelGrid, pixels_per_voxel: float) -> RectifiedView | None:
-    """Rectify a view for a grid; None where its lines of sight do not meet, or too near, or voxels are coarse.
+def rectify(mapping: ViewMapping, grid: VoxelGrid, pixels_per_voxel: float, max_deviation_px: float) -> RectifiedView:
+    """Rectify a view for a grid; the largest scale of all planes is ``pixels_per_voxel``.
 
-    The largest scale of all planes is ``pixels_per_voxel``.
+    Raises
+    ------
+    NotRectifiable
+        Its lines of sight do not meet, or too near; voxels are coarse; or it would be off by more than
+        ``max_deviation_px``.
     """
-    if not isinstance(mapping, CentralMapping):
-        return None
-    centre = grid.to_index(np.asarray(mapping.centre_mm)[None])[0]
+    centre, to_reference = _central_projection(mapping, grid)
     z_ref = 0.5 * (grid.shape[0] - 1)
-    depth = np.arange(grid.shape[0]) - centre[0]
-    if depth[0] * depth[-1] <= 0:
-        return None
-    to_reference = (z_ref - centre[0]) / depth
     reference_scale = pixels_per_voxel / to_reference.max()
     scale = reference_scale * to_reference
-    if scale.min() < MIN_RELATIVE_SCALE * pixels_per_voxel:
-        return None
     shift_v, shift_u = (reference_scale * centre[axis] * (1 - to_reference) for axis in (1, 2))
     left, top = GUARD_PX - shift_u.min(), GUARD_PX - shift_v.min()
     last_column = -(-grid.shape[2] // BLOCK_COLUMNS) * BLOCK_COLUMNS - 1
@@ -104,8 +104,11 @@ def rectify(mapping: ViewMapping, grid: VoxelGrid, pixels_per_voxel: float) -> R
     )
     recorded_px_per_voxel = reference_scale * np.linalg.norm(np.diff(nodes_px, axis=1), axis=-1).mean() / MAP_SPACING_PX
     if recorded_px_per_voxel > MAX_PIXELS_PER_VOXEL:
-        return None
+        raise NotRectifiable(f"a voxel covers {recorded_px_per_voxel:.2g} px, limit {MAX_PIXELS_PER_VOXEL} px")
     bend_px = float(np.linalg.norm(_middle(nodes_px) - middle_px[:-1, :-1], axis=-1).max())
+    deviation_px = bend_px + _deviation_px(mapping, grid, centre, to_reference)
+    if deviation_px > max_deviation_px:
+        raise NotRectifiable(f"rectified it would be off by {deviation_px:.2g} px, limit {max_deviation_px} px")
     return RectifiedView(
         shape_px=(rows, columns),
         nodes_px=np.ascontiguousarray(nodes_px, dtype=np.float32),
@@ -113,8 +116,26 @@ def rectify(mapping: ViewMapping, grid: VoxelGrid, pixels_per_voxel: float) -> R
         shift_u_px=shift_u + left,
         shift_v_px=shift_v + top,
         image_size_px=mapping.image_size_px,
-        deviation_px=bend_px + _deviation_px(mapping, grid, centre, to_reference),
+        deviation_px=deviation_px,
     )
+
+
+def _central_projection(mapping: ViewMapping, grid: VoxelGrid) -> tuple[FloatArray, FloatArray]:
+    """Voxel index (z, y, x) where lines of sight meet; and by what planes (nz,) are scaled onto the middle one."""
+    if not isinstance(mapping, CentralMapping):
+        raise NotRectifiable("its lines of sight do not meet in one point")
+    centre = grid.to_index(np.asarray(mapping.centre_mm)[None])[0]
+    depth = np.arange(grid.shape[0]) - centre[0]
+    if depth[0] * depth[-1] <= 0:
+        raise NotRectifiable("its lines of sight meet beside the volume, or inside")
+    to_reference: FloatArray = (0.5 * (grid.shape[0] - 1) - centre[0]) / depth
+    relative_scale = to_reference.min() / to_reference.max()
+    if relative_scale < MIN_RELATIVE_SCALE:
+        raise NotRectifiable(
+            f"the far end of the volume is seen at {relative_scale:.2f} of the scale of the near end, "
+            f"limit {MIN_RELATIVE_SCALE}"
+        )
+    return centre, to_reference
 
 
 def _project_plane(
