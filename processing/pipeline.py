@@ -264,7 +264,7 @@ def _workbench(
 ) -> _Workbench:
     calibration = load_calibration(calibration_file)
     grid = settings.grid.to_grid() if settings.grid else default_grid(calibration)
-    plan = plan_reconstruction([calibration.views[view].mapping for view in views], grid)
+    plan = plan_reconstruction([calibration.views[view].mapping for view in views], grid, settings.accuracy)
     images = tuple(np.empty(view.image_size_px[::-1], np.float32) for view in plan.views)
     return _Workbench(plan, images, np.empty(grid.shape, np.float32))
 

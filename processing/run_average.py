@@ -70,7 +70,8 @@ def average_run(
     with RunReader(run_dir) as run:
         first = run.read_shot(shots[0])
         require_match(run_dir.name, first, calibration)
-        plan = plan_reconstruction([calibration.views[view].mapping for view in first.views], grid)
+        mappings = [calibration.views[view].mapping for view in first.views]
+        plan = plan_reconstruction(mappings, grid, settings.accuracy)
         exposures = _exposures(run, shots, calibration, settings, done)
         if settings.method.iterative:
             volume = _mean_of_each(plan, exposures, settings)

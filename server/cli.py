@@ -7,6 +7,7 @@ import argparse
 import json
 import sys
 from collections.abc import Callable, Sequence
+from enum import StrEnum
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from daq.errors import DaqError, PlanError, ShotFileError
 from processing.calibration.errors import CalibrationError
 from processing.importing import ManifestError
 from processing.pipeline import PipelineError
+from processing.reconstruction.accuracy import Accuracy
 from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.reconstruction.volume_file import VolumeFileError
@@ -164,6 +166,7 @@ def _add_reconstruct(verbs: Any) -> None:
 
 def _add_reconstruction_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--method", choices=[method.value for method in ReconstructionMethod], default="mlos")
+    _add_choice(parser, "accuracy", Accuracy)
     for name in ("iterations", "relaxation", "least_gain"):
         field = ReconstructionSettings.model_fields[name]
         parser.add_argument(
@@ -178,6 +181,13 @@ def _add_reconstruction_options(parser: argparse.ArgumentParser) -> None:
         "--grid",
         metavar="X0:X1,Y0:Y1,Z0:Z1[@PITCH]",
         help="box in mm, voxel edge in mm; default: what all views see within the calibrated z range, one pixel",
+    )
+
+
+def _add_choice(parser: argparse.ArgumentParser, name: str, kind: type[StrEnum]) -> None:
+    field = ReconstructionSettings.model_fields[name]
+    parser.add_argument(
+        f"--{name}", choices=[one.value for one in kind], default=field.default.value, help=field.description
     )
 
 

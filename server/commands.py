@@ -24,6 +24,7 @@ from processing.pipeline import (
     default_grid,
     reconstruct_shot,
 )
+from processing.reconstruction.accuracy import Accuracy
 from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.settings import GridSettings, ReconstructionSettings
 from processing.volume import VoxelGrid
@@ -120,6 +121,7 @@ def reconstruction_settings(options: Namespace, grid: GridSettings) -> Reconstru
     """Method and options of a command as settings."""
     return ReconstructionSettings(
         method=ReconstructionMethod(options.method),
+        accuracy=Accuracy(options.accuracy),
         iterations=options.iterations,
         relaxation=options.relaxation,
         least_gain=options.least_gain,
@@ -139,6 +141,7 @@ def reconstruct_run(options: Namespace) -> dict[str, Any]:
         results.append(reconstruct_shot(options.run, shot, options.calibration, settings, options.out))
     return {
         "method": options.method,
+        "accuracy": options.accuracy,
         "grid": grid.model_dump(mode="json"),
         "volumes": [volume.model_dump(mode="json") for result in results for volume in result.volumes],
         "cpu_s": sum(result.cpu_s for result in results),

@@ -2,12 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
 
 from processing.geometry import ViewMapping
+from processing.reconstruction.accuracy import Accuracy
 from processing.reconstruction.fixed_point import FixedPoint
 from processing.reconstruction.kernels import _native
 from processing.reconstruction.node_view import NodeView, sample_mapping
@@ -20,15 +20,6 @@ MAX_DEVIATION_PX = 0.02
 
 
 DEFAULT_THREADS = 2
-
-
-class Accuracy(Enum):
-    """Pixels per voxel of rectified images; their samples are interpolated linearly."""
-
-    NOMINAL = 0.95
-    """As accurate as linear interpolation of the recorded image."""
-    FINE = 1.5
-    """Two to three times more accurate, at twice the cost."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,6 +107,6 @@ def plan_reconstruction(
 def plan_view(mapping: ViewMapping, grid: VoxelGrid, accuracy: Accuracy = Accuracy.NOMINAL) -> RectifiedView | NodeView:
     """Rectify the view where that is exact to ``MAX_DEVIATION_PX``; sample its mapping otherwise."""
     try:
-        return rectify(mapping, grid, accuracy.value, MAX_DEVIATION_PX)
+        return rectify(mapping, grid, accuracy.pixels_per_voxel, MAX_DEVIATION_PX)
     except NotRectifiable as why:
         return replace(sample_mapping(mapping, grid, MAX_DEVIATION_PX), reason=str(why))

@@ -5,6 +5,7 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from processing.reconstruction.accuracy import Accuracy
 from processing.reconstruction.method import ReconstructionMethod
 from processing.volume import VoxelGrid
 
@@ -39,6 +40,9 @@ class ReconstructionSettings(FrozenValue):
     """How shots become volumes; travels with every result."""
 
     method: ReconstructionMethod = ReconstructionMethod.MLOS
+    accuracy: Annotated[Accuracy, Field(description="fine: two to three times more accurate, at twice the cost")] = (
+        Accuracy.NOMINAL
+    )
     iterations: Annotated[int, Field(ge=1, le=200, description="of SMART and MART, at most")] = 20
     relaxation: Annotated[float, Field(gt=0, le=2, description="exponent of SMART and MART; the paper's is 1")] = 1.0
     least_gain: Annotated[

@@ -12,11 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from processing.geometry import PinholeCamera
+from processing.reconstruction.accuracy import Accuracy
 from processing.reconstruction.kernels import _native
 from processing.reconstruction.line_of_sight import KERNEL_METHOD, line_of_sight
 from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.node_view import sample_mapping
-from processing.reconstruction.plan import MAX_DEVIATION_PX, Accuracy, Plan, plan_reconstruction
+from processing.reconstruction.plan import MAX_DEVIATION_PX, Plan, plan_reconstruction
 from processing.reconstruction.smart import smart
 from processing.studies import speed_targets as targets
 from processing.studies.speed_baseline import Timing, measure, naive_line_of_sight, naive_smart_iteration

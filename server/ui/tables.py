@@ -9,7 +9,8 @@ from nicegui import ui
 
 from daq.errors import DaqError
 from daq.run_plan import RunKind
-from processing.reconstruction.method import ReconstructionMethod
+from processing.reconstruction.accuracy import Accuracy
+from processing.reconstruction.method import ReconstructionMethod as Method
 from processing.reconstruction.settings import ReconstructionSettings
 from server.jobs import Job, JobKind, JobState, calibration_job
 from server.problems import ServerError
@@ -26,16 +27,18 @@ _SHOWN = 60
 
 
 class RunTable:
-    """Runs, newest first; a calibration run can be fitted, a sample run reconstructed by a chosen method."""
+    """Runs, newest first; a calibration run can be fitted, a sample run reconstructed as chosen."""
 
     def __init__(self, context: Context) -> None:
         self._context = context
         with panel("Runs", "flex-1"):
             with ui.row().classes("w-full items-center justify-between no-wrap q-mt-none"):
                 ui.label("Reconstruct by").classes("text-xs opacity-70")
-                methods = {method.value: method.value.upper() for method in ReconstructionMethod}
-                self._method = ui.select(methods, value=context.services.settings.method.value)
-                self._method.props('dense borderless options-dense aria-label="Method"').classes("text-xs")
+                chosen = context.services.settings
+                self._method = _choice(
+                    "Method", {method.value: method.value.upper() for method in Method}, chosen.method
+                )
+                self._accuracy = _choice("Accuracy", {one.value: one.value for one in Accuracy}, chosen.accuracy)
             self._table = _table(
                 ("name", "Run"), ("kind", "Kind"), ("shots", "Valid / shots"), ("outcome", "Outcome"), ("action", "")
             )
@@ -57,8 +60,8 @@ class RunTable:
         self._context.runner.submit(calibration_job(run_id, f"{run_id}-pinhole", "pinhole"))
 
     def _reconstruct(self, run_id: str) -> None:
-        method = ReconstructionMethod(self._method.value)
-        settings: ReconstructionSettings = self._context.services.settings.model_copy(update={"method": method})
+        chosen = {"method": Method(self._method.value), "accuracy": Accuracy(self._accuracy.value)}
+        settings: ReconstructionSettings = self._context.services.settings.model_copy(update=chosen)
         request_reconstruction(self._context, run_id, None, None, settings)
 
 
@@ -84,6 +87,11 @@ class JobTableView:
         else:
             await _try(lambda: asyncio.to_thread(self._context.calibrations.choose, event.args["calibration"]))
             ui.notify(f"{event.args['calibration']} is the current calibration", type="positive")
+
+
+def _choice(label: str, options: dict[str, str], value: str) -> ui.select:
+    select = ui.select(options, value=str(value)).classes("text-xs")
+    return select.props(f'dense borderless options-dense aria-label="{label}"')
 
 
 async def _try(action: Callable[[], Awaitable[Any]]) -> None:

@@ -11,11 +11,12 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from processing.geometry import FloatArray, ViewMapping
+from processing.reconstruction.accuracy import Accuracy
 from processing.reconstruction.kernels import _native
 from processing.reconstruction.line_of_sight import line_of_sight
 from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.node_view import NodeView, sample_mapping
-from processing.reconstruction.plan import Accuracy, Plan, plan_reconstruction
+from processing.reconstruction.plan import Plan, plan_reconstruction
 from processing.volume import VoxelGrid
 from tests.processing import oracle
 

@@ -12,12 +12,13 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from processing.geometry import FloatArray, PinholeCamera, ViewMapping, view_camera
+from processing.reconstruction.accuracy import Accuracy
 from processing.reconstruction.kernels import _native
 from processing.reconstruction.line_of_sight import line_of_sight
 from processing.reconstruction.mean_line_of_sight import mean_line_of_sight
 from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.node_view import sample_mapping
-from processing.reconstruction.plan import Accuracy, Plan, plan_reconstruction
+from processing.reconstruction.plan import Plan, plan_reconstruction
 from processing.reconstruction.sparse_line_of_sight import slabs_of_sight, sparse_line_of_sight
 from processing.volume import VoxelGrid
 from tests.processing import oracle

@@ -48,7 +48,7 @@ def test_reconstruct_tells_grid_and_volumes(
 ) -> None:
     arguments = ["reconstruct", run_dir, "--calibration", calibration_file, "-o", tmp_path / "out", f"--grid={GRID}"]
     result = told(capsys, *arguments)
-    assert result["method"] == "mlos"
+    assert (result["method"], result["accuracy"]) == ("mlos", "nominal")
     assert result["grid"] == {"shape": [21, 21, 21], "origin_mm": [-1, -1, -1], "pitch_mm": 0.1}
     assert [(volume["shot"], volume["frame"]) for volume in result["volumes"]] == [
         (0, "a"),
@@ -83,6 +83,17 @@ def test_smart_is_told_how_to_iterate(
             main([*map(str, common), "-o", str(tmp_path / "out"), option, "201"])
         assert f"argument {option}: 201: Input should be less than" in (error := capsys.readouterr().err)
         assert limit in error
+
+
+def test_finer_images_are_asked_for_by_name(
+    run_dir: Path, calibration_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    common = ["reconstruct", run_dir, "--calibration", calibration_file, "--grid=-1:1,-1:1,-1:1@0.05", "--shots", "0:1"]
+    told(capsys, *common, "-o", tmp_path / "nominal")
+    assert told(capsys, *common, "-o", tmp_path / "fine", "--accuracy", "fine")["accuracy"] == "fine"
+    nominal, fine = (read_volume(tmp_path / name / "shot_00000_a.vtkhdf") for name in ("nominal", "fine"))
+    assert json.loads(str(fine[2]["settings"]))["accuracy"] == "fine"
+    assert 0 < np.abs(fine[0] - nominal[0]).max() < 0.2
 
 
 def test_average_of_results(
