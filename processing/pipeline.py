@@ -3,7 +3,7 @@
 import json
 import resource
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib.metadata import version
@@ -21,6 +21,7 @@ from processing.reconstruction.common_volume import common_volume
 from processing.reconstruction.line_of_sight import line_of_sight
 from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.plan import Plan, plan_reconstruction
+from processing.reconstruction.planned_view import PlannedView
 from processing.reconstruction.settings import FrozenValue, GridSettings, ReconstructionSettings
 from processing.reconstruction.smart import mart, smart
 from processing.reconstruction.volume_file import write_volume
@@ -52,11 +53,12 @@ class VolumeRecord(FrozenValue):
 
 
 class ShotResult(FrozenValue):
-    """What became of one shot."""
+    """What became of one shot; ``views`` tells how each view was seen."""
 
     shot: int
     method: ReconstructionMethod
     grid: GridSettings
+    views: Mapping[str, PlannedView]
     volumes: tuple[VolumeRecord, ...]
     cpu_s: float
     peak_rss_mb: float
@@ -101,19 +103,22 @@ def reconstruct_shot(
     with RunReader(run_dir) as run:
         recorded = run.read_shot(shot)
         require_match(run_dir.name, recorded, calibration)
-        provenance = _provenance(run, calibration, calibration_file, settings)
-        bench = _workbench(calibration_file, str(provenance["calibration_sha256"]), settings, tuple(recorded.views))
+        made_by = _provenance(run, calibration, calibration_file, settings)
+        bench = _workbench(calibration_file, str(made_by["calibration_sha256"]), settings, tuple(recorded.views))
+        views = {name: PlannedView.of(view) for name, view in zip(recorded.views, bench.plan.views, strict=True)}
+        provenance = {**made_by, "views": json.dumps({name: view.model_dump() for name, view in views.items()})}
         claim_results(results_dir, provenance)
         volumes = []
         for frame in frame_names(run):
             if should_stop():
                 raise Stopped(f"{run_dir.name}, shot {shot}: stopped before exposure {frame}")
-            views = shot_intensities(run, recorded, frame, settings, bench.images)
-            volumes.append(_reconstruct_frame(bench, views, settings, results_dir, shot, frame, provenance))
+            images = shot_intensities(run, recorded, frame, settings, bench.images)
+            volumes.append(_reconstruct_frame(bench, images, settings, results_dir, shot, frame, provenance))
     return ShotResult(
         shot=shot,
         method=settings.method,
         grid=GridSettings.of(bench.plan.grid),
+        views=views,
         volumes=tuple(volumes),
         cpu_s=time.process_time() - started_cpu_s,
         peak_rss_mb=resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
@@ -201,7 +206,7 @@ class _Workbench:
 
 def _reconstruct_frame(
     bench: _Workbench,
-    views: list[Intensity],
+    images: list[Intensity],
     settings: ReconstructionSettings,
     results_dir: Path,
     shot: int,
@@ -209,7 +214,7 @@ def _reconstruct_frame(
     provenance: Provenance,
 ) -> VolumeRecord:
     started_s = time.perf_counter()
-    residuals = reconstruct(bench.plan, views, settings, bench.volume)
+    residuals = reconstruct(bench.plan, images, settings, bench.volume)
     seconds = round(time.perf_counter() - started_s, 4)
     file = volume_path(results_dir, shot, frame)
     convergence = {"residuals": json.dumps(residuals)} if residuals else {}

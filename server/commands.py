@@ -21,6 +21,7 @@ from processing.calibration.joint_fit import calibrate
 from processing.importing import import_manifest
 from processing.pipeline import (
     PipelineError,
+    ShotResult,
     default_grid,
     reconstruct_shot,
 )
@@ -135,18 +136,29 @@ def reconstruct_run(options: Namespace) -> dict[str, Any]:
     grid = GridSettings.of(parse_grid(options.grid, calibration) if options.grid else default_grid(calibration))
     settings = reconstruction_settings(options, grid)
     shots = selected_shots(options.run, options.shots)
-    results = []
+    results: list[ShotResult] = []
     for shot in shots:
         progress(f"{options.run.name}: shot {shot} by {options.method}")
         results.append(reconstruct_shot(options.run, shot, options.calibration, settings, options.out))
+        if len(results) == 1:
+            _tell_slow_views(results[0])
     return {
         "method": options.method,
         "accuracy": options.accuracy,
         "grid": grid.model_dump(mode="json"),
+        "views": {name: view.model_dump() for name, view in results[0].views.items()},
         "volumes": [volume.model_dump(mode="json") for result in results for volume in result.volumes],
         "cpu_s": sum(result.cpu_s for result in results),
         "peak_rss_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
     }
+
+
+def _tell_slow_views(result: ShotResult) -> None:
+    for name, view in result.views.items():
+        if view.reason:
+            progress(
+                f"{name} takes the exact way, which is slower, nodes every {view.node_spacing_voxel}: {view.reason}"
+            )
 
 
 def parse_grid(text: str, calibration: Calibration) -> VoxelGrid:

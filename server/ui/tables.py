@@ -132,7 +132,7 @@ def _job_row(job: Job) -> dict[str, Any]:
         "run": job.run_id,
         "outcome": job.state,
         "colour": outcome_colour(job.state),
-        "detail": job.error or (_disparity(job) if job.kind is JobKind.CHECK else _quality(job)),
+        "detail": job.error or _DETAIL[job.kind](job),
         "action": choices.get(job.state, ""),
         "calibration": job.calibration,
     }
@@ -157,7 +157,16 @@ def _disparity(job: Job) -> str:
 
 
 def _quality(job: Job) -> str:
-    """Hold-out error and verdict of the worst view of a calibration; nothing for other jobs."""
+    """Hold-out error and verdict of the worst view of a calibration; nothing before it has ended."""
     views = (job.result or {}).get("views", {}).values()
     worst = max(views, key=lambda view: view["holdout_error_px"] or math.inf, default=None)
     return "" if worst is None else f"hold-out {worst['holdout_error_px'] or math.nan:.3f} px, {worst['verdict']}"
+
+
+def _slow_views(job: Job) -> str:
+    """The views that could not be rectified, with the reason; nothing where all were."""
+    views = (job.result or {}).get("views", {})
+    return "; ".join(f"{name} exact: {view['reason']}" for name, view in views.items() if view["reason"])
+
+
+_DETAIL = {JobKind.CALIBRATION: _quality, JobKind.CHECK: _disparity, JobKind.RECONSTRUCTION: _slow_views}

@@ -20,6 +20,7 @@ from processing.pipeline import (
     shot_intensities,
 )
 from processing.reconstruction.method import ReconstructionMethod
+from processing.reconstruction.planned_view import PlannedView
 from processing.reconstruction.settings import GridSettings, ReconstructionSettings
 from processing.reconstruction.volume_file import VolumeFileError, read_volume
 from processing.results_file import average_volumes, volume_files, volume_path
@@ -78,6 +79,11 @@ def test_result_and_volumes_name_their_origin(run_dir: Path, calibration_file: P
     assert provenance["calibration"] == load_calibration(calibration_file).id
     assert ReconstructionSettings.model_validate_json(str(provenance["settings"])) == SETTINGS
     assert (provenance["shot"], provenance["frame"]) == (0, "b")
+    views = {name: PlannedView.model_validate(view) for name, view in json.loads(str(provenance["views"])).items()}
+    assert views == dict(result.views)
+    assert list(views) == ["view1", "view2", "view3"]
+    assert {(view.mapping, view.reason) for view in views.values()} == {("rectified", None)}
+    assert all(0 <= view.deviation_px < 0.02 for view in views.values())
 
 
 def test_references_that_are_written_later_count(run_dir: Path) -> None:

@@ -13,6 +13,7 @@ from processing.geometry import FloatArray, PinholeCamera, ViewMapping, view_cam
 from processing.reconstruction.kernels import _native
 from processing.reconstruction.node_view import NodeView, sample_mapping
 from processing.reconstruction.plan import MAX_DEVIATION_PX, plan_reconstruction, plan_view
+from processing.reconstruction.planned_view import PlannedView
 from processing.reconstruction.rectified_view import MAP_SPACING_PX, RectifiedView, rectify
 from processing.volume import VoxelGrid
 from tests.processing import oracle
@@ -123,6 +124,9 @@ def test_a_view_says_why_it_takes_the_nodes(mapping: ViewMapping, grid: VoxelGri
     view = plan_view(mapping, grid)
     assert isinstance(view, NodeView)
     assert re.search(reason, view.reason)
+    described = PlannedView.of(view)
+    assert (described.mapping, described.node_spacing_voxel, described.reason) == ("exact", view.spacing, view.reason)
+    assert described.deviation_px == pytest.approx(view.deviation_px, abs=1e-4)
 
 
 @settings(max_examples=10, deadline=None)

@@ -56,9 +56,22 @@ def test_reconstruct_tells_grid_and_volumes(
         (2, "a"),
         (2, "b"),
     ]
+    assert {view["mapping"] for view in result["views"].values()} == {"exact"}, "voxels of 2 px are averaged"
+    assert result["views"]["view2"]["reason"] == "a voxel covers 2 px, limit 1.5 px"
     assert result["cpu_s"] > 0
     assert result["peak_rss_mb"] > 0
     assert all((tmp_path / "out" / volume["file"]).is_file() for volume in result["volumes"])
+
+
+def test_reconstruct_says_before_the_second_shot_which_views_are_slow(
+    run_dir: Path, calibration_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["reconstruct", run_dir, "--calibration", calibration_file, "-o", tmp_path / "out", f"--grid={GRID}"]
+    assert main([*map(str, arguments)]) == 0
+    _invalid, first, *slow, second = capsys.readouterr().err.splitlines()
+    assert (first, second) == ("run: shot 0 by mlos", "run: shot 2 by mlos")
+    assert [line.split()[0] for line in slow] == ["view1", "view2", "view3"]
+    assert all("takes the exact way, which is slower" in line and "a voxel covers" in line for line in slow)
 
 
 def test_shots_can_be_chosen(
@@ -89,11 +102,12 @@ def test_finer_images_are_asked_for_by_name(
     run_dir: Path, calibration_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     common = ["reconstruct", run_dir, "--calibration", calibration_file, "--grid=-1:1,-1:1,-1:1@0.05", "--shots", "0:1"]
-    told(capsys, *common, "-o", tmp_path / "nominal")
+    nominal = told(capsys, *common, "-o", tmp_path / "nominal")
+    assert {view["mapping"] for view in nominal["views"].values()} == {"rectified"}
     assert told(capsys, *common, "-o", tmp_path / "fine", "--accuracy", "fine")["accuracy"] == "fine"
-    nominal, fine = (read_volume(tmp_path / name / "shot_00000_a.vtkhdf") for name in ("nominal", "fine"))
-    assert json.loads(str(fine[2]["settings"]))["accuracy"] == "fine"
-    assert 0 < np.abs(fine[0] - nominal[0]).max() < 0.2
+    volumes = [read_volume(tmp_path / name / "shot_00000_a.vtkhdf") for name in ("nominal", "fine")]
+    assert json.loads(str(volumes[1][2]["settings"]))["accuracy"] == "fine"
+    assert 0 < np.abs(volumes[1][0] - volumes[0][0]).max() < 0.2
 
 
 def test_average_of_results(
