@@ -1,11 +1,15 @@
 """Volumes as VTKHDF ImageData, which ParaView opens (docs.vtk.org, VTKHDF file format 2.0).
 
-Intensities are stored as float32: VTK knows no half precision, whose values survive unchanged. Chunks are whole
-planes, deflated by ISA-L at its fastest: ordinary gzip for every reader, several times faster to write.
+Intensities are float32, or uint8 times an attribute. Those of float16 are stored as float32, which keeps their values
+and deflates to little more: the VTKHDF format has no half precision, and where HDF5 converts it for VTK, that takes
+half as long again. Chunks are parts of planes, deflated by ISA-L at its fastest: ordinary gzip for every reader,
+several times faster to write.
 """
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +18,8 @@ import numpy as np
 from isal import isal_zlib
 from numpy.typing import NDArray
 
+from processing.reconstruction.slab_volume import SLAB_ROWS, SlabVolume
+from processing.reconstruction.voxel_type import VoxelType
 from processing.volume import VoxelGrid
 
 FORMAT_VERSION = (2, 0)
@@ -21,6 +27,7 @@ INTENSITY = "intensity"
 PROVENANCE = "tomoshadow"
 SCHEMA = {"schema": "tomoshadow/volume", "schema_version": 1}
 Value = str | int | float
+Intensities = NDArray[np.float32]
 
 
 class VolumeFileError(Exception):
@@ -28,18 +35,12 @@ class VolumeFileError(Exception):
 
 
 def write_volume(path: Path, volume: NDArray[Any], grid: VoxelGrid, provenance: Mapping[str, Value]) -> None:
-    """Write a volume; the file appears complete or not at all.
+    """Write a volume that is in memory; otherwise as ``write_slabs``.
 
     Parameters
     ----------
-    path : Path
-        Usually ``*.vtkhdf``; an existing file is replaced.
-    volume : (z, y, x) float32 or float16 array
-        Intensities.
-    grid : VoxelGrid
-        Where its voxels lie; VTK sees the same x, y, z in mm.
-    provenance : Mapping[str, str | int | float]
-        Where it comes from: kept as attributes of the group ``/tomoshadow``.
+    volume : (z, y, x) float32, float16 or uint8 array
+        Intensities; 255 is 1 where they are bytes.
 
     Raises
     ------
@@ -48,10 +49,29 @@ def write_volume(path: Path, volume: NDArray[Any], grid: VoxelGrid, provenance: 
     """
     if volume.shape != grid.shape:
         raise ValueError(f"{path}: volume has shape {volume.shape}, its grid {grid.shape}")
+    write_slabs(path, SlabVolume.of(volume), grid, provenance)
+
+
+def write_slabs(path: Path, volume: SlabVolume, grid: VoxelGrid, provenance: Mapping[str, Value]) -> None:
+    """Write a volume as its slabs come; the file appears complete or not at all.
+
+    Parameters
+    ----------
+    path : Path
+        Usually ``*.vtkhdf``; an existing file is replaced.
+    volume : SlabVolume
+        Intensities.
+    grid : VoxelGrid
+        Where its voxels lie; VTK sees the same x, y, z in mm.
+    provenance : Mapping[str, str | int | float]
+        Where it comes from: kept as attributes of the group ``/tomoshadow``.
+    """
     part = path.with_name(path.name + ".part")
     try:
         with h5py.File(part, "w", libver=("v110", "v110")) as file:
-            _write_image_data(file.create_group("VTKHDF", track_order=True), volume, grid)
+            dataset = _make_image_data(file.create_group("VTKHDF", track_order=True), volume, grid)
+            for first_row, slab in volume.slabs:
+                _write_slab(dataset, first_row, slab, volume.unit)
             file.create_group(PROVENANCE).attrs.update({**provenance, **SCHEMA})
         _sync(part)
         part.replace(path)
@@ -60,8 +80,74 @@ def write_volume(path: Path, volume: NDArray[Any], grid: VoxelGrid, provenance: 
         raise
 
 
-def read_volume(path: Path) -> tuple[NDArray[np.float32], VoxelGrid, dict[str, Value]]:
-    """Read a volume that ``write_volume`` wrote.
+@dataclass(frozen=True, eq=False)
+class StoredVolume:
+    """A volume in an open file, of which only what is asked for is read.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    grid : VoxelGrid
+        Where its voxels lie.
+    provenance : Mapping[str, str | int | float]
+        Where it comes from.
+    voxels : h5py.Dataset
+        (nz, ny, nx), as stored.
+    unit : float
+        Intensity of a stored 1.
+    """
+
+    path: Path
+    grid: VoxelGrid
+    provenance: Mapping[str, Value]
+    voxels: h5py.Dataset
+    unit: float
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Number of voxels (nz, ny, nx)."""
+        return self.grid.shape
+
+    def __getitem__(self, part: slice | tuple[slice, slice]) -> Intensities:
+        """Some planes z, or some rows y of them; float32 intensities.
+
+        Raises
+        ------
+        VolumeFileError
+            The file is damaged.
+        """
+        with _naming(self.path):
+            values: Intensities = self.voxels[part].astype(np.float32, copy=False)
+        if self.unit != 1:
+            values *= np.float32(self.unit)
+        return values
+
+    def slabs(self) -> Iterator[tuple[int, Intensities]]:
+        """First row and intensities of each slab."""
+        for first_row in range(0, self.shape[1], SLAB_ROWS):
+            yield first_row, self[:, first_row : first_row + SLAB_ROWS]
+
+
+@contextmanager
+def open_volume(path: Path) -> Iterator[StoredVolume]:
+    """Open a volume that ``write_volume`` or ``write_slabs`` wrote.
+
+    Raises
+    ------
+    VolumeFileError
+        The file is missing, truncated, or not a volume.
+    """
+    with _naming(path):
+        file = h5py.File(path, "r")
+    with file:
+        with _naming(path):
+            stored = _stored(path, file)
+        yield stored
+
+
+def read_volume(path: Path) -> tuple[Intensities, VoxelGrid, dict[str, Value]]:
+    """Read a volume that ``write_volume`` or ``write_slabs`` wrote.
 
     Returns
     -------
@@ -74,17 +160,26 @@ def read_volume(path: Path) -> tuple[NDArray[np.float32], VoxelGrid, dict[str, V
     VolumeFileError
         The file is missing, truncated, or not a volume.
     """
+    with open_volume(path) as stored:
+        return stored[:], stored.grid, dict(stored.provenance)
+
+
+@contextmanager
+def _naming(path: Path) -> Iterator[None]:
     try:
-        with h5py.File(path, "r") as file:
-            volume = file[f"VTKHDF/PointData/{INTENSITY}"][...].astype(np.float32, copy=False)
-            grid = _read_grid(file["VTKHDF"].attrs, volume.shape)
-            provenance = {name: _plain(value) for name, value in file[PROVENANCE].attrs.items()}
+        yield
     except (OSError, KeyError, ValueError) as error:
         raise VolumeFileError(f"{path}: not a readable volume: {error}") from error
-    return volume, grid, {name: value for name, value in provenance.items() if name not in SCHEMA}
 
 
-def _write_image_data(group: h5py.Group, volume: NDArray[Any], grid: VoxelGrid) -> None:
+def _stored(path: Path, file: h5py.File) -> StoredVolume:
+    voxels = file[f"VTKHDF/PointData/{INTENSITY}"]
+    provenance = {name: _plain(value) for name, value in file[PROVENANCE].attrs.items() if name not in SCHEMA}
+    grid = _read_grid(file["VTKHDF"].attrs, voxels.shape)
+    return StoredVolume(path, grid, provenance, voxels, float(voxels.attrs.get("scale_factor", 1.0)))
+
+
+def _make_image_data(group: h5py.Group, volume: SlabVolume, grid: VoxelGrid) -> h5py.Dataset:
     nz, ny, nx = grid.shape
     group.attrs["Version"] = np.array(FORMAT_VERSION, dtype=np.int64)
     _write_name(group, "Type", "ImageData")
@@ -92,14 +187,30 @@ def _write_image_data(group: h5py.Group, volume: NDArray[Any], grid: VoxelGrid) 
     group.attrs["Origin"] = np.array(grid.origin_mm, dtype=np.float64)
     group.attrs["Spacing"] = np.full(3, grid.pitch_mm, dtype=np.float64)
     group.attrs["Direction"] = np.eye(3, dtype=np.float64).ravel()
-    points = group.create_group("PointData")
-    dataset = points.create_dataset(
-        INTENSITY, grid.shape, np.float32, chunks=(1, ny, nx), shuffle=True, compression="gzip", compression_opts=1
+    dtype = np.uint8 if volume.voxels is VoxelType.UINT8 else np.float32
+    dataset = group.create_group("PointData").create_dataset(
+        INTENSITY,
+        grid.shape,
+        dtype,
+        chunks=(1, min(SLAB_ROWS, ny), nx),
+        shuffle=True,
+        compression="gzip",
+        compression_opts=1,
     )
     _write_name(dataset, "Attribute", "Scalars")
     dataset.attrs.update({"units": "1", "axes": "z y x", "long_name": "inverted shadow intensity"})
-    for z, plane in enumerate(volume):
-        dataset.id.write_direct_chunk((z, 0, 0), _deflated(np.ascontiguousarray(plane, dtype=np.float32)))
+    dataset.attrs.update({"voxels": volume.voxels.value, "scale_factor": volume.unit if dtype == np.uint8 else 1.0})
+    return dataset
+
+
+def _write_slab(dataset: h5py.Dataset, first_row: int, slab: NDArray[Any], unit: float) -> None:
+    """Write chunks of whole size, as HDF5 wants them; beyond the volume they are zero."""
+    chunk = np.zeros(dataset.chunks[1:], dataset.dtype)
+    for z, rows in enumerate(slab):
+        chunk[: len(rows)] = rows
+        if chunk.dtype == np.float32 and unit != 1:
+            chunk *= np.float32(unit)
+        dataset.id.write_direct_chunk((z, first_row, 0), _deflated(chunk))
 
 
 def _write_name(target: h5py.Group | h5py.Dataset, attribute: str, name: str) -> None:
@@ -107,9 +218,9 @@ def _write_name(target: h5py.Group | h5py.Dataset, attribute: str, name: str) ->
     target.attrs.create(attribute, name.encode(), dtype=h5py.string_dtype("ascii", len(name)))
 
 
-def _deflated(plane: NDArray[np.float32]) -> bytes:
+def _deflated(chunk: NDArray[Any]) -> bytes:
     """Shuffle and deflate, the bytes that HDF5's own filters would make."""
-    bytes_by_significance = plane.reshape(-1, 1).view(np.uint8).T
+    bytes_by_significance = chunk.reshape(-1, 1).view(np.uint8).T
     return isal_zlib.compress(np.ascontiguousarray(bytes_by_significance), 1)
 
 

@@ -1,5 +1,6 @@
 """Volume files: what is written comes back, ParaView's format is kept, broken files are named."""
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import h5py
@@ -9,19 +10,30 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from processing.reconstruction.volume_file import VolumeFileError, read_volume, write_volume
+from processing.reconstruction.slab_volume import SLAB_ROWS, SlabVolume
+from processing.reconstruction.volume_file import (
+    VolumeFileError,
+    open_volume,
+    read_volume,
+    write_slabs,
+    write_volume,
+)
+from processing.reconstruction.voxel_type import VoxelType
 from processing.volume import VoxelGrid
 
 GRID = VoxelGrid((5, 7, 11), (-1.0, 2.0, -3.5), 1 / 60)
 
 
-def some_volume() -> NDArray[np.float32]:
-    return np.random.default_rng(3).random(GRID.shape).astype(np.float32)
+TALL = VoxelGrid((3, 2 * SLAB_ROWS + 9, 5), (0.0, 0.0, 0.0), 0.1)
+
+
+def some_volume(grid: VoxelGrid = GRID) -> NDArray[np.float32]:
+    return np.random.default_rng(3).random(grid.shape).astype(np.float32)
 
 
 @settings(max_examples=20, deadline=None)
 @given(
-    shape=st.tuples(st.integers(1, 6), st.integers(1, 6), st.integers(1, 6)),
+    shape=st.tuples(st.integers(1, 6), st.integers(1, 6) | st.integers(60, 200), st.integers(1, 6)),
     origin_mm=st.tuples(st.floats(-9, 9), st.floats(-9, 9), st.floats(-9, 9)),
     pitch_mm=st.floats(1e-3, 1),
     provenance=st.dictionaries(st.sampled_from(["run", "shot", "frame"]), st.text("abc -é") | st.integers(-9, 9)),
@@ -49,6 +61,54 @@ def test_half_precision_comes_back_as_float32(tmp_path: Path) -> None:
     volume, _, _ = read_volume(tmp_path / "half.vtkhdf")
     assert volume.dtype == np.float32
     np.testing.assert_array_equal(volume, half.astype(np.float32))
+
+
+@pytest.mark.parametrize(
+    ("dtype", "stored", "unit"), [("float32", "f4", 1), ("float16", "f4", 1), ("uint8", "u1", 1 / 255)]
+)
+def test_a_file_says_how_its_voxels_are_to_be_read(tmp_path: Path, dtype: str, stored: str, unit: float) -> None:
+    volume = (some_volume(TALL) * (255 if dtype == "uint8" else 1)).astype(dtype)
+    write_volume(tmp_path / "one.vtkhdf", volume, TALL, {})
+    with h5py.File(tmp_path / "one.vtkhdf") as file:
+        dataset = file["VTKHDF/PointData/intensity"]
+        assert (dataset.dtype, dataset.attrs["voxels"], dataset.attrs["scale_factor"]) == (stored, dtype, unit)
+        read, _, _ = read_volume(tmp_path / "one.vtkhdf")
+        np.testing.assert_array_equal(read, dataset[...].astype(np.float32) * np.float32(unit))
+    np.testing.assert_array_equal(read, volume.astype(np.float32) * np.float32(unit))
+
+
+@pytest.mark.parametrize("voxels", VoxelType)
+def test_slabs_may_come_in_the_same_memory_and_in_a_unit(tmp_path: Path, voxels: VoxelType) -> None:
+    volume = (some_volume(TALL) * 200).astype("uint8" if voxels is VoxelType.UINT8 else "float16")
+    memory = np.empty((3, SLAB_ROWS, 5), volume.dtype)
+
+    def slabs() -> Iterator[tuple[int, NDArray[np.generic]]]:
+        for first_row in range(0, TALL.shape[1], SLAB_ROWS):
+            rows = volume[:, first_row : first_row + SLAB_ROWS]
+            memory[:, : rows.shape[1]] = rows
+            yield first_row, memory[:, : rows.shape[1]]
+
+    write_slabs(tmp_path / "one.vtkhdf", SlabVolume(slabs(), voxels, 0.3), TALL, {})
+    np.testing.assert_array_equal(read_volume(tmp_path / "one.vtkhdf")[0], volume.astype(np.float32) * np.float32(0.3))
+
+
+def test_parts_are_read_by_planes_and_by_slabs(tmp_path: Path) -> None:
+    volume = some_volume(TALL)
+    write_volume(tmp_path / "one.vtkhdf", volume, TALL, {"run": "r1"})
+    with open_volume(tmp_path / "one.vtkhdf") as stored:
+        assert (stored.shape, stored.grid, dict(stored.provenance)) == (TALL.shape, TALL, {"run": "r1"})
+        np.testing.assert_array_equal(stored[1:2], volume[1:2])
+        slabs = dict(stored.slabs())
+        assert list(slabs) == [0, SLAB_ROWS, 2 * SLAB_ROWS]
+        np.testing.assert_array_equal(np.concatenate(list(slabs.values()), axis=1), volume)
+
+
+def test_a_volume_of_before_the_types_is_read(tmp_path: Path) -> None:
+    write_volume(tmp_path / "old.vtkhdf", some_volume(), GRID, {})
+    with h5py.File(tmp_path / "old.vtkhdf", "r+") as file:
+        for name in ("voxels", "scale_factor"):
+            del file["VTKHDF/PointData/intensity"].attrs[name]
+    np.testing.assert_array_equal(read_volume(tmp_path / "old.vtkhdf")[0], some_volume())
 
 
 def test_it_is_vtk_image_data(tmp_path: Path) -> None:

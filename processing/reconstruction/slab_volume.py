@@ -1,0 +1,52 @@
+"""SlabVolume: a volume that comes slab by slab along y and never lies in memory as a whole."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from processing.reconstruction.voxel_type import VoxelType
+
+SLAB_ROWS = 64
+"""A slab of the paper's volume has 75 MB in float16."""
+
+Slabs = Iterable[tuple[int, NDArray[Any]]]
+
+
+@dataclass(frozen=True, eq=False)
+class SlabVolume:
+    """A volume in slabs.
+
+    Parameters
+    ----------
+    slabs : iterable of (int, (nz, rows, nx) array)
+        First row y and voxels of slabs of ``SLAB_ROWS`` rows, in order; the last has what is left. The memory of a
+        slab may be used again for the next one.
+    voxels : VoxelType
+        How they are stored.
+    unit : float
+        Intensity of a voxel of 1.
+    """
+
+    slabs: Slabs
+    voxels: VoxelType
+    unit: float
+
+    @classmethod
+    def of(cls, volume: NDArray[Any]) -> "SlabVolume":
+        """Slabs of a volume (z, y, x) of float32, float16 or uint8, in which 255 is 1."""
+        voxels = VoxelType(volume.dtype.name)
+        return cls(slabs_of(volume), voxels, voxels.unit)
+
+    def intensities(self) -> Iterator[tuple[int, NDArray[np.float32]]]:
+        """The slabs in float32, whatever their type."""
+        for first_row, slab in self.slabs:
+            yield first_row, np.multiply(slab, np.float32(self.unit), dtype=np.float32)
+
+
+def slabs_of(volume: NDArray[Any]) -> Iterator[tuple[int, NDArray[Any]]]:
+    """First row and voxels of each slab of a volume (z, y, x), without a copy."""
+    for first_row in range(0, volume.shape[1], SLAB_ROWS):
+        yield first_row, volume[:, first_row : first_row + SLAB_ROWS]

@@ -1,0 +1,18 @@
+"""VoxelType: how finely the voxels of a volume are told apart."""
+
+from enum import StrEnum
+
+
+class VoxelType(StrEnum):
+    """Type of the voxels that kernels write. Named as numpy names it."""
+
+    FLOAT32 = "float32"
+    FLOAT16 = "float16"
+    """11 significant bits, more than most cameras have."""
+    UINT8 = "uint8"
+    """256 steps."""
+
+    @property
+    def unit(self) -> float:
+        """Intensity of a voxel of 1, where an intensity of 1 is the largest."""
+        return 1 / 255 if self is VoxelType.UINT8 else 1.0
