@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from processing.preprocessing import Intensity
-from processing.reconstruction.volume_file import VolumeFileError, read_volume
+from processing.reconstruction.volume_file import VolumeFileError, open_volume
 from processing.volume import VoxelGrid
 
 FrameName = Literal["a", "b"]
@@ -56,12 +56,14 @@ def average_volumes(files: list[Path]) -> tuple[Intensity, VoxelGrid]:
     """
     if not files:
         raise VolumeFileError("there are no volumes to average")
-    first, grid, _ = read_volume(files[0])
-    total = first.astype(np.float32)
-    for file in files[1:]:
-        volume, its_grid, _ = read_volume(file)
-        if its_grid != grid:
-            raise VolumeFileError(f"{file}: its grid {its_grid} differs from {grid}, that of {files[0].name}")
-        total += volume
+    with open_volume(files[0]) as first:
+        grid = first.grid
+    total = np.zeros(grid.shape, np.float32)
+    for file in files:
+        with open_volume(file) as volume:
+            if volume.grid != grid:
+                raise VolumeFileError(f"{file}: its grid {volume.grid} differs from {grid}, that of {files[0].name}")
+            for first_row, slab in volume.slabs():
+                total[:, first_row : first_row + slab.shape[1]] += slab
     total /= np.float32(len(files))
     return total, grid

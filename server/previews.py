@@ -8,7 +8,7 @@ that no droplet disappears. A small volume is its own preview.
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,10 +58,22 @@ class VolumePreview:
         return np.asarray(self.voxels.max(axis=AXES.index(axis)), np.uint8)
 
 
-def make_preview(volume: NDArray[Any], grid: VoxelGrid, longest_axis: int = LONGEST_AXIS) -> VolumePreview:
-    """Reduce a volume (z, y, x) of non-negative values to block maxima."""
+class Planes(Protocol):
+    """A volume (z, y, x) that gives away some planes: an array, or an open file."""
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Number of voxels (nz, ny, nx)."""
+
+    def __getitem__(self, planes: slice, /) -> NDArray[Any]:
+        """Planes z."""
+
+
+def make_preview(volume: Planes, grid: VoxelGrid, longest_axis: int = LONGEST_AXIS) -> VolumePreview:
+    """Reduce a volume (z, y, x) of non-negative values to block maxima; one layer of blocks in memory at a time."""
     factor = math.ceil(max(volume.shape) / longest_axis)
-    reduced = _block_maxima(volume, factor).astype(np.float32)
+    starts = range(0, volume.shape[0], factor)
+    reduced = np.concatenate([_block_maxima(volume[z : z + factor], factor) for z in starts]).astype(np.float32)
     limit = float(reduced.max())
     voxels = np.clip(np.rint(reduced * (255.0 / limit if limit > 0 else 0.0)), 0, 255).astype(np.uint8)
     return VolumePreview(voxels, _coarser(grid, factor, voxels.shape), limit, grid.shape)

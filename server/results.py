@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import Any
 
 from daq.run_plan import FrozenModel
-from processing.reconstruction.volume_file import read_volume
+from processing.reconstruction.volume_file import open_volume
 from processing.results_file import volume_files
 from server.previews import VolumePreview, load_preview, make_preview, preview_path, save_preview
 from server.problems import NotFound
 from server.surfaces import surface_glb
 
-_MAKING = threading.Lock()  # a full volume takes gigabytes: one at a time
+_MAKING = threading.Lock()  # a full volume takes seconds: who waits for a preview does not make it again
 
 
 class VolumeSummary(FrozenModel):
@@ -58,8 +58,8 @@ def preview_of(volume: Path) -> VolumePreview:
 
 def write_preview(volume: Path) -> None:
     """Read a volume and leave its preview beside it."""
-    voxels, grid, _ = read_volume(volume)
-    save_preview(preview_path(volume), make_preview(voxels, grid))
+    with open_volume(volume) as stored:
+        save_preview(preview_path(volume), make_preview(stored, stored.grid))
 
 
 @lru_cache(maxsize=16)

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from processing.reconstruction.volume_file import open_volume, write_volume
 from processing.volume import VoxelGrid
 from server.previews import load_preview, make_preview, save_preview
 
@@ -37,6 +38,18 @@ def test_a_small_volume_is_its_own_preview(tmp_path: Path) -> None:
     np.testing.assert_allclose(preview.voxels / 255 * 2, volume, atol=0.005)
     np.testing.assert_array_equal(preview.plane("y", 3), preview.voxels[:, 3])
     np.testing.assert_array_equal(preview.projection("x"), preview.voxels.max(axis=2))
+
+
+def test_a_file_has_the_preview_of_its_volume(tmp_path: Path) -> None:
+    volume = np.random.default_rng(2).random((9, 130, 11)).astype(np.float32)
+    grid = VoxelGrid.centred(volume.shape, 0.1)
+    write_volume(tmp_path / "v.vtkhdf", volume, grid, {})
+    with open_volume(tmp_path / "v.vtkhdf") as stored:
+        by_layers = make_preview(stored, stored.grid, 30)
+    whole = make_preview(volume, grid, 30)
+    assert (by_layers.grid, by_layers.limit, by_layers.full_shape) == (whole.grid, whole.limit, whole.full_shape)
+    np.testing.assert_array_equal(by_layers.voxels, whole.voxels)
+    assert by_layers.voxels.max() == 255
 
 
 def test_an_empty_volume_has_an_empty_preview() -> None:
