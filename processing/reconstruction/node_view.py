@@ -54,14 +54,13 @@ class NodeView:
         width, height = (n // self.binning + FRAME_BEFORE_PX + FRAME_AFTER_PX for n in self.image_size_px)
         return height, width
 
-    def resample(self, image: NDArray[np.float32], threads: int) -> FixedPoint:
-        """The image, averaged and framed with zeros."""
+    def resample(self, image: NDArray[np.float32], out: NDArray[np.int16], threads: int) -> FixedPoint:
+        """The image, averaged and framed with zeros, in ``out``."""
         if self.binning > 1:
             height, width = (n // self.binning * self.binning for n in image.shape)
             blocks = image[:height, :width].reshape(height // self.binning, self.binning, -1, self.binning)
             image = blocks.mean(axis=(1, 3), dtype=np.float32)
-        framed = np.empty(self.shape_px, np.int16)
-        return FixedPoint(framed, _native.quantise(image, FRAME_BEFORE_PX, FRAME_AFTER_PX, framed, threads))
+        return FixedPoint(out, _native.quantise(image, FRAME_BEFORE_PX, FRAME_AFTER_PX, out, threads))
 
     def bind(self, image: FixedPoint, *, cull: bool) -> _native.View:
         """A resampled image with the geometry of this view, for the kernels."""

@@ -47,7 +47,12 @@ class Plan:
         """Memory that the resampled images of one exposure take."""
         return sum(2 * view.shape_px[0] * view.shape_px[1] for view in self.views)
 
-    def resample(self, images: Sequence[NDArray[np.float32]], threads: int = DEFAULT_THREADS) -> list[FixedPoint]:
+    def resample(
+        self,
+        images: Sequence[NDArray[np.float32]],
+        threads: int = DEFAULT_THREADS,
+        out: Sequence[NDArray[np.int16]] | None = None,
+    ) -> list[FixedPoint]:
         """Bring recorded images into the form that the kernels sample.
 
         Parameters
@@ -56,20 +61,23 @@ class Plan:
             Inverted shadow intensities, one image per view; less than 0 counts as 0.
         threads : int
             The result does not depend on it.
+        out : sequence of int16 arrays, optional
+            Receive the images, which have the ``shape_px`` of the views; by default new ones.
 
         Raises
         ------
         ValueError
             Number or shape of the images do not fit the plan.
         """
+        memory = [np.empty(view.shape_px, np.int16) for view in self.views] if out is None else out
         if len(images) != len(self.views):
             raise ValueError(f"{len(images)} images for a plan of {len(self.views)} views")
         for number, (image, view) in enumerate(zip(images, self.views, strict=True)):
             if np.shape(image) != view.image_size_px[::-1]:
                 raise ValueError(f"image {number} has shape {np.shape(image)}, its view {view.image_size_px[::-1]}")
         return [
-            view.resample(np.ascontiguousarray(image, dtype=np.float32), threads)
-            for image, view in zip(images, self.views, strict=True)
+            view.resample(np.ascontiguousarray(image, dtype=np.float32), pixels, threads)
+            for image, pixels, view in zip(images, memory, self.views, strict=True)
         ]
 
     def bind(self, resampled: Sequence[FixedPoint], *, cull: bool = True) -> list[_native.View]:

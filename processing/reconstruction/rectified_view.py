@@ -69,10 +69,9 @@ class RectifiedView:
     image_size_px: tuple[int, int]
     deviation_px: float
 
-    def resample(self, image: NDArray[np.float32], threads: int) -> FixedPoint:
-        """The image on the plane z_ref: cubic, zero outside of the recorded image, limited to what that contains."""
-        pixels = np.empty(self.shape_px, np.int16)
-        return FixedPoint(pixels, _native.resample(image, self.nodes_px, pixels, threads))
+    def resample(self, image: NDArray[np.float32], out: NDArray[np.int16], threads: int) -> FixedPoint:
+        """The image on the plane z_ref, in ``out``: cubic, zero outside of the recorded image, limited to its range."""
+        return FixedPoint(out, _native.resample(image, self.nodes_px, out, threads))
 
     def bind(self, image: FixedPoint, *, cull: bool) -> _native.View:
         """A resampled image with the geometry of this view, for the kernels."""

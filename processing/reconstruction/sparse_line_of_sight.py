@@ -4,16 +4,14 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import DTypeLike, NDArray
+from numpy.typing import NDArray
 
 from processing.reconstruction.kernels import _native
 from processing.reconstruction.line_of_sight import DEFAULT_THREADS, kernel_method
 from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.plan import Plan
+from processing.reconstruction.slab_volume import SLAB_ROWS
 from processing.reconstruction.sparse_volume import SparseVolume
-
-SLAB_ROWS = 64
-"""A slab of the paper's volume has 75 MB in float16."""
 
 
 def sparse_line_of_sight(
@@ -49,41 +47,44 @@ def slabs_of_sight(
     images: Sequence[NDArray[np.float32]],
     method: ReconstructionMethod = ReconstructionMethod.MLOS,
     *,
-    rows: int = SLAB_ROWS,
-    dtype: DTypeLike = np.float16,
+    out: NDArray[Any] | None = None,
+    resampled: Sequence[NDArray[np.int16]] | None = None,
     threads: int = DEFAULT_THREADS,
 ) -> Iterator[tuple[int, NDArray[Any]]]:
-    """Reconstruct a volume slab by slab, for statistics that need no more.
+    """Reconstruct a volume slab by slab, for all that needs no more at once.
 
     Parameters
     ----------
     plan, images, method, threads
         As ``line_of_sight`` takes them.
-    rows : int
-        Rows y of a slab; the last one has what is left.
-    dtype : data type
-        float32, float16 or uint8.
+    out : (nz, rows, nx) float32, float16 or uint8 array, optional
+        Receives one slab after the other, of so many rows y; the last one has what is left. By default new memory
+        of ``SLAB_ROWS`` rows of float16.
+    resampled : sequence of int16 arrays, optional
+        As ``Plan.resample`` takes them; memory that is used again is faster.
 
     Yields
     ------
     int
         The slab's first row y in the volume.
     (nz, rows, nx) array
-        The slab; its memory is used again for the next one.
+        The slab, in ``out``; its memory is used again for the next one.
 
     Raises
     ------
     ValueError
-        ``rows`` is not positive, images do not fit the plan, or the method is an iterative one.
+        ``out`` has no rows or other planes and columns than the grid, images do not fit the plan, or the method is
+        an iterative one.
     """
     number = kernel_method(method)
-    if rows < 1:
-        raise ValueError(f"slabs of {rows} rows, they need one or more")
-    views = plan.bind(plan.resample(images, threads))
     nz, ny, nx = plan.grid.shape
-    memory = np.empty(nz * min(rows, ny) * nx, dtype)
+    memory = np.empty((nz, min(SLAB_ROWS, ny), nx), np.float16) if out is None else out
+    rows = memory.shape[1]
+    if rows < 1 or memory.shape != (nz, rows, nx):
+        raise ValueError(f"slabs of shape {memory.shape}, they need ({nz}, one or more, {nx})")
+    views = plan.bind(plan.resample(images, threads, resampled))
     for first_row in range(0, ny, rows):
         here = min(rows, ny - first_row)
-        slab = memory[: nz * here * nx].reshape(nz, here, nx)
+        slab = memory.reshape(-1)[: nz * here * nx].reshape(nz, here, nx)
         _native.line_of_sight(views, number, slab, threads, first_row, ny)
         yield first_row, slab

@@ -126,7 +126,10 @@ def test_bricks_slabs_and_means_are_the_same_volume(
     with instruction_set(isa):
         volume = line_of_sight(plan, images, method, np.empty(plan.grid.shape, np.float16))
         bricks = sparse_line_of_sight(plan, images, method, floor=floor)
-        slabs = np.concatenate([slab.copy() for _, slab in slabs_of_sight(plan, images, method, rows=rows)], axis=1)
+        out = np.empty((plan.grid.shape[0], rows, plan.grid.shape[2]), np.float16)
+        used = [np.full(view.shape_px, 99, np.int16) for view in plan.views]
+        streamed = slabs_of_sight(plan, images, method, out=out, resampled=used)
+        slabs = np.concatenate([slab.copy() for _, slab in streamed], axis=1)
         mean = mean_line_of_sight(plan, [images, images, images], method)
     dense = bricks.dense()
     np.testing.assert_array_equal(dense[dense != 0], volume[dense != 0])
@@ -176,8 +179,9 @@ def test_bricks_take_little_memory_and_come_in_any_format() -> None:
 def test_streams_and_bricks_refuse_what_does_not_fit() -> None:
     grid, mappings = VoxelGrid.centred((3, 4, 5), PITCH_MM), oracle.cameras(2)
     plan, images = plan_reconstruction(mappings, grid), [np.ones(m.image_size_px[::-1], np.float32) for m in mappings]
-    with pytest.raises(ValueError, match="slabs of 0 rows"):
-        next(slabs_of_sight(plan, images, rows=0))
+    for shape in ((3, 0, 5), (3, 4, 6)):
+        with pytest.raises(ValueError, match=r"slabs of shape \(3, .*\), they need \(3, one or more, 5\)"):
+            next(slabs_of_sight(plan, images, out=np.empty(shape, np.float16)))
     for make in (sparse_line_of_sight, lambda *given: next(slabs_of_sight(*given))):
         with pytest.raises(ValueError, match="smart is not a line-of-sight method"):
             make(plan, images, ReconstructionMethod.SMART)
