@@ -3,13 +3,14 @@
 import json
 import resource
 import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
-import numpy as np
+from numpy.typing import NDArray
 
 from daq.run_file import RUN_FILE
 from daq.shotfile import RunReader, Shot
@@ -18,15 +19,15 @@ from processing.calibration.calibration_file import file_sha256, load_calibratio
 from processing.calibration.errors import CalibrationError
 from processing.preprocessing import Intensity, Preprocessing, intensity
 from processing.reconstruction.common_volume import common_volume
-from processing.reconstruction.line_of_sight import line_of_sight
 from processing.reconstruction.method import ReconstructionMethod
-from processing.reconstruction.plan import Plan, plan_reconstruction
+from processing.reconstruction.plan import plan_reconstruction
 from processing.reconstruction.planned_view import PlannedView
 from processing.reconstruction.settings import FrozenValue, GridSettings, ReconstructionSettings
-from processing.reconstruction.smart import mart, smart
-from processing.reconstruction.volume_file import write_volume
+from processing.reconstruction.slab_volume import Slabs
+from processing.reconstruction.volume_file import write_slabs
 from processing.results_file import FrameName, Provenance, claim_results, volume_path
 from processing.volume import VoxelGrid
+from processing.workbench import Workbench
 
 _References = dict[str, tuple[Intensity | None, Intensity | None]]
 
@@ -113,7 +114,7 @@ def reconstruct_shot(
             if should_stop():
                 raise Stopped(f"{run_dir.name}, shot {shot}: stopped before exposure {frame}")
             images = shot_intensities(run, recorded, frame, settings, bench.images)
-            volumes.append(_reconstruct_frame(bench, images, settings, results_dir, shot, frame, provenance))
+            volumes.append(_reconstruct_frame(bench, images, results_dir, shot, frame, provenance))
     return ShotResult(
         shot=shot,
         method=settings.method,
@@ -123,25 +124,6 @@ def reconstruct_shot(
         cpu_s=time.process_time() - started_cpu_s,
         peak_rss_mb=resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
     )
-
-
-def reconstruct(
-    plan: Plan, images: Sequence[Intensity], settings: ReconstructionSettings, out: Intensity
-) -> tuple[float, ...]:
-    """Reconstruct one exposure by the method of the settings; ``out`` (z, y, x) receives it. Returns the residuals."""
-    if not settings.method.iterative:
-        line_of_sight(plan, images, settings.method, out)
-        return ()
-    solve = smart if settings.method is ReconstructionMethod.SMART else mart
-    result = solve(
-        plan,
-        images,
-        iterations=settings.iterations,
-        relaxation=settings.relaxation,
-        least_gain=settings.least_gain,
-        out=out,
-    )
-    return result.residuals
 
 
 def default_grid(calibration: Calibration, pitch_mm: float | None = None) -> VoxelGrid:
@@ -195,30 +177,37 @@ def _read_references(run_dir: Path, _written_ns: int) -> _References:
         return {view: (run.dark(view), run.background(view)) for view in run.header.views}
 
 
-@dataclass(frozen=True, eq=False)
-class _Workbench:
-    """What the shots of a run share: first touch of fresh memory costs more than a reconstruction."""
+class _Clocked:
+    """Slabs, and the seconds that they took to come."""
 
-    plan: Plan
-    images: tuple[Intensity, ...]
-    volume: Intensity
+    def __init__(self, slabs: Slabs) -> None:
+        self._slabs = iter(slabs)
+        self.seconds = 0.0
+
+    def __iter__(self) -> Iterator[tuple[int, NDArray[Any]]]:
+        return self
+
+    def __next__(self) -> tuple[int, NDArray[Any]]:
+        started_s = time.perf_counter()
+        try:
+            return next(self._slabs)
+        finally:
+            self.seconds += time.perf_counter() - started_s
 
 
 def _reconstruct_frame(
-    bench: _Workbench,
-    images: list[Intensity],
-    settings: ReconstructionSettings,
-    results_dir: Path,
-    shot: int,
-    frame: FrameName,
-    provenance: Provenance,
+    bench: Workbench, images: list[Intensity], results_dir: Path, shot: int, frame: FrameName, provenance: Provenance
 ) -> VolumeRecord:
+    """Slabs are written as they are made; the time of writing does not count."""
     started_s = time.perf_counter()
-    residuals = reconstruct(bench.plan, images, settings, bench.volume)
-    seconds = round(time.perf_counter() - started_s, 4)
+    volume, residuals = bench.reconstruct(images)
+    begun_s = time.perf_counter() - started_s
+    slabs = _Clocked(volume.slabs)
     file = volume_path(results_dir, shot, frame)
     convergence = {"residuals": json.dumps(residuals)} if residuals else {}
-    write_volume(file, bench.volume, bench.plan.grid, {**provenance, "shot": shot, "frame": frame, **convergence})
+    named = {**provenance, "shot": shot, "frame": frame, **convergence}
+    write_slabs(file, replace(volume, slabs=slabs), bench.plan.grid, named)
+    seconds = round(begun_s + slabs.seconds, 4)
     return VolumeRecord(shot=shot, frame=frame, file=file.name, seconds=seconds, residuals=residuals)
 
 
@@ -266,12 +255,11 @@ def _provenance(
 @lru_cache(maxsize=1)
 def _workbench(
     calibration_file: Path, _sha256: str, settings: ReconstructionSettings, views: tuple[str, ...]
-) -> _Workbench:
+) -> Workbench:
     calibration = load_calibration(calibration_file)
     grid = settings.grid.to_grid() if settings.grid else default_grid(calibration)
     plan = plan_reconstruction([calibration.views[view].mapping for view in views], grid, settings.accuracy)
-    images = tuple(np.empty(view.image_size_px[::-1], np.float32) for view in plan.views)
-    return _Workbench(plan, images, np.empty(grid.shape, np.float32))
+    return Workbench.of(plan, settings)
 
 
 def _widened(span_mm: tuple[float, float]) -> tuple[float, float]:

@@ -8,12 +8,13 @@ import numpy as np
 
 from daq.shotfile import RunReader
 from processing.calibration.calibration import Calibration
-from processing.pipeline import default_grid, frame_names, reconstruct, require_match, shot_intensities
+from processing.pipeline import default_grid, frame_names, require_match, shot_intensities
 from processing.preprocessing import Intensity
 from processing.reconstruction.mean_line_of_sight import mean_line_of_sight
 from processing.reconstruction.plan import Plan, plan_reconstruction
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.volume import VoxelGrid
+from processing.workbench import Workbench
 
 Exposures = Iterator[list[Intensity]]
 
@@ -98,11 +99,11 @@ def _exposures(
 
 
 def _mean_of_each(plan: Plan, exposures: Exposures, settings: ReconstructionSettings) -> Intensity:
-    mean, volume = np.zeros(plan.grid.shape, np.float32), np.empty(plan.grid.shape, np.float32)
-    count = 0
+    bench, mean, count = Workbench.of(plan, settings), np.zeros(plan.grid.shape, np.float32), 0
     for images in exposures:
-        reconstruct(plan, images, settings, volume)
-        mean += volume
+        volume, _ = bench.reconstruct(images)
+        for first_row, slab in volume.intensities():
+            mean[:, first_row : first_row + slab.shape[1]] += slab
         count += 1
     mean /= np.float32(count)
     return mean

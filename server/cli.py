@@ -20,6 +20,7 @@ from processing.reconstruction.accuracy import Accuracy
 from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.reconstruction.volume_file import VolumeFileError
+from processing.reconstruction.voxel_type import VoxelType
 from server import commands
 from server.average_command import average
 from server.bench_command import BenchError, bench
@@ -162,6 +163,7 @@ def _add_reconstruct(verbs: Any) -> None:
     parser.add_argument("--calibration", type=Path, required=True)
     parser.add_argument("-o", "--out", type=Path, required=True, help="directory of the results")
     _add_reconstruction_options(parser)
+    _add_choice(parser, "voxels", VoxelType)
 
 
 def _add_reconstruction_options(parser: argparse.ArgumentParser) -> None:
@@ -197,6 +199,7 @@ def _add_average(verbs: Any) -> None:
     parser.add_argument("-o", "--out", type=Path, required=True, help="volume file to write; slices beside it")
     parser.add_argument("--calibration", type=Path, help="of the run; no volume of a single exposure is stored")
     _add_reconstruction_options(parser)
+    parser.set_defaults(voxels=VoxelType.FLOAT32.value)  # a mean has finer steps than one exposure
 
 
 def _add_study(verbs: Any) -> None:

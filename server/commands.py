@@ -28,6 +28,7 @@ from processing.pipeline import (
 from processing.reconstruction.accuracy import Accuracy
 from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.settings import GridSettings, ReconstructionSettings
+from processing.reconstruction.voxel_type import VoxelType
 from processing.volume import VoxelGrid
 from server.calibration_pictures import calibration_pictures
 from server.config import load_config
@@ -123,6 +124,7 @@ def reconstruction_settings(options: Namespace, grid: GridSettings) -> Reconstru
     return ReconstructionSettings(
         method=ReconstructionMethod(options.method),
         accuracy=Accuracy(options.accuracy),
+        voxels=VoxelType(options.voxels),
         iterations=options.iterations,
         relaxation=options.relaxation,
         least_gain=options.least_gain,
@@ -145,6 +147,7 @@ def reconstruct_run(options: Namespace) -> dict[str, Any]:
     return {
         "method": options.method,
         "accuracy": options.accuracy,
+        "voxels": options.voxels,
         "grid": grid.model_dump(mode="json"),
         "views": {name: view.model_dump() for name, view in results[0].views.items()},
         "volumes": [volume.model_dump(mode="json") for result in results for volume in result.volumes],

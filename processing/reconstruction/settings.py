@@ -7,6 +7,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from processing.reconstruction.accuracy import Accuracy
 from processing.reconstruction.method import ReconstructionMethod
+from processing.reconstruction.voxel_type import VoxelType
 from processing.volume import VoxelGrid
 
 
@@ -43,6 +44,10 @@ class ReconstructionSettings(FrozenValue):
     accuracy: Annotated[Accuracy, Field(description="fine: two to three times more accurate, at twice the cost")] = (
         Accuracy.NOMINAL
     )
+    voxels: Annotated[
+        VoxelType,
+        Field(description="how volumes are stored: float16 keeps 11 bits in half the file of float32, uint8 256 steps"),
+    ] = VoxelType.FLOAT16
     iterations: Annotated[int, Field(ge=1, le=200, description="of SMART and MART, at most")] = 20
     relaxation: Annotated[float, Field(gt=0, le=2, description="exponent of SMART and MART; the paper's is 1")] = 1.0
     least_gain: Annotated[

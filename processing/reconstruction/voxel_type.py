@@ -1,10 +1,10 @@
-"""VoxelType: how finely the voxels of a volume are told apart."""
+"""VoxelType: how finely the intensities of a volume are told apart."""
 
 from enum import StrEnum
 
 
 class VoxelType(StrEnum):
-    """Type of the voxels that kernels write. Named as numpy names it."""
+    """How finely the intensity of a voxel is kept; named as numpy names the types that the kernels write."""
 
     FLOAT32 = "float32"
     FLOAT16 = "float16"

@@ -12,6 +12,7 @@ from daq.run_plan import RunKind
 from processing.reconstruction.accuracy import Accuracy
 from processing.reconstruction.method import ReconstructionMethod as Method
 from processing.reconstruction.settings import ReconstructionSettings
+from processing.reconstruction.voxel_type import VoxelType
 from server.jobs import Job, JobKind, JobState, calibration_job
 from server.problems import ServerError
 from server.reconstruction import request_reconstruction
@@ -39,6 +40,7 @@ class RunTable:
                     "Method", {method.value: method.value.upper() for method in Method}, chosen.method
                 )
                 self._accuracy = _choice("Accuracy", {one.value: one.value for one in Accuracy}, chosen.accuracy)
+                self._voxels = _choice("Voxels", {one.value: one.value for one in VoxelType}, chosen.voxels)
             self._table = _table(
                 ("name", "Run"), ("kind", "Kind"), ("shots", "Valid / shots"), ("outcome", "Outcome"), ("action", "")
             )
@@ -60,7 +62,11 @@ class RunTable:
         self._context.runner.submit(calibration_job(run_id, f"{run_id}-pinhole", "pinhole"))
 
     def _reconstruct(self, run_id: str) -> None:
-        chosen = {"method": Method(self._method.value), "accuracy": Accuracy(self._accuracy.value)}
+        chosen = {
+            "method": Method(self._method.value),
+            "accuracy": Accuracy(self._accuracy.value),
+            "voxels": VoxelType(self._voxels.value),
+        }
         settings: ReconstructionSettings = self._context.services.settings.model_copy(update=chosen)
         request_reconstruction(self._context, run_id, None, None, settings)
 

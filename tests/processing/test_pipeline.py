@@ -22,7 +22,8 @@ from processing.pipeline import (
 from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.planned_view import PlannedView
 from processing.reconstruction.settings import GridSettings, ReconstructionSettings
-from processing.reconstruction.volume_file import VolumeFileError, read_volume
+from processing.reconstruction.volume_file import VolumeFileError, open_volume, read_volume
+from processing.reconstruction.voxel_type import VoxelType
 from processing.results_file import average_volumes, volume_files, volume_path
 from processing.volume import VoxelGrid
 from tests.processing.droplet_run import DROPLETS_A_MM, MOTION_MM, SHAPE, write_calibration, write_run
@@ -45,9 +46,13 @@ def reconstructed(run_dir: Path, calibration_file: Path, settings: Reconstructio
     return reconstruct_shot(run_dir, 0, calibration_file, settings, run_dir / "results")
 
 
+@pytest.mark.parametrize("voxels", list(VoxelType))
 @pytest.mark.parametrize("method", list(ReconstructionMethod))
-def test_droplets_peak_where_they_were(run_dir: Path, calibration_file: Path, method: ReconstructionMethod) -> None:
-    reconstructed(run_dir, calibration_file, SETTINGS.model_copy(update={"method": method, "iterations": 3}))
+def test_droplets_peak_where_they_were(
+    run_dir: Path, calibration_file: Path, method: ReconstructionMethod, voxels: VoxelType
+) -> None:
+    settings = SETTINGS.model_copy(update={"method": method, "iterations": 3, "voxels": voxels})
+    reconstructed(run_dir, calibration_file, settings)
     for frame, moved_mm in (("a", 0 * MOTION_MM), ("b", MOTION_MM)):
         volume, grid, _ = read_volume(run_dir / "results" / f"shot_00000_{frame}.vtkhdf")
         for expected in np.rint(grid.to_index(DROPLETS_A_MM + moved_mm)).astype(int):
@@ -139,12 +144,28 @@ def test_results_id_tells_settings_and_calibrations_apart() -> None:
     assert SETTINGS.results_id("monday").startswith("mlos-")
 
 
-def test_the_average_is_the_mean(run_dir: Path, calibration_file: Path) -> None:
-    reconstructed(run_dir, calibration_file)
+@pytest.mark.parametrize("voxels", list(VoxelType))
+def test_the_average_is_the_mean(run_dir: Path, calibration_file: Path, voxels: VoxelType) -> None:
+    reconstructed(run_dir, calibration_file, SETTINGS.model_copy(update={"voxels": voxels}))
     files = volume_files(run_dir / "results")
     mean, grid = average_volumes(files)
     assert grid == GRID
     np.testing.assert_allclose(mean, (read_volume(files[0])[0] + read_volume(files[1])[0]) / 2, atol=1e-7)
+
+
+def test_volumes_of_all_types_agree_and_name_theirs(run_dir: Path, calibration_file: Path) -> None:
+    volumes = {}
+    for voxels in VoxelType:
+        settings = SETTINGS.model_copy(update={"voxels": voxels})
+        reconstruct_shot(run_dir, 0, calibration_file, settings, run_dir / voxels)
+        with open_volume(volume_path(run_dir / voxels, 0, "a")) as stored:
+            assert stored.voxels.attrs["voxels"] == voxels
+            assert ReconstructionSettings.model_validate_json(str(stored.provenance["settings"])) == settings
+            volumes[voxels] = stored[:]
+    single = volumes[VoxelType.FLOAT32]
+    assert single.max() > 0.5
+    np.testing.assert_allclose(volumes[VoxelType.FLOAT16], single, rtol=2.0**-11, atol=2.0**-25)
+    np.testing.assert_allclose(volumes[VoxelType.UINT8], single, atol=0.51 / 255)
 
 
 def test_volumes_on_different_grids_have_no_average(run_dir: Path, calibration_file: Path) -> None:

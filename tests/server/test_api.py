@@ -1,3 +1,4 @@
+import json
 import struct
 import threading
 from typing import Any
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from processing.reconstruction.settings import ReconstructionSettings
 from tests.server.serving import DEADLINE_S, Serving, plan_of
 
 
@@ -17,7 +19,7 @@ def decode(png: bytes) -> NDArray[Any]:
     return pixels
 
 
-def wait_for_jobs(server: Serving, count: int, kind: str = "reconstruction") -> list[dict[str, object]]:
+def wait_for_jobs(server: Serving, count: int, kind: str = "reconstruction") -> list[dict[str, Any]]:
     """Jobs of a kind, once that many have ended."""
     events = server.services.events
     changed = threading.Event()
@@ -123,6 +125,12 @@ def test_recorded_shots_are_reconstructed_by_themselves(server: Serving) -> None
     assert len(server.http.get("/api/jobs", params={"run_id": run_id, "kind": "reconstruction"}).json()) == 2
     again = server.http.post("/api/jobs", json={"run_id": run_id})
     assert [job["state"] for job in again.json()] == ["done", "done"]
+    chosen = {"method": "minlos", "accuracy": "fine", "voxels": "uint8"}
+    server.http.post("/api/jobs", json={"run_id": run_id, "shots": [1], "settings": chosen})
+    newest, *_ = wait_for_jobs(server, 3)
+    assert newest["settings"] == ReconstructionSettings.model_validate(chosen).model_dump(mode="json")
+    finest, *_ = server.http.get(f"/api/runs/{run_id}/results").json()
+    assert json.loads(finest["provenance"]["settings"]) == newest["settings"]
 
 
 def test_an_invalid_shot_is_recorded_and_not_reconstructed(server: Serving) -> None:

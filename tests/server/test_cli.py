@@ -48,7 +48,7 @@ def test_reconstruct_tells_grid_and_volumes(
 ) -> None:
     arguments = ["reconstruct", run_dir, "--calibration", calibration_file, "-o", tmp_path / "out", f"--grid={GRID}"]
     result = told(capsys, *arguments)
-    assert (result["method"], result["accuracy"]) == ("mlos", "nominal")
+    assert (result["method"], result["accuracy"], result["voxels"]) == ("mlos", "nominal", "float16")
     assert result["grid"] == {"shape": [21, 21, 21], "origin_mm": [-1, -1, -1], "pitch_mm": 0.1}
     assert [(volume["shot"], volume["frame"]) for volume in result["volumes"]] == [
         (0, "a"),
@@ -110,10 +110,12 @@ def test_finer_images_are_asked_for_by_name(
     assert 0 < np.abs(volumes[1][0] - volumes[0][0]).max() < 0.2
 
 
+@pytest.mark.parametrize("voxels", ["float32", "float16", "uint8"])
 def test_average_of_results(
-    run_dir: Path, calibration_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    voxels: str, run_dir: Path, calibration_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    told(capsys, "reconstruct", run_dir, "--calibration", calibration_file, "-o", tmp_path / "out", f"--grid={GRID}")
+    common = ["reconstruct", run_dir, "--calibration", calibration_file, f"--grid={GRID}"]
+    assert told(capsys, *common, "-o", tmp_path / "out", "--voxels", voxels)["voxels"] == voxels
     result = told(capsys, "average", tmp_path / "out", "-o", tmp_path / "mean.vtkhdf")
     assert result["volumes"] == 4
     assert read_volume(tmp_path / "mean.vtkhdf")[0].shape == (21, 21, 21)

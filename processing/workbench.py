@@ -1,0 +1,96 @@
+"""Workbench: what the exposures of a run share, so that each reconstruction finds its memory warm."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from processing.preprocessing import Intensity
+from processing.reconstruction.block_slabs import slabs_of_blocks
+from processing.reconstruction.method import ReconstructionMethod
+from processing.reconstruction.plan import Plan
+from processing.reconstruction.settings import ReconstructionSettings
+from processing.reconstruction.slab_volume import SLAB_ROWS, SlabVolume
+from processing.reconstruction.smart import mart, smart
+from processing.reconstruction.sparse_line_of_sight import slabs_of_sight
+from processing.reconstruction.voxel_type import VoxelType
+
+
+@dataclass(frozen=True, eq=False)
+class Workbench:
+    """A plan with the memory that reconstructions by it use again: fresh memory costs more than they do.
+
+    Parameters
+    ----------
+    plan : Plan
+        Geometry of views and grid.
+    settings : ReconstructionSettings
+        Method, options and type of voxels.
+    images : tuple of (rows, columns) float32 arrays
+        For preprocessed images, one per view.
+    resampled : tuple of (rows, columns) int16 arrays
+        For what the kernels sample, one per view.
+    memory : (nz, rows, nx) array
+        For a slab of the volume; for the whole of it where SMART or MART fills it block by block.
+    """
+
+    plan: Plan
+    settings: ReconstructionSettings
+    images: tuple[Intensity, ...]
+    resampled: tuple[NDArray[np.int16], ...]
+    memory: NDArray[Any]
+
+    @classmethod
+    def of(cls, plan: Plan, settings: ReconstructionSettings) -> "Workbench":
+        """A workbench with all its memory."""
+        return cls(
+            plan,
+            settings,
+            images=tuple(np.empty(view.image_size_px[::-1], np.float32) for view in plan.views),
+            resampled=tuple(np.empty(view.shape_px, np.int16) for view in plan.views),
+            memory=_whole(plan, settings) if settings.method.iterative else _slab(plan, settings),
+        )
+
+    def reconstruct(self, images: Sequence[Intensity]) -> tuple[SlabVolume, tuple[float, ...]]:
+        """Reconstruct one exposure by the method of the settings.
+
+        Parameters
+        ----------
+        images : sequence of (rows, columns) float32 arrays
+            Preprocessed, one per view.
+
+        Returns
+        -------
+        SlabVolume
+            To be used before the next exposure; a line-of-sight method computes each slab when it is asked for.
+        tuple of float
+            The residuals of SMART and MART, see ``processing.reconstruction.smart.SmartResult``.
+        """
+        method, voxels = self.settings.method, self.settings.voxels
+        if method.iterative:
+            return self._refine(images)
+        slabs = slabs_of_sight(self.plan, images, method, out=self.memory, resampled=self.resampled)
+        return SlabVolume(slabs, voxels, voxels.unit), ()
+
+    def _refine(self, images: Sequence[Intensity]) -> tuple[SlabVolume, tuple[float, ...]]:
+        solve = smart if self.settings.method is ReconstructionMethod.SMART else mart
+        result = solve(
+            self.plan,
+            images,
+            iterations=self.settings.iterations,
+            relaxation=self.settings.relaxation,
+            least_gain=self.settings.least_gain,
+        )
+        return slabs_of_blocks(result.blocks, self.settings.voxels, self.memory), result.residuals
+
+
+def _slab(plan: Plan, settings: ReconstructionSettings) -> NDArray[Any]:
+    nz, ny, nx = plan.grid.shape
+    return np.empty((nz, min(SLAB_ROWS, ny), nx), settings.voxels.value)
+
+
+def _whole(plan: Plan, settings: ReconstructionSettings) -> NDArray[Any]:
+    """Bytes need the memory of float16, in which their scale is found first."""
+    return np.empty(plan.grid.shape, np.float32 if settings.voxels is VoxelType.FLOAT32 else np.float16)
