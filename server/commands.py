@@ -159,9 +159,8 @@ def reconstruct_run(options: Namespace) -> dict[str, Any]:
 def _tell_slow_views(result: ShotResult) -> None:
     for name, view in result.views.items():
         if view.reason:
-            progress(
-                f"{name} takes the exact way, which is slower, nodes every {view.node_spacing_voxel}: {view.reason}"
-            )
+            nodes = f"nodes {view.node_spacing_voxel} voxels apart"
+            progress(f"{name} takes the exact way, which is slower ({nodes}): {view.reason}")
 
 
 def parse_grid(text: str, calibration: Calibration) -> VoxelGrid:
