@@ -15,7 +15,6 @@ from processing.reconstruction.settings import ReconstructionSettings
 from processing.reconstruction.slab_volume import SLAB_ROWS, SlabVolume
 from processing.reconstruction.smart import mart, smart
 from processing.reconstruction.sparse_line_of_sight import slabs_of_sight
-from processing.reconstruction.voxel_type import VoxelType
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +32,7 @@ class Workbench:
     resampled : tuple of (rows, columns) int16 arrays
         For what the kernels sample, one per view.
     memory : (nz, rows, nx) array
-        For a slab of the volume; for the whole of it where SMART or MART fills it block by block.
+        For a slab of the volume; no more of it is in memory at once.
     """
 
     plan: Plan
@@ -45,12 +44,13 @@ class Workbench:
     @classmethod
     def of(cls, plan: Plan, settings: ReconstructionSettings) -> "Workbench":
         """A workbench with all its memory."""
+        nz, ny, nx = plan.grid.shape
         return cls(
             plan,
             settings,
             images=tuple(np.empty(view.image_size_px[::-1], np.float32) for view in plan.views),
             resampled=tuple(np.empty(view.shape_px, np.int16) for view in plan.views),
-            memory=_whole(plan, settings) if settings.method.iterative else _slab(plan, settings),
+            memory=np.empty((nz, min(SLAB_ROWS, ny), nx), settings.voxels.value),
         )
 
     def reconstruct(self, images: Sequence[Intensity]) -> tuple[SlabVolume, tuple[float, ...]]:
@@ -84,13 +84,3 @@ class Workbench:
             least_gain=self.settings.least_gain,
         )
         return slabs_of_blocks(result.blocks, self.settings.voxels, self.memory), result.residuals
-
-
-def _slab(plan: Plan, settings: ReconstructionSettings) -> NDArray[Any]:
-    nz, ny, nx = plan.grid.shape
-    return np.empty((nz, min(SLAB_ROWS, ny), nx), settings.voxels.value)
-
-
-def _whole(plan: Plan, settings: ReconstructionSettings) -> NDArray[Any]:
-    """Bytes need the memory of float16, in which their scale is found first."""
-    return np.empty(plan.grid.shape, np.float32 if settings.voxels is VoxelType.FLOAT32 else np.float16)

@@ -1,5 +1,6 @@
 """The blocks of SMART as slabs of a volume, in any type of voxels."""
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -7,8 +8,11 @@ from numpy.typing import NDArray
 
 from processing.reconstruction.kernels import _native
 from processing.reconstruction.plan import DEFAULT_THREADS
-from processing.reconstruction.slab_volume import SlabVolume, slabs_of
+from processing.reconstruction.slab_volume import SlabVolume, slabs_in
 from processing.reconstruction.voxel_type import VoxelType
+
+SEARCH_ROWS = 16
+"""Rows in which the brightest voxel is looked for at a time."""
 
 
 def slabs_of_blocks(
@@ -22,17 +26,29 @@ def slabs_of_blocks(
         The volume.
     voxels : VoxelType
         Of the slabs; 255 is the brightest voxel where they are bytes.
-    out : (z, y, x) float32 or float16 array
-        Memory that the slabs are part of; float16 where voxels are bytes.
+    out : (nz, rows, nx) array of that type
+        Receives one slab after the other; a multiple of 8 rows y, or all.
     threads : int
         The result does not depend on it.
     """
-    blocks.write(out, threads)
-    if voxels is not VoxelType.UINT8:
-        return SlabVolume(slabs_of(out), voxels, voxels.unit)
+    unit = voxels.unit
+    if voxels is VoxelType.UINT8:
+        brightest = _brightest(blocks, threads)
+        blocks.scale(1 / brightest)
+        unit *= brightest
+    return SlabVolume(_written(blocks, out, threads), voxels, unit)
+
+
+def _written(blocks: _native.Blocks, out: NDArray[Any], threads: int) -> Iterator[tuple[int, NDArray[Any]]]:
+    for first_row, slab in slabs_in(out, blocks.shape[1]):
+        blocks.write(slab, threads, first_row)
+        yield first_row, slab
+
+
+def _brightest(blocks: _native.Blocks, threads: int) -> float:
+    """Largest voxel, or 1 where all are empty."""
+    nz, _, nx = blocks.shape
+    halves = np.empty((nz, SEARCH_ROWS, nx), np.float16)
     # halves that are not negative are in the order of their bits, which numpy compares faster
-    brightest = float(out.view(np.int16).max().view(np.float16)) or 1.0
-    counts = out.reshape(-1)[: (out.size + 1) // 2].view(np.uint8)[: out.size].reshape(out.shape)
-    blocks.scale(1 / brightest)
-    blocks.write(counts, threads)
-    return SlabVolume(slabs_of(counts), voxels, brightest * voxels.unit)
+    bits = max(slab.view(np.int16).max() for _, slab in _written(blocks, halves, threads))
+    return float(bits.view(np.float16)) or 1.0

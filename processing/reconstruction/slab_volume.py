@@ -46,6 +46,14 @@ class SlabVolume:
             yield first_row, np.multiply(slab, np.float32(self.unit), dtype=np.float32)
 
 
+def slabs_in(memory: NDArray[Any], grid_rows: int) -> Iterator[tuple[int, NDArray[Any]]]:
+    """First row and memory of each slab of a grid with so many rows y, all in the same memory (nz, rows, nx)."""
+    nz, rows, nx = memory.shape
+    for first_row in range(0, grid_rows, rows):
+        here = min(rows, grid_rows - first_row)
+        yield first_row, memory.reshape(-1)[: nz * here * nx].reshape(nz, here, nx)
+
+
 def slabs_of(volume: NDArray[Any]) -> Iterator[tuple[int, NDArray[Any]]]:
     """First row and voxels of each slab of a volume (z, y, x), without a copy."""
     for first_row in range(0, volume.shape[1], SLAB_ROWS):

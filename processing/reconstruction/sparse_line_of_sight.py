@@ -10,7 +10,7 @@ from processing.reconstruction.kernels import _native
 from processing.reconstruction.line_of_sight import DEFAULT_THREADS, kernel_method
 from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.plan import Plan
-from processing.reconstruction.slab_volume import SLAB_ROWS
+from processing.reconstruction.slab_volume import SLAB_ROWS, slabs_in
 from processing.reconstruction.sparse_volume import SparseVolume
 
 
@@ -83,8 +83,6 @@ def slabs_of_sight(
     if rows < 1 or memory.shape != (nz, rows, nx):
         raise ValueError(f"slabs of shape {memory.shape}, they need ({nz}, one or more, {nx})")
     views = plan.bind(plan.resample(images, threads, resampled))
-    for first_row in range(0, ny, rows):
-        here = min(rows, ny - first_row)
-        slab = memory.reshape(-1)[: nz * here * nx].reshape(nz, here, nx)
+    for first_row, slab in slabs_in(memory, ny):
         _native.line_of_sight(views, number, slab, threads, first_row, ny)
         yield first_row, slab

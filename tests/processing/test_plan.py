@@ -209,6 +209,10 @@ def test_kernels_refuse_geometry_that_leads_outside() -> None:
         projections.smart_pass(blocks, [False], [True, True], 1)
     with pytest.raises(ValueError, match="another shape than the blocks"):
         blocks.write(np.zeros((3, 4, 6), np.float32), 1)
+    first = volume[:, :1].copy()
+    for first_row, message in ((-8, "more rows"), (volume.shape[1], "more rows"), (1, "multiple of 8")):
+        with pytest.raises(ValueError, match=message):
+            blocks.write(first, 1, first_row)
 
 
 def test_resampling_refuses_what_does_not_fit() -> None:

@@ -206,6 +206,10 @@ def test_blocks_are_few_and_lose_nothing(by_nodes: bool) -> None:
         stored = np.full(GRID.shape, 9, np.float32)
         blocks.write(stored, 2)
         np.testing.assert_allclose(stored, dense, rtol=2**-11, atol=most * 2**-32)
+        for first_row, rows in ((0, 8), (8, 13), (40, GRID.shape[1] - 40)):
+            part = np.full((GRID.shape[0], rows, GRID.shape[2]), 9, np.float32)
+            blocks.write(part, 2, first_row)
+            np.testing.assert_array_equal(part, stored[:, first_row : first_row + rows])
 
 
 def test_stop_ends_it_and_sees_the_residual() -> None:

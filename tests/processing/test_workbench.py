@@ -76,8 +76,9 @@ def test_an_empty_exposure_is_an_empty_volume(plan: Plan, voxels: VoxelType) -> 
         assert not volume.any()
 
 
-def test_a_line_of_sight_needs_one_slab_of_memory(plan: Plan) -> None:
-    bench = bench_of(plan, ReconstructionMethod.MLOS, VoxelType.FLOAT16)
+@pytest.mark.parametrize("method", [ReconstructionMethod.MLOS, ReconstructionMethod.SMART])
+def test_one_slab_of_memory_is_enough(plan: Plan, method: ReconstructionMethod) -> None:
+    bench = bench_of(plan, method, VoxelType.FLOAT16)
     assert bench.memory.nbytes == 9 * SLAB_ROWS * 37 * 2
     volume, _ = bench.reconstruct(exposure(plan, 1))
     assert all(np.shares_memory(slab, bench.memory) for _, slab in volume.slabs)

@@ -71,9 +71,10 @@ void Blocks::pass(const Kernels &kernels, const std::vector<View> &views, const 
     if (job.n_updates) gain_ = 1.0f;
 }
 
-void Blocks::write(const Kernels &kernels, Format format, void *volume, int threads) {
-    for_each(static_cast<int>(slabs_.size()), threads, [&](int slab) {
-        kernels.write_blocks(shape_, slab, slabs_[slab].list(), unit(), format, volume);
+void Blocks::write(const Kernels &kernels, Format format, void *volume, int first_row, int rows, int threads) {
+    const Shape part{shape_.nz, rows, shape_.nx};
+    for_each((rows + smart_rows - 1) / smart_rows, threads, [&](int slab) {
+        kernels.write_blocks(part, slab, slabs_[first_row / smart_rows + slab].list(), unit(), format, volume);
     });
 }
 

@@ -29,7 +29,11 @@ public:
     // Intensity of a stored 1, in which projections come.
     float unit() const { return unit_ * gain_; }
     void scale(float factor) { gain_ *= factor; }
-    void write(const Kernels &kernels, Format format, void *volume, int threads);
+    // Rows [first_row, first_row + rows) of the volume; first_row is a multiple of smart_rows.
+    void write(const Kernels &kernels, Format format, void *volume, int first_row, int rows, int threads);
+    void write(const Kernels &kernels, Format format, void *volume, int threads) {
+        write(kernels, format, volume, 0, shape_.ny, threads);
+    }
 
     const Shape &shape() const { return shape_; }
     int64_t count() const;

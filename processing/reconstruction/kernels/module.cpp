@@ -283,14 +283,16 @@ private:
     BandImages images_;
 };
 
-void fill_volume(Blocks &blocks, const AnyVolume &volume, int threads) {
+void fill_volume(Blocks &blocks, const AnyVolume &volume, int threads, int first_row) {
     const Shape shape = shape_of(volume), &stored = blocks.shape();
-    require(shape.nz == stored.nz && shape.ny == stored.ny && shape.nx == stored.nx, "volume: another shape than the blocks");
+    require(shape.nz == stored.nz && shape.nx == stored.nx && shape.ny <= stored.ny, "volume: another shape than the blocks");
+    require(first_row >= 0 && first_row <= stored.ny - shape.ny, "volume: more rows than the blocks");
+    require(first_row % smart_rows == 0, "volume: the first row must be a multiple of 8");
     require(threads >= 1, "threads must be positive");
     const Kernels &kernels = selected_kernels();
     const Format format = format_of(volume);
     nb::gil_scoped_release release;
-    blocks.write(kernels, format, volume.data(), threads);
+    blocks.write(kernels, format, volume.data(), first_row, shape.ny, threads);
 }
 
 Recorded recorded(const RecordedArray &image) {
@@ -395,7 +397,7 @@ NB_MODULE(_native, module) {
         .def_static("of_volume", &blocks_of_volume, "volume"_a, "most"_a, "threads"_a, "memory"_a = nb::none())
         .def("scale", &Blocks::scale, "factor"_a)
         .def_prop_ro("unit", &Blocks::unit)
-        .def("write", &fill_volume, "volume"_a, "threads"_a)
+        .def("write", &fill_volume, "volume"_a, "threads"_a, "first_row"_a = 0)
         .def_prop_ro("shape", [](const Blocks &blocks) {
             return std::make_tuple(blocks.shape().nz, blocks.shape().ny, blocks.shape().nx);
         })
