@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 from matplotlib.figure import Figure
 
 from processing.studies.accuracy_report import accuracy_figure, accuracy_line, accuracy_statements
+from processing.studies.accuracy_study import CalibrationStudy
 from processing.studies.average import (
     AverageStudy,
     average_figure,
@@ -19,7 +20,7 @@ from processing.studies.average import (
     average_study,
     profile_rows,
 )
-from processing.studies.calibration_accuracy import CalibrationStudy, calibration_study
+from processing.studies.calibration_accuracy import calibration_study
 from processing.studies.density import (
     ALL_SIGMAS_VOXEL,
     DensityRow,

@@ -5,7 +5,7 @@ from itertools import product
 import numpy as np
 
 from processing.calibration.calibration import Model, ParameterCovariance, ViewCalibration
-from processing.calibration.pinhole_fit import PARAMETER_NAMES, camera_derivatives
+from processing.calibration.pinhole_fit import PARAMETER_NAMES, PINHOLE_PARAMETERS, camera_derivatives
 from processing.calibration.polynomial import COEFFICIENT_NAMES, PolynomialMapping, polynomial_derivatives
 from processing.geometry import FloatArray, PinholeCamera, ViewMapping
 
@@ -27,23 +27,58 @@ def parameter_covariance(
     model : Model
         What was fitted.
     """
-    jacobian = _derivatives(mapping, points_mm, model)
     residuals_px = mapping.project(points_mm) - image_px
-    freedom = residuals_px.size - jacobian.shape[1]
-    deviation_px = float(np.sqrt((residuals_px**2).sum() / max(freedom, 1)))
+    freedom = residuals_px.size - len(_names(model))
+    return least_covariance(mapping, points_mm, model, float(np.sqrt((residuals_px**2).sum() / max(freedom, 1))))
+
+
+def least_covariance(mapping: ViewMapping, points_mm: FloatArray, model: Model, noise_px: float) -> ParameterCovariance:
+    """Covariance of the best unbiased fit to points that are seen with normal noise (bound of Cramér and Rao).
+
+    Parameters
+    ----------
+    mapping : ViewMapping
+        The truth, or a fit close to it.
+    points_mm : (N, 3) array
+        The points of the fit.
+    model : Model
+        What is fitted.
+    noise_px : float
+        Standard deviation of the noise, per coordinate.
+    """
+    jacobian = _derivatives(mapping, points_mm, model)
     scale = np.linalg.norm(jacobian, axis=0)
     triangle = np.linalg.qr(jacobian / scale, mode="r")
-    root = deviation_px * np.linalg.inv(triangle) / scale[:, None]
-    names = COEFFICIENT_NAMES if model is Model.POLYNOMIAL else PARAMETER_NAMES[: len(root)]
-    return ParameterCovariance(names, _rounded(np.triu(root)))
+    root = noise_px * np.linalg.inv(triangle) / scale[:, None]
+    return ParameterCovariance(_names(model), _rounded(np.triu(root)))
 
 
 def position_std_px(view: ViewCalibration, points_mm: FloatArray) -> FloatArray | None:
     """Standard deviation (N,) of where a view sees points, as far as its fit is to blame; None where not known."""
     if view.covariance is None:
         return None
-    spread_px = _derivatives(view.mapping, points_mm, view.model) @ view.covariance.root
+    return _lengths_px(image_spread_px(view.mapping, view.covariance, points_mm, view.model))
+
+
+def image_spread_px(
+    mapping: ViewMapping, covariance: ParameterCovariance, points_mm: FloatArray, model: Model
+) -> FloatArray:
+    """What a covariance means in the image: (2 N, P), u before v; times its transpose, the covariance of image points.
+
+    Times P normal deviates it is an error of the image points that such a fit may have.
+    """
+    return np.asarray(_derivatives(mapping, points_mm, model) @ covariance.root, dtype=np.float64)
+
+
+def _lengths_px(spread_px: FloatArray) -> FloatArray:
+    """Root of the variances (N,) of u and v together."""
     return np.asarray(np.sqrt((spread_px**2).sum(axis=1).reshape(-1, 2).sum(axis=1)), dtype=np.float64)
+
+
+def _names(model: Model) -> tuple[str, ...]:
+    if model is Model.POLYNOMIAL:
+        return COEFFICIENT_NAMES
+    return PARAMETER_NAMES if model is Model.PINHOLE_TILTED else PARAMETER_NAMES[:PINHOLE_PARAMETERS]
 
 
 def _derivatives(mapping: ViewMapping, points_mm: FloatArray, model: Model) -> FloatArray:
