@@ -70,7 +70,7 @@ class CalibrationStudy:
     shots : int
         Shots of droplets.
     drift_px : float
-        How far one camera has moved.
+        How far one camera has moved; every view in a direction of its own.
     seed : int
         Of all noise.
     """

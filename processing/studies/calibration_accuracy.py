@@ -73,14 +73,13 @@ def _recovered_drifts(study: CalibrationStudy) -> Iterator[AccuracyRow]:
     cameras = droplet_views(_image_size_px(half_mm))
     calibration = droplet_calibration(cameras, half_mm)
     points_mm = np.random.default_rng(study.seed).uniform(-half_mm, half_mm, (1000, 3))
-    drift_px = study.drift_px * np.array([np.sqrt(0.5), -np.sqrt(0.5)])
     for density_per_mm3 in study.densities_per_mm3:
         rng = np.random.default_rng(study.seed)
         shots = [seen_droplets(cameras, half_mm, density_per_mm3, rng) for _ in range(study.shots)]
         for name in study.views:
             moved, case = list(calibration.views).index(name), f"{density_per_mm3:g} droplets/mm3"
             shifts_px = np.zeros((len(cameras), 2))
-            shifts_px[moved] = drift_px
+            shifts_px[moved] = drift_px(study, moved)
             drifted = [[seen + shift for seen, shift in zip(shot, shifts_px, strict=True)] for shot in shots]
             try:
                 found = self_calibrate(calibration, drifted, "study").calibration
@@ -94,6 +93,12 @@ def _recovered_drifts(study: CalibrationStudy) -> Iterator[AccuracyRow]:
             largest_px = float(np.max(error_px))
             kept = largest_px <= DRIFT_LIMIT_PX
             yield AccuracyRow("drift error", case, name, rms_px(error_px[moved]), largest_px, DRIFT_LIMIT_PX, kept)
+
+
+def drift_px(study: CalibrationStudy, number: int) -> FloatArray:
+    """How far (u, v) a view is moved: in another direction than the views before it, by the golden angle."""
+    angle_rad = np.deg2rad(137.5 * number - 45)
+    return study.drift_px * np.array([np.cos(angle_rad), np.sin(angle_rad)])
 
 
 def _image_size_px(half_mm: FloatArray) -> tuple[int, int]:

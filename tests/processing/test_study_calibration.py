@@ -13,7 +13,7 @@ from processing.studies.accuracy_report import (
     over_ideal,
 )
 from processing.studies.accuracy_study import AccuracyRow, CalibrationStudy, of_quantity
-from processing.studies.calibration_accuracy import calibration_study
+from processing.studies.calibration_accuracy import calibration_study, drift_px
 from processing.studies.fitted_cameras import fitted_cameras, regions_mm, tilted_cameras
 
 SMALL = CalibrationStudy(
@@ -89,6 +89,13 @@ def test_drift_of_every_view_is_recovered(rows: list[AccuracyRow]) -> None:
         assert row.kept
         assert row.maximum is not None
         assert row.maximum < 0.1
+
+
+def test_every_view_drifts_elsewhere() -> None:
+    drifts_px = np.array([drift_px(CalibrationStudy(), number) for number in range(4)])
+    np.testing.assert_allclose(np.linalg.norm(drifts_px, axis=1), 2.0)
+    cosines = (drifts_px @ drifts_px.T / 4)[np.triu_indices(4, 1)]
+    assert np.abs(cosines).max() < np.cos(np.deg2rad(30))
 
 
 def test_statements_give_limit_paper_and_worst_view(rows: list[AccuracyRow]) -> None:
