@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 from matplotlib.figure import Figure
 
-from processing.studies.accuracy_report import accuracy_figure, accuracy_line, accuracy_statements
+from processing.studies.accuracy_report import accuracy_figure, accuracy_line, accuracy_statements, all_kept
 from processing.studies.accuracy_study import CalibrationStudy
 from processing.studies.average import (
     AverageStudy,
@@ -141,7 +141,9 @@ def study_calibration(options: Namespace) -> dict[str, Any]:
     if options.density:
         study = replace(study, densities_per_mm3=tuple(options.density))
     rows = _collected(calibration_study(study), accuracy_line)
-    return _report(options.out, "calibration", rows, accuracy_figure(rows), accuracy_statements(rows))
+    result = _report(options.out, "calibration", rows, accuracy_figure(rows), accuracy_statements(rows))
+    progress(f"every figure within its limit: {'PASSED' if all_kept(rows) else 'FAILED'}")
+    return {**result, "passed": all_kept(rows)}
 
 
 @timed

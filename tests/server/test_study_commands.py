@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from processing.studies.accuracy_study import CalibrationStudy
 from processing.studies.density import DensityStudy
 from server import study_commands
 from server.cli import main
@@ -68,3 +69,29 @@ def test_the_density_study_states_widths_windows_and_subtraction(
     assert methods == ["mlos", "minlos", "gavlos", "smart-5", "smart-10", "smart", "mart-5"]
     assert 0 < result["seconds"]["cpu"] < 60
     assert "mean-subtracted in windows of 64^3 voxel at steps of 32" in progress
+
+
+@pytest.mark.parametrize(("drift_px", "status", "said"), [(2.0, 0, "PASSED"), (40.0, 1, "FAILED")])
+def test_the_calibration_study_says_whether_all_limits_are_kept(
+    drift_px: float,
+    status: int,
+    said: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    small = partial(
+        CalibrationStudy,
+        views=("view1",),
+        z_mm=(-4.5, -1.5, 1.5, 4.5),
+        fits=1,
+        binning=2,
+        photographs=("sharp",),
+        half_mm=(2.0, 1.5, 2.0),
+        drift_px=drift_px,
+    )
+    monkeypatch.setattr(study_commands, "CalibrationStudy", small)
+    assert main(["study", "calibration", "--density", "7", "-o", str(tmp_path), "--json"]) == status
+    output, progress = capsys.readouterr()
+    assert json.loads(output.splitlines()[-1])["passed"] is (status == 0)
+    assert f"every figure within its limit: {said}" in progress
