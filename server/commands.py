@@ -100,6 +100,8 @@ def view_errors(calibration: Calibration) -> dict[str, Any]:
                         "z_mm": plane.z_mm,
                         "mean_error_px": plane.mean_error_px,
                         "rms_px": plane.rms_px,
+                        "max_error_px": plane.max_error_px,
+                        "holdout_error_px": plane.holdout_error_px,
                     }
                     for plane in view.planes
                 ],

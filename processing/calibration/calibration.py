@@ -42,6 +42,10 @@ class PlaneError:
         Mean and root mean square of the distances.
     name : str
         Name of the image, board or level.
+    max_error_px : float | None
+        Largest distance; None in files from before it was kept.
+    holdout_error_px : float | None
+        Mean error of its points when the fit had not seen them; None likewise.
     """
 
     z_mm: float | None
@@ -49,6 +53,8 @@ class PlaneError:
     mean_error_px: float
     rms_px: float
     name: str
+    max_error_px: float | None = None
+    holdout_error_px: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

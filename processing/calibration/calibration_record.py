@@ -3,6 +3,7 @@
 import hashlib
 import json
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -32,6 +33,9 @@ Vector = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
 Matrix = tuple[Vector, Vector, Vector]
 Pair = tuple[FiniteFloat, FiniteFloat]
 NonNegative = Annotated[FiniteFloat, Field(ge=0)]
+
+_LATER = ("parent", "covariance", "candidates_holdout_error_px", "max_error_px", "holdout_error_px")
+"""Fields that files may lack, as they came later."""
 
 
 class _Record(BaseModel):
@@ -69,6 +73,8 @@ class PlaneRecord(_Record):
     n_points: Annotated[int, Field(ge=0)]
     mean_error_px: NonNegative
     rms_px: NonNegative
+    max_error_px: NonNegative | None = None
+    holdout_error_px: NonNegative | None = None
 
 
 class BoardRecord(_Record):
@@ -172,8 +178,9 @@ def json_id(content: Mapping[str, Any]) -> str:
 def to_json(record: CalibrationRecord) -> dict[str, Any]:
     """Record as JSON values; optional fields that are not known are left out, as in files older than they."""
     content = record.model_dump(mode="json", by_alias=True)
-    for described in (content, *content["views"].values()):
-        for optional in ("parent", "covariance", "candidates_holdout_error_px"):
+    views = content["views"].values()
+    for described in (content, *views, *(plane for view in views for plane in view["planes"])):
+        for optional in _LATER:
             if optional in described and described[optional] is None:
                 del described[optional]
     return content
@@ -195,16 +202,7 @@ def _view_record(view: ViewCalibration) -> ViewRecord:
             BoardRecord(name=pose.name, rotation=_matrix(pose.rotation), translation_mm=_vector(pose.translation_mm))
             for pose in view.board_poses
         ),
-        planes=tuple(
-            PlaneRecord(
-                name=plane.name,
-                z_mm=plane.z_mm,
-                n_points=plane.n_points,
-                mean_error_px=plane.mean_error_px,
-                rms_px=plane.rms_px,
-            )
-            for plane in view.planes
-        ),
+        planes=tuple(PlaneRecord(**asdict(plane)) for plane in view.planes),
         covariance=_covariance_record(view.covariance),
         candidates_holdout_error_px=dict(view.candidates_px) or None,
     )

@@ -89,22 +89,20 @@ def board_errors_px(camera: PinholeCamera, board: PlaneObservation, pose: BoardP
     return np.asarray(np.linalg.norm(camera.project(in_camera_mm) - board.image_px, axis=1), dtype=np.float64)
 
 
-def free_pose_holdout_px(boards: Sequence[PlaneObservation], image_size_px: tuple[int, int]) -> float:
-    """Mean error on boards whose image the intrinsics have not seen.
+def free_pose_holdout_px(boards: Sequence[PlaneObservation], image_size_px: tuple[int, int]) -> list[FloatArray]:
+    """Errors on every board when the intrinsics have not seen its image.
 
     The pose of a held-out board comes from every other of its points, its error from the rest.
     """
-    distances_px = []
-    folds = min(FOLDS, len(boards)) if len(boards) > MIN_BOARDS else 0
-    for fold in range(folds):
-        camera = fit_free_poses(
-            [board for number, board in enumerate(boards) if number % FOLDS != fold], image_size_px
-        ).camera
-        distances_px += [_unseen_error_px(camera, board) for board in boards[fold::FOLDS]]
-    if not distances_px:
+    if len(boards) <= MIN_BOARDS:
         camera = fit_free_poses(boards, image_size_px).camera
-        distances_px = [_unseen_error_px(camera, board) for board in boards]
-    return float(np.concatenate(distances_px).mean())
+        return [_unseen_error_px(camera, board) for board in boards]
+    folds = range(min(FOLDS, len(boards)))
+    cameras = [
+        fit_free_poses([board for number, board in enumerate(boards) if number % FOLDS != fold], image_size_px).camera
+        for fold in folds
+    ]
+    return [_unseen_error_px(cameras[number % FOLDS], board) for number, board in enumerate(boards)]
 
 
 def _unseen_error_px(camera: PinholeCamera, board: PlaneObservation) -> FloatArray:

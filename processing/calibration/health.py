@@ -1,6 +1,6 @@
 """Is a calibration to be trusted? Judged by points that the fit has not seen, never by its own residual."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,8 @@ FOLDS = 5
 """Parts that are held out in turn."""
 
 Fit = Callable[[Sequence[PlaneObservation]], ViewMapping]
+HeldOut = list[NDArray[np.bool_]]
+"""Which points (N,) of every plane are held out."""
 
 
 def errors_px(mapping: ViewMapping, plane: PlaneObservation) -> FloatArray:
@@ -35,10 +37,17 @@ def errors_px(mapping: ViewMapping, plane: PlaneObservation) -> FloatArray:
     return np.asarray(np.linalg.norm(mapping.project(plane.points_mm) - plane.image_px, axis=1), dtype=np.float64)
 
 
-def plane_error(plane: PlaneObservation, distances_px: FloatArray) -> PlaneError:
-    """Summary of the errors of one plane."""
-    mean_px, rms_px = float(distances_px.mean()), float(np.sqrt((distances_px**2).mean()))
-    return PlaneError(plane.z_mm, len(plane), mean_px, rms_px, plane.name)
+def plane_error(plane: PlaneObservation, distances_px: FloatArray, holdout_px: FloatArray) -> PlaneError:
+    """Summary of one plane: errors (N,) of its points, and those of the points that were held out of the fit."""
+    return PlaneError(
+        z_mm=plane.z_mm,
+        n_points=len(plane),
+        mean_error_px=float(distances_px.mean()),
+        rms_px=float(np.sqrt((distances_px**2).mean())),
+        name=plane.name,
+        max_error_px=float(distances_px.max()),
+        holdout_error_px=float(holdout_px.mean()),
+    )
 
 
 def judge(holdout_error_px: float, rejected: float = 0.0) -> Verdict:
@@ -79,13 +88,8 @@ def degeneracy(planes: Sequence[PlaneObservation]) -> str | None:
     )
 
 
-def holdout_error_px(planes: Sequence[PlaneObservation], fit: Fit) -> float:
-    """Mean error of points that were held out of the fit, each point once; see ``holdout_distances_px``."""
-    return float(holdout_distances_px(planes, fit).mean())
-
-
-def holdout_distances_px(planes: Sequence[PlaneObservation], fit: Fit) -> FloatArray:
-    """Errors (N,) of points that were held out of the fit, each point once, in an order that the planes alone decide.
+def holdout_distances_px(planes: Sequence[PlaneObservation], fit: Fit) -> list[FloatArray]:
+    """Errors (N,) of the points of every plane, each held out of the fit once.
 
     Whole planes are held out where the others still determine the camera, else every fifth point.
 
@@ -96,14 +100,16 @@ def holdout_distances_px(planes: Sequence[PlaneObservation], fit: Fit) -> FloatA
     fit : callable
         Fits a mapping to planes; may raise CalibrationError.
     """
-    folds = list(_plane_folds(planes))
-    if len(planes) < MIN_PLANES or any(degeneracy(training) for training, _ in folds):
-        folds = list(_point_folds(planes))
-    distances_px = []
-    for training, held_out in folds:
-        mapping = fit(training)
-        distances_px += [errors_px(mapping, plane) for plane in held_out if len(plane)]
-    return np.concatenate(distances_px)
+    folds = _plane_folds(planes)
+    if len(planes) < MIN_PLANES or any(degeneracy(_training(planes, held_out)) for held_out in folds):
+        folds = _point_folds(planes)
+    distances_px = [np.zeros(len(plane)) for plane in planes]
+    for held_out in folds:
+        mapping = fit(_training(planes, held_out))
+        for plane, mask, distance_px in zip(planes, held_out, distances_px, strict=True):
+            if mask.any():
+                distance_px[mask] = errors_px(mapping, plane.select(mask))
+    return distances_px
 
 
 def outline_mm(planes: Sequence[PlaneObservation]) -> tuple[tuple[float, float], ...]:
@@ -116,22 +122,17 @@ def outline_mm(planes: Sequence[PlaneObservation]) -> tuple[tuple[float, float],
     return tuple((float(x), float(y)) for x, y in corners)
 
 
-def _plane_folds(
-    planes: Sequence[PlaneObservation],
-) -> Iterator[tuple[list[PlaneObservation], list[PlaneObservation]]]:
-    for fold in range(min(FOLDS, len(planes))):
-        held_out = [plane for number, plane in enumerate(planes) if number % FOLDS == fold]
-        yield [plane for plane in planes if plane not in held_out], held_out
+def _plane_folds(planes: Sequence[PlaneObservation]) -> list[HeldOut]:
+    return [
+        [np.full(len(plane), number % FOLDS == fold) for number, plane in enumerate(planes)]
+        for fold in range(min(FOLDS, len(planes)))
+    ]
 
 
-def _point_folds(
-    planes: Sequence[PlaneObservation],
-) -> Iterator[tuple[list[PlaneObservation], list[PlaneObservation]]]:
-    for fold in range(FOLDS):
-        chosen = [_every_fifth(len(plane), fold) for plane in planes]
-        training = [plane.select(~mask) for plane, mask in zip(planes, chosen, strict=True)]
-        yield training, [plane.select(mask) for plane, mask in zip(planes, chosen, strict=True)]
+def _point_folds(planes: Sequence[PlaneObservation]) -> list[HeldOut]:
+    return [[np.arange(len(plane)) % FOLDS == fold for plane in planes] for fold in range(FOLDS)]
 
 
-def _every_fifth(n_points: int, fold: int) -> NDArray[np.bool_]:
-    return np.asarray(np.arange(n_points) % FOLDS == fold, dtype=np.bool_)
+def _training(planes: Sequence[PlaneObservation], held_out: HeldOut) -> list[PlaneObservation]:
+    """What is left for the fit; planes that are held out as a whole are not mentioned."""
+    return [plane.select(~mask) for plane, mask in zip(planes, held_out, strict=True) if not mask.all()]

@@ -12,7 +12,7 @@ from processing.calibration.calibration_record import content_id
 from processing.calibration.covariance import parameter_covariance
 from processing.calibration.errors import CalibrationError
 from processing.calibration.free_pose import board_errors_px, fit_free_poses, free_pose_holdout_px
-from processing.calibration.health import check_motion, errors_px, holdout_error_px, judge, outline_mm, plane_error
+from processing.calibration.health import check_motion, errors_px, holdout_distances_px, judge, outline_mm, plane_error
 from processing.calibration.model_choice import AUTO, fit_mapping, holdout_by_model, simplest_that_holds
 from processing.calibration.observation import CalibrationSet, PlaneObservation, ViewObservations, stacked
 from processing.geometry import FloatArray, PinholeCamera, ViewMapping
@@ -85,7 +85,7 @@ def _fitted_view(seen: ViewObservations, model: Model) -> ViewCalibration:
     mapping, used = fit_mapping(seen.planes, seen.image_size_px, model)
     masks = [_counted(mask) for mask in _by_plane(seen.planes, used)]
     planes = [plane.select(mask) for plane, mask in zip(seen.planes, masks, strict=True)]
-    holdout_px = holdout_error_px(planes, lambda training: fit_mapping(training, seen.image_size_px, model)[0])
+    holdout_px = holdout_distances_px(planes, lambda training: fit_mapping(training, seen.image_size_px, model)[0])
     errors = [errors_px(mapping, plane) for plane in planes]
     n_rejected = len(used) - sum(len(plane) for plane in planes)
     summary = _summary(mapping, model, planes, errors, holdout_px, n_rejected, extent_mm=outline_mm(planes))
@@ -112,11 +112,11 @@ def _summary(
     model: Model,
     planes: list[PlaneObservation],
     errors: list[FloatArray],
-    holdout_px: float,
+    holdout_px: list[FloatArray],
     n_rejected: int,
     extent_mm: tuple[tuple[float, float], ...],
 ) -> ViewCalibration:
-    distances_px = np.concatenate(errors)
+    distances_px, holdout_error_px = np.concatenate(errors), float(np.concatenate(holdout_px).mean())
     return ViewCalibration(
         mapping=mapping,
         model=model,
@@ -124,9 +124,9 @@ def _summary(
         mean_error_px=float(distances_px.mean()),
         rms_px=float(np.sqrt((distances_px**2).mean())),
         max_error_px=float(distances_px.max()),
-        holdout_error_px=holdout_px,
-        planes=tuple(plane_error(plane, distance_px) for plane, distance_px in zip(planes, errors, strict=True)),
-        verdict=judge(holdout_px, n_rejected / (n_rejected + len(distances_px))),
+        holdout_error_px=holdout_error_px,
+        planes=tuple(plane_error(*one) for one in zip(planes, errors, holdout_px, strict=True)),
+        verdict=judge(holdout_error_px, n_rejected / (n_rejected + len(distances_px))),
         n_rejected=n_rejected,
         extent_mm=extent_mm,
     )

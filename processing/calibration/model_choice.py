@@ -53,7 +53,9 @@ def holdout_by_model(planes: Sequence[PlaneObservation], image_size_px: tuple[in
     counted = [plane.select(mask) for plane, mask in zip(planes, masks, strict=True)]
 
     def distances_px(model: Model) -> FloatArray:
-        return holdout_distances_px(counted, lambda training: fit_mapping(training, image_size_px, model)[0])
+        return np.concatenate(
+            holdout_distances_px(counted, lambda training: fit_mapping(training, image_size_px, model)[0])
+        )
 
     return dict(_of_those_that_can(distances_px, tuple(used)))
 

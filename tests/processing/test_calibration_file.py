@@ -104,6 +104,7 @@ def _set(key: tuple[str | int, ...], value: Any) -> Change:
         (_set(("views", "left", "planes", 1, "z_mm"), "far"), r"views\.left\.planes\.1\.z_mm: "),
         (_set(("views", "left", "mapping", "focus"), 3), r"views\.left\.mapping\.pinhole\.focus: Extra"),
         (_set(("views", "left", "mean_error_px"), -1.0), r"views\.left\.mean_error_px: "),
+        (_set(("views", "left", "planes", 0, "max_error_px"), -1.0), r"views\.left\.planes\.0\.max_error_px: "),
         (_set(("views",), {}), "views: "),
         (_set(("z_range_mm",), [0.0, 9.0]), "id: cal-.* does not belong to this content"),
     ],
@@ -144,8 +145,14 @@ def test_files_from_before_a_field_existed_still_load(tmp_path: Path, calibratio
     save_calibration(calibration, path)
     content = json.loads(path.read_text())
     del content["target"]["y_axis"]
+    for plane in content["views"]["left"]["planes"]:
+        del plane["max_error_px"], plane["holdout_error_px"]
     content["id"] = json_id(content)
     path.write_text(json.dumps(content))
     old = load_calibration(path)
     assert old.target == TARGET
     assert old.id == content["id"] != calibration.id
+    assert {plane.max_error_px for plane in old.views["left"].planes} == {None}
+    save_calibration(old, tmp_path / "again.json")
+    again = json.loads((tmp_path / "again.json").read_text())
+    assert again["views"]["left"]["planes"] == content["views"]["left"]["planes"]

@@ -11,7 +11,7 @@ from processing.calibration.health import (
     check_motion,
     degeneracy,
     errors_px,
-    holdout_error_px,
+    holdout_distances_px,
     judge,
     outline_mm,
     plane_error,
@@ -56,8 +56,9 @@ def test_error_is_the_distance_of_equation_2() -> None:
     plane = shifted(seen_planes(camera, z_mm=(1.0,), noise_px=0)[0], px=(0.3, -0.4))
     distances_px = errors_px(camera, plane)
     np.testing.assert_allclose(distances_px, 0.5, atol=1e-9)
-    summary = plane_error(plane, np.array([0.0, 1.0]))
-    assert (summary.mean_error_px, summary.name) == (0.5, "z=1")
+    summary = plane_error(plane, np.array([0.0, 1.0]), np.array([0.5, 1.0]))
+    assert (summary.mean_error_px, summary.max_error_px, summary.name) == (0.5, 1.0, "z=1")
+    assert summary.holdout_error_px == 0.75
     assert summary.rms_px == pytest.approx(np.sqrt(0.5))
 
 
@@ -69,7 +70,8 @@ def test_the_fit_never_sees_what_it_is_judged_by() -> None:
         seen.append({plane.name for plane in training})
         return paper_camera()
 
-    holdout_error_px(planes, fit)
+    distances_px = holdout_distances_px(planes, fit)
+    assert [len(distance_px) for distance_px in distances_px] == [391] * 10
     held_out = [{plane.name for plane in planes} - names for names in seen]
     assert all(held_out)
     assert sorted(name for names in held_out for name in names) == sorted(plane.name for plane in planes)
@@ -84,7 +86,7 @@ def test_single_points_are_held_out_where_there_are_few_planes() -> None:
         assert len(training) == 3
         return paper_camera()
 
-    error_px = holdout_error_px(planes, fit)
+    error_px = np.concatenate(holdout_distances_px(planes, fit)).mean()
     total = sum(len(plane) for plane in planes)
     assert sum(total - size for size in sizes) == total
     assert error_px == pytest.approx(0.05 * np.sqrt(np.pi / 2), rel=0.1)
@@ -110,6 +112,30 @@ def test_a_stage_that_lied_about_one_position_is_found() -> None:
     assert lying.worst_plane.name == planes[3].name
     assert lying.worst_plane.mean_error_px > 0.3
     assert lying.verdict == "usable"
+
+
+@pytest.mark.parametrize("z_mm", [(-4.0, -2.0, 0.0, 2.0, 4.0), (-3.0, 0.0, 3.0)])
+def test_errors_are_told_plane_by_plane(z_mm: tuple[float, ...]) -> None:
+    view = calibrate(calibration_set(only=seen_planes(paper_camera(), z_mm=z_mm))).views["only"]
+    weights = [plane.n_points for plane in view.planes]
+    holdout_px = [plane.holdout_error_px for plane in view.planes if plane.holdout_error_px is not None]
+    assert np.average(holdout_px, weights=weights) == pytest.approx(view.holdout_error_px)
+    largest_px = [plane.max_error_px for plane in view.planes if plane.max_error_px is not None]
+    assert max(largest_px) == view.max_error_px
+    for plane in view.planes:
+        assert plane.max_error_px is not None
+        assert plane.holdout_error_px is not None
+        assert plane.mean_error_px < plane.rms_px < plane.max_error_px
+        assert plane.holdout_error_px == pytest.approx(plane.mean_error_px, rel=0.2)
+
+
+def test_a_held_out_plane_shows_its_wrong_position_itself() -> None:
+    planes = list(seen_planes(paper_camera(), z_mm=(-4.0, -2.0, 0.0, 2.0, 4.0)))
+    planes[0] = shifted(planes[0], mm=(0, 0, 0.004))  # not wrong enough to be left out
+    wrong, *right = calibrate(calibration_set(only=tuple(planes))).views["only"].planes
+    assert wrong.holdout_error_px is not None
+    assert wrong.holdout_error_px > 1.2 * wrong.mean_error_px
+    assert all(plane.holdout_error_px and plane.holdout_error_px < wrong.holdout_error_px / 1.2 for plane in right)
 
 
 def test_wrong_corners_are_counted() -> None:

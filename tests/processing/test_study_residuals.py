@@ -29,7 +29,11 @@ def test_every_plane_of_detected_corners_is_better_than_the_papers(rows: list[Re
     for row in detected:
         assert 0.001 < row.mean_error_px < 0.05
         assert row.rms_px >= row.mean_error_px
+        assert row.holdout_error_px is not None
+        assert row.max_error_px is not None
         assert row.holdout_error_px < 0.05
+        assert row.view_holdout_error_px < 0.05
+        assert row.rms_px < row.max_error_px
         assert row.n_points > 0.97 * SMALL.columns * SMALL.rows
 
 

@@ -224,6 +224,9 @@ def test_calibrate_measured_points_and_never_overwrite(tmp_path: Path, capsys: p
     assert view["holdout_error_px"] < 0.01
     assert view["verdict"] == "good"
     assert [plane["z_mm"] for plane in view["planes"]] == [-1.5, 0, 1.5]
+    for plane in view["planes"]:
+        assert plane["mean_error_px"] < plane["rms_px"] < plane["max_error_px"] <= view["max_error_px"]
+        assert 0 < plane["holdout_error_px"] < 0.01
     before = (tmp_path / "calibration.json").read_bytes()
     assert "not overwritten" in refused(capsys, *arguments)
     assert (tmp_path / "calibration.json").read_bytes() == before
