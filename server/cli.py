@@ -138,6 +138,13 @@ def _add_calibrate(verbs: Any) -> None:
         metavar="VIEW@Z=U,V",
         help="where a view of a run sees the target's origin at position Z in mm, if no image shows all of it",
     )
+    parser.add_argument(
+        "--roll",
+        type=commands.stated_roll,
+        action="append",
+        metavar="VIEW=DEG",
+        help="how a camera of a run is turned about its axis: 180 if it hangs upside down",
+    )
 
 
 def _add_check(verbs: Any) -> None:

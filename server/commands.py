@@ -5,6 +5,7 @@ import re
 import resource
 import sys
 from argparse import ArgumentTypeError, Namespace
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +14,12 @@ from pydantic import ValidationError
 
 from daq.shotfile import ImageKey, RunReader
 from processing.analysis.figures import residuals_figure
-from processing.calibration.calibration import Calibration
+from processing.calibration.calibration import Calibration, ViewCalibration
 from processing.calibration.calibration_file import load_calibration, save_calibration
 from processing.calibration.calibration_set import load_calibration_set
 from processing.calibration.covariance import worst_position_std_px
 from processing.calibration.joint_fit import calibrate
+from processing.calibration.placement import placement
 from processing.importing import import_manifest
 from processing.pipeline import (
     PipelineError,
@@ -54,7 +56,7 @@ def import_images(options: Namespace) -> dict[str, Any]:
 
 def calibrate_views(options: Namespace) -> dict[str, Any]:
     """``tomoshadow calibrate``."""
-    calibration_set = load_calibration_set(options.set, dict(options.origin or ()))
+    calibration_set = load_calibration_set(options.set, dict(options.origin or ()), dict(options.roll or ()))
     calibration = calibrate(calibration_set, model=options.model)
     save_calibration(calibration, options.out)
     figure = options.out.with_suffix(".png")
@@ -79,6 +81,14 @@ def stated_origin(text: str) -> tuple[tuple[str, float], tuple[float, float]]:
         raise ArgumentTypeError(f"{text!r} is not of the form VIEW@Z=U,V, for example view1@-4.5=812,604")
     view, z_mm, u_px, v_px = match.groups()
     return (view, float(z_mm)), (float(u_px), float(v_px))
+
+
+def stated_roll(text: str) -> tuple[str, float]:
+    """View and angle of ``VIEW=DEG``."""
+    match = re.fullmatch(rf"(.+)=({_NUMBER})", text)
+    if not match:
+        raise ArgumentTypeError(f"{text!r} is not of the form VIEW=DEG, for example view1=180")
+    return match[1], float(match[2])
 
 
 def view_errors(calibration: Calibration) -> dict[str, Any]:
@@ -106,11 +116,20 @@ def view_errors(calibration: Calibration) -> dict[str, Any]:
                     for plane in view.planes
                 ],
                 "worst_plane": view.worst_plane.name,
+                "placement": _placement(calibration, view),
                 "verdict": view.verdict.value,
             }
             for name, view in calibration.views.items()
         }
     }
+
+
+def _placement(calibration: Calibration, view: ViewCalibration) -> dict[str, Any] | None:
+    """Where a view stands; None where boards in free poses do not tell."""
+    if any(one.intrinsics_only for one in calibration.views.values()):
+        return None
+    ranges_mm = (calibration.x_range_mm, calibration.y_range_mm, calibration.z_range_mm)
+    return asdict(placement(view.mapping, np.mean(ranges_mm, axis=1)))
 
 
 def setting(name: str, text: str) -> Any:

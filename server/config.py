@@ -63,6 +63,9 @@ class ViewConfig(FrozenModel):
     """One line of sight: camera, lens and light."""
 
     azimuth_deg: Annotated[float, Field(ge=-180, le=180, description="viewing angle phi around y")]
+    roll_deg: Annotated[
+        float, Field(ge=-180, le=180, description="how the camera is turned about its axis; 180: it hangs upside down")
+    ] = 0.0
     camera: CameraConfig
     led_channel: Annotated[int, Field(ge=0, le=3, description="channel of the pulse generator, light and trigger")]
     lens: LensConfig

@@ -97,7 +97,7 @@ def _true_camera(view: ViewConfig, random: np.random.Generator) -> PinholeCamera
         scale_px_per_mm=image_scale_px_per_mm(view.lens.magnification, view.sensor.pixel_pitch_um),
         image_size_px=(view.sensor.width_px, view.sensor.height_px),
         pitch_deg=random.uniform(-0.5, 0.5),
-        roll_deg=random.uniform(-0.5, 0.5),
+        roll_deg=view.roll_deg + random.uniform(-0.5, 0.5),
         distortion=distortion,
         principal_offset_px=(
             view.azimuth_deg * SCHEIMPFLUG_MM_PER_DEG * pixels_per_mm,

@@ -14,13 +14,13 @@ from pydantic import ValidationError
 from processing.calibration.errors import CalibrationError
 from processing.calibration.imported_set import detect_imported
 from processing.calibration.observation import CalibrationSet
-from processing.calibration.recorded_set import NO_ORIGINS, Origins, detect_recorded
+from processing.calibration.recorded_set import NO_ORIGINS, NO_ROLLS, Origins, Rolls, detect_recorded
 from processing.calibration.set_record import CalibrationEntry, SetRecord
 
 SET_FILE = "set.json"
 
 
-def load_calibration_set(path: Path, origins: Origins = NO_ORIGINS) -> CalibrationSet:
+def load_calibration_set(path: Path, origins: Origins = NO_ORIGINS, rolls_deg: Rolls = NO_ROLLS) -> CalibrationSet:
     """Detect the target in a recorded calibration run or in an imported set.
 
     Parameters
@@ -30,21 +30,25 @@ def load_calibration_set(path: Path, origins: Origins = NO_ORIGINS) -> Calibrati
     origins : mapping of (view, z_mm) to (u, v)
         Where views of a run see the target's origin, roughly; needed where no image shows the whole target.
         An imported set states them itself.
+    rolls_deg : mapping of view to angle
+        How cameras of a run are turned about their axes, where its configuration does not say so. Likewise.
 
     Raises
     ------
     CalibrationError
-        The path is neither, an imported image does not show the target, or an origin is stated where it cannot be;
-        names the file.
+        The path is neither, an imported image does not show the target, or an origin or a roll is stated where it
+        cannot be; names the file.
     """
     path = Path(path)
     folder = next((one for one in (path, path / "calibration") if (one / SET_FILE).exists()), None)
-    if folder is not None and origins:
-        raise CalibrationError(f"{folder / SET_FILE}: an imported set states its origins itself (origin_px)")
+    if folder is not None and (origins or rolls_deg):
+        raise CalibrationError(
+            f"{folder / SET_FILE}: an imported set states its origins and rolls itself (origin_px, roll_deg)"
+        )
     if folder is not None:
         return _read_imported(folder)
     if (path / "run.h5").exists():
-        return detect_recorded(path, origins)
+        return detect_recorded(path, origins, rolls_deg)
     raise CalibrationError(f"{path}: neither a calibration run (run.h5) nor a calibration set ({SET_FILE})")
 
 

@@ -44,7 +44,8 @@ def detect_imported(source: str, entry: CalibrationEntry, folder: Path) -> Calib
             raise CalibrationError(f"{file}: {size} px, other images of {camera} have {sizes[camera]} px")
         planes[camera] += observations
     views = {camera: ViewObservations(sizes[camera], _in_order(planes[camera])) for camera in entry.cameras}
-    return CalibrationSet(source, entry.target, views)
+    azimuths_deg = {name: azimuth for name, azimuth in entry.azimuth_deg.items() if name not in entry.roll_deg}
+    return CalibrationSet(source, entry.target, views, azimuths_deg=azimuths_deg, rolls_deg=entry.roll_deg)
 
 
 def place_points(points: TargetPoints, target: Target, name: str, z_mm: float | None) -> PlaneObservation:
@@ -99,7 +100,7 @@ def _plane_observations(
         image = _image(folder / file)
         origin_px = plane.origin_px.get(camera, entry.origin_px.get(camera))
         try:
-            points = detect_target(image, entry.target, origin_px)
+            points = detect_target(image, entry.target, origin_px, entry.roll_deg.get(camera, 0.0))
         except TargetNotFound as error:
             raise TargetNotFound(f"{folder / file}: {error}") from error
         size = (image.shape[1], image.shape[0])

@@ -15,6 +15,7 @@ from processing.calibration.free_pose import board_errors_px, fit_free_poses, fr
 from processing.calibration.health import check_motion, errors_px, holdout_distances_px, judge, outline_mm, plane_error
 from processing.calibration.model_choice import AUTO, fit_mapping, holdout_by_model, simplest_that_holds
 from processing.calibration.observation import CalibrationSet, PlaneObservation, ViewObservations, stacked
+from processing.calibration.placement_check import check_placements
 from processing.geometry import FloatArray, PinholeCamera, ViewMapping
 
 
@@ -46,6 +47,8 @@ def calibrate(
         except CalibrationError as error:
             text = str(error)
             raise CalibrationError(text if text.startswith(name) else f"{name}: {text}") from error
+    mirrored = tuple(_mirrored(calibration_set, views))
+    placements = () if mirrored else tuple(_placements(calibration_set, views))
     undated = Calibration(
         id="",
         created_utc=created_utc or datetime.now(UTC).isoformat(timespec="seconds"),
@@ -53,7 +56,7 @@ def calibrate(
         views=views,
         z_range_mm=_common_z_range_mm(calibration_set),
         source=calibration_set.source,
-        notes=(*calibration_set.notes, *_mirrored(calibration_set, views)),
+        notes=(*calibration_set.notes, *mirrored, *placements),
     )
     return undated.with_id(content_id(undated))
 
@@ -69,6 +72,12 @@ def _mirrored(calibration_set: CalibrationSet, views: Mapping[str, ViewCalibrati
                     f"{name}: the target lies behind the camera: its axes are left-handed, volumes come out mirrored; "
                     'does y point up (y_axis = "up"), or z towards the views?'
                 )
+
+
+def _placements(calibration_set: CalibrationSet, views: Mapping[str, ViewCalibration]) -> Iterator[str]:
+    """Notes on where views stand; nothing where boards in free poses do not tell."""
+    if not any(view.intrinsics_only for view in views.values()):
+        yield from check_placements(calibration_set, {name: view.mapping for name, view in views.items()})
 
 
 def _joint_view(name: str, seen: ViewObservations, wanted: Model | None) -> ViewCalibration:

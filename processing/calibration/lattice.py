@@ -135,13 +135,17 @@ def grow_lattice(
     )
 
 
-def orient(lattice: Lattice, points_px: FloatArray) -> Lattice:
-    """Turn ids so that columns run to the right and rows downwards, as seen from the front of the target."""
+def orient(lattice: Lattice, points_px: FloatArray, roll_deg: float = 0.0) -> Lattice:
+    """Turn ids so that columns run to the right and rows downwards, as seen from the front of the target.
+
+    In the image of a camera that is rolled about its axis, columns run to where such a camera sees the right.
+    """
     columns_step_px, rows_step_px = _mean_steps(lattice, points_px)
     ids = lattice.ids
     if np.linalg.det(np.array([columns_step_px, rows_step_px])) < 0:
         ids, columns_step_px, rows_step_px = ids[:, ::-1], rows_step_px, columns_step_px
-    turns = max(range(4), key=lambda turn: _turned_step(columns_step_px, rows_step_px, turn)[0])
+    right = np.array([np.cos(np.deg2rad(roll_deg)), -np.sin(np.deg2rad(roll_deg))])
+    turns = max(range(4), key=lambda turn: float(_turned_step(columns_step_px, rows_step_px, turn) @ right))
     return lattice.with_ids(rotate_ids(ids, turns))
 
 

@@ -1,7 +1,7 @@
 """What calibration starts from: points with known places, and where each view sees them."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,12 +77,18 @@ class CalibrationSet:
         By view name.
     notes : tuple[str, ...]
         What was left out, and why; one line each.
+    azimuths_deg : Mapping[str, float]
+        Where the rig says that views stand; the fit is checked against it.
+    rolls_deg : Mapping[str, float]
+        How cameras were said to be turned about their axes; the others count as upright.
     """
 
     source: str
     target: Target | None
     views: Mapping[str, ViewObservations]
     notes: tuple[str, ...] = ()
+    azimuths_deg: Mapping[str, float] = field(default_factory=dict)
+    rolls_deg: Mapping[str, float] = field(default_factory=dict)
 
 
 def stacked(planes: Sequence[PlaneObservation]) -> tuple[FloatArray, FloatArray]:

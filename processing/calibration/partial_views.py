@@ -18,7 +18,7 @@ MAX_DEVIATION = 0.25
 
 
 def detect_by_others(
-    image: NDArray[np.generic], target: Target, z_mm: float, known: Sequence[PlaneObservation]
+    image: NDArray[np.generic], target: Target, z_mm: float, known: Sequence[PlaneObservation], roll_deg: float = 0.0
 ) -> TargetPoints:
     """Find the points of a target of known size of which a part is seen.
 
@@ -32,6 +32,8 @@ def detect_by_others(
         Position of the target.
     known : sequence of PlaneObservation
         What the view sees at other positions, with known places.
+    roll_deg : float
+        As for ``detect_target``.
 
     Raises
     ------
@@ -51,7 +53,7 @@ def detect_by_others(
     visible, visible_px = ids[inside], expected_px[inside]
     middle = int(np.argmin(np.linalg.norm(visible_px - visible_px.mean(axis=0), axis=1)))
     u_px, v_px = (float(value) for value in visible_px[middle])
-    found = detect_target(image, target, (u_px, v_px))
+    found = detect_target(image, target, (u_px, v_px), roll_deg)
     points = TargetPoints(found.ids + visible[middle], found.image_px)
     _check(points, _predict(known, target, points.ids, z_mm), visible_px)
     return points

@@ -4,6 +4,7 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,16 +21,19 @@ Place = tuple[str, float]
 """A view, and a position of the stage in mm."""
 Origins = Mapping[Place, tuple[float, float]]
 """Where the target's origin is seen (u, v)."""
+Rolls = Mapping[str, float]
+"""How cameras are turned about their axes, in degrees."""
 Found = dict[Place, PlaneObservation]
 Positions = Mapping[float, list[int]]
 """Indices of shots by stage position in mm."""
 
 NO_ORIGINS: Origins = MappingProxyType({})
+NO_ROLLS: Rolls = MappingProxyType({})
 
 _SHOWS_TARGET = (ImageKey.SAMPLE, ImageKey.FLAT)
 
 
-def detect_recorded(run_dir: Path, origins: Origins = NO_ORIGINS) -> CalibrationSet:
+def detect_recorded(run_dir: Path, origins: Origins = NO_ORIGINS, rolls_deg: Rolls = NO_ROLLS) -> CalibrationSet:
     """Detect the target in exposures A, averaged over the valid shots of each stage position.
 
     Where a view sees a part of the target only, the positions at which it is told which points these are (the whole
@@ -42,12 +46,15 @@ def detect_recorded(run_dir: Path, origins: Origins = NO_ORIGINS) -> Calibration
         A calibration run.
     origins : mapping of (view, z_mm) to (u, v)
         Where the target's origin is seen, roughly.
+    rolls_deg : mapping of view to angle
+        How cameras are turned about their axes, 180 where one hangs upside down; else as the run's configuration says.
+        Where a view that is named here stands is not checked against the configuration.
 
     Raises
     ------
     CalibrationError
         The run does not say what its target is, has no stage positions, a view never sees the target, or an origin
-        is stated for a view or a position that the run does not have.
+        or a roll is stated for a view or a position that the run does not have.
     """
     with RunReader(run_dir) as run:
         target = _target(run_dir, run.header.configuration)
@@ -56,25 +63,30 @@ def detect_recorded(run_dir: Path, origins: Origins = NO_ORIGINS) -> Calibration
             raise CalibrationError(f"{run_dir}: no valid shot has a stage position; is it a calibration run?")
         views, sizes = list(run.header.views), {name: form.shape[::-1] for name, form in run.header.views.items()}
         _check_origins(run_dir, origins, views, list(positions))
-        found, missed = _first_look(run, target, positions, origins)
-        more, notes = _second_look(run, target, positions, found, missed)
+        _check_rolls(run_dir, rolls_deg, views)
+        configuration = run.header.configuration
+        believed_deg = {**_of_views(configuration, "roll_deg"), **rolls_deg}
+        found, missed = _first_look(run, target, positions, origins, believed_deg)
+        more, notes = _second_look(run, target, positions, found, missed, believed_deg)
         source = run.header.run_id
     points = found | more
     planes = {view: [points[place] for place in sorted(points) if place[0] == view] for view in views}
     _check_seen(run_dir, planes, notes)
     seen = {view: ViewObservations(sizes[view], tuple(planes[view])) for view in views}
-    return CalibrationSet(source, target, seen, tuple(notes))
+    azimuths_deg = _of_views(configuration, "azimuth_deg")
+    checked_deg = {name: azimuths_deg[name] for name in views if name in azimuths_deg and name not in rolls_deg}
+    return CalibrationSet(source, target, seen, tuple(notes), checked_deg, believed_deg)
 
 
 def _first_look(
-    run: RunReader, target: Target, positions: Positions, origins: Origins
+    run: RunReader, target: Target, positions: Positions, origins: Origins, rolls_deg: Rolls
 ) -> tuple[Found, dict[Place, TargetNotFound]]:
     """What each image tells by itself, and why the others do not."""
     found, missed = {}, {}
     for z_mm, shots in positions.items():
         for view, image in _mean_frames(run, shots).items():
             try:
-                points = detect_target(image, target, origins.get((view, z_mm)))
+                points = detect_target(image, target, origins.get((view, z_mm)), rolls_deg.get(view, 0.0))
                 found[view, z_mm] = place_points(points, target, f"z={z_mm:g}", z_mm)
             except TargetNotFound as error:
                 missed[view, z_mm] = error
@@ -82,7 +94,12 @@ def _first_look(
 
 
 def _second_look(
-    run: RunReader, target: Target, positions: Positions, found: Found, missed: Mapping[Place, TargetNotFound]
+    run: RunReader,
+    target: Target,
+    positions: Positions,
+    found: Found,
+    missed: Mapping[Place, TargetNotFound],
+    rolls_deg: Rolls,
 ) -> tuple[Found, list[str]]:
     """What the other positions of a view tell of images that show a part of the target; notes on all of these."""
     more, notes = {}, []
@@ -92,7 +109,7 @@ def _second_look(
             if not isinstance(reason, OriginUnknown):
                 raise reason
             image = _mean_frames(run, positions[z_mm])[view]
-            points = detect_by_others(image, target, z_mm, known)
+            points = detect_by_others(image, target, z_mm, known, rolls_deg.get(view, 0.0))
         except TargetNotFound as error:
             also = "" if error is reason else f"; {error}"
             notes.append(f"{view}, z {z_mm:g} mm left out: {reason}{also}")
@@ -111,13 +128,24 @@ def _check_origins(run_dir: Path, origins: Origins, views: Sequence[str], positi
             )
 
 
+def _check_rolls(run_dir: Path, rolls_deg: Rolls, views: Sequence[str]) -> None:
+    if strangers := sorted(set(rolls_deg).difference(views)):
+        raise CalibrationError(f"{run_dir}: a roll is stated for {', '.join(strangers)}; views are {', '.join(views)}")
+
+
+def _of_views(configuration: dict[str, Any], key: str) -> dict[str, float]:
+    """A number of every view that the rig's configuration has; runs from elsewhere may not say."""
+    views = configuration.get("views", {})
+    return {name: float(view[key]) for name, view in views.items() if key in view}
+
+
 def mean_target_images(run_dir: Path, z_mm: float) -> dict[str, NDArray[np.float32]]:
     """Exposures A of every view, averaged over the valid shots at one stage position."""
     with RunReader(run_dir) as run:
         return _mean_frames(run, _by_position(run)[z_mm])
 
 
-def _target(run_dir: Path, configuration: dict[str, object]) -> Target:
+def _target(run_dir: Path, configuration: dict[str, Any]) -> Target:
     if "target" not in configuration:
         raise CalibrationError(f"{run_dir}: configuration.target: the run does not say what its target is")
     try:

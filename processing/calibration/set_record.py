@@ -52,6 +52,12 @@ class CalibrationEntry(_Entry):
 
     target: Target | None = None
     origin_px: Annotated[dict[CameraName, Pixel], Field(description="where the target's origin is seen")] = {}
+    roll_deg: Annotated[
+        dict[CameraName, float], Field(description="how cameras are turned about their axes; 180: upside down")
+    ] = {}
+    azimuth_deg: Annotated[
+        dict[CameraName, float], Field(description="where cameras stand, roughly; the fit is checked against it")
+    ] = {}
     plane: tuple[PlaneEntry, ...] = ()
     points: tuple[PointsEntry, ...] = ()
 
@@ -61,6 +67,9 @@ class CalibrationEntry(_Entry):
             raise ValueError("neither planes nor points")
         if self.plane and self.target is None:
             raise ValueError("target: planes need a target")
+        strangers = sorted({*self.roll_deg, *self.azimuth_deg}.difference(self.cameras))
+        if strangers:
+            raise ValueError(f"roll_deg, azimuth_deg: there is no camera {', '.join(strangers)}")
         if len({plane.z_mm is None for plane in self.plane}) > 1:
             raise ValueError("plane: some planes have z_mm, others have not; give all of them or none")
         return self

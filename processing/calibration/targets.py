@@ -2,7 +2,7 @@
 
 Ids (column, row) count from the target's origin node, which lies at x = y = 0: the marked dot, the node
 nearest to ``origin_px``, or, where a whole board of known size is seen, its middle. Columns run along +x
-(to the right in the image), rows along +y (downwards; the target may say that its y points up).
+(to the right in the image of an upright camera), rows along +y (downwards; the target may say that its y points up).
 """
 
 from collections.abc import Iterator
@@ -81,7 +81,10 @@ class TargetPoints:
 
 
 def detect_target(
-    image: NDArray[np.generic], target: Target, origin_px: tuple[float, float] | None = None
+    image: NDArray[np.generic],
+    target: Target,
+    origin_px: tuple[float, float] | None = None,
+    roll_deg: float = 0.0,
 ) -> TargetPoints:
     """Find the points of a target and assign them to its grid.
 
@@ -94,6 +97,8 @@ def detect_target(
     origin_px : tuple[float, float], optional
         Where the target's origin is seen, roughly (u, v). Not needed where a marker or the shape of
         the board tells; a marker wins.
+    roll_deg : float
+        How the camera is turned about its axis, to the nearest quarter: 180 where it hangs upside down.
 
     Returns
     -------
@@ -107,9 +112,9 @@ def detect_target(
     """
     pixels = np.ascontiguousarray(image, dtype=np.float32)
     if target.kind == "checkerboard":
-        grid, points_px = _find_corners(pixels, target, origin_px)
+        grid, points_px = _find_corners(pixels, target, origin_px, roll_deg)
     else:
-        grid, points_px = _find_dots(pixels, target, origin_px)
+        grid, points_px = _find_dots(pixels, target, origin_px, roll_deg)
     ids, image_px = grid.ids, points_px[grid.indices]
     smooth = on_smooth_grid(ids, image_px)
     order = np.flatnonzero(smooth)[np.lexsort((ids[smooth, 0], ids[smooth, 1]))]
@@ -117,11 +122,11 @@ def detect_target(
 
 
 def _find_corners(
-    pixels: NDArray[np.float32], target: Target, origin_px: tuple[float, float] | None
+    pixels: NDArray[np.float32], target: Target, origin_px: tuple[float, float] | None, roll_deg: float
 ) -> tuple[Lattice, FloatArray]:
     """The grid that fits the board, refined; the failure that came closest where none does."""
     failure, grown = TargetNotFound("checkerboard: no corners in a grid"), 0
-    for board, points_px in _candidate_boards(pixels):
+    for board, points_px in _candidate_boards(pixels, roll_deg):
         if len(board) < max(MIN_POINTS, grown // 2):
             continue
         try:
@@ -136,17 +141,17 @@ def _find_corners(
     raise failure
 
 
-def _candidate_boards(pixels: NDArray[np.float32]) -> Iterator[tuple[Lattice, FloatArray]]:
+def _candidate_boards(pixels: NDArray[np.float32], roll_deg: float) -> Iterator[tuple[Lattice, FloatArray]]:
     """Grids of corners and the corners; several scales and starts, as noise and dust can mislead one."""
     for smoothing_px in SMOOTHINGS_PX:
         saddles = find_saddles(pixels, smoothing_px)
         for lattice in corner_lattices(saddles):
             if len(lattice) >= MIN_POINTS:
-                yield trim_frame(orient(lattice, saddles.points_px), saddles.strength), saddles.points_px
+                yield trim_frame(orient(lattice, saddles.points_px, roll_deg), saddles.strength), saddles.points_px
 
 
 def _find_dots(
-    pixels: NDArray[np.float32], target: Target, origin_px: tuple[float, float] | None
+    pixels: NDArray[np.float32], target: Target, origin_px: tuple[float, float] | None, roll_deg: float
 ) -> tuple[Lattice, FloatArray]:
     signal = dot_signal(pixels)
     points_px = find_dots(signal)
@@ -155,7 +160,7 @@ def _find_dots(
         raise TargetNotFound(f"dots: {len(lattice)} points lie in a grid, at least {MIN_POINTS} are needed")
     found = marked_dot(signal, points_px[lattice.indices])
     marked = None if found is None else int(lattice.indices[found])
-    return _with_origin(orient(lattice, points_px), points_px, target, marked, origin_px), points_px
+    return _with_origin(orient(lattice, points_px, roll_deg), points_px, target, marked, origin_px), points_px
 
 
 def _with_origin(

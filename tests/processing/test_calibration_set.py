@@ -1,5 +1,6 @@
 """From a recorded calibration run, and from tables of points, to observations."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from processing.calibration.calibration_set import load_calibration_set, write_s
 from processing.calibration.errors import CalibrationError
 from processing.calibration.imported_set import read_table
 from processing.calibration.joint_fit import calibrate
+from processing.calibration.placement import placement
 from processing.calibration.set_record import CalibrationEntry, PointsEntry
 from processing.synthetic.paper_rig import paper_cameras, paper_optics
 from processing.synthetic.target import Checkerboard, render_target
@@ -32,15 +34,23 @@ class Planned:
     key: ImageKey = ImageKey.SAMPLE
 
 
-def see(view: str, z_mm: float, seed: int) -> Frame:
+def see(view: str, z_mm: float, seed: int, hanging: Sequence[str] = ()) -> Frame:
     clear = render_target(paper_cameras(BINNING)[view], Checkerboard(), z_mm, paper_optics(BINNING)[view])
-    return np.clip(np.random.default_rng(seed).normal(3000 * clear + 80, 20), 0, 4095).astype(np.uint16)
+    upright = np.clip(np.random.default_rng(seed).normal(3000 * clear + 80, 20), 0, 4095).astype(np.uint16)
+    return upright[::-1, ::-1] if view in hanging else upright
 
 
 def record(
-    run_dir: Path, planned: list[Planned], configuration: dict[str, object], columns: slice = slice(None)
+    run_dir: Path,
+    planned: list[Planned],
+    configuration: dict[str, object],
+    columns: slice = slice(None),
+    hanging: Sequence[str] = (),
 ) -> Path:
-    """A run of these shots, of some columns of the images; exposures B, and shots that do not count, show nothing."""
+    """A run of these shots, of some columns of the images; exposures B, and shots that do not count, show nothing.
+
+    Some cameras may hang upside down.
+    """
     shape = see("view1", 0.0, 0)[:, columns].shape
     dark, fine = np.zeros(shape, np.uint16), ExposureRecord(valid=True, frame_id=1)
     header = RunHeader(
@@ -52,7 +62,7 @@ def record(
     with RunWriter(run_dir, header) as writer:
         for index, shot in enumerate(planned):
             lit = shot.key is ImageKey.SAMPLE and shot.z_mm is not None
-            frames = {view: see(view, shot.z_mm or 0.0, index)[:, columns] if lit else dark for view in VIEWS}
+            frames = {view: see(view, shot.z_mm or 0.0, index, hanging)[:, columns] if lit else dark for view in VIEWS}
             exposures = {view: DoubleFrame(frame, dark, fine, fine) for view, frame in frames.items()}
             writer.write_shot(Shot(index, shot.key, exposures, stage_z_mm=shot.z_mm))
         writer.finish("completed")
@@ -72,6 +82,24 @@ def test_recorded_run_becomes_a_calibration(tmp_path: Path) -> None:
     for view in VIEWS:
         assert true_errors_px(calibration.views[view].mapping, paper_cameras(BINNING)[view]).mean() < 0.02
         assert calibration.views[view].verdict == "good"
+
+
+def test_a_camera_that_hangs_upside_down_must_be_said_to(tmp_path: Path) -> None:
+    views = {"view1": {"azimuth_deg": 45.0}, "view3": {"azimuth_deg": -15.0}}
+    planned = [Planned(z_mm) for z_mm in Z_MM]
+    run_dir = record(tmp_path / "run", planned, {"target": TARGET, "views": views}, hanging=["view3"])
+    with pytest.raises(CalibrationError, match=r"^view3: stands at 15 deg .* Say --roll view3=180"):
+        calibrate(load_calibration_set(run_dir))
+    hanging = views | {"view3": {"azimuth_deg": -15.0, "roll_deg": 180.0}}
+    configured = record(tmp_path / "said", planned, {"target": TARGET, "views": hanging}, hanging=["view3"])
+    for told in (load_calibration_set(run_dir, rolls_deg={"view3": 180.0}), load_calibration_set(configured)):
+        calibration = calibrate(told)
+        assert calibration.notes == ()
+        stands = placement(calibration.views["view3"].mapping, np.zeros(3))
+        assert stands.azimuth_deg == pytest.approx(-15.0, abs=0.5)
+        assert abs(stands.roll_deg) == pytest.approx(180.0, abs=0.5)
+    with pytest.raises(CalibrationError, match="a roll is stated for view9; views are view1, view3"):
+        load_calibration_set(run_dir, rolls_deg={"view9": 180.0})
 
 
 def test_position_without_target_is_left_out_and_noted(tmp_path: Path) -> None:

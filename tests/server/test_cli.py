@@ -223,6 +223,7 @@ def test_calibrate_measured_points_and_never_overwrite(tmp_path: Path, capsys: p
     assert view["n_points"] == 27 * 9
     assert view["holdout_error_px"] < 0.01
     assert view["verdict"] == "good"
+    assert set(view["placement"]) == {"azimuth_deg", "pitch_deg", "roll_deg", "centre_mm"}
     assert [plane["z_mm"] for plane in view["planes"]] == [-1.5, 0, 1.5]
     for plane in view["planes"]:
         assert plane["mean_error_px"] < plane["rms_px"] < plane["max_error_px"] <= view["max_error_px"]
@@ -237,10 +238,14 @@ def test_origins_are_stated_for_runs(tmp_path: Path, capsys: pytest.CaptureFixtu
     told(capsys, "import", tmp_path / "manifest.toml", "-o", tmp_path / "set")
     arguments = ["calibrate", tmp_path / "set", "-o", tmp_path / "calibration.json", "--origin"]
     message = refused(capsys, *arguments, "view1@-4.5=812,604.5")
-    assert "set.json: an imported set states its origins itself" in message
+    assert "set.json: an imported set states its origins and rolls itself" in message
     with pytest.raises(SystemExit):
         main([*map(str, arguments), "view1=812,604"])
     assert "not of the form VIEW@Z=U,V" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        main([*map(str, arguments[:-1]), "--roll", "view1"])
+    assert "not of the form VIEW=DEG" in capsys.readouterr().err
+    assert "states its origins and rolls itself" in refused(capsys, *arguments[:-1], "--roll", "view1=-90")
 
 
 def _write_points(folder: Path) -> None:

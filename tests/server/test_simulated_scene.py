@@ -47,6 +47,15 @@ def test_the_seed_decides_how_the_cameras_stand() -> None:
     assert np.any(one.rotation != other.rotation)
 
 
+def test_a_camera_hangs_as_the_configuration_says(small: RigConfig) -> None:
+    view = small.views["view1"].model_copy(update={"roll_deg": 180.0})
+    upright, hanging = (
+        true_cameras(small.model_copy(update={"views": {"view1": one}}), seed=1)["view1"]
+        for one in (small.views["view1"], view)
+    )
+    np.testing.assert_allclose(hanging.rotation[:2], -upright.rotation[:2], atol=1e-12)
+
+
 def test_the_target_stands_where_the_stage_is(small: RigConfig) -> None:
     height_mm = [0.0]
     scene, fixed = SimulatedScene(small, lambda: height_mm[0]), SimulatedScene(small, lambda: 2.0)
