@@ -96,6 +96,8 @@ def reconstruct_shot(
         The shot is not valid, or run and calibration do not belong together.
     CalibrationError
         The calibration was refused.
+    ReconstructionError
+        Its views see too little in common, or are too few.
     Stopped
         ``should_stop`` said so.
     """

@@ -17,6 +17,7 @@ from processing.calibration.errors import CalibrationError
 from processing.importing import ManifestError
 from processing.pipeline import PipelineError
 from processing.reconstruction.accuracy import Accuracy
+from processing.reconstruction.errors import ReconstructionError
 from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.reconstruction.volume_file import VolumeFileError
@@ -39,6 +40,7 @@ BAD_INPUT = (
     ManifestError,
     PipelineError,
     PlanError,
+    ReconstructionError,
     ShotFileError,
     VolumeFileError,
 )
@@ -53,7 +55,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         result = command(options)
     except BAD_INPUT as error:
         return _fail(options, error, status=2)
-    except (DaqError, OSError) as error:
+    except (DaqError, MemoryError, OSError) as error:
         return _fail(options, error, status=1)
     except KeyboardInterrupt:
         return _fail(options, RuntimeError("interrupted"), status=1)

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from processing.geometry import FloatArray, ViewMapping
+from processing.reconstruction.errors import ReconstructionError
 from processing.volume import VoxelGrid
 
 LATTICE = 81
@@ -35,9 +36,11 @@ def common_volume(
 
     Raises
     ------
-    ValueError
+    ReconstructionError
         The views have no volume in common.
     """
+    if z_range_mm[0] >= z_range_mm[1]:
+        raise ReconstructionError(f"the views share no range along z: it would go from {_both(z_range_mm)} mm")
     x_mm, y_mm = np.linspace(*x_range_mm, LATTICE), np.linspace(*y_range_mm, LATTICE)
     seen = np.ones((LATTICE, LATTICE), dtype=bool)
     for z_mm in np.linspace(*z_range_mm, 5):
@@ -45,13 +48,20 @@ def common_volume(
             seen &= _visible(mapping, x_mm, y_mm, float(z_mm))
     box = largest_rectangle(seen)
     if box is None:
-        raise ValueError(f"the {len(mappings)} views see no common volume within z = {z_range_mm} mm")
+        raise ReconstructionError(
+            f"the {len(mappings)} views see no common volume within x {_both(x_range_mm)}, y {_both(y_range_mm)}, "
+            f"z {_both(z_range_mm)} mm"
+        )
     top, bottom, left, right = box
     lower_mm = np.array([x_mm[left], y_mm[top], z_range_mm[0]])
     upper_mm = np.array([x_mm[right], y_mm[bottom], z_range_mm[1]])
     pitch_mm = pitch_mm or 1 / max(_scale_px_per_mm(mapping, (lower_mm + upper_mm) / 2) for mapping in mappings)
     nx, ny, nz = (int(extent_mm / pitch_mm) + 1 for extent_mm in upper_mm - lower_mm)
     return VoxelGrid((nz, ny, nx), (float(lower_mm[0]), float(lower_mm[1]), float(lower_mm[2])), float(pitch_mm))
+
+
+def _both(range_mm: tuple[float, float]) -> str:
+    return f"{range_mm[0]:g} to {range_mm[1]:g}"
 
 
 def largest_rectangle(mask: NDArray[np.bool_]) -> tuple[int, int, int, int] | None:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from processing.geometry import FloatArray, ViewMapping
+from processing.reconstruction.errors import ReconstructionError
 from processing.reconstruction.fixed_point import FixedPoint
 from processing.reconstruction.kernels import _native
 from processing.volume import VoxelGrid
@@ -72,7 +73,7 @@ def sample_mapping(mapping: ViewMapping, grid: VoxelGrid, max_deviation_px: floa
 
     Raises
     ------
-    ValueError
+    ReconstructionError
         The mapping is too rough even for nodes two voxels apart.
     """
     deviation_px = np.inf
@@ -81,7 +82,7 @@ def sample_mapping(mapping: ViewMapping, grid: VoxelGrid, max_deviation_px: floa
         deviation_px = _deviation_px(mapping, grid, nodes_px, spacing)
         if deviation_px <= max_deviation_px:
             return _node_view(mapping, nodes_px, spacing, deviation_px)
-    raise ValueError(
+    raise ReconstructionError(
         f"mapping is not smooth: it bends by {deviation_px:.3g} px within {SPACINGS[-1]} voxels, "
         f"limit {max_deviation_px} px"
     )

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from processing.geometry import ViewMapping
 from processing.reconstruction.accuracy import Accuracy
+from processing.reconstruction.errors import ReconstructionError
 from processing.reconstruction.fixed_point import FixedPoint
 from processing.reconstruction.kernels import _native
 from processing.reconstruction.node_view import NodeView, sample_mapping
@@ -104,11 +105,11 @@ def plan_reconstruction(
 
     Raises
     ------
-    ValueError
+    ReconstructionError
         Too few or too many views, or a mapping that is too rough to be sampled.
     """
     if not MIN_VIEWS <= len(mappings) <= MAX_VIEWS:
-        raise ValueError(f"{len(mappings)} views, a reconstruction takes {MIN_VIEWS} to {MAX_VIEWS}")
+        raise ReconstructionError(f"{len(mappings)} views, a reconstruction takes {MIN_VIEWS} to {MAX_VIEWS}")
     return Plan(grid, tuple(plan_view(mapping, grid, accuracy) for mapping in mappings))
 
 

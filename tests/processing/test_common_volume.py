@@ -5,6 +5,7 @@ import pytest
 
 from processing.geometry import PinholeCamera, view_camera
 from processing.reconstruction.common_volume import common_volume, largest_rectangle
+from processing.reconstruction.errors import ReconstructionError
 from processing.volume import VoxelGrid
 
 
@@ -45,7 +46,7 @@ def test_a_stated_pitch_is_kept() -> None:
 
 
 def test_views_without_a_common_volume_are_refused() -> None:
-    with pytest.raises(ValueError, match="2 views see no common volume"):
+    with pytest.raises(ReconstructionError, match="2 views see no common volume within x"):
         common_volume(cameras()[:2], x_range_mm=(200, 240), y_range_mm=(-15, 15), z_range_mm=(-4, 4))
 
 

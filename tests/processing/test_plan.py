@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from processing.geometry import FloatArray, PinholeCamera, ViewMapping, view_camera
+from processing.reconstruction.errors import ReconstructionError
 from processing.reconstruction.kernels import _native
 from processing.reconstruction.node_view import NodeView, sample_mapping
 from processing.reconstruction.plan import MAX_DEVIATION_PX, plan_reconstruction, plan_view
@@ -140,7 +141,7 @@ def test_nodes_are_as_dense_as_it_takes(roll_deg: float, bend: float, wavelength
 
 
 def test_a_rough_mapping_is_refused() -> None:
-    with pytest.raises(ValueError, match=r"not smooth: it bends by .* px within 2 voxels, limit 0.02 px"):
+    with pytest.raises(ReconstructionError, match=r"not smooth: it bends by .* px within 2 voxels, limit 0.02 px"):
         sample_mapping(Bent(camera(), 0, wavelength_mm=0.05), GRID, MAX_DEVIATION_PX)
 
 
@@ -170,7 +171,7 @@ def test_two_to_eight_views() -> None:
     assert len(plan.views) == 8
     assert plan.deviation_px <= MAX_DEVIATION_PX
     for count in (1, 9):
-        with pytest.raises(ValueError, match=f"{count} views, a reconstruction takes 2 to 8"):
+        with pytest.raises(ReconstructionError, match=f"{count} views, a reconstruction takes 2 to 8"):
             plan_reconstruction((oracle.cameras(8) * 2)[:count], GRID)
 
 

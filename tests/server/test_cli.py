@@ -2,14 +2,22 @@
 
 import json
 import shutil
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from processing.calibration.calibration import Model
+from processing.calibration.calibration_file import load_calibration, save_calibration
+from processing.calibration.calibration_record import content_id, json_id
+from processing.calibration.polynomial import EXPONENTS, PolynomialMapping
 from processing.reconstruction.volume_file import read_volume
+from server import commands
 from server.cli import main
+from tests.processing import droplet_run
 from tests.processing.droplet_run import cameras, write_calibration, write_run
 
 GRID = "-1:1,-1:1,-1:1@0.1"
@@ -156,6 +164,87 @@ def test_impossible_grids(
 ) -> None:
     arguments = ["reconstruct", run_dir, "--calibration", calibration_file, "-o", run_dir / "x", f"--grid={grid}"]
     assert reason in refused(capsys, *arguments)
+
+
+def edited(calibration_file: Path, edit: Callable[[Any], None]) -> Path:
+    """A calibration file that says something else, with the id that belongs to it."""
+    content = json.loads(calibration_file.read_text())
+    edit(content)
+    content["id"] = json_id(content)
+    calibration_file.write_text(json.dumps(content))
+    return calibration_file
+
+
+def no_common_depth(content: Any) -> None:
+    content["z_range_mm"] = [1.0, -1.0]
+
+
+def targets_out_of_sight(content: Any) -> None:
+    for view in content["views"].values():
+        view["extent_mm"] = [[200.0, -2.0], [240.0, 2.0]]
+
+
+@pytest.mark.parametrize(
+    ("edit", "complaint"),
+    [
+        (no_common_depth, "the views share no range along z: it would go from 1 to -1 mm"),
+        (targets_out_of_sight, "the 3 views see no common volume within x 190 to 250, y -3 to 3, z -1.5 to 1.5 mm"),
+    ],
+)
+@pytest.mark.parametrize("command", ["reconstruct", "average"])
+def test_views_that_share_nothing_are_one_clear_error(
+    command: str,
+    edit: Callable[[Any], None],
+    complaint: str,
+    run_dir: Path,
+    calibration_file: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    arguments = [command, run_dir, "--calibration", edited(calibration_file, edit), "-o", tmp_path / "out"]
+    assert refused(capsys, *arguments) == complaint
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_run_of_one_view_is_one_clear_error(
+    calibration_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    only = {"view2": cameras()["view2"]}
+    monkeypatch.setattr(droplet_run, "cameras", lambda: only)
+    run_dir = write_run(tmp_path / "one")
+    message = refused(capsys, "reconstruct", run_dir, "--calibration", calibration_file, "-o", tmp_path / "out")
+    assert message == "1 views, a reconstruction takes 2 to 8"
+
+
+def test_a_mapping_that_runs_away_is_one_clear_error(
+    run_dir: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    coefficients = np.zeros((len(EXPONENTS), 2))
+    coefficients[EXPONENTS.index((3, 0, 0))] = 1e6
+    wild = PolynomialMapping(coefficients, np.zeros(3), np.ones(3), (160, 120))
+    calibration_file = tmp_path / "wild.json"
+    calibration = load_calibration(write_calibration(calibration_file))
+    views = {name: replace(view, mapping=wild, model=Model.POLYNOMIAL) for name, view in calibration.views.items()}
+    rough = replace(calibration, views=views)
+    save_calibration(rough.with_id(content_id(rough)), calibration_file, overwrite=True)
+    arguments = ["reconstruct", run_dir, "--calibration", calibration_file, f"--grid={GRID}", "-o", tmp_path / "out"]
+    assert refused(capsys, *arguments).startswith("mapping is not smooth: it bends by")
+
+
+def test_a_volume_beyond_the_memory_fails_without_a_traceback(
+    run_dir: Path,
+    calibration_file: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def too_much(*_: object) -> None:
+        np.empty(2**62, dtype=np.uint8)
+
+    monkeypatch.setattr(commands, "reconstruct_shot", too_much)
+    arguments = ["reconstruct", run_dir, "--calibration", calibration_file, f"--grid={GRID}", "-o", tmp_path / "out"]
+    assert main([*map(str, arguments)]) == 1
+    assert "Unable to allocate" in capsys.readouterr().err
 
 
 def test_a_truncated_shot_is_named_and_the_others_stay(
