@@ -16,16 +16,24 @@ TITLES = {
     "true error": "cameras: error in space [px]",
     "corner error": "corners: error in the image [px]",
     "corner time": "corners: CPU time per image [s]",
+    "disparity error": "watch: error of the disparity of one shot [px]",
     "drift error": "self-calibration: error left in the volume [px]",
 }
-LIMITED = {"true error": "rms", "corner error": "rms", "corner time": "time", "drift error": "largest error"}
+LIMITED = {
+    "true error": "rms",
+    "corner error": "rms",
+    "corner time": "time",
+    "disparity error": "error",
+    "drift error": "largest error",
+}
 """Which of its figures a quantity's limit is for."""
-LINE_LENGTH = 20
+LINE_LENGTH = 16
 """Letters of a tick label that still fit on one line."""
 PAPER = {
     "true error": "< 0.05 px on the points of the fit; the volume is not asked",
     "corner error": "0.1 px",
     "corner time": "not given",
+    "disparity error": "no watch",
     "drift error": "no self-calibration",
 }
 
@@ -69,18 +77,20 @@ def accuracy_line(row: AccuracyRow) -> str:
 
 def accuracy_figure(rows: Sequence[AccuracyRow]) -> Figure:
     """Every case of every quantity, view by view, and the limits."""
-    figure = Figure(figsize=(11, 7), layout="constrained")
-    for axes, (quantity, title) in zip(figure.subplots(2, 2).flat, TITLES.items(), strict=True):
+    figure = Figure(figsize=(15, 7.4), layout="constrained")
+    *panels, rest = figure.subplots(2, 3).flat
+    for axes, (quantity, title) in zip(panels, TITLES.items(), strict=True):
         _panel(axes, of_quantity(rows, quantity))
         axes.set_title(title, fontsize="medium", loc="left")
     views = list(dict.fromkeys(row.view for row in rows))
     handles = [
         *(_mark(colour, "s", colour, view) for view, colour in zip(views, COLOURS, strict=False)),
-        _mark("0.2", "o", "0.2", "rms, or time"),
+        _mark("0.2", "o", "0.2", "rms, error, or time"),
         _mark("0.2", "^", "white", "largest error"),
         _mark("0.2", "_", "0.2", "both of the best unbiased fit"),
     ]
-    figure.legend(handles=handles, frameon=False, ncols=len(handles), loc="outside lower center", fontsize="small")
+    rest.set_axis_off()
+    rest.legend(handles=handles, frameon=False, loc="center")
     return figure
 
 
@@ -125,10 +135,16 @@ def _values(row: AccuracyRow) -> list[float]:
 
 
 def _two_lines(case: str) -> str:
-    """The words of a case, a long one broken in the middle so that ticks stay apart."""
-    words = case.replace("pinhole_tilted", "tilted").replace("mm3", "mm³").split()
-    half = (len(words) + 1) // 2 if len(case) > LINE_LENGTH else len(words)
-    return "\n".join(filter(None, (" ".join(words[:half]), " ".join(words[half:]))))
+    """The words of a case, a long one broken after its first part or in the middle, so that ticks stay apart."""
+    text = case.replace("pinhole_tilted", "tilted").replace("mm3", "mm³")
+    what, comma, where = text.partition(", ")
+    if len(text) <= LINE_LENGTH:
+        return text
+    if comma and len(what) > 5:
+        return f"{what},\n{where}"
+    words = text.split()
+    half = (len(words) + 1) // 2
+    return "\n".join((" ".join(words[:half]), " ".join(words[half:])))
 
 
 def _by_case(rows: Sequence[AccuracyRow]) -> dict[str, list[AccuracyRow]]:

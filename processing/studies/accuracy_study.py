@@ -96,21 +96,22 @@ class AccuracyRow:
     Parameters
     ----------
     quantity : str
-        What was measured: ``true error``, ``corner error``, ``corner time`` or ``drift error``.
+        What was measured: ``true error``, ``corner error``, ``corner time``, ``disparity error`` or ``drift error``.
     case : str
         Model and region, photograph, or density of droplets.
     view : str
         Name of the view.
     value : float | None
-        Root mean square of this view in px, or CPU time in s; None where the product refused.
+        Root mean square of this view in px, its disparity's error in px, or CPU time in s; None where the product
+        refused.
     maximum : float | None
-        Largest error in px, of a drift in any view; None for times and refusals.
+        Largest error in px, of a drift in any view; None for times, disparities and refusals.
     limit : float
         What the value, of a drift the largest error, must not exceed.
     kept : bool
         Whether it does not.
     within : float | None
-        Share of the errors that do not exceed the limit; None for times and drifts.
+        Share of the errors that do not exceed the limit; None where single figures are judged.
     ideal_rms, ideal_maximum : float | None
         Of true errors: root mean square, and the largest to be expected of as many fits, that the best unbiased fits
         leave (bound of Cramér and Rao).

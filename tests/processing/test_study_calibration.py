@@ -13,7 +13,8 @@ from processing.studies.accuracy_report import (
     over_ideal,
 )
 from processing.studies.accuracy_study import AccuracyRow, CalibrationStudy, of_quantity
-from processing.studies.calibration_accuracy import calibration_study, drift_px
+from processing.studies.calibration_accuracy import calibration_study
+from processing.studies.drifting_views import direction
 from processing.studies.fitted_cameras import fitted_cameras, regions_mm, tilted_cameras
 
 SMALL = CalibrationStudy(
@@ -91,10 +92,21 @@ def test_drift_of_every_view_is_recovered(rows: list[AccuracyRow]) -> None:
         assert row.maximum < 0.1
 
 
+def test_one_shot_tells_whether_a_view_has_moved(rows: list[AccuracyRow]) -> None:
+    found = of_quantity(rows, "disparity error")
+    assert [(row.view, row.case.split(", ")[1]) for row in found] == [
+        (view, case) for view in ("view1", "view3") for case in ("in place", "off by 0.4 px")
+    ]
+    for row in found:
+        assert row.kept
+        assert row.value is not None
+        assert row.value < row.limit == pytest.approx(0.1)
+
+
 def test_every_view_drifts_elsewhere() -> None:
-    drifts_px = np.array([drift_px(CalibrationStudy(), number) for number in range(4)])
-    np.testing.assert_allclose(np.linalg.norm(drifts_px, axis=1), 2.0)
-    cosines = (drifts_px @ drifts_px.T / 4)[np.triu_indices(4, 1)]
+    directions = np.array([direction(number) for number in range(4)])
+    np.testing.assert_allclose(np.linalg.norm(directions, axis=1), 1.0)
+    cosines = (directions @ directions.T)[np.triu_indices(4, 1)]
     assert np.abs(cosines).max() < np.cos(np.deg2rad(30))
 
 
@@ -110,7 +122,8 @@ def test_statements_give_limit_paper_and_worst_view(rows: list[AccuracyRow]) -> 
     assert statements["corner error, sharp (limit 0.05 px)"].ours.startswith(f"{worst:.2g} px rms")
     assert float(statements["rms of all fits, relative to that of the best unbiased fits"].ours) < 1.5
     titles = [axes.get_title(loc="left") for axes in accuracy_figure(rows).axes]
-    assert [title.split(":")[0] for title in titles] == ["cameras", "corners", "corners", "self-calibration"]
+    topics = [title.split(":")[0] for title in titles]
+    assert topics == ["cameras", "corners", "corners", "watch", "self-calibration", ""]
 
 
 def test_what_breaks_a_limit_says_so(rows: list[AccuracyRow]) -> None:
