@@ -37,16 +37,9 @@ def calibrate(
     Raises
     ------
     CalibrationError
-        A view cannot be calibrated; names view, value and limit.
+        Views cannot be calibrated; names each of them, value and limit.
     """
-    wanted = None if model == AUTO else Model(model)
-    views = {}
-    for name, seen in calibration_set.views.items():
-        try:
-            views[name] = _free_view(seen, wanted) if seen.free_pose else _joint_view(name, seen, wanted)
-        except CalibrationError as error:
-            text = str(error)
-            raise CalibrationError(text if text.startswith(name) else f"{name}: {text}") from error
+    views = _all_views(calibration_set, None if model == AUTO else Model(model))
     mirrored = tuple(_mirrored(calibration_set, views))
     placements = () if mirrored else tuple(_placements(calibration_set, views))
     undated = Calibration(
@@ -59,6 +52,19 @@ def calibrate(
         notes=(*calibration_set.notes, *mirrored, *placements),
     )
     return undated.with_id(content_id(undated))
+
+
+def _all_views(calibration_set: CalibrationSet, wanted: Model | None) -> dict[str, ViewCalibration]:
+    """Every view, or what is wrong with all of those that are bad: who mends one should not meet the next one after."""
+    views, problems = {}, []
+    for name, seen in calibration_set.views.items():
+        try:
+            views[name] = _free_view(seen, wanted) if seen.free_pose else _joint_view(name, seen, wanted)
+        except CalibrationError as error:
+            problems.append(str(error) if str(error).startswith(name) else f"{name}: {error}")
+    if problems:
+        raise CalibrationError("; ".join(problems))
+    return views
 
 
 def _mirrored(calibration_set: CalibrationSet, views: Mapping[str, ViewCalibration]) -> Iterator[str]:

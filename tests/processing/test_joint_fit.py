@@ -114,6 +114,17 @@ def test_target_that_hardly_moved_is_refused(z_mm: tuple[float, ...], reason: st
         calibrate(still)
 
 
+def test_all_bad_views_are_named_at_once() -> None:
+    few = PlaneObservation("few", volume_points_mm(7), np.zeros((7, 2)))
+    bad = calibration_set(
+        few=(few,),
+        fine=seen_planes(paper_camera(), z_mm=(-3.0, 0.0, 3.0)),
+        still=seen_planes(paper_camera(), z_mm=(1.0,)),
+    )
+    with pytest.raises(CalibrationError, match=r"^few: 7 points are too few.*; still: the target hardly moved"):
+        calibrate(bad)
+
+
 def test_handful_of_points_is_refused() -> None:
     few = PlaneObservation("few", volume_points_mm(7), np.zeros((7, 2)))
     with pytest.raises(CalibrationError, match=r"^view2: 7 points are too few, at least 12"):
