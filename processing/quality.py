@@ -1,11 +1,8 @@
 """How good a reconstruction is, where the truth is known: quality factor, found and ghost droplets."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter
-from scipy.spatial import cKDTree
 
 Volume = NDArray[np.floating]
 Sums = NDArray[np.float64]
@@ -52,46 +49,6 @@ def quality_factor(
     if not varies.any():
         raise ValueError("truth and volume vary together in no window")
     return float(np.mean(covariance[varies] / np.sqrt(first_power[varies] * second_power[varies])))
-
-
-@dataclass(frozen=True)
-class DetectionRates:
-    """How many droplets a reconstruction shows.
-
-    Parameters
-    ----------
-    found : float
-        Share of true droplets that have a peak.
-    ghosts : float
-        Share of peaks that belong to no true droplet.
-    """
-
-    found: float
-    ghosts: float
-
-
-def detection_rates(
-    truth_voxel: NDArray[np.float64], volume: Volume, threshold: float, radius_voxel: float = 2.0
-) -> DetectionRates:
-    """Compare the peaks of a reconstruction with true positions.
-
-    Parameters
-    ----------
-    truth_voxel : (N, 3) array
-        True positions as voxel indices (z, y, x), N > 0.
-    volume : (z, y, x) array
-        Reconstruction.
-    threshold : float
-        Lower peaks do not count.
-    radius_voxel : float
-        How far a peak may lie from its droplet.
-    """
-    peaks = local_maxima(volume, threshold)
-    if not len(peaks):
-        return DetectionRates(found=0.0, ghosts=0.0)
-    to_peak, _ = cKDTree(peaks).query(truth_voxel)
-    to_truth, _ = cKDTree(truth_voxel).query(peaks)
-    return DetectionRates(float(np.mean(to_peak <= radius_voxel)), float(np.mean(to_truth > radius_voxel)))
 
 
 def local_maxima(volume: Volume, threshold: float) -> NDArray[np.intp]:

@@ -204,11 +204,6 @@ class Calibration:
         """Range of calibrated points along y, over all views."""
         return self._range_mm(1)
 
-    @property
-    def worst_view(self) -> str:
-        """Name of the view with the largest hold-out error."""
-        return max(self.views, key=lambda name: self.views[name].holdout_error_px)
-
     def require_world(self) -> None:
         """Refuse to reconstruct where nobody knows how the views stand to each other.
 

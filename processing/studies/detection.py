@@ -7,12 +7,28 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from processing.geometry import FloatArray
-from processing.quality import DetectionRates, Volume, local_maxima
+from processing.quality import Volume, local_maxima
 
 FAINTEST_PEAK = 1e-5
 """Peaks below this share of the highest one are never droplets."""
 RADIUS_VOXEL = 2.0
 """How far a peak may lie from its droplet."""
+
+
+@dataclass(frozen=True)
+class DetectionRates:
+    """How many droplets a reconstruction shows.
+
+    Parameters
+    ----------
+    found : float
+        Share of true droplets that have a peak.
+    ghosts : float
+        Share of peaks that belong to no true droplet.
+    """
+
+    found: float
+    ghosts: float
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,12 +4,15 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from processing.geometry import ViewMapping, view_camera
+from processing.quality import Volume, local_maxima
 from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.node_view import NodeView
 from processing.reconstruction.plan import Plan
 from processing.reconstruction.rectified_view import RectifiedView
+from processing.studies.detection import DetectionRates
 from processing.volume import VoxelGrid
 
 Array = NDArray[np.float64]
@@ -175,3 +178,27 @@ def cameras(count: int, roll_deg: float = 0.0, scale_px_per_mm: float = 60.0) ->
         )
         for number, azimuth_deg in enumerate(AZIMUTHS_DEG[:count])
     ]
+
+
+def detection_rates(
+    truth_voxel: NDArray[np.float64], volume: Volume, threshold: float, radius_voxel: float = 2.0
+) -> DetectionRates:
+    """Compare the peaks of a reconstruction with true positions.
+
+    Parameters
+    ----------
+    truth_voxel : (N, 3) array
+        True positions as voxel indices (z, y, x), N > 0.
+    volume : (z, y, x) array
+        Reconstruction.
+    threshold : float
+        Lower peaks do not count.
+    radius_voxel : float
+        How far a peak may lie from its droplet.
+    """
+    peaks = local_maxima(volume, threshold)
+    if not len(peaks):
+        return DetectionRates(found=0.0, ghosts=0.0)
+    to_peak, _ = cKDTree(peaks).query(truth_voxel)
+    to_truth, _ = cKDTree(truth_voxel).query(peaks)
+    return DetectionRates(float(np.mean(to_peak <= radius_voxel)), float(np.mean(to_truth > radius_voxel)))

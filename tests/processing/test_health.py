@@ -108,7 +108,7 @@ def test_a_stage_that_lied_about_one_position_is_found() -> None:
     planes[3] = shifted(planes[3], mm=(0, 0, 0.01))
     calibration = calibrate(calibration_set(honest=seen_planes(paper_camera(), noise_px=0.02), lying=tuple(planes)))
     lying = calibration.views["lying"]
-    assert calibration.worst_view == "lying"
+    assert lying.holdout_error_px > 2 * calibration.views["honest"].holdout_error_px
     assert lying.worst_plane.name == planes[3].name
     assert lying.worst_plane.mean_error_px > 0.3
     assert lying.verdict == "usable"

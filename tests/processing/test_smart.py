@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from processing.geometry import ViewMapping
-from processing.quality import detection_rates, quality_factor
+from processing.quality import quality_factor
 from processing.reconstruction.kernels import _native
 from processing.reconstruction.line_of_sight import line_of_sight
 from processing.reconstruction.node_view import sample_mapping
@@ -112,7 +112,7 @@ def test_every_droplet_is_found_and_ghosts_are_fewer_than_by_mlos(by_nodes: bool
     positions, mappings = droplets(20), oracle.cameras(4)  # 23 per cubic millimetre: none hides another
     plan, images = make_plan(mappings, by_nodes), images_of(positions, mappings)
     start, refined = line_of_sight(plan, images), smart(plan, images).volume
-    by_mlos, by_smart = (detection_rates(positions, v, 0.1 * float(v.max())) for v in (start, refined))
+    by_mlos, by_smart = (oracle.detection_rates(positions, v, 0.1 * float(v.max())) for v in (start, refined))
     assert by_smart.found == 1
     assert by_smart.ghosts <= by_mlos.ghosts
     assert by_smart.ghosts < 0.05
@@ -124,7 +124,7 @@ def test_more_views_show_fewer_ghosts() -> None:
     for count in (2, 4, 6):
         mappings = everything[:count]
         volume = smart(make_plan(mappings, False), images_of(positions, mappings), iterations=10).volume
-        ghosts.append(detection_rates(positions, volume, 0.05 * float(volume.max())).ghosts)
+        ghosts.append(oracle.detection_rates(positions, volume, 0.05 * float(volume.max())).ghosts)
     assert ghosts[0] > ghosts[1] > ghosts[2]
 
 

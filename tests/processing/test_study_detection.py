@@ -3,14 +3,15 @@
 import numpy as np
 import pytest
 
-from processing.quality import DetectionRates, detection_rates
 from processing.studies.detection import (
     DetectionCurve,
+    DetectionRates,
     best_threshold,
     detection_curve,
     half_median_threshold,
 )
 from processing.studies.simulated_droplets import blob_volume
+from tests.processing import oracle
 
 CENTRES = np.array([[8.0, 8.0, 8.0], [8.0, 24.0, 24.0], [24.0, 8.0, 24.0]])
 GHOSTS = np.array([[24.0, 24.0, 8.0]])
@@ -36,12 +37,12 @@ def test_two_droplets_in_one_peak_are_one_found() -> None:
     assert curve.rates(0.5) == DetectionRates(found=0.5, ghosts=0.0)
 
 
-def test_the_rates_are_those_of_the_quality_measure_where_droplets_are_apart() -> None:
+def test_the_rates_are_those_of_the_textbook_where_droplets_are_apart() -> None:
     volume = blob_volume((32, 32, 32), CENTRES, 1.0) + np.float32(0.6) * blob_volume((32, 32, 32), GHOSTS, 1.0)
     volume *= 1 + 0.2 * np.random.default_rng(1).random(volume.shape, dtype=np.float32)
     curve = detection_curve(CENTRES, volume)
     for threshold in (0.05, 0.3, 0.9):
-        assert curve.rates(threshold) == detection_rates(CENTRES, volume, threshold)
+        assert curve.rates(threshold) == oracle.detection_rates(CENTRES, volume, threshold)
 
 
 def test_an_empty_volume_has_no_peaks() -> None:
