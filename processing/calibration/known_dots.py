@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from processing.calibration.errors import TargetNotFound
-from processing.calibration.pinhole_fit import direct_linear_transformation
+from processing.calibration.pinhole_fit import direct_linear_transformation, projected_px
 from processing.geometry import FloatArray
 
 MIN_SEEDS = 6
@@ -102,8 +102,7 @@ def _vertex(before: NDArray[np.floating], here: NDArray[np.floating], after: NDA
 
 def _project(seen_mm: FloatArray, seen_px: FloatArray, points_mm: FloatArray) -> FloatArray:
     projection = direct_linear_transformation(seen_mm, seen_px, np.ones(len(seen_mm)))
-    homogeneous = np.column_stack([points_mm, np.ones(len(points_mm))]) @ projection.T
-    return np.asarray(homogeneous[:, :2] / homogeneous[:, 2:], dtype=np.float64)
+    return projected_px(projection, points_mm)
 
 
 def _near(expected_px: FloatArray, peaks_px: FloatArray, radius_px: float) -> list[NDArray[np.int64]]:

@@ -10,6 +10,13 @@ import numpy as np
 
 from processing.geometry import FloatArray
 
+ROBUST_SCALE = 3.0
+"""Residuals beyond so many times their typical size count less in the first pass of a fit."""
+REJECT_SCALE = 6.0
+"""Points beyond so many times that size are wrong and left out of the second pass."""
+REJECT_FLOOR_PX = 0.1
+"""Points this close to the model are never left out."""
+
 MAX_TRIALS = 150
 """Steps that are tried, those that lead upwards included."""
 TOLERANCE = 1e-8

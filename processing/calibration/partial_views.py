@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from processing.calibration.errors import TargetNotFound
 from processing.calibration.observation import PlaneObservation, stacked
-from processing.calibration.pinhole_fit import direct_linear_transformation
+from processing.calibration.pinhole_fit import direct_linear_transformation, projected_px
 from processing.calibration.targets import Target, TargetPoints, detect_target
 from processing.geometry import FloatArray
 
@@ -63,9 +63,7 @@ def _predict(known: Sequence[PlaneObservation], target: Target, ids: NDArray[np.
     """Where a camera through the known planes sees points (N, 2) of the target."""
     points_mm, image_px = stacked(known)
     projection = direct_linear_transformation(points_mm, image_px, np.ones(len(points_mm)))
-    world_mm = np.column_stack([target.points_mm(ids), np.full(len(ids), z_mm), np.ones(len(ids))])
-    homogeneous = world_mm @ projection.T
-    return np.asarray(homogeneous[:, :2] / homogeneous[:, 2:], dtype=np.float64)
+    return projected_px(projection, np.column_stack([target.points_mm(ids), np.full(len(ids), z_mm)]))
 
 
 def _check(points: TargetPoints, expected_px: FloatArray, visible_px: FloatArray) -> None:

@@ -15,7 +15,7 @@ from scipy.linalg import rq
 
 from processing.calibration.aim import Aim
 from processing.calibration.errors import CalibrationError
-from processing.calibration.least_squares import minimise
+from processing.calibration.least_squares import REJECT_FLOOR_PX, REJECT_SCALE, ROBUST_SCALE, minimise
 from processing.geometry import FloatArray, PinholeCamera, rotation_vector_of
 
 PINHOLE_PARAMETERS = 15
@@ -29,13 +29,6 @@ PARAMETER_NAMES = (
     *("tilt_x_rad", "tilt_y_rad"),
 )
 """What is fitted, in order; the rotation as a Rodrigues vector."""
-
-ROBUST_SCALE = 3.0
-"""Residuals beyond so many standard deviations count less in the first pass."""
-REJECT_SCALE = 6.0
-"""Points beyond so many standard deviations are wrong and left out of the second pass."""
-REJECT_FLOOR_PX = 0.1
-"""Points this close to the model are never left out."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,13 +108,18 @@ def direct_linear_transformation(points_mm: FloatArray, image_px: FloatArray, we
     return np.asarray(to_image @ projection @ to_world, dtype=np.float64)
 
 
+def projected_px(projection: FloatArray, points_mm: FloatArray) -> FloatArray:
+    """Image points (N, 2) of world points (N, 3) through a projection matrix (3, 4)."""
+    homogeneous = np.column_stack([points_mm, np.ones(len(points_mm))]) @ projection.T
+    return np.asarray(homogeneous[:, :2] / homogeneous[:, 2:], dtype=np.float64)
+
+
 def _first_guess(points_mm: FloatArray, image_px: FloatArray, image_size_px: tuple[int, int]) -> PinholeCamera:
     """Camera of a direct linear transformation in which wrong points have lost their weight."""
     weights = np.ones(len(points_mm))
     for _ in range(6):
         projection = direct_linear_transformation(points_mm, image_px, weights)
-        homogeneous = np.column_stack([points_mm, np.ones(len(points_mm))]) @ projection.T
-        residual_px = np.linalg.norm(homogeneous[:, :2] / homogeneous[:, 2:] - image_px, axis=1)
+        residual_px = np.linalg.norm(projected_px(projection, points_mm) - image_px, axis=1)
         weights = 1 / (1 + (residual_px / max(ROBUST_SCALE * float(np.median(residual_px)), 1e-3)) ** 2)
     return _decompose(projection, image_size_px)
 

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from processing.calibration.errors import CalibrationError
+from processing.calibration.least_squares import REJECT_FLOOR_PX, REJECT_SCALE, ROBUST_SCALE
 from processing.geometry import FloatArray
 
 ORDER, ORDER_Z = 3, 2
@@ -15,7 +16,6 @@ EXPONENTS = tuple(
 """Powers of x, y and z of the 19 terms (Soloff, Adrian and Liu 1997)."""
 COEFFICIENT_NAMES = tuple(f"{axis}_x{i}_y{j}_z{k}_px" for axis in "uv" for i, j, k in EXPONENTS)
 """Of all 38 coefficients, those of u before those of v."""
-ROBUST_SCALE, REJECT_SCALE, REJECT_FLOOR_PX = 3.0, 6.0, 0.1
 
 
 @dataclass(frozen=True, eq=False)
