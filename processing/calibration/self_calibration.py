@@ -5,7 +5,7 @@ Two rules keep the world where the target put it. If the motion of a single view
 no other view as well, that view moved and the others did not. Otherwise all views are moved as little as possible.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
@@ -101,45 +101,66 @@ def self_calibrate(
         Droplets are too few or do not agree; names numbers and limits.
     """
     calibration.require_world()
-    names = list(calibration.views)
-    require_views(len(names))
-    original = [view.mapping for view in calibration.views.values()]
-    box = measured_box(calibration)
-    seen = _sub_volumes(original, exposures, box, SEARCH_PX)
-    first, moved, mappings = seen, None, original
-    for _ in range(MAX_ROUNDS):
-        moved, corrections = _explain(original, mappings, seen)
-        previous, mappings = mappings, [corrected(*pair) for pair in zip(original, corrections, strict=True)]
-        seen = _sub_volumes(mappings, exposures, box, FINE_SEARCH_PX)
-        if max(_distances_px(previous, mappings, box)) < CONVERGED_PX:
-            break
-    after_px = _disagreement_px(mappings, seen)
-    distances_px = _distances_px(original, mappings, box)
+    require_views(len(calibration.views))
+    original, box = [view.mapping for view in calibration.views.values()], measured_box(calibration)
+    first = _sub_volumes(original, exposures, box, SEARCH_PX)
+    moved, mappings, last = _refined(original, exposures, box, first)
+    distances_px, after_px = _distances_px(original, mappings, box), _disagreement_px(mappings, last)
+    corrections = dict(zip(calibration.views, distances_px, strict=True))
+    note = f"self-calibration on {len(exposures)} exposures of {source}: {_moves(corrections)}"
     views = {
         name: _corrected_view(view, mapping, distance_px, left_px)
         for (name, view), mapping, distance_px, left_px in zip(
             calibration.views.items(), mappings, distances_px, after_px, strict=True
         )
     }
-    moves = ", ".join(f"{name} by {px:.2f} px" for name, px in zip(names, distances_px, strict=True) if px)
-    note = f"self-calibration on {len(exposures)} exposures of {source}: {moves or 'the views agree, nothing moved'}"
+    return SelfCalibration(
+        calibration=_child(calibration, views, note, created_utc),
+        corrections_px=corrections,
+        moved=None if moved is None else list(calibration.views)[moved],
+        before_px=dict(zip(calibration.views, _disagreement_px(original, first), strict=True)),
+        after_px=dict(zip(calibration.views, after_px, strict=True)),
+        sub_volumes=len(last),
+        droplets=sum(disparity.n_droplets for disparity in last),
+    )
+
+
+def _refined(
+    original: Sequence[ViewMapping],
+    exposures: Sequence[Sequence[FloatArray]],
+    box: Box,
+    seen: Sequence[LocalDisparity],
+) -> tuple[int | None, list[ViewMapping], Sequence[LocalDisparity]]:
+    """The view that moved, if a single one did; the corrected mappings; and what the droplets say of these."""
+    moved, mappings = None, list(original)
+    for _ in range(MAX_ROUNDS):
+        moved, corrections = _explain(original, mappings, seen)
+        previous, mappings = mappings, [corrected(*pair) for pair in zip(original, corrections, strict=True)]
+        seen = _sub_volumes(mappings, exposures, box, FINE_SEARCH_PX)
+        if max(_distances_px(previous, mappings, box)) < CONVERGED_PX:
+            break
+    return moved, mappings, seen
+
+
+def _moves(corrections_px: Mapping[str, float]) -> str:
+    """Which views were moved, for a person."""
+    moves = ", ".join(f"{name} by {px:.2f} px" for name, px in corrections_px.items() if px)
+    return moves or "the views agree, nothing moved"
+
+
+def _child(
+    parent: Calibration, views: Mapping[str, ViewCalibration], note: str, created_utc: str | None
+) -> Calibration:
+    """A calibration that names its parent."""
     undated = replace(
-        calibration,
+        parent,
         id="",
         created_utc=created_utc or datetime.now(UTC).isoformat(timespec="seconds"),
         views=views,
-        parent=calibration.id,
-        notes=(*calibration.notes, note),
+        parent=parent.id,
+        notes=(*parent.notes, note),
     )
-    return SelfCalibration(
-        calibration=undated.with_id(content_id(undated)),
-        corrections_px=dict(zip(names, distances_px, strict=True)),
-        moved=None if moved is None else names[moved],
-        before_px=dict(zip(names, _disagreement_px(original, first), strict=True)),
-        after_px=dict(zip(names, after_px, strict=True)),
-        sub_volumes=len(seen),
-        droplets=sum(disparity.n_droplets for disparity in seen),
-    )
+    return undated.with_id(content_id(undated))
 
 
 def _sub_volumes(

@@ -13,6 +13,7 @@ from processing.calibration.mapping_correction import corrected, correction_size
 from processing.calibration.polynomial import fit_polynomial
 from processing.calibration.self_calibration import SelfCalibration, self_calibrate
 from processing.geometry import FloatArray, PinholeCamera, ViewMapping
+from processing.studies.drifting_views import direction
 from tests.processing.drifting_views import SIZE_PX, calibration_of, droplet_shots, inside_mm, views
 
 Drift = Callable[[FloatArray], FloatArray]
@@ -52,7 +53,7 @@ def errors_px(result: SelfCalibration, drifts: dict[int, Drift]) -> FloatArray:
 
 @pytest.mark.parametrize("view", range(4))
 def test_drift_of_any_one_view_is_recovered(view: int) -> None:
-    drifts = {view: shifted(np.sqrt(2), -np.sqrt(2))}
+    drifts = {view: shifted(*(2.0 * direction(view)))}
     result = recalibrate(drifts)
     assert result.moved == f"view{view + 1}"
     assert errors_px(result, drifts).max() < 0.1
