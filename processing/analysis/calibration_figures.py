@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
-from processing.analysis.figures import VIEW_COLOURS
+from processing.analysis.colours import VIEW_COLOURS
 from processing.calibration.calibration import Calibration
 from processing.calibration.observation import CalibrationSet, PlaneObservation
 from processing.geometry import FloatArray

@@ -14,12 +14,11 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from numpy.typing import NDArray
 from skimage.measure import marching_cubes
 
+from processing.analysis.colours import FRAME_COLOURS, VIEW_COLOURS
 from processing.calibration.calibration import Calibration
 from processing.volume import VoxelGrid
 
 Volume = NDArray[np.float32]
-VIEW_COLOURS = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#f0e442", "#000000")
-FRAME_COLOURS = {"A": "#1f4e9c", "B": "#c0392b"}
 LIMIT_PX = 0.05
 
 

@@ -8,10 +8,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullFormatter
 
+from processing.analysis.colours import VIEW_COLOURS
 from processing.studies.accuracy_study import AccuracyRow, of_quantity
 from processing.studies.report import Statement
 
-COLOURS = ("#0072b2", "#e69f00", "#009e73", "#cc79a7")
 TITLES = {
     "true error": "cameras: error in space [px]",
     "corner error": "corners: error in the image [px]",
@@ -84,7 +84,7 @@ def accuracy_figure(rows: Sequence[AccuracyRow]) -> Figure:
         axes.set_title(title, fontsize="medium", loc="left")
     views = list(dict.fromkeys(row.view for row in rows))
     handles = [
-        *(_mark(colour, "s", colour, view) for view, colour in zip(views, COLOURS, strict=False)),
+        *(_mark(colour, "s", colour, view) for view, colour in zip(views, VIEW_COLOURS, strict=False)),
         _mark("0.2", "o", "0.2", "rms, error, or time"),
         _mark("0.2", "^", "white", "largest error"),
         _mark("0.2", "_", "0.2", "both of the best unbiased fit"),
@@ -103,7 +103,7 @@ def _panel(axes: Axes, rows: Sequence[AccuracyRow]) -> None:
     cases, views = list(_by_case(rows)), list(dict.fromkeys(row.view for row in rows))
     for row in rows:
         number = views.index(row.view)
-        place, colour = cases.index(row.case) + 0.16 * (number - 1.5), COLOURS[number % len(COLOURS)]
+        place, colour = cases.index(row.case) + 0.16 * (number - 1.5), VIEW_COLOURS[number % len(VIEW_COLOURS)]
         _points(axes, place, row, colour)
     if rows:
         limit = rows[0].limit

@@ -12,6 +12,7 @@ from enum import StrEnum
 import numpy as np
 from matplotlib.figure import Figure
 
+from processing.analysis.colours import VIEW_COLOURS
 from processing.calibration.calibration import Calibration, Model
 from processing.calibration.imported_set import place_points
 from processing.calibration.joint_fit import calibrate
@@ -25,7 +26,6 @@ from processing.synthetic.target import Checkerboard
 
 PAPER_LIMIT_PX = 0.05
 BITS = 12
-COLOURS = ("#0072b2", "#e69f00", "#009e73", "#cc79a7")
 
 
 class PointSource(StrEnum):
@@ -167,7 +167,7 @@ def residual_figure(rows: Sequence[ResidualRow]) -> Figure:
     for (view, points), curve in _by_curve(rows).items():
         z_mm, errors_px = [row.z_mm for row in curve], [row.mean_error_px for row in curve]
         if points == PointSource.DETECTED:
-            colour = COLOURS[views.index(view) % len(COLOURS)]
+            colour = VIEW_COLOURS[views.index(view) % len(VIEW_COLOURS)]
             axes.plot(z_mm, errors_px, color=colour, marker="o", label=f"{view}, corners detected in images")
         else:
             label = "all views, ideal points" if view == views[-1] else None
