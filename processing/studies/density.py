@@ -14,7 +14,7 @@ from matplotlib.ticker import NullLocator
 
 from processing.quality import quality_factor
 from processing.reconstruction.plan import plan_reconstruction
-from processing.studies.recipe import PAPER_RECIPES, Recipe, reconstruct_each
+from processing.studies.recipe import ALL_RECIPES, Recipe, reconstruct_each
 from processing.studies.report import Statement
 from processing.studies.simulated_droplets import (
     IMAGE_SIZE_PX,
@@ -33,7 +33,7 @@ ALL_SIGMAS_VOXEL = (0.75, 1.27, 1.5, 2.0)
 
 @dataclass(frozen=True)
 class DensityStudy:
-    """What to simulate; the defaults are the paper's.
+    """What to simulate; volume, densities and windows are the paper's, methods are those and how SMART gets there.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ class DensityStudy:
     shape: tuple[int, int, int] = PAPER_SHAPE
     counts: tuple[int, ...] = PAPER_COUNTS
     sigmas_voxel: tuple[float, ...] = (1.5,)
-    recipes: tuple[Recipe, ...] = PAPER_RECIPES
+    recipes: tuple[Recipe, ...] = ALL_RECIPES
     window: int = 64
     step: int = 32
     image_size_px: tuple[int, int] = IMAGE_SIZE_PX

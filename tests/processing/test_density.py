@@ -99,7 +99,8 @@ def test_the_limit_of_mlos_is_interpolated_and_stands_beside_the_papers() -> Non
     assert limiting_density_per_mm3(rows[:1], "mlos", 1.5) is None
 
 
-def test_the_defaults_are_the_papers() -> None:
+def test_the_defaults_are_the_papers_and_what_the_command_does() -> None:
     study = DensityStudy()
     assert study.sigmas_voxel == (1.5,)
-    assert [recipe.name for recipe in study.recipes] == ["mlos", "minlos", "gavlos", "smart"]
+    names = ["mlos", "minlos", "gavlos", "smart-5", "smart-10", "smart", "mart-5"]
+    assert [recipe.name for recipe in study.recipes] == names
