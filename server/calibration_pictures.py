@@ -18,8 +18,8 @@ def calibration_pictures(
     images = {name: image for name, image in found.items() if image is not None}
     if images:
         written.append(calibration_file.with_name(f"{calibration_file.stem}-grid.png"))
-        grid_figure(images, planes).savefig(written[-1], dpi=80)
+        grid_figure(images, planes).savefig(written[-1], dpi=100)
     if not any(view.intrinsics_only for view in calibration.views.values()):
         written.append(calibration_file.with_name(f"{calibration_file.stem}-errors.png"))
-        error_vectors_figure(calibration_set, calibration).savefig(written[-1], dpi=80)
+        error_vectors_figure(calibration_set, calibration).savefig(written[-1], dpi=100)
     return written

@@ -177,7 +177,7 @@ def _draw_panel(axes: Axes, rows: Sequence[DensityRow], sigma_voxel: float) -> N
     axes.set_ylim(0, 1.02)
     axes.set_title(rf"Gaussian droplets of $\sigma$ = {sigma_voxel:g} voxel", fontsize="medium")
     density_axis(axes, sorted({row.density_per_mm3 for row in rows}))
-    axes.legend(frameon=False, loc="lower left", fontsize="small")
+    axes.legend(frameon=False, loc="lower left", fontsize="small", handlelength=3.5)
 
 
 def density_axis(axes: Axes, densities_per_mm3: Sequence[float]) -> None:

@@ -173,7 +173,7 @@ def ghost_figure(rows: Sequence[GhostRow]) -> Figure:
         ghost_axes.set(ylabel="ghosts [% of the peaks]", title=title)
     for axes in panels[0]:
         axes.set_xlabel("")
-    panels[0, 1].legend(frameon=False, loc="upper left", fontsize="small")
+    panels[0, 1].legend(frameon=False, loc="upper left", fontsize="small", handlelength=3.5)
     figure.suptitle(
         rf"Gaussian droplets of $\sigma$ = {rows[0].sigma_voxel:g} voxel; dashed: "
         f"{100 * MIN_FOUND:.0f} % found, {100 * MAX_GHOSTS:.0f} % ghosts"
@@ -186,5 +186,6 @@ def _draw(axes: Axes, rows: Sequence[GhostRow], rule: ThresholdRule, quantity: s
         recipe, curve = Recipe.named(method), _curve(rows, method, rule)
         shares = [100 * getattr(row, quantity) for row in curve]
         axes.plot([row.density_per_mm3 for row in curve], shares, label=recipe.label, **recipe.style)
-    axes.set_ylim(-2, 102)
+    lowest = min(getattr(row, quantity) for row in rows)
+    axes.set_ylim(10 * np.floor(10 * lowest) - 2, 102)
     density_axis(axes, sorted({row.density_per_mm3 for row in rows}))

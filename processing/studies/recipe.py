@@ -4,6 +4,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+from matplotlib.colors import to_hex, to_rgb
+
 from processing.reconstruction.line_of_sight import line_of_sight
 from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.plan import Plan
@@ -12,7 +15,8 @@ from processing.studies.simulated_droplets import Image, Volume
 
 PAPER_ITERATIONS = 20
 COLOURS = {"mlos": "#0072b2", "minlos": "#e69f00", "gavlos": "#009e73", "smart": "#cc79a7", "mart": "#56b4e9"}
-_LINES = {5: ":", 10: "--"}
+_STAGES = {5: (":", "^", 0.4), 10: ("--", "s", 0.0), 20: ("-", "o", -0.4)}
+"""Line, marker, and by how much the colour of a method is lighter or darker after so many iterations."""
 
 
 @dataclass(frozen=True)
@@ -63,8 +67,11 @@ class Recipe:
 
     @property
     def style(self) -> dict[str, Any]:
-        """Colour by method, line by iterations: the same in every figure."""
-        return {"color": COLOURS[self.method.value], "linestyle": _LINES.get(self.iterations, "-"), "marker": "o"}
+        """Colour by method; line, marker and shade by iterations: the same in every figure."""
+        line, marker, lighter = _STAGES.get(self.iterations, ("-", "o", 0.0))
+        colour = np.array(to_rgb(COLOURS[self.method.value]))
+        shade = colour + lighter * (1 - colour if lighter > 0 else colour)
+        return {"color": to_hex(tuple(shade)), "linestyle": line, "marker": marker, "markersize": 5}
 
     def continues(self, other: "Recipe | None") -> bool:
         """Whether the volume of the other one is on the way to this one's."""

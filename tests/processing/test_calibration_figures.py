@@ -7,10 +7,10 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.quiver import Quiver
 
-from processing.analysis.calibration_figures import MAX_PLANES, error_vectors_figure, grid_figure
+from processing.analysis.calibration_figures import MAX_ARROWS, MAX_PLANES, error_vectors_figure, grid_figure
 from processing.calibration.joint_fit import calibrate
-from processing.calibration.observation import CalibrationSet
-from tests.processing.calibration_cases import calibration_set, paper_camera, seen_planes
+from processing.calibration.observation import CalibrationSet, PlaneObservation
+from tests.processing.calibration_cases import calibration_set, paper_camera, seen_planes, volume_points_mm
 
 
 @pytest.fixture(scope="module")
@@ -39,6 +39,29 @@ def test_grid_carries_world_coordinates_where_the_points_are(seen: CalibrationSe
     assert drawn(figure) > 1000
 
 
+def test_positions_are_told_as_a_person_would_say_them() -> None:
+    nearly = calibration_set(left=seen_planes(paper_camera(45), z_mm=(-2.0004, -0.5007, 0.0, 1.9996)))
+    figure = error_vectors_figure(nearly, calibrate(nearly))
+    assert [axes.get_title().split("\n")[0] for axes in figure.axes] == [
+        f"left, z = {z_mm} mm" for z_mm in ("-2", "-0.5", "0", "2")
+    ]
+
+
+def test_scattered_points_have_arrows_too() -> None:
+    camera, points_mm = paper_camera(), volume_points_mm(60)
+    scattered = calibration_set(only=(PlaneObservation("table", points_mm, camera.project(points_mm)),))
+    figure = error_vectors_figure(scattered, calibrate(scattered))
+    (arrows,) = [part for part in figure.axes[0].collections if isinstance(part, Quiver)]
+    assert len(np.asarray(arrows.get_offsets())) == 60
+
+
+def test_four_sections_stand_two_by_two(seen: CalibrationSet) -> None:
+    planes = {name: seen.views["left"].planes[5] for name in "abc"}
+    figure = grid_figure({name: np.zeros((1200, 1600), np.uint8) for name in planes}, planes)
+    assert [axes.get_title()[0] for axes in figure.axes] == ["a", "b", "c"]
+    assert drawn(figure) > 1000
+
+
 def test_arrows_are_the_errors_of_the_planes(seen: CalibrationSet) -> None:
     calibration = calibrate(seen)
     figure = error_vectors_figure(seen, calibration)
@@ -46,9 +69,15 @@ def test_arrows_are_the_errors_of_the_planes(seen: CalibrationSet) -> None:
     assert [len(part) for part in arrows] == [1] * MAX_PLANES + [1, 1, 1, 1, 0]
     plane, first = seen.views["left"].planes[0], arrows[0][0]
     errors_px = calibration.views["left"].mapping.project(plane.points_mm) - plane.image_px
-    np.testing.assert_allclose(np.column_stack([first.U, first.V]), errors_px)
+    places_px = np.asarray(first.get_offsets())
+    shown = np.linalg.norm(plane.image_px[None] - places_px[:, None], axis=2).argmin(axis=1)
+    assert len(plane) / 5 < len(places_px) <= MAX_ARROWS
+    np.testing.assert_allclose(plane.image_px[shown], places_px)
+    np.testing.assert_allclose(np.column_stack([first.U, first.V]), errors_px[shown])
     assert len({part[0].scale for part in arrows if part}) == 1
-    assert (
-        figure.axes[0].get_title() == f"left, z = -4.5 mm: {calibration.views['left'].planes[0].mean_error_px:.3f} px"
-    )
+    told = calibration.views["left"].planes[0]
+    title = f"left, z = -4.5 mm\n{told.mean_error_px:.3f} px, {told.max_error_px:.2f} px at most"
+    assert figure.axes[0].get_title() == title
+    assert figure.axes[0].get_ylabel() == "row [px]"
+    assert figure.axes[5].get_xlabel() == "column [px]"
     assert drawn(figure) > 1000
