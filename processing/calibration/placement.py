@@ -86,6 +86,19 @@ def doubtful_views(
     return {name: float(angles.min()) for name, angles in off_deg.items() if angles.min() > DOUBTFUL_DEG}
 
 
+def same_either_way(
+    mappings: Mapping[str, ViewMapping], middle_mm: FloatArray, turned_deg: Mapping[str, int]
+) -> list[str]:
+    """Views of which no azimuth tells whether they are turned as others are: those near 0 or 90 degrees."""
+    turns = sorted({TURNS_DEG.index(turn) for turn in turned_deg.values()})
+    undecided = []
+    for name, mapping in mappings.items():
+        azimuths_deg = _turned_azimuths_deg(_axes(mapping, middle_mm)[0])
+        if name not in turned_deg and (_line_angle_deg(azimuths_deg[turns] - azimuths_deg[0]) < CLEARER_DEG).any():
+            undecided.append(name)
+    return undecided
+
+
 def in_one_place(mappings: Mapping[str, ViewMapping], middle_mm: FloatArray) -> Iterator[tuple[str, str]]:
     """Pairs of pinhole cameras that seem to stand in each other's way."""
     cameras = {name: mapping for name, mapping in mappings.items() if isinstance(mapping, PinholeCamera)}

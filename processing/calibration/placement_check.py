@@ -6,7 +6,7 @@ import numpy as np
 
 from processing.calibration.errors import CalibrationError
 from processing.calibration.observation import CalibrationSet, stacked
-from processing.calibration.placement import doubtful_views, in_one_place, placement, turned_views
+from processing.calibration.placement import doubtful_views, in_one_place, placement, same_either_way, turned_views
 from processing.geometry import FloatArray, ViewMapping
 
 
@@ -30,6 +30,8 @@ def check_placements(calibration_set: CalibrationSet, mappings: Mapping[str, Vie
     turned_deg = turned_views(mappings, middle_mm, azimuths_deg)
     if turned_deg and (len(turned_deg) < len(mappings) or len(set(turned_deg.values())) > 1):
         texts = [_turned(calibration_set, name, mappings[name], middle_mm, turn) for name, turn in turned_deg.items()]
+        undecided = same_either_way(mappings, middle_mm, turned_deg)
+        texts += [f"{name}: looks the same either way; if it is turned too, say --roll for it" for name in undecided]
         raise CalibrationError("; ".join(texts))
     if turned_deg:
         turn_deg = next(iter(turned_deg.values()))

@@ -106,6 +106,11 @@ def test_all_turned_cameras_are_named(turned_deg: dict[str, float], said: tuple[
     assert [part.split("Say --roll ")[1].split(" ")[0] for part in text.split("; view")] == list(said)
 
 
+def test_a_view_from_the_front_cannot_be_checked_and_is_asked_about() -> None:
+    with pytest.raises(CalibrationError, match=r"^left: stands at .*; front: looks the same either way; if it is"):
+        calibrate(rig({"left": 40.0, "front": 0.0, "right": -40.0}, left=180.0))
+
+
 def test_a_camera_that_was_said_to_hang_upside_down_and_does_not() -> None:
     wrong = replace(rig(AZIMUTHS_DEG, view4=180.0), rolls_deg={"view4": 180.0})
     with pytest.raises(CalibrationError, match=r"Say --roll view4=0 \(.*or --roll view4=180 if"):
