@@ -33,6 +33,7 @@ DISTORTION = (0.6, 20.0, 8e-4, -6e-4, 0.0)
 NODES = (23, 17, 10)
 """Points along x, y and z at which errors are looked at; the outermost are the corners of the region."""
 IDEAL_FITS = 400
+"""Fits that are drawn from the bound."""
 
 
 def fitted_cameras(study: CalibrationStudy) -> Iterator[AccuracyRow]:
