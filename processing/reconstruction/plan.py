@@ -106,11 +106,21 @@ def plan_reconstruction(
     Raises
     ------
     ReconstructionError
-        Too few or too many views, or a mapping that is too rough to be sampled.
+        Too few or too many views, a mapping that is too rough to be sampled, or instructions asked for
+        (``TOMOSHADOW_ISA``) that this processor does not have.
     """
+    _check_instructions()
     if not MIN_VIEWS <= len(mappings) <= MAX_VIEWS:
         raise ReconstructionError(f"{len(mappings)} views, a reconstruction takes {MIN_VIEWS} to {MAX_VIEWS}")
     return Plan(grid, tuple(plan_view(mapping, grid, accuracy) for mapping in mappings))
+
+
+def _check_instructions() -> None:
+    """Complain of the environment before the work, and as an error that a user can mend."""
+    try:
+        _native.selected_isa()
+    except ValueError as error:
+        raise ReconstructionError(str(error)) from error
 
 
 def plan_view(mapping: ViewMapping, grid: VoxelGrid, accuracy: Accuracy = Accuracy.NOMINAL) -> RectifiedView | NodeView:

@@ -231,6 +231,18 @@ def test_a_mapping_that_runs_away_is_one_clear_error(
     assert refused(capsys, *arguments).startswith("mapping is not smooth: it bends by")
 
 
+def test_instructions_that_the_processor_lacks_are_one_clear_error(
+    run_dir: Path,
+    calibration_file: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("TOMOSHADOW_ISA", "sse9")
+    arguments = ["reconstruct", run_dir, "--calibration", calibration_file, f"--grid={GRID}", "-o", tmp_path / "out"]
+    assert refused(capsys, *arguments).startswith("TOMOSHADOW_ISA is sse9, this processor runs plain")
+
+
 def test_a_volume_beyond_the_memory_fails_without_a_traceback(
     run_dir: Path,
     calibration_file: Path,
