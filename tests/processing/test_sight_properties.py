@@ -1,8 +1,6 @@
 """Line of sight equals the textbook for any geometry, on every instruction set, in every form of output."""
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -11,83 +9,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from processing.geometry import FloatArray, PinholeCamera, ViewMapping, view_camera
-from processing.reconstruction.accuracy import Accuracy
+from processing.geometry import FloatArray
 from processing.reconstruction.kernels import _native
 from processing.reconstruction.line_of_sight import line_of_sight
 from processing.reconstruction.mean_line_of_sight import mean_line_of_sight
 from processing.reconstruction.method import ReconstructionMethod
-from processing.reconstruction.node_view import sample_mapping
 from processing.reconstruction.plan import Plan, plan_reconstruction
 from processing.reconstruction.sparse_line_of_sight import slabs_of_sight, sparse_line_of_sight
 from processing.volume import VoxelGrid
 from tests.processing import oracle
+from tests.processing.sight_cases import PITCH_MM, Images, cases, instruction_set
 
 METHODS = [ReconstructionMethod.GAVLOS, ReconstructionMethod.MINLOS, ReconstructionMethod.MLOS]
-PITCH_MM = 1 / 60
-Images = list[NDArray[np.float32]]
-
-
-@dataclass(frozen=True)
-class Mirrored:
-    """A central camera that looks into a mirror."""
-
-    camera: PinholeCamera
-
-    @property
-    def image_size_px(self) -> tuple[int, int]:
-        return self.camera.image_size_px
-
-    @property
-    def centre_mm(self) -> FloatArray:
-        return self.camera.centre_mm
-
-    def project(self, points_mm: FloatArray) -> FloatArray:
-        image_px = self.camera.project(points_mm)
-        return np.column_stack([self.image_size_px[0] - 1 - image_px[:, 0], image_px[:, 1]])
-
-
-@st.composite
-def views(draw: st.DrawFn) -> ViewMapping:
-    """Any azimuth, pitch and roll, distortion, and maybe a mirror."""
-    camera = view_camera(
-        draw(st.floats(-60, 60)),
-        focal_length_mm=85,
-        magnification=0.43,
-        scale_px_per_mm=60,
-        image_size_px=(draw(st.integers(70, 120)), draw(st.integers(50, 90))),
-        pitch_deg=draw(st.floats(-15, 15)),
-        roll_deg=draw(st.floats(-180, 180)),
-        distortion=np.array([draw(st.floats(-2, 2)), 0, draw(st.floats(-0.005, 0.005)), 0.003, 0]),
-    )
-    return Mirrored(camera) if draw(st.booleans()) else camera
-
-
-@st.composite
-def cases(draw: st.DrawFn) -> tuple[Plan, Images]:
-    """A plan of 2 to 8 views, rectified or by nodes, and images with empty regions."""
-    shape = (draw(st.integers(1, 12)), draw(st.integers(1, 40)), draw(st.integers(1, 70)))
-    mappings = draw(st.lists(views(), min_size=2, max_size=8))
-    grid = VoxelGrid.centred(shape, PITCH_MM)
-    by_nodes = draw(st.lists(st.booleans(), min_size=len(mappings), max_size=len(mappings)))
-    plan = plan_reconstruction(mappings, grid, draw(st.sampled_from(Accuracy)))
-    mixed = [
-        sample_mapping(mapping, grid, 0.02) if nodes else view
-        for mapping, nodes, view in zip(mappings, by_nodes, plan.views, strict=True)
-    ]
-    rng = np.random.default_rng(draw(st.integers(0, 99)))
-    images = [(0.2 + 0.8 * rng.random(mapping.image_size_px[::-1])).astype(np.float32) for mapping in mappings]
-    for image in images:
-        image[: draw(st.integers(0, 30))] = 0
-        image[:, : draw(st.integers(0, 50))] = 0
-    return Plan(grid, tuple(mixed)), images
-
-
-@contextmanager
-def instruction_set(name: str) -> Iterator[None]:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("TOMOSHADOW_ISA", name)
-        yield
 
 
 def tolerance(method: ReconstructionMethod, count: int) -> float:
