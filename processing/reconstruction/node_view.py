@@ -3,12 +3,15 @@
 Any smooth mapping will do: polynomials, refracting windows, any roll, mirrors.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from processing.geometry import FloatArray, ViewMapping
+from processing.reconstruction.bending import bend_px
 from processing.reconstruction.errors import ReconstructionError
 from processing.reconstruction.fixed_point import FixedPoint
 from processing.reconstruction.kernels import _native
@@ -79,7 +82,7 @@ def sample_mapping(mapping: ViewMapping, grid: VoxelGrid, max_deviation_px: floa
     deviation_px = np.inf
     for spacing in SPACINGS:
         nodes_px = _project_lattice(mapping, grid, spacing)
-        deviation_px = _deviation_px(mapping, grid, nodes_px, spacing)
+        deviation_px = bend_px(nodes_px, partial(_project_lattice, mapping, grid, spacing))
         if deviation_px <= max_deviation_px:
             return _node_view(mapping, nodes_px, spacing, deviation_px)
     raise ReconstructionError(
@@ -103,17 +106,10 @@ def _node_view(mapping: ViewMapping, nodes_px: FloatArray, spacing: int, deviati
     )
 
 
-def _project_lattice(mapping: ViewMapping, grid: VoxelGrid, spacing: int, offset: float = 0.0) -> FloatArray:
+def _project_lattice(
+    mapping: ViewMapping, grid: VoxelGrid, spacing: int, offset: Sequence[float] = (0.0, 0.0, 0.0)
+) -> FloatArray:
     """Image points (nodes_z, nodes_y, nodes_x, 2) of every ``spacing``-th voxel; the last nodes enclose the grid."""
-    axes = [spacing * (np.arange((n - 1) // spacing + 2, dtype=np.float64) + offset) for n in grid.shape]
+    axes = [spacing * (np.arange((n - 1) // spacing + 2) + along) for n, along in zip(grid.shape, offset, strict=True)]
     indices = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
     return mapping.project(grid.to_mm(indices.reshape(-1, 3))).reshape(indices.shape[:3] + (2,))
-
-
-def _deviation_px(mapping: ViewMapping, grid: VoxelGrid, nodes_px: FloatArray, spacing: int) -> float:
-    """Compare the middle between eight nodes with the mapping itself."""
-    middle_px = nodes_px
-    for axis in range(3):
-        middle_px = 0.5 * (np.take(middle_px, range(middle_px.shape[axis] - 1), axis) + np.delete(middle_px, 0, axis))
-    exact_px = _project_lattice(mapping, grid, spacing, offset=0.5)[:-1, :-1, :-1]
-    return float(np.linalg.norm(middle_px - exact_px, axis=-1).max())

@@ -5,13 +5,16 @@ as C + (P - C) (z_ref - C_z) / (z - C_z) on the plane z_ref. So the image is res
 through the full camera model with all its distortion; from there on no camera model is needed (shear-warp).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from processing.geometry import FloatArray, ViewMapping
+from processing.reconstruction.bending import bend_px
 from processing.reconstruction.fixed_point import FixedPoint
 from processing.reconstruction.kernels import _native
 from processing.volume import VoxelGrid
@@ -98,14 +101,12 @@ def rectify(mapping: ViewMapping, grid: VoxelGrid, pixels_per_voxel: float, max_
     columns += -columns % MAP_SPACING_PX
     rows = int(np.ceil((shift_v + scale * (grid.shape[1] - 1)).max() + top)) + 2 * GUARD_PX
     origin = np.array([z_ref, -top / reference_scale, -left / reference_scale])
-    nodes_px, middle_px = (
-        _project_plane(mapping, grid, origin, 1 / reference_scale, (rows, columns), offset) for offset in (0.0, 0.5)
-    )
+    points_at = partial(_project_plane, mapping, grid, origin, 1 / reference_scale, (rows, columns))
+    nodes_px = points_at((0.0, 0.0))
     recorded_px_per_voxel = reference_scale * np.linalg.norm(np.diff(nodes_px, axis=1), axis=-1).mean() / MAP_SPACING_PX
     if recorded_px_per_voxel > MAX_PIXELS_PER_VOXEL:
         raise NotRectifiable(f"a voxel covers {recorded_px_per_voxel:.2g} px, limit {MAX_PIXELS_PER_VOXEL} px")
-    bend_px = float(np.linalg.norm(_middle(nodes_px) - middle_px[:-1, :-1], axis=-1).max())
-    deviation_px = bend_px + _deviation_px(mapping, grid, centre, to_reference)
+    deviation_px = bend_px(nodes_px, points_at) + _deviation_px(mapping, grid, centre, to_reference)
     if deviation_px > max_deviation_px:
         raise NotRectifiable(f"rectified it would be off by {deviation_px:.2g} px, limit {max_deviation_px} px")
     return RectifiedView(
@@ -143,19 +144,16 @@ def _project_plane(
     origin: FloatArray,
     voxels_per_px: float,
     shape: tuple[int, int],
-    offset: float,
+    offset: Sequence[float],
 ) -> FloatArray:
     """Where nodes of the resampled image, whose pixel (0, 0) is the voxel index ``origin``, lie in the recorded one."""
     along_v, along_u = (
-        voxels_per_px * MAP_SPACING_PX * (np.arange((n - 1) // MAP_SPACING_PX + 2) + offset) for n in shape
+        voxels_per_px * MAP_SPACING_PX * (np.arange((n - 1) // MAP_SPACING_PX + 2) + along)
+        for n, along in zip(shape, offset, strict=True)
     )
     y, x = np.meshgrid(origin[1] + along_v, origin[2] + along_u, indexing="ij")
     indices = np.stack([np.full(x.shape, origin[0]), y, x], axis=-1)
     return mapping.project(grid.to_mm(indices.reshape(-1, 3))).reshape(*x.shape, 2)
-
-
-def _middle(nodes: FloatArray) -> FloatArray:
-    return 0.25 * (nodes[:-1, :-1] + nodes[1:, :-1] + nodes[:-1, 1:] + nodes[1:, 1:])
 
 
 def _deviation_px(mapping: ViewMapping, grid: VoxelGrid, centre: FloatArray, to_reference: FloatArray) -> float:

@@ -18,32 +18,9 @@ from processing.reconstruction.planned_view import PlannedView
 from processing.reconstruction.rectified_view import MAP_SPACING_PX, RectifiedView, rectify
 from processing.volume import VoxelGrid
 from tests.processing import oracle
+from tests.processing.sight_cases import Bent
 
 GRID = VoxelGrid.centred((40, 50, 60), 1 / 60)
-
-
-@dataclass(frozen=True)
-class Bent:
-    """A central camera behind a medium that bends lines of sight with depth."""
-
-    camera: PinholeCamera
-    bend_px_per_mm2: float
-    wavelength_mm: float = 0.0
-
-    @property
-    def image_size_px(self) -> tuple[int, int]:
-        return self.camera.image_size_px
-
-    @property
-    def centre_mm(self) -> FloatArray:
-        return self.camera.centre_mm
-
-    def project(self, points_mm: FloatArray) -> FloatArray:
-        image_px = self.camera.project(points_mm)
-        image_px[:, 0] += self.bend_px_per_mm2 * points_mm[:, 2] ** 2
-        if self.wavelength_mm:
-            image_px[:, 1] += np.sin(2 * np.pi * points_mm[:, 0] / self.wavelength_mm)
-        return image_px
 
 
 def camera(azimuth_deg: float = 30.0, **options: object) -> PinholeCamera:
@@ -130,14 +107,29 @@ def test_a_view_says_why_it_takes_the_nodes(mapping: ViewMapping, grid: VoxelGri
     assert described.deviation_px == pytest.approx(view.deviation_px, abs=1e-4)
 
 
-@settings(max_examples=10, deadline=None)
-@given(roll_deg=st.floats(-180, 180), bend=st.floats(-2, 2), wavelength_mm=st.floats(1.5, 9))
-def test_nodes_are_as_dense_as_it_takes(roll_deg: float, bend: float, wavelength_mm: float) -> None:
-    mapping = Bent(camera(roll_deg=roll_deg), bend, wavelength_mm)
+@settings(max_examples=20, deadline=None)
+@given(roll_deg=st.floats(-180, 180), bend=st.floats(-2, 2), wavelength_mm=st.floats(1.5, 9), saddle=st.floats(-4, 4))
+def test_nodes_are_as_dense_as_it_takes(roll_deg: float, bend: float, wavelength_mm: float, saddle: float) -> None:
+    mapping = Bent(camera(roll_deg=roll_deg), bend, wavelength_mm, saddle)
     view = sample_mapping(mapping, GRID, MAX_DEVIATION_PX)
     u, v, _ = np.moveaxis(oracle.node_values(view, GRID), -1, 0)
     expected_u, expected_v = oracle.seen_by(mapping, GRID)
-    assert np.hypot(u - 1 - expected_u, v - 1 - expected_v).max() < 2 * MAX_DEVIATION_PX
+    # waves are not quite of second order between nodes, and nodes are in single precision
+    largest = np.hypot(u - 1 - expected_u, v - 1 - expected_v).max()
+    assert largest < 1.1 * view.deviation_px + 1e-4
+    assert view.deviation_px <= MAX_DEVIATION_PX
+
+
+@pytest.mark.parametrize("saddle", [1.0, -4.0, 10.0])
+def test_saddles_are_not_taken_for_straight(saddle: float) -> None:
+    """In the middle between their nodes they are."""
+    mapping = Bent(camera(), saddle_px_per_mm2=saddle)
+    for max_deviation_px in (9.0, MAX_DEVIATION_PX):
+        view = sample_mapping(mapping, GRID, max_deviation_px)
+        u, v, _ = np.moveaxis(oracle.node_values(view, GRID), -1, 0)
+        expected_u, expected_v = oracle.seen_by(mapping, GRID)
+        largest = np.hypot(u - 1 - expected_u, v - 1 - expected_v).max()
+        assert largest == pytest.approx(view.deviation_px, rel=0.05)
 
 
 def test_a_rough_mapping_is_refused() -> None:
