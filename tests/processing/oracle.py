@@ -8,6 +8,7 @@ from scipy.spatial import cKDTree
 
 from processing.geometry import ViewMapping, view_camera
 from processing.quality import Volume, local_maxima
+from processing.reconstruction.fixed_point import FixedPoint
 from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.node_view import NodeView
 from processing.reconstruction.plan import Plan
@@ -82,13 +83,17 @@ def node_values(view: NodeView, grid: VoxelGrid) -> Array:
     return values
 
 
+def planned_samples(plan: Plan, resampled: Sequence[FixedPoint]) -> list[Array]:
+    """What every view sees at every voxel, in its resampled image."""
+    return [
+        bilinear(image.intensity, *planned_positions(view, plan.grid))
+        for view, image in zip(plan.views, resampled, strict=True)
+    ]
+
+
 def planned_line_of_sight(plan: Plan, images: Sequence[NDArray[np.float32]], method: ReconstructionMethod) -> Array:
     """The same as the kernels compute, from resampled images."""
-    samples = [
-        bilinear(image.intensity, *planned_positions(view, plan.grid))
-        for view, image in zip(plan.views, plan.resample(images), strict=True)
-    ]
-    return combine(samples, method)
+    return combine(planned_samples(plan, plan.resample(images)), method)
 
 
 def project_rectified(view: RectifiedView, volume: Array, shape: tuple[int, int]) -> Array:

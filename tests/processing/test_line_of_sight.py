@@ -19,6 +19,7 @@ from processing.reconstruction.node_view import NodeView, sample_mapping
 from processing.reconstruction.plan import Plan, plan_reconstruction
 from processing.volume import VoxelGrid
 from tests.processing import oracle
+from tests.processing.sight_bounds import assert_equals_textbook
 
 METHODS = [ReconstructionMethod.GAVLOS, ReconstructionMethod.MINLOS, ReconstructionMethod.MLOS]
 GRID = VoxelGrid.centred((21, 37, 275), 1 / 60)
@@ -52,8 +53,7 @@ def test_rectified_views_equal_the_textbook(
 ) -> None:
     mappings = oracle.cameras(count)
     plan, images = plan_reconstruction(mappings, GRID, accuracy), random_images(mappings)
-    expected = oracle.planned_line_of_sight(plan, images, method)
-    assert_same(line_of_sight(plan, images, method), expected, method, count)
+    assert_equals_textbook(line_of_sight(plan, images, method), plan, images, method)
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -61,15 +61,7 @@ def test_rectified_views_equal_the_textbook(
 def test_mapped_views_equal_the_textbook(isa: str, roll_deg: float, method: ReconstructionMethod) -> None:
     mappings = oracle.cameras(4, roll_deg)
     plan, images = node_plan(mappings), random_images(mappings)
-    expected = oracle.planned_line_of_sight(plan, images, method)
-    assert_same(line_of_sight(plan, images, method), expected, method, count=4)
-
-
-def assert_same(volume: NDArray[np.float32], expected: FloatArray, method: ReconstructionMethod, count: int) -> None:
-    """Every sample is exact to 1e-4. Roots are compared by their powers: the root of nearly nothing is sensitive."""
-    power = count if method is ReconstructionMethod.GAVLOS else 1
-    bound = 1e-4 * (1 if method is ReconstructionMethod.MINLOS else count)
-    np.testing.assert_allclose(volume.astype(float) ** power, expected**power, atol=bound)
+    assert_equals_textbook(line_of_sight(plan, images, method), plan, images, method)
 
 
 @pytest.mark.parametrize("method", METHODS)
