@@ -1,6 +1,7 @@
 """Line of sight equals the textbook for any geometry, on every instruction set, in every form of output."""
 
 from collections.abc import Sequence
+from itertools import product
 
 import numpy as np
 import pytest
@@ -12,7 +13,8 @@ from processing.reconstruction.kernels import _native
 from processing.reconstruction.line_of_sight import line_of_sight
 from processing.reconstruction.mean_line_of_sight import mean_line_of_sight
 from processing.reconstruction.method import ReconstructionMethod
-from processing.reconstruction.plan import Plan, plan_reconstruction
+from processing.reconstruction.node_view import sample_mapping
+from processing.reconstruction.plan import MAX_DEVIATION_PX, Plan, plan_reconstruction
 from processing.reconstruction.sparse_line_of_sight import slabs_of_sight, sparse_line_of_sight
 from processing.volume import VoxelGrid
 from tests.processing import oracle
@@ -32,6 +34,21 @@ def test_volumes_equal_the_textbook(
     with instruction_set(isa):
         volume = line_of_sight(plan, images, method, np.empty(plan.grid.shape, dtype))
         assert_equals_textbook(volume, plan, images, method)
+
+
+@pytest.mark.parametrize("isa", _native.available_isas())
+@pytest.mark.parametrize("by_nodes", [0, 1, 8])
+@pytest.mark.parametrize("count", range(2, 9))
+def test_any_number_of_views_in_any_format(isa: str, count: int, by_nodes: int) -> None:
+    grid, mappings = VoxelGrid.centred((3, 17, 40), PITCH_MM), oracle.cameras(count, roll_deg=2.0)
+    exact = tuple(sample_mapping(mapping, grid, MAX_DEVIATION_PX) for mapping in mappings[:by_nodes])
+    plan = Plan(grid, exact + plan_reconstruction(mappings, grid).views[by_nodes:])
+    rng = np.random.default_rng(count)
+    images = [rng.uniform(0.2, 1, mapping.image_size_px[::-1]).astype(np.float32) for mapping in mappings]
+    with instruction_set(isa):
+        for method, dtype in product(METHODS, ("float32", "float16", "uint8")):
+            volume = line_of_sight(plan, images, method, np.empty(grid.shape, dtype))
+            assert_equals_textbook(volume, plan, images, method)
 
 
 @pytest.mark.parametrize("isa", _native.available_isas())
