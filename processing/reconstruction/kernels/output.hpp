@@ -29,12 +29,6 @@ inline Floats root(Floats x, int n) {
     return x > zero ? guess : zero;
 }
 
-inline void take_root(Block &block, int rows, int n) {
-    for (int row = 0; row < rows; ++row)
-        for (int k = 0; k < block_columns; k += lanes)
-            store(block.rows[row] + k, root(load<Floats>(block.rows[row] + k), n));
-}
-
 inline void store_bytes(uint8_t *to, const float *from, int count) {
     for (int k = 0; k < count; ++k) {
         const float scaled = from[k] * 255.0f + 0.5f;

@@ -302,14 +302,5 @@ inline void sample_minimum(const View *views, int n_views, const PlaneTaps *taps
         sample<Combine::limit>(views[i], taps[i], tile, views[i].unit * sample_unit, block);
 }
 
-inline bool all_zero(const Block &block, int rows) {
-    for (int row = 0; row < rows; ++row) {
-        int32_t any = 0;
-        for (int k = 0; k < block_columns; ++k) any |= block.rows[row][k] != 0.0f;
-        if (any) return false;
-    }
-    return true;
-}
-
 }  // namespace
 }  // namespace tomoshadow::TOMOSHADOW_ISA
