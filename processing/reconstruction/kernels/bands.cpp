@@ -9,6 +9,8 @@ namespace tomoshadow {
 
 namespace {
 
+constexpr int rows_at_once = 16;
+
 struct Band {
     int first_slab, end_slab;
 };
@@ -54,6 +56,12 @@ void for_each(int count, int threads, const std::function<void(int)> &work) {
     for (int thread = 1; thread < std::min(threads, count); ++thread) others.emplace_back(share, thread);
     share(0);
     for (std::thread &other : others) other.join();
+}
+
+void for_rows(int rows, int threads, const std::function<void(int, int)> &work) {
+    for_each((rows + rows_at_once - 1) / rows_at_once, threads, [&](int chunk) {
+        work(chunk * rows_at_once, std::min(rows, (chunk + 1) * rows_at_once));
+    });
 }
 
 void run_line_of_sight(const Kernels &kernels, const LineOfSight &job, int threads) {

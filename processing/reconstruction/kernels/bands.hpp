@@ -11,6 +11,9 @@ namespace tomoshadow {
 // Call work(i) for i = 0 .. count - 1; thread t takes i = t, t + threads, ...
 void for_each(int count, int threads, const std::function<void(int)> &work);
 
+// The same for the rows of an image, a few at once: work(first row, end row).
+void for_rows(int rows, int threads, const std::function<void(int, int)> &work);
+
 void run_line_of_sight(const Kernels &kernels, const LineOfSight &job, int threads);
 void run_sum_of_sight(const Kernels &kernels, const SumOfSight &job, int threads);
 

@@ -8,15 +8,6 @@ namespace tomoshadow {
 
 namespace {
 
-constexpr int rows_at_once = 16;
-
-template <class Work>
-void for_rows(int rows, int threads, const Work &work) {
-    for_each((rows + rows_at_once - 1) / rows_at_once, threads, [&](int chunk) {
-        work(chunk * rows_at_once, std::min(rows, (chunk + 1) * rows_at_once));
-    });
-}
-
 // Minima along rows and columns, then means along columns; those along rows are left to whoever wants them.
 void minima(const Kernels &kernels, const Exposure &job, int threads) {
     for_rows(job.rows, threads, [&](int first, int end) { kernels.row_minima(job, first, end); });

@@ -11,14 +11,6 @@ namespace tomoshadow {
 
 namespace {
 
-constexpr int rows_at_once = 16;
-
-void for_rows(int rows, int threads, const std::function<void(int, int)> &work) {
-    for_each((rows + rows_at_once - 1) / rows_at_once, threads, [&](int chunk) {
-        work(chunk * rows_at_once, std::min(rows, (chunk + 1) * rows_at_once));
-    });
-}
-
 struct Range {
     float low = INFINITY, high = -INFINITY;
     void include(float value) {
