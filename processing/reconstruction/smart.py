@@ -147,7 +147,9 @@ def _run(
     for done in range(1, iterations + 1):
         iterate(state)
         residuals.append(state.residual)
-        if (stop is not None and stop(done, residuals[-1])) or residuals[-1] > (1 - least_gain) * residuals[-2]:
+        if stop is not None and stop(done, residuals[-1]):
+            break
+        if least_gain and residuals[-1] > (1 - least_gain) * residuals[-2]:
             break
     if out is not None:
         state.blocks.write(out, threads)

@@ -212,7 +212,8 @@ def test_blocks_are_few_and_lose_nothing(by_nodes: bool) -> None:
             np.testing.assert_array_equal(part, stored[:, first_row : first_row + rows])
 
 
-def test_stop_ends_it_and_sees_the_residual() -> None:
+@pytest.mark.parametrize("solve", [smart, mart])
+def test_stop_ends_it_and_sees_the_residual(solve: type(smart)) -> None:  # type: ignore[valid-type]
     mappings = oracle.cameras(2)
     plan, images = make_plan(mappings, False), images_of(droplets(10), mappings)
     seen: list[tuple[int, float]] = []
@@ -221,16 +222,41 @@ def test_stop_ends_it_and_sees_the_residual() -> None:
         seen.append((done, residual))
         return done == 3
 
-    result = smart(plan, images, iterations=9, stop=stop)
+    result = solve(plan, images, iterations=9, stop=stop)
     assert [done for done, _ in seen] == [1, 2, 3]
     assert result.residuals[1:] == tuple(residual for _, residual in seen)
 
 
-def test_less_relaxation_goes_slower() -> None:
+@pytest.mark.parametrize("solve", [smart, mart])
+def test_less_relaxation_goes_slower(solve: type(smart)) -> None:  # type: ignore[valid-type]
     mappings = oracle.cameras(3)
     plan, images = make_plan(mappings, False), images_of(droplets(30), mappings)
-    slow, fast = (smart(plan, images, iterations=4, relaxation=r).residuals[-1] for r in (0.3, 1.0))
-    assert fast < slow
+    slow, middle, fast = (solve(plan, images, iterations=4, relaxation=r).residuals[-1] for r in (0.1, 0.3, 1.0))
+    assert fast < middle < slow
+
+
+@pytest.mark.parametrize("least_gain", [0.02, 0.1, 0.5, 0.9])
+@pytest.mark.parametrize("solve", [smart, mart])
+def test_the_first_iteration_that_gains_too_little_is_the_last(
+    solve: type(smart),  # type: ignore[valid-type]
+    least_gain: float,
+) -> None:
+    mappings = oracle.cameras(3)
+    plan, images = make_plan(mappings, False), images_of(droplets(30), mappings)
+    residuals, everything = (solve(plan, images, iterations=9, least_gain=g).residuals for g in (least_gain, 0.0))
+    gains = 1 - np.divide(everything[1:], everything[:-1])
+    iterations = int(np.argmax(gains < least_gain)) + 1
+    assert gains[iterations - 1] < least_gain
+    assert residuals == everything[: iterations + 1]
+
+
+def test_without_least_gain_it_goes_on_even_when_the_residual_rises() -> None:
+    mappings = oracle.cameras(3)
+    plan, images = make_plan(mappings, False), images_of(droplets(30), mappings)
+    residuals = mart(plan, images, iterations=6, relaxation=3.0).residuals
+    assert len(residuals) == 7
+    assert np.diff(residuals).max() > 0
+    assert len(mart(plan, images, iterations=6, relaxation=3.0, least_gain=1e-6).residuals) < 7
 
 
 def test_dark_images_give_an_empty_volume() -> None:
@@ -248,5 +274,8 @@ def test_what_cannot_be_done_is_refused() -> None:
         smart(plan, images, iterations=0)
     with pytest.raises(ValueError, match=r"volume has shape \(1, 1, 1\)"):
         mart(plan, images, start=np.ones((1, 1, 1), np.float32))
+    for least_gain in (-0.1, 1.0):
+        with pytest.raises(ValueError, match=r"least_gain .* must be a share, 0 to 1"):
+            mart(plan, images, least_gain=least_gain)
     with pytest.raises(ValueError, match="contiguous float32 or float16, not uint8"):
         smart(plan, images, out=np.zeros(GRID.shape, np.uint8))
