@@ -89,9 +89,12 @@ def smart(plan: Plan, images: Sequence[Pixels], **options: Unpack[SmartOptions])
     Each iteration multiplies every voxel by the product over the views of (I / P)^(relaxation / n_views),
     where I is the image and P the projection of the volume, both sampled where the view sees the voxel; by 16 at most.
 
-    Three iterations differ from float64 by less than 5e-5 of the brightest voxel (rms), and nowhere by more than 1e-2:
-    ratios have steps of 1 / 2048, and each correction rounds as float16 does. From MLOS, where blocks below 1e-8 of the
-    brightest are not followed, it is 1e-4 and 2e-2.
+    Three iterations differ from float64 by less than 1.5e-3 of the volume, as norms, and nowhere by more than 1e-2 of
+    the brightest voxel: ratios have steps of 1 / 2048, and each correction rounds as float16 does. From MLOS, where blocks
+    below 1e-8 of the brightest are not followed, it is 3e-3 and 2e-2.
+
+    Views may see droplets that are not in the volume: voxels at its faces take their light, and become up to three
+    times as bright as others.
 
     Parameters
     ----------
@@ -117,7 +120,9 @@ def smart(plan: Plan, images: Sequence[Pixels], **options: Unpack[SmartOptions])
 def mart(plan: Plan, images: Sequence[Pixels], **options: Unpack[SmartOptions]) -> SmartResult:
     """MART by views: one after the other corrects the volume by (I / P)^relaxation, P projected anew for each.
 
-    An iteration corrects by every view once. All else is as in ``smart``.
+    An iteration corrects by every view once. All else is as in ``smart``, but that ratios are not roots: where one view
+    darkens and the next one brightens, their steps of 1 / 2048 weigh more. Three iterations differ from float64 by
+    about 0.2 % of the volume and nowhere by more than 1.5 % of it, or a tenth of the brightest voxel.
     """
 
     def iterate(state: SmartState) -> None:

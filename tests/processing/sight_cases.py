@@ -145,3 +145,34 @@ def sampled_densely(mapping: ViewMapping, grid: VoxelGrid, spacing: int) -> Node
     while view.spacing > spacing:
         view = sample_mapping(mapping, grid, 0.99 * view.deviation_px)
     return view
+
+
+def random_plan(rng: np.random.Generator) -> tuple[Plan, list[ViewMapping]]:
+    """The same by a generator, with views that see all of the volume or a part.
+
+    Hypothesis likes round numbers. With them pixels meet the edge of the volume exactly, and whether they see anything
+    of it is a matter of rounding: SMART asks that.
+    """
+    grid = VoxelGrid.centred(tuple(rng.integers((1, 5, 20), (13, 30, 90)).tolist()), PITCH_MM)
+    mappings = [random_view(rng) for _ in range(rng.integers(2, 9))]
+    planned = plan_reconstruction(mappings, grid, list(Accuracy)[rng.integers(2)]).views
+    by_nodes = 0.5 * rng.integers(3)
+    views = [
+        sampled_densely(mapping, grid, 2 ** int(rng.integers(1, 5))) if rng.random() < by_nodes else view
+        for mapping, view in zip(mappings, planned, strict=True)
+    ]
+    return Plan(grid, tuple(views)), mappings
+
+
+def random_view(rng: np.random.Generator) -> ViewMapping:
+    camera = view_camera(
+        rng.uniform(-60, 60),
+        focal_length_mm=85,
+        magnification=0.43,
+        scale_px_per_mm=60,
+        image_size_px=tuple(rng.integers((70, 60), (150, 130)).tolist()),
+        pitch_deg=rng.uniform(-15, 15),
+        roll_deg=rng.choice([8, 180]) * rng.uniform(-1, 1),
+        distortion=rng.uniform(-1, 1, 5) * (2, 0, 0.005, 0.005, 0),
+    )
+    return list(Kind)[rng.integers(len(Kind))].of(camera)
