@@ -131,16 +131,6 @@ def test_nothing_is_seen_outside_of_an_image(isa: str, by_nodes: bool) -> None:
     np.testing.assert_allclose(volume[4, 8, 300:400], 1, atol=1e-4)
 
 
-@pytest.mark.parametrize("by_nodes", [False, True])
-def test_the_same_bits_with_any_number_of_threads(by_nodes: bool) -> None:
-    mappings = oracle.cameras(4)
-    plan = node_plan(mappings) if by_nodes else plan_reconstruction(mappings, GRID)
-    images = random_images(mappings)
-    volumes = [line_of_sight(plan, images, threads=threads) for threads in (1, 2, 5)]
-    np.testing.assert_array_equal(volumes[0], volumes[1])
-    np.testing.assert_array_equal(volumes[0], volumes[2])
-
-
 def test_a_slice_is_the_same_as_in_the_volume() -> None:
     mappings = oracle.cameras(3)
     images = random_images(mappings)

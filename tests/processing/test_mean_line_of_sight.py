@@ -41,12 +41,6 @@ def test_it_is_the_mean_of_the_volumes(
     np.testing.assert_allclose(out, expected, rtol=1e-5, atol=1e-7)
 
 
-def test_the_same_bits_with_any_number_of_threads() -> None:
-    plan, shots = plan_reconstruction(oracle.cameras(3), GRID), exposures(3)
-    one, many = (mean_line_of_sight(plan, shots, threads=threads) for threads in (1, 3))
-    np.testing.assert_array_equal(one, many)
-
-
 def test_what_has_no_mean_is_refused() -> None:
     plan = plan_reconstruction(oracle.cameras(3), GRID)
     with pytest.raises(ValueError, match="a mean needs one exposure or more"):

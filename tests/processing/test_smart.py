@@ -132,15 +132,6 @@ def test_smart_is_closer_to_the_truth_than_mlos() -> None:
     assert qualities[1] > qualities[0] + 0.05
 
 
-def test_the_same_bits_with_any_number_of_threads() -> None:
-    mappings = oracle.cameras(3)
-    for by_nodes in (False, True):
-        plan, images = make_plan(mappings, by_nodes), images_of(droplets(40), mappings)
-        one, many = (smart(plan, images, iterations=3, threads=threads) for threads in (1, 3))
-        np.testing.assert_array_equal(one.volume, many.volume)
-        assert one.residuals == many.residuals
-
-
 def test_start_is_kept_and_its_zeros_stay() -> None:
     mappings = oracle.cameras(3)
     plan, images = make_plan(mappings, False), images_of(droplets(20), mappings)
