@@ -90,7 +90,7 @@ def smart(plan: Plan, images: Sequence[Pixels], **options: Unpack[SmartOptions])
     where I is the image and P the projection of the volume, both sampled where the view sees the voxel; by 16 at most.
 
     Three iterations differ from float64 by less than 1.5e-3 of the volume, as norms, and nowhere by more than 1e-2 of
-    the brightest voxel: ratios have steps of 1 / 2048, and each correction rounds as float16 does. From MLOS, where blocks
+    the brightest voxel: ratios have steps of 1 / 2048, and corrections round as float16 does. From MLOS, where blocks
     below 1e-8 of the brightest are not followed, it is 3e-3 and 2e-2.
 
     Views may see droplets that are not in the volume: voxels at its faces take their light, and become up to three
