@@ -131,15 +131,6 @@ def test_nothing_is_seen_outside_of_an_image(isa: str, by_nodes: bool) -> None:
     np.testing.assert_allclose(volume[4, 8, 300:400], 1, atol=1e-4)
 
 
-def test_a_slice_is_the_same_as_in_the_volume() -> None:
-    mappings = oracle.cameras(3)
-    images = random_images(mappings)
-    origin_mm = GRID.to_mm(np.array([10.0, 16.0, 32.0]))
-    part = VoxelGrid((1, 9, 100), tuple(origin_mm), GRID.pitch_mm)
-    whole = line_of_sight(node_plan(mappings), images)
-    np.testing.assert_allclose(line_of_sight(node_plan(mappings, part), images)[0], whole[10, 16:25, 32:132], atol=5e-3)
-
-
 @pytest.mark.parametrize("method", METHODS)
 def test_out_is_filled_and_returned_in_other_formats_too(isa: str, method: ReconstructionMethod) -> None:
     mappings = oracle.cameras(3)
