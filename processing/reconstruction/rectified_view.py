@@ -19,8 +19,10 @@ from processing.reconstruction.fixed_point import FixedPoint
 from processing.reconstruction.kernels import _native
 from processing.volume import VoxelGrid
 
-GUARD_PX = 2
-"""Pixels kept above and left of the volume."""
+GUARD_PX, BELOW_PX = 2.025, 4
+"""Kept above and left of the volume, and below it. With 0.95 px per voxel, pixels come closer to voxels by 1 / 19 voxel
+from one to the next; begun at 2.025 px, none comes closer than half of that. If one met a voxel, rounding would let it
+see a millionth of the next one, which SMART then brightens until it explains all light of the pixel."""
 BLOCK_COLUMNS, OVERHANG_PX = 32, 36
 """Voxels that the kernels compute at once, and columns that the widest vectors may read beyond them."""
 MAP_SPACING_PX = 16
@@ -99,7 +101,7 @@ def rectify(mapping: ViewMapping, grid: VoxelGrid, pixels_per_voxel: float, max_
     last_column = -(-grid.shape[2] // BLOCK_COLUMNS) * BLOCK_COLUMNS - 1
     columns = int(np.ceil((shift_u + scale * last_column).max() + left)) + OVERHANG_PX
     columns += -columns % MAP_SPACING_PX
-    rows = int(np.ceil((shift_v + scale * (grid.shape[1] - 1)).max() + top)) + 2 * GUARD_PX
+    rows = int(np.ceil((shift_v + scale * (grid.shape[1] - 1)).max() + top)) + BELOW_PX
     origin = np.array([z_ref, -top / reference_scale, -left / reference_scale])
     points_at = partial(_project_plane, mapping, grid, origin, 1 / reference_scale, (rows, columns))
     nodes_px = points_at((0.0, 0.0))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from processing.geometry import ViewMapping
+from processing.geometry import ViewMapping, view_camera
 from processing.quality import quality_factor
 from processing.reconstruction.kernels import _native
 from processing.reconstruction.line_of_sight import line_of_sight
@@ -81,6 +81,26 @@ def test_any_geometry_equals_the_textbook(seed: int, solve: type(smart)) -> None
         assert result.volume is out
         assert_close(out, expected, bounds)
         np.testing.assert_allclose(result.residuals, residuals, rtol=1e-3)
+
+
+@pytest.mark.parametrize("shape", [(1, 40, 80), (1, 60, 60), (5, 8, 60), (2, 20, 33)], ids=str)
+@pytest.mark.parametrize("azimuths_deg", [(0.0, 0.0), (30.0, -20.0, 0.0)], ids=str)
+def test_no_voxel_runs_away_where_pixels_might_meet_it(
+    isa: str, shape: tuple[int, int, int], azimuths_deg: tuple[float, ...]
+) -> None:
+    """Twenty voxels are nineteen pixels, and views along z see all planes nearly alike: pixels could meet voxels."""
+    grid = VoxelGrid.centred(shape, 1 / 60)
+    mappings: list[ViewMapping] = [
+        view_camera(azimuth, focal_length_mm=85, magnification=0.43, scale_px_per_mm=60, image_size_px=(140, 120))
+        for azimuth in azimuths_deg
+    ]
+    beyond = np.random.default_rng(1).uniform((0, -6, -6), np.add(shape, (-1, 5, 5)), (15, 3))
+    plan, images = make_plan(mappings, False, grid), images_of(beyond, mappings, grid=grid)
+    expected, residuals = oracle.smart(plan, images, 3)
+    result = smart(plan, images, iterations=3)
+    assert_close(result.volume, expected, SMART_FROM_MLOS)
+    np.testing.assert_allclose(result.residuals, residuals, rtol=1e-3)
+    assert result.residuals[-1] < result.residuals[1] < result.residuals[0]
 
 
 def assert_close(volume: NDArray[Any], expected: NDArray[np.float64], bounds: tuple[float, float]) -> None:
