@@ -102,3 +102,19 @@ def test_the_middle_of_a_polynomial_is_not_taken_for_a_camera(planes: int, z_mm:
     assert view.deviation_px <= MAX_DEVIATION_PX
     if planes > 1:
         assert isinstance(view, NodeView)
+
+
+def test_positions_in_large_images_are_in_single_precision(isa: str) -> None:
+    """Noise, in which pixels differ most from their neighbours, at the far edge of 2000 columns."""
+    camera = view_camera(
+        30.0, focal_length_mm=85, magnification=0.43, scale_px_per_mm=60, image_size_px=(2000, 150), roll_deg=2.0
+    )
+    grid = VoxelGrid((9, 24, 100), (16.5, -0.7, 0.0), PITCH_MM)
+    view = sample_mapping(camera, grid, MAX_DEVIATION_PX)
+    plan, images = Plan(grid, (view, view)), noise([camera, camera])[:1] * 2
+    u, _ = oracle.planned_positions(view, grid)
+    assert 1800 < u.min() < u.max() < 1999
+    volume = line_of_sight(plan, images, ReconstructionMethod.MINLOS)
+    assert_equals_textbook(volume, plan, images, ReconstructionMethod.MINLOS)
+    expected = oracle.planned_line_of_sight(plan, images, ReconstructionMethod.MINLOS)
+    np.testing.assert_allclose(volume, expected, rtol=0, atol=2e-4)

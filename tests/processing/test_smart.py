@@ -83,6 +83,18 @@ def test_any_geometry_equals_the_textbook(seed: int, solve: type(smart)) -> None
         np.testing.assert_allclose(result.residuals, residuals, rtol=1e-3)
 
 
+@pytest.mark.parametrize("solve", [smart, mart])
+@pytest.mark.parametrize("voxel_px", [1.4, 2, 4, 7])
+def test_coarse_voxels_equal_the_textbook(isa: str, voxel_px: float, solve: type(smart)) -> None:  # type: ignore[valid-type]
+    grid, mappings = VoxelGrid.centred((5, 14, 22), voxel_px / 60), oracle.cameras(3, roll_deg=9.0)
+    at = np.random.default_rng(7).uniform(0, np.array(grid.shape) - 1, (8, 3))
+    plan, images = plan_reconstruction(mappings, grid), images_of(at, mappings, 1.5 * voxel_px, grid)
+    expected, residuals = oracle.smart(plan, images, 3, by_views=solve is mart)
+    result = solve(plan, images, iterations=3)
+    assert_close(result.volume, expected, MART if solve is mart else SMART_FROM_MLOS)
+    np.testing.assert_allclose(result.residuals, residuals, rtol=1e-3)
+
+
 @pytest.mark.parametrize("shape", [(1, 40, 80), (1, 60, 60), (5, 8, 60), (2, 20, 33)], ids=str)
 @pytest.mark.parametrize("azimuths_deg", [(0.0, 0.0), (30.0, -20.0, 0.0)], ids=str)
 def test_no_voxel_runs_away_where_pixels_might_meet_it(
