@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from processing.calibration.polynomial import PolynomialMapping, fit_polynomial
 from processing.geometry import FloatArray, PinholeCamera, ViewMapping, view_camera
+from processing.reconstruction.accuracy import Accuracy
 from processing.reconstruction.node_view import NodeView, sample_mapping
-from processing.reconstruction.plan import MAX_DEVIATION_PX, Accuracy, Plan, plan_reconstruction
+from processing.reconstruction.plan import MAX_DEVIATION_PX, Plan, plan_reconstruction
 from processing.volume import VoxelGrid
 
 PITCH_MM = 1 / 60

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from scipy.special import erfc
 
 from processing.geometry import ViewMapping, view_camera
-from processing.reconstruction.plan import Accuracy, plan_view
+from processing.reconstruction.accuracy import Accuracy
+from processing.reconstruction.plan import plan_view
 from processing.reconstruction.rectified_view import RectifiedView
 from processing.volume import VoxelGrid
 from tests.processing import oracle
@@ -74,7 +75,8 @@ def squared_errors(case: Case, mapping: ViewMapping, seed: int) -> Array:
     for accuracy in Accuracy:
         view = plan_view(mapping, GRID, accuracy)
         assert isinstance(view, RectifiedView)
-        samples.append(oracle.bilinear(view.resample(recorded, 1).intensity, *oracle.planned_positions(view, GRID)))
+        resampled = view.resample(recorded, np.empty(view.shape_px, np.int16), 1)
+        samples.append(oracle.bilinear(resampled.intensity, *oracle.planned_positions(view, GRID)))
     return np.array([np.mean((sample - truth)[truth > 1e-3] ** 2) for sample in samples])
 
 

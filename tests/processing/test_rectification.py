@@ -7,10 +7,11 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from processing.geometry import ViewMapping
+from processing.reconstruction.accuracy import Accuracy
 from processing.reconstruction.kernels import _native
 from processing.reconstruction.node_view import FRAME_AFTER_PX, FRAME_BEFORE_PX, NodeView, sample_mapping
-from processing.reconstruction.plan import MAX_DEVIATION_PX, Accuracy
-from processing.reconstruction.rectified_view import RectifiedView, rectify
+from processing.reconstruction.plan import MAX_DEVIATION_PX, plan_view
+from processing.reconstruction.rectified_view import RectifiedView
 from processing.volume import VoxelGrid
 from tests.processing import oracle, resampling_oracle
 from tests.processing.sight_cases import PITCH_MM, instruction_set, views
@@ -58,12 +59,12 @@ def test_rectified_images_equal_the_textbook(
     seed: int,
 ) -> None:
     grid = VoxelGrid(shape, tuple(np.add(VoxelGrid.centred(shape, PITCH_MM).origin_mm, offset_mm)), PITCH_MM)
-    view = rectify(mapping, grid, accuracy.value)
-    assume(view is not None and view.deviation_px <= MAX_DEVIATION_PX)
-    assert view is not None
+    view = plan_view(mapping, grid, accuracy)
+    assume(isinstance(view, RectifiedView))
+    assert isinstance(view, RectifiedView)
     recorded = images(mapping.image_size_px, seed)
     with instruction_set(isa):
-        resampled = view.resample(recorded, 2)
+        resampled = view.resample(recorded, np.empty(view.shape_px, np.int16), 2)
     assert_between_nodes(mapping, grid, view, recorded, resampled.pixels, resampled.unit, isa)
     u, v = resampling_oracle.shown_positions(mapping, grid, view, *(np.arange(float(n)) for n in view.shape_px))
     exact, _ = resampling_oracle.convolve(np.maximum(recorded, 0), u, v)
@@ -112,7 +113,7 @@ def test_averaged_images_equal_the_textbook(isa: str, mapping: ViewMapping, voxe
     view = sample_mapping(mapping, VoxelGrid.centred((3, 5, 9), voxel_px * PITCH_MM), MAX_DEVIATION_PX)
     recorded = images(mapping.image_size_px, seed)
     with instruction_set(isa):
-        resampled = view.resample(recorded, 2)
+        resampled = view.resample(recorded, np.empty(view.shape_px, np.int16), 2)
     means = np.maximum(resampling_oracle.averaged(recorded, view.binning), 0)
     assert resampled.brightest == pytest.approx(means.max() or 1, rel=1e-5)
     framed = np.pad(means, (FRAME_BEFORE_PX, FRAME_AFTER_PX))
