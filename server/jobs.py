@@ -156,8 +156,9 @@ class JobTable:
         """)
 
     def close(self) -> None:
-        """Close the file."""
-        self._database.close()
+        """Close the file, once nobody reads or writes it any more."""
+        with self._lock:  # SQLite crashes the process where a connection is closed under a statement
+            self._database.close()
 
     def add(self, job: Job) -> Job:
         """Queue a job. The same work is not done twice: a waiting, running or done job is returned as it is."""

@@ -1,4 +1,6 @@
 import json
+import sqlite3
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -109,3 +111,34 @@ def test_a_lost_table_comes_back_from_the_run_directories(table: JobTable, tmp_p
 def test_an_unknown_job_is_named(table: JobTable) -> None:
     with pytest.raises(NotFound, match="no job 'x'"):
         table.get("x")
+
+
+def test_a_table_is_closed_once_its_readers_are_done(tmp_path: Path) -> None:
+    for attempt in range(20):
+        table = JobTable(tmp_path / f"{attempt}.sqlite")
+        table.restore(job_of(shot) for shot in range(50))
+        readers = [_Reader(table) for _ in range(2)]
+        for reader in readers:
+            assert reader.has_read.wait(10)
+        table.close()
+        for reader in readers:
+            reader.join(10)
+            assert "closed database" in reader.ended_by
+
+
+class _Reader(threading.Thread):
+    """Reads a table until it is closed, as the pages of a server do that ends."""
+
+    def __init__(self, table: JobTable) -> None:
+        super().__init__(daemon=True)
+        self._table = table
+        self.has_read = threading.Event()
+        self.ended_by = ""
+        self.start()
+
+    def run(self) -> None:
+        try:
+            while self._table.newest():
+                self.has_read.set()
+        except sqlite3.ProgrammingError as error:
+            self.ended_by = str(error)
