@@ -1,7 +1,7 @@
 """Workbench: what the exposures of a run share, so that each reconstruction finds its memory warm."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -13,13 +13,15 @@ from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.plan import Plan
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.reconstruction.slab_volume import SLAB_ROWS, SlabVolume
-from processing.reconstruction.smart import mart, smart
+from processing.reconstruction.smart import SmartResult, mart, smart
 from processing.reconstruction.sparse_line_of_sight import slabs_of_sight
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Workbench:
     """A plan with the memory that reconstructions by it use again: fresh memory costs more than they do.
+
+    It serves one exposure at a time.
 
     Parameters
     ----------
@@ -40,6 +42,7 @@ class Workbench:
     images: tuple[Intensity, ...]
     resampled: tuple[NDArray[np.int16], ...]
     memory: NDArray[Any]
+    _refined: SmartResult | None = field(default=None, init=False, repr=False)
 
     @classmethod
     def of(cls, plan: Plan, settings: ReconstructionSettings) -> "Workbench":
@@ -64,7 +67,8 @@ class Workbench:
         Returns
         -------
         SlabVolume
-            To be used before the next exposure; a line-of-sight method computes each slab when it is asked for.
+            To be used before the next exposure, which takes its memory; a line-of-sight method computes each slab when
+            it is asked for.
         tuple of float
             The residuals of SMART and MART, see ``processing.reconstruction.smart.SmartResult``.
         """
@@ -82,5 +86,7 @@ class Workbench:
             iterations=self.settings.iterations,
             relaxation=self.settings.relaxation,
             least_gain=self.settings.least_gain,
+            memory=self._refined,
         )
+        self._refined = result
         return slabs_of_blocks(result.blocks, self.settings.voxels, self.memory), result.residuals

@@ -82,3 +82,12 @@ def test_one_slab_of_memory_is_enough(plan: Plan, method: ReconstructionMethod) 
     assert bench.memory.nbytes == 9 * SLAB_ROWS * 37 * 2
     volume, _ = bench.reconstruct(exposure(plan, 1))
     assert all(np.shares_memory(slab, bench.memory) for _, slab in volume.slabs)
+
+
+@pytest.mark.parametrize("method", [ReconstructionMethod.SMART, ReconstructionMethod.MART])
+def test_the_next_exposure_takes_the_memory_of_the_blocks(plan: Plan, method: ReconstructionMethod) -> None:
+    bench = bench_of(plan, method, VoxelType.FLOAT32)
+    earlier, _ = bench.reconstruct(exposure(plan, 1))
+    volume, _ = volume_of(bench, exposure(plan, 2))
+    assert volume.any()
+    assert not any(slab.any() for _, slab in earlier.slabs)
