@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from daq.drivers.camera_profile import load_camera_profile
-from daq.timing import CameraTiming
+from daq.errors import PlanError
 from processing.optics import (
     airy_diameter_um,
     depth_of_field_mm,
@@ -41,12 +41,13 @@ def optics_table(config: RigConfig, motion: Motion = PAPER_MOTION) -> dict[str, 
 
     Raises
     ------
-    ValueError
-        The pulses do not fit the exposures of a camera.
+    PlanError
+        The pulses do not fit the exposures of a camera; names view and camera profile.
     """
-    timings = {name: load_camera_profile(view.camera.profile).camera_timing for name, view in config.views.items()}
-    views = {name: _view(view, timings[name], motion) for name, view in config.views.items()}
-    windows = [view["straddling_window_ns"] for view in views.values()]
+    windows_ns = {name: _straddling_window_ns(name, view, motion) for name, view in config.views.items()}
+    views = {
+        name: {**_view(view, motion), "straddling_window_ns": windows_ns[name]} for name, view in config.views.items()
+    }
     return {
         "motion": {
             "velocity_m_s": motion.velocity_m_s,
@@ -55,22 +56,33 @@ def optics_table(config: RigConfig, motion: Motion = PAPER_MOTION) -> dict[str, 
             "blur_um": round(travel_um(motion.velocity_m_s, motion.width_ns), 1),
             "displacement_um": round(travel_um(motion.velocity_m_s, motion.separation_ns), 1),
         },
-        "straddling_window_ns": [max(window[0] for window in windows), min(window[1] for window in windows)],
+        "straddling_window_ns": [
+            max(shortest for shortest, _ in windows_ns.values()),
+            min(longest for _, longest in windows_ns.values()),
+        ],
         "views": views,
     }
 
 
-def _view(view: ViewConfig, timing: CameraTiming, motion: Motion) -> dict[str, Any]:
+def _straddling_window_ns(name: str, view: ViewConfig, motion: Motion) -> list[int]:
+    timing = load_camera_profile(view.camera.profile).camera_timing
+    try:
+        window = straddling_window(
+            width_ns=motion.width_ns,
+            exposure_a_ns=timing.exposure_a_ns,
+            gap_ns=timing.gap_ns,
+            exposure_b_ns=timing.exposure_b_ns,
+            guard_ns=timing.guard_ns,
+        )
+    except ValueError as error:
+        raise PlanError(f"{name}: {error} of {view.camera.profile}") from error
+    return [window.shortest_ns, window.longest_ns]
+
+
+def _view(view: ViewConfig, motion: Motion) -> dict[str, float]:
     lens, sensor = view.lens, view.sensor
     scale_px_per_mm = image_scale_px_per_mm(lens.magnification, sensor.pixel_pitch_um)
     airy_um = airy_diameter_um(lens.f_number, lens.magnification)
-    window = straddling_window(
-        width_ns=motion.width_ns,
-        exposure_a_ns=timing.exposure_a_ns,
-        gap_ns=timing.gap_ns,
-        exposure_b_ns=timing.exposure_b_ns,
-        guard_ns=timing.guard_ns,
-    )
     values = {
         "airy_diameter_um": airy_um,
         "airy_diameter_px": airy_um / sensor.pixel_pitch_um,
@@ -82,5 +94,4 @@ def _view(view: ViewConfig, timing: CameraTiming, motion: Motion) -> dict[str, A
         "blur_px": travel_um(motion.velocity_m_s, motion.width_ns) / 1000 * scale_px_per_mm,
         "displacement_px": travel_um(motion.velocity_m_s, motion.separation_ns) / 1000 * scale_px_per_mm,
     }
-    rounded: dict[str, Any] = {key: round(value, 2) for key, value in values.items()}
-    return {**rounded, "straddling_window_ns": [window.shortest_ns, window.longest_ns]}
+    return {key: round(value, 2) for key, value in values.items()}

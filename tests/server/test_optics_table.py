@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from daq.errors import PlanError
 from server.config import load_config
 from server.optics_table import Motion, optics_table
 
@@ -29,5 +30,5 @@ def test_the_rig_of_the_paper_permits_its_pulses_and_blurs_less_than_it_resolves
 
 
 def test_pulses_that_fit_no_exposure_are_refused() -> None:
-    with pytest.raises(ValueError, match=r"width_ns: 9000 ns"):
+    with pytest.raises(PlanError, match=r"view1: width_ns: 9000 ns .*cameras/simulated.toml$"):
         optics_table(load_config(Path("configs/simulated.toml")), Motion(width_ns=9000))
