@@ -25,18 +25,21 @@ struct PixelBox {
     int top, bottom, left, right;
 };
 
+// Cells of pixels, the last row and column not included.
+struct CellBox {
+    int top, bottom, left, right;
+};
+
 // Where an image is not zero: sums[y][x] counts the cells above y and left of x in which any pixel is not zero, so that
 // four of them tell whether a box of any size is empty.
 struct Occupancy {
     static constexpr int cell_rows = 4, cell_columns = 8;
     const int32_t *sums;  // null: nobody looked
     int columns;
-    bool any(const PixelBox &box) const {
-        if (!sums) return true;
-        const int32_t *top = sums + static_cast<int64_t>(box.top / cell_rows) * columns;
-        const int32_t *bottom = sums + static_cast<int64_t>(box.bottom / cell_rows + 1) * columns;
-        const int left = box.left / cell_columns, right = box.right / cell_columns + 1;
-        return bottom[right] - bottom[left] != top[right] - top[left];
+    bool any(const CellBox &box) const {
+        const int32_t *top = sums + static_cast<int64_t>(box.top) * columns;
+        const int32_t *bottom = sums + static_cast<int64_t>(box.bottom) * columns;
+        return bottom[box.right] - bottom[box.left] != top[box.right] - top[box.left];
     }
 };
 

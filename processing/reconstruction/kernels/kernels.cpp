@@ -21,6 +21,7 @@ void line_of_sight(const LineOfSight &job, int slab) {
     const Exposures exposure{job.views, job.n_views, 1, job.method};
     PlaneStack planes(job.views, job.n_views, nx, job.first_row + y0, rows);
     Staging banks[2] = {{job.format, nx, rows, planes.depth()}, {job.format, nx, rows, planes.depth()}};
+    const Seen seen(planes.depth(), nx);
     Drain drain;
     const int64_t piece = static_cast<int64_t>(bytes_of(job.format)) * rows * block_columns;
     Block block;
@@ -28,13 +29,16 @@ void line_of_sight(const LineOfSight &job, int slab) {
     for (int z0 = 0, bank = 0; z0 < job.shape.nz; z0 += planes.depth(), bank = 1 - bank) {
         const int z_end = smaller(z0 + planes.depth(), job.shape.nz);
         planes.set(z0, z_end);
+        for (int z = z0; z < z_end; ++z) seen.look(exposure, planes.plane(z - z0), z - z0, {z, job.first_row + y0, rows, 0}, nx);
         for (int x0 = 0; x0 < nx; x0 += block_columns)
             for (int z = z0; z < z_end; ++z) {
                 const Tile tile{z, job.first_row + y0, rows, x0};
-                if (see(exposure, planes.plane(z - z0), tile, take))
+                if (const uint32_t exposures = seen.exposures(z - z0, x0)) {
+                    see(exposure, exposures, planes.plane(z - z0), tile, take);
                     banks[bank].put(tile, block, z - z0);
-                else
+                } else {
                     banks[bank].put_zeros(tile, z - z0);
+                }
                 drain.write(piece);
             }
         drain.finish();
@@ -56,17 +60,22 @@ void sparse_sight(const SparseSight &job, int slab, KeepBrick keep, void *owner)
     const int nx = job.shape.nx, y0 = slab * sight_rows, rows = smaller(sight_rows, job.shape.ny - y0);
     const Exposures exposure{job.views, job.n_views, 1, job.method};
     PlaneStack planes(job.views, job.n_views, nx, y0, rows);
+    const Seen seen(planes.depth(), nx);
     Block block;
     const auto take = [&](int row, const Floats (&values)[parts]) { std::memcpy(block.vectors[row], values, sizeof values); };
     alignas(64) uint16_t brick[sight_rows * block_columns];
     for (int z0 = 0; z0 < job.shape.nz; z0 += planes.depth()) {
         const int z_end = smaller(z0 + planes.depth(), job.shape.nz);
         planes.set(z0, z_end);
+        for (int z = z0; z < z_end; ++z) seen.look(exposure, planes.plane(z - z0), z - z0, {z, y0, rows, 0}, nx);
         for (int x0 = 0; x0 < nx; x0 += block_columns)
             for (int z = z0; z < z_end; ++z) {
                 const Tile tile{z, y0, rows, x0};
                 const int columns = smaller(block_columns, nx - x0);
-                if (!see(exposure, planes.plane(z - z0), tile, take) || !any_above(block, tile, columns, job.floor)) continue;
+                const uint32_t exposures = seen.exposures(z - z0, x0);
+                if (!exposures) continue;
+                see(exposure, exposures, planes.plane(z - z0), tile, take);
+                if (!any_above(block, tile, columns, job.floor)) continue;
                 std::memset(brick, 0, sizeof brick);
                 for (int row = 0; row < rows; ++row) store_halves(brick + row * block_columns, block.rows[row], columns);
                 keep(owner, z, x0, brick);
@@ -88,16 +97,20 @@ struct SumTile {
     int z0, depth, x0, x_end;
 };
 
-inline void add_exposures(const SumOfSight &job, const PlaneStack &planes, const SumTile &over, int y0, int rows, Block *sums) {
+inline void add_exposures(const SumOfSight &job, const PlaneStack &planes, const Seen &seen, const SumTile &over, int y0, int rows,
+                          Block *sums) {
     for (int n = 0; n < job.n_exposures; n += most_at_once) {
         const Exposures some{job.views + static_cast<int64_t>(n) * job.n_views, job.n_views,
                              smaller(most_at_once, job.n_exposures - n), job.method};
+        for (int plane = 0; plane < over.depth; ++plane)
+            seen.look(some, planes.plane(plane), plane, {over.z0 + plane, y0, rows, over.x0}, over.x_end);
         Block *sum = sums;
         for (int x0 = over.x0; x0 < over.x_end; x0 += block_columns)
             for (int plane = 0; plane < over.depth; ++plane, ++sum)
-                see(some, planes.plane(plane), {over.z0 + plane, y0, rows, x0}, [&](int row, const Floats (&values)[parts]) {
-                    for (int part = 0; part < parts; ++part) sum->vectors[row][part] += values[part];
-                });
+                see(some, seen.exposures(plane, x0), planes.plane(plane), {over.z0 + plane, y0, rows, x0},
+                    [&](int row, const Floats (&values)[parts]) {
+                        for (int part = 0; part < parts; ++part) sum->vectors[row][part] += values[part];
+                    });
     }
 }
 
@@ -105,6 +118,7 @@ void sum_of_sight(const SumOfSight &job, int slab) {
     const FlushSubnormals flush;
     const int nx = job.shape.nx, y0 = slab * sight_rows, rows = smaller(sight_rows, job.shape.ny - y0);
     PlaneStack planes(job.views, job.n_views, nx, y0, rows);
+    const Seen seen(planes.depth(), nx);
     const int64_t bytes = static_cast<int64_t>(sizeof(Block)) * planes.depth() * SumTile::blocks;
     const Memory sums(bytes);
     for (int z0 = 0; z0 < job.shape.nz; z0 += planes.depth()) {
@@ -113,7 +127,7 @@ void sum_of_sight(const SumOfSight &job, int slab) {
         for (int first = 0; first < nx; first += SumTile::blocks * block_columns) {
             const SumTile over{z0, depth, first, smaller(nx, first + SumTile::blocks * block_columns)};
             std::memset(sums.as<void>(), 0, static_cast<size_t>(bytes));
-            add_exposures(job, planes, over, y0, rows, sums.as<Block>());
+            add_exposures(job, planes, seen, over, y0, rows, sums.as<Block>());
             const Block *sum = sums.as<Block>();
             for (int x0 = over.x0; x0 < over.x_end; x0 += block_columns)
                 for (int plane = 0; plane < depth; ++plane) add_to_volume(job, {z0 + plane, y0, rows, x0}, *sum++);

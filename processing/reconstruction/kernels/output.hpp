@@ -36,13 +36,30 @@ inline void store_bytes(uint8_t *to, const float *from, int count) {
     }
 }
 
-inline void store_values(Format format, void *to, int64_t at, const float *from, int count) {
-    if (format == Format::single)
-        std::memcpy(static_cast<float *>(to) + at, from, sizeof(float) * static_cast<size_t>(count));
-    else if (format == Format::half)
-        store_halves(static_cast<uint16_t *>(to) + at, from, count);
+template <Format format>
+[[gnu::always_inline]] inline void store_values(uint8_t *to, const float *from, int count) {
+    if constexpr (format == Format::single)
+        std::memcpy(to, from, sizeof(float) * static_cast<size_t>(count));
+    else if constexpr (format == Format::half)
+        store_halves(reinterpret_cast<uint16_t *>(to), from, count);
     else
-        store_bytes(static_cast<uint8_t *>(to) + at, from, count);
+        store_bytes(to, from, count);
+}
+
+// The first columns of a block, to rows `stride` bytes apart.
+template <Format format>
+inline void store_block(uint8_t *to, int64_t stride, const Block &block, int rows, int columns) {
+    for (int row = 0; row < rows; ++row, to += stride)
+        if (columns == block_columns)
+            store_values<format>(to, block.rows[row], block_columns);
+        else
+            store_values<format>(to, block.rows[row], columns);
+}
+
+inline void store_block(Format format, uint8_t *to, int64_t stride, const Block &block, int rows, int columns) {
+    if (format == Format::single) return store_block<Format::single>(to, stride, block, rows, columns);
+    if (format == Format::half) return store_block<Format::half>(to, stride, block, rows, columns);
+    store_block<Format::byte>(to, stride, block, rows, columns);
 }
 
 // Copy to memory that is not read again soon.
@@ -55,10 +72,14 @@ inline void stream(void *to, const void *from, int64_t bytes) {
         std::memcpy(target, source, static_cast<size_t>(head));
         int64_t at = head;
         for (; at + 64 <= bytes; at += 64) {
+#if defined(__AVX512F__)
+            _mm512_stream_si512(reinterpret_cast<__m512i *>(target + at), _mm512_loadu_si512(source + at));
+#else
             const auto *line = reinterpret_cast<const __m256i *>(source + at);
             auto *out = reinterpret_cast<__m256i *>(target + at);
             _mm256_stream_si256(out, _mm256_loadu_si256(line));
             _mm256_stream_si256(out + 1, _mm256_loadu_si256(line + 1));
+#endif
         }
         target += at;
         source += at;
@@ -89,21 +110,13 @@ public:
 
     void put(const Tile &tile, const Block &block, int plane = 0) {
         empty(tile, plane) = false;
-        const int columns = smaller(block_columns, nx_ - tile.x0);
-        for (int row = 0; row < tile.rows; ++row) {
-            const int64_t at = static_cast<int64_t>(row) * nx_ + tile.x0;
-            if (columns == block_columns)
-                store_values(format_, start(plane), at, block.rows[row], block_columns);
-            else
-                store_values(format_, start(plane), at, block.rows[row], columns);
-        }
+        store_block(format_, at(tile, plane), row_bytes(), block, tile.rows, columns_of(tile));
     }
     void put_zeros(const Tile &tile, int plane = 0) {
         if (empty(tile, plane)) return;
         empty(tile, plane) = true;
-        const int64_t size = bytes_of(format_), columns = smaller(block_columns, nx_ - tile.x0);
         for (int row = 0; row < tile.rows; ++row)
-            std::memset(start(plane) + size * (static_cast<int64_t>(row) * nx_ + tile.x0), 0, static_cast<size_t>(size * columns));
+            std::memset(at(tile, plane) + row_bytes() * row, 0, static_cast<size_t>(bytes_of(format_) * columns_of(tile)));
     }
     void write(const Shape &shape, int z, int y0, void *volume, int plane = 0) const {
         stream(target(shape, z, y0, volume), start(plane), bytes_);
@@ -116,6 +129,9 @@ public:
     int64_t bytes() const { return bytes_; }
 
 private:
+    int columns_of(const Tile &tile) const { return smaller(block_columns, nx_ - tile.x0); }
+    int64_t row_bytes() const { return static_cast<int64_t>(bytes_of(format_)) * nx_; }
+    uint8_t *at(const Tile &tile, int plane) const { return start(plane) + bytes_of(format_) * tile.x0; }
     bool &empty(const Tile &tile, int plane) const { return empty_.as<bool>()[plane * blocks_ + tile.x0 / block_columns]; }
 
     Format format_;

@@ -33,19 +33,26 @@ inline void combine(float *at, Floats seen, float factor) {
 }
 
 // Rows of an image between which the rows of a tile are seen: where the upper one starts, and the weight of the lower
-// one. The same for all images of a view.
+// one; and the rows of cells that they lie in. The same for all images of a view.
 struct RowTaps {
     int32_t above[sight_rows];
     int32_t weight[sight_rows];
-    int first_row;
+    int first_cell, end_cell;
 };
+
+// Pixels are never negative, and to divide such numbers is quicker.
+template <int pixels>
+inline int cell_of(int pixel) {
+    return static_cast<int>(static_cast<unsigned>(pixel) / pixels);
+}
 
 inline RowTaps row_taps(const View &view, int z, int y0, int rows) {
     RowTaps taps;
     for (int row = 0; row < rows; ++row) {
         const double position = view.scale[z] * (y0 + row) + view.shift_v[z];
         const int at = static_cast<int>(position);
-        if (row == 0) taps.first_row = at;
+        if (row == 0) taps.first_cell = cell_of<Occupancy::cell_rows>(at);
+        if (row == rows - 1) taps.end_cell = cell_of<Occupancy::cell_rows>(at + 1) + 1;
         taps.above[row] = at * view.columns;
         taps.weight[row] = vertical_weight(static_cast<float>(position - at));
     }

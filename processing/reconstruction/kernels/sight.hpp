@@ -74,23 +74,37 @@ inline void see_rows(const View *views, const PlaneTaps *planes, const ColumnTap
     }
 }
 
-// The exposures that may see something in a tile.
-struct Seen {
-    int count = 0, exposures[most_at_once];
-    Seen(const Exposures &from, const PlaneTaps *planes, const Tile &tile) {
-        PixelBox boxes[max_views];
-        int known = 0;
-        for (int e = 0; e < from.count; ++e) {
-            const View *views = from.exposure(e);
-            int i = 0;
-            for (; i < from.n_views; ++i) {
-                if (!views[i].occupancy.sums) continue;
-                for (; known <= i; ++known) boxes[known] = box_around(views[known], planes[known], tile);
-                if (!views[i].occupancy.any(boxes[i])) break;
+// Which exposures may see something in the blocks of some planes, looked up before they are visited: the answers hardly
+// change from plane to plane, so that processors guess them.
+class Seen {
+public:
+    Seen(int planes, int nx) : blocks_(nx / block_columns + 1), bits_(static_cast<int64_t>(planes) * blocks_) {}
+    // The blocks of one plane from a tile on.
+    void look(const Exposures &from, const PlaneTaps *taps, int plane, Tile tile, int x_end) const {
+        const int first = tile.x0;
+        std::memset(&at(plane, first), (1 << from.count) - 1, static_cast<size_t>((x_end - first - 1) / block_columns + 1));
+        for (int i = 0; i < from.n_views; ++i)
+            for (tile.x0 = first; tile.x0 < x_end; tile.x0 += block_columns) {
+                uint8_t &bits = at(plane, tile.x0);
+                if (bits) bits = static_cast<uint8_t>(bits & seen_by(from, i, cells_around(from.views[i], taps[i], tile)));
             }
-            if (i == from.n_views) exposures[count++] = e;
-        }
     }
+    // Bit e is set where exposure e may see something in the block at x0.
+    uint32_t exposures(int plane, int x0) const { return at(plane, x0); }
+
+private:
+    static uint32_t seen_by(const Exposures &from, int i, const CellBox &box) {
+        uint32_t bits = 0;
+        for (int e = 0; e < from.count; ++e) {
+            const Occupancy &occupancy = from.exposure(e)[i].occupancy;
+            bits |= static_cast<uint32_t>(!occupancy.sums || occupancy.any(box)) << e;
+        }
+        return bits;
+    }
+    uint8_t &at(int plane, int x0) const { return bits_.as<uint8_t>()[plane * blocks_ + x0 / block_columns]; }
+
+    int blocks_;
+    Memory bits_;
 };
 
 inline bool all_rectified(const View *views, int n_views) {
@@ -139,11 +153,11 @@ inline void see_product(const Together &from, const Tile &tile, float gain, cons
 }
 
 template <int n, class Take>
-inline void see_together(const Exposures &from, const Seen &seen, const PlaneTaps *planes, const Tile &tile, const Take &take) {
+inline void see_together(const Exposures &from, uint32_t seen, const PlaneTaps *planes, const Tile &tile, const Take &take) {
     const bool one_window = share_window<n>(planes), minimum = from.method == Method::minimum;
     const ColumnTaps<n> columns(planes, tile);
-    for (int k = 0; k < seen.count; ++k) {
-        const View *views = from.exposure(seen.exposures[k]);
+    for (; seen; seen &= seen - 1) {
+        const View *views = from.exposure(__builtin_ctz(seen));
         if (one_window && minimum)
             see_rows<n, true, may_share_window>(views, planes, columns, tile.rows, 1.0f, take);
         else if (one_window)
@@ -156,11 +170,11 @@ inline void see_together(const Exposures &from, const Seen &seen, const PlaneTap
 }
 
 template <class Take>
-inline void see_one_by_one(const Exposures &from, const Seen &seen, const PlaneTaps *planes, const Tile &tile,
+inline void see_one_by_one(const Exposures &from, uint32_t seen, const PlaneTaps *planes, const Tile &tile,
                            const Take &take) {
     Block block;
-    for (int k = 0; k < seen.count; ++k) {
-        const View *views = from.exposure(seen.exposures[k]);
+    for (; seen; seen &= seen - 1) {
+        const View *views = from.exposure(__builtin_ctz(seen));
         if (from.method == Method::minimum)
             sample_minimum(views, from.n_views, planes, tile, block);
         else
@@ -170,7 +184,7 @@ inline void see_one_by_one(const Exposures &from, const Seen &seen, const PlaneT
 }
 
 template <class Take>
-inline void see_exposures(const Exposures &from, const Seen &seen, const PlaneTaps *planes, const Tile &tile,
+inline void see_exposures(const Exposures &from, uint32_t seen, const PlaneTaps *planes, const Tile &tile,
                           const Take &take) {
     const bool rectified = all_rectified(from.views, from.n_views);
     if (rectified && from.n_views == 4)
@@ -183,12 +197,10 @@ inline void see_exposures(const Exposures &from, const Seen &seen, const PlaneTa
         see_one_by_one(from, seen, planes, tile, take);
 }
 
-// Hand every row of the tile in every exposure that may not be empty there to take(row, values), `parts` vectors.
-// Returns whether there was any.
+// Hand every row of the tile in every exposure that may see something there, bit e of `seen`, to take(row, values),
+// `parts` vectors.
 template <class Take>
-inline bool see(const Exposures &from, const PlaneTaps *planes, const Tile &tile, const Take &take) {
-    const Seen seen(from, planes, tile);
-    if (!seen.count) return false;
+inline void see(const Exposures &from, uint32_t seen, const PlaneTaps *planes, const Tile &tile, const Take &take) {
     if (from.method == Method::geometric_mean)
         see_exposures(from, seen, planes, tile, [&](int row, Floats (&values)[parts]) {
             for (Floats &value : values) value = root(value, from.n_views);
@@ -196,7 +208,6 @@ inline bool see(const Exposures &from, const PlaneTaps *planes, const Tile &tile
         });
     else
         see_exposures(from, seen, planes, tile, take);
-    return true;
 }
 
 }  // namespace

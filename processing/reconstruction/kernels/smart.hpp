@@ -111,13 +111,19 @@ void smart_start(const SmartStart &job, int slab, const NewBlocks &blocks) {
     const int y0 = slab * smart_rows, rows = smaller(smart_rows, job.shape.ny - y0);
     const Projection nowhere[max_views] = {};
     TilePlanes planes(job.views, job.n_views, job.shape, y0, rows, 2);
+    const Exposures exposure{job.views, job.n_views, 1, Method::product};
+    const Seen seen(smart_planes, job.shape.nx);
     const bool rectified = all_rectified(job.views, job.n_views);
     Block copied;
     for_tiles(job.shape, [&](int z, int x0) {
         const Tile tile{z, y0, rows, x0};
-        if (z % smart_planes == 0 && x0 == 0) planes.set(z, nowhere);
+        if (z % smart_planes == 0 && x0 == 0) {
+            planes.set(z, nowhere);
+            for (int k = z; k < smaller(z + smart_planes, job.shape.nz); ++k)
+                seen.look(exposure, planes.taps[k - z], k - z, {k, y0, rows, 0}, job.shape.nx);
+        }
         const PlaneTaps *taps = planes.taps[z % smart_planes];
-        if (!job.volume && !occupied(job.views, job.n_views, taps, tile)) return;
+        if (!job.volume && !seen.exposures(z % smart_planes, x0)) return;
         NewBlock block(job, tile, blocks.next(blocks.owner));
         if (job.volume) {
             copy(job.volume, job.shape, tile, copied);

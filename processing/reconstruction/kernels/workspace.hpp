@@ -97,25 +97,20 @@ private:
     Memory lines_, taps_;
 };
 
-// A box of pixels around all samples of a tile, the same for all images of a view.
-inline PixelBox box_around(const View &view, const PlaneTaps &taps, const Tile &tile) {
+// Cells around all samples of a tile, the same for all images of a view.
+inline CellBox cells_around(const View &view, const PlaneTaps &taps, const Tile &tile) {
+    constexpr auto row_of = cell_of<Occupancy::cell_rows>, column_of = cell_of<Occupancy::cell_columns>;
     if (!view.nodes) {
         const double scale = view.scale[tile.z];
-        const int column = static_cast<int>(scale * tile.x0 + view.shift_u[tile.z]), row = taps.rows.first_row;
-        return {row, row + static_cast<int>(scale * (tile.rows - 1)) + 2, column,
-                column + static_cast<int>(scale * (block_columns - 1)) + 2};
+        const int column = static_cast<int>(scale * tile.x0 + view.shift_u[tile.z]);
+        const int last = column + static_cast<int>(scale * (block_columns - 1)) + 2;
+        return {taps.rows.first_cell, taps.rows.end_cell, column_of(column), column_of(last) + 1};
     }
     const Clamp last(view);
     const Extent u = extent_of(taps, 0, tile, view.spacing), v = extent_of(taps, 1, tile, view.spacing);
     const auto pixel = [](float at, float limit) { return static_cast<int>(Clamp::between(at, limit)); };
-    return {pixel(v.least, last.v), pixel(v.most, last.v) + 1, pixel(u.least, last.u), pixel(u.most, last.u) + 1};
-}
-
-// Whether all views may see something in the tile: if not, the product and the minimum are zero.
-inline bool occupied(const View *views, int n_views, const PlaneTaps *taps, const Tile &tile) {
-    for (int i = 0; i < n_views; ++i)
-        if (views[i].occupancy.sums && !views[i].occupancy.any(box_around(views[i], taps[i], tile))) return false;
-    return true;
+    return {row_of(pixel(v.least, last.v)), row_of(pixel(v.most, last.v) + 1) + 1, column_of(pixel(u.least, last.u)),
+            column_of(pixel(u.most, last.u) + 1) + 1};
 }
 
 }  // namespace
