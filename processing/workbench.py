@@ -52,7 +52,7 @@ class Workbench:
             plan,
             settings,
             images=tuple(np.empty(view.image_size_px[::-1], np.float32) for view in plan.views),
-            resampled=tuple(np.empty(view.shape_px, np.int16) for view in plan.views),
+            resampled=plan.empty_images(),
             memory=np.empty((nz, min(SLAB_ROWS, ny), nx), settings.voxels.value),
         )
 

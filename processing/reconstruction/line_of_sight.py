@@ -25,6 +25,7 @@ def line_of_sight(
     method: ReconstructionMethod = ReconstructionMethod.MLOS,
     out: NDArray[Any] | None = None,
     *,
+    resampled: Sequence[NDArray[np.int16]] | None = None,
     threads: int = DEFAULT_THREADS,
 ) -> NDArray[Any]:
     """Reconstruct a volume from one image per view.
@@ -41,6 +42,8 @@ def line_of_sight(
     out : (z, y, x) float32, float16 or uint8 array, optional
         Receives the volume; 255 is 1 where it is of bytes.
         A reused volume is much faster than a new one: fresh memory costs more than the method.
+    resampled : sequence of int16 arrays, optional
+        As ``Plan.resample`` takes them; memory that is used again is faster.
     threads : int
         The result does not depend on it.
 
@@ -57,7 +60,7 @@ def line_of_sight(
     number = kernel_method(method)
     volume = np.empty(plan.grid.shape, dtype=np.float32) if out is None else out
     check_volume(volume, plan, (np.float32, np.float16, np.uint8))
-    views = plan.bind(plan.resample(images, threads))
+    views = plan.bind(plan.resample(images, threads, resampled))
     _native.line_of_sight(views, number, volume, threads)
     return volume
 

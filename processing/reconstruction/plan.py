@@ -48,6 +48,10 @@ class Plan:
         """Memory that the resampled images of one exposure take."""
         return sum(2 * view.shape_px[0] * view.shape_px[1] for view in self.views)
 
+    def empty_images(self) -> tuple[NDArray[np.int16], ...]:
+        """Memory for the resampled images of one exposure; their pixels are undefined."""
+        return tuple(np.empty(view.shape_px, np.int16) for view in self.views)
+
     def resample(
         self,
         images: Sequence[NDArray[np.float32]],
@@ -70,7 +74,7 @@ class Plan:
         ValueError
             Number or shape of the images do not fit the plan.
         """
-        memory = [np.empty(view.shape_px, np.int16) for view in self.views] if out is None else out
+        memory = self.empty_images() if out is None else out
         if len(images) != len(self.views):
             raise ValueError(f"{len(images)} images for a plan of {len(self.views)} views")
         for number, (image, view) in enumerate(zip(images, self.views, strict=True)):

@@ -106,7 +106,7 @@ def _kernels(
     """Name, baseline and timing of every kernel; volumes are reused, so that their memory is warm."""
     plan = plan_reconstruction(cameras, study.grid)
     volume = np.zeros(study.shape, np.float16)
-    by_sight = partial(line_of_sight, plan, images, threads=study.threads)
+    by_sight = _by_sight(plan, images, study.threads)
     yield "resample", mlos_cpu_s, measure(lambda: plan.resample(images), study.repeats)
     for method in (ReconstructionMethod.MLOS, ReconstructionMethod.MINLOS, ReconstructionMethod.GAVLOS):
         timing = measure(partial(by_sight, method, out=volume), study.repeats)
@@ -118,16 +118,20 @@ def _kernels(
             dense = partial(_dense, plan, images, volume, study.threads)
             yield "mlos float16 avx2 dense", mlos_cpu_s, measure(dense, study.repeats)
     for name, other in _other_plans(study, cameras):
-        work = partial(line_of_sight, other, images, out=volume, threads=study.threads)
+        work = partial(_by_sight(other, images, study.threads), out=volume)
         yield f"mlos float16 {name}", mlos_cpu_s, measure(work, study.repeats)
     yield "smart iteration float16", smart_cpu_s, _smart_iteration(study, plan, images, volume)
     for name, grid in _parts(study.grid):
         part, out = plan_reconstruction(cameras, grid), np.zeros(grid.shape, np.float16)
-        work = partial(line_of_sight, part, images, out=out, threads=study.threads)
+        work = partial(_by_sight(part, images, study.threads), out=out)
         yield f"mlos float16 {name}", mlos_cpu_s * out.size / volume.size, measure(work, study.repeats)
     del volume
     single = np.zeros(study.shape, np.float32)
     yield "mlos float32", mlos_cpu_s, measure(partial(by_sight, out=single), study.repeats)
+
+
+def _by_sight(plan: Plan, images: Sequence[Image], threads: int) -> Callable[..., NDArray[np.float16]]:
+    return partial(line_of_sight, plan, images, resampled=plan.empty_images(), threads=threads)
 
 
 def _dense(plan: Plan, images: Sequence[Image], out: NDArray[np.float16], threads: int) -> None:

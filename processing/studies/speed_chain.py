@@ -68,11 +68,12 @@ def _from_raw_images(
     study: SpeedStudy, cameras: Sequence[PinholeCamera], plan: Plan, volumes: Sequence[Volume]
 ) -> Iterator[Measured]:
     sprays = [spray_images(study, cameras, seed) for seed in (1, 2)]
-    images = [np.zeros_like(image) for image in sprays[0]]
+    images, resampled = [np.zeros_like(image) for image in sprays[0]], plan.empty_images()
     timing = Timing(0.0, 1.0)
     for bits, target in targets.DOUBLE_EXPOSURE.items():
         raw = [raw_exposures(spray, bits) for spray in sprays]
-        timing = measure(partial(_reconstruct_raw, plan, raw, images, volumes, study.threads), study.repeats)
+        work = partial(_reconstruct_raw, plan, raw, images, resampled, volumes, study.threads)
+        timing = measure(work, study.repeats)
         yield _in_seconds(target, timing)
 
     def minima() -> None:
@@ -88,6 +89,7 @@ def _reconstruct_raw(
     plan: Plan,
     raw: Sequence[Sequence[RawExposure]],
     images: Sequence[Image],
+    resampled: Sequence[NDArray[np.int16]],
     volumes: Sequence[Volume],
     threads: int,
 ) -> None:
@@ -102,7 +104,7 @@ def _reconstruct_raw(
                 out=image,
                 threads=threads,
             )
-        line_of_sight(plan, images, out=volume, threads=threads)
+        line_of_sight(plan, images, out=volume, resampled=resampled, threads=threads)
 
 
 def _by_smart(

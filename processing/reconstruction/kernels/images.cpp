@@ -42,44 +42,51 @@ Recorded part(const Recorded &image, const PixelBox &box) {
 }
 
 // Memory that waits for the next image: fresh memory costs more than what is written to it.
+template <class T>
 class Scratch {
 public:
-    int16_t *of(size_t count) {
+    T *of(size_t count) {
         if (count > count_) {
-            memory_.reset(new int16_t[count]);  // not a vector, which would write zeros first
+            memory_.reset(new T[count]);  // not a vector, which would write zeros first
             count_ = count;
         }
         return memory_.get();
     }
 
 private:
-    std::unique_ptr<int16_t[]> memory_;
+    std::unique_ptr<T[]> memory_;
     size_t count_ = 0;
 };
 
-}  // namespace
-
-float quantise(const Kernels &kernels, const Recorded &image, int before, int after, int16_t *to, int threads) {
+float unit_of(const Kernels &kernels, const Recorded &image, int threads) {
     std::vector<float> brightest(static_cast<size_t>(image.rows), 0.0f);
     for_rows(image.rows, threads, [&](int first, int end) {
         for (int row = first; row < end; ++row)
             brightest[row] = kernels.brightest(image.row(row), image.columns);
     });
     const float largest = *std::max_element(brightest.begin(), brightest.end());
-    const float unit = (largest > 0.0f ? largest : 1.0f) / 32767.0f;
-    const int64_t columns = image.columns + before + after;
+    return (largest > 0.0f ? largest : 1.0f) / 32767.0f;
+}
+
+// One row of a frame of zeros with the image in it.
+void quantise_row(const Kernels &kernels, const Recorded &image, int row, int before, float unit, int16_t *line, int columns) {
+    if (row < 0 || row >= image.rows) {
+        std::fill(line, line + columns, int16_t(0));
+        return;
+    }
+    std::fill(line, line + before, int16_t(0));
+    kernels.quantise(image.row(row), 1.0f / unit, line + before, image.columns);
+    std::fill(line + before + image.columns, line + columns, int16_t(0));
+}
+
+}  // namespace
+
+float quantise(const Kernels &kernels, const Recorded &image, int before, int after, int16_t *to, int threads) {
+    const float unit = unit_of(kernels, image, threads);
+    const int columns = image.columns + before + after;
     for_rows(image.rows + before + after, threads, [&](int first, int end) {
-        for (int row = first; row < end; ++row) {
-            int16_t *line = to + row * columns;
-            const int from = row - before;
-            if (from < 0 || from >= image.rows) {
-                std::fill(line, line + columns, int16_t(0));
-                continue;
-            }
-            std::fill(line, line + before, int16_t(0));
-            kernels.quantise(image.row(from), 1.0f / unit, line + before, image.columns);
-            std::fill(line + before + image.columns, line + columns, int16_t(0));
-        }
+        for (int row = first; row < end; ++row)
+            quantise_row(kernels, image, row - before, before, unit, to + static_cast<int64_t>(row) * columns, columns);
     });
     return unit;
 }
@@ -90,10 +97,21 @@ float resample(const Kernels &kernels, const Recorded &image, const float *nodes
     const PixelBox box = pixels_needed(image, nodes, ((rows - 1) / Resampling::node_spacing + 2) * nodes_x);
     const Recorded needed = part(image, box);
     const int from_rows = needed.rows + 2 * margin, from_columns = needed.columns + 2 * margin;
-    thread_local Scratch scratch;
-    int16_t *const from = scratch.of(static_cast<size_t>(from_rows) * from_columns);
-    const float unit = quantise(kernels, needed, margin, margin, from, threads);
+    const int64_t cells = FilledCells::stride(from_columns);
+    thread_local Scratch<int16_t> pixels;
+    thread_local Scratch<uint8_t> flags;
+    int16_t *const from = pixels.of(static_cast<size_t>(from_rows) * from_columns);
+    uint8_t *const filled = flags.of(static_cast<size_t>(from_rows * cells));
+    const float unit = unit_of(kernels, needed, threads);
+    for_rows(from_rows, threads, [&](int first, int end) {
+        for (int row = first; row < end; ++row) {
+            int16_t *line = from + static_cast<int64_t>(row) * from_columns;
+            quantise_row(kernels, needed, row - margin, margin, unit, line, from_columns);
+            kernels.find_filled(line, from_columns, filled + row * cells);
+        }
+    });
     const Resampling job{from,
+                         filled,
                          from_rows,
                          from_columns,
                          static_cast<float>(margin - box.left),

@@ -152,11 +152,18 @@ struct Correction {
     int16_t *ratio;
 };
 
+// Where the rows of an image are not zero: a byte for every few columns.
+struct FilledCells {
+    static constexpr int columns = 8, most = 8;  // so many are looked at together
+    static int64_t stride(int image_columns) { return image_columns / columns + most; }
+};
+
 // Resample rows [first_row, end_row) of `to` from a recorded image in fixed point, by cubic convolution. Nodes are
 // pairs (u, v) for every node_spacing-th pixel of `to`, linear in between. The recorded image has a margin of zeros.
 struct Resampling {
     static constexpr int node_spacing = 16, margin = 64;
     const int16_t *from;
+    const uint8_t *filled;  // of every row of `from`, see FilledCells
     int from_rows, from_columns;  // with margins
     float origin_u, origin_v;  // of the recorded image, in `from`
     const float *nodes;
@@ -177,6 +184,7 @@ struct Kernels {
     void (*resample)(const Resampling &job, int first_row, int end_row);
     float (*brightest)(const float *pixels, int count);
     void (*quantise)(const float *pixels, float counts_per_unit, int16_t *to, int count);
+    void (*find_filled)(const int16_t *pixels, int count, uint8_t *filled);
     void (*row_minima)(const Exposure &job, int first_row, int end_row);
     void (*column_minima)(const Exposure &job, int strip);
     void (*row_means)(const Exposure &job, int first_row, int end_row);

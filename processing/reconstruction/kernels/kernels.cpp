@@ -140,6 +140,6 @@ void sum_of_sight(const SumOfSight &job, int slab) {
 extern const Kernels kernels;
 const Kernels kernels{
     TOMOSHADOW_TEXT(TOMOSHADOW_ISA), line_of_sight, sparse_sight, sum_of_sight, smart_start, smart_pass, write_blocks, correct,
-    resample, brightest, quantise, row_minima, column_minima, row_means, subtract_veil};
+    resample, brightest, quantise, find_filled, row_minima, column_minima, row_means, subtract_veil};
 
 }  // namespace tomoshadow::TOMOSHADOW_ISA

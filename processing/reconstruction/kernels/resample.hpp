@@ -10,15 +10,16 @@ namespace {
 constexpr int spacing = Resampling::node_spacing;
 constexpr float keys = -0.75f;  // slope of the kernel at distance 1
 
-// Weights of the four pixels around a position with this fraction.
+// Weights of the four pixels around a position with this fraction; they add up to one.
+template <class Value>
 struct CubicWeights {
-    float w[4];
-    explicit CubicWeights(float f) {
-        const float g = 1.0f - f;
-        w[0] = keys * f * g * g;
-        w[1] = ((keys + 2) * f - (keys + 3)) * f * f + 1;
-        w[2] = ((keys + 2) * g - (keys + 3)) * g * g + 1;
-        w[3] = keys * g * f * f;
+    Value w[4];
+    explicit CubicWeights(Value f) {
+        const Value g = 1.0f - f, fg = keys * f * g;
+        w[0] = fg * g;
+        w[1] = ((keys + 2) * f - (keys + 3)) * (f * f) + 1.0f;
+        w[3] = fg * f;
+        w[2] = 1.0f - w[0] - w[1] - w[3];
     }
 };
 
@@ -65,24 +66,26 @@ struct Box {
         top = inside ? static_cast<int>(v0) - 1 : 0;
         bottom = inside ? static_cast<int>(v1) + 3 : 0;
     }
+    // Whether all positions lie between the same two rows.
+    bool one_row() const { return bottom - top == 4; }
 };
 
 // Most boxes of a spray are; a few columns more are looked at.
 inline bool empty(const Resampling &job, const Box &box) {
-    Ints any{};
-    for (int row = box.top; row <= box.bottom; ++row)
-        for (int column = box.left; column <= box.right; column += 2 * lanes)
-            any |= load<Ints>(job.from + static_cast<int64_t>(row) * job.from_columns + column);
-    int32_t bits = 0;
-    for (int lane = 0; lane < lanes; ++lane) bits |= any[lane];
-    return bits == 0;
+    const int first = box.left / FilledCells::columns, cells = box.right / FilledCells::columns - first + 1;
+    if (cells > FilledCells::most) return false;
+    const int64_t stride = FilledCells::stride(job.from_columns);
+    const uint8_t *filled = job.filled + box.top * stride + first;
+    uint64_t any = 0;
+    for (int row = box.top; row <= box.bottom; ++row, filled += stride) any |= load<uint64_t>(filled);
+    return any << (64 - 8 * cells) == 0;
 }
 
 inline void resample_one_by_one(const Resampling &job, const Segment &at, int16_t *to) {
     for (int k = 0; k < spacing; ++k) {
         const float u = at.u + at.step_u * static_cast<float>(k), v = at.v + at.step_v * static_cast<float>(k);
         const int iu = static_cast<int>(u), iv = static_cast<int>(v);
-        const CubicWeights along(u - static_cast<float>(iu)), down(v - static_cast<float>(iv));
+        const CubicWeights<float> along(u - static_cast<float>(iu)), down(v - static_cast<float>(iv));
         const int16_t *pixel = job.from + static_cast<int64_t>(iv - 1) * job.from_columns + iu - 1;
         float sum = 0.0f;
         for (int row = 0; row < 4; ++row, pixel += job.from_columns)
@@ -102,33 +105,49 @@ inline Floats cubic_at(Floats distance) {
     return d < zero + 1.0f ? near : d < zero + 2.0f ? far : zero;
 }
 
-// All sixteen pixels of a segment at once, row by row of the window; no gathers.
+// What sixteen positions see in a row of pixels; no gathers.
+class RowOfTaps {
+public:
+    explicit RowOfTaps(Floats u) {
+        const Ints index = __builtin_convertvector(u, Ints), pairs = (index | index << 16) + 0x10000;
+        const CubicWeights<Floats> weights(u - __builtin_convertvector(index, Floats));
+        const Ints w0 = fixed(weights.w[0]), w1 = fixed(weights.w[1]), w2 = fixed(weights.w[2]);
+        near_ = reinterpret_cast<__m512i>((w0 & 0xffff) | w1 << 16);
+        far_ = reinterpret_cast<__m512i>((w2 & 0xffff) | (one - w0 - w1 - w2) << 16);
+        near_taps_ = reinterpret_cast<__m512i>(pairs);
+        far_taps_ = reinterpret_cast<__m512i>(pairs + 0x20002);
+    }
+    Floats of(const int16_t *pixels) const {
+        const __m512i window = _mm512_loadu_si512(pixels);
+        const __m512i near = _mm512_madd_epi16(_mm512_permutexvar_epi16(near_taps_, window), near_);
+        const __m512i far = _mm512_madd_epi16(_mm512_permutexvar_epi16(far_taps_, window), far_);
+        return reinterpret_cast<Floats>(_mm512_cvtepi32_ps(_mm512_add_epi32(near, far)));
+    }
+    static constexpr float unit = 1.0f / 16384;
+
+private:
+    static constexpr int32_t one = 16384;
+    static Ints fixed(Floats weight) {
+        return reinterpret_cast<Ints>(_mm512_cvtps_epi32(reinterpret_cast<__m512>(weight * static_cast<float>(one))));
+    }
+    __m512i near_taps_, far_taps_, near_, far_;
+};
+
+// All sixteen pixels of a segment at once, row by row of the window.
 inline void resample_window(const Resampling &job, const Segment &at, const Box &box, int16_t *to) {
-    Floats lane;
-    for (int k = 0; k < lanes; ++k) lane[k] = static_cast<float>(k);
-    const Floats u = lane * at.step_u + (at.u - static_cast<float>(box.left + 1));
-    const Floats v = lane * at.step_v + (at.v - static_cast<float>(box.top));
-    const Ints index = __builtin_convertvector(u, Ints);
-    const Floats f = u - __builtin_convertvector(index, Floats);
-    const auto fixed = [](Floats weight) {
-        return reinterpret_cast<Ints>(_mm512_cvtps_epi32(reinterpret_cast<__m512>(weight * 16384.0f)));
-    };
-    const Ints w0 = fixed(cubic_at(f + 1.0f)), w1 = fixed(cubic_at(f)), w2 = fixed(cubic_at(1.0f - f));
-    const Ints w3 = 16384 - w0 - w1 - w2;
-    const auto weights_a = reinterpret_cast<__m512i>((w0 & 0xffff) | w1 << 16);
-    const auto weights_b = reinterpret_cast<__m512i>((w2 & 0xffff) | w3 << 16);
-    const Ints pairs = (index | index << 16) + 0x10000;
-    const auto taps_a = reinterpret_cast<__m512i>(pairs), taps_b = reinterpret_cast<__m512i>(pairs + 0x20002);
+    const RowOfTaps row_of(lane_numbers() * at.step_u + (at.u - static_cast<float>(box.left + 1)));
+    const Floats v = lane_numbers() * at.step_v + (at.v - static_cast<float>(box.top));
     const int16_t *pixels = job.from + static_cast<int64_t>(box.top) * job.from_columns + box.left;
     Floats sum{};
-    for (int row = 0; row <= box.bottom - box.top; ++row, pixels += job.from_columns) {
-        const __m512i window = _mm512_loadu_si512(pixels);
-        const __m512i a = _mm512_madd_epi16(_mm512_permutexvar_epi16(taps_a, window), weights_a);
-        const __m512i b = _mm512_madd_epi16(_mm512_permutexvar_epi16(taps_b, window), weights_b);
-        const auto seen = reinterpret_cast<Floats>(_mm512_cvtepi32_ps(_mm512_add_epi32(a, b)));
-        sum += cubic_at(v - static_cast<float>(row)) * seen;
+    if (box.one_row()) {
+        const Floats zero{}, fraction = v - 1.0f, rising = fraction > zero ? fraction : zero;
+        const CubicWeights<Floats> down(lesser(rising, zero + 1.0f));
+        for (int row = 0; row < 4; ++row, pixels += job.from_columns) sum += down.w[row] * row_of.of(pixels);
+    } else {
+        for (int row = 0; row <= box.bottom - box.top; ++row, pixels += job.from_columns)
+            sum += cubic_at(v - static_cast<float>(row)) * row_of.of(pixels);
     }
-    const __m512 scaled = reinterpret_cast<__m512>(sum * (1.0f / 16384.0f));
+    const __m512 scaled = reinterpret_cast<__m512>(sum * RowOfTaps::unit);
     const __m512 limited = _mm512_min_ps(_mm512_max_ps(scaled, _mm512_setzero_ps()), _mm512_set1_ps(32767.0f));
     _mm256_storeu_si256(reinterpret_cast<__m256i *>(to), _mm512_cvtepi32_epi16(_mm512_cvtps_epi32(limited)));
 }
@@ -154,6 +173,16 @@ float brightest(const float *pixels, int count) {
 
 void quantise(const float *pixels, float counts_per_unit, int16_t *to, int count) {
     for (int k = 0; k < count; ++k) to[k] = rounded(pixels[k] * counts_per_unit);
+}
+
+void find_filled(const int16_t *pixels, int count, uint8_t *filled) {
+    constexpr int columns = FilledCells::columns;
+    for (int cell = 0; cell < count / columns; ++cell) {
+        uint64_t words[2];
+        std::memcpy(words, pixels + cell * columns, sizeof words);
+        filled[cell] = (words[0] | words[1]) != 0;
+    }
+    std::memset(filled + count / columns, 1, FilledCells::most);  // of pixels that are left over; and what nobody reads
 }
 
 void resample(const Resampling &job, int first_row, int end_row) {
