@@ -66,6 +66,19 @@ def test_full_size_board_is_accurate() -> None:
     assert np.sqrt((errors_px(points, camera, BOARD, 2.0) ** 2).mean()) < 0.03
 
 
+@pytest.mark.parametrize("dark_level", [0.0, 20.0])
+@pytest.mark.parametrize("slope_per_px", [(2e-3, 0.0), (0.0, -2e-3), (1e-3, 1e-3), (1e-3, -1e-3)])
+def test_light_that_slopes_moves_no_corner(slope_per_px: tuple[float, float], dark_level: float) -> None:
+    clear = 1000 * render_target(paper_cameras(2)["view3"], Checkerboard(), -2.0, paper_optics(2)["view3"])
+    v, u = np.indices(clear.shape)
+    light = np.exp((u - u.mean()) * slope_per_px[0] + (v - v.mean()) * slope_per_px[1])
+    even, sloping = detect_target(clear, BOARD), detect_target(clear * light + dark_level, BOARD)
+    np.testing.assert_array_equal(sloping.ids, even.ids)
+    moved_px = sloping.image_px - even.image_px
+    np.testing.assert_allclose(np.median(moved_px, axis=0), 0, atol=0.001)
+    np.testing.assert_allclose(moved_px, 0, atol=0.004)
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_blur_noise_and_dust_cost_points_not_accuracy(seed: int) -> None:
     image, camera = photograph("view4", BOARD, -3.0, blur_px=1.5, noise=0.01, dust=40, seed=seed)
