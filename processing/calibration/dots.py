@@ -30,8 +30,12 @@ def dot_signal(image: Image32) -> Image32:
     return np.asarray(signal if bright > -dark else -signal, dtype=np.float32)
 
 
-def find_dots(signal: Image32) -> FloatArray:
-    """Centroids (N, 2) of the dots in a signal of ``dot_signal``."""
+def find_dots(image: Image32, signal: Image32) -> FloatArray:
+    """Centroids (N, 2) of the dots of an image, which its ``dot_signal`` shows.
+
+    The signal tells where dots are, but leans at the outermost of them, where the mean around has dots on one side
+    only; their centroids are those of the image.
+    """
     level = DETECTION_LEVEL * float(np.percentile(signal, 99.95))
     if level <= 0:
         return np.empty((0, 2))
@@ -39,7 +43,7 @@ def find_dots(signal: Image32) -> FloatArray:
     boxes, areas = stats[1:, :4], stats[1:, 4]
     median_area = np.median(areas[areas >= 2]) if np.any(areas >= 2) else 0
     usual = (areas >= max(2, AREA_RANGE[0] * median_area)) & (areas <= AREA_RANGE[1] * median_area)
-    centroids = [_centroid(signal, box) for box in boxes[usual]]
+    centroids = [_centroid(image, box) for box in boxes[usual]]
     return np.array([centre for centre in centroids if centre is not None]).reshape(-1, 2)
 
 
@@ -72,18 +76,37 @@ def marked_dot(signal: Image32, points_px: FloatArray) -> int | None:
     return marked if stands_out and surrounded else None
 
 
-def _centroid(signal: Image32, box: NDArray[np.int32]) -> tuple[float, float] | None:
+def _centroid(image: Image32, box: NDArray[np.int32]) -> tuple[float, float] | None:
     left, top, width, height = (int(value) for value in box)
     margin = 2 + max(width, height) // 3
     rows, columns = slice(top - margin, top + height + margin), slice(left - margin, left + width + margin)
-    if min(rows.start, columns.start) < 0 or rows.stop > signal.shape[0] or columns.stop > signal.shape[1]:
+    if min(rows.start, columns.start) < 0 or rows.stop > image.shape[0] or columns.stop > image.shape[1]:
         return None
-    patch = signal[rows, columns].astype(np.float64)
-    patch -= np.median(np.concatenate([patch[0], patch[-1], patch[:, 0], patch[:, -1]]))
-    weights = np.maximum(patch - CENTROID_FLOOR * patch.max(), 0)
-    v, u = np.indices(patch.shape)
-    total = weights.sum()
+    contrast = _contrast(image[rows, columns].astype(np.float64))
+    weights = np.maximum(contrast - CENTROID_FLOOR * contrast.max(), 0)
+    v, u = np.indices(weights.shape)
+    total = max(weights.sum(), 1e-9)
     return float((u * weights).sum() / total) + columns.start, float((v * weights).sum() / total) + rows.start
+
+
+def _contrast(patch: FloatArray) -> FloatArray:
+    """Patch without the ground around its dot, positive; a dark dot as the part of the light that it takes away.
+
+    A dot takes away more where there is more light, which would draw its centroid there, by d^2 / 16 times the
+    relative slope of the light. Bright dots are still drawn so: their dark ground does not tell of the light.
+    """
+    ground = _ground(patch)
+    if patch.sum() > ground.sum():
+        return patch - ground
+    return 1 - patch / np.maximum(ground, 1e-6)
+
+
+def _ground(patch: FloatArray) -> FloatArray:
+    """Plane through the medians of the four edges: neighbours and markers may cover less than half of an edge."""
+    top, bottom, left, right = (np.median(edge) for edge in (patch[0], patch[-1], patch[:, 0], patch[:, -1]))
+    v, u = (np.linspace(-0.5, 0.5, count) for count in patch.shape)
+    mean = (top + bottom + left + right) / 4
+    return np.asarray(mean + (bottom - top) * v[:, None] + (right - left) * u, dtype=np.float64)
 
 
 def _surroundings(signal: Image32, point_px: FloatArray, half_px: int) -> FloatArray:

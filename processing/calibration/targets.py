@@ -154,7 +154,7 @@ def _find_dots(
     pixels: NDArray[np.float32], target: Target, origin_px: tuple[float, float] | None, roll_deg: float
 ) -> tuple[Lattice, FloatArray]:
     signal = dot_signal(pixels)
-    points_px = find_dots(signal)
+    points_px = find_dots(pixels, signal)
     lattice = assign_dots(points_px)
     if len(lattice) < MIN_POINTS:
         raise TargetNotFound(f"dots: {len(lattice)} points lie in a grid, at least {MIN_POINTS} are needed")

@@ -68,15 +68,27 @@ def test_full_size_board_is_accurate() -> None:
 
 @pytest.mark.parametrize("dark_level", [0.0, 20.0])
 @pytest.mark.parametrize("slope_per_px", [(2e-3, 0.0), (0.0, -2e-3), (1e-3, 1e-3), (1e-3, -1e-3)])
-def test_light_that_slopes_moves_no_corner(slope_per_px: tuple[float, float], dark_level: float) -> None:
-    clear = 1000 * render_target(paper_cameras(2)["view3"], Checkerboard(), -2.0, paper_optics(2)["view3"])
+@pytest.mark.parametrize("target", [BOARD, DOTS], ids=lambda target: target.kind)
+def test_light_that_slopes_moves_no_point(target: Target, slope_per_px: tuple[float, float], dark_level: float) -> None:
+    clear = 1000 * render_target(paper_cameras(2)["view3"], PATTERNS[target.kind], -2.0, paper_optics(2)["view3"])
     v, u = np.indices(clear.shape)
     light = np.exp((u - u.mean()) * slope_per_px[0] + (v - v.mean()) * slope_per_px[1])
-    even, sloping = detect_target(clear, BOARD), detect_target(clear * light + dark_level, BOARD)
+    even, sloping = detect_target(clear, target), detect_target(clear * light + dark_level, target)
     np.testing.assert_array_equal(sloping.ids, even.ids)
     moved_px = sloping.image_px - even.image_px
     np.testing.assert_allclose(np.median(moved_px, axis=0), 0, atol=0.001)
     np.testing.assert_allclose(moved_px, 0, atol=0.004)
+
+
+@pytest.mark.parametrize("bright", [False, True])
+def test_dots_at_the_edge_of_the_target_are_seen_where_they_are(bright: bool) -> None:
+    camera = paper_cameras(2)["view3"]
+    clear = 1000 * render_target(camera, DotTarget(), -2.0, paper_optics(2)["view3"])
+    points = detect_target(1000 - clear if bright else clear, DOTS)
+    true_px = camera.project(np.column_stack([DOTS.points_mm(points.ids), np.full(len(points), -2.0)]))
+    for axis, outermost in ((0, 11), (1, 8)):
+        outwards = np.sign(points.ids[:, axis]) * (points.image_px - true_px)[:, axis]
+        assert abs(outwards[abs(points.ids[:, axis]) == outermost].mean()) < 0.005
 
 
 @pytest.mark.parametrize("seed", range(6))
