@@ -31,14 +31,12 @@ def images(size_px: tuple[int, int], seed: int) -> NDArray[np.float32]:
     return np.asarray(image, dtype=np.float32)
 
 
-def rounding_counts(isa: str) -> float:
-    """Recorded pixels and the result are rounded, by half a count, and added in single precision.
+ROUNDING_COUNTS = 0.5 * 1.375**2 + 0.5 * (3 * 0.5 + 1.5) / 16384 * 32767 * 1.375 + 0.5 + 0.1
+"""Recorded pixels and the result are rounded, by half a count, and added in single precision.
 
-    The windows of AVX-512 round three of the horizontal weights to half of 1 / 16384, and the fourth takes what they
-    leave; errors that add to nothing weigh no more than half their sum.
-    """
-    weights = 0.5 * (3 * 0.5 + 1.5) / 16384 * 32767 * 1.375 if isa == "avx512" else 0.0
-    return 0.5 * 1.375**2 + weights + 0.5 + 0.1
+Three of the horizontal weights are rounded to half of 1 / 16384, and the fourth takes what they leave; errors that add
+to nothing weigh no more than half their sum.
+"""
 
 
 @pytest.mark.parametrize("isa", _native.available_isas())
@@ -68,7 +66,7 @@ def test_rectified_images_equal_the_textbook(
     assert_between_nodes(mapping, grid, view, recorded, resampled.pixels, resampled.unit, isa)
     u, v = resampling_oracle.shown_positions(mapping, grid, view, *(np.arange(float(n)) for n in view.shape_px))
     exact, _ = resampling_oracle.convolve(np.maximum(recorded, 0), u, v)
-    bound = rounding_counts(isa) + STEEPEST * 32767 * (view.deviation_px + 1e-4)
+    bound = ROUNDING_COUNTS + STEEPEST * 32767 * (view.deviation_px + 1e-4)
     np.testing.assert_allclose(resampled.pixels, np.clip(exact / resampled.unit, 0, 32767), rtol=0, atol=bound)
     assert_limited_by_what_is_seen(recorded, u, v, resampled.brightest)
 
@@ -88,7 +86,7 @@ def assert_between_nodes(
     # nodes, their interpolation and the position in a segment: four roundings of a position in the margins
     position_px = 4 * np.spacing(np.float32(max(recorded.shape) + 128))
     missed = np.abs(pixels - np.clip(expected / unit, 0, 32767))
-    assert (missed <= rounding_counts(isa) + position_px * steepness / unit).all()
+    assert (missed <= ROUNDING_COUNTS + position_px * steepness / unit).all()
 
 
 def assert_limited_by_what_is_seen(

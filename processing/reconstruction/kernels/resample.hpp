@@ -81,22 +81,45 @@ inline bool empty(const Resampling &job, const Box &box) {
     return any << (64 - 8 * cells) == 0;
 }
 
-inline void resample_one_by_one(const Resampling &job, const Segment &at, int16_t *to) {
-    for (int k = 0; k < spacing; ++k) {
-        const float u = at.u + at.step_u * static_cast<float>(k), v = at.v + at.step_v * static_cast<float>(k);
-        const int iu = static_cast<int>(u), iv = static_cast<int>(v);
-        const CubicWeights<float> along(u - static_cast<float>(iu)), down(v - static_cast<float>(iv));
-        const int16_t *pixel = job.from + static_cast<int64_t>(iv - 1) * job.from_columns + iu - 1;
-        float sum = 0.0f;
-        for (int row = 0; row < 4; ++row, pixel += job.from_columns)
-            sum += down.w[row] * (along.w[0] * pixel[0] + along.w[1] * pixel[1] + along.w[2] * pixel[2] + along.w[3] * pixel[3]);
-        to[k] = rounded(sum);
+// What neighbouring positions see in a row of pixels: the weights of four pixels, the first one at `index`.
+struct RowOfTaps {
+    static constexpr int32_t one = 1 << 14;
+    Ints index, near, far;  // weights of the first two pixels, and of the others, in the halves of words
+    explicit RowOfTaps(Floats u) : index(__builtin_convertvector(u, Ints)) {
+        const CubicWeights<Floats> weights(u - __builtin_convertvector(index, Floats));
+        const Ints w0 = fixed(weights.w[0]), w1 = fixed(weights.w[1]), w2 = fixed(weights.w[2]);
+        near = (w0 & 0xffff) | w1 << 16;
+        far = (w2 & 0xffff) | (one - w0 - w1 - w2) << 16;
     }
-}
+    static Ints fixed(Floats weight) {  // above -1
+        return __builtin_convertvector(weight * static_cast<float>(one) + (static_cast<float>(one) + 0.5f), Ints) - one;
+    }
+    Floats of(const int16_t *pixels) const {
+        return weighted_pairs(pixels, index, near) + weighted_pairs(pixels, index + 2, far);
+    }
+};
 
 #if defined(__AVX512BW__)
 
-constexpr float widest_window = 26.0f;  // columns that a segment may cross: 32 less the four taps and rounding
+// The same without gathers, where all four pixels of sixteen positions lie in a window.
+struct RowOfWindow {
+    static constexpr float widest = 26.0f;  // columns between the first and the last position: 32 less four taps and rounding
+    RowOfTaps taps;
+    __m512i near, far;
+    explicit RowOfWindow(Floats u) : taps(u) {
+        const Ints pairs = (taps.index | taps.index << 16) + 0x10000;
+        near = reinterpret_cast<__m512i>(pairs);
+        far = reinterpret_cast<__m512i>(pairs + 0x20002);
+    }
+    Floats of(const int16_t *pixels) const {
+        const __m512i window = _mm512_loadu_si512(pixels);
+        const __m512i left = _mm512_madd_epi16(_mm512_permutexvar_epi16(near, window), reinterpret_cast<__m512i>(taps.near));
+        const __m512i right = _mm512_madd_epi16(_mm512_permutexvar_epi16(far, window), reinterpret_cast<__m512i>(taps.far));
+        return reinterpret_cast<Floats>(_mm512_cvtepi32_ps(_mm512_add_epi32(left, right)));
+    }
+};
+
+#endif
 
 inline Floats cubic_at(Floats distance) {
     const Floats zero{};
@@ -105,54 +128,35 @@ inline Floats cubic_at(Floats distance) {
     return d < zero + 1.0f ? near : d < zero + 2.0f ? far : zero;
 }
 
-// What sixteen positions see in a row of pixels; no gathers.
-class RowOfTaps {
-public:
-    explicit RowOfTaps(Floats u) {
-        const Ints index = __builtin_convertvector(u, Ints), pairs = (index | index << 16) + 0x10000;
-        const CubicWeights<Floats> weights(u - __builtin_convertvector(index, Floats));
-        const Ints w0 = fixed(weights.w[0]), w1 = fixed(weights.w[1]), w2 = fixed(weights.w[2]);
-        near_ = reinterpret_cast<__m512i>((w0 & 0xffff) | w1 << 16);
-        far_ = reinterpret_cast<__m512i>((w2 & 0xffff) | (one - w0 - w1 - w2) << 16);
-        near_taps_ = reinterpret_cast<__m512i>(pairs);
-        far_taps_ = reinterpret_cast<__m512i>(pairs + 0x20002);
-    }
-    Floats of(const int16_t *pixels) const {
-        const __m512i window = _mm512_loadu_si512(pixels);
-        const __m512i near = _mm512_madd_epi16(_mm512_permutexvar_epi16(near_taps_, window), near_);
-        const __m512i far = _mm512_madd_epi16(_mm512_permutexvar_epi16(far_taps_, window), far_);
-        return reinterpret_cast<Floats>(_mm512_cvtepi32_ps(_mm512_add_epi32(near, far)));
-    }
-    static constexpr float unit = 1.0f / 16384;
+typedef int16_t Counts __attribute__((vector_size(2 * lanes)));
 
-private:
-    static constexpr int32_t one = 16384;
-    static Ints fixed(Floats weight) {
-        return reinterpret_cast<Ints>(_mm512_cvtps_epi32(reinterpret_cast<__m512>(weight * static_cast<float>(one))));
-    }
-    __m512i near_taps_, far_taps_, near_, far_;
-};
-
-// All sixteen pixels of a segment at once, row by row of the window.
-inline void resample_window(const Resampling &job, const Segment &at, const Box &box, int16_t *to) {
-    const RowOfTaps row_of(lane_numbers() * at.step_u + (at.u - static_cast<float>(box.left + 1)));
-    const Floats v = lane_numbers() * at.step_v + (at.v - static_cast<float>(box.top));
-    const int16_t *pixels = job.from + static_cast<int64_t>(box.top) * job.from_columns + box.left;
-    Floats sum{};
-    if (box.one_row()) {
-        const Floats zero{}, fraction = v - 1.0f, rising = fraction > zero ? fraction : zero;
-        const CubicWeights<Floats> down(lesser(rising, zero + 1.0f));
-        for (int row = 0; row < 4; ++row, pixels += job.from_columns) sum += down.w[row] * row_of.of(pixels);
-    } else {
-        for (int row = 0; row <= box.bottom - box.top; ++row, pixels += job.from_columns)
-            sum += cubic_at(v - static_cast<float>(row)) * row_of.of(pixels);
-    }
-    const __m512 scaled = reinterpret_cast<__m512>(sum * RowOfTaps::unit);
-    const __m512 limited = _mm512_min_ps(_mm512_max_ps(scaled, _mm512_setzero_ps()), _mm512_set1_ps(32767.0f));
-    _mm256_storeu_si256(reinterpret_cast<__m256i *>(to), _mm512_cvtepi32_epi16(_mm512_cvtps_epi32(limited)));
+inline Counts rounded(Floats values) {
+    const Floats zero{};
+    values = values > zero ? values : zero;
+    return __builtin_convertvector(__builtin_convertvector(lesser(values, all(32767.0f)) + 0.5f, Ints), Counts);
 }
 
-#endif
+// The pixels of a segment, row by row of its box.
+template <class Row>
+inline void resample_segment(const Resampling &job, const Segment &at, const Box &box, int16_t *to) {
+    const int16_t *first = job.from + static_cast<int64_t>(box.top) * job.from_columns + box.left;
+    for (int k = 0; k < spacing; k += lanes, to += lanes) {
+        const Floats along = lane_numbers() + static_cast<float>(k), zero{};
+        const Row row_of(along * at.step_u + (at.u - static_cast<float>(box.left + 1)));
+        const Floats v = along * at.step_v + (at.v - static_cast<float>(box.top));
+        const int16_t *pixels = first;
+        Floats sum{};
+        if (box.one_row()) {
+            const Floats fraction = v > zero + 1.0f ? v - 1.0f : zero;
+            const CubicWeights<Floats> down(lesser(fraction, all(1.0f)));
+            for (int row = 0; row < 4; ++row, pixels += job.from_columns) sum += down.w[row] * row_of.of(pixels);
+        } else {
+            for (int row = 0; row <= box.bottom - box.top; ++row, pixels += job.from_columns)
+                sum += cubic_at(v - static_cast<float>(row)) * row_of.of(pixels);
+        }
+        store(to, rounded(sum * (1.0f / RowOfTaps::one)));
+    }
+}
 
 // In four chains, because one would wait for itself.
 float brightest(const float *pixels, int count) {
@@ -196,12 +200,12 @@ void resample(const Resampling &job, int first_row, int end_row) {
                 continue;
             }
 #if defined(__AVX512BW__)
-            if (at.step_u * (spacing - 1) < widest_window && at.step_u * (spacing - 1) > -widest_window) {
-                resample_window(job, at, box, to);
+            if (box.right - box.left < RowOfWindow::widest + 4) {
+                resample_segment<RowOfWindow>(job, at, box, to);
                 continue;
             }
 #endif
-            resample_one_by_one(job, at, to);
+            resample_segment<RowOfTaps>(job, at, box, to);
         }
 }
 

@@ -160,23 +160,6 @@ struct Clamp {
     }
 };
 
-// Two neighbouring pixels, weighted: one 32-bit word is all that a voxel needs of a row.
-inline Floats weighted_pairs(const int16_t *pixels, Ints at, Ints weight) {
-#if defined(__AVX512BW__)
-    const __m512i pairs = _mm512_i32gather_epi32(reinterpret_cast<__m512i>(at), pixels, 2);
-    return reinterpret_cast<Floats>(_mm512_cvtepi32_ps(_mm512_madd_epi16(pairs, reinterpret_cast<__m512i>(weight))));
-#elif defined(__AVX2__)
-    const __m256i pairs =
-        _mm256_i32gather_epi32(reinterpret_cast<const int *>(pixels), reinterpret_cast<__m256i>(at), 2);
-    return reinterpret_cast<Floats>(_mm256_cvtepi32_ps(_mm256_madd_epi16(pairs, reinterpret_cast<__m256i>(weight))));
-#else
-    Ints sum;
-    for (int k = 0; k < lanes; ++k)
-        sum[k] = pixels[at[k]] * (weight[k] & 0xffff) + pixels[at[k] + 1] * (weight[k] >> 16);
-    return __builtin_convertvector(sum, Floats);
-#endif
-}
-
 #if defined(__AVX512BW__)
 
 // A segment between two nodes sixteen voxels apart. Without gathers, where its pixels fit into a window of few rows.
