@@ -25,7 +25,7 @@ void line_of_sight(const LineOfSight &job, int slab) {
     Drain drain;
     const int64_t piece = static_cast<int64_t>(bytes_of(job.format)) * rows * block_columns;
     Block block;
-    const auto take = [&](int row, const Floats (&values)[parts]) { std::memcpy(block.vectors[row], values, sizeof values); };
+    const auto take = [&](int row, const Floats (&values)[parts]) { block.set(row, values); };
     for (int z0 = 0, bank = 0; z0 < job.shape.nz; z0 += planes.depth(), bank = 1 - bank) {
         const int z_end = smaller(z0 + planes.depth(), job.shape.nz);
         planes.set(z0, z_end);
@@ -62,7 +62,7 @@ void sparse_sight(const SparseSight &job, int slab, KeepBrick keep, void *owner)
     PlaneStack planes(job.views, job.n_views, nx, y0, rows);
     const Seen seen(planes.depth(), nx);
     Block block;
-    const auto take = [&](int row, const Floats (&values)[parts]) { std::memcpy(block.vectors[row], values, sizeof values); };
+    const auto take = [&](int row, const Floats (&values)[parts]) { block.set(row, values); };
     alignas(64) uint16_t brick[sight_rows * block_columns];
     for (int z0 = 0; z0 < job.shape.nz; z0 += planes.depth()) {
         const int z_end = smaller(z0 + planes.depth(), job.shape.nz);

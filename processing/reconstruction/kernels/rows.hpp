@@ -85,7 +85,10 @@ typedef RowSamples QuickRowSamples;
 
 typedef float RowVoxel;
 
-[[gnu::always_inline]] inline void store_row(RowVoxel *to, const Floats (&values)[parts], const RowWords &) { std::memcpy(to, values, sizeof values); }
+[[gnu::always_inline]] inline void store_row(RowVoxel *to, const Floats (&values)[parts], const RowWords &) {
+#pragma GCC unroll 8
+    for (int part = 0; part < parts; ++part) store(to + part * lanes, values[part]);
+}
 
 inline float row_value(RowVoxel voxel) { return voxel; }
 

@@ -16,6 +16,11 @@ struct Tile {
 union alignas(64) Block {
     float rows[sight_rows][block_columns];
     Floats vectors[sight_rows][parts];
+    // Vector by vector: compilers copy arrays of them word by word.
+    [[gnu::always_inline]] void set(int row, const Floats (&values)[parts]) {
+#pragma GCC unroll 8
+        for (int part = 0; part < parts; ++part) vectors[row][part] = values[part];
+    }
 };
 
 // How the samples of a view enter a block: they replace, multiply or limit what is there. Samples are in units of
@@ -93,12 +98,12 @@ inline void sample_shared(const View &view, const RowTaps &rows, const Taps (&ta
 
 #endif
 
-template <Combine how>
+template <Combine how, bool compact>
 inline void sample_windows(const View &view, const RowTaps &rows, const Taps (&taps)[parts], const Tile &tile, float factor, Block &block) {
     for (int row = 0; row < tile.rows; ++row) {
         const int16_t *above = view.pixels + rows.above[row], *below = above + view.columns;
         for (int part = 0; part < parts; ++part) {
-            const Window window = blend(above, below, rows.weight[row], taps[part]);
+            const Window window = blend<compact>(above, below, rows.weight[row], taps[part]);
             combine<how>(block.rows[row] + part * lanes, pick(window, taps[part]), factor);
         }
     }
@@ -109,9 +114,11 @@ inline void sample_rectified(const View &view, const PlaneTaps &plane, const Til
     Taps taps[parts];
     plane.columns.taps(tile.x0, taps);
 #if defined(__AVX512BW__)
-    if (plane.columns.share_window()) return sample_shared<how>(view, plane.rows, taps, tile, factor, block);
+    if (plane.columns.compact()) return sample_shared<how>(view, plane.rows, taps, tile, factor, block);
+#else
+    if (plane.columns.compact()) return sample_windows<how, true>(view, plane.rows, taps, tile, factor, block);
 #endif
-    sample_windows<how>(view, plane.rows, taps, tile, factor, block);
+    sample_windows<how, false>(view, plane.rows, taps, tile, factor, block);
 }
 
 // Nodes that whole blocks of a row need; those beyond the lattice repeat the last one.

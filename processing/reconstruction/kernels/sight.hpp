@@ -2,6 +2,8 @@
 // by view.
 #pragma once
 
+#include <type_traits>
+
 #include "output.hpp"
 
 namespace tomoshadow::TOMOSHADOW_ISA {
@@ -45,11 +47,12 @@ struct Combination {
     }
 };
 
-// Hand every row of a tile to take(row, values), `parts` vectors. With `one_window` all columns of a view are picked from
-// the same window of pixels. What is in memory is read first: compilers cannot know that `take` leaves it alone.
-template <int n, bool minimum, bool one_window, class Take>
+// Hand every row of a tile to take(row, values), `parts` vectors. Compact columns of a view may be picked from the same
+// window of pixels. What is in memory is read first: compilers cannot know that `take` leaves it alone.
+template <int n, bool minimum, bool compact, class Take>
 inline void see_rows(const View *views, const PlaneTaps *planes, const ColumnTaps<n> &columns, int rows, float gain, const Take &take) {
     const Combination<n, minimum> combination(views, gain);
+    constexpr bool one_window = compact && window_of_a_row;
     const int16_t *above[n], *below[n];
     for (int i = 0; i < n; ++i) {
         above[i] = views[i].pixels + (one_window ? columns.taps[i][0].first : 0);
@@ -66,7 +69,7 @@ inline void see_rows(const View *views, const PlaneTaps *planes, const ColumnTap
 #pragma GCC unroll 8
             for (int part = 0; part < parts; ++part) {
                 const Taps &taps = columns.taps[i][part];
-                if constexpr (!one_window) window = blend(above[i] + offset, below[i] + offset, between.weight[row], taps);
+                if constexpr (!one_window) window = blend<compact>(above[i] + offset, below[i] + offset, between.weight[row], taps);
                 seen[part] = combination.add(seen[part], pick(window, taps), i);
             }
         }
@@ -114,19 +117,29 @@ inline bool all_rectified(const View *views, int n_views) {
 }
 
 template <int n>
-inline bool share_window(const PlaneTaps *planes) {
-    bool one_window = may_share_window;
-    for (int i = 0; i < n; ++i) one_window = one_window && planes[i].columns.share_window();
-    return one_window;
+inline bool all_compact(const PlaneTaps *planes) {
+    bool compact = true;
+    for (int i = 0; i < n; ++i) compact = compact && planes[i].columns.compact();
+    return compact;
 }
 
-template <int n, class Take>
-inline void see_product(const View *views, const PlaneTaps *planes, const Tile &tile, float gain, const Take &take) {
-    const ColumnTaps<n> columns(planes, tile);
-    if (share_window<n>(planes))
-        see_rows<n, false, may_share_window>(views, planes, columns, tile.rows, gain, take);
+// Calls with the number of views as a constant, where so many views are seen at once.
+template <class Call>
+[[gnu::always_inline]] inline bool at_once(bool rectified, int n_views, const Call &call) {
+    if (!rectified || n_views > 4) return false;
+    if (n_views == 4) call(std::integral_constant<int, 4>());
+    if (n_views == 3) call(std::integral_constant<int, 3>());
+    if (n_views == 2) call(std::integral_constant<int, 2>());
+    if (n_views == 1) call(std::integral_constant<int, 1>());
+    return true;
+}
+
+template <int n, bool minimum, class Take>
+inline void see_all(const View *views, const PlaneTaps *planes, const ColumnTaps<n> &columns, int rows, float gain, const Take &take) {
+    if (all_compact<n>(planes))
+        see_rows<n, minimum, true>(views, planes, columns, rows, gain, take);
     else
-        see_rows<n, false, false>(views, planes, columns, tile.rows, gain, take);
+        see_rows<n, minimum, false>(views, planes, columns, rows, gain, take);
 }
 
 // Some views, one after the other in memory.
@@ -140,10 +153,11 @@ struct Together {
 // Hand every row of the product of what some views see of a tile, times `gain`, to take(row, values), `parts` vectors.
 template <class Take>
 inline void see_product(const Together &from, const Tile &tile, float gain, const Take &take) {
-    if (from.rectified && from.count == 4) return see_product<4>(from.views, from.planes, tile, gain, take);
-    if (from.rectified && from.count == 3) return see_product<3>(from.views, from.planes, tile, gain, take);
-    if (from.rectified && from.count == 2) return see_product<2>(from.views, from.planes, tile, gain, take);
-    if (from.rectified && from.count == 1) return see_product<1>(from.views, from.planes, tile, gain, take);
+    const auto see_them = [&](auto count) __attribute__((always_inline)) {
+        constexpr int n = count;
+        see_all<n, false>(from.views, from.planes, ColumnTaps<n>(from.planes, tile), tile.rows, gain, take);
+    };
+    if (at_once(from.rectified, from.count, see_them)) return;
     Block block;
     sample_product(from.views, from.count, from.planes, tile, block);
     for (int row = 0; row < tile.rows; ++row) {
@@ -154,18 +168,13 @@ inline void see_product(const Together &from, const Tile &tile, float gain, cons
 
 template <int n, class Take>
 inline void see_together(const Exposures &from, uint32_t seen, const PlaneTaps *planes, const Tile &tile, const Take &take) {
-    const bool one_window = share_window<n>(planes), minimum = from.method == Method::minimum;
     const ColumnTaps<n> columns(planes, tile);
     for (; seen; seen &= seen - 1) {
         const View *views = from.exposure(__builtin_ctz(seen));
-        if (one_window && minimum)
-            see_rows<n, true, may_share_window>(views, planes, columns, tile.rows, 1.0f, take);
-        else if (one_window)
-            see_rows<n, false, may_share_window>(views, planes, columns, tile.rows, 1.0f, take);
-        else if (minimum)
-            see_rows<n, true, false>(views, planes, columns, tile.rows, 1.0f, take);
+        if (from.method == Method::minimum)
+            see_all<n, true>(views, planes, columns, tile.rows, 1.0f, take);
         else
-            see_rows<n, false, false>(views, planes, columns, tile.rows, 1.0f, take);
+            see_all<n, false>(views, planes, columns, tile.rows, 1.0f, take);
     }
 }
 
@@ -186,15 +195,8 @@ inline void see_one_by_one(const Exposures &from, uint32_t seen, const PlaneTaps
 template <class Take>
 inline void see_exposures(const Exposures &from, uint32_t seen, const PlaneTaps *planes, const Tile &tile,
                           const Take &take) {
-    const bool rectified = all_rectified(from.views, from.n_views);
-    if (rectified && from.n_views == 4)
-        see_together<4>(from, seen, planes, tile, take);
-    else if (rectified && from.n_views == 3)
-        see_together<3>(from, seen, planes, tile, take);
-    else if (rectified && from.n_views == 2)
-        see_together<2>(from, seen, planes, tile, take);
-    else
-        see_one_by_one(from, seen, planes, tile, take);
+    const auto see_them = [&](auto count) __attribute__((always_inline)) { see_together<count>(from, seen, planes, tile, take); };
+    if (!at_once(all_rectified(from.views, from.n_views), from.n_views, see_them)) see_one_by_one(from, seen, planes, tile, take);
 }
 
 // Hand every row of the tile in every exposure that may see something there, bit e of `seen`, to take(row, values),

@@ -40,27 +40,34 @@ struct RowWords {
 #else
 
 typedef Voxel Voxels __attribute__((vector_size(2 * lanes)));
+typedef Voxel TwoVoxels __attribute__((vector_size(4 * lanes)));
 
 inline Floats load_voxels(const Voxel *from) {
     return same_bits<Floats>(__builtin_convertvector(load<Voxels>(from), Ints) << dropped_bits);
 }
 
 struct RowWords {
-    alignas(64) Voxel words[block_columns];
+    TwoVoxels words[parts / 2];
     [[gnu::always_inline]] explicit RowWords(const Floats (&values)[parts]) {
-        for (int n = 0; n < parts; n += 2) pack(rounded(values[n]), rounded(values[n + 1]), words + n * lanes);
+#pragma GCC unroll 4
+        for (int n = 0; n < parts / 2; ++n) words[n] = packed(rounded(values[2 * n]), rounded(values[2 * n + 1]));
     }
+    [[gnu::always_inline]] void store(Voxel *to) const {
+#pragma GCC unroll 4
+        for (int n = 0; n < parts / 2; ++n) tomoshadow::TOMOSHADOW_ISA::store(to + 2 * n * lanes, words[n]);
+    }
+
+private:
     static Ints rounded(Floats values) { return (same_bits<Ints>(values) + (1 << (dropped_bits - 1))) >> dropped_bits; }
-    static void pack(Ints near, Ints far, Voxel *to) {
+    static TwoVoxels packed(Ints near, Ints far) {
 #if defined(__AVX2__)
         const __m256i halves = _mm256_packus_epi32(reinterpret_cast<__m256i>(near), reinterpret_cast<__m256i>(far));
-        _mm256_storeu_si256(reinterpret_cast<__m256i *>(to), _mm256_permute4x64_epi64(halves, 0xd8));
+        return reinterpret_cast<TwoVoxels>(_mm256_permute4x64_epi64(halves, 0xd8));
 #else
-        tomoshadow::TOMOSHADOW_ISA::store(to, __builtin_convertvector(near, Voxels));
-        tomoshadow::TOMOSHADOW_ISA::store(to + lanes, __builtin_convertvector(far, Voxels));
+        const Voxels both[2] = {__builtin_convertvector(near, Voxels), __builtin_convertvector(far, Voxels)};
+        return load<TwoVoxels>(both);
 #endif
     }
-    [[gnu::always_inline]] void store(Voxel *to) const { std::memcpy(to, words, sizeof words); }
 };
 
 #endif

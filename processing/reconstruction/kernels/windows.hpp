@@ -39,7 +39,7 @@ struct Taps {
     __m512i index, weight;
 };
 
-constexpr bool may_share_window = true;
+constexpr bool window_of_a_row = true;  // both vectors of voxels, where they are compact
 
 // Spacing in fixed point: without conversions, taps take half the time.
 class Columns {
@@ -49,18 +49,18 @@ public:
         : start_(fixed(at.start, 32)),
           step_(fixed(at.step, 32)),
           vector_step_(static_cast<int32_t>(fixed(at.step * lanes, fraction_bits))),
-          share_window_(at.step <= max_shared_step) {
+          compact_(at.step <= most_compact_step) {
         for (int k = 0; k < lanes; ++k) lanes_[k] = static_cast<int32_t>(fixed(at.step * k, fraction_bits));
     }
     // Whether two vectors of voxels see no more than 32 pixels, which is one window.
-    bool share_window() const { return share_window_; }
+    bool compact() const { return compact_; }
 
     [[gnu::always_inline]] void taps(int x0, Taps (&taps)[parts]) const {
         for (int part = 0; part < parts; ++part) {
-            const int64_t position = start_ + step_ * (share_window_ ? x0 : x0 + part * lanes);
+            const int64_t position = start_ + step_ * (compact_ ? x0 : x0 + part * lanes);
             const auto fraction = static_cast<int32_t>(static_cast<uint32_t>(position) >> (32 - fraction_bits));
             constexpr int32_t rounding = 1 << (fraction_bits - weight_bits - 1);
-            const Ints at = lanes_ + (fraction + rounding + (share_window_ ? part * vector_step_ : 0));
+            const Ints at = lanes_ + (fraction + rounding + (compact_ ? part * vector_step_ : 0));
             const auto left = reinterpret_cast<Ints>(_mm512_srli_epi32(reinterpret_cast<__m512i>(at), fraction_bits));
             const Ints right_weight = at >> (fraction_bits - weight_bits) & ((1 << weight_bits) - 1);
             taps[part].first = static_cast<int>(position >> 32);
@@ -71,12 +71,12 @@ public:
 
 private:
     static constexpr int fraction_bits = 26;
-    static constexpr double max_shared_step = 0.967;
+    static constexpr double most_compact_step = 0.967;
     static int64_t fixed(double value, int bits) { return static_cast<int64_t>(value * static_cast<double>(int64_t{1} << bits) + 0.5); }
     int64_t start_, step_;
     int32_t vector_step_;
     Ints lanes_;
-    bool share_window_;
+    bool compact_;
 };
 
 inline Window between(const Window &top, const Window &bottom, int32_t weight) {
@@ -87,6 +87,7 @@ inline Window between(const Window &top, const Window &bottom, int32_t weight) {
     return between(_mm512_loadu_si512(above), _mm512_loadu_si512(below), weight);
 }
 
+template <bool>
 [[gnu::always_inline]] inline Window blend(const int16_t *above, const int16_t *below, int32_t weight, const Taps &taps) {
     return blend(above + taps.first, below + taps.first, weight);
 }
@@ -99,18 +100,42 @@ inline Window between(const Window &top, const Window &bottom, int32_t weight) {
 #elif defined(__AVX2__)
 
 using Window = __m256i;  // two windows of 8 pixels, for 4 voxels each
+
 struct Taps {
-    int first, second;
+    int first, second;  // of the windows; compact: the first of 16 pixels
     __m256i bytes, weight;
 };
 
-// Taps of `lanes` voxels that see the columns first + at[0] and so on.
-[[gnu::always_inline]] inline Taps taps_of(int first, Floats at) {
-    const Ints left = __builtin_convertvector(at, Ints);
-    const Ints start = {left[0], left[0], left[0], left[0], left[4], left[4], left[4], left[4]};
-    const Ints bytes = (left - start) * 0x02020202 + 0x03020100;
-    const Ints weight = horizontal_weights(at - __builtin_convertvector(left, Floats));
-    return {first + left[0], first + left[4], reinterpret_cast<__m256i>(bytes), reinterpret_cast<__m256i>(weight)};
+constexpr bool window_of_a_row = false;
+
+class Columns {
+public:
+    Columns() = default;
+    explicit Columns(const Spacing &at) : at_(at) {}
+    // Whether the windows of a vector are the pixels 0 .. 7 and 4 .. 11 from the one before its first voxel on.
+    bool compact() const { return at_.step >= 0.75 && at_.step <= 1.25; }
+
+    [[gnu::always_inline]] void taps(int x0, Taps (&taps)[parts]) const {
+        const Floats steps = lane_numbers() * static_cast<float>(at_.step);
+        for (int part = 0; part < parts; ++part) {
+            const double position = at_.start + at_.step * (x0 + part * lanes);
+            const int first = static_cast<int>(position);
+            const Floats at = steps + all(static_cast<float>(position - first));
+            const Ints left = __builtin_convertvector(at, Ints);
+            const int second = compact() ? 3 : left[4], before = compact() ? 1 : 0;
+            const Ints start = {-before, -before, -before, -before, second, second, second, second};
+            const Ints bytes = (left - start) * 0x02020202 + 0x03020100;
+            const Ints weight = horizontal_weights(at - __builtin_convertvector(left, Floats));
+            taps[part] = {first - before, first + second, reinterpret_cast<__m256i>(bytes), reinterpret_cast<__m256i>(weight)};
+        }
+    }
+
+private:
+    Spacing at_;
+};
+
+inline Window between(const Window &top, const Window &bottom, int32_t weight) {
+    return _mm256_add_epi16(top, _mm256_mulhrs_epi16(_mm256_sub_epi16(bottom, top), _mm256_set1_epi32(weight)));
 }
 
 inline Window two_windows(const int16_t *row, const Taps &taps) {
@@ -118,9 +143,14 @@ inline Window two_windows(const int16_t *row, const Taps &taps) {
     return _mm256_inserti128_si256(_mm256_castsi128_si256(half(taps.first)), half(taps.second), 1);
 }
 
+template <bool compact>
 [[gnu::always_inline]] inline Window blend(const int16_t *above, const int16_t *below, int32_t weight, const Taps &taps) {
-    const __m256i top = two_windows(above, taps), bottom = two_windows(below, taps);
-    return _mm256_add_epi16(top, _mm256_mulhrs_epi16(_mm256_sub_epi16(bottom, top), _mm256_set1_epi32(weight)));
+    if constexpr (!compact) return between(two_windows(above, taps), two_windows(below, taps), weight);
+    const auto window = [&taps](const int16_t *row) {
+        return _mm256_loadu_si256(reinterpret_cast<const __m256i *>(row + taps.first));
+    };
+    constexpr int quarters = 0x94;  // 0 and 1, then 1 and 2
+    return _mm256_permute4x64_epi64(between(window(above), window(below), weight), quarters);
 }
 
 [[gnu::always_inline]] inline Floats pick(const Window &window, const Taps &taps) {
@@ -140,12 +170,30 @@ struct Taps {
     Ints index, weight;
 };
 
-// Taps of `lanes` voxels that see the columns first + at[0] and so on.
-[[gnu::always_inline]] inline Taps taps_of(int first, Floats at) {
-    const Ints left = __builtin_convertvector(at, Ints);
-    return {first, left, horizontal_weights(at - __builtin_convertvector(left, Floats)) >> 16};
-}
+constexpr bool window_of_a_row = false;
 
+class Columns {
+public:
+    Columns() = default;
+    explicit Columns(const Spacing &at) : at_(at) {}
+    bool compact() const { return false; }
+
+    void taps(int x0, Taps (&taps)[parts]) const {
+        const Floats steps = lane_numbers() * static_cast<float>(at_.step);
+        for (int part = 0; part < parts; ++part) {
+            const double position = at_.start + at_.step * (x0 + part * lanes);
+            const int first = static_cast<int>(position);
+            const Floats at = steps + all(static_cast<float>(position - first));
+            const Ints left = __builtin_convertvector(at, Ints);
+            taps[part] = {first, left, horizontal_weights(at - __builtin_convertvector(left, Floats)) >> 16};
+        }
+    }
+
+private:
+    Spacing at_;
+};
+
+template <bool>
 [[gnu::always_inline]] inline Window blend(const int16_t *above, const int16_t *below, int32_t weight, const Taps &taps) {
     return {above + taps.first, below + taps.first, weight & 0xffff};
 }
@@ -160,31 +208,6 @@ struct Taps {
     const Ints sum = left * ((1 << weight_bits) - taps.weight) + right * taps.weight;
     return __builtin_convertvector(sum, Floats);
 }
-
-#endif
-
-#if !defined(__AVX512BW__)
-
-constexpr bool may_share_window = false;
-
-class Columns {
-public:
-    Columns() = default;
-    explicit Columns(const Spacing &at) : at_(at) {}
-    bool share_window() const { return false; }
-
-    [[gnu::always_inline]] void taps(int x0, Taps (&taps)[parts]) const {
-        for (int part = 0; part < parts; ++part) {
-            const double position = at_.start + at_.step * (x0 + part * lanes);
-            const int first = static_cast<int>(position);
-            const Floats steps = all(static_cast<float>(at_.step)), fraction = all(static_cast<float>(position - first));
-            taps[part] = taps_of(first, multiply_add(lane_numbers(), steps, fraction));
-        }
-    }
-
-private:
-    Spacing at_;
-};
 
 #endif
 
