@@ -1,6 +1,7 @@
 #include "bands.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstring>
 #include <thread>
@@ -49,12 +50,13 @@ Range rows_seen(const View &view, const Shape &shape, int y0, int y1) {
 }  // namespace
 
 void for_each(int count, int threads, const std::function<void(int)> &work) {
-    const auto share = [&](int thread) {
-        for (int i = thread; i < count; i += threads) work(i);
+    std::atomic<int> next{0};
+    const auto share = [&] {
+        for (int i = next++; i < count; i = next++) work(i);
     };
     std::vector<std::thread> others;
-    for (int thread = 1; thread < std::min(threads, count); ++thread) others.emplace_back(share, thread);
-    share(0);
+    for (int thread = 1; thread < std::min(threads, count); ++thread) others.emplace_back(share);
+    share();
     for (std::thread &other : others) other.join();
 }
 
