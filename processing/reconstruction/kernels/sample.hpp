@@ -184,34 +184,33 @@ struct NodeSegment {
     }
 };
 
-// What a view sees along a segment that fits: each row adds with the weight 1 - |distance|. Not inline: with the
-// registers of its caller it would need more than there are.
+// What a view sees along a segment that fits, in the same two rows or in a few of which each adds with the weight
+// 1 - |distance|. Not inline: with the registers of its caller it would need more than there are.
 [[gnu::noinline]] Floats sample_segment(const View &view, const NodeSegment &at) {
     const float left = at.left(), top = at.top(), bottom = at.bottom();
     const int first_column = static_cast<int>(left), first_row = static_cast<int>(top);
-    const Floats lane = lane_numbers() * (1.0f / lanes);
+    const int more_rows = static_cast<int>(bottom) - first_row;
+    const Floats lane = lane_numbers() * (1.0f / lanes), zero{}, one = zero + 1.0f;
     const Floats at_u = lane * (at.u1 - at.u0) + (at.u0 - static_cast<float>(first_column));
     Floats distance = lane * (at.v1 - at.v0) + (at.v0 - static_cast<float>(first_row));
     const Ints column = __builtin_convertvector(at_u, Ints);
     const auto weight = reinterpret_cast<__m512i>(horizontal_weights(at_u - __builtin_convertvector(column, Floats)));
     const auto index = reinterpret_cast<__m512i>((column | column << 16) + 0x10000);
     const int16_t *pixels = view.pixels + static_cast<int64_t>(first_row) * view.columns + first_column;
-    const Floats zero{}, one = zero + 1.0f;
-    Floats seen{};
-    const auto add_row = [&] {
+    const auto next_row = [&] {
         const __m512i pairs = _mm512_permutexvar_epi16(index, _mm512_loadu_si512(pixels));
-        const auto along = reinterpret_cast<Floats>(_mm512_cvtepi32_ps(_mm512_madd_epi16(pairs, weight)));
-        const auto away = reinterpret_cast<Floats>(_mm512_abs_ps(reinterpret_cast<__m512>(distance)));
-        const auto share = _mm512_max_ps(reinterpret_cast<__m512>(one - away), _mm512_setzero_ps());
-        seen += reinterpret_cast<Floats>(share) * along;
         pixels += view.columns;
-        distance -= one;
+        return reinterpret_cast<Floats>(_mm512_cvtepi32_ps(_mm512_madd_epi16(pairs, weight)));
     };
-    // almost always enough: a fixed number is quicker than the right one
-    add_row();
-    add_row();
-    add_row();
-    for (int row = 3; row < static_cast<int>(bottom) - first_row + 2; ++row) add_row();
+    if (!more_rows) {
+        const Floats above = next_row(), below = next_row();
+        return above + distance * (below - above);
+    }
+    Floats seen{};
+    for (int row = 0; row < more_rows + 2; ++row, distance -= one) {
+        const auto away = reinterpret_cast<Floats>(_mm512_abs_ps(reinterpret_cast<__m512>(distance)));
+        seen += reinterpret_cast<Floats>(_mm512_max_ps(reinterpret_cast<__m512>(one - away), _mm512_setzero_ps())) * next_row();
+    }
     return seen;
 }
 
