@@ -5,6 +5,7 @@ Exit status: 0 done, 1 failed (also a result that says ``passed: false``), 2 bad
 
 import argparse
 import json
+import re
 import sys
 from collections.abc import Callable, Sequence
 from enum import StrEnum
@@ -46,10 +47,12 @@ BAD_INPUT = (
 )
 Command = Callable[[argparse.Namespace], dict[str, Any]]
 
+_NEGATIVE = re.compile(r"-\.?\d")
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; the exit status."""
-    options = _parser().parse_args(arguments)
+    options = _parser().parse_args(_joined(sys.argv[1:] if arguments is None else arguments))
     command: Command = options.command
     try:
         result = command(options)
@@ -62,6 +65,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.json or result:
         print(json.dumps(result) if options.json else commands.readable(result))  # noqa: T201
     return 0 if result.get("passed", True) else 1
+
+
+def _joined(arguments: Sequence[str]) -> list[str]:
+    """Options joined by = with values that begin with a minus: argparse takes -5:5,-5:5,0:1 for another option."""
+    joined: list[str] = []
+    for argument in arguments:
+        if joined and re.fullmatch(r"--[^=]+", joined[-1]) and _NEGATIVE.match(argument):
+            joined[-1] += f"={argument}"
+        else:
+            joined.append(argument)
+    return joined
 
 
 def _fail(options: argparse.Namespace, error: BaseException, status: int) -> int:

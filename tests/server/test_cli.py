@@ -156,6 +156,15 @@ def test_average_of_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     assert not (tmp_path / "mean.vtkhdf").exists()
 
 
+def test_a_grid_may_begin_below_zero_with_or_without_an_equals_sign(
+    run_dir: Path, calibration_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    common = ["reconstruct", run_dir, "--calibration", calibration_file, "--shots", "0:1"]
+    joined = told(capsys, *common, "-o", tmp_path / "joined", f"--grid={GRID}")
+    assert told(capsys, *common, "-o", tmp_path / "apart", "--grid", GRID)["grid"] == joined["grid"]
+    assert "every range must grow" in refused(capsys, *common, "-o", tmp_path / "x", "--grid", "-.5:-1,0:1,0:1")
+
+
 @pytest.mark.parametrize(
     ("grid", "reason"), [("1:2,3:4", "not of the form"), ("1:0,0:1,0:1", "must grow"), ("0:1,0:1,0:1@0", "positive")]
 )
