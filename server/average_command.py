@@ -7,15 +7,16 @@ from processing.analysis.figures import slices_figure
 from processing.calibration.calibration_file import load_calibration
 from processing.pipeline import PipelineError, default_grid
 from processing.reconstruction.settings import GridSettings
-from processing.reconstruction.volume_file import write_volume
+from processing.reconstruction.volume_file import VolumeFileError, write_volume
 from processing.results_file import Provenance, average_volumes, volume_files
 from processing.run_average import average_run
 from processing.volume import VoxelGrid
-from server.commands import parse_grid, progress, reconstruction_settings, selected_shots
+from server.commands import parse_grid, picture_beside, progress, reconstruction_settings, selected_shots
 
 
 def average(options: Namespace) -> dict[str, Any]:
     """``tomoshadow average``."""
+    picture_beside(options.out)
     if options.calibration is None and (options.results / "run.h5").is_file():
         raise PipelineError(f"{options.results} is a run: name its --calibration to average it")
     return _average_results(options) if options.calibration is None else _average_run(options)
@@ -23,6 +24,8 @@ def average(options: Namespace) -> dict[str, Any]:
 
 def _average_results(options: Namespace) -> dict[str, Any]:
     files = volume_files(options.results)
+    if not files:
+        raise VolumeFileError(f"{options.results}: there are no volumes to average")
     volume, grid = average_volumes(files)
     return _written(options, volume, grid, len(files), {})
 
@@ -42,7 +45,7 @@ def _average_run(options: Namespace) -> dict[str, Any]:
 
 def _written(options: Namespace, volume: Any, grid: VoxelGrid, count: int, made_by: Provenance) -> dict[str, Any]:
     write_volume(options.out, volume, grid, {"average_of": str(options.results), "volumes": count, **made_by})
-    figure = options.out.with_suffix(".png")
+    figure = picture_beside(options.out)
     slices_figure(volume, grid, f"mean of {count} volumes").savefig(figure, dpi=120)
     return {
         "file": str(options.out),

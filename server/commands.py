@@ -49,6 +49,20 @@ def readable(result: dict[str, Any]) -> str:
     return json.dumps(result, indent=2)
 
 
+def picture_beside(file: Path) -> Path:
+    """Where the picture of a result goes.
+
+    Raises
+    ------
+    PipelineError
+        The result itself is called so; the picture would take its place.
+    """
+    picture = file.with_suffix(".png")
+    if picture == file:
+        raise PipelineError(f"{file}: its picture would take its place; choose another ending")
+    return picture
+
+
 def import_images(options: Namespace) -> dict[str, Any]:
     """``tomoshadow import``."""
     return {"out": str(options.out), **import_manifest(options.manifest, options.out)}
@@ -56,10 +70,10 @@ def import_images(options: Namespace) -> dict[str, Any]:
 
 def calibrate_views(options: Namespace) -> dict[str, Any]:
     """``tomoshadow calibrate``."""
+    figure = picture_beside(options.out)
     calibration_set = load_calibration_set(options.set, dict(options.origin or ()), dict(options.roll or ()))
     calibration = calibrate(calibration_set, model=options.model)
     save_calibration(calibration, options.out)
-    figure = options.out.with_suffix(".png")
     residuals_figure(calibration).savefig(figure, dpi=120)
     figures = calibration_pictures(options.set, calibration_set, calibration, options.out)
     for note in calibration.notes:

@@ -152,8 +152,15 @@ def test_a_run_is_averaged_with_a_calibration_only(
 
 def test_average_of_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "empty").mkdir()
-    assert "no volumes" in refused(capsys, "average", tmp_path / "empty", "-o", tmp_path / "mean.vtkhdf")
+    complaint = refused(capsys, "average", tmp_path / "empty", "-o", tmp_path / "mean.vtkhdf")
+    assert complaint == f"{tmp_path / 'empty'}: there are no volumes to average"
     assert not (tmp_path / "mean.vtkhdf").exists()
+
+
+def test_a_picture_never_takes_the_place_of_its_result(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for command in ("calibrate", "average"):
+        complaint = refused(capsys, command, tmp_path, "-o", tmp_path / "result.png")
+        assert complaint == f"{tmp_path / 'result.png'}: its picture would take its place; choose another ending"
 
 
 def test_a_grid_may_begin_below_zero_with_or_without_an_equals_sign(
