@@ -110,6 +110,8 @@ def read_manifest(path: Path) -> ManifestFile:
         text = path.read_text(encoding="utf-8")
     except OSError as error:
         raise ManifestError(f"{path}: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise ManifestError(f"{path}: not UTF-8: byte {error.start} is {error.object[error.start]:#x}") from error
     try:
         manifest = Manifest.model_validate(tomllib.loads(text))
     except tomllib.TOMLDecodeError as error:

@@ -64,7 +64,7 @@ def read_table(path: Path, columns: Sequence[str]) -> dict[str, FloatArray]:
         The file is missing, or a line does not have these columns; names file and line.
     """
     try:
-        lines = path.read_text(encoding="utf-8").splitlines()
+        lines = path.read_text(encoding="utf-8-sig", errors="replace").splitlines()
     except OSError as error:
         raise CalibrationError(f"{path}: {error.strerror}") from error
     rows = []
@@ -78,6 +78,8 @@ def read_table(path: Path, columns: Sequence[str]) -> dict[str, FloatArray]:
             rows.append([float(field) for field in fields])
         except ValueError as error:
             raise CalibrationError(f"{path}, line {number}: {error}") from error
+        if not np.isfinite(rows[-1]).all():
+            raise CalibrationError(f"{path}, line {number}: {', '.join(fields)}: values must be finite")
     if not rows:
         raise CalibrationError(f"{path}: no points in it")
     return dict(zip(columns, np.array(rows).T, strict=True))

@@ -14,7 +14,7 @@ Column = Literal["id", "u_px", "v_px", "x_mm", "y_mm", "z_mm", "skip"]
 
 
 class _Entry(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
 class PlaneEntry(_Entry):
@@ -23,6 +23,12 @@ class PlaneEntry(_Entry):
     z_mm: float | None = None
     images: Annotated[dict[CameraName, str], Field(min_length=1)]
     origin_px: Annotated[dict[CameraName, Pixel], Field(description="overrides the origin_px of the set")] = {}
+
+    @model_validator(mode="after")
+    def _has_images_of_origins(self) -> Self:
+        if strangers := sorted(set(self.origin_px).difference(self.images)):
+            raise ValueError(f"origin_px: there is no image of {', '.join(strangers)}")
+        return self
 
 
 class PointsEntry(_Entry):
@@ -67,9 +73,9 @@ class CalibrationEntry(_Entry):
             raise ValueError("neither planes nor points")
         if self.plane and self.target is None:
             raise ValueError("target: planes need a target")
-        strangers = sorted({*self.roll_deg, *self.azimuth_deg}.difference(self.cameras))
-        if strangers:
-            raise ValueError(f"roll_deg, azimuth_deg: there is no camera {', '.join(strangers)}")
+        for key in ("origin_px", "roll_deg", "azimuth_deg"):
+            if strangers := sorted(set(getattr(self, key)).difference(self.cameras)):
+                raise ValueError(f"{key}: there is no camera {', '.join(strangers)}")
         if len({plane.z_mm is None for plane in self.plane}) > 1:
             raise ValueError("plane: some planes have z_mm, others have not; give all of them or none")
         return self

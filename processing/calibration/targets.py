@@ -30,7 +30,7 @@ class Target(BaseModel):
     ``rows`` is larger than the image; it needs a marked origin or ``origin_px``.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     kind: Literal["checkerboard", "dots"]
     columns: Annotated[int, Field(ge=2, le=1000, description="inner corners or dots along x")] | None = None

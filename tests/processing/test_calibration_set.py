@@ -154,6 +154,8 @@ def test_measured_points_are_split_by_level(tmp_path: Path) -> None:
     [
         ("1 2 3\n4 5\n", "line 2: 2 values, columns are u_px, v_px, x_mm"),
         ("1 2 3\n\n4 five 6\n", "line 3: could not convert"),
+        ("1 2 3\n4 5 nan\n", "line 2: 4, 5, nan: values must be finite"),
+        ("1 2 3\n-inf 5 6\n", "line 2: -inf, 5, 6: values must be finite"),
         ("# nothing\n", "no points in it"),
     ],
 )
@@ -164,6 +166,6 @@ def test_tables_are_refused_by_line(tmp_path: Path, text: str, complaint: str) -
 
 
 def test_tables_may_be_separated_by_anything(tmp_path: Path) -> None:
-    (tmp_path / "t.txt").write_text("1,2\n3;\t4 # last\n")
+    (tmp_path / "t.txt").write_bytes("\ufeff1,2\n".encode() + "3;\t4 # µm\n".encode("latin-1"))
     table = read_table(tmp_path / "t.txt", ("x_mm", "y_mm"))
     np.testing.assert_array_equal(table["y_mm"], [2.0, 4.0])

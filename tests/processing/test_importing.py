@@ -56,6 +56,14 @@ REFERENCES = f"""
 {frames("a", 1)}{frames("b", 2)}"""
 
 
+BOARD = """[calibration]
+target = { kind = "checkerboard", columns = 9, rows = 7, pitch_mm = 1 }
+[[calibration.plane]]
+z_mm = 1.0
+images = { left = "left_1.png" }
+"""
+
+
 def run_import(folder: Path, text: str) -> Path:
     (folder / "manifest.toml").write_text(text)
     import_manifest(folder / "manifest.toml", folder / "out")
@@ -135,6 +143,16 @@ def test_root_may_come_from_the_environment(folder: Path, monkeypatch: pytest.Mo
             '[[calibration.points]]\ncamera = "left"\nfile = "manifest.toml"\ncolumns = ["u_px", "v_px", "x_mm"]\n',
             r"line 1: calibration\.points\.0: columns: y_mm, z_mm must appear once",
         ),
+        (BOARD.replace("z_mm = 1.0", "z_mm = nan"), r"line 4: calibration\.plane\.0\.z_mm: .* finite number"),
+        (BOARD.replace("pitch_mm = 1", "pitch_mm = inf"), r"line 2: calibration\.target\.pitch_mm: .* finite number"),
+        (
+            BOARD.replace("[[", "origin_px = { middle = [1, 2] }\n[[", 1),
+            r"line 1: calibration: origin_px: there is no camera middle",
+        ),
+        (
+            BOARD + "origin_px = { middle = [1, 2] }\n",
+            r"line 3: calibration\.plane\.0: origin_px: there is no image of middle",
+        ),
     ],
 )
 def test_mistakes_name_the_line_and_write_nothing(folder: Path, text: str, complaint: str) -> None:
@@ -150,6 +168,12 @@ def test_nothing_is_overwritten(folder: Path) -> None:
     with pytest.raises(ManifestError, match="out: exists; an import never overwrites"):
         run_import(folder, RUN)
     assert (out / "run" / "run.h5").read_bytes() == run_file
+
+
+def test_a_manifest_that_is_not_utf8_is_named(tmp_path: Path) -> None:
+    (tmp_path / "manifest.toml").write_bytes("# µ\n".encode("latin-1"))
+    with pytest.raises(ManifestError, match=r"manifest\.toml: not UTF-8: byte 2 is 0xb5"):
+        import_manifest(tmp_path / "manifest.toml", tmp_path / "out")
 
 
 def test_missing_manifest_is_named(tmp_path: Path) -> None:
