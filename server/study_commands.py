@@ -63,10 +63,11 @@ Command = Callable[[Namespace], dict[str, Any]]
 
 
 def timed(study: Command) -> Command:
-    """Say how long a study took."""
+    """Say how long a study took; complain of a directory that cannot be written to before, not after."""
 
     @wraps(study)
     def run(options: Namespace) -> dict[str, Any]:
+        options.out.mkdir(parents=True, exist_ok=True)
         wall_s, cpu_s = time.perf_counter(), time.process_time()
         result = study(options)
         seconds = {"wall": time.perf_counter() - wall_s, "cpu": time.process_time() - cpu_s}
@@ -180,7 +181,6 @@ def _report(
     out: Path, name: str, rows: Sequence[Any], figure: Figure, statements: Sequence[Statement]
 ) -> dict[str, Any]:
     """Write CSV and figure; the JSON object of the study."""
-    out.mkdir(parents=True, exist_ok=True)
     csv, picture = out / f"{name}.csv", out / f"{name}.png"
     csv.write_text(csv_text(rows), encoding="utf-8")
     figure.savefig(picture, dpi=150)

@@ -40,8 +40,11 @@ def test_every_study_explains_itself(study: str, capsys: pytest.CaptureFixture[s
     ("arguments", "complaint"),
     [
         (["density", "--method", "smort"], "'smort' is none of gavlos"),
-        (["density", "--sigma", "-1"], "-1 must be above 0"),
-        (["density", "--sigma", "wide"], "invalid positive value: 'wide'"),
+        (["density", "--sigma", "-1"], "-1 must be from 0.3 to 10 voxel"),
+        (["ghosts", "--sigma", "inf"], "inf must be from 0.3 to 10 voxel"),
+        (["density", "--sigma", "wide"], "invalid width value: 'wide'"),
+        (["sensitivity", "--density", "inf"], "inf must be above 0, and finite"),
+        (["average", "--seed", "-1"], "-1 must be 0 or more"),
         (["ghosts", "--method", "mlos-3"], "mlos does not take 3 iterations"),
         (["average", "--shots", "0"], "0 must be 1 or more"),
     ],
@@ -53,6 +56,15 @@ def test_bad_usage_exits_with_2_and_names_the_value(
         main(["study", *arguments])
     assert stopped.value.code == 2
     assert complaint in capsys.readouterr().err
+
+
+def test_a_study_that_could_not_be_written_does_not_begin(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(study_commands, "average_study", lambda *_: pytest.fail("the study has begun"))
+    (tmp_path / "file").write_text("in the way")
+    assert main(["study", "average", "-o", str(tmp_path / "file")]) == 1
+    assert "file" in capsys.readouterr().err
 
 
 def test_the_density_study_states_widths_windows_and_subtraction(
