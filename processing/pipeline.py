@@ -260,7 +260,7 @@ def _workbench(
 ) -> Workbench:
     calibration = load_calibration(calibration_file)
     grid = settings.grid.to_grid() if settings.grid else default_grid(calibration)
-    plan = plan_reconstruction([calibration.views[view].mapping for view in views], grid, settings.accuracy)
+    plan = plan_reconstruction([calibration.views[view].mapping for view in views], grid, settings.accuracy, views)
     return Workbench.of(plan, settings)
 
 

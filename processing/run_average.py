@@ -72,7 +72,7 @@ def average_run(
         first = run.read_shot(shots[0])
         require_match(run_dir.name, first, calibration)
         mappings = [calibration.views[view].mapping for view in first.views]
-        plan = plan_reconstruction(mappings, grid, settings.accuracy)
+        plan = plan_reconstruction(mappings, grid, settings.accuracy, list(first.views))
         exposures = _exposures(run, shots, calibration, settings, done)
         if settings.method.iterative:
             volume = _mean_of_each(plan, exposures, settings)

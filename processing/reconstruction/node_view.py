@@ -87,7 +87,7 @@ def sample_mapping(mapping: ViewMapping, grid: VoxelGrid, max_deviation_px: floa
             return _node_view(mapping, nodes_px, spacing, deviation_px)
     raise ReconstructionError(
         f"mapping is not smooth: it bends by {deviation_px:.3g} px within {SPACINGS[-1]} voxels, "
-        f"limit {max_deviation_px} px"
+        f"limit {max_deviation_px} px; does the grid reach beyond what was calibrated?"
     )
 
 

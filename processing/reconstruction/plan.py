@@ -63,7 +63,7 @@ class Plan:
         Parameters
         ----------
         images : sequence of (rows, columns) float32 arrays
-            Inverted shadow intensities, one image per view; less than 0 counts as 0.
+            Inverted shadow intensities, one image per view; less than 0 and not-a-number count as 0.
         threads : int
             The result does not depend on it.
         out : sequence of int16 arrays, optional
@@ -72,7 +72,7 @@ class Plan:
         Raises
         ------
         ValueError
-            Number or shape of the images do not fit the plan.
+            Number or shape of the images do not fit the plan, or a pixel is infinite.
         """
         memory = self.empty_images() if out is None else out
         if len(images) != len(self.views):
@@ -80,10 +80,14 @@ class Plan:
         for number, (image, view) in enumerate(zip(images, self.views, strict=True)):
             if np.shape(image) != view.image_size_px[::-1]:
                 raise ValueError(f"image {number} has shape {np.shape(image)}, its view {view.image_size_px[::-1]}")
-        return [
+        resampled = [
             view.resample(np.ascontiguousarray(image, dtype=np.float32), pixels, threads)
             for image, pixels, view in zip(images, memory, self.views, strict=True)
         ]
+        for number, made in enumerate(resampled):
+            if not np.isfinite(made.unit):
+                raise ValueError(f"image {number}: its brightest pixel is {made.brightest}")
+        return resampled
 
     def bind(self, resampled: Sequence[FixedPoint], *, cull: bool = True) -> list[_native.View]:
         """Resampled images with the geometry of their views, for the kernels.
@@ -94,7 +98,10 @@ class Plan:
 
 
 def plan_reconstruction(
-    mappings: Sequence[ViewMapping], grid: VoxelGrid, accuracy: Accuracy = Accuracy.NOMINAL
+    mappings: Sequence[ViewMapping],
+    grid: VoxelGrid,
+    accuracy: Accuracy = Accuracy.NOMINAL,
+    names: Sequence[str] | None = None,
 ) -> Plan:
     """Plan the reconstruction of a grid from views of any mapping.
 
@@ -106,6 +113,8 @@ def plan_reconstruction(
         The volume to reconstruct; a slice or a region of interest is a grid of its own.
     accuracy : Accuracy
         How finely rectified views are resampled.
+    names : sequence of str, optional
+        Of the views, for errors; by default their numbers, from 1.
 
     Raises
     ------
@@ -116,7 +125,16 @@ def plan_reconstruction(
     _check_instructions()
     if not MIN_VIEWS <= len(mappings) <= MAX_VIEWS:
         raise ReconstructionError(f"{len(mappings)} views, a reconstruction takes {MIN_VIEWS} to {MAX_VIEWS}")
-    return Plan(grid, tuple(plan_view(mapping, grid, accuracy) for mapping in mappings))
+    named = names or [f"view {number}" for number in range(1, len(mappings) + 1)]
+    views = (_plan_named(name, mapping, grid, accuracy) for name, mapping in zip(named, mappings, strict=True))
+    return Plan(grid, tuple(views))
+
+
+def _plan_named(name: str, mapping: ViewMapping, grid: VoxelGrid, accuracy: Accuracy) -> RectifiedView | NodeView:
+    try:
+        return plan_view(mapping, grid, accuracy)
+    except ReconstructionError as error:
+        raise ReconstructionError(f"{name}: {error}") from error
 
 
 def _check_instructions() -> None:

@@ -13,7 +13,7 @@ from processing.geometry import FloatArray, PinholeCamera, ViewMapping, view_cam
 from processing.reconstruction.errors import ReconstructionError
 from processing.reconstruction.kernels import _native
 from processing.reconstruction.node_view import NodeView, sample_mapping
-from processing.reconstruction.plan import MAX_DEVIATION_PX, plan_reconstruction, plan_view
+from processing.reconstruction.plan import MAX_DEVIATION_PX, Plan, plan_reconstruction, plan_view
 from processing.reconstruction.planned_view import PlannedView
 from processing.reconstruction.rectified_view import MAP_SPACING_PX, RectifiedView, rectify
 from processing.volume import VoxelGrid
@@ -135,6 +135,11 @@ def test_saddles_are_not_taken_for_straight(saddle: float) -> None:
 def test_a_rough_mapping_is_refused() -> None:
     with pytest.raises(ReconstructionError, match=r"not smooth: it bends by .* px within 2 voxels, limit 0.02 px"):
         sample_mapping(Bent(camera(), 0, wavelength_mm=0.05), GRID, MAX_DEVIATION_PX)
+    views: list[ViewMapping] = [camera(), Bent(camera(), 0, wavelength_mm=0.05)]
+    with pytest.raises(ReconstructionError, match=r"^view 2: mapping is not smooth.*does the grid reach beyond"):
+        plan_reconstruction(views, GRID)
+    with pytest.raises(ReconstructionError, match=r"^right: mapping is not smooth"):
+        plan_reconstruction(views, GRID, names=["left", "right"])
 
 
 def test_the_node_area_is_that_of_a_voxel() -> None:
@@ -218,6 +223,22 @@ def test_resampling_refuses_what_does_not_fit() -> None:
         _native.resample(image, nodes, np.zeros((16, 31), np.int16), 1)
     with pytest.raises(ValueError, match="do not fill the output"):
         _native.quantise(image, 1, 2, np.zeros((12, 13), np.int16), 1)
+
+
+@pytest.mark.parametrize("by_nodes", [False, True])
+def test_infinite_pixels_are_refused_and_those_that_are_no_numbers_are_dark(by_nodes: bool) -> None:
+    mappings = oracle.cameras(2)
+    views = [sample_mapping(one, GRID, MAX_DEVIATION_PX) if by_nodes else plan_view(one, GRID) for one in mappings]
+    plan, images = Plan(GRID, tuple(views)), [np.ones(one.image_size_px[::-1], np.float32) for one in mappings]
+    middle = tuple(length // 2 for length in images[1].shape)
+    images[1][middle] = np.nan
+    dark = [image.copy() for image in images]
+    dark[1][middle] = 0
+    for found, expected in zip(plan.resample(images), plan.resample(dark), strict=True):
+        np.testing.assert_array_equal(found.pixels, expected.pixels)
+    images[1][middle] = np.inf
+    with pytest.raises(ValueError, match="image 1: its brightest pixel is inf"):
+        plan.resample(images)
 
 
 def test_views_keep_their_arrays_alive() -> None:

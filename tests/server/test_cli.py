@@ -244,7 +244,7 @@ def test_a_mapping_that_runs_away_is_one_clear_error(
     rough = replace(calibration, views=views)
     save_calibration(rough.with_id(content_id(rough)), calibration_file, overwrite=True)
     arguments = ["reconstruct", run_dir, "--calibration", calibration_file, f"--grid={GRID}", "-o", tmp_path / "out"]
-    assert refused(capsys, *arguments).startswith("mapping is not smooth: it bends by")
+    assert refused(capsys, *arguments).startswith("view1: mapping is not smooth: it bends by")
 
 
 def test_instructions_that_the_processor_lacks_are_one_clear_error(
