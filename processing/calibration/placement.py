@@ -78,6 +78,17 @@ def turned_views(
     return {name: TURNS_DEG[turn] for name, turn in best.items() if turn}
 
 
+def exchanged_views(
+    mappings: Mapping[str, ViewMapping], middle_mm: FloatArray, azimuths_deg: Mapping[str, float]
+) -> Iterator[tuple[str, str]]:
+    """Pairs of views that need only change places in the rig for all views to agree with it, none of them turned."""
+    for one, other in combinations([name for name in mappings if name in azimuths_deg], 2):
+        exchanged_deg = {**azimuths_deg, one: azimuths_deg[other], other: azimuths_deg[one]}
+        off_deg = _disagreements_deg(mappings, middle_mm, exchanged_deg)
+        if all(angles[0] < CLEARER_DEG for angles in off_deg.values()):
+            yield one, other
+
+
 def doubtful_views(
     mappings: Mapping[str, ViewMapping], middle_mm: FloatArray, azimuths_deg: Mapping[str, float]
 ) -> dict[str, float]:

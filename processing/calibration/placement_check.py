@@ -6,7 +6,14 @@ import numpy as np
 
 from processing.calibration.errors import CalibrationError
 from processing.calibration.observation import CalibrationSet, stacked
-from processing.calibration.placement import doubtful_views, in_one_place, placement, same_either_way, turned_views
+from processing.calibration.placement import (
+    doubtful_views,
+    exchanged_views,
+    in_one_place,
+    placement,
+    same_either_way,
+    turned_views,
+)
 from processing.geometry import FloatArray, ViewMapping
 
 
@@ -32,17 +39,28 @@ def check_placements(calibration_set: CalibrationSet, mappings: Mapping[str, Vie
         texts = [_turned(calibration_set, name, mappings[name], middle_mm, turn) for name, turn in turned_deg.items()]
         undecided = same_either_way(mappings, middle_mm, turned_deg)
         texts += [f"{name}: looks the same either way; if it is turned too, say --roll for it" for name in undecided]
+        texts += [f"or {question}" for question in _exchanged(mappings, middle_mm, azimuths_deg)]
         raise CalibrationError("; ".join(texts))
     if turned_deg:
         turn_deg = next(iter(turned_deg.values()))
         yield f"every view sees the target's axes turned by {turn_deg} deg about z: so do x and y of all results"
-    for name, off_deg in doubtful_views(mappings, middle_mm, azimuths_deg).items():
+    doubtful_deg = doubtful_views(mappings, middle_mm, azimuths_deg)
+    for name, off_deg in doubtful_deg.items():
         yield f"{name}: {_both_azimuths(calibration_set, name, mappings[name], middle_mm)}, {off_deg:.0f} deg apart"
+    if doubtful_deg:
+        yield from _exchanged(mappings, middle_mm, azimuths_deg)
     for one, other in in_one_place(mappings, middle_mm):
         yield (
             f"{one} and {other} seem to stand in one place: if one of them hangs upside down, say so (roll_deg), "
             "else their lines of sight do not meet"
         )
+
+
+def _exchanged(
+    mappings: Mapping[str, ViewMapping], middle_mm: FloatArray, azimuths_deg: Mapping[str, float]
+) -> Iterator[str]:
+    for one, other in exchanged_views(mappings, middle_mm, azimuths_deg):
+        yield f"have {one} and {other} been exchanged? Then all views agree with the rig"
 
 
 def _turned(

@@ -89,6 +89,7 @@ def test_an_upside_down_camera_is_refused_by_name_with_the_remedy(model: str) ->
     )
     assert "Say --roll view4=180 (roll_deg in configuration or manifest), or --roll view4=0 if" in text
     assert "view1" not in text
+    assert "exchanged" not in text
 
 
 @pytest.mark.parametrize(
@@ -104,6 +105,20 @@ def test_all_turned_cameras_are_named(turned_deg: dict[str, float], said: tuple[
         calibrate(rig(AZIMUTHS_DEG, **turned_deg))
     text = str(refusal.value)
     assert [part.split("Say --roll ")[1].split(" ")[0] for part in text.split("; view")] == list(said)
+
+
+@pytest.mark.parametrize("pair", [("view1", "view2"), ("view2", "view3"), ("view1", "view4")])
+def test_views_whose_images_were_exchanged_are_asked_about(pair: tuple[str, str]) -> None:
+    one, other = pair
+    exchanged = AZIMUTHS_DEG | {one: AZIMUTHS_DEG[other], other: AZIMUTHS_DEG[one]}
+    with pytest.raises(CalibrationError, match=f"; or have {one} and {other} been exchanged"):
+        calibrate(replace(rig(exchanged), azimuths_deg=AZIMUTHS_DEG))
+
+
+def test_exchanged_views_that_no_turn_explains_are_noted() -> None:
+    said_deg = {"far": -70.0, "near": -48.0, "right": 40.0}
+    notes = calibrate(replace(rig(said_deg | {"far": -48.0, "near": -70.0}), azimuths_deg=said_deg)).notes
+    assert notes[-1] == "have far and near been exchanged? Then all views agree with the rig"
 
 
 def test_a_view_from_the_front_cannot_be_checked_and_is_asked_about() -> None:
