@@ -18,6 +18,9 @@ from processing.calibration.observation import CalibrationSet, PlaneObservation,
 from processing.calibration.placement_check import check_placements
 from processing.geometry import FloatArray, PinholeCamera, ViewMapping
 
+MAX_STRETCH = 1.1
+"""Pixels are square; a sensor tilted by 24 deg looks like one of pixels of 1.095 to a model without tilt."""
+
 
 def calibrate(
     calibration_set: CalibrationSet, model: Model | str = Model.PINHOLE, *, created_utc: str | None = None
@@ -49,7 +52,7 @@ def calibrate(
         views=views,
         z_range_mm=_common_z_range_mm(calibration_set),
         source=calibration_set.source,
-        notes=(*calibration_set.notes, *mirrored, *placements),
+        notes=(*calibration_set.notes, *mirrored, *_stretched(views), *placements),
     )
     return undated.with_id(content_id(undated))
 
@@ -77,6 +80,18 @@ def _mirrored(calibration_set: CalibrationSet, views: Mapping[str, ViewCalibrati
                 yield (
                     f"{name}: the target lies behind the camera: its axes are left-handed, volumes come out mirrored; "
                     'does y point up (y_axis = "up"), or z towards the views?'
+                )
+
+
+def _stretched(views: Mapping[str, ViewCalibration]) -> Iterator[str]:
+    """Notes on pixels that are not square: a wrong pitch, or a wrong scale of the stage, fits as well as the right."""
+    for name, view in views.items():
+        if isinstance(view.mapping, PinholeCamera) and not view.intrinsics_only:
+            height_to_width = float(view.mapping.camera_matrix[0, 0] / view.mapping.camera_matrix[1, 1])
+            if not 1 / MAX_STRETCH < height_to_width < MAX_STRETCH:
+                yield (
+                    f"{name}: its pixels seem {height_to_width:.2f} times as high as wide: is pitch_mm of the target "
+                    f"right, and the position of its planes in mm?"
                 )
 
 

@@ -66,6 +66,17 @@ def test_left_handed_axes_are_noted() -> None:
     assert note.startswith("only: the target lies behind the camera: its axes are left-handed")
 
 
+@pytest.mark.parametrize(("model", "pitch"), [("pinhole", 0.5), ("pinhole", 1.25), ("pinhole_tilted", 2.0)])
+def test_a_wrong_pitch_fits_nearly_as_well_and_shows_in_the_pixels(model: str, pitch: float) -> None:
+    planes = seen_planes(paper_camera(45.0), z_mm=(-4, -1, 1, 4), columns=15, rows=11)
+    wrong = tuple(replace(plane, points_mm=plane.points_mm * (pitch, pitch, 1)) for plane in planes)
+    calibration = calibrate(calibration_set(right=planes, wrong=wrong), model)
+    assert calibration.views["wrong"].verdict in ("good", "usable")
+    (note,) = calibration.notes
+    assert note.startswith("wrong: its pixels seem ")
+    assert note.endswith("is pitch_mm of the target right, and the position of its planes in mm?")
+
+
 def test_too_few_points_are_refused() -> None:
     with pytest.raises(CalibrationError, match="8 points for 15 parameters, need 9"):
         fit_pinhole(volume_points_mm(8), np.zeros((8, 2)), (100, 100))
