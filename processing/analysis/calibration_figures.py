@@ -108,7 +108,7 @@ def _section(axes: Axes, image: NDArray[np.generic], plane: PlaneObservation) ->
     axes.plot(*plane.image_px[inside].T, marker="+", linestyle="none", color=_MARK, markersize=12, markeredgewidth=2)
     for (x_mm, y_mm, _), (u, v) in zip(plane.points_mm[inside], plane.image_px[inside], strict=True):
         axes.annotate(
-            f"{x_mm:g}, {y_mm:g}",
+            f"{x_mm + 0.0:g}, {y_mm + 0.0:g}",  # of a target whose y points up, 0 is -0
             (u, v),
             xytext=(4, 5),
             textcoords="offset points",

@@ -1,6 +1,7 @@
 """Calibration figures show the points that were found, where they are, and their errors at one scale."""
 
 import io
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -25,15 +26,18 @@ def drawn(figure: Figure) -> int:
     return len(buffer.getvalue())
 
 
-def test_grid_carries_world_coordinates_where_the_points_are(seen: CalibrationSet) -> None:
-    planes = {"left": seen.views["left"].planes[5]}
+@pytest.mark.parametrize("y_sign", [1, -1])
+def test_grid_carries_world_coordinates_where_the_points_are(seen: CalibrationSet, y_sign: int) -> None:
+    plane = seen.views["left"].planes[5]
+    planes = {"left": replace(plane, points_mm=plane.points_mm.round(9) * (1, y_sign, 1))}
     figure = grid_figure({"left": np.zeros((1200, 1600), np.uint8)}, planes)
     (axes,) = figure.axes
     labels = {text.get_text(): text.xy for text in axes.texts if hasattr(text, "xy")}
     assert 20 <= len(labels) <= 60
-    for (x_mm, y_mm, _), place_px in zip(planes["left"].points_mm, planes["left"].image_px, strict=True):
-        if f"{x_mm:g}, {y_mm:g}" in labels:
-            np.testing.assert_allclose(labels[f"{x_mm:g}, {y_mm:g}"], place_px)
+    points = zip(planes["left"].points_mm.round().astype(int), planes["left"].image_px, strict=True)
+    places_px = {f"{x_mm}, {y_mm}": place_px for (x_mm, y_mm, _), place_px in points}
+    for label, place_px in labels.items():
+        np.testing.assert_allclose(place_px, places_px[label])
     assert axes.get_title() == "left, z = 0.5 mm; x, y in mm"
     assert axes.get_ylim()[0] > axes.get_ylim()[1]
     assert drawn(figure) > 1000
