@@ -146,7 +146,31 @@ def shot_intensities(
     settings: ReconstructionSettings,
     out: Sequence[Intensity | None] | None = None,
 ) -> list[Intensity]:
-    """Preprocessed images of one exposure, in the order of the shot's views; ``out`` receives them where given."""
+    """Preprocessed images of one exposure.
+
+    Parameters
+    ----------
+    run : RunReader
+        Has polarity and reference images.
+    shot : Shot
+        A shot of that run.
+    frame : {"a", "b"}
+        Which exposure.
+    settings : ReconstructionSettings
+        Sliding minimum and noise floor.
+    out : sequence of (rows, columns) float32 arrays, optional
+        Receive the images.
+
+    Returns
+    -------
+    list of (rows, columns) float32 arrays
+        In the order of the shot's views: 0 where the view is free, 1 where it is blocked.
+
+    Raises
+    ------
+    PipelineError
+        A view has no such exposure.
+    """
     header, references, number = run.header, _references(run), "ab".index(frame)
     preprocessing = Preprocessing(header.polarity, settings.minimum_window_px, settings.noise_floor)
     images = []

@@ -108,6 +108,22 @@ def sliding_minimum(
     """Smallest value in a square window around each pixel, averaged over the same window.
 
     Beyond its edges an image continues as it ends. Its cost hardly depends on the window.
+
+    Parameters
+    ----------
+    image : (rows, columns) float32 array
+        Of any unit.
+    window_px : int
+        Edge of the window, from 1 on.
+    out : (rows, columns) float32 array, optional
+        Receives the minima; reused memory is faster than new.
+    threads : int
+        The result does not depend on it.
+
+    Returns
+    -------
+    (rows, columns) float32 array
+        In the unit of the image; ``out`` where given.
     """
     result = _result(image.shape, out)
     _native.sliding_minimum(np.ascontiguousarray(image, dtype=np.float32), window_px, result, threads)

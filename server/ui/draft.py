@@ -12,7 +12,6 @@ from server.config import RigConfig
 
 PLAN_FIELDS = RunPlan.model_fields
 PULSE_FIELDS = PulsePair.model_fields
-CURRENT_LIMIT_A = 30.0
 
 
 def first_draft(config: RigConfig) -> dict[str, Any]:
