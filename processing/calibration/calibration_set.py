@@ -61,8 +61,9 @@ def write_set_file(folder: Path, source: str, calibration: CalibrationEntry) -> 
 def _read_imported(folder: Path) -> CalibrationSet:
     file = folder / SET_FILE
     try:
-        record = SetRecord.model_validate_json(file.read_text(encoding="utf-8"))
+        record = SetRecord.model_validate_json(file.read_bytes())
     except ValidationError as error:
         first = error.errors()[0]
-        raise CalibrationError(f"{file}: {'.'.join(str(part) for part in first['loc'])}: {first['msg']}") from error
+        where = ".".join(str(part) for part in first["loc"]) or "text"
+        raise CalibrationError(f"{file}: {where}: {first['msg']}") from error
     return detect_imported(record.source, record.calibration, folder)

@@ -132,6 +132,9 @@ def test_damaged_set_file_is_refused_by_field(tmp_path: Path) -> None:
     (tmp_path / "set.json").write_text('{"schema": "tomoshadow.calibration_set", "source": "x", "calibration": {}}')
     with pytest.raises(CalibrationError, match=r"set\.json: calibration: .*neither planes nor points"):
         load_calibration_set(tmp_path)
+    (tmp_path / "set.json").write_bytes(b"\xff")
+    with pytest.raises(CalibrationError, match=r"set\.json: text: Invalid JSON"):
+        load_calibration_set(tmp_path)
 
 
 def test_measured_points_are_split_by_level(tmp_path: Path) -> None:
