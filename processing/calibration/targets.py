@@ -179,12 +179,22 @@ def _with_origin(
         raise OriginUnknown("dots: no dot carries a marker; say where the origin is seen (origin_px)")
     board = place_board(lattice, target.columns, target.rows)
     if board is None:
-        seen_columns, seen_rows = np.ptp(lattice.ids, axis=0) + 1
+        columns, rows = (int(extent) + 1 for extent in np.ptp(lattice.ids, axis=0))
         raise OriginUnknown(
-            f"{target.kind}: a grid of {seen_columns} x {seen_rows} points is seen, not the whole board of "
-            f"{target.columns} x {target.rows}; say where its origin is seen (origin_px)"
+            f"{target.kind}: a grid of {columns} x {rows} points is seen, {_misfit(target, columns, rows)}"
         )
     return board.with_ids(board.ids - ((target.columns - 1) // 2, (target.rows - 1) // 2))
+
+
+def _misfit(target: Target, columns: int, rows: int) -> str:
+    """Why a grid of so many points seen is not the board, and what to do."""
+    board = (target.columns or 0, target.rows or 0)
+    text = f"not the whole board of {board[0]} x {board[1]}; "
+    if max(columns, rows) > max(board) or min(columns, rows) > min(board):
+        return text + "it is larger: are columns and rows right?"
+    if target.kind == "checkerboard" and sorted((columns + 1, rows + 1)) == sorted(board):
+        return text + "columns and rows count inner corners, not squares; or say where its origin is seen (origin_px)"
+    return text + "say where its origin is seen (origin_px)"
 
 
 def _nearest(candidates_px: FloatArray, origin_px: tuple[float, float], lattice: Lattice, points_px: FloatArray) -> int:

@@ -1,5 +1,7 @@
 """Targets are found to a few hundredths of a pixel in rendered images, and honestly not found otherwise."""
 
+import re
+
 import cv2
 import numpy as np
 import pytest
@@ -160,10 +162,20 @@ def test_image_without_target_is_refused(target: Target, noise: float) -> None:
         detect_target(image, target)
 
 
-@pytest.mark.parametrize("size", [(24, 17), (22, 17), (23, 16), (25, 19), (30, 20)])
-def test_another_board_is_refused(size: tuple[int, int]) -> None:
+@pytest.mark.parametrize(
+    ("size", "advice"),
+    [
+        ((24, 17), "say where its origin is seen"),
+        ((22, 17), "it is larger: are columns and rows right?"),
+        ((23, 16), "it is larger: are columns and rows right?"),
+        ((24, 18), "columns and rows count inner corners, not squares; or say where"),
+        ((25, 19), "say where its origin is seen"),
+        ((30, 20), "say where its origin is seen"),
+    ],
+)
+def test_another_board_is_refused(size: tuple[int, int], advice: str) -> None:
     image, _ = photograph("view3", BOARD, 0.0)
-    with pytest.raises(TargetNotFound, match=f"not the whole board of {size[0]} x {size[1]}"):
+    with pytest.raises(TargetNotFound, match=re.escape(f"not the whole board of {size[0]} x {size[1]}; {advice}")):
         detect_target(image, Target(kind="checkerboard", columns=size[0], rows=size[1], pitch_mm=1.0))
 
 
