@@ -91,7 +91,7 @@ def write_run(run_dir: Path, count: int = 3, header: RunHeader | None = None) ->
     return header
 
 
-@settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=12, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     shapes=st.lists(
         st.tuples(st.integers(1, 17), st.integers(1, 19), st.sampled_from([8, 10, 12, 16])), min_size=2, max_size=8
@@ -251,7 +251,7 @@ def pristine(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return run_dir
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(where=st.floats(0, 1, exclude_max=True), bit=st.integers(0, 7))
 def test_a_flipped_bit_never_gives_other_data(pristine: Path, where: float, bit: int) -> None:
     header = header_of()

@@ -70,7 +70,7 @@ def wire() -> Iterator[Wire]:
         yield Wire(port)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(channel=legal_channels(), number=st.integers(0, 3))
 def test_a_legal_train_comes_back_quantised(wire: Wire, channel: Channel, number: int) -> None:
     assert channel.error() is None
@@ -87,7 +87,7 @@ def test_a_legal_train_comes_back_quantised(wire: Wire, channel: Channel, number
     assert loaded.number("period_us") == actual.period_us(LIMIT["MAX_DUTY_PPM"])
 
 
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=400)
 @given(channel=spoilt_channels())
 def test_any_other_train_is_refused_with_the_right_number(wire: Wire, channel: Channel) -> None:
     expected = channel.error() or channel.quantised().error()
@@ -96,7 +96,7 @@ def test_any_other_train_is_refused_with_the_right_number(wire: Wire, channel: C
     assert wire.ask(Command.LOAD).error == (None if expected is None else ErrorNumber.NO_TRAIN)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(number=st.integers(4, 2**32 - 1), channel=legal_channels())
 def test_there_are_four_channels(wire: Wire, number: int, channel: Channel) -> None:
     assert wire.ask(Command.CHANNEL, number, *astuple(channel)).error is ErrorNumber.CHANNEL

@@ -129,7 +129,7 @@ def channels(draw: st.DrawFn) -> Channel:
     ).straddling()
 
 
-@settings(max_examples=30, deadline=None, derandomize=True)
+@settings(max_examples=30)
 @given(plan=st.lists(st.none() | channels(), min_size=4, max_size=4).filter(any))
 def test_any_plan_is_fired_as_answered(shared: Board, plan: list[Channel | None]) -> None:
     replies = iter(shared.configure(plan))

@@ -23,7 +23,7 @@ angle_rad = st.floats(-1.0, 1.0)
 
 
 @given(turn=st.tuples(angle_rad, angle_rad, angle_rad), tilt=st.tuples(angle_rad, angle_rad), behind=st.booleans())
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_values_are_the_parameters_in_other_words(
     turn: tuple[float, float, float], tilt: tuple[float, float], behind: bool
 ) -> None:

@@ -45,7 +45,7 @@ def test_an_empty_image_has_no_droplets() -> None:
 @given(
     x=st.floats(-2.5, 2.5), y=st.floats(-2.0, 2.0), z=st.floats(-1.5, 1.5), azimuth_deg=st.sampled_from([45, 15, -45])
 )
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_lines_of_sight_lead_back_to_the_point(x: float, y: float, z: float, azimuth_deg: float) -> None:
     (camera,) = views([azimuth_deg])
     point_mm = np.array([[x, y, z]])

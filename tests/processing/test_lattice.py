@@ -28,7 +28,7 @@ def perspective_px(ids: IdArray, tilt: float, roll_rad: float) -> FloatArray:
     return np.column_stack([cos * u - sin * v + 400, sin * u + cos * v + 300])
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(tilt=st.floats(-0.8, 0.8), roll_deg=st.floats(-40, 40), missing=st.floats(0, 0.15), seed=st.integers(0, 999))
 def test_every_reachable_point_gets_its_own_node(tilt: float, roll_deg: float, missing: float, seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -97,7 +97,7 @@ def test_a_mirror_changes_nothing_but_the_image() -> None:
     np.testing.assert_allclose(mirrored, line_of_sight(node_plan(mappings), images), atol=2e-4)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(
     position=st.tuples(st.integers(4, 16), st.integers(4, 32), st.integers(4, 270)),
     by_nodes=st.booleans(),
@@ -159,7 +159,7 @@ def test_leaving_out_what_is_empty_changes_nothing(isa: str, accuracy: Accuracy)
     np.testing.assert_array_equal(culled, dense)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(
     shape=st.tuples(st.integers(1, 5), st.integers(1, 40), st.integers(1, 70)),
     format_=st.sampled_from([np.float32, np.float16, np.uint8]),

@@ -27,7 +27,7 @@ def camera(azimuth_deg: float = 30.0, **options: object) -> PinholeCamera:
     return view_camera(azimuth_deg, focal_length_mm=85, magnification=0.43, scale_px_per_mm=60, **options)  # type: ignore[arg-type]
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(
     azimuth_deg=st.floats(-60, 60),
     pitch_deg=st.floats(-20, 20),
@@ -107,7 +107,7 @@ def test_a_view_says_why_it_takes_the_nodes(mapping: ViewMapping, grid: VoxelGri
     assert described.deviation_px == pytest.approx(view.deviation_px, abs=1e-4)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(roll_deg=st.floats(-180, 180), bend=st.floats(-2, 2), wavelength_mm=st.floats(1.5, 9), saddle=st.floats(-4, 4))
 def test_nodes_are_as_dense_as_it_takes(roll_deg: float, bend: float, wavelength_mm: float, saddle: float) -> None:
     mapping = Bent(camera(roll_deg=roll_deg), bend, wavelength_mm, saddle)

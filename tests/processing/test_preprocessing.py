@@ -117,7 +117,7 @@ def random_exposure(
 @pytest.mark.parametrize("polarity", ["shadow", "bright"])
 @pytest.mark.parametrize("bits", [8, 12, 16])
 def test_intensities_equal_the_textbook(isa: str, bits: int, polarity: Literal["shadow", "bright"]) -> None:
-    @settings(max_examples=12, deadline=None, derandomize=True)
+    @settings(max_examples=12)
     @given(
         shape=st.tuples(st.integers(1, 90), st.integers(1, 150)),
         window_px=st.sampled_from([0, 1, 2, 3, 16, 31, 64, 65, 201, 333]),
@@ -134,7 +134,8 @@ def test_intensities_equal_the_textbook(isa: str, bits: int, polarity: Literal["
         references = {"dark": dark if with_dark else None, "background": background if with_background else None}
         expected = oracle.intensity(frame, how, bits=bits, **references)
         result = intensity(frame, how, bits=bits, threads=threads, **references)
-        np.testing.assert_allclose(result, expected, atol=2e-6)
+        # sums of a window in single precision, along columns and rows: half a rounding for each of their terms
+        np.testing.assert_allclose(result, expected, atol=1e-6 + (window_px or 201) * 2.0**-24)
 
     check()
 

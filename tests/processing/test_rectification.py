@@ -40,7 +40,7 @@ to nothing weigh no more than half their sum.
 
 
 @pytest.mark.parametrize("isa", _native.available_isas())
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60)
 @given(
     mapping=views(),
     shape=st.tuples(st.integers(1, 12), st.integers(1, 40), st.integers(1, 70)),
@@ -101,7 +101,7 @@ def assert_limited_by_what_is_seen(
 
 
 @pytest.mark.parametrize("isa", _native.available_isas())
-@settings(max_examples=30, deadline=None, derandomize=True)
+@settings(max_examples=30)
 @given(
     mapping=views(),
     voxel_px=st.floats(0.5, 8),
@@ -119,7 +119,7 @@ def test_averaged_images_equal_the_textbook(isa: str, mapping: ViewMapping, voxe
     np.testing.assert_allclose(resampled.pixels, framed / resampled.unit, rtol=0, atol=0.5 + 0.05)
 
 
-@settings(max_examples=30, deadline=None, derandomize=True)
+@settings(max_examples=30)
 @given(mapping=views(), voxel_px=st.floats(0.5, 8))
 def test_nodes_lead_into_the_averaged_image(mapping: ViewMapping, voxel_px: float) -> None:
     grid = VoxelGrid.centred((3, 5, 9), voxel_px * PITCH_MM)

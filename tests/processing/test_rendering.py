@@ -23,7 +23,7 @@ def shadow_of(view: str, spray: Spray, exposure_s: float = 0.0) -> tuple[FloatAr
 
 
 @given(VIEWS, st.tuples(st.floats(-8, 8), st.floats(-8, 8), st.floats(-4, 4)), st.floats(0.015, 0.2))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_centroid_is_the_projection_within_a_hundredth_pixel(
     view: str, position: tuple[float, float, float], diameter_mm: float
 ) -> None:

@@ -25,7 +25,7 @@ METHODS = [ReconstructionMethod.GAVLOS, ReconstructionMethod.MINLOS, Reconstruct
 
 
 @pytest.mark.parametrize("isa", _native.available_isas())
-@settings(max_examples=40, deadline=None, derandomize=True)
+@settings(max_examples=40)
 @given(case=cases(), method=st.sampled_from(METHODS), dtype=st.sampled_from(["float32", "float16", "uint8"]))
 def test_volumes_equal_the_textbook(
     isa: str, case: tuple[Plan, Images], method: ReconstructionMethod, dtype: str
@@ -52,7 +52,7 @@ def test_any_number_of_views_in_any_format(isa: str, count: int, by_nodes: int) 
 
 
 @pytest.mark.parametrize("isa", _native.available_isas())
-@settings(max_examples=15, deadline=None, derandomize=True)
+@settings(max_examples=15)
 @given(case=cases(), method=st.sampled_from(METHODS), floor=st.sampled_from([0.0, 0.3]), rows=st.integers(1, 50))
 def test_bricks_slabs_and_means_are_the_same_volume(
     isa: str, case: tuple[Plan, Images], method: ReconstructionMethod, floor: float, rows: int

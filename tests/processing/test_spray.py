@@ -54,7 +54,7 @@ def test_columns_of_unequal_length_are_refused() -> None:
 
 
 @given(st.tuples(*[st.floats(-0.15, 0.15)] * 3), st.floats(0.02, 0.12))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_droplet_peaks_at_its_voxel_and_keeps_its_centre(
     position: tuple[float, float, float], diameter_mm: float
 ) -> None:

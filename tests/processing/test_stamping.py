@@ -22,7 +22,7 @@ def centroid(shadow: FloatImage) -> FloatArray:
 
 
 @given(st.floats(28, 36), st.floats(28, 36), st.floats(0.3, 12), st.floats(0.7, 3))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_disc_has_its_area_and_its_centre(row: float, column: float, radius_px: float, sigma_px: float) -> None:
     shadow = 1 - stamp_discs(one_disc([row, column], radius_px, sigma_px), (65, 65))
     assert shadow.sum(dtype=float) == pytest.approx(np.pi * radius_px**2, rel=0.012)

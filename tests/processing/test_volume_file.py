@@ -31,7 +31,7 @@ def some_volume(grid: VoxelGrid = GRID) -> NDArray[np.float32]:
     return np.random.default_rng(3).random(grid.shape).astype(np.float32)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(
     shape=st.tuples(st.integers(1, 6), st.integers(1, 6) | st.integers(60, 200), st.integers(1, 6)),
     origin_mm=st.tuples(st.floats(-9, 9), st.floats(-9, 9), st.floats(-9, 9)),

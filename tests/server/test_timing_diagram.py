@@ -43,7 +43,7 @@ def trained(timing: ShotTiming, shift_ns: int, grid_ns: int = 1) -> FiredTrain:
     return FiredTrain(1, {name: edge(view.camera_trigger_ns) for name, view in timing.views.items()}, pulses)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(
     shift_ns=st.integers(0, 2_000_000), separation_ns=st.integers(3_500, 100_000), left_a=st.sampled_from([0.0, 20.0])
 )
