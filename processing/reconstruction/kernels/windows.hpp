@@ -162,12 +162,13 @@ template <bool compact>
 
 struct Window {
     const int16_t *above, *below;
-    int32_t weight;
+    float weight;
 };
 
 struct Taps {
     int first;
-    Ints index, weight;
+    int32_t index[lanes];
+    Floats fraction;
 };
 
 constexpr bool window_of_a_row = false;
@@ -185,7 +186,9 @@ public:
             const int first = static_cast<int>(position);
             const Floats at = steps + all(static_cast<float>(position - first));
             const Ints left = __builtin_convertvector(at, Ints);
-            taps[part] = {first, left, horizontal_weights(at - __builtin_convertvector(left, Floats)) >> 16};
+            taps[part].first = first;
+            store(taps[part].index, left);
+            taps[part].fraction = at - __builtin_convertvector(left, Floats);
         }
     }
 
@@ -195,18 +198,22 @@ private:
 
 template <bool>
 [[gnu::always_inline]] inline Window blend(const int16_t *above, const int16_t *below, int32_t weight, const Taps &taps) {
-    return {above + taps.first, below + taps.first, weight & 0xffff};
+    return {above + taps.first, below + taps.first, static_cast<float>(weight & 0xffff) * (1.0f / 32768)};
 }
 
+// Neighbours in x are the halves of one word.
 [[gnu::always_inline]] inline Floats pick(const Window &window, const Taps &taps) {
-    Ints left, right;
+    Ints top, bottom;
     for (int k = 0; k < lanes; ++k) {
-        const int16_t *above = window.above + taps.index[k], *below = window.below + taps.index[k];
-        left[k] = above[0] + (((below[0] - above[0]) * window.weight + 0x4000) >> 15);
-        right[k] = above[1] + (((below[1] - above[1]) * window.weight + 0x4000) >> 15);
+        top[k] = load<int32_t>(window.above + taps.index[k]);
+        bottom[k] = load<int32_t>(window.below + taps.index[k]);
     }
-    const Ints sum = left * ((1 << weight_bits) - taps.weight) + right * taps.weight;
-    return __builtin_convertvector(sum, Floats);
+    const auto between = [&window](Ints above, Ints below) {
+        const Floats start = __builtin_convertvector(above, Floats);
+        return start + (__builtin_convertvector(below, Floats) - start) * window.weight;
+    };
+    const Floats left = between(top << 16 >> 16, bottom << 16 >> 16), right = between(top >> 16, bottom >> 16);
+    return (left + (right - left) * taps.fraction) * (1.0f / sample_unit);
 }
 
 #endif
