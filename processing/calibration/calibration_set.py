@@ -36,8 +36,8 @@ def load_calibration_set(path: Path, origins: Origins = NO_ORIGINS, rolls_deg: R
     Raises
     ------
     CalibrationError
-        The path is neither, an imported image does not show the target, or an origin or a roll is stated where it
-        cannot be; names the file.
+        The path is neither, a view never sees the target, or an origin or a roll is stated where it cannot be; names
+        the file.
     """
     path = Path(path)
     folder = next((one for one in (path, path / "calibration") if (one / SET_FILE).exists()), None)

@@ -2,6 +2,7 @@
 
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -9,19 +10,19 @@ import numpy as np
 from processing.calibration.errors import CalibrationError, TargetNotFound
 from processing.calibration.known_dots import find_known_dots
 from processing.calibration.observation import CalibrationSet, PlaneObservation, ViewObservations
-from processing.calibration.set_record import CalibrationEntry, PlaneEntry, PointsEntry
-from processing.calibration.targets import Target, TargetPoints, detect_target
+from processing.calibration.plane_detection import DetectedPlanes, PlaneImage, Size, detect_planes
+from processing.calibration.set_record import CalibrationEntry, PointsEntry
 from processing.geometry import FloatArray
 from processing.image_file import GreyImage, ImageFileError, read_image
 
 MIN_LEVEL_POINTS = 3
 """Measured points are reported by z level where each level has so many points."""
 
-Size = tuple[int, int]
-
 
 def detect_imported(source: str, entry: CalibrationEntry, folder: Path) -> CalibrationSet:
     """Detect the target in all images and read all tables.
+
+    What single images do not tell, see ``plane_detection.detect_planes``.
 
     Parameters
     ----------
@@ -35,24 +36,18 @@ def detect_imported(source: str, entry: CalibrationEntry, folder: Path) -> Calib
     Raises
     ------
     CalibrationError
-        An image does not show the target, sizes differ within a camera, or a table is wrong; names the file.
+        A camera never sees the target, sizes differ within a camera, or a table is wrong; names the file.
     """
-    planes: dict[str, list[PlaneObservation]] = defaultdict(list)
-    sizes: dict[str, Size] = {}
-    for camera, file, size, observations in _observations(entry, folder):
+    detected = _detected(folder, entry)
+    planes = defaultdict(list, {camera: list(seen.planes) for camera, seen in detected.views.items()})
+    sizes = {camera: seen.image_size_px for camera, seen in detected.views.items()}
+    for camera, file, size, levels in _measured(entry, folder):
         if sizes.setdefault(camera, size) != size:
             raise CalibrationError(f"{file}: {size} px, other images of {camera} have {sizes[camera]} px")
-        planes[camera] += observations
+        planes[camera] += levels
     views = {camera: ViewObservations(sizes[camera], _in_order(planes[camera])) for camera in entry.cameras}
     azimuths_deg = {name: azimuth for name, azimuth in entry.azimuth_deg.items() if name not in entry.roll_deg}
-    return CalibrationSet(source, entry.target, views, azimuths_deg=azimuths_deg, rolls_deg=entry.roll_deg)
-
-
-def place_points(points: TargetPoints, target: Target, name: str, z_mm: float | None) -> PlaneObservation:
-    """Detected points on the plane z, or on a board in a free pose where z is not known."""
-    on_plane_mm = target.points_mm(points.ids)
-    world_mm = np.column_stack([on_plane_mm, np.full(len(points), z_mm or 0.0)])
-    return PlaneObservation(name, world_mm, points.image_px, z_mm, free_pose=z_mm is None)
+    return CalibrationSet(source, entry.target, views, detected.notes, azimuths_deg, entry.roll_deg)
 
 
 def read_table(path: Path, columns: Sequence[str]) -> dict[str, FloatArray]:
@@ -85,28 +80,24 @@ def read_table(path: Path, columns: Sequence[str]) -> dict[str, FloatArray]:
     return dict(zip(columns, np.array(rows).T, strict=True))
 
 
-def _observations(entry: CalibrationEntry, folder: Path) -> Iterator[tuple[str, Path, Size, list[PlaneObservation]]]:
-    for plane in entry.plane:
-        yield from _plane_observations(entry, plane, folder)
-    for points in entry.points:
-        size, observations = _dot_levels(points, folder) if points.image else _measured_levels(points, folder)
-        yield points.camera, folder / points.file, size, observations
-
-
-def _plane_observations(
-    entry: CalibrationEntry, plane: PlaneEntry, folder: Path
-) -> Iterator[tuple[str, Path, Size, list[PlaneObservation]]]:
+def _detected(folder: Path, entry: CalibrationEntry) -> DetectedPlanes:
     if entry.target is None:
-        raise CalibrationError("calibration.target: planes need a target")
-    for camera, file in plane.images.items():
-        image = _image(folder / file)
-        origin_px = plane.origin_px.get(camera, entry.origin_px.get(camera))
-        try:
-            points = detect_target(image, entry.target, origin_px, entry.roll_deg.get(camera, 0.0))
-        except TargetNotFound as error:
-            raise TargetNotFound(f"{folder / file}: {error}") from error
-        size = (image.shape[1], image.shape[0])
-        yield camera, folder / file, size, [place_points(points, entry.target, Path(file).name, plane.z_mm)]
+        return DetectedPlanes({}, ())
+    return detect_planes(str(folder), list(_plane_images(entry, folder)), entry.target, entry.roll_deg)
+
+
+def _plane_images(entry: CalibrationEntry, folder: Path) -> Iterator[PlaneImage]:
+    for plane in entry.plane:
+        for camera, file in plane.images.items():
+            origin_px = plane.origin_px.get(camera, entry.origin_px.get(camera))
+            yield PlaneImage(camera, Path(file).name, file, plane.z_mm, partial(_image, folder / file), origin_px)
+
+
+def _measured(entry: CalibrationEntry, folder: Path) -> Iterator[tuple[str, Path, Size, list[PlaneObservation]]]:
+    """Camera, table, size of its images and levels of every entry of points."""
+    for points in entry.points:
+        size, levels = _dot_levels(points, folder) if points.image else _measured_levels(points, folder)
+        yield points.camera, folder / points.file, size, levels
 
 
 def _measured_levels(points: PointsEntry, folder: Path) -> tuple[Size, list[PlaneObservation]]:

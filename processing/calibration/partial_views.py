@@ -40,9 +40,12 @@ def detect_by_others(
     TargetNotFound
         Too few positions are known, or what is seen does not lie where they say.
     """
-    if len(known) < MIN_KNOWN_PLANES or target.columns is None or target.rows is None:
+    if target.columns is None:
+        raise TargetNotFound("other positions would tell if columns and rows of the target were given")
+    positions = len({plane.z_mm for plane in known})
+    if positions < MIN_KNOWN_PLANES:
         raise TargetNotFound(
-            f"{len(known)} other positions are known, {MIN_KNOWN_PLANES} would tell; "
+            f"{positions} other positions are known, {MIN_KNOWN_PLANES} would tell; "
             "say where the origin is seen at two positions"
         )
     ids = target.board_ids()

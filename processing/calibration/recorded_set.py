@@ -1,7 +1,8 @@
 """Calibration sets from recorded runs: the target at known positions of the stage."""
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache, partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -11,11 +12,10 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from daq.shotfile import ImageKey, RunReader, Shot
-from processing.calibration.errors import CalibrationError, OriginUnknown, TargetNotFound
-from processing.calibration.imported_set import place_points
-from processing.calibration.observation import CalibrationSet, PlaneObservation, ViewObservations
-from processing.calibration.partial_views import detect_by_others
-from processing.calibration.targets import Target, detect_target
+from processing.calibration.errors import CalibrationError
+from processing.calibration.observation import CalibrationSet
+from processing.calibration.plane_detection import PlaneImage, detect_planes
+from processing.calibration.targets import Target
 
 Place = tuple[str, float]
 """A view, and a position of the stage in mm."""
@@ -23,9 +23,10 @@ Origins = Mapping[Place, tuple[float, float]]
 """Where the target's origin is seen (u, v)."""
 Rolls = Mapping[str, float]
 """How cameras are turned about their axes, in degrees."""
-Found = dict[Place, PlaneObservation]
 Positions = Mapping[float, list[int]]
 """Indices of shots by stage position in mm."""
+MeanFrames = dict[str, NDArray[np.float32]]
+"""Mean of exposures A by view, (rows, columns)."""
 
 NO_ORIGINS: Origins = MappingProxyType({})
 NO_ROLLS: Rolls = MappingProxyType({})
@@ -36,9 +37,7 @@ _SHOWS_TARGET = (ImageKey.SAMPLE, ImageKey.FLAT)
 def detect_recorded(run_dir: Path, origins: Origins = NO_ORIGINS, rolls_deg: Rolls = NO_ROLLS) -> CalibrationSet:
     """Detect the target in exposures A, averaged over the valid shots of each stage position.
 
-    Where a view sees a part of the target only, the positions at which it is told which points these are (the whole
-    board, a marker, a stated origin) tell it for the others. A view that does not see the target at some position
-    goes without it; the set notes both.
+    What single images do not tell, see ``plane_detection.detect_planes``.
 
     Parameters
     ----------
@@ -61,62 +60,36 @@ def detect_recorded(run_dir: Path, origins: Origins = NO_ORIGINS, rolls_deg: Rol
         positions = dict(sorted(_by_position(run).items()))
         if not positions:
             raise CalibrationError(f"{run_dir}: no valid shot has a stage position; is it a calibration run?")
-        views, sizes = list(run.header.views), {name: form.shape[::-1] for name, form in run.header.views.items()}
+        configuration, views = run.header.configuration, list(run.header.views)
         _check_origins(run_dir, origins, views, list(positions))
         _check_rolls(run_dir, rolls_deg, views)
-        configuration = run.header.configuration
         believed_deg = {**_of_views(configuration, "roll_deg"), **rolls_deg}
-        found, missed = _first_look(run, target, positions, origins, believed_deg)
-        more, notes = _second_look(run, target, positions, found, missed, believed_deg)
+        detected = detect_planes(str(run_dir), _plane_images(run, positions, origins), target, believed_deg)
         source = run.header.run_id
-    points = found | more
-    planes = {view: [points[place] for place in sorted(points) if place[0] == view] for view in views}
-    _check_seen(run_dir, planes, notes)
-    seen = {view: ViewObservations(sizes[view], tuple(planes[view])) for view in views}
     azimuths_deg = _of_views(configuration, "azimuth_deg")
     checked_deg = {name: azimuths_deg[name] for name in views if name in azimuths_deg and name not in rolls_deg}
-    return CalibrationSet(source, target, seen, tuple(notes), checked_deg, believed_deg)
+    return CalibrationSet(source, target, detected.views, detected.notes, checked_deg, believed_deg)
 
 
-def _first_look(
-    run: RunReader, target: Target, positions: Positions, origins: Origins, rolls_deg: Rolls
-) -> tuple[Found, dict[Place, TargetNotFound]]:
-    """What each image tells by itself, and why the others do not."""
-    found, missed = {}, {}
-    for z_mm, shots in positions.items():
-        for view, image in _mean_frames(run, shots).items():
-            try:
-                points = detect_target(image, target, origins.get((view, z_mm)), rolls_deg.get(view, 0.0))
-                found[view, z_mm] = place_points(points, target, f"z={z_mm:g}", z_mm)
-            except TargetNotFound as error:
-                missed[view, z_mm] = error
-    return found, missed
+def _plane_images(run: RunReader, positions: Positions, origins: Origins) -> list[PlaneImage]:
+    """Every view at every position, the mean of its frames; those of one position are read together."""
+    mean_frames = lru_cache(maxsize=1)(lambda z_mm: _mean_frames(run, positions[z_mm]))
+    return [
+        PlaneImage(
+            view,
+            f"z={z_mm:g}",
+            f"z {z_mm:g} mm",
+            z_mm,
+            partial(_frame_of, mean_frames, z_mm, view),
+            origins.get((view, z_mm)),
+        )
+        for z_mm in positions
+        for view in run.header.views
+    ]
 
 
-def _second_look(
-    run: RunReader,
-    target: Target,
-    positions: Positions,
-    found: Found,
-    missed: Mapping[Place, TargetNotFound],
-    rolls_deg: Rolls,
-) -> tuple[Found, list[str]]:
-    """What the other positions of a view tell of images that show a part of the target; notes on all of these."""
-    more, notes = {}, []
-    for (view, z_mm), reason in missed.items():
-        known = [plane for (name, _), plane in found.items() if name == view]
-        try:
-            if not isinstance(reason, OriginUnknown):
-                raise reason
-            image = _mean_frames(run, positions[z_mm])[view]
-            points = detect_by_others(image, target, z_mm, known, rolls_deg.get(view, 0.0))
-        except TargetNotFound as error:
-            also = "" if error is reason else f"; {error}"
-            notes.append(f"{view}, z {z_mm:g} mm left out: {reason}{also}")
-            continue
-        more[view, z_mm] = place_points(points, target, f"z={z_mm:g}", z_mm)
-        notes.append(f"{view}, z {z_mm:g} mm: {len(points)} points of the target; other positions tell which")
-    return more, notes
+def _frame_of(mean_frames: Callable[[float], MeanFrames], z_mm: float, view: str) -> NDArray[np.float32]:
+    return mean_frames(z_mm)[view]
 
 
 def _check_origins(run_dir: Path, origins: Origins, views: Sequence[str], positions_mm: Sequence[float]) -> None:
@@ -139,7 +112,7 @@ def _of_views(configuration: dict[str, Any], key: str) -> dict[str, float]:
     return {name: float(view[key]) for name, view in views.items() if key in view}
 
 
-def mean_target_images(run_dir: Path, z_mm: float) -> dict[str, NDArray[np.float32]]:
+def mean_target_images(run_dir: Path, z_mm: float) -> MeanFrames:
     """Exposures A of every view, averaged over the valid shots at one stage position."""
     with RunReader(run_dir) as run:
         return _mean_frames(run, _by_position(run)[z_mm])
@@ -164,18 +137,11 @@ def _by_position(run: RunReader) -> Positions:
     return positions
 
 
-def _mean_frames(run: RunReader, shots: list[int]) -> dict[str, NDArray[np.float32]]:
-    totals: dict[str, NDArray[np.float32]] = {}
+def _mean_frames(run: RunReader, shots: list[int]) -> MeanFrames:
+    totals: MeanFrames = {}
     for index in shots:
         shot: Shot = run.read_shot(index)
         for view, exposures in shot.views.items():
             frame = exposures.frame_a.astype(np.float32)
             totals[view] = totals[view] + frame if view in totals else frame
     return {view: total / np.float32(len(shots)) for view, total in totals.items()}
-
-
-def _check_seen(run_dir: Path, planes: Mapping[str, Sequence[PlaneObservation]], notes: Sequence[str]) -> None:
-    for view, seen in planes.items():
-        if not seen:
-            reason = next(note for note in notes if note.startswith(view))
-            raise CalibrationError(f"{run_dir}: {view} never sees the target; {reason}")

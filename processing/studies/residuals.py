@@ -14,9 +14,9 @@ from matplotlib.figure import Figure
 
 from processing.analysis.colours import VIEW_COLOURS
 from processing.calibration.calibration import Calibration, Model
-from processing.calibration.imported_set import place_points
 from processing.calibration.joint_fit import calibrate
 from processing.calibration.observation import CalibrationSet, PlaneObservation, ViewObservations
+from processing.calibration.plane_detection import place_points
 from processing.calibration.targets import Target, detect_target
 from processing.geometry import FloatArray, PinholeCamera
 from processing.studies.report import Statement

@@ -1,5 +1,6 @@
 """Manifests: images from elsewhere become runs and calibration sets, or nothing is written and the line is named."""
 
+import re
 from pathlib import Path
 
 import cv2
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 
 from daq.shotfile import ImageKey, RunReader
 from processing.calibration.calibration_set import load_calibration_set
+from processing.calibration.errors import CalibrationError
 from processing.calibration.joint_fit import calibrate
 from processing.import_manifest import ManifestError
 from processing.importing import import_manifest
@@ -181,21 +183,61 @@ def test_missing_manifest_is_named(tmp_path: Path) -> None:
         import_manifest(tmp_path / "none.toml", tmp_path / "out")
 
 
+BOARD_23 = '[calibration]\ntarget = { kind = "checkerboard", columns = 23, rows = 17, pitch_mm = 1.0 }\n'
+
+
+def photograph_board(folder: Path, z_mm: float, columns: slice = slice(None), hidden: int = 0) -> str:
+    """Write an image of the board at z, cut to some columns, the first ones dark; its plane in a manifest."""
+    seen = render_target(paper_cameras(4)["view1"], Checkerboard(), z_mm, paper_optics(4)["view1"])[:, columns]
+    seen[:, :hidden] = 0
+    cv2.imwrite(str(folder / f"{z_mm:g}.tif"), (40 + 200 * seen).astype(np.uint8))
+    return f'[[calibration.plane]]\nz_mm = {z_mm:g}\nimages = {{ view1 = "{z_mm:g}.tif" }}\n'
+
+
 def test_planes_become_a_set_that_can_be_calibrated_without_the_originals(tmp_path: Path) -> None:
-    camera, optics = paper_cameras(4)["view1"], paper_optics(4)["view1"]
-    text = '[calibration]\ntarget = { kind = "checkerboard", columns = 23, rows = 17, pitch_mm = 1.0 }\n'
-    for z_mm in (-3, -1, 1, 3):
-        seen = render_target(camera, Checkerboard(), float(z_mm), optics)
-        cv2.imwrite(str(tmp_path / f"{z_mm}.tif"), (40 + 200 * seen).astype(np.uint8))
-        text += f'[[calibration.plane]]\nz_mm = {z_mm}\nimages = {{ view1 = "{z_mm}.tif" }}\n'
+    text = BOARD_23 + "".join(photograph_board(tmp_path, z_mm) for z_mm in (-3.0, -1.0, 1.0, 3.0))
     out = run_import(tmp_path, text)
     for original in tmp_path.glob("*.tif"):
         original.unlink()
     calibration = calibrate(load_calibration_set(out))
     assert calibration.source == "manifest"
     assert [plane.name for plane in calibration.views["view1"].planes] == ["-3.tif", "-1.tif", "1.tif", "3.tif"]
-    assert true_errors_px(calibration.views["view1"].mapping, camera).mean() < 0.03
+    assert true_errors_px(calibration.views["view1"].mapping, paper_cameras(4)["view1"]).mean() < 0.03
     assert load_calibration_set(out / "calibration").target == calibration.target
+
+
+def test_a_blank_image_is_left_out_and_a_part_of_the_board_is_told_by_the_others(tmp_path: Path) -> None:
+    columns = slice(42, 390)
+    text = BOARD_23 + "".join(photograph_board(tmp_path, z_mm, columns) for z_mm in (-4.0, -2.0, 0.0, 2.0, 4.0))
+    cv2.imwrite(str(tmp_path / "-2.tif"), np.full((300, 348), 40, np.uint8))
+    found = load_calibration_set(run_import(tmp_path, text))
+    assert [plane.name for plane in found.views["view1"].planes] == ["-4.tif", "0.tif", "2.tif", "4.tif"]
+    blank, part = found.notes
+    assert blank == "view1, images/001/-2.tif left out: checkerboard: no corners in a grid"
+    assert re.fullmatch(r"view1, images/004/4\.tif: \d+ points of the target; other positions tell which", part)
+    cut_px = found.views["view1"].planes[-1].image_px + (columns.start, 0)
+    true_px = paper_cameras(4)["view1"].project(found.views["view1"].planes[-1].points_mm)
+    assert np.median(np.linalg.norm(cut_px - true_px, axis=1)) < 0.1
+
+
+def test_a_camera_that_never_sees_the_target_is_refused(tmp_path: Path) -> None:
+    text = BOARD_23.replace("23", "24") + photograph_board(tmp_path, 0.0)
+    with pytest.raises(CalibrationError, match=r"calibration: view1 never sees the target; .*images/000/0\.tif left"):
+        load_calibration_set(run_import(tmp_path, text))
+
+
+def test_a_part_of_a_board_in_a_free_pose_is_left_out(tmp_path: Path) -> None:
+    text = BOARD_23 + photograph_board(tmp_path, 0.0) + photograph_board(tmp_path, 1.0, hidden=150)
+    found = load_calibration_set(run_import(tmp_path, re.sub("z_mm = .*\n", "", text)))
+    assert [plane.name for plane in found.views["view1"].planes] == ["0.tif"]
+    (note,) = found.notes
+    assert re.fullmatch(r"view1, images/001/1\.tif left out: .* not the whole board of 23 x 17.*", note)
+
+
+def test_images_of_a_camera_that_differ_in_size_are_refused(tmp_path: Path) -> None:
+    text = BOARD_23 + photograph_board(tmp_path, 0.0) + photograph_board(tmp_path, 1.0, slice(0, 399))
+    with pytest.raises(CalibrationError, match=r"images/001/1\.tif: \(399, 300\) px, other images of view1 have \(400"):
+        load_calibration_set(run_import(tmp_path, text))
 
 
 def test_points_take_the_image_size_from_the_run(folder: Path) -> None:
