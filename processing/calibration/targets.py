@@ -108,7 +108,8 @@ def detect_target(
     Raises
     ------
     TargetNotFound
-        There are too few points; OriginUnknown where nothing tells which of them is the origin.
+        There are too few points, or more than the board has; OriginUnknown where nothing tells which of them is the
+        origin.
     """
     pixels = np.ascontiguousarray(image, dtype=np.float32)
     if target.kind == "checkerboard":
@@ -174,23 +175,45 @@ def _with_origin(
     if marked is None and origin_px is not None:
         marked = int(lattice.indices[_nearest(points_px[lattice.indices], origin_px, lattice, points_px)])
     if marked is not None:
-        return lattice.with_ids(lattice.ids - lattice.ids[lattice.indices == marked])
+        return _within_board(lattice.with_ids(lattice.ids - lattice.ids[lattice.indices == marked]), target)
     if target.columns is None or target.rows is None:
         raise OriginUnknown("dots: no dot carries a marker; say where the origin is seen (origin_px)")
     board = place_board(lattice, target.columns, target.rows)
     if board is None:
-        columns, rows = (int(extent) + 1 for extent in np.ptp(lattice.ids, axis=0))
-        raise OriginUnknown(
-            f"{target.kind}: a grid of {columns} x {rows} points is seen, {_misfit(target, columns, rows)}"
-        )
+        raise OriginUnknown(_misfit(target, *_extent(lattice)))
     return board.with_ids(board.ids - ((target.columns - 1) // 2, (target.rows - 1) // 2))
+
+
+def _within_board(lattice: Lattice, target: Target) -> Lattice:
+    """Points that a board of the stated size can have: of a larger grid, sparse outer lines are stray points."""
+    if target.columns is None or not _is_larger(target, *_extent(lattice)):
+        return lattice
+    even_strength = np.ones(int(lattice.indices.max()) + 1)
+    trimmed = trim_frame(lattice, even_strength)
+    if _is_larger(target, *_extent(trimmed)):
+        raise TargetNotFound(_misfit(target, *_extent(trimmed)))
+    return trimmed
+
+
+def _extent(lattice: Lattice) -> tuple[int, int]:
+    """Columns and rows that a grid spans."""
+    columns, rows = (int(extent) + 1 for extent in np.ptp(lattice.ids, axis=0))
+    return columns, rows
+
+
+def _is_larger(target: Target, columns: int, rows: int) -> bool:
+    """Whether a grid of so many points is larger than the board, upright or turned."""
+    board = (target.columns or 0, target.rows or 0)
+    return max(columns, rows) > max(board) or min(columns, rows) > min(board)
 
 
 def _misfit(target: Target, columns: int, rows: int) -> str:
     """Why a grid of so many points seen is not the board, and what to do."""
     board = (target.columns or 0, target.rows or 0)
-    text = f"not the whole board of {board[0]} x {board[1]}; "
-    if max(columns, rows) > max(board) or min(columns, rows) > min(board):
+    text = (
+        f"{target.kind}: a grid of {columns} x {rows} points is seen, not the whole board of {board[0]} x {board[1]}; "
+    )
+    if _is_larger(target, columns, rows):
         return text + "it is larger: are columns and rows right?"
     if target.kind == "checkerboard" and sorted((columns + 1, rows + 1)) == sorted(board):
         return text + "columns and rows count inner corners, not squares; or say where its origin is seen (origin_px)"

@@ -72,6 +72,32 @@ def test_marker_or_stated_origin_tells_every_mounting(kind: str, mounting: NDArr
     assert errors_px(points, camera, origin_mm).max() < 0.2
 
 
+@pytest.mark.parametrize(("columns", "rows"), [(7, 7), (9, 8), (8, 12)])
+@pytest.mark.parametrize("kind", ["dots", "checkerboard"])
+def test_a_board_of_another_size_is_refused_though_its_origin_is_known(kind: str, columns: int, rows: int) -> None:
+    camera = paper_cameras(BINNING)["view2"]
+    marked = kind == "dots"
+    pattern = DotTarget(9, 9, PITCH_MM, 0.3) if marked else Checkerboard(9, 9, PITCH_MM)
+    image = photograph(camera, Mounted(pattern, MOUNTINGS[0], marked))
+    u_px, v_px = camera.project(np.array([[*(ORIGIN_ID * PITCH_MM), 0.0]]))[0]
+    target = Target.model_validate({"kind": kind, "columns": columns, "rows": rows, "pitch_mm": PITCH_MM})
+    with pytest.raises(
+        TargetNotFound, match=f"9 x 9 points is seen, not the whole board of {columns} x {rows}; it is la"
+    ):
+        detect_target(image, target, None if marked else (u_px, v_px))
+
+
+def test_stray_points_beyond_the_board_are_left_out() -> None:
+    camera = paper_cameras(BINNING)["view2"]
+    image = photograph(camera, Mounted(DotTarget(9, 9, PITCH_MM, 0.3), MOUNTINGS[0], marked=True))
+    inside, stray = camera.project(np.array([[4 * PITCH_MM, 0.0, 0.0], [5 * PITCH_MM, 0.0, 0.0]])).round().astype(int)
+    around = np.mgrid[-6:7, -6:7]
+    image[stray[1] + around[0], stray[0] + around[1]] = image[inside[1] + around[0], inside[0] + around[1]]
+    points = detect_target(image, Target(kind="dots", columns=9, rows=9, pitch_mm=PITCH_MM))
+    np.testing.assert_array_equal(np.ptp(points.ids, axis=0), [8, 8])
+    assert len(points) == 81
+
+
 def test_missing_corners_cost_themselves_only() -> None:
     camera = paper_cameras(BINNING)["view1"]
     image = photograph(camera, Checkerboard())
