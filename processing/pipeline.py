@@ -43,7 +43,8 @@ class Stopped(Exception):
 class VolumeRecord(FrozenValue):
     """One volume that was written; ``seconds`` is the wall time of its reconstruction.
 
-    ``residuals`` are those of SMART and MART, see ``processing.reconstruction.smart.SmartResult``.
+    ``residuals`` are those of SMART and MART, see ``processing.reconstruction.smart.SmartResult``. ``blind_views``
+    see nothing in this exposure, no pixel above the noise floor: a shot may be empty, or a lens be covered.
     """
 
     shot: int
@@ -51,6 +52,7 @@ class VolumeRecord(FrozenValue):
     file: str
     seconds: float
     residuals: tuple[float, ...] = ()
+    blind_views: tuple[str, ...] = ()
 
 
 class ShotResult(FrozenValue):
@@ -116,7 +118,10 @@ def reconstruct_shot(
             if should_stop():
                 raise Stopped(f"{run_dir.name}, shot {shot}: stopped before exposure {frame}")
             images = shot_intensities(run, recorded, frame, settings, bench.images)
-            volumes.append(_reconstruct_frame(bench, images, results_dir, shot, frame, provenance))
+            blind = tuple(view for view, image in zip(recorded.views, images, strict=True) if not image.any())
+            named = {**provenance, "blind_views": json.dumps(blind)} if blind else provenance
+            written = _reconstruct_frame(bench, images, results_dir, shot, frame, named)
+            volumes.append(written.model_copy(update={"blind_views": blind}))
     return ShotResult(
         shot=shot,
         method=settings.method,

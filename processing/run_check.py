@@ -74,6 +74,7 @@ def check_shot(run_dir: Path, shot: int, calibration: Calibration) -> ShotCheck:
     (exposures,) = _droplets(run_dir, [shot], calibration)
     mappings = [view.mapping for view in calibration.views.values()]
     try:
+        _require_droplets(calibration, exposures)
         measured = shot_disparity(mappings, exposures, measured_box(calibration))
     except CalibrationError as error:
         return ShotCheck(shot, {}, str(error))
@@ -91,6 +92,7 @@ def self_calibrate_run(run_dir: Path, shots: Sequence[int], calibration: Calibra
         An exposure is missing.
     """
     exposures = [exposure for of_shot in _droplets(run_dir, shots, calibration) for exposure in of_shot]
+    _require_droplets(calibration, exposures)
     return self_calibrate(calibration, exposures, run_dir.name)
 
 
@@ -111,6 +113,18 @@ def _droplets(run_dir: Path, shots: Sequence[int], calibration: Calibration) -> 
                 exposures.append([find_droplets(images[name]) for name in calibration.views])
             found.append(exposures)
     return found
+
+
+def _require_droplets(calibration: Calibration, exposures: Sequence[Exposure]) -> None:
+    """Refuse exposures in none of which some view sees a droplet: the others cannot tell anything of it."""
+    seen = zip(calibration.views, zip(*exposures, strict=True), strict=True)
+    counts = {name: sum(map(len, droplets_px)) for name, droplets_px in seen}
+    if blind := [name for name, count in counts.items() if not count]:
+        by_view = ", ".join(f"{name} {count}" for name, count in counts.items())
+        raise CalibrationError(
+            f"{', '.join(blind)}: no droplet is seen (droplets in {len(exposures)} exposures: {by_view}); "
+            "is a lens covered, or a light off?"
+        )
 
 
 def _check_views(run: RunReader, calibration: Calibration) -> None:

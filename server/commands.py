@@ -179,6 +179,7 @@ def reconstruct_run(options: Namespace) -> dict[str, Any]:
         results.append(reconstruct_shot(options.run, shot, options.calibration, settings, options.out))
         if len(results) == 1:
             _tell_slow_views(results[0])
+        _tell_blind_views(results[-1])
     return {
         "method": options.method,
         "accuracy": options.accuracy,
@@ -196,6 +197,15 @@ def _tell_slow_views(result: ShotResult) -> None:
         if view.reason:
             nodes = f"nodes {view.node_spacing_voxel} voxels apart"
             progress(f"{name} takes the exact way, which is slower ({nodes}): {view.reason}")
+
+
+def _tell_blind_views(result: ShotResult) -> None:
+    for volume in result.volumes:
+        for name in volume.blind_views:
+            progress(
+                f"shot {volume.shot}, exposure {volume.frame}: {name} sees nothing; "
+                "is the shot empty, or a lens covered, a light off?"
+            )
 
 
 def parse_grid(text: str, calibration: Calibration) -> VoxelGrid:

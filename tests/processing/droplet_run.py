@@ -43,21 +43,22 @@ def shadowgraph(camera: PinholeCamera, droplets_mm: NDArray[np.float64]) -> NDAr
     return image
 
 
-def write_run(run_dir: Path, shots: int = 1, invalid: tuple[int, ...] = ()) -> Path:
-    """Record shots; in the invalid ones exposure B of view2 is missing."""
+def write_run(run_dir: Path, shots: int = 1, invalid: tuple[int, ...] = (), covered: tuple[str, ...] = ()) -> Path:
+    """Record shots; in the invalid ones exposure B of view2 is missing; covered views are dark."""
     views = {name: ViewFormat(SHAPE, 8) for name in cameras()}
     header = RunHeader(run_id=run_dir.name, created_utc="2026-01-01T00:00:00+00:00", views=views, separation_ns=6400)
     with RunWriter(run_dir, header) as writer:
         for index in range(shots):
-            writer.write_shot(_shot(index, valid=index not in invalid))
+            writer.write_shot(_shot(index, valid=index not in invalid, covered=covered))
         writer.finish("completed")
     return run_dir
 
 
-def _shot(index: int, *, valid: bool) -> Shot:
+def _shot(index: int, *, valid: bool, covered: tuple[str, ...]) -> Shot:
     views = {}
     for name, camera in cameras().items():
-        frame_a, frame_b = (shadowgraph(camera, DROPLETS_A_MM + step * MOTION_MM) for step in (0, 1))
+        light = name not in covered
+        frame_a, frame_b = (light * shadowgraph(camera, DROPLETS_A_MM + step * MOTION_MM) for step in (0, 1))
         views[name] = DoubleFrame(frame_a, frame_b, SEEN, SEEN)
     if not valid:
         views["view2"] = replace(views["view2"], frame_b=np.zeros(SHAPE, np.uint8), record_b=MISSING)

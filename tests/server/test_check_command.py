@@ -1,6 +1,7 @@
 """check and self-calibrate: a camera that moved after calibration is told from the shots, and put right."""
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -21,8 +22,13 @@ SEEN = ExposureRecord(valid=True, frame_id=1, device_timestamp_ns=1)
 DRIFT_PX = 2
 
 
-def write_droplet_run(run_dir: Path, density_per_mm3: float = DENSITY_PER_MM3, view_count: int = 4) -> Path:
-    """Two shots; the picture of view2 lies two pixels further right than when it was calibrated."""
+def write_droplet_run(
+    run_dir: Path, density_per_mm3: float = DENSITY_PER_MM3, view_count: int = 4, covered: str = ""
+) -> Path:
+    """Two shots; the picture of view2 lies two pixels further right than when it was calibrated.
+
+    A covered view is dark.
+    """
     rng = np.random.default_rng(11)
     cameras = {f"view{number}": camera for number, camera in enumerate(views()[:view_count], start=1)}
     shape = (SIZE_PX[1], SIZE_PX[0])
@@ -40,6 +46,7 @@ def write_droplet_run(run_dir: Path, density_per_mm3: float = DENSITY_PER_MM3, v
                 points_mm = rng.uniform(-HALF_MM, HALF_MM, (int(density_per_mm3 * np.prod(2 * HALF_MM)), 3))
                 images = {name: droplet_image(camera, points_mm, rng) for name, camera in cameras.items()}
                 images["view2"] = np.roll(images["view2"], DRIFT_PX, axis=1)
+                images = {name: image * (name != covered) for name, image in images.items()}
                 exposures.append({name: np.round(200 * image).astype(np.uint8) for name, image in images.items()})
             shot_views = {name: DoubleFrame(exposures[0][name], exposures[1][name], SEEN, SEEN) for name in cameras}
             writer.write_shot(Shot(index, ImageKey.SAMPLE, shot_views))
@@ -105,6 +112,20 @@ def test_shots_without_droplets_say_so_and_correct_nothing(
     refused = told(capsys, "self-calibrate", empty, "--calibration", calibration_file, "-o", new, status=2)
     assert "sub-volumes, 8 are needed" in refused["error"]
     assert not new.exists()
+
+
+def test_a_view_that_sees_no_droplet_is_named(
+    calibration_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = write_droplet_run(tmp_path / "covered", covered="view3")
+    blind = (
+        r"^view3: no droplet is seen \(droplets in \d exposures: view1 \d+, view2 \d+, view3 0, view4 \d+\); is a lens"
+    )
+    problem = told(capsys, "check", run, "--calibration", calibration_file, "--shots", "0:1")["shots"][0]["problem"]
+    assert re.match(blind, problem)
+    new = tmp_path / "new.json"
+    refused = told(capsys, "self-calibrate", run, "--calibration", calibration_file, "-o", new, status=2)
+    assert re.match(blind, refused["error"])
 
 
 def test_calibration_of_other_views_is_refused(

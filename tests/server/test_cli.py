@@ -82,6 +82,26 @@ def test_reconstruct_says_before_the_second_shot_which_views_are_slow(
     assert all("takes the exact way, which is slower" in line and "a voxel covers" in line for line in slow)
 
 
+def test_a_view_that_sees_nothing_is_named_with_every_volume(
+    calibration_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run_dir = write_run(tmp_path / "run", covered=("view2",))
+    arguments = ["reconstruct", run_dir, "--calibration", calibration_file, "-o", tmp_path / "out", f"--grid={GRID}"]
+    assert main([*map(str, arguments), "--json"]) == 0
+    output = capsys.readouterr()
+    assert [volume["blind_views"] for volume in json.loads(output.out)["volumes"]] == [["view2"], ["view2"]]
+    assert "shot 0, exposure a: view2 sees nothing; is the shot empty, or a lens covered" in output.err
+    assert "exposure b: view2 sees nothing" in output.err
+    assert read_volume(tmp_path / "out" / "shot_00000_a.vtkhdf")[2]["blind_views"] == '["view2"]'
+
+
+def test_views_that_see_droplets_are_not_named(
+    run_dir: Path, calibration_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["reconstruct", run_dir, "--calibration", calibration_file, "-o", tmp_path / "out", f"--grid={GRID}"]
+    assert [volume["blind_views"] for volume in told(capsys, *arguments)["volumes"]] == [[]] * 4
+
+
 def test_shots_can_be_chosen(
     run_dir: Path, calibration_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
