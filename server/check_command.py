@@ -4,7 +4,7 @@ from argparse import Namespace
 from typing import Any
 
 from processing.calibration.calibration import Verdict
-from processing.calibration.calibration_file import load_calibration, save_calibration
+from processing.calibration.calibration_file import load_calibration, require_free, save_calibration
 from processing.run_check import ALARM_PX, STOP_PX, ShotCheck, check_shot, self_calibrate_run
 from server.commands import progress, selected_shots
 
@@ -56,6 +56,7 @@ def check_json(measured: ShotCheck) -> dict[str, Any]:
 
 def self_calibrate_views(options: Namespace) -> dict[str, Any]:
     """``tomoshadow self-calibrate``."""
+    require_free(options.out)
     calibration = load_calibration(options.calibration)
     shots = selected_shots(options.run, options.shots)
     progress(f"{options.run.name}: droplets of {len(shots)} shots")

@@ -15,7 +15,7 @@ from pydantic import ValidationError
 from daq.shotfile import ImageKey, RunReader
 from processing.analysis.figures import residuals_figure
 from processing.calibration.calibration import Calibration, ViewCalibration
-from processing.calibration.calibration_file import load_calibration, save_calibration
+from processing.calibration.calibration_file import load_calibration, require_free, save_calibration
 from processing.calibration.calibration_set import load_calibration_set
 from processing.calibration.covariance import worst_position_std_px
 from processing.calibration.joint_fit import calibrate
@@ -71,6 +71,7 @@ def import_images(options: Namespace) -> dict[str, Any]:
 def calibrate_views(options: Namespace) -> dict[str, Any]:
     """``tomoshadow calibrate``."""
     figure = picture_beside(options.out)
+    require_free(options.out)
     calibration_set = load_calibration_set(options.set, dict(options.origin or ()), dict(options.roll or ()))
     calibration = calibrate(calibration_set, model=options.model)
     save_calibration(calibration, options.out)

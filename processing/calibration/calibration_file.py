@@ -26,6 +26,7 @@ __all__ = [
     "ViewCalibration",
     "file_sha256",
     "load_calibration",
+    "require_free",
     "save_calibration",
 ]
 
@@ -52,9 +53,25 @@ def save_calibration(calibration: Calibration, path: Path, *, overwrite: bool = 
         else:
             os.link(part, path)
     except FileExistsError as error:
-        raise CalibrationError(f"{path}: exists; a calibration is not overwritten unless asked to") from error
+        raise _exists(path) from error
     finally:
         part.unlink(missing_ok=True)
+
+
+def require_free(path: Path) -> None:
+    """Refuse a calibration file that exists, before its successor is computed.
+
+    Raises
+    ------
+    CalibrationError
+        It exists.
+    """
+    if Path(path).exists():
+        raise _exists(path)
+
+
+def _exists(path: Path) -> CalibrationError:
+    return CalibrationError(f"{path}: exists; a calibration is not overwritten unless asked to")
 
 
 def load_calibration(path: Path) -> Calibration:

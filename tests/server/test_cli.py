@@ -370,6 +370,18 @@ def test_calibrate_measured_points_and_never_overwrite(tmp_path: Path, capsys: p
     assert (tmp_path / "calibration.json").read_bytes() == before
 
 
+@pytest.mark.parametrize(
+    "command", [["calibrate", "nowhere"], ["self-calibrate", "nowhere", "--calibration", "nowhere.json"]]
+)
+def test_a_calibration_that_exists_is_refused_before_anything_is_computed(
+    command: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "calibration.json").write_text("kept")
+    complaint = refused(capsys, *command, "-o", tmp_path / "calibration.json")
+    assert complaint == f"{tmp_path / 'calibration.json'}: exists; a calibration is not overwritten unless asked to"
+    assert (tmp_path / "calibration.json").read_text() == "kept"
+
+
 def test_origins_are_stated_for_runs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     _write_points(tmp_path)
     told(capsys, "import", tmp_path / "manifest.toml", "-o", tmp_path / "set")
