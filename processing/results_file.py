@@ -52,18 +52,33 @@ def average_volumes(files: list[Path]) -> tuple[Intensity, VoxelGrid]:
     Raises
     ------
     VolumeFileError
-        There are none, or their grids differ.
+        There are none, or their grids, calibrations or settings differ.
     """
     if not files:
         raise VolumeFileError("there are no volumes to average")
     with open_volume(files[0]) as first:
-        grid = first.grid
+        grid, made_by = first.grid, _made_by(first.provenance)
     total = np.zeros(grid.shape, np.float32)
     for file in files:
         with open_volume(file) as volume:
             if volume.grid != grid:
                 raise VolumeFileError(f"{file}: its grid {volume.grid} differs from {grid}, that of {files[0].name}")
+            if differing := _differing(_made_by(volume.provenance), made_by):
+                raise VolumeFileError(f"{file}: {differing} of {files[0].name}; these have no common mean")
             for first_row, slab in volume.slabs():
                 total[:, first_row : first_row + slab.shape[1]] += slab
     total /= np.float32(len(files))
     return total, grid
+
+
+def _made_by(provenance: Provenance) -> dict[str, object]:
+    """Calibration and settings of a volume, one by one; empty where it does not say. Its grid speaks for itself."""
+    settings = json.loads(str(provenance.get("settings", "{}")))
+    settings.pop("grid", None)
+    return {"calibration": provenance.get("calibration"), **settings}
+
+
+def _differing(its: Mapping[str, object], others: Mapping[str, object]) -> str:
+    """What is not the same, for a person; empty where all is."""
+    names = [name for name in {**its, **others} if its.get(name) != others.get(name)]
+    return ", ".join(f"{name} {its.get(name)} instead of {others.get(name)}" for name in names)

@@ -178,5 +178,37 @@ def test_volumes_on_different_grids_have_no_average(run_dir: Path, calibration_f
         average_volumes([])
 
 
+@pytest.mark.parametrize(
+    ("change", "complaint"),
+    [
+        ({"method": ReconstructionMethod.MINLOS}, "method minlos instead of mlos of shot_00000_a.vtkhdf"),
+        (
+            {"noise_floor": 0.1, "minimum_window_px": 9},
+            "minimum_window_px 9 instead of 0, noise_floor 0.1 instead of 0.05",
+        ),
+    ],
+)
+def test_volumes_of_different_settings_have_no_average(
+    run_dir: Path, calibration_file: Path, change: dict[str, object], complaint: str
+) -> None:
+    reconstructed(run_dir, calibration_file)
+    reconstruct_shot(run_dir, 0, calibration_file, SETTINGS.model_copy(update=change), run_dir / "others")
+    other = volume_path(run_dir / "others", 0, "b").replace(volume_path(run_dir / "results", 1, "b"))
+    with pytest.raises(VolumeFileError, match=f"{other}: {complaint}"):
+        average_volumes(volume_files(run_dir / "results"))
+
+
+def test_volumes_of_different_calibrations_have_no_average(run_dir: Path, tmp_path: Path) -> None:
+    calibrations = [write_calibration(tmp_path / f"{px}.json", holdout_px=px) for px in (0.02, 0.03)]
+    for file, folder in zip(calibrations, ("results", "others"), strict=True):
+        reconstruct_shot(run_dir, 0, file, SETTINGS, run_dir / folder)
+    ids = [load_calibration(file).id for file in calibrations]
+    files = [volume_path(run_dir / folder, 0, "a") for folder in ("results", "others")]
+    with pytest.raises(
+        VolumeFileError, match=f"others/shot_00000_a.vtkhdf: calibration {ids[1]} instead of {ids[0]} of"
+    ):
+        average_volumes(files)
+
+
 def test_default_grid_takes_a_stated_pitch(calibration_file: Path) -> None:
     assert default_grid(load_calibration(calibration_file), pitch_mm=0.1).pitch_mm == 0.1
