@@ -51,7 +51,7 @@ def save_calibration(calibration: Calibration, path: Path, *, overwrite: bool = 
         if overwrite:
             part.replace(path)
         else:
-            os.link(part, path)
+            _publish(part, path)
     except FileExistsError as error:
         raise _exists(path) from error
     finally:
@@ -68,6 +68,17 @@ def require_free(path: Path) -> None:
     """
     if Path(path).exists():
         raise _exists(path)
+
+
+def _publish(part: Path, path: Path) -> None:
+    """Give a file its name unless that is taken; a disk without hard links (FAT) has the name claimed first."""
+    try:
+        os.link(part, path)
+    except FileExistsError:
+        raise
+    except OSError:
+        path.open("x").close()
+        part.replace(path)
 
 
 def _exists(path: Path) -> CalibrationError:

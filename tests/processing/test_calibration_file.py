@@ -1,6 +1,8 @@
 """Calibration files come back exactly, are never overwritten by accident, and are checked when read."""
 
+import errno
 import json
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -62,6 +64,22 @@ def test_boards_in_free_poses_come_back(tmp_path: Path) -> None:
 def test_same_content_has_the_same_id_at_any_time(calibration: Calibration) -> None:
     assert make(created_utc="2030-01-01T00:00:00+00:00").id == calibration.id
     assert make(noise_px=0.06).id != calibration.id
+
+
+def test_a_disk_without_hard_links_is_no_matter(
+    tmp_path: Path, calibration: Calibration, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(source: Path, target: Path) -> None:
+        raise PermissionError(errno.EPERM, "Operation not permitted", str(source), None, str(target))
+
+    monkeypatch.setattr(os, "link", refuse)
+    save_calibration(calibration, tmp_path / "c.json")
+    assert load_calibration(tmp_path / "c.json").id == calibration.id
+    before = (tmp_path / "c.json").read_bytes()
+    with pytest.raises(CalibrationError, match="not overwritten"):
+        save_calibration(make(noise_px=0.06), tmp_path / "c.json")
+    assert (tmp_path / "c.json").read_bytes() == before
+    assert [file.name for file in tmp_path.iterdir()] == ["c.json"]
 
 
 def test_a_person_can_read_it(tmp_path: Path, calibration: Calibration) -> None:
