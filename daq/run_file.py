@@ -111,6 +111,9 @@ def read_reference(run_dir: Path, view: str, name: Reference) -> NDArray[np.floa
 def reading(run_dir: Path) -> Iterator[h5py.File]:
     """Open ``run.h5`` and turn what can go wrong into ShotFileError."""
     path = run_dir / RUN_FILE
+    if not path.exists():
+        missing = f"no run, it has no {RUN_FILE}" if run_dir.is_dir() else "there is no such directory"
+        raise ShotFileError(f"{run_dir}: {missing}")
     try:
         with h5py.File(path, "r") as file:
             schema, version = file.attrs["schema"], file.attrs["schema_version"]

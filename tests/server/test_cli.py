@@ -306,10 +306,10 @@ def test_a_truncated_shot_is_named_and_the_others_stay(
 
 
 def test_a_run_that_is_none(calibration_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    message = refused(
-        capsys, "reconstruct", tmp_path / "nowhere", "--calibration", calibration_file, "-o", tmp_path / "out"
-    )
-    assert "nowhere" in message
+    arguments = ["reconstruct", tmp_path / "nowhere", "--calibration", calibration_file, "-o", tmp_path / "out"]
+    assert refused(capsys, *arguments) == f"{tmp_path / 'nowhere'}: there is no such directory"
+    (tmp_path / "nowhere").mkdir()
+    assert refused(capsys, *arguments) == f"{tmp_path / 'nowhere'}: no run, it has no run.h5"
     assert not (tmp_path / "out").exists()
 
 
