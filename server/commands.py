@@ -36,7 +36,10 @@ from server.calibration_pictures import calibration_pictures
 from server.config import load_config
 from server.optics_table import optics_table
 
-_NUMBER = r"[-+]?\d*\.?\d+"
+MAX_VOXELS = 10**12
+"""More fill any disk: a thousand times the largest volume of the paper's rig."""
+
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,2})?"
 
 
 def progress(text: str) -> None:
@@ -215,7 +218,7 @@ def parse_grid(text: str, calibration: Calibration) -> VoxelGrid:
     Raises
     ------
     PipelineError
-        The text is not of that form, or the box is empty.
+        The text is not of that form, or the box is empty or beyond all measure.
     """
     extent = rf"({_NUMBER}):({_NUMBER})"
     match = re.fullmatch(rf"{extent},{extent},{extent}(?:@({_NUMBER}))?", text)
@@ -227,6 +230,10 @@ def parse_grid(text: str, calibration: Calibration) -> VoxelGrid:
     if (upper_mm <= lower_mm).any() or pitch_mm <= 0:
         raise PipelineError(f"--grid {text!r}: every range must grow, and the pitch must be positive")
     nx, ny, nz = (round(float(extent_mm) / pitch_mm) + 1 for extent_mm in upper_mm - lower_mm)
+    if nx * ny * nz > MAX_VOXELS:
+        raise PipelineError(
+            f"--grid {text!r}: {nx:.3g} x {ny:.3g} x {nz:.3g} voxels, at most {MAX_VOXELS:.1g} are taken"
+        )
     return VoxelGrid((nz, ny, nx), (float(lower_mm[0]), float(lower_mm[1]), float(lower_mm[2])), pitch_mm)
 
 

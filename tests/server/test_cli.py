@@ -1,6 +1,7 @@
 """The command line: what it prints, and that bad input gets one clear error, an exit status, and loses nothing."""
 
 import json
+import re
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
@@ -14,6 +15,7 @@ from processing.calibration.calibration import Model
 from processing.calibration.calibration_file import load_calibration, save_calibration
 from processing.calibration.calibration_record import content_id, json_id
 from processing.calibration.polynomial import EXPONENTS, PolynomialMapping
+from processing.pipeline import PipelineError
 from processing.reconstruction.volume_file import read_volume
 from server import commands
 from server.cli import main
@@ -192,8 +194,26 @@ def test_a_grid_may_begin_below_zero_with_or_without_an_equals_sign(
     assert "every range must grow" in refused(capsys, *common, "-o", tmp_path / "x", "--grid", "-.5:-1,0:1,0:1")
 
 
+@pytest.mark.parametrize("grid", ["-1.:1.,-1:+1.0,-10e-1:1e0@1e-1", "-1:1,-1.:1,-1:1.E+0@.1"])
+def test_a_grid_takes_numbers_in_every_spelling(grid: str, calibration_file: Path) -> None:
+    calibration = load_calibration(calibration_file)
+    assert commands.parse_grid(grid, calibration) == commands.parse_grid(GRID, calibration)
+
+
+@pytest.mark.parametrize("grid", ["0:1,0:1,0:1e999", "0:1,0:1,0:e0", "0:1,0:1,0:.", "0:nan,0:1,0:1", "0:1,0:1,0:1@0x1"])
+def test_a_grid_of_other_words_is_named(grid: str, calibration_file: Path) -> None:
+    with pytest.raises(PipelineError, match=re.escape(f"--grid {grid!r} is not of the form X0:X1")):
+        commands.parse_grid(grid, load_calibration(calibration_file))
+
+
 @pytest.mark.parametrize(
-    ("grid", "reason"), [("1:2,3:4", "not of the form"), ("1:0,0:1,0:1", "must grow"), ("0:1,0:1,0:1@0", "positive")]
+    ("grid", "reason"),
+    [
+        ("1:2,3:4", "not of the form"),
+        ("1:0,0:1,0:1", "must grow"),
+        ("0:1,0:1,0:1@0", "positive"),
+        ("0:1,0:1,0:1e99", "e+100 voxels, at most 1e+12"),
+    ],
 )
 def test_impossible_grids(
     grid: str, reason: str, run_dir: Path, calibration_file: Path, capsys: pytest.CaptureFixture[str]
