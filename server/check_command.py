@@ -12,7 +12,7 @@ _MEANING = {Verdict.WARN: "ALARM", Verdict.REFUSE: "STOP: do not reconstruct wit
 
 
 def check(options: Namespace) -> dict[str, Any]:
-    """``tomoshadow check``."""
+    """``tomoshadow check``; it has not passed where a shot would stop reconstruction."""
     calibration = load_calibration(options.calibration)
     shots = []
     for index in selected_shots(options.run, options.shots):
@@ -21,6 +21,7 @@ def check(options: Namespace) -> dict[str, Any]:
         shots.append(measured)
     verdicts = [shot.verdict for shot in shots if shot.verdict is not None]
     return {
+        "passed": Verdict.REFUSE not in verdicts,
         "run": options.run.name,
         "calibration": calibration.id,
         "alarm_px": ALARM_PX,

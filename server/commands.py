@@ -14,7 +14,7 @@ from pydantic import ValidationError
 
 from daq.shotfile import ImageKey, RunReader
 from processing.analysis.figures import residuals_figure
-from processing.calibration.calibration import Calibration, ViewCalibration
+from processing.calibration.calibration import Calibration, Verdict, ViewCalibration
 from processing.calibration.calibration_file import load_calibration, require_free, save_calibration
 from processing.calibration.calibration_set import load_calibration_set
 from processing.calibration.covariance import worst_position_std_px
@@ -72,7 +72,7 @@ def import_images(options: Namespace) -> dict[str, Any]:
 
 
 def calibrate_views(options: Namespace) -> dict[str, Any]:
-    """``tomoshadow calibrate``."""
+    """``tomoshadow calibrate``; it has not passed where a view is refused."""
     figure = picture_beside(options.out)
     require_free(options.out)
     calibration_set = load_calibration_set(options.set, dict(options.origin or ()), dict(options.roll or ()))
@@ -82,7 +82,13 @@ def calibrate_views(options: Namespace) -> dict[str, Any]:
     figures = calibration_pictures(options.set, calibration_set, calibration, options.out)
     for note in calibration.notes:
         progress(note)
+    refused = {name: view for name, view in calibration.views.items() if view.verdict is Verdict.REFUSE}
+    for name, view in refused.items():
+        progress(
+            f"{name}: REFUSED, hold-out error {view.holdout_error_px:.3g} px: reconstruction does not start with it"
+        )
     return {
+        "passed": not refused,
         "calibration": str(options.out),
         "id": calibration.id,
         "figure": str(figure),

@@ -75,7 +75,8 @@ def told(capsys: pytest.CaptureFixture[str], *arguments: object, status: int = 0
 def test_moved_view_stops_and_a_corrected_calibration_is_good_again(
     run_dir: Path, calibration_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    before = told(capsys, "check", run_dir, "--calibration", calibration_file)
+    before = told(capsys, "check", run_dir, "--calibration", calibration_file, status=1)
+    assert before["passed"] is False
     assert (before["verdict"], before["alarm_px"], before["stop_px"]) == ("refuse", 0.3, 0.8)
     assert [shot["shot"] for shot in before["shots"]] == [0, 1]
     for shot in before["shots"]:
@@ -98,6 +99,7 @@ def test_moved_view_stops_and_a_corrected_calibration_is_good_again(
     assert [shot["shot"] for shot in after["shots"]] == [1]
     assert max(after["shots"][0]["views"].values()) < 0.2
     assert after["verdict"] in ("good", "usable")
+    assert after["passed"] is True
 
 
 def test_shots_without_droplets_say_so_and_correct_nothing(

@@ -36,9 +36,9 @@ def calibration_file(tmp_path: Path) -> Path:
     return write_calibration(tmp_path / "calibration.json")
 
 
-def told(capsys: pytest.CaptureFixture[str], *arguments: object) -> dict[str, Any]:
+def told(capsys: pytest.CaptureFixture[str], *arguments: object, status: int = 0) -> dict[str, Any]:
     """The JSON object of a command that worked: the last line of its output."""
-    assert main([*map(str, arguments), "--json"]) == 0
+    assert main([*map(str, arguments), "--json"]) == status
     result: dict[str, Any] = json.loads(capsys.readouterr().out.splitlines()[-1])
     return result
 
@@ -417,11 +417,24 @@ def test_origins_are_stated_for_runs(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert "states its origins and rolls itself" in refused(capsys, *arguments[:-1], "--roll", "view1=-90")
 
 
-def _write_points(folder: Path) -> None:
-    """Three planes of exact points of a known camera, and the manifest that names them."""
+def test_a_refused_view_is_written_and_fails_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    _write_points(tmp_path, noise_px=3.0)
+    told(capsys, "import", tmp_path / "manifest.toml", "-o", tmp_path / "set")
+    result = told(capsys, "calibrate", tmp_path / "set", "-o", tmp_path / "calibration.json", status=1)
+    assert (result["passed"], result["views"]["view1"]["verdict"]) == (False, "refuse")
+    assert load_calibration(tmp_path / "calibration.json").id == result["id"]
+    assert main(["calibrate", str(tmp_path / "set"), "-o", str(tmp_path / "again.json")]) == 1
+    error_px = result["views"]["view1"]["holdout_error_px"]
+    assert f"view1: REFUSED, hold-out error {error_px:.3g} px" in capsys.readouterr().err
+
+
+def _write_points(folder: Path, noise_px: float = 0.0) -> None:
+    """Three planes of points of a known camera, and the manifest that names them."""
     x_mm, y_mm, z_mm = np.meshgrid(np.linspace(-3, 3, 9), np.linspace(-2, 2, 9), [-1.5, 0, 1.5])
     points_mm = np.column_stack([x_mm.ravel(), y_mm.ravel(), z_mm.ravel()])
-    np.savetxt(folder / "points.txt", np.column_stack([cameras()["view1"].project(points_mm), points_mm]))
+    seen_px = cameras()["view1"].project(points_mm)
+    seen_px += np.random.default_rng(1).normal(0, noise_px, seen_px.shape)
+    np.savetxt(folder / "points.txt", np.column_stack([seen_px, points_mm]))
     (folder / "manifest.toml").write_text(
         '[[calibration.points]]\ncamera = "view1"\nfile = "points.txt"\nimage_size_px = [160, 120]\n'
         'columns = ["u_px", "v_px", "x_mm", "y_mm", "z_mm"]\n'
