@@ -3,27 +3,24 @@
 import json
 import resource
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
-
-from numpy.typing import NDArray
 
 from daq.run_file import RUN_FILE
 from daq.shotfile import RunReader, Shot
 from processing.calibration.calibration import Calibration, Verdict
 from processing.calibration.calibration_file import file_sha256, load_calibration
 from processing.calibration.errors import CalibrationError
+from processing.clocked_slabs import ClockedSlabs
 from processing.preprocessing import Intensity, Preprocessing, intensity
 from processing.reconstruction.common_volume import common_volume
 from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.plan import plan_reconstruction
 from processing.reconstruction.planned_view import PlannedView
 from processing.reconstruction.settings import FrozenValue, GridSettings, ReconstructionSettings
-from processing.reconstruction.slab_volume import Slabs
 from processing.reconstruction.volume_file import write_slabs
 from processing.results_file import FrameName, Provenance, claim_results, volume_path
 from processing.volume import VoxelGrid
@@ -208,24 +205,6 @@ def _read_references(run_dir: Path, _written_ns: int) -> _References:
         return {view: (run.dark(view), run.background(view)) for view in run.header.views}
 
 
-class _Clocked:
-    """Slabs, and the seconds that they took to come."""
-
-    def __init__(self, slabs: Slabs) -> None:
-        self._slabs = iter(slabs)
-        self.seconds = 0.0
-
-    def __iter__(self) -> Iterator[tuple[int, NDArray[Any]]]:
-        return self
-
-    def __next__(self) -> tuple[int, NDArray[Any]]:
-        started_s = time.perf_counter()
-        try:
-            return next(self._slabs)
-        finally:
-            self.seconds += time.perf_counter() - started_s
-
-
 def _reconstruct_frame(
     bench: Workbench, images: list[Intensity], results_dir: Path, shot: int, frame: FrameName, provenance: Provenance
 ) -> VolumeRecord:
@@ -233,7 +212,7 @@ def _reconstruct_frame(
     started_s = time.perf_counter()
     volume, residuals = bench.reconstruct(images)
     begun_s = time.perf_counter() - started_s
-    slabs = _Clocked(volume.slabs)
+    slabs = ClockedSlabs(volume.slabs)
     file = volume_path(results_dir, shot, frame)
     convergence = {"residuals": json.dumps(residuals)} if residuals else {}
     named = {**provenance, "shot": shot, "frame": frame, **convergence}

@@ -26,6 +26,7 @@ from processing.reconstruction.voxel_type import VoxelType
 from server import commands
 from server.average_command import average
 from server.bench_command import BenchError, bench
+from server.calibrate_command import calibrate_views, stated_origin, stated_roll
 from server.check_command import check, self_calibrate_views
 from server.config import ConfigError
 from server.doctor import doctor
@@ -138,7 +139,7 @@ def _add_import(verbs: Any) -> None:
 
 
 def _add_calibrate(verbs: Any) -> None:
-    parser = _verb(verbs, "calibrate", commands.calibrate_views, "fit the camera of every view to a calibration set")
+    parser = _verb(verbs, "calibrate", calibrate_views, "fit the camera of every view to a calibration set")
     parser.add_argument("set", type=Path, help="calibration run, or an imported set")
     parser.add_argument("-o", "--out", type=Path, required=True, help="calibration file to write")
     parser.add_argument(
@@ -149,14 +150,14 @@ def _add_calibrate(verbs: Any) -> None:
     )
     parser.add_argument(
         "--origin",
-        type=commands.stated_origin,
+        type=stated_origin,
         action="append",
         metavar="VIEW@Z=U,V",
         help="where a view of a run sees the target's origin at position Z in mm, if no image shows all of it",
     )
     parser.add_argument(
         "--roll",
-        type=commands.stated_roll,
+        type=stated_roll,
         action="append",
         metavar="VIEW=DEG",
         help="how a camera of a run is turned about its axis: 180 if it hangs upside down",

@@ -5,7 +5,6 @@ import re
 import resource
 import sys
 from argparse import ArgumentTypeError, Namespace
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +12,8 @@ import numpy as np
 from pydantic import ValidationError
 
 from daq.shotfile import ImageKey, RunReader
-from processing.analysis.figures import residuals_figure
-from processing.calibration.calibration import Calibration, Verdict, ViewCalibration
-from processing.calibration.calibration_file import load_calibration, require_free, save_calibration
-from processing.calibration.calibration_set import load_calibration_set
-from processing.calibration.covariance import worst_position_std_px
-from processing.calibration.joint_fit import calibrate
-from processing.calibration.placement import placement
+from processing.calibration.calibration import Calibration
+from processing.calibration.calibration_file import load_calibration
 from processing.importing import import_manifest
 from processing.pipeline import (
     PipelineError,
@@ -32,14 +26,13 @@ from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.settings import GridSettings, ReconstructionSettings
 from processing.reconstruction.voxel_type import VoxelType
 from processing.volume import VoxelGrid
-from server.calibration_pictures import calibration_pictures
 from server.config import load_config
 from server.optics_table import optics_table
 
 MAX_VOXELS = 10**12
 """More fill any disk: a thousand times the largest volume of the paper's rig."""
 
-_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,2})?"
+NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,2})?"
 
 
 def progress(text: str) -> None:
@@ -69,91 +62,6 @@ def picture_beside(file: Path) -> Path:
 def import_images(options: Namespace) -> dict[str, Any]:
     """``tomoshadow import``."""
     return {"out": str(options.out), **import_manifest(options.manifest, options.out)}
-
-
-def calibrate_views(options: Namespace) -> dict[str, Any]:
-    """``tomoshadow calibrate``; it has not passed where a view is refused."""
-    figure = picture_beside(options.out)
-    require_free(options.out)
-    calibration_set = load_calibration_set(options.set, dict(options.origin or ()), dict(options.roll or ()))
-    calibration = calibrate(calibration_set, model=options.model)
-    save_calibration(calibration, options.out)
-    residuals_figure(calibration).savefig(figure, dpi=120)
-    figures = calibration_pictures(options.set, calibration_set, calibration, options.out)
-    for note in calibration.notes:
-        progress(note)
-    refused = {name: view for name, view in calibration.views.items() if view.verdict is Verdict.REFUSE}
-    for name, view in refused.items():
-        progress(
-            f"{name}: REFUSED, hold-out error {view.holdout_error_px:.3g} px: reconstruction does not start with it"
-        )
-    return {
-        "passed": not refused,
-        "calibration": str(options.out),
-        "id": calibration.id,
-        "figure": str(figure),
-        "figures": [str(picture) for picture in figures],
-        "notes": list(calibration.notes),
-        **view_errors(calibration),
-    }
-
-
-def stated_origin(text: str) -> tuple[tuple[str, float], tuple[float, float]]:
-    """View, position in mm and image point of ``VIEW@Z=U,V``."""
-    match = re.fullmatch(rf"(.+)@({_NUMBER})=({_NUMBER}),({_NUMBER})", text)
-    if not match:
-        raise ArgumentTypeError(f"{text!r} is not of the form VIEW@Z=U,V, for example view1@-4.5=812,604")
-    view, z_mm, u_px, v_px = match.groups()
-    return (view, float(z_mm)), (float(u_px), float(v_px))
-
-
-def stated_roll(text: str) -> tuple[str, float]:
-    """View and angle of ``VIEW=DEG``."""
-    match = re.fullmatch(rf"(.+)=({_NUMBER})", text)
-    if not match:
-        raise ArgumentTypeError(f"{text!r} is not of the form VIEW=DEG, for example view1=180")
-    return match[1], float(match[2])
-
-
-def view_errors(calibration: Calibration) -> dict[str, Any]:
-    """Residuals of a calibration by view, as the JSON of ``calibrate`` has them."""
-    return {
-        "views": {
-            name: {
-                "model": view.model.value,
-                "n_points": view.n_points,
-                "mean_error_px": view.mean_error_px,
-                "rms_px": view.rms_px,
-                "max_error_px": view.max_error_px,
-                "holdout_error_px": view.holdout_error_px,
-                "candidates_holdout_error_px": dict(view.candidates_px),
-                "position_std_px": worst_position_std_px(view),
-                "planes": [
-                    {
-                        "name": plane.name,
-                        "z_mm": plane.z_mm,
-                        "mean_error_px": plane.mean_error_px,
-                        "rms_px": plane.rms_px,
-                        "max_error_px": plane.max_error_px,
-                        "holdout_error_px": plane.holdout_error_px,
-                    }
-                    for plane in view.planes
-                ],
-                "worst_plane": view.worst_plane.name,
-                "placement": _placement(calibration, view),
-                "verdict": view.verdict.value,
-            }
-            for name, view in calibration.views.items()
-        }
-    }
-
-
-def _placement(calibration: Calibration, view: ViewCalibration) -> dict[str, Any] | None:
-    """Where a view stands; None where boards in free poses do not tell."""
-    if any(one.intrinsics_only for one in calibration.views.values()):
-        return None
-    ranges_mm = (calibration.x_range_mm, calibration.y_range_mm, calibration.z_range_mm)
-    return asdict(placement(view.mapping, np.mean(ranges_mm, axis=1)))
 
 
 def setting(name: str, text: str) -> Any:
@@ -226,8 +134,8 @@ def parse_grid(text: str, calibration: Calibration) -> VoxelGrid:
     PipelineError
         The text is not of that form, or the box is empty or beyond all measure.
     """
-    extent = rf"({_NUMBER}):({_NUMBER})"
-    match = re.fullmatch(rf"{extent},{extent},{extent}(?:@({_NUMBER}))?", text)
+    extent = rf"({NUMBER}):({NUMBER})"
+    match = re.fullmatch(rf"{extent},{extent},{extent}(?:@({NUMBER}))?", text)
     if not match:
         raise PipelineError(f"--grid {text!r} is not of the form X0:X1,Y0:Y1,Z0:Z1[@PITCH] in mm")
     *bounds_mm, pitch = match.groups()
