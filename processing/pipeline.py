@@ -18,7 +18,7 @@ from processing.clocked_slabs import ClockedSlabs
 from processing.preprocessing import Intensity, Preprocessing, intensity
 from processing.reconstruction.common_volume import common_volume
 from processing.reconstruction.method import ReconstructionMethod
-from processing.reconstruction.plan import plan_reconstruction
+from processing.reconstruction.plan import DEFAULT_THREADS, plan_reconstruction
 from processing.reconstruction.planned_view import PlannedView
 from processing.reconstruction.settings import FrozenValue, GridSettings, ReconstructionSettings
 from processing.reconstruction.volume_file import write_slabs
@@ -71,6 +71,8 @@ def reconstruct_shot(
     settings: ReconstructionSettings,
     results_dir: Path,
     should_stop: Callable[[], bool] = lambda: False,
+    *,
+    threads: int = DEFAULT_THREADS,
 ) -> ShotResult:
     """Reconstruct every exposure of one shot and write its volumes.
 
@@ -88,6 +90,8 @@ def reconstruct_shot(
         Receives the volumes; a volume of the same shot and settings is replaced atomically.
     should_stop : callable
         Asked between the steps.
+    threads : int
+        The volumes do not depend on it.
 
     Raises
     ------
@@ -106,7 +110,8 @@ def reconstruct_shot(
         recorded = run.read_shot(shot)
         require_match(run_dir.name, recorded, calibration)
         made_by = _provenance(run, calibration, calibration_file, settings)
-        bench = _workbench(calibration_file, str(made_by["calibration_sha256"]), settings, tuple(recorded.views))
+        named_by = str(made_by["calibration_sha256"])
+        bench = _workbench(calibration_file, named_by, settings, tuple(recorded.views), threads)
         views = {name: PlannedView.of(view) for name, view in zip(recorded.views, bench.plan.views, strict=True)}
         provenance = {**made_by, "views": json.dumps({name: view.model_dump() for name, view in views.items()})}
         claim_results(results_dir, provenance)
@@ -114,7 +119,7 @@ def reconstruct_shot(
         for frame in frame_names(run):
             if should_stop():
                 raise Stopped(f"{run_dir.name}, shot {shot}: stopped before exposure {frame}")
-            images = shot_intensities(run, recorded, frame, settings, bench.images)
+            images = shot_intensities(run, recorded, frame, settings, bench.images, threads=threads)
             blind = tuple(view for view, image in zip(recorded.views, images, strict=True) if not image.any())
             named = {**provenance, "blind_views": json.dumps(blind)} if blind else provenance
             written = _reconstruct_frame(bench, images, results_dir, shot, frame, named)
@@ -147,6 +152,8 @@ def shot_intensities(
     frame: FrameName,
     settings: ReconstructionSettings,
     out: Sequence[Intensity | None] | None = None,
+    *,
+    threads: int = DEFAULT_THREADS,
 ) -> list[Intensity]:
     """Preprocessed images of one exposure.
 
@@ -162,6 +169,8 @@ def shot_intensities(
         Sliding minimum and noise floor.
     out : sequence of (rows, columns) float32 arrays, optional
         Receive the images.
+    threads : int
+        The images do not depend on it.
 
     Returns
     -------
@@ -189,6 +198,7 @@ def shot_intensities(
                 dark=None if dark is None else dark[number],
                 background=None if background is None else background[number],
                 out=image,
+                threads=threads,
             )
         )
     return images
@@ -264,12 +274,12 @@ def _provenance(
 
 @lru_cache(maxsize=1)
 def _workbench(
-    calibration_file: Path, _sha256: str, settings: ReconstructionSettings, views: tuple[str, ...]
+    calibration_file: Path, _sha256: str, settings: ReconstructionSettings, views: tuple[str, ...], threads: int
 ) -> Workbench:
     calibration = load_calibration(calibration_file)
     grid = settings.grid.to_grid() if settings.grid else default_grid(calibration)
     plan = plan_reconstruction([calibration.views[view].mapping for view in views], grid, settings.accuracy, views)
-    return Workbench.of(plan, settings)
+    return Workbench.of(plan, settings, threads)
 
 
 def _widened(span_mm: tuple[float, float]) -> tuple[float, float]:

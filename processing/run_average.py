@@ -11,7 +11,7 @@ from processing.calibration.calibration import Calibration
 from processing.pipeline import default_grid, frame_names, require_match, shot_intensities
 from processing.preprocessing import Intensity
 from processing.reconstruction.mean_line_of_sight import mean_line_of_sight
-from processing.reconstruction.plan import Plan, plan_reconstruction
+from processing.reconstruction.plan import DEFAULT_THREADS, plan_reconstruction
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.volume import VoxelGrid
 from processing.workbench import Workbench
@@ -44,6 +44,8 @@ def average_run(
     calibration: Calibration,
     settings: ReconstructionSettings,
     done: Callable[[int], None] = lambda _: None,
+    *,
+    threads: int = DEFAULT_THREADS,
 ) -> RunAverage:
     """Mean of what ``reconstruct_shot`` makes of every exposure of some shots.
 
@@ -59,6 +61,8 @@ def average_run(
         Method, grid and preprocessing.
     done : callable
         Told the number of exposures that have been read, after each.
+    threads : int
+        The mean does not depend on it.
 
     Raises
     ------
@@ -73,11 +77,11 @@ def average_run(
         require_match(run_dir.name, first, calibration)
         mappings = [calibration.views[view].mapping for view in first.views]
         plan = plan_reconstruction(mappings, grid, settings.accuracy, list(first.views))
-        exposures = _exposures(run, shots, calibration, settings, done)
+        exposures = _exposures(run, shots, calibration, settings, done, threads)
         if settings.method.iterative:
-            volume = _mean_of_each(plan, exposures, settings)
+            volume = _mean_of_each(Workbench.of(plan, settings, threads), exposures)
         else:
-            volume = mean_line_of_sight(plan, exposures, settings.method)
+            volume = mean_line_of_sight(plan, exposures, settings.method, threads=threads)
         return RunAverage(volume, grid, len(shots) * len(frame_names(run)))
 
 
@@ -87,19 +91,20 @@ def _exposures(
     calibration: Calibration,
     settings: ReconstructionSettings,
     done: Callable[[int], None],
+    threads: int,
 ) -> Exposures:
     count = 0
     for index in shots:
         shot = run.read_shot(index)
         require_match(run.header.run_id, shot, calibration)
         for frame in frame_names(run):
-            yield shot_intensities(run, shot, frame, settings)
+            yield shot_intensities(run, shot, frame, settings, threads=threads)
             count += 1
             done(count)
 
 
-def _mean_of_each(plan: Plan, exposures: Exposures, settings: ReconstructionSettings) -> Intensity:
-    bench, mean, count = Workbench.of(plan, settings), np.zeros(plan.grid.shape, np.float32), 0
+def _mean_of_each(bench: Workbench, exposures: Exposures) -> Intensity:
+    mean, count = np.zeros(bench.plan.grid.shape, np.float32), 0
     for images in exposures:
         volume, _ = bench.reconstruct(images)
         for first_row, slab in volume.intensities():

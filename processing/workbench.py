@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from processing.preprocessing import Intensity
 from processing.reconstruction.block_slabs import slabs_of_blocks
 from processing.reconstruction.method import ReconstructionMethod
-from processing.reconstruction.plan import Plan
+from processing.reconstruction.plan import DEFAULT_THREADS, Plan
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.reconstruction.slab_volume import SLAB_ROWS, SlabVolume
 from processing.reconstruction.smart import SmartResult, mart, smart
@@ -35,6 +35,8 @@ class Workbench:
         For what the kernels sample, one per view.
     memory : (nz, rows, nx) array
         For a slab of the volume; no more of it is in memory at once.
+    threads : int
+        The results do not depend on it.
     """
 
     plan: Plan
@@ -42,10 +44,11 @@ class Workbench:
     images: tuple[Intensity, ...]
     resampled: tuple[NDArray[np.int16], ...]
     memory: NDArray[Any]
+    threads: int = DEFAULT_THREADS
     _refined: SmartResult | None = field(default=None, init=False, repr=False)
 
     @classmethod
-    def of(cls, plan: Plan, settings: ReconstructionSettings) -> "Workbench":
+    def of(cls, plan: Plan, settings: ReconstructionSettings, threads: int = DEFAULT_THREADS) -> "Workbench":
         """A workbench with all its memory."""
         nz, ny, nx = plan.grid.shape
         return cls(
@@ -54,6 +57,7 @@ class Workbench:
             images=tuple(np.empty(view.image_size_px[::-1], np.float32) for view in plan.views),
             resampled=plan.empty_images(),
             memory=np.empty((nz, min(SLAB_ROWS, ny), nx), settings.voxels.value),
+            threads=threads,
         )
 
     def reconstruct(self, images: Sequence[Intensity]) -> tuple[SlabVolume, tuple[float, ...]]:
@@ -75,7 +79,9 @@ class Workbench:
         method, voxels = self.settings.method, self.settings.voxels
         if method.iterative:
             return self._refine(images)
-        slabs = slabs_of_sight(self.plan, images, method, out=self.memory, resampled=self.resampled)
+        slabs = slabs_of_sight(
+            self.plan, images, method, out=self.memory, resampled=self.resampled, threads=self.threads
+        )
         return SlabVolume(slabs, voxels, voxels.unit), ()
 
     def _refine(self, images: Sequence[Intensity]) -> tuple[SlabVolume, tuple[float, ...]]:
@@ -87,6 +93,7 @@ class Workbench:
             relaxation=self.settings.relaxation,
             least_gain=self.settings.least_gain,
             memory=self._refined,
+            threads=self.threads,
         )
         self._refined = result
-        return slabs_of_blocks(result.blocks, self.settings.voxels, self.memory), result.residuals
+        return slabs_of_blocks(result.blocks, self.settings.voxels, self.memory, self.threads), result.residuals

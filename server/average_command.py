@@ -11,7 +11,14 @@ from processing.reconstruction.volume_file import VolumeFileError, write_volume
 from processing.results_file import Provenance, average_volumes, volume_files
 from processing.run_average import average_run
 from processing.volume import VoxelGrid
-from server.commands import parse_grid, picture_beside, progress, reconstruction_settings, selected_shots
+from server.commands import (
+    parse_grid,
+    picture_beside,
+    progress,
+    reconstruction_settings,
+    selected_shots,
+    usable_processors,
+)
 
 
 def average(options: Namespace) -> dict[str, Any]:
@@ -37,7 +44,12 @@ def _average_run(options: Namespace) -> dict[str, Any]:
     shots = selected_shots(options.results, options.shots)
     name = options.results.name
     mean = average_run(
-        options.results, shots, calibration, settings, lambda done: progress(f"{name}: {done} exposures")
+        options.results,
+        shots,
+        calibration,
+        settings,
+        lambda done: progress(f"{name}: {done} exposures"),
+        threads=usable_processors(),
     )
     made_by = {"calibration": calibration.id, "settings": settings.model_dump_json()}
     return {**_written(options, mean.volume, grid, mean.exposures, made_by), "method": options.method}

@@ -1,6 +1,7 @@
 """What each command does: parsed arguments in, the JSON object of design out. Progress goes to stderr."""
 
 import json
+import os
 import re
 import resource
 import sys
@@ -85,6 +86,11 @@ def reconstruction_settings(options: Namespace, grid: GridSettings) -> Reconstru
     )
 
 
+def usable_processors() -> int:
+    """Processors that this process may use: as many threads as a command takes, which has the machine to itself."""
+    return len(os.sched_getaffinity(0))
+
+
 def reconstruct_run(options: Namespace) -> dict[str, Any]:
     """``tomoshadow reconstruct``."""
     calibration = load_calibration(options.calibration)
@@ -94,7 +100,10 @@ def reconstruct_run(options: Namespace) -> dict[str, Any]:
     results: list[ShotResult] = []
     for shot in shots:
         progress(f"{options.run.name}: shot {shot} by {options.method}")
-        results.append(reconstruct_shot(options.run, shot, options.calibration, settings, options.out))
+        result = reconstruct_shot(
+            options.run, shot, options.calibration, settings, options.out, threads=usable_processors()
+        )
+        results.append(result)
         if len(results) == 1:
             _tell_slow_views(results[0])
         _tell_blind_views(results[-1])

@@ -18,9 +18,8 @@ from processing.volume import VoxelGrid
 MIN_VIEWS, MAX_VIEWS = 2, 8
 MAX_DEVIATION_PX = 0.02
 """What a plan may add to the calibration error; a good calibration has 0.05 px."""
-
-
 DEFAULT_THREADS = 2
+"""Of work that runs beside an acquisition or another worker; who has the machine to himself says more."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -66,6 +66,19 @@ def test_slabs_are_the_volume(plan: Plan, method: ReconstructionMethod, voxels: 
             assert volume.max() == pytest.approx(expected.max() if method.iterative else volume.max(), rel=1e-3)
 
 
+@pytest.mark.parametrize("voxels", [VoxelType.FLOAT32, VoxelType.UINT8])
+@pytest.mark.parametrize("method", ReconstructionMethod)
+def test_any_number_of_threads_gives_the_same_bits(plan: Plan, method: ReconstructionMethod, voxels: VoxelType) -> None:
+    settings = ReconstructionSettings(method=method, voxels=voxels, iterations=2)
+    volumes = []
+    for threads in (1, 2, 7, 40):
+        bench = Workbench.of(plan, settings, threads)
+        assert bench.threads == threads
+        volumes.append(volume_of(bench, exposure(plan, 1))[0])
+    for volume in volumes[1:]:
+        np.testing.assert_array_equal(volume, volumes[0])
+
+
 @pytest.mark.parametrize("voxels", VoxelType)
 def test_an_empty_exposure_is_an_empty_volume(plan: Plan, voxels: VoxelType) -> None:
     for method in (ReconstructionMethod.MLOS, ReconstructionMethod.SMART):

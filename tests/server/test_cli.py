@@ -1,11 +1,13 @@
 """The command line: what it prints, and that bad input gets one clear error, an exit status, and loses nothing."""
 
 import json
+import os
 import re
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -17,7 +19,7 @@ from processing.calibration.calibration_record import content_id, json_id
 from processing.calibration.polynomial import EXPONENTS, PolynomialMapping
 from processing.pipeline import PipelineError
 from processing.reconstruction.volume_file import read_volume
-from server import commands
+from server import average_command, commands
 from server.cli import main
 from tests.processing import droplet_run
 from tests.processing.droplet_run import cameras, write_calibration, write_run
@@ -306,13 +308,32 @@ def test_a_volume_beyond_the_memory_fails_without_a_traceback(
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def too_much(*_: object) -> None:
+    def too_much(*_: object, **_options: object) -> None:
         np.empty(2**62, dtype=np.uint8)
 
     monkeypatch.setattr(commands, "reconstruct_shot", too_much)
     arguments = ["reconstruct", run_dir, "--calibration", calibration_file, f"--grid={GRID}", "-o", tmp_path / "out"]
     assert main([*map(str, arguments)]) == 1
     assert "Unable to allocate" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("command", "module"), [("reconstruct", commands), ("average", average_command)])
+def test_a_command_takes_the_processors_that_it_may_use(
+    command: str,
+    module: ModuleType,
+    run_dir: Path,
+    calibration_file: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def tell(*_: object, threads: int) -> None:
+        raise PipelineError(f"{threads} threads")
+
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0, 2, 5})
+    monkeypatch.setattr(module, "reconstruct_shot" if module is commands else "average_run", tell)
+    arguments = [command, run_dir, "--calibration", calibration_file, f"--grid={GRID}", "-o", tmp_path / "out"]
+    assert refused(capsys, *arguments) == "3 threads"
 
 
 def test_a_truncated_shot_is_named_and_the_others_stay(
