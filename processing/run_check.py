@@ -6,10 +6,11 @@ from pathlib import Path
 
 from daq.shotfile import RunReader
 from processing.calibration.calibration import Calibration, Verdict
-from processing.calibration.disparity import ViewDisparity, measured_box, shot_disparity
+from processing.calibration.disparity import MIN_VIEWS, REACH_PX, ViewDisparity, measured_box, shot_disparity
 from processing.calibration.droplet_images import find_droplets
-from processing.calibration.errors import CalibrationError
+from processing.calibration.errors import CalibrationError, OutOfRange
 from processing.calibration.health import LIMITS_PX, judge
+from processing.calibration.odd_view import odd_view, would_agree
 from processing.calibration.self_calibration import CLEARER, NOISE_PX, SelfCalibration, self_calibrate
 from processing.geometry import FloatArray
 from processing.pipeline import PipelineError, shot_intensities
@@ -35,11 +36,14 @@ class ShotCheck:
         By view; empty where the droplets do not tell.
     problem : str
         Why they do not tell.
+    beyond : tuple of str
+        Views one of which, at least, has moved further than can be measured; none, where droplets do not tell that.
     """
 
     shot: int
     views: dict[str, ViewDisparity]
     problem: str = ""
+    beyond: tuple[str, ...] = ()
 
     @property
     def worst_px(self) -> float:
@@ -49,6 +53,8 @@ class ShotCheck:
     @property
     def moved(self) -> str | None:
         """The view whose motion alone explains an alarm, clearly better than that of any other would."""
+        if len(self.beyond) == 1:
+            return self.beyond[0]
         if len(self.views) < 2 or self.worst_px <= ALARM_PX:
             return None
         best, second = sorted(self.views, key=lambda name: self.views[name].left_px)[:2]
@@ -57,7 +63,12 @@ class ShotCheck:
 
     @property
     def verdict(self) -> Verdict | None:
-        """By the limits of a hold-out error: ``warn`` is an alarm, ``refuse`` stops reconstruction."""
+        """By the limits of a hold-out error: ``warn`` is an alarm, ``refuse`` stops reconstruction.
+
+        A view that has moved further than can be measured is refused too.
+        """
+        if self.beyond:
+            return Verdict.REFUSE
         return judge(self.worst_px) if self.views else None
 
 
@@ -72,13 +83,35 @@ def check_shot(run_dir: Path, shot: int, calibration: Calibration) -> ShotCheck:
         An exposure is missing.
     """
     (exposures,) = _droplets(run_dir, [shot], calibration)
+    return check_exposures(shot, exposures, calibration)
+
+
+def check_exposures(shot: int, exposures: Sequence[Exposure], calibration: Calibration) -> ShotCheck:
+    """Measure the disparity of every view by the droplets (N, 2) of each exposure and view; ``shot`` is its index."""
     mappings = [view.mapping for view in calibration.views.values()]
     try:
         _require_droplets(calibration, exposures)
         measured = shot_disparity(mappings, exposures, measured_box(calibration))
     except CalibrationError as error:
-        return ShotCheck(shot, {}, str(error))
+        return _unmeasured(shot, exposures, calibration, error)
     return ShotCheck(shot, dict(zip(calibration.views, measured, strict=True)))
+
+
+def _unmeasured(
+    shot: int, exposures: Sequence[Exposure], calibration: Calibration, error: CalibrationError
+) -> ShotCheck:
+    """A shot without disparities: a view has moved too far for that, or the droplets do not tell."""
+    names = list(calibration.views)
+    if len(names) < MIN_VIEWS:
+        return ShotCheck(shot, {}, str(error))
+    odd = odd_view([view.mapping for view in calibration.views.values()], exposures, measured_box(calibration))
+    if odd is not None:
+        problem = f"{names[odd]} has moved further than {REACH_PX:g} px, or shows other droplets: the other views agree"
+        return ShotCheck(shot, {}, problem, (names[odd],))
+    if isinstance(error, OutOfRange) or would_agree(exposures):
+        problem = f"{error}: a view has moved further than {REACH_PX:g} px, or several have"
+        return ShotCheck(shot, {}, problem, tuple(names))
+    return ShotCheck(shot, {}, f"{error}: too few droplets, or too many, to tell whether a view has moved")
 
 
 def self_calibrate_run(run_dir: Path, shots: Sequence[int], calibration: Calibration) -> SelfCalibration:

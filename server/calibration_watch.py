@@ -21,6 +21,10 @@ _REMEDY = (
     "The shots are kept: correct the calibration by the droplets (tomoshadow self-calibrate) or calibrate anew, "
     "choose the result, and reconstruct again."
 )
+_REMEDY_BEYOND = (
+    "The shots are kept, but their droplets cannot correct so much: calibrate anew, choose the result, and "
+    "reconstruct again."
+)
 
 
 class CalibrationStanding(FrozenModel):
@@ -30,15 +34,16 @@ class CalibrationStanding(FrozenModel):
     calibration: str
     shot: Annotated[int, Field(description="the shot that was checked")]
     verdict: Annotated[Verdict, Field(description="warn: an alarm; refuse: nothing is reconstructed")]
-    moved: Annotated[str | None, Field(description="the view whose motion alone explains the disparities")]
-    views: Annotated[dict[str, float], Field(description="disparity by view, px")]
+    moved: Annotated[str | None, Field(description="the view whose motion alone explains what is seen")]
+    views: Annotated[dict[str, float], Field(description="disparity by view, px; none where it cannot be measured")]
     uncertainty_px: dict[str, float]
+    problem: Annotated[str | None, Field(description="what is wrong where no disparity can be measured")] = None
     shots_checked: Annotated[int, Field(description="of this run with this calibration")]
 
     @property
-    def worst_view(self) -> str:
-        """The view that has moved; where that is not clear, the one that disagrees most with the others."""
-        return self.moved or max(self.views, key=lambda name: self.views[name])
+    def worst_view(self) -> str | None:
+        """The view that has moved; where that is not clear, the one that disagrees most with the others, if any."""
+        return self.moved or max(self.views, key=lambda name: self.views[name], default=None)
 
     @property
     def is_alarm(self) -> bool:
@@ -48,13 +53,16 @@ class CalibrationStanding(FrozenModel):
     @property
     def message(self) -> str:
         """What is wrong and how to mend it."""
+        if self.problem:
+            return f"{self._misfit}: {self.problem}. {_REMEDY_BEYOND}"
         limit = f"stop above {STOP_PX:g} px" if self.verdict is Verdict.REFUSE else f"alarm above {ALARM_PX:g} px"
         moved = f"{self.moved} has moved; " if self.moved else ""
         views = ", ".join(f"{name} {disparity_px:.2f}" for name, disparity_px in self.views.items())
-        return (
-            f"calibration {self.calibration} does not fit run {self.run_id}, shot {self.shot}: {moved}"
-            f"views are off the others by {views} px ({limit}). {_REMEDY}"
-        )
+        return f"{self._misfit}: {moved}views are off the others by {views} px ({limit}). {_REMEDY}"
+
+    @property
+    def _misfit(self) -> str:
+        return f"calibration {self.calibration} does not fit run {self.run_id}, shot {self.shot}"
 
 
 Pair = tuple[str, str]
@@ -133,7 +141,7 @@ class CalibrationWatch:
     def _judged(self, account: _Account, job: Job) -> CalibrationStanding | None:
         """Standing after a check; droplets that do not tell change nothing, nor does a shot before the newest one."""
         result = job.result if job.state is JobState.DONE else None
-        if not result or not result["views"]:
+        if not result or result["verdict"] is None:
             return account.standing
         shot: int = result["shot"]
         account.told.add(shot)
@@ -147,6 +155,7 @@ class CalibrationWatch:
             moved=result["moved"],
             views=result["views"],
             uncertainty_px=result["uncertainty_px"],
+            problem=result.get("problem"),
             shots_checked=len(account.told),
         )
 
@@ -163,6 +172,6 @@ class CalibrationWatch:
                 shot=now.shot,
                 verdict=now.verdict,
                 view=now.worst_view,
-                disparity_px=now.views[now.worst_view],
+                disparity_px=now.views.get(now.worst_view or ""),
                 message=now.message if now.is_alarm else None,
             )

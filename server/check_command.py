@@ -33,14 +33,18 @@ def check(options: Namespace) -> dict[str, Any]:
 
 def check_line(measured: ShotCheck) -> str:
     """One shot for a person."""
+    meaning = _MEANING.get(measured.verdict) if measured.verdict else None
+    return f"shot {measured.shot}: {_finding(measured)}" + (f"  {meaning}" if meaning else "")
+
+
+def _finding(measured: ShotCheck) -> str:
+    """The figures and the view that has moved, or why there are no figures."""
     if not measured.views:
-        return f"shot {measured.shot}: {measured.problem}"
+        return measured.problem
     views = ", ".join(
         f"{name} {view.disparity_px:.2f} ± {view.uncertainty_px:.2f} px" for name, view in measured.views.items()
     )
-    meaning = _MEANING.get(measured.verdict) if measured.verdict else None
-    moved = f", {measured.moved} has moved" if measured.moved else ""
-    return f"shot {measured.shot}: {views}{moved}" + (f"  {meaning}" if meaning else "")
+    return f"{views}, {measured.moved} has moved" if measured.moved else views
 
 
 def check_json(measured: ShotCheck) -> dict[str, Any]:

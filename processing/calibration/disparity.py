@@ -15,18 +15,28 @@ from scipy.spatial import cKDTree
 
 from processing.calibration.calibration import Calibration
 from processing.calibration.droplet_matching import Box, Matches, match_exposures
-from processing.calibration.errors import CalibrationError
+from processing.calibration.errors import CalibrationError, OutOfRange
 from processing.calibration.sight_lines import linearise, unseen
 from processing.geometry import FloatArray, ViewMapping
 
 SEARCH_PX = 4.0
 """Largest residual a drifted view may leave: room for drifts up to about 3 px."""
+REACH_PX = 3.0
+"""A drift that is found in any view and direction; in some further ones are."""
 PEAK_RADIUS_PX = 0.5
 """Droplets of one peak lie so close to its middle, all views together: three times their scatter."""
 MIN_DROPLETS = 12
 """A peak of fewer droplets may be chance."""
 SIGNIFICANCE = 8.0
 """Standard deviations of the background by which a peak must exceed it."""
+CLEARER = 2.0
+"""A peak exceeds any that lies elsewhere so many times: chance alone makes several, of much the same height.
+
+Droplets of false combinations come in groups (exposures A and B of a shot show the same ones), so that their
+scatter cannot be told from their number.
+"""
+ELSEWHERE_PX = 4 * PEAK_RADIUS_PX
+"""So far away a peak is another one, even if a view that has turned widens it."""
 MIN_VIEWS = 3
 """Two views agree on every point of an epipolar line: they cannot tell a drift along it."""
 SHOT_DIVISIONS = (2, 2, 2)
@@ -119,6 +129,8 @@ def shot_disparity(
     ------
     CalibrationError
         There are too few views or droplets, or none agree.
+    OutOfRange
+        A view has moved so far that the search range cuts off its droplets.
     """
     require_views(len(mappings))
     matches = match_exposures(mappings, exposures, box, SEARCH_PX)
@@ -128,9 +140,11 @@ def shot_disparity(
     if not local:
         seen = ", ".join(str(sum(map(len, view))) for view in zip(*exposures, strict=True))
         raise CalibrationError(
-            f"the views see {seen} droplets, of which no {MIN_DROPLETS} agree within {SEARCH_PX:g} px: "
-            "too few droplets, too many, or a view has moved further"
+            f"the views see {seen} droplets, of which no {MIN_DROPLETS} agree within {SEARCH_PX:g} px"
         )
+    largest_px = max(float(np.linalg.norm(disparity.disparity_px, axis=1).max()) for disparity in local)
+    if largest_px > SEARCH_PX - PEAK_RADIUS_PX:
+        raise OutOfRange(f"droplets agree only at the edge of what is searched, {SEARCH_PX:g} px")
     projectors = [_projector(mappings, disparity.point_mm) for disparity in local]
     return tuple(_of_view(view, local, projectors) for view in range(len(mappings)))
 
@@ -182,19 +196,27 @@ def _peak(matches: Matches, rows: NDArray[np.intp], n_views: int) -> LocalDispar
     joint_px = matches.disparities_px[rows].reshape(len(rows), -1)
     tree = cKDTree(joint_px)
     candidates = joint_px[:: max(1, len(rows) // _MAX_CENTRES)]
-    counts = tree.query_ball_point(candidates, PEAK_RADIUS_PX, return_length=True)
-    centre_px = candidates[int(np.argmax(counts))]
+    counts = np.asarray(tree.query_ball_point(candidates, PEAK_RADIUS_PX, return_length=True), dtype=np.intp)
+    centre_px, members = _climbed(tree, candidates[int(np.argmax(counts))])
+    around = len(tree.query_ball_point(centre_px, 2 * PEAK_RADIUS_PX)) - len(members)
+    background = around / (2 ** (2 * n_views - 3) - 1)
+    elsewhere = counts[np.linalg.norm(candidates - centre_px, axis=1) > ELSEWHERE_PX].max(initial=0)
+    excess = max(SIGNIFICANCE * np.sqrt(background), CLEARER * (elsewhere - background))
+    if len(members) < max(MIN_DROPLETS, background + excess):
+        return None
+    deviation_px = joint_px[members].reshape(len(members), n_views, 2) - centre_px.reshape(n_views, 2)
+    scatter_px = np.sqrt((deviation_px**2).mean(axis=(0, 2)))
+    point_mm = matches.points_mm[rows[members]].mean(axis=0)
+    return LocalDisparity(point_mm, centre_px.reshape(n_views, 2), scatter_px, len(members))
+
+
+def _climbed(tree: cKDTree, centre_px: FloatArray) -> tuple[FloatArray, NDArray[np.intp]]:
+    """Middle (2 n,) of the peak near a first guess, and which points of the tree belong to it."""
+    joint_px = np.asarray(tree.data, dtype=np.float64)
     for _ in range(10):
         members = np.asarray(tree.query_ball_point(centre_px, PEAK_RADIUS_PX), dtype=np.intp)
         moved_px = joint_px[members].mean(axis=0)
         if np.abs(moved_px - centre_px).max() < 1e-4:
             break
         centre_px = moved_px
-    around = len(tree.query_ball_point(centre_px, 2 * PEAK_RADIUS_PX)) - len(members)
-    background = around / (2 ** (2 * n_views - 3) - 1)
-    if len(members) < max(MIN_DROPLETS, background + SIGNIFICANCE * np.sqrt(background)):
-        return None
-    deviation_px = joint_px[members].reshape(len(members), n_views, 2) - centre_px.reshape(n_views, 2)
-    scatter_px = np.sqrt((deviation_px**2).mean(axis=(0, 2)))
-    point_mm = matches.points_mm[rows[members]].mean(axis=0)
-    return LocalDisparity(point_mm, centre_px.reshape(n_views, 2), scatter_px, len(members))
+    return centre_px, members

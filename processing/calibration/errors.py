@@ -3,6 +3,7 @@
 ::
 
     CalibrationError        a calibration cannot be made, read or trusted; names view or file, value and limit
+    ├── OutOfRange          droplets show that a view has moved further than can be measured
     └── TargetNotFound      an image does not show the target well enough
         └── OriginUnknown   it shows a grid, but not which of the target's points these are
 """
@@ -10,6 +11,10 @@
 
 class CalibrationError(Exception):
     """A calibration cannot be made, read or trusted; the text names view or file, value and limit."""
+
+
+class OutOfRange(CalibrationError):
+    """A view has moved about as far as a disparity is looked for, or further."""
 
 
 class TargetNotFound(CalibrationError):

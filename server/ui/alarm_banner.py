@@ -33,6 +33,7 @@ class AlarmBanner:
     def _show(self, standing: CalibrationStanding) -> None:
         stops = standing.verdict is Verdict.REFUSE
         self._banner.classes(add="stop" if stops else "warn", remove="warn" if stops else "stop")
-        worst = f"{standing.worst_view} {standing.views[standing.worst_view]:.2f} px"
-        self._title.set_text(f"{'RECONSTRUCTION STOPPED' if stops else 'CALIBRATION ALARM'}: {worst}")
+        worst = standing.worst_view or "a view"
+        by = f"{standing.views[worst]:.2f} px" if worst in standing.views else "has moved far"
+        self._title.set_text(f"{'RECONSTRUCTION STOPPED' if stops else 'CALIBRATION ALARM'}: {worst} {by}")
         self._text.set_text(f"{standing.message} Shots checked: {standing.shots_checked}.")

@@ -157,7 +157,7 @@ def _disparity(job: Job) -> str:
     """The view that disagrees most, or why the droplets do not tell; nothing before the check has ended."""
     result = job.result or {"views": {}}
     if not result["views"]:
-        return str(result.get("problem") or "")
+        return ", ".join(str(result[key]) for key in ("problem", "verdict") if result.get(key))
     worst = result["moved"] or max(result["views"], key=result["views"].__getitem__)
     return f"{worst} {result['views'][worst]:.2f} px, {result['verdict']}"
 

@@ -9,7 +9,7 @@ from processing.calibration.calibration import Model
 from processing.calibration.disparity import local_disparities, measured_box, shot_disparity
 from processing.calibration.droplet_images import find_droplets
 from processing.calibration.droplet_matching import Box, Matches, match_droplets
-from processing.calibration.errors import CalibrationError
+from processing.calibration.errors import CalibrationError, OutOfRange
 from processing.calibration.sight_lines import back_project, triangulate
 from processing.studies.seen_droplets import droplet_image
 from tests.processing.drifting_views import HALF_MM, calibration_of, droplet_shots, inside_mm, views
@@ -81,6 +81,21 @@ def test_peak_is_found_in_a_cloud_of_false_matches() -> None:
     assert found.n_droplets == pytest.approx(40, abs=8)
     np.testing.assert_allclose(found.scatter_px, 0.08, atol=0.03)
     assert local_disparities(cameras, Matches(matches.points_mm[:3000], cloud), BOX, (1, 1, 1)) == []
+
+
+def test_groups_of_false_matches_are_no_peak() -> None:
+    rng = np.random.default_rng(4)
+    groups = rng.uniform(-3, 3, (6, 1, 4, 2)) + rng.normal(0, 0.05, (6, 16, 4, 2))
+    joint_px = np.concatenate([rng.uniform(-4, 4, (3000, 4, 2)), groups.reshape(-1, 4, 2)])
+    matches = Matches(rng.uniform(-1, 1, (len(joint_px), 3)), joint_px)
+    assert local_disparities(views(), matches, BOX, (1, 1, 1)) == []
+
+
+def test_a_peak_at_the_edge_of_the_search_range_is_no_figure() -> None:
+    droplets_px = list(droplet_shots(4)[0])
+    droplets_px[1] = droplets_px[1] + 5.2 * np.array([0.6, 0.8])
+    with pytest.raises(OutOfRange, match="at the edge of what is searched, 4 px"):
+        shot_disparity(views(), [droplets_px], BOX)
 
 
 @pytest.mark.parametrize("view", range(4))
