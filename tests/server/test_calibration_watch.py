@@ -28,6 +28,19 @@ def ended(shot: int, disparity_px: float | None, state: JobState = JobState.DONE
     return check_job(RUN, shot, CALIBRATION).model_copy(update={"state": state, "result": result})
 
 
+def lost(shot: int, moved: str | None) -> Job:
+    """A check that found a view out of range: refused without a figure."""
+    result = {
+        "shot": shot,
+        "verdict": Verdict.REFUSE,
+        "moved": moved,
+        "views": {},
+        "uncertainty_px": {},
+        "problem": f"{moved or 'a view'} has moved further than 3 px",
+    }
+    return check_job(RUN, shot, CALIBRATION).model_copy(update={"state": JobState.DONE, "result": result})
+
+
 def watch_of(disparities_px: Sequence[float | None]) -> tuple[CalibrationWatch, EventPublisher]:
     """A watch after checks of one shot after the other."""
     events = EventPublisher()
@@ -73,6 +86,24 @@ def test_a_refusal_names_run_shot_views_limit_and_remedy() -> None:
         assert part in refusal
     assert watch.refusal(reconstruction(calibration="another")) is None
     assert watch.refusal(check_job(RUN, 1, CALIBRATION)) is None
+
+
+@pytest.mark.parametrize("moved", ["view2", None])
+def test_a_view_out_of_range_stops_although_nothing_is_measured(moved: str | None) -> None:
+    watch, events = watch_of([0.1])
+    watch.learn(lost(1, moved))
+    refusal = watch.refusal(reconstruction())
+    assert refusal is not None
+    assert f"shot 1: {moved or 'a view'} has moved further than 3 px. The shots are kept" in refusal
+    assert "calibrate anew" in refusal
+    assert "px (" not in refusal
+    (alarm,) = events.since(0)
+    assert (alarm.data["verdict"], alarm.data["view"], alarm.data["disparity_px"]) == ("refuse", moved, None)
+    assert alarm.data["message"] == refusal
+    watch.learn(ended(2, None))
+    assert watch.refusal(reconstruction()) == refusal
+    watch.learn(ended(3, 0.1))
+    assert watch.refusal(reconstruction()) is None
 
 
 def test_the_newest_shot_that_tells_decides_and_a_change_is_told_once() -> None:

@@ -14,7 +14,7 @@ from processing.calibration.calibration_file import load_calibration, save_calib
 from processing.calibration.disparity import ViewDisparity
 from processing.run_check import ShotCheck
 from processing.studies.seen_droplets import droplet_image
-from server.check_command import check_line
+from server.check_command import check_json, check_line
 from server.cli import main
 from tests.processing.drifting_views import DENSITY_PER_MM3, HALF_MM, SIZE_PX, calibration_of, inside_mm, views
 
@@ -136,6 +136,16 @@ def test_calibration_of_other_views_is_refused(
     other = write_droplet_run(tmp_path / "other", density_per_mm3=0.05, view_count=3)
     refused = told(capsys, "check", other, "--calibration", calibration_file, status=2)
     assert "run other has views ['view1', 'view2', 'view3'], calibration cal-" in refused["error"]
+
+
+def test_a_view_out_of_range_is_told_without_a_figure() -> None:
+    measured = ShotCheck(3, {}, "view2 has moved further than 3 px", ("view2",))
+    assert check_line(measured) == (
+        "shot 3: view2 has moved further than 3 px  STOP: do not reconstruct with this calibration"
+    )
+    told = check_json(measured)
+    assert (told["verdict"], told["moved"], told["views"]) == ("refuse", "view2", {})
+    assert told["problem"] == "view2 has moved further than 3 px"
 
 
 @pytest.mark.parametrize(
