@@ -16,14 +16,14 @@ TITLES = {
     "true error": "cameras: error in space [px]",
     "corner error": "corners: error in the image [px]",
     "corner time": "corners: CPU time per image [s]",
-    "disparity error": "watch: error of the disparity of one shot [px]",
+    "disparity error": "watch: error of the disparity of single shots [px]",
     "drift error": "self-calibration: error left in the volume [px]",
 }
 LIMITED = {
     "true error": "rms",
     "corner error": "rms",
     "corner time": "time",
-    "disparity error": "error",
+    "disparity error": "rms and alarms",
     "drift error": "largest error",
 }
 """Which of its figures a quantity's limit is for."""
@@ -85,7 +85,7 @@ def accuracy_figure(rows: Sequence[AccuracyRow]) -> Figure:
     views = list(dict.fromkeys(row.view for row in rows))
     handles = [
         *(_mark(colour, "s", colour, view) for view, colour in zip(views, VIEW_COLOURS, strict=False)),
-        _mark("0.2", "o", "0.2", "rms, error, or time"),
+        _mark("0.2", "o", "0.2", "rms, or time"),
         _mark("0.2", "^", "white", "largest error"),
         _mark("0.2", "_", "0.2", "both of the best unbiased fit"),
     ]

@@ -68,7 +68,9 @@ class CalibrationStudy:
     densities_per_mm3 : tuple of float
         Of droplets.
     shots : int
-        Shots of droplets.
+        Shots of droplets that self-calibration takes together.
+    watched_shots : int
+        Shots that the watch looks at one by one; at least one per view.
     drift_px : float
         How far one camera has moved; every view in a direction of its own.
     seed : int
@@ -85,6 +87,7 @@ class CalibrationStudy:
     half_mm: tuple[float, float, float] = (2.5, 2.0, 4.5)
     densities_per_mm3: tuple[float, ...] = (3.5, 7.0)
     shots: int = 4
+    watched_shots: int = 12
     drift_px: float = 2.0
     seed: int = 0
 
@@ -102,14 +105,13 @@ class AccuracyRow:
     view : str
         Name of the view.
     value : float | None
-        Root mean square of this view in px, its disparity's error in px, or CPU time in s; None where the product
-        refused.
+        Root mean square of this view in px, or CPU time in s; None where the product refused.
     maximum : float | None
-        Largest error in px, of a drift in any view; None for times, disparities and refusals.
+        Largest error in px, of a drift in any view; None for times and refusals.
     limit : float
         What the value, of a drift the largest error, must not exceed.
     kept : bool
-        Whether it does not.
+        Whether it does not; of disparities, whether alarms are right in every shot too.
     within : float | None
         Share of the errors that do not exceed the limit; None where single figures are judged.
     ideal_rms, ideal_maximum : float | None

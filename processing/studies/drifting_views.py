@@ -1,7 +1,7 @@
 """Cameras that have moved since they were calibrated: what the watch sees of it, and what self-calibration leaves.
 
-Droplets of the spray itself tell. The watch looks at a single shot, as ``tomoshadow check`` does; self-calibration
-takes several. Every view is moved in a direction of its own.
+Droplets of the spray itself tell. The watch looks at a single shot, as ``tomoshadow check`` does, so that many single
+shots are asked; self-calibration takes several together. Every view is moved in a direction of its own.
 """
 
 from collections.abc import Iterator, Sequence
@@ -20,8 +20,9 @@ from processing.studies.seen_droplets import droplet_calibration, droplet_views,
 from processing.studies.simulated_droplets import SCALE_VOXEL_PER_MM
 
 WATCHED_PX = 0.4
-"""A drift that the watch must raise an alarm for, ``LIMITS_PX``, and its error must not hide."""
-DISPARITY_LIMIT_PX = WATCHED_PX - LIMITS_PX[Verdict.USABLE]
+"""A drift that the watch must raise an alarm for, and its error must not hide."""
+ALARM_PX = LIMITS_PX[Verdict.USABLE]
+DISPARITY_LIMIT_PX = WATCHED_PX - ALARM_PX
 
 Shot = Sequence[FloatArray]
 """Droplets (N, 2) of every view."""
@@ -51,12 +52,12 @@ def drifting_views(study: CalibrationStudy) -> Iterator[AccuracyRow]:
     rig = _Rig.of(study)
     for density_per_mm3 in study.densities_per_mm3:
         rng, case = np.random.default_rng(study.seed), f"{density_per_mm3:g} droplets/mm3"
-        shots = [seen_droplets(rig.cameras, np.array(study.half_mm), density_per_mm3, rng) for _ in range(study.shots)]
+        count = max(study.shots, study.watched_shots)
+        shots = [seen_droplets(rig.cameras, np.array(study.half_mm), density_per_mm3, rng) for _ in range(count)]
+        yield from _watched(rig, shots[: study.watched_shots], study.views, case)
         for view in study.views:
-            yield _watched(rig, shots[0], view, np.zeros(2), f"{case}, in place")
-            shift_px = WATCHED_PX * direction(rig.number_of(view))
-            yield _watched(rig, shots[0], view, shift_px, f"{case}, off by {WATCHED_PX:g} px")
-            yield _recovered(rig, shots, view, study.drift_px * direction(rig.number_of(view)), case)
+            shift_px = study.drift_px * direction(rig.number_of(view))
+            yield _recovered(rig, shots[: study.shots], view, shift_px, case)
 
 
 def direction(number: int) -> FloatArray:
@@ -65,17 +66,35 @@ def direction(number: int) -> FloatArray:
     return np.array([np.cos(angle_rad), np.sin(angle_rad)])
 
 
-def _watched(rig: _Rig, shot: Shot, view: str, shift_px: FloatArray, case: str) -> AccuracyRow:
-    """By how much the disparity of a view differs from how far it has moved."""
-    number = rig.number_of(view)
-    (moved,) = _moved([shot], number, shift_px)
+def _watched(rig: _Rig, shots: Sequence[Shot], views: Sequence[str], case: str) -> Iterator[AccuracyRow]:
+    """Disparities of shot after shot: with all views in place, and with one off, the views taking turns."""
+    in_place = [_disparities_px(rig, shot) for shot in shots]
+    for turn, view in enumerate(views):
+        number = rig.number_of(view)
+        off = [
+            _disparities_px(rig, moved)[number]
+            for moved in _moved(shots[turn :: len(views)], number, WATCHED_PX * direction(number))
+        ]
+        yield _watched_row(f"{case}, in place", view, [shot[number] for shot in in_place], 0.0)
+        yield _watched_row(f"{case}, off by {WATCHED_PX:g} px", view, off, WATCHED_PX)
+
+
+def _disparities_px(rig: _Rig, shot: Shot) -> list[float]:
+    """Of every view in one shot; infinite where the droplets do not tell."""
     try:
-        measured = shot_disparity(rig.cameras, [moved], measured_box(rig.calibration))[number]
+        return [view.disparity_px for view in shot_disparity(rig.cameras, [shot], measured_box(rig.calibration))]
     except CalibrationError:
+        return [np.inf] * len(rig.cameras)
+
+
+def _watched_row(case: str, view: str, disparities_px: Sequence[float], drift_px: float) -> AccuracyRow:
+    """By how much the disparities of single shots differ from a drift; each must raise an alarm, or none may."""
+    if not np.all(np.isfinite(disparities_px)):
         return AccuracyRow("disparity error", case, view, None, None, DISPARITY_LIMIT_PX, kept=False)
-    error_px = abs(measured.disparity_px - float(np.linalg.norm(shift_px)))
-    kept = error_px < DISPARITY_LIMIT_PX
-    return AccuracyRow("disparity error", case, view, error_px, None, DISPARITY_LIMIT_PX, kept)
+    error_px = np.abs(np.subtract(disparities_px, drift_px))
+    alarmed = np.greater(disparities_px, ALARM_PX)
+    kept = rms_px(error_px) < DISPARITY_LIMIT_PX and bool(np.all(alarmed == (drift_px > ALARM_PX)))
+    return AccuracyRow("disparity error", case, view, rms_px(error_px), float(error_px.max()), DISPARITY_LIMIT_PX, kept)
 
 
 def _recovered(rig: _Rig, shots: Sequence[Shot], view: str, shift_px: FloatArray, case: str) -> AccuracyRow:
