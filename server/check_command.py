@@ -75,6 +75,7 @@ def self_calibrate_views(options: Namespace) -> dict[str, Any]:
         "moved": result.moved,
         "sub_volumes": result.sub_volumes,
         "droplets": result.droplets,
+        "uncertainty_px": result.uncertainty_px,
         "views": {
             name: {
                 "correction_px": result.corrections_px[name],

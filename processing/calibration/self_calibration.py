@@ -25,6 +25,7 @@ from processing.calibration.droplet_matching import Box, match_exposures
 from processing.calibration.errors import CalibrationError
 from processing.calibration.health import judge
 from processing.calibration.mapping_correction import corrected, correction_size, sensitivity
+from processing.calibration.motion_fit import FAINTEST, largest_uncertainty_px, places_mm, solve
 from processing.calibration.sight_lines import linearise, unseen
 from processing.geometry import FloatArray, ViewMapping
 
@@ -32,6 +33,8 @@ DIVISIONS = ((3, 3, 3), (2, 2, 2))
 """Sub-volumes along x, y and z; larger ones where droplets are too dense for a peak in small ones."""
 MIN_SUB_VOLUMES = 8
 """Fewer do not show how a correction varies over the volume."""
+MAX_UNCERTAINTY_PX = 0.06
+"""Standard uncertainty of a correction, where it is largest; its error is to stay below 0.1 px."""
 CROWDED_PX = 12.0
 """Where the droplets that are found are closer to each other than this, on average, many more hide each other."""
 FINE_SEARCH_PX = 1.5
@@ -40,8 +43,6 @@ MAX_ROUNDS = 5
 CONVERGED_PX = 0.01
 AGREED_PX = 0.05
 """Views that disagree by less are left as they are: a good calibration has this error."""
-FAINTEST = 0.2
-"""A common motion of the views that changes disparities by less than this share of it is left alone."""
 EXPLAINED_PX = 0.1
 """A motion that leaves less than this explains the disparities."""
 CLEARER = 2.0
@@ -68,6 +69,8 @@ class SelfCalibration:
         Sub-volumes whose droplets told.
     droplets : int
         Droplets in their peaks.
+    uncertainty_px : float
+        Largest standard uncertainty of the corrections, anywhere in the volume; 0 if nothing moved.
     """
 
     calibration: Calibration
@@ -77,6 +80,7 @@ class SelfCalibration:
     after_px: dict[str, float]
     sub_volumes: int
     droplets: int
+    uncertainty_px: float
 
 
 def self_calibrate(
@@ -98,7 +102,7 @@ def self_calibrate(
     Raises
     ------
     CalibrationError
-        Droplets are too few or do not agree; names numbers and limits.
+        Droplets are too few, do not agree or leave the correction uncertain; names numbers and limits.
     """
     calibration.require_world()
     require_views(len(calibration.views))
@@ -107,6 +111,8 @@ def self_calibrate(
     moved, mappings, last = _refined(original, exposures, box, first)
     distances_px, after_px = _distances_px(original, mappings, box), _disagreement_px(mappings, last)
     corrections = dict(zip(calibration.views, distances_px, strict=True))
+    uncertainty_px = largest_uncertainty_px(mappings, np.flatnonzero(distances_px), last, box)
+    _require_certain(uncertainty_px, last)
     note = f"self-calibration on {len(exposures)} exposures of {source}: {_moves(corrections)}"
     views = {
         name: _corrected_view(view, mapping, distance_px, left_px)
@@ -122,7 +128,18 @@ def self_calibrate(
         after_px=dict(zip(calibration.views, after_px, strict=True)),
         sub_volumes=len(last),
         droplets=sum(disparity.n_droplets for disparity in last),
+        uncertainty_px=uncertainty_px,
     )
+
+
+def _require_certain(uncertainty_px: float, seen: Sequence[LocalDisparity]) -> None:
+    if uncertainty_px > MAX_UNCERTAINTY_PX:
+        droplets = sum(disparity.n_droplets for disparity in seen)
+        raise CalibrationError(
+            f"{droplets} droplets in {len(seen)} sub-volumes leave the correction uncertain by "
+            f"{uncertainty_px:.2f} px, at most {MAX_UNCERTAINTY_PX:g} px are allowed: "
+            "take more shots, or shots of a thinner spray"
+        )
 
 
 def _refined(
@@ -212,22 +229,13 @@ def _explain(
     none = [np.zeros(correction_size(mapping)) for mapping in original]
     if _rms_px(target_px) < AGREED_PX:
         return None, none
-    alone = [_solve(block, target_px, 0.0) for block in blocks]
+    alone = [solve(block, target_px, 0.0) for block in blocks]
     left_px = [_rms_px(target_px - block @ correction) for block, correction in zip(blocks, alone, strict=True)]
     best, second = np.argsort(left_px)[:2]
     if left_px[best] < EXPLAINED_PX and left_px[second] > CLEARER * max(left_px[best], NOISE_PX):
         return int(best), [*none[:best], alone[best], *none[best + 1 :]]
-    together = _solve(np.concatenate(blocks, axis=2), target_px, FAINTEST)
+    together = solve(np.concatenate(blocks, axis=2), target_px, FAINTEST)
     return None, np.split(together, np.cumsum([len(part) for part in none])[:-1])
-
-
-def _solve(block: FloatArray, target_px: FloatArray, faintest: float) -> FloatArray:
-    """Smallest correction (P,) of least squares, without the motions that disparities hardly show."""
-    matrix = block.reshape(-1, block.shape[-1])
-    left, strength, motions = np.linalg.svd(matrix, full_matrices=False)
-    shown = strength > max(faintest * np.sqrt(target_px.size / 2), 1e-4 * strength[0])
-    amounts = (left[:, shown].T @ target_px.ravel()) / strength[shown]
-    return np.asarray(motions[shown].T @ amounts, dtype=np.float64)
 
 
 def _rms_px(disparity_px: FloatArray) -> float:
@@ -243,9 +251,9 @@ def _disagreement_px(mappings: Sequence[ViewMapping], seen: Sequence[LocalDispar
 
 
 def _distances_px(before: Sequence[ViewMapping], after: Sequence[ViewMapping], box: Box) -> list[float]:
-    corners_mm = np.array(np.meshgrid(*zip(box.lower_mm, box.middle_mm, box.upper_mm, strict=True))).reshape(3, -1).T
+    points_mm = places_mm(box)
     return [
-        float(np.linalg.norm(new.project(corners_mm) - old.project(corners_mm), axis=1).max())
+        float(np.linalg.norm(new.project(points_mm) - old.project(points_mm), axis=1).max())
         for old, new in zip(before, after, strict=True)
     ]
 

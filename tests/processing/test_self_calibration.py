@@ -14,7 +14,7 @@ from processing.calibration.polynomial import fit_polynomial
 from processing.calibration.self_calibration import SelfCalibration, self_calibrate
 from processing.geometry import FloatArray, PinholeCamera, ViewMapping
 from processing.studies.drifting_views import direction
-from tests.processing.drifting_views import SIZE_PX, calibration_of, droplet_shots, inside_mm, views
+from tests.processing.drifting_views import HALF_MM, SIZE_PX, calibration_of, droplet_shots, inside_mm, views
 
 Drift = Callable[[FloatArray], FloatArray]
 SHOTS = 4
@@ -128,6 +128,29 @@ def test_too_few_droplets_are_refused() -> None:
         match=r"\d of 27 sub-volumes, 8 are needed: 4 exposures with 15, 15.*take more shots; if",
     ):
         self_calibrate(calibration_of(views()), sparse, "run")
+
+
+def test_what_is_left_uncertain_is_refused() -> None:
+    """A few droplets, seen badly: enough sub-volumes, but the correction would be wrong by 0.3 px."""
+    rng = np.random.default_rng(1)
+    shots = []
+    for _ in range(SHOTS):
+        points_mm = rng.uniform(-HALF_MM, HALF_MM, (90, 3))
+        shot = [camera.project(points_mm) + rng.normal(0, 0.18, (90, 2)) for camera in views()]
+        shots.append([shot[0] + 2.0 * direction(0), *shot[1:]])
+    with pytest.raises(
+        CalibrationError,
+        match=r"1\d\d droplets in \d+ sub-volumes leave .* uncertain by 0\.\d+ px, at most 0\.06 px.*more shots",
+    ):
+        self_calibrate(calibration_of(views()), shots, "run")
+
+
+def test_uncertainty_is_that_of_the_error() -> None:
+    drifts = {1: shifted(*(2.0 * direction(1)))}
+    result = recalibrate(drifts)
+    assert 0.01 < result.uncertainty_px < 0.06
+    assert errors_px(result, drifts).max() < 3 * result.uncertainty_px
+    assert recalibrate({}).uncertainty_px == 0.0
 
 
 def test_droplets_that_have_nothing_to_do_with_each_other_are_refused() -> None:
