@@ -55,7 +55,7 @@ class ShotCheck:
         """The view whose motion alone explains an alarm, clearly better than that of any other would."""
         if len(self.beyond) == 1:
             return self.beyond[0]
-        if len(self.views) < 2 or self.worst_px <= ALARM_PX:
+        if len(self.views) < 2 or self._certain_px <= ALARM_PX:
             return None
         best, second = sorted(self.views, key=lambda name: self.views[name].left_px)[:2]
         clearly = self.views[second].left_px > CLEARER * max(self.views[best].left_px, NOISE_PX)
@@ -69,7 +69,11 @@ class ShotCheck:
         """
         if self.beyond:
             return Verdict.REFUSE
-        return judge(self.worst_px) if self.views else None
+        return judge(self._certain_px) if self.views else None
+
+    @property
+    def _certain_px(self) -> float:
+        return max(view.certain_px for view in self.views.values())
 
 
 def check_shot(run_dir: Path, shot: int, calibration: Calibration) -> ShotCheck:

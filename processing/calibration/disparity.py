@@ -83,6 +83,11 @@ class ViewDisparity:
     uncertainty_px: float
     left_px: float = math.nan
 
+    @property
+    def certain_px(self) -> float:
+        """Disparity less its uncertainty: what is judged, so that few droplets of a dense spray are no alarm."""
+        return max(0.0, self.disparity_px - self.uncertainty_px)
+
 
 def measured_box(calibration: Calibration) -> Box:
     """The calibrated volume."""

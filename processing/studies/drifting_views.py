@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from processing.calibration.calibration import Calibration, Verdict
-from processing.calibration.disparity import measured_box, shot_disparity
+from processing.calibration.disparity import ViewDisparity, measured_box, shot_disparity
 from processing.calibration.errors import CalibrationError
 from processing.calibration.health import LIMITS_PX
 from processing.calibration.self_calibration import self_calibrate
@@ -68,31 +68,31 @@ def direction(number: int) -> FloatArray:
 
 def _watched(rig: _Rig, shots: Sequence[Shot], views: Sequence[str], case: str) -> Iterator[AccuracyRow]:
     """Disparities of shot after shot: with all views in place, and with one off, the views taking turns."""
-    in_place = [_disparities_px(rig, shot) for shot in shots]
+    in_place = [_disparities(rig, shot) for shot in shots]
     for turn, view in enumerate(views):
         number = rig.number_of(view)
         off = [
-            _disparities_px(rig, moved)[number]
+            _disparities(rig, moved)[number]
             for moved in _moved(shots[turn :: len(views)], number, WATCHED_PX * direction(number))
         ]
         yield _watched_row(f"{case}, in place", view, [shot[number] for shot in in_place], 0.0)
         yield _watched_row(f"{case}, off by {WATCHED_PX:g} px", view, off, WATCHED_PX)
 
 
-def _disparities_px(rig: _Rig, shot: Shot) -> list[float]:
+def _disparities(rig: _Rig, shot: Shot) -> Sequence[ViewDisparity]:
     """Of every view in one shot; infinite where the droplets do not tell."""
     try:
-        return [view.disparity_px for view in shot_disparity(rig.cameras, [shot], measured_box(rig.calibration))]
+        return shot_disparity(rig.cameras, [shot], measured_box(rig.calibration))
     except CalibrationError:
-        return [np.inf] * len(rig.cameras)
+        return [ViewDisparity(np.inf, 0.0)] * len(rig.cameras)
 
 
-def _watched_row(case: str, view: str, disparities_px: Sequence[float], drift_px: float) -> AccuracyRow:
+def _watched_row(case: str, view: str, measured: Sequence[ViewDisparity], drift_px: float) -> AccuracyRow:
     """By how much the disparities of single shots differ from a drift; each must raise an alarm, or none may."""
-    if not np.all(np.isfinite(disparities_px)):
+    error_px = np.abs([shot.disparity_px - drift_px for shot in measured])
+    if not np.all(np.isfinite(error_px)):
         return AccuracyRow("disparity error", case, view, None, None, DISPARITY_LIMIT_PX, kept=False)
-    error_px = np.abs(np.subtract(disparities_px, drift_px))
-    alarmed = np.greater(disparities_px, ALARM_PX)
+    alarmed = np.array([shot.certain_px > ALARM_PX for shot in measured])
     kept = rms_px(error_px) < DISPARITY_LIMIT_PX and bool(np.all(alarmed == (drift_px > ALARM_PX)))
     return AccuracyRow("disparity error", case, view, rms_px(error_px), float(error_px.max()), DISPARITY_LIMIT_PX, kept)
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from processing.calibration.calibration import Verdict
+from processing.calibration.disparity import ViewDisparity
 from processing.geometry import FloatArray
 from processing.run_check import ShotCheck, check_exposures
 from processing.studies.drifting_views import direction
@@ -90,6 +91,15 @@ def test_several_views_out_of_range_stop_too() -> None:
 @pytest.mark.parametrize("density_per_mm3", [0.5, 2.0, 7.0, 14.0, 20.0, 28.0, 40.0])
 def test_views_in_place_raise_no_alarm_however_dense_the_spray(density_per_mm3: float) -> None:
     assert photographed(density_per_mm3).verdict in (Verdict.GOOD, Verdict.USABLE, None)
+
+
+@pytest.mark.parametrize(
+    ("uncertainty_px", "verdict"), [(0.01, Verdict.WARN), (0.075, Verdict.USABLE)], ids=["many", "few droplets"]
+)
+def test_only_what_is_certain_of_a_disparity_is_judged(uncertainty_px: float, verdict: Verdict) -> None:
+    """0.317 ± 0.075 px was measured of views in place, at 18 droplets/mm3."""
+    check = ShotCheck(0, {"view1": ViewDisparity(0.1, 0.02), "view2": ViewDisparity(0.317, uncertainty_px)})
+    assert check.verdict is verdict
 
 
 @pytest.mark.parametrize(("density_per_mm3", "drift_px"), [(0.0, 0.0), (0.05, 0.0), (0.05, 30.0), (60.0, 30.0)])

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from processing.calibration.disparity import ViewDisparity
 from processing.studies.accuracy_report import (
     accuracy_figure,
     accuracy_line,
@@ -112,12 +113,12 @@ def test_any_shot_tells_whether_a_view_has_moved(rows: list[AccuracyRow]) -> Non
         (0.0, [0.01] * 11 + [0.31], False),
         (0.0, [0.11, 0.12, 0.1], False),
         (0.4, [0.42, 0.38, 0.31], True),
-        (0.4, [0.4] * 11 + [0.29], False),
+        (0.4, [0.4] * 11 + [0.304], False),
         (0.4, [0.4, 0.4, np.inf], False),
     ],
 )
 def test_the_watch_is_judged_by_all_its_shots(drift_px: float, disparities_px: list[float], kept: bool) -> None:
-    row = _watched_row("spray", "view1", disparities_px, drift_px)
+    row = _watched_row("spray", "view1", [ViewDisparity(one_px, 0.005) for one_px in disparities_px], drift_px)
     assert row.kept is kept
     if np.all(np.isfinite(disparities_px)):
         assert row.maximum == pytest.approx(np.max(np.abs(np.subtract(disparities_px, drift_px))))
