@@ -141,7 +141,7 @@ class CalibrationWatch:
     def _judged(self, account: _Account, job: Job) -> CalibrationStanding | None:
         """Standing after a check; droplets that do not tell change nothing, nor does a shot before the newest one."""
         result = job.result if job.state is JobState.DONE else None
-        if not result or result["verdict"] is None:
+        if not result or result.get("verdict") is None:
             return account.standing
         shot: int = result["shot"]
         account.told.add(shot)
