@@ -1,7 +1,6 @@
 """The mean volume of many exposures, without a volume for each of them."""
 
 from collections.abc import Iterable, Sequence
-from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +10,8 @@ from processing.reconstruction.line_of_sight import DEFAULT_THREADS, check_volum
 from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.plan import Plan
 
-BATCH_BYTES = 1 << 30
-"""Of resampled images in memory at the same time; the volume is read and written once for each batch."""
+BATCH_BYTES, BATCH_EXPOSURES = 1 << 30, 128
+"""Most of resampled images in memory at the same time; the volume is read and written once for each batch."""
 
 Exposure = Sequence[NDArray[np.float32]]
 
@@ -50,8 +49,10 @@ def mean_line_of_sight(
     check_volume(mean, plan, (np.float32,))
     mean.fill(0)
     count, coming = 0, iter(exposures)
-    batch_size = max(1, BATCH_BYTES // plan.resampled_bytes)
-    while batch := [plan.bind(plan.resample(images, threads)) for images in islice(coming, batch_size)]:
+    fitting = max(1, min(BATCH_EXPOSURES, BATCH_BYTES // plan.resampled_bytes))
+    memory = [plan.empty_images() for _ in range(fitting)]
+    # in this order: where the memory ends, no exposure is taken
+    while batch := [plan.bind(plan.resample(one, threads, own)) for own, one in zip(memory, coming, strict=False)]:
         _native.sum_of_sight(batch, number, mean, threads)
         count += len(batch)
     if not count:
