@@ -17,8 +17,9 @@ from processing.calibration.errors import CalibrationError
 from processing.clocked_slabs import ClockedSlabs
 from processing.preprocessing import Intensity, Preprocessing, intensity
 from processing.reconstruction.common_volume import common_volume
+from processing.reconstruction.kernels import DEFAULT_THREADS
 from processing.reconstruction.method import ReconstructionMethod
-from processing.reconstruction.plan import DEFAULT_THREADS, plan_reconstruction
+from processing.reconstruction.plan import plan_reconstruction
 from processing.reconstruction.planned_view import PlannedView
 from processing.reconstruction.settings import FrozenValue, GridSettings, ReconstructionSettings
 from processing.reconstruction.volume_file import write_slabs

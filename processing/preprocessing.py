@@ -12,8 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from processing.reconstruction.kernels import _native
-from processing.reconstruction.plan import DEFAULT_THREADS
+from processing.reconstruction.kernels import DEFAULT_THREADS, _native
 
 Polarity = Literal["shadow", "bright"]
 Intensity = NDArray[np.float32]

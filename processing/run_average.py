@@ -10,8 +10,9 @@ from daq.shotfile import RunReader
 from processing.calibration.calibration import Calibration
 from processing.pipeline import default_grid, frame_names, require_match, shot_intensities
 from processing.preprocessing import Intensity
+from processing.reconstruction.kernels import DEFAULT_THREADS
 from processing.reconstruction.mean_line_of_sight import mean_line_of_sight
-from processing.reconstruction.plan import DEFAULT_THREADS, plan_reconstruction
+from processing.reconstruction.plan import plan_reconstruction
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.volume import VoxelGrid
 from processing.workbench import Workbench

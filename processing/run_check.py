@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from daq.shotfile import RunReader
 from processing.calibration.calibration import Calibration, Verdict
@@ -70,6 +71,17 @@ class ShotCheck:
         if self.beyond:
             return Verdict.REFUSE
         return judge(self._certain_px) if self.views else None
+
+    def record(self) -> dict[str, Any]:
+        """What was found, for a program: JSON values."""
+        return {
+            "shot": self.shot,
+            "verdict": self.verdict,
+            "moved": self.moved,
+            "views": {name: view.disparity_px for name, view in self.views.items()},
+            "uncertainty_px": {name: view.uncertainty_px for name, view in self.views.items()},
+            "problem": self.problem or None,
+        }
 
     @property
     def _certain_px(self) -> float:

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from processing.preprocessing import Intensity
 from processing.reconstruction.block_slabs import slabs_of_blocks
+from processing.reconstruction.kernels import DEFAULT_THREADS
 from processing.reconstruction.method import ReconstructionMethod
-from processing.reconstruction.plan import DEFAULT_THREADS, Plan
+from processing.reconstruction.plan import Plan
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.reconstruction.slab_volume import SLAB_ROWS, SlabVolume
 from processing.reconstruction.smart import SmartResult, mart, smart

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from daq.run_plan import FrozenModel
-from server.problems import NotFound
+from server.errors import NotFound
 
 _CURRENT = "current"
 

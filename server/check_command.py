@@ -27,7 +27,7 @@ def check(options: Namespace) -> dict[str, Any]:
         "alarm_px": ALARM_PX,
         "stop_px": STOP_PX,
         "verdict": max(verdicts, key=list(Verdict).index) if verdicts else None,
-        "shots": [check_json(shot) for shot in shots],
+        "shots": [shot.record() for shot in shots],
     }
 
 
@@ -45,18 +45,6 @@ def _finding(measured: ShotCheck) -> str:
         f"{name} {view.disparity_px:.2f} ± {view.uncertainty_px:.2f} px" for name, view in measured.views.items()
     )
     return f"{views}, {measured.moved} has moved" if measured.moved else views
-
-
-def check_json(measured: ShotCheck) -> dict[str, Any]:
-    """One shot for a program."""
-    return {
-        "shot": measured.shot,
-        "verdict": measured.verdict,
-        "moved": measured.moved,
-        "views": {name: view.disparity_px for name, view in measured.views.items()},
-        "uncertainty_px": {name: view.uncertainty_px for name, view in measured.views.items()},
-        "problem": measured.problem or None,
-    }
 
 
 def self_calibrate_views(options: Namespace) -> dict[str, Any]:

@@ -29,7 +29,7 @@ from server.bench_command import BenchError, bench
 from server.calibrate_command import calibrate_views, stated_origin, stated_roll
 from server.check_command import check, self_calibrate_views
 from server.config import ConfigError
-from server.doctor import doctor
+from server.doctor_command import doctor
 from server.firmware_image import ImageError
 from server.firmware_options import add_firmware_tools
 from server.study_options import add_studies

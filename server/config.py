@@ -8,8 +8,8 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, SecretStr, ValidationError, ValidationInfo, field_validator, model_validator
 
 from daq.acquisition_limits import AcquisitionLimits
+from daq.faults import ScriptedFault
 from daq.run_plan import FrozenModel
-from daq.simulation.faults import ScriptedFault
 from processing.toml_lines import line_of
 
 ViewName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,31}$")]

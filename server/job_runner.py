@@ -12,9 +12,9 @@ from typing import Any
 from processing.engine import Engine, Task, TaskAborted, TaskError
 from server.calibration_watch import CalibrationWatch
 from server.calibrations import CalibrationStore
+from server.errors import Conflict
 from server.events import EventPublisher
 from server.jobs import Job, JobKind, JobState, JobTable
-from server.problems import Conflict
 
 _CHECKS_REMEMBERED = 1000
 

@@ -22,7 +22,7 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from daq.run_plan import FrozenModel
-from server.problems import Conflict, NotFound
+from server.errors import Conflict, NotFound
 
 
 class JobKind(StrEnum):

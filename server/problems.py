@@ -20,6 +20,7 @@ from daq.errors import (
     RecorderError,
     ShotFileError,
 )
+from server.errors import Conflict, NotFound, ServerError, Unprocessable
 
 MEDIA_TYPE = "application/problem+json"
 _LOG = logging.getLogger(__name__)
@@ -35,22 +36,6 @@ class Problem(BaseModel):
     status: int
     detail: str | None = None
     instance: str | None = Field(None, description="path of the request")
-
-
-class ServerError(Exception):
-    """Base of the errors that the server itself raises on purpose."""
-
-
-class NotFound(ServerError):
-    """There is no such thing; the text names it."""
-
-
-class Conflict(ServerError):
-    """The thing is not in a state that allows this; the text names the state."""
-
-
-class Unprocessable(ServerError):
-    """The request is well formed and makes no sense here."""
 
 
 STATUS_OF: dict[type[Exception], HTTPStatus] = {

@@ -6,9 +6,9 @@ from collections.abc import Iterable
 from daq.run_events import ShotRecorded
 from daq.run_plan import ImageKey, RunKind
 from processing.reconstruction.settings import ReconstructionSettings
+from server.errors import Unprocessable
 from server.events import RUN_EVENTS
 from server.jobs import Job, reconstruction_job
-from server.problems import Unprocessable
 from server.services import Context
 
 _SHOT_RECORDED = RUN_EVENTS[ShotRecorded]

@@ -9,8 +9,8 @@ from typing import Any
 from daq.run_plan import FrozenModel
 from processing.reconstruction.volume_file import open_volume
 from processing.results_file import volume_files
+from server.errors import NotFound
 from server.previews import VolumePreview, load_preview, make_preview, preview_path, save_preview
-from server.problems import NotFound
 from server.surfaces import surface_glb
 
 _MAKING = threading.Lock()  # a full volume takes seconds: who waits for a preview does not make it again

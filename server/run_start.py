@@ -1,7 +1,7 @@
 """Starting a run: the one way for API and page."""
 
 from daq.run_plan import RunKind, RunPlan
-from server.problems import Unprocessable
+from server.errors import Unprocessable
 from server.services import Context
 
 

@@ -13,7 +13,7 @@ from daq.run_events import RunStatus
 from daq.run_plan import FrozenModel, ImageKey, RunKind, RunPlan
 from daq.run_state import RunOutcome
 from daq.shotfile import RunReader, list_runs
-from server.problems import NotFound
+from server.errors import NotFound
 
 ACTIVE = "active"
 """Stands in the place of the outcome while a run is being recorded."""

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Protocol
 
 from daq.devices import Rig
+from daq.faults import Fault
 from daq.run_events import RunStatus
 from daq.run_plan import RunPlan
-from daq.simulation.faults import Fault
 from processing.engine import Engine, Task
 from processing.reconstruction.settings import ReconstructionSettings
 from server.calibration_watch import CalibrationStanding, CalibrationWatch

@@ -12,7 +12,6 @@ from processing.engine import Task
 from processing.pipeline import reconstruct_shot
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.run_check import check_shot
-from server.check_command import check_json
 from server.jobs import JobKind
 from server.results import write_preview
 
@@ -52,7 +51,7 @@ def check_run(job: dict[str, Any], should_stop: Callable[[], bool]) -> dict[str,
     """Measure how well the calibration still fits one shot."""
     calibration = load_calibration(Path(job["calibration_file"]))
     should_stop()
-    return check_json(check_shot(Path(job["run_dir"]), job["shot"], calibration))
+    return check_shot(Path(job["run_dir"]), job["shot"], calibration).record()
 
 
 TASKS: Mapping[JobKind, Task] = MappingProxyType(

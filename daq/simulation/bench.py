@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from types import TracebackType
 from typing import Self
 
+from daq.faults import BENCH_FAULTS, Fault, FaultKind, ScriptedFault
 from daq.shot import FiredTrain
-from daq.simulation.faults import BENCH_FAULTS, Fault, FaultKind, ScriptedFault
 from daq.simulation.gige_camera import SimulatedCamera
 from daq.simulation.interlock import DoorSwitch
 from daq.simulation.pulse_generator import FirmwareProcess

@@ -20,7 +20,7 @@ class Model(StrEnum):
 
 
 class Verdict(StrEnum):
-    """What a view is good for, by its hold-out error; limits in ``processing.calibration.health``."""
+    """What a view is good for, by its hold-out error."""
 
     GOOD = "good"
     USABLE = "usable"

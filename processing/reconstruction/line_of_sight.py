@@ -6,9 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from processing.reconstruction.kernels import _native
+from processing.reconstruction.kernels import DEFAULT_THREADS, _native
 from processing.reconstruction.method import ReconstructionMethod
-from processing.reconstruction.plan import DEFAULT_THREADS as DEFAULT_THREADS
 from processing.reconstruction.plan import Plan
 
 KERNEL_METHOD = {

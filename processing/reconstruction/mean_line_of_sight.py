@@ -5,8 +5,8 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from processing.reconstruction.kernels import _native
-from processing.reconstruction.line_of_sight import DEFAULT_THREADS, check_volume, kernel_method
+from processing.reconstruction.kernels import DEFAULT_THREADS, _native
+from processing.reconstruction.line_of_sight import check_volume, kernel_method
 from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.plan import Plan
 

@@ -10,7 +10,7 @@ from processing.geometry import ViewMapping
 from processing.reconstruction.accuracy import Accuracy
 from processing.reconstruction.errors import ReconstructionError
 from processing.reconstruction.fixed_point import FixedPoint
-from processing.reconstruction.kernels import _native
+from processing.reconstruction.kernels import DEFAULT_THREADS, _native
 from processing.reconstruction.node_view import NodeView, sample_mapping
 from processing.reconstruction.rectified_view import NotRectifiable, RectifiedView, rectify
 from processing.volume import VoxelGrid
@@ -18,8 +18,6 @@ from processing.volume import VoxelGrid
 MIN_VIEWS, MAX_VIEWS = 2, 8
 MAX_DEVIATION_PX = 0.02
 """What a plan may add to the calibration error; a good calibration has 0.05 px."""
-DEFAULT_THREADS = 2
-"""Of work that runs beside an acquisition or another worker; who has the machine to himself says more."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,9 +8,9 @@ from typing import Any, TypedDict, Unpack
 import numpy as np
 from numpy.typing import NDArray
 
-from processing.reconstruction.kernels import _native
+from processing.reconstruction.kernels import DEFAULT_THREADS, _native
 from processing.reconstruction.line_of_sight import check_volume
-from processing.reconstruction.plan import DEFAULT_THREADS, Plan
+from processing.reconstruction.plan import Plan
 from processing.reconstruction.smart_state import FirstGuess, SmartState
 
 Volume = NDArray[np.float32]

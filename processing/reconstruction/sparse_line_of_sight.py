@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from processing.reconstruction.kernels import _native
-from processing.reconstruction.line_of_sight import DEFAULT_THREADS, kernel_method
+from processing.reconstruction.kernels import DEFAULT_THREADS, _native
+from processing.reconstruction.line_of_sight import kernel_method
 from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.plan import Plan
 from processing.reconstruction.slab_volume import SLAB_ROWS, slabs_in

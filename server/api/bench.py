@@ -2,10 +2,11 @@
 
 from fastapi import APIRouter
 
+from daq.faults import Fault
 from daq.run_plan import FrozenModel
-from daq.simulation.faults import Fault
 from server.api.parameters import ContextOf
-from server.problems import NotFound, Unprocessable, responses
+from server.errors import NotFound, Unprocessable
+from server.problems import responses
 from server.services import Bench
 
 router = APIRouter(prefix="/api/bench", tags=["bench"])

@@ -8,8 +8,9 @@ from pydantic import Field
 from daq.run_plan import FrozenModel, RunKind
 from server.api.parameters import CalibrationId, ContextOf
 from server.calibrations import CalibrationSummary
+from server.errors import Unprocessable
 from server.jobs import Job, calibration_job
-from server.problems import Unprocessable, responses
+from server.problems import responses
 
 router = APIRouter(prefix="/api/calibrations", tags=["calibrations"])
 

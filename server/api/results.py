@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from daq.run_plan import FrozenModel
 from server.api.parameters import ContextOf, RunId
+from server.errors import NotFound
 from server.pictures import plane_png
 from server.previews import VolumePreview
-from server.problems import NotFound, responses
+from server.problems import responses
 from server.results import ResultSet, preview_of, result_sets, surface_of, volume_file
 
 router = APIRouter(prefix="/api/runs/{run_id}/results", tags=["results"])

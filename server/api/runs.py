@@ -8,7 +8,8 @@ from daq.run_plan import RunPlan
 from daq.shotfile import RunHeader
 from server.api.parameters import ContextOf, RunId
 from server.api.rig import AcquisitionView, view_of_acquisition
-from server.problems import Conflict, responses
+from server.errors import Conflict
+from server.problems import responses
 from server.run_start import start_run
 from server.runs import RunSummary
 

@@ -7,8 +7,9 @@ from fastapi import APIRouter, Query, Response
 from daq.run_plan import FrozenModel, ImageKey
 from daq.shotfile import ExposureRecord, FiredTrain, Shot
 from server.api.parameters import ContextOf, RunId, ShotIndex
+from server.errors import NotFound
 from server.pictures import Stretch, frame_png
-from server.problems import NotFound, responses
+from server.problems import responses
 from server.runs import RunStore
 
 router = APIRouter(prefix="/api/runs/{run_id}/shots", tags=["shots"])

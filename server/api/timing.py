@@ -8,7 +8,8 @@ from daq.run_plan import RunPlan
 from daq.shot import FiredTrain
 from daq.timing import CameraTiming, ShotTiming, plan_shot_timing
 from server.api.parameters import ContextOf, RunId
-from server.problems import Conflict, NotFound, responses
+from server.errors import Conflict, NotFound
+from server.problems import responses
 from server.services import Context
 from server.shot_timing import fired_timing, nominal_plan
 from server.timing_diagram import picture, timing_diagram

@@ -10,7 +10,7 @@ from daq.errors import DaqError
 from daq.run_plan import RunKind
 from daq.run_state import RunOutcome
 from daq.timing import plan_shot_timing
-from server.problems import ServerError
+from server.errors import ServerError
 from server.run_start import start_run
 from server.runs import RunSummary
 from server.services import Context

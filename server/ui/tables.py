@@ -13,8 +13,8 @@ from processing.reconstruction.accuracy import Accuracy
 from processing.reconstruction.method import ReconstructionMethod as Method
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.reconstruction.voxel_type import VoxelType
+from server.errors import ServerError
 from server.jobs import Job, JobKind, JobState, calibration_job
-from server.problems import ServerError
 from server.reconstruction import request_reconstruction
 from server.runs import ACTIVE, RunSummary
 from server.services import Context

@@ -7,9 +7,9 @@ from pathlib import Path
 from nicegui import ui
 
 from processing.volume import VoxelGrid
+from server.errors import NotFound
 from server.jobs import Job, JobKind, JobState
 from server.previews import AXES
-from server.problems import NotFound
 from server.results import preview_of, volume_file
 from server.services import Context
 from server.ui.theme import panel

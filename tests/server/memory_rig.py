@@ -10,8 +10,8 @@ import numpy as np
 
 from daq.devices import DeviceIdentity, GeneratorState, GeneratorStatus, Rig, TriggerSource
 from daq.errors import DeviceRefused, InterlockOpen
+from daq.faults import Fault
 from daq.shot import DoubleFrame, ExposureRecord, FiredTrain, Image, LightPulse
-from daq.simulation.faults import Fault
 from daq.timing import CameraTiming, ShotTiming
 from server.config import RigConfig
 

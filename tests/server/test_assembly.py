@@ -8,9 +8,9 @@ import pytest
 
 from daq.devices import GeneratorState
 from daq.errors import DeviceRefused, DeviceUnavailable
+from daq.faults import Fault, FaultKind, ScriptedFault
 from daq.run_plan import PulsePair, RunKind, RunPlan
 from daq.shot import DoubleFrame
-from daq.simulation.faults import Fault, FaultKind, ScriptedFault
 from daq.simulation.gpio_chip import ChipUnsupported, SimulatedSwitchLine
 from daq.timing import plan_shot_timing
 from processing.synthetic.truth_file import read_true_spray

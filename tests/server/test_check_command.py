@@ -14,7 +14,7 @@ from processing.calibration.calibration_file import load_calibration, save_calib
 from processing.calibration.disparity import ViewDisparity
 from processing.run_check import ShotCheck
 from processing.studies.seen_droplets import droplet_image
-from server.check_command import check_json, check_line
+from server.check_command import check_line
 from server.cli import main
 from tests.processing.drifting_views import DENSITY_PER_MM3, HALF_MM, SIZE_PX, calibration_of, inside_mm, views
 
@@ -143,7 +143,7 @@ def test_a_view_out_of_range_is_told_without_a_figure() -> None:
     assert check_line(measured) == (
         "shot 3: view2 has moved further than 3 px  STOP: do not reconstruct with this calibration"
     )
-    told = check_json(measured)
+    told = measured.record()
     assert (told["verdict"], told["moved"], told["views"]) == ("refuse", "view2", {})
     assert told["problem"] == "view2 has moved further than 3 px"
 

@@ -10,10 +10,10 @@ import pytest
 from processing.engine import InlineEngine
 from server.calibration_watch import CalibrationWatch
 from server.calibrations import CalibrationStore
+from server.errors import Conflict
 from server.events import EventPublisher
 from server.job_runner import JobRunner
 from server.jobs import Job, JobKind, JobState, JobTable, check_job, reconstruction_job
-from server.problems import Conflict
 
 DEADLINE_S = 10.0
 

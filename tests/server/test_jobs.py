@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from server.errors import Conflict, NotFound
 from server.jobs import (
     TRANSITIONS,
     Job,
@@ -18,7 +19,6 @@ from server.jobs import (
     jobs_on_disk,
     reconstruction_job,
 )
-from server.problems import Conflict, NotFound
 
 
 @pytest.fixture
