@@ -1,4 +1,4 @@
-"""Shot and DoubleFrame: one firing, seen by all views. Values only; ``daq.shotfile`` stores them."""
+"""Shot and DoubleFrame: one firing, seen by all views. Values only; ``daq.files.run_directory`` stores them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

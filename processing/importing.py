@@ -12,7 +12,7 @@ from typing import TypedDict
 import numpy as np
 from numpy.typing import NDArray
 
-from daq.shotfile import DoubleFrame, ExposureRecord, ImageKey, RunHeader, RunWriter, Shot, ViewFormat
+from daq.files.run_directory import DoubleFrame, ExposureRecord, ImageKey, RunHeader, RunWriter, Shot, ViewFormat
 from processing.calibration.calibration_set import write_set_file
 from processing.calibration.set_record import CalibrationEntry, PlaneEntry, PointsEntry
 from processing.image_file import GreyImage, ImageFileError, read_image

@@ -9,8 +9,8 @@ from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
 
-from daq.run_file import RUN_FILE
-from daq.shotfile import RunReader, Shot
+from daq.files.run_directory import RunReader, Shot
+from daq.files.run_file import RUN_FILE
 from processing.calibration.calibration import Calibration, Verdict
 from processing.calibration.calibration_file import file_sha256, load_calibration
 from processing.calibration.errors import CalibrationError

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from daq.shotfile import RunReader
+from daq.files.run_directory import RunReader
 from processing.calibration.calibration import Calibration
 from processing.pipeline import default_grid, frame_names, require_match, shot_intensities
 from processing.preprocessing import Intensity

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from daq.shotfile import RunReader
+from daq.files.run_directory import RunReader
 from processing.calibration.calibration import Calibration, Verdict
 from processing.calibration.disparity import MIN_VIEWS, REACH_PX, ViewDisparity, measured_box, shot_disparity
 from processing.calibration.droplet_images import find_droplets

@@ -16,11 +16,11 @@ from daq.drivers.serial_stage import SerialStage, StageScale
 from daq.errors import DeviceUnavailable
 from daq.run_plan import RunKind
 from daq.shot import FiredTrain
-from daq.simulation.bench import BenchDevices, SimulatedBench
-from daq.simulation.gige_camera import SimulatedCamera
+from daq.simulation.camera.gige_camera import SimulatedCamera
 from daq.simulation.gpio_chip import CHIP_PATH, ChipUnsupported, SimulatedSwitchLine, free_line
 from daq.simulation.interlock import DoorSwitch, MemoryInterlock
-from daq.simulation.pulse_generator import FirmwareProcess
+from daq.simulation.laboratory import BenchDevices, SimulatedBench
+from daq.simulation.pico.firmware_process import FirmwareProcess
 from daq.simulation.stage import SimulatedStage
 from server.config import (
     PulseGeneratorConfig,

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from daq.recorder import Recorder
-from daq.shotfile import DoubleFrame, ExposureRecord, ImageKey, RunHeader, RunWriter, Shot, ViewFormat
+from daq.files.run_directory import DoubleFrame, ExposureRecord, ImageKey, RunHeader, RunWriter, Shot, ViewFormat
+from daq.run.recorder import Recorder
 from processing.studies.speed import SpeedResult, speed_study
 from processing.studies.speed_scene import SpeedStudy
 from processing.studies.speed_targets import Measured, markdown_table

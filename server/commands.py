@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from daq.shotfile import ImageKey, RunReader
+from daq.files.run_directory import ImageKey, RunReader
 from processing.calibration.calibration import Calibration
 from processing.calibration.calibration_file import load_calibration
 from processing.importing import import_manifest

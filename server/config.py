@@ -7,8 +7,8 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, SecretStr, ValidationError, ValidationInfo, field_validator, model_validator
 
-from daq.acquisition_limits import AcquisitionLimits
 from daq.faults import ScriptedFault
+from daq.run.limits import AcquisitionLimits
 from daq.run_plan import FrozenModel
 from processing.toml_lines import line_of
 

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from daq.acquisition import Acquisition
 from daq.errors import DaqError
-from daq.run_events import RunEvent, RunMessage
+from daq.files.run_directory import RunReader
+from daq.run.acquisition import Acquisition
+from daq.run.events import RunEvent, RunMessage
+from daq.run.state import RunOutcome
 from daq.run_plan import PulsePair, RunKind, RunPlan
-from daq.run_state import RunOutcome
-from daq.shotfile import RunReader
 from processing.calibration.calibration import Calibration
 from processing.calibration.calibration_file import file_sha256, save_calibration
 from processing.calibration.calibration_set import load_calibration_set

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from daq.shotfile import RunReader
+from daq.files.run_directory import RunReader
 from processing.analysis.figures import isosurface_figure, residuals_figure, shadowgraph_figure, slices_figure
 from processing.preprocessing import Intensity
 from processing.reconstruction.volume_file import read_volume

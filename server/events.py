@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from typing import Any
 
-from daq.run_events import RunEvent, RunMessage, ShotRecorded, StateChanged
+from daq.run.events import RunEvent, RunMessage, ShotRecorded, StateChanged
 
 HISTORY = 2000
 RUN_EVENTS = {StateChanged: "run_state", ShotRecorded: "shot_recorded", RunMessage: "run_message"}
@@ -79,7 +79,7 @@ class EventPublisher:
         return event
 
     def publish_run_event(self, event: RunEvent) -> None:
-        """Add what acquisition says; ``daq.acquisition.Acquisition`` gets this as its ``publish``."""
+        """Add what acquisition says; ``daq.run.acquisition.Acquisition`` gets this as its ``publish``."""
         self.publish(RUN_EVENTS[type(event)], **asdict(event))
 
     def since(self, last_id: int) -> list[Event]:

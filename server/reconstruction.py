@@ -3,7 +3,7 @@
 import asyncio
 from collections.abc import Iterable
 
-from daq.run_events import ShotRecorded
+from daq.run.events import ShotRecorded
 from daq.run_plan import ImageKey, RunKind
 from processing.reconstruction.settings import ReconstructionSettings
 from server.errors import Unprocessable

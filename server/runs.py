@@ -9,10 +9,10 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from daq.run_events import RunStatus
+from daq.files.run_directory import RunReader, list_runs
+from daq.run.events import RunStatus
+from daq.run.state import RunOutcome
 from daq.run_plan import FrozenModel, ImageKey, RunKind, RunPlan
-from daq.run_state import RunOutcome
-from daq.shotfile import RunReader, list_runs
 from server.errors import NotFound
 
 ACTIVE = "active"

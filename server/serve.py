@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from daq.acquisition import Acquisition
+from daq.run.acquisition import Acquisition
 from processing.calibration.calibration_file import file_sha256
 from processing.engine import DaskEngine
 from server.app import create_app, serve

@@ -7,7 +7,7 @@ from typing import Protocol
 
 from daq.devices import Rig
 from daq.faults import Fault
-from daq.run_events import RunStatus
+from daq.run.events import RunStatus
 from daq.run_plan import RunPlan
 from processing.engine import Engine, Task
 from processing.reconstruction.settings import ReconstructionSettings
@@ -23,7 +23,7 @@ from server.runs import RunStore
 
 
 class RunControl(Protocol):
-    """What the server asks of ``daq.acquisition.Acquisition``; every method but ``start`` returns at once."""
+    """What the server asks of ``daq.run.acquisition.Acquisition``; every method but ``start`` returns at once."""
 
     def start(self, plan: RunPlan) -> str: ...  # noqa: D102
     def stop(self) -> None: ...  # noqa: D102

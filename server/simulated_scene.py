@@ -8,7 +8,7 @@ import numpy as np
 
 from daq.run_plan import RunKind
 from daq.shot import FiredTrain, Image
-from daq.simulation.light import Exposure
+from daq.simulation.camera.light import Exposure
 from processing.geometry import PinholeCamera, view_camera
 from processing.optics import image_scale_px_per_mm
 from processing.synthetic.nozzles import flat_fan_spray, hollow_cone_spray

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from daq.shotfile import ImageKey, RunReader, Shot
+from daq.files.run_directory import ImageKey, RunReader, Shot
 from processing.calibration.errors import CalibrationError
 from processing.calibration.observation import CalibrationSet
 from processing.calibration.plane_detection import PlaneImage, detect_planes

@@ -5,8 +5,8 @@ from typing import Annotated, Any
 from fastapi import APIRouter
 from pydantic import ConfigDict, Field
 
+from daq.run.state import RunOutcome, RunState
 from daq.run_plan import FrozenModel
-from daq.run_state import RunOutcome, RunState
 from server.api.parameters import ContextOf
 from server.calibration_watch import CalibrationStanding
 from server.monitor import Lamp

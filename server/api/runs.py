@@ -4,8 +4,8 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
 
+from daq.files.run_directory import RunHeader
 from daq.run_plan import RunPlan
-from daq.shotfile import RunHeader
 from server.api.parameters import ContextOf, RunId
 from server.api.rig import AcquisitionView, view_of_acquisition
 from server.errors import Conflict

@@ -4,8 +4,8 @@ from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query, Response
 
+from daq.files.run_directory import ExposureRecord, FiredTrain, Shot
 from daq.run_plan import FrozenModel, ImageKey
-from daq.shotfile import ExposureRecord, FiredTrain, Shot
 from server.api.parameters import ContextOf, RunId, ShotIndex
 from server.errors import NotFound
 from server.pictures import Stretch, frame_png

@@ -2,7 +2,7 @@
 
 from nicegui import ui
 
-from daq.run_state import RunState
+from daq.run.state import RunState
 from server.monitor import Lamp
 from server.services import Context
 

@@ -7,8 +7,8 @@ from typing import Any
 from nicegui import ui
 
 from daq.errors import DaqError
+from daq.run.state import RunOutcome
 from daq.run_plan import RunKind
-from daq.run_state import RunOutcome
 from daq.timing import plan_shot_timing
 from server.errors import ServerError
 from server.run_start import start_run

@@ -6,8 +6,8 @@ from nicegui import ui
 from starlette.concurrency import run_in_threadpool
 
 from daq.errors import DaqError
-from daq.run_events import RunStatus
-from daq.run_state import RunState
+from daq.run.events import RunStatus
+from daq.run.state import RunState
 from server.monitor import Health, Lamp
 from server.services import Context
 from server.ui.theme import panel

@@ -14,8 +14,8 @@ from daq.drivers.aravis_camera import AravisCamera
 from daq.drivers.camera_profile import FeatureWrite, load_camera_profile
 from daq.errors import DeviceError
 from daq.shot import DoubleFrame, FiredTrain, Image, LightPulse
-from daq.simulation.gige_camera import SimulatedCamera
-from daq.simulation.light import Exposure
+from daq.simulation.camera.gige_camera import SimulatedCamera
+from daq.simulation.camera.light import Exposure
 
 pytestmark = pytest.mark.network
 

@@ -13,7 +13,7 @@ from daq.drivers.serial_pulse_generator import SerialPulseGenerator
 from daq.errors import DeviceError, DeviceRefused, PlanError
 from daq.run_plan import PulsePair, RunPlan
 from daq.shot import FiredTrain
-from daq.simulation.pulse_generator import FirmwareProcess
+from daq.simulation.pico.firmware_process import FirmwareProcess
 from daq.timing import CameraTiming, ShotTiming, Window, plan_shot_timing
 
 CHANNELS = {"left": 0, "middle": 2, "right": 3}

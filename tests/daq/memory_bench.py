@@ -11,8 +11,8 @@ import numpy as np
 from daq.devices import DeviceIdentity, GeneratorState, GeneratorStatus, Rig, TriggerSource
 from daq.errors import DeviceError, DeviceRefused, DeviceTimeout
 from daq.shot import DoubleFrame, ExposureRecord, FiredTrain, Image, LightPulse
+from daq.simulation.camera.light import Exposure, exposures_of
 from daq.simulation.interlock import MemoryInterlock
-from daq.simulation.light import Exposure, exposures_of
 from daq.timing import CameraTiming, ShotTiming
 
 TIMING = CameraTiming(

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from daq.acquisition import Acquisition
-from daq.acquisition_limits import AcquisitionLimits
 from daq.devices import GeneratorState, GeneratorStatus, Rig
 from daq.errors import BusyError, DaqError, DeviceError, DeviceOvertaken, DeviceRefused, InterlockOpen, PlanError
-from daq.run_events import RunEvent, RunMessage, ShotRecorded, StateChanged
-from daq.run_state import RunOutcome, RunState
-from daq.shotfile import ImageKey, PulsePair, RunKind, RunPlan, RunReader, RunWriter
+from daq.files.run_directory import ImageKey, PulsePair, RunKind, RunPlan, RunReader, RunWriter
+from daq.run.acquisition import Acquisition
+from daq.run.events import RunEvent, RunMessage, ShotRecorded, StateChanged
+from daq.run.limits import AcquisitionLimits
+from daq.run.state import RunOutcome, RunState
 from daq.timing import CameraTiming
 from tests.daq.memory_bench import DARK_COUNTS, LIT_COUNTS, MemoryBench
 

@@ -8,17 +8,17 @@ from pathlib import Path
 
 import pytest
 
-from daq.acquisition import Acquisition
-from daq.acquisition_limits import AcquisitionLimits
 from daq.devices import Rig
 from daq.drivers.serial_pulse_generator import SerialPulseGenerator
 from daq.errors import DeviceError, DeviceRefused
+from daq.files.run_directory import RunReader
+from daq.run.acquisition import Acquisition
+from daq.run.limits import AcquisitionLimits
+from daq.run.state import RunOutcome, RunState
 from daq.run_plan import PulsePair, RunKind, RunPlan
-from daq.run_state import RunOutcome, RunState
 from daq.shot import FiredTrain
-from daq.shotfile import RunReader
 from daq.simulation.interlock import MemoryInterlock
-from daq.simulation.pulse_generator import FirmwareProcess
+from daq.simulation.pico.firmware_process import FirmwareProcess
 from tests.daq.memory_bench import MemoryCamera
 
 CHANNELS = {"view1": 0, "view2": 3}

@@ -17,10 +17,10 @@ from daq.drivers.aravis_camera import AravisCamera
 from daq.drivers.camera_profile import FeatureWrite, PairSpacing, load_camera_profile
 from daq.errors import DeviceError, DeviceRefused, DeviceTimeout, DeviceUnavailable
 from daq.shot import DoubleFrame, FiredTrain, Image, LightPulse
-from daq.simulation.gige_camera import SimulatedCamera
-from daq.simulation.gige_control import GVCP_PORT, Command
-from daq.simulation.gige_registers import Register
-from daq.simulation.light import Exposure
+from daq.simulation.camera.gige_camera import SimulatedCamera
+from daq.simulation.camera.gige_control import GVCP_PORT, Command
+from daq.simulation.camera.gige_registers import Register
+from daq.simulation.camera.light import Exposure
 
 pytestmark = pytest.mark.network
 

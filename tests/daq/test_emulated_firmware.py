@@ -11,10 +11,10 @@ from daq.drivers.serial_pulse_generator import SerialPulseGenerator
 from daq.errors import DeviceError, DeviceRefused, DeviceUnavailable
 from daq.run_plan import PulsePair, RunPlan
 from daq.shot import FiredTrain
-from daq.simulation.emulated_firmware import measured_shot
-from daq.simulation.pulse_generator import FirmwareProcess
-from daq.simulation.rp2040_chip import TRIGGER
-from daq.simulation.rp2040_emulator import START_CYCLES, Edge
+from daq.simulation.pico.emulated_firmware import measured_shot
+from daq.simulation.pico.firmware_process import FirmwareProcess
+from daq.simulation.pico.rp2040_chip import TRIGGER
+from daq.simulation.pico.rp2040_emulator import START_CYCLES, Edge
 from daq.timing import CameraTiming, ShotTiming, plan_shot_timing
 
 CHANNELS = {"left": 1, "right": 3}

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from daq.drivers.camera_profile import PairSpacing
 from daq.drivers.exposure_pairing import Arrival, ExposureFormat, double_frame, frame_id_distance, place_exposures
-from daq.simulation.gige_stream import next_block_id
+from daq.simulation.camera.gige_stream import next_block_id
 
 SHAPE = (3, 4)
 FORM = ExposureFormat(SHAPE, 8, 2, PairSpacing(spacing_ns=8500, tolerance_ns=100))

@@ -10,8 +10,8 @@ import pytest
 from daq.drivers.aravis_camera import AravisCamera
 from daq.drivers.camera_profile import load_camera_profile
 from daq.shot import FiredTrain, Image
-from daq.simulation.gige_camera import SimulatedCamera
-from daq.simulation.light import Exposure
+from daq.simulation.camera.gige_camera import SimulatedCamera
+from daq.simulation.camera.light import Exposure
 
 pytestmark = pytest.mark.network
 

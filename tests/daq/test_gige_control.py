@@ -4,9 +4,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from daq.simulation.gige_control import Command, ControlChannel, ResendRequest, Status
-from daq.simulation.gige_registers import PixelFormat, Register, RegisterBank
-from daq.simulation.gige_xml import camera_xml
+from daq.simulation.camera.gige_control import Command, ControlChannel, ResendRequest, Status
+from daq.simulation.camera.gige_registers import PixelFormat, Register, RegisterBank
+from daq.simulation.camera.gige_xml import camera_xml
 
 OWNER, OTHER = ("127.0.0.1", 1000), ("127.0.0.1", 2000)
 SHAPE = (1200, 1600)

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from daq.shot import Image
-from daq.simulation.gige_registers import PixelFormat
-from daq.simulation.gige_stream import Block
+from daq.simulation.camera.gige_registers import PixelFormat
+from daq.simulation.camera.gige_stream import Block
 
 blocks = st.builds(
     Block,

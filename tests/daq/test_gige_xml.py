@@ -2,8 +2,8 @@ from xml.etree import ElementTree
 
 import pytest
 
-from daq.simulation.gige_registers import ExposureMode, PixelFormat, Register, RegisterBank
-from daq.simulation.gige_xml import camera_xml
+from daq.simulation.camera.gige_registers import ExposureMode, PixelFormat, Register, RegisterBank
+from daq.simulation.camera.gige_xml import camera_xml
 
 SHAPE = (1200, 1600)
 GENAPI = "{http://www.genicam.org/GenApi/Version_1_1}"

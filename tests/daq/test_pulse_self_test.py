@@ -11,7 +11,7 @@ from daq.drivers.pulse_protocol import Command, State
 from daq.drivers.pulse_self_test import Verdict, self_test
 from daq.errors import DeviceError
 from daq.shot import FiredTrain
-from daq.simulation.pulse_generator import FirmwareProcess
+from daq.simulation.pico.firmware_process import FirmwareProcess
 
 CHANNELS = {"left": 0, "right": 1}
 

@@ -14,8 +14,8 @@ from daq.drivers.serial_pulse_generator import SerialPulseGenerator
 from daq.errors import DeviceUnavailable
 from daq.run_plan import PulsePair, RunPlan
 from daq.shot import FiredTrain
-from daq.simulation.firmware_build import build_firmware
-from daq.simulation.pulse_generator import FirmwareProcess
+from daq.simulation.pico.firmware_build import build_firmware
+from daq.simulation.pico.firmware_process import FirmwareProcess
 from daq.timing import CameraTiming, plan_shot_timing
 
 CAMERA = CameraTiming(1_000, 20_000, 500, 30_000_000, 1_000_000)
@@ -54,7 +54,7 @@ def test_every_shot_is_told_in_order_and_at_once() -> None:
 
 def test_it_does_not_outlive_a_killed_owner() -> None:
     owner_code = (
-        "from daq.simulation.pulse_generator import FirmwareProcess\n"
+        "from daq.simulation.pico.firmware_process import FirmwareProcess\n"
         "import signal\n"
         "with FirmwareProcess({}, lambda train: None) as firmware:\n"
         "    print(firmware.pid, flush=True)\n"

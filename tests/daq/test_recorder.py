@@ -11,8 +11,17 @@ import numpy as np
 import pytest
 
 from daq.errors import RecorderError, RecorderOverflow
-from daq.recorder import Recorder
-from daq.shotfile import DoubleFrame, ExposureRecord, ImageKey, RunHeader, RunReader, RunWriter, Shot, ViewFormat
+from daq.files.run_directory import (
+    DoubleFrame,
+    ExposureRecord,
+    ImageKey,
+    RunHeader,
+    RunReader,
+    RunWriter,
+    Shot,
+    ViewFormat,
+)
+from daq.run.recorder import Recorder
 
 SHAPE = (120, 160)
 HEADER = RunHeader(

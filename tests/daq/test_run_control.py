@@ -6,8 +6,8 @@ import time
 from hypothesis import given
 from hypothesis import strategies as st
 
-from daq.run_control import RunControl
-from daq.run_state import RunStep
+from daq.run.ending import RunControl
+from daq.run.state import RunStep
 
 ENDINGS = st.sampled_from([RunStep.LAST_SHOT, RunStep.STOP, RunStep.ABORT, RunStep.ERROR])
 

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from daq.errors import BusyError
-from daq.run_state import OUTCOMES, TRANSITIONS, RunOutcome, RunState, RunStep, next_state
+from daq.run.state import OUTCOMES, TRANSITIONS, RunOutcome, RunState, RunStep, next_state
 
 LIGHT_MAY_BE_ON = {RunState.ARMING, RunState.ACQUIRING}
 RESTING = {RunState.IDLE, RunState.FAULT}

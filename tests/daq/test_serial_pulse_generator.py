@@ -27,7 +27,7 @@ from daq.drivers.pulse_protocol import (
 from daq.drivers.serial_pulse_generator import SerialPulseGenerator
 from daq.errors import DeviceError, DeviceRefused, DeviceTimeout, DeviceUnavailable, ProtocolError
 from daq.run_plan import PulsePair, RunPlan
-from daq.simulation.pulse_generator import FirmwareProcess
+from daq.simulation.pico.firmware_process import FirmwareProcess
 from daq.timing import CameraTiming, ShotTiming, plan_shot_timing
 
 CHANNELS = {"left": 0, "right": 1}

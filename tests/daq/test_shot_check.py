@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from daq.run.shot_check import ShotFindings, check_exposures, light_thresholds
 from daq.shot import DoubleFrame, ExposureRecord
-from daq.shot_check import ShotFindings, check_exposures, light_thresholds
 
 SHAPE = (200, 48)
 THRESHOLDS = {"view1": (20.0, 20.0)}

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from daq.shotfile import (
+from daq.files.run_directory import (
     DoubleFrame,
     ExposureRecord,
     FiredTrain,

@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from daq.run.train_check import TOLERANCE_NS, train_deviation
 from daq.run_plan import PulsePair, RunPlan
 from daq.shot import FiredTrain, LightPulse
 from daq.timing import CameraTiming, ShotTiming, plan_shot_timing
-from daq.train_check import TOLERANCE_NS, train_deviation
 
 CAMERAS = {
     "view1": CameraTiming(1000, 20_000, 2000, 30_000_000, 1_000_000),

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from daq.drivers.pulse_protocol import MAX_SEQUENCE, Command, Reply, Request, Source, decode_reply, encode_request
-from daq.simulation.firmware_build import ImageKind, build_image
-from daq.simulation.rp2040_chip import TRIGGER
-from daq.simulation.rp2040_emulator import CYCLE_NS, CYCLES_PER_MS, START_CYCLES, Edge, EmulatedPico
+from daq.simulation.pico.firmware_build import ImageKind, build_image
+from daq.simulation.pico.rp2040_chip import TRIGGER
+from daq.simulation.pico.rp2040_emulator import CYCLE_NS, CYCLES_PER_MS, START_CYCLES, Edge, EmulatedPico
 
 PERIOD_MS = 10
 CAMERA_PULSE_NS = 10_000

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from daq.drivers.pulse_protocol import Command, ErrorNumber, Reply, Request, decode_reply, encode_request
-from daq.simulation.pulse_generator import FirmwareProcess
+from daq.simulation.pico.firmware_process import FirmwareProcess
 from tests.firmware.train_oracle import LIMIT, TICK_NS
 from tests.firmware.train_oracle import OracleChannel as Channel
 

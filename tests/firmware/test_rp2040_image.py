@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from daq.simulation import rp2040_chip
-from daq.simulation.firmware_build import build_image
-from daq.simulation.rp2040_emulator import EmulatedPico
+from daq.simulation.pico import rp2040_chip
+from daq.simulation.pico.firmware_build import build_image
+from daq.simulation.pico.rp2040_emulator import EmulatedPico
 
 ROOT = Path(__file__).resolve().parents[2]
 FIRMWARE = ROOT / "firmware" / "rp2040"

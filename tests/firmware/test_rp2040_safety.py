@@ -17,8 +17,8 @@ from daq.drivers.pulse_protocol import (
     decode_reply,
     encode_request,
 )
-from daq.simulation.rp2040_chip import PIN_CAMERA, PIN_ESTOP, PIN_INTERLOCK, PIN_LIGHT, PIN_TRIGGER
-from daq.simulation.rp2040_emulator import CYCLE_NS, CYCLES_PER_MS
+from daq.simulation.pico.rp2040_chip import PIN_CAMERA, PIN_ESTOP, PIN_INTERLOCK, PIN_LIGHT, PIN_TRIGGER
+from daq.simulation.pico.rp2040_emulator import CYCLE_NS, CYCLES_PER_MS
 from tests.firmware.rp2040_board import BOOT_MS, PAPER, PERIOD_MS, Board
 
 WATCHDOG_MS = 200

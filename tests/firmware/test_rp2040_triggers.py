@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from daq.drivers.pulse_protocol import ABORT_BYTE, HEARTBEAT_MS, Command, ErrorNumber, Fault, Source, State
-from daq.simulation.rp2040_emulator import CYCLE_NS, CYCLES_PER_MS, START_CYCLES
+from daq.simulation.pico.rp2040_emulator import CYCLE_NS, CYCLES_PER_MS, START_CYCLES
 from tests.firmware.rp2040_board import PAPER, PERIOD_MS, Board, Channel
 
 FIRST_SHOT_MS = 20

@@ -14,7 +14,7 @@ from itertools import pairwise
 import pytest
 from pioemu import State, emulate
 
-from daq.simulation.rp2040_emulator import CYCLE_NS, START_CYCLES
+from daq.simulation.pico.rp2040_emulator import CYCLE_NS, START_CYCLES
 from tests.firmware.rp2040_board import PAPER, PERIOD_MS, Board, Channel, Waveform, image
 
 OUTPUTS = ("light", "camera")

@@ -5,10 +5,10 @@ from dataclasses import replace
 import pytest
 
 from daq.drivers.pulse_protocol import ABORT_BYTE, Command, ErrorNumber, Request, State, decode_reply, encode_request
-from daq.simulation.firmware_build import ImageKind
-from daq.simulation.rp2040_chip import TRIGGER
-from daq.simulation.rp2040_emulator import CYCLE_NS, CYCLES_PER_MS
-from daq.simulation.usb_host import CONFIGURATION, DEVICE, PACKET, Setup, UsbHost
+from daq.simulation.pico.firmware_build import ImageKind
+from daq.simulation.pico.rp2040_chip import TRIGGER
+from daq.simulation.pico.rp2040_emulator import CYCLE_NS, CYCLES_PER_MS
+from daq.simulation.pico.usb_host import CONFIGURATION, DEVICE, PACKET, Setup, UsbHost
 from tests.firmware.rp2040_board import PAPER, PERIOD_MS, Board
 
 ENUMERATION_MS = 20

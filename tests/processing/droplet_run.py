@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from daq.shotfile import DoubleFrame, ExposureRecord, ImageKey, RunHeader, RunWriter, Shot, ViewFormat
+from daq.files.run_directory import DoubleFrame, ExposureRecord, ImageKey, RunHeader, RunWriter, Shot, ViewFormat
 from processing.calibration.calibration import Calibration, Model, PlaneError, Verdict, ViewCalibration
 from processing.calibration.calibration_file import save_calibration
 from processing.calibration.calibration_record import content_id

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from daq.shotfile import DoubleFrame, ExposureRecord, ImageKey, RunHeader, RunWriter, Shot, ViewFormat
+from daq.files.run_directory import DoubleFrame, ExposureRecord, ImageKey, RunHeader, RunWriter, Shot, ViewFormat
 from processing.calibration.calibration_set import load_calibration_set, write_set_file
 from processing.calibration.errors import CalibrationError
 from processing.calibration.imported_set import read_table

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
-from daq.shotfile import RunReader
+from daq.files.run_directory import RunReader
 from processing.calibration.calibration import Calibration
 from processing.calibration.calibration_set import load_calibration_set
 from processing.calibration.errors import CalibrationError, TargetNotFound

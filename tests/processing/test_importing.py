@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from daq.shotfile import ImageKey, RunReader
+from daq.files.run_directory import ImageKey, RunReader
 from processing.calibration.calibration_set import load_calibration_set
 from processing.calibration.errors import CalibrationError
 from processing.calibration.joint_fit import calibrate

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from daq.run_file import add_references
-from daq.shotfile import RunReader
+from daq.files.run_directory import RunReader
+from daq.files.run_file import add_references
 from processing.calibration.calibration import Verdict
 from processing.calibration.calibration_file import load_calibration
 from processing.calibration.errors import CalibrationError

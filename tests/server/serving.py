@@ -13,8 +13,8 @@ import numpy as np
 import uvicorn
 from fastapi import FastAPI
 
-from daq.acquisition import Acquisition
-from daq.run_events import RunStatus
+from daq.run.acquisition import Acquisition
+from daq.run.events import RunStatus
 from processing.engine import Engine, InlineEngine
 from processing.volume import VoxelGrid
 from server.app import create_api

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from daq.shotfile import DoubleFrame, ExposureRecord, ImageKey, RunHeader, RunWriter, Shot, ViewFormat
+from daq.files.run_directory import DoubleFrame, ExposureRecord, ImageKey, RunHeader, RunWriter, Shot, ViewFormat
 from processing.calibration.calibration import Verdict
 from processing.calibration.calibration_file import load_calibration, save_calibration
 from processing.calibration.disparity import ViewDisparity

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from daq.run_events import ShotRecorded
+from daq.run.events import ShotRecorded
 from server.events import Event, EventPublisher
 from tests.server.serving import Serving, plan_of
 

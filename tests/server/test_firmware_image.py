@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from daq.errors import DeviceError, DeviceUnavailable
-from daq.simulation.firmware_build import ImageKind, build_image
+from daq.simulation.pico.firmware_build import ImageKind, build_image
 from server.firmware_image import (
     BOOT_BYTES,
     FAMILY_FLAG,

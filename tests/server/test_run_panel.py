@@ -1,7 +1,7 @@
 import pytest
 
-from daq.run_events import RunStatus
-from daq.run_state import RunState
+from daq.run.events import RunStatus
+from daq.run.state import RunState
 from server.monitor import Health, Lamp
 from server.ui.run_panel import counts_text, waits_for_acknowledgement
 

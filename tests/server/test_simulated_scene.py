@@ -7,7 +7,7 @@ import pytest
 
 from daq.run_plan import RunKind
 from daq.shot import FiredTrain, LightPulse
-from daq.simulation.light import CollectedPulse, Exposure
+from daq.simulation.camera.light import CollectedPulse, Exposure
 from daq.timing import Window
 from processing.synthetic.truth_file import TruthFileError, read_true_cameras, read_true_spray
 from server.config import RigConfig, load_config

@@ -7,15 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from daq.acquisition import Acquisition
-from daq.acquisition_limits import AcquisitionLimits
 from daq.devices import GeneratorState
 from daq.errors import InterlockOpen, PlanError
 from daq.faults import Fault, FaultKind
-from daq.run_events import RunEvent, RunStatus, ShotRecorded
+from daq.files.run_directory import RunReader
+from daq.run.acquisition import Acquisition
+from daq.run.events import RunEvent, RunStatus, ShotRecorded
+from daq.run.limits import AcquisitionLimits
+from daq.run.state import RunOutcome, RunState
 from daq.run_plan import ImageKey, PulsePair, RunKind, RunPlan
-from daq.run_state import RunOutcome, RunState
-from daq.shotfile import RunReader
 from processing.synthetic.truth_file import read_true_cameras, read_true_spray
 from server.assembly import TRUTH_FILE, AssembledRig, open_rig
 from server.config import load_config

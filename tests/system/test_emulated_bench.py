@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from daq.acquisition import Acquisition
+from daq.files.run_directory import RunReader
+from daq.run.acquisition import Acquisition
+from daq.run.state import RunOutcome
 from daq.run_plan import PulsePair, RunKind, RunPlan
-from daq.run_state import RunOutcome
-from daq.shotfile import RunReader
 from server.assembly import open_rig
 from server.config import RigConfig, load_config
 

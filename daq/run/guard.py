@@ -12,9 +12,9 @@ from typing import Self
 
 from daq.devices import Rig
 from daq.errors import DaqError, DeviceError, DeviceOvertaken
-from daq.preflight import check_light_permitted
-from daq.run_control import RunControl
-from daq.run_state import RunStep
+from daq.run.ending import RunControl
+from daq.run.preflight import check_light_permitted
+from daq.run.state import RunStep
 
 
 class RunGuard:

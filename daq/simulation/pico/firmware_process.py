@@ -17,7 +17,7 @@ from typing import Self
 
 from daq.errors import DeviceTimeout, DeviceUnavailable
 from daq.shot import FiredTrain, LightPulse
-from daq.simulation.firmware_build import build_firmware, build_image
+from daq.simulation.pico.firmware_build import build_firmware, build_image
 
 _DEVICE = "simulated pulse generator"
 _ANSWER_LIMIT_S = 5.0
@@ -204,7 +204,7 @@ def _host_command() -> list[str]:
 def _emulator_command() -> list[str]:
     if importlib.util.find_spec("rp2040py") is None:
         raise DeviceUnavailable(_DEVICE, "rp2040py, which emulates the Pico, is missing (pip install rp2040py==0.3.6)")
-    return [sys.executable, "-m", "daq.simulation.emulated_firmware", str(build_image())]
+    return [sys.executable, "-m", "daq.simulation.pico.emulated_firmware", str(build_image())]
 
 
 def _lines(process: subprocess.Popen[str]) -> Iterator[str]:

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from threading import Event, Lock
 from time import perf_counter
 
-from daq.simulation.gige_control import Peer, ResendRequest
-from daq.simulation.gige_registers import PixelFormat
+from daq.simulation.camera.gige_control import Peer, ResendRequest
+from daq.simulation.camera.gige_registers import PixelFormat
 
 Packet = tuple[bytes, memoryview]
 

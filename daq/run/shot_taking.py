@@ -3,15 +3,15 @@
 import time
 from collections.abc import Callable
 
-from daq.acquisition_limits import AcquisitionLimits
 from daq.devices import Rig
 from daq.errors import DeviceRefused
-from daq.preflight import PreparedRun
-from daq.run_control import RunControl
+from daq.run.ending import RunControl
+from daq.run.limits import AcquisitionLimits
+from daq.run.preflight import PreparedRun
+from daq.run.shot_check import ShotFindings, Thresholds, check_exposures
+from daq.run.train_check import train_deviation
 from daq.run_plan import ImageKey
 from daq.shot import DoubleFrame, FiredTrain, Shot
-from daq.shot_check import ShotFindings, Thresholds, check_exposures
-from daq.train_check import train_deviation
 
 _LEAST_COLLECT_S = 0.05
 """What a camera gets although another one used up the deadline: its frames lie in its buffers already."""

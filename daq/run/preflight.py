@@ -8,9 +8,9 @@ from pathlib import Path
 
 from daq.devices import GeneratorState, Rig
 from daq.errors import DeviceRefused, InterlockOpen, PlanError
-from daq.references import find_references
+from daq.files.run_directory import ViewFormat
+from daq.run.references import find_references
 from daq.run_plan import RunKind, RunPlan
-from daq.shotfile import ViewFormat
 from daq.timing import ShotTiming, plan_shot_timing
 
 DISK_MARGIN_BYTES = 256 * 2**20

@@ -2,7 +2,7 @@
 
 Run as a program, it speaks like the host build of the firmware, ``firmware/host/main.c``::
 
-    python -m daq.simulation.emulated_firmware IMAGE.bin
+    python -m daq.simulation.pico.emulated_firmware IMAGE.bin
 
 What it says of a shot is not what the firmware meant to do, but what its pins did.
 """
@@ -16,8 +16,8 @@ import tty
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
-from daq.simulation.rp2040_chip import CHANNELS, TRIGGER
-from daq.simulation.rp2040_emulator import CYCLE_NS, CYCLES_PER_MS, START_CYCLES, Edge, EmulatedPico
+from daq.simulation.pico.rp2040_chip import CHANNELS, TRIGGER
+from daq.simulation.pico.rp2040_emulator import CYCLE_NS, CYCLES_PER_MS, START_CYCLES, Edge, EmulatedPico
 
 _BOOT_MS = 5
 _NOTICE_MS = 5

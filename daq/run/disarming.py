@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from daq.devices import Camera, GeneratorState, Rig
 from daq.errors import DaqError, DeviceError
-from daq.run_guard import switch_off
+from daq.run.guard import switch_off
 
 _RETRY_S = 0.05
 

@@ -17,12 +17,12 @@ import numpy as np
 from h5py import h5d, h5p, h5s, h5t
 from numpy.typing import NDArray
 
-from daq.atomic_file import replacing
 from daq.errors import RecorderError, ShotFileError
-from daq.run_header import RunHeader
-from daq.shot_columns import columns_of, frames_path, view_path
-from daq.shot_encoding import encode_frame
-from daq.single_shot_file import LIBRARY_VERSIONS, SCHEMA_VERSION, create_groups
+from daq.files.atomic_file import replacing
+from daq.files.columns import columns_of, frames_path, view_path
+from daq.files.encoding import encode_frame
+from daq.files.header import RunHeader
+from daq.files.shot_file import LIBRARY_VERSIONS, SCHEMA_VERSION, create_groups
 
 RUN_FILE = "run.h5"
 SHOTS_FOLDER = "shots"

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from daq.run_header import RunHeader
+from daq.files.header import RunHeader
 from daq.run_plan import ImageKey
 from daq.shot import DoubleFrame, ExposureRecord, FiredTrain, Image, LightPulse, Shot
 

@@ -9,17 +9,17 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from daq.acquisition_limits import AcquisitionLimits
 from daq.devices import GeneratorState, Rig
 from daq.errors import BusyError, DeviceError, PlanError
-from daq.preflight import PreparedRun, prepare_run
-from daq.run_control import RunControl
-from daq.run_events import RunEvent, RunMessage, RunStatus, ShotRecorded, StateChanged
+from daq.files.run_directory import open_runs
+from daq.run.ending import RunControl
+from daq.run.events import RunEvent, RunMessage, RunStatus, ShotRecorded, StateChanged
+from daq.run.limits import AcquisitionLimits
+from daq.run.preflight import PreparedRun, prepare_run
+from daq.run.session import RunSession, describe_run
+from daq.run.state import OUTCOMES, RunState, RunStep, next_state
 from daq.run_plan import RunPlan
-from daq.run_session import RunSession, describe_run
-from daq.run_state import OUTCOMES, RunState, RunStep, next_state
 from daq.shot import Shot
-from daq.shotfile import open_runs
 
 
 def _nobody_listens(_: RunEvent) -> None:

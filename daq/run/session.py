@@ -9,21 +9,21 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from daq.acquisition_limits import AcquisitionLimits
 from daq.devices import Rig
-from daq.disarming import confirm_light_off, disarm_cameras
 from daq.errors import DaqError
-from daq.preflight import PreparedRun
-from daq.recorder import Recorder
-from daq.references import mean_images
-from daq.run_control import RunControl
-from daq.run_guard import RunGuard, switch_off
+from daq.files.run_directory import RunHeader, RunWriter
+from daq.run.disarming import confirm_light_off, disarm_cameras
+from daq.run.ending import RunControl
+from daq.run.guard import RunGuard, switch_off
+from daq.run.limits import AcquisitionLimits
+from daq.run.preflight import PreparedRun
+from daq.run.recorder import Recorder
+from daq.run.references import mean_images
+from daq.run.shot_check import Thresholds, light_thresholds
+from daq.run.shot_taking import ShotTaker
+from daq.run.state import OUTCOMES, RunStep
 from daq.run_plan import RunKind
-from daq.run_state import OUTCOMES, RunStep
 from daq.shot import Shot
-from daq.shot_check import Thresholds, light_thresholds
-from daq.shot_taking import ShotTaker
-from daq.shotfile import RunHeader, RunWriter
 
 _SOFTWARE = ("tomoshadow", "numpy", "h5py", "isal", "pydantic")
 

@@ -18,18 +18,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.shot import FiredTrain, Image
-from daq.simulation.gige_control import GVCP_PORT, ControlChannel
-from daq.simulation.gige_faults import CameraFaults, ShotFault
-from daq.simulation.gige_registers import (
+from daq.simulation.camera.gige_control import GVCP_PORT, ControlChannel
+from daq.simulation.camera.gige_faults import CameraFaults, ShotFault
+from daq.simulation.camera.gige_registers import (
     LATCH_TIMESTAMP,
     STREAM_PACKET_SIZE_MASK,
     Register,
     RegisterBank,
     TriggerSource,
 )
-from daq.simulation.gige_stream import Block, StreamChannel, next_block_id
-from daq.simulation.gige_xml import camera_xml
-from daq.simulation.light import Exposure, FrameSource, exposures_of
+from daq.simulation.camera.gige_stream import Block, StreamChannel, next_block_id
+from daq.simulation.camera.gige_xml import camera_xml
+from daq.simulation.camera.light import Exposure, FrameSource, exposures_of
 from daq.timing import CameraTiming
 
 _CONTROL_POLL_S = 0.2

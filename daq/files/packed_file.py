@@ -6,12 +6,12 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from daq.atomic_file import replacing
 from daq.errors import RecorderError
-from daq.run_file import RUN_FILE, shot_path
-from daq.run_header import RunHeader
-from daq.shot_columns import columns_of, frames_path
-from daq.single_shot_file import LIBRARY_VERSIONS, create_frames, reading_shot
+from daq.files.atomic_file import replacing
+from daq.files.columns import columns_of, frames_path
+from daq.files.header import RunHeader
+from daq.files.run_file import RUN_FILE, shot_path
+from daq.files.shot_file import LIBRARY_VERSIONS, create_frames, reading_shot
 
 
 def pack_run(run_dir: Path, header: RunHeader, shot_count: int, out: Path) -> None:

@@ -9,9 +9,9 @@ from typing import Self
 
 from daq.faults import BENCH_FAULTS, Fault, FaultKind, ScriptedFault
 from daq.shot import FiredTrain
-from daq.simulation.gige_camera import SimulatedCamera
+from daq.simulation.camera.gige_camera import SimulatedCamera
 from daq.simulation.interlock import DoorSwitch
-from daq.simulation.pulse_generator import FirmwareProcess
+from daq.simulation.pico.firmware_process import FirmwareProcess
 from daq.simulation.stage import SimulatedStage
 
 _CAMERA_FAULTS: Mapping[FaultKind, Callable[[float], Mapping[str, float | bool]]] = {

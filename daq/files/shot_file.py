@@ -12,11 +12,11 @@ from h5py import h5d, h5p, h5s, h5t
 from numpy.typing import NDArray
 
 from daq.errors import RecorderError, ShotFileError
-from daq.run_header import RunHeader, ViewFormat
+from daq.files.columns import Column, columns_of, crc32_path, frames_path, shot_from_columns, shot_to_columns, view_path
+from daq.files.encoding import EncodedFrame, decode_frame, encode_frame, is_shuffled
+from daq.files.header import RunHeader, ViewFormat
 from daq.run_plan import ImageKey
 from daq.shot import Image, Shot
-from daq.shot_columns import Column, columns_of, crc32_path, frames_path, shot_from_columns, shot_to_columns, view_path
-from daq.shot_encoding import EncodedFrame, decode_frame, encode_frame, is_shuffled
 
 LIBRARY_VERSIONS = ("v110", "v110")
 """Format of every file: newer formats cannot be opened by the HDF5 1.10 tools of current distributions."""

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 from rp2040py.peripherals.vreg_and_chip_reset import HAD_RUN
 
-from daq.simulation.board_number import give_number
-from daq.simulation.mcp4728 import Mcp4728
-from daq.simulation.rp2040_chip import (
+from daq.simulation.pico.board_number import give_number
+from daq.simulation.pico.mcp4728 import Mcp4728
+from daq.simulation.pico.rp2040_chip import (
     OUTPUT_PINS,
     PIN_ESTOP,
     PIN_I2C_SCL,
@@ -27,8 +27,8 @@ from daq.simulation.rp2040_chip import (
     pwm_set_points_ma,
     start_boot_rom,
 )
-from daq.simulation.serial_pace import pace_serial_line
-from daq.simulation.usb_host import UsbHost
+from daq.simulation.pico.serial_pace import pace_serial_line
+from daq.simulation.pico.usb_host import UsbHost
 
 CYCLE_NS = 8
 CYCLES_PER_MS = 125_000

@@ -9,7 +9,7 @@ from pathlib import Path
 from daq.errors import DeviceTimeout, DeviceUnavailable
 
 _DEVICE = "simulated pulse generator"
-_ROOT = Path(__file__).resolve().parents[2]
+_ROOT = Path(__file__).resolve().parents[3]
 _BUILD_DIR = _ROOT / "build" / "firmware"
 _BUILD_LIMIT_S = 60.0
 

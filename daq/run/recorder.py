@@ -8,8 +8,8 @@ from types import TracebackType
 from typing import Self
 
 from daq.errors import RecorderError, RecorderOverflow
+from daq.files.run_directory import RunWriter
 from daq.shot import Shot
-from daq.shotfile import RunWriter
 
 
 def _nobody_listens(_: Shot) -> None:

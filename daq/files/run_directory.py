@@ -2,8 +2,8 @@
 
 ::
 
-    RUN/run.h5          what the run is, its references, its outcome, a view over all shots   (daq.run_file)
-    RUN/shots/N.h5      one shot, committed by rename after fsync                             (daq.single_shot_file)
+    RUN/run.h5          what the run is, its references, its outcome, a view over all shots   (daq.files.run_file)
+    RUN/shots/N.h5      one shot, committed by rename after fsync                             (daq.files.shot_file)
 
 Any HDF5 reader sees the whole run through ``run.h5``: ``h5py.File("run.h5")["/cameras/view1/frames"][3]``.
 """
@@ -16,10 +16,11 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from daq.atomic_file import commit, part_path, sync
 from daq.errors import RecorderError, ShotFileError
-from daq.packed_file import pack_run
-from daq.run_file import (
+from daq.files.atomic_file import commit, part_path, sync
+from daq.files.header import RunHeader, ViewFormat
+from daq.files.packed_file import pack_run
+from daq.files.run_file import (
     RUN_FILE,
     SHOTS_FOLDER,
     Reference,
@@ -32,10 +33,9 @@ from daq.run_file import (
     shot_path,
     write_run_file,
 )
-from daq.run_header import RunHeader, ViewFormat
+from daq.files.shot_file import EncodedShot, encode_shot, read_image_key, read_shot_file, write_encoded_shot
 from daq.run_plan import ImageKey, PulsePair, RunKind, RunPlan
 from daq.shot import DoubleFrame, ExposureRecord, FiredTrain, Image, LightPulse, Shot
-from daq.single_shot_file import EncodedShot, encode_shot, read_image_key, read_shot_file, write_encoded_shot
 
 __all__ = [
     "DoubleFrame",

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from enum import IntEnum
 
-from daq.simulation.gige_registers import Register, RegisterBank
+from daq.simulation.camera.gige_registers import Register, RegisterBank
 
 GVCP_PORT = 3956
 Peer = tuple[str, int]

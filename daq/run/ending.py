@@ -3,7 +3,7 @@
 import threading
 import time
 
-from daq.run_state import RunStep
+from daq.run.state import RunStep
 
 _OVERRIDDEN_BY = {
     None: frozenset({RunStep.LAST_SHOT, RunStep.STOP, RunStep.ABORT, RunStep.ERROR}),

@@ -3,7 +3,7 @@
 from enum import IntEnum
 from xml.etree.ElementTree import Element, SubElement, tostring
 
-from daq.simulation.gige_registers import ExposureMode, PixelFormat, Register, TriggerSource
+from daq.simulation.camera.gige_registers import ExposureMode, PixelFormat, Register, TriggerSource
 
 _CATEGORIES = {
     "DeviceControl": ("DeviceVendorName", "DeviceModelName", "DeviceVersion", "DeviceID"),

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from daq.files.run_directory import ReferenceImages
 from daq.shot import DoubleFrame, Image
-from daq.shotfile import ReferenceImages
 
 LIT_FRACTION_OF_SCALE = 0.06
 """Without references: a lit shadowgraph lies far above this part of full scale, the dark level of a sensor below."""

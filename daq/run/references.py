@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.errors import PlanError, ShotFileError
+from daq.files.run_directory import ReferenceImages, RunReader, ViewFormat, list_runs
 from daq.run_plan import RunKind
-from daq.shotfile import ReferenceImages, RunReader, ViewFormat, list_runs
 
 REFERENCE_KINDS = (RunKind.DARK, RunKind.BACKGROUND)
 

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
+from daq.run.state import RunOutcome, RunState
 from daq.run_plan import RunPlan
-from daq.run_state import RunOutcome, RunState
 
 
 @dataclass(frozen=True)
