@@ -1,1 +1,5 @@
-"""From images to measured volumes. Pure arrays in, arrays out; only files, importing and pipeline touch disk."""
+"""From images to measured volumes, read top to bottom: a shot flows from calibration to analysis.
+
+Pure arrays in, arrays out; what touches disk lies in ``runs``, in ``calibration.sets`` and in modules named ``*_file``.
+Of ``daq`` it knows the files alone.
+"""

@@ -3,13 +3,13 @@
 from argparse import Namespace
 from typing import Any
 
-from processing.analysis.figures import slices_figure
 from processing.calibration.calibration_file import load_calibration
-from processing.pipeline import PipelineError, default_grid
+from processing.figures.volume_figures import slices_figure
 from processing.reconstruction.settings import GridSettings
 from processing.reconstruction.volume_file import VolumeFileError, write_volume
-from processing.results_file import Provenance, average_volumes, volume_files
-from processing.run_average import average_run
+from processing.runs.pipeline import PipelineError, default_grid
+from processing.runs.results_file import Provenance, average_volumes, volume_files
+from processing.runs.run_average import average_run
 from processing.volume import VoxelGrid
 from server.commands import (
     parse_grid,

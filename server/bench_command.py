@@ -12,9 +12,9 @@ import numpy as np
 
 from daq.files.run_directory import DoubleFrame, ExposureRecord, ImageKey, RunHeader, RunWriter, Shot, ViewFormat
 from daq.run.recorder import Recorder
-from processing.studies.speed import SpeedResult, speed_study
-from processing.studies.speed_scene import SpeedStudy
-from processing.studies.speed_targets import Measured, markdown_table
+from processing.benchmarks.scene import SpeedStudy
+from processing.benchmarks.speed import SpeedResult, speed_study
+from processing.benchmarks.targets import Measured, markdown_table
 from server.commands import progress
 
 MISTUNED = ("OPENBLAS_CORETYPE", "OPENBLAS_L2_SIZE")

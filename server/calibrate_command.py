@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from processing.analysis.figures import residuals_figure
+from processing.calibration.calibrate import calibrate
 from processing.calibration.calibration import Calibration, Verdict, ViewCalibration
 from processing.calibration.calibration_file import require_free, save_calibration
-from processing.calibration.calibration_set import load_calibration_set
-from processing.calibration.covariance import worst_position_std_px
-from processing.calibration.joint_fit import calibrate
-from processing.calibration.placement import placement
+from processing.calibration.fit.covariance import worst_position_std_px
+from processing.calibration.fit.placement import placement
+from processing.calibration.sets.calibration_set import load_calibration_set
+from processing.figures.volume_figures import residuals_figure
 from server.calibration_pictures import calibration_pictures
 from server.commands import NUMBER, picture_beside, progress
 

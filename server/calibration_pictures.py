@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-from processing.analysis.calibration_figures import error_vectors_figure, grid_figure
 from processing.calibration.calibration import Calibration
 from processing.calibration.observation import CalibrationSet
-from processing.calibration.target_image import target_image
+from processing.calibration.sets.target_image import target_image
+from processing.figures.calibration_figures import error_vectors_figure, grid_figure
 
 
 def calibration_pictures(

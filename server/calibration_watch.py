@@ -12,7 +12,7 @@ from pydantic import Field
 
 from daq.run_plan import FrozenModel
 from processing.calibration.calibration import Verdict
-from processing.run_check import ALARM_PX, STOP_PX
+from processing.runs.run_check import ALARM_PX, STOP_PX
 from server.events import EventPublisher
 from server.jobs import ENDED, Job, JobKind, JobState, check_job
 

@@ -5,7 +5,7 @@ from typing import Any
 
 from processing.calibration.calibration import Verdict
 from processing.calibration.calibration_file import load_calibration, require_free, save_calibration
-from processing.run_check import ALARM_PX, STOP_PX, ShotCheck, check_shot, self_calibrate_run
+from processing.runs.run_check import ALARM_PX, STOP_PX, ShotCheck, check_shot, self_calibrate_run
 from server.commands import progress, selected_shots
 
 _MEANING = {Verdict.WARN: "ALARM", Verdict.REFUSE: "STOP: do not reconstruct with this calibration"}

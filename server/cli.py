@@ -15,14 +15,14 @@ from typing import Any
 
 from daq.errors import DaqError, PlanError, ShotFileError
 from processing.calibration.errors import CalibrationError
-from processing.importing import ManifestError
-from processing.pipeline import PipelineError
 from processing.reconstruction.accuracy import Accuracy
 from processing.reconstruction.errors import ReconstructionError
 from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.reconstruction.volume_file import VolumeFileError
 from processing.reconstruction.voxel_type import VoxelType
+from processing.runs.importing import ManifestError
+from processing.runs.pipeline import PipelineError
 from server import commands
 from server.average_command import average
 from server.bench_command import BenchError, bench

@@ -15,17 +15,17 @@ from pydantic import ValidationError
 from daq.files.run_directory import ImageKey, RunReader
 from processing.calibration.calibration import Calibration
 from processing.calibration.calibration_file import load_calibration
-from processing.importing import import_manifest
-from processing.pipeline import (
+from processing.reconstruction.accuracy import Accuracy
+from processing.reconstruction.method import ReconstructionMethod
+from processing.reconstruction.settings import GridSettings, ReconstructionSettings
+from processing.reconstruction.voxel_type import VoxelType
+from processing.runs.importing import import_manifest
+from processing.runs.pipeline import (
     PipelineError,
     ShotResult,
     default_grid,
     reconstruct_shot,
 )
-from processing.reconstruction.accuracy import Accuracy
-from processing.reconstruction.method import ReconstructionMethod
-from processing.reconstruction.settings import GridSettings, ReconstructionSettings
-from processing.reconstruction.voxel_type import VoxelType
 from processing.volume import VoxelGrid
 from server.config import load_config
 from server.optics_table import optics_table

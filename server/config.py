@@ -10,7 +10,7 @@ from pydantic import Field, SecretStr, ValidationError, ValidationInfo, field_va
 from daq.faults import ScriptedFault
 from daq.run.limits import AcquisitionLimits
 from daq.run_plan import FrozenModel
-from processing.toml_lines import line_of
+from processing.runs.toml_lines import line_of
 
 ViewName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,31}$")]
 CurrentA = Annotated[float, Field(gt=0, le=30)]

@@ -15,16 +15,16 @@ from daq.run.acquisition import Acquisition
 from daq.run.events import RunEvent, RunMessage
 from daq.run.state import RunOutcome
 from daq.run_plan import PulsePair, RunKind, RunPlan
+from processing.analysis.quality import quality_factor
+from processing.calibration.calibrate import calibrate
 from processing.calibration.calibration import Calibration
 from processing.calibration.calibration_file import file_sha256, save_calibration
-from processing.calibration.calibration_set import load_calibration_set
-from processing.calibration.joint_fit import calibrate
+from processing.calibration.sets.calibration_set import load_calibration_set
 from processing.geometry import FloatArray
-from processing.pipeline import ShotResult, default_grid, reconstruct_shot
-from processing.quality import quality_factor
 from processing.reconstruction.settings import GridSettings, ReconstructionSettings
 from processing.reconstruction.volume_file import read_volume
-from processing.results_file import volume_path
+from processing.runs.pipeline import ShotResult, default_grid, reconstruct_shot
+from processing.runs.results_file import volume_path
 from processing.synthetic.spray import droplet_volume
 from processing.synthetic.truth_file import read_true_cameras, read_true_spray
 from processing.volume import VoxelGrid

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 
 from daq.files.run_directory import RunReader
-from processing.analysis.figures import isosurface_figure, residuals_figure, shadowgraph_figure, slices_figure
+from processing.figures.volume_figures import isosurface_figure, residuals_figure, shadowgraph_figure, slices_figure
 from processing.preprocessing import Intensity
 from processing.reconstruction.volume_file import read_volume
-from processing.results_file import volume_path
+from processing.runs.results_file import volume_path
 from processing.volume import VoxelGrid
 from server.demo import Demonstration
 from server.report import Picture, Section, Table, write_report

@@ -8,7 +8,7 @@ from typing import Any
 
 from daq.run_plan import FrozenModel
 from processing.reconstruction.volume_file import open_volume
-from processing.results_file import volume_files
+from processing.runs.results_file import volume_files
 from server.errors import NotFound
 from server.previews import VolumePreview, load_preview, make_preview, preview_path, save_preview
 from server.surfaces import surface_glb

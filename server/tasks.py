@@ -5,13 +5,13 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from processing.calibration.calibrate import calibrate
 from processing.calibration.calibration_file import load_calibration, save_calibration
-from processing.calibration.calibration_set import load_calibration_set
-from processing.calibration.joint_fit import calibrate
+from processing.calibration.sets.calibration_set import load_calibration_set
 from processing.engine import Task
-from processing.pipeline import reconstruct_shot
 from processing.reconstruction.settings import ReconstructionSettings
-from processing.run_check import check_shot
+from processing.runs.pipeline import reconstruct_shot
+from processing.runs.run_check import check_shot
 from server.jobs import JobKind
 from server.results import write_preview
 

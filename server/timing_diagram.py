@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from daq.timing import ShotTiming, ViewTiming, Window
-from processing.analysis.colours import FRAME_COLOURS
+from processing.figures.colours import FRAME_COLOURS
 from server.shot_timing import guards_of
 
 _DRAWING = Lock()

@@ -1,1 +1,4 @@
-"""What a volume says: figures, and the measurements of later stages."""
+"""What a volume says: pure functions on arrays and tables.
+
+It may import everything down to ``reconstruction``; figures, studies and runs import it.
+"""

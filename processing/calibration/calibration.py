@@ -7,7 +7,7 @@ from enum import StrEnum
 import numpy as np
 
 from processing.calibration.errors import CalibrationError
-from processing.calibration.targets import Target
+from processing.calibration.target.targets import Target
 from processing.geometry import FloatArray, ViewMapping
 
 

@@ -18,8 +18,8 @@ from processing.calibration.calibration import (
     Verdict,
     ViewCalibration,
 )
-from processing.calibration.polynomial import EXPONENTS, PolynomialMapping
-from processing.calibration.targets import Target
+from processing.calibration.fit.polynomial import EXPONENTS, PolynomialMapping
+from processing.calibration.target.targets import Target
 from processing.geometry import FloatArray, PinholeCamera, ViewMapping
 
 SCHEMA: Literal["tomoshadow.calibration"] = "tomoshadow.calibration"

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from processing.calibration.targets import Target
+from processing.calibration.target.targets import Target
 from processing.geometry import FloatArray
 
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from processing.reconstruction.kernels import DEFAULT_THREADS, _native
 from processing.reconstruction.method import ReconstructionMethod
-from processing.reconstruction.plan import Plan
+from processing.reconstruction.planning.plan import Plan
 
 KERNEL_METHOD = {
     ReconstructionMethod.GAVLOS: 0,

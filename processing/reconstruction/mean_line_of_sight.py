@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from processing.reconstruction.kernels import DEFAULT_THREADS, _native
 from processing.reconstruction.line_of_sight import check_volume, kernel_method
 from processing.reconstruction.method import ReconstructionMethod
-from processing.reconstruction.plan import Plan
+from processing.reconstruction.planning.plan import Plan
 
 BATCH_BYTES, BATCH_EXPOSURES = 1 << 30, 128
 """Most of resampled images in memory at the same time; the volume is read and written once for each batch."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from processing.reconstruction.kernels import DEFAULT_THREADS, _native
 from processing.reconstruction.line_of_sight import check_volume
-from processing.reconstruction.plan import Plan
+from processing.reconstruction.planning.plan import Plan
 from processing.reconstruction.smart_state import FirstGuess, SmartState
 
 Volume = NDArray[np.float32]

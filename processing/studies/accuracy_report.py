@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from processing.analysis.colours import VIEW_COLOURS
+from processing.figures.colours import VIEW_COLOURS
 from processing.studies.accuracy_study import AccuracyRow, of_quantity
 from processing.studies.report import Statement
 

@@ -6,7 +6,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from processing.calibration.targets import Target
+from processing.calibration.target.targets import Target
 from processing.geometry import FloatArray
 
 TARGET = Target(kind="checkerboard", columns=23, rows=17, pitch_mm=1.0)

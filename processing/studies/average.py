@@ -11,7 +11,7 @@ from matplotlib.image import AxesImage
 from numpy.typing import NDArray
 
 from processing.reconstruction.mean_line_of_sight import mean_line_of_sight
-from processing.reconstruction.plan import plan_reconstruction
+from processing.reconstruction.planning.plan import plan_reconstruction
 from processing.studies.hollow_cone_shots import cropped_cameras, height_mm, hollow_cone_images, slab_grid
 from processing.studies.recipe import COLOURS, Recipe, reconstruct_each
 from processing.studies.report import Statement

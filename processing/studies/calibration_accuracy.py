@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import cv2
 import numpy as np
 
-from processing.calibration.targets import detect_target
+from processing.calibration.target.targets import detect_target
 from processing.studies.accuracy_study import (
     CORNER_LIMIT_PX,
     CORNER_LIMIT_S,

@@ -12,8 +12,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
-from processing.quality import quality_factor
-from processing.reconstruction.plan import plan_reconstruction
+from processing.analysis.quality import quality_factor
+from processing.reconstruction.planning.plan import plan_reconstruction
 from processing.studies.recipe import ALL_RECIPES, Recipe, reconstruct_each
 from processing.studies.report import Statement
 from processing.studies.simulated_droplets import (

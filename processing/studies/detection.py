@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from processing.analysis.quality import Volume, local_maxima
 from processing.geometry import FloatArray
-from processing.quality import Volume, local_maxima
 
 FAINTEST_PEAK = 1e-5
 """Peaks below this share of the highest one are never droplets."""

@@ -12,8 +12,8 @@ from itertools import product
 import numpy as np
 
 from processing.calibration.calibration import Model
-from processing.calibration.covariance import image_spread_px, least_covariance
-from processing.calibration.model_choice import fit_mapping
+from processing.calibration.fit.covariance import image_spread_px, least_covariance
+from processing.calibration.fit.model_choice import fit_mapping
 from processing.calibration.observation import PlaneObservation, stacked
 from processing.geometry import FloatArray, PinholeCamera, view_camera
 from processing.studies.accuracy_study import (

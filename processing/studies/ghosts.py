@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from processing.reconstruction.plan import plan_reconstruction
+from processing.reconstruction.planning.plan import plan_reconstruction
 from processing.studies.density import density_axis
 from processing.studies.detection import (
     RADIUS_VOXEL,

@@ -9,7 +9,7 @@ from matplotlib.colors import to_hex, to_rgb
 
 from processing.reconstruction.line_of_sight import line_of_sight
 from processing.reconstruction.method import ReconstructionMethod
-from processing.reconstruction.plan import Plan
+from processing.reconstruction.planning.plan import Plan
 from processing.reconstruction.smart import mart, smart
 from processing.studies.simulated_droplets import Image, Volume
 

@@ -12,12 +12,12 @@ from enum import StrEnum
 import numpy as np
 from matplotlib.figure import Figure
 
-from processing.analysis.colours import VIEW_COLOURS
+from processing.calibration.calibrate import calibrate
 from processing.calibration.calibration import Calibration, Model
-from processing.calibration.joint_fit import calibrate
 from processing.calibration.observation import CalibrationSet, PlaneObservation, ViewObservations
-from processing.calibration.plane_detection import place_points
-from processing.calibration.targets import Target, detect_target
+from processing.calibration.sets.plane_detection import place_points
+from processing.calibration.target.targets import Target, detect_target
+from processing.figures.colours import VIEW_COLOURS
 from processing.geometry import FloatArray, PinholeCamera
 from processing.studies.report import Statement
 from processing.synthetic.paper_rig import paper_cameras, paper_optics

@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from processing.geometry import PinholeCamera, view_camera
-from processing.reconstruction.plan import plan_reconstruction
+from processing.reconstruction.planning.plan import plan_reconstruction
 from processing.studies.detection import RADIUS_VOXEL, detection_curve, half_median_threshold
 from processing.studies.recipe import Recipe, reconstruct_each
 from processing.studies.report import Statement

@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from processing.benchmarks import targets as speed_targets
+from processing.benchmarks.baseline import Timing, measure
+from processing.benchmarks.memory import peak_memory_gb
+from processing.benchmarks.scene import dense_images, raw_exposures, sparse_images, spray_images, study_cameras
+from processing.benchmarks.targets import Measured, Target, markdown_table
 from processing.preprocessing import Preprocessing, intensity
 from processing.reconstruction.kernels import _native
 from processing.reconstruction.line_of_sight import line_of_sight
-from processing.reconstruction.plan import plan_reconstruction
-from processing.studies import speed_targets
-from processing.studies.speed_baseline import Timing, measure
-from processing.studies.speed_memory import peak_memory_gb
-from processing.studies.speed_scene import dense_images, raw_exposures, sparse_images, spray_images, study_cameras
-from processing.studies.speed_targets import Measured, Target, markdown_table
+from processing.reconstruction.planning.plan import plan_reconstruction
 from server.bench_command import QUICK, BenchError, split_at_table
 from server.cli import main
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from processing.calibration.observation import CalibrationSet, PlaneObservation, ViewObservations
-from processing.calibration.targets import Target
+from processing.calibration.target.targets import Target
 from processing.geometry import FloatArray, PinholeCamera, ViewMapping, view_camera
 
 TARGET = Target(kind="checkerboard", columns=23, rows=17, pitch_mm=1.0)

@@ -6,13 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from processing.analysis.quality import Volume, local_maxima
 from processing.geometry import ViewMapping, view_camera
-from processing.quality import Volume, local_maxima
-from processing.reconstruction.fixed_point import FixedPoint
 from processing.reconstruction.method import ReconstructionMethod
-from processing.reconstruction.node_view import NodeView
-from processing.reconstruction.plan import Plan
-from processing.reconstruction.rectified_view import RectifiedView
+from processing.reconstruction.planning.fixed_point import FixedPoint
+from processing.reconstruction.planning.node_view import NodeView
+from processing.reconstruction.planning.plan import Plan
+from processing.reconstruction.planning.rectified_view import RectifiedView
 from processing.studies.detection import DetectionRates
 from processing.volume import VoxelGrid
 

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from processing.geometry import ViewMapping
-from processing.reconstruction.rectified_view import MAP_SPACING_PX, RectifiedView
+from processing.reconstruction.planning.rectified_view import MAP_SPACING_PX, RectifiedView
 from processing.volume import VoxelGrid
 from tests.processing.oracle import Array, bilinear
 

@@ -6,11 +6,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from processing.reconstruction.fixed_point import FixedPoint
 from processing.reconstruction.method import ReconstructionMethod
-from processing.reconstruction.node_view import NodeView
-from processing.reconstruction.plan import Plan
-from processing.reconstruction.rectified_view import RectifiedView
+from processing.reconstruction.planning.fixed_point import FixedPoint
+from processing.reconstruction.planning.node_view import NodeView
+from processing.reconstruction.planning.plan import Plan
+from processing.reconstruction.planning.rectified_view import RectifiedView
 from tests.processing import oracle
 from tests.processing.sight_cases import Images
 

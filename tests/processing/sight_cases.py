@@ -10,11 +10,11 @@ import pytest
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from processing.calibration.polynomial import PolynomialMapping, fit_polynomial
+from processing.calibration.fit.polynomial import PolynomialMapping, fit_polynomial
 from processing.geometry import FloatArray, PinholeCamera, ViewMapping, view_camera
 from processing.reconstruction.accuracy import Accuracy
-from processing.reconstruction.node_view import NodeView, sample_mapping
-from processing.reconstruction.plan import MAX_DEVIATION_PX, Plan, plan_reconstruction
+from processing.reconstruction.planning.node_view import NodeView, sample_mapping
+from processing.reconstruction.planning.plan import MAX_DEVIATION_PX, Plan, plan_reconstruction
 from processing.volume import VoxelGrid
 
 PITCH_MM = 1 / 60

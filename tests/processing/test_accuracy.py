@@ -9,8 +9,8 @@ from scipy.special import erfc
 
 from processing.geometry import ViewMapping, view_camera
 from processing.reconstruction.accuracy import Accuracy
-from processing.reconstruction.plan import plan_view
-from processing.reconstruction.rectified_view import RectifiedView
+from processing.reconstruction.planning.plan import plan_view
+from processing.reconstruction.planning.rectified_view import RectifiedView
 from processing.volume import VoxelGrid
 from tests.processing import oracle
 from tests.processing.sight_cases import PITCH_MM

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from processing.calibration.aim import Aim
+from processing.calibration.fit.aim import Aim
+from processing.calibration.fit.pinhole_fit import PARAMETER_NAMES, fit_pinhole
 from processing.calibration.observation import stacked
-from processing.calibration.pinhole_fit import PARAMETER_NAMES, fit_pinhole
 from processing.geometry import FloatArray
 from tests.processing.calibration_cases import paper_camera, seen_planes, true_errors_px
 

@@ -8,9 +8,9 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.quiver import Quiver
 
-from processing.analysis.calibration_figures import MAX_ARROWS, MAX_PLANES, error_vectors_figure, grid_figure
-from processing.calibration.joint_fit import calibrate
+from processing.calibration.calibrate import calibrate
 from processing.calibration.observation import CalibrationSet, PlaneObservation
+from processing.figures.calibration_figures import MAX_ARROWS, MAX_PLANES, error_vectors_figure, grid_figure
 from tests.processing.calibration_cases import calibration_set, paper_camera, seen_planes, volume_points_mm
 
 

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from processing.calibration.calibrate import calibrate
 from processing.calibration.calibration import Calibration
 from processing.calibration.calibration_file import file_sha256, load_calibration, save_calibration
 from processing.calibration.calibration_record import json_id
 from processing.calibration.errors import CalibrationError
-from processing.calibration.joint_fit import calibrate
 from processing.calibration.observation import PlaneObservation
 from tests.processing.calibration_cases import TARGET, calibration_set, paper_camera, seen_planes, volume_points_mm
 from tests.processing.test_free_pose import boards

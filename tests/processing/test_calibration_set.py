@@ -9,12 +9,12 @@ import pytest
 from numpy.typing import NDArray
 
 from daq.files.run_directory import DoubleFrame, ExposureRecord, ImageKey, RunHeader, RunWriter, Shot, ViewFormat
-from processing.calibration.calibration_set import load_calibration_set, write_set_file
+from processing.calibration.calibrate import calibrate
 from processing.calibration.errors import CalibrationError
-from processing.calibration.imported_set import read_table
-from processing.calibration.joint_fit import calibrate
-from processing.calibration.placement import placement
-from processing.calibration.set_record import CalibrationEntry, PointsEntry
+from processing.calibration.fit.placement import placement
+from processing.calibration.sets.calibration_set import load_calibration_set, write_set_file
+from processing.calibration.sets.imported_set import read_table
+from processing.calibration.sets.set_record import CalibrationEntry, PointsEntry
 from processing.synthetic.paper_rig import paper_cameras, paper_optics
 from processing.synthetic.target import Checkerboard, render_target
 from tests.processing.calibration_cases import paper_camera, target_plane_mm, true_errors_px

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from processing.geometry import PinholeCamera, view_camera
-from processing.reconstruction.common_volume import common_volume, largest_rectangle
 from processing.reconstruction.errors import ReconstructionError
+from processing.reconstruction.planning.common_volume import common_volume, largest_rectangle
 from processing.volume import VoxelGrid
 
 

@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from processing.calibration.calibrate import calibrate
 from processing.calibration.calibration import Calibration, ViewCalibration
 from processing.calibration.calibration_file import load_calibration, save_calibration
-from processing.calibration.covariance import position_std_px, worst_position_std_px
 from processing.calibration.errors import CalibrationError
-from processing.calibration.joint_fit import calibrate
+from processing.calibration.fit.covariance import position_std_px, worst_position_std_px
+from processing.calibration.fit.pinhole_fit import fit_pinhole
+from processing.calibration.fit.polynomial import fit_polynomial
 from processing.calibration.observation import PlaneObservation, stacked
-from processing.calibration.pinhole_fit import fit_pinhole
-from processing.calibration.polynomial import fit_polynomial
 from processing.geometry import PinholeCamera
 from tests.processing.calibration_cases import calibration_set, paper_camera, seen_planes
 from tests.processing.test_self_calibration import recalibrate, shifted

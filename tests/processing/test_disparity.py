@@ -6,11 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from processing.calibration.calibration import Model
-from processing.calibration.disparity import local_disparities, measured_box, shot_disparity
-from processing.calibration.droplet_images import find_droplets
-from processing.calibration.droplet_matching import Box, Matches, match_droplets
+from processing.calibration.droplets.disparity import local_disparities, measured_box, shot_disparity
+from processing.calibration.droplets.droplet_images import find_droplets
+from processing.calibration.droplets.droplet_matching import Box, Matches, match_droplets
 from processing.calibration.errors import CalibrationError, OutOfRange
-from processing.calibration.sight_lines import back_project, triangulate
+from processing.calibration.triangulation import back_project, triangulate
 from processing.studies.seen_droplets import droplet_image
 from tests.processing.drifting_views import HALF_MM, calibration_of, droplet_shots, inside_mm, views
 

@@ -7,8 +7,8 @@ from processing.geometry import PinholeCamera, ViewMapping, view_camera
 from processing.reconstruction.kernels import _native
 from processing.reconstruction.line_of_sight import line_of_sight
 from processing.reconstruction.method import ReconstructionMethod
-from processing.reconstruction.node_view import NodeView, sample_mapping
-from processing.reconstruction.plan import MAX_DEVIATION_PX, Plan, plan_view
+from processing.reconstruction.planning.node_view import NodeView, sample_mapping
+from processing.reconstruction.planning.plan import MAX_DEVIATION_PX, Plan, plan_view
 from processing.volume import VoxelGrid
 from tests.processing import oracle
 from tests.processing.sight_bounds import assert_equals_textbook

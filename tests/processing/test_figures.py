@@ -5,8 +5,8 @@ import io
 import numpy as np
 from matplotlib.figure import Figure
 
-from processing.analysis.figures import isosurface_figure, residuals_figure, shadowgraph_figure, slices_figure
 from processing.calibration.calibration import Calibration, Model, PlaneError, Verdict, ViewCalibration
+from processing.figures.volume_figures import isosurface_figure, residuals_figure, shadowgraph_figure, slices_figure
 from processing.geometry import view_camera
 from processing.volume import VoxelGrid
 

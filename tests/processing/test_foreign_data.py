@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from daq.files.run_directory import RunReader
+from processing.calibration.calibrate import calibrate
 from processing.calibration.calibration import Calibration
-from processing.calibration.calibration_set import load_calibration_set
 from processing.calibration.errors import CalibrationError, TargetNotFound
-from processing.calibration.joint_fit import calibrate
 from processing.calibration.observation import CalibrationSet, PlaneObservation, ViewObservations
-from processing.calibration.targets import Target, detect_target
+from processing.calibration.sets.calibration_set import load_calibration_set
+from processing.calibration.target.targets import Target, detect_target
 from processing.image_file import read_image
-from processing.importing import import_manifest
+from processing.runs.importing import import_manifest
 
 pytestmark = pytest.mark.skipif(
     "TOMOSHADOW_DATA" not in os.environ, reason="TOMOSHADOW_DATA does not name a folder of foreign data sets"

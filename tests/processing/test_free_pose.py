@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from processing.calibration.errors import CalibrationError
-from processing.calibration.free_pose import board_errors_px, fit_free_poses, free_pose_holdout_px
+from processing.calibration.fit.free_pose import board_errors_px, fit_free_poses, free_pose_holdout_px
 from processing.calibration.observation import PlaneObservation
 from processing.geometry import PinholeCamera
 

@@ -5,8 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
+from processing.calibration.calibrate import calibrate
 from processing.calibration.errors import CalibrationError
-from processing.calibration.health import (
+from processing.calibration.fit.health import (
     LIMITS_PX,
     check_motion,
     degeneracy,
@@ -16,7 +17,6 @@ from processing.calibration.health import (
     outline_mm,
     plane_error,
 )
-from processing.calibration.joint_fit import calibrate
 from processing.calibration.observation import PlaneObservation
 from processing.geometry import PinholeCamera
 from tests.processing.calibration_cases import calibration_set, paper_camera, seen_planes, target_plane_mm

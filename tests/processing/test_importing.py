@@ -9,11 +9,11 @@ import pytest
 from numpy.typing import NDArray
 
 from daq.files.run_directory import ImageKey, RunReader
-from processing.calibration.calibration_set import load_calibration_set
+from processing.calibration.calibrate import calibrate
 from processing.calibration.errors import CalibrationError
-from processing.calibration.joint_fit import calibrate
-from processing.import_manifest import ManifestError
-from processing.importing import import_manifest
+from processing.calibration.sets.calibration_set import load_calibration_set
+from processing.runs.import_manifest import ManifestError
+from processing.runs.importing import import_manifest
 from processing.synthetic.paper_rig import paper_cameras, paper_optics
 from processing.synthetic.target import Checkerboard, render_target
 from tests.processing.calibration_cases import true_errors_px

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from processing.calibration.calibrate import calibrate
 from processing.calibration.errors import CalibrationError
-from processing.calibration.joint_fit import calibrate
+from processing.calibration.fit.pinhole_fit import fit_pinhole
 from processing.calibration.observation import PlaneObservation, stacked
-from processing.calibration.pinhole_fit import fit_pinhole
 from tests.processing.calibration_cases import (
     calibration_set,
     paper_camera,

@@ -6,7 +6,7 @@ import pytest
 from numpy.typing import NDArray
 
 from processing.calibration.errors import TargetNotFound
-from processing.calibration.known_dots import find_known_dots
+from processing.calibration.sets.known_dots import find_known_dots
 from processing.geometry import FloatArray, view_camera
 
 CAMERA = view_camera(20.0, focal_length_mm=70.0, magnification=0.12, scale_px_per_mm=8.0, image_size_px=(640, 480))

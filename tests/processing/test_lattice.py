@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from processing.calibration.lattice import (
+from processing.calibration.target.lattice import (
     IdArray,
     Lattice,
     grow_lattice,

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from processing.reconstruction.kernels import _native
 from processing.reconstruction.line_of_sight import line_of_sight
-from processing.reconstruction.plan import Plan, plan_reconstruction
+from processing.reconstruction.planning.plan import Plan, plan_reconstruction
 from processing.reconstruction.sparse_line_of_sight import sparse_line_of_sight
 from processing.volume import VoxelGrid
 from tests.processing import oracle

@@ -15,8 +15,8 @@ from processing.reconstruction.accuracy import Accuracy
 from processing.reconstruction.kernels import _native
 from processing.reconstruction.line_of_sight import line_of_sight
 from processing.reconstruction.method import ReconstructionMethod
-from processing.reconstruction.node_view import NodeView, sample_mapping
-from processing.reconstruction.plan import Plan, plan_reconstruction
+from processing.reconstruction.planning.node_view import NodeView, sample_mapping
+from processing.reconstruction.planning.plan import Plan, plan_reconstruction
 from processing.volume import VoxelGrid
 from tests.processing import oracle
 from tests.processing.sight_bounds import assert_equals_textbook

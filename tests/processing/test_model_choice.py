@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from processing.calibration.calibrate import calibrate
 from processing.calibration.calibration import Model, ViewCalibration
 from processing.calibration.calibration_file import load_calibration, save_calibration
 from processing.calibration.errors import CalibrationError
-from processing.calibration.joint_fit import calibrate
-from processing.calibration.model_choice import holdout_by_model, simplest_that_holds
+from processing.calibration.fit.model_choice import holdout_by_model, simplest_that_holds
 from processing.calibration.observation import PlaneObservation
 from processing.geometry import PinholeCamera
 from server.calibrate_command import view_errors

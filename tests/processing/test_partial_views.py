@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from processing.calibration.calibration_set import load_calibration_set
+from processing.calibration.calibrate import calibrate
 from processing.calibration.errors import CalibrationError, TargetNotFound
-from processing.calibration.joint_fit import calibrate
-from processing.calibration.partial_views import detect_by_others
-from processing.calibration.targets import Target, TargetPoints, detect_target
+from processing.calibration.sets.calibration_set import load_calibration_set
+from processing.calibration.sets.partial_views import detect_by_others
+from processing.calibration.target.targets import Target, TargetPoints, detect_target
 from processing.geometry import FloatArray, PinholeCamera
 from processing.synthetic.paper_rig import paper_cameras, paper_optics
 from processing.synthetic.stamping import FloatImage

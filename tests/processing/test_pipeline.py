@@ -11,7 +11,12 @@ from daq.files.run_file import add_references
 from processing.calibration.calibration import Verdict
 from processing.calibration.calibration_file import load_calibration
 from processing.calibration.errors import CalibrationError
-from processing.pipeline import (
+from processing.reconstruction.method import ReconstructionMethod
+from processing.reconstruction.planning.planned_view import PlannedView
+from processing.reconstruction.settings import GridSettings, ReconstructionSettings
+from processing.reconstruction.volume_file import VolumeFileError, open_volume, read_volume
+from processing.reconstruction.voxel_type import VoxelType
+from processing.runs.pipeline import (
     PipelineError,
     ShotResult,
     Stopped,
@@ -19,12 +24,7 @@ from processing.pipeline import (
     reconstruct_shot,
     shot_intensities,
 )
-from processing.reconstruction.method import ReconstructionMethod
-from processing.reconstruction.planned_view import PlannedView
-from processing.reconstruction.settings import GridSettings, ReconstructionSettings
-from processing.reconstruction.volume_file import VolumeFileError, open_volume, read_volume
-from processing.reconstruction.voxel_type import VoxelType
-from processing.results_file import average_volumes, volume_files, volume_path
+from processing.runs.results_file import average_volumes, volume_files, volume_path
 from processing.volume import VoxelGrid
 from tests.processing.droplet_run import DROPLETS_A_MM, MOTION_MM, SHAPE, write_calibration, write_run
 

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from processing.calibration.calibrate import calibrate
 from processing.calibration.errors import CalibrationError
-from processing.calibration.joint_fit import calibrate
+from processing.calibration.fit.placement import placement
 from processing.calibration.observation import CalibrationSet, PlaneObservation
-from processing.calibration.placement import placement
-from processing.calibration.sight_lines import triangulate
-from processing.calibration.targets import Target, detect_target
+from processing.calibration.target.targets import Target, detect_target
+from processing.calibration.triangulation import triangulate
 from processing.geometry import PinholeCamera, rotation_from_angles, view_camera
 from processing.synthetic.target import Checkerboard, render_target
 from processing.synthetic.view_optics import ViewOptics

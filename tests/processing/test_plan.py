@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from processing.geometry import FloatArray, PinholeCamera, ViewMapping, view_camera
 from processing.reconstruction.errors import ReconstructionError
 from processing.reconstruction.kernels import _native
-from processing.reconstruction.node_view import NodeView, sample_mapping
-from processing.reconstruction.plan import MAX_DEVIATION_PX, Plan, plan_reconstruction, plan_view
-from processing.reconstruction.planned_view import PlannedView
-from processing.reconstruction.rectified_view import MAP_SPACING_PX, RectifiedView, rectify
+from processing.reconstruction.planning.node_view import NodeView, sample_mapping
+from processing.reconstruction.planning.plan import MAX_DEVIATION_PX, Plan, plan_reconstruction, plan_view
+from processing.reconstruction.planning.planned_view import PlannedView
+from processing.reconstruction.planning.rectified_view import MAP_SPACING_PX, RectifiedView, rectify
 from processing.volume import VoxelGrid
 from tests.processing import oracle
 from tests.processing.sight_cases import Bent

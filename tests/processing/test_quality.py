@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from processing.quality import local_maxima, quality_factor
+from processing.analysis.quality import local_maxima, quality_factor
 
 
 def noise(shape: tuple[int, int, int] = (24, 32, 40), seed: int = 1) -> NDArray[np.float32]:

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from processing.geometry import ViewMapping
 from processing.reconstruction.accuracy import Accuracy
 from processing.reconstruction.kernels import _native
-from processing.reconstruction.node_view import FRAME_AFTER_PX, FRAME_BEFORE_PX, NodeView, sample_mapping
-from processing.reconstruction.plan import MAX_DEVIATION_PX, plan_view
-from processing.reconstruction.rectified_view import RectifiedView
+from processing.reconstruction.planning.node_view import FRAME_AFTER_PX, FRAME_BEFORE_PX, NodeView, sample_mapping
+from processing.reconstruction.planning.plan import MAX_DEVIATION_PX, plan_view
+from processing.reconstruction.planning.rectified_view import RectifiedView
 from processing.volume import VoxelGrid
 from tests.processing import oracle, resampling_oracle
 from tests.processing.sight_cases import PITCH_MM, instruction_set, views

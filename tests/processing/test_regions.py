@@ -12,9 +12,9 @@ from processing.reconstruction.accuracy import Accuracy
 from processing.reconstruction.kernels import _native
 from processing.reconstruction.line_of_sight import line_of_sight
 from processing.reconstruction.method import ReconstructionMethod
-from processing.reconstruction.node_view import FRAME_BEFORE_PX, NodeView, sample_mapping
-from processing.reconstruction.plan import MAX_DEVIATION_PX, Plan, plan_reconstruction
-from processing.reconstruction.rectified_view import MAP_SPACING_PX, RectifiedView
+from processing.reconstruction.planning.node_view import FRAME_BEFORE_PX, NodeView, sample_mapping
+from processing.reconstruction.planning.plan import MAX_DEVIATION_PX, Plan, plan_reconstruction
+from processing.reconstruction.planning.rectified_view import MAP_SPACING_PX, RectifiedView
 from processing.volume import VoxelGrid
 from tests.processing import oracle
 from tests.processing.sight_bounds import assert_equals_textbook, sample_error

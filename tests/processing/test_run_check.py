@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from processing.calibration.calibration import Verdict
-from processing.calibration.disparity import ViewDisparity
+from processing.calibration.droplets.disparity import ViewDisparity
 from processing.geometry import FloatArray
-from processing.run_check import ShotCheck, check_exposures
+from processing.runs.run_check import ShotCheck, check_exposures
 from processing.studies.drifting_views import direction
 from tests.processing.drifting_views import calibration_of, droplet_shots, inside_mm, views
 

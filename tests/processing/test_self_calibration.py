@@ -8,10 +8,10 @@ import pytest
 
 from processing.calibration.calibration import Model
 from processing.calibration.calibration_file import load_calibration, save_calibration
+from processing.calibration.droplets.mapping_correction import corrected, correction_size, sensitivity
+from processing.calibration.droplets.self_calibration import SelfCalibration, self_calibrate
 from processing.calibration.errors import CalibrationError
-from processing.calibration.mapping_correction import corrected, correction_size, sensitivity
-from processing.calibration.polynomial import fit_polynomial
-from processing.calibration.self_calibration import SelfCalibration, self_calibrate
+from processing.calibration.fit.polynomial import fit_polynomial
 from processing.geometry import FloatArray, PinholeCamera, ViewMapping
 from processing.studies.drifting_views import direction
 from tests.processing.drifting_views import HALF_MM, SIZE_PX, calibration_of, droplet_shots, inside_mm, views

@@ -13,8 +13,8 @@ from processing.reconstruction.kernels import _native
 from processing.reconstruction.line_of_sight import line_of_sight
 from processing.reconstruction.mean_line_of_sight import mean_line_of_sight
 from processing.reconstruction.method import ReconstructionMethod
-from processing.reconstruction.node_view import sample_mapping
-from processing.reconstruction.plan import MAX_DEVIATION_PX, Plan, plan_reconstruction
+from processing.reconstruction.planning.node_view import sample_mapping
+from processing.reconstruction.planning.plan import MAX_DEVIATION_PX, Plan, plan_reconstruction
 from processing.reconstruction.sparse_line_of_sight import slabs_of_sight, sparse_line_of_sight
 from processing.volume import VoxelGrid
 from tests.processing import oracle

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from processing.analysis.quality import quality_factor
 from processing.geometry import ViewMapping, view_camera
-from processing.quality import quality_factor
 from processing.reconstruction.kernels import _native
 from processing.reconstruction.line_of_sight import line_of_sight
-from processing.reconstruction.node_view import sample_mapping
-from processing.reconstruction.plan import Plan, plan_reconstruction
+from processing.reconstruction.planning.node_view import sample_mapping
+from processing.reconstruction.planning.plan import Plan, plan_reconstruction
 from processing.reconstruction.smart import mart, smart
 from processing.volume import VoxelGrid
 from tests.processing import oracle

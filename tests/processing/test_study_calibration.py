@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from processing.calibration.disparity import ViewDisparity
+from processing.calibration.droplets.disparity import ViewDisparity
 from processing.studies.accuracy_report import (
     accuracy_figure,
     accuracy_line,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from processing.reconstruction.method import ReconstructionMethod
-from processing.reconstruction.plan import plan_reconstruction
+from processing.reconstruction.planning.plan import plan_reconstruction
 from processing.reconstruction.smart import mart, smart
 from processing.studies.recipe import ALL_RECIPES, Recipe, reconstruct_each
 from processing.studies.simulated_droplets import simulate_shot, study_cameras, study_grid

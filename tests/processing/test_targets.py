@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from processing.calibration.errors import TargetNotFound
-from processing.calibration.targets import Target, TargetPoints, detect_target
+from processing.calibration.target.targets import Target, TargetPoints, detect_target
 from processing.geometry import FloatArray, PinholeCamera
 from processing.synthetic.paper_rig import paper_cameras, paper_optics
 from processing.synthetic.target import Checkerboard, DotTarget, render_target

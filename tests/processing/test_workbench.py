@@ -6,13 +6,13 @@ from numpy.typing import NDArray
 
 from processing.reconstruction.line_of_sight import line_of_sight
 from processing.reconstruction.method import ReconstructionMethod
-from processing.reconstruction.plan import Plan, plan_reconstruction
+from processing.reconstruction.planning.plan import Plan, plan_reconstruction
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.reconstruction.slab_volume import SLAB_ROWS
 from processing.reconstruction.smart import mart, smart
 from processing.reconstruction.voxel_type import VoxelType
+from processing.reconstruction.workbench import Workbench
 from processing.volume import VoxelGrid
-from processing.workbench import Workbench
 from tests.processing import oracle
 
 GRID = VoxelGrid.centred((9, 2 * SLAB_ROWS + 5, 37), 1 / 60)

@@ -10,7 +10,7 @@ import pytest
 from fastapi import FastAPI
 
 from processing.calibration.calibration_file import load_calibration, save_calibration
-from processing.run_check import self_calibrate_run
+from processing.runs.run_check import self_calibrate_run
 from server.app import create_api
 from server.jobs import JobKind
 from server.services import Services

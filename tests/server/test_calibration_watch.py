@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import pytest
 
 from processing.calibration.calibration import Verdict
-from processing.calibration.health import judge
-from processing.run_check import ALARM_PX
+from processing.calibration.fit.health import judge
+from processing.runs.run_check import ALARM_PX
 from server.calibration_watch import CalibrationWatch
 from server.events import EventPublisher
 from server.jobs import Job, JobState, check_job, reconstruction_job

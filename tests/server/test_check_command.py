@@ -11,8 +11,8 @@ import pytest
 from daq.files.run_directory import DoubleFrame, ExposureRecord, ImageKey, RunHeader, RunWriter, Shot, ViewFormat
 from processing.calibration.calibration import Verdict
 from processing.calibration.calibration_file import load_calibration, save_calibration
-from processing.calibration.disparity import ViewDisparity
-from processing.run_check import ShotCheck
+from processing.calibration.droplets.disparity import ViewDisparity
+from processing.runs.run_check import ShotCheck
 from processing.studies.seen_droplets import droplet_image
 from server.check_command import check_line
 from server.cli import main

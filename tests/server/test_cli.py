@@ -16,9 +16,9 @@ import pytest
 from processing.calibration.calibration import Model
 from processing.calibration.calibration_file import load_calibration, save_calibration
 from processing.calibration.calibration_record import content_id, json_id
-from processing.calibration.polynomial import EXPONENTS, PolynomialMapping
-from processing.pipeline import PipelineError
+from processing.calibration.fit.polynomial import EXPONENTS, PolynomialMapping
 from processing.reconstruction.volume_file import read_volume
+from processing.runs.pipeline import PipelineError
 from server import average_command, commands
 from server.cli import main
 from tests.processing import droplet_run

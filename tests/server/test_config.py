@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from pydantic import ValidationError
 
-from processing.toml_lines import line_of
+from processing.runs.toml_lines import line_of
 from server.config import ConfigError, RigConfig, load_config
 
 CONFIGS = Path("configs")

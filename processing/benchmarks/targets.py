@@ -1,0 +1,90 @@
+"""What reconstruction must reach on two cores with AVX-512, and what it should: the table that ``bench`` prints."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from processing.benchmarks.baseline import Timing
+
+Unit = Literal["x", "s", "ms", "GB", "%"]
+
+
+@dataclass(frozen=True)
+class Target:
+    """One line of the table.
+
+    Parameters
+    ----------
+    work : str
+        What is done.
+    unit : {"x", "s", "ms", "GB", "%"}
+        ``x`` is the CPU time of the baseline over that of the kernel; more is better. Else less is.
+    at_least, aim : float
+        Floor and goal, in that unit.
+    """
+
+    work: str
+    unit: Unit
+    at_least: float
+    aim: float | None = None
+
+    def verdict(self, value: float) -> Literal["aim", "yes", "no"]:
+        """Whether a measured value reaches the aim, the floor, or neither."""
+        if self.aim is not None and self._reaches(value, self.aim):
+            return "aim"
+        return "yes" if self._reaches(value, self.at_least) else "no"
+
+    def _reaches(self, value: float, limit: float) -> bool:
+        return value >= limit if self.unit == "x" else value <= limit
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A target and what was measured of it; ``how`` says what else one should know."""
+
+    target: Target
+    value: float
+    timing: Timing | None = None
+    how: str = ""
+
+
+MLOS_DENSE = Target("MLOS, every block", "x", 40)
+MLOS_CULLED = Target("MLOS, empty blocks skipped", "x", 40, 100)
+DOUBLE_EXPOSURE = {
+    bits: Target(f"double exposure, 8 raw images of {bits} bit to 2 volumes", "s", 0.5, 0.15) for bits in (8, 16)
+}
+SLIDING_MINIMUM = Target("sliding minima, share of that CPU time", "%", 50)
+EXACT = Target("MLOS by the exact mapping, distortion included", "x", 10, 20)
+AVX2_MLOS = Target("MLOS with AVX2 only, every block", "x", 15, 25)
+SMART_DENSE = Target("SMART of a double exposure, no voxel empty", "s", 15, 7)
+SMART_SPARSE = Target("SMART of a double exposure, sparse spray", "s", 6, 2.5)
+AVX2_SMART = Target("SMART of a double exposure with AVX2 only, no voxel empty", "s", 30, 15)
+MEAN = Target("mean volume of single exposures, images in RAM", "s", 40, 12)
+SLICE = Target("one slice, images in RAM", "ms", 20, 5)
+REGION = Target("256^3 voxels, images in RAM", "ms", 20, 5)
+VOLUME_MEMORY = Target("peak resident memory, MLOS of the whole volume", "GB", 1.6, 0.4)
+SLABS_MEMORY = Target("peak resident memory, MLOS slab by slab", "GB", 1.6, 0.4)
+SMART_MEMORY = Target("peak resident memory, SMART of a sparse spray, filled blocks", "GB", 1.6, 0.4)
+
+
+def markdown_table(measured: tuple[Measured, ...]) -> str:
+    """All that was measured, as Markdown that people read without rendering it, too."""
+    rows = [("work", "at least", "aim", "measured", "reached")]
+    rows += [
+        (
+            f"{one.target.work} ({one.how})" if one.how else one.target.work,
+            _figure(one.target.at_least, one.target),
+            "" if one.target.aim is None else _figure(one.target.aim, one.target),
+            _figure(one.value, one.target) + (f" ({one.timing.cpu_s:.2g} CPU-s)" if one.timing else ""),
+            one.target.verdict(one.value),
+        )
+        for one in measured
+    ]
+    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
+    lines = ["| " + " | ".join(map(str.ljust, row, widths)) + " |" for row in rows]
+    lines.insert(1, "| " + " | ".join("-" * width for width in widths) + " |")
+    return "\n".join(lines)
+
+
+def _figure(value: float, target: Target) -> str:
+    digits = f"{value:.3g}" if value < 1000 else f"{value:.0f}"
+    return f"{digits}x" if target.unit == "x" else f"{digits} {target.unit}"

@@ -1,0 +1,186 @@
+"""calibrate: all points of a view in one joint 3-D fit, judged by points it has not seen -> Calibration."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from datetime import UTC, datetime
+
+import numpy as np
+from numpy.typing import NDArray
+
+from processing.calibration.calibration import Calibration, Model, ViewCalibration
+from processing.calibration.calibration_record import content_id
+from processing.calibration.errors import CalibrationError
+from processing.calibration.fit.covariance import parameter_covariance
+from processing.calibration.fit.free_pose import board_errors_px, fit_free_poses, free_pose_holdout_px
+from processing.calibration.fit.health import (
+    check_motion,
+    errors_px,
+    holdout_distances_px,
+    judge,
+    outline_mm,
+    plane_error,
+)
+from processing.calibration.fit.model_choice import AUTO, fit_mapping, holdout_by_model, simplest_that_holds
+from processing.calibration.fit.placement_check import check_placements
+from processing.calibration.observation import CalibrationSet, PlaneObservation, ViewObservations, stacked
+from processing.geometry import FloatArray, PinholeCamera, ViewMapping
+
+MAX_STRETCH = 1.1
+"""Pixels are square; a sensor tilted by 24 deg looks like one of pixels of 1.095 to a model without tilt."""
+
+
+def calibrate(
+    calibration_set: CalibrationSet, model: Model | str = Model.PINHOLE, *, created_utc: str | None = None
+) -> Calibration:
+    """Fit the camera of every view and judge it.
+
+    Parameters
+    ----------
+    calibration_set : CalibrationSet
+        Detected points.
+    model : Model | str
+        One joint fit per view: ``pinhole``, ``pinhole_tilted`` or ``polynomial``; or ``auto``: each view gets the
+        simplest of them unless another predicts unseen points clearly better (boards in free poses: ``pinhole``).
+    created_utc : str, optional
+        ISO 8601; now, if not given.
+
+    Raises
+    ------
+    CalibrationError
+        Views cannot be calibrated; names each of them, value and limit.
+    """
+    views = _all_views(calibration_set, None if model == AUTO else Model(model))
+    mirrored = tuple(_mirrored(calibration_set, views))
+    placements = () if mirrored else tuple(_placements(calibration_set, views))
+    undated = Calibration(
+        id="",
+        created_utc=created_utc or datetime.now(UTC).isoformat(timespec="seconds"),
+        target=calibration_set.target,
+        views=views,
+        z_range_mm=_common_z_range_mm(calibration_set),
+        source=calibration_set.source,
+        notes=(*calibration_set.notes, *mirrored, *_stretched(views), *placements),
+    )
+    return undated.with_id(content_id(undated))
+
+
+def _all_views(calibration_set: CalibrationSet, wanted: Model | None) -> dict[str, ViewCalibration]:
+    """Every view, or what is wrong with all of those that are bad: who mends one should not meet the next one after."""
+    views, problems = {}, []
+    for name, seen in calibration_set.views.items():
+        try:
+            views[name] = _free_view(seen, wanted) if seen.free_pose else _joint_view(name, seen, wanted)
+        except CalibrationError as error:
+            problems.append(str(error) if str(error).startswith(name) else f"{name}: {error}")
+    if problems:
+        raise CalibrationError("; ".join(problems))
+    return views
+
+
+def _mirrored(calibration_set: CalibrationSet, views: Mapping[str, ViewCalibration]) -> Iterator[str]:
+    """Notes on views that a left-handed world puts behind the camera: volumes would come out mirrored."""
+    for name, view in views.items():
+        camera = view.mapping
+        if isinstance(camera, PinholeCamera) and not view.intrinsics_only:
+            points_mm, _ = stacked(calibration_set.views[name].planes)
+            if np.mean(points_mm @ camera.rotation[2] + camera.translation_mm[2]) < 0:
+                yield (
+                    f"{name}: the target lies behind the camera: its axes are left-handed, volumes come out mirrored; "
+                    'does y point up (y_axis = "up"), or z towards the views?'
+                )
+
+
+def _stretched(views: Mapping[str, ViewCalibration]) -> Iterator[str]:
+    """Notes on pixels that are not square: a wrong pitch, or a wrong scale of the stage, fits as well as the right."""
+    for name, view in views.items():
+        if isinstance(view.mapping, PinholeCamera) and not view.intrinsics_only:
+            height_to_width = float(view.mapping.camera_matrix[0, 0] / view.mapping.camera_matrix[1, 1])
+            if not 1 / MAX_STRETCH < height_to_width < MAX_STRETCH:
+                yield (
+                    f"{name}: its pixels seem {height_to_width:.2f} times as high as wide: is pitch_mm of the target "
+                    f"right, and the position of its planes in mm?"
+                )
+
+
+def _placements(calibration_set: CalibrationSet, views: Mapping[str, ViewCalibration]) -> Iterator[str]:
+    """Notes on where views stand; nothing where boards in free poses do not tell."""
+    if not any(view.intrinsics_only for view in views.values()):
+        yield from check_placements(calibration_set, {name: view.mapping for name, view in views.items()})
+
+
+def _joint_view(name: str, seen: ViewObservations, wanted: Model | None) -> ViewCalibration:
+    """Fit the model that is wanted; None: all models, and the one to keep."""
+    check_motion(name, seen.planes)
+    if wanted is not None:
+        return _fitted_view(seen, wanted)
+    distances_px = holdout_by_model(seen.planes, seen.image_size_px)
+    chosen = _fitted_view(seen, simplest_that_holds(distances_px))
+    return replace(chosen, candidates_px={model: float(px.mean()) for model, px in distances_px.items()})
+
+
+def _fitted_view(seen: ViewObservations, model: Model) -> ViewCalibration:
+    mapping, used = fit_mapping(seen.planes, seen.image_size_px, model)
+    masks = [_counted(mask) for mask in _by_plane(seen.planes, used)]
+    planes = [plane.select(mask) for plane, mask in zip(seen.planes, masks, strict=True)]
+    holdout_px = holdout_distances_px(planes, lambda training: fit_mapping(training, seen.image_size_px, model)[0])
+    errors = [errors_px(mapping, plane) for plane in planes]
+    n_rejected = len(used) - sum(len(plane) for plane in planes)
+    summary = _summary(mapping, model, planes, errors, holdout_px, n_rejected, extent_mm=outline_mm(planes))
+    points_mm, image_px = (values[used] for values in stacked(seen.planes))
+    return replace(summary, covariance=parameter_covariance(mapping, points_mm, image_px, model))
+
+
+def _free_view(seen: ViewObservations, wanted: Model | None) -> ViewCalibration:
+    if wanted not in (None, Model.PINHOLE):
+        raise CalibrationError(f"boards in free poses give a pinhole camera, not {wanted}")
+    if not all(plane.free_pose for plane in seen.planes):
+        raise CalibrationError("some planes have z_mm, others have not: give all of them or none")
+    fitted = fit_free_poses(seen.planes, seen.image_size_px)
+    errors = [
+        board_errors_px(fitted.camera, board, pose) for board, pose in zip(seen.planes, fitted.poses, strict=True)
+    ]
+    holdout_px = free_pose_holdout_px(seen.planes, seen.image_size_px)
+    summary = _summary(fitted.camera, Model.PINHOLE, list(seen.planes), errors, holdout_px, 0, extent_mm=())
+    return summary.with_boards(fitted.poses)
+
+
+def _summary(
+    mapping: ViewMapping,
+    model: Model,
+    planes: list[PlaneObservation],
+    errors: list[FloatArray],
+    holdout_px: list[FloatArray],
+    n_rejected: int,
+    extent_mm: tuple[tuple[float, float], ...],
+) -> ViewCalibration:
+    distances_px, holdout_error_px = np.concatenate(errors), float(np.concatenate(holdout_px).mean())
+    return ViewCalibration(
+        mapping=mapping,
+        model=model,
+        n_points=len(distances_px),
+        mean_error_px=float(distances_px.mean()),
+        rms_px=float(np.sqrt((distances_px**2).mean())),
+        max_error_px=float(distances_px.max()),
+        holdout_error_px=holdout_error_px,
+        planes=tuple(plane_error(*one) for one in zip(planes, errors, holdout_px, strict=True)),
+        verdict=judge(holdout_error_px, n_rejected / (n_rejected + len(distances_px))),
+        n_rejected=n_rejected,
+        extent_mm=extent_mm,
+    )
+
+
+def _counted(used: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Points of a plane that its error counts: a plane of which most points are wrong is itself wrong, and shows it."""
+    return np.ones_like(used) if 2 * used.sum() < len(used) else used
+
+
+def _by_plane(planes: Sequence[PlaneObservation], mask: NDArray[np.bool_]) -> list[NDArray[np.bool_]]:
+    return np.split(mask, np.cumsum([len(plane) for plane in planes])[:-1])
+
+
+def _common_z_range_mm(calibration_set: CalibrationSet) -> tuple[float, float]:
+    """Range that every view is calibrated for; (0, 0) where the world is not known."""
+    if any(seen.free_pose for seen in calibration_set.views.values()):
+        return (0.0, 0.0)
+    depths_mm = [stacked(seen.planes)[0][:, 2] for seen in calibration_set.views.values()]
+    return float(max(z.min() for z in depths_mm)), float(min(z.max() for z in depths_mm))

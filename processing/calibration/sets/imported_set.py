@@ -1,0 +1,150 @@
+"""Calibration sets from images and tables that came from elsewhere."""
+
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from processing.calibration.errors import CalibrationError, TargetNotFound
+from processing.calibration.observation import CalibrationSet, PlaneObservation, ViewObservations
+from processing.calibration.sets.known_dots import find_known_dots
+from processing.calibration.sets.plane_detection import DetectedPlanes, PlaneImage, Size, detect_planes
+from processing.calibration.sets.set_record import CalibrationEntry, PointsEntry
+from processing.geometry import FloatArray
+from processing.image_file import GreyImage, ImageFileError, read_image
+
+MIN_LEVEL_POINTS = 3
+"""Measured points are reported by z level where each level has so many points."""
+
+
+def detect_imported(source: str, entry: CalibrationEntry, folder: Path) -> CalibrationSet:
+    """Detect the target in all images and read all tables.
+
+    What single images do not tell, see ``plane_detection.detect_planes``.
+
+    Parameters
+    ----------
+    source : str
+        Name of the set.
+    entry : CalibrationEntry
+        What there is.
+    folder : Path
+        Paths in the entry are relative to it.
+
+    Raises
+    ------
+    CalibrationError
+        A camera never sees the target, sizes differ within a camera, or a table is wrong; names the file.
+    """
+    detected = _detected(folder, entry)
+    planes = defaultdict(list, {camera: list(seen.planes) for camera, seen in detected.views.items()})
+    sizes = {camera: seen.image_size_px for camera, seen in detected.views.items()}
+    for camera, file, size, levels in _measured(entry, folder):
+        if sizes.setdefault(camera, size) != size:
+            raise CalibrationError(f"{file}: {size} px, other images of {camera} have {sizes[camera]} px")
+        planes[camera] += levels
+    views = {camera: ViewObservations(sizes[camera], _in_order(planes[camera])) for camera in entry.cameras}
+    azimuths_deg = {name: azimuth for name, azimuth in entry.azimuth_deg.items() if name not in entry.roll_deg}
+    return CalibrationSet(source, entry.target, views, detected.notes, azimuths_deg, entry.roll_deg)
+
+
+def read_table(path: Path, columns: Sequence[str]) -> dict[str, FloatArray]:
+    """Columns of a table of numbers, separated by blanks, tabs, commas or semicolons; # starts a comment.
+
+    Raises
+    ------
+    CalibrationError
+        The file is missing, or a line does not have these columns; names file and line.
+    """
+    try:
+        lines = path.read_text(encoding="utf-8-sig", errors="replace").splitlines()
+    except OSError as error:
+        raise CalibrationError(f"{path}: {error.strerror}") from error
+    rows = []
+    for number, line in enumerate(lines, start=1):
+        fields = line.split("#")[0].replace(",", " ").replace(";", " ").split()
+        if not fields:
+            continue
+        if len(fields) != len(columns):
+            raise CalibrationError(f"{path}, line {number}: {len(fields)} values, columns are {', '.join(columns)}")
+        try:
+            rows.append([float(field) for field in fields])
+        except ValueError as error:
+            raise CalibrationError(f"{path}, line {number}: {error}") from error
+        if not np.isfinite(rows[-1]).all():
+            raise CalibrationError(f"{path}, line {number}: {', '.join(fields)}: values must be finite")
+    if not rows:
+        raise CalibrationError(f"{path}: no points in it")
+    return dict(zip(columns, np.array(rows).T, strict=True))
+
+
+def _detected(folder: Path, entry: CalibrationEntry) -> DetectedPlanes:
+    if entry.target is None:
+        return DetectedPlanes({}, ())
+    return detect_planes(str(folder), list(_plane_images(entry, folder)), entry.target, entry.roll_deg)
+
+
+def _plane_images(entry: CalibrationEntry, folder: Path) -> Iterator[PlaneImage]:
+    for plane in entry.plane:
+        for camera, file in plane.images.items():
+            origin_px = plane.origin_px.get(camera, entry.origin_px.get(camera))
+            yield PlaneImage(camera, Path(file).name, file, plane.z_mm, partial(_image, folder / file), origin_px)
+
+
+def _measured(entry: CalibrationEntry, folder: Path) -> Iterator[tuple[str, Path, Size, list[PlaneObservation]]]:
+    """Camera, table, size of its images and levels of every entry of points."""
+    for points in entry.points:
+        size, levels = _dot_levels(points, folder) if points.image else _measured_levels(points, folder)
+        yield points.camera, folder / points.file, size, levels
+
+
+def _measured_levels(points: PointsEntry, folder: Path) -> tuple[Size, list[PlaneObservation]]:
+    table = read_table(folder / points.file, points.columns)
+    image_px = np.column_stack([table["u_px"], table["v_px"]])
+    size = points.image_size_px or (int(image_px[:, 0].max()) + 1, int(image_px[:, 1].max()) + 1)
+    return size, _levels(Path(points.file).name, _world_mm(table), image_px)
+
+
+def _dot_levels(points: PointsEntry, folder: Path) -> tuple[Size, list[PlaneObservation]]:
+    table = read_table(folder / points.file, points.columns)
+    file = folder / str(points.image)
+    image, world_mm = _image(file), _world_mm(table)
+    index_of = {int(name): index for index, name in enumerate(table["id"])}
+    unknown = [name for name in points.seeds_px if not name.isdecimal() or int(name) not in index_of]
+    if unknown:
+        raise CalibrationError(f"{folder / points.file}: no point {', '.join(unknown)}, which seeds_px names")
+    seeds_px = {index_of[int(name)]: place for name, place in points.seeds_px.items()}
+    try:
+        dots = find_known_dots(image, world_mm, seeds_px, points.dot_diameter_px)
+    except TargetNotFound as error:
+        raise TargetNotFound(f"{file}: {error}") from error
+    return (image.shape[1], image.shape[0]), _levels(file.name, world_mm[dots.indices], dots.image_px)
+
+
+def _image(file: Path) -> GreyImage:
+    try:
+        return read_image(file)
+    except ImageFileError as error:
+        raise CalibrationError(str(error)) from error
+
+
+def _world_mm(table: dict[str, FloatArray]) -> FloatArray:
+    return np.column_stack([table["x_mm"], table["y_mm"], table["z_mm"]])
+
+
+def _levels(name: str, world_mm: FloatArray, image_px: FloatArray) -> list[PlaneObservation]:
+    """One observation per z level, or a single one where points are scattered along z."""
+    levels_mm, counts = np.unique(world_mm[:, 2], return_counts=True)
+    if counts.min() < MIN_LEVEL_POINTS:
+        return [PlaneObservation(name, world_mm, image_px)]
+    return [
+        PlaneObservation(f"{name} z={z_mm:g}", world_mm[on_level], image_px[on_level], float(z_mm))
+        for z_mm in levels_mm
+        for on_level in [world_mm[:, 2] == z_mm]
+    ]
+
+
+def _in_order(planes: list[PlaneObservation]) -> tuple[PlaneObservation, ...]:
+    return tuple(sorted(planes, key=lambda plane: 0.0 if plane.z_mm is None else plane.z_mm))

@@ -1,0 +1,158 @@
+"""Planes of a target, recorded or imported: each image tells for itself, or the other planes of its view tell."""
+
+from collections import defaultdict
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from processing.calibration.errors import CalibrationError, OriginUnknown, TargetNotFound
+from processing.calibration.observation import PlaneObservation, ViewObservations
+from processing.calibration.sets.partial_views import detect_by_others
+from processing.calibration.target.targets import Target, TargetPoints, detect_target
+
+Image = NDArray[np.generic]
+Size = tuple[int, int]
+Found = dict[int, PlaneObservation]
+"""By index of the image."""
+
+
+@dataclass(frozen=True)
+class PlaneImage:
+    """An image of the target, read when it is needed.
+
+    Parameters
+    ----------
+    view : str
+        Who sees it.
+    name : str
+        Of the plane.
+    where : str
+        What notes and errors call it.
+    z_mm : float | None
+        Position of the target; None where it stands in a free pose.
+    read : callable
+        The image, (rows, columns) grey values.
+    origin_px : tuple[float, float] | None
+        Where the target's origin is seen (u, v), roughly, if somebody said so.
+    """
+
+    view: str
+    name: str
+    where: str
+    z_mm: float | None
+    read: Callable[[], Image]
+    origin_px: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class DetectedPlanes:
+    """What the images show.
+
+    Parameters
+    ----------
+    views : Mapping[str, ViewObservations]
+        By view, its planes in the order of the images.
+    notes : tuple[str, ...]
+        Which images were left out and why, and which ones others told; one line each.
+    """
+
+    views: Mapping[str, ViewObservations]
+    notes: tuple[str, ...]
+
+
+def detect_planes(
+    source: str, images: Sequence[PlaneImage], target: Target, rolls_deg: Mapping[str, float]
+) -> DetectedPlanes:
+    """Find the target in all images.
+
+    Where a view sees a part of the target only, the planes at which it is told which points these are (the whole
+    board, a marker, a stated origin) tell it for the others. An image that does not show the target is left out;
+    notes say both.
+
+    Parameters
+    ----------
+    source : str
+        Directory of the run or set; errors name it.
+    images : sequence of PlaneImage
+        Of all views.
+    target : Target
+        What to look for.
+    rolls_deg : mapping of view to angle
+        How cameras are turned about their axes; the others count as upright.
+
+    Raises
+    ------
+    CalibrationError
+        A view never sees the target, or its images differ in size.
+    """
+    sizes_px, found, missed = _first_look(source, images, target, rolls_deg)
+    more, notes = _second_look(images, target, found, missed, rolls_deg)
+    planes: dict[str, list[PlaneObservation]] = defaultdict(list)
+    for index, plane in sorted((found | more).items()):
+        planes[images[index].view].append(plane)
+    for view in sizes_px:
+        if view not in planes:
+            reason = next(note for note in notes if note.startswith(f"{view}, "))
+            raise CalibrationError(f"{source}: {view} never sees the target; {reason}")
+    return DetectedPlanes({view: ViewObservations(sizes_px[view], tuple(planes[view])) for view in sizes_px}, notes)
+
+
+def place_points(points: TargetPoints, target: Target, name: str, z_mm: float | None) -> PlaneObservation:
+    """Detected points on the plane z, or on a board in a free pose where z is not known."""
+    on_plane_mm = target.points_mm(points.ids)
+    world_mm = np.column_stack([on_plane_mm, np.full(len(points), z_mm or 0.0)])
+    return PlaneObservation(name, world_mm, points.image_px, z_mm, free_pose=z_mm is None)
+
+
+def _first_look(
+    source: str, images: Sequence[PlaneImage], target: Target, rolls_deg: Mapping[str, float]
+) -> tuple[dict[str, Size], Found, dict[int, TargetNotFound]]:
+    """Sizes by view; what each image tells by itself, and why the others do not."""
+    sizes_px: dict[str, Size] = {}
+    found, missed = {}, {}
+    for index, image in enumerate(images):
+        pixels = image.read()
+        size_px = (pixels.shape[1], pixels.shape[0])
+        if sizes_px.setdefault(image.view, size_px) != size_px:
+            others = f"other images of {image.view} have {sizes_px[image.view]} px"
+            raise CalibrationError(f"{source}: {image.where}: {size_px} px, {others}")
+        try:
+            points = detect_target(pixels, target, image.origin_px, rolls_deg.get(image.view, 0.0))
+            found[index] = place_points(points, target, image.name, image.z_mm)
+        except TargetNotFound as error:
+            missed[index] = error
+    return sizes_px, found, missed
+
+
+def _second_look(
+    images: Sequence[PlaneImage],
+    target: Target,
+    found: Found,
+    missed: Mapping[int, TargetNotFound],
+    rolls_deg: Mapping[str, float],
+) -> tuple[Found, tuple[str, ...]]:
+    """What the other planes of a view tell of images that show a part of the target; notes on all of these."""
+    more, notes = {}, []
+    for index, reason in missed.items():
+        image = images[index]
+        known = [plane for other, plane in found.items() if images[other].view == image.view]
+        try:
+            points = _told_by_others(image, reason, target, known, rolls_deg.get(image.view, 0.0))
+        except TargetNotFound as error:
+            also = "" if error is reason else f"; {error}"
+            notes.append(f"{image.view}, {image.where} left out: {reason}{also}")
+            continue
+        more[index] = place_points(points, target, image.name, image.z_mm)
+        notes.append(f"{image.view}, {image.where}: {len(points)} points of the target; other positions tell which")
+    return more, tuple(notes)
+
+
+def _told_by_others(
+    image: PlaneImage, reason: TargetNotFound, target: Target, known: Sequence[PlaneObservation], roll_deg: float
+) -> TargetPoints:
+    """The points of an image of which the others may tell; where they cannot, the reason stands."""
+    if image.z_mm is None or not isinstance(reason, OriginUnknown):
+        raise reason
+    return detect_by_others(image.read(), target, image.z_mm, known, roll_deg)

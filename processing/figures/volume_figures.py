@@ -1,0 +1,135 @@
+"""Figures as the paper has them: residuals per plane (Fig. 3), slices and projections, iso-surfaces (Fig. 4).
+
+Each function returns a matplotlib Figure; who wants a file saves it.
+"""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import LightSource, PowerNorm
+from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+from numpy.typing import NDArray
+from skimage.measure import marching_cubes
+
+from processing.calibration.calibration import Calibration
+from processing.figures.colours import FRAME_COLOURS, VIEW_COLOURS
+from processing.volume import VoxelGrid
+
+Volume = NDArray[np.float32]
+LIMIT_PX = 0.05
+
+
+def residuals_figure(calibration: Calibration) -> Figure:
+    """Mean back-projection error (eq. 2) of each view over the calibration planes (Fig. 3 of the paper).
+
+    Boards in free poses, which have no z, are numbered instead.
+    """
+    figure = Figure(figsize=(6.4, 4.0), layout="constrained")
+    axes = figure.subplots()
+    highest_px, xlabel = LIMIT_PX, "plane z [mm]"
+    for (name, view), colour in zip(calibration.views.items(), VIEW_COLOURS, strict=False):
+        errors_px = [plane.mean_error_px for plane in view.planes]
+        positions = [plane.z_mm for plane in view.planes if plane.z_mm is not None]
+        if len(positions) < len(errors_px):
+            positions, xlabel = [float(number) for number in range(1, len(errors_px) + 1)], "board"
+        label = f"{name} (hold-out {view.holdout_error_px:.3f} px)"
+        axes.plot(positions, errors_px, marker="o", color=colour, label=label)
+        highest_px = max(highest_px, *errors_px)
+    axes.axhline(LIMIT_PX, color="0.4", linestyle="--", linewidth=1)
+    axes.annotate("paper: < 0.05 px", (0.01, LIMIT_PX), xycoords=("axes fraction", "data"), va="bottom", color="0.4")
+    axes.set(xlabel=xlabel, ylabel="mean back-projection error [px]", ylim=(0, 1.15 * highest_px))
+    axes.legend(frameon=False, fontsize="small")
+    return figure
+
+
+def slices_figure(volume: Volume, grid: VoxelGrid, title: str = "") -> Figure:
+    """Slices through the fullest planes (top) and maximum projections (bottom) of a volume along its three axes.
+
+    Colours follow the square root of the intensity, so that single droplets show beside dense liquid.
+    """
+    figure = Figure(figsize=(11, 5.8), layout="constrained")
+    panels = figure.subplots(2, 3)
+    scale = PowerNorm(0.5, vmin=0, vmax=float(np.quantile(volume.max(axis=0), 0.999)) or 1.0)
+    for column, axis in enumerate((0, 1, 2)):
+        fullest = int(volume.sum(axis=tuple({0, 1, 2} - {axis})).argmax())
+        depth_mm = (grid.z_mm, grid.y_mm, grid.x_mm)[axis][fullest]
+        label = f"{'zyx'[axis]} = {depth_mm:.2f} mm"
+        plane = np.take(volume, fullest, axis=axis)
+        picture = _show(panels[0, column], plane, grid, axis, scale)
+        panels[0, column].set_title(f"slice at {label}", fontsize="medium")
+        _show(panels[1, column], volume.max(axis=axis), grid, axis, scale)
+        panels[1, column].set_title(f"maximum along {'zyx'[axis]}", fontsize="medium")
+    figure.colorbar(picture, ax=panels, label="reconstructed intensity [-]", shrink=0.6)
+    if title:
+        figure.suptitle(title)
+    return figure
+
+
+def isosurface_figure(frames: Mapping[str, Volume], grid: VoxelGrid, level: float, title: str = "") -> Figure:
+    """Iso-surfaces of exposures A (blue) and B (red) in one volume (Fig. 4 of the paper).
+
+    Parameters
+    ----------
+    frames : Mapping[str, Volume]
+        Volumes (z, y, x) by the name of the exposure.
+    grid : VoxelGrid
+        Grid of all of them; a few million voxels at most.
+    level : float
+        Intensity of the surface.
+    title : str
+        Title of the figure.
+    """
+    figure = Figure(figsize=(6.4, 6.0), layout="constrained")
+    axes = figure.add_subplot(projection="3d")
+    for name, volume in frames.items():
+        mesh = _surface(volume, grid, level)
+        if mesh is not None:
+            vertices_mm, faces = mesh
+            axes.add_collection3d(_shaded(vertices_mm[faces][..., [0, 2, 1]], FRAME_COLOURS[name]))
+        axes.plot([], [], [], color=FRAME_COLOURS[name], linewidth=6, label=f"exposure {name}")
+    axes.set(xlim=grid.x_mm[[0, -1]], ylim=grid.z_mm[[0, -1]], zlim=grid.y_mm[[-1, 0]])
+    axes.set(xlabel="x [mm]", ylabel="z [mm]", zlabel="y [mm]")
+    axes.set_box_aspect([float(np.ptp(extent_mm)) or 1.0 for extent_mm in (grid.x_mm, grid.z_mm, grid.y_mm)], zoom=0.85)
+    axes.zaxis.labelpad = 8
+    axes.legend(frameon=False, loc="upper left")
+    if title:
+        figure.suptitle(title)
+    return figure
+
+
+def shadowgraph_figure(images: Mapping[str, NDArray[np.generic]], title: str = "") -> Figure:
+    """One exposure of every view, side by side."""
+    figure = Figure(figsize=(3.4 * len(images), 2.9), layout="constrained")
+    panels: Sequence[Axes] = np.atleast_1d(figure.subplots(1, len(images))).tolist()
+    for axes, (name, image) in zip(panels, images.items(), strict=True):
+        axes.imshow(image, cmap="gray", vmin=0)
+        axes.set(title=name, xlabel="column [px]", ylabel="row [px]" if axes is panels[0] else "")
+        axes.tick_params(labelsize="small")
+    if title:
+        figure.suptitle(title)
+    return figure
+
+
+def _show(axes: Axes, image: NDArray[np.float32], grid: VoxelGrid, axis: int, scale: PowerNorm) -> AxesImage:
+    names = [name for name in "zyx" if name != "zyx"[axis]]
+    across_mm, down_mm = ({"x": grid.x_mm, "y": grid.y_mm, "z": grid.z_mm}[name] for name in reversed(names))
+    half_mm = grid.pitch_mm / 2
+    extent = (across_mm[0] - half_mm, across_mm[-1] + half_mm, down_mm[-1] + half_mm, down_mm[0] - half_mm)
+    axes.set(xlabel=f"{names[1]} [mm]", ylabel=f"{names[0]} [mm]")
+    return axes.imshow(image, cmap="magma", norm=scale, extent=extent, interpolation="antialiased")
+
+
+def _surface(volume: Volume, grid: VoxelGrid, level: float) -> tuple[NDArray[np.float64], NDArray[np.intp]] | None:
+    if not volume.min() < level < volume.max():
+        return None
+    vertices, faces, _, _ = marching_cubes(volume, level)  # type: ignore[no-untyped-call]
+    return grid.to_mm(vertices), faces
+
+
+def _shaded(triangles: NDArray[np.float64], colour: str) -> Poly3DCollection:
+    return Poly3DCollection(
+        triangles, facecolors=colour, linewidths=0, shade=True, lightsource=LightSource(azdeg=225, altdeg=45)
+    )

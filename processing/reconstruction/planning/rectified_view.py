@@ -1,0 +1,167 @@
+"""The fast way to see voxels: an image resampled once, of which every plane z is a scale and a shift.
+
+Lines of sight of a central camera meet in one point C. A point P on the plane z lies on the same line of sight
+as C + (P - C) (z_ref - C_z) / (z - C_z) on the plane z_ref. So the image is resampled once onto the plane z_ref,
+through the full camera model with all its distortion; from there on no camera model is needed (shear-warp).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from processing.geometry import FloatArray, ViewMapping
+from processing.reconstruction.kernels import _native
+from processing.reconstruction.planning.bending import bend_px
+from processing.reconstruction.planning.fixed_point import FixedPoint
+from processing.volume import VoxelGrid
+
+GUARD_PX, BELOW_PX = 2.025, 4
+"""Kept above and left of the volume, and below it. With 0.95 px per voxel, pixels come closer to voxels by 1 / 19 voxel
+from one to the next; begun at 2.025 px, none comes closer than half of that. If one met a voxel, rounding would let it
+see a millionth of the next one, which SMART then brightens until it explains all light of the pixel."""
+BLOCK_COLUMNS, OVERHANG_PX = 32, 36
+"""Voxels that the kernels compute at once, and columns that the widest vectors may read beyond them."""
+MAP_SPACING_PX = 16
+"""The camera model is evaluated at every sixteenth pixel of the resampled image; it is straight in between."""
+MAX_PIXELS_PER_VOXEL = 1.5
+"""Of the recorded image; coarser voxels would skip pixels."""
+MIN_RELATIVE_SCALE = 0.63
+"""Smallest scale of any plane against the largest one; beyond it the volume is too deep for its distance."""
+
+
+class NotRectifiable(Exception):
+    """A view cannot be rectified for a grid, or not exactly; the text says why."""
+
+
+@runtime_checkable
+class CentralMapping(ViewMapping, Protocol):
+    """A mapping whose lines of sight meet in one point."""
+
+    @property
+    def centre_mm(self) -> FloatArray:
+        """Where they meet, (3,)."""
+
+
+@dataclass(frozen=True, eq=False)
+class RectifiedView:
+    """A view whose image is resampled onto the plane z_ref, the middle of the volume.
+
+    Parameters
+    ----------
+    shape_px : tuple[int, int]
+        (rows, columns) of the resampled image.
+    nodes_px : (node rows, node columns, 2) float32 array
+        Where every ``MAP_SPACING_PX``-th pixel of the resampled image lies in the recorded one, (u, v).
+    scale : (nz,) float64 array
+        Pixels of the resampled image per voxel, for each plane.
+    shift_u_px, shift_v_px : (nz,) float64 arrays
+        Where voxel (z, 0, 0) is seen in the resampled image.
+    image_size_px : tuple[int, int]
+        (width, height) of the recorded image.
+    deviation_px : float
+        Largest distance to the full camera model, in the recorded image.
+    """
+
+    shape_px: tuple[int, int]
+    nodes_px: NDArray[np.float32]
+    scale: FloatArray
+    shift_u_px: FloatArray
+    shift_v_px: FloatArray
+    image_size_px: tuple[int, int]
+    deviation_px: float
+
+    def resample(self, image: NDArray[np.float32], out: NDArray[np.int16], threads: int) -> FixedPoint:
+        """The image on the plane z_ref, in ``out``: cubic, zero outside of the recorded image, limited to its range."""
+        return FixedPoint(out, _native.resample(image, self.nodes_px, out, threads))
+
+    def bind(self, image: FixedPoint, *, cull: bool) -> _native.View:
+        """A resampled image with the geometry of this view, for the kernels."""
+        return _native.View.rectified(image.pixels, image.unit, self.scale, self.shift_u_px, self.shift_v_px, cull)
+
+
+def rectify(mapping: ViewMapping, grid: VoxelGrid, pixels_per_voxel: float, max_deviation_px: float) -> RectifiedView:
+    """Rectify a view for a grid; the largest scale of all planes is ``pixels_per_voxel``.
+
+    Raises
+    ------
+    NotRectifiable
+        Its lines of sight do not meet, or too near; voxels are coarse; or it would be off by more than
+        ``max_deviation_px``.
+    """
+    centre, to_reference = _central_projection(mapping, grid)
+    z_ref = 0.5 * (grid.shape[0] - 1)
+    reference_scale = pixels_per_voxel / to_reference.max()
+    scale = reference_scale * to_reference
+    shift_v, shift_u = (reference_scale * centre[axis] * (1 - to_reference) for axis in (1, 2))
+    left, top = GUARD_PX - shift_u.min(), GUARD_PX - shift_v.min()
+    last_column = -(-grid.shape[2] // BLOCK_COLUMNS) * BLOCK_COLUMNS - 1
+    columns = int(np.ceil((shift_u + scale * last_column).max() + left)) + OVERHANG_PX
+    columns += -columns % MAP_SPACING_PX
+    rows = int(np.ceil((shift_v + scale * (grid.shape[1] - 1)).max() + top)) + BELOW_PX
+    origin = np.array([z_ref, -top / reference_scale, -left / reference_scale])
+    points_at = partial(_project_plane, mapping, grid, origin, 1 / reference_scale, (rows, columns))
+    nodes_px = points_at((0.0, 0.0))
+    recorded_px_per_voxel = reference_scale * np.linalg.norm(np.diff(nodes_px, axis=1), axis=-1).mean() / MAP_SPACING_PX
+    if recorded_px_per_voxel > MAX_PIXELS_PER_VOXEL:
+        raise NotRectifiable(f"a voxel covers {recorded_px_per_voxel:.2g} px, limit {MAX_PIXELS_PER_VOXEL} px")
+    deviation_px = bend_px(nodes_px, points_at) + _deviation_px(mapping, grid, centre, to_reference)
+    if deviation_px > max_deviation_px:
+        raise NotRectifiable(f"rectified it would be off by {deviation_px:.2g} px, limit {max_deviation_px} px")
+    return RectifiedView(
+        shape_px=(rows, columns),
+        nodes_px=np.ascontiguousarray(nodes_px, dtype=np.float32),
+        scale=scale,
+        shift_u_px=shift_u + left,
+        shift_v_px=shift_v + top,
+        image_size_px=mapping.image_size_px,
+        deviation_px=deviation_px,
+    )
+
+
+def _central_projection(mapping: ViewMapping, grid: VoxelGrid) -> tuple[FloatArray, FloatArray]:
+    """Voxel index (z, y, x) where lines of sight meet; and by what planes (nz,) are scaled onto the middle one."""
+    if not isinstance(mapping, CentralMapping):
+        raise NotRectifiable("its lines of sight do not meet in one point")
+    centre = grid.to_index(np.asarray(mapping.centre_mm)[None])[0]
+    depth = np.arange(grid.shape[0]) - centre[0]
+    if depth[0] * depth[-1] <= 0:
+        raise NotRectifiable("its lines of sight meet beside the volume, or inside")
+    to_reference: FloatArray = (0.5 * (grid.shape[0] - 1) - centre[0]) / depth
+    relative_scale = to_reference.min() / to_reference.max()
+    if relative_scale < MIN_RELATIVE_SCALE:
+        raise NotRectifiable(
+            f"the far end of the volume is seen at {relative_scale:.2f} of the scale of the near end, "
+            f"limit {MIN_RELATIVE_SCALE}"
+        )
+    return centre, to_reference
+
+
+def _project_plane(
+    mapping: ViewMapping,
+    grid: VoxelGrid,
+    origin: FloatArray,
+    voxels_per_px: float,
+    shape: tuple[int, int],
+    offset: Sequence[float],
+) -> FloatArray:
+    """Where nodes of the resampled image, whose pixel (0, 0) is the voxel index ``origin``, lie in the recorded one."""
+    along_v, along_u = (
+        voxels_per_px * MAP_SPACING_PX * (np.arange((n - 1) // MAP_SPACING_PX + 2) + along)
+        for n, along in zip(shape, offset, strict=True)
+    )
+    y, x = np.meshgrid(origin[1] + along_v, origin[2] + along_u, indexing="ij")
+    indices = np.stack([np.full(x.shape, origin[0]), y, x], axis=-1)
+    return mapping.project(grid.to_mm(indices.reshape(-1, 3))).reshape(*x.shape, 2)
+
+
+def _deviation_px(mapping: ViewMapping, grid: VoxelGrid, centre: FloatArray, to_reference: FloatArray) -> float:
+    """Compare the way over the plane z_ref with the mapping itself, on a lattice of voxels."""
+    axes = [np.unique(np.linspace(0, n - 1, 17).round()) for n in grid.shape]
+    voxels = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    on_reference = centre + (voxels - centre) * to_reference[voxels[:, 0].astype(np.intp), None]
+    difference_px = mapping.project(grid.to_mm(voxels)) - mapping.project(grid.to_mm(on_reference))
+    return float(np.linalg.norm(difference_px, axis=1).max())

@@ -1,0 +1,288 @@
+"""One shot + one calibration + settings -> volumes on disk. Every shot by itself, whoever asks for it."""
+
+import json
+import resource
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import lru_cache
+from importlib.metadata import version
+from pathlib import Path
+
+from daq.files.run_directory import RunReader, Shot
+from daq.files.run_file import RUN_FILE
+from processing.calibration.calibration import Calibration, Verdict
+from processing.calibration.calibration_file import file_sha256, load_calibration
+from processing.calibration.errors import CalibrationError
+from processing.preprocessing import Intensity, Preprocessing, intensity
+from processing.reconstruction.kernels import DEFAULT_THREADS
+from processing.reconstruction.method import ReconstructionMethod
+from processing.reconstruction.planning.common_volume import common_volume
+from processing.reconstruction.planning.plan import plan_reconstruction
+from processing.reconstruction.planning.planned_view import PlannedView
+from processing.reconstruction.settings import FrozenValue, GridSettings, ReconstructionSettings
+from processing.reconstruction.volume_file import write_slabs
+from processing.reconstruction.workbench import Workbench
+from processing.runs.clocked_slabs import ClockedSlabs
+from processing.runs.results_file import FrameName, Provenance, claim_results, volume_path
+from processing.volume import VoxelGrid
+
+_References = dict[str, tuple[Intensity | None, Intensity | None]]
+
+
+class PipelineError(Exception):
+    """A shot cannot be reconstructed; the text names run, shot and reason."""
+
+
+class Stopped(Exception):
+    """The reconstruction was told to stop."""
+
+
+class VolumeRecord(FrozenValue):
+    """One volume that was written; ``seconds`` is the wall time of its reconstruction.
+
+    ``residuals`` are those of SMART and MART, see ``processing.reconstruction.smart.SmartResult``. ``blind_views``
+    see nothing in this exposure, no pixel above the noise floor: a shot may be empty, or a lens be covered.
+    """
+
+    shot: int
+    frame: FrameName
+    file: str
+    seconds: float
+    residuals: tuple[float, ...] = ()
+    blind_views: tuple[str, ...] = ()
+
+
+class ShotResult(FrozenValue):
+    """What became of one shot; ``views`` tells how each view was seen."""
+
+    shot: int
+    method: ReconstructionMethod
+    grid: GridSettings
+    views: Mapping[str, PlannedView]
+    volumes: tuple[VolumeRecord, ...]
+    cpu_s: float
+    peak_rss_mb: float
+
+
+def reconstruct_shot(
+    run_dir: Path,
+    shot: int,
+    calibration_file: Path,
+    settings: ReconstructionSettings,
+    results_dir: Path,
+    should_stop: Callable[[], bool] = lambda: False,
+    *,
+    threads: int = DEFAULT_THREADS,
+) -> ShotResult:
+    """Reconstruct every exposure of one shot and write its volumes.
+
+    Parameters
+    ----------
+    run_dir : Path
+        The recorded run.
+    shot : int
+        Index of the shot.
+    calibration_file : Path
+        Calibration of the views of the run.
+    settings : ReconstructionSettings
+        Method, grid and preprocessing.
+    results_dir : Path
+        Receives the volumes; a volume of the same shot and settings is replaced atomically.
+    should_stop : callable
+        Asked between the steps.
+    threads : int
+        The volumes do not depend on it.
+
+    Raises
+    ------
+    PipelineError
+        The shot is not valid, or run and calibration do not belong together.
+    CalibrationError
+        The calibration was refused.
+    ReconstructionError
+        Its views see too little in common, or are too few.
+    Stopped
+        ``should_stop`` said so.
+    """
+    started_cpu_s = time.process_time()
+    calibration = load_calibration(calibration_file)
+    with RunReader(run_dir) as run:
+        recorded = run.read_shot(shot)
+        require_match(run_dir.name, recorded, calibration)
+        made_by = _provenance(run, calibration, calibration_file, settings)
+        named_by = str(made_by["calibration_sha256"])
+        bench = _workbench(calibration_file, named_by, settings, tuple(recorded.views), threads)
+        views = {name: PlannedView.of(view) for name, view in zip(recorded.views, bench.plan.views, strict=True)}
+        provenance = {**made_by, "views": json.dumps({name: view.model_dump() for name, view in views.items()})}
+        claim_results(results_dir, provenance)
+        volumes = []
+        for frame in frame_names(run):
+            if should_stop():
+                raise Stopped(f"{run_dir.name}, shot {shot}: stopped before exposure {frame}")
+            images = shot_intensities(run, recorded, frame, settings, bench.images, threads=threads)
+            blind = tuple(view for view, image in zip(recorded.views, images, strict=True) if not image.any())
+            named = {**provenance, "blind_views": json.dumps(blind)} if blind else provenance
+            written = _reconstruct_frame(bench, images, results_dir, shot, frame, named)
+            volumes.append(written.model_copy(update={"blind_views": blind}))
+    return ShotResult(
+        shot=shot,
+        method=settings.method,
+        grid=GridSettings.of(bench.plan.grid),
+        views=views,
+        volumes=tuple(volumes),
+        cpu_s=time.process_time() - started_cpu_s,
+        peak_rss_mb=resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+    )
+
+
+def default_grid(calibration: Calibration, pitch_mm: float | None = None) -> VoxelGrid:
+    """The volume that all views see within the calibrated z range; x and y reach a quarter beyond the target."""
+    return common_volume(
+        [view.mapping for view in calibration.views.values()],
+        x_range_mm=_widened(calibration.x_range_mm),
+        y_range_mm=_widened(calibration.y_range_mm),
+        z_range_mm=calibration.z_range_mm,
+        pitch_mm=pitch_mm,
+    )
+
+
+def shot_intensities(
+    run: RunReader,
+    shot: Shot,
+    frame: FrameName,
+    settings: ReconstructionSettings,
+    out: Sequence[Intensity | None] | None = None,
+    *,
+    threads: int = DEFAULT_THREADS,
+) -> list[Intensity]:
+    """Preprocessed images of one exposure.
+
+    Parameters
+    ----------
+    run : RunReader
+        Has polarity and reference images.
+    shot : Shot
+        A shot of that run.
+    frame : {"a", "b"}
+        Which exposure.
+    settings : ReconstructionSettings
+        Sliding minimum and noise floor.
+    out : sequence of (rows, columns) float32 arrays, optional
+        Receive the images.
+    threads : int
+        The images do not depend on it.
+
+    Returns
+    -------
+    list of (rows, columns) float32 arrays
+        In the order of the shot's views: 0 where the view is free, 1 where it is blocked.
+
+    Raises
+    ------
+    PipelineError
+        A view has no such exposure.
+    """
+    header, references, number = run.header, _references(run), "ab".index(frame)
+    preprocessing = Preprocessing(header.polarity, settings.minimum_window_px, settings.noise_floor)
+    images = []
+    for (view, exposures), image in zip(shot.views.items(), out or [None] * len(shot.views), strict=True):
+        pixels = (exposures.frame_a, exposures.frame_b)[number]
+        if pixels is None:
+            raise PipelineError(f"{header.run_id}, shot {shot.index}: {view} has no exposure {frame}")
+        dark, background = references[view]
+        images.append(
+            intensity(
+                pixels,
+                preprocessing,
+                bits=header.views[view].bits,
+                dark=None if dark is None else dark[number],
+                background=None if background is None else background[number],
+                out=image,
+                threads=threads,
+            )
+        )
+    return images
+
+
+def _references(run: RunReader) -> _References:
+    return _read_references(run.run_dir, (run.run_dir / RUN_FILE).stat().st_mtime_ns)
+
+
+@lru_cache(maxsize=1)
+def _read_references(run_dir: Path, _written_ns: int) -> _References:
+    """Dark and background of every view; to unpack them takes longer than to reconstruct a shot."""
+    with RunReader(run_dir) as run:
+        return {view: (run.dark(view), run.background(view)) for view in run.header.views}
+
+
+def _reconstruct_frame(
+    bench: Workbench, images: list[Intensity], results_dir: Path, shot: int, frame: FrameName, provenance: Provenance
+) -> VolumeRecord:
+    """Slabs are written as they are made; the time of writing does not count."""
+    started_s = time.perf_counter()
+    volume, residuals = bench.reconstruct(images)
+    begun_s = time.perf_counter() - started_s
+    slabs = ClockedSlabs(volume.slabs)
+    file = volume_path(results_dir, shot, frame)
+    convergence = {"residuals": json.dumps(residuals)} if residuals else {}
+    named = {**provenance, "shot": shot, "frame": frame, **convergence}
+    write_slabs(file, replace(volume, slabs=slabs), bench.plan.grid, named)
+    seconds = round(begun_s + slabs.seconds, 4)
+    return VolumeRecord(shot=shot, frame=frame, file=file.name, seconds=seconds, residuals=residuals)
+
+
+def frame_names(run: RunReader) -> tuple[FrameName, ...]:
+    """Exposures of every shot of a run."""
+    return ("a", "b") if run.header.frames_per_shot == 2 else ("a",)
+
+
+def require_match(run_name: str, shot: Shot, calibration: Calibration) -> None:
+    """Refuse a shot that is not whole, and a calibration that is not made for it or not good enough."""
+    if not shot.valid:
+        raise PipelineError(f"{run_name}, shot {shot.index}: exposures are missing, nothing to reconstruct")
+    calibration.require_world()
+    unknown = sorted(set(shot.views) - set(calibration.views))
+    if unknown:
+        raise PipelineError(
+            f"{run_name}: views {unknown} are not in the calibration, it has {sorted(calibration.views)}"
+        )
+    for name, exposures in shot.views.items():
+        rows, columns = exposures.frame_a.shape
+        view = calibration.views[name]
+        if (columns, rows) != view.mapping.image_size_px:
+            raise PipelineError(
+                f"{run_name}, {name}: image of {columns} x {rows} px, calibrated for {view.mapping.image_size_px}"
+            )
+        if view.verdict is Verdict.REFUSE:
+            raise CalibrationError(
+                f"calibration {calibration.id}, {name}: hold-out error {view.holdout_error_px:.3g} px is refused"
+            )
+
+
+def _provenance(
+    run: RunReader, calibration: Calibration, calibration_file: Path, settings: ReconstructionSettings
+) -> Provenance:
+    return {
+        "run": run.header.run_id,
+        "calibration": calibration.id,
+        "calibration_file": calibration_file.name,
+        "calibration_sha256": file_sha256(calibration_file),
+        "settings": settings.model_dump_json(),
+        "tomoshadow": version("tomoshadow"),
+    }
+
+
+@lru_cache(maxsize=1)
+def _workbench(
+    calibration_file: Path, _sha256: str, settings: ReconstructionSettings, views: tuple[str, ...], threads: int
+) -> Workbench:
+    calibration = load_calibration(calibration_file)
+    grid = settings.grid.to_grid() if settings.grid else default_grid(calibration)
+    plan = plan_reconstruction([calibration.views[view].mapping for view in views], grid, settings.accuracy, views)
+    return Workbench.of(plan, settings, threads)
+
+
+def _widened(span_mm: tuple[float, float]) -> tuple[float, float]:
+    quarter_mm = (span_mm[1] - span_mm[0]) / 4
+    return span_mm[0] - quarter_mm, span_mm[1] + quarter_mm

@@ -1,0 +1,115 @@
+"""The mean volume of recorded shots, straight from their images: no volume of a single exposure is kept."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from daq.files.run_directory import RunReader
+from processing.calibration.calibration import Calibration
+from processing.preprocessing import Intensity
+from processing.reconstruction.kernels import DEFAULT_THREADS
+from processing.reconstruction.mean_line_of_sight import mean_line_of_sight
+from processing.reconstruction.planning.plan import plan_reconstruction
+from processing.reconstruction.settings import ReconstructionSettings
+from processing.reconstruction.workbench import Workbench
+from processing.runs.pipeline import default_grid, frame_names, require_match, shot_intensities
+from processing.volume import VoxelGrid
+
+Exposures = Iterator[list[Intensity]]
+
+
+@dataclass(frozen=True, eq=False)
+class RunAverage:
+    """Mean of the volumes of many exposures.
+
+    Parameters
+    ----------
+    volume : (z, y, x) float32 array
+        The mean.
+    grid : VoxelGrid
+        Where it lies.
+    exposures : int
+        How many; A and B count apart.
+    """
+
+    volume: Intensity
+    grid: VoxelGrid
+    exposures: int
+
+
+def average_run(
+    run_dir: Path,
+    shots: Sequence[int],
+    calibration: Calibration,
+    settings: ReconstructionSettings,
+    done: Callable[[int], None] = lambda _: None,
+    *,
+    threads: int = DEFAULT_THREADS,
+) -> RunAverage:
+    """Mean of what ``reconstruct_shot`` makes of every exposure of some shots.
+
+    Parameters
+    ----------
+    run_dir : Path
+        The recorded run.
+    shots : sequence of int
+        At least one.
+    calibration : Calibration
+        Of the views of the run.
+    settings : ReconstructionSettings
+        Method, grid and preprocessing.
+    done : callable
+        Told the number of exposures that have been read, after each.
+    threads : int
+        The mean does not depend on it.
+
+    Raises
+    ------
+    PipelineError
+        A shot is not valid, or run and calibration do not belong together.
+    CalibrationError
+        The calibration was refused.
+    """
+    grid = settings.grid.to_grid() if settings.grid else default_grid(calibration)
+    with RunReader(run_dir) as run:
+        first = run.read_shot(shots[0])
+        require_match(run_dir.name, first, calibration)
+        mappings = [calibration.views[view].mapping for view in first.views]
+        plan = plan_reconstruction(mappings, grid, settings.accuracy, list(first.views))
+        exposures = _exposures(run, shots, calibration, settings, done, threads)
+        if settings.method.iterative:
+            volume = _mean_of_each(Workbench.of(plan, settings, threads), exposures)
+        else:
+            volume = mean_line_of_sight(plan, exposures, settings.method, threads=threads)
+        return RunAverage(volume, grid, len(shots) * len(frame_names(run)))
+
+
+def _exposures(
+    run: RunReader,
+    shots: Sequence[int],
+    calibration: Calibration,
+    settings: ReconstructionSettings,
+    done: Callable[[int], None],
+    threads: int,
+) -> Exposures:
+    count = 0
+    for index in shots:
+        shot = run.read_shot(index)
+        require_match(run.header.run_id, shot, calibration)
+        for frame in frame_names(run):
+            yield shot_intensities(run, shot, frame, settings, threads=threads)
+            count += 1
+            done(count)
+
+
+def _mean_of_each(bench: Workbench, exposures: Exposures) -> Intensity:
+    mean, count = np.zeros(bench.plan.grid.shape, np.float32), 0
+    for images in exposures:
+        volume, _ = bench.reconstruct(images)
+        for first_row, slab in volume.intensities():
+            mean[:, first_row : first_row + slab.shape[1]] += slab
+        count += 1
+    mean /= np.float32(count)
+    return mean

@@ -1,0 +1,192 @@
+"""Does a calibration still fit the shots of a run? Asked of the droplets in them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from daq.files.run_directory import RunReader
+from processing.calibration.calibration import Calibration, Verdict
+from processing.calibration.droplets.disparity import MIN_VIEWS, REACH_PX, ViewDisparity, measured_box, shot_disparity
+from processing.calibration.droplets.displaced_view import odd_view, would_agree
+from processing.calibration.droplets.droplet_images import find_droplets
+from processing.calibration.droplets.self_calibration import CLEARER, NOISE_PX, SelfCalibration, self_calibrate
+from processing.calibration.errors import CalibrationError, OutOfRange
+from processing.calibration.fit.health import LIMITS_PX, judge
+from processing.geometry import FloatArray
+from processing.reconstruction.settings import ReconstructionSettings
+from processing.runs.pipeline import PipelineError, shot_intensities
+from processing.runs.results_file import FrameName
+
+ALARM_PX, STOP_PX = LIMITS_PX[Verdict.USABLE], LIMITS_PX[Verdict.WARN]
+"""Disparity of a view above which an operator should know, and above which volumes are not worth having."""
+
+Exposure = list[FloatArray]
+_FRAMES: tuple[FrameName, ...] = ("a", "b")
+
+
+@dataclass(frozen=True)
+class ShotCheck:
+    """What the droplets of one shot say of a calibration.
+
+    Parameters
+    ----------
+    shot : int
+        Index of the shot.
+    views : dict[str, ViewDisparity]
+        By view; empty where the droplets do not tell.
+    problem : str
+        Why they do not tell.
+    beyond : tuple of str
+        Views one of which, at least, has moved further than can be measured; none, where droplets do not tell that.
+    """
+
+    shot: int
+    views: dict[str, ViewDisparity]
+    problem: str = ""
+    beyond: tuple[str, ...] = ()
+
+    @property
+    def worst_px(self) -> float:
+        """Largest disparity of a view."""
+        return max(view.disparity_px for view in self.views.values())
+
+    @property
+    def moved(self) -> str | None:
+        """The view whose motion alone explains an alarm, clearly better than that of any other would."""
+        if len(self.beyond) == 1:
+            return self.beyond[0]
+        if len(self.views) < 2 or self._certain_px <= ALARM_PX:
+            return None
+        best, second = sorted(self.views, key=lambda name: self.views[name].left_px)[:2]
+        clearly = self.views[second].left_px > CLEARER * max(self.views[best].left_px, NOISE_PX)
+        return best if clearly else None
+
+    @property
+    def verdict(self) -> Verdict | None:
+        """By the limits of a hold-out error: ``warn`` is an alarm, ``refuse`` stops reconstruction.
+
+        A view that has moved further than can be measured is refused too.
+        """
+        if self.beyond:
+            return Verdict.REFUSE
+        return judge(self._certain_px) if self.views else None
+
+    def record(self) -> dict[str, Any]:
+        """What was found, for a program: JSON values."""
+        return {
+            "shot": self.shot,
+            "verdict": self.verdict,
+            "moved": self.moved,
+            "views": {name: view.disparity_px for name, view in self.views.items()},
+            "uncertainty_px": {name: view.uncertainty_px for name, view in self.views.items()},
+            "problem": self.problem or None,
+        }
+
+    @property
+    def _certain_px(self) -> float:
+        return max(view.certain_px for view in self.views.values())
+
+
+def check_shot(run_dir: Path, shot: int, calibration: Calibration) -> ShotCheck:
+    """Measure the disparity of every view in one recorded shot.
+
+    Raises
+    ------
+    CalibrationError
+        The calibration does not belong to the views of the run.
+    PipelineError
+        An exposure is missing.
+    """
+    (exposures,) = _droplets(run_dir, [shot], calibration)
+    return check_exposures(shot, exposures, calibration)
+
+
+def check_exposures(shot: int, exposures: Sequence[Exposure], calibration: Calibration) -> ShotCheck:
+    """Measure the disparity of every view by the droplets (N, 2) of each exposure and view; ``shot`` is its index."""
+    mappings = [view.mapping for view in calibration.views.values()]
+    try:
+        _require_droplets(calibration, exposures)
+        measured = shot_disparity(mappings, exposures, measured_box(calibration))
+    except CalibrationError as error:
+        return _unmeasured(shot, exposures, calibration, error)
+    return ShotCheck(shot, dict(zip(calibration.views, measured, strict=True)))
+
+
+def _unmeasured(
+    shot: int, exposures: Sequence[Exposure], calibration: Calibration, error: CalibrationError
+) -> ShotCheck:
+    """A shot without disparities: a view has moved too far for that, or the droplets do not tell."""
+    names = list(calibration.views)
+    if len(names) < MIN_VIEWS:
+        return ShotCheck(shot, {}, str(error))
+    odd = odd_view([view.mapping for view in calibration.views.values()], exposures, measured_box(calibration))
+    if odd is not None:
+        problem = f"{names[odd]} has moved further than {REACH_PX:g} px, or shows other droplets: the other views agree"
+        return ShotCheck(shot, {}, problem, (names[odd],))
+    if isinstance(error, OutOfRange) or would_agree(exposures):
+        problem = f"{error}: a view has moved further than {REACH_PX:g} px, or several have"
+        return ShotCheck(shot, {}, problem, tuple(names))
+    return ShotCheck(shot, {}, f"{error}: too few droplets, or too many, to tell whether a view has moved")
+
+
+def self_calibrate_run(run_dir: Path, shots: Sequence[int], calibration: Calibration) -> SelfCalibration:
+    """Correct a calibration by the droplets in recorded shots, exposures A and B alike.
+
+    Raises
+    ------
+    CalibrationError
+        The droplets do not tell, or the calibration does not belong to the views of the run.
+    PipelineError
+        An exposure is missing.
+    """
+    exposures = [exposure for of_shot in _droplets(run_dir, shots, calibration) for exposure in of_shot]
+    _require_droplets(calibration, exposures)
+    return self_calibrate(calibration, exposures, run_dir.name)
+
+
+def _droplets(run_dir: Path, shots: Sequence[int], calibration: Calibration) -> list[list[Exposure]]:
+    """Droplets by shot, exposure and view, in the order of the views of the calibration."""
+    calibration.require_world()
+    settings = ReconstructionSettings()
+    with RunReader(run_dir) as run:
+        _check_views(run, calibration)
+        found = []
+        for index in shots:
+            shot = run.read_shot(index)
+            if not shot.valid:
+                raise PipelineError(f"{run_dir.name}, shot {index}: exposures are missing, nothing to check")
+            exposures = []
+            for frame in _FRAMES[: run.header.frames_per_shot]:
+                images = dict(zip(shot.views, shot_intensities(run, shot, frame, settings), strict=True))
+                exposures.append([find_droplets(images[name]) for name in calibration.views])
+            found.append(exposures)
+    return found
+
+
+def _require_droplets(calibration: Calibration, exposures: Sequence[Exposure]) -> None:
+    """Refuse exposures in none of which some view sees a droplet: the others cannot tell anything of it."""
+    seen = zip(calibration.views, zip(*exposures, strict=True), strict=True)
+    counts = {name: sum(map(len, droplets_px)) for name, droplets_px in seen}
+    if blind := [name for name, count in counts.items() if not count]:
+        by_view = ", ".join(f"{name} {count}" for name, count in counts.items())
+        raise CalibrationError(
+            f"{', '.join(blind)}: no droplet is seen (droplets in {len(exposures)} exposures: {by_view}); "
+            "is a lens covered, or a light off?"
+        )
+
+
+def _check_views(run: RunReader, calibration: Calibration) -> None:
+    formats = run.header.views
+    if set(formats) != set(calibration.views):
+        raise CalibrationError(
+            f"run {run.header.run_id} has views {sorted(formats)}, "
+            f"calibration {calibration.id} has {sorted(calibration.views)}"
+        )
+    for name, view in calibration.views.items():
+        rows, columns = formats[name].shape
+        if (columns, rows) != view.mapping.image_size_px:
+            raise CalibrationError(
+                f"run {run.header.run_id}, {name}: image of {columns} x {rows} px, "
+                f"calibrated for {view.mapping.image_size_px}"
+            )
