@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from processing.reconstruction.kernels import DEFAULT_THREADS, _native
+from processing.kernels import DEFAULT_THREADS, _native
 
 Polarity = Literal["shadow", "bright"]
 Intensity = NDArray[np.float32]

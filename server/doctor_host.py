@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
 
-from processing.reconstruction.kernels import _native
+from processing.kernels import _native
 from server.checkup import Checkup, Status
 
 RMEM_MAX_BYTES = 4 * 2**20

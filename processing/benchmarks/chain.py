@@ -23,8 +23,8 @@ from processing.benchmarks.scene import (
 )
 from processing.benchmarks.targets import Measured, Target
 from processing.geometry import PinholeCamera
+from processing.kernels import _native
 from processing.preprocessing import Preprocessing, intensity, sliding_minimum
-from processing.reconstruction.kernels import _native
 from processing.reconstruction.line_of_sight import line_of_sight
 from processing.reconstruction.mean_line_of_sight import mean_line_of_sight
 from processing.reconstruction.planning.plan import Plan, plan_reconstruction

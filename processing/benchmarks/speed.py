@@ -17,8 +17,8 @@ from processing.benchmarks.chain import chain_speeds, instruction_set
 from processing.benchmarks.scene import Image, SpeedStudy, spray_images, study_cameras
 from processing.benchmarks.targets import Measured
 from processing.geometry import PinholeCamera
+from processing.kernels import _native
 from processing.reconstruction.accuracy import Accuracy
-from processing.reconstruction.kernels import _native
 from processing.reconstruction.line_of_sight import KERNEL_METHOD, line_of_sight
 from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.planning.node_view import sample_mapping

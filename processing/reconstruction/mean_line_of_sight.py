@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from processing.reconstruction.kernels import DEFAULT_THREADS, _native
+from processing.kernels import DEFAULT_THREADS, _native
 from processing.reconstruction.line_of_sight import check_volume, kernel_method
 from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.planning.plan import Plan

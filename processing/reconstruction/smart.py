@@ -8,7 +8,7 @@ from typing import Any, TypedDict, Unpack
 import numpy as np
 from numpy.typing import NDArray
 
-from processing.reconstruction.kernels import DEFAULT_THREADS, _native
+from processing.kernels import DEFAULT_THREADS, _native
 from processing.reconstruction.line_of_sight import check_volume
 from processing.reconstruction.planning.plan import Plan
 from processing.reconstruction.smart_state import FirstGuess, SmartState

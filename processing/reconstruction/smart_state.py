@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from processing.reconstruction.kernels import _native
+from processing.kernels import _native
 from processing.reconstruction.line_of_sight import check_volume
 from processing.reconstruction.planning.fixed_point import FixedPoint
 from processing.reconstruction.planning.plan import Plan

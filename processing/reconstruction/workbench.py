@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from processing.kernels import DEFAULT_THREADS
 from processing.preprocessing import Intensity
 from processing.reconstruction.block_slabs import slabs_of_blocks
-from processing.reconstruction.kernels import DEFAULT_THREADS
 from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.planning.plan import Plan
 from processing.reconstruction.settings import ReconstructionSettings

@@ -14,8 +14,8 @@ from daq.files.run_file import RUN_FILE
 from processing.calibration.calibration import Calibration, Verdict
 from processing.calibration.calibration_file import file_sha256, load_calibration
 from processing.calibration.errors import CalibrationError
+from processing.kernels import DEFAULT_THREADS
 from processing.preprocessing import Intensity, Preprocessing, intensity
-from processing.reconstruction.kernels import DEFAULT_THREADS
 from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.planning.common_volume import common_volume
 from processing.reconstruction.planning.plan import plan_reconstruction

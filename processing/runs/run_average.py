@@ -8,8 +8,8 @@ import numpy as np
 
 from daq.files.run_directory import RunReader
 from processing.calibration.calibration import Calibration
+from processing.kernels import DEFAULT_THREADS
 from processing.preprocessing import Intensity
-from processing.reconstruction.kernels import DEFAULT_THREADS
 from processing.reconstruction.mean_line_of_sight import mean_line_of_sight
 from processing.reconstruction.planning.plan import plan_reconstruction
 from processing.reconstruction.settings import ReconstructionSettings

@@ -13,8 +13,8 @@ from processing.benchmarks.baseline import Timing, measure
 from processing.benchmarks.memory import peak_memory_gb
 from processing.benchmarks.scene import dense_images, raw_exposures, sparse_images, spray_images, study_cameras
 from processing.benchmarks.targets import Measured, Target, markdown_table
+from processing.kernels import _native
 from processing.preprocessing import Preprocessing, intensity
-from processing.reconstruction.kernels import _native
 from processing.reconstruction.line_of_sight import line_of_sight
 from processing.reconstruction.planning.plan import plan_reconstruction
 from server.bench_command import QUICK, BenchError, split_at_table

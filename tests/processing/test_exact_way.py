@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from processing.geometry import PinholeCamera, ViewMapping, view_camera
-from processing.reconstruction.kernels import _native
+from processing.kernels import _native
 from processing.reconstruction.line_of_sight import line_of_sight
 from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.planning.node_view import NodeView, sample_mapping

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from processing.reconstruction.kernels import _native
+from processing.kernels import _native
 
-KERNELS = Path(__file__).parents[2] / "processing" / "reconstruction" / "kernels"
+KERNELS = Path(__file__).parents[2] / "processing" / "kernels"
 DRIVER = Path(__file__).with_name("kernel_driver") / "driver.cpp"
 SOURCES = ("bands.cpp", "blocks.cpp", "bricks.cpp", "exposure.cpp", "images.cpp", "instruction_set.cpp")
 ARCHITECTURE = {"plain": [], "avx2": ["-march=x86-64-v3"], "avx512": ["-march=x86-64-v4"]}

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from processing.reconstruction.kernels import _native
+from processing.kernels import _native
 from processing.reconstruction.line_of_sight import line_of_sight
 from processing.reconstruction.planning.plan import Plan, plan_reconstruction
 from processing.reconstruction.sparse_line_of_sight import sparse_line_of_sight

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from processing.geometry import FloatArray, ViewMapping
+from processing.kernels import _native
 from processing.reconstruction.accuracy import Accuracy
-from processing.reconstruction.kernels import _native
 from processing.reconstruction.line_of_sight import line_of_sight
 from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.planning.node_view import NodeView, sample_mapping

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from processing.kernels import _native
 from processing.reconstruction import mean_line_of_sight as module
-from processing.reconstruction.kernels import _native
 from processing.reconstruction.line_of_sight import line_of_sight
 from processing.reconstruction.mean_line_of_sight import mean_line_of_sight
 from processing.reconstruction.method import ReconstructionMethod

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from processing.geometry import FloatArray, PinholeCamera, ViewMapping, view_camera
+from processing.kernels import _native
 from processing.reconstruction.errors import ReconstructionError
-from processing.reconstruction.kernels import _native
 from processing.reconstruction.planning.node_view import NodeView, sample_mapping
 from processing.reconstruction.planning.plan import MAX_DEVIATION_PX, Plan, plan_reconstruction, plan_view
 from processing.reconstruction.planning.planned_view import PlannedView

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from processing.kernels import _native
 from processing.preprocessing import Preprocessing, intensity, sliding_minimum
-from processing.reconstruction.kernels import _native
 from tests.processing import preprocessing_oracle as oracle
 
 ROWS, COLUMNS = 120, 160

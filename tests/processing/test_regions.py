@@ -8,8 +8,8 @@ import pytest
 from numpy.typing import NDArray
 
 from processing.geometry import ViewMapping
+from processing.kernels import _native
 from processing.reconstruction.accuracy import Accuracy
-from processing.reconstruction.kernels import _native
 from processing.reconstruction.line_of_sight import line_of_sight
 from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.planning.node_view import FRAME_BEFORE_PX, NodeView, sample_mapping

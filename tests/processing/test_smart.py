@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from processing.analysis.quality import quality_factor
 from processing.geometry import ViewMapping, view_camera
-from processing.reconstruction.kernels import _native
+from processing.kernels import _native
 from processing.reconstruction.line_of_sight import line_of_sight
 from processing.reconstruction.planning.node_view import sample_mapping
 from processing.reconstruction.planning.plan import Plan, plan_reconstruction

@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from processing.geometry import ViewMapping
+from processing.kernels import DEFAULT_THREADS, _native
 from processing.reconstruction.accuracy import Accuracy
 from processing.reconstruction.errors import ReconstructionError
-from processing.reconstruction.kernels import DEFAULT_THREADS, _native
 from processing.reconstruction.planning.fixed_point import FixedPoint
 from processing.reconstruction.planning.node_view import NodeView, sample_mapping
 from processing.reconstruction.planning.rectified_view import NotRectifiable, RectifiedView, rectify

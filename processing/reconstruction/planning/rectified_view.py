@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from processing.geometry import FloatArray, ViewMapping
-from processing.reconstruction.kernels import _native
+from processing.kernels import _native
 from processing.reconstruction.planning.bending import bend_px
 from processing.reconstruction.planning.fixed_point import FixedPoint
 from processing.volume import VoxelGrid

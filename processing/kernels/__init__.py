@@ -1,0 +1,7 @@
+"""The compiled kernels: C++17 behind one binding, ``_native``.
+
+They know no other module; ``preprocessing`` and ``reconstruction`` are their callers.
+"""
+
+DEFAULT_THREADS = 2
+"""Of work that runs beside an acquisition or another worker; who has the machine to himself says more."""
