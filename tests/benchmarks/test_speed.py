@@ -17,8 +17,8 @@ from processing.kernels import _native
 from processing.preprocessing import Preprocessing, intensity
 from processing.reconstruction.line_of_sight import line_of_sight
 from processing.reconstruction.planning.plan import plan_reconstruction
-from server.bench_command import QUICK, BenchError, split_at_table
-from server.cli import main
+from server.cli.bench_command import QUICK, BenchError, split_at_table
+from server.cli.main import main
 
 
 def test_bench_prints_what_the_interface_promises(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from processing.engine import DaskEngine, Engine, InlineEngine, TaskAborted, TaskError
+from server.lab.engine import DaskEngine, Engine, InlineEngine, TaskAborted, TaskError
 
 ENGINES = pytest.mark.parametrize("make", [InlineEngine, DaskEngine])
 

@@ -13,7 +13,7 @@ from daq.errors import DeviceRefused, InterlockOpen
 from daq.faults import Fault
 from daq.shot import DoubleFrame, ExposureRecord, FiredTrain, Image, LightPulse
 from daq.timing import CameraTiming, ShotTiming
-from server.config import RigConfig
+from server.rig.config import RigConfig
 
 SHAPE = (96, 128)
 VIEWS = ("view1", "view2")

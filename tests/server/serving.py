@@ -15,13 +15,13 @@ from fastapi import FastAPI
 
 from daq.run.acquisition import Acquisition
 from daq.run.events import RunStatus
-from processing.engine import Engine, InlineEngine
 from processing.volume import VoxelGrid
-from server.app import create_api
-from server.events import EventPublisher
-from server.jobs import JobKind
-from server.previews import make_preview, preview_path, save_preview
-from server.services import Services
+from server.lab.engine import Engine, InlineEngine
+from server.lab.events import EventPublisher
+from server.lab.jobs import JobKind
+from server.lab.services import Services
+from server.pictures.previews import make_preview, preview_path, save_preview
+from server.web.app import create_api
 from tests.server.memory_rig import VIEWS, MemoryLaboratory, memory_config
 
 DEADLINE_S = 20.0

@@ -14,8 +14,8 @@ from daq.shot import DoubleFrame
 from daq.simulation.gpio_chip import ChipUnsupported, SimulatedSwitchLine
 from daq.timing import plan_shot_timing
 from processing.synthetic.truth_file import read_true_spray
-from server.assembly import AssembledRig, open_rig
-from server.config import RigConfig, SimulationConfig, load_config
+from server.rig.assembly import AssembledRig, open_rig
+from server.rig.config import RigConfig, SimulationConfig, load_config
 
 pytestmark = pytest.mark.network
 

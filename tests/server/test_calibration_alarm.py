@@ -11,10 +11,10 @@ from fastapi import FastAPI
 
 from processing.calibration.calibration_file import load_calibration, save_calibration
 from processing.runs.run_check import self_calibrate_run
-from server.app import create_api
-from server.jobs import JobKind
-from server.services import Services
-from server.tasks import check_run
+from server.lab.jobs import JobKind
+from server.lab.services import Services
+from server.lab.tasks import check_run
+from server.web.app import create_api
 from tests.processing.drifting_views import calibration_of, views
 from tests.server.serving import DEADLINE_S, Serving, plan_of, serving, write_spray
 from tests.server.test_api import use_a_calibration, wait_for_jobs

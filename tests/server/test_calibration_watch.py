@@ -7,9 +7,9 @@ import pytest
 from processing.calibration.calibration import Verdict
 from processing.calibration.fit.health import judge
 from processing.runs.run_check import ALARM_PX
-from server.calibration_watch import CalibrationWatch
-from server.events import EventPublisher
-from server.jobs import Job, JobState, check_job, reconstruction_job
+from server.lab.events import EventPublisher
+from server.lab.jobs import Job, JobState, check_job, reconstruction_job
+from server.lab.watch import CalibrationWatch
 
 RUN, CALIBRATION = "run", "cal"
 

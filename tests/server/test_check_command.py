@@ -14,8 +14,8 @@ from processing.calibration.calibration_file import load_calibration, save_calib
 from processing.calibration.droplets.disparity import ViewDisparity
 from processing.runs.run_check import ShotCheck
 from processing.studies.seen_droplets import droplet_image
-from server.check_command import check_line
-from server.cli import main
+from server.cli.check_command import check_line
+from server.cli.main import main
 from tests.processing.drifting_views import DENSITY_PER_MM3, HALF_MM, SIZE_PX, calibration_of, inside_mm, views
 
 SEEN = ExposureRecord(valid=True, frame_id=1, device_timestamp_ns=1)

@@ -19,8 +19,8 @@ from processing.calibration.calibration_record import content_id, json_id
 from processing.calibration.fit.polynomial import EXPONENTS, PolynomialMapping
 from processing.reconstruction.volume_file import read_volume
 from processing.runs.pipeline import PipelineError
-from server import average_command, commands
-from server.cli import main
+from server.cli import average_command, commands
+from server.cli.main import main
 from tests.processing import droplet_run
 from tests.processing.droplet_run import cameras, write_calibration, write_run
 

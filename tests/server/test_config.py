@@ -7,7 +7,7 @@ import pytest
 from pydantic import ValidationError
 
 from processing.runs.toml_lines import line_of
-from server.config import ConfigError, RigConfig, load_config
+from server.rig.config import ConfigError, RigConfig, load_config
 
 CONFIGS = Path("configs")
 TABLE_1 = {

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from server import doctor_host
-from server.checkup import Checkup, Status
-from server.cli import main
+from server.cli.main import main
+from server.doctor import doctor_host
+from server.doctor.checkup import Checkup, Status
 
 
 def test_without_configuration_the_computer_is_looked_at(capsys: pytest.CaptureFixture[str]) -> None:

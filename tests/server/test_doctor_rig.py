@@ -7,11 +7,11 @@ from typing import Any
 import pytest
 
 from daq.drivers.aravis_device import AravisDevice
-from server.assembly import wire_rig
-from server.checkup import Checkup, Status
-from server.cli import main
-from server.config import RigConfig, load_config
-from server.doctor_rig import check_camera, check_interlock, check_network, check_rig
+from server.cli.main import main
+from server.doctor.checkup import Checkup, Status
+from server.doctor.doctor_rig import check_camera, check_interlock, check_network, check_rig
+from server.rig.assembly import wire_rig
+from server.rig.config import RigConfig, load_config
 from tests.server.memory_rig import MemoryDoor
 
 pytestmark = pytest.mark.network

@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from daq.run_plan import RunKind
-from server.ui.draft import (
+from server.web.ui.draft import (
     PLAN_FIELDS,
     PULSE_FIELDS,
     DraftStore,

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from daq.run.events import ShotRecorded
-from server.events import Event, EventPublisher
+from server.lab.events import Event, EventPublisher
 from tests.server.serving import Serving, plan_of
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from server.cli import main
+from server.cli.main import main
 from tests.server.test_firmware_image import bootable, mounted, saved, uf2
 
 CONFIG = ["--config", "configs/simulated_small.toml", "--json"]

@@ -10,7 +10,7 @@ import pytest
 
 from daq.errors import DeviceError, DeviceUnavailable
 from daq.simulation.pico.firmware_build import ImageKind, build_image
-from server.firmware_image import (
+from server.rig.firmware_image import (
     BOOT_BYTES,
     FAMILY_FLAG,
     FIRST_MAGIC,
@@ -141,7 +141,7 @@ def lose_drive(monkeypatch: pytest.MonkeyPatch, drive: Path, *, restarted: bool)
             (drive / "INFO_UF2.TXT").unlink()
         raise OSError(errno.EIO, "Input/output error")
 
-    monkeypatch.setattr("server.firmware_image.os.fsync", fail)
+    monkeypatch.setattr("server.rig.firmware_image.os.fsync", fail)
 
 
 def test_a_board_that_restarts_with_its_last_block_has_got_it(

@@ -11,7 +11,7 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 from websockets.typing import Origin
 
-from server.guard import COOKIE, Guard
+from server.web.guard import COOKIE, Guard
 from tests.server.serving import Serving, serving
 
 TOKEN = "correct horse battery staple"

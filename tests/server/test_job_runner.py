@@ -7,13 +7,13 @@ from typing import Any
 
 import pytest
 
-from processing.engine import InlineEngine
-from server.calibration_watch import CalibrationWatch
-from server.calibrations import CalibrationStore
-from server.errors import Conflict
-from server.events import EventPublisher
-from server.job_runner import JobRunner
-from server.jobs import Job, JobKind, JobState, JobTable, check_job, reconstruction_job
+from server.lab.calibrations import CalibrationStore
+from server.lab.engine import InlineEngine
+from server.lab.errors import Conflict
+from server.lab.events import EventPublisher
+from server.lab.jobs import Job, JobKind, JobState, JobTable, check_job, reconstruction_job
+from server.lab.runner import JobRunner
+from server.lab.watch import CalibrationWatch
 
 DEADLINE_S = 10.0
 

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server.errors import Conflict, NotFound
-from server.jobs import (
+from server.lab.errors import Conflict, NotFound
+from server.lab.jobs import (
     TRANSITIONS,
     Job,
     JobKind,

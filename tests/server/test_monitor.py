@@ -3,7 +3,7 @@ from pathlib import Path
 
 from daq.devices import GeneratorStatus
 from daq.errors import DeviceTimeout
-from server.monitor import Health, Lamp, RigMonitor
+from server.lab.monitor import Health, Lamp, RigMonitor
 from tests.server.memory_rig import MemoryLaboratory
 
 

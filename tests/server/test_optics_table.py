@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from daq.errors import PlanError
-from server.config import load_config
-from server.optics_table import Motion, optics_table
+from server.rig.config import load_config
+from server.rig.optics_table import Motion, optics_table
 
 D_A_UM = {"view1": 39, "view2": 28, "view3": 28, "view4": 38}
 

@@ -3,7 +3,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server.pictures import Stretch, frame_png, plane_png, preview_jpeg, to_grey
+from server.pictures.pictures import Stretch, frame_png, plane_png, preview_jpeg, to_grey
 
 
 @given(st.integers(0, 4000), st.integers(1, 95))

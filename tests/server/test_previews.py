@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from processing.reconstruction.volume_file import open_volume, write_volume
 from processing.volume import VoxelGrid
-from server.previews import load_preview, make_preview, save_preview
+from server.pictures.previews import load_preview, make_preview, save_preview
 
 SHAPES = st.tuples(st.integers(1, 30), st.integers(1, 30), st.integers(1, 30))
 

@@ -2,8 +2,8 @@ import pytest
 
 from daq.run.events import RunStatus
 from daq.run.state import RunState
-from server.monitor import Health, Lamp
-from server.ui.run_panel import counts_text, waits_for_acknowledgement
+from server.lab.monitor import Health, Lamp
+from server.web.ui.run_panel import counts_text, waits_for_acknowledgement
 
 
 def generator_lamp(health: Health) -> Lamp:

@@ -14,7 +14,7 @@ import sys
 from contextlib import contextmanager
 from pathlib import Path
 import uvicorn
-from server.app import create_app, serve
+from server.web.app import create_app, serve
 from tests.server import serving
 
 def talkative_serve(services):

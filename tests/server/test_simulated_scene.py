@@ -10,8 +10,8 @@ from daq.shot import FiredTrain, LightPulse
 from daq.simulation.camera.light import CollectedPulse, Exposure
 from daq.timing import Window
 from processing.synthetic.truth_file import TruthFileError, read_true_cameras, read_true_spray
-from server.config import RigConfig, load_config
-from server.simulated_scene import SimulatedScene, true_cameras
+from server.rig.config import RigConfig, load_config
+from server.rig.simulated_scene import SimulatedScene, true_cameras
 
 
 @pytest.fixture(scope="module")

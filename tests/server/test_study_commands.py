@@ -8,8 +8,8 @@ import pytest
 
 from processing.studies.accuracy_study import CalibrationStudy
 from processing.studies.density import DensityStudy
-from server import study_commands
-from server.cli import main
+from server.cli import study_commands
+from server.cli.main import main
 
 
 def test_a_study_writes_csv_and_figure_and_says_what_the_paper_says(

@@ -7,8 +7,8 @@ import pytest
 from numpy.typing import NDArray
 
 from processing.volume import VoxelGrid
-from server.previews import make_preview
-from server.surfaces import surface_glb
+from server.pictures.previews import make_preview
+from server.pictures.surfaces import surface_glb
 
 
 def read_glb(data: bytes) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:

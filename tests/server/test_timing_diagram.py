@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from daq.run_plan import PulsePair, RunPlan
 from daq.shot import FiredTrain, LightPulse
 from daq.timing import CameraTiming, ShotTiming, plan_shot_timing
-from server.shot_timing import Guards, fired_timing, guards_of, timing_table
-from server.timing_diagram import picture, timing_diagram
+from server.pictures.timing_diagram import picture, timing_diagram
+from server.rig.shot_timing import Guards, fired_timing, guards_of, timing_table
 from tests.server.serving import Serving, plan_of
 
 FAST = CameraTiming(1_000, 8_000, 500, 30_000_000, 16_000_000)

@@ -17,8 +17,8 @@ from daq.run.limits import AcquisitionLimits
 from daq.run.state import RunOutcome, RunState
 from daq.run_plan import ImageKey, PulsePair, RunKind, RunPlan
 from processing.synthetic.truth_file import read_true_cameras, read_true_spray
-from server.assembly import TRUTH_FILE, AssembledRig, open_rig
-from server.config import load_config
+from server.rig.assembly import TRUTH_FILE, AssembledRig, open_rig
+from server.rig.config import load_config
 
 pytestmark = pytest.mark.network
 SMALL, FULL = (Path("configs") / name for name in ("simulated_small.toml", "simulated.toml"))

@@ -12,10 +12,10 @@ from playwright.sync_api import Page, expect
 
 from processing.calibration.calibration import Calibration
 from processing.calibration.calibration_file import save_calibration
-from server.app import create_app
-from server.jobs import JobKind
-from server.services import Services
-from server.tasks import check_run
+from server.lab.jobs import JobKind
+from server.lab.services import Services
+from server.lab.tasks import check_run
+from server.web.app import create_app
 from tests.processing.drifting_views import calibration_of, views
 from tests.server.serving import Serving, serving, tell_nothing
 from tests.server.test_check_command import DRIFT_PX, write_droplet_run

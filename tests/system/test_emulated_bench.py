@@ -9,8 +9,8 @@ from daq.files.run_directory import RunReader
 from daq.run.acquisition import Acquisition
 from daq.run.state import RunOutcome
 from daq.run_plan import PulsePair, RunKind, RunPlan
-from server.assembly import open_rig
-from server.config import RigConfig, load_config
+from server.rig.assembly import open_rig
+from server.rig.config import RigConfig, load_config
 
 pytestmark = pytest.mark.network
 SHOTS = 3

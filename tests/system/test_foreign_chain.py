@@ -11,7 +11,7 @@ from scipy.ndimage import maximum_filter
 from scipy.spatial import cKDTree
 
 from processing.reconstruction.volume_file import read_volume
-from server.cli import main
+from server.cli.main import main
 
 ROOT = Path(__file__).parents[2]
 DATA = os.environ.get("TOMOSHADOW_DATA")

@@ -1,1 +1,0 @@
-"""REST: one router per resource. Handlers validate, call, and return a view; blocking ones run in threads."""

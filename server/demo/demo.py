@@ -1,0 +1,228 @@
+"""The demonstration: the whole chain on the simulated bench, from the target on its stage to judged volumes."""
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from daq.errors import DaqError
+from daq.files.run_directory import RunReader
+from daq.run.acquisition import Acquisition
+from daq.run.events import RunEvent, RunMessage
+from daq.run.state import RunOutcome
+from daq.run_plan import PulsePair, RunKind, RunPlan
+from processing.analysis.quality import quality_factor
+from processing.calibration.calibrate import calibrate
+from processing.calibration.calibration import Calibration
+from processing.calibration.calibration_file import file_sha256, save_calibration
+from processing.calibration.sets.calibration_set import load_calibration_set
+from processing.geometry import FloatArray
+from processing.reconstruction.settings import GridSettings, ReconstructionSettings
+from processing.reconstruction.volume_file import read_volume
+from processing.runs.pipeline import ShotResult, default_grid, reconstruct_shot
+from processing.runs.results_file import volume_path
+from processing.synthetic.spray import droplet_volume
+from processing.synthetic.truth_file import read_true_cameras, read_true_spray
+from processing.volume import VoxelGrid
+from server.rig.assembly import TRUTH_FILE, AssembledRig, open_rig
+from server.rig.config import ConfigError, RigConfig, load_config
+
+STAGE_Z_MM = tuple(float(z) for z in np.linspace(-4.5, 4.5, 10))
+PITCH_MM = 1 / 30
+RUN_DEADLINE_S = 240.0
+CALIBRATION_RATE_HZ, SAMPLE_RATE_HZ = 2.0, 1.0
+REFERENCE_SHOTS = 4
+TRUTH_SIGMA_MM = 0.02
+"""Blur of the true volume: about the Airy disk in object space, d_A / M = 0.065 to 0.09 mm, as a Gaussian core."""
+
+Progress = Callable[[str], None]
+
+
+@dataclass
+class Stopwatch:
+    """Seconds per step."""
+
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    @contextmanager
+    def step(self, name: str) -> Iterator[None]:
+        """Add the time of the block to a step."""
+        started_s = time.perf_counter()
+        yield
+        self.seconds[name] = round(self.seconds.get(name, 0.0) + time.perf_counter() - started_s, 2)
+
+
+@dataclass(frozen=True)
+class Demonstration:
+    """All that the demonstration made, for its report."""
+
+    calibration: Calibration
+    true_error_px: dict[str, float]
+    sample_run: Path
+    results: tuple[ShotResult, ...]
+    results_dir: Path
+    quality_factors: tuple[float, ...]
+    shots_planned: int
+    shots_recorded: int
+    shots_valid: int
+    seconds: dict[str, float]
+
+
+def demonstrate(
+    config_file: Path, out: Path, shots: int, progress: Progress, firmware: str | None = None
+) -> Demonstration:
+    """Calibrate, record dark, background and samples, reconstruct each shot, compare with the truth.
+
+    ``firmware`` stands for the configuration's ``simulation.firmware``.
+
+    Raises
+    ------
+    ConfigError
+        The configuration is wrong, or of a real rig.
+    DaqError
+        A run did not complete.
+    """
+    config = _simulated_rig(config_file, firmware)
+    watch = Stopwatch()
+    with open_rig(config) as bench:
+        recorder = _Runs(config, bench, out / "runs", progress)
+        with watch.step("calibrate"):
+            calibration = _calibrate(recorder, out)
+        with watch.step("acquire"):
+            sample = _record_sample(recorder, shots, calibration)
+    recorded, valid = _recorded_and_valid(sample)
+    grid = default_grid(calibration, PITCH_MM)
+    settings = ReconstructionSettings(grid=GridSettings.of(grid))
+    results_dir = sample / "results" / settings.results_id(calibration.id)
+    with watch.step("reconstruct"):
+        results = []
+        for shot in valid:
+            progress(f"reconstructing shot {shot} by {settings.method.value}")
+            file = calibration_path(out, calibration.id)
+            results.append(reconstruct_shot(sample, shot, file, settings, results_dir))
+    with watch.step("judge"):
+        progress("comparing with the truth")
+        qualities = tuple(_quality(sample, results_dir, result.shot) for result in results)
+    return Demonstration(
+        calibration=calibration,
+        true_error_px=true_errors_px(calibration, sample, grid),
+        sample_run=sample,
+        results=tuple(results),
+        results_dir=results_dir,
+        quality_factors=qualities,
+        shots_planned=shots,
+        shots_recorded=recorded,
+        shots_valid=len(results),
+        seconds=watch.seconds,
+    )
+
+
+def _simulated_rig(config_file: Path, firmware: str | None) -> RigConfig:
+    config = load_config(config_file)
+    if config.simulation is None:
+        raise ConfigError(f"{config_file}: the demonstration needs a rig with [simulation]")
+    if firmware is None:
+        return config
+    simulation = config.simulation.model_copy(update={"firmware": firmware})
+    return config.model_copy(update={"simulation": simulation})
+
+
+def _calibrate(recorder: "_Runs", out: Path) -> Calibration:
+    """Record the target on its stage and calibrate all views."""
+    target_run = recorder.record(RunKind.CALIBRATION, 1, CALIBRATION_RATE_HZ, stage_z_mm=STAGE_Z_MM)
+    calibration = calibrate(load_calibration_set(target_run))
+    file = calibration_path(out, calibration.id)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    save_calibration(calibration, file)
+    return calibration
+
+
+def _record_sample(recorder: "_Runs", shots: int, calibration: Calibration) -> Path:
+    """Record dark and background, then the spray."""
+    references = [
+        recorder.record(kind, REFERENCE_SHOTS, SAMPLE_RATE_HZ).name for kind in (RunKind.DARK, RunKind.BACKGROUND)
+    ]
+    return recorder.record(
+        RunKind.SAMPLE, shots, SAMPLE_RATE_HZ, references=tuple(references), calibration=calibration.id
+    )
+
+
+def calibration_path(out: Path, calibration_id: str) -> Path:
+    """Where the demonstration keeps a calibration."""
+    return out / "calibrations" / f"{calibration_id}.json"
+
+
+def true_errors_px(calibration: Calibration, run_dir: Path, grid: VoxelGrid) -> dict[str, float]:
+    """Largest distance per view between the calibrated and the true image of any point of the volume."""
+    points_mm = _lattice(grid)
+    cameras = read_true_cameras(run_dir / TRUTH_FILE)
+    return {
+        name: float(np.linalg.norm(view.mapping.project(points_mm) - cameras[name].project(points_mm), axis=1).max())
+        for name, view in calibration.views.items()
+    }
+
+
+class _Runs:
+    """Records the runs of the demonstration one after the other."""
+
+    def __init__(self, config: RigConfig, bench: AssembledRig, data_dir: Path, progress: Progress) -> None:
+        self._data_dir = data_dir
+        self._progress = progress
+        self._pulse = PulsePair(current_a={name: view.nominal_current_a for name, view in config.views.items()})
+        self._acquisition = Acquisition(
+            bench.rig,
+            data_dir,
+            self._tell,
+            configuration=config.model_dump(mode="json"),
+            hash_calibration=lambda name: file_sha256(calibration_path(data_dir.parent, name)),
+            limits=config.acquisition.to_limits(),
+        )
+
+    def _tell(self, event: RunEvent) -> None:
+        if isinstance(event, RunMessage):
+            self._progress(event.text)
+
+    def record(self, kind: RunKind, shots: int, rate_hz: float, **details: Any) -> Path:
+        plan = RunPlan(name=f"demo {kind.value}", kind=kind, shots=shots, rate_hz=rate_hz, pulse=self._pulse, **details)
+        self._progress(f"recording {plan.total_shots} {kind.value} shots")
+        run_dir = self._data_dir / self._acquisition.start(plan)
+        status = self._acquisition.wait(RUN_DEADLINE_S)
+        if status.outcome is not RunOutcome.COMPLETED:
+            raise DaqError(f"{run_dir.name}: {status.outcome or status.state}, {status.message}")
+        self._progress(f"{run_dir.name}: {status.shots_valid} of {status.shots_planned} shots valid")
+        return run_dir
+
+
+def _recorded_and_valid(run_dir: Path) -> tuple[int, list[int]]:
+    """Number of recorded shots, and which of them are good.
+
+    Raises
+    ------
+    DaqError
+        None is.
+    """
+    with RunReader(run_dir) as run:
+        recorded, valid = run.shot_count, [index for index in range(run.shot_count) if run.read_shot(index).valid]
+    if not valid:
+        raise DaqError(f"{run_dir.name}: none of {recorded} shots is valid, nothing to reconstruct")
+    return recorded, valid
+
+
+def _quality(run_dir: Path, results_dir: Path, shot: int) -> float:
+    """Quality factor c_II of exposure A against the spray that was really there."""
+    with RunReader(run_dir) as run:
+        fired = run.read_shot(shot).fired
+    if fired is None:
+        raise DaqError(f"{run_dir.name}, shot {shot}: names no firing")
+    volume, grid, _ = read_volume(volume_path(results_dir, shot, "a"))
+    spray = read_true_spray(run_dir / TRUTH_FILE, fired.sequence).spray
+    return quality_factor(droplet_volume(spray, grid, TRUTH_SIGMA_MM), volume)
+
+
+def _lattice(grid: VoxelGrid) -> FloatArray:
+    axes_mm = (np.linspace(axis_mm[0], axis_mm[-1], 15) for axis_mm in (grid.x_mm, grid.y_mm, grid.z_mm))
+    return np.stack(np.meshgrid(*axes_mm, indexing="ij"), axis=-1).reshape(-1, 3)

@@ -1,0 +1,271 @@
+"""Jobs of processing and their table: what was asked for, what became of it.
+
+::
+
+    QUEUED ──▶ RUNNING ──▶ DONE
+      │ ▲         ├──────▶ FAILED ──▶ QUEUED   (asked for again)
+      │ └─────────┤                            (the server died)
+      └───────────┴──────▶ ABORTED ─▶ QUEUED   (asked for again)
+
+The table is a catalogue: run directories hold the truth, and ``jobs_on_disk`` finds it there.
+"""
+
+import json
+import sqlite3
+import threading
+from collections.abc import Iterable, Iterator, Mapping
+from datetime import UTC, datetime
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import Field
+
+from daq.run_plan import FrozenModel
+from server.lab.errors import Conflict, NotFound
+
+
+class JobKind(StrEnum):
+    """What a job does."""
+
+    RECONSTRUCTION = "reconstruction"
+    CALIBRATION = "calibration"
+    CHECK = "check"
+
+
+class JobState(StrEnum):
+    """Where a job stands."""
+
+    QUEUED = "queued"
+    RUNNING = "running"
+    DONE = "done"
+    FAILED = "failed"
+    ABORTED = "aborted"
+
+
+TRANSITIONS: Mapping[JobState, frozenset[JobState]] = {
+    JobState.QUEUED: frozenset({JobState.RUNNING, JobState.ABORTED}),
+    JobState.RUNNING: frozenset({JobState.DONE, JobState.FAILED, JobState.ABORTED, JobState.QUEUED}),
+    JobState.DONE: frozenset(),
+    JobState.FAILED: frozenset({JobState.QUEUED}),
+    JobState.ABORTED: frozenset({JobState.QUEUED}),
+}
+"""State -> states that may follow."""
+_UNSUCCESSFUL = (JobState.FAILED, JobState.ABORTED)
+ENDED = (JobState.DONE, *_UNSUCCESSFUL)
+"""States of jobs that do not run or wait."""
+
+
+def now_utc() -> str:
+    """Time of day, ISO 8601."""
+    return datetime.now(UTC).isoformat(timespec="milliseconds")
+
+
+class Job(FrozenModel):
+    """One piece of work of the processing side, by itself a complete account of it."""
+
+    id: Annotated[str, Field(description="made of run, results and shot: the same work has the same id")]
+    kind: JobKind
+    run_id: str
+    shot: Annotated[int | None, Field(description="index of the shot; null for a calibration")] = None
+    calibration: Annotated[str, Field(description="id of the calibration that is used, or made")]
+    results_id: Annotated[str | None, Field(description="directory of the results in the run; null if there are none")]
+    settings: Annotated[dict[str, Any], Field(description="what the work function is told")]
+    state: JobState = JobState.QUEUED
+    result: Annotated[dict[str, Any] | None, Field(description="what it said when done")] = None
+    error: Annotated[str | None, Field(description="why it failed")] = None
+    created_utc: str = Field(default_factory=now_utc)
+    changed_utc: str = Field(default_factory=now_utc)
+
+
+def reconstruction_job(
+    run_id: str, shot: int, calibration: str, settings_id: str, settings: Mapping[str, Any], **more: Any
+) -> Job:
+    """Job for one shot; its results lie in a directory of their own per settings and calibration."""
+    return _reconstruction(run_id, shot, calibration, f"{settings_id}-{calibration}", settings, more)
+
+
+def calibration_job(run_id: str, calibration: str, model: str) -> Job:
+    """Job that makes a calibration from a calibration run."""
+    return Job(
+        id=f"{run_id}.{calibration}",
+        kind=JobKind.CALIBRATION,
+        run_id=run_id,
+        calibration=calibration,
+        results_id=None,
+        settings={"model": model},
+    )
+
+
+def check_job(run_id: str, shot: int, calibration: str) -> Job:
+    """Job that measures how well a calibration fits a shot."""
+    return Job(
+        id=f"{run_id}.check-{calibration}.{shot:05d}",
+        kind=JobKind.CHECK,
+        run_id=run_id,
+        shot=shot,
+        calibration=calibration,
+        results_id=None,
+        settings={},
+    )
+
+
+def _reconstruction(
+    run_id: str, shot: int, calibration: str, results_id: str, settings: Mapping[str, Any], more: Mapping[str, Any]
+) -> Job:
+    return Job(
+        id=f"{run_id}.{results_id}.{shot:05d}",
+        kind=JobKind.RECONSTRUCTION,
+        run_id=run_id,
+        shot=shot,
+        calibration=calibration,
+        results_id=results_id,
+        settings=dict(settings),
+        **more,
+    )
+
+
+_SELECT = """
+    SELECT document FROM job
+    WHERE state IN (SELECT value FROM json_each(?1)) AND (?2 IS NULL OR run_id = ?2)
+        AND json_extract(document, '$.kind') IN (SELECT value FROM json_each(?3))
+"""
+
+
+class JobTable:
+    """All jobs, in one SQLite file; may be used from any thread.
+
+    Parameters
+    ----------
+    path : Path
+        Database file; made if it does not exist.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._lock = threading.Lock()
+        self._database = sqlite3.connect(path, check_same_thread=False, isolation_level=None)
+        self._database.executescript("""
+            PRAGMA journal_mode = WAL;
+            PRAGMA synchronous = NORMAL;
+            CREATE TABLE IF NOT EXISTS job (
+                number INTEGER PRIMARY KEY, id TEXT NOT NULL UNIQUE, run_id TEXT NOT NULL, state TEXT NOT NULL,
+                document TEXT NOT NULL
+            );
+            CREATE INDEX IF NOT EXISTS job_by_state ON job (state, number);
+            CREATE INDEX IF NOT EXISTS job_by_run ON job (run_id, number);
+        """)
+
+    def close(self) -> None:
+        """Close the file, once nobody reads or writes it any more."""
+        with self._lock:  # SQLite crashes the process where a connection is closed under a statement
+            self._database.close()
+
+    def add(self, job: Job) -> Job:
+        """Queue a job. The same work is not done twice: a waiting, running or done job is returned as it is."""
+        with self._lock, self._database:
+            known = self._find(job.id)
+            if known is None:
+                self._insert(job)
+                return job
+            if known.state not in _UNSUCCESSFUL:
+                return known
+            return self._replace(known, JobState.QUEUED, result=None, error=None)
+
+    def move(self, job_id: str, to: JobState, *, result: dict[str, Any] | None = None, error: str | None = None) -> Job:
+        """Change the state of a job.
+
+        Raises
+        ------
+        NotFound
+            There is no such job.
+        Conflict
+            That state does not follow its present one.
+        """
+        with self._lock, self._database:
+            job = self._known(job_id)
+            if to not in TRANSITIONS[job.state]:
+                raise Conflict(f"job {job_id} is {job.state}, it cannot become {to}")
+            return self._replace(job, to, result=result, error=error)
+
+    def get(self, job_id: str) -> Job:
+        """One job; NotFound if there is none."""
+        with self._lock:
+            return self._known(job_id)
+
+    def newest(
+        self,
+        run_id: str | None = None,
+        states: Iterable[JobState] = tuple(JobState),
+        limit: int = 200,
+        kinds: Iterable[JobKind] = tuple(JobKind),
+    ) -> list[Job]:
+        """Jobs of one run or all, of some kinds or all, newest first."""
+        return self._select(f"{_SELECT} ORDER BY number DESC LIMIT ?4", run_id, states, limit, kinds)
+
+    def oldest(self, state: JobState, limit: int = -1, kinds: Iterable[JobKind] = tuple(JobKind)) -> list[Job]:
+        """Jobs in one state, the longest waiting first; -1 for all of them."""
+        return self._select(f"{_SELECT} ORDER BY number LIMIT ?4", None, [state], limit, kinds)
+
+    def requeue_interrupted(self) -> int:
+        """Queue again what was running when the server died; how many jobs that were."""
+        running = self.oldest(JobState.RUNNING)
+        for job in running:
+            self.move(job.id, JobState.QUEUED)
+        return len(running)
+
+    def restore(self, jobs: Iterable[Job]) -> int:
+        """Take in jobs that the table does not know; how many."""
+        with self._lock, self._database:
+            new = [job for job in jobs if self._find(job.id) is None]
+            for job in new:
+                self._insert(job)
+        return len(new)
+
+    def _select(
+        self, query: str, run_id: str | None, states: Iterable[JobState], limit: int, kinds: Iterable[JobKind]
+    ) -> list[Job]:
+        with self._lock:
+            rows = self._database.execute(query, (_listed(states), run_id, _listed(kinds), limit)).fetchall()
+        return [Job.model_validate_json(document) for (document,) in rows]
+
+    def _find(self, job_id: str) -> Job | None:
+        row = self._database.execute("SELECT document FROM job WHERE id = ?", (job_id,)).fetchone()
+        return Job.model_validate_json(row[0]) if row else None
+
+    def _known(self, job_id: str) -> Job:
+        job = self._find(job_id)
+        if job is None:
+            raise NotFound(f"there is no job {job_id!r}")
+        return job
+
+    def _insert(self, job: Job) -> None:
+        self._database.execute(
+            "INSERT INTO job (id, run_id, state, document) VALUES (?, ?, ?, ?)",
+            (job.id, job.run_id, job.state, job.model_dump_json()),
+        )
+
+    def _replace(self, job: Job, state: JobState, *, result: dict[str, Any] | None, error: str | None) -> Job:
+        changed = job.model_copy(update={"state": state, "result": result, "error": error, "changed_utc": now_utc()})
+        self._database.execute(
+            "UPDATE job SET state = ?, document = ? WHERE id = ?", (state, changed.model_dump_json(), job.id)
+        )
+        return changed
+
+
+def _listed(names: Iterable[StrEnum]) -> str:
+    return json.dumps([name.value for name in names])
+
+
+def jobs_on_disk(data_dir: Path) -> Iterator[Job]:
+    """Finished reconstructions, as the results in the run directories tell them."""
+    for record in sorted(data_dir.glob("*/results/*/settings.json")):
+        written = json.loads(record.read_text())
+        for volume in sorted(record.parent.glob("shot_*_a.vtkhdf")):
+            yield _reconstruction(
+                run_id=record.parents[2].name,
+                shot=int(volume.name.split("_")[1]),
+                calibration=Path(written["calibration_file"]).stem,
+                results_id=record.parent.name,
+                settings=json.loads(written["settings"]),
+                more={"state": JobState.DONE},
+            )

@@ -1,0 +1,70 @@
+"""What is reconstructed, and when: every valid shot of a sample run by itself, and what an operator asks for."""
+
+import asyncio
+from collections.abc import Iterable
+
+from daq.run.events import ShotRecorded
+from daq.run_plan import ImageKey, RunKind
+from processing.reconstruction.settings import ReconstructionSettings
+from server.lab.errors import Unprocessable
+from server.lab.events import RUN_EVENTS
+from server.lab.jobs import Job, reconstruction_job
+from server.lab.services import Context
+
+_SHOT_RECORDED = RUN_EVENTS[ShotRecorded]
+
+
+async def follow_acquisition(context: Context) -> None:
+    """Queue a job for every shot that is recorded from now on; acquisition knows nothing of it."""
+    events = context.services.events
+    async for event in events.follow(events.newest):
+        if event is not None and event.name == _SHOT_RECORDED and event.data["valid"]:
+            await asyncio.to_thread(reconstruct_by_itself, context, event.data["run_id"], event.data["index"])
+
+
+def reconstruct_by_itself(context: Context, run_id: str, shot: int) -> None:
+    """Queue a recorded shot, if it shows a spray and a calibration is known."""
+    summary = context.runs.summary(run_id)
+    calibration = summary.calibration or context.calibrations.current
+    if summary.kind is RunKind.SAMPLE and calibration is not None:
+        request_reconstruction(context, run_id, [shot], calibration, context.services.settings)
+
+
+def request_reconstruction(
+    context: Context,
+    run_id: str,
+    shots: Iterable[int] | None,
+    calibration: str | None,
+    settings: ReconstructionSettings,
+) -> list[Job]:
+    """Queue shots of a run; without ``shots`` all valid ones, without ``calibration`` the run's own or the current one.
+
+    The last of them is checked first: whether its droplets still agree with the calibration.
+
+    Raises
+    ------
+    NotFound
+        There is no such run or calibration.
+    Unprocessable
+        No calibration is known, or the run has no such shot.
+    """
+    summary = context.runs.summary(run_id)
+    chosen = calibration or summary.calibration or context.calibrations.current
+    if chosen is None:
+        raise Unprocessable(f"run {run_id} names no calibration, and none is current")
+    context.calibrations.document(chosen)
+    wanted = _valid_shots(context, run_id) if shots is None else list(shots)
+    if absent := [shot for shot in wanted if shot >= summary.shots_recorded]:
+        raise Unprocessable(f"run {run_id} has {summary.shots_recorded} shots, not {absent}")
+    if wanted:
+        context.runner.check(run_id, chosen, wanted[-1])
+    described = settings.model_dump(mode="json")
+    return [
+        context.runner.submit(reconstruction_job(run_id, shot, chosen, settings.results_id(chosen), described))
+        for shot in wanted
+    ]
+
+
+def _valid_shots(context: Context, run_id: str) -> list[int]:
+    keys = context.runs.reader(run_id).image_keys()
+    return [index for index, key in enumerate(keys.tolist()) if key == ImageKey.SAMPLE]

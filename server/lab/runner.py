@@ -1,0 +1,177 @@
+"""JobRunner: takes jobs from the table to the engine, and writes down what becomes of them.
+
+The table is the queue. Whatever is asked for while the server is down, or was running when it died, is done later.
+"""
+
+import asyncio
+from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from server.lab.calibrations import CalibrationStore
+from server.lab.engine import Engine, Task, TaskAborted, TaskError
+from server.lab.errors import Conflict
+from server.lab.events import EventPublisher
+from server.lab.jobs import Job, JobKind, JobState, JobTable
+from server.lab.watch import CalibrationWatch
+
+_CHECKS_REMEMBERED = 1000
+
+
+class JobRunner:
+    """Runs queued jobs, as many at a time as the engine has workers.
+
+    Parameters
+    ----------
+    engine : Engine
+        Where they run; started.
+    table : JobTable
+        The queue and the account of all jobs.
+    tasks : Mapping[JobKind, Task]
+        Work function by kind of job.
+    events : EventPublisher
+        Gets ``job_changed`` and ``job_progress``.
+    data_dir : Path
+        Folder of the run directories.
+    calibrations : CalibrationStore
+        Where calibrations are read from and written to.
+    watch : CalibrationWatch
+        Learns from checks; may hold a reconstruction back, or refuse it.
+    """
+
+    def __init__(
+        self,
+        engine: Engine,
+        table: JobTable,
+        tasks: Mapping[JobKind, Task],
+        events: EventPublisher,
+        data_dir: Path,
+        calibrations: CalibrationStore,
+        watch: CalibrationWatch,
+    ) -> None:
+        self._engine = engine
+        self._table = table
+        self._tasks = tasks
+        self._events = events
+        self._data_dir = data_dir
+        self._calibrations = calibrations
+        self._watch = watch
+        self._loop = asyncio.get_running_loop()
+        self._changed = asyncio.Event()
+        self._running: set[str] = set()
+        self._checked_last = False
+
+    def submit(self, job: Job) -> Job:
+        """Queue a job; from any thread. The same work is not done twice."""
+        queued = self._table.add(job)
+        self._tell(queued)
+        self._loop.call_soon_threadsafe(self._changed.set)
+        if following := self._watch.learn(queued):
+            self.submit(following)
+        return queued
+
+    def check(self, run_id: str, calibration: str, shot: int) -> None:
+        """Queue a check of a shot, or see to it after the one of this run that is under way; from any thread."""
+        if job := self._watch.next_check(run_id, calibration, shot):
+            self.submit(job)
+
+    async def abort(self, job_id: str) -> Job:
+        """Abort a job: a waiting one at once, a running one at its next step.
+
+        Raises
+        ------
+        NotFound
+            There is no such job.
+        Conflict
+            It has ended already.
+        """
+        if job_id in self._running:
+            await self._engine.abort(job_id)
+            return await asyncio.to_thread(self._table.get, job_id)
+        return await self._move(job_id, JobState.ABORTED)
+
+    async def run(self) -> None:
+        """Work until cancelled; jobs that are then unfinished are taken up by the next start."""
+        await asyncio.to_thread(self._take_up)
+        async with asyncio.TaskGroup() as group:
+            while True:
+                self._changed.clear()
+                for job in await asyncio.to_thread(self._waiting):
+                    if self._may_start(job):
+                        self._running.add(job.id)
+                        self._checked_last = job.kind is JobKind.CHECK
+                        group.create_task(self._perform(job))
+                await self._changed.wait()
+
+    def _take_up(self) -> None:
+        self._table.requeue_interrupted()
+        for job in reversed(self._table.newest(limit=_CHECKS_REMEMBERED, kinds=[JobKind.CHECK])):
+            self._watch.learn(job)
+
+    def _waiting(self) -> list[Job]:
+        """Who may be next: checks and all else take turns, so that neither keeps the other waiting."""
+        checks = self._table.oldest(JobState.QUEUED, self._engine.workers, [JobKind.CHECK])
+        others = self._table.oldest(JobState.QUEUED, self._engine.workers, set(JobKind) - {JobKind.CHECK})
+        return [*others, *checks] if self._checked_last else [*checks, *others]
+
+    def _may_start(self, job: Job) -> bool:
+        has_room = len(self._running) < self._engine.workers
+        return has_room and job.id not in self._running and not self._watch.holds(job)
+
+    async def _perform(self, job: Job) -> None:
+        try:
+            await self._move(job.id, JobState.RUNNING)
+            await self._settle(job)
+        except Conflict:
+            return  # aborted between being read from the table and being started
+        finally:
+            self._running.discard(job.id)
+            self._changed.set()
+
+    async def _settle(self, job: Job) -> None:
+        if refusal := self._watch.refusal(job):
+            await self._move(job.id, JobState.FAILED, error=refusal)
+            return
+        try:
+            arguments = self._arguments(job)
+            result = await self._engine.submit(
+                job.id, self._tasks[job.kind], arguments, partial(self._tell_progress, job.id)
+            )
+        except TaskAborted:
+            await self._move(job.id, JobState.ABORTED)
+        except TaskError as error:
+            await self._move(job.id, JobState.FAILED, error=str(error))
+        else:
+            await self._move(job.id, JobState.DONE, result=result)
+
+    def _arguments(self, job: Job) -> dict[str, Any]:
+        run_dir = self._data_dir / job.run_id
+        return {
+            "run_dir": str(run_dir),
+            "shot": job.shot,
+            "calibration_file": str(self._calibrations.path(job.calibration)),
+            "results_dir": str(run_dir / "results" / job.results_id) if job.results_id else None,
+            "settings": job.settings,
+        }
+
+    async def _move(self, job_id: str, to: JobState, **more: Any) -> Job:
+        job = await asyncio.to_thread(partial(self._table.move, job_id, to, **more))
+        self._tell(job)
+        if following := self._watch.learn(job):
+            await asyncio.to_thread(self.submit, following)
+        return job
+
+    def _tell(self, job: Job) -> None:
+        self._events.publish(
+            "job_changed",
+            job=job.id,
+            kind=job.kind,
+            run=job.run_id,
+            shot=job.shot,
+            state=job.state,
+            error=job.error,
+        )
+
+    def _tell_progress(self, job_id: str, steps: int) -> None:
+        self._events.publish("job_progress", job=job_id, steps=steps)

@@ -1,0 +1,109 @@
+"""Services: everything the web application is given, and everything it builds from that at start-up."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Protocol
+
+from daq.devices import Rig
+from daq.faults import Fault
+from daq.run.events import RunStatus
+from daq.run_plan import RunPlan
+from processing.reconstruction.settings import ReconstructionSettings
+from server.lab.calibrations import CalibrationStore
+from server.lab.engine import Engine, Task
+from server.lab.events import EventPublisher
+from server.lab.jobs import JobKind, JobTable
+from server.lab.live import LiveFeed
+from server.lab.monitor import RigMonitor
+from server.lab.runner import JobRunner
+from server.lab.runs import RunStore
+from server.lab.watch import CalibrationStanding, CalibrationWatch
+from server.rig.config import RigConfig
+
+
+class RunControl(Protocol):
+    """What the server asks of ``daq.run.acquisition.Acquisition``; every method but ``start`` returns at once."""
+
+    def start(self, plan: RunPlan) -> str: ...  # noqa: D102
+    def stop(self) -> None: ...  # noqa: D102
+    def abort(self) -> None: ...  # noqa: D102
+    def acknowledge(self) -> None: ...  # noqa: D102
+    def status(self) -> RunStatus: ...  # noqa: D102
+
+
+class Bench(Protocol):
+    """What the server asks of a simulated bench."""
+
+    def inject(self, fault: Fault) -> None:
+        """Let something go wrong; ValueError if the bench has no such view."""
+
+    def open_door(self) -> None:
+        """Open the interlock."""
+
+    def close_door(self) -> None:
+        """Allow light."""
+
+
+@dataclass(frozen=True)
+class Services:
+    """What the application is given.
+
+    Parameters
+    ----------
+    config : RigConfig
+        Configuration of the rig and the server.
+    rig : Rig
+        Opened devices.
+    acquisition : RunControl
+        The run.
+    events : EventPublisher
+        The one that acquisition publishes to.
+    engine : Engine
+        Not yet started.
+    tasks : Mapping[JobKind, Task]
+        Work functions.
+    settings : ReconstructionSettings
+        How recorded shots are reconstructed where nobody asks for anything else.
+    bench : Bench | None
+        The simulated bench, if it is one.
+    host_names : tuple[str, ...]
+        Names of this server beside the loopback ones.
+    """
+
+    config: RigConfig
+    rig: Rig
+    acquisition: RunControl
+    events: EventPublisher
+    engine: Engine
+    tasks: Mapping[JobKind, Task]
+    settings: ReconstructionSettings = field(default_factory=ReconstructionSettings)
+    bench: Bench | None = None
+    host_names: tuple[str, ...] = ()
+
+    @property
+    def data_dir(self) -> Path:
+        """Folder of the run directories."""
+        return self.config.server.data_dir
+
+
+@dataclass(frozen=True)
+class Context:
+    """What handlers and pages work with; lives as long as the application runs."""
+
+    services: Services
+    runs: RunStore
+    calibrations: CalibrationStore
+    jobs: JobTable
+    runner: JobRunner
+    watch: CalibrationWatch
+    monitor: RigMonitor
+    live: LiveFeed
+
+    @property
+    def standing(self) -> CalibrationStanding | None:
+        """How the calibration in use stood at the last check; None once another one has been chosen."""
+        status, standing = self.services.acquisition.status(), self.watch.standing
+        running = status.plan.calibration if status.active and status.plan else None
+        in_use = (running, self.calibrations.current)
+        return standing if standing is not None and standing.calibration in in_use else None

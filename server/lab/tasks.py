@@ -1,0 +1,60 @@
+"""The work functions of jobs: they run in worker processes, on paths and JSON values."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from processing.calibration.calibrate import calibrate
+from processing.calibration.calibration_file import load_calibration, save_calibration
+from processing.calibration.sets.calibration_set import load_calibration_set
+from processing.reconstruction.settings import ReconstructionSettings
+from processing.runs.pipeline import reconstruct_shot
+from processing.runs.run_check import check_shot
+from server.lab.engine import Task
+from server.lab.jobs import JobKind
+from server.lab.results import write_preview
+
+
+def reconstruct(job: dict[str, Any], should_stop: Callable[[], bool]) -> dict[str, Any]:
+    """Reconstruct one shot and leave a preview beside each volume."""
+    results_dir = Path(job["results_dir"])
+    settings = ReconstructionSettings.model_validate(job["settings"])
+    result = reconstruct_shot(
+        Path(job["run_dir"]), job["shot"], Path(job["calibration_file"]), settings, results_dir, should_stop
+    )
+    for volume in result.volumes:
+        write_preview(results_dir / volume.file)
+    return result.model_dump(mode="json")
+
+
+def calibrate_run(job: dict[str, Any], should_stop: Callable[[], bool]) -> dict[str, Any]:
+    """Fit all views to the shots of a calibration run."""
+    calibration_set = load_calibration_set(Path(job["run_dir"]))
+    should_stop()
+    calibration = calibrate(calibration_set, model=job["settings"]["model"])
+    save_calibration(calibration, Path(job["calibration_file"]))
+    return {
+        "calibration": calibration.id,
+        "views": {
+            name: {
+                "mean_error_px": view.mean_error_px,
+                "holdout_error_px": view.holdout_error_px,
+                "verdict": view.verdict,
+            }
+            for name, view in calibration.views.items()
+        },
+    }
+
+
+def check_run(job: dict[str, Any], should_stop: Callable[[], bool]) -> dict[str, Any]:
+    """Measure how well the calibration still fits one shot."""
+    calibration = load_calibration(Path(job["calibration_file"]))
+    should_stop()
+    return check_shot(Path(job["run_dir"]), job["shot"], calibration).record()
+
+
+TASKS: Mapping[JobKind, Task] = MappingProxyType(
+    {JobKind.RECONSTRUCTION: reconstruct, JobKind.CALIBRATION: calibrate_run, JobKind.CHECK: check_run}
+)
+"""Work function of every kind of job."""

@@ -1,0 +1,177 @@
+"""CalibrationWatch: does the calibration of a run still fit its shots? Check jobs tell, reconstructions ask.
+
+A check takes seconds and shots may come faster. So one check of a run is under way at a time; when it has ended, the
+newest shot that was asked for meanwhile is next. Slow runs are checked shot by shot, fast ones by a sample.
+"""
+
+import threading
+from dataclasses import dataclass, field
+from typing import Annotated
+
+from pydantic import Field
+
+from daq.run_plan import FrozenModel
+from processing.calibration.calibration import Verdict
+from processing.runs.run_check import ALARM_PX, STOP_PX
+from server.lab.events import EventPublisher
+from server.lab.jobs import ENDED, Job, JobKind, JobState, check_job
+
+_ALARMING = (Verdict.WARN, Verdict.REFUSE)
+_REMEDY = (
+    "The shots are kept: correct the calibration by the droplets (tomoshadow self-calibrate) or calibrate anew, "
+    "choose the result, and reconstruct again."
+)
+_REMEDY_BEYOND = (
+    "The shots are kept, but their droplets cannot correct so much: calibrate anew, choose the result, and "
+    "reconstruct again."
+)
+
+
+class CalibrationStanding(FrozenModel):
+    """What the newest check that could tell says of a calibration and a run."""
+
+    run_id: str
+    calibration: str
+    shot: Annotated[int, Field(description="the shot that was checked")]
+    verdict: Annotated[Verdict, Field(description="warn: an alarm; refuse: nothing is reconstructed")]
+    moved: Annotated[str | None, Field(description="the view whose motion alone explains what is seen")]
+    views: Annotated[dict[str, float], Field(description="disparity by view, px; none where it cannot be measured")]
+    uncertainty_px: dict[str, float]
+    problem: Annotated[str | None, Field(description="what is wrong where no disparity can be measured")] = None
+    shots_checked: Annotated[int, Field(description="of this run with this calibration")]
+
+    @property
+    def worst_view(self) -> str | None:
+        """The view that has moved; where that is not clear, the one that disagrees most with the others, if any."""
+        return self.moved or max(self.views, key=lambda name: self.views[name], default=None)
+
+    @property
+    def is_alarm(self) -> bool:
+        """The operator should know."""
+        return self.verdict in _ALARMING
+
+    @property
+    def message(self) -> str:
+        """What is wrong and how to mend it."""
+        if self.problem:
+            return f"{self._misfit}: {self.problem}. {_REMEDY_BEYOND}"
+        limit = f"stop above {STOP_PX:g} px" if self.verdict is Verdict.REFUSE else f"alarm above {ALARM_PX:g} px"
+        moved = f"{self.moved} has moved; " if self.moved else ""
+        views = ", ".join(f"{name} {disparity_px:.2f}" for name, disparity_px in self.views.items())
+        return f"{self._misfit}: {moved}views are off the others by {views} px ({limit}). {_REMEDY}"
+
+    @property
+    def _misfit(self) -> str:
+        return f"calibration {self.calibration} does not fit run {self.run_id}, shot {self.shot}"
+
+
+Pair = tuple[str, str]
+"""Run and calibration."""
+
+
+@dataclass
+class _Account:
+    """What is known of a run and a calibration."""
+
+    under_way: str | None = None
+    next_shot: int | None = None
+    has_ended: bool = False
+    told: set[int] = field(default_factory=set)
+    standing: CalibrationStanding | None = None
+
+
+class CalibrationWatch:
+    """Keeps account of all checks; may be used from any thread.
+
+    Parameters
+    ----------
+    events : EventPublisher
+        Gets ``calibration_alarm`` when the verdict on a run changes for the worse, or back.
+    """
+
+    def __init__(self, events: EventPublisher) -> None:
+        self._events = events
+        self._lock = threading.Lock()
+        self._accounts: dict[Pair, _Account] = {}
+        self.standing: CalibrationStanding | None = None
+        """Of the run that was checked last."""
+
+    def next_check(self, run_id: str, calibration: str, shot: int) -> Job | None:
+        """Job that checks a shot; None while another one of this run is under way, the shot then comes after it."""
+        with self._lock:
+            account = self._account(run_id, calibration)
+            if account.under_way is not None:
+                account.next_shot = shot
+                return None
+            job = check_job(run_id, shot, calibration)
+            account.under_way, account.next_shot = job.id, None
+            return job
+
+    def learn(self, job: Job) -> Job | None:
+        """Take notice of the state of a check; returns the check that follows one that has ended, if any."""
+        if job.kind is not JobKind.CHECK:
+            return None
+        with self._lock:
+            account = self._account(job.run_id, job.calibration)
+            if job.state not in ENDED:
+                account.under_way = job.id
+                return None
+            account.under_way, account.has_ended = None, True
+            before, account.standing = account.standing, self._judged(account, job)
+            following = account.next_shot
+        self._tell(before, account.standing)
+        return None if following is None else self.next_check(job.run_id, job.calibration, following)
+
+    def holds(self, job: Job) -> bool:
+        """Whether a reconstruction has to wait: the first check of its run and calibration is under way."""
+        account = self._accounts.get((job.run_id, job.calibration))
+        waits = account is not None and account.under_way is not None and not account.has_ended
+        return waits and job.kind is JobKind.RECONSTRUCTION
+
+    def refusal(self, job: Job) -> str | None:
+        """Why a reconstruction must not be made; None if it may."""
+        account = self._accounts.get((job.run_id, job.calibration))
+        standing = account.standing if account else None
+        refused = standing is not None and standing.verdict is Verdict.REFUSE
+        return standing.message if standing and refused and job.kind is JobKind.RECONSTRUCTION else None
+
+    def _account(self, run_id: str, calibration: str) -> _Account:
+        return self._accounts.setdefault((run_id, calibration), _Account())
+
+    def _judged(self, account: _Account, job: Job) -> CalibrationStanding | None:
+        """Standing after a check; droplets that do not tell change nothing, nor does a shot before the newest one."""
+        result = job.result if job.state is JobState.DONE else None
+        if not result or result.get("verdict") is None:
+            return account.standing
+        shot: int = result["shot"]
+        account.told.add(shot)
+        if account.standing and account.standing.shot > shot:
+            return account.standing
+        return CalibrationStanding(
+            run_id=job.run_id,
+            calibration=job.calibration,
+            shot=shot,
+            verdict=result["verdict"],
+            moved=result["moved"],
+            views=result["views"],
+            uncertainty_px=result["uncertainty_px"],
+            problem=result.get("problem"),
+            shots_checked=len(account.told),
+        )
+
+    def _tell(self, before: CalibrationStanding | None, now: CalibrationStanding | None) -> None:
+        if now is None:
+            return
+        self.standing = now
+        was = before.verdict if before is not None and before.is_alarm else None
+        if (now.verdict if now.is_alarm else None) is not was:
+            self._events.publish(
+                "calibration_alarm",
+                run=now.run_id,
+                calibration=now.calibration,
+                shot=now.shot,
+                verdict=now.verdict,
+                view=now.worst_view,
+                disparity_px=now.views.get(now.worst_view or ""),
+                message=now.message if now.is_alarm else None,
+            )

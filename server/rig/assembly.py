@@ -1,0 +1,240 @@
+"""Assembly: the only module that names concrete devices. Drivers are the same on a real and on a simulated rig."""
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from daq.devices import Interlock, Rig
+from daq.drivers.aravis_camera import AravisCamera
+from daq.drivers.camera_profile import CameraProfile, load_camera_profile
+from daq.drivers.gpio_interlock import GpioInterlock
+from daq.drivers.pulse_line import PulseLine
+from daq.drivers.pulse_protocol import Reply
+from daq.drivers.serial_pulse_generator import SerialPulseGenerator
+from daq.drivers.serial_stage import SerialStage, StageScale
+from daq.errors import DeviceUnavailable
+from daq.run_plan import RunKind
+from daq.shot import FiredTrain
+from daq.simulation.camera.gige_camera import SimulatedCamera
+from daq.simulation.gpio_chip import CHIP_PATH, ChipUnsupported, SimulatedSwitchLine, free_line
+from daq.simulation.interlock import DoorSwitch, MemoryInterlock
+from daq.simulation.laboratory import BenchDevices, SimulatedBench
+from daq.simulation.pico.firmware_process import FirmwareProcess
+from daq.simulation.stage import SimulatedStage
+from server.rig.config import (
+    PulseGeneratorConfig,
+    RigConfig,
+    SimulationConfig,
+    StageConfig,
+    ViewConfig,
+)
+from server.rig.simulated_scene import SimulatedScene
+
+TRUTH_FILE = Path("truth", "truth.h5")
+"""Where a run on the simulated bench keeps what nobody could measure; relative to the run."""
+
+Profiles = Mapping[str, CameraProfile]
+
+_GENERATOR = "pulse_generator"
+_STAGE_SPEED_MM_S = 100.0
+
+
+@dataclass(frozen=True)
+class AssembledRig:
+    """An opened rig.
+
+    Parameters
+    ----------
+    rig : Rig
+        Its devices.
+    bench : SimulatedBench | None
+        Doors to open and faults to inject, where the rig is simulated.
+    """
+
+    rig: Rig
+    bench: SimulatedBench | None = None
+
+
+@contextmanager
+def open_rig(config: RigConfig) -> Iterator[AssembledRig]:
+    """Open all devices of a rig, real or simulated; the light goes off first when the block ends.
+
+    Raises
+    ------
+    DeviceError
+        A device is absent, held by somebody else, or does not answer; names it.
+    PlanError
+        A camera profile cannot be read.
+    """
+    with wire_rig(config) as wired, ExitStack() as devices:
+        rig = wired.rig
+        # The generator is entered last and so left first: the light goes off before anything else is closed.
+        for device in (rig.stage, *rig.cameras.values(), rig.interlock, rig.generator):
+            if device is not None:
+                devices.enter_context(device)
+        yield wired
+
+
+@contextmanager
+def wire_rig(config: RigConfig) -> Iterator[AssembledRig]:
+    """All devices of a rig, not yet opened; of a simulated one, the far ends run until the block ends.
+
+    Raises
+    ------
+    DeviceError
+        A simulated far end cannot run.
+    PlanError
+        A camera profile cannot be read.
+    """
+    profiles = {name: load_camera_profile(view.camera.profile) for name, view in config.views.items()}
+    with ExitStack() as far_ends:
+        if config.simulation is None:
+            yield AssembledRig(_rig(config, profiles, _gpio_interlock(config)))
+        else:
+            yield _simulation(config, config.simulation, profiles, far_ends)
+
+
+@contextmanager
+def open_generator(config: RigConfig) -> Iterator[SerialPulseGenerator]:
+    """Open the pulse generator alone, without the cameras; on a simulated bench nobody sees its light."""
+    with _generator_wired(config) as wired, _pulse_generator(wired) as generator:
+        yield generator
+
+
+@contextmanager
+def open_pulse_line(config: RigConfig) -> Iterator[tuple[PulseLine, Reply]]:
+    """Open the line of the pulse generator and return what it says it is; the generator is off at the end."""
+    with _generator_wired(config) as wired:
+        line = PulseLine(_GENERATOR, _port_of(wired))
+        identity = line.open()
+        try:
+            yield line, identity
+            line.off()
+        finally:
+            line.close()
+
+
+@contextmanager
+def _generator_wired(config: RigConfig) -> Iterator[RigConfig]:
+    """Yield the configuration with the port of a simulated generator in it, where the rig is simulated."""
+    if config.simulation is None:
+        yield config
+        return
+    with _simulated_generator(config, lambda _: None) as firmware:
+        yield config.model_copy(update={"pulse_generator": PulseGeneratorConfig(port=firmware.port)})
+
+
+def _simulated_generator(config: RigConfig, on_fired: Callable[[FiredTrain], None]) -> FirmwareProcess:
+    emulated = config.simulation is not None and config.simulation.firmware == "emulated"
+    return FirmwareProcess(channels_of(config), on_fired, emulated=emulated)
+
+
+def _rig(config: RigConfig, profiles: Profiles, interlock: Interlock) -> Rig:
+    stage = None if config.stage is None else _stage(config.stage)
+    cameras = {
+        name: AravisCamera(name, view.camera.ip, profiles[name], (view.sensor.height_px, view.sensor.width_px))
+        for name, view in config.views.items()
+    }
+    return Rig(cameras, _pulse_generator(config), interlock, stage, max_current_a=_current_limits_a(config))
+
+
+def _pulse_generator(config: RigConfig) -> SerialPulseGenerator:
+    max_light_a = {name: view.max_light_a for name, view in config.views.items()}
+    return SerialPulseGenerator(
+        _GENERATOR, _port_of(config), channels_of(config), _current_limits_a(config), max_light_a
+    )
+
+
+def _current_limits_a(config: RigConfig) -> dict[str, float]:
+    return {name: view.max_current_a for name, view in config.views.items()}
+
+
+def _port_of(config: RigConfig) -> str:
+    if config.pulse_generator is None:
+        raise ValueError(f"rig {config.name}: has no pulse generator")
+    return config.pulse_generator.port
+
+
+def _gpio_interlock(config: RigConfig) -> GpioInterlock:
+    if config.interlock is None:
+        raise ValueError(f"rig {config.name}: has no interlock")
+    wire = config.interlock
+    return GpioInterlock("interlock", wire.chip, wire.line, active_low=wire.active_low)
+
+
+def _stage(stage: StageConfig) -> SerialStage:
+    return SerialStage("stage", stage.port, stage.range_mm, scale=StageScale(stage.microstep_um, stage.zero_mm))
+
+
+def channels_of(config: RigConfig) -> dict[str, int]:
+    """Channel of the pulse generator by view."""
+    return {name: view.led_channel for name, view in config.views.items()}
+
+
+def _simulation(
+    config: RigConfig, simulation: SimulationConfig, profiles: Profiles, far_ends: ExitStack
+) -> AssembledRig:
+    """Simulated devices at the far ends of all wires, then the drivers of a real rig at the near ones."""
+    bench = far_ends.enter_context(SimulatedBench(simulation.faults))
+    interlock, switch = _interlock_and_switch(simulation)
+    stage = far_ends.enter_context(_simulated_stage(config, simulation))
+    zero_mm = 0.0 if config.stage is None else config.stage.zero_mm
+    scene = SimulatedScene(config, lambda: stage.position_mm - zero_mm)
+    cameras = {
+        name: far_ends.enter_context(_simulated_camera(name, view, profiles[name], scene))
+        for name, view in config.views.items()
+    }
+    generator = far_ends.enter_context(_simulated_generator(config, bench.on_fired))
+    bench.connect(BenchDevices(cameras, generator, switch, stage))
+    wired = config.model_copy(
+        update={
+            "pulse_generator": PulseGeneratorConfig(port=generator.port),
+            "stage": config.stage and config.stage.model_copy(update={"port": stage.port}),
+        }
+    )
+
+    def prepare(kind: RunKind) -> None:
+        bench.forget_fired()
+        scene.prepare(kind)
+
+    def keep_truth(run_dir: Path) -> None:
+        scene.write_truth(run_dir / TRUTH_FILE, bench.fired)
+
+    rig = _rig(wired, profiles, interlock)
+    return AssembledRig(replace(rig, prepare_scene=prepare, keep_truth=keep_truth), bench)
+
+
+def _interlock_and_switch(simulation: SimulationConfig) -> tuple[Interlock, DoorSwitch]:
+    if simulation.gpio != "memory":
+        try:
+            line = free_line()
+            return GpioInterlock("interlock", CHIP_PATH, line), SimulatedSwitchLine(line)
+        except ChipUnsupported as reason:
+            if simulation.gpio == "chip":
+                raise DeviceUnavailable("interlock", f"simulation.gpio is 'chip', but {reason}") from reason
+    memory = MemoryInterlock("interlock")
+    return memory, memory
+
+
+def _simulated_stage(config: RigConfig, simulation: SimulationConfig) -> SimulatedStage:
+    stage = config.stage
+    if stage is None:
+        return SimulatedStage(seed=simulation.seed)
+    return SimulatedStage(
+        travel_mm=2 * max(stage.zero_mm + stage.range_mm[1], 1.0),
+        speed_mm_s=_STAGE_SPEED_MM_S,
+        microstep_um=stage.microstep_um,
+        seed=simulation.seed,
+    )
+
+
+def _simulated_camera(name: str, view: ViewConfig, profile: CameraProfile, scene: SimulatedScene) -> SimulatedCamera:
+    return SimulatedCamera(
+        name,
+        view.camera.ip,
+        f"sim-{name}"[:15],
+        profile.camera_timing,
+        scene.expose,
+        (view.sensor.height_px, view.sensor.width_px),
+    )

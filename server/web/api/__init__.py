@@ -1,0 +1,4 @@
+"""REST: one router per resource. Handlers validate, call, and return a view; blocking ones run in threads.
+
+They may import ``lab`` and ``pictures``; pages do not import them.
+"""

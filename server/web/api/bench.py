@@ -1,0 +1,45 @@
+"""/api/bench: the laboratory of a simulated rig, where doors open and things go wrong. A real rig answers 404."""
+
+from fastapi import APIRouter
+
+from daq.faults import Fault
+from daq.run_plan import FrozenModel
+from server.lab.errors import NotFound, Unprocessable
+from server.lab.services import Bench
+from server.web.api.parameters import ContextOf
+from server.web.problems import responses
+
+router = APIRouter(prefix="/api/bench", tags=["bench"])
+
+
+class Door(FrozenModel):
+    """The laboratory door; open, it locks the light."""
+
+    open: bool
+
+
+@router.post("/faults", status_code=202, responses=responses(404))
+def inject_fault(fault: Fault, context: ContextOf) -> Fault:
+    """Let something go wrong, from now on or at the next shot."""
+    try:
+        _bench(context).inject(fault)
+    except ValueError as error:
+        raise Unprocessable(str(error)) from error
+    return fault
+
+
+@router.put("/door", responses=responses(404))
+def move_door(door: Door, context: ContextOf) -> Door:
+    """Open or close the laboratory door."""
+    bench = _bench(context)
+    if door.open:
+        bench.open_door()
+    else:
+        bench.close_door()
+    return door
+
+
+def _bench(context: ContextOf) -> Bench:
+    if context.services.bench is None:
+        raise NotFound("this rig is no simulated bench")
+    return context.services.bench

@@ -1,0 +1,56 @@
+"""/api/jobs: reconstructions, checks and calibrations, waiting, running and done."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Query
+from pydantic import Field
+
+from daq.run_plan import FrozenModel
+from processing.reconstruction.settings import ReconstructionSettings
+from server.lab.jobs import Job, JobKind, JobState
+from server.lab.reconstruction import request_reconstruction
+from server.web.api.parameters import ContextOf, JobId
+from server.web.problems import responses
+
+router = APIRouter(prefix="/api/jobs", tags=["jobs"])
+
+
+class ReconstructionRequest(FrozenModel):
+    """Reconstruct shots of a run."""
+
+    run_id: str
+    shots: Annotated[
+        tuple[Annotated[int, Field(ge=0)], ...] | None, Field(description="indices; null: all valid shots")
+    ] = None
+    calibration: Annotated[str | None, Field(description="null: the run's own, or the current one")] = None
+    settings: ReconstructionSettings = ReconstructionSettings()
+
+
+@router.get("")
+def list_jobs(
+    context: ContextOf,
+    run_id: str | None = None,
+    state: JobState | None = None,
+    kind: JobKind | None = None,
+    limit: Annotated[int, Query(ge=1, le=10_000)] = 200,
+) -> list[Job]:
+    """Jobs, newest first."""
+    return context.jobs.newest(run_id, [state] if state else JobState, limit, [kind] if kind else JobKind)
+
+
+@router.post("", status_code=202, responses=responses(404))
+def create_jobs(request: ReconstructionRequest, context: ContextOf) -> list[Job]:
+    """Queue one job per shot; work that is waiting, running or done already is not repeated."""
+    return request_reconstruction(context, request.run_id, request.shots, request.calibration, request.settings)
+
+
+@router.get("/{job_id}", responses=responses(404))
+def show_job(job_id: JobId, context: ContextOf) -> Job:
+    """One job."""
+    return context.jobs.get(job_id)
+
+
+@router.post("/{job_id}/abort", status_code=202, responses=responses(404, 409))
+async def abort_job(job_id: JobId, context: ContextOf) -> Job:
+    """A waiting job ends at once, a running one at its next step."""
+    return await context.runner.abort(job_id)

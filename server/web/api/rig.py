@@ -1,0 +1,82 @@
+"""/api/rig: lamps, state of acquisition, configuration; acknowledging a fault, aborting whatever runs."""
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter
+from pydantic import ConfigDict, Field
+
+from daq.run.state import RunOutcome, RunState
+from daq.run_plan import FrozenModel
+from server.lab.monitor import Lamp
+from server.lab.watch import CalibrationStanding
+from server.web.api.parameters import ContextOf
+from server.web.problems import responses
+
+router = APIRouter(prefix="/api/rig", tags=["rig"])
+
+
+class AcquisitionView(FrozenModel):
+    """State of acquisition, and the counts of the present or last run."""
+
+    model_config = ConfigDict(from_attributes=True)
+
+    state: RunState
+    outcome: Annotated[RunOutcome | None, Field(description="of the last run; null while one is active")]
+    run_id: str | None
+    shots_planned: int
+    shots_recorded: int
+    shots_valid: int
+    message: str
+
+
+class RigView(FrozenModel):
+    """The rig at a glance."""
+
+    name: str
+    simulated: bool
+    views: list[str]
+    lamps: tuple[Lamp, ...]
+    acquisition: AcquisitionView
+    calibration: Annotated[
+        CalibrationStanding | None,
+        Field(description="how the calibration in use fitted the last shot that was checked; null: nothing is known"),
+    ]
+
+
+@router.get("")
+async def show_rig(context: ContextOf) -> RigView:
+    """State of every device and of acquisition; devices are asked once a second."""
+    config = context.services.config
+    return RigView(
+        name=config.name,
+        simulated=config.simulation is not None,
+        views=list(config.views),
+        lamps=context.monitor.lamps,
+        acquisition=view_of_acquisition(context),
+        calibration=context.standing,
+    )
+
+
+@router.get("/configuration")
+async def show_configuration(context: ContextOf) -> dict[str, Any]:
+    """Configuration of the rig as it was read; the token is masked."""
+    return context.services.config.model_dump(mode="json")
+
+
+@router.post("/abort", status_code=202, responses=responses(503, 504))
+def abort_everything(context: ContextOf) -> AcquisitionView:
+    """Light off at once, whatever runs."""
+    context.services.acquisition.abort()
+    return view_of_acquisition(context)
+
+
+@router.post("/acknowledge", status_code=202, responses=responses(409))
+def acknowledge_fault(context: ContextOf) -> AcquisitionView:
+    """Leave the FAULT state: the operator has seen to the light."""
+    context.services.acquisition.acknowledge()
+    return view_of_acquisition(context)
+
+
+def view_of_acquisition(context: ContextOf) -> AcquisitionView:
+    """State of acquisition now."""
+    return AcquisitionView.model_validate(context.services.acquisition.status())

@@ -1,0 +1,64 @@
+"""/api/runs: past runs, and the one that is active."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Response
+
+from daq.files.run_directory import RunHeader
+from daq.run_plan import RunPlan
+from server.lab.errors import Conflict
+from server.lab.run_start import start_run
+from server.lab.runs import RunSummary
+from server.web.api.parameters import ContextOf, RunId
+from server.web.api.rig import AcquisitionView, view_of_acquisition
+from server.web.problems import responses
+
+router = APIRouter(prefix="/api/runs", tags=["runs"])
+
+
+@router.get("")
+def list_runs(context: ContextOf, limit: Annotated[int, Query(ge=1, le=1000)] = 100) -> list[RunSummary]:
+    """Runs, newest first."""
+    return context.runs.newest(limit)
+
+
+@router.post("", status_code=201, responses=responses(409, 423, 503, 504))
+def create_run(plan: RunPlan, context: ContextOf, response: Response) -> AcquisitionView:
+    """Start a run. There is no queue: a busy rig answers 409, a plan that this rig cannot run 422."""
+    run_id = start_run(context, plan)
+    response.headers["Location"] = f"/api/runs/{run_id}"
+    return view_of_acquisition(context)
+
+
+@router.get("/{run_id}", responses=responses(404))
+def show_run(run_id: RunId, context: ContextOf) -> RunSummary:
+    """What a run is and how it went."""
+    return context.runs.summary(run_id)
+
+
+@router.get("/{run_id}/header", responses=responses(404))
+def show_header(run_id: RunId, context: ContextOf) -> RunHeader:
+    """Plan, configuration, devices and versions, as they were when the run started."""
+    return context.runs.reader(run_id).header
+
+
+@router.post("/{run_id}/stop", status_code=202, responses=responses(409))
+def stop_run(run_id: RunId, context: ContextOf) -> AcquisitionView:
+    """End the run after the present shot."""
+    _require_active(run_id, context)
+    context.services.acquisition.stop()
+    return view_of_acquisition(context)
+
+
+@router.post("/{run_id}/abort", status_code=202, responses=responses(409, 503, 504))
+def abort_run(run_id: RunId, context: ContextOf) -> AcquisitionView:
+    """End the run now: light off first."""
+    _require_active(run_id, context)
+    context.services.acquisition.abort()
+    return view_of_acquisition(context)
+
+
+def _require_active(run_id: str, context: ContextOf) -> None:
+    status = context.services.acquisition.status()
+    if status.run_id != run_id or not status.active:
+        raise Conflict(f"run {run_id} is not active; acquisition is {status.state}")

@@ -1,0 +1,87 @@
+"""/api/runs/{run_id}/shots: what was recorded, and pictures of it."""
+
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, Query, Response
+
+from daq.files.run_directory import ExposureRecord, FiredTrain, Shot
+from daq.run_plan import FrozenModel, ImageKey
+from server.lab.errors import NotFound
+from server.lab.runs import RunStore
+from server.pictures.pictures import Stretch, frame_png
+from server.web.api.parameters import ContextOf, RunId, ShotIndex
+from server.web.problems import responses
+
+router = APIRouter(prefix="/api/runs/{run_id}/shots", tags=["shots"])
+_FOR_EVER = {"Cache-Control": "private, max-age=31536000, immutable"}  # a committed shot never changes
+
+
+class ShotView(FrozenModel):
+    """One shot in a list."""
+
+    index: int
+    image_key: str
+
+
+class ShotDetail(FrozenModel):
+    """One shot: what each camera and the pulse generator said."""
+
+    index: int
+    image_key: str
+    host_time_ns: int
+    stage_z_mm: float | None
+    fired: FiredTrain | None
+    exposures: dict[str, dict[str, ExposureRecord]]
+
+
+@router.get("", responses=responses(404))
+def list_shots(run_id: RunId, context: ContextOf) -> list[ShotView]:
+    """All shots of a run."""
+    keys = context.runs.reader(run_id).image_keys().tolist()
+    return [ShotView(index=index, image_key=ImageKey(key).name.lower()) for index, key in enumerate(keys)]
+
+
+@router.get("/{shot}", responses=responses(404))
+def show_shot(run_id: RunId, shot: ShotIndex, context: ContextOf) -> ShotDetail:
+    """Frame ids, timestamps, packet counters and the actual pulse train."""
+    recorded = _read(context.runs, run_id, shot)
+    return ShotDetail(
+        index=recorded.index,
+        image_key=recorded.image_key.name.lower(),
+        host_time_ns=recorded.host_time_ns,
+        stage_z_mm=recorded.stage_z_mm,
+        fired=recorded.fired,
+        exposures={view: {"a": frames.record_a, "b": frames.record_b} for view, frames in recorded.views.items()},
+    )
+
+
+@router.get(
+    "/{shot}/{view}/{frame}.png",
+    response_class=Response,
+    responses={**responses(404), 200: {"content": {"image/png": {}}}},
+)
+def show_frame(
+    run_id: RunId,
+    shot: ShotIndex,
+    view: str,
+    frame: Literal["a", "b"],
+    context: ContextOf,
+    stretch: Annotated[
+        Stretch, Query(description="auto: 0.1 % to 99.9 % quantile; full: the whole bit depth")
+    ] = Stretch.AUTO,
+    width_px: Annotated[int | None, Query(ge=16, le=8192, description="narrower than the frame")] = None,
+) -> Response:
+    """One exposure as an 8 bit picture; the raw values are in the shot file."""
+    exposures = _read(context.runs, run_id, shot).views.get(view)
+    image = None if exposures is None else exposures.frame_a if frame == "a" else exposures.frame_b
+    if image is None:
+        raise NotFound(f"run {run_id}, shot {shot} has no exposure {frame} of {view!r}")
+    bits = context.runs.reader(run_id).header.views[view].bits
+    return Response(frame_png(image, bits, stretch, width_px), media_type="image/png", headers=_FOR_EVER)
+
+
+def _read(runs: RunStore, run_id: str, shot: int) -> Shot:
+    reader = runs.reader(run_id)
+    if shot >= reader.shot_count:
+        raise NotFound(f"run {run_id} has {reader.shot_count} shots, not {shot}")
+    return reader.read_shot(shot)

@@ -1,0 +1,162 @@
+"""The web application: REST, events, live view and page in one process; ``serve`` runs it."""
+
+import asyncio
+import logging
+import signal
+from collections.abc import AsyncIterator, Coroutine, Iterator
+from contextlib import AsyncExitStack, asynccontextmanager, contextmanager
+from importlib.metadata import version
+from typing import Any
+
+import uvicorn
+from fastapi import Depends, FastAPI, Request
+from starlette.exceptions import HTTPException
+from starlette.routing import Match
+
+from server.lab.calibrations import CalibrationStore
+from server.lab.jobs import JobTable, jobs_on_disk
+from server.lab.live import LiveFeed
+from server.lab.monitor import RigMonitor
+from server.lab.reconstruction import follow_acquisition
+from server.lab.runner import JobRunner
+from server.lab.runs import RunStore
+from server.lab.services import Context, Services
+from server.lab.watch import CalibrationWatch
+from server.web import problems
+from server.web.api import bench, calibrations, events, jobs, live, results, rig, runs, shots, sign_in, timing
+from server.web.api.parameters import forbid_unknown_query
+from server.web.guard import Guard
+from server.web.ui.page import mount_page
+
+_LOG = logging.getLogger(__name__)
+_RESOURCES = (rig, runs, shots, results, calibrations, jobs, events, bench, timing)
+_METHODS = ["GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"]
+_SHUTDOWN_S = 3
+
+
+def create_app(services: Services) -> FastAPI:
+    """Build the application.
+
+    Parameters
+    ----------
+    services : Services
+        Opened rig, acquisition, engine (started and ended with the application), configuration.
+    """
+    app = create_api(services)
+    mount_page(app, services.config)
+    return app
+
+
+def create_api(services: Services) -> FastAPI:
+    """Build the application without the page."""
+    app = FastAPI(
+        title="tomoshadow",
+        version=version("tomoshadow"),
+        openapi_url="/api/openapi.json",
+        docs_url=None,
+        redoc_url=None,
+        lifespan=lambda app: _life(app, services),
+        responses=problems.responses(400, 401, 403, 422),
+    )
+    problems.install(app)
+    for resource in _RESOURCES:
+        app.include_router(resource.router, dependencies=[Depends(forbid_unknown_query)])
+    app.include_router(live.router)
+    app.include_router(sign_in.router)
+    app.add_api_route("/api/{path:path}", _nothing_here, methods=_METHODS, include_in_schema=False)
+    token = services.config.server.token
+    problems.describe(app)
+    app.add_middleware(Guard, host_names=services.host_names, token=token.get_secret_value() if token else None)
+    return app
+
+
+def serve(app: FastAPI, host: str = "127.0.0.1", port: int = 8080) -> None:
+    """Serve until SIGINT or SIGTERM, then return. One process: acquisition, jobs and pages share its state."""
+    # The server passes a signal on once it has ended. By default SIGTERM would then kill the process before the caller
+    # has switched off the light and closed the devices.
+    previous = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        uvicorn.run(
+            app,
+            host=host,
+            port=port,
+            workers=1,
+            timeout_graceful_shutdown=_SHUTDOWN_S,
+            access_log=False,
+            log_level="warning",
+        )
+    finally:
+        signal.signal(signal.SIGTERM, previous)
+
+
+@asynccontextmanager
+async def _life(app: FastAPI, services: Services) -> AsyncIterator[None]:
+    services.data_dir.mkdir(parents=True, exist_ok=True)
+    services.events.attach()
+    async with AsyncExitStack() as stack:
+        stack.callback(services.events.detach)
+        jobs_table = stack.enter_context(_job_table(services))
+        await stack.enter_async_context(services.engine)
+        context = app.state.context = _context(services, jobs_table)
+        await context.monitor.ask()
+        for work in (context.runner.run(), follow_acquisition(context), context.monitor.run(), context.live.run()):
+            await stack.enter_async_context(_in_background(work))
+        yield
+
+
+@contextmanager
+def _job_table(services: Services) -> Iterator[JobTable]:
+    path = services.data_dir / "jobs.sqlite"
+    is_new = not path.exists()
+    table = JobTable(path)
+    try:
+        if is_new:
+            table.restore(jobs_on_disk(services.data_dir))
+        yield table
+    finally:
+        table.close()
+
+
+def _context(services: Services, table: JobTable) -> Context:
+    store = CalibrationStore(services.data_dir / "calibrations")
+    watch = CalibrationWatch(services.events)
+    return Context(
+        services=services,
+        runs=RunStore(services.data_dir, services.acquisition.status),
+        calibrations=store,
+        jobs=table,
+        runner=JobRunner(services.engine, table, services.tasks, services.events, services.data_dir, store, watch),
+        watch=watch,
+        monitor=RigMonitor(services.rig, services.data_dir),
+        live=LiveFeed(services.rig.cameras),
+    )
+
+
+@asynccontextmanager
+async def _in_background(work: Coroutine[Any, Any, None]) -> AsyncIterator[None]:
+    task = asyncio.create_task(work)
+    task.add_done_callback(_report_death)
+    try:
+        yield
+    finally:
+        task.cancel()
+        await asyncio.wait([task])
+
+
+def _report_death(task: asyncio.Task[None]) -> None:
+    if not task.cancelled() and (error := task.exception()):
+        _LOG.critical("background work %s died", task.get_coro(), exc_info=error)
+
+
+async def _nothing_here(request: Request) -> None:
+    """Answer unknown paths below /api here: behind the page's mount they would get HTML."""
+    if allowed := _methods_of(request):
+        raise HTTPException(405, headers={"Allow": ", ".join(allowed)})
+    raise HTTPException(404, f"there is nothing at {request.url.path}")
+
+
+def _methods_of(request: Request) -> list[str]:
+    """Methods of a path that has none for the method of this request: every method is a route of its own."""
+    routes = (route for resource in _RESOURCES for route in resource.router.routes)
+    matching = (route for route in routes if route.matches(request.scope)[0] is Match.PARTIAL)
+    return sorted({method for route in matching for method in getattr(route, "methods", None) or ()})

@@ -1,0 +1,54 @@
+"""Open a rig and serve it: what ``tomoshadow serve`` does."""
+
+from pathlib import Path
+
+from daq.run.acquisition import Acquisition
+from processing.calibration.calibration_file import file_sha256
+from server.lab.calibrations import CalibrationStore
+from server.lab.engine import DaskEngine
+from server.lab.events import EventPublisher
+from server.lab.services import Services
+from server.lab.tasks import TASKS
+from server.rig.assembly import AssembledRig, open_rig
+from server.rig.config import RigConfig, load_config
+from server.web.app import create_app, serve
+
+
+def serve_rig(config_file: Path, host: str | None = None, port: int | None = None) -> None:
+    """Serve the rig of a configuration until SIGINT or SIGTERM; the light is off before and after.
+
+    Raises
+    ------
+    ConfigError
+        The configuration is wrong.
+    DeviceError
+        A device is absent or does not answer.
+    """
+    config = load_config(config_file)
+    config = config.model_copy(update={"server": config.server.moved(host, port)})
+    with open_rig(config) as bench:
+        events = EventPublisher()
+        with _acquisition(config, bench, events) as acquisition:
+            services = Services(
+                config=config,
+                rig=bench.rig,
+                acquisition=acquisition,
+                events=events,
+                engine=DaskEngine(),
+                tasks=TASKS,
+                bench=bench.bench,
+            )
+            serve(create_app(services), config.server.host, config.server.port)
+
+
+def _acquisition(config: RigConfig, bench: AssembledRig, events: EventPublisher) -> Acquisition:
+    data_dir = config.server.data_dir
+    calibrations = CalibrationStore(data_dir / "calibrations")
+    return Acquisition(
+        bench.rig,
+        data_dir,
+        events.publish_run_event,
+        configuration=config.model_dump(mode="json"),
+        hash_calibration=lambda name: file_sha256(calibrations.path(name)),
+        limits=config.acquisition.to_limits(),
+    )

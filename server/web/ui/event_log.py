@@ -1,0 +1,43 @@
+"""EventLog: the last events as lines, for the operator's eye."""
+
+from datetime import datetime
+
+from nicegui import ui
+
+from server.lab.events import Event
+from server.web.ui.theme import panel
+
+
+class EventLog:
+    """Built once per page; gets the events of its timer."""
+
+    def __init__(self) -> None:
+        with panel("Events"):
+            self._log = ui.log(max_lines=200).classes("w-full text-xs").style("height:150px")
+            self._log.props('role=log aria-label="event log"')
+
+    def add(self, events: list[Event]) -> None:
+        """Append events that say something to a person."""
+        for event in events:
+            if line := line_of(event):
+                self._log.push(line)
+
+
+def line_of(event: Event) -> str | None:
+    """One line; None for events that are too many or too small."""
+    data = event.data
+    match event.name:
+        case "run_state":
+            text = f"{data['run_id']}: {data['state']}" + (f", {data['message']}" if data["message"] else "")
+        case "shot_recorded":
+            text = f"shot {data['index']} recorded" + ("" if data["valid"] else ", INVALID")
+        case "run_message":
+            text = data["text"]
+        case "job_changed":
+            what = data["kind"] if data["shot"] is None else f"{data['kind']} of shot {data['shot']}"
+            text = f"{what}: {data['state']}" + (f", {data['error']}" if data["error"] else "")
+        case "calibration_alarm":
+            text = data["message"] or f"calibration {data['calibration']} fits run {data['run']} again"
+        case _:
+            return None
+    return f"{datetime.fromisoformat(event.time_utc).astimezone():%H:%M:%S}  {text}"

@@ -1,0 +1,69 @@
+"""The page: one screen for one operator. Mounted last, because it answers every path that nobody else does."""
+
+from fastapi import FastAPI
+from nicegui import ui
+
+from server.lab.services import Context
+from server.rig.config import RigConfig
+from server.web.ui import theme
+from server.web.ui.alarm_banner import AlarmBanner
+from server.web.ui.draft import DraftStore
+from server.web.ui.event_log import EventLog
+from server.web.ui.header import Header
+from server.web.ui.live_tiles import LiveTiles
+from server.web.ui.run_form import RunForm
+from server.web.ui.run_panel import RunPanel
+from server.web.ui.tables import JobTableView, RunTable
+from server.web.ui.theme import panel
+from server.web.ui.volume_panel import VolumePanel
+
+_REFRESH_S = 0.25
+_EVENTS_SHOWN = 100
+_LISTS_CHANGED = {"run_state", "job_changed"}
+
+
+def mount_page(app: FastAPI, config: RigConfig) -> None:
+    """Serve the page at ``/``; register every other route before."""
+
+    @ui.page("/", title=f"tomoshadow: {config.name}")
+    def show() -> None:
+        Page(app.state.context)
+
+    ui.run_with(app, dark=None, show_welcome_message=False, reconnect_timeout=10)
+
+
+class Page:
+    """The page of one browser tab."""
+
+    def __init__(self, context: Context) -> None:
+        self._events = context.services.events
+        self._seen = max(0, self._events.newest - _EVENTS_SHOWN)
+        self._are_lists_old = True
+        dark = theme.apply()
+        draft = DraftStore(context.services.data_dir / "draft.json", context.services.config)
+        self._header = Header(context, dark)
+        self._alarm = AlarmBanner(context)
+        with ui.element("div").classes("screen"):
+            with ui.element("div").classes("column"):
+                with panel("Live"):
+                    LiveTiles(list(context.services.config.views))
+                self._runs, self._jobs = RunTable(context), JobTableView(context)
+            with ui.element("div").classes("column wide"):
+                self._volume = VolumePanel(context)
+            with ui.element("div").classes("column controls"):
+                self._run, self._form, self._log = RunPanel(context), RunForm(context, draft), EventLog()
+        ui.timer(_REFRESH_S, self._refresh)
+
+    async def _refresh(self) -> None:
+        events = self._events.since(self._seen)
+        self._log.add(events)
+        for part in (self._header, self._alarm, self._run, self._form):
+            part.refresh()
+        if events:
+            self._seen = events[-1].id
+        if self._are_lists_old or any(event.name in _LISTS_CHANGED for event in events):
+            self._are_lists_old = False
+            await self._runs.reload()
+            await self._jobs.reload()
+            await self._volume.reload()
+            await self._form.reload_choices()

@@ -1,0 +1,197 @@
+"""RunForm: the next run. Limits are those of the plan and of the rig; a refusal is shown with its reason."""
+
+import asyncio
+from collections.abc import Callable
+from typing import Any
+
+from nicegui import ui
+
+from daq.errors import DaqError
+from daq.run.state import RunOutcome
+from daq.run_plan import RunKind
+from daq.timing import plan_shot_timing
+from server.lab.errors import ServerError
+from server.lab.run_start import start_run
+from server.lab.runs import RunSummary
+from server.lab.services import Context
+from server.web.ui.draft import (
+    PLAN_FIELDS,
+    PULSE_FIELDS,
+    DraftStore,
+    plan_of,
+    problem_of,
+    problem_of_current,
+    problem_of_positions,
+)
+from server.web.ui.theme import panel
+
+_REFERENCE_KINDS = (RunKind.DARK, RunKind.BACKGROUND)
+
+
+class RunForm:
+    """Built once per page.
+
+    Parameters
+    ----------
+    context : Context
+        The application.
+    draft : DraftStore
+        What the form shows first, and where every change goes.
+    """
+
+    def __init__(self, context: Context, draft: DraftStore) -> None:
+        self._context = context
+        self._draft = draft
+        self._known_references: set[str] = set()
+        self._fields: list[ui.input | ui.number] = []
+        with panel("New run"):
+            self._add_kind_and_name()
+            with ui.grid(columns=2).classes("w-full gap-2"):
+                self._add_number("shots", "Shots", PLAN_FIELDS, whole=True)
+                self._add_number("rate_hz", "Rate / Hz", PLAN_FIELDS)
+                self._add_number("width_ns", "Pulse width / ns", PULSE_FIELDS, whole=True)
+                self._add_number("separation_ns", "Separation / ns", PULSE_FIELDS, whole=True)
+                for view in context.services.config.views:
+                    self._add_current(view)
+            self._add_choices()
+            self._refusal = ui.label("").classes("refusal").props("role=alert")
+            self._start = ui.button("Start run", icon="play_arrow", on_click=self._on_start).classes("w-full")
+        self._check()
+
+    def refresh(self) -> None:
+        """Follow the state of acquisition."""
+        self._start.set_enabled(not self._context.services.acquisition.status().active)
+
+    async def reload_choices(self) -> None:
+        """Show the reference runs and calibrations that exist now."""
+        runs, calibrations = await asyncio.gather(
+            asyncio.to_thread(self._context.runs.newest), asyncio.to_thread(self._context.calibrations.list)
+        )
+        references = [run for run in runs if run.kind in _REFERENCE_KINDS and run.outcome == RunOutcome.COMPLETED]
+        self._references.set_options(
+            {run.run_id: _reference_label(run) for run in references}, value=self._proposed(references)
+        )
+        known = {item.id: item.id + (" (current)" if item.current else "") for item in calibrations}
+        calibration = self._draft.values["calibration"]
+        self._calibration.set_options(known, value=calibration if calibration in known else None)
+
+    def _proposed(self, references: list[RunSummary]) -> list[str]:
+        """What the operator chose; the newest run of each kind where nothing is chosen or a new one has come."""
+        known, self._known_references = self._known_references, {run.run_id for run in references}
+        chosen = [run_id for run_id in self._draft.values["references"] if run_id in self._known_references]
+        if chosen and known >= self._known_references:
+            return chosen
+        newest = {run.kind: run.run_id for run in reversed(references)}
+        return sorted(newest.values())
+
+    def _add_kind_and_name(self) -> None:
+        kinds = {kind.value: kind.value.capitalize() for kind in RunKind}
+        ui.toggle(kinds, value=self._draft.values["kind"], on_change=self._changed("kind")).props(
+            'dense unelevated spread no-caps size=sm aria-label="Kind of run"'
+        ).classes("w-full")
+        name = ui.input(
+            "Name",
+            value=self._draft.values["name"],
+            on_change=self._changed("name"),
+            validation=lambda text: problem_of(PLAN_FIELDS, "name", text) and "letters, digits, space . _ -",
+        )
+        self._fields.append(name.props("dense outlined hide-bottom-space").classes("w-full"))
+
+    def _add_number(self, name: str, label: str, fields: dict[str, Any], *, whole: bool = False) -> None:
+        number = ui.number(
+            label,
+            value=self._draft.values[name],
+            on_change=self._changed(name),
+            validation=lambda value: problem_of(fields, name, value),
+            precision=0 if whole else None,
+        )
+        self._fields.append(number.props("dense outlined hide-bottom-space"))
+
+    def _add_current(self, view: str) -> None:
+        limit_a = self._context.services.config.views[view].max_current_a
+
+        def keep(event: Any) -> None:
+            self._changed("current_a")(_Changed({**self._draft.values["current_a"], view: event.value}))
+
+        number = ui.number(
+            f"LED {view} / A",
+            value=self._draft.values["current_a"].get(view),
+            on_change=keep,
+            validation=lambda value: problem_of_current(value, limit_a),
+        )
+        self._fields.append(number.props("dense outlined hide-bottom-space"))
+
+    def _add_choices(self) -> None:
+        positions = ui.input(
+            "Target positions / mm",
+            value=self._draft.values["stage_z_mm"],
+            on_change=self._changed("stage_z_mm"),
+            validation=problem_of_positions,
+        )
+        self._fields.append(positions.props("dense outlined hide-bottom-space").classes("w-full"))
+        self._positions = positions
+        self._references = (
+            ui.select(
+                {}, label="Dark and background runs", multiple=True, value=[], on_change=self._changed("references")
+            )
+            .props("dense outlined use-chips options-dense")
+            .classes("w-full")
+        )
+        self._calibration = (
+            ui.select(
+                {}, label="Calibration (none: the current one)", clearable=True, on_change=self._changed("calibration")
+            )
+            .props("dense outlined options-dense")
+            .classes("w-full")
+        )
+
+    def _changed(self, name: str) -> Callable[[Any], None]:
+        def keep(event: Any) -> None:
+            self._draft.set(name, event.value)
+            self._check()
+
+        return keep
+
+    def _check(self) -> None:
+        """Say at once why the rig would refuse this plan."""
+        if not hasattr(self, "_start"):
+            return  # while the form is being built
+        kind = RunKind(self._draft.values["kind"])
+        has_stage = self._context.services.rig.stage is not None
+        self._positions.set_visibility(kind is RunKind.CALIBRATION and has_stage)
+        self._references.set_visibility(kind is RunKind.SAMPLE)
+        self._calibration.set_visibility(kind is RunKind.SAMPLE)
+        self._refusal.set_text(self._reason_against() or "")
+
+    def _reason_against(self) -> str | None:
+        try:
+            plan = plan_of(self._draft.values)
+        except ValueError:
+            return None  # the field itself says what is wrong with it
+        cameras = {name: camera.timing for name, camera in self._context.services.rig.cameras.items()}
+        try:
+            plan_shot_timing(plan, cameras)
+        except DaqError as error:
+            return str(error)
+        return None
+
+    async def _on_start(self) -> None:
+        if not all([field.validate() for field in self._fields if field.visible]):
+            return
+        try:
+            await asyncio.to_thread(start_run, self._context, plan_of(self._draft.values))
+        except (DaqError, ServerError, ValueError) as error:
+            self._refusal.set_text(str(error))
+        else:
+            self._refusal.set_text("")
+
+
+class _Changed:
+    """A new value, in the shape of an event."""
+
+    def __init__(self, value: Any) -> None:
+        self.value = value
+
+
+def _reference_label(run: RunSummary) -> str:
+    return f"{run.kind}: {run.name}, {run.shots_valid} shots"

@@ -1,0 +1,90 @@
+"""RunPanel: what the run is doing, and the buttons that end it. ABORT is always there and always enabled."""
+
+from collections.abc import Callable, Sequence
+
+from nicegui import ui
+from starlette.concurrency import run_in_threadpool
+
+from daq.errors import DaqError
+from daq.run.events import RunStatus
+from daq.run.state import RunState
+from server.lab.monitor import Health, Lamp
+from server.lab.services import Context
+from server.web.ui.theme import panel
+
+
+class RunPanel:
+    """Built once per page, refreshed by its timer."""
+
+    def __init__(self, context: Context) -> None:
+        self._acquisition = context.services.acquisition
+        self._monitor = context.monitor
+        with panel("Run"):
+            with ui.row().classes("w-full items-baseline justify-between no-wrap"):
+                self._name = ui.label("no run yet").classes("text-base font-medium ellipsis")
+                self._outcome = ui.badge("").props('aria-label="run outcome"')
+            self._bar = ui.linear_progress(0, show_value=False, size="10px").props('rounded aria-label="run progress"')
+            self._counts = ui.label("").classes("text-sm").props('role=status aria-label="run counts"')
+            self._message = ui.label("").classes("text-xs opacity-70").props('role=status aria-label="run message"')
+            with ui.row().classes("w-full gap-2 no-wrap"):
+                self._stop = (
+                    ui.button("Stop", icon="stop", on_click=self._acquisition.stop).props("outline").classes("flex-1")
+                )
+                self._stop.tooltip("Ends the run after the present shot")
+                ui.button("ABORT", icon="front_hand", on_click=self._on_abort, color="negative").classes("flex-1")
+            self._acknowledge = ui.button("Acknowledge fault", icon="verified_user", on_click=self._on_acknowledge)
+            self._acknowledge.props("outline color=negative").classes("w-full")
+
+    def refresh(self) -> None:
+        """Show the present state."""
+        status = self._acquisition.status()
+        self._name.set_text(status.run_id or "no run yet")
+        self._bar.set_value(status.shots_recorded / max(1, status.shots_planned))
+        self._counts.set_text(counts_text(status))
+        self._message.set_text(status.message)
+        self._outcome.set_text(status.outcome.value if status.outcome else "active" if status.active else "")
+        self._outcome.props(f"color={outcome_colour(status.outcome)}")
+        self._outcome.set_visibility(bool(self._outcome.text))
+        self._stop.set_enabled(status.active)
+        self._acknowledge.set_visibility(waits_for_acknowledgement(status, self._monitor.lamps))
+
+    async def _on_abort(self) -> None:
+        await _notify_failure(self._acquisition.abort)
+
+    async def _on_acknowledge(self) -> None:
+        await _notify_failure(self._acquisition.acknowledge)
+
+
+async def _notify_failure(command: Callable[[], None]) -> None:
+    """Give a command to acquisition in a thread of the pool that is kept for requests, and say if it failed."""
+    try:
+        await run_in_threadpool(command)
+    except DaqError as error:
+        ui.notify(str(error), type="negative")
+
+
+def waits_for_acknowledgement(status: RunStatus, lamps: Sequence[Lamp]) -> bool:
+    """True where an operator must clear a fault: of acquisition, or latched by a generator that is at rest."""
+    latched = any(lamp.kind == "generator" and lamp.health is Health.FAULT for lamp in lamps)
+    return status.state is RunState.FAULT or (latched and not status.active)
+
+
+def counts_text(status: RunStatus) -> str:
+    """Shots in words."""
+    if status.run_id is None:
+        return "ready"
+    invalid = status.shots_recorded - status.shots_valid
+    text = f"{status.shots_recorded} / {status.shots_planned} shots recorded, {status.shots_valid} valid"
+    return f"{text}, {invalid} INVALID" if invalid else text
+
+
+def outcome_colour(outcome: str | None) -> str:
+    """Colour of an outcome or a job state: what went well, what an operator ended, what went wrong."""
+    return {
+        "completed": "positive",
+        "done": "positive",
+        "stopped": "blue-grey",
+        "aborted": "warning",
+        "interrupted": "warning",
+        "failed": "negative",
+    }.get(outcome or "", "primary")

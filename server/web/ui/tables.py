@@ -1,0 +1,178 @@
+"""Tables of the page: runs with their outcomes, jobs with their states."""
+
+import asyncio
+import math
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+from nicegui import ui
+
+from daq.errors import DaqError
+from daq.run_plan import RunKind
+from processing.reconstruction.accuracy import Accuracy
+from processing.reconstruction.method import ReconstructionMethod as Method
+from processing.reconstruction.settings import ReconstructionSettings
+from processing.reconstruction.voxel_type import VoxelType
+from server.lab.errors import ServerError
+from server.lab.jobs import Job, JobKind, JobState, calibration_job
+from server.lab.reconstruction import request_reconstruction
+from server.lab.runs import ACTIVE, RunSummary
+from server.lab.services import Context
+from server.web.ui.run_panel import outcome_colour
+from server.web.ui.theme import panel
+
+_BADGE = '<q-td :props="props"><q-badge :color="props.row.colour" :label="props.value" /></q-td>'
+_ACTION = """<q-td :props="props" auto-width><q-btn v-if="props.value" dense flat no-caps size="sm" color="primary"
+:label="props.value" @click.stop="$parent.$emit('act', props.row)" /></q-td>"""
+_SHOWN = 60
+
+
+class RunTable:
+    """Runs, newest first; a calibration run can be fitted, a sample run reconstructed as chosen."""
+
+    def __init__(self, context: Context) -> None:
+        self._context = context
+        with panel("Runs", "flex-1"):
+            with ui.row().classes("w-full items-center justify-between no-wrap q-mt-none"):
+                ui.label("Reconstruct by").classes("text-xs opacity-70")
+                chosen = context.services.settings
+                self._method = _choice(
+                    "Method", {method.value: method.value.upper() for method in Method}, chosen.method
+                )
+                self._accuracy = _choice("Accuracy", {one.value: one.value for one in Accuracy}, chosen.accuracy)
+                self._voxels = _choice("Voxels", {one.value: one.value for one in VoxelType}, chosen.voxels)
+            self._table = _table(
+                ("name", "Run"), ("kind", "Kind"), ("shots", "Valid / shots"), ("outcome", "Outcome"), ("action", "")
+            )
+            self._table.add_slot("body-cell-action", _ACTION)
+            self._table.on("act", self._on_act)
+
+    async def reload(self) -> None:
+        """Read the run directories again."""
+        runs = await asyncio.to_thread(self._context.runs.newest, _SHOWN)
+        self._table.rows = [_run_row(run) for run in runs]
+        self._table.update()
+
+    async def _on_act(self, event: Any) -> None:
+        run_id, kind = event.args["id"], event.args["kind"]
+        ask = self._calibrate if kind == RunKind.CALIBRATION else self._reconstruct
+        await _try(lambda: asyncio.to_thread(ask, run_id))
+
+    def _calibrate(self, run_id: str) -> None:
+        self._context.runner.submit(calibration_job(run_id, f"{run_id}-pinhole", "pinhole"))
+
+    def _reconstruct(self, run_id: str) -> None:
+        chosen = {
+            "method": Method(self._method.value),
+            "accuracy": Accuracy(self._accuracy.value),
+            "voxels": VoxelType(self._voxels.value),
+        }
+        settings: ReconstructionSettings = self._context.services.settings.model_copy(update=chosen)
+        request_reconstruction(self._context, run_id, None, None, settings)
+
+
+class JobTableView:
+    """Jobs, newest first; an unfinished one can be aborted, a fitted calibration chosen."""
+
+    def __init__(self, context: Context) -> None:
+        self._context = context
+        with panel("Processing", "flex-1"):
+            self._table = _table(("job", "Job"), ("run", "Run"), ("outcome", "State"), ("detail", ""), ("action", ""))
+            self._table.add_slot("body-cell-action", _ACTION)
+            self._table.on("act", self._on_act)
+
+    async def reload(self) -> None:
+        """Read the job table again."""
+        jobs = await asyncio.to_thread(self._context.jobs.newest, None, JobState, _SHOWN)
+        self._table.rows = [_job_row(job) for job in jobs]
+        self._table.update()
+
+    async def _on_act(self, event: Any) -> None:
+        if event.args["action"] == "Abort":
+            await _try(lambda: self._context.runner.abort(event.args["id"]))
+        else:
+            await _try(lambda: asyncio.to_thread(self._context.calibrations.choose, event.args["calibration"]))
+            ui.notify(f"{event.args['calibration']} is the current calibration", type="positive")
+
+
+def _choice(label: str, options: dict[str, str], value: str) -> ui.select:
+    select = ui.select(options, value=str(value)).classes("text-xs")
+    return select.props(f'dense borderless options-dense aria-label="{label}"')
+
+
+async def _try(action: Callable[[], Awaitable[Any]]) -> None:
+    try:
+        await action()
+    except (DaqError, ServerError) as error:
+        ui.notify(str(error), type="negative")
+
+
+def _table(*columns: tuple[str, str]) -> ui.table:
+    described = [{"name": name, "label": label, "field": name, "align": "left"} for name, label in columns]
+    table = ui.table(columns=described, rows=[], row_key="id").classes("w-full").props("dense flat hide-bottom")
+    table.props('rows-per-page-options="[0]" :pagination="{rowsPerPage: 0}"')
+    table.add_slot("body-cell-outcome", _BADGE)
+    return table
+
+
+def _run_row(run: RunSummary) -> dict[str, Any]:
+    valid = "…" if run.shots_valid is None else run.shots_valid
+    actions = {RunKind.CALIBRATION: "Calibrate", RunKind.SAMPLE: "Reconstruct"}
+    return {
+        "id": run.run_id,
+        "name": run.name,
+        "kind": run.kind,
+        "shots": f"{valid} / {run.shots_recorded}",
+        "outcome": run.outcome,
+        "colour": outcome_colour(run.outcome),
+        "action": "" if run.outcome == ACTIVE or run.kind is None else actions.get(run.kind, ""),
+    }
+
+
+def _job_row(job: Job) -> dict[str, Any]:
+    is_calibration = job.kind is JobKind.CALIBRATION
+    choices = {JobState.QUEUED: "Abort", JobState.RUNNING: "Abort", JobState.DONE: "Use" if is_calibration else ""}
+    return {
+        "id": job.id,
+        "job": _name(job),
+        "run": job.run_id,
+        "outcome": job.state,
+        "colour": outcome_colour(job.state),
+        "detail": job.error or _DETAIL[job.kind](job),
+        "action": choices.get(job.state, ""),
+        "calibration": job.calibration,
+    }
+
+
+def _name(job: Job) -> str:
+    method = str(job.settings.get("method", "")).upper()
+    return {
+        JobKind.CALIBRATION: "calibration",
+        JobKind.CHECK: f"check of shot {job.shot}",
+        JobKind.RECONSTRUCTION: f"{method} shot {job.shot}",
+    }[job.kind]
+
+
+def _disparity(job: Job) -> str:
+    """The view that disagrees most, or why the droplets do not tell; nothing before the check has ended."""
+    result = job.result or {"views": {}}
+    if not result["views"]:
+        return ", ".join(str(result[key]) for key in ("problem", "verdict") if result.get(key))
+    worst = result["moved"] or max(result["views"], key=result["views"].__getitem__)
+    return f"{worst} {result['views'][worst]:.2f} px, {result['verdict']}"
+
+
+def _quality(job: Job) -> str:
+    """Hold-out error and verdict of the worst view of a calibration; nothing before it has ended."""
+    views = (job.result or {}).get("views", {}).values()
+    worst = max(views, key=lambda view: view["holdout_error_px"] or math.inf, default=None)
+    return "" if worst is None else f"hold-out {worst['holdout_error_px'] or math.nan:.3f} px, {worst['verdict']}"
+
+
+def _slow_views(job: Job) -> str:
+    """The views that could not be rectified, with the reason; nothing where all were."""
+    views = (job.result or {}).get("views", {})
+    return "; ".join(f"{name} exact: {view['reason']}" for name, view in views.items() if view["reason"])
+
+
+_DETAIL = {JobKind.CALIBRATION: _quality, JobKind.CHECK: _disparity, JobKind.RECONSTRUCTION: _slow_views}
