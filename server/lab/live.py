@@ -1,21 +1,17 @@
-"""LiveFeed: the newest exposure of every camera as small JPEGs, over one websocket per page.
+"""LiveFeed: the newest exposure of every camera as small JPEGs.
 
 One message is one byte, the number of the view, and a JPEG. A reader that is slow misses pictures and never holds up
 another one. Nothing is encoded while nobody looks.
 """
 
 import asyncio
-import contextlib
-from collections.abc import Mapping
+from collections.abc import AsyncGenerator, Mapping
 from dataclasses import dataclass
-
-from fastapi import WebSocket, WebSocketDisconnect
 
 from daq.devices import Camera
 from daq.shot import Image
 from server.pictures.pictures import preview_jpeg
 
-LIVE_PATH = "/api/live"
 _PERIOD_S = 0.1
 _WIDTH_PX = 560
 
@@ -54,31 +50,23 @@ class LiveFeed:
             tick.set()
             await pause(_PERIOD_S)
 
-    async def serve(self, socket: WebSocket) -> None:
-        """Send pictures to one page until it leaves."""
-        await socket.accept()
+    async def pictures(self) -> AsyncGenerator[bytes, None]:
+        """Give the newest picture of every view, then new ones, until closed; one message each."""
         self._readers += 1
         self._wanted.set()
         try:
-            await self._send_until_closed(socket)
+            sent = [0] * len(self._cameras)
+            while True:
+                tick = self._tick
+                for view, picture in enumerate(list(self._pictures)):
+                    if picture.number > sent[view]:
+                        yield picture.message
+                        sent[view] = picture.number
+                await tick.wait()
         finally:
             self._readers -= 1
             if self._readers == 0:
                 self._wanted.clear()
-
-    async def _send_until_closed(self, socket: WebSocket) -> None:
-        closed = asyncio.create_task(_closed(socket))
-        sent = [0] * len(self._cameras)
-        with contextlib.suppress(WebSocketDisconnect, RuntimeError):  # the page left while we were sending
-            while not closed.done():
-                for view, picture in enumerate(list(self._pictures)):
-                    if picture.number > sent[view]:
-                        await socket.send_bytes(picture.message)
-                        sent[view] = picture.number
-                tick = asyncio.create_task(self._tick.wait())
-                await asyncio.wait([tick, closed], return_when=asyncio.FIRST_COMPLETED)
-                tick.cancel()
-        closed.cancel()
 
     def _encode_new_exposures(self) -> None:
         for view, camera in enumerate(self._cameras):
@@ -92,9 +80,3 @@ class LiveFeed:
 async def pause(period_s: float) -> None:
     """Let the event loop do other things for a while: the pace of a loop, never a wait for something."""
     await asyncio.sleep(period_s)
-
-
-async def _closed(socket: WebSocket) -> None:
-    """Wait until the page has closed its end; what it says before is nothing to us."""
-    while (await socket.receive())["type"] != "websocket.disconnect":
-        continue

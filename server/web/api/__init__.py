@@ -1,4 +1,4 @@
 """REST: one router per resource. Handlers validate, call, and return a view; blocking ones run in threads.
 
-They may import ``lab`` and ``pictures``; pages do not import them.
+They may import ``lab`` and ``pictures``, and nothing of ``ui``.
 """

@@ -1,4 +1,4 @@
 """The operator's page, one module per part of it.
 
-They may import ``lab`` and ``pictures``, not REST.
+They may import ``lab``, ``pictures`` and the addresses of REST.
 """

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from nicegui.element import Element
 
-from server.lab.live import LIVE_PATH
+from server.web.api.live import LIVE_PATH
 
 
 class LiveTiles(Element, component="live_tiles.js"):
