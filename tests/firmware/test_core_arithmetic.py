@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.firmware.train_oracle import LIMIT, OracleChannel
+from tests.support.train_oracle import LIMIT, OracleChannel
 
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAM = ROOT / "build" / "firmware" / "arithmetic"

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from daq.drivers.pulse_protocol import Command, ErrorNumber, Reply, Request, decode_reply, encode_request
 from daq.simulation.pico.firmware_process import FirmwareProcess
-from tests.firmware.train_oracle import LIMIT, TICK_NS
-from tests.firmware.train_oracle import OracleChannel as Channel
+from tests.support.train_oracle import LIMIT, TICK_NS
+from tests.support.train_oracle import OracleChannel as Channel
 
 
 @st.composite

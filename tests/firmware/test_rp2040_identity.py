@@ -10,7 +10,7 @@ import pytest
 from daq.drivers.pulse_protocol import Command
 from daq.simulation.pico.board_number import BOARD_NUMBER
 from daq.simulation.pico.firmware_build import ImageKind, build_image
-from tests.firmware.rp2040_board import BOOT_MS, Board
+from tests.support.rp2040_board import BOOT_MS, Board
 
 FIRMWARE = Path(__file__).resolve().parents[2] / "firmware"
 KIB = 1024

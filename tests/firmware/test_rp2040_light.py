@@ -7,8 +7,8 @@ import pytest
 
 from daq.drivers.pulse_protocol import ABORT_BYTE, Command, ErrorNumber, Fault, State
 from daq.simulation.pico.rp2040_emulator import CYCLE_NS
-from tests.firmware.rp2040_board import BOOT_MS, PAPER, PERIOD_MS, Board
 from tests.firmware.test_protocol_table import c_enum
+from tests.support.rp2040_board import BOOT_MS, PAPER, PERIOD_MS, Board
 
 LIMIT = c_enum("limits.h", "limits")
 READY_MS = 25

@@ -19,7 +19,7 @@ from daq.drivers.pulse_protocol import (
 )
 from daq.simulation.pico.rp2040_chip import PIN_CAMERA, PIN_ESTOP, PIN_INTERLOCK, PIN_LIGHT, PIN_TRIGGER
 from daq.simulation.pico.rp2040_emulator import CYCLE_NS, CYCLES_PER_MS
-from tests.firmware.rp2040_board import BOOT_MS, PAPER, PERIOD_MS, Board
+from tests.support.rp2040_board import BOOT_MS, PAPER, PERIOD_MS, Board
 
 WATCHDOG_MS = 200
 DARK_WITHIN_NS = 450

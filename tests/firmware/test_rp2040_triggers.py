@@ -8,7 +8,7 @@ import pytest
 
 from daq.drivers.pulse_protocol import ABORT_BYTE, HEARTBEAT_MS, Command, ErrorNumber, Fault, Source, State
 from daq.simulation.pico.rp2040_emulator import CYCLE_NS, CYCLES_PER_MS, START_CYCLES
-from tests.firmware.rp2040_board import PAPER, PERIOD_MS, Board, Channel
+from tests.support.rp2040_board import PAPER, PERIOD_MS, Board, Channel
 
 FIRST_SHOT_MS = 20
 EDGES_OF_A_SHOT = 6

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from daq.drivers.pulse_protocol import COUNTERS, FIELDS, Command, ErrorNumber, Reply
-from tests.firmware.rp2040_board import CAMERA_PULSE_NS, PAPER, PERIOD_MS, Board, Channel, Waveform
+from tests.support.rp2040_board import CAMERA_PULSE_NS, PAPER, PERIOD_MS, Board, Channel, Waveform
 
 TICK_NS = 8
 SERIES_SHOTS = 1000

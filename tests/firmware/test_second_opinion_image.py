@@ -19,7 +19,7 @@ from daq.drivers.pulse_protocol import Command, Reply, Request, decode_reply, en
 from daq.simulation.pico.firmware_build import ImageKind
 from daq.simulation.pico.rp2040_chip import OUTPUT_PINS, PIN_ESTOP, PIN_INTERLOCK, PIN_SET_POINT, PIN_TRIGGER
 from daq.simulation.pico.rp2040_emulator import CYCLE_NS, START_CYCLES
-from tests.firmware.rp2040_board import BOOT_MS, PAPER, PERIOD_MS, Board, Channel, Waveform, image
+from tests.support.rp2040_board import BOOT_MS, PAPER, PERIOD_MS, Board, Channel, Waveform, image
 
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAM = ROOT / "firmware" / "tests" / "rp2040js" / "board.cjs"

@@ -15,7 +15,7 @@ import pytest
 from pioemu import State, emulate
 
 from daq.simulation.pico.rp2040_emulator import CYCLE_NS, START_CYCLES
-from tests.firmware.rp2040_board import PAPER, PERIOD_MS, Board, Channel, Waveform, image
+from tests.support.rp2040_board import PAPER, PERIOD_MS, Board, Channel, Waveform, image
 
 OUTPUTS = ("light", "camera")
 TRIGGER_BIT, OUTPUT_BIT = 0, 1

@@ -9,7 +9,7 @@ from daq.drivers.pulse_protocol import ABORT_BYTE, Command, ErrorNumber, Fault, 
 from daq.simulation.pico.firmware_build import ImageKind
 from daq.simulation.pico.mcp4728 import MA_PER_MV, Mcp4728, Register
 from daq.simulation.pico.rp2040_emulator import CYCLES_PER_MS
-from tests.firmware.rp2040_board import BOOT_MS, PAPER, PERIOD_MS, Board
+from tests.support.rp2040_board import BOOT_MS, PAPER, PERIOD_MS, Board
 
 CURRENTS_MA = (10, 9_870, 20_000, 30_000)
 DARK_MA = (0, 0, 0, 0)

@@ -9,7 +9,7 @@ from daq.simulation.pico.firmware_build import ImageKind
 from daq.simulation.pico.rp2040_chip import TRIGGER
 from daq.simulation.pico.rp2040_emulator import CYCLE_NS, CYCLES_PER_MS
 from daq.simulation.pico.usb_host import CONFIGURATION, DEVICE, PACKET, Setup, UsbHost
-from tests.firmware.rp2040_board import PAPER, PERIOD_MS, Board
+from tests.support.rp2040_board import PAPER, PERIOD_MS, Board
 
 ENUMERATION_MS = 20
 REPLY_LIMIT_MS = 5

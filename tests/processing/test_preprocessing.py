@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from processing.kernels import _native
 from processing.preprocessing import Preprocessing, intensity, sliding_minimum
-from tests.processing import preprocessing_oracle as oracle
+from tests.support import preprocessing_oracle as oracle
 
 ROWS, COLUMNS = 120, 160
 BITS = 12

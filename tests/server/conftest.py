@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.server.serving import Serving, serving
+from tests.support.serving import Serving, serving
 
 
 @pytest.fixture

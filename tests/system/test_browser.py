@@ -16,10 +16,10 @@ from server.lab.jobs import JobKind
 from server.lab.services import Services
 from server.lab.tasks import check_run
 from server.web.app import create_app
-from tests.processing.drifting_views import calibration_of, views
-from tests.server.serving import Serving, serving, tell_nothing
-from tests.server.test_check_command import DRIFT_PX, write_droplet_run
-from tests.system.operator import VIEWS, drive_the_page
+from tests.server.cli.test_check_command import DRIFT_PX, write_droplet_run
+from tests.support.drifting_views import calibration_of, views
+from tests.support.operator import VIEWS, drive_the_page
+from tests.support.serving import Serving, serving, tell_nothing
 
 PICTURES = os.environ.get("TOMOSHADOW_PICTURES")
 DRIFTED = "drifted"

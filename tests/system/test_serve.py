@@ -15,7 +15,7 @@ import httpx
 import pytest
 from playwright.sync_api import Page
 
-from tests.system.operator import VIEWS, drive_the_page
+from tests.support.operator import VIEWS, drive_the_page
 
 pytestmark = pytest.mark.network
 

@@ -1,0 +1,470 @@
+"""Runs on a bench in memory: how they end, what is on the disk then, and when the light goes off."""
+
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from daq.devices import GeneratorState, GeneratorStatus, Rig
+from daq.errors import BusyError, DaqError, DeviceError, DeviceOvertaken, DeviceRefused, InterlockOpen, PlanError
+from daq.files.run_directory import ImageKey, PulsePair, RunKind, RunPlan, RunReader, RunWriter
+from daq.run.acquisition import Acquisition
+from daq.run.events import RunEvent, RunMessage, ShotRecorded, StateChanged
+from daq.run.limits import AcquisitionLimits
+from daq.run.state import RunOutcome, RunState
+from daq.timing import CameraTiming
+from tests.support.memory_bench import DARK_COUNTS, LIT_COUNTS, MemoryBench
+
+LIMITS = AcquisitionLimits(frame_s=0.1, light_off_s=0.2, disarm_s=0.3, drain_s=10, heartbeat_s=0.05)
+DEADLINE_S = 20.0
+
+
+class Laboratory:
+    """A bench, its acquisition, and everything that was published."""
+
+    def __init__(self, data_dir: Path) -> None:
+        self.bench = MemoryBench()
+        self.data_dir = data_dir
+        self.events: list[RunEvent] = []
+        self.acquisition = Acquisition(
+            self.bench.rig, data_dir, self._publish, {"name": "bench"}, lambda name: f"sha of {name}", LIMITS
+        )
+        self._recorded = threading.Condition()
+
+    def _publish(self, event: RunEvent) -> None:
+        with self._recorded:
+            self.events.append(event)
+            self._recorded.notify_all()
+
+    def run(self, plan: RunPlan) -> RunReader:
+        run_id = self.acquisition.start(plan)
+        assert not self.acquisition.wait(DEADLINE_S).active
+        return RunReader(self.data_dir / run_id)
+
+    def start_and_await_shot(self, plan: RunPlan, index: int) -> RunReader:
+        run_id = self.acquisition.start(plan)
+        with self._recorded:
+            assert self._recorded.wait_for(
+                lambda: any(isinstance(event, ShotRecorded) and event.index == index for event in self.events),
+                DEADLINE_S,
+            )
+        return RunReader(self.data_dir / run_id)
+
+    def await_in_journal(self, entry: str) -> None:
+        deadline = time.monotonic() + DEADLINE_S
+        tick = threading.Event()
+        while entry not in self.bench.journal:
+            assert time.monotonic() < deadline, entry
+            tick.wait(0.002)
+
+    def messages(self) -> str:
+        return "\n".join(event.text for event in self.events if isinstance(event, RunMessage))
+
+
+@pytest.fixture
+def lab(tmp_path: Path) -> Iterator[Laboratory]:
+    laboratory = Laboratory(tmp_path / "runs")
+    with laboratory.acquisition:
+        yield laboratory
+    assert laboratory.bench.generator.state is not GeneratorState.ARMED
+
+
+def plan_of(shots: int = 4, rate_hz: float = 100, **changes: Any) -> RunPlan:
+    fields: dict[str, Any] = {
+        "name": "hollow cone",
+        "shots": shots,
+        "rate_hz": rate_hz,
+        "pulse": PulsePair(current_a={"view1": 20.0, "view2": 12.0}),
+        **changes,
+    }
+    return RunPlan.model_validate(fields)
+
+
+SLOW: dict[str, Any] = {"shots": 50, "rate_hz": 0.2}
+
+
+def test_a_run_is_on_the_disk_with_all_that_explains_it(lab: Laboratory) -> None:
+    reader = lab.run(plan_of(calibration="c7"))
+    status = lab.acquisition.status()
+    assert (status.state, status.outcome) == (RunState.IDLE, RunOutcome.COMPLETED)
+    assert (status.shots_planned, status.shots_recorded, status.shots_valid) == (4, 4, 4)
+    assert (reader.outcome, reader.cause, reader.shot_count) == ("completed", "", 4)
+    assert reader.image_keys().tolist() == [0, 0, 0, 0]
+    header = reader.header
+    assert header.plan == plan_of(calibration="c7")
+    assert header.configuration == {"name": "bench"}
+    assert header.calibration_sha256 == "sha of c7"
+    assert set(header.devices) == {"view1", "view2", "generator", "door", "stage"}
+    shot = reader.read_shot(2)
+    assert shot.fired is not None
+    pulses = shot.fired.pulses["view2"]
+    assert pulses[1].start_ns - pulses[0].start_ns == 6400
+    assert (shot.fired.sequence, pulses[0].current_a, shot.stage_z_mm) == (3, 12.0, None)
+    assert np.median(shot.views["view2"].frame_a) == (DARK_COUNTS + LIT_COUNTS) << 4
+    assert abs(shot.host_time_ns - time.time_ns()) < 60e9
+
+
+def test_events_tell_the_run_in_order(lab: Laboratory) -> None:
+    lab.run(plan_of(2))
+    told = [event.state.value if isinstance(event, StateChanged) else event for event in lab.events]
+    states = [entry for entry in told if isinstance(entry, str)]
+    assert states == ["arming", "acquiring", "disarming", "idle"]
+    assert [event.index for event in lab.events if isinstance(event, ShotRecorded)] == [0, 1]
+    last = lab.events[-1]
+    assert isinstance(last, StateChanged)
+    assert (last.outcome, last.message) == (RunOutcome.COMPLETED, "2 of 2 shots recorded, 2 valid")
+
+
+def test_runs_follow_each_other_and_never_share_a_directory(lab: Laboratory) -> None:
+    readers = [lab.run(plan_of(1)) for _ in range(3)]
+    assert [reader.outcome for reader in readers] == ["completed"] * 3
+    names = [reader.run_dir.name for reader in readers]
+    assert len(set(names)) == 3
+    assert names == sorted(names)
+    assert all(name.split("-", 1)[1].startswith("hollow_cone") for name in names)
+
+
+def test_no_shot_comes_before_its_time(lab: Laboratory) -> None:
+    """Cameras ignore an early trigger, the generator refuses it: a late shot is never caught up with."""
+    reader = lab.run(plan_of(6, rate_hz=25))
+    times_s = np.array([reader.read_shot(index).host_time_ns for index in range(6)]) / 1e9
+    assert np.all(np.diff(times_s) > 1 / 25 - 0.001)
+    assert times_s[-1] - times_s[0] < 3
+
+
+def test_the_light_goes_off_before_the_cameras(lab: Laboratory) -> None:
+    lab.run(plan_of(1))
+    journal = lab.bench.journal
+    assert journal[:4] == ["scene sample", "view1 arm", "view2 arm", "arm 4"]
+    assert journal.index("off") < journal.index("view1 disarm")
+
+
+def test_dark_and_background_runs_make_a_sample_run_complete(lab: Laboratory) -> None:
+    dark = lab.run(plan_of(3, kind=RunKind.DARK))
+    background = lab.run(plan_of(2, kind=RunKind.BACKGROUND))
+    assert dark.image_keys().tolist() == [ImageKey.DARK] * 3
+    assert background.image_keys().tolist() == [ImageKey.BACKGROUND] * 2
+    shot = dark.read_shot(0)
+    assert shot.fired is not None
+    assert all(pulse.current_a == 0 for pulses in shot.fired.pulses.values() for pulse in pulses)
+    sample = lab.run(plan_of(1, references=(dark.run_dir.name, background.run_dir.name)))
+    for reader, stored in ((dark, sample.dark), (background, sample.background)):
+        for view in ("view1", "view2"):
+            shots = [reader.read_shot(index).views[view] for index in range(reader.shot_count)]
+            frames = [(shot.frame_a, np.asarray(shot.frame_b)) for shot in shots]
+            expected = np.mean(np.array(frames, np.float64), axis=0)
+            found = stored(view)
+            assert found is not None
+            np.testing.assert_allclose(found, expected, rtol=1e-6)
+    assert sample.image_keys().tolist() == [ImageKey.SAMPLE]
+
+
+def test_a_lost_frame_is_fired_again(lab: Laboratory) -> None:
+    lab.bench.cameras["view2"].lost = {2, 3}
+    reader = lab.run(plan_of(4, refire_quota=2))
+    assert reader.image_keys().tolist() == [0, 0, 0, 0]
+    fired = [reader.read_shot(index).fired for index in range(4)]
+    assert [train.sequence for train in fired if train] == [1, 4, 5, 6]
+    assert "shot 1: no exposure B of view2" in lab.messages()
+
+
+def test_beyond_the_quota_a_lost_frame_keeps_its_slot(lab: Laboratory) -> None:
+    lab.bench.cameras["view2"].lost = {2, 3, 5}
+    reader = lab.run(plan_of(5, refire_quota=1))
+    assert reader.image_keys().tolist() == [0, ImageKey.INVALID, 0, ImageKey.INVALID, 0]
+    shot = reader.read_shot(1)
+    assert shot.index == 1
+    lost = shot.views["view2"]
+    assert (lost.record_a.valid, lost.record_b.valid, shot.views["view1"].valid) == (True, False, True)
+    assert lost.frame_b is not None
+    assert not lost.frame_b.any()
+    status = lab.acquisition.status()
+    assert (status.outcome, status.shots_recorded, status.shots_valid) == (RunOutcome.COMPLETED, 5, 3)
+
+
+def test_a_lost_pulse_is_flagged_and_not_taken_for_a_lost_frame(lab: Laboratory) -> None:
+    lab.bench.generator.unlit = {2}
+    reader = lab.run(plan_of(3))
+    assert reader.image_keys().tolist() == [0, ImageKey.INVALID, 0]
+    assert lab.bench.generator.fired == 3
+    assert "shot 1: no light in B of view1, no light in B of view2" in lab.messages()
+
+
+def test_a_view_without_current_may_be_dark(lab: Laboratory) -> None:
+    reader = lab.run(plan_of(2, pulse=PulsePair(current_a={"view1": 20.0, "view2": 0.0})))
+    assert reader.image_keys().tolist() == [0, 0]
+
+
+def test_a_target_is_taken_at_each_position_and_light_waits_for_the_stage(lab: Laboratory) -> None:
+    reader = lab.run(plan_of(2, kind=RunKind.CALIBRATION, stage_z_mm=(-3.0, 0.0, 3.0)))
+    shots = [reader.read_shot(index) for index in range(6)]
+    assert [shot.stage_z_mm for shot in shots] == [-2.999, -2.999, 0.001, 0.001, 3.001, 3.001]
+    acted = [entry for entry in lab.bench.journal if entry.startswith(("move", "arm"))]
+    assert acted == ["move -3", "arm 5", "move 0", "arm 5", "move 3", "arm 5"]
+
+
+def assert_failed(lab: Laboratory, reader: RunReader, cause: str, readable: int) -> None:
+    status = lab.acquisition.wait(DEADLINE_S)
+    assert (status.state, status.outcome) == (RunState.IDLE, RunOutcome.FAILED)
+    assert cause in status.message
+    assert (reader.outcome, reader.cause) == ("failed", status.message)
+    assert reader.shot_count == readable
+    assert all(reader.read_shot(index).valid for index in range(readable))
+    journal = lab.bench.journal
+    assert journal.index("off") < journal.index("view1 disarm")
+
+
+def test_a_dead_camera_fails_the_run_and_keeps_its_shots(lab: Laboratory) -> None:
+    lab.bench.cameras["view2"].broken_at = 3
+    assert_failed(lab, lab.run(plan_of(9)), "view2: control lost", 2)
+    assert lab.bench.generator.fired == 3
+
+
+def test_a_failed_fire_is_no_lost_frame(lab: Laboratory) -> None:
+    lab.bench.generator.silent_at = 2
+    assert_failed(lab, lab.run(plan_of(9)), "generator: no answer to 'fire' within 0.5 s", 1)
+    assert lab.bench.generator.fired == 2
+
+
+def test_a_generator_that_loads_something_else_never_fires(lab: Laboratory) -> None:
+    lab.bench.generator.wrong_echo_ns = 100
+    assert_failed(lab, lab.run(plan_of()), "start of pulse 1 of view1 is 6500 ns instead of 6400 ns", 0)
+    assert lab.bench.generator.fired == 0
+
+
+def test_a_generator_fault_ends_the_wait_for_the_next_shot(lab: Laboratory) -> None:
+    reader = lab.start_and_await_shot(plan_of(**SLOW), 0)
+    lab.bench.generator.trip("heartbeat")
+    assert_failed(lab, reader, "generator: fault: heartbeat", 1)
+    with pytest.raises(DeviceRefused, match="heartbeat; acknowledge it first"):
+        lab.acquisition.start(plan_of())
+    lab.acquisition.acknowledge()
+    assert lab.run(plan_of(1)).outcome == "completed"
+
+
+def test_a_shot_that_cannot_be_stored_fails_the_run(lab: Laboratory) -> None:
+    reader = lab.start_and_await_shot(plan_of(1000, rate_hz=30), 0)
+    for index in range(20, 40):
+        path = reader.run_dir / "shots" / f"{index}.h5"
+        if not path.exists():
+            path.mkdir()
+    status = lab.acquisition.wait(DEADLINE_S)
+    assert status.outcome is RunOutcome.FAILED
+    assert "exists already" in status.message
+    assert reader.outcome == "failed"
+
+
+def test_an_open_door_darkens_at_once_and_names_the_reason(lab: Laboratory) -> None:
+    reader = lab.start_and_await_shot(plan_of(**SLOW), 0)
+    lab.bench.interlock.open_door()
+    assert_failed(lab, reader, "door: the interlock is open", 1)
+
+
+@pytest.fixture
+def frozen(lab: Laboratory) -> Iterator[threading.Event]:
+    """A camera that hangs in collect and in disarm until the end of the test."""
+    thaw = threading.Event()
+    lab.bench.cameras["view1"].timing = CameraTiming(1000, 20_000, 2000, 3_000_000_000, 0)
+    lab.bench.cameras["view1"].frozen = thaw
+    yield thaw
+    thaw.set()
+
+
+@pytest.mark.parametrize("reason", ["abort", "door"])
+def test_light_off_never_waits_for_a_frozen_camera(lab: Laboratory, frozen: threading.Event, reason: str) -> None:
+    run_id = lab.acquisition.start(plan_of(rate_hz=0.1))
+    lab.await_in_journal("fire 1")
+    began = time.monotonic()
+    if reason == "abort":
+        lab.acquisition.abort()
+    else:
+        lab.bench.interlock.open_door()
+    lab.await_in_journal("off")
+    assert time.monotonic() - began < 0.5
+    assert lab.bench.generator.state is GeneratorState.SAFE
+    assert lab.acquisition.status().active
+    frozen.set()
+    status = lab.acquisition.wait(DEADLINE_S)
+    assert status.outcome is (RunOutcome.ABORTED if reason == "abort" else RunOutcome.FAILED)
+    assert RunReader(lab.data_dir / run_id).outcome == status.outcome
+
+
+def test_a_frozen_camera_is_left_alone_after_its_deadline(lab: Laboratory) -> None:
+    reader = lab.start_and_await_shot(plan_of(**SLOW), 0)
+    thaw = lab.bench.cameras["view2"].frozen = threading.Event()
+    lab.acquisition.stop()
+    status = lab.acquisition.wait(2.0)
+    thaw.set()
+    assert status.outcome is RunOutcome.STOPPED
+    assert "view2: not disarmed within 0.3 s" in lab.messages()
+    assert reader.outcome == "stopped"
+
+
+def test_a_stop_ends_the_wait_and_completes_the_shot(lab: Laboratory) -> None:
+    reader = lab.start_and_await_shot(plan_of(**SLOW), 0)
+    lab.acquisition.stop()
+    status = lab.acquisition.wait(2.0)
+    assert (status.state, status.outcome, status.shots_recorded) == (RunState.IDLE, RunOutcome.STOPPED, 1)
+    assert (reader.outcome, reader.cause) == ("stopped", "stopped by the operator")
+
+
+def test_an_abort_between_shots_is_an_abort_and_no_failure(lab: Laboratory) -> None:
+    reader = lab.start_and_await_shot(plan_of(1000, rate_hz=30), 2)
+    lab.acquisition.abort()
+    status = lab.acquisition.wait(DEADLINE_S)
+    assert (status.state, status.outcome) == (RunState.IDLE, RunOutcome.ABORTED)
+    assert reader.outcome == "aborted"
+    assert reader.shot_count == status.shots_recorded >= 3
+
+
+def test_light_that_does_not_go_off_is_a_fault_until_acknowledged(lab: Laboratory) -> None:
+    lab.bench.generator.stuck = True
+    reader = lab.run(plan_of(1))
+    status = lab.acquisition.status()
+    assert (status.state, status.outcome) == (RunState.FAULT, RunOutcome.FAILED)
+    assert status.message == "light not confirmed off: generator: still armed after off"
+    assert reader.cause == status.message
+    with pytest.raises(BusyError, match="acquisition is fault"):
+        lab.acquisition.start(plan_of())
+    with pytest.raises(DeviceError, match="still armed"):
+        lab.acquisition.acknowledge()
+    assert lab.acquisition.status().state is RunState.FAULT
+    lab.bench.generator.stuck = False
+    lab.acquisition.acknowledge()
+    assert lab.run(plan_of(1)).outcome == "completed"
+
+
+def test_only_one_run_at_a_time(lab: Laboratory) -> None:
+    lab.start_and_await_shot(plan_of(**SLOW), 0)
+    with pytest.raises(BusyError, match="start is not possible: acquisition is acquiring"):
+        lab.acquisition.start(plan_of())
+    with pytest.raises(BusyError, match="acknowledge is not possible"):
+        lab.acquisition.acknowledge()
+    lab.acquisition.abort()
+    assert lab.acquisition.wait(DEADLINE_S).outcome is RunOutcome.ABORTED
+
+
+REFUSALS: dict[str, tuple[dict[str, Any], type[DaqError], str]] = {
+    "views": ({"pulse": PulsePair(current_a={"view1": 1.0})}, PlanError, "pulse.current_a names views"),
+    "rate": ({"pulse": PulsePair(current_a={"view1": 1.0, "view2": 1.0}, separation_ns=2000)}, PlanError, "2000 ns"),
+    "current": (
+        {"pulse": PulsePair(current_a={"view1": 30.0, "view2": 26.5})},
+        PlanError,
+        "pulse.current_a: 26.5 A is above 26 A, the limit of the LED of view2",
+    ),
+    "position": ({"stage_z_mm": (0.0, 11.0)}, PlanError, "11 mm is outside of -10 to 10 mm"),
+    "reference": ({"references": ("../secret",)}, PlanError, r"no run '\.\./secret'"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSALS)
+def test_an_impossible_plan_is_refused_with_its_reason(lab: Laboratory, case: str) -> None:
+    changes, error, reason = REFUSALS[case]
+    with pytest.raises(error, match=reason):
+        lab.acquisition.start(plan_of(**changes))
+    assert lab.acquisition.status().state is RunState.IDLE
+    assert not lab.bench.journal
+    assert lab.run(plan_of(1)).outcome == "completed"
+
+
+def test_a_run_that_the_disk_does_not_hold_is_refused_with_both_numbers(lab: Laboratory) -> None:
+    lab.bench.cameras["view1"].image_shape = (60_000, 60_000)
+    with pytest.raises(
+        PlanError, match=r"100000 shots of \d+ bytes need \d+ bytes on the disk of .*, \d+ bytes are free"
+    ):
+        lab.acquisition.start(plan_of(100_000))
+
+
+def test_a_calibration_that_does_not_exist_refuses_the_plan(lab: Laboratory) -> None:
+    acquisition = Acquisition(
+        lab.bench.rig, lab.data_dir, hash_calibration=lambda name: (lab.data_dir / name).read_text()
+    )
+    with pytest.raises(PlanError, match=r"No such file.*c9"):
+        acquisition.start(plan_of(calibration="c9"))
+    assert not acquisition.status().active
+
+
+def test_a_rig_without_a_stage_refuses_positions(lab: Laboratory) -> None:
+    rig = lab.bench.rig
+    acquisition = Acquisition(Rig(rig.cameras, rig.generator, rig.interlock), lab.data_dir)
+    with pytest.raises(PlanError, match="no translation stage"):
+        acquisition.start(plan_of(stage_z_mm=(0.0,)))
+
+
+def test_only_dark_and_background_runs_of_this_rig_are_references(lab: Laboratory) -> None:
+    sample = lab.run(plan_of(1))
+    with pytest.raises(PlanError, match="is sample, not dark or background"):
+        lab.acquisition.start(plan_of(references=(sample.run_dir.name,)))
+    lab.bench.generator.unlit = {2}
+    unlit = lab.run(plan_of(1, kind=RunKind.BACKGROUND))
+    with pytest.raises(PlanError, match="has no valid shot"):
+        lab.acquisition.start(plan_of(references=(unlit.run_dir.name,)))
+    dark = lab.run(plan_of(1, kind=RunKind.DARK))
+    lab.bench.cameras["view1"].image_shape = (8, 8)
+    with pytest.raises(PlanError, match="has views"):
+        lab.acquisition.start(plan_of(references=(dark.run_dir.name,)))
+
+
+@pytest.mark.parametrize("which", ["door", "generator"])
+def test_no_light_while_an_interlock_is_open(lab: Laboratory, which: str) -> None:
+    if which == "door":
+        lab.bench.interlock.open_door()
+    lab.bench.generator.interlock_closed = which != "generator"
+    with pytest.raises(InterlockOpen, match=f"^{which}"):
+        lab.acquisition.start(plan_of())
+    assert not lab.bench.journal
+
+
+def test_the_guard_asks_again_when_the_light_goes_off_under_its_question(
+    lab: Laboratory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    generator, overtaken = lab.bench.generator, threading.Event()
+    status = generator.status
+
+    def overtaken_once() -> GeneratorStatus:
+        if threading.current_thread().name == "run-guard" and not overtaken.is_set():
+            overtaken.set()
+            raise DeviceOvertaken(generator.name, "STATUS was overtaken by off")
+        return status()
+
+    monkeypatch.setattr(generator, "status", overtaken_once)
+    with lab.run(plan_of(2)) as run:
+        assert run.outcome == RunOutcome.COMPLETED
+    assert overtaken.is_set()
+
+
+def test_a_bug_in_the_scene_is_a_failed_run_and_not_a_dead_thread(lab: Laboratory) -> None:
+    def break_down(kind: RunKind) -> None:
+        raise ZeroDivisionError("no nozzle")
+
+    bench = lab.bench
+    rig = Rig(bench.cameras, bench.generator, bench.interlock, prepare_scene=break_down)
+    acquisition = Acquisition(rig, lab.data_dir, limits=LIMITS)
+    acquisition.start(plan_of())
+    status = acquisition.wait(DEADLINE_S)
+    assert (status.state, status.outcome) == (RunState.IDLE, RunOutcome.FAILED)
+    assert "ZeroDivisionError('no nozzle')" in status.message
+    assert "off" in bench.journal
+
+
+def test_runs_without_an_outcome_are_reported_as_interrupted(lab: Laboratory, tmp_path: Path) -> None:
+    done = lab.run(plan_of(1))
+    header = done.header.model_copy(update={"run_id": "20260101T000000-killed"})
+    with RunWriter(lab.data_dir / header.run_id, header):
+        pass
+    events: list[RunEvent] = []
+    with Acquisition(lab.bench.rig, lab.data_dir, events.append) as restarted:
+        assert restarted.interrupted_runs() == ("20260101T000000-killed",)
+    assert events == [RunMessage("20260101T000000-killed", "interrupted: its process ended before the run did")]
+
+
+def test_leaving_ends_the_run_in_the_dark(tmp_path: Path) -> None:
+    lab = Laboratory(tmp_path)
+    with lab.acquisition:
+        reader = lab.start_and_await_shot(plan_of(**SLOW), 0)
+    assert reader.outcome == "aborted"
+    assert lab.bench.generator.state is GeneratorState.SAFE

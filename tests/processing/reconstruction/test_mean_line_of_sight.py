@@ -1,0 +1,53 @@
+"""The mean of exposures: that of their volumes."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from processing.kernels import _native
+from processing.reconstruction import mean_line_of_sight as module
+from processing.reconstruction.line_of_sight import line_of_sight
+from processing.reconstruction.mean_line_of_sight import mean_line_of_sight
+from processing.reconstruction.method import ReconstructionMethod
+from processing.reconstruction.planning.node_view import sample_mapping
+from processing.reconstruction.planning.plan import Plan, plan_reconstruction
+from processing.volume import VoxelGrid
+from tests.support import oracle
+
+GRID = VoxelGrid.centred((11, 21, 75), 1 / 60)
+
+
+def exposures(count: int) -> list[list[NDArray[np.float32]]]:
+    rng = np.random.default_rng(2)
+    sizes = [mapping.image_size_px[::-1] for mapping in oracle.cameras(3)]
+    return [[(rng.random(size) * (rng.random(size) > 0.9)).astype(np.float32) for size in sizes] for _ in range(count)]
+
+
+@pytest.mark.parametrize("isa", _native.available_isas())
+@pytest.mark.parametrize("by_nodes", [False, True])
+@pytest.mark.parametrize("method", list(ReconstructionMethod)[:3])
+def test_it_is_the_mean_of_the_volumes(
+    monkeypatch: pytest.MonkeyPatch, isa: str, by_nodes: bool, method: ReconstructionMethod
+) -> None:
+    monkeypatch.setenv("TOMOSHADOW_ISA", isa)
+    mappings, shots = oracle.cameras(3), exposures(17)
+    plan = plan_reconstruction(mappings, GRID)
+    if by_nodes:
+        plan = Plan(GRID, tuple(sample_mapping(mapping, GRID, 0.02) for mapping in mappings))
+    monkeypatch.setattr(module, "BATCH_BYTES", 6 * plan.resampled_bytes)
+    expected = np.mean([line_of_sight(plan, images, method) for images in shots], axis=0, dtype=np.float64)
+    out = np.full(GRID.shape, 9, np.float32)
+    assert mean_line_of_sight(plan, iter(shots), method, out) is out
+    np.testing.assert_allclose(out, expected, rtol=1e-5, atol=1e-7)
+
+
+def test_what_has_no_mean_is_refused() -> None:
+    plan = plan_reconstruction(oracle.cameras(3), GRID)
+    with pytest.raises(ValueError, match="a mean needs one exposure or more"):
+        mean_line_of_sight(plan, [])
+    other = plan_reconstruction(oracle.cameras(3), GRID)
+    views = [each.bind(each.resample(exposures(1)[0])) for each in (plan, other)]
+    with pytest.raises(ValueError, match="exposures must be of the same views"):
+        _native.sum_of_sight(views, 2, np.zeros(GRID.shape, np.float32), 1)
+    with pytest.raises(ValueError, match="smart is not a line-of-sight method"):
+        mean_line_of_sight(plan, exposures(1), ReconstructionMethod.SMART)

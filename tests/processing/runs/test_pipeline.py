@@ -1,0 +1,214 @@
+"""From a recorded shot to its volumes: each droplet peaks where it was, or one clear error says why not."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from daq.files.run_directory import RunReader
+from daq.files.run_file import add_references
+from processing.calibration.calibration import Verdict
+from processing.calibration.calibration_file import load_calibration
+from processing.calibration.errors import CalibrationError
+from processing.reconstruction.method import ReconstructionMethod
+from processing.reconstruction.planning.planned_view import PlannedView
+from processing.reconstruction.settings import GridSettings, ReconstructionSettings
+from processing.reconstruction.volume_file import VolumeFileError, open_volume, read_volume
+from processing.reconstruction.voxel_type import VoxelType
+from processing.runs.pipeline import (
+    PipelineError,
+    ShotResult,
+    Stopped,
+    default_grid,
+    reconstruct_shot,
+    shot_intensities,
+)
+from processing.runs.results_file import average_volumes, volume_files, volume_path
+from processing.volume import VoxelGrid
+from tests.support.droplet_run import DROPLETS_A_MM, MOTION_MM, SHAPE, write_calibration, write_run
+
+GRID = VoxelGrid.centred((61, 81, 81), 0.05)
+SETTINGS = ReconstructionSettings(grid=GridSettings.of(GRID), minimum_window_px=0)
+
+
+@pytest.fixture
+def run_dir(tmp_path: Path) -> Path:
+    return write_run(tmp_path / "run", shots=2, invalid=(1,))
+
+
+@pytest.fixture
+def calibration_file(tmp_path: Path) -> Path:
+    return write_calibration(tmp_path / "calibration.json")
+
+
+def reconstructed(run_dir: Path, calibration_file: Path, settings: ReconstructionSettings = SETTINGS) -> ShotResult:
+    return reconstruct_shot(run_dir, 0, calibration_file, settings, run_dir / "results")
+
+
+@pytest.mark.parametrize("voxels", list(VoxelType))
+@pytest.mark.parametrize("method", list(ReconstructionMethod))
+def test_droplets_peak_where_they_were(
+    run_dir: Path, calibration_file: Path, method: ReconstructionMethod, voxels: VoxelType
+) -> None:
+    settings = SETTINGS.model_copy(update={"method": method, "iterations": 3, "voxels": voxels})
+    reconstructed(run_dir, calibration_file, settings)
+    for frame, moved_mm in (("a", 0 * MOTION_MM), ("b", MOTION_MM)):
+        volume, grid, _ = read_volume(run_dir / "results" / f"shot_00000_{frame}.vtkhdf")
+        for expected in np.rint(grid.to_index(DROPLETS_A_MM + moved_mm)).astype(int):
+            around = tuple(slice(index - 6, index + 7) for index in expected)
+            peak = np.array(np.unravel_index(volume[around].argmax(), (13, 13, 13))) - 6
+            assert np.abs(peak).max() <= 1, (frame, expected, peak)
+
+
+def test_smart_records_how_it_converged_and_stops_when_told(run_dir: Path, calibration_file: Path) -> None:
+    settings = SETTINGS.model_copy(update={"method": ReconstructionMethod.SMART, "iterations": 30, "least_gain": 0.2})
+    for volume in reconstructed(run_dir, calibration_file, settings).volumes:
+        gains = 1 - np.divide(volume.residuals[1:], volume.residuals[:-1])
+        assert 1 <= len(gains) < 30
+        assert (gains[:-1] >= 0.2).all()
+        assert gains[-1] < 0.2
+        _, _, provenance = read_volume(run_dir / "results" / volume.file)
+        assert json.loads(str(provenance["residuals"])) == list(volume.residuals)
+
+
+def test_result_and_volumes_name_their_origin(run_dir: Path, calibration_file: Path) -> None:
+    result = reconstructed(run_dir, calibration_file)
+    assert [(volume.shot, volume.frame, volume.file) for volume in result.volumes] == [
+        (0, "a", "shot_00000_a.vtkhdf"),
+        (0, "b", "shot_00000_b.vtkhdf"),
+    ]
+    assert result.grid.to_grid() == GRID
+    _, _, provenance = read_volume(volume_path(run_dir / "results", 0, "b"))
+    assert provenance["run"] == "run"
+    assert provenance["calibration"] == load_calibration(calibration_file).id
+    assert ReconstructionSettings.model_validate_json(str(provenance["settings"])) == SETTINGS
+    assert (provenance["shot"], provenance["frame"]) == (0, "b")
+    views = {name: PlannedView.model_validate(view) for name, view in json.loads(str(provenance["views"])).items()}
+    assert views == dict(result.views)
+    assert list(views) == ["view1", "view2", "view3"]
+    assert {(view.mapping, view.reason) for view in views.values()} == {("rectified", None)}
+    assert all(0 <= view.deviation_px < 0.02 for view in views.values())
+
+
+def test_references_that_are_written_later_count(run_dir: Path) -> None:
+    with RunReader(run_dir) as run:
+        shot, views = run.read_shot(0), run.header.views
+        without = shot_intensities(run, shot, "a", SETTINGS)
+        levels = {"dark": 0.0, "background": 400.0}
+        images = {name: dict.fromkeys(views, np.full((2, *SHAPE), level, np.float32)) for name, level in levels.items()}
+        add_references(run_dir, run.header, {"dark": images["dark"], "background": images["background"]})
+        half_lit = shot_intensities(run, shot, "a", SETTINGS)
+    for before, after in zip(without, half_lit, strict=True):
+        assert np.median(before) == pytest.approx(0, abs=1e-6)
+        assert np.median(after) == pytest.approx((0.5 - 0.05) / 0.95, abs=1e-6)
+
+
+def test_the_default_grid_is_the_calibrated_range_in_pixels(run_dir: Path, calibration_file: Path) -> None:
+    result = reconstructed(run_dir, calibration_file, ReconstructionSettings(minimum_window_px=0))
+    grid = result.grid.to_grid()
+    assert grid.pitch_mm == pytest.approx(1 / 20, rel=0.05)
+    assert grid.z_mm[[0, -1]] == pytest.approx([-1.5, 1.5], abs=0.05)
+    assert np.ptp(grid.x_mm) > 4
+
+
+def test_a_shot_with_missing_exposures_is_refused(run_dir: Path, calibration_file: Path) -> None:
+    with pytest.raises(PipelineError, match="run, shot 1: exposures are missing"):
+        reconstruct_shot(run_dir, 1, calibration_file, SETTINGS, run_dir / "results")
+    assert not (run_dir / "results").exists()
+
+
+def test_a_refused_calibration_makes_no_volumes(run_dir: Path, tmp_path: Path) -> None:
+    bad = write_calibration(tmp_path / "bad.json", Verdict.REFUSE, holdout_px=1.7)
+    with pytest.raises(CalibrationError, match=r"view1: hold-out error 1\.7 px is refused"):
+        reconstructed(run_dir, bad)
+
+
+def test_results_of_other_settings_are_not_mixed(run_dir: Path, calibration_file: Path) -> None:
+    reconstructed(run_dir, calibration_file)
+    with pytest.raises(VolumeFileError, match="results of another run, calibration or settings"):
+        reconstructed(run_dir, calibration_file, SETTINGS.model_copy(update={"noise_floor": 0.2}))
+
+
+def test_a_stop_is_honoured_between_exposures(run_dir: Path, calibration_file: Path) -> None:
+    answers = iter([False, True])
+    with pytest.raises(Stopped, match="before exposure b"):
+        reconstruct_shot(run_dir, 0, calibration_file, SETTINGS, run_dir / "results", lambda: next(answers))
+    assert [file.name for file in volume_files(run_dir / "results")] == ["shot_00000_a.vtkhdf"]
+
+
+def test_results_id_tells_settings_and_calibrations_apart() -> None:
+    other = SETTINGS.model_copy(update={"noise_floor": 0.2})
+    assert len({SETTINGS.results_id("monday"), SETTINGS.results_id("tuesday"), other.results_id("monday")}) == 3
+    assert SETTINGS.results_id("monday") == SETTINGS.model_copy().results_id("monday")
+    assert SETTINGS.results_id("monday").startswith("mlos-")
+
+
+@pytest.mark.parametrize("voxels", list(VoxelType))
+def test_the_average_is_the_mean(run_dir: Path, calibration_file: Path, voxels: VoxelType) -> None:
+    reconstructed(run_dir, calibration_file, SETTINGS.model_copy(update={"voxels": voxels}))
+    files = volume_files(run_dir / "results")
+    mean, grid = average_volumes(files)
+    assert grid == GRID
+    np.testing.assert_allclose(mean, (read_volume(files[0])[0] + read_volume(files[1])[0]) / 2, atol=1e-7)
+
+
+def test_volumes_of_all_types_agree_and_name_theirs(run_dir: Path, calibration_file: Path) -> None:
+    volumes = {}
+    for voxels in VoxelType:
+        settings = SETTINGS.model_copy(update={"voxels": voxels})
+        reconstruct_shot(run_dir, 0, calibration_file, settings, run_dir / voxels)
+        with open_volume(volume_path(run_dir / voxels, 0, "a")) as stored:
+            assert stored.voxels.attrs["voxels"] == voxels
+            assert ReconstructionSettings.model_validate_json(str(stored.provenance["settings"])) == settings
+            volumes[voxels] = stored[:]
+    single = volumes[VoxelType.FLOAT32]
+    assert single.max() > 0.5
+    np.testing.assert_allclose(volumes[VoxelType.FLOAT16], single, rtol=2.0**-11, atol=2.0**-25)
+    np.testing.assert_allclose(volumes[VoxelType.UINT8], single, atol=0.51 / 255)
+
+
+def test_volumes_on_different_grids_have_no_average(run_dir: Path, calibration_file: Path) -> None:
+    reconstructed(run_dir, calibration_file)
+    smaller = SETTINGS.model_copy(update={"grid": GridSettings.of(VoxelGrid.centred((11, 11, 11), 0.05))})
+    reconstruct_shot(run_dir, 0, calibration_file, smaller, run_dir / "smaller")
+    with pytest.raises(VolumeFileError, match="differs from"):
+        average_volumes([volume_path(run_dir / "results", 0, "a"), volume_path(run_dir / "smaller", 0, "a")])
+    with pytest.raises(VolumeFileError, match="no volumes"):
+        average_volumes([])
+
+
+@pytest.mark.parametrize(
+    ("change", "complaint"),
+    [
+        ({"method": ReconstructionMethod.MINLOS}, "method minlos instead of mlos of shot_00000_a.vtkhdf"),
+        (
+            {"noise_floor": 0.1, "minimum_window_px": 9},
+            "minimum_window_px 9 instead of 0, noise_floor 0.1 instead of 0.05",
+        ),
+    ],
+)
+def test_volumes_of_different_settings_have_no_average(
+    run_dir: Path, calibration_file: Path, change: dict[str, object], complaint: str
+) -> None:
+    reconstructed(run_dir, calibration_file)
+    reconstruct_shot(run_dir, 0, calibration_file, SETTINGS.model_copy(update=change), run_dir / "others")
+    other = volume_path(run_dir / "others", 0, "b").replace(volume_path(run_dir / "results", 1, "b"))
+    with pytest.raises(VolumeFileError, match=f"{other}: {complaint}"):
+        average_volumes(volume_files(run_dir / "results"))
+
+
+def test_volumes_of_different_calibrations_have_no_average(run_dir: Path, tmp_path: Path) -> None:
+    calibrations = [write_calibration(tmp_path / f"{px}.json", holdout_px=px) for px in (0.02, 0.03)]
+    for file, folder in zip(calibrations, ("results", "others"), strict=True):
+        reconstruct_shot(run_dir, 0, file, SETTINGS, run_dir / folder)
+    ids = [load_calibration(file).id for file in calibrations]
+    files = [volume_path(run_dir / folder, 0, "a") for folder in ("results", "others")]
+    with pytest.raises(
+        VolumeFileError, match=f"others/shot_00000_a.vtkhdf: calibration {ids[1]} instead of {ids[0]} of"
+    ):
+        average_volumes(files)
+
+
+def test_default_grid_takes_a_stated_pitch(calibration_file: Path) -> None:
+    assert default_grid(load_calibration(calibration_file), pitch_mm=0.1).pitch_mm == 0.1

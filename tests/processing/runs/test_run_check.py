@@ -1,0 +1,114 @@
+"""What a shot says of the views: which one has moved, how far, or too far; or that it is not one alone."""
+
+import numpy as np
+import pytest
+
+from processing.calibration.calibration import Verdict
+from processing.calibration.droplets.disparity import ViewDisparity
+from processing.geometry import FloatArray
+from processing.runs.run_check import ShotCheck, check_exposures
+from processing.studies.drifting_views import direction
+from tests.support.drifting_views import calibration_of, droplet_shots, inside_mm, views
+
+CALIBRATION = calibration_of(views())
+MAPPINGS = [view.mapping for view in CALIBRATION.views.values()]
+
+
+def checked(drifts_px: dict[int, tuple[float, float]], count: int = 120) -> ShotCheck:
+    """A shot of droplets that are seen to a twentieth of a pixel; some views have moved."""
+    rng = np.random.default_rng(5)
+    seen: list[FloatArray] = []
+    for view, mapping in enumerate(MAPPINGS):
+        image_px = mapping.project(inside_mm(count)) + drifts_px.get(view, (0.0, 0.0))
+        seen.append(image_px + rng.normal(0, 0.05, image_px.shape))
+    return check_exposures(0, [seen], CALIBRATION)
+
+
+def photographed(density_per_mm3: float, view: int = 0, drift_px: float = 0.0) -> ShotCheck:
+    """Two exposures of a uniform spray as the views see it; one view has moved."""
+    exposures = [list(seen) for seen in droplet_shots(2, density_per_mm3)]
+    for seen in exposures:
+        seen[view] = seen[view] + drift_px * direction(view)
+    return check_exposures(0, exposures, CALIBRATION)
+
+
+@pytest.mark.parametrize("drift_px", [(0.45, 0.0), (0.0, -0.45), (1.5, 1.0)])
+@pytest.mark.parametrize("view", range(4))
+def test_the_view_that_moved_is_named_and_its_disparity_is_its_drift(view: int, drift_px: tuple[float, float]) -> None:
+    check = checked({view: drift_px})
+    assert check.moved == f"view{view + 1}"
+    assert check.views[check.moved].disparity_px == pytest.approx(np.hypot(*drift_px), abs=0.06)
+    assert check.views[check.moved].left_px < 0.03
+
+
+def test_two_that_moved_are_not_blamed_on_one() -> None:
+    check = checked({0: (0.0, 0.7), 2: (0.8, -0.6)})
+    assert check.worst_px > 0.5
+    assert check.moved is None
+
+
+def test_small_disparities_are_blamed_on_nobody() -> None:
+    check = checked({1: (0.2, 0.0)})
+    assert check.worst_px == pytest.approx(0.2, abs=0.05)
+    assert check.moved is None
+
+
+@pytest.mark.parametrize("drift_px", [12.0, 30.0, 100.0])
+@pytest.mark.parametrize("view", range(4))
+def test_a_view_that_moved_out_of_range_stops_without_a_figure(view: int, drift_px: float) -> None:
+    check = photographed(2.0, view, drift_px)
+    assert (check.verdict, check.moved, check.views) == (Verdict.REFUSE, f"view{view + 1}", {})
+    assert check.problem.startswith(f"view{view + 1} has moved further than 3 px, or shows other droplets")
+
+
+@pytest.mark.parametrize("drift_px", [4.5, 5.0, 6.0, 8.0])
+@pytest.mark.parametrize("view", range(4))
+def test_what_is_measured_beyond_the_reach_is_true(view: int, drift_px: float) -> None:
+    check = photographed(2.0, view, drift_px)
+    assert check.verdict is Verdict.REFUSE
+    assert check.moved == f"view{view + 1}"
+    if check.views:
+        assert check.views[check.moved].disparity_px == pytest.approx(drift_px, abs=0.1)
+
+
+@pytest.mark.parametrize("density_per_mm3", [0.7, 7.0, 14.0])
+def test_few_and_many_droplets_tell_of_a_view_out_of_range(density_per_mm3: float) -> None:
+    assert photographed(density_per_mm3, 1, 30.0).moved == "view2"
+
+
+def test_a_view_near_the_end_of_the_range_stops_without_a_figure() -> None:
+    check = photographed(2.0, 1, 5.3)
+    assert (check.verdict, check.views) == (Verdict.REFUSE, {})
+    assert "view2" in check.beyond
+
+
+def test_several_views_out_of_range_stop_too() -> None:
+    check = checked({0: (20.0, 10.0), 1: (-15.0, 25.0)}, count=400)
+    assert (check.verdict, check.moved, check.beyond) == (Verdict.REFUSE, None, tuple(CALIBRATION.views))
+    assert check.problem.endswith("agree within 4 px: a view has moved further than 3 px, or several have")
+
+
+@pytest.mark.parametrize("density_per_mm3", [0.5, 2.0, 7.0, 14.0, 20.0, 28.0, 40.0])
+def test_views_in_place_raise_no_alarm_however_dense_the_spray(density_per_mm3: float) -> None:
+    assert photographed(density_per_mm3).verdict in (Verdict.GOOD, Verdict.USABLE, None)
+
+
+@pytest.mark.parametrize(
+    ("uncertainty_px", "verdict"), [(0.01, Verdict.WARN), (0.075, Verdict.USABLE)], ids=["many", "few droplets"]
+)
+def test_only_what_is_certain_of_a_disparity_is_judged(uncertainty_px: float, verdict: Verdict) -> None:
+    """0.317 ± 0.075 px was measured of views in place, at 18 droplets/mm3."""
+    check = ShotCheck(0, {"view1": ViewDisparity(0.1, 0.02), "view2": ViewDisparity(0.317, uncertainty_px)})
+    assert check.verdict is verdict
+
+
+@pytest.mark.parametrize(("density_per_mm3", "drift_px"), [(0.0, 0.0), (0.05, 0.0), (0.05, 30.0), (60.0, 30.0)])
+def test_too_few_and_too_many_droplets_do_not_tell(density_per_mm3: float, drift_px: float) -> None:
+    check = photographed(density_per_mm3, 2, drift_px)
+    assert (check.verdict, check.moved, check.beyond) == (None, None, ())
+    assert check.problem.endswith("too few droplets, or too many, to tell whether a view has moved")
+
+
+def test_a_view_that_sees_nothing_has_not_moved() -> None:
+    (seen,) = droplet_shots(1, 2.0)
+    assert check_exposures(0, [[*seen[:3], np.empty((0, 2))]], CALIBRATION).verdict is None

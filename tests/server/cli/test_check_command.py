@@ -1,0 +1,159 @@
+"""check and self-calibrate: a camera that moved after calibration is told from the shots, and put right."""
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from daq.files.run_directory import DoubleFrame, ExposureRecord, ImageKey, RunHeader, RunWriter, Shot, ViewFormat
+from processing.calibration.calibration import Verdict
+from processing.calibration.calibration_file import load_calibration, save_calibration
+from processing.calibration.droplets.disparity import ViewDisparity
+from processing.runs.run_check import ShotCheck
+from processing.studies.seen_droplets import droplet_image
+from server.cli.check_command import check_line
+from server.cli.main import main
+from tests.support.drifting_views import DENSITY_PER_MM3, HALF_MM, SIZE_PX, calibration_of, inside_mm, views
+
+SEEN = ExposureRecord(valid=True, frame_id=1, device_timestamp_ns=1)
+DRIFT_PX = 2
+
+
+def write_droplet_run(
+    run_dir: Path, density_per_mm3: float = DENSITY_PER_MM3, view_count: int = 4, covered: str = ""
+) -> Path:
+    """Two shots; the picture of view2 lies two pixels further right than when it was calibrated.
+
+    A covered view is dark.
+    """
+    rng = np.random.default_rng(11)
+    cameras = {f"view{number}": camera for number, camera in enumerate(views()[:view_count], start=1)}
+    shape = (SIZE_PX[1], SIZE_PX[0])
+    header = RunHeader(
+        run_id=run_dir.name,
+        created_utc="2026-01-01T00:00:00+00:00",
+        views={name: ViewFormat(shape, 8) for name in cameras},
+        polarity="bright",
+        separation_ns=6400,
+    )
+    with RunWriter(run_dir, header) as writer:
+        for index in range(2):
+            exposures = []
+            for _ in "ab":
+                points_mm = rng.uniform(-HALF_MM, HALF_MM, (int(density_per_mm3 * np.prod(2 * HALF_MM)), 3))
+                images = {name: droplet_image(camera, points_mm, rng) for name, camera in cameras.items()}
+                images["view2"] = np.roll(images["view2"], DRIFT_PX, axis=1)
+                images = {name: image * (name != covered) for name, image in images.items()}
+                exposures.append({name: np.round(200 * image).astype(np.uint8) for name, image in images.items()})
+            shot_views = {name: DoubleFrame(exposures[0][name], exposures[1][name], SEEN, SEEN) for name in cameras}
+            writer.write_shot(Shot(index, ImageKey.SAMPLE, shot_views))
+        writer.finish("completed")
+    return run_dir
+
+
+@pytest.fixture(scope="module")
+def run_dir(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_droplet_run(tmp_path_factory.mktemp("runs") / "droplets")
+
+
+@pytest.fixture
+def calibration_file(tmp_path: Path) -> Path:
+    save_calibration(calibration_of(views()), tmp_path / "old.json")
+    return tmp_path / "old.json"
+
+
+def told(capsys: pytest.CaptureFixture[str], *arguments: object, status: int = 0) -> dict[str, Any]:
+    """The JSON object of a command."""
+    assert main([*map(str, arguments), "--json"]) == status
+    result: dict[str, Any] = json.loads(capsys.readouterr().out.splitlines()[-1])
+    return result
+
+
+def test_moved_view_stops_and_a_corrected_calibration_is_good_again(
+    run_dir: Path, calibration_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = told(capsys, "check", run_dir, "--calibration", calibration_file, status=1)
+    assert before["passed"] is False
+    assert (before["verdict"], before["alarm_px"], before["stop_px"]) == ("refuse", 0.3, 0.8)
+    assert [shot["shot"] for shot in before["shots"]] == [0, 1]
+    for shot in before["shots"]:
+        assert shot["views"]["view2"] == pytest.approx(DRIFT_PX, abs=0.15)
+        assert 0 < shot["uncertainty_px"]["view2"] < 0.1
+
+    new = tmp_path / "new.json"
+    result = told(capsys, "self-calibrate", run_dir, "--calibration", calibration_file, "-o", new)
+    assert result["moved"] == "view2"
+    assert result["views"]["view2"]["correction_px"] == pytest.approx(DRIFT_PX, abs=0.15)
+    assert result["views"]["view1"]["correction_px"] == 0
+    calibration = load_calibration(new)
+    assert (calibration.parent, calibration.id) == (result["parent"], result["id"])
+    assert result["parent"] == load_calibration(calibration_file).id
+    points_mm = inside_mm()
+    error_px = calibration.views["view2"].mapping.project(points_mm) - views()[1].project(points_mm) - (DRIFT_PX, 0)
+    assert np.linalg.norm(error_px, axis=1).max() < 0.1
+
+    after = told(capsys, "check", run_dir, "--calibration", new, "--shots", "1:2")
+    assert [shot["shot"] for shot in after["shots"]] == [1]
+    assert max(after["shots"][0]["views"].values()) < 0.2
+    assert after["verdict"] in ("good", "usable")
+    assert after["passed"] is True
+
+
+def test_shots_without_droplets_say_so_and_correct_nothing(
+    calibration_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    empty = write_droplet_run(tmp_path / "empty", density_per_mm3=0.05)
+    result = told(capsys, "check", empty, "--calibration", calibration_file)
+    assert result["verdict"] is None
+    assert result["shots"][0]["views"] == {}
+    assert "too few droplets" in result["shots"][0]["problem"]
+    new = tmp_path / "new.json"
+    refused = told(capsys, "self-calibrate", empty, "--calibration", calibration_file, "-o", new, status=2)
+    assert "sub-volumes, 8 are needed" in refused["error"]
+    assert not new.exists()
+
+
+def test_a_view_that_sees_no_droplet_is_named(
+    calibration_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = write_droplet_run(tmp_path / "covered", covered="view3")
+    blind = (
+        r"^view3: no droplet is seen \(droplets in \d exposures: view1 \d+, view2 \d+, view3 0, view4 \d+\); is a lens"
+    )
+    problem = told(capsys, "check", run, "--calibration", calibration_file, "--shots", "0:1")["shots"][0]["problem"]
+    assert re.match(blind, problem)
+    new = tmp_path / "new.json"
+    refused = told(capsys, "self-calibrate", run, "--calibration", calibration_file, "-o", new, status=2)
+    assert re.match(blind, refused["error"])
+
+
+def test_calibration_of_other_views_is_refused(
+    calibration_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    other = write_droplet_run(tmp_path / "other", density_per_mm3=0.05, view_count=3)
+    refused = told(capsys, "check", other, "--calibration", calibration_file, status=2)
+    assert "run other has views ['view1', 'view2', 'view3'], calibration cal-" in refused["error"]
+
+
+def test_a_view_out_of_range_is_told_without_a_figure() -> None:
+    measured = ShotCheck(3, {}, "view2 has moved further than 3 px", ("view2",))
+    assert check_line(measured) == (
+        "shot 3: view2 has moved further than 3 px  STOP: do not reconstruct with this calibration"
+    )
+    told = measured.record()
+    assert (told["verdict"], told["moved"], told["views"]) == ("refuse", "view2", {})
+    assert told["problem"] == "view2 has moved further than 3 px"
+
+
+@pytest.mark.parametrize(
+    ("disparity_px", "verdict", "ending"),
+    [(0.2, Verdict.USABLE, "px"), (0.4, Verdict.WARN, "ALARM"), (0.9, Verdict.REFUSE, "with this calibration")],
+)
+def test_limits_are_told(disparity_px: float, verdict: Verdict, ending: str) -> None:
+    measured = ShotCheck(3, {"view1": ViewDisparity(0.01, 0.01), "view2": ViewDisparity(disparity_px, 0.02)})
+    assert measured.verdict is verdict
+    assert check_line(measured).startswith(f"shot 3: view1 0.01 ± 0.01 px, view2 {disparity_px:.2f} ± 0.02 px")
+    assert check_line(measured).endswith(ending)

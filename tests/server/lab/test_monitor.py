@@ -1,0 +1,42 @@
+import asyncio
+from pathlib import Path
+
+from daq.devices import GeneratorStatus
+from daq.errors import DeviceTimeout
+from server.lab.monitor import Health, Lamp, RigMonitor
+from tests.support.memory_rig import MemoryLaboratory
+
+
+def lamps_of(laboratory: MemoryLaboratory, tmp_path: Path) -> dict[str, Lamp]:
+    monitor = RigMonitor(laboratory.rig, tmp_path)
+    asyncio.run(monitor.ask())
+    return {lamp.name: lamp for lamp in monitor.lamps}
+
+
+def test_an_open_door_is_a_red_lamp(tmp_path: Path) -> None:
+    laboratory = MemoryLaboratory()
+    assert lamps_of(laboratory, tmp_path)["interlock"].health is Health.OK
+    laboratory.open_door()
+    assert lamps_of(laboratory, tmp_path)["interlock"].health is Health.FAULT
+
+
+def test_a_camera_that_dies_between_runs_is_a_red_lamp(tmp_path: Path) -> None:
+    laboratory = MemoryLaboratory()
+    laboratory.cameras["view2"].is_lost = True
+    lamps = lamps_of(laboratory, tmp_path)
+    assert lamps["view2"] == Lamp(name="view2", kind="camera", health=Health.FAULT, detail="has stopped answering")
+    assert lamps["view1"].health is Health.OK
+
+
+def test_a_silent_device_is_a_red_lamp_and_hides_no_other(tmp_path: Path) -> None:
+    laboratory = MemoryLaboratory()
+
+    def silent() -> GeneratorStatus:
+        raise DeviceTimeout("pulse generator", "status", 0.5)
+
+    laboratory.generator.status = silent  # type: ignore[method-assign]
+    lamps = lamps_of(laboratory, tmp_path)
+    assert lamps["pulse generator"].health is Health.FAULT
+    assert "0.5 s" in lamps["pulse generator"].detail
+    assert lamps["view1"].detail == "tomoshadow memory, view1"
+    assert lamps["disk"].detail.endswith("GB free")

@@ -1,0 +1,117 @@
+"""Who may talk to the server: every door, http and websocket, is tried with every kind of visitor."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import httpx
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import connect
+from websockets.typing import Origin
+
+from server.web.guard import COOKIE, Guard
+from tests.support.serving import Serving, serving
+
+TOKEN = "correct horse battery staple"
+
+
+@pytest.fixture(scope="module")
+def guarded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
+    with serving(tmp_path_factory.mktemp("guard") / "runs", token=TOKEN) as server:
+        yield server
+
+
+def bearer(token: str) -> dict[str, str]:
+    return {"Authorization": f"Bearer {token}"}
+
+
+@pytest.mark.parametrize("path", ["/api/rig", "/api/runs", "/api/events", "/api/nothing", "/api/openapi.json", "/"])
+def test_without_the_token_every_path_is_closed(guarded: Serving, path: str) -> None:
+    for headers in ({}, bearer("wrong"), {"Cookie": f"{COOKIE}=wrong"}):
+        answer = guarded.http.get(path, headers=headers)
+        assert (answer.status_code, answer.headers["content-type"]) == (401, "application/problem+json")
+        assert answer.headers["www-authenticate"] == "Bearer"
+
+
+def test_with_the_token_scripts_come_in(guarded: Serving) -> None:
+    assert guarded.http.get("/api/rig", headers=bearer(TOKEN)).status_code == 200
+
+
+def test_a_browser_is_led_to_the_form_and_gets_a_cookie_that_scripts_cannot_read(guarded: Serving) -> None:
+    with httpx.Client(base_url=guarded.http.base_url) as browser:
+        led = browser.get("/", headers={"Accept": "text/html"})
+        assert (led.status_code, led.headers["location"]) == (303, "/sign-in")
+        assert "password" in browser.get("/sign-in").text
+        assert browser.post("/sign-in", data={"token": "wrong"}).status_code == 401
+        signed_in = browser.post("/sign-in", data={"token": TOKEN})
+        cookie = signed_in.headers["set-cookie"].lower()
+        assert "httponly" in cookie
+        assert "samesite=strict" in cookie
+        assert browser.get("/api/rig").status_code == 200
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [
+        {"Origin": "http://evil.example"},
+        {"Origin": "http://evil.example:8080"},
+        {"Origin": "null"},
+        {"Origin": "http://127.0.0.1:1"},
+    ],
+)
+def test_foreign_pages_are_refused_token_or_not(guarded: Serving, headers: dict[str, str]) -> None:
+    answer = guarded.http.post("/api/rig/abort", headers={**bearer(TOKEN), **headers})
+    assert answer.status_code == 403, answer.text
+
+
+@pytest.mark.parametrize("host", ["evil.example", "127.0.0.1.evil.example", "", "[::1"])
+def test_without_a_token_a_foreign_name_of_this_machine_is_refused(server: Serving, host: str) -> None:
+    assert server.http.get("/api/rig", headers={"Host": host}).status_code == 403
+
+
+def test_with_a_token_the_server_may_have_any_name(guarded: Serving) -> None:
+    assert guarded.http.get("/api/rig", headers={**bearer(TOKEN), "Host": "lab-pc.example"}).status_code == 200
+
+
+def test_the_page_of_this_server_is_its_own_origin(guarded: Serving) -> None:
+    headers = {**bearer(TOKEN), "Origin": str(guarded.http.base_url).rstrip("/")}
+    assert guarded.http.get("/api/rig", headers=headers).status_code == 200
+
+
+@pytest.mark.parametrize("headers", [{}, bearer("wrong")])
+def test_the_live_socket_is_guarded_too(guarded: Serving, headers: dict[str, str]) -> None:
+    with pytest.raises(InvalidStatus), connect(f"ws://127.0.0.1:{guarded.port}/api/live", additional_headers=headers):
+        pass
+
+
+def test_a_foreign_page_cannot_open_the_live_socket(server: Serving) -> None:
+    with (
+        pytest.raises(InvalidStatus),
+        connect(f"ws://127.0.0.1:{server.port}/api/live", origin=Origin("http://evil.example")),
+    ):
+        pass
+
+
+def test_the_token_does_not_show_in_the_configuration(guarded: Serving) -> None:
+    answer = guarded.http.get("/api/rig/configuration", headers=bearer(TOKEN))
+    assert TOKEN not in answer.text
+
+
+@given(st.text(max_size=40))
+def test_no_host_but_a_loopback_name_is_ours(host: str) -> None:
+    guard = Guard(_nobody)
+    is_plain_loopback = host in ("localhost", "127.0.0.1") or host.startswith(("localhost:", "127.", "[::1]"))
+    if guard._is_ours(host):
+        assert is_plain_loopback or host.lower().startswith("localhost")
+
+
+def test_host_names_can_be_added(tmp_path: Path) -> None:
+    guard = Guard(_nobody, host_names=["Lab-PC"])
+    assert guard._is_ours("lab-pc:8080")
+    assert not guard._is_ours("lab-pc.example:8080")
+
+
+async def _nobody(*_: object) -> None:
+    raise AssertionError("nobody is asked")
