@@ -11,18 +11,18 @@ import numpy as np
 import pytest
 
 from daq.drivers.camera_profile import load_camera_profile
-from daq.shotfile import open_runs
-from processing.importing import import_manifest
-from processing.pipeline import ShotResult, reconstruct_shot
+from daq.files.run_directory import open_runs
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.reconstruction.volume_file import read_volume
-from processing.results_file import volume_path
-from server.calibration_watch import CalibrationWatch
-from server.config import load_config
-from server.events import EventPublisher
-from server.jobs import Job, JobKind, JobState, JobTable, jobs_on_disk
-from server.ui.draft import DraftStore, first_draft, plan_of
-from tests.system.old_data import EXPECTED, copy_to_read, describe, describe_kind, frames_sha256, run
+from processing.runs.importing import import_manifest
+from processing.runs.pipeline import ShotResult, reconstruct_shot
+from processing.runs.results_file import volume_path
+from server.lab.events import EventPublisher
+from server.lab.jobs import Job, JobKind, JobState, JobTable, jobs_on_disk
+from server.lab.watch import CalibrationWatch
+from server.rig.config import load_config
+from server.web.ui.draft import DraftStore, first_draft, plan_of
+from tests.support.old_data import EXPECTED, copy_to_read, describe, describe_kind, frames_sha256, run
 
 VERSIONS = sorted((Path(__file__).parents[1] / "fixtures").glob("v*"))
 

@@ -1,6 +1,6 @@
 """What files of a version say, by the product's own readers; ``expected.json`` beside them keeps it for ever.
 
-Once per version, when its files are added: ``python -m tests.system.old_data tests/fixtures/v0.1.0``.
+Once per version, when its files are added: ``python -m tests.support.old_data tests/fixtures/v0.1.0``.
 """
 
 import hashlib
@@ -17,18 +17,18 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from daq.run_events import RunStatus
+from daq.files.run_directory import RunReader, Shot, list_runs
+from daq.run.events import RunStatus
 from daq.shot import DoubleFrame, FiredTrain
-from daq.shotfile import RunReader, Shot, list_runs
 from processing.calibration.calibration_file import load_calibration
-from processing.calibration.calibration_set import load_calibration_set
+from processing.calibration.sets.calibration_set import load_calibration_set
 from processing.reconstruction.volume_file import open_volume
 from processing.synthetic.truth_file import read_true_cameras, read_true_spray
-from server.calibrations import CalibrationStore
-from server.jobs import JobTable
-from server.previews import load_preview
-from server.results import result_sets
-from server.runs import RunStore
+from server.lab.calibrations import CalibrationStore
+from server.lab.jobs import JobTable
+from server.lab.results import result_sets
+from server.lab.runs import RunStore
+from server.pictures.previews import load_preview
 
 EXPECTED = "expected.json"
 POINTS_MM = ((0.0, 0.0, 0.0), (0.5, -0.4, 0.6), (-0.7, 0.3, -0.8))
