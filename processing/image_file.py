@@ -6,10 +6,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from processing.errors import BadInput
+
 GreyImage = NDArray[np.uint8] | NDArray[np.uint16]
 
 
-class ImageFileError(Exception):
+class ImageFileError(BadInput):
     """An image file cannot be read; the text names the file."""
 
 

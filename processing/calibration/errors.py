@@ -8,8 +8,10 @@
         └── OriginUnknown   it shows a grid, but not which of the target's points these are
 """
 
+from processing.errors import BadInput
 
-class CalibrationError(Exception):
+
+class CalibrationError(BadInput):
     """A calibration cannot be made, read or trusted; the text names view or file, value and limit."""
 
 

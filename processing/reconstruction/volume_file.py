@@ -18,6 +18,7 @@ import numpy as np
 from isal import isal_zlib
 from numpy.typing import NDArray
 
+from processing.errors import BadInput
 from processing.reconstruction.slab_volume import SLAB_ROWS, SlabVolume
 from processing.reconstruction.voxel_type import VoxelType
 from processing.volume import VoxelGrid
@@ -30,7 +31,7 @@ Value = str | int | float
 Intensities = NDArray[np.float32]
 
 
-class VolumeFileError(Exception):
+class VolumeFileError(BadInput):
     """A file does not hold a volume that can be read; the text names it."""
 
 

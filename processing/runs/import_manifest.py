@@ -11,6 +11,7 @@ from typing import Annotated, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from processing.calibration.sets.set_record import CalibrationEntry, CameraName
+from processing.errors import BadInput
 from processing.runs.toml_lines import Key, line_of
 
 _VARIABLE = re.compile(r"^\$(\w+|\{\w+\})")
@@ -18,7 +19,7 @@ _VARIABLE = re.compile(r"^\$(\w+|\{\w+\})")
 Images = Annotated[dict[CameraName, str], Field(min_length=1, max_length=8)]
 
 
-class ManifestError(Exception):
+class ManifestError(BadInput):
     """A manifest, or a file that it names, is wrong; the text names file and line."""
 
 

@@ -14,6 +14,7 @@ from daq.files.run_file import RUN_FILE
 from processing.calibration.calibration import Calibration, Verdict
 from processing.calibration.calibration_file import file_sha256, load_calibration
 from processing.calibration.errors import CalibrationError
+from processing.errors import BadInput
 from processing.kernels import DEFAULT_THREADS
 from processing.preprocessing import Intensity, Preprocessing, intensity
 from processing.reconstruction.method import ReconstructionMethod
@@ -30,7 +31,7 @@ from processing.volume import VoxelGrid
 _References = dict[str, tuple[Intensity | None, Intensity | None]]
 
 
-class PipelineError(Exception):
+class PipelineError(BadInput):
     """A shot cannot be reconstructed; the text names run, shot and reason."""
 
 

@@ -15,6 +15,7 @@ from daq.run.recorder import Recorder
 from processing.benchmarks.scene import SpeedStudy
 from processing.benchmarks.speed import SpeedResult, speed_study
 from processing.benchmarks.targets import Measured, markdown_table
+from processing.errors import BadInput
 from server.cli.commands import progress
 
 MISTUNED = ("OPENBLAS_CORETYPE", "OPENBLAS_L2_SIZE")
@@ -34,7 +35,7 @@ QUICK = SpeedStudy(
 RECORDER_DEADLINE_S = 120.0
 
 
-class BenchError(Exception):
+class BenchError(BadInput):
     """The table has no place to go; the text names the file."""
 
 

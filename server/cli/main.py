@@ -14,38 +14,21 @@ from pathlib import Path
 from typing import Any
 
 from daq.errors import DaqError, PlanError, ShotFileError
-from processing.calibration.errors import CalibrationError
+from processing.errors import BadInput
 from processing.reconstruction.accuracy import Accuracy
-from processing.reconstruction.errors import ReconstructionError
 from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.settings import ReconstructionSettings
-from processing.reconstruction.volume_file import VolumeFileError
 from processing.reconstruction.voxel_type import VoxelType
-from processing.runs.importing import ManifestError
-from processing.runs.pipeline import PipelineError
 from server.cli import commands
 from server.cli.average_command import average
-from server.cli.bench_command import BenchError, bench
+from server.cli.bench_command import bench
 from server.cli.calibrate_command import calibrate_views, stated_origin, stated_roll
 from server.cli.check_command import check, self_calibrate_views
 from server.cli.doctor_command import doctor
 from server.cli.firmware_options import add_firmware_tools
 from server.cli.study_options import add_studies
-from server.rig.config import ConfigError
-from server.rig.firmware_image import ImageError
 
-BAD_INPUT = (
-    BenchError,
-    CalibrationError,
-    ConfigError,
-    ImageError,
-    ManifestError,
-    PipelineError,
-    PlanError,
-    ReconstructionError,
-    ShotFileError,
-    VolumeFileError,
-)
+BAD_INPUT = (BadInput, PlanError, ShotFileError)
 Command = Callable[[argparse.Namespace], dict[str, Any]]
 
 _NEGATIVE = re.compile(r"-\.?\d")

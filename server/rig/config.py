@@ -10,13 +10,14 @@ from pydantic import Field, SecretStr, ValidationError, ValidationInfo, field_va
 from daq.faults import ScriptedFault
 from daq.run.limits import AcquisitionLimits
 from daq.run_plan import FrozenModel
+from processing.errors import BadInput
 from processing.runs.toml_lines import line_of
 
 ViewName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,31}$")]
 CurrentA = Annotated[float, Field(gt=0, le=30)]
 
 
-class ConfigError(Exception):
+class ConfigError(BadInput):
     """The configuration cannot be used; one line per problem, each with file, line, key, value and limit."""
 
 

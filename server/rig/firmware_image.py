@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from daq.errors import DeviceError, DeviceUnavailable
+from processing.errors import BadInput
 
 BLOCK_BYTES = 512
 FIRST_MAGIC, SECOND_MAGIC, LAST_MAGIC = 0x0A324655, 0x9E5D5157, 0x0AB16F30
@@ -25,7 +26,7 @@ _IDENTITY = re.compile(rb"model=tomoshadow-pulse version=([0-9.]+)")
 _DEVICE = "pulse generator's drive"
 
 
-class ImageError(Exception):
+class ImageError(BadInput):
     """The file is no firmware image of the pulse generator; names file and block."""
 
 
