@@ -67,6 +67,19 @@ class SpeedStudy:
         return VoxelGrid.centred(self.shape, 1 / SCALE_PX_PER_MM)
 
 
+QUICK = SpeedStudy(
+    (48, 160, 200),
+    (320, 240),
+    droplets=200,
+    repeats=2,
+    baseline_planes=3,
+    iterations=2,
+    sparse_droplets=50,
+    mean_exposures=10,
+)
+"""Shows that everything is measured; the figures mean little."""
+
+
 def study_cameras(image_size_px: tuple[int, int]) -> list[PinholeCamera]:
     """The four views of the experiment, pitched and distorted."""
     return [

@@ -19,8 +19,6 @@ from processing.image_file import GreyImage, ImageFileError, read_image
 from processing.runs.import_manifest import ManifestError, ManifestFile, RunEntry, named_files, read_manifest
 from processing.runs.toml_lines import Key
 
-__all__ = ["Imported", "ManifestError", "import_manifest"]
-
 CALIBRATION_FOLDER, RUN_FOLDER = "calibration", "run"
 
 _KINDS = (("shot", ImageKey.SAMPLE), ("background", ImageKey.BACKGROUND), ("dark", ImageKey.DARK))

@@ -14,7 +14,6 @@ from daq.files.run_file import RUN_FILE
 from processing.calibration.calibration import Calibration, Verdict
 from processing.calibration.calibration_file import file_sha256, load_calibration
 from processing.calibration.errors import CalibrationError
-from processing.errors import BadInput
 from processing.kernels import DEFAULT_THREADS
 from processing.preprocessing import Intensity, Preprocessing, intensity
 from processing.reconstruction.method import ReconstructionMethod
@@ -25,14 +24,11 @@ from processing.reconstruction.settings import FrozenValue, GridSettings, Recons
 from processing.reconstruction.volume_file import write_slabs
 from processing.reconstruction.workbench import Workbench
 from processing.runs.clocked_slabs import ClockedSlabs
+from processing.runs.errors import PipelineError
 from processing.runs.results_file import FrameName, Provenance, claim_results, volume_path
 from processing.volume import VoxelGrid
 
 _References = dict[str, tuple[Intensity | None, Intensity | None]]
-
-
-class PipelineError(BadInput):
-    """A shot cannot be reconstructed; the text names run, shot and reason."""
 
 
 class Stopped(Exception):

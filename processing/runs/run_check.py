@@ -15,7 +15,8 @@ from processing.calibration.errors import CalibrationError, OutOfRange
 from processing.calibration.fit.health import LIMITS_PX, judge
 from processing.geometry import FloatArray
 from processing.reconstruction.settings import ReconstructionSettings
-from processing.runs.pipeline import PipelineError, shot_intensities
+from processing.runs.errors import PipelineError
+from processing.runs.pipeline import shot_intensities
 from processing.runs.results_file import FrameName
 
 ALARM_PX, STOP_PX = LIMITS_PX[Verdict.USABLE], LIMITS_PX[Verdict.WARN]

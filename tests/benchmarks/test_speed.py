@@ -11,13 +11,13 @@ import pytest
 from processing.benchmarks import targets as speed_targets
 from processing.benchmarks.baseline import Timing, measure
 from processing.benchmarks.memory import peak_memory_gb
-from processing.benchmarks.scene import dense_images, raw_exposures, sparse_images, spray_images, study_cameras
+from processing.benchmarks.scene import QUICK, dense_images, raw_exposures, sparse_images, spray_images, study_cameras
 from processing.benchmarks.targets import Measured, Target, markdown_table
 from processing.kernels import _native
 from processing.preprocessing import Preprocessing, intensity
 from processing.reconstruction.line_of_sight import line_of_sight
 from processing.reconstruction.planning.plan import plan_reconstruction
-from server.cli.bench_command import QUICK, BenchError, split_at_table
+from server.cli.bench import BenchError, split_at_table
 from server.cli.main import main
 
 
@@ -25,7 +25,8 @@ def test_bench_prints_what_the_interface_promises(capsys: pytest.CaptureFixture[
     report = tmp_path / "report.md"
     report.write_text("before\n<!-- bench -->\nold\n<!-- /bench -->\nafter\n")
     assert main(["bench", "--quick", "--json", "--table", str(report)]) == 0
-    result = json.loads(capsys.readouterr().out.splitlines()[-1])
+    output, progress = capsys.readouterr()
+    result = json.loads(output.splitlines()[-1])
     assert_every_target(result["targets"])
     assert_table(report.read_text(), result["targets"])
     assert result["isa"] in _native.available_isas()
@@ -42,6 +43,7 @@ def test_bench_prints_what_the_interface_promises(capsys: pytest.CaptureFixture[
         baseline = result["naive"]["smart_iteration_cpu_s" if "smart" in kernel["name"] else "mlos_cpu_s"]
         assert kernel["ratio_to_naive"] == pytest.approx(baseline / kernel["cpu_s"])
     recorder, (width_px, height_px) = result["recorder"], QUICK.image_size_px
+    assert f"recorder: {recorder['shots_per_s']:.1f} shots/s" in progress.splitlines()[-1]
     assert recorder["mb_per_s"] == pytest.approx(recorder["shots_per_s"] * 8 * width_px * height_px / 1e6)
 
 

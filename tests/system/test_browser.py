@@ -16,7 +16,7 @@ from server.lab.jobs import JobKind
 from server.lab.services import Services
 from server.lab.tasks import check_run
 from server.web.app import create_app
-from tests.server.cli.test_check_command import DRIFT_PX, write_droplet_run
+from tests.support.drifting_run import DRIFT_PX, write_droplet_run
 from tests.support.drifting_views import calibration_of, views
 from tests.support.operator import VIEWS, drive_the_page
 from tests.support.serving import Serving, serving, tell_nothing

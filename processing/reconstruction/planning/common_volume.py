@@ -55,7 +55,7 @@ def common_volume(
     top, bottom, left, right = box
     lower_mm = np.array([x_mm[left], y_mm[top], z_range_mm[0]])
     upper_mm = np.array([x_mm[right], y_mm[bottom], z_range_mm[1]])
-    pitch_mm = pitch_mm or 1 / max(_scale_px_per_mm(mapping, (lower_mm + upper_mm) / 2) for mapping in mappings)
+    pitch_mm = pitch_mm or 1 / max(scale_px_per_mm(mapping, (lower_mm + upper_mm) / 2) for mapping in mappings)
     nx, ny, nz = (int(extent_mm / pitch_mm) + 1 for extent_mm in upper_mm - lower_mm)
     return VoxelGrid((nz, ny, nx), (float(lower_mm[0]), float(lower_mm[1]), float(lower_mm[2])), float(pitch_mm))
 
@@ -95,7 +95,8 @@ def _visible(mapping: ViewMapping, x_mm: FloatArray, y_mm: FloatArray, z_mm: flo
     return inside.reshape(grid_x_mm.shape)
 
 
-def _scale_px_per_mm(mapping: ViewMapping, point_mm: FloatArray) -> float:
+def scale_px_per_mm(mapping: ViewMapping, point_mm: FloatArray) -> float:
+    """How large a view sees x or y at a point (3,), whichever it sees larger."""
     step_mm = 0.1
     seen_px = mapping.project(point_mm + step_mm * np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]]))
     return float(np.linalg.norm(seen_px[1:] - seen_px[0], axis=1).max() / step_mm)

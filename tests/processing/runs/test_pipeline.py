@@ -16,14 +16,8 @@ from processing.reconstruction.planning.planned_view import PlannedView
 from processing.reconstruction.settings import GridSettings, ReconstructionSettings
 from processing.reconstruction.volume_file import VolumeFileError, open_volume, read_volume
 from processing.reconstruction.voxel_type import VoxelType
-from processing.runs.pipeline import (
-    PipelineError,
-    ShotResult,
-    Stopped,
-    default_grid,
-    reconstruct_shot,
-    shot_intensities,
-)
+from processing.runs.errors import PipelineError
+from processing.runs.pipeline import ShotResult, Stopped, default_grid, reconstruct_shot, shot_intensities
 from processing.runs.results_file import average_volumes, volume_files, volume_path
 from processing.volume import VoxelGrid
 from tests.support.droplet_run import DROPLETS_A_MM, MOTION_MM, SHAPE, write_calibration, write_run

@@ -15,8 +15,8 @@ from server.lab.jobs import JobKind
 from server.lab.services import Services
 from server.lab.tasks import check_run
 from server.web.app import create_api
-from tests.server.cli.test_check_command import DRIFT_PX, write_droplet_run
 from tests.server.web.test_api import use_a_calibration, wait_for_jobs
+from tests.support.drifting_run import DRIFT_PX, write_droplet_run
 from tests.support.drifting_views import calibration_of, views
 from tests.support.serving import DEADLINE_S, Serving, plan_of, serving, write_spray
 

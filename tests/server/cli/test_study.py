@@ -1,14 +1,15 @@
 """``tomoshadow study``: files, JSON and usage."""
 
 import json
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 import pytest
 
-from processing.studies.accuracy_study import CalibrationStudy
+from processing.studies.calibration_accuracy import calibration_study
 from processing.studies.density import DensityStudy
-from server.cli import study_commands
+from processing.studies.recipe import PAPER_ITERATIONS
 from server.cli.main import main
 
 
@@ -26,6 +27,7 @@ def test_a_study_writes_csv_and_figure_and_says_what_the_paper_says(
     assert [set(statement) for statement in result["statements"]] == [{"topic", "paper", "ours"}] * 2
     assert "shot 1 of 1" in progress
     assert "paper: SMART-20, then MLOS" in progress
+    assert progress.endswith(f"4 rows in {result['csv']}, {result['figure']}\n")
 
 
 @pytest.mark.parametrize("study", ["density", "ghosts", "average", "residuals", "calibration", "sensitivity"])
@@ -61,7 +63,7 @@ def test_bad_usage_exits_with_2_and_names_the_value(
 def test_a_study_that_could_not_be_written_does_not_begin(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(study_commands, "average_study", lambda *_: pytest.fail("the study has begun"))
+    monkeypatch.setattr("processing.studies.average.average_study", lambda *_: pytest.fail("the study has begun"))
     (tmp_path / "file").write_text("in the way")
     assert main(["study", "average", "-o", str(tmp_path / "file")]) == 1
     assert "file" in capsys.readouterr().err
@@ -71,7 +73,7 @@ def test_the_density_study_states_widths_windows_and_subtraction(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     small = partial(DensityStudy, shape=(64, 64, 64), counts=(10, 20), image_size_px=(128, 104))
-    monkeypatch.setattr(study_commands, "DensityStudy", small)
+    monkeypatch.setattr("processing.studies.density.DensityStudy", small)
     assert main(["study", "density", "--sigma", "1", "--sigma", "2", "-o", str(tmp_path), "--json"]) == 0
     output, progress = capsys.readouterr()
     result = json.loads(output.splitlines()[-1])
@@ -93,7 +95,7 @@ def test_the_calibration_study_says_whether_all_limits_are_kept(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     small = partial(
-        CalibrationStudy,
+        replace,
         views=("view1",),
         z_mm=(-4.5, -1.5, 1.5, 4.5),
         fits=1,
@@ -102,8 +104,15 @@ def test_the_calibration_study_says_whether_all_limits_are_kept(
         half_mm=(2.0, 1.5, 2.0),
         drift_px=drift_px,
     )
-    monkeypatch.setattr(study_commands, "CalibrationStudy", small)
+    study = "processing.studies.calibration_accuracy.calibration_study"
+    monkeypatch.setattr(study, lambda asked: calibration_study(small(asked)))
     assert main(["study", "calibration", "--density", "7", "-o", str(tmp_path), "--json"]) == status
     output, progress = capsys.readouterr()
     assert json.loads(output.splitlines()[-1])["passed"] is (status == 0)
     assert f"every figure within its limit: {said}" in progress
+
+
+def test_help_states_the_papers_iterations(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["study", "density", "--help"])
+    assert f"of smart and mart without -N, {PAPER_ITERATIONS} by default" in capsys.readouterr().out

@@ -6,32 +6,20 @@ import time
 from argparse import Namespace
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from daq.files.run_directory import DoubleFrame, ExposureRecord, ImageKey, RunHeader, RunWriter, Shot, ViewFormat
-from daq.run.recorder import Recorder
-from processing.benchmarks.scene import SpeedStudy
-from processing.benchmarks.speed import SpeedResult, speed_study
-from processing.benchmarks.targets import Measured, markdown_table
 from processing.errors import BadInput
-from server.cli.commands import progress
+from server.cli.options import Verbs, add_verb
+from server.cli.output import Outcome, progress, table
+
+if TYPE_CHECKING:
+    from processing.benchmarks.speed import SpeedResult
+    from processing.benchmarks.targets import Measured
 
 MISTUNED = ("OPENBLAS_CORETYPE", "OPENBLAS_L2_SIZE")
 """Variables that change the speed of the numpy baseline."""
 TABLE_BEGIN, TABLE_END = "<!-- bench -->", "<!-- /bench -->"
 RECORDED_SHOTS = 24
-QUICK = SpeedStudy(
-    (48, 160, 200),
-    (320, 240),
-    droplets=200,
-    repeats=2,
-    baseline_planes=3,
-    iterations=2,
-    sparse_droplets=50,
-    mean_exposures=10,
-)
 RECORDER_DEADLINE_S = 120.0
 
 
@@ -39,24 +27,36 @@ class BenchError(BadInput):
     """The table has no place to go; the text names the file."""
 
 
-def bench(options: Namespace) -> dict[str, Any]:
-    """``tomoshadow bench``."""
+def add(verbs: Verbs) -> None:
+    """Add the command."""
+    parser = add_verb(verbs, "bench", bench, "speed of kernels and recorder against plain numpy and OpenCV")
+    parser.add_argument("--quick", action="store_true", help="a small volume; the figures mean little")
+    parser.add_argument("--directory", type=Path, help="where the recorder writes; default: the temporary directory")
+    parser.add_argument("--table", type=Path, help="Markdown file whose table, between <!-- bench --> marks, to renew")
+
+
+def bench(options: Namespace) -> Outcome:
+    """Measure, and renew the table."""
+    from processing.benchmarks.scene import QUICK, SpeedStudy
+    from processing.benchmarks.speed import speed_study
+    from processing.benchmarks.targets import markdown_table
+
     around_table = split_at_table(options.table) if options.table else None
     for name in MISTUNED:
         if name in os.environ:
             progress(f"{name} is set: the baseline is not what others measure; unset it")
-    result = speed_study(QUICK if options.quick else SpeedStudy(), progress)
+    study = QUICK if options.quick else SpeedStudy()
+    speed = speed_study(study, progress)
     progress("recorder")
-    size_px = QUICK.image_size_px if options.quick else SpeedStudy().image_size_px
-    recorder = recorder_speed(options.directory, size_px, result.views)
-    table = markdown_table(result.targets)
-    progress(f"{kernel_table(result)}\n\n{table}")
+    recorder = recorder_speed(options.directory, study.image_size_px, speed.views)
+    targets = markdown_table(speed.targets)
     if around_table:
-        options.table.write_text(f"\n{table}\n\n".join(around_table))
-    return speed_json(result) | {"recorder": recorder}
+        options.table.write_text(f"\n{targets}\n\n".join(around_table))
+    recorded = f"recorder: {recorder['shots_per_s']:.1f} shots/s, {recorder['mb_per_s']:.0f} MB/s"
+    return Outcome(speed_json(speed) | {"recorder": recorder}, f"{kernel_table(speed)}\n\n{targets}\n\n{recorded}")
 
 
-def speed_json(result: SpeedResult) -> dict[str, Any]:
+def speed_json(result: "SpeedResult") -> dict[str, Any]:
     """The JSON object of a speed study."""
     return {
         "isa": result.isa,
@@ -68,7 +68,7 @@ def speed_json(result: SpeedResult) -> dict[str, Any]:
     }
 
 
-def _target_json(one: Measured) -> dict[str, Any]:
+def _target_json(one: "Measured") -> dict[str, Any]:
     stated = {"measured": one.value, "reached": one.target.verdict(one.value), "how": one.how}
     return asdict(one.target) | stated | (asdict(one.timing) if one.timing else {})
 
@@ -88,18 +88,22 @@ def split_at_table(report: Path) -> tuple[str, str]:
     return before + begin, end + after
 
 
-def kernel_table(result: SpeedResult) -> str:
-    """The kernels as a table for people."""
-    rows = [f"{'kernel':<28}{'wall s':>9}{'CPU s':>9}{'times naive':>13}"]
-    rows += [
-        f"{kernel.name:<28}{kernel.wall_s:>9.4f}{kernel.cpu_s:>9.4f}{kernel.ratio_to_naive:>13.1f}"
+def kernel_table(result: "SpeedResult") -> str:
+    """A line per kernel, for people."""
+    rows = [
+        [kernel.name, f"{kernel.wall_s:.4f}", f"{kernel.cpu_s:.4f}", f"{kernel.ratio_to_naive:.1f}"]
         for kernel in result.kernels
     ]
-    return "\n".join(rows)
+    return table(["kernel", "wall s", "CPU s", "times naive"], rows)
 
 
 def recorder_speed(directory: Path | None, image_size_px: tuple[int, int], views: int) -> dict[str, float]:
     """Shots and raw megabytes per second that the recorder brings safely to the disk of ``directory``."""
+    import numpy as np
+
+    from daq.files.run_directory import DoubleFrame, ExposureRecord, ImageKey, RunHeader, RunWriter, Shot, ViewFormat
+    from daq.run.recorder import Recorder
+
     width_px, height_px = image_size_px
     shape = (height_px, width_px)
     header = RunHeader(

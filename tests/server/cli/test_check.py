@@ -1,57 +1,19 @@
 """check and self-calibrate: a camera that moved after calibration is told from the shots, and put right."""
 
-import json
 import re
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
-from daq.files.run_directory import DoubleFrame, ExposureRecord, ImageKey, RunHeader, RunWriter, Shot, ViewFormat
 from processing.calibration.calibration import Verdict
 from processing.calibration.calibration_file import load_calibration, save_calibration
 from processing.calibration.droplets.disparity import ViewDisparity
 from processing.runs.run_check import ShotCheck
-from processing.studies.seen_droplets import droplet_image
-from server.cli.check_command import check_line
-from server.cli.main import main
-from tests.support.drifting_views import DENSITY_PER_MM3, HALF_MM, SIZE_PX, calibration_of, inside_mm, views
-
-SEEN = ExposureRecord(valid=True, frame_id=1, device_timestamp_ns=1)
-DRIFT_PX = 2
-
-
-def write_droplet_run(
-    run_dir: Path, density_per_mm3: float = DENSITY_PER_MM3, view_count: int = 4, covered: str = ""
-) -> Path:
-    """Two shots; the picture of view2 lies two pixels further right than when it was calibrated.
-
-    A covered view is dark.
-    """
-    rng = np.random.default_rng(11)
-    cameras = {f"view{number}": camera for number, camera in enumerate(views()[:view_count], start=1)}
-    shape = (SIZE_PX[1], SIZE_PX[0])
-    header = RunHeader(
-        run_id=run_dir.name,
-        created_utc="2026-01-01T00:00:00+00:00",
-        views={name: ViewFormat(shape, 8) for name in cameras},
-        polarity="bright",
-        separation_ns=6400,
-    )
-    with RunWriter(run_dir, header) as writer:
-        for index in range(2):
-            exposures = []
-            for _ in "ab":
-                points_mm = rng.uniform(-HALF_MM, HALF_MM, (int(density_per_mm3 * np.prod(2 * HALF_MM)), 3))
-                images = {name: droplet_image(camera, points_mm, rng) for name, camera in cameras.items()}
-                images["view2"] = np.roll(images["view2"], DRIFT_PX, axis=1)
-                images = {name: image * (name != covered) for name, image in images.items()}
-                exposures.append({name: np.round(200 * image).astype(np.uint8) for name, image in images.items()})
-            shot_views = {name: DoubleFrame(exposures[0][name], exposures[1][name], SEEN, SEEN) for name in cameras}
-            writer.write_shot(Shot(index, ImageKey.SAMPLE, shot_views))
-        writer.finish("completed")
-    return run_dir
+from server.cli.check import check_line, views_table
+from tests.support.command_line import told
+from tests.support.drifting_run import DRIFT_PX, write_droplet_run
+from tests.support.drifting_views import calibration_of, inside_mm, views
 
 
 @pytest.fixture(scope="module")
@@ -63,13 +25,6 @@ def run_dir(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def calibration_file(tmp_path: Path) -> Path:
     save_calibration(calibration_of(views()), tmp_path / "old.json")
     return tmp_path / "old.json"
-
-
-def told(capsys: pytest.CaptureFixture[str], *arguments: object, status: int = 0) -> dict[str, Any]:
-    """The JSON object of a command."""
-    assert main([*map(str, arguments), "--json"]) == status
-    result: dict[str, Any] = json.loads(capsys.readouterr().out.splitlines()[-1])
-    return result
 
 
 def test_moved_view_stops_and_a_corrected_calibration_is_good_again(
@@ -157,3 +112,16 @@ def test_limits_are_told(disparity_px: float, verdict: Verdict, ending: str) -> 
     assert measured.verdict is verdict
     assert check_line(measured).startswith(f"shot 3: view1 0.01 ± 0.01 px, view2 {disparity_px:.2f} ± 0.02 px")
     assert check_line(measured).endswith(ending)
+
+
+def test_people_get_a_line_per_view() -> None:
+    shots = [{"views": {"view1": 0.1, "view2": px}} for px in (0.25, 0.35, 0.95)]
+    result = {"shots": [*shots, {"views": {}}], "verdict": "refuse", "alarm_px": 0.3, "stop_px": 0.8}
+    assert views_table(result).splitlines() == [
+        "view   median [px]  largest [px]",
+        "view1         0.10          0.10",
+        "view2         0.35          0.95",
+        "3 of 4 shots tell: refuse; alarm above 0.3 px, stop above 0.8 px",
+    ]
+    silent = {**result, "shots": [{"views": {}}], "verdict": None}
+    assert views_table(silent) == "0 of 1 shots tell: no verdict; alarm above 0.3 px, stop above 0.8 px"

@@ -1,6 +1,7 @@
 """``tomoshadow firmware`` on the simulated bench, through the command line."""
 
 import json
+import re
 import shutil
 import signal
 import subprocess
@@ -10,6 +11,7 @@ from typing import Any
 
 import pytest
 
+from server.cli.firmware import described, train_table
 from server.cli.main import main
 from tests.server.rig.test_firmware_image import bootable, mounted, saved, uf2
 
@@ -32,6 +34,11 @@ def test_info_tells_identity_state_and_counters(capsys: pytest.CaptureFixture[st
     assert info["limits"] == [
         {"channel": n, "max_current_ma": 30_000, "max_duty_ppm": 200, "max_light_ma": 500} for n in range(4)
     ]
+    lines = described(info).splitlines()
+    assert lines[0].startswith("identity: ")
+    assert "state: SAFE, faults: none" in lines
+    assert "interlock: closed, emergency stop: closed" in lines
+    assert lines[-4].split() == ["0", "30000", "200", "500"]
 
 
 def test_selftest_passes_and_lists_its_checks(capsys: pytest.CaptureFixture[str]) -> None:
@@ -58,6 +65,10 @@ def test_scope_writes_both_pictures_and_tells_both_values(capsys: pytest.Capture
     for view in result["views"].values():
         assert view["requested"]["pulse_b_ns"] == [6405, 7408]
         assert view["actual"]["pulse_b_ns"] == [6408, 7408], "6405 goes to 6408, 1003 to 1000"
+    _heads, *lines = train_table(result["views"]).splitlines()
+    assert [re.split(" {2,}", line)[:3] for line in lines] == [
+        [name, "0 to 1000", "6408 to 7408"] for name in result["views"]
+    ]
 
 
 def test_scope_draws_a_plan(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:

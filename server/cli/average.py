@@ -1,0 +1,94 @@
+"""``tomoshadow average``: the mean of stored volumes, or of a run whose volumes need not be stored."""
+
+from argparse import Namespace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from processing.reconstruction.voxel_type import VoxelType
+from processing.runs.errors import PipelineError
+from server.cli.options import (
+    Verbs,
+    add_reconstruction,
+    add_verb,
+    describe_grid,
+    picture_beside,
+    reconstruction_settings,
+    selected_shots,
+    usable_processors,
+)
+from server.cli.output import Outcome, progress
+
+if TYPE_CHECKING:
+    from processing.runs.results_file import Provenance
+    from processing.volume import VoxelGrid
+
+
+def add(verbs: Verbs) -> None:
+    """Add the command."""
+    parser = add_verb(
+        verbs, "average", average, "mean volume and slices of results, or straight from the shots of a run"
+    )
+    parser.add_argument("results", type=Path, help="directory of results; or a run, with --calibration")
+    parser.add_argument("-o", "--out", type=Path, required=True, help="volume file to write; slices beside it")
+    parser.add_argument("--calibration", type=Path, help="of the run; no volume of a single exposure is stored")
+    add_reconstruction(parser)
+    parser.set_defaults(voxels=VoxelType.FLOAT32)  # a mean has finer steps than one exposure
+
+
+def average(options: Namespace) -> Outcome:
+    """Average what there is: volumes, or shots with a calibration."""
+    picture_beside(options.out)
+    if options.calibration is None and (options.results / "run.h5").is_file():
+        raise PipelineError(f"{options.results} is a run: name its --calibration to average it")
+    result = _average_results(options) if options.calibration is None else _average_run(options)
+    grid = describe_grid(result["grid"]["shape"], result["grid"]["pitch_mm"])
+    return Outcome(
+        result, f"{result['file']}: mean of {result['volumes']} volumes, {grid}; slices in {result['figure']}"
+    )
+
+
+def _average_results(options: Namespace) -> dict[str, Any]:
+    from processing.reconstruction.volume_file import VolumeFileError
+    from processing.runs.results_file import average_volumes, volume_files
+
+    files = volume_files(options.results)
+    if not files:
+        raise VolumeFileError(f"{options.results}: there are no volumes to average")
+    volume, grid = average_volumes(files)
+    return _written(options, volume, grid, len(files), {})
+
+
+def _average_run(options: Namespace) -> dict[str, Any]:
+    from processing.calibration.calibration_file import load_calibration
+    from processing.runs.run_average import average_run
+
+    calibration = load_calibration(options.calibration)
+    settings = reconstruction_settings(options, calibration)
+    shots = selected_shots(options.results, options.shots)
+    mean = average_run(
+        options.results,
+        shots,
+        calibration,
+        settings,
+        lambda done: progress(f"{options.results.name}: {done} exposures"),
+        threads=usable_processors(),
+    )
+    made_by = {"calibration": calibration.id, "settings": settings.model_dump_json()}
+    written = _written(options, mean.volume, mean.grid, mean.exposures, made_by)
+    return {**written, "method": settings.method.value}
+
+
+def _written(options: Namespace, volume: Any, grid: "VoxelGrid", count: int, made_by: "Provenance") -> dict[str, Any]:
+    from processing.figures.volume_figures import slices_figure
+    from processing.reconstruction.settings import GridSettings
+    from processing.reconstruction.volume_file import write_volume
+
+    write_volume(options.out, volume, grid, {"average_of": str(options.results), "volumes": count, **made_by})
+    figure = picture_beside(options.out)
+    slices_figure(volume, grid, f"mean of {count} volumes").savefig(figure, dpi=120)
+    return {
+        "file": str(options.out),
+        "figure": str(figure),
+        "volumes": count,
+        "grid": GridSettings.of(grid).model_dump(),
+    }

@@ -1,0 +1,171 @@
+"""``tomoshadow calibrate``: a camera for every view, and what its errors say."""
+
+import re
+from argparse import ArgumentTypeError, Namespace
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from server.cli.options import NUMBER, Verbs, add_verb, picture_beside
+from server.cli.output import Outcome, progress, table
+
+if TYPE_CHECKING:
+    from processing.calibration.calibration import Calibration, ViewCalibration
+    from processing.geometry import FloatArray
+
+
+def add(verbs: Verbs) -> None:
+    """Add the command."""
+    parser = add_verb(verbs, "calibrate", calibrate_views, "fit the camera of every view to a calibration set")
+    parser.add_argument("set", type=Path, help="calibration run, or an imported set")
+    parser.add_argument("-o", "--out", type=Path, required=True, help="calibration file to write")
+    parser.add_argument(
+        "--model",
+        choices=("pinhole", "pinhole_tilted", "polynomial", "auto"),
+        default="pinhole",
+        help="auto: for each view the simplest one, unless another predicts unseen points clearly better",
+    )
+    parser.add_argument(
+        "--origin",
+        type=stated_origin,
+        action="append",
+        metavar="VIEW@Z=U,V",
+        help="where a view of a run sees the target's origin at position Z in mm, if no image shows all of it",
+    )
+    parser.add_argument(
+        "--roll",
+        type=stated_roll,
+        action="append",
+        metavar="VIEW=DEG",
+        help="how a camera of a run is turned about its axis: 180 if it hangs upside down",
+    )
+
+
+def stated_origin(text: str) -> tuple[tuple[str, float], tuple[float, float]]:
+    """View, position in mm and image point of ``VIEW@Z=U,V``."""
+    match = re.fullmatch(rf"(.+)@({NUMBER})=({NUMBER}),({NUMBER})", text)
+    if not match:
+        raise ArgumentTypeError(f"{text!r} is not of the form VIEW@Z=U,V, for example view1@-4.5=812,604")
+    view, z_mm, u_px, v_px = match.groups()
+    return (view, float(z_mm)), (float(u_px), float(v_px))
+
+
+def stated_roll(text: str) -> tuple[str, float]:
+    """View and angle of ``VIEW=DEG``."""
+    match = re.fullmatch(rf"(.+)=({NUMBER})", text)
+    if not match:
+        raise ArgumentTypeError(f"{text!r} is not of the form VIEW=DEG, for example view1=180")
+    return match[1], float(match[2])
+
+
+def calibrate_views(options: Namespace) -> Outcome:
+    """Fit, and write the calibration; it has not passed where a view is refused."""
+    from processing.calibration.calibrate import calibrate
+    from processing.calibration.calibration import Verdict
+    from processing.calibration.calibration_file import require_free, save_calibration
+    from processing.calibration.sets.calibration_set import load_calibration_set
+    from processing.figures.volume_figures import residuals_figure
+    from server.pictures.calibration_pictures import calibration_pictures
+
+    figure = picture_beside(options.out)
+    require_free(options.out)
+    calibration_set = load_calibration_set(options.set, dict(options.origin or ()), dict(options.roll or ()))
+    calibration = calibrate(calibration_set, model=options.model)
+    save_calibration(calibration, options.out)
+    residuals_figure(calibration).savefig(figure, dpi=120)
+    figures = calibration_pictures(options.set, calibration_set, calibration, options.out)
+    for note in calibration.notes:
+        progress(note)
+    refused = {name: view for name, view in calibration.views.items() if view.verdict is Verdict.REFUSE}
+    for name, view in refused.items():
+        progress(
+            f"{name}: REFUSED, hold-out error {view.holdout_error_px:.3g} px: reconstruction does not start with it"
+        )
+    result = {
+        "passed": not refused,
+        "calibration": str(options.out),
+        "id": calibration.id,
+        "figure": str(figure),
+        "figures": [str(picture) for picture in figures],
+        "notes": list(calibration.notes),
+        **view_errors(calibration),
+    }
+    pictures = ", ".join(map(str, [figure, *figures]))
+    return Outcome(result, f"{views_table(calibration)}\n{calibration.id}: {options.out}, pictures in {pictures}")
+
+
+def views_table(calibration: "Calibration") -> str:
+    """A line per view, for people."""
+    middle_mm = _middle_mm(calibration)
+    rows = [
+        [
+            name,
+            view.verdict.value,
+            f"{view.holdout_error_px:.4f}",
+            str(view.n_points),
+            *_scale_and_azimuth(view, middle_mm),
+        ]
+        for name, view in calibration.views.items()
+    ]
+    return table(["view", "verdict", "hold-out [px]", "points", "px/mm", "azimuth [deg]"], rows)
+
+
+def _scale_and_azimuth(view: "ViewCalibration", middle_mm: "FloatArray | None") -> tuple[str, str]:
+    from processing.calibration.fit.placement import placement
+    from processing.reconstruction.planning.common_volume import scale_px_per_mm
+
+    if middle_mm is None:
+        return "", ""
+    return f"{scale_px_per_mm(view.mapping, middle_mm):.2f}", f"{placement(view.mapping, middle_mm).azimuth_deg:.2f}"
+
+
+def view_errors(calibration: "Calibration") -> dict[str, Any]:
+    """Residuals of a calibration by view, as the JSON of ``calibrate`` has them."""
+    from processing.calibration.fit.covariance import worst_position_std_px
+
+    middle_mm = _middle_mm(calibration)
+    return {
+        "views": {
+            name: {
+                "model": view.model.value,
+                "n_points": view.n_points,
+                "mean_error_px": view.mean_error_px,
+                "rms_px": view.rms_px,
+                "max_error_px": view.max_error_px,
+                "holdout_error_px": view.holdout_error_px,
+                "candidates_holdout_error_px": dict(view.candidates_px),
+                "position_std_px": worst_position_std_px(view),
+                "planes": [
+                    {
+                        "name": plane.name,
+                        "z_mm": plane.z_mm,
+                        "mean_error_px": plane.mean_error_px,
+                        "rms_px": plane.rms_px,
+                        "max_error_px": plane.max_error_px,
+                        "holdout_error_px": plane.holdout_error_px,
+                    }
+                    for plane in view.planes
+                ],
+                "worst_plane": view.worst_plane.name,
+                "placement": _placement(view, middle_mm),
+                "verdict": view.verdict.value,
+            }
+            for name, view in calibration.views.items()
+        }
+    }
+
+
+def _placement(view: "ViewCalibration", middle_mm: "FloatArray | None") -> dict[str, Any] | None:
+    from processing.calibration.fit.placement import placement
+
+    return None if middle_mm is None else asdict(placement(view.mapping, middle_mm))
+
+
+def _middle_mm(calibration: "Calibration") -> "FloatArray | None":
+    """Middle of the target (3,); None where boards in free poses do not tell where views stand."""
+    import numpy as np
+
+    if any(view.intrinsics_only for view in calibration.views.values()):
+        return None
+    ranges_mm = (calibration.x_range_mm, calibration.y_range_mm, calibration.z_range_mm)
+    return np.asarray(np.mean(ranges_mm, axis=1), dtype=np.float64)

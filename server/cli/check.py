@@ -1,0 +1,74 @@
+"""``tomoshadow check``: what the droplets in the shots of a run say of a calibration."""
+
+from argparse import Namespace
+from statistics import median
+from typing import TYPE_CHECKING, Any
+
+from server.cli.options import Verbs, add_calibrated_run, add_shots, add_verb, selected_shots
+from server.cli.output import Outcome, progress, table
+
+if TYPE_CHECKING:
+    from processing.runs.run_check import ShotCheck
+
+_MEANING = {"warn": "ALARM", "refuse": "STOP: do not reconstruct with this calibration"}
+
+
+def add(verbs: Verbs) -> None:
+    """Add the command."""
+    summary = "do the droplets in the shots of a run still agree with a calibration?"
+    parser = add_verb(verbs, "check", check, summary)
+    add_calibrated_run(parser)
+    add_shots(parser)
+
+
+def check(options: Namespace) -> Outcome:
+    """Check shot by shot; it has not passed where a shot would stop reconstruction."""
+    from processing.calibration.calibration import Verdict
+    from processing.calibration.calibration_file import load_calibration
+    from processing.runs.run_check import ALARM_PX, STOP_PX, check_shot
+
+    calibration = load_calibration(options.calibration)
+    shots = []
+    for index in selected_shots(options.run, options.shots):
+        measured = check_shot(options.run, index, calibration)
+        progress(f"{options.run.name}: {check_line(measured)}")
+        shots.append(measured)
+    verdicts = [shot.verdict for shot in shots if shot.verdict is not None]
+    result = {
+        "passed": Verdict.REFUSE not in verdicts,
+        "run": options.run.name,
+        "calibration": calibration.id,
+        "alarm_px": ALARM_PX,
+        "stop_px": STOP_PX,
+        "verdict": max(verdicts, key=list(Verdict).index) if verdicts else None,
+        "shots": [shot.record() for shot in shots],
+    }
+    return Outcome(result, views_table(result))
+
+
+def check_line(measured: "ShotCheck") -> str:
+    """One shot for a person."""
+    meaning = _MEANING.get(measured.verdict) if measured.verdict else None
+    return f"shot {measured.shot}: {_finding(measured)}" + (f"  {meaning}" if meaning else "")
+
+
+def _finding(measured: "ShotCheck") -> str:
+    """The figures and the view that has moved, or why there are no figures."""
+    if not measured.views:
+        return measured.problem
+    views = ", ".join(
+        f"{name} {view.disparity_px:.2f} ± {view.uncertainty_px:.2f} px" for name, view in measured.views.items()
+    )
+    return f"{views}, {measured.moved} has moved" if measured.moved else views
+
+
+def views_table(result: dict[str, Any]) -> str:
+    """A line per view over all shots that tell, and the verdict, for people."""
+    told = [shot for shot in result["shots"] if shot["views"]]
+    verdict = f"{len(told)} of {len(result['shots'])} shots tell: {result['verdict'] or 'no verdict'}"
+    limits = f"alarm above {result['alarm_px']:g} px, stop above {result['stop_px']:g} px"
+    if not told:
+        return f"{verdict}; {limits}"
+    disparities_px = {name: [shot["views"][name] for shot in told] for name in told[0]["views"]}
+    rows = [[name, f"{median(values):.2f}", f"{max(values):.2f}"] for name, values in disparities_px.items()]
+    return f"{table(['view', 'median [px]', 'largest [px]'], rows)}\n{verdict}; {limits}"

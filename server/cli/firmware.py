@@ -1,0 +1,217 @@
+"""``tomoshadow firmware``: identity and limits, self-test, timing diagram, continuous light, flashing."""
+
+from argparse import ArgumentParser, Namespace
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import asdict
+from pathlib import Path
+from threading import Event
+from typing import TYPE_CHECKING, Any
+
+from daq.errors import DeviceError, PlanError
+from server.cli.options import Verbs, add_rig, add_verb
+from server.cli.output import Outcome, progress, table
+
+if TYPE_CHECKING:
+    from daq.devices import GeneratorStatus, PulseGenerator
+    from daq.drivers.pulse_line import PulseLine
+
+_HEARTBEAT_S = 0.5
+
+
+def add(verbs: Verbs) -> None:
+    """Add the tools."""
+    tools = verbs.add_parser("firmware", help="the pulse generator").add_subparsers(required=True, metavar="TOOL")
+    add_rig(add_verb(tools, "info", info, "identity, state and counters of the pulse generator"))
+    summary = "try everything that needs no light: protocol, refusals, limits, budget, off"
+    add_rig(add_verb(tools, "selftest", selftest, summary))
+    summary = "timing diagram of a pulse train as the generator loads it; nothing is fired"
+    _add_scope_options(add_verb(tools, "scope", scope, summary))
+    summary = "continuous light of low current, as the back light of the calibration target; Ctrl-C ends it"
+    _add_light_options(add_verb(tools, "light", light, summary))
+    summary = "check a UF2 image and copy it to a board that waits for one"
+    _add_flash_options(add_verb(tools, "flash", flash, summary))
+
+
+def _add_scope_options(parser: ArgumentParser) -> None:
+    add_rig(parser)
+    parser.add_argument("-o", "--out", type=Path, default=Path("timing.svg"), help="SVG and PNG of this name")
+    parser.add_argument("--plan", type=Path, metavar="PLAN.json", help="run plan; default: nominal currents")
+    parser.add_argument("--width", type=int, metavar="NS", help="pulse width of the default plan")
+    parser.add_argument("--separation", type=int, metavar="NS", help="pulse separation of the default plan")
+
+
+def _add_light_options(parser: ArgumentParser) -> None:
+    add_rig(parser)
+    parser.add_argument("--current-a", type=float, required=True, help="current of each LED, at most its max_light_a")
+    parser.add_argument("--time-s", type=float, default=60.0, help="it ends by itself; at most 600, default 60")
+    parser.add_argument(
+        "--view", action="append", metavar="VIEW", help="LED of this view; default: all with max_light_a"
+    )
+
+
+def _add_flash_options(parser: ArgumentParser) -> None:
+    parser.add_argument("image", type=Path, metavar="IMAGE.uf2")
+    parser.add_argument("--drive", type=Path, help="where RPI-RP2 is mounted; default: the only one found")
+
+
+def info(options: Namespace) -> Outcome:
+    """Ask the generator for all that it tells."""
+    from daq.drivers.pulse_protocol import CHANNEL_COUNT, COUNTERS, Cause, Command, Fault, State
+    from server.rig.assembly import open_pulse_line
+    from server.rig.config import load_config
+
+    with open_pulse_line(load_config(options.config)) as (line, identity):
+        status = line.ask(Command.STATUS)
+        faults = Fault(status.number("faults"))
+        result = {
+            "identity": dict(identity.fields),
+            "starts": identity.boot,
+            "start_cause": Cause(identity.number("cause")).name,
+            "state": State(status.number("state")).name,
+            "faults": [fault.name for fault in Fault if fault & faults],
+            "interlock_closed": status.number("interlock") == 1,
+            "estop_closed": status.number("estop") == 1,
+            "shots_left": status.number("shots_left"),
+            "counters": {name: status.number(name) for name in COUNTERS},
+            "limits": [dict(_limits(line, channel)) for channel in range(CHANNEL_COUNT)],
+        }
+    return Outcome(result, described(result))
+
+
+def _limits(line: "PulseLine", channel: int) -> Iterator[tuple[str, int]]:
+    from daq.drivers.pulse_protocol import FIELDS, UNCHANGED, Command
+
+    reply = line.ask(Command.LIMIT, channel, UNCHANGED, UNCHANGED, UNCHANGED)
+    for name in FIELDS[Command.LIMIT].reply:
+        yield name, reply.number(name)
+
+
+def described(result: dict[str, Any]) -> str:
+    """Identity, state, counters and limits, for people."""
+    lines = [
+        f"identity: {_named(result['identity'])}",
+        f"starts: {result['starts']}, the last one by {result['start_cause']}",
+        f"state: {result['state']}, faults: {', '.join(result['faults']) or 'none'}",
+        f"interlock: {_closed(result['interlock_closed'])}, emergency stop: {_closed(result['estop_closed'])}",
+        f"shots left: {result['shots_left']}",
+        f"counters: {_named(result['counters'])}",
+    ]
+    limits = result["limits"]
+    return "\n".join([*lines, table(list(limits[0]), [[str(value) for value in limit.values()] for limit in limits])])
+
+
+def _named(values: dict[str, Any]) -> str:
+    return ", ".join(f"{name} {value}" for name, value in values.items())
+
+
+def _closed(closed: bool) -> str:
+    return "closed" if closed else "open"
+
+
+def selftest(options: Namespace) -> Outcome:
+    """Let the generator prove itself; no LED is lit."""
+    from daq.drivers.pulse_self_test import Verdict, self_test
+    from server.rig.assembly import open_pulse_line
+    from server.rig.config import load_config
+
+    checks = []
+    with open_pulse_line(load_config(options.config)) as (line, identity):
+        for check in self_test(line, identity):
+            progress(f"{check.verdict:8}{check.name}: {check.detail}")
+            checks.append(check)
+    found = Counter(check.verdict for check in checks)
+    result = {"passed": not found[Verdict.FAIL], "checks": [asdict(check) for check in checks]}
+    return Outcome(result, ", ".join(f"{found[verdict]} {verdict}" for verdict in Verdict))
+
+
+def scope(options: Namespace) -> Outcome:
+    """Draw the train; it is loaded and never armed, so there is no light."""
+    from daq.timing import plan_shot_timing
+    from server.pictures.timing_diagram import picture, timing_diagram
+    from server.rig.assembly import open_generator
+    from server.rig.config import load_config
+    from server.rig.shot_timing import camera_timings, fired_timing, load_plan, nominal_plan, timing_table
+
+    config = load_config(options.config)
+    plan = load_plan(options.plan) if options.plan else nominal_plan(config, options.width, options.separation)
+    cameras = camera_timings(config)
+    requested = plan_shot_timing(plan, cameras)
+    with open_generator(config) as generator:
+        identity = generator.identity()
+        actual = fired_timing(requested, cameras, generator.configure(requested))
+    figure = timing_diagram(actual, f"{config.name}: pulse train as loaded, {identity.model} {identity.firmware}")
+    files = {kind: options.out.with_suffix(f".{kind}") for kind in ("svg", "png")}
+    options.out.parent.mkdir(parents=True, exist_ok=True)
+    files["svg"].write_bytes(picture(figure, "svg"))
+    files["png"].write_bytes(picture(figure, "png"))
+    views = timing_table(requested, actual)
+    result = {
+        **{kind: str(path) for kind, path in files.items()},
+        "shortest_period_ns": requested.shortest_period_ns,
+        "views": views,
+    }
+    return Outcome(result, f"{train_table(views)}\n{result['svg']}, {result['png']}")
+
+
+def train_table(views: dict[str, Any]) -> str:
+    """A line per view with what was loaded, for people."""
+    rows = [
+        [
+            name,
+            *("{} to {}".format(*view["actual"][key]) for key in ("pulse_a_ns", "pulse_b_ns")),
+            *(str(view["actual"][key]) for key in ("separation_ns", "guard_before_ns", "guard_after_ns")),
+            f"{view['actual']['current_a']:g}",
+        ]
+        for name, view in views.items()
+    ]
+    heads = [
+        "view",
+        "pulse A [ns]",
+        "pulse B [ns]",
+        "separation [ns]",
+        "guard before [ns]",
+        "after [ns]",
+        "current [A]",
+    ]
+    return table(heads, rows)
+
+
+def light(options: Namespace) -> Outcome:
+    """Light until the time is over, or Ctrl-C; whatever ends it, the generator is off then."""
+    from server.rig.assembly import open_generator
+    from server.rig.config import load_config
+
+    config = load_config(options.config)
+    views = options.view or [name for name, view in config.views.items() if view.max_light_a]
+    if not views:
+        raise PlanError(f"{options.config}: no view permits continuous light, none has max_light_a")
+    with open_generator(config) as generator:
+        generator.light(dict.fromkeys(views, options.current_a), options.time_s)
+        progress(f"{', '.join(views)}: lit for {options.time_s:g} s at most; Ctrl-C ends it")
+        status = _wait_while_lit(generator)
+    if status.faults:
+        raise DeviceError(generator.name, f"the light was ended by a fault: {', '.join(status.faults)}")
+    result = {"views": views, "current_a": options.current_a, "time_s": options.time_s}
+    return Outcome(result, f"{', '.join(views)}: off")
+
+
+def _wait_while_lit(generator: "PulseGenerator") -> "GeneratorStatus":
+    """Asking is the heartbeat without which the light ends."""
+    from daq.devices import GeneratorState
+
+    never = Event()
+    while (status := generator.status()).state is GeneratorState.LIT:
+        never.wait(_HEARTBEAT_S)
+    return status
+
+
+def flash(options: Namespace) -> Outcome:
+    """Flash; nothing is written before image and board have been checked."""
+    from server.rig.firmware_image import find_drive, load_image, write_image
+
+    image = load_image(options.image)
+    drive = find_drive(options.drive)
+    progress(f"{image.path}: version {image.version}, {image.blocks} blocks, to {drive}")
+    result = {"written": str(write_image(image, drive)), "version": image.version, "blocks": image.blocks}
+    return Outcome(result, f"{result['written']}: version {image.version}")

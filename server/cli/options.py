@@ -1,0 +1,212 @@
+"""What several commands are told: rig, run, calibration, shots, grid and method; and what they make of it."""
+
+import math
+import os
+import re
+from argparse import ArgumentParser, ArgumentTypeError, Namespace, _SubParsersAction
+from collections.abc import Callable
+from enum import StrEnum
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from processing.reconstruction.accuracy import Accuracy
+from processing.reconstruction.method import ReconstructionMethod
+from processing.runs.errors import PipelineError
+from server.cli.output import Outcome, progress
+
+if TYPE_CHECKING:
+    from processing.calibration.calibration import Calibration
+    from processing.reconstruction.settings import ReconstructionSettings
+    from processing.volume import VoxelGrid
+
+Verbs: TypeAlias = "_SubParsersAction[ArgumentParser]"
+Command = Callable[[Namespace], Outcome]
+
+MAX_VOXELS = 10**12
+"""More fill any disk: a thousand times the largest volume of the paper's rig."""
+
+MIN_SIGMA_VOXEL, MAX_SIGMA_VOXEL = 0.3, 10.0
+
+NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,2})?"
+
+
+def add_verb(verbs: Verbs, name: str, command: Command, summary: str) -> ArgumentParser:
+    """Add a command."""
+    parser = verbs.add_parser(name, help=summary, description=summary)
+    parser.add_argument("--json", action="store_true", help="print one JSON object as the last line")
+    parser.set_defaults(command=command)
+    return parser
+
+
+def add_rig(parser: ArgumentParser) -> None:
+    """Let a command be told the rig."""
+    parser.add_argument("--config", type=Path, required=True, help="rig configuration")
+
+
+def add_calibrated_run(parser: ArgumentParser) -> None:
+    """Let a command be told a run, and the calibration of its views."""
+    parser.add_argument("run", type=Path, help="run directory")
+    parser.add_argument("--calibration", type=Path, required=True)
+
+
+def add_shots(parser: ArgumentParser) -> None:
+    """Let a command be told which shots to take."""
+    parser.add_argument("--shots", metavar="A:B", help="shots A to B - 1; default all")
+
+
+def add_reconstruction(parser: ArgumentParser) -> None:
+    """Let a command be told how to reconstruct which shots; what is not said is left to ReconstructionSettings."""
+    parser.add_argument("--method", choices=[method.value for method in ReconstructionMethod])
+    add_choice(parser, "accuracy", Accuracy, "fine: two to three times more accurate, at twice the cost")
+    _add_limited(parser, "iterations", "N", "of SMART and MART, at most")
+    _add_limited(parser, "relaxation", "X", "exponent of SMART and MART; the paper's is 1")
+    summary = "SMART and MART stop when an iteration lowers the residual by less than this share"
+    _add_limited(parser, "least_gain", "X", summary)
+    add_shots(parser)
+    parser.add_argument(
+        "--grid",
+        metavar="X0:X1,Y0:Y1,Z0:Z1[@PITCH]",
+        help="box in mm, voxel edge in mm; default: what all views see within the calibrated z range, one pixel",
+    )
+
+
+def add_choice(parser: ArgumentParser, name: str, kind: type[StrEnum], summary: str) -> None:
+    """Let a command be told one of a kind."""
+    parser.add_argument(f"--{name}", choices=[one.value for one in kind], help=summary)
+
+
+def _add_limited(parser: ArgumentParser, name: str, metavar: str, summary: str) -> None:
+    option = f"--{name.replace('_', '-')}"
+    parser.add_argument(option, type=partial(setting, name), metavar=metavar, help=summary)
+
+
+def positive(text: str) -> float:
+    """A finite number above 0."""
+    if not 0 < (value := float(text)) < math.inf:
+        raise ArgumentTypeError(f"{text} must be above 0, and finite")
+    return value
+
+
+def width(text: str) -> float:
+    """Width of a droplet in voxel: one that a voxel can show, and that a window of the quality factor holds."""
+    if not MIN_SIGMA_VOXEL <= (value := float(text)) <= MAX_SIGMA_VOXEL:
+        raise ArgumentTypeError(f"{text} must be from {MIN_SIGMA_VOXEL:g} to {MAX_SIGMA_VOXEL:g} voxel")
+    return value
+
+
+def seed(text: str) -> int:
+    """A whole number from 0 on."""
+    if (value := int(text)) < 0:
+        raise ArgumentTypeError(f"{text} must be 0 or more")
+    return value
+
+
+def count(text: str) -> int:
+    """A whole number from 1 on."""
+    if not (value := int(text)) > 0:
+        raise ArgumentTypeError(f"{text} must be 1 or more")
+    return value
+
+
+def setting(name: str, text: str) -> Any:
+    """The value of an option, with the limits of the setting of that name."""
+    from pydantic import ValidationError
+
+    from processing.reconstruction.settings import ReconstructionSettings
+
+    try:
+        return getattr(ReconstructionSettings.model_validate({name: text}), name)
+    except ValidationError as error:
+        raise ArgumentTypeError(f"{text}: {error.errors()[0]['msg']}") from error
+
+
+def reconstruction_settings(options: Namespace, calibration: "Calibration") -> "ReconstructionSettings":
+    """Grid, method and options of a command as settings."""
+    from processing.reconstruction.settings import GridSettings, ReconstructionSettings
+    from processing.runs.pipeline import default_grid
+
+    grid = parse_grid(options.grid, calibration) if options.grid else default_grid(calibration)
+    names = ("method", "accuracy", "voxels", "iterations", "relaxation", "least_gain")
+    said = {name: value for name in names if (value := getattr(options, name)) is not None}
+    return ReconstructionSettings.model_validate({**said, "grid": GridSettings.of(grid)})
+
+
+def parse_grid(text: str, calibration: "Calibration") -> "VoxelGrid":
+    """Grid of ``X0:X1,Y0:Y1,Z0:Z1[@PITCH]``, all in mm; without a pitch the default grid's.
+
+    Raises
+    ------
+    PipelineError
+        The text is not of that form, or the box is empty or beyond all measure.
+    """
+    import numpy as np
+
+    from processing.runs.pipeline import default_grid
+    from processing.volume import VoxelGrid
+
+    extent = rf"({NUMBER}):({NUMBER})"
+    match = re.fullmatch(rf"{extent},{extent},{extent}(?:@({NUMBER}))?", text)
+    if not match:
+        raise PipelineError(f"--grid {text!r} is not of the form X0:X1,Y0:Y1,Z0:Z1[@PITCH] in mm")
+    *bounds_mm, pitch = match.groups()
+    lower_mm, upper_mm = np.array(bounds_mm, dtype=float).reshape(3, 2).T
+    pitch_mm = float(pitch) if pitch else default_grid(calibration).pitch_mm
+    if (upper_mm <= lower_mm).any() or pitch_mm <= 0:
+        raise PipelineError(f"--grid {text!r}: every range must grow, and the pitch must be positive")
+    nx, ny, nz = (round(float(extent_mm) / pitch_mm) + 1 for extent_mm in upper_mm - lower_mm)
+    if nx * ny * nz > MAX_VOXELS:
+        raise PipelineError(
+            f"--grid {text!r}: {nx:.3g} x {ny:.3g} x {nz:.3g} voxels, at most {MAX_VOXELS:.1g} are taken"
+        )
+    return VoxelGrid((nz, ny, nx), (float(lower_mm[0]), float(lower_mm[1]), float(lower_mm[2])), pitch_mm)
+
+
+def selected_shots(run_dir: Path, selection: str | None) -> list[int]:
+    """Valid sample shots within A:B; one that was flagged while recording is left out, one that is torn is an error."""
+    from daq.files.run_directory import ImageKey, RunReader
+
+    first, last = _bounds(selection)
+    with RunReader(run_dir) as run:
+        keys = dict(enumerate(run.image_keys().tolist()[:last]))
+        wanted = {index: key for index, key in keys.items() if index >= first}
+        for index in (index for index, key in wanted.items() if key == ImageKey.INVALID):
+            run.read_shot(index)
+            progress(f"{run_dir.name}: shot {index} is invalid, left out")
+    chosen = [index for index, key in wanted.items() if key == ImageKey.SAMPLE]
+    if not chosen:
+        raise PipelineError(f"{run_dir}: has no valid sample shots" + (f" in {selection}" if selection else ""))
+    return chosen
+
+
+def _bounds(selection: str | None) -> tuple[int, int | None]:
+    match = re.fullmatch(r"(\d*):(\d*)", selection or ":")
+    if not match:
+        raise PipelineError(f"--shots {selection!r} is not of the form A:B")
+    first, last = match.groups()
+    return int(first or 0), int(last) if last else None
+
+
+def usable_processors() -> int:
+    """Processors that this process may use: as many threads as a command takes, which has the machine to itself."""
+    return len(os.sched_getaffinity(0))
+
+
+def picture_beside(file: Path) -> Path:
+    """Where the picture of a result goes.
+
+    Raises
+    ------
+    PipelineError
+        The result itself is called so; the picture would take its place.
+    """
+    picture = file.with_suffix(".png")
+    if picture == file:
+        raise PipelineError(f"{file}: its picture would take its place; choose another ending")
+    return picture
+
+
+def describe_grid(shape: tuple[int, int, int], pitch_mm: float) -> str:
+    """A grid for people, x first as in --grid."""
+    nz, ny, nx = shape
+    return f"{nx} x {ny} x {nz} voxels of {pitch_mm:.3g} mm"

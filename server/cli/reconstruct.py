@@ -1,0 +1,90 @@
+"""``tomoshadow reconstruct``: the shots of a run become volumes."""
+
+import resource
+from argparse import Namespace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from processing.reconstruction.voxel_type import VoxelType
+from server.cli.options import (
+    Verbs,
+    add_calibrated_run,
+    add_choice,
+    add_reconstruction,
+    add_verb,
+    describe_grid,
+    reconstruction_settings,
+    selected_shots,
+    usable_processors,
+)
+from server.cli.output import Outcome, progress, table
+
+if TYPE_CHECKING:
+    from processing.runs.pipeline import ShotResult
+
+
+def add(verbs: Verbs) -> None:
+    """Add the command."""
+    parser = add_verb(verbs, "reconstruct", reconstruct, "turn the shots of a run into volumes")
+    add_calibrated_run(parser)
+    parser.add_argument("-o", "--out", type=Path, required=True, help="directory of the results")
+    add_reconstruction(parser)
+    summary = "how volumes are stored: float16 keeps 11 bits in half the file of float32, uint8 256 steps"
+    add_choice(parser, "voxels", VoxelType, summary)
+
+
+def reconstruct(options: Namespace) -> Outcome:
+    """Reconstruct shot by shot."""
+    from processing.calibration.calibration_file import load_calibration
+    from processing.runs.pipeline import reconstruct_shot
+
+    settings = reconstruction_settings(options, load_calibration(options.calibration))
+    shots: list[ShotResult] = []
+    for index in selected_shots(options.run, options.shots):
+        progress(f"{options.run.name}: shot {index} by {settings.method}")
+        shot = reconstruct_shot(
+            options.run, index, options.calibration, settings, options.out, threads=usable_processors()
+        )
+        if not shots:
+            _tell_slow_views(shot)
+        _tell_blind_views(shot)
+        shots.append(shot)
+    result = {
+        **settings.model_dump(mode="json", include={"method", "accuracy", "voxels", "grid"}),
+        "views": {name: view.model_dump() for name, view in shots[0].views.items()},
+        "volumes": [volume.model_dump(mode="json") for shot in shots for volume in shot.volumes],
+        "cpu_s": sum(shot.cpu_s for shot in shots),
+        "peak_rss_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+    }
+    return Outcome(result, f"{volumes_table(result)}\n{options.out}: {_summary(result)}")
+
+
+def _tell_slow_views(shot: "ShotResult") -> None:
+    for name, view in shot.views.items():
+        if view.reason:
+            nodes = f"nodes {view.node_spacing_voxel} voxels apart"
+            progress(f"{name} takes the exact way, which is slower ({nodes}): {view.reason}")
+
+
+def _tell_blind_views(shot: "ShotResult") -> None:
+    for volume in shot.volumes:
+        for name in volume.blind_views:
+            progress(
+                f"shot {volume.shot}, exposure {volume.frame}: {name} sees nothing; "
+                "is the shot empty, or a lens covered, a light off?"
+            )
+
+
+def volumes_table(result: dict[str, Any]) -> str:
+    """A line per volume, for people."""
+    rows = [
+        [str(volume["shot"]), volume["frame"].upper(), f"{volume['seconds']:.2f}", volume["file"]]
+        for volume in result["volumes"]
+    ]
+    return table(["shot", "exposure", "seconds", "file"], rows)
+
+
+def _summary(result: dict[str, Any]) -> str:
+    grid = describe_grid(result["grid"]["shape"], result["grid"]["pitch_mm"])
+    cost = f"{result['cpu_s']:.1f} CPU-s, at most {result['peak_rss_mb']:.0f} MB"
+    return f"{len(result['volumes'])} volumes by {result['method']}, {grid}; {cost}"

@@ -1,0 +1,66 @@
+"""``tomoshadow average``: of volumes, and straight from a run."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from processing.reconstruction.volume_file import read_volume
+from tests.support.command_line import GRID, refused, shown, told
+
+
+@pytest.mark.parametrize("voxels", ["float32", "float16", "uint8"])
+def test_average_of_results(
+    voxels: str, run_dir: Path, calibration_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    common = ["reconstruct", run_dir, "--calibration", calibration_file, f"--grid={GRID}"]
+    assert told(capsys, *common, "-o", tmp_path / "out", "--voxels", voxels)["voxels"] == voxels
+    result = told(capsys, "average", tmp_path / "out", "-o", tmp_path / "mean.vtkhdf")
+    assert result["volumes"] == 4
+    assert read_volume(tmp_path / "mean.vtkhdf")[0].shape == (21, 21, 21)
+    assert Path(result["figure"]).stat().st_size > 1000
+
+
+@pytest.mark.parametrize("method", ["mlos", "gavlos", "smart"])
+def test_average_of_a_run_is_the_average_of_its_results(
+    method: str, run_dir: Path, calibration_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    options = ["--calibration", calibration_file, f"--grid={GRID}", "--method", method, "--iterations", 2]
+    told(capsys, "reconstruct", run_dir, *options, "-o", tmp_path / "out")
+    stored = told(capsys, "average", tmp_path / "out", "-o", tmp_path / "stored.vtkhdf")
+    straight = told(capsys, "average", run_dir, *options, "-o", tmp_path / "straight.vtkhdf")
+    assert (straight["volumes"], straight["grid"]) == (stored["volumes"], stored["grid"])
+    volumes = [read_volume(tmp_path / f"{name}.vtkhdf")[0].astype(np.float64) for name in ("stored", "straight")]
+    assert volumes[0].max() > 0
+    np.testing.assert_allclose(volumes[1], volumes[0], atol=2e-3 * volumes[0].max())
+
+
+def test_a_run_is_averaged_with_a_calibration_only(
+    run_dir: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert "name its --calibration" in refused(capsys, "average", run_dir, "-o", tmp_path / "mean.vtkhdf")
+
+
+def test_average_of_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "empty").mkdir()
+    complaint = refused(capsys, "average", tmp_path / "empty", "-o", tmp_path / "mean.vtkhdf")
+    assert complaint == f"{tmp_path / 'empty'}: there are no volumes to average"
+    assert not (tmp_path / "mean.vtkhdf").exists()
+
+
+def test_people_are_told_where_the_mean_is(
+    run_dir: Path, calibration_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out, grid = tmp_path / "mean.vtkhdf", "21 x 21 x 21 voxels of 0.1 mm"
+    text = shown(capsys, "average", run_dir, "--calibration", calibration_file, f"--grid={GRID}", "-o", out)
+    assert text == f"{out}: mean of 4 volumes, {grid}; slices in {tmp_path / 'mean.png'}\n"
+
+
+def test_a_mean_is_kept_as_float32_unless_asked_for(
+    run_dir: Path, calibration_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    options = ["--calibration", calibration_file, f"--grid={GRID}", "--shots", "0:1", "-o", tmp_path / "mean.vtkhdf"]
+    assert told(capsys, "average", run_dir, *options)["method"] == "mlos"
+    settings = json.loads(str(read_volume(tmp_path / "mean.vtkhdf")[2]["settings"]))
+    assert settings["voxels"] == "float32"

@@ -1,0 +1,69 @@
+"""The command line itself: usage, help, exit status, and readers that have seen enough."""
+
+from pathlib import Path
+
+import pytest
+
+from processing.errors import BadInput
+from server.cli.main import COMMANDS, main
+from tests.support.command_line import refused
+from tests.support.fresh_interpreter import modules_after, packages_of
+
+ROOT = Path(__file__).parents[3]
+CHAIN = ("demo", "serve", "doctor", "import", "calibrate", "check", "self-calibrate", "reconstruct", "average")
+STUDIES = ("density", "ghosts", "average", "residuals", "calibration", "sensitivity")
+TOOLS = ("info", "selftest", "scope", "light", "flash")
+WORDS = [
+    [],
+    *([command] for command in (*CHAIN, "study", "optics", "bench", "firmware")),
+    *(["study", study] for study in STUDIES),
+    *(["firmware", tool] for tool in TOOLS),
+]
+"""Of every command."""
+HEAVY = {
+    *("numpy", "cv2", "h5py", "scipy", "skimage", "matplotlib", "pydantic"),
+    *("fastapi", "starlette", "nicegui", "uvicorn", "dask", "distributed", "gi", "serial", "gpiod"),
+}
+
+
+def test_unknown_usage_exits_with_2(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as stopped:
+        main(["reconstruct", "--method", "magic"])
+    assert stopped.value.code == 2
+    assert "usage" in capsys.readouterr().err
+
+
+def test_help_loads_nothing_that_is_heavy() -> None:
+    """Measured by what is imported: time says little on a busy machine."""
+    code = f"""
+from contextlib import suppress
+from server.cli.main import main
+for words in {WORDS}:
+    with suppress(SystemExit):
+        main([*words, "--help"])
+"""
+    modules = modules_after(code)
+    assert {command.__name__ for command in COMMANDS} <= modules
+    assert not packages_of(modules) & HEAVY
+
+
+def test_every_command_has_help(capsys: pytest.CaptureFixture[str]) -> None:
+    for words in WORDS:
+        with pytest.raises(SystemExit) as stopped:
+            main([*words, "--help"])
+        assert stopped.value.code == 0
+        assert capsys.readouterr().out.startswith(" ".join(["usage: tomoshadow", *words]))
+
+
+def test_bad_input_is_told_apart_from_failure(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(error: Exception) -> None:
+        raise error
+
+    arguments = ["optics", "--config", tmp_path / "rig.toml"]
+    monkeypatch.setattr("server.rig.config.load_config", lambda _: fail(BadInput("rig.toml, line 3: wrong")))
+    assert refused(capsys, *arguments) == "rig.toml, line 3: wrong"
+    monkeypatch.setattr("server.rig.config.load_config", lambda _: fail(OSError("disk full")))
+    assert main([*map(str, arguments)]) == 1
+    assert capsys.readouterr().err == "tomoshadow: disk full\n"

@@ -1,0 +1,44 @@
+"""A run of droplets seen by four views, one of which has moved since it was calibrated."""
+
+from pathlib import Path
+
+import numpy as np
+
+from daq.files.run_directory import DoubleFrame, ExposureRecord, ImageKey, RunHeader, RunWriter, Shot, ViewFormat
+from processing.studies.seen_droplets import droplet_image
+from tests.support.drifting_views import DENSITY_PER_MM3, HALF_MM, SIZE_PX, views
+
+SEEN = ExposureRecord(valid=True, frame_id=1, device_timestamp_ns=1)
+DRIFT_PX = 2
+
+
+def write_droplet_run(
+    run_dir: Path, density_per_mm3: float = DENSITY_PER_MM3, view_count: int = 4, covered: str = ""
+) -> Path:
+    """Two shots; the picture of view2 lies two pixels further right than when it was calibrated.
+
+    A covered view is dark.
+    """
+    rng = np.random.default_rng(11)
+    cameras = {f"view{number}": camera for number, camera in enumerate(views()[:view_count], start=1)}
+    shape = (SIZE_PX[1], SIZE_PX[0])
+    header = RunHeader(
+        run_id=run_dir.name,
+        created_utc="2026-01-01T00:00:00+00:00",
+        views={name: ViewFormat(shape, 8) for name in cameras},
+        polarity="bright",
+        separation_ns=6400,
+    )
+    with RunWriter(run_dir, header) as writer:
+        for index in range(2):
+            exposures = []
+            for _ in "ab":
+                points_mm = rng.uniform(-HALF_MM, HALF_MM, (int(density_per_mm3 * np.prod(2 * HALF_MM)), 3))
+                images = {name: droplet_image(camera, points_mm, rng) for name, camera in cameras.items()}
+                images["view2"] = np.roll(images["view2"], DRIFT_PX, axis=1)
+                images = {name: image * (name != covered) for name, image in images.items()}
+                exposures.append({name: np.round(200 * image).astype(np.uint8) for name, image in images.items()})
+            shot_views = {name: DoubleFrame(exposures[0][name], exposures[1][name], SEEN, SEEN) for name in cameras}
+            writer.write_shot(Shot(index, ImageKey.SAMPLE, shot_views))
+        writer.finish("completed")
+    return run_dir
