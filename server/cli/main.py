@@ -8,6 +8,7 @@ import re
 import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
+from typing import Any
 
 from daq.errors import DaqError, PlanError, ShotFileError
 from processing.errors import BadInput
@@ -81,8 +82,15 @@ def _fail(options: Namespace, error: BaseException, status: int) -> int:
     return status
 
 
+class _Parser(ArgumentParser):
+    """Prints as commands do."""
+
+    def _print_message(self, message: str, file: Any = None) -> None:
+        say(message, file or sys.stderr, end="")
+
+
 def _parser() -> ArgumentParser:
-    parser = ArgumentParser(prog="tomoshadow", description="Tomographic shadowgraphy, from trigger to volume.")
+    parser = _Parser(prog="tomoshadow", description="Tomographic shadowgraphy, from trigger to volume.")
     verbs = parser.add_subparsers(required=True, metavar="COMMAND")
     for command in COMMANDS:
         command.add(verbs)

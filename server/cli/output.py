@@ -1,6 +1,7 @@
 """What commands say: progress while they work, and at the end an object for programs and a text for people."""
 
 import json
+import os
 import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -41,9 +42,13 @@ def progress(text: str) -> None:
     say(text, sys.stderr)
 
 
-def say(text: str, stream: TextIO) -> None:
-    """Print at once."""
-    print(text, file=stream, flush=True)
+def say(text: str, stream: TextIO, end: str = "\n") -> None:
+    """Print at once. A reader who has seen enough, as ``| head``, ends neither the work nor in a traceback."""
+    try:
+        print(text, end=end, file=stream, flush=True)
+    except BrokenPipeError:
+        with open(os.devnull, "w") as nowhere:
+            os.dup2(nowhere.fileno(), stream.fileno())
 
 
 def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

@@ -1,5 +1,8 @@
 """The command line itself: usage, help, exit status, and readers that have seen enough."""
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -67,3 +70,16 @@ def test_bad_input_is_told_apart_from_failure(
     monkeypatch.setattr("server.rig.config.load_config", lambda _: fail(OSError("disk full")))
     assert main([*map(str, arguments)]) == 1
     assert capsys.readouterr().err == "tomoshadow: disk full\n"
+
+
+@pytest.mark.parametrize("words", [["--help"], ["optics", "--config", "configs/spray4view.toml"]])
+def test_a_reader_who_has_seen_enough_ends_it_quietly(words: list[str]) -> None:
+    """As ``| head`` does: what a pipe is written to that nobody reads any more."""
+    reading, writing = os.pipe()
+    os.close(reading)
+    command = [sys.executable, "-m", "server.cli", *words]
+    try:
+        done = subprocess.run(command, cwd=ROOT, stdout=writing, stderr=subprocess.PIPE, timeout=60, check=False)
+    finally:
+        os.close(writing)
+    assert (done.returncode, done.stderr) == (0, b"")

@@ -1,10 +1,11 @@
 """What commands say: tables, the object and the text, and streams that nobody reads."""
 
 import json
+import os
 
 import pytest
 
-from server.cli.output import Outcome, table, tell
+from server.cli.output import Outcome, say, table, tell
 
 
 def test_words_stand_left_and_figures_right() -> None:
@@ -33,6 +34,15 @@ def test_people_get_the_text_and_programs_the_object(capsys: pytest.CaptureFixtu
 def test_what_has_nothing_to_say_says_nothing(capsys: pytest.CaptureFixture[str]) -> None:
     tell(Outcome({}), as_json=False)
     assert capsys.readouterr() == ("", "")
+
+
+def test_work_goes_on_when_nobody_reads_any_more() -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    with os.fdopen(writing, "w") as stream:
+        say("lost", stream)
+        say("lost, too", stream)
+        assert os.path.samestat(os.fstat(stream.fileno()), os.stat(os.devnull))
 
 
 def test_only_a_result_that_says_so_has_not_passed() -> None:
