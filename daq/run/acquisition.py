@@ -9,9 +9,10 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from daq.devices import GeneratorState, Rig
-from daq.errors import BusyError, DeviceError, PlanError
+from daq.devices import Rig
+from daq.errors import BusyError, PlanError
 from daq.files.run_directory import open_runs
+from daq.run import light
 from daq.run.ending import RunControl
 from daq.run.events import RunEvent, RunMessage, RunStatus, ShotRecorded, StateChanged
 from daq.run.limits import AcquisitionLimits
@@ -136,7 +137,7 @@ class Acquisition:
             The generator did not take the command; acquisition goes on trying.
         """
         self._control.end(RunStep.ABORT, "aborted by the operator")
-        self._rig.generator.off()
+        light.switch_off(self._rig)
 
     def acknowledge(self) -> None:
         """Clear the generator's latched faults, and leave FAULT if the light is off.
@@ -151,12 +152,7 @@ class Acquisition:
         state = self.status().state
         if state is not RunState.IDLE:
             next_state(state, RunStep.ACKNOWLEDGE)
-        generator = self._rig.generator
-        generator.off()
-        generator.clear()
-        after = generator.status().state
-        if after in (GeneratorState.ARMED, GeneratorState.LIT):
-            raise DeviceError(generator.name, f"still {after} after off")
+        light.acknowledge_faults(self._rig)
         if state is RunState.FAULT:
             self._move(RunStep.ACKNOWLEDGE)
 

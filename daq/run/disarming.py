@@ -1,25 +1,11 @@
-"""The end of a run: light confirmed off, then cameras disarmed, without waiting for a frozen one."""
+"""Cameras disarmed side by side, without waiting for a frozen one."""
 
 import threading
 import time
 from collections.abc import Mapping
 
-from daq.devices import Camera, GeneratorState, Rig
-from daq.errors import DaqError, DeviceError
-from daq.run.guard import switch_off
-
-_RETRY_S = 0.05
-
-
-def confirm_light_off(rig: Rig, deadline_s: float) -> str | None:
-    """Switch off until the generator itself says that it is not armed; returns why it could not be confirmed."""
-    deadline = time.monotonic() + deadline_s
-    pause = threading.Event()
-    while True:
-        reason = switch_off(rig) or _still_armed(rig)
-        if reason is None or time.monotonic() >= deadline:
-            return reason
-        pause.wait(_RETRY_S)
+from daq.devices import Camera
+from daq.errors import DaqError
 
 
 def disarm_cameras(cameras: Mapping[str, Camera], deadline_s: float) -> dict[str, str]:
@@ -39,15 +25,6 @@ def disarm_cameras(cameras: Mapping[str, Camera], deadline_s: float) -> dict[str
         thread.join(max(0.0, deadline - time.monotonic()))
     late = {view: f"{view}: not disarmed within {deadline_s:g} s" for view, one in threads.items() if one.is_alive()}
     return {**problems, **late}
-
-
-def _still_armed(rig: Rig) -> str | None:
-    try:
-        state = rig.generator.status().state
-    except DeviceError as error:
-        return str(error)
-    lights = state in (GeneratorState.ARMED, GeneratorState.LIT)
-    return f"{rig.generator.name}: still {state} after off" if lights else None
 
 
 def _disarm(view: str, camera: Camera, problems: dict[str, str]) -> None:

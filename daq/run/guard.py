@@ -11,9 +11,9 @@ from types import TracebackType
 from typing import Self
 
 from daq.devices import Rig
-from daq.errors import DaqError, DeviceError, DeviceOvertaken
+from daq.errors import DaqError, DeviceOvertaken
+from daq.run import light
 from daq.run.ending import RunControl
-from daq.run.preflight import check_light_permitted
 from daq.run.state import RunStep
 
 
@@ -52,17 +52,8 @@ class RunGuard:
         try:
             while not self._done.is_set():
                 with suppress(DeviceOvertaken):  # switched off between two positions of the stage: dark, ask again
-                    check_light_permitted(self._rig)
+                    light.check_permitted(self._rig)
                 self._rig.interlock.wait_for_change(self._period_s)
         except DaqError as error:
-            switch_off(self._rig)
+            light.try_to_switch_off(self._rig)
             self._control.end(RunStep.ERROR, str(error))
-
-
-def switch_off(rig: Rig) -> str | None:
-    """Ask for darkness now; returns why that failed, for whoever must make sure of it later."""
-    try:
-        rig.generator.off()
-    except DeviceError as error:
-        return str(error)
-    return None

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
-from daq.devices import GeneratorState, Rig
-from daq.errors import DeviceRefused, InterlockOpen, PlanError
+from daq.devices import Rig
+from daq.errors import PlanError
 from daq.files.run_directory import ViewFormat
+from daq.run import light
 from daq.run.references import find_references
 from daq.run_plan import RunKind, RunPlan
 from daq.timing import ShotTiming, plan_shot_timing
@@ -62,21 +63,8 @@ def prepare_run(rig: Rig, data_dir: Path, plan: RunPlan, now: datetime) -> Prepa
     views = {view: ViewFormat(camera.image_shape, camera.bits) for view, camera in rig.cameras.items()}
     references = find_references(data_dir, plan.references, views)
     _check_disk(data_dir, plan, views)
-    check_light_permitted(rig)
+    light.check_permitted(rig)
     return PreparedRun(_new_run_id(data_dir, plan.name, now), plan, timing, views, references)
-
-
-def check_light_permitted(rig: Rig) -> None:
-    """Refuse while the interlock is open or the generator has a fault."""
-    if not rig.interlock.is_closed():
-        raise InterlockOpen(f"{rig.interlock.name}: the interlock is open")
-    status = rig.generator.status()
-    if status.state is GeneratorState.FAULT:
-        raise DeviceRefused(rig.generator.name, f"fault: {', '.join(status.faults)}; acknowledge it first")
-    if not status.interlock_closed:
-        raise InterlockOpen(f"{rig.generator.name}: the interlock input of the pulse generator is open")
-    if not status.estop_closed:
-        raise InterlockOpen(f"{rig.generator.name}: the emergency stop of the pulse generator is open")
 
 
 def _timing(rig: Rig, plan: RunPlan) -> ShotTiming:

@@ -12,9 +12,10 @@ from typing import Any
 from daq.devices import Rig
 from daq.errors import DaqError
 from daq.files.run_directory import RunHeader, RunWriter
-from daq.run.disarming import confirm_light_off, disarm_cameras
+from daq.run import light
+from daq.run.disarming import disarm_cameras
 from daq.run.ending import RunControl
-from daq.run.guard import RunGuard, switch_off
+from daq.run.guard import RunGuard
 from daq.run.limits import AcquisitionLimits
 from daq.run.preflight import PreparedRun
 from daq.run.recorder import Recorder
@@ -84,12 +85,12 @@ class RunSession:
         """Arm, and take all shots; returns when the last one is handed to the recorder, or the run is ended."""
         with RunGuard(self._rig, self._control, self._limits.heartbeat_s):
             self._attempt(partial(self._acquire, run_dir, describe, on_armed, on_commit))
-            switch_off(self._rig)
+            light.try_to_switch_off(self._rig)
         self._control.end(RunStep.LAST_SHOT)
 
     def disarm(self) -> str | None:
         """Light off, then cameras; returns why the light could not be confirmed off."""
-        reason = confirm_light_off(self._rig, self._limits.light_off_s)
+        reason = light.confirm_off(self._rig, self._limits.light_off_s)
         if reason:
             self._control.end(RunStep.ERROR, f"light not confirmed off: {reason}")
         for problem in disarm_cameras(self._rig.cameras, self._limits.disarm_s).values():
@@ -151,7 +152,7 @@ class RunSession:
             self._fail(f"internal error: {error!r}")
 
     def _fail(self, cause: str) -> None:
-        switch_off(self._rig)
+        light.try_to_switch_off(self._rig)
         if not self._control.end(RunStep.ERROR, cause):
             self._say(cause)
 

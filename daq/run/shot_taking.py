@@ -5,6 +5,7 @@ from collections.abc import Callable
 
 from daq.devices import Rig
 from daq.errors import DeviceRefused
+from daq.run import light
 from daq.run.ending import RunControl
 from daq.run.limits import AcquisitionLimits
 from daq.run.preflight import PreparedRun
@@ -66,7 +67,7 @@ class ShotTaker:
         """
         generator, plan = self._rig.generator, self._run.plan
         if plan.stage_z_mm and self._rig.stage:
-            generator.off()
+            light.switch_off(self._rig)
             self._stage_z_mm = self._rig.stage.move_to(plan.stage_z_mm[position])
         if deviation := train_deviation(self._run.timing, generator.configure(self._run.timing)):
             raise DeviceRefused(generator.name, f"loaded another pulse train: {deviation}")

@@ -1,0 +1,76 @@
+"""Light: whether it is permitted, off, and known to be off. Nothing here waits for a camera."""
+
+import threading
+import time
+from contextlib import suppress
+
+from daq.devices import GeneratorState, Rig
+from daq.errors import DeviceError, DeviceRefused, InterlockOpen
+
+_RETRY_S = 0.05
+_LIGHT_STATES = frozenset({GeneratorState.ARMED, GeneratorState.LIT})
+
+
+def check_permitted(rig: Rig) -> None:
+    """Refuse while the interlock is open or the generator has a fault.
+
+    Raises
+    ------
+    DeviceRefused
+        The pulse generator has a latched fault.
+    InterlockOpen
+        The light must not be switched on.
+    """
+    if not rig.interlock.is_closed():
+        raise InterlockOpen(f"{rig.interlock.name}: the interlock is open")
+    status = rig.generator.status()
+    if status.state is GeneratorState.FAULT:
+        raise DeviceRefused(rig.generator.name, f"fault: {', '.join(status.faults)}; acknowledge it first")
+    if not status.interlock_closed:
+        raise InterlockOpen(f"{rig.generator.name}: the interlock input of the pulse generator is open")
+    if not status.estop_closed:
+        raise InterlockOpen(f"{rig.generator.name}: the emergency stop of the pulse generator is open")
+
+
+def switch_off(rig: Rig) -> None:
+    """Light off now, from any thread; DeviceError if the generator does not take the command."""
+    rig.generator.off()
+
+
+def try_to_switch_off(rig: Rig) -> None:
+    """Light off now, if the generator takes the command; who has to be sure of it confirms it afterwards."""
+    with suppress(DeviceError):
+        switch_off(rig)
+
+
+def confirm_off(rig: Rig, deadline_s: float) -> str | None:
+    """Switch off until the generator itself says that it is off; returns why that could not be confirmed."""
+    deadline = time.monotonic() + deadline_s
+    pause = threading.Event()
+    while reason := _reason_not_off(rig):
+        if time.monotonic() >= deadline:
+            return reason
+        pause.wait(_RETRY_S)
+    return None
+
+
+def acknowledge_faults(rig: Rig) -> None:
+    """Clear the generator's latched faults in the dark; DeviceError if it refuses, or the light is not off."""
+    switch_off(rig)
+    rig.generator.clear()
+    _check_off(rig)
+
+
+def _reason_not_off(rig: Rig) -> str | None:
+    try:
+        switch_off(rig)
+        _check_off(rig)
+    except DeviceError as error:
+        return str(error)
+    return None
+
+
+def _check_off(rig: Rig) -> None:
+    state = rig.generator.status().state
+    if state in _LIGHT_STATES:
+        raise DeviceError(rig.generator.name, f"still {state} after off")
