@@ -4,14 +4,12 @@ A constructor acquires nothing; ``with device:`` opens and closes it. Light is o
 an error and after closing. Every method has a deadline and raises ``daq.errors.DeviceTimeout``.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from pathlib import Path
 from types import TracebackType
 from typing import Protocol, Self
 
-from daq.run_plan import RunKind
 from daq.shot import DoubleFrame, FiredTrain, Image
 from daq.timing import CameraTiming, ShotTiming
 
@@ -176,14 +174,6 @@ class TranslationStage(Device, Protocol):
         """Actual position."""
 
 
-def _nothing_to_prepare(_: RunKind) -> None:
-    """On a real rig the operator prepares the scene before pressing start."""
-
-
-def _no_truth_to_keep(_: Path) -> None:
-    """On a real rig nobody knows the truth."""
-
-
 @dataclass(frozen=True)
 class Rig:
     """All devices of one rig.
@@ -196,10 +186,6 @@ class Rig:
         Light and its permission.
     stage : TranslationStage | None
         Carries the calibration target, where there is one.
-    prepare_scene : Callable[[RunKind], None]
-        Called before a run; the simulated bench plays the operator here (spray on or off, target in).
-    keep_truth : Callable[[Path], None]
-        Called with the directory of a run after its last shot; the simulated bench writes what nobody could measure.
     max_current_a : Mapping[str, float]
         Limit of each view's LED; a view that is not named has only the limit of the generator.
     """
@@ -208,6 +194,13 @@ class Rig:
     generator: PulseGenerator
     interlock: Interlock
     stage: TranslationStage | None = None
-    prepare_scene: Callable[[RunKind], None] = _nothing_to_prepare
-    keep_truth: Callable[[Path], None] = _no_truth_to_keep
     max_current_a: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def devices(self) -> tuple[Device, ...]:
+        """All of them, in the order in which they are opened.
+
+        The generator comes last and so is closed first: the light goes off before anything else ends.
+        """
+        carriers = () if self.stage is None else (self.stage,)
+        return (*carriers, *self.cameras.values(), self.interlock, self.generator)

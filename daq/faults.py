@@ -1,4 +1,4 @@
-"""Faults of the simulated bench: what can go wrong, when, and to whom."""
+"""Faults of the simulated laboratory: what can go wrong, when, and to whom."""
 
 from enum import StrEnum
 from typing import Annotated, Self
@@ -42,7 +42,7 @@ class FaultKind(StrEnum):
     """The carriage of the stage is blocked."""
 
 
-BENCH_FAULTS = frozenset(
+LABORATORY_FAULTS = frozenset(
     {FaultKind.GENERATOR_RESET, FaultKind.SERIAL_GARBAGE, FaultKind.INTERLOCK_OPEN, FaultKind.STAGE_STALL}
 )
 """Faults that happen to no view."""
@@ -57,7 +57,7 @@ class Fault(FrozenModel):
 
     @model_validator(mode="after")
     def _happens_to_somebody(self) -> Self:
-        if (self.view is None) != (self.kind in BENCH_FAULTS):
+        if (self.view is None) != (self.kind in LABORATORY_FAULTS):
             raise ValueError(f"{self.kind}: {'needs a view' if self.view is None else 'happens to no view'}")
         return self
 

@@ -1,10 +1,7 @@
 """Acquisition: one run at a time, on a thread of its own."""
 
 import threading
-from collections.abc import Callable, Mapping
-from dataclasses import replace
-from datetime import UTC, datetime
-from functools import partial
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -13,14 +10,15 @@ from daq.devices import Rig
 from daq.errors import BusyError, PlanError
 from daq.files.run_directory import open_runs
 from daq.run import light
-from daq.run.ending import RunControl
-from daq.run.events import RunEvent, RunMessage, RunStatus, ShotRecorded, StateChanged
+from daq.run.active_run import ActiveRun, RunObserver
+from daq.run.ending import RunEnding
+from daq.run.events import RunEvent, RunMessage, RunStatus
 from daq.run.limits import AcquisitionLimits
 from daq.run.preflight import PreparedRun, prepare_run
-from daq.run.session import RunSession, describe_run
-from daq.run.state import OUTCOMES, RunState, RunStep, next_state
+from daq.run.progress import RunProgress
+from daq.run.session import RunSession
+from daq.run.state import RunState, RunStep, next_state
 from daq.run_plan import RunPlan
-from daq.shot import Shot
 
 
 def _nobody_listens(_: RunEvent) -> None:
@@ -52,6 +50,8 @@ class Acquisition:
         SHA-256 of a calibration by its id, stored in every run that names one.
     limits : AcquisitionLimits
         Deadlines.
+    observers : sequence of RunObserver
+        Who takes part in every run without being a device.
     """
 
     def __init__(
@@ -62,6 +62,7 @@ class Acquisition:
         configuration: Mapping[str, Any] | None = None,
         hash_calibration: Callable[[str], str | None] = _no_calibration_store,
         limits: AcquisitionLimits | None = None,
+        observers: Sequence[RunObserver] = (),
     ) -> None:
         self._rig = rig
         self._data_dir = data_dir
@@ -69,10 +70,10 @@ class Acquisition:
         self._configuration = dict(configuration or {})
         self._hash_calibration = hash_calibration
         self._limits = limits or AcquisitionLimits()
+        self._observers = tuple(observers)
         self._starting = threading.Lock()
-        self._changed = threading.Condition()
-        self._status = RunStatus()
-        self._control = RunControl()
+        self._progress = RunProgress(publish)
+        self._ending = RunEnding()
 
     def __enter__(self) -> Self:
         for run_id in self.interrupted_runs():
@@ -88,8 +89,7 @@ class Acquisition:
 
     def status(self) -> RunStatus:
         """Snapshot; never waits for a device."""
-        with self._changed:
-            return self._status
+        return self._progress.status()
 
     def interrupted_runs(self) -> tuple[str, ...]:
         """Runs without an outcome whose process is gone: their outcome is INTERRUPTED, their shots are sound."""
@@ -114,19 +114,18 @@ class Acquisition:
             raise BusyError("another run is being started")
         try:
             next_state(self.status().state, RunStep.START)
-            self._control = RunControl()
-            run, calibration_sha256 = self._prepare(plan)
-            started = RunStatus(run_id=run.run_id, shots_planned=plan.total_shots, plan=plan)
-            self._move(RunStep.START, **vars(started))
-            work = partial(self._work, run, self._control, calibration_sha256)
-            threading.Thread(target=work, name="acquisition", daemon=True).start()
-            return run.run_id
+            ending = self._ending = RunEnding()
+            prepared = self._prepare(plan)
+            self._progress.begin(prepared.header.run_id, plan)
+            run = ActiveRun(self._rig, prepared, self._progress, self._limits, self._observers, ending)
+            threading.Thread(target=self._work, args=(run,), name="acquisition", daemon=True).start()
+            return prepared.header.run_id
         finally:
             self._starting.release()
 
     def stop(self) -> None:
         """End the run after the shot under way; without a run there is nothing to do."""
-        self._control.end(RunStep.STOP, "stopped by the operator")
+        self._ending.end(RunStep.STOP, "stopped by the operator")
 
     def abort(self) -> None:
         """Light off now, from this thread, whatever acquisition waits for; the shot under way is lost.
@@ -136,7 +135,7 @@ class Acquisition:
         DeviceError
             The generator did not take the command; acquisition goes on trying.
         """
-        self._control.end(RunStep.ABORT, "aborted by the operator")
+        self._ending.end(RunStep.ABORT, "aborted by the operator")
         light.switch_off(self._rig)
 
     def acknowledge(self) -> None:
@@ -154,58 +153,25 @@ class Acquisition:
             next_state(state, RunStep.ACKNOWLEDGE)
         light.acknowledge_faults(self._rig)
         if state is RunState.FAULT:
-            self._move(RunStep.ACKNOWLEDGE)
+            self._progress.move(RunStep.ACKNOWLEDGE)
 
     def wait(self, deadline_s: float) -> RunStatus:
         """Wait until no run is active; returns the status then, or the one at the deadline."""
-        with self._changed:
-            self._changed.wait_for(lambda: not self._status.active, deadline_s)
-            return self._status
+        return self._progress.wait(deadline_s)
 
-    def _prepare(self, plan: RunPlan) -> tuple[PreparedRun, str | None]:
+    def _prepare(self, plan: RunPlan) -> PreparedRun:
         try:
             self._data_dir.mkdir(parents=True, exist_ok=True)
-            run = prepare_run(self._rig, self._data_dir, plan, datetime.now(UTC))
-            return run, self._hash_calibration(plan.calibration) if plan.calibration else None
+            return prepare_run(self._rig, self._data_dir, plan, self._configuration, self._hash_calibration)
         except OSError as error:
             raise PlanError(f"the run cannot be stored, or its calibration not be read: {error}") from error
 
-    def _work(self, run: PreparedRun, control: RunControl, calibration_sha256: str | None) -> None:
+    def _work(self, run: ActiveRun) -> None:
         """Thread: one run from ARMING until it rests."""
-        session = RunSession(self._rig, run, control, self._limits, self._say)
-        session.acquire(
-            self._data_dir / run.run_id,
-            partial(describe_run, self._rig, run, self._configuration, calibration_sha256),
-            partial(self._move, RunStep.ARMED),
-            self._committed,
-        )
-        self._move(control.ending or RunStep.ERROR, message=control.cause)
+        session, ending, progress = RunSession(run), run.ending, run.progress
+        session.acquire()
+        progress.move(ending.step or RunStep.ERROR, message=ending.cause)
         light_reason = session.disarm()
         session.close()
-        outcome = OUTCOMES[control.ending or RunStep.ERROR]
         step = RunStep.LIGHT_UNKNOWN if light_reason else RunStep.LIGHT_OFF
-        self._move(step, outcome=outcome, message=control.cause or self._summary())
-
-    def _summary(self) -> str:
-        status = self.status()
-        return f"{status.shots_recorded} of {status.shots_planned} shots recorded, {status.shots_valid} valid"
-
-    def _committed(self, shot: Shot) -> None:
-        with self._changed:
-            status = self._status
-            recorded, valid = status.shots_recorded + 1, status.shots_valid + shot.valid
-            self._status = replace(status, shots_recorded=recorded, shots_valid=valid)
-            self._publish(ShotRecorded(status.run_id or "", shot.index, shot.valid))
-
-    def _say(self, text: str) -> None:
-        with self._changed:
-            self._status = replace(self._status, message=text)
-            self._publish(RunMessage(self._status.run_id or "", text))
-
-    def _move(self, step: RunStep, **changes: Any) -> None:
-        """Change state and tell it under one lock: events come in the order in which things happened."""
-        with self._changed:
-            state = next_state(self._status.state, step)
-            status = self._status = replace(self._status, **{**changes, "state": state})
-            self._publish(StateChanged(status.run_id or "", state, status.outcome, status.message))
-            self._changed.notify_all()
+        progress.move(step, outcome=ending.outcome, message=ending.cause or progress.status().summary)

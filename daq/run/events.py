@@ -40,6 +40,11 @@ class RunStatus:
         """A run is under way."""
         return self.state not in (RunState.IDLE, RunState.FAULT)
 
+    @property
+    def summary(self) -> str:
+        """The counts in words."""
+        return f"{self.shots_recorded} of {self.shots_planned} shots recorded, {self.shots_valid} valid"
+
 
 @dataclass(frozen=True)
 class StateChanged:

@@ -10,10 +10,9 @@ from contextlib import suppress
 from types import TracebackType
 from typing import Self
 
-from daq.devices import Rig
 from daq.errors import DaqError, DeviceOvertaken
 from daq.run import light
-from daq.run.ending import RunControl
+from daq.run.active_run import ActiveRun
 from daq.run.state import RunStep
 
 
@@ -22,18 +21,15 @@ class RunGuard:
 
     Parameters
     ----------
-    rig : Rig
-        Its interlock is watched; its generator gets a status request every ``period_s``.
-    control : RunControl
-        Told about the error, after the light is off.
-    period_s : float
-        Well below the heartbeat limit of the generator.
+    run : ActiveRun
+        Its interlock is watched, its generator gets a status request at the period of its limits, which is well below
+        what the generator permits. Its ending is told about the error, after the light is off.
     """
 
-    def __init__(self, rig: Rig, control: RunControl, period_s: float) -> None:
-        self._rig = rig
-        self._control = control
-        self._period_s = period_s
+    def __init__(self, run: ActiveRun) -> None:
+        self._rig = run.rig
+        self._ending = run.ending
+        self._period_s = run.limits.heartbeat_s
         self._done = threading.Event()
         self._thread = threading.Thread(target=self._watch, name="run-guard", daemon=True)
 
@@ -56,4 +52,4 @@ class RunGuard:
                 self._rig.interlock.wait_for_change(self._period_s)
         except DaqError as error:
             light.try_to_switch_off(self._rig)
-            self._control.end(RunStep.ERROR, str(error))
+            self._ending.end(RunStep.ERROR, str(error))

@@ -1,14 +1,16 @@
 """Everything that can be checked before a run starts, so that it is refused with a reason instead of failing."""
 
 import shutil
-from collections.abc import Mapping
-from dataclasses import dataclass
-from datetime import datetime
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import Any
 
 from daq.devices import Rig
 from daq.errors import PlanError
-from daq.files.run_directory import ViewFormat
+from daq.files.run_directory import RunHeader, ViewFormat
 from daq.run import light
 from daq.run.references import find_references
 from daq.run_plan import RunKind, RunPlan
@@ -18,6 +20,7 @@ DISK_MARGIN_BYTES = 256 * 2**20
 """What a run leaves free; room for its header, references and the operating system."""
 _FRAMES_PER_SHOT = 2
 _REFERENCE_ITEM_BYTES = 4
+_SOFTWARE = ("tomoshadow", "numpy", "h5py", "isal", "pydantic")
 
 
 @dataclass(frozen=True)
@@ -26,27 +29,51 @@ class PreparedRun:
 
     Parameters
     ----------
-    run_id : str
-        Name of the run directory.
+    run_dir : Path
+        Where it will be stored; does not exist yet.
     plan : RunPlan
         As the operator wrote it.
+    header : RunHeader
+        What the run is, but for its devices.
     timing : ShotTiming
         Edges of every shot; currents are 0 in a dark run.
-    views : Mapping[str, ViewFormat]
-        Frames of every view.
     references : Mapping[RunKind, tuple[Path, ...]]
         Dark and background runs that belong to it.
     """
 
-    run_id: str
+    run_dir: Path
     plan: RunPlan
+    header: RunHeader
     timing: ShotTiming
-    views: Mapping[str, ViewFormat]
     references: Mapping[RunKind, tuple[Path, ...]]
 
+    def header_of(self, rig: Rig) -> RunHeader:
+        """Header with what the devices of a rig answer when they are asked who they are."""
+        devices = {device.name: asdict(device.identity()) for device in rig.devices}
+        return self.header.model_copy(update={"devices": devices})
 
-def prepare_run(rig: Rig, data_dir: Path, plan: RunPlan, now: datetime) -> PreparedRun:
-    """Check a plan against rig, references, disk, generator and interlock.
+
+def prepare_run(
+    rig: Rig,
+    data_dir: Path,
+    plan: RunPlan,
+    configuration: Mapping[str, Any],
+    hash_calibration: Callable[[str], str | None],
+) -> PreparedRun:
+    """Check a plan against rig, references, disk, generator and interlock, and describe the run.
+
+    Parameters
+    ----------
+    rig : Rig
+        Open devices.
+    data_dir : Path
+        Where run directories are made.
+    plan : RunPlan
+        What the operator wants.
+    configuration : Mapping[str, Any]
+        The resolved configuration of the rig (JSON).
+    hash_calibration : Callable[[str], str | None]
+        SHA-256 of a calibration by its id.
 
     Raises
     ------
@@ -56,6 +83,8 @@ def prepare_run(rig: Rig, data_dir: Path, plan: RunPlan, now: datetime) -> Prepa
         The pulse generator has a latched fault.
     InterlockOpen
         The light must not be switched on.
+    OSError
+        The disk or the calibration cannot be read.
     """
     timing = _timing(rig, plan)
     _check_currents(rig, plan)
@@ -64,7 +93,19 @@ def prepare_run(rig: Rig, data_dir: Path, plan: RunPlan, now: datetime) -> Prepa
     references = find_references(data_dir, plan.references, views)
     _check_disk(data_dir, plan, views)
     light.check_permitted(rig)
-    return PreparedRun(_new_run_id(data_dir, plan.name, now), plan, timing, views, references)
+    now = datetime.now(UTC)
+    header = RunHeader(
+        run_id=_new_run_id(data_dir, plan.name, now),
+        created_utc=now.isoformat(),
+        views=views,
+        plan=plan,
+        configuration=dict(configuration),
+        software=_software_versions(),
+        calibration_id=plan.calibration,
+        calibration_sha256=hash_calibration(plan.calibration) if plan.calibration else None,
+        separation_ns=plan.pulse.separation_ns,
+    )
+    return PreparedRun(data_dir / header.run_id, plan, header, timing, references)
 
 
 def _timing(rig: Rig, plan: RunPlan) -> ShotTiming:
@@ -115,3 +156,13 @@ def _new_run_id(data_dir: Path, name: str, now: datetime) -> str:
         number += 1
         run_id = f"{stem}-{number}"
     return run_id
+
+
+def _software_versions() -> dict[str, str]:
+    versions = {}
+    for package in _SOFTWARE:
+        try:
+            versions[package] = version(package)
+        except PackageNotFoundError:
+            versions[package] = "not installed as a package"
+    return versions

@@ -1,14 +1,10 @@
 """ShotTaker: pace, fire, collect, check; and fire again where a frame is proven to be missing."""
 
 import time
-from collections.abc import Callable
 
-from daq.devices import Rig
 from daq.errors import DeviceRefused
 from daq.run import light
-from daq.run.ending import RunControl
-from daq.run.limits import AcquisitionLimits
-from daq.run.preflight import PreparedRun
+from daq.run.active_run import ActiveRun
 from daq.run.shot_check import ShotFindings, Thresholds, check_exposures
 from daq.run.train_check import train_deviation
 from daq.run_plan import ImageKey
@@ -23,37 +19,22 @@ class ShotTaker:
 
     Parameters
     ----------
-    rig : Rig
-        Open devices.
-    run : PreparedRun
-        What to do.
-    control : RunControl
-        Looked at before every shot, while waiting for its time, and between cameras.
-    limits : AcquisitionLimits
-        Deadlines.
+    run : ActiveRun
+        What to do; its ending is looked at before every shot, while waiting for its time, and between cameras.
     thresholds : Mapping[str, tuple[float, float]]
         Bright levels above which an exposure is lit.
-    say : Callable[[str], None]
-        Gets a line for everything that is worth one.
     """
 
-    def __init__(
-        self,
-        rig: Rig,
-        run: PreparedRun,
-        control: RunControl,
-        limits: AcquisitionLimits,
-        thresholds: Thresholds,
-        say: Callable[[str], None],
-    ) -> None:
-        self._rig = rig
-        self._run = run
-        self._control = control
+    def __init__(self, run: ActiveRun, thresholds: Thresholds) -> None:
+        self._rig = run.rig
+        self._plan = run.prepared.plan
+        self._timing = run.prepared.timing
+        self._ending = run.ending
+        self._say = run.progress.say
         self._thresholds = thresholds
-        self._say = say
-        self._frame_deadline_s = run.timing.shortest_period_ns / 1e9 + limits.frame_s
-        self._refires_left = run.plan.refire_quota
-        self._period_s = 1 / run.plan.rate_hz
+        self._frame_deadline_s = self._timing.shortest_period_ns / 1e9 + run.limits.frame_s
+        self._refires_left = self._plan.refire_quota
+        self._period_s = 1 / self._plan.rate_hz
         self._due_s = 0.0
         self._stage_z_mm: float | None = None
 
@@ -65,21 +46,21 @@ class ShotTaker:
         DeviceRefused
             The generator did not load what it was asked to.
         """
-        generator, plan = self._rig.generator, self._run.plan
+        generator, plan = self._rig.generator, self._plan
         if plan.stage_z_mm and self._rig.stage:
             light.switch_off(self._rig)
             self._stage_z_mm = self._rig.stage.move_to(plan.stage_z_mm[position])
-        if deviation := train_deviation(self._run.timing, generator.configure(self._run.timing)):
+        if deviation := train_deviation(self._timing, generator.configure(self._timing)):
             raise DeviceRefused(generator.name, f"loaded another pulse train: {deviation}")
-        if not self._control.ending:
+        if not self._ending.step:
             generator.arm(plan.shots + self._refires_left, period_us=int(1e6 * self._period_s))
 
     def take(self, index: int) -> Shot | None:
         """Take one shot when it is due; None if the run is ended."""
-        position, number = divmod(index, self._run.plan.shots)
+        position, number = divmod(index, self._plan.shots)
         if position and not number:
             self.load_position(position)
-        while self._control.wait_until(self._due_s):
+        while self._ending.wait_until(self._due_s):
             shot, findings = self._fire(index)
             if shot is None or not findings.missing or not self._refires_left:
                 return shot
@@ -102,7 +83,7 @@ class ShotTaker:
         if views is None:
             return None, ShotFindings()
         findings = self._check(index, fired, views)
-        key = self._run.plan.kind.image_key if findings.good else ImageKey.INVALID
+        key = self._plan.kind.image_key if findings.good else ImageKey.INVALID
         return Shot(index, key, views, fired, host_time_ns, self._stage_z_mm), findings
 
     def _collect(self) -> dict[str, DoubleFrame] | None:
@@ -111,13 +92,13 @@ class ShotTaker:
         views = {}
         for view, camera in self._rig.cameras.items():
             views[view] = camera.collect(max(_LEAST_COLLECT_S, deadline_s - time.monotonic()))
-            if self._control.at_once:
+            if self._ending.at_once:
                 return None
         return views
 
     def _check(self, index: int, fired: FiredTrain, views: dict[str, DoubleFrame]) -> ShotFindings:
-        lit = {view: one.current_a > 0 for view, one in self._run.timing.views.items()}
-        misfired = train_deviation(self._run.timing, fired) or ""
+        lit = {view: one.current_a > 0 for view, one in self._timing.views.items()}
+        misfired = train_deviation(self._timing, fired) or ""
         findings = check_exposures(views, lit, self._thresholds, misfired)
         if not findings.good:
             self._say(f"shot {index}: {findings}")

@@ -1,4 +1,4 @@
-"""Interlock of the simulated bench: the switch that a visitor of the laboratory moves, and a chain in memory."""
+"""Interlock of the simulated laboratory: the switch that a visitor of the laboratory moves, and a chain in memory."""
 
 import threading
 from types import TracebackType

@@ -1,4 +1,4 @@
-"""SimulatedBench: the laboratory around the simulated devices; light reaches the cameras here, and faults happen."""
+"""SimulatedLaboratory: what lies around the simulated devices; light reaches the cameras here, and faults happen."""
 
 import threading
 from collections.abc import Callable, Mapping, Sequence
@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from types import TracebackType
 from typing import Self
 
-from daq.faults import BENCH_FAULTS, Fault, FaultKind, ScriptedFault
+from daq.faults import LABORATORY_FAULTS, Fault, FaultKind, ScriptedFault
 from daq.shot import FiredTrain
 from daq.simulation.camera.gige_camera import SimulatedCamera
 from daq.simulation.interlock import DoorSwitch
@@ -30,7 +30,7 @@ _CAMERA_FAULTS: Mapping[FaultKind, Callable[[float], Mapping[str, float | bool]]
 
 
 @dataclass(frozen=True)
-class BenchDevices:
+class SimulatedDevices:
     """The simulated devices: everything that a fault can happen to."""
 
     cameras: Mapping[str, SimulatedCamera]
@@ -39,8 +39,8 @@ class BenchDevices:
     stage: SimulatedStage
 
 
-class SimulatedBench:
-    """The laboratory: what was fired triggers cameras, doors open, things go wrong. A context manager.
+class SimulatedLaboratory:
+    """What was fired triggers cameras, doors open, things go wrong. A context manager.
 
     Parameters
     ----------
@@ -50,12 +50,12 @@ class SimulatedBench:
 
     def __init__(self, script: Sequence[ScriptedFault] = ()) -> None:
         self._script = tuple(script)
-        self._connected: BenchDevices | None = None
+        self._connected: SimulatedDevices | None = None
         self._pulse_faults: list[Fault] = []
         self._fired: list[FiredTrain] = []
         self._firing = threading.Lock()
         # The generator calls from the thread that also reads its answers: what asks it needs another one.
-        self._visitor = ThreadPoolExecutor(1, thread_name_prefix="bench visitor")
+        self._visitor = ThreadPoolExecutor(1, thread_name_prefix="laboratory visitor")
 
     def __enter__(self) -> Self:
         return self
@@ -66,14 +66,14 @@ class SimulatedBench:
         self._visitor.shutdown()
 
     @property
-    def devices(self) -> BenchDevices:
+    def devices(self) -> SimulatedDevices:
         """The simulated devices, once they are connected."""
         if self._connected is None:
-            raise RuntimeError("the bench has no devices yet")
+            raise RuntimeError("the laboratory has no devices yet")
         return self._connected
 
-    def connect(self, devices: BenchDevices) -> None:
-        """Put the devices on the bench and close the door."""
+    def connect(self, devices: SimulatedDevices) -> None:
+        """Put the devices into the laboratory and close the door."""
         self._connected = devices
         self.close_door()
 
@@ -104,12 +104,12 @@ class SimulatedBench:
         Raises
         ------
         ValueError
-            The fault happens to a view that the bench does not have.
+            The fault happens to a view that the laboratory does not have.
         """
         if fault.view is not None and fault.view not in self.devices.cameras:
             raise ValueError(f"there is no view {fault.view}; the bench has {sorted(self.devices.cameras)}")
-        if fault.kind in BENCH_FAULTS:
-            self._spoil_bench(fault)
+        if fault.kind in LABORATORY_FAULTS:
+            self._spoil_laboratory(fault)
         elif fault.kind in (FaultKind.PULSE_B_LOST, FaultKind.PULSE_B_LATE):
             with self._firing:
                 self._pulse_faults.append(fault)
@@ -133,12 +133,12 @@ class SimulatedBench:
             camera.trigger(train)
 
     def _happen(self, fault: Fault) -> None:
-        if fault.kind in BENCH_FAULTS:
-            self._visitor.submit(self._spoil_bench, fault)
+        if fault.kind in LABORATORY_FAULTS:
+            self._visitor.submit(self._spoil_laboratory, fault)
         else:
             self.inject(fault)
 
-    def _spoil_bench(self, fault: Fault) -> None:
+    def _spoil_laboratory(self, fault: Fault) -> None:
         match fault.kind:
             case FaultKind.GENERATOR_RESET:
                 self.devices.generator.reset()

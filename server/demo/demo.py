@@ -28,8 +28,9 @@ from processing.runs.results_file import volume_path
 from processing.synthetic.spray import droplet_volume
 from processing.synthetic.truth_file import read_true_cameras, read_true_spray
 from processing.volume import VoxelGrid
-from server.rig.assembly import TRUTH_FILE, AssembledRig, open_rig
+from server.rig.assembly import AssembledRig, open_rig
 from server.rig.config import ConfigError, RigConfig, load_config
+from server.rig.simulated_operator import TRUTH_FILE
 
 STAGE_Z_MM = tuple(float(z) for z in np.linspace(-4.5, 4.5, 10))
 PITCH_MM = 1 / 30
@@ -88,8 +89,8 @@ def demonstrate(
     """
     config = _simulated_rig(config_file, firmware)
     watch = Stopwatch()
-    with open_rig(config) as bench:
-        recorder = _Runs(config, bench, out / "runs", progress)
+    with open_rig(config) as assembled:
+        recorder = _Runs(config, assembled, out / "runs", progress)
         with watch.step("calibrate"):
             calibration = _calibrate(recorder, out)
         with watch.step("acquire"):
@@ -169,17 +170,18 @@ def true_errors_px(calibration: Calibration, run_dir: Path, grid: VoxelGrid) -> 
 class _Runs:
     """Records the runs of the demonstration one after the other."""
 
-    def __init__(self, config: RigConfig, bench: AssembledRig, data_dir: Path, progress: Progress) -> None:
+    def __init__(self, config: RigConfig, assembled: AssembledRig, data_dir: Path, progress: Progress) -> None:
         self._data_dir = data_dir
         self._progress = progress
         self._pulse = PulsePair(current_a={name: view.nominal_current_a for name, view in config.views.items()})
         self._acquisition = Acquisition(
-            bench.rig,
+            assembled.rig,
             data_dir,
             self._tell,
             configuration=config.model_dump(mode="json"),
             hash_calibration=lambda name: file_sha256(calibration_path(data_dir.parent, name)),
             limits=config.acquisition.to_limits(),
+            observers=assembled.observers,
         )
 
     def _tell(self, event: RunEvent) -> None:

@@ -32,11 +32,11 @@ class RunControl(Protocol):
     def status(self) -> RunStatus: ...  # noqa: D102
 
 
-class Bench(Protocol):
-    """What the server asks of a simulated bench."""
+class Laboratory(Protocol):
+    """What the server asks of the laboratory of a simulated rig."""
 
     def inject(self, fault: Fault) -> None:
-        """Let something go wrong; ValueError if the bench has no such view."""
+        """Let something go wrong; ValueError if the laboratory has no such view."""
 
     def open_door(self) -> None:
         """Open the interlock."""
@@ -65,8 +65,8 @@ class Services:
         Work functions.
     settings : ReconstructionSettings
         How recorded shots are reconstructed where nobody asks for anything else.
-    bench : Bench | None
-        The simulated bench, if it is one.
+    laboratory : Laboratory | None
+        What surrounds the rig, if it is simulated.
     host_names : tuple[str, ...]
         Names of this server beside the loopback ones.
     """
@@ -78,7 +78,7 @@ class Services:
     engine: Engine
     tasks: Mapping[JobKind, Task]
     settings: ReconstructionSettings = field(default_factory=ReconstructionSettings)
-    bench: Bench | None = None
+    laboratory: Laboratory | None = None
     host_names: tuple[str, ...] = ()
 
     @property

@@ -2,8 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import dataclass
 
 from daq.devices import Interlock, Rig
 from daq.drivers.aravis_camera import AravisCamera
@@ -14,12 +13,12 @@ from daq.drivers.pulse_protocol import Reply
 from daq.drivers.serial_pulse_generator import SerialPulseGenerator
 from daq.drivers.serial_stage import SerialStage, StageScale
 from daq.errors import DeviceUnavailable
-from daq.run_plan import RunKind
+from daq.run.active_run import RunObserver
 from daq.shot import FiredTrain
 from daq.simulation.camera.gige_camera import SimulatedCamera
 from daq.simulation.gpio_chip import CHIP_PATH, ChipUnsupported, SimulatedSwitchLine, free_line
 from daq.simulation.interlock import DoorSwitch, MemoryInterlock
-from daq.simulation.laboratory import BenchDevices, SimulatedBench
+from daq.simulation.laboratory import SimulatedDevices, SimulatedLaboratory
 from daq.simulation.pico.firmware_process import FirmwareProcess
 from daq.simulation.stage import SimulatedStage
 from server.rig.config import (
@@ -29,10 +28,8 @@ from server.rig.config import (
     StageConfig,
     ViewConfig,
 )
+from server.rig.simulated_operator import SimulatedOperator
 from server.rig.simulated_scene import SimulatedScene
-
-TRUTH_FILE = Path("truth", "truth.h5")
-"""Where a run on the simulated bench keeps what nobody could measure; relative to the run."""
 
 Profiles = Mapping[str, CameraProfile]
 
@@ -48,12 +45,15 @@ class AssembledRig:
     ----------
     rig : Rig
         Its devices.
-    bench : SimulatedBench | None
+    laboratory : SimulatedLaboratory | None
         Doors to open and faults to inject, where the rig is simulated.
+    observers : tuple[RunObserver, ...]
+        Who takes part in its runs: nobody, or the operator of a simulated rig.
     """
 
     rig: Rig
-    bench: SimulatedBench | None = None
+    laboratory: SimulatedLaboratory | None = None
+    observers: tuple[RunObserver, ...] = ()
 
 
 @contextmanager
@@ -68,11 +68,8 @@ def open_rig(config: RigConfig) -> Iterator[AssembledRig]:
         A camera profile cannot be read.
     """
     with wire_rig(config) as wired, ExitStack() as devices:
-        rig = wired.rig
-        # The generator is entered last and so left first: the light goes off before anything else is closed.
-        for device in (rig.stage, *rig.cameras.values(), rig.interlock, rig.generator):
-            if device is not None:
-                devices.enter_context(device)
+        for device in wired.rig.devices:
+            devices.enter_context(device)
         yield wired
 
 
@@ -97,7 +94,7 @@ def wire_rig(config: RigConfig) -> Iterator[AssembledRig]:
 
 @contextmanager
 def open_generator(config: RigConfig) -> Iterator[SerialPulseGenerator]:
-    """Open the pulse generator alone, without the cameras; on a simulated bench nobody sees its light."""
+    """Open the pulse generator alone, without the cameras; on a simulated rig nobody sees its light."""
     with _generator_wired(config) as wired, _pulse_generator(wired) as generator:
         yield generator
 
@@ -176,7 +173,7 @@ def _simulation(
     config: RigConfig, simulation: SimulationConfig, profiles: Profiles, far_ends: ExitStack
 ) -> AssembledRig:
     """Simulated devices at the far ends of all wires, then the drivers of a real rig at the near ones."""
-    bench = far_ends.enter_context(SimulatedBench(simulation.faults))
+    laboratory = far_ends.enter_context(SimulatedLaboratory(simulation.faults))
     interlock, switch = _interlock_and_switch(simulation)
     stage = far_ends.enter_context(_simulated_stage(config, simulation))
     zero_mm = 0.0 if config.stage is None else config.stage.zero_mm
@@ -185,24 +182,16 @@ def _simulation(
         name: far_ends.enter_context(_simulated_camera(name, view, profiles[name], scene))
         for name, view in config.views.items()
     }
-    generator = far_ends.enter_context(_simulated_generator(config, bench.on_fired))
-    bench.connect(BenchDevices(cameras, generator, switch, stage))
+    generator = far_ends.enter_context(_simulated_generator(config, laboratory.on_fired))
+    laboratory.connect(SimulatedDevices(cameras, generator, switch, stage))
     wired = config.model_copy(
         update={
             "pulse_generator": PulseGeneratorConfig(port=generator.port),
             "stage": config.stage and config.stage.model_copy(update={"port": stage.port}),
         }
     )
-
-    def prepare(kind: RunKind) -> None:
-        bench.forget_fired()
-        scene.prepare(kind)
-
-    def keep_truth(run_dir: Path) -> None:
-        scene.write_truth(run_dir / TRUTH_FILE, bench.fired)
-
-    rig = _rig(wired, profiles, interlock)
-    return AssembledRig(replace(rig, prepare_scene=prepare, keep_truth=keep_truth), bench)
+    operator = SimulatedOperator(scene, laboratory)
+    return AssembledRig(_rig(wired, profiles, interlock), laboratory, (operator,))
 
 
 def _interlock_and_switch(simulation: SimulationConfig) -> tuple[Interlock, DoorSwitch]:

@@ -1,4 +1,4 @@
-"""The scene of a simulated bench: the views of its configuration, as imperfect as real ones, and the truth of them."""
+"""The scene of a simulated rig: the views of its configuration, as imperfect as real ones, and the truth of them."""
 
 import threading
 from collections.abc import Callable, Sequence

@@ -26,29 +26,30 @@ def serve_rig(config_file: Path, host: str | None = None, port: int | None = Non
     """
     config = load_config(config_file)
     config = config.model_copy(update={"server": config.server.moved(host, port)})
-    with open_rig(config) as bench:
+    with open_rig(config) as assembled:
         events = EventPublisher()
-        with _acquisition(config, bench, events) as acquisition:
+        with _acquisition(config, assembled, events) as acquisition:
             services = Services(
                 config=config,
-                rig=bench.rig,
+                rig=assembled.rig,
                 acquisition=acquisition,
                 events=events,
                 engine=DaskEngine(),
                 tasks=TASKS,
-                bench=bench.bench,
+                laboratory=assembled.laboratory,
             )
             serve(create_app(services), config.server.host, config.server.port)
 
 
-def _acquisition(config: RigConfig, bench: AssembledRig, events: EventPublisher) -> Acquisition:
+def _acquisition(config: RigConfig, assembled: AssembledRig, events: EventPublisher) -> Acquisition:
     data_dir = config.server.data_dir
     calibrations = CalibrationStore(data_dir / "calibrations")
     return Acquisition(
-        bench.rig,
+        assembled.rig,
         data_dir,
         events.publish_run_event,
         configuration=config.model_dump(mode="json"),
         hash_calibration=lambda name: file_sha256(calibrations.path(name)),
         limits=config.acquisition.to_limits(),
+        observers=assembled.observers,
     )

@@ -3,6 +3,7 @@
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from pathlib import Path
 from types import TracebackType
 from typing import Self
 
@@ -10,6 +11,8 @@ import numpy as np
 
 from daq.devices import DeviceIdentity, GeneratorState, GeneratorStatus, Rig, TriggerSource
 from daq.errors import DeviceError, DeviceRefused, DeviceTimeout
+from daq.files.run_directory import RunReader
+from daq.run_plan import RunPlan
 from daq.shot import DoubleFrame, ExposureRecord, FiredTrain, Image, LightPulse
 from daq.simulation.camera.light import Exposure, exposures_of
 from daq.simulation.interlock import MemoryInterlock
@@ -221,9 +224,14 @@ class MemoryBench:
             self.interlock,
             self.stage,
             max_current_a={"view2": 26.0},
-            prepare_scene=lambda kind: self.journal.append(f"scene {kind}"),
         )
 
     def _fired(self, train: FiredTrain) -> None:
         for camera in self.cameras.values():
             camera.trigger(train)
+
+    def before_run(self, plan: RunPlan) -> None:
+        self.journal.append(f"before {plan.kind}")
+
+    def after_run(self, run_dir: Path) -> None:
+        self.journal.append(f"after, {RunReader(run_dir).shot_count} shots, {RunReader(run_dir).outcome}")

@@ -112,7 +112,7 @@ def assembled(
                 JobKind.CALIBRATION: write_calibration,
                 JobKind.CHECK: tell_nothing,
             },
-            bench=laboratory,
+            laboratory=laboratory,
         )
 
 

@@ -17,8 +17,9 @@ from daq.run.limits import AcquisitionLimits
 from daq.run.state import RunOutcome, RunState
 from daq.run_plan import ImageKey, PulsePair, RunKind, RunPlan
 from processing.synthetic.truth_file import read_true_cameras, read_true_spray
-from server.rig.assembly import TRUTH_FILE, AssembledRig, open_rig
+from server.rig.assembly import AssembledRig, open_rig
 from server.rig.config import load_config
+from server.rig.simulated_operator import TRUTH_FILE
 
 pytestmark = pytest.mark.network
 SMALL, FULL = (Path("configs") / name for name in ("simulated_small.toml", "simulated.toml"))
@@ -47,7 +48,7 @@ def plan(kind: RunKind, shots: int, **changes: object) -> RunPlan:
 def record(
     assembled: AssembledRig, data_dir: Path, of: RunPlan, limits: AcquisitionLimits = LIMITS
 ) -> tuple[RunStatus, RunReader]:
-    with Acquisition(assembled.rig, data_dir, limits=limits) as acquisition:
+    with Acquisition(assembled.rig, data_dir, limits=limits, observers=assembled.observers) as acquisition:
         run_id = acquisition.start(of)
         status = acquisition.wait(60.0)
     return status, RunReader(data_dir / run_id)
@@ -120,19 +121,19 @@ def test_a_calibration_run_moves_the_target(assembled: AssembledRig, tmp_path: P
 
 
 def test_a_lost_exposure_is_fired_again(assembled: AssembledRig, tmp_path: Path) -> None:
-    assert assembled.bench is not None
-    assembled.bench.inject(Fault(kind=FaultKind.DROPPED_B, view="view3"))
+    assert assembled.laboratory is not None
+    assembled.laboratory.inject(Fault(kind=FaultKind.DROPPED_B, view="view3"))
     status, reader = record(assembled, tmp_path, plan(RunKind.BACKGROUND, 2))
     assert (status.outcome, status.shots_recorded, status.shots_valid) == (RunOutcome.COMPLETED, 2, 2)
     with reader:
         sequences = [shot.fired.sequence for shot in map(reader.read_shot, range(2)) if shot.fired]
-    assert len(assembled.bench.fired) == 3
+    assert len(assembled.laboratory.fired) == 3
     assert sequences[1] == sequences[0] + 1
 
 
 def test_without_quota_a_lost_exposure_keeps_its_slot(assembled: AssembledRig, tmp_path: Path) -> None:
-    assert assembled.bench is not None
-    assembled.bench.inject(Fault(kind=FaultKind.DROPPED_B, view="view3"))
+    assert assembled.laboratory is not None
+    assembled.laboratory.inject(Fault(kind=FaultKind.DROPPED_B, view="view3"))
     status, reader = record(assembled, tmp_path, plan(RunKind.BACKGROUND, 2, refire_quota=0))
     assert (status.shots_recorded, status.shots_valid) == (2, 1)
     with reader:
@@ -141,8 +142,8 @@ def test_without_quota_a_lost_exposure_keeps_its_slot(assembled: AssembledRig, t
 
 
 def test_light_that_did_not_come_is_no_lost_frame(assembled: AssembledRig, tmp_path: Path) -> None:
-    assert assembled.bench is not None
-    assembled.bench.inject(Fault(kind=FaultKind.PULSE_B_LOST, view="view1"))
+    assert assembled.laboratory is not None
+    assembled.laboratory.inject(Fault(kind=FaultKind.PULSE_B_LOST, view="view1"))
     status, reader = record(assembled, tmp_path, plan(RunKind.BACKGROUND, 2))
     assert (status.shots_recorded, status.shots_valid) == (2, 1)
     with reader:
@@ -157,7 +158,7 @@ def fail_in_mid_run(assembled: AssembledRig, data_dir: Path, mishap: Callable[[]
         if isinstance(event, ShotRecorded):
             recorded.set()
 
-    with Acquisition(assembled.rig, data_dir, watch, limits=LIMITS) as acquisition:
+    with Acquisition(assembled.rig, data_dir, watch, limits=LIMITS, observers=assembled.observers) as acquisition:
         run_id = acquisition.start(plan(RunKind.BACKGROUND, 1000))
         assert recorded.wait(20.0)
         mishap()
@@ -170,33 +171,33 @@ def fail_in_mid_run(assembled: AssembledRig, data_dir: Path, mishap: Callable[[]
 
 
 def test_a_door_that_opens_in_a_run_ends_it_with_the_light_off(assembled: AssembledRig, tmp_path: Path) -> None:
-    bench = assembled.bench
-    assert bench is not None
+    laboratory = assembled.laboratory
+    assert laboratory is not None
     try:
-        status = fail_in_mid_run(assembled, tmp_path, bench.open_door)
+        status = fail_in_mid_run(assembled, tmp_path, laboratory.open_door)
         assert (status.state, status.outcome) == (RunState.IDLE, RunOutcome.FAILED)
         assert "interlock" in status.message
         with Acquisition(assembled.rig, tmp_path) as acquisition, pytest.raises(InterlockOpen):
             acquisition.start(plan(RunKind.BACKGROUND, 1))
     finally:
-        bench.close_door()
+        laboratory.close_door()
     with Acquisition(assembled.rig, tmp_path) as acquisition:
         acquisition.acknowledge()
     assert record(assembled, tmp_path, plan(RunKind.BACKGROUND, 1))[0].outcome is RunOutcome.COMPLETED
 
 
 def test_a_generator_that_restarts_in_a_run_ends_it(assembled: AssembledRig, tmp_path: Path) -> None:
-    bench = assembled.bench
-    assert bench is not None
-    status = fail_in_mid_run(assembled, tmp_path, lambda: bench.inject(Fault(kind=FaultKind.GENERATOR_RESET)))
+    laboratory = assembled.laboratory
+    assert laboratory is not None
+    status = fail_in_mid_run(assembled, tmp_path, lambda: laboratory.inject(Fault(kind=FaultKind.GENERATOR_RESET)))
     assert status.outcome is RunOutcome.FAILED
     assert "pulse_generator: the microcontroller was reset" in status.message
     assert record(assembled, tmp_path, plan(RunKind.BACKGROUND, 1))[0].outcome is RunOutcome.COMPLETED
 
 
 def test_noise_on_the_serial_line_does_not_end_a_run(assembled: AssembledRig, tmp_path: Path) -> None:
-    assert assembled.bench is not None
-    assembled.bench.inject(Fault(kind=FaultKind.SERIAL_GARBAGE, amount=300))
+    assert assembled.laboratory is not None
+    assembled.laboratory.inject(Fault(kind=FaultKind.SERIAL_GARBAGE, amount=300))
     assert record(assembled, tmp_path, plan(RunKind.BACKGROUND, 1))[0].outcome is RunOutcome.COMPLETED
 
 

@@ -29,10 +29,10 @@ def test_a_run_with_the_image_of_the_pico(tmp_path: Path) -> None:
         name="emulated", kind=RunKind.BACKGROUND, shots=SHOTS, rate_hz=5.0, pulse=PulsePair(current_a=current_a)
     )
     with open_rig(config) as assembled:
-        with Acquisition(assembled.rig, tmp_path) as acquisition:
+        with Acquisition(assembled.rig, tmp_path, observers=assembled.observers) as acquisition:
             run_id = acquisition.start(plan)
             status = acquisition.wait(60.0)
-        fired = [] if assembled.bench is None else assembled.bench.fired
+        fired = [] if assembled.laboratory is None else assembled.laboratory.fired
     assert (status.outcome, status.shots_valid) == (RunOutcome.COMPLETED, SHOTS)
     assert [train.sequence for train in fired] == [1, 2, 3]
     with RunReader(tmp_path / run_id) as reader:
@@ -57,7 +57,10 @@ def test_a_target_moves_under_the_eyes_of_the_guard(tmp_path: Path) -> None:
         pulse=PulsePair(current_a=current_a),
         stage_z_mm=(-4.0, -2.0, 0.0, 2.0, 4.0),
     )
-    with open_rig(config) as assembled, Acquisition(assembled.rig, tmp_path) as acquisition:
+    with (
+        open_rig(config) as assembled,
+        Acquisition(assembled.rig, tmp_path, observers=assembled.observers) as acquisition,
+    ):
         acquisition.start(plan)
         status = acquisition.wait(60.0)
     assert (status.outcome, status.shots_valid) == (RunOutcome.COMPLETED, 5), status.message

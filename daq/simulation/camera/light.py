@@ -1,4 +1,4 @@
-"""The light path of the simulated bench: what was fired, and what an exposure integrates of it."""
+"""The light path of the simulated laboratory: what was fired, and what an exposure integrates of it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

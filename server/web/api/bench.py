@@ -5,7 +5,7 @@ from fastapi import APIRouter
 from daq.faults import Fault
 from daq.run_plan import FrozenModel
 from server.lab.errors import NotFound, Unprocessable
-from server.lab.services import Bench
+from server.lab.services import Laboratory
 from server.web.api.parameters import ContextOf
 from server.web.problems import responses
 
@@ -22,7 +22,7 @@ class Door(FrozenModel):
 def inject_fault(fault: Fault, context: ContextOf) -> Fault:
     """Let something go wrong, from now on or at the next shot."""
     try:
-        _bench(context).inject(fault)
+        _laboratory(context).inject(fault)
     except ValueError as error:
         raise Unprocessable(str(error)) from error
     return fault
@@ -31,15 +31,15 @@ def inject_fault(fault: Fault, context: ContextOf) -> Fault:
 @router.put("/door", responses=responses(404))
 def move_door(door: Door, context: ContextOf) -> Door:
     """Open or close the laboratory door."""
-    bench = _bench(context)
+    laboratory = _laboratory(context)
     if door.open:
-        bench.open_door()
+        laboratory.open_door()
     else:
-        bench.close_door()
+        laboratory.close_door()
     return door
 
 
-def _bench(context: ContextOf) -> Bench:
-    if context.services.bench is None:
+def _laboratory(context: ContextOf) -> Laboratory:
+    if context.services.laboratory is None:
         raise NotFound("this rig is no simulated bench")
-    return context.services.bench
+    return context.services.laboratory

@@ -31,7 +31,13 @@ class Laboratory:
         self.data_dir = data_dir
         self.events: list[RunEvent] = []
         self.acquisition = Acquisition(
-            self.bench.rig, data_dir, self._publish, {"name": "bench"}, lambda name: f"sha of {name}", LIMITS
+            self.bench.rig,
+            data_dir,
+            self._publish,
+            {"name": "bench"},
+            lambda name: f"sha of {name}",
+            LIMITS,
+            [self.bench],
         )
         self._recorded = threading.Condition()
 
@@ -139,7 +145,7 @@ def test_no_shot_comes_before_its_time(lab: Laboratory) -> None:
 def test_the_light_goes_off_before_the_cameras(lab: Laboratory) -> None:
     lab.run(plan_of(1))
     journal = lab.bench.journal
-    assert journal[:4] == ["scene sample", "view1 arm", "view2 arm", "arm 4"]
+    assert journal[:4] == ["before sample", "view1 arm", "view2 arm", "arm 4"]
     assert journal.index("off") < journal.index("view1 disarm")
 
 
@@ -437,18 +443,40 @@ def test_the_guard_asks_again_when_the_light_goes_off_under_its_question(
     assert overtaken.is_set()
 
 
-def test_a_bug_in_the_scene_is_a_failed_run_and_not_a_dead_thread(lab: Laboratory) -> None:
-    def break_down(kind: RunKind) -> None:
-        raise ZeroDivisionError("no nozzle")
+class Clumsy:
+    """An observer that breaks down before or after a run."""
 
+    def __init__(self, when: str) -> None:
+        self._when = when
+
+    def before_run(self, plan: RunPlan) -> None:
+        if self._when == "before":
+            raise ZeroDivisionError("no nozzle")
+
+    def after_run(self, run_dir: Path) -> None:
+        if self._when == "after":
+            raise ZeroDivisionError("no nozzle")
+
+
+@pytest.mark.parametrize("when", ["before", "after"])
+def test_a_bug_in_the_scene_is_a_failed_run_and_not_a_dead_thread(lab: Laboratory, when: str) -> None:
     bench = lab.bench
-    rig = Rig(bench.cameras, bench.generator, bench.interlock, prepare_scene=break_down)
-    acquisition = Acquisition(rig, lab.data_dir, limits=LIMITS)
-    acquisition.start(plan_of())
+    acquisition = Acquisition(bench.rig, lab.data_dir, limits=LIMITS, observers=[Clumsy(when)])
+    run_dir = lab.data_dir / acquisition.start(plan_of(2))
     status = acquisition.wait(DEADLINE_S)
     assert (status.state, status.outcome) == (RunState.IDLE, RunOutcome.FAILED)
     assert "ZeroDivisionError('no nozzle')" in status.message
     assert "off" in bench.journal
+    assert run_dir.exists() == (when == "after")
+    if when == "after":
+        reader = RunReader(run_dir)
+        assert (reader.shot_count, reader.outcome, reader.cause) == (2, "failed", status.message)
+
+
+def test_observers_have_the_first_and_the_last_word(lab: Laboratory) -> None:
+    lab.run(plan_of(2))
+    assert lab.bench.journal[0] == "before sample"
+    assert lab.bench.journal[-1] == "after, 2 shots, None"
 
 
 def test_runs_without_an_outcome_are_reported_as_interrupted(lab: Laboratory, tmp_path: Path) -> None:

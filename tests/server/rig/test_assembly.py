@@ -40,17 +40,18 @@ def shoot(
     assembled: AssembledRig, *faults: Fault, shots: int = 1, kind: RunKind = RunKind.BACKGROUND
 ) -> list[Mapping[str, DoubleFrame]]:
     """Arm everything, fire, collect, disarm; faults happen before the first shot."""
-    rig, bench = assembled.rig, assembled.bench
-    assert bench is not None
+    rig, laboratory = assembled.rig, assembled.laboratory
+    assert laboratory is not None
     rig.generator.off()
     rig.generator.configure(
         plan_shot_timing(plan(assembled), {name: camera.timing for name, camera in rig.cameras.items()})
     )
-    rig.prepare_scene(kind)
+    (operator,) = assembled.observers
+    operator.before_run(plan(assembled, kind))
     for camera in rig.cameras.values():
         camera.arm()
     for fault in faults:
-        bench.inject(fault)
+        laboratory.inject(fault)
     try:
         rig.generator.arm(shots)
         return [fire(assembled) for _ in range(shots)]
@@ -113,10 +114,10 @@ def test_a_dropped_exposure_is_flagged_and_the_next_shot_is_whole(assembled: Ass
 
 
 def test_the_door_reaches_computer_and_generator(assembled: AssembledRig) -> None:
-    rig, bench = assembled.rig, assembled.bench
-    assert bench is not None
+    rig, laboratory = assembled.rig, assembled.laboratory
+    assert laboratory is not None
     assert rig.interlock.is_closed()
-    bench.open_door()
+    laboratory.open_door()
     try:
         assert rig.interlock.wait_for_change(1.0)
         assert not rig.interlock.is_closed()
@@ -126,7 +127,7 @@ def test_the_door_reaches_computer_and_generator(assembled: AssembledRig) -> Non
         with pytest.raises(DeviceRefused):
             rig.generator.arm(1)
     finally:
-        bench.close_door()
+        laboratory.close_door()
         rig.generator.clear()
     assert rig.interlock.is_closed()
     assert rig.generator.status().interlock_closed
@@ -135,16 +136,17 @@ def test_the_door_reaches_computer_and_generator(assembled: AssembledRig) -> Non
 def test_the_truth_of_fired_sprays_is_kept(assembled: AssembledRig, tmp_path: Path) -> None:
     before = assembled.rig.generator.status().counters["fired"]
     shoot(assembled, shots=2, kind=RunKind.SAMPLE)
-    assembled.rig.keep_truth(tmp_path)
+    (operator,) = assembled.observers
+    operator.after_run(tmp_path)
     path = tmp_path / "truth" / "truth.h5"
     for sequence in (before + 1, before + 2):
         assert len(read_true_spray(path, sequence).spray) > 1000
 
 
 def test_a_fault_of_an_unknown_view_is_refused(assembled: AssembledRig) -> None:
-    assert assembled.bench is not None
+    assert assembled.laboratory is not None
     with pytest.raises(ValueError, match="there is no view view9"):
-        assembled.bench.inject(Fault(kind=FaultKind.FROZEN, view="view9"))
+        assembled.laboratory.inject(Fault(kind=FaultKind.FROZEN, view="view9"))
 
 
 def test_scripted_faults_happen_at_their_firing_and_the_light_ends_with_the_rig() -> None:
@@ -159,8 +161,8 @@ def test_scripted_faults_happen_at_their_firing_and_the_light_ends_with_the_rig(
         assert [name for name, frames in second.items() if not frames.valid] == ["view4"]
         opened.rig.interlock.wait_for_change(2.0)
         assert not opened.rig.interlock.is_closed()
-        assert opened.bench is not None
-        generator = opened.bench.devices.generator.pid
+        assert opened.laboratory is not None
+        generator = opened.laboratory.devices.generator.pid
     assert not Path(f"/proc/{generator}").exists()
 
 
