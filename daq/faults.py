@@ -5,7 +5,7 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from daq.run_plan import FrozenModel
+from daq.frozen_model import FrozenModel
 
 
 class FaultKind(StrEnum):

@@ -3,7 +3,10 @@
 from enum import IntEnum, StrEnum
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
+
+from daq.frozen_model import FrozenModel
+from daq.names import RunName
 
 
 class ImageKey(IntEnum):
@@ -38,12 +41,6 @@ _IMAGE_KEYS = {
 }
 
 
-class FrozenModel(BaseModel):
-    """A value: frozen, and a misspelt field is an error."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
 class PulsePair(FrozenModel):
     """The two light pulses of a double exposure, the same timing for all views."""
 
@@ -60,7 +57,7 @@ class PulsePair(FrozenModel):
 class RunPlan(FrozenModel):
     """A planned sequence of shots of one kind."""
 
-    name: Annotated[str, Field(min_length=1, max_length=80, pattern=r"^[A-Za-z0-9][A-Za-z0-9 ._-]*$")]
+    name: RunName
     kind: RunKind = RunKind.SAMPLE
     shots: Annotated[int, Field(ge=1, le=100_000, description="number of double exposures")]
     rate_hz: Annotated[float, Field(gt=0, le=100, description="shots per second")] = 1.0

@@ -11,7 +11,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, ValidationError, model_validator
 
 from daq.errors import PlanError
-from daq.run_plan import FrozenModel
+from daq.frozen_model import FrozenModel
 from daq.timing import CameraTiming
 
 FeatureValue = bool | int | float | str

@@ -4,11 +4,11 @@ from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, StringConstraints
+from pydantic import Field
 
-from daq.run_plan import FrozenModel, RunPlan
-
-ViewName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
+from daq.frozen_model import FrozenModel
+from daq.names import ViewName
+from daq.run_plan import RunPlan
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from daq.run_plan import FrozenModel
+from daq.frozen_model import FrozenModel
 from server.lab.errors import NotFound
 
 _CURRENT = "current"

@@ -21,7 +21,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from daq.run_plan import FrozenModel
+from daq.frozen_model import FrozenModel
 from server.lab.errors import Conflict, NotFound
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from daq.devices import Device, DeviceIdentity, GeneratorState, Rig
 from daq.errors import DaqError
-from daq.run_plan import FrozenModel
+from daq.frozen_model import FrozenModel
 from server.lab.live import pause
 
 _PERIOD_S = 1.0

@@ -6,7 +6,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from daq.run_plan import FrozenModel
+from daq.frozen_model import FrozenModel
 from processing.reconstruction.volume_file import open_volume
 from processing.runs.results_file import volume_files
 from server.lab.errors import NotFound

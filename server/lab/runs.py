@@ -10,9 +10,10 @@ import numpy as np
 from pydantic import Field
 
 from daq.files.run_directory import RunReader, list_runs
+from daq.frozen_model import FrozenModel
 from daq.run.events import RunStatus
 from daq.run.state import RunOutcome
-from daq.run_plan import FrozenModel, ImageKey, RunKind, RunPlan
+from daq.run_plan import ImageKey, RunKind, RunPlan
 from server.lab.errors import NotFound
 
 ACTIVE = "active"

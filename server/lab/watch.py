@@ -10,7 +10,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from daq.run_plan import FrozenModel
+from daq.frozen_model import FrozenModel
 from processing.calibration.calibration import Verdict
 from processing.runs.run_check import ALARM_PX, STOP_PX
 from server.lab.events import EventPublisher

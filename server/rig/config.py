@@ -8,12 +8,12 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, SecretStr, ValidationError, ValidationInfo, field_validator, model_validator
 
 from daq.faults import ScriptedFault
+from daq.frozen_model import FrozenModel
+from daq.names import RigViewName
 from daq.run.limits import AcquisitionLimits
-from daq.run_plan import FrozenModel
 from processing.errors import BadInput
 from processing.runs.toml_lines import line_of
 
-ViewName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,31}$")]
 CurrentA = Annotated[float, Field(gt=0, le=30)]
 
 
@@ -176,7 +176,7 @@ class RigConfig(FrozenModel):
     """Everything that is known about a rig before it is opened."""
 
     name: Annotated[str, Field(min_length=1, max_length=80)]
-    views: Annotated[dict[ViewName, ViewConfig], Field(min_length=2, max_length=4)]
+    views: Annotated[dict[RigViewName, ViewConfig], Field(min_length=2, max_length=4)]
     target: TargetConfig = TargetConfig()
     pulse_generator: PulseGeneratorConfig | None = None
     interlock: InterlockConfig | None = None

@@ -3,7 +3,7 @@
 from fastapi import APIRouter
 
 from daq.faults import Fault
-from daq.run_plan import FrozenModel
+from daq.frozen_model import FrozenModel
 from server.lab.errors import NotFound, Unprocessable
 from server.lab.services import Laboratory
 from server.web.api.parameters import ContextOf

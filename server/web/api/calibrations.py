@@ -5,7 +5,8 @@ from typing import Annotated, Any, Literal
 from fastapi import APIRouter, Response
 from pydantic import Field
 
-from daq.run_plan import FrozenModel, RunKind
+from daq.frozen_model import FrozenModel
+from daq.run_plan import RunKind
 from server.lab.calibrations import CalibrationSummary
 from server.lab.errors import Unprocessable
 from server.lab.jobs import Job, calibration_job

@@ -5,7 +5,7 @@ from typing import Annotated
 from fastapi import APIRouter, Query
 from pydantic import Field
 
-from daq.run_plan import FrozenModel
+from daq.frozen_model import FrozenModel
 from processing.reconstruction.settings import ReconstructionSettings
 from server.lab.jobs import Job, JobKind, JobState
 from server.lab.reconstruction import request_reconstruction

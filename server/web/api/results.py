@@ -11,7 +11,7 @@ from fastapi import APIRouter, Path, Query, Response
 from fastapi.responses import FileResponse
 from numpy.typing import NDArray
 
-from daq.run_plan import FrozenModel
+from daq.frozen_model import FrozenModel
 from server.lab.errors import NotFound
 from server.lab.results import ResultSet, preview_of, result_sets, surface_of, volume_file
 from server.pictures.pictures import plane_png

@@ -5,8 +5,8 @@ from typing import Annotated, Any
 from fastapi import APIRouter
 from pydantic import ConfigDict, Field
 
+from daq.frozen_model import FrozenModel
 from daq.run.state import RunOutcome, RunState
-from daq.run_plan import FrozenModel
 from server.lab.monitor import Lamp
 from server.lab.watch import CalibrationStanding
 from server.web.api.parameters import ContextOf

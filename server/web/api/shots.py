@@ -5,7 +5,8 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Query, Response
 
 from daq.files.run_directory import ExposureRecord, FiredTrain, Shot
-from daq.run_plan import FrozenModel, ImageKey
+from daq.frozen_model import FrozenModel
+from daq.run_plan import ImageKey
 from server.lab.errors import NotFound
 from server.lab.runs import RunStore
 from server.pictures.pictures import Stretch, frame_png

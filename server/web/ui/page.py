@@ -13,7 +13,7 @@ from server.web.ui.header import Header
 from server.web.ui.live_tiles import LiveTiles
 from server.web.ui.run_form import RunForm
 from server.web.ui.run_panel import RunPanel
-from server.web.ui.tables import JobTableView, RunTable
+from server.web.ui.tables import JobPanel, RunTable
 from server.web.ui.theme import panel
 from server.web.ui.volume_panel import VolumePanel
 
@@ -47,7 +47,7 @@ class Page:
             with ui.element("div").classes("column"):
                 with panel("Live"):
                     LiveTiles(list(context.services.config.views))
-                self._runs, self._jobs = RunTable(context), JobTableView(context)
+                self._runs, self._jobs = RunTable(context), JobPanel(context)
             with ui.element("div").classes("column wide"):
                 self._volume = VolumePanel(context)
             with ui.element("div").classes("column controls"):

@@ -71,7 +71,7 @@ class RunTable:
         request_reconstruction(self._context, run_id, None, None, settings)
 
 
-class JobTableView:
+class JobPanel:
     """Jobs, newest first; an unfinished one can be aborted, a fitted calibration chosen."""
 
     def __init__(self, context: Context) -> None:

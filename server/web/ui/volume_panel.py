@@ -24,7 +24,7 @@ class FreeSlider(ui.slider):
     LOOPBACK = False
 
 
-class SliceView:
+class SlicePicture:
     """A slice across one axis, with its slider."""
 
     def __init__(self, axis: str) -> None:
@@ -68,7 +68,7 @@ class VolumePanel:
                     'flat dense round type=a aria-label="download volume"'
                 )
             with ui.grid(columns=3).classes("w-full gap-2"):
-                self._slices = [SliceView(axis) for axis in _PICTURES]
+                self._slices = [SlicePicture(axis) for axis in _PICTURES]
             self._scene = ui.scene(grid=False, background_color="#0b0f14", fps=15).classes("scene-box")
             self._scene.props('role=img aria-label="iso-surface"')
             with ui.row().classes("w-full items-center no-wrap gap-3"):
