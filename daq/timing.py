@@ -12,6 +12,18 @@ from daq.run_plan import PulsePair, RunPlan
 
 
 @dataclass(frozen=True)
+class Window:
+    """A span of time, ``open_ns`` <= t < ``close_ns``."""
+
+    open_ns: int
+    close_ns: int
+
+    def overlap_ns(self, other: "Window") -> int:
+        """Length of the common part of two windows, 0 where there is none."""
+        return max(0, min(self.close_ns, other.close_ns) - max(self.open_ns, other.open_ns))
+
+
+@dataclass(frozen=True)
 class CameraTiming:
     """Timing model of a double-frame camera, all in nanoseconds from its trigger edge on.
 
@@ -53,25 +65,26 @@ class CameraTiming:
         """Trigger edge until the next trigger is accepted."""
         return self.frame_b_open_ns + self.exposure_b_ns + self.readout_ns
 
-    def shortest_separation_ns(self, width_ns: int) -> int:
-        """Smallest pulse separation that straddles the frame boundary (pulse start to pulse start)."""
-        return width_ns + self.gap_ns + 2 * self.guard_ns
+    def exposures(self, trigger_ns: int) -> tuple[Window, Window]:
+        """Exposures A and B of a trigger edge."""
+        opened_a_ns, opened_b_ns = trigger_ns + self.trigger_delay_ns, trigger_ns + self.frame_b_open_ns
+        return (
+            Window(opened_a_ns, opened_a_ns + self.exposure_a_ns),
+            Window(opened_b_ns, opened_b_ns + self.exposure_b_ns),
+        )
 
-    def longest_separation_ns(self, width_ns: int) -> int:
-        """Largest pulse separation that keeps both pulses inside their exposures (pulse start to pulse start)."""
-        return self.exposure_a_ns + self.gap_ns + self.exposure_b_ns - width_ns - 2 * self.guard_ns
+    def has_room_for(self, width_ns: int) -> bool:
+        """Whether a pulse and its guards fit into either exposure."""
+        return width_ns + 2 * self.guard_ns <= min(self.exposure_a_ns, self.exposure_b_ns)
 
+    def straddling_ns(self, width_ns: int) -> tuple[int, int]:
+        """Shortest and longest separation, pulse start to pulse start, that straddles the frame boundary.
 
-@dataclass(frozen=True)
-class Window:
-    """A span of time, ``open_ns`` <= t < ``close_ns``."""
-
-    open_ns: int
-    close_ns: int
-
-    def overlap_ns(self, other: "Window") -> int:
-        """Length of the common part of two windows, 0 where there is none."""
-        return max(0, min(self.close_ns, other.close_ns) - max(self.open_ns, other.open_ns))
+        Any shorter one brings a pulse too near to the gap, any longer one a pulse too near to the other end of its
+        exposure.
+        """
+        lit_ns = width_ns + 2 * self.guard_ns
+        return lit_ns + self.gap_ns, self.exposure_a_ns + self.gap_ns + self.exposure_b_ns - lit_ns
 
 
 @dataclass(frozen=True)
@@ -117,12 +130,12 @@ def plan_shot_timing(plan: RunPlan, cameras: Mapping[str, CameraTiming]) -> Shot
 
 def _view_timing(view: str, pulse: PulsePair, camera: CameraTiming) -> ViewTiming:
     _check_straddling(view, pulse, camera)
-    frame_a_close_ns = _frame_a_close_ns(pulse, camera)
-    trigger_ns = frame_a_close_ns - camera.frame_a_close_ns
+    trigger_ns = _frame_a_close_ns(pulse, camera) - camera.frame_a_close_ns
+    frame_a, frame_b = camera.exposures(trigger_ns)
     return ViewTiming(
         camera_trigger_ns=trigger_ns,
-        frame_a=Window(trigger_ns + camera.trigger_delay_ns, frame_a_close_ns),
-        frame_b=Window(trigger_ns + camera.frame_b_open_ns, trigger_ns + camera.frame_b_open_ns + camera.exposure_b_ns),
+        frame_a=frame_a,
+        frame_b=frame_b,
         pulse_a=Window(0, pulse.width_ns),
         pulse_b=Window(pulse.separation_ns, pulse.separation_ns + pulse.width_ns),
         current_a=pulse.current_a[view],
@@ -130,16 +143,15 @@ def _view_timing(view: str, pulse: PulsePair, camera: CameraTiming) -> ViewTimin
 
 
 def _check_straddling(view: str, pulse: PulsePair, camera: CameraTiming) -> None:
-    shorter_ns = min(camera.exposure_a_ns, camera.exposure_b_ns)
-    if pulse.width_ns + 2 * camera.guard_ns > shorter_ns:
+    if not camera.has_room_for(pulse.width_ns):
+        shorter_ns = min(camera.exposure_a_ns, camera.exposure_b_ns)
         raise PlanError(f"pulse.width_ns: {pulse.width_ns} ns does not fit the exposure of {view}, {shorter_ns} ns")
-    shortest_ns = camera.shortest_separation_ns(pulse.width_ns)
+    shortest_ns, longest_ns = camera.straddling_ns(pulse.width_ns)
     if pulse.separation_ns < shortest_ns:
         raise PlanError(
             f"pulse.separation_ns: {pulse.separation_ns} ns is below {shortest_ns} ns, the limit of camera {view} "
             f"(width {pulse.width_ns} + gap {camera.gap_ns} + 2 x guard {camera.guard_ns} ns)"
         )
-    longest_ns = camera.longest_separation_ns(pulse.width_ns)
     if pulse.separation_ns > longest_ns:
         raise PlanError(
             f"pulse.separation_ns: {pulse.separation_ns} ns is above {longest_ns} ns, the limit of camera {view} "

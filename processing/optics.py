@@ -1,6 +1,4 @@
-"""What lens, light and sensor allow: diffraction, depth of field, blur, pulse separation. Pure functions."""
-
-from dataclasses import dataclass
+"""What lens, light and sensor allow: diffraction, depth of field, blur. Pure functions."""
 
 GREEN_UM = 0.50
 """Wavelength of the light; with it eq. 1 reproduces d_A of Table 1."""
@@ -41,42 +39,3 @@ def image_scale_px_per_mm(magnification: float, pixel_pitch_um: float) -> float:
 def travel_um(velocity_m_s: float, duration_ns: int) -> float:
     """Path in um of a droplet during a time: motion blur for a pulse width, displacement for a separation."""
     return velocity_m_s * duration_ns / 1000
-
-
-@dataclass(frozen=True)
-class StraddlingWindow:
-    """Pulse separations, start to start, that put pulse A into frame A and pulse B into frame B."""
-
-    shortest_ns: int
-    longest_ns: int
-
-
-def straddling_window(
-    *, width_ns: int, exposure_a_ns: int, gap_ns: int, exposure_b_ns: int, guard_ns: int
-) -> StraddlingWindow:
-    """Shortest and longest pulse separation of a double-frame camera.
-
-    Parameters
-    ----------
-    width_ns : int
-        Pulse duration tau_p.
-    exposure_a_ns, gap_ns, exposure_b_ns : int
-        Exposure A, the blind time after it, exposure B.
-    guard_ns : int
-        Distance that light keeps from either end of an exposure.
-
-    Raises
-    ------
-    ValueError
-        A pulse and its guards do not fit into one of the exposures.
-    """
-    lit_ns = width_ns + 2 * guard_ns
-    if lit_ns > min(exposure_a_ns, exposure_b_ns):
-        raise ValueError(
-            f"width_ns: {width_ns} ns and 2 x guard {guard_ns} ns do not fit the shorter exposure, "
-            f"{min(exposure_a_ns, exposure_b_ns)} ns"
-        )
-    return StraddlingWindow(
-        shortest_ns=lit_ns + gap_ns,
-        longest_ns=exposure_a_ns + gap_ns + exposure_b_ns - lit_ns,
-    )

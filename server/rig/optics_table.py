@@ -10,7 +10,6 @@ from processing.optics import (
     depth_of_field_mm,
     image_scale_px_per_mm,
     resolved_diameter_um,
-    straddling_window,
     travel_um,
 )
 from server.rig.config import RigConfig, ViewConfig
@@ -44,9 +43,10 @@ def optics_table(config: RigConfig, motion: Motion = PAPER_MOTION) -> dict[str, 
     PlanError
         The pulses do not fit the exposures of a camera; names view and camera profile.
     """
-    windows_ns = {name: _straddling_window_ns(name, view, motion) for name, view in config.views.items()}
+    windows_ns = {name: _straddling_ns(name, view, motion.width_ns) for name, view in config.views.items()}
     views = {
-        name: {**_view(view, motion), "straddling_window_ns": windows_ns[name]} for name, view in config.views.items()
+        name: {**_view(view, motion), "straddling_window_ns": list(windows_ns[name])}
+        for name, view in config.views.items()
     }
     return {
         "motion": {
@@ -64,19 +64,14 @@ def optics_table(config: RigConfig, motion: Motion = PAPER_MOTION) -> dict[str, 
     }
 
 
-def _straddling_window_ns(name: str, view: ViewConfig, motion: Motion) -> list[int]:
-    timing = load_camera_profile(view.camera.profile).camera_timing
-    try:
-        window = straddling_window(
-            width_ns=motion.width_ns,
-            exposure_a_ns=timing.exposure_a_ns,
-            gap_ns=timing.gap_ns,
-            exposure_b_ns=timing.exposure_b_ns,
-            guard_ns=timing.guard_ns,
+def _straddling_ns(name: str, view: ViewConfig, width_ns: int) -> tuple[int, int]:
+    camera = load_camera_profile(view.camera.profile).camera_timing
+    if not camera.has_room_for(width_ns):
+        raise PlanError(
+            f"{name}: width_ns: {width_ns} ns and 2 x guard {camera.guard_ns} ns do not fit the shorter exposure, "
+            f"{min(camera.exposure_a_ns, camera.exposure_b_ns)} ns of {view.camera.profile}"
         )
-    except ValueError as error:
-        raise PlanError(f"{name}: {error} of {view.camera.profile}") from error
-    return [window.shortest_ns, window.longest_ns]
+    return camera.straddling_ns(width_ns)
 
 
 def _view(view: ViewConfig, motion: Motion) -> dict[str, float]:

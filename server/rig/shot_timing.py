@@ -96,13 +96,8 @@ def _origin_ns(requested: ShotTiming, train: FiredTrain) -> int:
 def _fired_view(
     requested: ViewTiming, camera: CameraTiming, trigger_ns: int, pulses: tuple[LightPulse, ...], origin_ns: int
 ) -> ViewTiming:
-    opened_b_ns = trigger_ns + camera.frame_b_open_ns
-    exposed = replace(
-        requested,
-        camera_trigger_ns=trigger_ns,
-        frame_a=Window(trigger_ns + camera.trigger_delay_ns, trigger_ns + camera.frame_a_close_ns),
-        frame_b=Window(opened_b_ns, opened_b_ns + camera.exposure_b_ns),
-    )
+    frame_a, frame_b = camera.exposures(trigger_ns)
+    exposed = replace(requested, camera_trigger_ns=trigger_ns, frame_a=frame_a, frame_b=frame_b)
     lit = lit_pulses(pulses)
     if len(lit) != 2:
         return replace(exposed, current_a=0.0)

@@ -26,7 +26,7 @@ def test_every_accepted_plan_straddles(width: int, separation: int, delay: int, 
     try:
         view = plan_shot_timing(plan(width, separation), {"view1": camera}).views["view1"]
     except PlanError:
-        assert separation < camera.shortest_separation_ns(width)
+        assert separation < camera.straddling_ns(width)[0]
         return
     assert view.frame_a.open_ns + guard <= view.pulse_a.open_ns
     assert view.pulse_a.close_ns + guard <= view.frame_a.close_ns
@@ -62,3 +62,33 @@ def test_unknown_view_is_refused() -> None:
 def test_windows_overlap_by_their_common_part() -> None:
     assert Window(0, 10).overlap_ns(Window(4, 20)) == 6
     assert Window(0, 10).overlap_ns(Window(10, 20)) == 0
+
+
+timings = st.builds(
+    CameraTiming,
+    trigger_delay_ns=st.integers(0, 3000),
+    exposure_a_ns=st.integers(3000, 20_000),
+    gap_ns=st.integers(0, 3000),
+    exposure_b_ns=st.integers(3000, 200_000),
+    readout_ns=st.just(1000),
+    guard_ns=st.integers(0, 400),
+)
+
+
+@given(timings, st.integers(250, 2000), st.integers(2000, 200_000))
+def test_the_planner_accepts_exactly_the_window(camera: CameraTiming, width: int, separation: int) -> None:
+    shortest_ns, longest_ns = camera.straddling_ns(width)
+    try:
+        plan_shot_timing(plan(width, separation), {"view1": camera})
+        accepted = True
+    except PlanError:
+        accepted = False
+    assert accepted == (shortest_ns <= separation <= longest_ns)
+
+
+def test_a_pulse_longer_than_the_exposure_is_refused_with_both_values() -> None:
+    short = CameraTiming(500, exposure_a_ns=2100, gap_ns=1, exposure_b_ns=9_000, readout_ns=9_000)
+    assert short.has_room_for(1700)
+    assert not short.has_room_for(1701)
+    with pytest.raises(PlanError, match=r"2000 ns does not fit the exposure of view1, 2100 ns"):
+        plan_shot_timing(plan(width_ns=2000), {"view1": short})

@@ -55,10 +55,7 @@ def exposures_of(
     train: FiredTrain, view: str, timing: CameraTiming, shape: tuple[int, int], bits: int
 ) -> tuple[Exposure, Exposure]:
     """Exposures A and B of a camera whose trigger line saw this train."""
-    trigger_ns = train.camera_trigger_ns[view]
-    opened_b_ns = trigger_ns + timing.frame_b_open_ns
-    window_a = Window(trigger_ns + timing.trigger_delay_ns, trigger_ns + timing.frame_a_close_ns)
-    window_b = Window(opened_b_ns, opened_b_ns + timing.exposure_b_ns)
+    window_a, window_b = timing.exposures(train.camera_trigger_ns[view])
     pulses = train.pulses.get(view, ())
     return (
         Exposure(view, train.sequence, "A", window_a, _collect(pulses, window_a), shape, bits),
