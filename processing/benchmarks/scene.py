@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 
 from processing.geometry import PinholeCamera, view_camera
 from processing.preprocessing import Frame
+from processing.synthetic.paper_rig import IMAGE_SCALE_PX_PER_MM, TABLE_1
 from processing.volume import VoxelGrid
 
 Image = NDArray[np.float32]
 
-SCALE_PX_PER_MM = 60.0
-OPTICS = ((45.0, 100, 0.45, 3.0), (15.0, 85, 0.43, -2.0), (-15.0, 85, 0.44, 2.0), (-45.0, 100, 0.43, -3.0))
-"""Azimuth, focal length, magnification and pitch of the views (Table 1; angles in degrees, lengths in mm)."""
+SCALE_PX_PER_MM = IMAGE_SCALE_PX_PER_MM
+PITCHES_DEG = (3.0, -2.0, 2.0, -3.0)
 DISTORTIONS = (
     (2.0, 50, 0.004, -0.003, 0),
     (-1.5, 20, -0.003, 0.004, 0),
@@ -84,17 +84,15 @@ def study_cameras(image_size_px: tuple[int, int]) -> list[PinholeCamera]:
     """The four views of the experiment, pitched and distorted."""
     return [
         view_camera(
-            azimuth_deg,
-            focal_length_mm=focal_length_mm,
-            magnification=magnification,
+            row.azimuth_deg,
+            focal_length_mm=row.focal_length_mm,
+            magnification=row.magnification,
             scale_px_per_mm=SCALE_PX_PER_MM,
             image_size_px=image_size_px,
             pitch_deg=pitch_deg,
             distortion=np.array(distortion),
         )
-        for (azimuth_deg, focal_length_mm, magnification, pitch_deg), distortion in zip(
-            OPTICS, DISTORTIONS, strict=True
-        )
+        for row, pitch_deg, distortion in zip(TABLE_1.values(), PITCHES_DEG, DISTORTIONS, strict=True)
     ]
 
 

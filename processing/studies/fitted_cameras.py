@@ -24,8 +24,7 @@ from processing.studies.accuracy_study import (
     error_row,
     rms_px,
 )
-from processing.studies.simulated_droplets import AZIMUTHS_DEG, FOCAL_LENGTHS_MM, MAGNIFICATIONS, SCALE_VOXEL_PER_MM
-from processing.synthetic.paper_rig import IMAGE_SIZE_PX
+from processing.synthetic.paper_rig import IMAGE_SCALE_PX_PER_MM, IMAGE_SIZE_PX, TABLE_1
 
 HALF_VOLUME_MM = (9.0, 8.625, 4.5)
 """Half-widths of the paper's reconstruction: a little higher than the target, and less wide."""
@@ -93,19 +92,19 @@ def ideal_errors_px(study: CalibrationStudy, camera: PinholeCamera, points_mm: F
 def tilted_cameras(study: CalibrationStudy, *, tilted: bool) -> dict[str, PinholeCamera]:
     """The four views with their optical axes off the middle; where tilted, by the Scheimpflug condition."""
     cameras = {}
-    for number, azimuth_deg in enumerate(AZIMUTHS_DEG):
+    for name, row in TABLE_1.items():
         u_px, v_px = study.principal_offset_px
         camera = view_camera(
-            azimuth_deg,
-            focal_length_mm=FOCAL_LENGTHS_MM[number],
-            magnification=MAGNIFICATIONS[number],
-            scale_px_per_mm=SCALE_VOXEL_PER_MM,
+            row.azimuth_deg,
+            focal_length_mm=row.focal_length_mm,
+            magnification=row.magnification,
+            scale_px_per_mm=IMAGE_SCALE_PX_PER_MM,
             image_size_px=IMAGE_SIZE_PX,
             distortion=np.array(DISTORTION),
-            principal_offset_px=(float(np.copysign(u_px, azimuth_deg)), v_px),
+            principal_offset_px=(float(np.copysign(u_px, row.azimuth_deg)), v_px),
         )
-        scheimpflug_rad = float(np.arctan(MAGNIFICATIONS[number] * np.tan(np.deg2rad(azimuth_deg))))
-        cameras[f"view{number + 1}"] = replace(camera, tilt_rad=(0.0, scheimpflug_rad)) if tilted else camera
+        scheimpflug_rad = float(np.arctan(row.magnification * np.tan(np.deg2rad(row.azimuth_deg))))
+        cameras[name] = replace(camera, tilt_rad=(0.0, scheimpflug_rad)) if tilted else camera
     return cameras
 
 

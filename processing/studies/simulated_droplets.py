@@ -8,15 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from processing.geometry import FloatArray, PinholeCamera, view_camera
+from processing.synthetic.paper_rig import IMAGE_SCALE_PX_PER_MM, TABLE_1
 from processing.volume import VoxelGrid
 
 Volume = NDArray[np.float32]
 Image = NDArray[np.float32]
 
-SCALE_VOXEL_PER_MM = 60.0
-AZIMUTHS_DEG = (45.0, 15.0, -15.0, -45.0)
-FOCAL_LENGTHS_MM = (100.0, 85.0, 85.0, 100.0)
-MAGNIFICATIONS = (0.45, 0.43, 0.44, 0.43)
+SCALE_VOXEL_PER_MM = IMAGE_SCALE_PX_PER_MM
+AZIMUTHS_DEG = tuple(row.azimuth_deg for row in TABLE_1.values())
 IMAGE_SIZE_PX = (600, 560)
 PAPER_SHAPE = (250, 500, 500)
 PAPER_COUNTS = (1000, 2000, 4000, 8000, 16000)
@@ -60,15 +59,13 @@ def study_cameras(image_size_px: tuple[int, int] = IMAGE_SIZE_PX) -> list[Pinhol
     """The four views of the experiment (Table 1) as ideal pinhole cameras."""
     return [
         view_camera(
-            azimuth_deg,
-            focal_length_mm=focal_length_mm,
-            magnification=magnification,
+            row.azimuth_deg,
+            focal_length_mm=row.focal_length_mm,
+            magnification=row.magnification,
             scale_px_per_mm=SCALE_VOXEL_PER_MM,
             image_size_px=image_size_px,
         )
-        for azimuth_deg, focal_length_mm, magnification in zip(
-            AZIMUTHS_DEG, FOCAL_LENGTHS_MM, MAGNIFICATIONS, strict=True
-        )
+        for row in TABLE_1.values()
     ]
 
 

@@ -1,6 +1,7 @@
-"""The four views of the paper (Table 1) as cameras and optics."""
+"""The rig of the paper: Table 1, and its four views as cameras and optics."""
 
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 
@@ -13,24 +14,34 @@ IMAGE_SIZE_PX = (1600, 1200)
 
 
 @dataclass(frozen=True)
-class _PaperView:
-    """A row of Table 1, with the distortion and the offset of the optical axis that the table does not give."""
+class TableRow:
+    """A row of Table 1: angle, lens, Airy disk on the sensor, and LED current of a view."""
 
     azimuth_deg: float
     f_number: float
     focal_length_mm: float
     magnification: float
+    airy_diameter_um: float
     current_a: float
-    distortion: tuple[float, float, float, float, float]
-    principal_offset_px: tuple[float, float]
 
 
-_VIEWS = {
-    "view1": _PaperView(45, 22, 100, 0.45, 25, (0.6, 20, 0.0008, -0.0006, 0), (180, -20)),
-    "view2": _PaperView(15, 16, 85, 0.43, 9.9, (-0.5, 10, -0.0006, 0.0008, 0), (60, 15)),
-    "view3": _PaperView(-15, 16, 85, 0.44, 10, (0.6, 0, 0.0004, 0.001, 0), (-60, 10)),
-    "view4": _PaperView(-45, 22, 100, 0.43, 26, (-0.6, 10, 0.001, 0.0004, 0), (-180, -15)),
+TABLE_1 = MappingProxyType(
+    {
+        "view1": TableRow(45.0, 22.0, 100.0, 0.45, 39.0, 25.0),
+        "view2": TableRow(15.0, 16.0, 85.0, 0.43, 28.0, 9.9),
+        "view3": TableRow(-15.0, 16.0, 85.0, 0.44, 28.0, 10.0),
+        "view4": TableRow(-45.0, 22.0, 100.0, 0.43, 38.0, 26.0),
+    }
+)
+
+_DISTORTIONS = {
+    "view1": (0.6, 20, 0.0008, -0.0006, 0),
+    "view2": (-0.5, 10, -0.0006, 0.0008, 0),
+    "view3": (0.6, 0, 0.0004, 0.001, 0),
+    "view4": (-0.6, 10, 0.001, 0.0004, 0),
 }
+_PRINCIPAL_OFFSETS_PX = {"view1": (180, -20), "view2": (60, 15), "view3": (-60, 10), "view4": (-180, -15)}
+"""What the table does not give: distortion, and where the optical axis meets the sensor."""
 
 
 def paper_cameras(binning: int = 1) -> dict[str, PinholeCamera]:
@@ -49,10 +60,10 @@ def paper_cameras(binning: int = 1) -> dict[str, PinholeCamera]:
             magnification=view.magnification,
             scale_px_per_mm=IMAGE_SCALE_PX_PER_MM / binning,
             image_size_px=(width_px, height_px),
-            distortion=np.array(view.distortion),
-            principal_offset_px=(view.principal_offset_px[0] / binning, view.principal_offset_px[1] / binning),
+            distortion=np.array(_DISTORTIONS[name]),
+            principal_offset_px=(_PRINCIPAL_OFFSETS_PX[name][0] / binning, _PRINCIPAL_OFFSETS_PX[name][1] / binning),
         )
-        for name, view in _VIEWS.items()
+        for name, view in TABLE_1.items()
     }
 
 
@@ -62,5 +73,5 @@ def paper_optics(binning: int = 1) -> dict[str, ViewOptics]:
         name: ViewOptics(
             view.f_number, view.focal_length_mm, view.magnification, PIXEL_PITCH_UM * binning, view.current_a
         )
-        for name, view in _VIEWS.items()
+        for name, view in TABLE_1.items()
     }

@@ -11,13 +11,13 @@ from processing.optics import (
     resolved_diameter_um,
     travel_um,
 )
+from processing.synthetic.paper_rig import TABLE_1
 
 
-@pytest.mark.parametrize(
-    ("f_number", "magnification", "table_um"), [(22, 0.45, 39), (16, 0.43, 28), (16, 0.44, 28), (22, 0.43, 38)]
-)
-def test_equation_1_reproduces_table_1(f_number: float, magnification: float, table_um: int) -> None:
-    assert round(airy_diameter_um(f_number, magnification)) == table_um
+@pytest.mark.parametrize("view", TABLE_1)
+def test_equation_1_reproduces_table_1(view: str) -> None:
+    row = TABLE_1[view]
+    assert round(airy_diameter_um(row.f_number, row.magnification)) == row.airy_diameter_um
 
 
 @given(st.floats(1.4, 45), st.floats(0.05, 5))

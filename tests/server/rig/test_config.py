@@ -7,15 +7,10 @@ import pytest
 from pydantic import ValidationError
 
 from processing.runs.toml_lines import line_of
+from processing.synthetic.paper_rig import IMAGE_SIZE_PX, PIXEL_PITCH_UM, TABLE_1
 from server.rig.config import ConfigError, RigConfig, load_config
 
 CONFIGS = Path("configs")
-TABLE_1 = {
-    "view1": (45, 22, 100, 0.45, 25.0),
-    "view2": (15, 16, 85, 0.43, 9.9),
-    "view3": (-15, 16, 85, 0.44, 10.0),
-    "view4": (-45, 22, 100, 0.43, 26.0),
-}
 
 
 @pytest.fixture
@@ -44,10 +39,13 @@ def test_every_example_loads(path: Path) -> None:
 @pytest.mark.parametrize("name", ["simulated.toml", "spray4view.toml"])
 def test_both_examples_are_the_rig_of_table_1(name: str) -> None:
     config = load_config(CONFIGS / name)
-    for view, row in TABLE_1.items():
-        lens, of = config.views[view].lens, config.views[view]
-        assert (of.azimuth_deg, lens.f_number, lens.focal_length_mm, lens.magnification, of.nominal_current_a) == row
-        assert (of.sensor.width_px, of.sensor.height_px, of.sensor.pixel_pitch_um) == (1600, 1200, 7.4)
+    assert list(config.views) == list(TABLE_1)
+    for view, row in zip(config.views.values(), TABLE_1.values(), strict=True):
+        lens, sensor = view.lens, view.sensor
+        assert (lens.f_number, lens.focal_length_mm) == (row.f_number, row.focal_length_mm)
+        assert (view.azimuth_deg, lens.magnification) == (row.azimuth_deg, row.magnification)
+        assert view.nominal_current_a == row.current_a
+        assert ((sensor.width_px, sensor.height_px), sensor.pixel_pitch_um) == (IMAGE_SIZE_PX, PIXEL_PITCH_UM)
     assert (config.target.columns, config.target.rows, config.target.pitch_mm) == (23, 17, 1.0)
 
 

@@ -6,16 +6,16 @@ from pathlib import Path
 import pytest
 
 from daq.errors import PlanError
+from processing.synthetic.paper_rig import TABLE_1
 from server.rig.config import load_config
 from server.rig.optics_table import Motion, optics_table
-
-D_A_UM = {"view1": 39, "view2": 28, "view3": 28, "view4": 38}
 
 
 @pytest.mark.parametrize("name", ["simulated.toml", "spray4view.toml"])
 def test_both_examples_have_the_airy_disks_of_table_1(name: str) -> None:
     table = optics_table(load_config(Path("configs") / name))
-    assert {view: round(values["airy_diameter_um"]) for view, values in table["views"].items()} == D_A_UM
+    diameters_um = {view: round(values["airy_diameter_um"]) for view, values in table["views"].items()}
+    assert diameters_um == {view: row.airy_diameter_um for view, row in TABLE_1.items()}
 
 
 def test_the_rig_of_the_paper_permits_its_pulses_and_blurs_less_than_it_resolves() -> None:
