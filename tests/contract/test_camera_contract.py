@@ -1,10 +1,12 @@
-"""What every Camera does, run on the Aravis driver with the simulated GigE Vision camera behind it."""
+"""What every Camera does, run on the Aravis driver with a simulated GigE Vision camera behind it, and in memory."""
 
 from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
-from itertools import count
+from functools import partial
 from pathlib import Path
 from time import monotonic
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,31 +15,34 @@ from daq.devices import Camera
 from daq.drivers.aravis_camera import AravisCamera
 from daq.drivers.camera_profile import FeatureWrite, load_camera_profile
 from daq.errors import DeviceError
+from daq.files.run_directory import ViewFormat
 from daq.shot import DoubleFrame, FiredTrain, Image, LightPulse
 from daq.simulation.camera.gige_camera import SimulatedCamera
 from daq.simulation.camera.light import Exposure
+from tests.support.memory_devices import MemoryCamera
 
 pytestmark = pytest.mark.network
 
 VIEW, SHAPE = "view2", (96, 160)
 PROFILE = load_camera_profile(Path(__file__).parents[2] / "configs" / "cameras" / "simulated.toml")
-STACKED = {
-    "features": (*PROFILE.features[:-1], FeatureWrite(feature="ExposureMode", value="StackedDoubleFrame")),
-    "pair": None,
-    "stacked": True,
-}
-"""Both exposures in one image, one above the other."""
-FORMATS = ("Mono8", "Mono10", "Mono12", "Mono14", "Mono16")
+BITS = (8, 10, 12, 14, 16)
 FRAME_MARK = {"A": 1, "B": 2}
 
 
-@dataclass(frozen=True)
-class CameraBench:
+@dataclass
+class CameraStand:
     """A camera, and hands that fire light into it."""
 
     camera: Camera
-    fire: Callable[[], int]
-    lose_exposure_b: Callable[[], None]
+    serial: str
+    trigger: Callable[[FiredTrain], None]
+    lose_exposure_b_of: Callable[[int], None]
+    fired: int = 0
+
+    def fire(self) -> int:
+        self.fired += 1
+        self.trigger(train(self.fired))
+        return self.fired
 
     def shoot(self, deadline_s: float = 2.0) -> tuple[int, DoubleFrame]:
         self.camera.begin_shot()
@@ -60,76 +65,99 @@ def train(sequence: int) -> FiredTrain:
     return FiredTrain(sequence, {VIEW: 0}, {VIEW: pulses})
 
 
-@pytest.fixture
-def bench(request: pytest.FixtureRequest) -> Iterator[CameraBench]:
-    profile = PROFILE.model_copy(update=getattr(request, "param", {}))
+@contextmanager
+def driven(**changes: Any) -> Iterator[CameraStand]:
+    """The driver, with some values of its profile changed."""
+    profile = PROFILE.model_copy(update=changes)
     simulated = SimulatedCamera(VIEW, "127.0.0.31", "SN31", profile.camera_timing, signed, SHAPE)
-    sequences = count(1)
 
-    def fire() -> int:
-        sequence = next(sequences)
-        simulated.trigger(train(sequence))
-        return sequence
-
-    def lose_exposure_b() -> None:
+    def lose_next_b(_: int) -> None:
         simulated.faults.dropped_b = 1
 
     with simulated, AravisCamera(VIEW, "127.0.0.31", profile, SHAPE) as camera:
-        yield CameraBench(camera, fire, lose_exposure_b)
+        yield CameraStand(camera, "SN31", simulated.trigger, lose_next_b)
 
 
-def test_names_itself(bench: CameraBench) -> None:
-    assert bench.camera.name == VIEW
-    identity = bench.camera.identity()
-    assert (identity.vendor, identity.serial) == ("tomoshadow", "SN31")
+@contextmanager
+def stacked() -> Iterator[CameraStand]:
+    """The driver of a camera with both exposures in one image, one above the other."""
+    stacking = FeatureWrite(feature="ExposureMode", value="StackedDoubleFrame")
+    with driven(features=(*PROFILE.features[:-1], stacking), pair=None, stacked=True) as stand:
+        yield stand
+
+
+@contextmanager
+def in_memory(bits: int = 8) -> Iterator[CameraStand]:
+    """The camera of the tests of runs."""
+    with MemoryCamera(VIEW, [], signed, ViewFormat(SHAPE, bits), PROFILE.camera_timing) as camera:
+        yield CameraStand(camera, VIEW, camera.trigger, camera.lost.add)
+
+
+Opening = Callable[..., AbstractContextManager[CameraStand]]
+WITH_TWO_IMAGES: tuple[Opening, ...] = (driven, in_memory)
+
+
+@pytest.fixture(params=WITH_TWO_IMAGES)
+def stand(request: pytest.FixtureRequest) -> Iterator[CameraStand]:
+    with request.param() as stand:
+        yield stand
+
+
+def test_names_itself(stand: CameraStand) -> None:
+    assert stand.camera.name == VIEW
+    identity = stand.camera.identity()
+    assert (identity.vendor, identity.serial) == ("tomoshadow", stand.serial)
     assert identity.model
     assert identity.firmware
 
 
-def test_tells_the_timing_of_its_profile(bench: CameraBench) -> None:
-    assert bench.camera.timing == PROFILE.camera_timing
+def test_tells_the_timing_of_its_profile(stand: CameraStand) -> None:
+    assert stand.camera.timing == PROFILE.camera_timing
 
 
 @pytest.mark.parametrize(
-    "bench",
-    [*({"pixel_format": name} for name in FORMATS), STACKED],
-    ids=[*FORMATS, "stacked"],
+    "stand",
+    [
+        *(pytest.param(partial(driven, pixel_format=f"Mono{bits}"), id=f"Mono{bits}") for bits in BITS),
+        *(pytest.param(partial(in_memory, bits), id=f"in memory, {bits} bit") for bits in BITS),
+        stacked,
+    ],
     indirect=True,
 )
-def test_delivers_both_exposures_of_a_firing_in_their_places(bench: CameraBench) -> None:
-    bench.camera.arm()
-    sequence, shot = bench.shoot()
+def test_delivers_both_exposures_of_a_firing_in_their_places(stand: CameraStand) -> None:
+    stand.camera.arm()
+    sequence, shot = stand.shoot()
     assert shot.valid
     assert shot.frame_b is not None
     for image, mark in ((shot.frame_a, 1), (shot.frame_b, 2)):
-        assert image.shape == bench.camera.image_shape == SHAPE
-        assert image.dtype == (np.uint8 if bench.camera.bits == 8 else np.uint16)
+        assert image.shape == stand.camera.image_shape == SHAPE
+        assert image.dtype == (np.uint8 if stand.camera.bits == 8 else np.uint16)
         assert image[0, :2].tolist() == [sequence, mark]
         assert image[1, 1] == 10
-    assert bench.camera.bits == 8 or int(shot.frame_a.max()) == 2**bench.camera.bits - 1
+    assert stand.camera.bits == 8 or int(shot.frame_a.max()) == 2**stand.camera.bits - 1
 
 
-def test_each_shot_brings_its_own_firing(bench: CameraBench) -> None:
-    bench.camera.arm()
+def test_each_shot_brings_its_own_firing(stand: CameraStand) -> None:
+    stand.camera.arm()
     for _ in range(3):
-        sequence, shot = bench.shoot()
+        sequence, shot = stand.shoot()
         assert shot.valid
         assert shot.frame_a[0, 0] == sequence
 
 
-def test_images_of_a_shot_stay_as_they_are(bench: CameraBench) -> None:
-    bench.camera.arm()
-    _, first = bench.shoot()
+def test_images_of_a_shot_stay_as_they_are(stand: CameraStand) -> None:
+    stand.camera.arm()
+    _, first = stand.shoot()
     kept = first.frame_a.copy()
     for _ in range(9):
-        assert bench.shoot()[1].valid
+        assert stand.shoot()[1].valid
     np.testing.assert_array_equal(first.frame_a, kept)
 
 
-def test_a_missing_exposure_keeps_its_slot(bench: CameraBench) -> None:
-    bench.camera.arm()
-    bench.lose_exposure_b()
-    sequence, shot = bench.shoot(1.0)
+def test_a_missing_exposure_keeps_its_slot(stand: CameraStand) -> None:
+    stand.camera.arm()
+    stand.lose_exposure_b_of(1)
+    sequence, shot = stand.shoot(1.0)
     assert not shot.valid
     assert shot.record_a.valid
     assert shot.frame_a[0, 0] == sequence
@@ -139,45 +167,45 @@ def test_a_missing_exposure_keeps_its_slot(bench: CameraBench) -> None:
     assert not shot.frame_b.any()
 
 
-def test_collects_until_the_deadline_and_no_longer(bench: CameraBench) -> None:
-    bench.camera.arm()
-    bench.camera.begin_shot()
+def test_collects_until_the_deadline_and_no_longer(stand: CameraStand) -> None:
+    stand.camera.arm()
+    stand.camera.begin_shot()
     began_s = monotonic()
-    shot = bench.camera.collect(0.2)
+    shot = stand.camera.collect(0.2)
     assert 0.2 <= monotonic() - began_s < 0.5
     assert not shot.record_a.valid
     assert not shot.record_b.valid
 
 
-@pytest.mark.parametrize("bench", [{}, STACKED], ids=["two images", "stacked"], indirect=True)
-def test_shows_the_newest_exposure(bench: CameraBench) -> None:
-    assert bench.camera.latest() is None
-    bench.camera.arm()
-    sequence, _ = bench.shoot()
-    newest = bench.camera.latest()
+@pytest.mark.parametrize("stand", [*WITH_TWO_IMAGES, stacked], indirect=True)
+def test_shows_the_newest_exposure(stand: CameraStand) -> None:
+    assert stand.camera.latest() is None
+    stand.camera.arm()
+    sequence, _ = stand.shoot()
+    newest = stand.camera.latest()
     assert newest is not None
     assert newest[0, :2].tolist() == [sequence, 2]
 
 
-def test_disarms_in_any_state_and_arms_again(bench: CameraBench) -> None:
-    bench.camera.disarm()
+def test_disarms_in_any_state_and_arms_again(stand: CameraStand) -> None:
+    stand.camera.disarm()
     for _ in range(2):
-        bench.camera.arm()
-        bench.camera.arm()
-        assert bench.shoot()[1].valid
-        bench.camera.disarm()
-        bench.camera.disarm()
+        stand.camera.arm()
+        stand.camera.arm()
+        assert stand.shoot()[1].valid
+        stand.camera.disarm()
+        stand.camera.disarm()
 
 
-def test_is_deaf_while_disarmed(bench: CameraBench) -> None:
-    bench.camera.arm()
-    bench.camera.disarm()
-    bench.fire()
-    bench.camera.arm()
-    assert not bench.camera.collect(0.15).valid
+def test_is_deaf_while_disarmed(stand: CameraStand) -> None:
+    stand.camera.arm()
+    stand.camera.disarm()
+    stand.fire()
+    stand.camera.arm()
+    assert not stand.camera.collect(0.15).valid
 
 
 @pytest.mark.parametrize("call", [lambda camera: camera.begin_shot(), lambda camera: camera.collect(0.1)])
-def test_refuses_shots_while_disarmed(bench: CameraBench, call: Callable[[Camera], object]) -> None:
+def test_refuses_shots_while_disarmed(stand: CameraStand, call: Callable[[Camera], object]) -> None:
     with pytest.raises(DeviceError, match=f"{VIEW}: the camera is not armed"):
-        call(bench.camera)
+        call(stand.camera)

@@ -1,8 +1,14 @@
-"""What every pulse generator does: the real driver against the firmware's core on a pseudo-terminal."""
+"""What every pulse generator does: the real driver against the firmware on a pseudo-terminal, and one in memory.
+
+What only the firmware does is tested on a ``board``.
+"""
 
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Protocol
 
 import pytest
 import serial
@@ -15,6 +21,7 @@ from daq.run_plan import PulsePair, RunPlan
 from daq.shot import FiredTrain
 from daq.simulation.pico.firmware_process import FirmwareProcess
 from daq.timing import CameraTiming, ShotTiming, Window, plan_shot_timing
+from tests.support.memory_devices import MemoryGenerator
 
 CHANNELS = {"left": 0, "middle": 2, "right": 3}
 CAMERA = CameraTiming(
@@ -32,13 +39,24 @@ def shot_timing(width_ns: int = 1000, separation_ns: int = 6400, **current_a: fl
     return plan_shot_timing(RunPlan(name="contract", shots=1, pulse=pulse), dict.fromkeys(CHANNELS, CAMERA))
 
 
-@dataclass
-class Bench:
-    """A generator, the laboratory around it, and the light that it gave."""
+class Surroundings(Protocol):
+    """What surrounds a generator: a door, time, and continuous light that comes out."""
 
-    firmware: FirmwareProcess
-    generator: SerialPulseGenerator
-    light: list[FiredTrain]
+    @property
+    def light_a(self) -> Mapping[str, float]: ...
+
+    def set_interlock(self, closed: bool) -> None: ...
+
+    def advance(self, time_ms: int) -> None: ...
+
+
+@dataclass
+class Stand:
+    """A generator, what surrounds it, and the pulses that it gave."""
+
+    generator: PulseGenerator
+    around: Surroundings
+    light: list[FiredTrain] = field(default_factory=list)
     changed: threading.Condition = field(default_factory=threading.Condition)
 
     def wait_for_light(self, shots: int) -> list[FiredTrain]:
@@ -47,45 +65,81 @@ class Bench:
         return self.light
 
     def let_period_pass(self) -> None:
-        self.firmware.advance(PERIOD_MS)
+        self.around.advance(PERIOD_MS)
+
+    def see(self, train: FiredTrain) -> None:
+        with self.changed:
+            self.light.append(train)
+            self.changed.notify_all()
 
 
-# Not where the answer depends on how fast the emulator is: its time is that of the wall clock.
-on_the_real_image_too = pytest.mark.parametrize("emulated", [False, True], ids=["host", "emulated"])
+@dataclass
+class Board(Stand):
+    """The driver, and the firmware behind it."""
+
+    generator: SerialPulseGenerator
+    around: FirmwareProcess
 
 
-@pytest.fixture
-def emulated() -> bool:
-    return False
-
-
-@pytest.fixture
-def bench(emulated: bool) -> Iterator[Bench]:
-    light: list[FiredTrain] = []
-    changed = threading.Condition()
-
-    def on_fired(train: FiredTrain) -> None:
-        with changed:
-            light.append(train)
-            changed.notify_all()
-
+@contextmanager
+def board_with(*, emulated: bool) -> Iterator[Board]:
     with (
-        FirmwareProcess(CHANNELS, on_fired, emulated=emulated) as firmware,
+        FirmwareProcess(CHANNELS, lambda train: opened.see(train), emulated=emulated) as firmware,
         SerialPulseGenerator("generator", firmware.port, CHANNELS) as generator,
     ):
-        yield Bench(firmware, generator, light, changed)
+        opened = Board(generator, firmware)
+        yield opened
+
+
+@contextmanager
+def in_memory() -> Iterator[Stand]:
+    with MemoryGenerator("generator", [], CHANNELS, lambda train: opened.see(train)) as generator:
+        opened = Stand(generator, generator)
+        yield opened
+
+
+OPENINGS: Mapping[str, Callable[[], AbstractContextManager[Stand]]] = {
+    "host": partial(board_with, emulated=False),
+    "emulated": partial(board_with, emulated=True),
+    "memory": in_memory,
+}
+# Not where the answer depends on how fast the emulator is: its time is that of the wall clock.
+everywhere = pytest.mark.parametrize("stand", OPENINGS, indirect=True)
+on_the_real_image_too = pytest.mark.parametrize("board", [False, True], ids=["host", "emulated"], indirect=True)
+
+
+@pytest.fixture(params=["host", "memory"])
+def stand(request: pytest.FixtureRequest) -> Iterator[Stand]:
+    with OPENINGS[request.param]() as stand:
+        yield stand
+
+
+@pytest.fixture(params=[False], ids=["host"])
+def board(request: pytest.FixtureRequest) -> Iterator[Board]:
+    with board_with(emulated=request.param) as board:
+        yield board
 
 
 @pytest.fixture
-def generator(bench: Bench) -> PulseGenerator:
-    return bench.generator
+def generator(stand: Stand) -> PulseGenerator:
+    return stand.generator
 
 
 @pytest.fixture
-def armed(bench: Bench) -> Bench:
-    bench.generator.configure(shot_timing())
-    bench.generator.arm(5)
-    return bench
+def armed(stand: Stand) -> Stand:
+    arm(stand.generator)
+    return stand
+
+
+@pytest.fixture
+def armed_board(board: Board) -> Board:
+    arm(board.generator)
+    return board
+
+
+def arm(generator: PulseGenerator) -> None:
+    generator.configure(shot_timing())
+    generator.arm(5)
 
 
 def test_light_is_off_after_opening(generator: PulseGenerator) -> None:
@@ -95,8 +149,14 @@ def test_light_is_off_after_opening(generator: PulseGenerator) -> None:
     assert set(status.counters) == {"requested", "fired", "suppressed", "early", "cameras", "crc_errors"}
 
 
-def test_it_says_who_it_is(generator: PulseGenerator) -> None:
+def test_it_names_itself(generator: PulseGenerator) -> None:
     identity = generator.identity()
+    assert generator.name == "generator"
+    assert all((identity.vendor, identity.model, identity.serial, identity.firmware))
+
+
+def test_it_says_who_it_is(board: Board) -> None:
+    identity = board.generator.identity()
     assert identity.model == "tomoshadow-pulse"
     assert identity.serial
     assert identity.firmware.startswith("2.")
@@ -131,27 +191,27 @@ def test_camera_trigger_keeps_its_distance_to_pulse_a(generator: PulseGenerator)
         assert abs(distance_ns + edges.camera_trigger_ns) <= 4
 
 
-@on_the_real_image_too
-def test_what_is_fired_is_what_was_answered(bench: Bench) -> None:
-    configured = bench.generator.configure(shot_timing(middle=12.5))
-    bench.generator.arm(1)
-    fired = bench.generator.fire()
+@everywhere
+def test_what_is_fired_is_what_was_answered(stand: Stand) -> None:
+    configured = stand.generator.configure(shot_timing(middle=12.5))
+    stand.generator.arm(1)
+    fired = stand.generator.fire()
     assert fired == replace(configured, sequence=1)
-    assert bench.wait_for_light(1) == [fired]
+    assert stand.wait_for_light(1) == [fired]
 
 
-@on_the_real_image_too
-def test_a_dark_view_gets_its_trigger_and_no_light(bench: Bench) -> None:
-    bench.generator.configure(shot_timing(left=0.0, middle=0.0, right=0.0))
-    bench.generator.arm(1)
-    fired = bench.generator.fire()
+@everywhere
+def test_a_dark_view_gets_its_trigger_and_no_light(stand: Stand) -> None:
+    stand.generator.configure(shot_timing(left=0.0, middle=0.0, right=0.0))
+    stand.generator.arm(1)
+    fired = stand.generator.fire()
     assert set(fired.camera_trigger_ns) == set(CHANNELS)
     assert all(pulses == () for pulses in fired.pulses.values())
-    assert bench.wait_for_light(1) == [fired]
+    assert stand.wait_for_light(1) == [fired]
 
 
-@on_the_real_image_too
-def test_the_budget_is_exact(armed: Bench) -> None:
+@everywhere
+def test_the_budget_is_exact(armed: Stand) -> None:
     for shot in range(5):
         assert armed.generator.status().shots_left == 5 - shot
         assert armed.generator.fire().sequence == shot + 1
@@ -162,18 +222,18 @@ def test_the_budget_is_exact(armed: Bench) -> None:
     assert len(armed.wait_for_light(5)) == 5
 
 
-def test_nothing_fires_before_arming(bench: Bench) -> None:
+def test_nothing_fires_before_arming(stand: Stand) -> None:
     with pytest.raises(DeviceRefused, match="not armed"):
-        bench.generator.fire()
+        stand.generator.fire()
     with pytest.raises(DeviceRefused, match="no pulse train"):
-        bench.generator.arm(1)
-    bench.generator.configure(shot_timing())
+        stand.generator.arm(1)
+    stand.generator.configure(shot_timing())
     with pytest.raises(DeviceRefused, match="not armed"):
-        bench.generator.fire()
-    assert bench.generator.status().counters == {
+        stand.generator.fire()
+    assert stand.generator.status().counters == {
         "requested": 2, "fired": 0, "suppressed": 2, "early": 0, "cameras": 0, "crc_errors": 0
     }  # fmt: skip
-    assert bench.light == []
+    assert stand.light == []
 
 
 @pytest.mark.parametrize("shots", [0, 1_000_001])
@@ -184,7 +244,7 @@ def test_an_impossible_budget_is_refused(generator: PulseGenerator, shots: int) 
     assert generator.status().state is GeneratorState.SAFE
 
 
-def test_an_early_shot_is_not_fired_and_counted(armed: Bench) -> None:
+def test_an_early_shot_is_not_fired_and_counted(armed: Stand) -> None:
     armed.generator.fire()
     with pytest.raises(DeviceRefused, match="shortest period"):
         armed.generator.fire()
@@ -196,7 +256,7 @@ def test_an_early_shot_is_not_fired_and_counted(armed: Bench) -> None:
     assert armed.generator.fire().sequence == 2
 
 
-def test_configure_and_arm_are_refused_while_armed(armed: Bench) -> None:
+def test_configure_and_arm_are_refused_while_armed(armed: Stand) -> None:
     with pytest.raises(DeviceRefused, match="armed"):
         armed.generator.configure(shot_timing())
     with pytest.raises(DeviceRefused, match="armed"):
@@ -220,8 +280,8 @@ def test_a_view_without_channel_is_named(generator: PulseGenerator) -> None:
         generator.configure(ShotTiming({"behind": views["left"]}, 0))
 
 
-@on_the_real_image_too
-def test_off_disarms_in_every_state(armed: Bench) -> None:
+@everywhere
+def test_off_disarms_in_every_state(armed: Stand) -> None:
     armed.generator.off()
     assert armed.generator.status().state is GeneratorState.SAFE
     assert armed.generator.status().shots_left == 0
@@ -229,12 +289,12 @@ def test_off_disarms_in_every_state(armed: Bench) -> None:
     with pytest.raises(DeviceRefused, match="not armed"):
         armed.generator.fire()
     armed.generator.arm(1)
-    armed.firmware.set_interlock(False)
+    armed.around.set_interlock(False)
     armed.generator.off()
     assert armed.generator.status().state is GeneratorState.FAULT
 
 
-def test_off_works_while_another_thread_asks_without_pause(armed: Bench) -> None:
+def test_off_works_while_another_thread_asks_without_pause(armed: Stand) -> None:
     reasons: set[str] = set()
     finished = threading.Event()
 
@@ -259,197 +319,195 @@ def test_off_works_while_another_thread_asks_without_pause(armed: Bench) -> None
 
 
 @on_the_real_image_too
-def test_a_silent_host_trips_and_clear_acknowledges(armed: Bench) -> None:
-    armed.firmware.advance(HEARTBEAT_MS + 1)
-    status = armed.generator.status()
+def test_a_silent_host_trips_and_clear_acknowledges(armed_board: Board) -> None:
+    armed_board.around.advance(HEARTBEAT_MS + 1)
+    status = armed_board.generator.status()
     assert (status.state, status.faults) == (GeneratorState.FAULT, ("heartbeat",))
     with pytest.raises(DeviceRefused, match="fault is latched"):
-        armed.generator.fire()
-    armed.generator.clear()
-    status = armed.generator.status()
+        armed_board.generator.fire()
+    armed_board.generator.clear()
+    status = armed_board.generator.status()
     assert (status.state, status.faults, status.shots_left) == (GeneratorState.SAFE, (), 0)
 
 
-def test_status_is_the_heartbeat(armed: Bench) -> None:
+def test_status_is_the_heartbeat(armed_board: Board) -> None:
     for _ in range(4):
-        armed.firmware.advance(HEARTBEAT_MS // 2)
-        assert armed.generator.status().state is GeneratorState.ARMED
+        armed_board.around.advance(HEARTBEAT_MS // 2)
+        assert armed_board.generator.status().state is GeneratorState.ARMED
 
 
-@on_the_real_image_too
-def test_an_opened_interlock_latches(armed: Bench) -> None:
-    armed.firmware.set_interlock(False)
+@everywhere
+def test_an_opened_interlock_latches(armed: Stand) -> None:
+    armed.around.set_interlock(False)
     status = armed.generator.status()
     assert (status.state, status.faults, status.interlock_closed) == (GeneratorState.FAULT, ("interlock",), False)
     with pytest.raises(DeviceRefused, match="interlock is open"):
         armed.generator.clear()
-    armed.firmware.set_interlock(True)
+    armed.around.set_interlock(True)
     assert armed.generator.status().state is GeneratorState.FAULT
     armed.generator.clear()
     assert armed.generator.status().state is GeneratorState.SAFE
     assert armed.light == []
 
 
-def test_an_open_interlock_forbids_arming(bench: Bench) -> None:
-    bench.generator.configure(shot_timing())
-    bench.firmware.set_interlock(False)
+def test_an_open_interlock_forbids_arming(stand: Stand) -> None:
+    stand.generator.configure(shot_timing())
+    stand.around.set_interlock(False)
     with pytest.raises(DeviceRefused, match="interlock is open"):
-        bench.generator.arm(1)
-    bench.firmware.set_interlock(True)
-    bench.generator.arm(1)
+        stand.generator.arm(1)
+    stand.around.set_interlock(True)
+    stand.generator.arm(1)
 
 
 @on_the_real_image_too
-def test_the_emergency_stop_latches_in_every_state(bench: Bench) -> None:
-    bench.firmware.set_estop(False)
-    status = bench.generator.status()
+def test_the_emergency_stop_latches_in_every_state(board: Board) -> None:
+    board.around.set_estop(False)
+    status = board.generator.status()
     assert (status.state, status.faults, status.estop_closed) == (GeneratorState.FAULT, ("estop",), False)
     with pytest.raises(DeviceRefused, match="emergency stop is open"):
-        bench.generator.clear()
-    bench.firmware.set_estop(True)
+        board.generator.clear()
+    board.around.set_estop(True)
     with pytest.raises(DeviceRefused, match="fault is latched"):
-        bench.generator.configure(shot_timing())
-    bench.generator.clear()
-    status = bench.generator.status()
+        board.generator.configure(shot_timing())
+    board.generator.clear()
+    status = board.generator.status()
     assert (status.state, status.faults, status.estop_closed) == (GeneratorState.SAFE, (), True)
 
 
 @on_the_real_image_too
-def test_set_points_that_are_not_confirmed_as_zero_are_a_fault(bench: Bench) -> None:
-    bench.firmware.set_converter(False)
-    bench.generator.off()
-    bench.firmware.advance(CONVERTER_FOUND_MS)
-    status = bench.generator.status()
+def test_set_points_that_are_not_confirmed_as_zero_are_a_fault(board: Board) -> None:
+    board.around.set_converter(False)
+    board.generator.off()
+    board.around.advance(CONVERTER_FOUND_MS)
+    status = board.generator.status()
     assert (status.state, status.faults) == (GeneratorState.FAULT, ("setpoint",))
     with pytest.raises(DeviceRefused, match="a set-point does not read as it was set"):
-        bench.generator.clear()
-    bench.firmware.set_converter(True)
-    bench.firmware.advance(CONVERTER_FOUND_MS)
+        board.generator.clear()
+    board.around.set_converter(True)
+    board.around.advance(CONVERTER_FOUND_MS)
     with pytest.raises(DeviceRefused, match="fault is latched"):
-        bench.generator.configure(shot_timing())
-    bench.generator.clear()
-    assert bench.generator.status().state is GeneratorState.SAFE
+        board.generator.configure(shot_timing())
+    board.generator.clear()
+    assert board.generator.status().state is GeneratorState.SAFE
 
 
 @on_the_real_image_too
-def test_an_external_edge_fires(bench: Bench) -> None:
-    configured = bench.generator.configure(shot_timing())
-    bench.generator.arm(2, TriggerSource.EXTERNAL)
-    bench.let_period_pass()
-    bench.firmware.trigger()
-    assert bench.wait_for_light(1) == [replace(configured, sequence=1)]
-    assert bench.generator.status().shots_left == 1
+def test_an_external_edge_fires(board: Board) -> None:
+    configured = board.generator.configure(shot_timing())
+    board.generator.arm(2, TriggerSource.EXTERNAL)
+    board.let_period_pass()
+    board.around.trigger()
+    assert board.wait_for_light(1) == [replace(configured, sequence=1)]
+    assert board.generator.status().shots_left == 1
 
 
-def test_external_edges_fire_within_period_and_budget(bench: Bench) -> None:
-    configured = bench.generator.configure(shot_timing())
-    bench.generator.arm(2, TriggerSource.EXTERNAL)
-    bench.let_period_pass()
-    bench.firmware.trigger()
-    bench.firmware.trigger()  # early
-    bench.let_period_pass()
-    bench.firmware.trigger()
-    bench.let_period_pass()
-    bench.firmware.trigger()  # beyond the budget
-    assert [replace(train, sequence=0) for train in bench.wait_for_light(2)] == [configured] * 2
-    status = bench.generator.status()
+def test_external_edges_fire_within_period_and_budget(board: Board) -> None:
+    configured = board.generator.configure(shot_timing())
+    board.generator.arm(2, TriggerSource.EXTERNAL)
+    board.let_period_pass()
+    board.around.trigger()
+    board.around.trigger()  # early
+    board.let_period_pass()
+    board.around.trigger()
+    board.let_period_pass()
+    board.around.trigger()  # beyond the budget
+    assert [replace(train, sequence=0) for train in board.wait_for_light(2)] == [configured] * 2
+    status = board.generator.status()
     assert (status.state, status.shots_left) == (GeneratorState.SAFE, 0)
     assert (status.counters["fired"], status.counters["early"], status.counters["cameras"]) == (2, 1, 6)
-    assert len(bench.light) == 2
+    assert len(board.light) == 2
 
 
-def test_the_last_shot_is_told_whoever_fired_it(bench: Bench) -> None:
-    configured = bench.generator.configure(shot_timing(width_ns=1003, left=0.0))
+def test_the_last_shot_is_told_whoever_fired_it(board: Board) -> None:
+    configured = board.generator.configure(shot_timing(width_ns=1003, left=0.0))
     with pytest.raises(DeviceRefused, match="no shot"):
-        bench.generator.last_fired()
-    bench.generator.arm(1, TriggerSource.EXTERNAL)
-    bench.let_period_pass()
-    bench.firmware.trigger()
-    assert bench.generator.last_fired() == replace(configured, sequence=1) == bench.wait_for_light(1)[0]
+        board.generator.last_fired()
+    board.generator.arm(1, TriggerSource.EXTERNAL)
+    board.let_period_pass()
+    board.around.trigger()
+    assert board.generator.last_fired() == replace(configured, sequence=1) == board.wait_for_light(1)[0]
 
 
-def test_external_edges_do_nothing_when_armed_for_commands(armed: Bench) -> None:
-    armed.firmware.trigger()
-    assert armed.generator.status().counters["requested"] == 0
-    assert armed.light == []
+def test_external_edges_do_nothing_when_armed_for_commands(armed_board: Board) -> None:
+    armed_board.around.trigger()
+    assert armed_board.generator.status().counters["requested"] == 0
+    assert armed_board.light == []
 
 
-def test_the_timer_fires_by_itself(bench: Bench) -> None:
-    bench.generator.configure(shot_timing())
-    bench.generator.arm(3, TriggerSource.TIMER, 20_000)
+def test_the_timer_fires_by_itself(board: Board) -> None:
+    board.generator.configure(shot_timing())
+    board.generator.arm(3, TriggerSource.TIMER, 20_000)
     with pytest.raises(DeviceRefused, match="another trigger source"):
-        bench.generator.fire()
-    assert len(bench.wait_for_light(3)) == 3
-    assert bench.generator.status().state is GeneratorState.SAFE
+        board.generator.fire()
+    assert len(board.wait_for_light(3)) == 3
+    assert board.generator.status().state is GeneratorState.SAFE
 
 
 @pytest.mark.parametrize("source", TriggerSource)
-def test_a_period_that_the_duty_forbids_is_refused_when_arming(bench: Bench, source: TriggerSource) -> None:
-    bench.generator.configure(shot_timing(width_ns=2000))  # 4 us at 200 ppm: 20 ms
+def test_a_period_that_the_duty_forbids_is_refused_when_arming(board: Board, source: TriggerSource) -> None:
+    board.generator.configure(shot_timing(width_ns=2000))  # 4 us at 200 ppm: 20 ms
     with pytest.raises(PlanError, match=r"every 19999 us is too fast .* every 20000 us"):
-        bench.generator.arm(1, source, 19_999)
-    bench.generator.arm(1, source, 20_000)
-    bench.generator.off()
+        board.generator.arm(1, source, 19_999)
+    board.generator.arm(1, source, 20_000)
+    board.generator.off()
 
 
-def test_a_very_slow_plan_is_armed(bench: Bench) -> None:
-    bench.generator.configure(shot_timing())
-    bench.generator.arm(1, period_us=3_600_000_000)
-    assert bench.generator.status().state is GeneratorState.ARMED
+def test_a_very_slow_plan_is_armed(stand: Stand) -> None:
+    stand.generator.configure(shot_timing())
+    stand.generator.arm(1, period_us=3_600_000_000)
+    assert stand.generator.status().state is GeneratorState.ARMED
 
 
-def test_a_view_may_flash_once(bench: Bench) -> None:
+def test_a_view_may_flash_once(stand: Stand) -> None:
     timing = shot_timing()
     once = {view: replace(edges, pulse_b=Window(0, 0)) for view, edges in timing.views.items()}
-    configured = bench.generator.configure(ShotTiming(once, timing.shortest_period_ns))
+    configured = stand.generator.configure(ShotTiming(once, timing.shortest_period_ns))
     assert all(len(pulses) == 1 for pulses in configured.pulses.values())
-    bench.generator.arm(1)
-    assert bench.generator.fire() == replace(configured, sequence=1)
-    assert bench.wait_for_light(1)[0].pulses == configured.pulses
+    stand.generator.arm(1)
+    assert stand.generator.fire() == replace(configured, sequence=1)
+    assert stand.wait_for_light(1)[0].pulses == configured.pulses
 
 
-def wait_until_lit(bench: Bench, current_a: dict[str, float]) -> None:
+def wait_until_lit(stand: Stand, current_a: dict[str, float]) -> None:
     for _ in range(100):
-        bench.firmware.advance(1)
-        if bench.firmware.light_a == current_a:
+        stand.around.advance(1)
+        if stand.around.light_a == current_a:
             return
-    pytest.fail(f"{bench.firmware.light_a} instead of {current_a}")
+    pytest.fail(f"{stand.around.light_a} instead of {current_a}")
 
 
-@on_the_real_image_too
-def test_continuous_light_comes_and_goes(bench: Bench) -> None:
-    bench.firmware.advance(20)
-    bench.generator.light({"left": 0.1, "right": 0.5}, 60.0)
-    assert bench.generator.status().state is GeneratorState.LIT
-    wait_until_lit(bench, {"left": 0.1, "right": 0.5})
-    bench.generator.off()
-    assert bench.generator.status().state is GeneratorState.SAFE
-    wait_until_lit(bench, {})
+@everywhere
+def test_continuous_light_comes_and_goes(stand: Stand) -> None:
+    stand.around.advance(20)
+    stand.generator.light({"left": 0.1, "right": 0.5}, 60.0)
+    assert stand.generator.status().state is GeneratorState.LIT
+    wait_until_lit(stand, {"left": 0.1, "right": 0.5})
+    stand.generator.off()
+    assert stand.generator.status().state is GeneratorState.SAFE
+    wait_until_lit(stand, {})
 
 
-def test_continuous_light_ends_with_its_time(bench: Bench) -> None:
-    bench.generator.light({"left": 0.1}, 0.05)
-    bench.firmware.advance(100)
-    assert bench.generator.status().state is GeneratorState.SAFE
-    wait_until_lit(bench, {})
+def test_continuous_light_ends_with_its_time(stand: Stand) -> None:
+    stand.generator.light({"left": 0.1}, 0.05)
+    stand.around.advance(100)
+    assert stand.generator.status().state is GeneratorState.SAFE
+    wait_until_lit(stand, {})
 
 
 @pytest.mark.parametrize("current_a", [0.0, 0.501, 20.0])
-def test_continuous_light_has_a_limit_of_its_own(bench: Bench, current_a: float) -> None:
+def test_continuous_light_has_a_limit_of_its_own(stand: Stand, current_a: float) -> None:
     with pytest.raises(DeviceRefused, match="continuous light is not 1 to 500 mA"):
-        bench.generator.light({"left": current_a}, 1.0)
+        stand.generator.light({"left": current_a}, 1.0)
     with pytest.raises(PlanError, match="behind"):
-        bench.generator.light({"behind": 0.1}, 1.0)
-    assert bench.generator.status().state is GeneratorState.SAFE
+        stand.generator.light({"behind": 0.1}, 1.0)
+    assert stand.generator.status().state is GeneratorState.SAFE
 
 
-def test_continuous_light_and_pulses_exclude_each_other(armed: Bench) -> None:
+def test_continuous_light_and_pulses_exclude_each_other(armed: Stand) -> None:
     with pytest.raises(DeviceRefused, match="armed or lit"):
         armed.generator.light({"left": 0.1}, 1.0)
     armed.generator.off()
-    with pytest.raises(DeviceRefused, match="before the shortest period"):
-        armed.generator.light({"left": 0.1}, 1.0)
-    armed.firmware.advance(30)
+    armed.around.advance(30)
     armed.generator.light({"left": 0.1}, 60.0)
     with pytest.raises(DeviceRefused, match="armed or lit"):
         armed.generator.arm(1)
@@ -457,12 +515,20 @@ def test_continuous_light_and_pulses_exclude_each_other(armed: Bench) -> None:
         armed.generator.configure(shot_timing())
 
 
-def test_a_silent_host_ends_continuous_light(bench: Bench) -> None:
-    bench.generator.light({"left": 0.1}, 60.0)
-    wait_until_lit(bench, {"left": 0.1})
-    bench.firmware.advance(HEARTBEAT_MS + 1)
-    assert bench.generator.status().faults == ("heartbeat",)
-    wait_until_lit(bench, {})
+def test_continuous_light_waits_for_the_shortest_period(armed_board: Board) -> None:
+    armed_board.generator.off()
+    with pytest.raises(DeviceRefused, match="before the shortest period"):
+        armed_board.generator.light({"left": 0.1}, 1.0)
+    armed_board.around.advance(30)
+    armed_board.generator.light({"left": 0.1}, 1.0)
+
+
+def test_a_silent_host_ends_continuous_light(board: Board) -> None:
+    board.generator.light({"left": 0.1}, 60.0)
+    wait_until_lit(board, {"left": 0.1})
+    board.around.advance(HEARTBEAT_MS + 1)
+    assert board.generator.status().faults == ("heartbeat",)
+    wait_until_lit(board, {})
 
 
 def test_the_generator_keeps_the_limit_of_an_led_for_continuous_light() -> None:

@@ -1,4 +1,4 @@
-"""What every TranslationStage does, run on the serial driver with the simulated instrument behind it."""
+"""What every TranslationStage does, run on the serial driver with a simulated instrument behind it, and in memory."""
 
 from collections.abc import Iterator
 
@@ -8,13 +8,20 @@ from daq.devices import TranslationStage
 from daq.drivers.serial_stage import SerialStage, StageScale
 from daq.errors import DeviceRefused
 from daq.simulation.stage import SimulatedStage
+from tests.support.memory_devices import MemoryStage
+from tests.support.memory_rig import MemoryRig
+
+RANGE_MM = (-5.0, 5.0)
 
 
-@pytest.fixture(params=["serial"])
-def stage() -> Iterator[TranslationStage]:
+@pytest.fixture(params=["serial", "memory"])
+def stage(request: pytest.FixtureRequest) -> Iterator[TranslationStage]:
+    if request.param == "memory":
+        yield MemoryStage("stage", [], MemoryRig().generator, RANGE_MM)
+        return
     with SimulatedStage(speed_mm_s=500) as instrument:
         scale = StageScale(zero_mm=20.0)
-        with SerialStage("stage", instrument.port, (-5.0, 5.0), scale=scale, poll_s=0.002) as opened:
+        with SerialStage("stage", instrument.port, RANGE_MM, scale=scale, poll_s=0.002) as opened:
             yield opened
 
 

@@ -1,196 +1,110 @@
 """A rig in memory: no wires, but honest devices. What the generator fires is what the cameras see."""
 
-import threading
 from collections.abc import Mapping
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 import numpy as np
 
-from daq.devices import DeviceIdentity, GeneratorState, GeneratorStatus, Rig, TriggerSource
-from daq.errors import DeviceRefused, InterlockOpen
-from daq.faults import Fault
-from daq.shot import DoubleFrame, ExposureRecord, FiredTrain, Image, LightPulse
-from daq.timing import CameraTiming, ShotTiming
+from daq.devices import Rig
+from daq.faults import Fault, FaultKind
+from daq.files.run_directory import RunReader, ViewFormat
+from daq.run_plan import RunPlan
+from daq.shot import FiredTrain, Image
+from daq.simulation.camera.light import Exposure, FrameSource
+from daq.simulation.interlock import MemoryInterlock
+from daq.timing import CameraTiming
 from server.rig.config import RigConfig
+from tests.support.memory_devices import MemoryCamera, MemoryGenerator, MemoryStage
 
-SHAPE = (96, 128)
 VIEWS = ("view1", "view2")
+SHAPE = (96, 128)
+FORMATS = {"view1": ViewFormat((24, 32), 8), "view2": ViewFormat((16, 40), 12)}
 TIMING = CameraTiming(
-    trigger_delay_ns=1000,
-    exposure_a_ns=8000,
-    gap_ns=2000,
-    exposure_b_ns=20_000_000,
-    readout_ns=1_000_000,
+    trigger_delay_ns=1000, exposure_a_ns=20_000, gap_ns=2000, exposure_b_ns=2_000_000, readout_ns=1_000_000
 )
+DARK_COUNTS, LIT_COUNTS = 4, 120
 
 
-class _MemoryDevice:
-    def __init__(self, name: str) -> None:
-        self.name = name
+def flat_field(exposure: Exposure) -> Image:
+    """As bright everywhere as its light, but for a corner in which no two frames are alike."""
+    counts = DARK_COUNTS + LIT_COUNTS * len(exposure.pulses)
+    image = np.full(exposure.shape, counts << (exposure.bits - 8), np.uint8 if exposure.bits == 8 else np.uint16)
+    image[0, 0] += (2 * exposure.sequence + (exposure.frame == "B")) % 3
+    return image
 
-    def __enter__(self) -> Self:
-        return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+def two_discs(exposure: Exposure) -> Image:
+    """Two discs before a lit background that move down from A to B, and nothing in the dark; 8 bit."""
+    if not exposure.pulses:
+        return np.zeros(exposure.shape, np.uint8)
+    rows, columns = np.indices(exposure.shape)
+    image = np.full(exposure.shape, 200, np.uint8) - (columns // 8).astype(np.uint8)
+    for row, column in ((30, 40), (60, 90)):
+        image[np.hypot(rows - row - 6 * (exposure.frame == "B"), columns - column) < 9] = 40
+    return image
+
+
+class MemoryRig:
+    """A rig, what surrounds it, and handles to break it; it observes its runs.
+
+    Parameters
+    ----------
+    formats : Mapping[str, ViewFormat]
+        Frames of every view.
+    scene : FrameSource
+        What the cameras see.
+    timing : CameraTiming
+        Of all cameras.
+    """
+
+    def __init__(
+        self,
+        formats: Mapping[str, ViewFormat] = FORMATS,
+        scene: FrameSource = flat_field,
+        timing: CameraTiming = TIMING,
     ) -> None:
-        pass
-
-    def identity(self) -> DeviceIdentity:
-        return DeviceIdentity("tomoshadow", "memory", self.name, "1")
-
-
-class MemoryCamera(_MemoryDevice):
-    """Sees two discs before a lit background, and nothing in the dark."""
-
-    timing = TIMING
-    image_shape = SHAPE
-    bits = 8
-    is_lost = False
-
-    def __init__(self, name: str) -> None:
-        super().__init__(name)
-        self.misses_next = False
-        self._exposed = threading.Event()
-        self._lit = (False, False)
-        self._frame_id = 0
-        self._latest: Image | None = None
-
-    def arm(self) -> None:
-        self._exposed.clear()
-
-    def begin_shot(self) -> None:
-        self._exposed.clear()
-
-    def expose(self, pulses: tuple[LightPulse, ...]) -> None:
-        self._lit = (len(pulses) > 0, len(pulses) > 1)
-        self._frame_id += 2
-        self._exposed.set()
-
-    def collect(self, deadline_s: float) -> DoubleFrame:
-        arrived = self._exposed.wait(deadline_s) and not self.misses_next
-        self.misses_next = False
-        image_a, image_b = (self._image(lit and arrived, number) for number, lit in enumerate(self._lit))
-        self._latest = image_b
-        record = ExposureRecord(arrived, self._frame_id if arrived else 0, self._frame_id * 1000 if arrived else 0)
-        return DoubleFrame(image_a, image_b, record, record)
-
-    def disarm(self) -> None:
-        self._exposed.clear()
-
-    def latest(self) -> Image | None:
-        return self._latest
-
-    def _image(self, lit: bool, number: int) -> Image:
-        rows, columns = np.indices(SHAPE)
-        if not lit:
-            return np.zeros(SHAPE, np.uint8)
-        image = np.full(SHAPE, 200, np.uint8) - (columns // 8).astype(np.uint8)
-        for row, column in ((30, 40), (60, 90)):
-            image[np.hypot(rows - row - 6 * number, columns - column) < 9] = 40
-        return image
-
-
-class MemoryGenerator(_MemoryDevice):
-    """Fires what it was configured for, while it is armed and the door is closed."""
-
-    def __init__(self, name: str, cameras: Mapping[str, MemoryCamera], interlock: "MemoryDoor") -> None:
-        super().__init__(name)
-        self._cameras = cameras
-        self._interlock = interlock
-        self._lock = threading.Lock()
-        self._train = FiredTrain(0)
-        self._shots_left = 0
-        self._sequence = 0
-
-    def configure(self, timing: ShotTiming) -> FiredTrain:
-        triggers = {name: view.camera_trigger_ns for name, view in timing.views.items()}
-        pulses = {
-            name: tuple(
-                LightPulse(pulse.open_ns, pulse.close_ns - pulse.open_ns, view.current_a)
-                for pulse in (view.pulse_a, view.pulse_b)
-                if view.current_a > 0
-            )
-            for name, view in timing.views.items()
+        self.journal: list[str] = []
+        self.cameras = {
+            view: MemoryCamera(view, self.journal, scene, view_format, timing) for view, view_format in formats.items()
         }
-        self._train = FiredTrain(0, triggers, pulses)
-        return self._train
-
-    def light(self, current_a: Mapping[str, float], time_s: float) -> None:
-        raise DeviceRefused(self.name, f"no continuous light: {dict(current_a)} for {time_s} s")
-
-    def arm(self, shots: int, source: TriggerSource = TriggerSource.COMMAND, period_us: int = 0) -> None:
-        if not self._interlock.is_closed():
-            raise InterlockOpen("the door is open")
-        with self._lock:
-            self._shots_left = shots
-
-    def fire(self) -> FiredTrain:
-        with self._lock:
-            if self._shots_left == 0:
-                raise DeviceRefused(self.name, "not armed")
-            self._shots_left -= 1
-            self._sequence += 1
-        train = FiredTrain(self._sequence, self._train.camera_trigger_ns, self._train.pulses)
-        for name, camera in self._cameras.items():
-            camera.expose(train.pulses[name])
-        return train
-
-    def status(self) -> GeneratorStatus:
-        state = GeneratorState.ARMED if self._shots_left else GeneratorState.SAFE
-        counters = {"requested": self._sequence, "fired": self._sequence, "suppressed": 0, "early": 0, "crc_errors": 0}
-        return GeneratorStatus(state, (), self._interlock.is_closed(), self._shots_left, counters)
-
-    def off(self) -> None:
-        with self._lock:
-            self._shots_left = 0
-
-    def clear(self) -> None:
-        self.off()
-
-
-class MemoryDoor(_MemoryDevice):
-    """The interlock: a door that tests open."""
-
-    def __init__(self, name: str) -> None:
-        super().__init__(name)
-        self._closed = True
-        self._changed = threading.Condition()
-
-    def is_closed(self) -> bool:
-        return self._closed
-
-    def wait_for_change(self, deadline_s: float) -> bool:
-        with self._changed:
-            return self._changed.wait(deadline_s)
-
-    def move(self, *, closed: bool) -> None:
-        with self._changed:
-            self._closed = closed
-            self._changed.notify_all()
-
-
-class MemoryLaboratory:
-    """The rig, and what surrounds it."""
-
-    def __init__(self, views: tuple[str, ...] = VIEWS) -> None:
-        self.cameras = {view: MemoryCamera(view) for view in views}
-        self.door = MemoryDoor("interlock")
-        self.generator = MemoryGenerator("pulse generator", self.cameras, self.door)
-        self.rig = Rig(self.cameras, self.generator, self.door)
+        self.generator = MemoryGenerator("generator", self.journal, formats, self._fired)
+        self.interlock = MemoryInterlock("door")
+        self.stage = MemoryStage("stage", self.journal, self.generator)
+        self.rig = Rig(self.cameras, self.generator, self.interlock, self.stage, max_current_a={"view2": 26.0})
+        self.close_door()
 
     def open_door(self) -> None:
-        self.door.move(closed=False)
+        self.generator.set_interlock(False)
+        self.interlock.open_door()
 
     def close_door(self) -> None:
-        self.door.move(closed=True)
+        self.generator.set_interlock(True)
+        self.interlock.close_door()
 
     def inject(self, fault: Fault) -> None:
         if fault.view not in self.cameras:
             raise ValueError(f"there is no view {fault.view}")
-        self.cameras[fault.view].misses_next = True
+        assert fault.kind is FaultKind.DROPPED_B
+        self.cameras[fault.view].lost.add(self.generator.fired + 1)
+
+    def before_run(self, plan: RunPlan) -> None:
+        self.journal.append(f"before {plan.kind}")
+
+    def after_run(self, run_dir: Path) -> None:
+        reader = RunReader(run_dir)
+        self.journal.append(f"after, {reader.shot_count} shots, {reader.outcome}")
+
+    def _fired(self, train: FiredTrain) -> None:
+        for camera in self.cameras.values():
+            camera.trigger(train)
+
+
+def served_rig(views: tuple[str, ...] = VIEWS) -> MemoryRig:
+    """The rig of ``memory_config``: its cameras take 21 ms for a shot."""
+    slow = CameraTiming(
+        trigger_delay_ns=1000, exposure_a_ns=20_000, gap_ns=2000, exposure_b_ns=20_000_000, readout_ns=1_000_000
+    )
+    return MemoryRig(dict.fromkeys(views, ViewFormat(SHAPE, 8)), two_discs, slow)
 
 
 def memory_config(data_dir: Path, views: tuple[str, ...] = VIEWS, token: str | None = None) -> RigConfig:

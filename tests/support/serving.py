@@ -4,7 +4,7 @@ import json
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +22,7 @@ from server.lab.jobs import JobKind
 from server.lab.services import Services
 from server.pictures.previews import make_preview, preview_path, save_preview
 from server.web.app import create_api
-from tests.support.memory_rig import VIEWS, MemoryLaboratory, memory_config
+from tests.support.memory_rig import VIEWS, memory_config, served_rig
 
 DEADLINE_S = 20.0
 
@@ -99,11 +99,12 @@ def assembled(
     data_dir: Path, *, engine: Engine | None = None, views: tuple[str, ...] = VIEWS, token: str | None = None
 ) -> Iterator[Services]:
     """A rig in memory with its acquisition, ready to be served."""
-    laboratory, events = MemoryLaboratory(views), EventPublisher()
-    with Acquisition(laboratory.rig, data_dir, events.publish_run_event) as acquisition:
+    laboratory, events = served_rig(views), EventPublisher()
+    rig = replace(laboratory.rig, stage=None)
+    with Acquisition(rig, data_dir, events.publish_run_event) as acquisition:
         yield Services(
             config=memory_config(data_dir, views, token),
-            rig=laboratory.rig,
+            rig=rig,
             acquisition=acquisition,
             events=events,
             engine=engine or InlineEngine(),

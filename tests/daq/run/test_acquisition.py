@@ -1,4 +1,4 @@
-"""Runs on a bench in memory: how they end, what is on the disk then, and when the light goes off."""
+"""Runs on a rig in memory: how they end, what is on the disk then, and when the light goes off."""
 
 import threading
 import time
@@ -17,27 +17,27 @@ from daq.run.events import RunEvent, RunMessage, ShotRecorded, StateChanged
 from daq.run.limits import AcquisitionLimits
 from daq.run.state import RunOutcome, RunState
 from daq.timing import CameraTiming
-from tests.support.memory_bench import DARK_COUNTS, LIT_COUNTS, MemoryBench
+from tests.support.memory_rig import DARK_COUNTS, LIT_COUNTS, MemoryRig
 
 LIMITS = AcquisitionLimits(frame_s=0.1, light_off_s=0.2, disarm_s=0.3, drain_s=10, heartbeat_s=0.05)
 DEADLINE_S = 20.0
 
 
 class Laboratory:
-    """A bench, its acquisition, and everything that was published."""
+    """A rig, its acquisition, and everything that was published."""
 
     def __init__(self, data_dir: Path) -> None:
-        self.bench = MemoryBench()
+        self.memory = MemoryRig()
         self.data_dir = data_dir
         self.events: list[RunEvent] = []
         self.acquisition = Acquisition(
-            self.bench.rig,
+            self.memory.rig,
             data_dir,
             self._publish,
-            {"name": "bench"},
+            {"name": "in memory"},
             lambda name: f"sha of {name}",
             LIMITS,
-            [self.bench],
+            [self.memory],
         )
         self._recorded = threading.Condition()
 
@@ -63,7 +63,7 @@ class Laboratory:
     def await_in_journal(self, entry: str) -> None:
         deadline = time.monotonic() + DEADLINE_S
         tick = threading.Event()
-        while entry not in self.bench.journal:
+        while entry not in self.memory.journal:
             assert time.monotonic() < deadline, entry
             tick.wait(0.002)
 
@@ -76,7 +76,7 @@ def lab(tmp_path: Path) -> Iterator[Laboratory]:
     laboratory = Laboratory(tmp_path / "runs")
     with laboratory.acquisition:
         yield laboratory
-    assert laboratory.bench.generator.state is not GeneratorState.ARMED
+    assert laboratory.memory.generator.state is not GeneratorState.ARMED
 
 
 def plan_of(shots: int = 4, rate_hz: float = 100, **changes: Any) -> RunPlan:
@@ -102,7 +102,7 @@ def test_a_run_is_on_the_disk_with_all_that_explains_it(lab: Laboratory) -> None
     assert reader.image_keys().tolist() == [0, 0, 0, 0]
     header = reader.header
     assert header.plan == plan_of(calibration="c7")
-    assert header.configuration == {"name": "bench"}
+    assert header.configuration == {"name": "in memory"}
     assert header.calibration_sha256 == "sha of c7"
     assert set(header.devices) == {"view1", "view2", "generator", "door", "stage"}
     shot = reader.read_shot(2)
@@ -144,7 +144,7 @@ def test_no_shot_comes_before_its_time(lab: Laboratory) -> None:
 
 def test_the_light_goes_off_before_the_cameras(lab: Laboratory) -> None:
     lab.run(plan_of(1))
-    journal = lab.bench.journal
+    journal = lab.memory.journal
     assert journal[:4] == ["before sample", "view1 arm", "view2 arm", "arm 4"]
     assert journal.index("off") < journal.index("view1 disarm")
 
@@ -156,7 +156,7 @@ def test_dark_and_background_runs_make_a_sample_run_complete(lab: Laboratory) ->
     assert background.image_keys().tolist() == [ImageKey.BACKGROUND] * 2
     shot = dark.read_shot(0)
     assert shot.fired is not None
-    assert all(pulse.current_a == 0 for pulses in shot.fired.pulses.values() for pulse in pulses)
+    assert not any(shot.fired.pulses.values())
     sample = lab.run(plan_of(1, references=(dark.run_dir.name, background.run_dir.name)))
     for reader, stored in ((dark, sample.dark), (background, sample.background)):
         for view in ("view1", "view2"):
@@ -170,7 +170,7 @@ def test_dark_and_background_runs_make_a_sample_run_complete(lab: Laboratory) ->
 
 
 def test_a_lost_frame_is_fired_again(lab: Laboratory) -> None:
-    lab.bench.cameras["view2"].lost = {2, 3}
+    lab.memory.cameras["view2"].lost = {2, 3}
     reader = lab.run(plan_of(4, refire_quota=2))
     assert reader.image_keys().tolist() == [0, 0, 0, 0]
     fired = [reader.read_shot(index).fired for index in range(4)]
@@ -179,7 +179,7 @@ def test_a_lost_frame_is_fired_again(lab: Laboratory) -> None:
 
 
 def test_beyond_the_quota_a_lost_frame_keeps_its_slot(lab: Laboratory) -> None:
-    lab.bench.cameras["view2"].lost = {2, 3, 5}
+    lab.memory.cameras["view2"].lost = {2, 3, 5}
     reader = lab.run(plan_of(5, refire_quota=1))
     assert reader.image_keys().tolist() == [0, ImageKey.INVALID, 0, ImageKey.INVALID, 0]
     shot = reader.read_shot(1)
@@ -193,10 +193,10 @@ def test_beyond_the_quota_a_lost_frame_keeps_its_slot(lab: Laboratory) -> None:
 
 
 def test_a_lost_pulse_is_flagged_and_not_taken_for_a_lost_frame(lab: Laboratory) -> None:
-    lab.bench.generator.unlit = {2}
+    lab.memory.generator.unlit = {2}
     reader = lab.run(plan_of(3))
     assert reader.image_keys().tolist() == [0, ImageKey.INVALID, 0]
-    assert lab.bench.generator.fired == 3
+    assert lab.memory.generator.fired == 3
     assert "shot 1: no light in B of view1, no light in B of view2" in lab.messages()
 
 
@@ -209,7 +209,7 @@ def test_a_target_is_taken_at_each_position_and_light_waits_for_the_stage(lab: L
     reader = lab.run(plan_of(2, kind=RunKind.CALIBRATION, stage_z_mm=(-3.0, 0.0, 3.0)))
     shots = [reader.read_shot(index) for index in range(6)]
     assert [shot.stage_z_mm for shot in shots] == [-2.999, -2.999, 0.001, 0.001, 3.001, 3.001]
-    acted = [entry for entry in lab.bench.journal if entry.startswith(("move", "arm"))]
+    acted = [entry for entry in lab.memory.journal if entry.startswith(("move", "arm"))]
     assert acted == ["move -3", "arm 5", "move 0", "arm 5", "move 3", "arm 5"]
 
 
@@ -220,31 +220,31 @@ def assert_failed(lab: Laboratory, reader: RunReader, cause: str, readable: int)
     assert (reader.outcome, reader.cause) == ("failed", status.message)
     assert reader.shot_count == readable
     assert all(reader.read_shot(index).valid for index in range(readable))
-    journal = lab.bench.journal
+    journal = lab.memory.journal
     assert journal.index("off") < journal.index("view1 disarm")
 
 
 def test_a_dead_camera_fails_the_run_and_keeps_its_shots(lab: Laboratory) -> None:
-    lab.bench.cameras["view2"].broken_at = 3
+    lab.memory.cameras["view2"].broken_at = 3
     assert_failed(lab, lab.run(plan_of(9)), "view2: control lost", 2)
-    assert lab.bench.generator.fired == 3
+    assert lab.memory.generator.fired == 3
 
 
 def test_a_failed_fire_is_no_lost_frame(lab: Laboratory) -> None:
-    lab.bench.generator.silent_at = 2
+    lab.memory.generator.silent_at = 2
     assert_failed(lab, lab.run(plan_of(9)), "generator: no answer to 'fire' within 0.5 s", 1)
-    assert lab.bench.generator.fired == 2
+    assert lab.memory.generator.fired == 2
 
 
 def test_a_generator_that_loads_something_else_never_fires(lab: Laboratory) -> None:
-    lab.bench.generator.wrong_echo_ns = 100
+    lab.memory.generator.wrong_echo_ns = 100
     assert_failed(lab, lab.run(plan_of()), "start of pulse 1 of view1 is 6500 ns instead of 6400 ns", 0)
-    assert lab.bench.generator.fired == 0
+    assert lab.memory.generator.fired == 0
 
 
 def test_a_generator_fault_ends_the_wait_for_the_next_shot(lab: Laboratory) -> None:
     reader = lab.start_and_await_shot(plan_of(**SLOW), 0)
-    lab.bench.generator.trip("heartbeat")
+    lab.memory.generator.trip("heartbeat")
     assert_failed(lab, reader, "generator: fault: heartbeat", 1)
     with pytest.raises(DeviceRefused, match="heartbeat; acknowledge it first"):
         lab.acquisition.start(plan_of())
@@ -266,7 +266,7 @@ def test_a_shot_that_cannot_be_stored_fails_the_run(lab: Laboratory) -> None:
 
 def test_an_open_door_darkens_at_once_and_names_the_reason(lab: Laboratory) -> None:
     reader = lab.start_and_await_shot(plan_of(**SLOW), 0)
-    lab.bench.interlock.open_door()
+    lab.memory.interlock.open_door()
     assert_failed(lab, reader, "door: the interlock is open", 1)
 
 
@@ -274,8 +274,8 @@ def test_an_open_door_darkens_at_once_and_names_the_reason(lab: Laboratory) -> N
 def frozen(lab: Laboratory) -> Iterator[threading.Event]:
     """A camera that hangs in collect and in disarm until the end of the test."""
     thaw = threading.Event()
-    lab.bench.cameras["view1"].timing = CameraTiming(1000, 20_000, 2000, 3_000_000_000, 0)
-    lab.bench.cameras["view1"].frozen = thaw
+    lab.memory.cameras["view1"].timing = CameraTiming(1000, 20_000, 2000, 3_000_000_000, 0)
+    lab.memory.cameras["view1"].frozen = thaw
     yield thaw
     thaw.set()
 
@@ -288,10 +288,10 @@ def test_light_off_never_waits_for_a_frozen_camera(lab: Laboratory, frozen: thre
     if reason == "abort":
         lab.acquisition.abort()
     else:
-        lab.bench.interlock.open_door()
+        lab.memory.interlock.open_door()
     lab.await_in_journal("off")
     assert time.monotonic() - began < 0.5
-    assert lab.bench.generator.state is GeneratorState.SAFE
+    assert lab.memory.generator.state is GeneratorState.SAFE
     assert lab.acquisition.status().active
     frozen.set()
     status = lab.acquisition.wait(DEADLINE_S)
@@ -301,7 +301,7 @@ def test_light_off_never_waits_for_a_frozen_camera(lab: Laboratory, frozen: thre
 
 def test_a_frozen_camera_is_left_alone_after_its_deadline(lab: Laboratory) -> None:
     reader = lab.start_and_await_shot(plan_of(**SLOW), 0)
-    thaw = lab.bench.cameras["view2"].frozen = threading.Event()
+    thaw = lab.memory.cameras["view2"].frozen = threading.Event()
     lab.acquisition.stop()
     status = lab.acquisition.wait(2.0)
     thaw.set()
@@ -328,7 +328,7 @@ def test_an_abort_between_shots_is_an_abort_and_no_failure(lab: Laboratory) -> N
 
 
 def test_light_that_does_not_go_off_is_a_fault_until_acknowledged(lab: Laboratory) -> None:
-    lab.bench.generator.stuck = True
+    lab.memory.generator.stuck = True
     reader = lab.run(plan_of(1))
     status = lab.acquisition.status()
     assert (status.state, status.outcome) == (RunState.FAULT, RunOutcome.FAILED)
@@ -339,7 +339,7 @@ def test_light_that_does_not_go_off_is_a_fault_until_acknowledged(lab: Laborator
     with pytest.raises(DeviceError, match="still armed"):
         lab.acquisition.acknowledge()
     assert lab.acquisition.status().state is RunState.FAULT
-    lab.bench.generator.stuck = False
+    lab.memory.generator.stuck = False
     lab.acquisition.acknowledge()
     assert lab.run(plan_of(1)).outcome == "completed"
 
@@ -373,12 +373,12 @@ def test_an_impossible_plan_is_refused_with_its_reason(lab: Laboratory, case: st
     with pytest.raises(error, match=reason):
         lab.acquisition.start(plan_of(**changes))
     assert lab.acquisition.status().state is RunState.IDLE
-    assert not lab.bench.journal
+    assert not lab.memory.journal
     assert lab.run(plan_of(1)).outcome == "completed"
 
 
 def test_a_run_that_the_disk_does_not_hold_is_refused_with_both_numbers(lab: Laboratory) -> None:
-    lab.bench.cameras["view1"].image_shape = (60_000, 60_000)
+    lab.memory.cameras["view1"].image_shape = (60_000, 60_000)
     with pytest.raises(
         PlanError, match=r"100000 shots of \d+ bytes need \d+ bytes on the disk of .*, \d+ bytes are free"
     ):
@@ -387,7 +387,7 @@ def test_a_run_that_the_disk_does_not_hold_is_refused_with_both_numbers(lab: Lab
 
 def test_a_calibration_that_does_not_exist_refuses_the_plan(lab: Laboratory) -> None:
     acquisition = Acquisition(
-        lab.bench.rig, lab.data_dir, hash_calibration=lambda name: (lab.data_dir / name).read_text()
+        lab.memory.rig, lab.data_dir, hash_calibration=lambda name: (lab.data_dir / name).read_text()
     )
     with pytest.raises(PlanError, match=r"No such file.*c9"):
         acquisition.start(plan_of(calibration="c9"))
@@ -395,7 +395,7 @@ def test_a_calibration_that_does_not_exist_refuses_the_plan(lab: Laboratory) -> 
 
 
 def test_a_rig_without_a_stage_refuses_positions(lab: Laboratory) -> None:
-    rig = lab.bench.rig
+    rig = lab.memory.rig
     acquisition = Acquisition(Rig(rig.cameras, rig.generator, rig.interlock), lab.data_dir)
     with pytest.raises(PlanError, match="no translation stage"):
         acquisition.start(plan_of(stage_z_mm=(0.0,)))
@@ -405,12 +405,12 @@ def test_only_dark_and_background_runs_of_this_rig_are_references(lab: Laborator
     sample = lab.run(plan_of(1))
     with pytest.raises(PlanError, match="is sample, not dark or background"):
         lab.acquisition.start(plan_of(references=(sample.run_dir.name,)))
-    lab.bench.generator.unlit = {2}
+    lab.memory.generator.unlit = {2}
     unlit = lab.run(plan_of(1, kind=RunKind.BACKGROUND))
     with pytest.raises(PlanError, match="has no valid shot"):
         lab.acquisition.start(plan_of(references=(unlit.run_dir.name,)))
     dark = lab.run(plan_of(1, kind=RunKind.DARK))
-    lab.bench.cameras["view1"].image_shape = (8, 8)
+    lab.memory.cameras["view1"].image_shape = (8, 8)
     with pytest.raises(PlanError, match="has views"):
         lab.acquisition.start(plan_of(references=(dark.run_dir.name,)))
 
@@ -418,17 +418,17 @@ def test_only_dark_and_background_runs_of_this_rig_are_references(lab: Laborator
 @pytest.mark.parametrize("which", ["door", "generator"])
 def test_no_light_while_an_interlock_is_open(lab: Laboratory, which: str) -> None:
     if which == "door":
-        lab.bench.interlock.open_door()
-    lab.bench.generator.interlock_closed = which != "generator"
+        lab.memory.interlock.open_door()
+    lab.memory.generator.set_interlock(which != "generator")
     with pytest.raises(InterlockOpen, match=f"^{which}"):
         lab.acquisition.start(plan_of())
-    assert not lab.bench.journal
+    assert not lab.memory.journal
 
 
 def test_the_guard_asks_again_when_the_light_goes_off_under_its_question(
     lab: Laboratory, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    generator, overtaken = lab.bench.generator, threading.Event()
+    generator, overtaken = lab.memory.generator, threading.Event()
     status = generator.status
 
     def overtaken_once() -> GeneratorStatus:
@@ -460,13 +460,12 @@ class Clumsy:
 
 @pytest.mark.parametrize("when", ["before", "after"])
 def test_a_bug_in_the_scene_is_a_failed_run_and_not_a_dead_thread(lab: Laboratory, when: str) -> None:
-    bench = lab.bench
-    acquisition = Acquisition(bench.rig, lab.data_dir, limits=LIMITS, observers=[Clumsy(when)])
+    acquisition = Acquisition(lab.memory.rig, lab.data_dir, limits=LIMITS, observers=[Clumsy(when)])
     run_dir = lab.data_dir / acquisition.start(plan_of(2))
     status = acquisition.wait(DEADLINE_S)
     assert (status.state, status.outcome) == (RunState.IDLE, RunOutcome.FAILED)
     assert "ZeroDivisionError('no nozzle')" in status.message
-    assert "off" in bench.journal
+    assert "off" in lab.memory.journal
     assert run_dir.exists() == (when == "after")
     if when == "after":
         reader = RunReader(run_dir)
@@ -475,8 +474,8 @@ def test_a_bug_in_the_scene_is_a_failed_run_and_not_a_dead_thread(lab: Laborator
 
 def test_observers_have_the_first_and_the_last_word(lab: Laboratory) -> None:
     lab.run(plan_of(2))
-    assert lab.bench.journal[0] == "before sample"
-    assert lab.bench.journal[-1] == "after, 2 shots, None"
+    assert lab.memory.journal[0] == "before sample"
+    assert lab.memory.journal[-1] == "after, 2 shots, None"
 
 
 def test_runs_without_an_outcome_are_reported_as_interrupted(lab: Laboratory, tmp_path: Path) -> None:
@@ -485,7 +484,7 @@ def test_runs_without_an_outcome_are_reported_as_interrupted(lab: Laboratory, tm
     with RunWriter(lab.data_dir / header.run_id, header):
         pass
     events: list[RunEvent] = []
-    with Acquisition(lab.bench.rig, lab.data_dir, events.append) as restarted:
+    with Acquisition(lab.memory.rig, lab.data_dir, events.append) as restarted:
         assert restarted.interrupted_runs() == ("20260101T000000-killed",)
     assert events == [RunMessage("20260101T000000-killed", "interrupted: its process ended before the run did")]
 
@@ -495,4 +494,4 @@ def test_leaving_ends_the_run_in_the_dark(tmp_path: Path) -> None:
     with lab.acquisition:
         reader = lab.start_and_await_shot(plan_of(**SLOW), 0)
     assert reader.outcome == "aborted"
-    assert lab.bench.generator.state is GeneratorState.SAFE
+    assert lab.memory.generator.state is GeneratorState.SAFE

@@ -19,7 +19,8 @@ from daq.run_plan import PulsePair, RunKind, RunPlan
 from daq.shot import FiredTrain
 from daq.simulation.interlock import MemoryInterlock
 from daq.simulation.pico.firmware_process import FirmwareProcess
-from tests.support.memory_bench import MemoryCamera
+from tests.support.memory_devices import MemoryCamera
+from tests.support.memory_rig import FORMATS, TIMING, flat_field
 
 CHANNELS = {"view1": 0, "view2": 3}
 LIMITS = AcquisitionLimits(frame_s=0.5, light_off_s=0.5, disarm_s=0.5, drain_s=10)
@@ -30,7 +31,7 @@ class FirmwareLaboratory:
     """A rig around the firmware, and its acquisition."""
 
     def __init__(self, data_dir: Path) -> None:
-        self.cameras = {view: MemoryCamera(view, []) for view in CHANNELS}
+        self.cameras = {view: MemoryCamera(view, [], flat_field, FORMATS["view1"], TIMING) for view in CHANNELS}
         self.firmware = FirmwareProcess(CHANNELS, self._fired)
         self.door = MemoryInterlock("door")
         self.door.close_door()

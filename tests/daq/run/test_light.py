@@ -7,42 +7,52 @@ import pytest
 from daq.devices import GeneratorState
 from daq.errors import DeviceError, DeviceTimeout
 from daq.run import light
-from tests.support.memory_bench import MemoryBench
+from daq.run_plan import PulsePair, RunPlan
+from daq.timing import plan_shot_timing
+from tests.support.memory_rig import TIMING, MemoryRig
+
+PLAN = RunPlan(name="light", shots=1, pulse=PulsePair(current_a={"view1": 20.0, "view2": 12.0}))
 
 
-@pytest.fixture
-def bench() -> MemoryBench:
-    bench = MemoryBench()
-    bench.generator.state = GeneratorState.ARMED
-    return bench
+@pytest.fixture(params=[GeneratorState.ARMED, GeneratorState.LIT])
+def memory(request: pytest.FixtureRequest) -> MemoryRig:
+    """A rig that can give light, or gives it."""
+    memory = MemoryRig()
+    if request.param is GeneratorState.LIT:
+        memory.generator.light({"view1": 0.1}, 60.0)
+    else:
+        memory.generator.configure(plan_shot_timing(PLAN, dict.fromkeys(memory.cameras, TIMING)))
+        memory.generator.arm(1)
+    assert memory.generator.state is request.param
+    return memory
 
 
-def test_light_that_goes_off_late_is_confirmed(bench: MemoryBench) -> None:
-    bench.generator.stuck = True
-    repaired = threading.Timer(0.1, setattr, (bench.generator, "stuck", False))
+def test_light_that_goes_off_late_is_confirmed(memory: MemoryRig) -> None:
+    memory.generator.stuck = True
+    repaired = threading.Timer(0.1, setattr, (memory.generator, "stuck", False))
     repaired.start()
-    assert light.confirm_off(bench.rig, 10.0) is None
-    assert bench.generator.state is GeneratorState.SAFE
-    assert bench.journal.count("off") > 1
+    assert light.confirm_off(memory.rig, 10.0) is None
+    assert memory.generator.state is GeneratorState.SAFE
+    assert memory.journal.count("off") > 1
     repaired.join()
 
 
-@pytest.mark.parametrize("state", [GeneratorState.ARMED, GeneratorState.LIT])
-def test_a_generator_that_can_still_give_light_is_named(bench: MemoryBench, state: GeneratorState) -> None:
-    bench.generator.state, bench.generator.stuck = state, True
-    assert light.confirm_off(bench.rig, 0.0) == f"generator: still {state} after off"
-    with pytest.raises(DeviceError, match=f"generator: still {state} after off"):
-        light.acknowledge_faults(bench.rig)
+def test_a_generator_that_can_still_give_light_is_named(memory: MemoryRig) -> None:
+    memory.generator.stuck = True
+    reason = f"generator: still {memory.generator.state} after off"
+    assert light.confirm_off(memory.rig, 0.0) == reason
+    with pytest.raises(DeviceError, match=reason):
+        light.acknowledge_faults(memory.rig)
 
 
 def test_a_generator_that_does_not_answer_is_not_known_to_be_off(
-    bench: MemoryBench, monkeypatch: pytest.MonkeyPatch
+    memory: MemoryRig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def silent() -> None:
         raise DeviceTimeout("generator", "off", 1.0)
 
-    monkeypatch.setattr(bench.generator, "off", silent)
-    light.try_to_switch_off(bench.rig)
-    assert light.confirm_off(bench.rig, 0.0) == "generator: no answer to 'off' within 1 s"
+    monkeypatch.setattr(memory.generator, "off", silent)
+    light.try_to_switch_off(memory.rig)
+    assert light.confirm_off(memory.rig, 0.0) == "generator: no answer to 'off' within 1 s"
     with pytest.raises(DeviceTimeout):
-        light.switch_off(bench.rig)
+        light.switch_off(memory.rig)

@@ -7,12 +7,12 @@ from typing import Any
 import pytest
 
 from daq.drivers.aravis_device import AravisDevice
+from daq.simulation.interlock import MemoryInterlock
 from server.cli.main import main
 from server.doctor.checkup import Checkup, Status
 from server.doctor.doctor_rig import check_camera, check_interlock, check_network, check_rig
 from server.rig.assembly import wire_rig
 from server.rig.config import RigConfig, load_config
-from tests.support.memory_rig import MemoryDoor
 
 pytestmark = pytest.mark.network
 
@@ -78,10 +78,10 @@ def test_a_camera_that_another_program_holds_is_told_and_hides_no_other() -> Non
 
 
 def test_an_open_door_is_a_warning() -> None:
-    door = MemoryDoor("interlock")
-    door.move(closed=False)
+    door = MemoryInterlock("interlock")
     assert check_interlock(door).status is Status.WARN
-    assert check_interlock(MemoryDoor("interlock")).status is Status.OK
+    door.close_door()
+    assert check_interlock(door).status is Status.OK
 
 
 def test_an_address_that_no_interface_leads_to_fails() -> None:

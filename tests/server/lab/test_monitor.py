@@ -4,38 +4,38 @@ from pathlib import Path
 from daq.devices import GeneratorStatus
 from daq.errors import DeviceTimeout
 from server.lab.monitor import Health, Lamp, RigMonitor
-from tests.support.memory_rig import MemoryLaboratory
+from tests.support.memory_rig import MemoryRig
 
 
-def lamps_of(laboratory: MemoryLaboratory, tmp_path: Path) -> dict[str, Lamp]:
-    monitor = RigMonitor(laboratory.rig, tmp_path)
+def lamps_of(memory: MemoryRig, tmp_path: Path) -> dict[str, Lamp]:
+    monitor = RigMonitor(memory.rig, tmp_path)
     asyncio.run(monitor.ask())
     return {lamp.name: lamp for lamp in monitor.lamps}
 
 
 def test_an_open_door_is_a_red_lamp(tmp_path: Path) -> None:
-    laboratory = MemoryLaboratory()
-    assert lamps_of(laboratory, tmp_path)["interlock"].health is Health.OK
-    laboratory.open_door()
-    assert lamps_of(laboratory, tmp_path)["interlock"].health is Health.FAULT
+    memory = MemoryRig()
+    assert lamps_of(memory, tmp_path)["interlock"].health is Health.OK
+    memory.open_door()
+    assert lamps_of(memory, tmp_path)["interlock"].health is Health.FAULT
 
 
 def test_a_camera_that_dies_between_runs_is_a_red_lamp(tmp_path: Path) -> None:
-    laboratory = MemoryLaboratory()
-    laboratory.cameras["view2"].is_lost = True
-    lamps = lamps_of(laboratory, tmp_path)
+    memory = MemoryRig()
+    memory.cameras["view2"].is_lost = True
+    lamps = lamps_of(memory, tmp_path)
     assert lamps["view2"] == Lamp(name="view2", kind="camera", health=Health.FAULT, detail="has stopped answering")
     assert lamps["view1"].health is Health.OK
 
 
 def test_a_silent_device_is_a_red_lamp_and_hides_no_other(tmp_path: Path) -> None:
-    laboratory = MemoryLaboratory()
+    memory = MemoryRig()
 
     def silent() -> GeneratorStatus:
         raise DeviceTimeout("pulse generator", "status", 0.5)
 
-    laboratory.generator.status = silent  # type: ignore[method-assign]
-    lamps = lamps_of(laboratory, tmp_path)
+    memory.generator.status = silent  # type: ignore[method-assign]
+    lamps = lamps_of(memory, tmp_path)
     assert lamps["pulse generator"].health is Health.FAULT
     assert "0.5 s" in lamps["pulse generator"].detail
     assert lamps["view1"].detail == "tomoshadow memory, view1"
