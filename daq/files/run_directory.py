@@ -1,4 +1,4 @@
-"""The data contract: runs on disk. The only module of ``daq`` that ``processing`` may import.
+"""The data contract: runs on disk. What ``processing`` needs of ``daq`` it imports from here.
 
 ::
 

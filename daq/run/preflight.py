@@ -1,4 +1,4 @@
-"""Everything that can be checked before a run starts, so that it is refused with a reason instead of failing."""
+"""What is checked and written down before a run starts, so that it is refused with a reason instead of failing."""
 
 import shutil
 from collections.abc import Callable, Mapping
@@ -93,8 +93,20 @@ def prepare_run(
     references = find_references(data_dir, plan.references, views)
     _check_disk(data_dir, plan, views)
     light.check_permitted(rig)
+    calibration_sha256 = hash_calibration(plan.calibration) if plan.calibration else None
+    header = _header(data_dir, plan, views, configuration, calibration_sha256)
+    return PreparedRun(data_dir / header.run_id, plan, header, timing, references)
+
+
+def _header(
+    data_dir: Path,
+    plan: RunPlan,
+    views: dict[str, ViewFormat],
+    configuration: Mapping[str, Any],
+    calibration_sha256: str | None,
+) -> RunHeader:
     now = datetime.now(UTC)
-    header = RunHeader(
+    return RunHeader(
         run_id=_new_run_id(data_dir, plan.name, now),
         created_utc=now.isoformat(),
         views=views,
@@ -102,10 +114,9 @@ def prepare_run(
         configuration=dict(configuration),
         software=_software_versions(),
         calibration_id=plan.calibration,
-        calibration_sha256=hash_calibration(plan.calibration) if plan.calibration else None,
+        calibration_sha256=calibration_sha256,
         separation_ns=plan.pulse.separation_ns,
     )
-    return PreparedRun(data_dir / header.run_id, plan, header, timing, references)
 
 
 def _timing(rig: Rig, plan: RunPlan) -> ShotTiming:

@@ -158,7 +158,7 @@ class AcquisitionConfig(FrozenModel):
 
 
 class SimulationConfig(FrozenModel):
-    """Makes the rig a simulated bench: real drivers, simulated devices at the other end of every wire."""
+    """Makes the rig a simulated one: real drivers, simulated devices at the other end of every wire."""
 
     seed: int = 1
     spray: Literal["hollow_cone", "flat_fan"] = "hollow_cone"
