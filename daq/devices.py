@@ -202,5 +202,5 @@ class Rig:
 
         The generator comes last and so is closed first: the light goes off before anything else ends.
         """
-        carriers = () if self.stage is None else (self.stage,)
-        return (*carriers, *self.cameras.values(), self.interlock, self.generator)
+        stages = () if self.stage is None else (self.stage,)
+        return (*stages, *self.cameras.values(), self.interlock, self.generator)
