@@ -69,7 +69,7 @@ def _all_views(calibration_set: CalibrationSet, wanted: Model | None) -> dict[st
     views, problems = {}, []
     for name, seen in calibration_set.views.items():
         try:
-            views[name] = _free_view(seen, wanted) if seen.free_pose else _joint_view(name, seen, wanted)
+            views[name] = _free_view(seen, wanted) if seen.free_pose else _placed_view(name, seen, wanted)
         except CalibrationError as error:
             problems.append(str(error) if str(error).startswith(name) else f"{name}: {error}")
     if problems:
@@ -108,7 +108,7 @@ def _placements(calibration_set: CalibrationSet, views: Mapping[str, ViewCalibra
         yield from check_placements(calibration_set, {name: view.mapping for name, view in views.items()})
 
 
-def _joint_view(name: str, seen: ViewObservations, wanted: Model | None) -> ViewCalibration:
+def _placed_view(name: str, seen: ViewObservations, wanted: Model | None) -> ViewCalibration:
     """Fit the model that is wanted; None: all models, and the one to keep."""
     check_motion(name, seen.planes)
     if wanted is not None:

@@ -8,7 +8,7 @@ from typing import Any
 from daq.files.run_directory import RunReader
 from processing.calibration.calibration import Calibration, Verdict
 from processing.calibration.droplets.disparity import MIN_VIEWS, REACH_PX, ViewDisparity, measured_box, shot_disparity
-from processing.calibration.droplets.displaced_view import odd_view, would_agree
+from processing.calibration.droplets.displaced_view import displaced_view, would_agree
 from processing.calibration.droplets.droplet_images import find_droplets
 from processing.calibration.droplets.self_calibration import CLEARER, NOISE_PX, SelfCalibration, self_calibrate
 from processing.calibration.errors import CalibrationError, OutOfRange
@@ -121,10 +121,12 @@ def _unmeasured(
     names = list(calibration.views)
     if len(names) < MIN_VIEWS:
         return ShotCheck(shot, {}, str(error))
-    odd = odd_view([view.mapping for view in calibration.views.values()], exposures, measured_box(calibration))
-    if odd is not None:
-        problem = f"{names[odd]} has moved further than {REACH_PX:g} px, or shows other droplets: the other views agree"
-        return ShotCheck(shot, {}, problem, (names[odd],))
+    mappings = [view.mapping for view in calibration.views.values()]
+    displaced = displaced_view(mappings, exposures, measured_box(calibration))
+    if displaced is not None:
+        name = names[displaced]
+        problem = f"{name} has moved further than {REACH_PX:g} px, or shows other droplets: the other views agree"
+        return ShotCheck(shot, {}, problem, (name,))
     if isinstance(error, OutOfRange) or would_agree(exposures):
         problem = f"{error}: a view has moved further than {REACH_PX:g} px, or several have"
         return ShotCheck(shot, {}, problem, tuple(names))

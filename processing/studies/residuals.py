@@ -1,8 +1,8 @@
 """Back-projection error of a calibration, plane by plane (Fig. 3 of the paper).
 
 The target is rendered as each view sees it, with blur, uneven light, dust and noise; the product's detector finds
-its corners, and the product's joint fit calibrates the view. Beside it stands what the same fit makes of ideal
-points of an ideal pinhole camera: the error that is left when nothing is wrong.
+its corners, and ``calibrate`` fits the view. Beside it stands what the same fit makes of ideal points of an ideal
+pinhole camera: the error that is left when nothing is wrong.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence

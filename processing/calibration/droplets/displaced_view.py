@@ -25,13 +25,13 @@ _FOURTH_NEIGHBOUR = 1.08
 """Median distance of the fourth neighbour, relative to the mean distance, of points that lie at random."""
 
 
-def odd_view(mappings: Sequence[ViewMapping], exposures: Sequence[Sequence[FloatArray]], box: Box) -> int | None:
+def displaced_view(mappings: Sequence[ViewMapping], exposures: Sequence[Sequence[FloatArray]], box: Box) -> int | None:
     """Number of the view without which all others agree; None where it is not one alone, or droplets are too few.
 
     Parameters
     ----------
     mappings : sequence of ViewMapping
-        The views as calibrated; three have no odd one, as two agree on nearly everything.
+        The views as calibrated; of three none can be found, as two agree on nearly everything.
     exposures : sequence of sequences of (N, 2) arrays
         By exposure: the droplets of each view, in px.
     box : Box
@@ -41,10 +41,10 @@ def odd_view(mappings: Sequence[ViewMapping], exposures: Sequence[Sequence[Float
         return None
     exposures = _enough(exposures)
     agreed = [_agreed_without(view, mappings, exposures, box) for view in range(len(mappings))]
-    odd = np.flatnonzero(agreed)
-    if len(odd) != 1 or _expected(int(odd[0]), agreed[odd[0]], exposures) < EXPECTED_DROPLETS:
+    displaced = np.flatnonzero(agreed)
+    if len(displaced) != 1 or _expected(int(displaced[0]), agreed[displaced[0]], exposures) < EXPECTED_DROPLETS:
         return None
-    return int(odd[0])
+    return int(displaced[0])
 
 
 def would_agree(exposures: Sequence[Sequence[FloatArray]]) -> bool:

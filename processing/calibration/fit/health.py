@@ -21,7 +21,7 @@ MAX_REJECTED = 0.1
 MIN_DEPTH_RATIO = 0.02
 """Spread of the points along their flattest direction, relative to the widest one; less is as good as a plane."""
 MIN_POINTS = 12
-"""Points that a joint fit needs at the very least."""
+"""Points that a fit needs at the very least."""
 MIN_PLANES = 4
 """With fewer planes, holding one out leaves too little of the depth: single points are held out instead."""
 FOLDS = 5
