@@ -115,7 +115,8 @@ def _placed_view(name: str, seen: ViewObservations, wanted: Model | None) -> Vie
         return _fitted_view(seen, wanted)
     distances_px = holdout_by_model(seen.planes, seen.image_size_px)
     chosen = _fitted_view(seen, simplest_that_holds(distances_px))
-    return replace(chosen, candidates_px={model: float(px.mean()) for model, px in distances_px.items()})
+    errors_by_model_px = {model: float(px.mean()) for model, px in distances_px.items()}
+    return replace(chosen, candidates_holdout_error_px=errors_by_model_px)
 
 
 def _fitted_view(seen: ViewObservations, model: Model) -> ViewCalibration:
@@ -141,7 +142,7 @@ def _free_view(seen: ViewObservations, wanted: Model | None) -> ViewCalibration:
     ]
     holdout_px = free_pose_holdout_px(seen.planes, seen.image_size_px)
     summary = _summary(fitted.camera, Model.PINHOLE, list(seen.planes), errors, holdout_px, 0, extent_mm=())
-    return summary.with_boards(fitted.poses)
+    return replace(summary, boards_in_free_poses=fitted.poses)
 
 
 def _summary(
@@ -155,17 +156,18 @@ def _summary(
 ) -> ViewCalibration:
     distances_px, holdout_error_px = np.concatenate(errors), float(np.concatenate(holdout_px).mean())
     return ViewCalibration(
-        mapping=mapping,
+        verdict=judge(holdout_error_px, n_rejected / (n_rejected + len(distances_px))),
         model=model,
         n_points=len(distances_px),
+        n_rejected=n_rejected,
         mean_error_px=float(distances_px.mean()),
         rms_px=float(np.sqrt((distances_px**2).mean())),
         max_error_px=float(distances_px.max()),
         holdout_error_px=holdout_error_px,
-        planes=tuple(plane_error(*one) for one in zip(planes, errors, holdout_px, strict=True)),
-        verdict=judge(holdout_error_px, n_rejected / (n_rejected + len(distances_px))),
-        n_rejected=n_rejected,
+        mapping=mapping,
         extent_mm=extent_mm,
+        boards_in_free_poses=(),
+        planes=tuple(plane_error(*one) for one in zip(planes, errors, holdout_px, strict=True)),
     )
 
 

@@ -1,14 +1,23 @@
-"""Calibration: the camera of every view, and how well it describes what was seen. Values only."""
+"""Calibration: the camera of every view, and how well it describes what was seen. Values only.
+
+Views stand in a calibration file as they are here: names and order of their fields are those of the file.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from typing import Annotated
 
 import numpy as np
+from pydantic import ConfigDict, Field, with_config
 
 from processing.calibration.errors import CalibrationError
+from processing.calibration.stored_fields import Matrix, Square, StoredMapping, Vector
 from processing.calibration.target.targets import Target
-from processing.geometry import FloatArray, ViewMapping
+
+Count = Annotated[int, Field(ge=0)]
+ErrorPx = Annotated[float, Field(ge=0)]
+_STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
 
 
 class Model(StrEnum):
@@ -28,35 +37,37 @@ class Verdict(StrEnum):
     REFUSE = "refuse"
 
 
+@with_config(_STRICT)
 @dataclass(frozen=True)
 class PlaneError:
     """Back-projection errors (eq. 2) of one plane, level or board.
 
     Parameters
     ----------
+    name : str
+        Name of the image, board or level.
     z_mm : float | None
         Its position; None for scattered points and boards in free poses.
     n_points : int
         Points that count.
     mean_error_px, rms_px : float
         Mean and root mean square of the distances.
-    name : str
-        Name of the image, board or level.
     max_error_px : float | None
         Largest distance; None in files from before it was kept.
     holdout_error_px : float | None
         Mean error of its points when the fit had not seen them; None likewise.
     """
 
-    z_mm: float | None
-    n_points: int
-    mean_error_px: float
-    rms_px: float
     name: str
-    max_error_px: float | None = None
-    holdout_error_px: float | None = None
+    z_mm: float | None
+    n_points: Count
+    mean_error_px: ErrorPx
+    rms_px: ErrorPx
+    max_error_px: ErrorPx | None = None
+    holdout_error_px: ErrorPx | None = None
 
 
+@with_config(_STRICT)
 @dataclass(frozen=True, eq=False)
 class BoardPose:
     """Where the fit found a board that stood in a free pose, in camera coordinates.
@@ -72,39 +83,45 @@ class BoardPose:
     """
 
     name: str
-    rotation: FloatArray
-    translation_mm: FloatArray
+    rotation: Matrix
+    translation_mm: Vector
 
 
+@with_config(_STRICT)
 @dataclass(frozen=True, eq=False)
 class ParameterCovariance:
     """How well the parameters of a fit are determined.
 
     Parameters
     ----------
-    names : tuple[str, ...]
-        The P parameters, with units.
+    parameters : tuple[str, ...]
+        Names of the P parameters, with units.
     root : (P, P) array
         The covariance is ``root @ root.T``.
     """
 
-    names: tuple[str, ...]
-    root: FloatArray
+    parameters: tuple[str, ...]
+    root: Square
+
+    def __post_init__(self) -> None:
+        if len(self.root) != len(self.parameters):
+            raise ValueError("root: one row and one column for every parameter")
 
     @property
     def std(self) -> dict[str, float]:
         """Standard deviation by parameter."""
-        return dict(zip(self.names, np.linalg.norm(self.root, axis=1).tolist(), strict=True))
+        return dict(zip(self.parameters, np.linalg.norm(self.root, axis=1).tolist(), strict=True))
 
 
-@dataclass(frozen=True, eq=False)
+@with_config(_STRICT)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class ViewCalibration:
     """One view.
 
     Parameters
     ----------
-    mapping : ViewMapping
-        World to image. With ``board_poses`` it is the camera alone, in its own coordinates.
+    verdict : Verdict
+        What the view is good for.
     model : Model
         Kind of mapping.
     n_points, n_rejected : int
@@ -113,38 +130,34 @@ class ViewCalibration:
         Back-projection error (eq. 2) of the used points.
     holdout_error_px : float
         Mean error of points that the fit had not seen; the figure to trust.
-    planes : tuple[PlaneError, ...]
-        Errors by plane.
-    verdict : Verdict
-        What the view is good for.
+    mapping : ViewMapping
+        World to image. With ``boards_in_free_poses`` it is the camera alone, in its own coordinates.
     extent_mm : tuple[tuple[float, float], ...]
         Convex outline (x, y) of the used points.
-    board_poses : tuple[BoardPose, ...]
+    boards_in_free_poses : tuple[BoardPose, ...]
         Poses of the boards, where the fit had to find them.
+    planes : tuple[PlaneError, ...]
+        Errors by plane.
     covariance : ParameterCovariance | None
         Of the parameters of the mapping; None for boards in free poses, and after a correction.
-    candidates_px : Mapping[Model, float]
+    candidates_holdout_error_px : Mapping[Model, float]
         Where the model was chosen among several: the hold-out error of each, all on the same points.
     """
 
-    mapping: ViewMapping
-    model: Model
-    n_points: int
-    mean_error_px: float
-    rms_px: float
-    max_error_px: float
-    holdout_error_px: float
-    planes: tuple[PlaneError, ...]
     verdict: Verdict
-    n_rejected: int = 0
-    extent_mm: tuple[tuple[float, float], ...] = ()
-    board_poses: tuple[BoardPose, ...] = ()
+    model: Model
+    n_points: Count
+    n_rejected: Count
+    mean_error_px: ErrorPx
+    rms_px: ErrorPx
+    max_error_px: ErrorPx
+    holdout_error_px: ErrorPx
+    mapping: StoredMapping
+    extent_mm: tuple[tuple[float, float], ...]
+    boards_in_free_poses: tuple[BoardPose, ...]
+    planes: tuple[PlaneError, ...]
     covariance: ParameterCovariance | None = None
-    candidates_px: Mapping[Model, float] = field(default_factory=dict)
-
-    def with_boards(self, board_poses: tuple[BoardPose, ...]) -> "ViewCalibration":
-        """The same with the poses of boards."""
-        return replace(self, board_poses=board_poses)
+    candidates_holdout_error_px: Mapping[Model, ErrorPx] = field(default_factory=dict)
 
     @property
     def worst_plane(self) -> PlaneError:
@@ -154,7 +167,7 @@ class ViewCalibration:
     @property
     def intrinsics_only(self) -> bool:
         """The camera is known, its place in the world is not."""
-        return bool(self.board_poses)
+        return bool(self.boards_in_free_poses)
 
 
 @dataclass(frozen=True, eq=False)

@@ -120,7 +120,8 @@ def file_sha256(path: Path) -> str:
 
 def _first_problem(error: ValidationError) -> str:
     first = error.errors()[0]
-    return f"{'.'.join(str(part) for part in first['loc'])}: {first['msg']}"
+    text = "Extra inputs are not permitted" if first["type"] == "unexpected_keyword_argument" else first["msg"]
+    return f"{'.'.join(str(part) for part in first['loc'])}: {text}"
 
 
 def _readable(content: object, indent: int = 0) -> str:

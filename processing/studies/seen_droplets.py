@@ -58,11 +58,22 @@ def droplet_calibration(
 ) -> Calibration:
     """A good calibration of the box of half-widths (3,) with these mappings, ``view1`` and so on."""
     x_mm, y_mm, z_mm = (float(one_mm) for one_mm in half_mm)
-    plane = PlaneError(-z_mm, 100, 0.01, 0.01, "low")
+    plane = PlaneError("low", -z_mm, 100, 0.01, 0.01)
     outline_mm = ((-x_mm, -y_mm), (x_mm, -y_mm), (x_mm, y_mm), (-x_mm, y_mm))
     views = {
         f"view{number}": ViewCalibration(
-            mapping, model, 200, 0.01, 0.01, 0.02, 0.02, (plane,), Verdict.GOOD, extent_mm=outline_mm
+            verdict=Verdict.GOOD,
+            model=model,
+            n_points=200,
+            n_rejected=0,
+            mean_error_px=0.01,
+            rms_px=0.01,
+            max_error_px=0.02,
+            holdout_error_px=0.02,
+            mapping=mapping,
+            extent_mm=outline_mm,
+            boards_in_free_poses=(),
+            planes=(plane,),
         )
         for number, mapping in enumerate(mappings, start=1)
     }

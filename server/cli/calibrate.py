@@ -133,7 +133,7 @@ def view_errors(calibration: "Calibration") -> dict[str, Any]:
                 "rms_px": view.rms_px,
                 "max_error_px": view.max_error_px,
                 "holdout_error_px": view.holdout_error_px,
-                "candidates_holdout_error_px": dict(view.candidates_px),
+                "candidates_holdout_error_px": dict(view.candidates_holdout_error_px),
                 "position_std_px": worst_position_std_px(view),
                 "planes": [
                     {

@@ -68,10 +68,21 @@ def _shot(index: int, *, valid: bool, covered: tuple[str, ...]) -> Shot:
 def write_calibration(path: Path, verdict: Verdict = Verdict.GOOD, holdout_px: float = 0.02) -> Path:
     """Calibration with the true cameras."""
     outline_mm = ((-3.0, -2.5), (3.0, -2.5), (3.0, 2.5), (-3.0, 2.5))
-    planes = (PlaneError(-1.5, 100, 0.01, 0.01, "low"), PlaneError(1.5, 100, 0.01, 0.01, "high"))
+    planes = (PlaneError("low", -1.5, 100, 0.01, 0.01), PlaneError("high", 1.5, 100, 0.01, 0.01))
     views = {
         name: ViewCalibration(
-            camera, Model.PINHOLE, 200, 0.01, 0.01, 0.02, holdout_px, planes, verdict, extent_mm=outline_mm
+            verdict=verdict,
+            model=Model.PINHOLE,
+            n_points=200,
+            n_rejected=0,
+            mean_error_px=0.01,
+            rms_px=0.01,
+            max_error_px=0.02,
+            holdout_error_px=holdout_px,
+            mapping=camera,
+            extent_mm=outline_mm,
+            boards_in_free_poses=(),
+            planes=planes,
         )
         for name, camera in cameras().items()
     }

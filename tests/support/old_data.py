@@ -100,8 +100,8 @@ def calibration(path: Path) -> Description:
                 "model": view.model,
                 "holdout_error_px": view.holdout_error_px,
                 "planes_z_mm": [plane.z_mm for plane in view.planes],
-                "candidates_px": dict(view.candidates_px),
-                "parameters": view.covariance.names if view.covariance else None,
+                "candidates_px": dict(view.candidates_holdout_error_px),
+                "parameters": view.covariance.parameters if view.covariance else None,
                 "pixels": view.mapping.project(_points()).tolist(),
             }
             for name, view in loaded.views.items()

@@ -10,7 +10,8 @@ import pytest
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from processing.calibration.fit.polynomial import PolynomialMapping, fit_polynomial
+from processing.calibration.fit.polynomial import fit_polynomial
+from processing.calibration.polynomial_mapping import PolynomialMapping
 from processing.geometry import FloatArray, PinholeCamera, ViewMapping, view_camera
 from processing.reconstruction.accuracy import Accuracy
 from processing.reconstruction.planning.node_view import NodeView, sample_mapping

@@ -7,7 +7,7 @@ field added. Corrections are vectors whose elements are of the order of the pixe
 import cv2
 import numpy as np
 
-from processing.calibration.fit.polynomial import EXPONENTS, PolynomialMapping
+from processing.calibration.polynomial_mapping import EXPONENTS, PolynomialMapping
 from processing.geometry import FloatArray, PinholeCamera, ViewMapping
 
 _STEP = 0.1

@@ -6,7 +6,8 @@ import numpy as np
 
 from processing.calibration.calibration import Model, ParameterCovariance, ViewCalibration
 from processing.calibration.fit.pinhole_fit import PARAMETER_NAMES, PINHOLE_PARAMETERS, camera_derivatives
-from processing.calibration.fit.polynomial import COEFFICIENT_NAMES, PolynomialMapping, polynomial_derivatives
+from processing.calibration.fit.polynomial import COEFFICIENT_NAMES, polynomial_derivatives
+from processing.calibration.polynomial_mapping import PolynomialMapping
 from processing.geometry import FloatArray, PinholeCamera, ViewMapping
 
 _DIGITS = 6

@@ -40,11 +40,11 @@ def errors_px(mapping: ViewMapping, plane: PlaneObservation) -> FloatArray:
 def plane_error(plane: PlaneObservation, distances_px: FloatArray, holdout_px: FloatArray) -> PlaneError:
     """Summary of one plane: errors (N,) of its points, and those of the points that were held out of the fit."""
     return PlaneError(
+        name=plane.name,
         z_mm=plane.z_mm,
         n_points=len(plane),
         mean_error_px=float(distances_px.mean()),
         rms_px=float(np.sqrt((distances_px**2).mean())),
-        name=plane.name,
         max_error_px=float(distances_px.max()),
         holdout_error_px=float(holdout_px.mean()),
     )

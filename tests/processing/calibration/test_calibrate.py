@@ -153,7 +153,7 @@ def test_boards_in_free_poses_cannot_be_reconstructed_with() -> None:
         image_px = camera.project(board_mm @ turn.T) + rng.normal(0, 0.02, (len(board_mm), 2))
         boards.append(PlaneObservation(f"board {number}", board_mm, image_px, free_pose=True))
     calibration = calibrate(calibration_set(only=tuple(boards)))
-    assert [pose.name for pose in calibration.views["only"].board_poses] == [board.name for board in boards]
+    assert [pose.name for pose in calibration.views["only"].boards_in_free_poses] == [board.name for board in boards]
     with pytest.raises(CalibrationError, match="only: boards stood in free poses, so only the intrinsics are known"):
         calibration.require_world()
     with pytest.raises(CalibrationError, match="free poses give a pinhole camera, not polynomial"):

@@ -3,7 +3,9 @@
 import errno
 import json
 import os
+import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +15,7 @@ import pytest
 from processing.calibration.calibrate import calibrate
 from processing.calibration.calibration import Calibration
 from processing.calibration.calibration_file import file_sha256, load_calibration, save_calibration
-from processing.calibration.calibration_record import json_id
+from processing.calibration.calibration_record import content_id, json_id
 from processing.calibration.errors import CalibrationError
 from processing.calibration.observation import PlaneObservation
 from tests.processing.calibration.fit.test_free_pose import boards
@@ -21,6 +23,7 @@ from tests.support.calibration_cases import TARGET, calibration_set, paper_camer
 
 Change = Callable[[Any], None]
 MODELS = ["pinhole", "pinhole_tilted", "polynomial"]
+OLD_FILES = sorted(Path(__file__).parents[2].glob("fixtures/v*/runs/calibrations/*.json"))
 
 
 def make(model: str = "pinhole", created_utc: str = "2026-01-02T03:04:05+00:00", noise_px: float = 0.05) -> Calibration:
@@ -51,12 +54,29 @@ def test_round_trip_is_exact(tmp_path: Path, model: str) -> None:
     assert file_sha256(tmp_path / "a.json") == file_sha256(tmp_path / "b.json")
 
 
+@pytest.mark.parametrize("old", OLD_FILES, ids=lambda path: f"{path.parents[2].name}-{path.stem}")
+def test_old_files_are_written_again_as_they_stand(tmp_path: Path, old: Path) -> None:
+    save_calibration(load_calibration(old), tmp_path / "again.json")
+    old_text, again_text = (_without_versions(path) for path in (old, tmp_path / "again.json"))
+    assert again_text == old_text
+
+
+def _without_versions(path: Path) -> str:
+    return re.sub(r'"software": \{[^}]*\}', "", path.read_text())
+
+
+def test_what_could_not_be_read_again_gets_no_id(calibration: Calibration) -> None:
+    broken = replace(calibration.views["left"], rms_px=float("nan"))
+    with pytest.raises(ValueError, match=r"views\.left\.rms_px"):
+        content_id(replace(calibration, views={"left": broken}))
+
+
 def test_boards_in_free_poses_come_back(tmp_path: Path) -> None:
     written = calibrate(calibration_set(only=tuple(boards())))
     save_calibration(written, tmp_path / "c.json")
     read = load_calibration(tmp_path / "c.json").views["only"]
     assert read.intrinsics_only
-    for pose, other in zip(read.board_poses, written.views["only"].board_poses, strict=True):
+    for pose, other in zip(read.boards_in_free_poses, written.views["only"].boards_in_free_poses, strict=True):
         np.testing.assert_array_equal(pose.rotation, other.rotation)
     assert read.planes[0].z_mm is None
 
@@ -121,6 +141,8 @@ def _set(key: tuple[str | int, ...], value: Any) -> Change:
         (_set(("schema",), "other"), "schema: not a calibration file"),
         (_set(("views", "left", "planes", 1, "z_mm"), "far"), r"views\.left\.planes\.1\.z_mm: "),
         (_set(("views", "left", "mapping", "focus"), 3), r"views\.left\.mapping\.pinhole\.focus: Extra"),
+        (_set(("views", "left", "focus"), 3), r"views\.left\.focus: Extra"),
+        (_set(("views", "left", "covariance", "parameters"), ["one"]), r"views\.left\.covariance: .* one row and"),
         (_set(("views", "left", "mean_error_px"), -1.0), r"views\.left\.mean_error_px: "),
         (_set(("views", "left", "planes", 0, "max_error_px"), -1.0), r"views\.left\.planes\.0\.max_error_px: "),
         (_set(("views",), {}), "views: "),

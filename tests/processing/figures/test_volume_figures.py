@@ -31,9 +31,20 @@ def calibration_of(z_mm: list[float | None]) -> Calibration:
     views = {}
     for number in (1, 2):
         error_px = 0.01 * number
-        planes = tuple(PlaneError(z, 391, error_px, error_px, f"plane {z}") for z in z_mm)
+        planes = tuple(PlaneError(f"plane {z}", z, 391, error_px, error_px) for z in z_mm)
         views[f"view{number}"] = ViewCalibration(
-            camera, Model.PINHOLE, 391, error_px, error_px, error_px, 2 * error_px, planes, Verdict.GOOD
+            verdict=Verdict.GOOD,
+            model=Model.PINHOLE,
+            n_points=391,
+            n_rejected=0,
+            mean_error_px=error_px,
+            rms_px=error_px,
+            max_error_px=error_px,
+            holdout_error_px=2 * error_px,
+            mapping=camera,
+            extent_mm=(),
+            boards_in_free_poses=(),
+            planes=planes,
         )
     return Calibration("id", "2026-01-01T00:00:00+00:00", None, views, (-4.5, 4.5), "test")
 

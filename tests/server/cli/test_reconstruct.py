@@ -12,7 +12,7 @@ import pytest
 from processing.calibration.calibration import Model
 from processing.calibration.calibration_file import load_calibration, save_calibration
 from processing.calibration.calibration_record import content_id, json_id
-from processing.calibration.fit.polynomial import EXPONENTS, PolynomialMapping
+from processing.calibration.polynomial_mapping import EXPONENTS, PolynomialMapping
 from processing.reconstruction.volume_file import read_volume
 from server.cli.main import main
 from tests.support import droplet_run

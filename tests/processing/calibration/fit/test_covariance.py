@@ -63,7 +63,7 @@ def test_image_points_scatter_as_predicted(view: ViewCalibration, repeats: list[
 def test_tilted_camera_has_two_parameters_more() -> None:
     covariance = calibrated("pinhole_tilted").views["only"].covariance
     assert covariance is not None
-    assert covariance.names[-2:] == ("tilt_x_rad", "tilt_y_rad")
+    assert covariance.parameters[-2:] == ("tilt_x_rad", "tilt_y_rad")
     assert covariance.root.shape == (17, 17)
 
 
@@ -72,7 +72,7 @@ def test_coefficients_of_a_polynomial_scatter_as_predicted() -> None:
     points_mm = np.random.default_rng(5).uniform([-8, -6, -4], [8, 6, 4], (50, 3))
     fits = [fit_polynomial(*stacked(planes(seed)), (1600, 1200))[0] for seed in range(REPEATS)]
     assert view.covariance is not None
-    assert view.covariance.names[:2] == ("u_x0_y0_z0_px", "u_x1_y0_z0_px")
+    assert view.covariance.parameters[:2] == ("u_x0_y0_z0_px", "u_x1_y0_z0_px")
     std_px = np.array(list(view.covariance.std.values())).reshape(2, -1).T
     found_px = np.std([fit.coefficients for fit in fits], axis=0, ddof=1)
     np.testing.assert_allclose(np.median(found_px / std_px, axis=0), 1.0, atol=0.2)
@@ -96,10 +96,10 @@ def test_file_keeps_it(tmp_path: Path) -> None:
     read, before = load_calibration(path).views["only"].covariance, written.views["only"].covariance
     assert read is not None
     assert before is not None
-    assert read.names == before.names
+    assert read.parameters == before.parameters
     np.testing.assert_array_equal(read.root, before.root)
     content = json.loads(path.read_text())
     del content["views"]["only"]["covariance"]["root"][3][2]
     path.write_text(json.dumps(content))
-    with pytest.raises(CalibrationError, match=r"views\.only\.covariance: .*one row and one column"):
+    with pytest.raises(CalibrationError, match=r"views\.only\.covariance\.root: .*one row and one column"):
         load_calibration(path)

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from processing.calibration.errors import CalibrationError
-from processing.calibration.fit.polynomial import EXPONENTS, PolynomialMapping, fit_polynomial
+from processing.calibration.fit.polynomial import fit_polynomial
 from processing.calibration.observation import PlaneObservation, stacked
+from processing.calibration.polynomial_mapping import EXPONENTS, PolynomialMapping
 from tests.support.calibration_cases import paper_camera, seen_planes, true_errors_px, volume_points_mm
 
 
