@@ -5,6 +5,7 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from processing.preprocessing import Polarity, Preprocessing
 from processing.reconstruction.accuracy import Accuracy
 from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.voxel_type import VoxelType
@@ -57,8 +58,16 @@ class ReconstructionSettings(FrozenValue):
         ),
     ] = 0.0
     grid: Annotated[GridSettings | None, Field(description="default: what all views see, one voxel per pixel")] = None
-    minimum_window_px: Annotated[int, Field(ge=0, le=2001, description="sliding minimum; 0 leaves it out")] = 201
-    noise_floor: Annotated[float, Field(ge=0, lt=1, description="intensity that counts as nothing")] = 0.05
+    minimum_window_px: Annotated[int, Field(ge=0, le=2001, description="sliding minimum; 0 leaves it out")] = (
+        Preprocessing.minimum_window_px
+    )
+    noise_floor: Annotated[float, Field(ge=0, lt=1, description="intensity that counts as nothing")] = (
+        Preprocessing.noise_floor
+    )
+
+    def preprocessing(self, polarity: Polarity) -> Preprocessing:
+        """How exposures of a run of this polarity become intensities."""
+        return Preprocessing(polarity, self.minimum_window_px, self.noise_floor)
 
     def results_id(self, calibration: str) -> str:
         """Name of the results directory: method, and a hash of all settings and of the calibration's name."""

@@ -15,7 +15,7 @@ from processing.calibration.calibration import Calibration, Verdict
 from processing.calibration.calibration_file import file_sha256, load_calibration
 from processing.calibration.errors import CalibrationError
 from processing.kernels import DEFAULT_THREADS
-from processing.preprocessing import Intensity, Preprocessing, intensity
+from processing.preprocessing import Intensity, intensity
 from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.planning.common_volume import common_volume
 from processing.reconstruction.planning.plan import plan_reconstruction
@@ -181,7 +181,7 @@ def shot_intensities(
         A view has no such exposure.
     """
     header, references, number = run.header, _references(run), "ab".index(frame)
-    preprocessing = Preprocessing(header.polarity, settings.minimum_window_px, settings.noise_floor)
+    preprocessing = settings.preprocessing(header.polarity)
     images = []
     for (view, exposures), image in zip(shot.views.items(), out or [None] * len(shot.views), strict=True):
         pixels = (exposures.frame_a, exposures.frame_b)[number]
