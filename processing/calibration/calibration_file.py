@@ -8,7 +8,7 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from processing.calibration.calibration import Calibration, ViewCalibration
+from processing.calibration.calibration import Calibration
 from processing.calibration.calibration_record import (
     SCHEMA,
     VERSION,
@@ -19,16 +19,6 @@ from processing.calibration.calibration_record import (
     to_record,
 )
 from processing.calibration.errors import CalibrationError
-
-__all__ = [
-    "Calibration",
-    "CalibrationError",
-    "ViewCalibration",
-    "file_sha256",
-    "load_calibration",
-    "require_free",
-    "save_calibration",
-]
 
 _SOFTWARE = ("tomoshadow", "numpy", "scipy", "opencv-python-headless")
 
