@@ -1,7 +1,4 @@
-"""Figures as the paper has them: residuals per plane (Fig. 3), slices and projections, iso-surfaces (Fig. 4).
-
-Each function returns a matplotlib Figure; who wants a file saves it.
-"""
+"""Figures of volumes and of the images they come from: slices and projections, iso-surfaces (Fig. 4), shadowgraphs."""
 
 from collections.abc import Mapping, Sequence
 
@@ -14,35 +11,10 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from numpy.typing import NDArray
 from skimage.measure import marching_cubes
 
-from processing.calibration.calibration import Calibration
-from processing.figures.colours import FRAME_COLOURS, VIEW_COLOURS
+from processing.figures.colours import FRAME_COLOURS
 from processing.volume import VoxelGrid
 
 Volume = NDArray[np.float32]
-LIMIT_PX = 0.05
-
-
-def residuals_figure(calibration: Calibration) -> Figure:
-    """Mean back-projection error (eq. 2) of each view over the calibration planes (Fig. 3 of the paper).
-
-    Boards in free poses, which have no z, are numbered instead.
-    """
-    figure = Figure(figsize=(6.4, 4.0), layout="constrained")
-    axes = figure.subplots()
-    highest_px, xlabel = LIMIT_PX, "plane z [mm]"
-    for (name, view), colour in zip(calibration.views.items(), VIEW_COLOURS, strict=False):
-        errors_px = [plane.mean_error_px for plane in view.planes]
-        positions = [plane.z_mm for plane in view.planes if plane.z_mm is not None]
-        if len(positions) < len(errors_px):
-            positions, xlabel = [float(number) for number in range(1, len(errors_px) + 1)], "board"
-        label = f"{name} (hold-out {view.holdout_error_px:.3f} px)"
-        axes.plot(positions, errors_px, marker="o", color=colour, label=label)
-        highest_px = max(highest_px, *errors_px)
-    axes.axhline(LIMIT_PX, color="0.4", linestyle="--", linewidth=1)
-    axes.annotate("paper: < 0.05 px", (0.01, LIMIT_PX), xycoords=("axes fraction", "data"), va="bottom", color="0.4")
-    axes.set(xlabel=xlabel, ylabel="mean back-projection error [px]", ylim=(0, 1.15 * highest_px))
-    axes.legend(frameon=False, fontsize="small")
-    return figure
 
 
 def slices_figure(volume: Volume, grid: VoxelGrid, title: str = "") -> Figure:

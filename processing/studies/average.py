@@ -5,20 +5,17 @@ from dataclasses import dataclass
 from itertools import islice
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.image import AxesImage
 from numpy.typing import NDArray
 
+from processing.figures.average_figures import Slice, mean_slices_figure
 from processing.reconstruction.mean_line_of_sight import mean_line_of_sight
 from processing.reconstruction.planning.plan import plan_reconstruction
 from processing.studies.hollow_cone_shots import cropped_cameras, height_mm, hollow_cone_images, slab_grid
-from processing.studies.recipe import COLOURS, Recipe, reconstruct_each
+from processing.studies.recipe import Recipe, reconstruct_each
 from processing.studies.report import Statement
 from processing.studies.ring import RadialProfile, radial_profile
 from processing.volume import VoxelGrid
-
-Slice = NDArray[np.float64]
 
 _BATCH = 8
 """Shots whose images are in memory at the same time."""
@@ -191,49 +188,13 @@ def average_statements(rows: Sequence[AverageRow]) -> list[Statement]:
 
 def average_figure(mean: MeanSlices) -> Figure:
     """Mean slices in the order of Fig. 6, and their radial profiles."""
-    figure = Figure(figsize=(13.4, 7.6), layout="constrained")
-    pictures, curves = figure.subfigures(1, 2, squeeze=False, width_ratios=(1, 1.1))[0]
-    panels = pictures.subplots(2, 2, sharex=True, sharey=True)
-    for axes, (method, slice_zx) in zip(panels.flat, mean.slices.items(), strict=False):
-        image = _draw_slice(axes, slice_zx, mean.study.grid, Recipe.named(method).label)
-    for axes in panels[-1]:
-        axes.set_xlabel("x [mm]")
-    for axes in panels[:, 0]:
-        axes.set_ylabel("z [mm]")
-    pictures.colorbar(
-        image, ax=panels, location="bottom", label="mean intensity, relative to the maximum [-]", shrink=0.8, aspect=40
-    )
-    upper, lower = curves.subplots(2, 1, sharex=True)
-    _draw_profiles(upper, lower, mean)
-    study = mean.study
-    figure.suptitle(
+    study, recipes = mean.study, {method: Recipe.named(method) for method in mean.slices}
+    profiles = {method: mean.profile(method) for method in mean.slices}
+    return mean_slices_figure(
+        {recipe.label: mean.slices[method] for method, recipe in recipes.items()},
+        study.grid,
+        [recipes[method].curve(one.radii_mm, one.intensities) for method, one in profiles.items()],
+        [recipes[method].curve(one.radii_mm, one.gradients_per_mm) for method, one in profiles.items()],
         f"mean of {study.shots} synthetic shots of the hollow cone, "
-        rf"y = {study.diameters_from_orifice:g} $d_0$, voxel {1000 * study.grid.pitch_mm:.1f} µm"
+        rf"y = {study.diameters_from_orifice:g} $d_0$, voxel {1000 * study.grid.pitch_mm:.1f} µm",
     )
-    return figure
-
-
-def _draw_slice(axes: Axes, slice_zx: Slice, grid: VoxelGrid, title: str) -> AxesImage:
-    half_mm = 0.5 * grid.pitch_mm
-    extent = (
-        grid.x_mm[0] - half_mm,
-        grid.x_mm[-1] + half_mm,
-        grid.z_mm[0] - half_mm,
-        grid.z_mm[-1] + half_mm,
-    )
-    axes.set_title(title, fontsize="medium")
-    return axes.imshow(slice_zx / slice_zx.max(), origin="lower", extent=extent, cmap="gray_r", vmin=0, vmax=1)
-
-
-def _draw_profiles(upper: Axes, lower: Axes, mean: MeanSlices) -> None:
-    for method in mean.slices:
-        profile, recipe = mean.profile(method), Recipe.named(method)
-        colour = COLOURS[recipe.method.value]
-        upper.plot(profile.radii_mm, profile.intensities, color=colour, label=recipe.label)
-        lower.plot(profile.radii_mm, profile.gradients_per_mm, color=colour)
-    upper.set(ylabel="radial profile, relative to the slice's mean [-]")
-    upper.set_ylim(bottom=0)
-    lower.set(xlabel="radius [mm]", ylabel="gradient of the profile [1/mm]")
-    upper.legend(frameon=False)
-    for axes in (upper, lower):
-        axes.grid(alpha=0.25)

@@ -8,13 +8,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import NullLocator
 
 from processing.analysis.quality import quality_factor
+from processing.figures.method_figures import quality_figure
 from processing.reconstruction.planning.plan import plan_reconstruction
-from processing.studies.recipe import ALL_RECIPES, Recipe, reconstruct_each
+from processing.studies.recipe import ALL_RECIPES, Recipe, method_curves, reconstruct_each
 from processing.studies.report import Statement
 from processing.studies.simulated_droplets import (
     IMAGE_SIZE_PX,
@@ -143,46 +142,10 @@ def _best_lines_of_sight(rows: Sequence[DensityRow], sigma_voxel: float) -> list
 def density_figure(rows: Sequence[DensityRow], study: DensityStudy | None = None) -> Figure:
     """Quality factor against droplet density, one curve per method and one panel per sigma (Fig. 7, right)."""
     study = study or DensityStudy()
-    sigmas_voxel = list(dict.fromkeys(row.sigma_voxel for row in rows))
-    columns = min(2, len(sigmas_voxel))
-    lines = -(-len(sigmas_voxel) // columns)
-    figure = Figure(figsize=(6.4 * columns, 4.4 * lines), layout="constrained")
-    panels = figure.subplots(lines, columns, squeeze=False, sharey=True)
-    for axes, sigma_voxel in zip(panels.flat, sigmas_voxel, strict=False):
-        _draw_panel(axes, [row for row in rows if row.sigma_voxel == sigma_voxel], sigma_voxel)
-    for axes in panels.flat[len(sigmas_voxel) :]:
-        axes.remove()
-    for axes in panels[:, 0]:
-        axes.set_ylabel("quality factor Q [-]")
-    figure.suptitle(f"Q mean-subtracted in {study.window}³ windows at steps of {study.step}", fontsize="small")
-    return figure
-
-
-def _draw_panel(axes: Axes, rows: Sequence[DensityRow], sigma_voxel: float) -> None:
-    for method in dict.fromkeys(row.method for row in rows):
-        recipe = Recipe.named(method)
-        axes.plot(*quality_curve(rows, method, sigma_voxel), label=recipe.label, **recipe.style)
-    axes.axhline(PAPER_QUALITY, color="0.4", linestyle="--", linewidth=1)
-    axes.axvline(PAPER_DENSITY_PER_MM3, color="0.4", linestyle="--", linewidth=1)
-    axes.plot(PAPER_DENSITY_PER_MM3, PAPER_QUALITY, marker="s", color="0.2", linestyle="none")
-    axes.annotate(
-        "paper: MLOS usable\nup to about 20 droplets/mm³\n(Q > 0.5)",
-        (PAPER_DENSITY_PER_MM3, 0.03),
-        xytext=(-6, 0),
-        textcoords="offset points",
-        ha="right",
-        fontsize="small",
-        color="0.3",
-    )
-    axes.set_ylim(0, 1.02)
-    axes.set_title(rf"Gaussian droplets of $\sigma$ = {sigma_voxel:g} voxel", fontsize="medium")
-    density_axis(axes, sorted({row.density_per_mm3 for row in rows}))
-    axes.legend(frameon=False, loc="lower left", fontsize="small", handlelength=3.5)
-
-
-def density_axis(axes: Axes, densities_per_mm3: Sequence[float]) -> None:
-    """A logarithmic axis of densities, marked where they were simulated."""
-    axes.set(xscale="log", xlabel="droplet density [1/mm³]")
-    axes.set_xticks(densities_per_mm3, [f"{density:.3g}" for density in densities_per_mm3])
-    axes.xaxis.set_minor_locator(NullLocator())
-    axes.grid(alpha=0.25)
+    panels = {
+        sigma_voxel: method_curves(
+            [row for row in rows if row.sigma_voxel == sigma_voxel], "density_per_mm3", "quality_factor"
+        )
+        for sigma_voxel in dict.fromkeys(row.sigma_voxel for row in rows)
+    }
+    return quality_figure(panels, (PAPER_DENSITY_PER_MM3, PAPER_QUALITY), study.window, study.step)

@@ -15,7 +15,7 @@ from processing.calibration.droplets.self_calibration import self_calibrate
 from processing.calibration.errors import CalibrationError
 from processing.calibration.fit.health import LIMITS_PX
 from processing.geometry import FloatArray, PinholeCamera
-from processing.studies.accuracy_study import DRIFT_LIMIT_PX, AccuracyRow, CalibrationStudy, rms_px
+from processing.studies.calibration_rows import DRIFT_LIMIT_PX, CalibrationRow, CalibrationStudy, rms_px
 from processing.studies.seen_droplets import droplet_calibration, droplet_views, seen_droplets
 from processing.studies.simulated_droplets import SCALE_VOXEL_PER_MM
 
@@ -47,7 +47,7 @@ class _Rig:
         return list(self.calibration.views).index(view)
 
 
-def drifting_views(study: CalibrationStudy) -> Iterator[AccuracyRow]:
+def drifting_views(study: CalibrationStudy) -> Iterator[CalibrationRow]:
     """What the watch misses of a drift, and what self-calibration leaves of one, density by density."""
     rig = _Rig.of(study)
     for density_per_mm3 in study.densities_per_mm3:
@@ -66,7 +66,7 @@ def direction(number: int) -> FloatArray:
     return np.array([np.cos(angle_rad), np.sin(angle_rad)])
 
 
-def _watched(rig: _Rig, shots: Sequence[Shot], views: Sequence[str], case: str) -> Iterator[AccuracyRow]:
+def _watched(rig: _Rig, shots: Sequence[Shot], views: Sequence[str], case: str) -> Iterator[CalibrationRow]:
     """Disparities of shot after shot: with all views in place, and with one off, the views taking turns."""
     in_place = [_disparities(rig, shot) for shot in shots]
     for turn, view in enumerate(views):
@@ -87,23 +87,24 @@ def _disparities(rig: _Rig, shot: Shot) -> Sequence[ViewDisparity]:
         return [ViewDisparity(np.inf, 0.0)] * len(rig.cameras)
 
 
-def _watched_row(case: str, view: str, measured: Sequence[ViewDisparity], drift_px: float) -> AccuracyRow:
+def _watched_row(case: str, view: str, measured: Sequence[ViewDisparity], drift_px: float) -> CalibrationRow:
     """By how much the disparities of single shots differ from a drift; each must raise an alarm, or none may."""
     error_px = np.abs([shot.disparity_px - drift_px for shot in measured])
     if not np.all(np.isfinite(error_px)):
-        return AccuracyRow("disparity error", case, view, None, None, DISPARITY_LIMIT_PX, kept=False)
+        return CalibrationRow("disparity error", case, view, None, None, DISPARITY_LIMIT_PX, kept=False)
     alarmed = np.array([shot.certain_px > ALARM_PX for shot in measured])
-    kept = rms_px(error_px) < DISPARITY_LIMIT_PX and bool(np.all(alarmed == (drift_px > ALARM_PX)))
-    return AccuracyRow("disparity error", case, view, rms_px(error_px), float(error_px.max()), DISPARITY_LIMIT_PX, kept)
+    value_px, largest_px = rms_px(error_px), float(error_px.max())
+    kept = value_px < DISPARITY_LIMIT_PX and bool(np.all(alarmed == (drift_px > ALARM_PX)))
+    return CalibrationRow("disparity error", case, view, value_px, largest_px, DISPARITY_LIMIT_PX, kept)
 
 
-def _recovered(rig: _Rig, shots: Sequence[Shot], view: str, shift_px: FloatArray, case: str) -> AccuracyRow:
+def _recovered(rig: _Rig, shots: Sequence[Shot], view: str, shift_px: FloatArray, case: str) -> CalibrationRow:
     """What is left of a drift anywhere in the volume, in any view."""
     number = rig.number_of(view)
     try:
         found = self_calibrate(rig.calibration, _moved(shots, number, shift_px), "study").calibration
     except CalibrationError:
-        return AccuracyRow("drift error", case, view, None, None, DRIFT_LIMIT_PX, kept=False)
+        return CalibrationRow("drift error", case, view, None, None, DRIFT_LIMIT_PX, kept=False)
     truth_px = [camera.project(rig.points_mm) for camera in rig.cameras]
     truth_px[number] = truth_px[number] + shift_px
     error_px = [
@@ -112,7 +113,7 @@ def _recovered(rig: _Rig, shots: Sequence[Shot], view: str, shift_px: FloatArray
     ]
     largest_px = float(np.max(error_px))
     kept = largest_px <= DRIFT_LIMIT_PX
-    return AccuracyRow("drift error", case, view, rms_px(error_px[number]), largest_px, DRIFT_LIMIT_PX, kept)
+    return CalibrationRow("drift error", case, view, rms_px(error_px[number]), largest_px, DRIFT_LIMIT_PX, kept)
 
 
 def _moved(shots: Sequence[Shot], number: int, shift_px: FloatArray) -> list[list[FloatArray]]:

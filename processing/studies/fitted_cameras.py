@@ -16,10 +16,10 @@ from processing.calibration.fit.covariance import image_spread_px, least_covaria
 from processing.calibration.fit.model_choice import fit_mapping
 from processing.calibration.observation import PlaneObservation, stacked
 from processing.geometry import FloatArray, PinholeCamera, view_camera
-from processing.studies.accuracy_study import (
+from processing.studies.calibration_rows import (
     TARGET,
     TRUE_ERROR_LIMIT_PX,
-    AccuracyRow,
+    CalibrationRow,
     CalibrationStudy,
     error_row,
     rms_px,
@@ -35,7 +35,7 @@ IDEAL_FITS = 400
 """Fits that are drawn from the bound."""
 
 
-def fitted_cameras(study: CalibrationStudy) -> Iterator[AccuracyRow]:
+def fitted_cameras(study: CalibrationStudy) -> Iterator[CalibrationRow]:
     """True errors of both camera models in both regions, view by view."""
     regions = regions_mm(study)
     for model, view in product((Model.PINHOLE, Model.PINHOLE_TILTED), study.views):
@@ -52,7 +52,7 @@ def fitted_cameras(study: CalibrationStudy) -> Iterator[AccuracyRow]:
             yield beside_ideal(row, ideal_px, study.fits)
 
 
-def beside_ideal(row: AccuracyRow, ideal_px: FloatArray, fits: int) -> AccuracyRow:
+def beside_ideal(row: CalibrationRow, ideal_px: FloatArray, fits: int) -> CalibrationRow:
     """The row of so many fits, and what the best unbiased fits leave, from their errors (fits, N)."""
     largest_px = ideal_px.max(axis=1)
     sets = np.array_split(largest_px, max(1, len(largest_px) // fits))

@@ -8,11 +8,10 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from processing.figures.method_figures import ghosts_figure
 from processing.reconstruction.planning.plan import plan_reconstruction
-from processing.studies.density import density_axis
 from processing.studies.detection import (
     RADIUS_VOXEL,
     DetectionCurve,
@@ -20,7 +19,7 @@ from processing.studies.detection import (
     detection_curve,
     half_median_threshold,
 )
-from processing.studies.recipe import ALL_RECIPES, Recipe, reconstruct_each
+from processing.studies.recipe import ALL_RECIPES, Recipe, method_curves, reconstruct_each
 from processing.studies.report import Statement
 from processing.studies.simulated_droplets import (
     IMAGE_SIZE_PX,
@@ -158,34 +157,13 @@ def _curve(rows: Sequence[GhostRow], method: str, rule: ThresholdRule) -> list[G
 
 def ghost_figure(rows: Sequence[GhostRow]) -> Figure:
     """Found droplets and ghosts against density; one line of panels per choice of the threshold."""
-    figure = Figure(figsize=(10, 8), layout="constrained")
-    panels = figure.subplots(2, 2, sharex=True)
     titles = {
         ThresholdRule.HALF_MEDIAN: "threshold: half the median of the peaks above it",
         ThresholdRule.BEST_WITH_TRUTH: "best threshold, chosen with the truth",
     }
-    for (found_axes, ghost_axes), (rule, title) in zip(panels, titles.items(), strict=True):
-        _draw(found_axes, rows, rule, "found")
-        _draw(ghost_axes, rows, rule, "ghosts")
-        found_axes.axhline(100 * MIN_FOUND, color="0.4", linestyle="--", linewidth=1)
-        ghost_axes.axhline(100 * MAX_GHOSTS, color="0.4", linestyle="--", linewidth=1)
-        found_axes.set(ylabel="found [% of the droplets]", title=title)
-        ghost_axes.set(ylabel="ghosts [% of the peaks]", title=title)
-    for axes in panels[0]:
-        axes.set_xlabel("")
-    panels[0, 1].legend(frameon=False, loc="upper left", fontsize="small", handlelength=3.5)
-    figure.suptitle(
-        rf"Gaussian droplets of $\sigma$ = {rows[0].sigma_voxel:g} voxel; dashed: "
-        f"{100 * MIN_FOUND:.0f} % found, {100 * MAX_GHOSTS:.0f} % ghosts"
-    )
-    return figure
-
-
-def _draw(axes: Axes, rows: Sequence[GhostRow], rule: ThresholdRule, quantity: str) -> None:
-    for method in dict.fromkeys(row.method for row in rows):
-        recipe, curve = Recipe.named(method), _curve(rows, method, rule)
-        shares = [100 * getattr(row, quantity) for row in curve]
-        axes.plot([row.density_per_mm3 for row in curve], shares, label=recipe.label, **recipe.style)
-    lowest = min(getattr(row, quantity) for row in rows)
-    axes.set_ylim(10 * np.floor(10 * lowest) - 2, 102)
-    density_axis(axes, sorted({row.density_per_mm3 for row in rows}))
+    panels = {}
+    for rule, title in titles.items():
+        chosen = [row for row in rows if row.threshold_rule == rule]
+        found, ghosts = (method_curves(chosen, "density_per_mm3", quantity) for quantity in ("found", "ghosts"))
+        panels[title] = (found, ghosts)
+    return ghosts_figure(panels, (MIN_FOUND, MAX_GHOSTS), rows[0].sigma_voxel)

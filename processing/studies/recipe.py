@@ -2,21 +2,18 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Any
 
-import numpy as np
-from matplotlib.colors import to_hex, to_rgb
-
+from processing.figures.curve import MethodCurve, Values
 from processing.reconstruction.line_of_sight import line_of_sight
 from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.planning.plan import Plan
 from processing.reconstruction.smart import mart, smart
+from processing.studies.report import grouped
 from processing.studies.simulated_droplets import Image, Volume
 
 PAPER_ITERATIONS = 20
-COLOURS = {"mlos": "#0072b2", "minlos": "#e69f00", "gavlos": "#009e73", "smart": "#cc79a7", "mart": "#56b4e9"}
-_STAGES = {5: (":", "^", 0.4), 10: ("--", "s", 0.0), 20: ("-", "o", -0.4)}
-"""Line, marker, and by how much the colour of a method is lighter or darker after so many iterations."""
 
 
 @dataclass(frozen=True)
@@ -65,13 +62,9 @@ class Recipe:
         """What a legend says."""
         return f"{self.method.name}-{self.iterations}" if self.iterations else self.method.name
 
-    @property
-    def style(self) -> dict[str, Any]:
-        """Colour by method; line, marker and shade by iterations: the same in every figure."""
-        line, marker, lighter = _STAGES.get(self.iterations, ("-", "o", 0.0))
-        colour = np.array(to_rgb(COLOURS[self.method.value]))
-        shade = colour + lighter * (1 - colour if lighter > 0 else colour)
-        return {"color": to_hex(tuple(shade)), "linestyle": line, "marker": marker, "markersize": 5}
+    def curve(self, x: Values, y: Values) -> MethodCurve:
+        """The line of this recipe in a figure."""
+        return MethodCurve(self.label, x, y, self.method.value, self.iterations)
 
     def continues(self, other: "Recipe | None") -> bool:
         """Whether the volume of the other one is on the way to this one's."""
@@ -83,6 +76,14 @@ PAPER_RECIPES = (*LINE_OF_SIGHT, Recipe.named("smart"))
 """The methods of the paper."""
 ALL_RECIPES = tuple(Recipe.named(n) for n in ("mlos", "minlos", "gavlos", "smart-5", "smart-10", "smart", "mart-5"))
 """And how SMART gets there, and MART, which corrects four times per iteration."""
+
+
+def method_curves(rows: Sequence[Any], x: str, y: str) -> list[MethodCurve]:
+    """One figure of a study's rows over another: a line for every method, in order of x."""
+    return [
+        Recipe.named(method).curve([getattr(row, x) for row in line], [getattr(row, y) for row in line])
+        for method, line in grouped(sorted(rows, key=attrgetter(x)), attrgetter("method")).items()
+    ]
 
 
 def reconstruct_each(plan: Plan, images: Sequence[Image], recipes: Sequence[Recipe], out: Volume) -> Iterator[Recipe]:

@@ -1,10 +1,13 @@
-"""What every study hands over beside its figure: a table, and the paper's statement beside ours."""
+"""What every study hands over beside its figure: its rows as a table, and the paper's statement beside ours."""
 
 import csv
 import io
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, TypeVar
+
+Row = TypeVar("Row")
+Key = TypeVar("Key")
 
 
 @dataclass(frozen=True)
@@ -23,6 +26,14 @@ class Statement:
 
     def __str__(self) -> str:
         return f"{self.topic}: paper: {self.paper}; here: {self.ours}"
+
+
+def grouped(rows: Iterable[Row], key: Callable[[Row], Key]) -> dict[Key, list[Row]]:
+    """Rows by a key, in the order in which they came."""
+    groups: dict[Key, list[Row]] = {}
+    for row in rows:
+        groups.setdefault(key(row), []).append(row)
+    return groups
 
 
 def csv_text(rows: Sequence[Any]) -> str:

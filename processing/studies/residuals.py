@@ -5,9 +5,10 @@ its corners, and ``calibrate`` fits the view. Beside it stands what the same fit
 pinhole camera: the error that is left when nothing is wrong.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from operator import attrgetter
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -17,14 +18,14 @@ from processing.calibration.calibration import Calibration, Model
 from processing.calibration.observation import CalibrationSet, PlaneObservation, ViewObservations
 from processing.calibration.sets.plane_detection import place_points
 from processing.calibration.target.targets import Target, detect_target
-from processing.figures.colours import VIEW_COLOURS
+from processing.figures.curve import Curve
+from processing.figures.residual_figures import PAPER_LIMIT_PX, detection_residuals_figure
 from processing.geometry import FloatArray, PinholeCamera
-from processing.studies.report import Statement
+from processing.studies.report import Statement, grouped
 from processing.synthetic.paper_rig import paper_cameras, paper_optics
 from processing.synthetic.scene import NOMINAL_WIDTH_NS, Scene, SceneKind
 from processing.synthetic.target import Checkerboard
 
-PAPER_LIMIT_PX = 0.05
 BITS = 12
 
 
@@ -148,38 +149,18 @@ def residual_statements(rows: Sequence[ResidualRow]) -> list[Statement]:
             f"< {PAPER_LIMIT_PX} px",
             f"{max(row.mean_error_px for row in chosen):.2g} px (hold-out {chosen[0].view_holdout_error_px:.2g} px)",
         )
-        for (view, points), chosen in _by_curve(rows).items()
+        for (view, points), chosen in grouped(rows, attrgetter("view", "points")).items()
     ]
-
-
-def _by_curve(rows: Sequence[ResidualRow]) -> Mapping[tuple[str, str], list[ResidualRow]]:
-    curves: dict[tuple[str, str], list[ResidualRow]] = {}
-    for row in rows:
-        curves.setdefault((row.view, row.points), []).append(row)
-    return curves
 
 
 def residual_figure(rows: Sequence[ResidualRow]) -> Figure:
     """Mean back-projection error of every plane, by view and by source of the points."""
-    figure = Figure(figsize=(6.8, 4.4), layout="constrained")
-    axes = figure.subplots()
-    views = list(dict.fromkeys(row.view for row in rows))
-    for (view, points), curve in _by_curve(rows).items():
-        z_mm, errors_px = [row.z_mm for row in curve], [row.mean_error_px for row in curve]
-        if points == PointSource.DETECTED:
-            colour = VIEW_COLOURS[views.index(view) % len(VIEW_COLOURS)]
-            axes.plot(z_mm, errors_px, color=colour, marker="o", label=f"{view}, corners detected in images")
-        else:
-            label = "all views, ideal points" if view == views[-1] else None
-            axes.plot(z_mm, errors_px, color="0.2", linestyle=":", label=label)
-    axes.axhline(PAPER_LIMIT_PX, color="0.4", linestyle="--", linewidth=1)
-    axes.annotate(
-        "paper: < 0.05 px", (0.01, PAPER_LIMIT_PX), xycoords=("axes fraction", "data"), va="bottom", color="0.4"
+    detected, ideal = (
+        [
+            Curve(view, [row.z_mm for row in curve], [row.mean_error_px for row in curve])
+            for (view, points), curve in grouped(rows, attrgetter("view", "points")).items()
+            if points == source
+        ]
+        for source in PointSource
     )
-    highest_px = max(PAPER_LIMIT_PX, *(row.mean_error_px for row in rows))
-    axes.set(
-        xlabel="plane z [mm]", ylabel="mean back-projection error [px]", ylim=(-0.02 * highest_px, 1.15 * highest_px)
-    )
-    axes.grid(alpha=0.25)
-    axes.legend(frameon=False, fontsize="small", loc="center", bbox_to_anchor=(0.5, 0.6))
-    return figure
+    return detection_residuals_figure(detected, ideal)

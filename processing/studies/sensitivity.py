@@ -11,10 +11,11 @@ from enum import StrEnum
 import numpy as np
 from matplotlib.figure import Figure
 
+from processing.figures.method_figures import influences_figure
 from processing.geometry import PinholeCamera, view_camera
 from processing.reconstruction.planning.plan import plan_reconstruction
 from processing.studies.detection import RADIUS_VOXEL, detection_curve, half_median_threshold
-from processing.studies.recipe import Recipe, reconstruct_each
+from processing.studies.recipe import Recipe, method_curves, reconstruct_each
 from processing.studies.report import Statement
 from processing.studies.simulated_droplets import (
     SCALE_VOXEL_PER_MM,
@@ -222,28 +223,13 @@ def _value_text(row: SensitivityRow) -> str:
 
 def sensitivity_figure(rows: Sequence[SensitivityRow]) -> Figure:
     """Found droplets and ghosts against each influence, one panel each."""
-    influences = [influence for influence in Influence if any(row.influence == influence for row in rows)]
-    figure = Figure(figsize=(10, 4 * ((len(influences) + 1) // 2)), layout="constrained")
-    panels = figure.subplots((len(influences) + 1) // 2, 2, squeeze=False, sharey=True)
-    for axes, influence in zip(panels.flat, influences, strict=False):
-        for method in dict.fromkeys(row.method for row in rows):
-            recipe = Recipe.named(method)
-            curve = [row for row in rows if row.influence == influence and row.method == method]
-            values = [row.value for row in curve]
-            style = {"color": recipe.style["color"], "marker": "o"}
-            axes.plot(values, [100 * row.found for row in curve], label=f"{recipe.label}, found", **style)
-            axes.plot(
-                values, [100 * row.ghosts for row in curve], label=f"{recipe.label}, ghosts", linestyle="--", **style
-            )
-        axes.set(xlabel=LABELS[influence], ylim=(-3, 103))
-        if influence in (Influence.VIEWS, Influence.YAW_SPREAD):
-            axes.set_xticks(values)
-        axes.grid(alpha=0.25)
-    for axes in panels[:, 0]:
-        axes.set_ylabel("share [%]")
-    panels[0, 0].legend(frameon=False, fontsize="small", loc="center left")
-    figure.suptitle(
+    panels = {}
+    for influence in (one for one in Influence if any(row.influence == one for row in rows)):
+        chosen = [row for row in rows if row.influence == influence]
+        found, ghosts = (method_curves(chosen, "value", quantity) for quantity in ("found", "ghosts"))
+        panels[LABELS[influence]] = (found, ghosts)
+    title = (
         rf"{rows[0].density_per_mm3:g} droplets/mm³ of $\sigma$ = {rows[0].sigma_voxel:g} voxel; "
         "found: share of the droplets, ghosts: share of the peaks"
     )
-    return figure
+    return influences_figure(panels, {LABELS[Influence.VIEWS], LABELS[Influence.YAW_SPREAD]}, title)

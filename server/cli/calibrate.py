@@ -64,7 +64,7 @@ def calibrate_views(options: Namespace) -> Outcome:
     from processing.calibration.calibration import Verdict
     from processing.calibration.calibration_file import require_free, save_calibration
     from processing.calibration.sets.calibration_set import load_calibration_set
-    from processing.figures.volume_figures import residuals_figure
+    from processing.figures.residual_figures import residuals_figure
     from server.pictures.calibration_pictures import calibration_pictures
 
     figure = picture_beside(options.out)

@@ -219,15 +219,20 @@ def _add_calibration(studies: Verbs) -> None:
 
 def calibration(options: Namespace) -> dict[str, Any]:
     """``tomoshadow study calibration``."""
-    from processing.studies.accuracy_report import accuracy_figure, accuracy_line, accuracy_statements, all_kept
-    from processing.studies.accuracy_study import CalibrationStudy
-    from processing.studies.calibration_accuracy import calibration_study
+    from processing.studies.calibration_errors import (
+        all_kept,
+        calibration_figure,
+        calibration_line,
+        calibration_statements,
+        calibration_study,
+    )
+    from processing.studies.calibration_rows import CalibrationStudy
 
     study = CalibrationStudy(shots=options.shots, seed=options.seed)
     if options.density:
         study = replace(study, densities_per_mm3=tuple(options.density))
-    rows = _collected(calibration_study(study), accuracy_line)
-    result = _report(options.out, "calibration", rows, accuracy_figure(rows), accuracy_statements(rows))
+    rows = _collected(calibration_study(study), calibration_line)
+    result = _report(options.out, "calibration", rows, calibration_figure(rows), calibration_statements(rows))
     progress(f"every figure within its limit: {'PASSED' if all_kept(rows) else 'FAILED'}")
     return {**result, "passed": all_kept(rows)}
 

@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 
 from daq.files.run_directory import RunReader
-from processing.figures.volume_figures import isosurface_figure, residuals_figure, shadowgraph_figure, slices_figure
+from processing.figures.residual_figures import residuals_figure
+from processing.figures.volume_figures import isosurface_figure, shadowgraph_figure, slices_figure
 from processing.preprocessing import Intensity
 from processing.reconstruction.volume_file import read_volume
 from processing.runs.results_file import volume_path

@@ -7,10 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.files.run_directory import DoubleFrame, ExposureRecord, ImageKey, RunHeader, RunWriter, Shot, ViewFormat
-from processing.calibration.calibration import Calibration, Model, PlaneError, Verdict, ViewCalibration
+from processing.calibration.calibration import Verdict
 from processing.calibration.calibration_file import save_calibration
 from processing.calibration.calibration_record import content_id
 from processing.geometry import PinholeCamera, view_camera
+from processing.studies.seen_droplets import droplet_calibration
 
 SHAPE = (120, 160)
 SCALE_PX_PER_MM = 20.0
@@ -67,25 +68,8 @@ def _shot(index: int, *, valid: bool, covered: tuple[str, ...]) -> Shot:
 
 def write_calibration(path: Path, verdict: Verdict = Verdict.GOOD, holdout_px: float = 0.02) -> Path:
     """Calibration with the true cameras."""
-    outline_mm = ((-3.0, -2.5), (3.0, -2.5), (3.0, 2.5), (-3.0, 2.5))
-    planes = (PlaneError("low", -1.5, 100, 0.01, 0.01), PlaneError("high", 1.5, 100, 0.01, 0.01))
-    views = {
-        name: ViewCalibration(
-            verdict=verdict,
-            model=Model.PINHOLE,
-            n_points=200,
-            n_rejected=0,
-            mean_error_px=0.01,
-            rms_px=0.01,
-            max_error_px=0.02,
-            holdout_error_px=holdout_px,
-            mapping=camera,
-            extent_mm=outline_mm,
-            boards_in_free_poses=(),
-            planes=planes,
-        )
-        for name, camera in cameras().items()
-    }
-    undated = Calibration("", "2026-01-01T00:00:00+00:00", None, views, (-1.5, 1.5), "test")
-    save_calibration(undated.with_id(content_id(undated)), path)
+    good = droplet_calibration(list(cameras().values()), np.array([3.0, 2.5, 1.5]))
+    views = {name: replace(view, verdict=verdict, holdout_error_px=holdout_px) for name, view in good.views.items()}
+    judged = replace(good, views=views)
+    save_calibration(judged.with_id(content_id(judged)), path)
     return path

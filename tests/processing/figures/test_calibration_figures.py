@@ -1,29 +1,21 @@
 """Calibration figures show the points that were found, where they are, and their errors at one scale."""
 
-import io
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 from matplotlib.quiver import Quiver
 
 from processing.calibration.calibrate import calibrate
 from processing.calibration.observation import CalibrationSet, PlaneObservation
 from processing.figures.calibration_figures import MAX_ARROWS, MAX_PLANES, error_vectors_figure, grid_figure
 from tests.support.calibration_cases import calibration_set, paper_camera, seen_planes, volume_points_mm
+from tests.support.drawing import drawn
 
 
 @pytest.fixture(scope="module")
 def seen() -> CalibrationSet:
     return calibration_set(left=seen_planes(paper_camera(45)), right=seen_planes(paper_camera(-45), z_mm=(-2, 0, 1, 2)))
-
-
-def drawn(figure: Figure) -> int:
-    """Bytes of the picture: drawing it must work without a warning."""
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=50)
-    return len(buffer.getvalue())
 
 
 @pytest.mark.parametrize("y_sign", [1, -1])

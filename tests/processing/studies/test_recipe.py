@@ -48,11 +48,3 @@ def test_other_recipes_start_anew() -> None:
     assert smart_10.continues(Recipe.named("smart-5"))
     for before in (None, Recipe.named("mlos"), Recipe.named("mart-5"), smart_10, Recipe.named("smart")):
         assert not smart_10.continues(before)
-
-
-def test_no_two_curves_of_a_figure_look_alike() -> None:
-    styles = [recipe.style for recipe in ALL_RECIPES]
-    assert len({style["color"] for style in styles}) == len(styles)
-    stages = [Recipe.named(name).style for name in ("smart-5", "smart-10", "smart")]
-    assert len({style["marker"] for style in stages}) == len({style["linestyle"] for style in stages}) == 3
-    assert [style["marker"] for style in stages] == ["^", "s", "o"]

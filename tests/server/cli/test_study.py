@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from processing.studies.calibration_accuracy import calibration_study
+from processing.studies.calibration_errors import calibration_study
 from processing.studies.density import DensityStudy
 from processing.studies.recipe import PAPER_ITERATIONS
 from server.cli.main import main
@@ -104,7 +104,7 @@ def test_the_calibration_study_says_whether_all_limits_are_kept(
         half_mm=(2.0, 1.5, 2.0),
         drift_px=drift_px,
     )
-    study = "processing.studies.calibration_accuracy.calibration_study"
+    study = "processing.studies.calibration_errors.calibration_study"
     monkeypatch.setattr(study, lambda asked: calibration_study(small(asked)))
     assert main(["study", "calibration", "--density", "7", "-o", str(tmp_path), "--json"]) == status
     output, progress = capsys.readouterr()

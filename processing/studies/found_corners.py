@@ -1,8 +1,4 @@
-"""How accurate is a calibration? Against truth that only a simulation has, each figure beside its limit.
-
-Cameras: see ``fitted_cameras``. Corners: the paper's board rendered with blur, noise and uneven light, against where
-they truly are. Cameras that have moved: see ``drifting_views``.
-"""
+"""How well are corners found? The paper's board, rendered with blur, noise and uneven light, against the truth."""
 
 import time
 from collections.abc import Iterator
@@ -11,32 +7,23 @@ import cv2
 import numpy as np
 
 from processing.calibration.target.targets import detect_target
-from processing.studies.accuracy_study import (
+from processing.studies.calibration_rows import (
     CORNER_LIMIT_PX,
     CORNER_LIMIT_S,
     PHOTOGRAPHS,
     TARGET,
-    AccuracyRow,
+    CalibrationRow,
     CalibrationStudy,
     Photograph,
     error_row,
 )
-from processing.studies.drifting_views import drifting_views
-from processing.studies.fitted_cameras import fitted_cameras
 from processing.synthetic.paper_rig import paper_cameras, paper_optics
 from processing.synthetic.stamping import FloatImage
 from processing.synthetic.target import Checkerboard, render_target
 
 
-def calibration_study(study: CalibrationStudy | None = None) -> Iterator[AccuracyRow]:
-    """Measure view by view; the same study gives the same errors (times differ)."""
-    study = study or CalibrationStudy()
-    yield from fitted_cameras(study)
-    yield from _found_corners(study)
-    yield from drifting_views(study)
-
-
-def _found_corners(study: CalibrationStudy) -> Iterator[AccuracyRow]:
+def found_corners(study: CalibrationStudy) -> Iterator[CalibrationRow]:
+    """Errors of corners and time per image, view by view and photograph by photograph."""
     board = Checkerboard(TARGET.columns or 0, TARGET.rows or 0, TARGET.pitch_mm)
     for number, view in enumerate(study.views):
         camera = paper_cameras(study.binning)[view]
@@ -50,7 +37,7 @@ def _found_corners(study: CalibrationStudy) -> Iterator[AccuracyRow]:
             world_mm = np.column_stack([TARGET.points_mm(points.ids), np.full(len(points), z_mm)])
             error_px = np.linalg.norm(points.image_px - camera.project(world_mm), axis=1)
             yield error_row("corner error", case, view, error_px, CORNER_LIMIT_PX)
-            yield AccuracyRow("corner time", case, view, seconds, None, CORNER_LIMIT_S, seconds < CORNER_LIMIT_S)
+            yield CalibrationRow("corner time", case, view, seconds, None, CORNER_LIMIT_S, seconds < CORNER_LIMIT_S)
 
 
 def _photograph(clear: FloatImage, how: Photograph, rng: np.random.Generator) -> FloatImage:

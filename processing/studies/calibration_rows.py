@@ -1,4 +1,4 @@
-"""What the calibration study measures, and what it says of each case: settings, limits and rows. Values only."""
+"""What the study of calibration errors measures, and what it says of each case. Values only."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -93,7 +93,7 @@ class CalibrationStudy:
 
 
 @dataclass(frozen=True)
-class AccuracyRow:
+class CalibrationRow:
     """One figure of one view.
 
     Parameters
@@ -134,10 +134,10 @@ class AccuracyRow:
     ideal_fits_within: float | None = None
 
 
-def error_row(quantity: str, case: str, view: str, error_px: FloatArray, limit_px: float) -> AccuracyRow:
+def error_row(quantity: str, case: str, view: str, error_px: FloatArray, limit_px: float) -> CalibrationRow:
     """Row of errors, in an array of any shape, whose root mean square has a limit."""
     value_px, within = rms_px(error_px), float((error_px <= limit_px).mean())
-    return AccuracyRow(quantity, case, view, value_px, float(error_px.max()), limit_px, value_px <= limit_px, within)
+    return CalibrationRow(quantity, case, view, value_px, float(error_px.max()), limit_px, value_px <= limit_px, within)
 
 
 def rms_px(error_px: FloatArray) -> float:
@@ -145,6 +145,6 @@ def rms_px(error_px: FloatArray) -> float:
     return float(np.sqrt((error_px**2).mean()))
 
 
-def of_quantity(rows: Sequence[AccuracyRow], quantity: str) -> list[AccuracyRow]:
+def of_quantity(rows: Sequence[CalibrationRow], quantity: str) -> list[CalibrationRow]:
     """Rows of one quantity."""
     return [row for row in rows if row.quantity == quantity]
