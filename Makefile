@@ -9,7 +9,7 @@ DEBIAN_PACKAGES := python3-venv python3-dev python3-gi gir1.2-aravis-0.8 iproute
 TEST_PACKAGES := cppcheck g++-aarch64-linux-gnu qemu-user $(shell command -v npm >/dev/null || echo nodejs npm)
 FIRMWARE_PACKAGES := gcc gcc-arm-none-eabi libc6-dev make python3
 AS_ROOT := $(shell [ "$$(id -u)" = 0 ] || echo sudo)
-KERNEL_SOURCES := $(wildcard processing/kernels/*.cpp processing/kernels/*.hpp processing/kernels/CMakeLists.txt)
+KERNEL_SOURCES := $(wildcard processing/kernels/*.hpp processing/kernels/*/*.[ch]pp processing/kernels/CMakeLists.txt)
 FIRMWARE_SOURCES := $(wildcard firmware/*/*.[chS] firmware/rp2040/image.* firmware/Makefile)
 
 # Those of the Debian packages that are missing.

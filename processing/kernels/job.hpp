@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "exposure.hpp"
+#include "host/preprocess.hpp"
 
 namespace tomoshadow {
 

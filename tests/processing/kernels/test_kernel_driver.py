@@ -13,7 +13,7 @@ from processing.kernels import _native
 
 KERNELS = Path(__file__).parents[3] / "processing" / "kernels"
 DRIVER = Path(__file__).with_name("kernel_driver") / "driver.cpp"
-SOURCES = ("bands.cpp", "blocks.cpp", "bricks.cpp", "exposure.cpp", "images.cpp", "instruction_set.cpp")
+SOURCES = sorted(map(str, (KERNELS / "host").glob("*.cpp")))
 ARCHITECTURE = {"plain": [], "avx2": ["-march=x86-64-v3"], "avx512": ["-march=x86-64-v4"]}
 SANITIZERS = ["-O0", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
 DEADLINE_S = 200.0
@@ -23,7 +23,7 @@ Results = dict[tuple[str, int], tuple[float, float]]
 
 def compile_kernels(compiler: str, options: list[str], isa: str, directory: Path) -> Path:
     out = directory / f"{isa}.o"
-    run([compiler, "-std=c++17", *options, f"-DTOMOSHADOW_ISA={isa}", "-I.", "-c", "kernels.cpp", "-o", str(out)])
+    run([compiler, "-std=c++17", *options, f"-DTOMOSHADOW_ISA={isa}", "-I.", "-c", "simd/kernels.cpp", "-o", str(out)])
     return out
 
 

@@ -4,12 +4,12 @@
 #include <cstdio>
 #include <memory>
 
-#include "bands.hpp"
-#include "blocks.hpp"
-#include "bricks.hpp"
-#include "exposure.hpp"
-#include "images.hpp"
-#include "instruction_set.hpp"
+#include "host/smart.hpp"
+#include "host/blocks.hpp"
+#include "host/bricks.hpp"
+#include "host/preprocess.hpp"
+#include "host/resample.hpp"
+#include "host/instruction_set.hpp"
 
 using namespace tomoshadow;
 

@@ -4,7 +4,7 @@
 
 #include <type_traits>
 
-#include "output.hpp"
+#include "simd/output.hpp"
 
 namespace tomoshadow::TOMOSHADOW_ISA {
 namespace {

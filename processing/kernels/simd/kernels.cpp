@@ -1,13 +1,13 @@
 // Line of sight, and the list of all kernels. This file is compiled once per instruction set; all it defines lives in the
 // namespace of that set and calls no inline function of the standard library, so that the linker cannot hand
 // code for a newer processor to an older one.
-#include "instruction_set.hpp"
-#include "output.hpp"
-#include "preprocess.hpp"
-#include "ratios.hpp"
-#include "resample.hpp"
-#include "sight.hpp"
-#include "smart.hpp"
+#include "host/instruction_set.hpp"
+#include "simd/output.hpp"
+#include "simd/preprocess.hpp"
+#include "simd/ratios.hpp"
+#include "simd/resample.hpp"
+#include "simd/sight.hpp"
+#include "simd/smart.hpp"
 
 #define TOMOSHADOW_TEXT_(name) #name
 #define TOMOSHADOW_TEXT(name) TOMOSHADOW_TEXT_(name)

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "job.hpp"
-#include "lanes.hpp"
+#include "simd/lanes.hpp"
 
 namespace tomoshadow::TOMOSHADOW_ISA {
 namespace {

@@ -1,4 +1,4 @@
-#include "bands.hpp"
+#include "host/smart.hpp"
 
 #include <algorithm>
 #include <atomic>

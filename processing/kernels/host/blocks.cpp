@@ -1,4 +1,4 @@
-#include "blocks.hpp"
+#include "host/blocks.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "job.hpp"
-#include "windows.hpp"
+#include "simd/windows.hpp"
 
 namespace tomoshadow::TOMOSHADOW_ISA {
 namespace {

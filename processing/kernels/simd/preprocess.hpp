@@ -3,7 +3,7 @@
 // beginning of the next): a few operations per pixel, whatever the window, and no running sum that would drift.
 #pragma once
 
-#include "workspace.hpp"
+#include "simd/workspace.hpp"
 
 namespace tomoshadow::TOMOSHADOW_ISA {
 namespace {

@@ -1,4 +1,4 @@
-#include "instruction_set.hpp"
+#include "host/instruction_set.hpp"
 
 #include <cstdlib>
 #include <stdexcept>

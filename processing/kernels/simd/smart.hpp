@@ -1,10 +1,10 @@
 // SMART: blocks found by MLOS, then multiplied by ratios and projected, pass by pass.
 #pragma once
 
-#include "output.hpp"
-#include "project.hpp"
-#include "ratios.hpp"
-#include "sight.hpp"
+#include "simd/output.hpp"
+#include "simd/project.hpp"
+#include "simd/ratios.hpp"
+#include "simd/sight.hpp"
 
 namespace tomoshadow::TOMOSHADOW_ISA {
 namespace {

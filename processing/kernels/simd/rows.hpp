@@ -1,7 +1,7 @@
 // Rows of voxels on their way into projections, and what evenly spaced pixels see of them by linear interpolation.
 #pragma once
 
-#include "voxels.hpp"
+#include "simd/voxels.hpp"
 
 namespace tomoshadow::TOMOSHADOW_ISA {
 namespace {

@@ -5,7 +5,7 @@
 // (1/2 for rounding pixels, 1 + 1/2 for the vertical, 1 for the horizontal weight).
 #pragma once
 
-#include "lanes.hpp"
+#include "simd/lanes.hpp"
 
 namespace tomoshadow::TOMOSHADOW_ISA {
 namespace {

@@ -1,11 +1,11 @@
-#include "images.hpp"
+#include "host/resample.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <memory>
 
-#include "bands.hpp"
+#include "host/smart.hpp"
 
 namespace tomoshadow {
 

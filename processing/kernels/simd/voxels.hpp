@@ -3,7 +3,7 @@
 // and all arithmetic is done in that unit: what would underflow there is zero in memory, too.
 #pragma once
 
-#include "lanes.hpp"
+#include "simd/lanes.hpp"
 
 namespace tomoshadow::TOMOSHADOW_ISA {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <cstdlib>
 
-#include "sample.hpp"
+#include "simd/sample.hpp"
 
 namespace tomoshadow::TOMOSHADOW_ISA {
 namespace {

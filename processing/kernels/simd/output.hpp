@@ -1,7 +1,7 @@
 // From blocks to the volume: roots, number formats, and stores that do not pass through the caches.
 #pragma once
 
-#include "workspace.hpp"
+#include "simd/workspace.hpp"
 
 namespace tomoshadow::TOMOSHADOW_ISA {
 namespace {

@@ -1,7 +1,7 @@
 // From projections to the ratio images that correct the volume.
 #pragma once
 
-#include "lanes.hpp"
+#include "simd/lanes.hpp"
 #include "job.hpp"
 
 namespace tomoshadow::TOMOSHADOW_ISA {

@@ -11,11 +11,11 @@
 #include <optional>
 #include <stdexcept>
 
-#include "bands.hpp"
-#include "blocks.hpp"
-#include "bricks.hpp"
-#include "images.hpp"
-#include "instruction_set.hpp"
+#include "host/smart.hpp"
+#include "host/blocks.hpp"
+#include "host/bricks.hpp"
+#include "host/resample.hpp"
+#include "host/instruction_set.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;

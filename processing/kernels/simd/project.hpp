@@ -1,8 +1,8 @@
 // The way back: what the blocks of a tile add to the image of a view.
 #pragma once
 
-#include "rows.hpp"
-#include "sample.hpp"
+#include "simd/rows.hpp"
+#include "simd/sample.hpp"
 
 namespace tomoshadow::TOMOSHADOW_ISA {
 namespace {

@@ -1,6 +1,6 @@
-#include "bricks.hpp"
+#include "host/bricks.hpp"
 
-#include "bands.hpp"
+#include "host/smart.hpp"
 
 namespace tomoshadow {
 

@@ -4,7 +4,7 @@
 #include <memory>
 #include <vector>
 
-#include "bands.hpp"
+#include "host/smart.hpp"
 #include "job.hpp"
 
 namespace tomoshadow {

@@ -1,8 +1,8 @@
-#include "exposure.hpp"
+#include "host/preprocess.hpp"
 
 #include <algorithm>
 
-#include "bands.hpp"
+#include "host/smart.hpp"
 
 namespace tomoshadow {
 
