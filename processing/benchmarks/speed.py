@@ -18,9 +18,8 @@ from processing.benchmarks.scene import Image, SpeedStudy, spray_images, study_c
 from processing.benchmarks.targets import Measured
 from processing.geometry import PinholeCamera
 from processing.kernels import _native
-from processing.reconstruction.accuracy import Accuracy
+from processing.reconstruction.choices import Accuracy, ReconstructionMethod
 from processing.reconstruction.line_of_sight import KERNEL_METHOD, line_of_sight
-from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.planning.node_view import sample_mapping
 from processing.reconstruction.planning.plan import MAX_DEVIATION_PX, Plan, plan_reconstruction
 from processing.reconstruction.smart import smart
@@ -53,7 +52,7 @@ class SpeedResult:
 KERNEL_TARGETS = {
     "mlos float16 dense": targets.MLOS_DENSE,
     "mlos float16": targets.MLOS_CULLED,
-    "mlos float16 exact": targets.EXACT,
+    "mlos float16 exact": targets.SAMPLED,
     "mlos float16 avx2 dense": targets.AVX2_MLOS,
     "mlos float16 slice": targets.SLICE,
     "mlos float16 256^3": targets.REGION,

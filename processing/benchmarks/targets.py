@@ -53,7 +53,7 @@ DOUBLE_EXPOSURE = {
     bits: Target(f"double exposure, 8 raw images of {bits} bit to 2 volumes", "s", 0.5, 0.15) for bits in (8, 16)
 }
 SLIDING_MINIMUM = Target("sliding minima, share of that CPU time", "%", 50)
-EXACT = Target("MLOS by the exact mapping, distortion included", "x", 10, 20)
+SAMPLED = Target("MLOS by the exact mapping, distortion included", "x", 10, 20)
 AVX2_MLOS = Target("MLOS with AVX2 only, every block", "x", 15, 25)
 SMART_DENSE = Target("SMART of a double exposure, no voxel empty", "s", 15, 7)
 SMART_SPARSE = Target("SMART of a double exposure, sparse spray", "s", 6, 2.5)

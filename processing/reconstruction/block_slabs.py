@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from processing.kernels import DEFAULT_THREADS, _native
+from processing.reconstruction.choices import VoxelType
 from processing.reconstruction.slab_volume import SlabVolume, slabs_in
-from processing.reconstruction.voxel_type import VoxelType
 
 SEARCH_ROWS = 16
 """Rows in which the brightest voxel is looked for at a time."""

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from processing.kernels import DEFAULT_THREADS, _native
-from processing.reconstruction.method import ReconstructionMethod
+from processing.reconstruction.choices import ReconstructionMethod
 from processing.reconstruction.planning.plan import Plan
 
 KERNEL_METHOD = {

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from processing.kernels import DEFAULT_THREADS, _native
+from processing.reconstruction.choices import ReconstructionMethod
 from processing.reconstruction.line_of_sight import check_volume, kernel_method
-from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.planning.plan import Plan
 
 BATCH_BYTES, BATCH_EXPOSURES = 1 << 30, 128

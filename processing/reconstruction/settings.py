@@ -6,9 +6,7 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field
 
 from processing.preprocessing import Polarity, Preprocessing
-from processing.reconstruction.accuracy import Accuracy
-from processing.reconstruction.method import ReconstructionMethod
-from processing.reconstruction.voxel_type import VoxelType
+from processing.reconstruction.choices import Accuracy, ReconstructionMethod, VoxelType
 from processing.volume import VoxelGrid
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from processing.reconstruction.voxel_type import VoxelType
+from processing.reconstruction.choices import VoxelType
 
 SLAB_ROWS = 64
 """A slab of the paper's volume has 75 MB in float16."""

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from processing.kernels import DEFAULT_THREADS, _native
+from processing.reconstruction.choices import ReconstructionMethod
 from processing.reconstruction.line_of_sight import kernel_method
-from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.planning.plan import Plan
 from processing.reconstruction.slab_volume import SLAB_ROWS, slabs_in
 from processing.reconstruction.sparse_volume import SparseVolume

@@ -19,8 +19,8 @@ from isal import isal_zlib
 from numpy.typing import NDArray
 
 from processing.errors import BadInput
+from processing.reconstruction.choices import VoxelType
 from processing.reconstruction.slab_volume import SLAB_ROWS, SlabVolume
-from processing.reconstruction.voxel_type import VoxelType
 from processing.volume import VoxelGrid
 
 FORMAT_VERSION = (2, 0)

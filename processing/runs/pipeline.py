@@ -16,13 +16,13 @@ from processing.calibration.calibration_file import file_sha256, load_calibratio
 from processing.calibration.errors import CalibrationError
 from processing.kernels import DEFAULT_THREADS
 from processing.preprocessing import Intensity, intensity
-from processing.reconstruction.method import ReconstructionMethod
+from processing.reconstruction.choices import ReconstructionMethod
 from processing.reconstruction.planning.common_volume import common_volume
 from processing.reconstruction.planning.plan import plan_reconstruction
 from processing.reconstruction.planning.planned_view import PlannedView
+from processing.reconstruction.reconstructor import Reconstructor
 from processing.reconstruction.settings import FrozenValue, GridSettings, ReconstructionSettings
 from processing.reconstruction.volume_file import write_slabs
-from processing.reconstruction.workbench import Workbench
 from processing.runs.clocked_slabs import ClockedSlabs
 from processing.runs.errors import PipelineError
 from processing.runs.results_file import FrameName, Provenance, claim_results, volume_path
@@ -109,23 +109,24 @@ def reconstruct_shot(
         require_match(run_dir.name, recorded, calibration)
         made_by = _provenance(run, calibration, calibration_file, settings)
         named_by = str(made_by["calibration_sha256"])
-        bench = _workbench(calibration_file, named_by, settings, tuple(recorded.views), threads)
-        views = {name: PlannedView.of(view) for name, view in zip(recorded.views, bench.plan.views, strict=True)}
+        reconstructor = _reconstructor(calibration_file, named_by, settings, tuple(recorded.views), threads)
+        planned = zip(recorded.views, reconstructor.plan.views, strict=True)
+        views = {name: PlannedView.of(view) for name, view in planned}
         provenance = {**made_by, "views": json.dumps({name: view.model_dump() for name, view in views.items()})}
         claim_results(results_dir, provenance)
         volumes = []
         for frame in frame_names(run):
             if should_stop():
                 raise Stopped(f"{run_dir.name}, shot {shot}: stopped before exposure {frame}")
-            images = shot_intensities(run, recorded, frame, settings, bench.images, threads=threads)
+            images = shot_intensities(run, recorded, frame, settings, reconstructor.images, threads=threads)
             blind = tuple(view for view, image in zip(recorded.views, images, strict=True) if not image.any())
             named = {**provenance, "blind_views": json.dumps(blind)} if blind else provenance
-            written = _reconstruct_frame(bench, images, results_dir, shot, frame, named)
+            written = _reconstruct_frame(reconstructor, images, results_dir, shot, frame, named)
             volumes.append(written.model_copy(update={"blind_views": blind}))
     return ShotResult(
         shot=shot,
         method=settings.method,
-        grid=GridSettings.of(bench.plan.grid),
+        grid=GridSettings.of(reconstructor.plan.grid),
         views=views,
         volumes=tuple(volumes),
         cpu_s=time.process_time() - started_cpu_s,
@@ -214,17 +215,22 @@ def _read_references(run_dir: Path, _written_ns: int) -> _References:
 
 
 def _reconstruct_frame(
-    bench: Workbench, images: list[Intensity], results_dir: Path, shot: int, frame: FrameName, provenance: Provenance
+    reconstructor: Reconstructor,
+    images: list[Intensity],
+    results_dir: Path,
+    shot: int,
+    frame: FrameName,
+    provenance: Provenance,
 ) -> VolumeRecord:
     """Slabs are written as they are made; the time of writing does not count."""
     started_s = time.perf_counter()
-    volume, residuals = bench.reconstruct(images)
+    volume, residuals = reconstructor.reconstruct(images)
     begun_s = time.perf_counter() - started_s
     slabs = ClockedSlabs(volume.slabs)
     file = volume_path(results_dir, shot, frame)
     convergence = {"residuals": json.dumps(residuals)} if residuals else {}
     named = {**provenance, "shot": shot, "frame": frame, **convergence}
-    write_slabs(file, replace(volume, slabs=slabs), bench.plan.grid, named)
+    write_slabs(file, replace(volume, slabs=slabs), reconstructor.plan.grid, named)
     seconds = round(begun_s + slabs.seconds, 4)
     return VolumeRecord(shot=shot, frame=frame, file=file.name, seconds=seconds, residuals=residuals)
 
@@ -271,13 +277,13 @@ def _provenance(
 
 
 @lru_cache(maxsize=1)
-def _workbench(
+def _reconstructor(
     calibration_file: Path, _sha256: str, settings: ReconstructionSettings, views: tuple[str, ...], threads: int
-) -> Workbench:
+) -> Reconstructor:
     calibration = load_calibration(calibration_file)
     grid = settings.grid.to_grid() if settings.grid else default_grid(calibration)
     plan = plan_reconstruction([calibration.views[view].mapping for view in views], grid, settings.accuracy, views)
-    return Workbench.of(plan, settings, threads)
+    return Reconstructor.of(plan, settings, threads)
 
 
 def _widened(span_mm: tuple[float, float]) -> tuple[float, float]:

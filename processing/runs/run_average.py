@@ -12,8 +12,8 @@ from processing.kernels import DEFAULT_THREADS
 from processing.preprocessing import Intensity
 from processing.reconstruction.mean_line_of_sight import mean_line_of_sight
 from processing.reconstruction.planning.plan import plan_reconstruction
+from processing.reconstruction.reconstructor import Reconstructor
 from processing.reconstruction.settings import ReconstructionSettings
-from processing.reconstruction.workbench import Workbench
 from processing.runs.pipeline import default_grid, frame_names, require_match, shot_intensities
 from processing.volume import VoxelGrid
 
@@ -80,7 +80,7 @@ def average_run(
         plan = plan_reconstruction(mappings, grid, settings.accuracy, list(first.views))
         exposures = _exposures(run, shots, calibration, settings, done, threads)
         if settings.method.iterative:
-            volume = _mean_of_each(Workbench.of(plan, settings, threads), exposures)
+            volume = _mean_of_each(Reconstructor.of(plan, settings, threads), exposures)
         else:
             volume = mean_line_of_sight(plan, exposures, settings.method, threads=threads)
         return RunAverage(volume, grid, len(shots) * len(frame_names(run)))
@@ -104,10 +104,10 @@ def _exposures(
             done(count)
 
 
-def _mean_of_each(bench: Workbench, exposures: Exposures) -> Intensity:
-    mean, count = np.zeros(bench.plan.grid.shape, np.float32), 0
+def _mean_of_each(reconstructor: Reconstructor, exposures: Exposures) -> Intensity:
+    mean, count = np.zeros(reconstructor.plan.grid.shape, np.float32), 0
     for images in exposures:
-        volume, _ = bench.reconstruct(images)
+        volume, _ = reconstructor.reconstruct(images)
         for first_row, slab in volume.intensities():
             mean[:, first_row : first_row + slab.shape[1]] += slab
         count += 1

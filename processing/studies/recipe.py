@@ -6,8 +6,8 @@ from operator import attrgetter
 from typing import Any
 
 from processing.figures.curve import MethodCurve, Values
+from processing.reconstruction.choices import ReconstructionMethod
 from processing.reconstruction.line_of_sight import line_of_sight
-from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.planning.plan import Plan
 from processing.reconstruction.smart import mart, smart
 from processing.studies.report import grouped

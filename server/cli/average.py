@@ -4,7 +4,7 @@ from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from processing.reconstruction.voxel_type import VoxelType
+from processing.reconstruction.choices import VoxelType
 from processing.runs.errors import PipelineError
 from server.cli.options import (
     Verbs,

@@ -10,8 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from processing.reconstruction.accuracy import Accuracy
-from processing.reconstruction.method import ReconstructionMethod
+from processing.reconstruction.choices import Accuracy, ReconstructionMethod
 from processing.runs.errors import PipelineError
 from server.cli.output import Outcome, progress
 

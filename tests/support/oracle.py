@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 
 from processing.analysis.quality import Volume, local_maxima
 from processing.geometry import ViewMapping, view_camera
-from processing.reconstruction.method import ReconstructionMethod
+from processing.reconstruction.choices import ReconstructionMethod
 from processing.reconstruction.planning.fixed_point import FixedPoint
 from processing.reconstruction.planning.node_view import NodeView
 from processing.reconstruction.planning.plan import Plan

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from processing.reconstruction.method import ReconstructionMethod
+from processing.reconstruction.choices import ReconstructionMethod
 from processing.reconstruction.planning.fixed_point import FixedPoint
 from processing.reconstruction.planning.node_view import NodeView
 from processing.reconstruction.planning.plan import Plan

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from processing.calibration.fit.polynomial import fit_polynomial
 from processing.calibration.polynomial_mapping import PolynomialMapping
 from processing.geometry import FloatArray, PinholeCamera, ViewMapping, view_camera
-from processing.reconstruction.accuracy import Accuracy
+from processing.reconstruction.choices import Accuracy
 from processing.reconstruction.planning.node_view import NodeView, sample_mapping
 from processing.reconstruction.planning.plan import MAX_DEVIATION_PX, Plan, plan_reconstruction
 from processing.volume import VoxelGrid

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from processing.geometry import ViewMapping
 from processing.kernels import DEFAULT_THREADS, _native
-from processing.reconstruction.accuracy import Accuracy
+from processing.reconstruction.choices import Accuracy
 from processing.reconstruction.errors import ReconstructionError
 from processing.reconstruction.planning.fixed_point import FixedPoint
 from processing.reconstruction.planning.node_view import NodeView, sample_mapping

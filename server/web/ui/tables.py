@@ -9,10 +9,9 @@ from nicegui import ui
 
 from daq.errors import DaqError
 from daq.run_plan import RunKind
-from processing.reconstruction.accuracy import Accuracy
-from processing.reconstruction.method import ReconstructionMethod as Method
+from processing.reconstruction.choices import Accuracy, VoxelType
+from processing.reconstruction.choices import ReconstructionMethod as Method
 from processing.reconstruction.settings import ReconstructionSettings
-from processing.reconstruction.voxel_type import VoxelType
 from server.lab.errors import ServerError
 from server.lab.jobs import Job, JobKind, JobState, calibration_job
 from server.lab.reconstruction import request_reconstruction

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.special import erfc
 
 from processing.geometry import ViewMapping, view_camera
-from processing.reconstruction.accuracy import Accuracy
+from processing.reconstruction.choices import Accuracy
 from processing.reconstruction.planning.plan import plan_view
 from processing.reconstruction.planning.rectified_view import RectifiedView
 from processing.volume import VoxelGrid

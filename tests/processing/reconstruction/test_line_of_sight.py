@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 
 from processing.geometry import FloatArray, ViewMapping
 from processing.kernels import _native
-from processing.reconstruction.accuracy import Accuracy
+from processing.reconstruction.choices import Accuracy, ReconstructionMethod
 from processing.reconstruction.line_of_sight import line_of_sight
-from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.planning.node_view import NodeView, sample_mapping
 from processing.reconstruction.planning.plan import Plan, plan_reconstruction
 from processing.volume import VoxelGrid

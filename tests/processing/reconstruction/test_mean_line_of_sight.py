@@ -6,9 +6,9 @@ from numpy.typing import NDArray
 
 from processing.kernels import _native
 from processing.reconstruction import mean_line_of_sight as module
+from processing.reconstruction.choices import ReconstructionMethod
 from processing.reconstruction.line_of_sight import line_of_sight
 from processing.reconstruction.mean_line_of_sight import mean_line_of_sight
-from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.planning.node_view import sample_mapping
 from processing.reconstruction.planning.plan import Plan, plan_reconstruction
 from processing.volume import VoxelGrid

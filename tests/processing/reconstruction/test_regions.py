@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 
 from processing.geometry import ViewMapping
 from processing.kernels import _native
-from processing.reconstruction.accuracy import Accuracy
+from processing.reconstruction.choices import Accuracy, ReconstructionMethod
 from processing.reconstruction.line_of_sight import line_of_sight
-from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.planning.node_view import FRAME_BEFORE_PX, NodeView, sample_mapping
 from processing.reconstruction.planning.plan import MAX_DEVIATION_PX, Plan, plan_reconstruction
 from processing.reconstruction.planning.rectified_view import MAP_SPACING_PX, RectifiedView
@@ -56,7 +55,7 @@ REGIONS = (
 )
 
 
-def exact(grid: VoxelGrid) -> Plan:
+def sampled(grid: VoxelGrid) -> Plan:
     return Plan(grid, tuple(sample_mapping(mapping, grid, MAX_DEVIATION_PX) for mapping in MAPPINGS))
 
 
@@ -82,7 +81,7 @@ def recorded_px(view: RectifiedView | NodeView, grid: VoxelGrid) -> NDArray[np.f
     return np.stack([oracle.bilinear(at, u / MAP_SPACING_PX, v / MAP_SPACING_PX) for at in channels], axis=-1)
 
 
-@pytest.mark.parametrize("planned", [exact, nominal, fine])
+@pytest.mark.parametrize("planned", [sampled, nominal, fine])
 @pytest.mark.parametrize("region", REGIONS, ids=str)
 def test_it_is_seen_where_the_whole_volume_is_seen(region: Region, planned: Planned) -> None:
     whole, part = planned(WHOLE), planned(region.grid)
@@ -98,7 +97,7 @@ def assert_inside(image_px: NDArray[np.float64], mapping: ViewMapping) -> None:
 
 
 @pytest.mark.parametrize("isa", _native.available_isas())
-@pytest.mark.parametrize("planned", [exact, nominal, fine])
+@pytest.mark.parametrize("planned", [sampled, nominal, fine])
 @pytest.mark.parametrize("region", REGIONS, ids=str)
 def test_it_equals_the_textbook(isa: str, region: Region, planned: Planned) -> None:
     plan = planned(region.grid)
@@ -112,7 +111,7 @@ def test_it_equals_the_textbook(isa: str, region: Region, planned: Planned) -> N
 @pytest.mark.parametrize("region", REGIONS, ids=str)
 def test_by_nodes_it_is_the_same_part_of_the_volume(isa: str, region: Region) -> None:
     """The pixels are the same. Positions differ by both deviations; no pixel differs from the next by more than 1."""
-    whole, part = exact(WHOLE), exact(region.grid)
+    whole, part = sampled(WHOLE), sampled(region.grid)
     with instruction_set(isa):
         expected, volume = (line_of_sight(plan, images(), ReconstructionMethod.MINLOS) for plan in (whole, part))
     bounds = [

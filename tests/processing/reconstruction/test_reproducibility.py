@@ -8,10 +8,9 @@ import pytest
 from numpy.typing import NDArray
 
 from processing.kernels import _native
-from processing.reconstruction.accuracy import Accuracy
+from processing.reconstruction.choices import Accuracy, ReconstructionMethod
 from processing.reconstruction.line_of_sight import line_of_sight
 from processing.reconstruction.mean_line_of_sight import mean_line_of_sight
-from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.planning.node_view import sample_mapping
 from processing.reconstruction.planning.plan import MAX_DEVIATION_PX, Plan, plan_reconstruction
 from processing.reconstruction.smart import mart, smart
@@ -36,8 +35,8 @@ def isa(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
 @pytest.fixture(params=[0, 1, 3], ids="{} by nodes".format)
 def plan(request: pytest.FixtureRequest) -> Plan:
     """None, some or all views by nodes."""
-    exact = tuple(sample_mapping(mapping, GRID, MAX_DEVIATION_PX) for mapping in MAPPINGS[: request.param])
-    return Plan(GRID, exact + plan_reconstruction(MAPPINGS, GRID, Accuracy.FINE).views[request.param :])
+    sampled = tuple(sample_mapping(mapping, GRID, MAX_DEVIATION_PX) for mapping in MAPPINGS[: request.param])
+    return Plan(GRID, sampled + plan_reconstruction(MAPPINGS, GRID, Accuracy.FINE).views[request.param :])
 
 
 @pytest.fixture

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from processing.kernels import _native
+from processing.reconstruction.choices import ReconstructionMethod
 from processing.reconstruction.line_of_sight import line_of_sight
 from processing.reconstruction.mean_line_of_sight import mean_line_of_sight
-from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.planning.node_view import sample_mapping
 from processing.reconstruction.planning.plan import MAX_DEVIATION_PX, Plan, plan_reconstruction
 from processing.reconstruction.sparse_line_of_sight import slabs_of_sight, sparse_line_of_sight
@@ -41,8 +41,8 @@ def test_volumes_equal_the_textbook(
 @pytest.mark.parametrize("count", range(2, 9))
 def test_any_number_of_views_in_any_format(isa: str, count: int, by_nodes: int) -> None:
     grid, mappings = VoxelGrid.centred((3, 17, 40), PITCH_MM), oracle.cameras(count, roll_deg=2.0)
-    exact = tuple(sample_mapping(mapping, grid, MAX_DEVIATION_PX) for mapping in mappings[:by_nodes])
-    plan = Plan(grid, exact + plan_reconstruction(mappings, grid).views[by_nodes:])
+    sampled = tuple(sample_mapping(mapping, grid, MAX_DEVIATION_PX) for mapping in mappings[:by_nodes])
+    plan = Plan(grid, sampled + plan_reconstruction(mappings, grid).views[by_nodes:])
     rng = np.random.default_rng(count)
     images = [rng.uniform(0.2, 1, mapping.image_size_px[::-1]).astype(np.float32) for mapping in mappings]
     with instruction_set(isa):

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from processing.reconstruction.choices import VoxelType
 from processing.reconstruction.slab_volume import SLAB_ROWS, SlabVolume
 from processing.reconstruction.volume_file import (
     VolumeFileError,
@@ -18,7 +19,6 @@ from processing.reconstruction.volume_file import (
     write_slabs,
     write_volume,
 )
-from processing.reconstruction.voxel_type import VoxelType
 from processing.volume import VoxelGrid
 
 GRID = VoxelGrid((5, 7, 11), (-1.0, 2.0, -3.5), 1 / 60)

@@ -11,11 +11,10 @@ from daq.files.run_file import add_references
 from processing.calibration.calibration import Verdict
 from processing.calibration.calibration_file import load_calibration
 from processing.calibration.errors import CalibrationError
-from processing.reconstruction.method import ReconstructionMethod
+from processing.reconstruction.choices import ReconstructionMethod, VoxelType
 from processing.reconstruction.planning.planned_view import PlannedView
 from processing.reconstruction.settings import GridSettings, ReconstructionSettings
 from processing.reconstruction.volume_file import VolumeFileError, open_volume, read_volume
-from processing.reconstruction.voxel_type import VoxelType
 from processing.runs.errors import PipelineError
 from processing.runs.pipeline import ShotResult, Stopped, default_grid, reconstruct_shot, shot_intensities
 from processing.runs.results_file import average_volumes, volume_files, volume_path

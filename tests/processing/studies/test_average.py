@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from processing.reconstruction.method import ReconstructionMethod
+from processing.reconstruction.choices import ReconstructionMethod
 from processing.studies.average import (
     AverageStudy,
     MeanSlices,

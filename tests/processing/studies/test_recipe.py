@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from processing.reconstruction.method import ReconstructionMethod
+from processing.reconstruction.choices import ReconstructionMethod
 from processing.reconstruction.planning.plan import plan_reconstruction
 from processing.reconstruction.smart import mart, smart
 from processing.studies.recipe import ALL_RECIPES, Recipe, reconstruct_each

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from processing.calibration.calibration_file import load_calibration
-from processing.reconstruction.method import ReconstructionMethod
+from processing.reconstruction.choices import ReconstructionMethod
 from processing.reconstruction.settings import GridSettings, ReconstructionSettings
 from processing.runs.errors import PipelineError
 from server.cli.main import main

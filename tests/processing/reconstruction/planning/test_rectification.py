@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from processing.geometry import ViewMapping
 from processing.kernels import _native
-from processing.reconstruction.accuracy import Accuracy
+from processing.reconstruction.choices import Accuracy
 from processing.reconstruction.planning.node_view import FRAME_AFTER_PX, FRAME_BEFORE_PX, NodeView, sample_mapping
 from processing.reconstruction.planning.plan import MAX_DEVIATION_PX, plan_view
 from processing.reconstruction.planning.rectified_view import RectifiedView

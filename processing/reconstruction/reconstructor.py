@@ -1,4 +1,4 @@
-"""Workbench: what the exposures of a run share, so that each reconstruction finds its memory warm."""
+"""Reconstructor: what the exposures of a run share, so that each reconstruction finds its memory warm."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from processing.kernels import DEFAULT_THREADS
 from processing.preprocessing import Intensity
 from processing.reconstruction.block_slabs import slabs_of_blocks
-from processing.reconstruction.method import ReconstructionMethod
+from processing.reconstruction.choices import ReconstructionMethod
 from processing.reconstruction.planning.plan import Plan
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.reconstruction.slab_volume import SLAB_ROWS, SlabVolume
@@ -19,7 +19,7 @@ from processing.reconstruction.sparse_line_of_sight import slabs_of_sight
 
 
 @dataclass(eq=False)
-class Workbench:
+class Reconstructor:
     """A plan with the memory that reconstructions by it use again: fresh memory costs more than they do.
 
     It serves one exposure at a time.
@@ -49,8 +49,8 @@ class Workbench:
     _refined: SmartResult | None = field(default=None, init=False, repr=False)
 
     @classmethod
-    def of(cls, plan: Plan, settings: ReconstructionSettings, threads: int = DEFAULT_THREADS) -> "Workbench":
-        """A workbench with all its memory."""
+    def of(cls, plan: Plan, settings: ReconstructionSettings, threads: int = DEFAULT_THREADS) -> "Reconstructor":
+        """A reconstructor with all its memory."""
         nz, ny, nx = plan.grid.shape
         return cls(
             plan,

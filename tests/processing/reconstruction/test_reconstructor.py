@@ -1,17 +1,16 @@
-"""Workbenches: slabs of any type are the volume that each method makes, exposure after exposure in the same memory."""
+"""Reconstructors: slabs of any type are the volume of each method, exposure after exposure in the same memory."""
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from processing.reconstruction.choices import ReconstructionMethod, VoxelType
 from processing.reconstruction.line_of_sight import line_of_sight
-from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.planning.plan import Plan, plan_reconstruction
+from processing.reconstruction.reconstructor import Reconstructor
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.reconstruction.slab_volume import SLAB_ROWS
 from processing.reconstruction.smart import mart, smart
-from processing.reconstruction.voxel_type import VoxelType
-from processing.reconstruction.workbench import Workbench
 from processing.volume import VoxelGrid
 from tests.support import oracle
 
@@ -31,13 +30,13 @@ def exposure(plan: Plan, seed: int) -> Images:
     return [np.where(rng.random(shape) < 0.7, rng.random(shape), 0).astype(np.float32) for shape in shapes]
 
 
-def bench_of(plan: Plan, method: ReconstructionMethod, voxels: VoxelType) -> Workbench:
-    return Workbench.of(plan, ReconstructionSettings(method=method, voxels=voxels, iterations=2))
+def reconstructor_of(plan: Plan, method: ReconstructionMethod, voxels: VoxelType) -> Reconstructor:
+    return Reconstructor.of(plan, ReconstructionSettings(method=method, voxels=voxels, iterations=2))
 
 
-def volume_of(bench: Workbench, images: Images) -> tuple[NDArray[np.float32], float]:
+def volume_of(reconstructor: Reconstructor, images: Images) -> tuple[NDArray[np.float32], float]:
     """The whole volume, and its unit."""
-    volume, _ = bench.reconstruct(images)
+    volume, _ = reconstructor.reconstruct(images)
     return np.concatenate([slab for _, slab in volume.intensities()], axis=1), volume.unit
 
 
@@ -51,10 +50,10 @@ def expected_of(plan: Plan, method: ReconstructionMethod, images: Images) -> NDA
 @pytest.mark.parametrize("voxels", VoxelType)
 @pytest.mark.parametrize("method", ReconstructionMethod)
 def test_slabs_are_the_volume(plan: Plan, method: ReconstructionMethod, voxels: VoxelType) -> None:
-    bench = bench_of(plan, method, voxels)
+    reconstructor = reconstructor_of(plan, method, voxels)
     for seed in (1, 2, 1):
         images = exposure(plan, seed)
-        volume, unit = volume_of(bench, images)
+        volume, unit = volume_of(reconstructor, images)
         expected = expected_of(plan, method, images)
         assert expected.max() > 0.1
         if voxels is VoxelType.FLOAT32:
@@ -72,9 +71,9 @@ def test_any_number_of_threads_gives_the_same_bits(plan: Plan, method: Reconstru
     settings = ReconstructionSettings(method=method, voxels=voxels, iterations=2)
     volumes = []
     for threads in (1, 2, 7, 40):
-        bench = Workbench.of(plan, settings, threads)
-        assert bench.threads == threads
-        volumes.append(volume_of(bench, exposure(plan, 1))[0])
+        reconstructor = Reconstructor.of(plan, settings, threads)
+        assert reconstructor.threads == threads
+        volumes.append(volume_of(reconstructor, exposure(plan, 1))[0])
     for volume in volumes[1:]:
         np.testing.assert_array_equal(volume, volumes[0])
 
@@ -82,25 +81,25 @@ def test_any_number_of_threads_gives_the_same_bits(plan: Plan, method: Reconstru
 @pytest.mark.parametrize("voxels", VoxelType)
 def test_an_empty_exposure_is_an_empty_volume(plan: Plan, voxels: VoxelType) -> None:
     for method in (ReconstructionMethod.MLOS, ReconstructionMethod.SMART):
-        bench = bench_of(plan, method, voxels)
-        volume_of(bench, exposure(plan, 1))
-        volume, unit = volume_of(bench, [np.zeros(view.image_size_px[::-1], np.float32) for view in plan.views])
+        reconstructor = reconstructor_of(plan, method, voxels)
+        volume_of(reconstructor, exposure(plan, 1))
+        volume, unit = volume_of(reconstructor, [np.zeros(view.image_size_px[::-1], np.float32) for view in plan.views])
         assert unit > 0
         assert not volume.any()
 
 
 @pytest.mark.parametrize("method", [ReconstructionMethod.MLOS, ReconstructionMethod.SMART])
 def test_one_slab_of_memory_is_enough(plan: Plan, method: ReconstructionMethod) -> None:
-    bench = bench_of(plan, method, VoxelType.FLOAT16)
-    assert bench.memory.nbytes == 9 * SLAB_ROWS * 37 * 2
-    volume, _ = bench.reconstruct(exposure(plan, 1))
-    assert all(np.shares_memory(slab, bench.memory) for _, slab in volume.slabs)
+    reconstructor = reconstructor_of(plan, method, VoxelType.FLOAT16)
+    assert reconstructor.memory.nbytes == 9 * SLAB_ROWS * 37 * 2
+    volume, _ = reconstructor.reconstruct(exposure(plan, 1))
+    assert all(np.shares_memory(slab, reconstructor.memory) for _, slab in volume.slabs)
 
 
 @pytest.mark.parametrize("method", [ReconstructionMethod.SMART, ReconstructionMethod.MART])
 def test_the_next_exposure_takes_the_memory_of_the_blocks(plan: Plan, method: ReconstructionMethod) -> None:
-    bench = bench_of(plan, method, VoxelType.FLOAT32)
-    earlier, _ = bench.reconstruct(exposure(plan, 1))
-    volume, _ = volume_of(bench, exposure(plan, 2))
+    reconstructor = reconstructor_of(plan, method, VoxelType.FLOAT32)
+    earlier, _ = reconstructor.reconstruct(exposure(plan, 1))
+    volume, _ = volume_of(reconstructor, exposure(plan, 2))
     assert volume.any()
     assert not any(slab.any() for _, slab in earlier.slabs)

@@ -1,12 +1,12 @@
-"""The exact way: nodes of every spacing and mappings of every kind equal the textbook, on every instruction set."""
+"""The sampled way: nodes of every spacing and mappings of every kind equal the textbook, on every instruction set."""
 
 import numpy as np
 import pytest
 
 from processing.geometry import PinholeCamera, ViewMapping, view_camera
 from processing.kernels import _native
+from processing.reconstruction.choices import ReconstructionMethod
 from processing.reconstruction.line_of_sight import line_of_sight
-from processing.reconstruction.method import ReconstructionMethod
 from processing.reconstruction.planning.node_view import NodeView, sample_mapping
 from processing.reconstruction.planning.plan import MAX_DEVIATION_PX, Plan, plan_view
 from processing.volume import VoxelGrid
@@ -48,7 +48,7 @@ def noise(mappings: list[ViewMapping]) -> Images:
     return [rng.uniform(0.1, 1, mapping.image_size_px[::-1]).astype(np.float32) for mapping in mappings]
 
 
-def exact_plan(mappings: list[ViewMapping]) -> Plan:
+def sampled_plan(mappings: list[ViewMapping]) -> Plan:
     return Plan(GRID, tuple(sample_mapping(mapping, GRID, MAX_DEVIATION_PX) for mapping in mappings))
 
 
@@ -59,7 +59,7 @@ def test_nodes_of_every_spacing(isa: str, spacing: int, roll_deg: float, method:
     mappings: list[ViewMapping] = [
         Bent(camera, wavelength_mm=WAVELENGTH_MM[spacing]) for camera in cameras(4, roll_deg)
     ]
-    plan, images = exact_plan(mappings), noise(mappings)
+    plan, images = sampled_plan(mappings), noise(mappings)
     assert {view.spacing for view in plan.views if isinstance(view, NodeView)} == {spacing}
     assert_all_inside(plan)
     assert_equals_textbook(line_of_sight(plan, images, method), plan, images, method)
@@ -79,14 +79,14 @@ def assert_all_inside(plan: Plan) -> None:
 @pytest.mark.parametrize("kind", [Kind.TILTED, Kind.POLYNOMIAL])
 def test_mappings_of_every_kind(isa: str, kind: Kind, roll_deg: float, method: ReconstructionMethod) -> None:
     mappings = [kind.of(camera) for camera in cameras(3, roll_deg)]
-    plan, images = exact_plan(mappings), noise(mappings)
+    plan, images = sampled_plan(mappings), noise(mappings)
     assert_equals_textbook(line_of_sight(plan, images, method), plan, images, method)
 
 
 @pytest.mark.parametrize("kind", [Kind.TILTED, Kind.POLYNOMIAL])
 def test_plans_of_every_kind_see_what_the_mapping_sees(kind: Kind) -> None:
     mappings = [kind.of(camera) for camera in cameras(3, 10.0)]
-    for mapping, view in zip(mappings, exact_plan(mappings).views, strict=True):
+    for mapping, view in zip(mappings, sampled_plan(mappings).views, strict=True):
         u, v = oracle.planned_positions(view, GRID)
         expected_u, expected_v = oracle.seen_by(mapping, GRID)
         assert np.hypot(u - 1 - expected_u, v - 1 - expected_v).max() < 1.1 * view.deviation_px + 1e-4
