@@ -11,10 +11,9 @@ from typing import Literal
 import numpy as np
 
 from processing.benchmarks.scene import SpeedStudy, sparse_images, spray_images, study_cameras
-from processing.reconstruction.line_of_sight import line_of_sight
+from processing.reconstruction.line_of_sight import line_of_sight, slabs_of_sight
 from processing.reconstruction.planning.plan import plan_reconstruction
 from processing.reconstruction.smart import smart
-from processing.reconstruction.sparse_line_of_sight import slabs_of_sight
 
 Work = Literal["volume", "slabs", "smart"]
 DEADLINE_S = 300.0

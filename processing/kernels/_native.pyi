@@ -43,9 +43,6 @@ def line_of_sight(
     first_row: int = 0,
     grid_rows: int = 0,
 ) -> None: ...
-def sparse_sight(
-    views: Sequence[View], method: int, shape: tuple[int, int, int], floor: float, threads: int
-) -> tuple[NDArray[np.int32], NDArray[np.uint16]]: ...
 def sum_of_sight(
     exposures: Sequence[Sequence[View]], method: int, volume: NDArray[np.float32], threads: int
 ) -> None: ...

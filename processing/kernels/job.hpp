@@ -72,17 +72,6 @@ struct LineOfSight {
     void *volume;
 };
 
-// The same, but only blocks of which a voxel exceeds `floor` are kept, in float16: values are (sight_rows, block_columns),
-// zero beyond the volume.
-struct SparseSight {
-    const View *views;
-    int n_views;
-    Shape shape;
-    Method method;
-    float floor;
-};
-using KeepBrick = void (*)(void *owner, int z, int x0, const uint16_t *values);
-
 // The sum of many exposures of the same views, which share their geometry: views[exposure * n_views + i].
 struct SumOfSight {
     const View *views;
@@ -175,7 +164,6 @@ struct Resampling {
 struct Kernels {
     const char *name;
     void (*line_of_sight)(const LineOfSight &job, int slab);
-    void (*sparse_sight)(const SparseSight &job, int slab, KeepBrick keep, void *owner);
     void (*sum_of_sight)(const SumOfSight &job, int slab);
     void (*smart_start)(const SmartStart &job, int slab, const NewBlocks &blocks);
     void (*smart_pass)(const SmartPass &job, int slab, const BlockList &blocks, const Projection *projections);

@@ -9,13 +9,12 @@ from numpy.typing import NDArray
 
 from processing.kernels import DEFAULT_THREADS
 from processing.preprocessing import Intensity
-from processing.reconstruction.block_slabs import slabs_of_blocks
 from processing.reconstruction.choices import ReconstructionMethod
+from processing.reconstruction.line_of_sight import slabs_of_sight
 from processing.reconstruction.planning.plan import Plan
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.reconstruction.slab_volume import SLAB_ROWS, SlabVolume
 from processing.reconstruction.smart import SmartResult, mart, smart
-from processing.reconstruction.sparse_line_of_sight import slabs_of_sight
 
 
 @dataclass(eq=False)
@@ -97,4 +96,4 @@ class Reconstructor:
             threads=self.threads,
         )
         self._refined = result
-        return slabs_of_blocks(result.blocks, self.settings.voxels, self.memory, self.threads), result.residuals
+        return result.sparse.slabs(self.settings.voxels, self.memory, self.threads), result.residuals

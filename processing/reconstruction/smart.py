@@ -8,10 +8,11 @@ from typing import Any, TypedDict, Unpack
 import numpy as np
 from numpy.typing import NDArray
 
-from processing.kernels import DEFAULT_THREADS, _native
+from processing.kernels import DEFAULT_THREADS
 from processing.reconstruction.line_of_sight import check_volume
 from processing.reconstruction.planning.plan import Plan
 from processing.reconstruction.smart_state import FirstGuess, SmartState
+from processing.reconstruction.sparse_volume import SparseVolume
 
 Volume = NDArray[np.float32]
 Pixels = NDArray[np.float32]
@@ -38,8 +39,8 @@ class SmartOptions(TypedDict, total=False):
     out : (z, y, x) float32 or float16 array
         Receives the volume. Without it only the blocks that are not empty are in memory until somebody asks for more.
     memory : SmartResult, optional
-        An earlier result that nobody needs any more: its blocks lose their voxels and lend their memory, because fresh
-        memory costs as much time as some iterations.
+        An earlier result that nobody needs any more: it loses its voxels and lends its memory, because fresh memory
+        costs as much time as some iterations.
     threads : int
         The result does not depend on it.
     """
@@ -60,27 +61,22 @@ class SmartResult:
 
     Parameters
     ----------
-    blocks : Blocks
-        The volume where it is not empty, as fine as float16: ``blocks.nbytes`` of memory; ``blocks.write`` makes it
-        dense.
+    sparse : SparseVolume
+        The volume where it is not empty.
     residuals : tuple of float
         Norm of projections minus images over norm of the images: of the scaled start, then after every iteration.
     out : (z, y, x) array, optional
         The volume, where the caller wanted it to be.
     """
 
-    blocks: _native.Blocks
+    sparse: SparseVolume
     residuals: tuple[float, ...]
     out: Output | None = None
 
     @cached_property
     def volume(self) -> Output:
         """Intensities (z, y, x), ``out`` or float32; their sum along a line of sight is the intensity of the image."""
-        if self.out is not None:
-            return self.out
-        volume = np.empty(self.blocks.shape, np.float32)
-        self.blocks.write(volume, DEFAULT_THREADS)
-        return volume
+        return self.sparse.dense() if self.out is None else self.out
 
 
 def smart(plan: Plan, images: Sequence[Pixels], **options: Unpack[SmartOptions]) -> SmartResult:
@@ -146,7 +142,7 @@ def _run(
     if out is not None:
         check_volume(out, plan, (np.float32, np.float16))
     memory = options.get("memory")
-    start = FirstGuess(options.get("start"), memory.blocks if memory else None)
+    start = FirstGuess(options.get("start"), memory.sparse if memory else None)
     state = SmartState(plan, images, start, relaxation * share, threads)
     residuals = [state.residual]
     for done in range(1, iterations + 1):
@@ -157,5 +153,5 @@ def _run(
         if least_gain and residuals[-1] > (1 - least_gain) * residuals[-2]:
             break
     if out is not None:
-        state.blocks.write(out, threads)
-    return SmartResult(state.blocks, tuple(residuals), out)
+        state.volume.dense(out, threads=threads)
+    return SmartResult(state.volume, tuple(residuals), out)

@@ -10,11 +10,10 @@ from processing.kernels import _native
 from processing.reconstruction.line_of_sight import check_volume
 from processing.reconstruction.planning.fixed_point import FixedPoint
 from processing.reconstruction.planning.plan import Plan
+from processing.reconstruction.sparse_volume import SparseVolume
 
 Image = NDArray[np.float32]
 
-NEGLIGIBLE = 1e-8
-"""Blocks in which MLOS is nowhere brighter than this share of what it could be stay empty."""
 START_VIEWS = 4
 """The product of more views spans more than float16 does; the power 4 / n_views of it is as bright as that of four."""
 RATIO_COUNTS = 2048
@@ -30,16 +29,16 @@ class FirstGuess:
     ----------
     volume : (z, y, x) float32 array, optional
         MLOS by default; it is scaled to the sum of the images.
-    memory : Blocks, optional
-        They become empty, and the start uses their memory.
+    memory : SparseVolume, optional
+        It becomes empty and lends its memory.
     """
 
     volume: Image | None = None
-    memory: _native.Blocks | None = None
+    memory: SparseVolume | None = None
 
 
 class SmartState:
-    """Blocks of the volume that are not empty, its projections, and the ratio images that correct it.
+    """The volume where it is not empty, its projections, and the ratio images that correct it.
 
     Parameters
     ----------
@@ -58,7 +57,7 @@ class SmartState:
     def __init__(self, plan: Plan, images: Sequence[Image], start: FirstGuess, exponent: float, threads: int) -> None:
         self._exponent, self._threads = exponent, threads
         self._images = plan.resample(images, threads)
-        self.blocks = _first_guess(plan, self._images, start, threads)
+        self.volume = _first_guess(plan, self._images, start, threads)
         self._ratios = [np.zeros(image.pixels.shape, np.int16) for image in self._images]
         views = plan.bind([FixedPoint(ratio, 1 / RATIO_COUNTS) for ratio in self._ratios], cull=False)
         self._projections = _native.Projections(views, plan.grid.shape)
@@ -85,20 +84,20 @@ class SmartState:
 
     def _project(self, update: Sequence[int], project: Sequence[int]) -> None:
         updated, projected = ([view in chosen for view in self.views] for chosen in (update, project))
-        self._projections.smart_pass(self.blocks, updated, projected, self._threads)
+        self._projections.smart_pass(self.volume.blocks, updated, projected, self._threads)
 
     def _match_scale(self) -> None:
-        projected = self.blocks.unit * sum(self._projections.sum(view) for view in self.views)
+        projected = self.volume.blocks.unit * sum(self._projections.sum(view) for view in self.views)
         recorded = sum(image.unit * float(image.pixels.sum(dtype=np.int64)) for image in self._images)
         if projected > 0 and recorded > 0:
-            self.blocks.scale(recorded / projected)
+            self.volume.blocks.scale(recorded / projected)
 
     def _correct(self, views: Sequence[int]) -> None:
         for view in views:
             image, ratio = self._images[view], self._ratios[view]
             self._missed[view] = self._projections.correct(
                 view,
-                self.blocks.unit,
+                self.volume.blocks.unit,
                 image.pixels,
                 image.unit,
                 exponent=self._exponent,
@@ -113,15 +112,13 @@ def _energy(image: FixedPoint) -> float:
     return image.unit**2 * sum(rows)
 
 
-def _first_guess(plan: Plan, resampled: Sequence[FixedPoint], start: FirstGuess, threads: int) -> _native.Blocks:
-    volume, memory = start.volume, start.memory
+def _first_guess(plan: Plan, resampled: Sequence[FixedPoint], start: FirstGuess, threads: int) -> SparseVolume:
+    volume = start.volume
     if volume is None:
         exponent = min(1.0, START_VIEWS / len(resampled))
-        most = float(np.prod([image.brightest for image in resampled])) ** exponent
-        views = plan.bind(resampled)
-        return _native.Blocks.of_views(views, plan.grid.shape, exponent, NEGLIGIBLE * most, most, threads, memory)
+        return SparseVolume.of_sight(plan, resampled, exponent, threads=threads, memory=start.memory)
     check_volume(volume, plan, (np.float32,))
     least, most = float(volume.min()), float(volume.max())
     if not (least >= 0 and np.isfinite(most)):
         raise ValueError(f"start must not be negative and finite, its values are {least} to {most}")
-    return _native.Blocks.of_volume(volume, most, threads, memory)
+    return SparseVolume.of(volume, threads=threads, memory=start.memory)

@@ -1,75 +1,126 @@
-"""SparseVolume: a volume that is stored where it is not empty."""
+"""SparseVolume: a volume that is stored where it is not empty, whether line of sight or SMART made it."""
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-BRICK_ROWS, BRICK_COLUMNS = 16, 32
-"""Voxels of a brick along y and x; it lies in one plane z."""
+from processing.kernels import DEFAULT_THREADS, _native
+from processing.reconstruction.choices import VoxelType
+from processing.reconstruction.planning.fixed_point import FixedPoint
+from processing.reconstruction.planning.plan import Plan
+from processing.reconstruction.slab_volume import SlabVolume, slabs_in
+
+NEGLIGIBLE = 1e-8
+"""Blocks in which MLOS is nowhere brighter than this share of what it could be stay empty."""
+SEARCH_ROWS = 16
+"""Rows in which the brightest voxel is looked for at a time."""
 
 
 @dataclass(frozen=True, eq=False)
 class SparseVolume:
-    """A volume as bricks, each in one plane; zero elsewhere.
+    """A volume in blocks of 8 x 32 voxels of one plane, as fine as float16; zero elsewhere.
 
     Parameters
     ----------
-    shape : tuple[int, int, int]
-        Of the whole volume, (nz, ny, nx).
-    positions : (n, 3) int32 array
-        Index (z, y, x) of the first voxel of every brick: multiples of 1, 16 and 32, no brick twice, in order of y.
-    values : (n, 16, 32) float16 array
-        Voxels (y, x) of every brick; zero beyond the volume.
+    blocks : Blocks
+        Where the kernels keep it.
     """
 
-    shape: tuple[int, int, int]
-    positions: NDArray[np.int32]
-    values: NDArray[np.float16]
+    blocks: _native.Blocks
+
+    @classmethod
+    def of_sight(
+        cls,
+        plan: Plan,
+        resampled: Sequence[FixedPoint],
+        exponent: float = 1.0,
+        *,
+        threads: int = DEFAULT_THREADS,
+        memory: "SparseVolume | None" = None,
+    ) -> "SparseVolume":
+        """MLOS, or a power of it.
+
+        Parameters
+        ----------
+        plan : Plan
+            Geometry of views and grid.
+        resampled : sequence of FixedPoint
+            What ``Plan.resample`` made of one image per view.
+        exponent : float
+            Of the product of what the views see.
+        threads : int
+            The result does not depend on it.
+        memory : SparseVolume, optional
+            It becomes empty and lends its memory.
+        """
+        most = float(np.prod([image.brightest for image in resampled])) ** exponent
+        views, spare = plan.bind(resampled), memory.blocks if memory else None
+        floor = NEGLIGIBLE * most
+        return cls(_native.Blocks.of_views(views, plan.grid.shape, exponent, floor, most, threads, spare))
+
+    @classmethod
+    def of(
+        cls, volume: NDArray[np.float32], *, threads: int = DEFAULT_THREADS, memory: "SparseVolume | None" = None
+    ) -> "SparseVolume":
+        """A volume (z, y, x) of float32, not negative; ``memory`` becomes empty and lends its memory."""
+        spare = memory.blocks if memory else None
+        return cls(_native.Blocks.of_volume(volume, float(volume.max()), threads, spare))
 
     @property
     def nbytes(self) -> int:
-        """Memory of the bricks."""
-        return self.positions.nbytes + self.values.nbytes
+        """Memory of the blocks."""
+        return self.blocks.nbytes
 
-    @property
-    def occupancy(self) -> float:
-        """Share of all bricks of the volume that is stored."""
-        nz, ny, nx = self.shape
-        return len(self.positions) / (nz * -(-ny // BRICK_ROWS) * -(-nx // BRICK_COLUMNS))
-
-    def dense(self, out: NDArray[Any] | None = None) -> NDArray[Any]:
-        """The whole volume, (nz, ny, nx).
+    def dense(self, out: NDArray[Any] | None = None, *, threads: int = DEFAULT_THREADS) -> NDArray[Any]:
+        """The whole volume.
 
         Parameters
         ----------
         out : (nz, ny, nx) float32, float16 or uint8 array, optional
-            Receives the volume; 255 is 1 where it is of bytes. By default a new float16 one.
+            Receives the volume; 255 is 1 where it is of bytes. By default a new float32 one.
+        threads : int
+            The result does not depend on it.
 
         Raises
         ------
         ValueError
             ``out`` has another shape.
         """
-        volume = np.empty(self.shape, np.float16) if out is None else out
-        if volume.shape != self.shape:
-            raise ValueError(f"volume has shape {volume.shape}, the bricks are of {self.shape}")
-        nz, ny, nx = self.shape
-        across = -(-nx // BRICK_COLUMNS)
-        slab = np.empty((nz, BRICK_ROWS, across, BRICK_COLUMNS), volume.dtype)
-        z, y, x = self.positions.T
-        for first_row in range(0, ny, BRICK_ROWS):
-            here = slice(*np.searchsorted(y, (first_row, first_row + BRICK_ROWS)))
-            slab.fill(0)
-            slab[z[here], :, x[here] // BRICK_COLUMNS] = _converted(self.values[here], volume.dtype)
-            rows = min(BRICK_ROWS, ny - first_row)
-            volume[:, first_row : first_row + rows] = slab[:, :rows].reshape(nz, rows, -1)[:, :, :nx]
+        volume = np.empty(self.blocks.shape, np.float32) if out is None else out
+        self.blocks.write(volume, threads)
         return volume
 
+    def slabs(self, voxels: VoxelType, out: NDArray[Any], threads: int = DEFAULT_THREADS) -> SlabVolume:
+        """The volume slab by slab; its scale changes where voxels are bytes.
 
-def _converted(values: NDArray[np.float16], dtype: np.dtype[Any]) -> NDArray[Any]:
-    counts: NDArray[Any] = values
-    if dtype == np.uint8:
-        counts = np.clip(values.astype(np.float32) * 255 + np.float32(0.5), 0, 255)
-    return counts.astype(dtype)
+        Parameters
+        ----------
+        voxels : VoxelType
+            Of the slabs; 255 is the brightest voxel where they are bytes.
+        out : (nz, rows, nx) array of that type
+            Receives one slab after the other; a multiple of 8 rows y, or all.
+        threads : int
+            The result does not depend on it.
+        """
+        unit = voxels.unit
+        if voxels is VoxelType.UINT8:
+            brightest = self._brightest(threads)
+            self.blocks.scale(1 / brightest)
+            unit *= brightest
+        return SlabVolume(self._written(out, threads), voxels, unit)
+
+    def _written(self, out: NDArray[Any], threads: int) -> Iterator[tuple[int, NDArray[Any]]]:
+        for first_row, slab in slabs_in(out, self.blocks.shape[1]):
+            self.blocks.write(slab, threads, first_row)
+            yield first_row, slab
+
+    def _brightest(self, threads: int) -> float:
+        """Largest voxel, or 1 where all are empty."""
+        nz, _, nx = self.blocks.shape
+        halves = np.empty((nz, SEARCH_ROWS, nx), np.float16)
+        # halves that are not negative are in the order of their bits, which numpy compares faster
+        bits = max(slab.view(np.int16).max() for _, slab in self._written(halves, threads))
+        return float(bits.view(np.float16)) or 1.0

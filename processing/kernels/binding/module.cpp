@@ -13,7 +13,6 @@
 
 #include "host/smart.hpp"
 #include "host/blocks.hpp"
-#include "host/bricks.hpp"
 #include "host/resample.hpp"
 #include "host/instruction_set.hpp"
 
@@ -166,31 +165,6 @@ void line_of_sight(const std::vector<const BoundView *> &bound, int method, cons
     const Kernels &kernels = selected_kernels();
     nb::gil_scoped_release release;
     run_line_of_sight(kernels, job, threads);
-}
-
-// Memory that numpy frees.
-template <class T, class... Size>
-nb::ndarray<nb::numpy, T> given_away(std::vector<T> &&values, Size... size) {
-    auto *owned = new std::vector<T>(std::move(values));
-    const nb::capsule owner(owned, [](void *memory) noexcept { delete static_cast<std::vector<T> *>(memory); });
-    return nb::ndarray<nb::numpy, T>(owned->data(), {static_cast<size_t>(size)...}, owner);
-}
-
-nb::tuple sparse_sight(const std::vector<const BoundView *> &bound, int method, std::tuple<int, int, int> size, float floor,
-                       int threads) {
-    const Shape shape{std::get<0>(size), std::get<1>(size), std::get<2>(size)};
-    require(shape.nz > 0 && shape.ny > 0 && shape.nx > 0, "volume: empty");
-    const auto views = views_on(bound, shape, threads);
-    const SparseSight job{views.data(), static_cast<int>(views.size()), shape, method_of(method), floor};
-    const Kernels &kernels = selected_kernels();
-    Bricks bricks;
-    {
-        nb::gil_scoped_release release;
-        bricks = bricks_of_sight(kernels, job, threads);
-    }
-    const size_t count = bricks.positions.size() / 3;
-    return nb::make_tuple(given_away(std::move(bricks.positions), count, 3),
-                          given_away(std::move(bricks.values), count, sight_rows, block_columns));
 }
 
 void sum_of_sight(const std::vector<std::vector<const BoundView *>> &exposures, int method, const FloatVolume &volume,
@@ -389,7 +363,6 @@ NB_MODULE(_native, module) {
     module.def("sliding_minimum", &sliding_minimum_of, "image"_a, "window"_a, "out"_a.noconvert(), "threads"_a);
     module.def("line_of_sight", &line_of_sight, "views"_a, "method"_a, "volume"_a, "threads"_a,
                "first_row"_a = 0, "grid_rows"_a = 0);
-    module.def("sparse_sight", &sparse_sight, "views"_a, "method"_a, "shape"_a, "floor"_a, "threads"_a);
     module.def("sum_of_sight", &sum_of_sight, "exposures"_a, "method"_a, "volume"_a, "threads"_a);
     nb::class_<Blocks>(module, "Blocks")
         .def_static("of_views", &blocks_of_views, "views"_a, "shape"_a, "exponent"_a, "floor"_a, "most"_a,

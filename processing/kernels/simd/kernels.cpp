@@ -48,41 +48,6 @@ void line_of_sight(const LineOfSight &job, int slab) {
     finish_streams();
 }
 
-inline bool any_above(const Block &block, const Tile &tile, int columns, float floor) {
-    int32_t any = 0;
-    for (int row = 0; row < tile.rows; ++row)
-        for (int k = 0; k < columns; ++k) any |= block.rows[row][k] > floor;
-    return any != 0;
-}
-
-void sparse_sight(const SparseSight &job, int slab, KeepBrick keep, void *owner) {
-    const FlushSubnormals flush;
-    const int nx = job.shape.nx, y0 = slab * sight_rows, rows = smaller(sight_rows, job.shape.ny - y0);
-    const Exposures exposure{job.views, job.n_views, 1, job.method};
-    PlaneStack planes(job.views, job.n_views, nx, y0, rows);
-    const Seen seen(planes.depth(), nx);
-    Block block;
-    const auto take = [&](int row, const Floats (&values)[parts]) { block.set(row, values); };
-    alignas(64) uint16_t brick[sight_rows * block_columns];
-    for (int z0 = 0; z0 < job.shape.nz; z0 += planes.depth()) {
-        const int z_end = smaller(z0 + planes.depth(), job.shape.nz);
-        planes.set(z0, z_end);
-        for (int z = z0; z < z_end; ++z) seen.look(exposure, planes.plane(z - z0), z - z0, {z, y0, rows, 0}, nx);
-        for (int x0 = 0; x0 < nx; x0 += block_columns)
-            for (int z = z0; z < z_end; ++z) {
-                const Tile tile{z, y0, rows, x0};
-                const int columns = smaller(block_columns, nx - x0);
-                const uint32_t exposures = seen.exposures(z - z0, x0);
-                if (!exposures) continue;
-                see(exposure, exposures, planes.plane(z - z0), tile, take);
-                if (!any_above(block, tile, columns, job.floor)) continue;
-                std::memset(brick, 0, sizeof brick);
-                for (int row = 0; row < rows; ++row) store_halves(brick + row * block_columns, block.rows[row], columns);
-                keep(owner, z, x0, brick);
-            }
-    }
-}
-
 inline void add_to_volume(const SumOfSight &job, const Tile &tile, const Block &sum) {
     for (int row = 0; row < tile.rows; ++row) {
         float *voxels = job.volume + (static_cast<int64_t>(tile.z) * job.shape.ny + tile.y0 + row) * job.shape.nx + tile.x0;
@@ -139,7 +104,7 @@ void sum_of_sight(const SumOfSight &job, int slab) {
 
 extern const Kernels kernels;
 const Kernels kernels{
-    TOMOSHADOW_TEXT(TOMOSHADOW_ISA), line_of_sight, sparse_sight, sum_of_sight, smart_start, smart_pass, write_blocks, correct,
+    TOMOSHADOW_TEXT(TOMOSHADOW_ISA), line_of_sight, sum_of_sight, smart_start, smart_pass, write_blocks, correct,
     resample, brightest, quantise, find_filled, row_minima, column_minima, row_means, subtract_veil};
 
 }  // namespace tomoshadow::TOMOSHADOW_ISA

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from processing.kernels import _native
 from processing.reconstruction.line_of_sight import line_of_sight
 from processing.reconstruction.planning.plan import Plan, plan_reconstruction
-from processing.reconstruction.sparse_line_of_sight import sparse_line_of_sight
+from processing.reconstruction.sparse_volume import SparseVolume
 from processing.volume import VoxelGrid
 from tests.support import oracle
 from tests.support.sight_cases import PITCH_MM, sampled_densely
@@ -76,14 +76,12 @@ def test_projections_and_blocks_outlive_their_views(plan: Plan) -> None:
     assert rubbish
 
 
-def test_bricks_outlive_the_volume_they_came_from(plan: Plan) -> None:
-    bricks = sparse_line_of_sight(plan, images())
-    expected = bricks.positions.copy(), bricks.values.copy()
-    positions, part = bricks.positions, bricks.values[1:, 3]
-    del bricks
+def test_a_sparse_volume_outlives_what_it_came_from(plan: Plan) -> None:
+    expected = SparseVolume.of_sight(plan, plan.resample(images())).dense()
+    volume = SparseVolume.of_sight(plan, plan.resample(images()))
     rubbish = churn()
-    np.testing.assert_array_equal(positions, expected[0])
-    np.testing.assert_array_equal(part, expected[1][1:, 3])
+    np.testing.assert_array_equal(volume.dense(), expected)
+    assert expected.any()
     assert rubbish
 
 

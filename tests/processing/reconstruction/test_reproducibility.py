@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from processing.kernels import _native
 from processing.reconstruction.choices import Accuracy, ReconstructionMethod
-from processing.reconstruction.line_of_sight import line_of_sight
+from processing.reconstruction.line_of_sight import line_of_sight, slabs_of_sight
 from processing.reconstruction.mean_line_of_sight import mean_line_of_sight
 from processing.reconstruction.planning.node_view import sample_mapping
 from processing.reconstruction.planning.plan import MAX_DEVIATION_PX, Plan, plan_reconstruction
 from processing.reconstruction.smart import mart, smart
-from processing.reconstruction.sparse_line_of_sight import slabs_of_sight, sparse_line_of_sight
+from processing.reconstruction.sparse_volume import SparseVolume
 from processing.volume import VoxelGrid
 from tests.support import oracle
 from tests.support.sight_cases import PITCH_MM, Images
@@ -60,13 +60,16 @@ def test_volumes(isa: str, plan: Plan, images: Images, method: ReconstructionMet
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_bricks_and_slabs(isa: str, plan: Plan, images: Images, method: ReconstructionMethod) -> None:
-    def bricks(threads: int) -> Arrays:
-        volume = sparse_line_of_sight(plan, images, method, floor=0.4, threads=threads)
-        return volume.positions, volume.values
-
-    assert_same_bits(bricks)
+def test_slabs(isa: str, plan: Plan, images: Images, method: ReconstructionMethod) -> None:
     assert_same_bits(lambda threads: [slab for _, slab in slabs_of_sight(plan, images, method, threads=threads)])
+
+
+def test_sparse_volumes(isa: str, plan: Plan, images: Images) -> None:
+    def blocks(threads: int) -> Arrays:
+        volume = SparseVolume.of_sight(plan, plan.resample(images), threads=threads)
+        return np.array(volume.nbytes), volume.dense(threads=threads)
+
+    assert_same_bits(blocks)
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -192,7 +192,7 @@ def test_an_earlier_result_lends_its_memory_and_nothing_else() -> None:
     again = smart(plan, fewer, iterations=2, memory=earlier)
     np.testing.assert_array_equal(again.volume, fresh.volume)
     assert again.residuals == fresh.residuals
-    assert earlier.blocks.count == 0
+    assert earlier.sparse.nbytes == 0
     assert not earlier.volume.any()
 
 

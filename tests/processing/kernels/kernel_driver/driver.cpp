@@ -6,7 +6,6 @@
 
 #include "host/smart.hpp"
 #include "host/blocks.hpp"
-#include "host/bricks.hpp"
 #include "host/preprocess.hpp"
 #include "host/resample.hpp"
 #include "host/instruction_set.hpp"
@@ -126,9 +125,7 @@ void look(const Kernels &kernels, int number) {
     std::vector<View> exposures;
     for (int e = 0; e < 5; ++e) exposures.insert(exposures.end(), scene.views.begin(), scene.views.end());
     run_sum_of_sight(kernels, {exposures.data(), n_views, 5, shape, method, sum.get()}, 2);
-    const Bricks bricks = bricks_of_sight(kernels, {scene.views.data(), n_views, shape, method, 0.0f}, 2);
     std::printf("sight %d %.6f %.6f\n", number, sum_of(volume.get(), voxels(shape)), sum_of(sum.get(), voxels(shape)));
-    if (bricks.positions.size() > 3 * voxels(shape)) std::abort();
 }
 
 // Two iterations, from MLOS or from a volume.
