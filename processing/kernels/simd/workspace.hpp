@@ -57,10 +57,11 @@ inline Extent extent_of(const PlaneTaps &taps, int channel, const Tile &tile, in
 
 // Where all views see the rows of a slab, in a few planes at once: kernels go through the planes of a column of blocks,
 // because neighbouring planes see almost the same pixels. Mappings by nodes need much memory for each plane, and get fewer.
+// What happens once per stack is not inline, so that compilers inline what happens for every block.
 class PlaneStack {
 public:
     static constexpr int rectified_depth = 8, mapped_depth = 4;
-    PlaneStack(const View *views, int n_views, int nx, int y0, int rows)
+    [[gnu::noinline]] PlaneStack(const View *views, int n_views, int nx, int y0, int rows)
         : views_(views),
           n_views_(n_views),
           y0_(y0),
@@ -81,7 +82,7 @@ public:
         }
     }
     int depth() const { return depth_; }
-    void set(int z0, int z_end) {
+    [[gnu::noinline]] void set(int z0, int z_end) {
         for (int z = z0; z < z_end; ++z)
             for (int i = 0; i < n_views_; ++i)
                 set_plane(views_[i], z, y0_, rows_, taps_.as<PlaneTaps>()[(z - z0) * n_views_ + i]);
