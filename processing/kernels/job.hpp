@@ -3,8 +3,6 @@
 
 #include <cstdint>
 
-#include "host/preprocess.hpp"
-
 namespace tomoshadow {
 
 // Volumes are (z, y, x), images (row, column), both contiguous.
@@ -16,6 +14,18 @@ struct Shape {
 constexpr int block_columns = 32;
 constexpr int sight_rows = 16;  // rows of a slab for line of sight ...
 constexpr int smart_rows = 8;   // ... and for SMART, whose blocks come and go with the droplets
+
+constexpr int max_views = 8;
+
+// Pixels per voxel of a rectified view, and voxels per pixel, which the windows of all instruction sets have room for.
+constexpr double max_scale = 1.8;
+
+// Columns that a rectified image has from the one on in which the last voxel of a block is seen, which the widest vectors
+// may read, and rows from that of the last voxel on.
+constexpr int overhang_columns = 36, overhang_rows = 4;
+
+// Voxels from node to node of a mapping that is sampled at nodes.
+constexpr int node_spacings[] = {16, 8, 4, 2};
 
 // SMART works through a slab tile by tile: what the views see of a tile stays in the nearest cache for all its planes.
 constexpr int smart_planes = 16, smart_columns = 256;
@@ -114,7 +124,7 @@ struct NewBlocks {
 
 // Find the blocks that exceed `floor` somewhere, in a volume or, where that is null, in a power of the product of what
 // views see. They are stored times `gain`.
-struct SmartStart {
+struct BlockSearch {
     const View *views;
     int n_views;
     const float *volume;
@@ -161,13 +171,29 @@ struct Resampling {
     int columns;  // of `to`, a multiple of node_spacing
 };
 
+// A recorded exposure, all arrays contiguous and of the same shape. Its light is what it recorded less the dark image:
+// divided by that of the background and inverted, or, without one, by the full scale.
+struct Exposure {
+    enum class Grey { byte, word, single };  // uint8, uint16, float32
+    const void *pixels;
+    Grey grey;
+    int rows, columns;
+    const float *dark, *background;  // or null
+    float full_scale;
+    int window;         // edge of the sliding minimum in pixels; 0: none
+    float noise_floor;  // of the intensity
+    float *intensity;   // the result; meanwhile minima and their means
+};
+
+constexpr int strip_columns = 64;  // columns that are worked on at once
+
 struct Kernels {
     const char *name;
     void (*line_of_sight)(const LineOfSight &job, int slab);
     void (*sum_of_sight)(const SumOfSight &job, int slab);
-    void (*smart_start)(const SmartStart &job, int slab, const NewBlocks &blocks);
-    void (*smart_pass)(const SmartPass &job, int slab, const BlockList &blocks, const Projection *projections);
+    void (*find_blocks)(const BlockSearch &job, int slab, const NewBlocks &blocks);
     void (*write_blocks)(const Shape &shape, int slab, const BlockList &blocks, float unit, Format format, void *volume);
+    void (*smart_pass)(const SmartPass &job, int slab, const BlockList &blocks, const Projection *projections);
     double (*correct)(const Correction &job, int row);  // returns the sum of (projected - recorded)^2
     void (*resample)(const Resampling &job, int first_row, int end_row);
     float (*brightest)(const float *pixels, int count);

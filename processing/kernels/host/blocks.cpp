@@ -1,10 +1,11 @@
 #include "host/blocks.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <new>
 #include <utility>
+
+#include "host/parallel.hpp"
 
 namespace tomoshadow {
 
@@ -42,16 +43,16 @@ std::vector<Blocks::Slab> Blocks::slabs_in(Blocks *memory, int count) {
     return slabs;
 }
 
-Blocks::Blocks(const Kernels &kernels, const SmartStart &start, float most, int threads, Blocks *memory)
+Blocks::Blocks(const Kernels &kernels, const BlockSearch &start, float most, int threads, Blocks *memory)
     : shape_(start.shape), unit_(unit_for(most)), slabs_(slabs_in(memory, (start.shape.ny + smart_rows - 1) / smart_rows)) {
-    SmartStart job = start;
+    BlockSearch job = start;
     job.gain = 1.0f / unit_;
-    for_each(static_cast<int>(slabs_.size()), threads, [&](int slab) { kernels.smart_start(job, slab, slabs_[slab].growing()); });
+    for_each(static_cast<int>(slabs_.size()), threads, [&](int slab) { kernels.find_blocks(job, slab, slabs_[slab].growing()); });
 }
 
 Blocks Blocks::of_views(const Kernels &kernels, const std::vector<View> &views, const Shape &shape,
                         float exponent, float floor, float most, int threads, Blocks *memory) {
-    const SmartStart start{views.data(), static_cast<int>(views.size()), nullptr, shape, exponent, floor, 0.0f};
+    const BlockSearch start{views.data(), static_cast<int>(views.size()), nullptr, shape, exponent, floor, 0.0f};
     return {kernels, start, most, threads, memory};
 }
 
@@ -60,21 +61,10 @@ Blocks Blocks::of_volume(const Kernels &kernels, const float *volume, const Shap
     return {kernels, {nullptr, 0, volume, shape, 1.0f, 0.0f, 0.0f}, most, threads, memory};
 }
 
-void Blocks::pass(const Kernels &kernels, const std::vector<View> &views, const std::vector<bool> &update,
-                  const std::vector<bool> &project, BandImages &images, int threads) {
-    const auto first = std::find(update.begin(), update.end(), true), end = std::find(first, update.end(), false);
-    const SmartPass job{views.data(), static_cast<int>(views.size()), static_cast<int>(first - update.begin()),
-                        static_cast<int>(end - first), gain_, shape_};
-    images.project(project, threads, [&](int slab, const Projection *projections) {
-        kernels.smart_pass(job, slab, slabs_[slab].list(), projections);
-    });
-    if (job.n_updates) gain_ = 1.0f;
-}
-
 void Blocks::write(const Kernels &kernels, Format format, void *volume, int first_row, int rows, int threads) {
     const Shape part{shape_.nz, rows, shape_.nx};
     for_each((rows + smart_rows - 1) / smart_rows, threads, [&](int slab) {
-        kernels.write_blocks(part, slab, slabs_[first_row / smart_rows + slab].list(), unit(), format, volume);
+        kernels.write_blocks(part, slab, this->slab(first_row / smart_rows + slab), unit(), format, volume);
     });
 }
 

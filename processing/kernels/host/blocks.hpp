@@ -4,7 +4,6 @@
 #include <memory>
 #include <vector>
 
-#include "host/smart.hpp"
 #include "job.hpp"
 
 namespace tomoshadow {
@@ -22,13 +21,13 @@ public:
     static Blocks of_volume(const Kernels &kernels, const float *volume, const Shape &shape, float most, int threads,
                             Blocks *memory = nullptr);
 
-    // Multiply by the samples of the ratio images of the views to update, which are neighbours, then project onto the
-    // views to project.
-    void pass(const Kernels &kernels, const std::vector<View> &views, const std::vector<bool> &update,
-              const std::vector<bool> &project, BandImages &images, int threads);
+    BlockList slab(int number) const { return slabs_[number].list(); }
     // Intensity of a stored 1, in which projections come.
     float unit() const { return unit_ * gain_; }
+    // A factor waits for the next update of the voxels, which applies it.
     void scale(float factor) { gain_ *= factor; }
+    float gain() const { return gain_; }
+    void gain_applied() { gain_ = 1.0f; }
     // Rows [first_row, first_row + rows) of the volume; first_row is a multiple of smart_rows.
     void write(const Kernels &kernels, Format format, void *volume, int first_row, int rows, int threads);
     void write(const Kernels &kernels, Format format, void *volume, int threads) {
@@ -58,11 +57,11 @@ private:
         std::vector<std::unique_ptr<uint16_t[], Free>> memory_;
         std::vector<uint16_t *> chunks_;
     };
-    Blocks(const Kernels &kernels, const SmartStart &job, float most, int threads, Blocks *memory);
+    Blocks(const Kernels &kernels, const BlockSearch &job, float most, int threads, Blocks *memory);
     static std::vector<Slab> slabs_in(Blocks *memory, int count);
 
     Shape shape_;
-    float unit_, gain_ = 1.0f;  // the gain waits for the next update
+    float unit_, gain_ = 1.0f;
     std::vector<Slab> slabs_;
 };
 

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "host/smart.hpp"
+#include "host/parallel.hpp"
 
 namespace tomoshadow {
 

@@ -1,7 +1,5 @@
-// Images on their way to the kernels: fixed point, resampling, occupancy.
+// Images on their way to the kernels: fixed point and resampling.
 #pragma once
-
-#include <vector>
 
 #include "job.hpp"
 
@@ -22,12 +20,5 @@ float quantise(const Kernels &kernels, const Recorded &image, int before, int af
 // Resample a recorded image onto rows x columns pixels, see Resampling. Returns the intensity of one count.
 float resample(const Kernels &kernels, const Recorded &image, const float *nodes, int nodes_x, int16_t *to, int rows,
                int columns, int threads);
-
-// Cells of an image and their sums, see Occupancy.
-struct OccupiedCells {
-    std::vector<int32_t> sums;
-    int columns;
-};
-OccupiedCells occupied_cells(const int16_t *pixels, int rows, int columns);
 
 }  // namespace tomoshadow

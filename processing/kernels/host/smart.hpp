@@ -1,30 +1,27 @@
-// Who computes what: slabs are dealt to threads by number, so that the same input gives the same bits.
+// SMART: what blocks look like from some views, and the ratios that correct them.
 #pragma once
 
-#include <functional>
 #include <vector>
 
+#include "host/blocks.hpp"
 #include "job.hpp"
 
 namespace tomoshadow {
 
-// Call work(i) for i = 0 .. count - 1; thread t takes i = t, t + threads, ...
-void for_each(int count, int threads, const std::function<void(int)> &work);
-
-// The same for the rows of an image, a few at once: work(first row, end row).
-void for_rows(int rows, int threads, const std::function<void(int, int)> &work);
-
-void run_line_of_sight(const Kernels &kernels, const LineOfSight &job, int threads);
-void run_sum_of_sight(const Kernels &kernels, const SumOfSight &job, int threads);
-
-// What the volume looks like from each view, in parts: bands of slabs project into images of their own.
-class BandImages {
+// What the volume looks like from each view, in parts: bands of slabs project into images of their own, which are added in
+// order, so that the sums do not depend on who computed what.
+class Projections {
 public:
-    BandImages(const std::vector<View> &views, const Shape &shape);
+    // The images of the views hold the ratios.
+    Projections(std::vector<View> views, const Shape &shape);
 
-    // Let `work` project slab after slab, band by band, onto the wanted views.
-    void project(const std::vector<bool> &wanted, int threads,
-                 const std::function<void(int slab, const Projection *projections)> &work);
+    const std::vector<View> &views() const { return views_; }
+    const Shape &shape() const { return shape_; }
+
+    // Multiply blocks by the samples of the ratio images of the views to update, which are neighbours, then project them
+    // onto the views to project.
+    void pass(const Kernels &kernels, Blocks &blocks, const std::vector<bool> &update, const std::vector<bool> &project,
+              int threads);
     // The sum of the latest projection onto a view, in units of the volume.
     double sum(int view) const;
     // Set the ratio image of a view from its latest projection: the parts that `job` lacks, in order. Returns the sum
@@ -32,17 +29,27 @@ public:
     double correct(const Kernels &kernels, int view, Correction job, int threads) const;
 
 private:
-    std::vector<Projection> parts(int view) const;
-
     struct alignas(64) Line {
         float pixels[16];
     };
-    struct Images {
-        int first_slab, end_slab;
-        std::vector<std::vector<Line>> memory;
-        std::vector<Projection> parts;
+    class Band {
+    public:
+        Band(const std::vector<View> &views, const Shape &shape, int first_slab, int end_slab);
+        // Where to project: images of zeros for the wanted views, nowhere for others.
+        std::vector<Projection> cleared(const std::vector<bool> &wanted);
+        const Projection &part(int view) const { return parts_[view]; }
+
+        const int first_slab, end_slab;
+
+    private:
+        std::vector<std::vector<Line>> memory_;
+        std::vector<Projection> parts_;
     };
-    std::vector<Images> bands_;
+    std::vector<Projection> parts(int view) const;
+
+    std::vector<View> views_;
+    Shape shape_;
+    std::vector<Band> bands_;
 };
 
 }  // namespace tomoshadow

@@ -2,6 +2,7 @@
 // namespace of that set and calls no inline function of the standard library, so that the linker cannot hand
 // code for a newer processor to an older one.
 #include "job.hpp"
+#include "simd/blocks.hpp"
 #include "simd/line_of_sight.hpp"
 #include "simd/preprocess.hpp"
 #include "simd/ratios.hpp"
@@ -15,7 +16,7 @@ namespace tomoshadow::TOMOSHADOW_ISA {
 
 extern const Kernels kernels;
 const Kernels kernels{
-    TOMOSHADOW_TEXT(TOMOSHADOW_ISA), line_of_sight, sum_of_sight, smart_start, smart_pass, write_blocks, correct,
+    TOMOSHADOW_TEXT(TOMOSHADOW_ISA), line_of_sight, sum_of_sight, find_blocks, write_blocks, smart_pass, correct,
     resample, brightest, quantise, find_filled, row_minima, column_minima, row_means, subtract_veil};
 
 }  // namespace tomoshadow::TOMOSHADOW_ISA

@@ -75,8 +75,6 @@ inline Floats multiply_add(Floats a, Floats b, Floats c) {
 #endif
 }
 
-constexpr double max_step = 1.8;  // voxels from pixel to pixel, or pixels from voxel to voxel
-
 // The lesser of a and b, b where one of them is not a number. Compilers do not find the instruction.
 inline Floats lesser(Floats a, Floats b) {
 #if defined(__AVX512F__)

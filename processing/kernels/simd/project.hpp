@@ -23,7 +23,7 @@ struct TileRows {
 // shares it takes; rows -1 and `rows` are zero. Where image rows are no denser than rows of voxels, one at most lies
 // between two of them: then each t has its image row, or the spare one and no shares.
 struct ImageRows {
-    static constexpr int most = static_cast<int>((smart_rows + 1) * max_step) + 2;
+    static constexpr int most = static_cast<int>((smart_rows + 1) * max_scale) + 2;
     bool one_each;
     uint32_t changed;  // bit t: its image row is another one than in the plane before
     int count;

@@ -8,8 +8,6 @@
 namespace tomoshadow::TOMOSHADOW_ISA {
 namespace {
 
-constexpr int max_views = 8;
-
 // Zeroed memory, aligned to cache lines.
 class Memory {
 public:

@@ -4,11 +4,12 @@
 #include <cstdio>
 #include <memory>
 
-#include "host/smart.hpp"
-#include "host/blocks.hpp"
+#include "host/instruction_set.hpp"
+#include "host/line_of_sight.hpp"
+#include "host/occupancy.hpp"
 #include "host/preprocess.hpp"
 #include "host/resample.hpp"
-#include "host/instruction_set.hpp"
+#include "host/smart.hpp"
 
 using namespace tomoshadow;
 
@@ -27,8 +28,6 @@ public:
 private:
     uint32_t state_;
 };
-
-constexpr int overhang = 34;
 
 struct Scene {
     Shape shape;
@@ -69,8 +68,8 @@ private:
             shifts_u.push_back(1.3 + slope * z);
             shifts_v.push_back(0.7 + 0.1 * z);
         }
-        View &view = add_image(random, static_cast<int>(scale * (shape.ny - 1) + shifts_v.back()) + 3,
-                               static_cast<int>(scale * last + shifts_u.back()) + overhang);
+        View &view = add_image(random, static_cast<int>(scale * (shape.ny - 1) + shifts_v.back()) + overhang_rows,
+                               static_cast<int>(scale * last + shifts_u.back()) + overhang_columns);
         planes.push_back(std::move(scales));
         view.scale = planes.back().data();
         planes.push_back(std::move(shifts_u));
@@ -79,7 +78,7 @@ private:
         view.shift_v = planes.back().data();
     }
     void add_mapped(Random &random) {
-        const int spacing = 16 >> random.below(4), nz = (shape.nz - 1) / spacing + 2, ny = (shape.ny - 1) / spacing + 2,
+        const int spacing = node_spacings[random.below(4)], nz = (shape.nz - 1) / spacing + 2, ny = (shape.ny - 1) / spacing + 2,
                   nx = (shape.nx - 1) / spacing + 2;
         const int rows = 20 + random.below(60), columns = 40 + random.below(100);
         View &view = add_image(random, rows, columns);
@@ -148,14 +147,14 @@ void iterate(const Kernels &kernels, int number) {
         view.unit = 1.0f / 2048;
         view.occupancy = {};
     }
-    BandImages images(corrected, shape);
+    Projections images(corrected, shape);
     const std::vector<bool> all(n_views, true), none(n_views, false);
     double projected = 0, missed = 0;
-    blocks.pass(kernels, corrected, none, all, images, 2);
+    images.pass(kernels, blocks, none, all, 2);
     for (int i = 0; i < n_views; ++i) projected += images.sum(i);
     if (projected > 0) blocks.scale(1000.0f / static_cast<float>(projected * blocks.unit()));
     for (int done = 0; done < 3; ++done) {
-        if (done) blocks.pass(kernels, corrected, all, all, images, 2);
+        if (done) images.pass(kernels, blocks, all, all, 2);
         missed = 0;
         for (int i = 0; i < n_views; ++i) {
             const View &seen = scene.views[i];

@@ -1,0 +1,71 @@
+#include "host/line_of_sight.hpp"
+
+#include "binding/bind.hpp"
+#include "binding/bound_view.hpp"
+#include "host/instruction_set.hpp"
+
+using namespace nanobind::literals;
+
+namespace tomoshadow {
+
+namespace {
+
+Method method_of(int number) {
+    require(number >= 0 && number <= 2, "method must be 0, 1 or 2");
+    return static_cast<Method>(number);
+}
+
+// Kernels look up once where the views of all exposures see a voxel.
+bool same_geometry(const View &a, const View &b) {
+    return a.rows == b.rows && a.columns == b.columns && a.scale == b.scale && a.shift_u == b.shift_u &&
+           a.shift_v == b.shift_v && a.nodes == b.nodes && a.spacing == b.spacing;
+}
+
+void line_of_sight(const std::vector<const BoundView *> &bound, int method, const AnyVolume &volume, int threads,
+                   int first_row, int grid_rows) {
+    const Shape shape = shape_of(volume);
+    if (!grid_rows) grid_rows = shape.ny;
+    require(first_row >= 0 && first_row <= grid_rows - shape.ny, "volume: more rows than the grid");
+    require_threads(threads);
+    const auto views = views_on(bound, {shape.nz, grid_rows, shape.nx});
+    const LineOfSight job{views.data(), static_cast<int>(views.size()), shape, first_row, method_of(method),
+                          format_of(volume), volume.data()};
+    const Kernels &kernels = selected_kernels();
+    nb::gil_scoped_release release;
+    run_line_of_sight(kernels, job, threads);
+}
+
+void sum_of_sight(const std::vector<std::vector<const BoundView *>> &exposures, int method,
+                  const FloatVolume &volume, int threads) {
+    const Shape shape = shape_of(volume);
+    require(!exposures.empty(), "one exposure or more, please");
+    require_threads(threads);
+    std::vector<View> views;
+    for (const auto &bound : exposures) {
+        require(bound.size() == exposures[0].size(), "exposures differ in their number of views");
+        for (const View &view : views_on(bound, shape)) {
+            require(same_geometry(view, views.size() < bound.size() ? view : views[views.size() % bound.size()]),
+                    "exposures must be of the same views");
+            views.push_back(view);
+        }
+    }
+    const SumOfSight job{views.data(), static_cast<int>(exposures[0].size()), static_cast<int>(exposures.size()),
+                         shape,        method_of(method),                      volume.data()};
+    const Kernels &kernels = selected_kernels();
+    nb::gil_scoped_release release;
+    run_sum_of_sight(kernels, job, threads);
+}
+
+}  // namespace
+
+void bind_line_of_sight(nb::module_ &module) {
+    nb::class_<BoundView>(module, "View")
+        .def_static("rectified", &BoundView::rectified, "pixels"_a, "unit"_a, "scale"_a, "shift_u"_a, "shift_v"_a,
+                    "cull"_a = true)
+        .def_static("mapped", &BoundView::mapped, "pixels"_a, "unit"_a, "nodes"_a, "spacing"_a, "cull"_a = true);
+    module.def("line_of_sight", &line_of_sight, "views"_a, "method"_a, "volume"_a, "threads"_a, "first_row"_a = 0,
+               "grid_rows"_a = 0);
+    module.def("sum_of_sight", &sum_of_sight, "exposures"_a, "method"_a, "volume"_a, "threads"_a);
+}
+
+}  // namespace tomoshadow
