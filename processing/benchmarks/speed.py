@@ -19,7 +19,7 @@ from processing.benchmarks.targets import Measured
 from processing.geometry import PinholeCamera
 from processing.kernels import _native
 from processing.reconstruction.choices import Accuracy, ReconstructionMethod
-from processing.reconstruction.line_of_sight import KERNEL_METHOD, line_of_sight
+from processing.reconstruction.line_of_sight import line_of_sight
 from processing.reconstruction.planning.node_view import sample_mapping
 from processing.reconstruction.planning.plan import MAX_DEVIATION_PX, Plan, plan_reconstruction
 from processing.reconstruction.smart import smart
@@ -136,7 +136,7 @@ def _by_sight(plan: Plan, images: Sequence[Image], threads: int) -> Callable[...
 def _dense(plan: Plan, images: Sequence[Image], out: NDArray[np.float16], threads: int) -> None:
     """MLOS of every block, empty or not."""
     views = plan.bind(plan.resample(images, threads), cull=False)
-    _native.line_of_sight(views, KERNEL_METHOD[ReconstructionMethod.MLOS], out, threads)
+    _native.line_of_sight(views, ReconstructionMethod.MLOS, out, threads)
 
 
 def _other_plans(study: SpeedStudy, cameras: Sequence[PinholeCamera]) -> Iterator[tuple[str, Plan]]:

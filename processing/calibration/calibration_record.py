@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from processing.calibration.calibration import Calibration, ViewCalibration
 from processing.calibration.stored_fields import Pair
 from processing.calibration.target.targets import Target
+from processing.kernels import _native
 
 SCHEMA: Literal["tomoshadow.calibration"] = "tomoshadow.calibration"
 VERSION: Literal[1] = 1
@@ -39,7 +40,7 @@ class CalibrationRecord(BaseModel):
     target: Target | None
     z_range_mm: Pair
     notes: tuple[str, ...]
-    views: Annotated[dict[str, ViewCalibration], Field(min_length=1, max_length=8)]
+    views: Annotated[dict[str, ViewCalibration], Field(min_length=1, max_length=_native.MAX_VIEWS)]
 
 
 def to_record(calibration: Calibration, software: dict[str, str]) -> CalibrationRecord:

@@ -4,6 +4,21 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
+MAX_VIEWS: int
+METHODS: tuple[str, ...]
+"""Of line of sight."""
+BLOCK_COLUMNS: int
+"""Voxels along x that are computed at once."""
+BLOCK_ROWS: int
+"""Rows y of a block that is stored; parts of a volume begin at multiples of it."""
+OVERHANG_COLUMNS: int
+OVERHANG_ROWS: int
+"""Of a rectified image, from where the last voxel of a block is seen."""
+MAP_SPACING_PX: int
+"""From node to node of what ``resample`` takes."""
+NODE_SPACINGS: tuple[int, ...]
+"""Voxels from node to node that a mapped view may have, widest first."""
+
 @final
 class View:
     """An image and where voxels are seen in it; immutable, keeps its arrays alive."""
@@ -37,14 +52,14 @@ def preprocess(
 def sliding_minimum(image: NDArray[np.float32], window: int, out: NDArray[np.float32], threads: int) -> None: ...
 def line_of_sight(
     views: Sequence[View],
-    method: int,
+    method: str,
     volume: NDArray[np.float32] | NDArray[np.float16] | NDArray[np.uint8],
     threads: int,
     first_row: int = 0,
     grid_rows: int = 0,
 ) -> None: ...
 def sum_of_sight(
-    exposures: Sequence[Sequence[View]], method: int, volume: NDArray[np.float32], threads: int
+    exposures: Sequence[Sequence[View]], method: str, volume: NDArray[np.float32], threads: int
 ) -> None: ...
 
 @final

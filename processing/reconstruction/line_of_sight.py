@@ -11,13 +11,6 @@ from processing.reconstruction.choices import ReconstructionMethod
 from processing.reconstruction.planning.plan import Plan
 from processing.reconstruction.slab_volume import SLAB_ROWS, slabs_in
 
-KERNEL_METHOD = {
-    ReconstructionMethod.GAVLOS: 0,
-    ReconstructionMethod.MINLOS: 1,
-    ReconstructionMethod.MLOS: 2,
-}
-"""How the kernels number the methods."""
-
 
 def line_of_sight(
     plan: Plan,
@@ -57,11 +50,11 @@ def line_of_sight(
     ValueError
         Images or ``out`` do not fit the plan, or the method is an iterative one.
     """
-    number = kernel_method(method)
+    check_method(method)
     volume = np.empty(plan.grid.shape, dtype=np.float32) if out is None else out
     check_volume(volume, plan, (np.float32, np.float16, np.uint8))
     views = plan.bind(plan.resample(images, threads, resampled))
-    _native.line_of_sight(views, number, volume, threads)
+    _native.line_of_sight(views, method, volume, threads)
     return volume
 
 
@@ -99,7 +92,7 @@ def slabs_of_sight(
         ``out`` has no rows or other planes and columns than the grid, images do not fit the plan, or the method is
         an iterative one.
     """
-    number = kernel_method(method)
+    check_method(method)
     nz, ny, nx = plan.grid.shape
     memory = np.empty((nz, min(SLAB_ROWS, ny), nx), np.float16) if out is None else out
     rows = memory.shape[1]
@@ -107,15 +100,14 @@ def slabs_of_sight(
         raise ValueError(f"slabs of shape {memory.shape}, they need ({nz}, one or more, {nx})")
     views = plan.bind(plan.resample(images, threads, resampled))
     for first_row, slab in slabs_in(memory, ny):
-        _native.line_of_sight(views, number, slab, threads, first_row, ny)
+        _native.line_of_sight(views, method, slab, threads, first_row, ny)
         yield first_row, slab
 
 
-def kernel_method(method: ReconstructionMethod) -> int:
-    """Number of a method for the kernels; raise ValueError for an iterative one."""
-    if method not in KERNEL_METHOD:
-        raise ValueError(f"{method.value} is not a line-of-sight method: {[m.value for m in KERNEL_METHOD]}")
-    return KERNEL_METHOD[method]
+def check_method(method: ReconstructionMethod) -> None:
+    """Raise ValueError for an iterative method."""
+    if method not in _native.METHODS:
+        raise ValueError(f"{method.value} is not a line-of-sight method: {list(_native.METHODS)}")
 
 
 def check_volume(volume: NDArray[Any], plan: Plan, dtypes: tuple[type, ...]) -> None:

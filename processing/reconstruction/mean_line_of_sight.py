@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from processing.kernels import DEFAULT_THREADS, _native
 from processing.reconstruction.choices import ReconstructionMethod
-from processing.reconstruction.line_of_sight import check_volume, kernel_method
+from processing.reconstruction.line_of_sight import check_method, check_volume
 from processing.reconstruction.planning.plan import Plan
 
 BATCH_BYTES, BATCH_EXPOSURES = 1 << 30, 128
@@ -44,7 +44,7 @@ def mean_line_of_sight(
     ValueError
         There is no exposure, images or ``out`` do not fit the plan, or the method is an iterative one.
     """
-    number = kernel_method(method)
+    check_method(method)
     mean = np.empty(plan.grid.shape, np.float32) if out is None else out
     check_volume(mean, plan, (np.float32,))
     mean.fill(0)
@@ -53,7 +53,7 @@ def mean_line_of_sight(
     memory = [plan.empty_images() for _ in range(fitting)]
     # in this order: where the memory ends, no exposure is taken
     while batch := [plan.bind(plan.resample(one, threads, own)) for own, one in zip(memory, coming, strict=False)]:
-        _native.sum_of_sight(batch, number, mean, threads)
+        _native.sum_of_sight(batch, method, mean, threads)
         count += len(batch)
     if not count:
         raise ValueError("a mean needs one exposure or more")

@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from processing.kernels import _native
 from processing.reconstruction.choices import VoxelType
 
-SLAB_ROWS = 64
+SLAB_ROWS = 8 * _native.BLOCK_ROWS
 """A slab of the paper's volume has 75 MB in float16."""
 
 Slabs = Iterable[tuple[int, NDArray[Any]]]

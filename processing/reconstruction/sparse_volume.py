@@ -15,7 +15,7 @@ from processing.reconstruction.slab_volume import SlabVolume, slabs_in
 
 NEGLIGIBLE = 1e-8
 """Blocks in which MLOS is nowhere brighter than this share of what it could be stay empty."""
-SEARCH_ROWS = 16
+SEARCH_ROWS = 2 * _native.BLOCK_ROWS
 """Rows in which the brightest voxel is looked for at a time."""
 
 
@@ -101,7 +101,7 @@ class SparseVolume:
         voxels : VoxelType
             Of the slabs; 255 is the brightest voxel where they are bytes.
         out : (nz, rows, nx) array of that type
-            Receives one slab after the other; a multiple of 8 rows y, or all.
+            Receives one slab after the other; a multiple of ``BLOCK_ROWS`` rows y, or all.
         threads : int
             The result does not depend on it.
         """

@@ -12,11 +12,12 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from processing.calibration.sets.set_record import CalibrationEntry, CameraName
 from processing.errors import BadInput
+from processing.kernels import _native
 from processing.runs.toml_lines import Key, line_of
 
 _VARIABLE = re.compile(r"^\$(\w+|\{\w+\})")
 
-Images = Annotated[dict[CameraName, str], Field(min_length=1, max_length=8)]
+Images = Annotated[dict[CameraName, str], Field(min_length=1, max_length=_native.MAX_VIEWS)]
 
 
 class ManifestError(BadInput):
@@ -53,7 +54,7 @@ class RunEntry(_Entry):
         first = self.shot[0]
         cameras = set(first.frame_a)
         if len(cameras) < 2:
-            raise ValueError(f"shot: {len(cameras)} camera, a run has 2 to 8")
+            raise ValueError(f"shot: {len(cameras)} camera, a run has 2 to {_native.MAX_VIEWS}")
         for kind in ("shot", "background", "dark"):
             entries: tuple[ShotEntry, ...] = getattr(self, kind)
             for number, entry in enumerate(entries):
@@ -75,8 +76,8 @@ class Manifest(_Entry):
     def _has_something(self) -> Self:
         if self.calibration is None and self.run is None:
             raise ValueError("neither [calibration] nor [run]")
-        if self.calibration is not None and len(self.calibration.cameras) > 8:
-            raise ValueError(f"calibration: {len(self.calibration.cameras)} cameras, 8 are possible")
+        if self.calibration is not None and len(self.calibration.cameras) > _native.MAX_VIEWS:
+            raise ValueError(f"calibration: {len(self.calibration.cameras)} cameras, {_native.MAX_VIEWS} are possible")
         return self
 
 

@@ -35,7 +35,7 @@ BoundView BoundView::rectified(PixelArray pixels, float unit, PlaneArray scale, 
 
 BoundView BoundView::mapped(PixelArray pixels, float unit, NodeArray nodes, int spacing, bool cull) {
     require(std::find(std::begin(node_spacings), std::end(node_spacings), spacing) != std::end(node_spacings),
-            "nodes: spacing must be 2, 4, 8 or 16");
+            "nodes: no such spacing, see NODE_SPACINGS");
     BoundView bound(std::move(pixels), unit);
     bound.view_.nodes = nodes.data();
     bound.view_.nodes_z = static_cast<int>(nodes.shape(1));

@@ -1,5 +1,7 @@
 #include "host/line_of_sight.hpp"
 
+#include <nanobind/stl/string.h>
+
 #include "binding/bind.hpp"
 #include "binding/bound_view.hpp"
 #include "host/instruction_set.hpp"
@@ -10,9 +12,16 @@ namespace tomoshadow {
 
 namespace {
 
-Method method_of(int number) {
-    require(number >= 0 && number <= 2, "method must be 0, 1 or 2");
-    return static_cast<Method>(number);
+struct NamedMethod {
+    const char *name;
+    Method method;
+};
+constexpr NamedMethod methods[] = {{"gavlos", Method::geometric_mean}, {"minlos", Method::minimum}, {"mlos", Method::product}};
+
+Method method_of(const std::string &name) {
+    for (const NamedMethod &named : methods)
+        if (named.name == name) return named.method;
+    throw std::invalid_argument(name + " is not a line-of-sight method, see METHODS");
 }
 
 // Kernels look up once where the views of all exposures see a voxel.
@@ -21,7 +30,7 @@ bool same_geometry(const View &a, const View &b) {
            a.shift_v == b.shift_v && a.nodes == b.nodes && a.spacing == b.spacing;
 }
 
-void line_of_sight(const std::vector<const BoundView *> &bound, int method, const AnyVolume &volume, int threads,
+void line_of_sight(const std::vector<const BoundView *> &bound, const std::string &method, const AnyVolume &volume, int threads,
                    int first_row, int grid_rows) {
     const Shape shape = shape_of(volume);
     if (!grid_rows) grid_rows = shape.ny;
@@ -35,7 +44,7 @@ void line_of_sight(const std::vector<const BoundView *> &bound, int method, cons
     run_line_of_sight(kernels, job, threads);
 }
 
-void sum_of_sight(const std::vector<std::vector<const BoundView *>> &exposures, int method,
+void sum_of_sight(const std::vector<std::vector<const BoundView *>> &exposures, const std::string &method,
                   const FloatVolume &volume, int threads) {
     const Shape shape = shape_of(volume);
     require(!exposures.empty(), "one exposure or more, please");
@@ -59,6 +68,9 @@ void sum_of_sight(const std::vector<std::vector<const BoundView *>> &exposures, 
 }  // namespace
 
 void bind_line_of_sight(nb::module_ &module) {
+    nb::list names;
+    for (const NamedMethod &named : methods) names.append(named.name);
+    module.attr("METHODS") = nb::tuple(names);
     nb::class_<BoundView>(module, "View")
         .def_static("rectified", &BoundView::rectified, "pixels"_a, "unit"_a, "scale"_a, "shift_u"_a, "shift_v"_a,
                     "cull"_a = true)

@@ -17,8 +17,6 @@ from processing.reconstruction.planning.bending import bend_px
 from processing.reconstruction.planning.fixed_point import FixedPoint
 from processing.volume import VoxelGrid
 
-SPACINGS = (16, 8, 4, 2)
-"""Voxels from node to node that the kernels know."""
 MAX_PIXELS_PER_VOXEL = 1.1
 """A projected voxel covers its four nearest pixels; where voxels are coarser, images are averaged first."""
 FRAME_BEFORE_PX, FRAME_AFTER_PX = 1, 2
@@ -80,13 +78,13 @@ def sample_mapping(mapping: ViewMapping, grid: VoxelGrid, max_deviation_px: floa
         The mapping is too rough even for nodes two voxels apart.
     """
     deviation_px = np.inf
-    for spacing in SPACINGS:
+    for spacing in _native.NODE_SPACINGS:
         nodes_px = _project_lattice(mapping, grid, spacing)
         deviation_px = bend_px(nodes_px, partial(_project_lattice, mapping, grid, spacing))
         if deviation_px <= max_deviation_px:
             return _node_view(mapping, nodes_px, spacing, deviation_px)
     raise ReconstructionError(
-        f"mapping is not smooth: it bends by {deviation_px:.3g} px within {SPACINGS[-1]} voxels, "
+        f"mapping is not smooth: it bends by {deviation_px:.3g} px within {_native.NODE_SPACINGS[-1]} voxels, "
         f"limit {max_deviation_px} px; does the grid reach beyond what was calibrated?"
     )
 

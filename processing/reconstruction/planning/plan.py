@@ -15,7 +15,7 @@ from processing.reconstruction.planning.node_view import NodeView, sample_mappin
 from processing.reconstruction.planning.rectified_view import NotRectifiable, RectifiedView, rectify
 from processing.volume import VoxelGrid
 
-MIN_VIEWS, MAX_VIEWS = 2, 8
+MIN_VIEWS = 2
 MAX_DEVIATION_PX = 0.02
 """What a plan may add to the calibration error; a good calibration has 0.05 px."""
 
@@ -120,8 +120,8 @@ def plan_reconstruction(
         (``TOMOSHADOW_ISA``) that this processor does not have.
     """
     _check_instructions()
-    if not MIN_VIEWS <= len(mappings) <= MAX_VIEWS:
-        raise ReconstructionError(f"{len(mappings)} views, a reconstruction takes {MIN_VIEWS} to {MAX_VIEWS}")
+    if not MIN_VIEWS <= len(mappings) <= _native.MAX_VIEWS:
+        raise ReconstructionError(f"{len(mappings)} views, a reconstruction takes {MIN_VIEWS} to {_native.MAX_VIEWS}")
     named = names or [f"view {number}" for number in range(1, len(mappings) + 1)]
     views = (_plan_named(name, mapping, grid, accuracy) for name, mapping in zip(named, mappings, strict=True))
     return Plan(grid, tuple(views))

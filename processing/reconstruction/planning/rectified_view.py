@@ -19,14 +19,12 @@ from processing.reconstruction.planning.bending import bend_px
 from processing.reconstruction.planning.fixed_point import FixedPoint
 from processing.volume import VoxelGrid
 
-GUARD_PX, BELOW_PX = 2.025, 4
-"""Kept above and left of the volume, and below it. With 0.95 px per voxel, pixels come closer to voxels by 1 / 19 voxel
-from one to the next; begun at 2.025 px, none comes closer than half of that. If one met a voxel, rounding would let it
-see a millionth of the next one, which SMART then brightens until it explains all light of the pixel."""
-BLOCK_COLUMNS, OVERHANG_PX = 32, 36
-"""Voxels that the kernels compute at once, and columns that the widest vectors may read beyond them."""
-MAP_SPACING_PX = 16
-"""The camera model is evaluated at every sixteenth pixel of the resampled image; it is straight in between."""
+GUARD_PX = 2.025
+"""Kept above and left of the volume. With 0.95 px per voxel, pixels come closer to voxels by 1 / 19 voxel from one to
+the next; begun at 2.025 px, none comes closer than half of that. If one met a voxel, rounding would let it see a
+millionth of the next one, which SMART then brightens until it explains all light of the pixel."""
+MAP_SPACING_PX = _native.MAP_SPACING_PX
+"""Pixels of the resampled image from one evaluation of the camera model to the next; it is straight in between."""
 MAX_PIXELS_PER_VOXEL = 1.5
 """Of the recorded image; coarser voxels would skip pixels."""
 MIN_RELATIVE_SCALE = 0.63
@@ -98,10 +96,10 @@ def rectify(mapping: ViewMapping, grid: VoxelGrid, pixels_per_voxel: float, max_
     scale = reference_scale * to_reference
     shift_v, shift_u = (reference_scale * centre[axis] * (1 - to_reference) for axis in (1, 2))
     left, top = GUARD_PX - shift_u.min(), GUARD_PX - shift_v.min()
-    last_column = -(-grid.shape[2] // BLOCK_COLUMNS) * BLOCK_COLUMNS - 1
-    columns = int(np.ceil((shift_u + scale * last_column).max() + left)) + OVERHANG_PX
+    last_column = -(-grid.shape[2] // _native.BLOCK_COLUMNS) * _native.BLOCK_COLUMNS - 1
+    columns = int(np.ceil((shift_u + scale * last_column).max() + left)) + _native.OVERHANG_COLUMNS
     columns += -columns % MAP_SPACING_PX
-    rows = int(np.ceil((shift_v + scale * (grid.shape[1] - 1)).max() + top)) + BELOW_PX
+    rows = int(np.ceil((shift_v + scale * (grid.shape[1] - 1)).max() + top)) + _native.OVERHANG_ROWS
     origin = np.array([z_ref, -top / reference_scale, -left / reference_scale])
     points_at = partial(_project_plane, mapping, grid, origin, 1 / reference_scale, (rows, columns))
     nodes_px = points_at((0.0, 0.0))

@@ -51,7 +51,7 @@ def test_views_keep_pixels_and_geometry(plan: Plan) -> None:
     views = unowned_views(plan)
     rubbish = churn()
     volume = np.empty(GRID.shape, np.float32)
-    _native.line_of_sight(views, 2, volume, 2)
+    _native.line_of_sight(views, "mlos", volume, 2)
     np.testing.assert_array_equal(volume, expected)
     assert rubbish
 

@@ -152,8 +152,8 @@ def test_leaving_out_what_is_empty_changes_nothing(isa: str, accuracy: Accuracy)
         image[:, :150] = 0
     resampled = plan.resample(images)
     culled, dense = np.full((2, *GRID.shape), 9, np.float32)
-    _native.line_of_sight(plan.bind(resampled), 2, culled, 2)
-    _native.line_of_sight(plan.bind(resampled, cull=False), 2, dense, 2)
+    _native.line_of_sight(plan.bind(resampled), "mlos", culled, 2)
+    _native.line_of_sight(plan.bind(resampled, cull=False), "mlos", dense, 2)
     assert 0 < np.mean(dense > 0) < 0.1
     np.testing.assert_array_equal(culled, dense)
 

@@ -48,6 +48,6 @@ def test_what_has_no_mean_is_refused() -> None:
     other = plan_reconstruction(oracle.cameras(3), GRID)
     views = [each.bind(each.resample(exposures(1)[0])) for each in (plan, other)]
     with pytest.raises(ValueError, match="exposures must be of the same views"):
-        _native.sum_of_sight(views, 2, np.zeros(GRID.shape, np.float32), 1)
+        _native.sum_of_sight(views, "mlos", np.zeros(GRID.shape, np.float32), 1)
     with pytest.raises(ValueError, match="smart is not a line-of-sight method"):
         mean_line_of_sight(plan, exposures(1), ReconstructionMethod.SMART)

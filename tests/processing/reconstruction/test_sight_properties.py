@@ -76,4 +76,6 @@ def test_slabs_refuse_what_does_not_fit() -> None:
         next(slabs_of_sight(plan, images, ReconstructionMethod.SMART))
     views = plan.bind(plan.resample(images))
     with pytest.raises(ValueError, match="more rows than the grid"):
-        _native.line_of_sight(views, 2, np.zeros((3, 3, 5), np.float32), 1, 2, 4)
+        _native.line_of_sight(views, "mlos", np.zeros((3, 3, 5), np.float32), 1, 2, 4)
+    with pytest.raises(ValueError, match="smart is not a line-of-sight method, see METHODS"):
+        _native.line_of_sight(views, "smart", np.zeros(grid.shape, np.float32), 1)

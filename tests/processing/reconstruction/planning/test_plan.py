@@ -180,9 +180,9 @@ def test_kernels_refuse_geometry_that_leads_outside() -> None:
     volume, pixels = np.zeros((3, 4, 5), np.float32), np.zeros((20, 90), np.int16)
     scale, shift = np.ones(3), np.full(3, 2.0)
     inside = rectified(pixels, scale, shift, shift)
-    _native.line_of_sight([inside], 2, volume, 1)
+    _native.line_of_sight([inside], "mlos", volume, 1)
     nodes = np.zeros((3, 2, 2, 2), np.float32)
-    _native.line_of_sight([_native.View.mapped(pixels, 1.0, nodes, 16)], 2, volume, 1)
+    _native.line_of_sight([_native.View.mapped(pixels, 1.0, nodes, 16)], "mlos", volume, 1)
     outside = [
         rectified(pixels, scale, shift + 30, shift),
         rectified(pixels, scale, shift, shift + 30),
@@ -194,7 +194,7 @@ def test_kernels_refuse_geometry_that_leads_outside() -> None:
     ]
     for view in outside:
         with pytest.raises(ValueError, match=r"(view|nodes): "):
-            _native.line_of_sight([view], 2, volume, 1)
+            _native.line_of_sight([view], "mlos", volume, 1)
     blocks, projections = _native.Blocks.of_volume(volume, 1.0, 1), _native.Projections([inside], volume.shape)
     narrow = np.zeros((19, 90), np.int16)
     with pytest.raises(ValueError, match="projections and images differ in shape"):
@@ -245,6 +245,6 @@ def test_views_keep_their_arrays_alive() -> None:
     view = rectified(np.full((20, 90), 32767, np.int16), np.ones(3), np.full(3, 2.0), np.full(3, 2.0))
     churn = [np.zeros((20, 90), np.int16) for _ in range(50)]
     volume = np.zeros((3, 4, 5), np.float32)
-    _native.line_of_sight([view], 2, volume, 1)
+    _native.line_of_sight([view], "mlos", volume, 1)
     np.testing.assert_array_equal(volume, 32767)
     assert len(churn) == 50
