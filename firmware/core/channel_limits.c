@@ -41,7 +41,8 @@ bool train_within(const struct pulse_train *train, const struct channel_limits *
 
 bool light_within(uint32_t current_ma, const struct channel_limits *limits)
 {
-    const struct channel_limits light = {smaller(limits->max_current_ma, limits->max_light_ma), limits->max_duty_ppm, 0};
+    const struct channel_limits light = {smaller(limits->max_current_ma, limits->max_light_ma), limits->max_duty_ppm,
+                                         0};
     return channel_within(&(struct channel){.current_ma = current_ma}, &light);
 }
 

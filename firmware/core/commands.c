@@ -190,9 +190,10 @@ static enum error clear(struct safety *safety, const uint32_t *fields, struct te
 }
 
 static const struct command COMMANDS[] = {
-    {"NEW", 0, new_train}, {"LIMIT", 4, limit}, {"CHANNEL", 9, set_channel}, {"LOAD", 0, load},
-    {"ARM", 3, arm},       {"FIRE", 0, fire},   {"LIGHT", 5, give_light},         {"SHOT", 1, shot},
-    {"STATUS", 0, status}, {"BEAT", 0, beat},   {"OFF", 0, off},             {"CLEAR", 0, clear},
+    {"NEW", 0, new_train},    {"LIMIT", 4, limit}, {"CHANNEL", 9, set_channel},
+    {"LOAD", 0, load},        {"ARM", 3, arm},     {"FIRE", 0, fire},
+    {"LIGHT", 5, give_light}, {"SHOT", 1, shot},   {"STATUS", 0, status},
+    {"BEAT", 0, beat},        {"OFF", 0, off},     {"CLEAR", 0, clear},
 };
 
 static const struct command *find(struct span word)

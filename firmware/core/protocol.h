@@ -25,7 +25,7 @@ struct protocol {
     char line[MAX_LINE];
     size_t length;
     bool overflow;
-    bool answered;      /* the next three belong to the newest numbered line */
+    bool answered; /* the next three belong to the newest numbered line */
     uint32_t sequence;
     uint16_t crc;
     struct text reply;

@@ -79,15 +79,15 @@ struct safety {
     uint32_t train_id; /* counts the trains loaded since boot */
     enum source source;
     uint32_t shots_left;
-    bool permitted;           /* the trigger input may start a shot */
+    bool permitted; /* the trigger input may start a shot */
     uint32_t timer_period_us;
     uint64_t timer_due_us;
     struct counters counters;
-    uint64_t not_before_us;   /* the next light */
-    uint64_t train_over_us;   /* the latest one */
-    uint64_t settled_us;      /* the set-points that pulses had */
+    uint64_t not_before_us; /* the next light */
+    uint64_t train_over_us; /* the latest one */
+    uint64_t settled_us;    /* the set-points that pulses had */
     uint64_t light_over_us;
-    uint64_t heard_us;        /* last valid line of the host */
+    uint64_t heard_us; /* last valid line of the host */
 };
 
 /* Of any train within the absolute limits: what has forgotten the light before it waits as long. */

@@ -135,7 +135,8 @@ static void run_timer(struct safety *safety)
         return;
     (void)shoot(safety, SOURCE_TIMER); /* refused: counted */
     const uint64_t next_us = safety->timer_due_us + safety->timer_period_us;
-    safety->timer_due_us = later_us(next_us > now_us ? next_us : now_us + safety->timer_period_us, safety->not_before_us);
+    safety->timer_due_us =
+        later_us(next_us > now_us ? next_us : now_us + safety->timer_period_us, safety->not_before_us);
 }
 
 void shooting_poll(struct safety *safety)

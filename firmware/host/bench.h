@@ -8,9 +8,9 @@
 #include <stdint.h>
 
 struct bench {
-    int serial;               /* file descriptor of the serial line */
+    int serial; /* file descriptor of the serial line */
     bool interlock_closed;
-    bool interlock_opened;    /* since the core last asked */
+    bool interlock_opened; /* since the core last asked */
     bool estop_closed;
     bool estop_opened;
     bool converter_stuck;     /* zero is not confirmed */
@@ -21,7 +21,7 @@ struct bench {
 
 extern struct bench bench;
 
-void bench_power_up(void); /* what a reset does to the hardware */
+void bench_power_up(void);  /* what a reset does to the hardware */
 void bench_find_port(void); /* lets the time pass that a host needs to find a board that has just started */
 void bench_set_interlock(bool closed);
 void bench_set_estop(bool closed);

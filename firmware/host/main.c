@@ -88,7 +88,8 @@ static void run(struct protocol *protocol)
     struct pollfd waiting[2] = {{bench.serial, POLLIN, 0}, {STDIN_FILENO, POLLIN, 0}};
     bool open = true;
     while (open) {
-        poll(waiting, 2, protocol->safety.state == STATE_ARMED ? (int)safety_idle_us(&protocol->safety) / 1000 : POLL_MS);
+        poll(waiting, 2,
+             protocol->safety.state == STATE_ARMED ? (int)safety_idle_us(&protocol->safety) / 1000 : POLL_MS);
         if (waiting[1].revents)
             open = read_control(protocol);
         if (open && waiting[0].revents)

@@ -3,7 +3,7 @@
  * A line of stdin is the eight fields of a channel and three limits; of stdout:
  *     ERROR                                                  what channel_check says of the requested values, or then
  *     ERROR CAMERA A_START A_WIDTH B_START B_WIDTH           of the quantised ones, or then
- *     0 ... WITHIN LIGHT_WITHIN LENGTH_NS PERIOD_US          with the tightened limits; the current as one of the light */
+ *     0 ... WITHIN LIGHT_WITHIN LENGTH_NS PERIOD_US          with the tightened limits; also as a current of light */
 #include <inttypes.h>
 #include <stdio.h>
 
@@ -46,11 +46,11 @@ int main(void)
 {
     struct channel channel = {0};
     struct channel_limits asked = {0};
-    while (scanf("%" SCNu32 "%" SCNu32 "%" SCNu32 "%" SCNu32 "%" SCNu32 "%" SCNu32 "%" SCNu32 "%" SCNu32
-                 "%" SCNu32 "%" SCNu32 "%" SCNu32,
-                 &channel.camera_ns, &channel.a_start_ns, &channel.a_width_ns, &channel.b_start_ns,
-                 &channel.b_width_ns, &channel.current_ma, &channel.frame_a_close_ns, &channel.frame_b_open_ns,
-                 &asked.max_current_ma, &asked.max_duty_ppm, &asked.max_light_ma) == 11)
+    while (scanf("%" SCNu32 "%" SCNu32 "%" SCNu32 "%" SCNu32 "%" SCNu32 "%" SCNu32 "%" SCNu32 "%" SCNu32 "%" SCNu32
+                 "%" SCNu32 "%" SCNu32,
+                 &channel.camera_ns, &channel.a_start_ns, &channel.a_width_ns, &channel.b_start_ns, &channel.b_width_ns,
+                 &channel.current_ma, &channel.frame_a_close_ns, &channel.frame_b_open_ns, &asked.max_current_ma,
+                 &asked.max_duty_ppm, &asked.max_light_ma) == 11)
         report(&channel, asked);
     return 0;
 }

@@ -16,15 +16,15 @@ struct fake_port {
     bool estop_closed;
     bool can_load;
     bool set_points_stuck; /* cannot be confirmed as zero */
-    bool interrupted; /* an interrupt switches the outputs off just before the next shot */
+    bool interrupted;      /* an interrupt switches the outputs off just before the next shot */
     struct pulse_train loaded;
     bool live; /* between port_load and port_off */
     bool permitted;
-    bool edge_fired;   /* since the core last asked */
-    uint32_t rises;    /* likewise */
-    uint32_t cameras;  /* likewise */
+    bool edge_fired;  /* since the core last asked */
+    uint32_t rises;   /* likewise */
+    uint32_t cameras; /* likewise */
     uint32_t light_ma[CHANNEL_COUNT];
-    bool prepared;     /* for light */
+    bool prepared; /* for light */
     uint64_t lit_until_us;
     unsigned fired;
     unsigned replies;
@@ -43,12 +43,12 @@ bool fake_lit(void);
 /* Send a body as a line with its CRC; returns the body of the reply, without CRC and line feed. */
 const char *exchange(struct protocol *protocol, const char *body);
 
-#define CHECK(condition)                                                               \
-    do {                                                                               \
-        if (!(condition)) {                                                            \
-            fprintf(stderr, "%s:%d: %s is false\n", __FILE__, __LINE__, #condition);   \
-            exit(1);                                                                   \
-        }                                                                              \
+#define CHECK(condition) \
+    do { \
+        if (!(condition)) { \
+            fprintf(stderr, "%s:%d: %s is false\n", __FILE__, __LINE__, #condition); \
+            exit(1); \
+        } \
     } while (0)
 
 #endif

@@ -1,7 +1,7 @@
-/* Hostile bytes, half-right lines, clock jumps, edges of the trigger input and stops that open, the same ones for the same
- * seed. After every step: no light without permission, and counters that add up.
+/* Hostile bytes, half-right lines, clock jumps, edges of the trigger input and stops that open, the same ones for the
+ * same seed. After every step: no light without permission, and counters that add up.
  *
- *     fuzz SEED STEPS       deterministic; with -DFUZZ_INPUT instead LLVMFuzzerTestOneInput, for libFuzzer and replay */
+ *     fuzz SEED STEPS       deterministic; with -DFUZZ_INPUT LLVMFuzzerTestOneInput, for libFuzzer and replay */
 #include <string.h>
 
 #include "fake_port.h"
@@ -159,7 +159,8 @@ static void check_invariants(void)
     was_lit = fake_lit();
     if (fake.fired != fired_before) {
         check_duty();
-        CHECK(fake.interlock_closed && fake.estop_closed && (last_shot_us == 0 || fake.now_us - last_shot_us >= MIN_PERIOD_US));
+        CHECK(fake.interlock_closed && fake.estop_closed &&
+              (last_shot_us == 0 || fake.now_us - last_shot_us >= MIN_PERIOD_US));
         last_shot_us = fake.now_us;
         fired_before = fake.fired;
     }

@@ -1,4 +1,4 @@
-/* Runs the golden vectors of stdin through the core, byte for byte. The format is told at the top of golden_vectors.txt. */
+/* Runs the golden vectors of stdin through the core, byte for byte. golden_vectors.txt tells the format at its top. */
 #include <string.h>
 
 #include "fake_port.h"

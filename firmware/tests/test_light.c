@@ -46,8 +46,10 @@ static enum error light_of(uint32_t current_ma)
 static void test_current_and_time_have_bounds(void)
 {
     boot();
-    CHECK(light_of(0) == ERROR_LIGHT && light_of(MAX_LIGHT_MA + 1) == ERROR_LIGHT && light_of(UINT32_MAX) == ERROR_LIGHT);
-    CHECK(safety_light(&safety, 0, LOW_MA) == ERROR_LIGHT && safety_light(&safety, MAX_LIGHT_MS + 1, LOW_MA) == ERROR_LIGHT);
+    CHECK(light_of(0) == ERROR_LIGHT && light_of(MAX_LIGHT_MA + 1) == ERROR_LIGHT &&
+          light_of(UINT32_MAX) == ERROR_LIGHT);
+    CHECK(safety_light(&safety, 0, LOW_MA) == ERROR_LIGHT &&
+          safety_light(&safety, MAX_LIGHT_MS + 1, LOW_MA) == ERROR_LIGHT);
     CHECK(light_of(MAX_LIGHT_MA) == ERROR_NONE);
     safety_off(&safety);
     wait_us(LONGEST_PERIOD_US);
@@ -57,8 +59,10 @@ static void test_current_and_time_have_bounds(void)
 static void test_the_limits_of_an_led_bind_it_too(void)
 {
     boot();
-    CHECK(!safety_tighten(&safety, 2, (struct channel_limits){UINT32_MAX, UINT32_MAX, 300}) && light_of(301) == ERROR_LIMIT);
-    CHECK(!safety_tighten(&safety, 2, (struct channel_limits){200, UINT32_MAX, UINT32_MAX}) && light_of(201) == ERROR_LIMIT);
+    CHECK(!safety_tighten(&safety, 2, (struct channel_limits){UINT32_MAX, UINT32_MAX, 300}) &&
+          light_of(301) == ERROR_LIMIT);
+    CHECK(!safety_tighten(&safety, 2, (struct channel_limits){200, UINT32_MAX, UINT32_MAX}) &&
+          light_of(201) == ERROR_LIMIT);
     CHECK(light_of(200) == ERROR_NONE);
     CHECK(safety_tighten(&safety, 2, (struct channel_limits){1, 1, 1}) == ERROR_NOT_SAFE);
     safety_off(&safety);

@@ -1,6 +1,6 @@
 /* Limits and quantisation of the pulse train, at and beyond every bound. */
-#include "fake_port.h"
 #include "channel_limits.h"
+#include "fake_port.h"
 #include "pulse_train.h"
 
 static const struct channel LEGAL = {

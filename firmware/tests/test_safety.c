@@ -173,7 +173,8 @@ static void test_a_tighter_duty_lengthens_the_period(void)
 {
     boot_armed(5);
     safety_off(&safety);
-    CHECK(safety_tighten(&safety, 0, (struct channel_limits){30000, 20, UINT32_MAX}) == ERROR_NONE && safety_load(&safety) == ERROR_NONE);
+    CHECK(safety_tighten(&safety, 0, (struct channel_limits){30000, 20, UINT32_MAX}) == ERROR_NONE &&
+          safety_load(&safety) == ERROR_NONE);
     CHECK(arm(5) == ERROR_NONE && safety_fire(&safety) == ERROR_NONE);
     wait_us(100000 - 1); /* 2 us of light at 20 ppm */
     CHECK(safety_fire(&safety) == ERROR_EARLY);
@@ -272,7 +273,8 @@ static void test_a_watchdog_reset_boots_into_a_fault(void)
 {
     fake_reset();
     safety_boot(&safety, CAUSE_WATCHDOG);
-    CHECK(safety.state == STATE_FAULT && safety.faults == FAULT_WATCHDOG && safety_load(&safety) == ERROR_FAULT_LATCHED);
+    CHECK(safety.state == STATE_FAULT && safety.faults == FAULT_WATCHDOG &&
+          safety_load(&safety) == ERROR_FAULT_LATCHED);
     CHECK(safety_clear(&safety) == ERROR_NONE && safety.state == STATE_SAFE);
 }
 

@@ -51,7 +51,8 @@ static void test_sources_and_periods_have_bounds(void)
     boot_loaded();
     wait_us(LONGEST_PERIOD_US);
     CHECK(safety_arm(&safety, 1, SOURCE_TIMER + 1, 0) == ERROR_SOURCE);
-    CHECK(safety_arm(&safety, 1, UINT32_MAX, 0) == ERROR_SOURCE && safety_arm(&safety, 1, SOURCE_TIMER, 0) == ERROR_PERIOD);
+    CHECK(safety_arm(&safety, 1, UINT32_MAX, 0) == ERROR_SOURCE &&
+          safety_arm(&safety, 1, SOURCE_TIMER, 0) == ERROR_PERIOD);
     for (uint32_t source = SOURCE_COMMAND; source <= SOURCE_TIMER; source++) {
         CHECK(safety_arm(&safety, 1, source, MIN_PERIOD_US - 1) == ERROR_PERIOD);
         CHECK(safety_arm(&safety, 1, source, MAX_PERIOD_US + 1) == ERROR_PERIOD && safety.state == STATE_SAFE);

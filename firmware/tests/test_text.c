@@ -44,7 +44,8 @@ static void test_hex_is_four_upper_case_digits(void)
     text_hex16(&text, 0x0AF9);
     CHECK(text.length == 4 && !memcmp(text.bytes, "0AF9", 4));
     CHECK(span_hex16(span("0AF9"), &number) && number == 0x0AF9);
-    CHECK(!span_hex16(span("0af9"), &number) && !span_hex16(span("0AF"), &number) && !span_hex16(span("0AF91"), &number));
+    CHECK(!span_hex16(span("0af9"), &number) && !span_hex16(span("0AF"), &number) &&
+          !span_hex16(span("0AF91"), &number));
 }
 
 static void test_words_are_equal_only_as_a_whole(void)

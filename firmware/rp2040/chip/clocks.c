@@ -37,8 +37,8 @@ enum {
     USB_DIVIDER = 5,
 };
 
-_Static_assert(CRYSTAL_MHZ * SYS_FEEDBACK == CLOCK_MHZ * SYS_DIVIDER_1 * SYS_DIVIDER_2, "the PLL gives the clock");
-_Static_assert(CRYSTAL_MHZ * USB_FEEDBACK == USB_MHZ * USB_DIVIDER * USB_DIVIDER, "the other one that of the USB");
+_Static_assert((CRYSTAL_MHZ * SYS_FEEDBACK) == CLOCK_MHZ * SYS_DIVIDER_1 * SYS_DIVIDER_2, "the PLL gives the clock");
+_Static_assert((CRYSTAL_MHZ * USB_FEEDBACK) == USB_MHZ * USB_DIVIDER * USB_DIVIDER, "the other one that of the USB");
 
 void blocks_restart(uint32_t reset_bits)
 {

@@ -70,10 +70,10 @@ enum io_ctrl {
     FUNCTION_PIO0 = 6,
     FUNCTION_PIO1 = 7,
     FUNCTION_NONE = 31,
-    OUTPUT_LOW = 2 << 8,      /* OUTOVER: whatever the peripheral drives */
+    OUTPUT_LOW = 2 << 8, /* OUTOVER: whatever the peripheral drives */
     OUTPUT_HIGH = 3 << 8,
-    OUTPUT_ENABLE = 3 << 12,  /* OEOVER */
-    INPUT_LOW = 2 << 16,      /* INOVER: whatever the pin sees */
+    OUTPUT_ENABLE = 3 << 12, /* OEOVER */
+    INPUT_LOW = 2 << 16,     /* INOVER: whatever the pin sees */
     INPUT_HIGH = 3 << 16,
 };
 

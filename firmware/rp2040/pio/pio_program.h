@@ -32,10 +32,10 @@ enum pio_field {
 };
 
 _Static_assert(2 * WIDTH_BITS + GAP_BITS <= 32, "pulse A, gap and pulse B fit one word");
-_Static_assert(PULSE_CYCLES_MAX * TICK_NS >= MAX_WIDTH_NS, "the longest permitted pulse fits");
-_Static_assert(PULSE_CYCLES_MAX * TICK_NS < MAX_WIDTH_NS + 100, "and hardly more than that");
-_Static_assert(GAP_CYCLES_MAX * TICK_NS >= MAX_SEPARATION_NS, "the longest permitted separation fits");
-_Static_assert(CAMERA_CYCLES_MAX * TICK_NS >= CAMERA_PULSE_NS, "the camera pulse fits");
+_Static_assert(MAX_WIDTH_NS <= PULSE_CYCLES_MAX * TICK_NS, "the longest permitted pulse fits");
+_Static_assert(MAX_WIDTH_NS + 100 > PULSE_CYCLES_MAX * TICK_NS, "and hardly more than that");
+_Static_assert(MAX_SEPARATION_NS <= GAP_CYCLES_MAX * TICK_NS, "the longest permitted separation fits");
+_Static_assert(CAMERA_PULSE_NS <= CAMERA_CYCLES_MAX * TICK_NS, "the camera pulse fits");
 _Static_assert(MIN_WIDTH_NS >= COUNT_OFFSET * TICK_NS && MIN_DARK_NS >= COUNT_OFFSET * TICK_NS,
                "every permitted width and gap can be encoded");
 
@@ -44,7 +44,7 @@ _Static_assert(MIN_WIDTH_NS >= COUNT_OFFSET * TICK_NS && MIN_DARK_NS >= COUNT_OF
 #define PIO_HIGH (1u << 12)
 #define PIO_JMP(address) (0x0000u | (address))
 #define PIO_JMP_X_DEC(address) (0x0040u | (address)) /* if X is not 0; decrements X */
-#define PIO_WAIT_PIN_LOW 0x2020u                      /* of the pin at IN_BASE */
+#define PIO_WAIT_PIN_LOW 0x2020u                     /* of the pin at IN_BASE */
 #define PIO_WAIT_PIN_HIGH 0x20a0u
 #define PIO_OUT_X(bits) (0x6020u | ((bits) & 31u))
 #define PIO_PULL 0x80a0u /* stalls while the FIFO is empty */
@@ -106,10 +106,11 @@ static const uint16_t LIT_PROGRAM[] = {
     PIO_LOW | PIO_JMP_Y_DEC(2u),
 };
 
-_Static_assert(LIT_ON_CYCLES * LIT_DIVIDER * TICK_NS <= MAX_WIDTH_NS, "no pulse of continuous light is longer either");
-_Static_assert(LIT_ON_CYCLES * 1000000ll <= MAX_LIGHT_DUTY_PPM * (long long)LIT_PERIOD_CYCLES, "and most of it is dark");
-_Static_assert((long long)LIT_WORDS_MAX * (LIT_PERIOD_CYCLES << LIT_COUNT_BITS) * LIT_DIVIDER * TICK_NS <=
-                   LIGHT_SUSTAIN_MS * 1000000ll,
+_Static_assert(MAX_WIDTH_NS >= LIT_ON_CYCLES * LIT_DIVIDER * TICK_NS, "no pulse of continuous light is longer either");
+_Static_assert(LIT_ON_CYCLES * 1000000ll <= MAX_LIGHT_DUTY_PPM * (long long)LIT_PERIOD_CYCLES,
+               "and most of it is dark");
+_Static_assert(LIGHT_SUSTAIN_MS * 1000000ll >=
+                   (long long)LIT_WORDS_MAX * (LIT_PERIOD_CYCLES << LIT_COUNT_BITS) * LIT_DIVIDER * TICK_NS,
                "whatever the FIFO holds, it ends in time");
 
 #endif

@@ -18,9 +18,9 @@ enum {
 
 /* Fast write, section 5.6.1: all four registers. Short enough for the queue behind a busy interrupt. */
 static const uint8_t ALL_ZERO[2 * CHANNEL_COUNT] = {FAST_POWER_DOWN, 0, FAST_POWER_DOWN, 0,
-                                                     FAST_POWER_DOWN, 0, FAST_POWER_DOWN, 0};
+                                                    FAST_POWER_DOWN, 0, FAST_POWER_DOWN, 0};
 
-_Static_assert(WRITE_BYTES * CHANNEL_COUNT <= I2C_FIFO && sizeof ALL_ZERO <= I2C_FIFO, "a write fits the queue");
+_Static_assert(I2C_FIFO >= WRITE_BYTES * CHANNEL_COUNT && I2C_FIFO >= sizeof ALL_ZERO, "a write fits the queue");
 _Static_assert(MAX_CURRENT_MA / SET_POINT_STEP_MA < 1 << 12, "full scale fits 12 bits");
 
 static volatile bool zero_due; /* asked for, not confirmed yet */

@@ -28,6 +28,8 @@ enum {
 
 #define TWO_BYTES(number) (number) & 0xff, (number) >> 8
 
+/* Laid out by their parts. */
+/* clang-format off */
 static const uint8_t DEVICE_DESCRIPTOR[] = {
     18, DEVICE, TWO_BYTES(0x0200), CLASS_CDC, 0, 0, USB_PACKET, TWO_BYTES(VENDOR), TWO_BYTES(PRODUCT),
     TWO_BYTES(0x0100), 1, 2, SERIAL_NUMBER, 1,
@@ -46,6 +48,7 @@ static const uint8_t CONFIGURATION_DESCRIPTOR[] = {
     7, ENDPOINT, USB_DATA, BULK, TWO_BYTES(USB_PACKET), 0,
     7, ENDPOINT, IN | USB_DATA, BULK, TWO_BYTES(USB_PACKET), 0,
 };
+/* clang-format on */
 
 _Static_assert(sizeof DEVICE_DESCRIPTOR == 18 && sizeof CONFIGURATION_DESCRIPTOR == 67, "as they say of themselves");
 _Static_assert(sizeof CONFIGURATION_DESCRIPTOR % USB_PACKET, "its last packet is a short one");
