@@ -24,26 +24,26 @@ struct channel_limits channel_limits_tightened(struct channel_limits present, st
     };
 }
 
-bool channel_within(const struct channel *channel, const struct channel_limits *limits)
+bool channel_limits_allow(const struct channel *channel, const struct channel_limits *limits)
 {
     if (!channel->current_ma)
         return true;
     return channel->current_ma <= limits->max_current_ma && limits->max_duty_ppm > 0;
 }
 
-bool train_within(const struct pulse_train *train, const struct channel_limits *limits)
+bool channel_limits_allow_train(const struct pulse_train *train, const struct channel_limits *limits)
 {
     for (int i = 0; i < CHANNEL_COUNT; i++)
-        if (train->channels[i].used && !channel_within(&train->channels[i], &limits[i]))
+        if (train->channels[i].used && !channel_limits_allow(&train->channels[i], &limits[i]))
             return false;
     return true;
 }
 
-bool light_within(uint32_t current_ma, const struct channel_limits *limits)
+bool channel_limits_allow_light(uint32_t current_ma, const struct channel_limits *limits)
 {
     const struct channel_limits light = {smaller(limits->max_current_ma, limits->max_light_ma), limits->max_duty_ppm,
                                          0};
-    return channel_within(&(struct channel){.current_ma = current_ma}, &light);
+    return channel_limits_allow(&(struct channel){.current_ma = current_ma}, &light);
 }
 
 static uint32_t channel_period_us(const struct channel *channel, uint32_t max_duty_ppm)
@@ -54,9 +54,9 @@ static uint32_t channel_period_us(const struct channel *channel, uint32_t max_du
     return (lit_ns * 1000u + max_duty_ppm - 1u) / max_duty_ppm;
 }
 
-uint32_t train_period_us(const struct pulse_train *train, const struct channel_limits *limits)
+uint32_t channel_limits_period_us(const struct pulse_train *train, const struct channel_limits *limits)
 {
-    const uint32_t busy_us = train_length_ns(train) / 1000u + START_US;
+    const uint32_t busy_us = pulse_train_length_ns(train) / 1000u + START_US;
     uint32_t period_us = busy_us > MIN_PERIOD_US ? busy_us : MIN_PERIOD_US;
     for (int i = 0; i < CHANNEL_COUNT; i++) {
         const uint32_t needed_us = channel_period_us(&train->channels[i], limits[i].max_duty_ppm);

@@ -19,16 +19,16 @@ struct channel_limits channel_limits_absolute(void);
 /* The tighter of both, field by field. */
 struct channel_limits channel_limits_tightened(struct channel_limits present, struct channel_limits asked);
 
-bool channel_within(const struct channel *channel, const struct channel_limits *limits);
+bool channel_limits_allow(const struct channel *channel, const struct channel_limits *limits);
 
 /* False if a used channel of the train is not within its limits. */
-bool train_within(const struct pulse_train *train, const struct channel_limits *limits);
+bool channel_limits_allow_train(const struct pulse_train *train, const struct channel_limits *limits);
 
 /* Whether a channel may give continuous light of this current. */
-bool light_within(uint32_t current_ma, const struct channel_limits *limits);
+bool channel_limits_allow_light(uint32_t current_ma, const struct channel_limits *limits);
 
 /* Shortest time to the next shot, so that no channel exceeds its duty over any length of time: the minimum period,
  * the light of this shot at the duty of its channel, or the shot itself. For a train within these limits. */
-uint32_t train_period_us(const struct pulse_train *train, const struct channel_limits *limits);
+uint32_t channel_limits_period_us(const struct pulse_train *train, const struct channel_limits *limits);
 
 #endif

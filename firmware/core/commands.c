@@ -4,7 +4,7 @@
 #include "port.h"
 #include "shooting.h"
 
-typedef enum error (*action)(struct safety *safety, const uint32_t *fields, struct text *reply);
+typedef enum error (*action)(struct generator *generator, const uint32_t *fields, struct text *reply);
 
 struct command {
     const char *word;
@@ -12,7 +12,7 @@ struct command {
     action run;
 };
 
-void command_identity(struct text *reply, enum cause cause, uint32_t last_sequence)
+void commands_identify(struct text *reply, enum cause cause, uint32_t last_sequence)
 {
     text_word(reply, " model=" MODEL " version=" VERSION " build=");
     text_word(reply, port_build);
@@ -27,16 +27,16 @@ void command_identity(struct text *reply, enum cause cause, uint32_t last_sequen
     text_field(reply, "last", last_sequence);
 }
 
-static void state_field(struct text *reply, const struct safety *safety)
+static void state_field(struct text *reply, const struct generator *generator)
 {
-    text_field(reply, "state", (uint32_t)safety->state);
+    text_field(reply, "state", (uint32_t)generator->state);
 }
 
-static enum error new_train(struct safety *safety, const uint32_t *fields, struct text *reply)
+static enum error new_train(struct generator *generator, const uint32_t *fields, struct text *reply)
 {
     (void)fields;
     (void)reply;
-    return safety_new_train(safety);
+    return safety_new_train(generator);
 }
 
 /* In units of the tick or of 1 ns; the name says which. */
@@ -55,7 +55,7 @@ static void channel_fields(struct text *reply, uint32_t number, const struct cha
     text_field(reply, "current_ma", channel->current_ma);
 }
 
-static enum error set_channel(struct safety *safety, const uint32_t *fields, struct text *reply)
+static enum error set_channel(struct generator *generator, const uint32_t *fields, struct text *reply)
 {
     const struct channel requested = {
         .camera_ns = fields[1],
@@ -67,77 +67,77 @@ static enum error set_channel(struct safety *safety, const uint32_t *fields, str
         .frame_a_close_ns = fields[7],
         .frame_b_open_ns = fields[8],
     };
-    const enum error error = safety_set_channel(safety, fields[0], &requested);
+    const enum error error = safety_set_channel(generator, fields[0], &requested);
     if (error)
         return error;
-    channel_fields(reply, fields[0], &safety->train.channels[fields[0]], "_ns=", 1);
+    channel_fields(reply, fields[0], &generator->train.channels[fields[0]], "_ns=", 1);
     return ERROR_NONE;
 }
 
-static enum error limit(struct safety *safety, const uint32_t *fields, struct text *reply)
+static enum error limit(struct generator *generator, const uint32_t *fields, struct text *reply)
 {
     const struct channel_limits asked = {fields[1], fields[2], fields[3]};
-    const enum error error = safety_tighten(safety, fields[0], asked);
+    const enum error error = safety_tighten(generator, fields[0], asked);
     if (error)
         return error;
     text_field(reply, "channel", fields[0]);
-    text_field(reply, "max_current_ma", safety->limits[fields[0]].max_current_ma);
-    text_field(reply, "max_duty_ppm", safety->limits[fields[0]].max_duty_ppm);
-    text_field(reply, "max_light_ma", safety->limits[fields[0]].max_light_ma);
+    text_field(reply, "max_current_ma", generator->limits[fields[0]].max_current_ma);
+    text_field(reply, "max_duty_ppm", generator->limits[fields[0]].max_duty_ppm);
+    text_field(reply, "max_light_ma", generator->limits[fields[0]].max_light_ma);
     return ERROR_NONE;
 }
 
-static enum error load(struct safety *safety, const uint32_t *fields, struct text *reply)
+static enum error load(struct generator *generator, const uint32_t *fields, struct text *reply)
 {
     (void)fields;
-    const enum error error = safety_load(safety);
+    const enum error error = safety_load(generator);
     if (error)
         return error;
-    text_field(reply, "train", safety->train_id);
-    text_field(reply, "length_ns", train_length_ns(&safety->train));
-    text_field(reply, "period_us", train_period_us(&safety->train, safety->limits));
+    text_field(reply, "train", generator->train_id);
+    text_field(reply, "length_ns", pulse_train_length_ns(&generator->train));
+    text_field(reply, "period_us", channel_limits_period_us(&generator->train, generator->limits));
     return ERROR_NONE;
 }
 
-static enum error arm(struct safety *safety, const uint32_t *fields, struct text *reply)
+static enum error arm(struct generator *generator, const uint32_t *fields, struct text *reply)
 {
-    const enum error error = safety_arm(safety, fields[0], fields[1], fields[2]);
+    const enum error error = shooting_arm(generator, fields[0], fields[1], fields[2]);
     if (error)
         return error;
-    text_field(reply, "train", safety->train_id);
-    text_field(reply, "shots_left", safety->shots_left);
+    text_field(reply, "train", generator->train_id);
+    text_field(reply, "shots_left", generator->shots_left);
     return ERROR_NONE;
 }
 
-static enum error fire(struct safety *safety, const uint32_t *fields, struct text *reply)
+static enum error fire(struct generator *generator, const uint32_t *fields, struct text *reply)
 {
     (void)fields;
-    const enum error error = safety_fire(safety);
+    const enum error error = shooting_fire(generator);
     if (error)
         return error;
-    text_field(reply, "fired", safety->counters.fired);
-    text_field(reply, "train", safety->train_id);
-    text_field(reply, "shots_left", safety->shots_left);
+    text_field(reply, "fired", generator->counters.fired);
+    text_field(reply, "train", generator->train_id);
+    text_field(reply, "shots_left", generator->shots_left);
     return ERROR_NONE;
 }
 
-static enum error give_light(struct safety *safety, const uint32_t *fields, struct text *reply)
+static enum error give_light(struct generator *generator, const uint32_t *fields, struct text *reply)
 {
-    const enum error error = safety_light(safety, fields[0], fields + 1);
+    const enum error error = light_start(generator, fields[0], fields + 1);
     if (error)
         return error;
-    state_field(reply, safety);
+    state_field(reply, generator);
     return ERROR_NONE;
 }
 
-static enum error shot(struct safety *safety, const uint32_t *fields, struct text *reply)
+static enum error shot(struct generator *generator, const uint32_t *fields, struct text *reply)
 {
     if (fields[0] >= CHANNEL_COUNT)
         return ERROR_CHANNEL;
-    const struct channel *fired = &safety->train.channels[fields[0]];
-    if (!safety->fired || !fired->used)
+    const struct channel *fired = &generator->train.channels[fields[0]];
+    if (!generator->fired || !fired->used)
         return ERROR_NO_SHOT;
-    text_field(reply, "fired", safety->counters.fired);
+    text_field(reply, "fired", generator->counters.fired);
     channel_fields(reply, fields[0], fired, "_ticks=", port_tick_ns);
     return ERROR_NONE;
 }
@@ -151,41 +151,41 @@ static void counter_fields(struct text *reply, const struct counters *counters)
         text_field(reply, names[i], counts[i]);
 }
 
-static enum error status(struct safety *safety, const uint32_t *fields, struct text *reply)
+static enum error status(struct generator *generator, const uint32_t *fields, struct text *reply)
 {
     (void)fields;
-    state_field(reply, safety);
-    text_field(reply, "faults", safety->faults);
-    text_field(reply, "interlock", safety->interlock_closed);
-    text_field(reply, "estop", safety->estop_closed);
-    text_field(reply, "source", (uint32_t)safety->source);
-    text_field(reply, "shots_left", safety->shots_left);
-    counter_fields(reply, &safety->counters);
+    state_field(reply, generator);
+    text_field(reply, "faults", generator->faults);
+    text_field(reply, "interlock", generator->interlock_closed);
+    text_field(reply, "estop", generator->estop_closed);
+    text_field(reply, "source", (uint32_t)generator->source);
+    text_field(reply, "shots_left", generator->shots_left);
+    counter_fields(reply, &generator->counters);
     return ERROR_NONE;
 }
 
-static enum error beat(struct safety *safety, const uint32_t *fields, struct text *reply)
+static enum error beat(struct generator *generator, const uint32_t *fields, struct text *reply)
 {
     (void)fields;
-    state_field(reply, safety);
+    state_field(reply, generator);
     return ERROR_NONE;
 }
 
-static enum error off(struct safety *safety, const uint32_t *fields, struct text *reply)
+static enum error off(struct generator *generator, const uint32_t *fields, struct text *reply)
 {
     (void)fields;
-    safety_off(safety);
-    state_field(reply, safety);
+    safety_off(generator);
+    state_field(reply, generator);
     return ERROR_NONE;
 }
 
-static enum error clear(struct safety *safety, const uint32_t *fields, struct text *reply)
+static enum error clear(struct generator *generator, const uint32_t *fields, struct text *reply)
 {
     (void)fields;
-    const enum error error = safety_clear(safety);
+    const enum error error = safety_clear(generator);
     if (error)
         return error;
-    state_field(reply, safety);
+    state_field(reply, generator);
     return ERROR_NONE;
 }
 
@@ -204,7 +204,7 @@ static const struct command *find(struct span word)
     return NULL;
 }
 
-enum error command_run(struct safety *safety, struct span word, struct span rest, struct text *reply)
+enum error commands_run(struct generator *generator, struct span word, struct span rest, struct text *reply)
 {
     uint32_t fields[MAX_FIELDS] = {0};
     const struct command *command = find(word);
@@ -213,5 +213,5 @@ enum error command_run(struct safety *safety, struct span word, struct span rest
     for (uint32_t i = 0; i < command->field_count; i++)
         if (!span_number(span_next_word(&rest), &fields[i]))
             return ERROR_SYNTAX;
-    return rest.length ? ERROR_SYNTAX : command->run(safety, fields, reply);
+    return rest.length ? ERROR_SYNTAX : command->run(generator, fields, reply);
 }

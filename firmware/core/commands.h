@@ -14,9 +14,9 @@
 enum { PROTOCOL_VERSION = 2, MAX_FIELDS = 9 };
 
 /* Carry out one command, given its word and the rest of the line; append the fields of the reply. */
-enum error command_run(struct safety *safety, struct span word, struct span rest, struct text *reply);
+enum error commands_run(struct generator *generator, struct span word, struct span rest, struct text *reply);
 
 /* Append what ID answers: the cause of the newest start and the number of the last answered line among it. */
-void command_identity(struct text *reply, enum cause cause, uint32_t last_sequence);
+void commands_identify(struct text *reply, enum cause cause, uint32_t last_sequence);
 
 #endif

@@ -2,57 +2,58 @@
 
 #include "port.h"
 
-static enum error check_currents(const struct safety *safety, const uint32_t *current_ma)
+static enum error check_currents(const struct generator *generator, const uint32_t *current_ma)
 {
     uint32_t sum_ma = 0;
     for (int i = 0; i < CHANNEL_COUNT; i++) {
         if (current_ma[i] > MAX_LIGHT_MA)
             return ERROR_LIGHT;
-        if (!light_within(current_ma[i], &safety->limits[i]))
+        if (!channel_limits_allow_light(current_ma[i], &generator->limits[i]))
             return ERROR_LIMIT;
         sum_ma += current_ma[i];
     }
     return sum_ma ? ERROR_NONE : ERROR_LIGHT;
 }
 
-static enum error light_permission(struct safety *safety, uint32_t time_ms, const uint32_t *current_ma)
+static enum error light_permission(struct generator *generator, uint32_t time_ms, const uint32_t *current_ma)
 {
-    enum error error = safety_check_safe(safety);
+    enum error error = safety_check_safe(generator);
     if (!error)
-        error = safety_check_stops(safety);
+        error = safety_check_stops(generator);
     if (error)
         return error;
     if (time_ms < 1 || time_ms > MAX_LIGHT_MS)
         return ERROR_LIGHT;
-    error = check_currents(safety, current_ma);
+    error = check_currents(generator, current_ma);
     if (error)
         return error;
     const uint64_t now_us = port_now_us();
-    const bool quiet = !safety->outputs_live && now_us >= safety->not_before_us && now_us >= safety->settled_us;
+    const bool quiet =
+        !generator->outputs_live && now_us >= generator->not_before_us && now_us >= generator->settled_us;
     return quiet ? ERROR_NONE : ERROR_EARLY;
 }
 
-enum error safety_light(struct safety *safety, uint32_t time_ms, const uint32_t *current_ma)
+enum error light_start(struct generator *generator, uint32_t time_ms, const uint32_t *current_ma)
 {
-    const enum error error = light_permission(safety, time_ms, current_ma);
+    const enum error error = light_permission(generator, time_ms, current_ma);
     if (error)
         return error;
-    safety->outputs_live = true; /* also where only a part can be prepared */
+    generator->outputs_live = true; /* also where only a part can be prepared */
     if (!port_prepare_light(current_ma)) {
-        safety_outputs_off(safety);
+        safety_outputs_off(generator);
         return ERROR_HARDWARE;
     }
-    safety->light_over_us = port_now_us() + time_ms * 1000u;
-    safety->state = STATE_LIT; /* safety_poll lights */
+    generator->light_over_us = port_now_us() + time_ms * 1000u;
+    generator->state = STATE_LIT; /* safety_poll lights */
     return ERROR_NONE;
 }
 
-void light_poll(struct safety *safety)
+void light_poll(struct generator *generator)
 {
-    if (safety->state != STATE_LIT)
+    if (generator->state != STATE_LIT)
         return;
-    if (port_now_us() >= safety->light_over_us)
-        safety_off(safety);
+    if (port_now_us() >= generator->light_over_us)
+        safety_off(generator);
     else
         port_sustain_light();
 }

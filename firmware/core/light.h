@@ -7,9 +7,9 @@
 
 /* Light on the channels whose current is not 0, for this time at most. Only while SAFE, with the set-points of pulses
  * long gone. */
-enum error safety_light(struct safety *safety, uint32_t time_ms, const uint32_t *current_ma);
+enum error light_start(struct generator *generator, uint32_t time_ms, const uint32_t *current_ma);
 
 /* Keep it on, or end it; for safety_poll. */
-void light_poll(struct safety *safety);
+void light_poll(struct generator *generator);
 
 #endif

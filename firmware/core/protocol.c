@@ -9,7 +9,7 @@ enum { CRC_LENGTH = 5 }; /* *1A2B */
 void protocol_boot(struct protocol *protocol, uint32_t boot, enum cause cause)
 {
     *protocol = (struct protocol){.boot = boot, .cause = cause};
-    safety_boot(&protocol->safety, cause);
+    safety_boot(&protocol->generator, cause);
 }
 
 /* Cut the CRC off the line; false where it is missing or wrong. */
@@ -50,7 +50,7 @@ static void run_command(struct protocol *protocol, struct span word, struct span
 {
     const size_t after_sequence = reply->length;
     write_ok(reply, protocol->boot);
-    const enum error error = command_run(&protocol->safety, word, rest, reply);
+    const enum error error = commands_run(&protocol->generator, word, rest, reply);
     if (error) {
         reply->length = after_sequence;
         write_error(reply, protocol->boot, error);
@@ -69,7 +69,7 @@ static void answer(struct protocol *protocol, uint32_t sequence, uint16_t crc, s
     if (span_equals(word, "ID") && !rest.length) {
         /* Opens a session: always answered afresh, and leaves the kept reply alone. */
         write_ok(reply, protocol->boot);
-        command_identity(reply, protocol->cause, protocol->sequence);
+        commands_identify(reply, protocol->cause, protocol->sequence);
     } else if (!is_newest(protocol, sequence)) {
         run_command(protocol, word, rest, reply);
         protocol->answered = true;
@@ -89,12 +89,12 @@ static void write_reply(struct protocol *protocol, struct text *reply)
     uint16_t crc = 0;
     uint32_t sequence = 0;
     if (protocol->overflow || !take_crc(&rest, &crc)) {
-        protocol->safety.counters.crc_errors++;
+        protocol->generator.counters.crc_errors++;
         write_unreadable(protocol, reply, protocol->overflow ? ERROR_LINE_TOO_LONG : ERROR_CRC);
         return;
     }
-    safety_poll(&protocol->safety); /* a host that comes back too late still finds the fault */
-    safety_heard(&protocol->safety);
+    safety_poll(&protocol->generator); /* a host that comes back too late still finds the fault */
+    safety_heard(&protocol->generator);
     if (!span_number(span_next_word(&rest), &sequence) || sequence > MAX_SEQUENCE) {
         write_unreadable(protocol, reply, ERROR_SYNTAX);
         return;
@@ -120,7 +120,7 @@ static void end_line(struct protocol *protocol)
 void protocol_receive(struct protocol *protocol, char byte)
 {
     if (byte == ABORT_BYTE) {
-        safety_off(&protocol->safety);
+        safety_off(&protocol->generator);
     } else if (byte == '\n') {
         if (protocol->length || protocol->overflow)
             end_line(protocol); /* an empty line is no line: a host may send it to end a torn one */
@@ -133,5 +133,5 @@ void protocol_receive(struct protocol *protocol, char byte)
 
 void protocol_poll(struct protocol *protocol)
 {
-    safety_poll(&protocol->safety);
+    safety_poll(&protocol->generator);
 }

@@ -19,7 +19,7 @@
 enum { ABORT_BYTE = 0x18, MAX_SEQUENCE = 65535 };
 
 struct protocol {
-    struct safety safety;
+    struct generator generator;
     uint32_t boot; /* how often the microcontroller has started */
     enum cause cause;
     char line[MAX_LINE];

@@ -10,19 +10,19 @@ static bool width_allowed(uint32_t width_ns)
     return width_ns >= MIN_WIDTH_NS && width_ns <= MAX_WIDTH_NS;
 }
 
-bool channel_is_single(const struct channel *channel)
+bool pulse_train_is_single(const struct channel *channel)
 {
     return !channel->b_start_ns && !channel->b_width_ns;
 }
 
 static bool widths_allowed(const struct channel *channel)
 {
-    return width_allowed(channel->a_width_ns) && (channel_is_single(channel) || width_allowed(channel->b_width_ns));
+    return width_allowed(channel->a_width_ns) && (pulse_train_is_single(channel) || width_allowed(channel->b_width_ns));
 }
 
 static bool separation_allowed(const struct channel *channel)
 {
-    if (channel_is_single(channel))
+    if (pulse_train_is_single(channel))
         return true;
     /* Sums of bounded values: edges and widths were checked before. */
     const uint32_t a_end_ns = channel->a_start_ns + channel->a_width_ns;
@@ -37,10 +37,10 @@ static bool straddles(const struct channel *channel)
     const uint64_t b_open_ns = (uint64_t)channel->camera_ns + channel->frame_b_open_ns;
     if ((uint64_t)channel->a_start_ns + channel->a_width_ns > a_close_ns)
         return false;
-    return channel_is_single(channel) || (a_close_ns <= b_open_ns && channel->b_start_ns >= b_open_ns);
+    return pulse_train_is_single(channel) || (a_close_ns <= b_open_ns && channel->b_start_ns >= b_open_ns);
 }
 
-enum error channel_check(const struct channel *channel)
+enum error pulse_train_check_channel(const struct channel *channel)
 {
     if (channel->camera_ns > MAX_EDGE_NS || channel->a_start_ns > MAX_EDGE_NS || channel->b_start_ns > MAX_EDGE_NS)
         return ERROR_EDGE;
@@ -58,7 +58,7 @@ static uint32_t nearest(uint32_t ns, uint32_t tick_ns)
     return (ns + tick_ns / 2u) / tick_ns * tick_ns;
 }
 
-struct channel channel_quantised(const struct channel *channel, uint32_t tick_ns)
+struct channel pulse_train_quantised(const struct channel *channel, uint32_t tick_ns)
 {
     struct channel actual = *channel;
     actual.camera_ns = nearest(channel->camera_ns, tick_ns);
@@ -69,20 +69,20 @@ struct channel channel_quantised(const struct channel *channel, uint32_t tick_ns
     return actual;
 }
 
-enum error train_check(const struct pulse_train *train)
+enum error pulse_train_check(const struct pulse_train *train)
 {
     enum error error = ERROR_NO_TRAIN;
     for (int i = 0; i < CHANNEL_COUNT; i++) {
         if (!train->channels[i].used)
             continue;
-        error = channel_check(&train->channels[i]);
+        error = pulse_train_check_channel(&train->channels[i]);
         if (error)
             return error;
     }
     return error;
 }
 
-uint32_t train_length_ns(const struct pulse_train *train)
+uint32_t pulse_train_length_ns(const struct pulse_train *train)
 {
     uint32_t length_ns = 0;
     for (int i = 0; i < CHANNEL_COUNT; i++) {

@@ -26,18 +26,18 @@ struct pulse_train {
 };
 
 /* First limit that the channel breaks, or ERROR_NONE. Safe for any field values. */
-enum error channel_check(const struct channel *channel);
+enum error pulse_train_check_channel(const struct channel *channel);
 
-/* Every edge and width at the nearest multiple of the tick. Only for a channel that passed channel_check. */
-struct channel channel_quantised(const struct channel *channel, uint32_t tick_ns);
+/* Every edge and width at the nearest multiple of the tick. Only for a channel that passed the check. */
+struct channel pulse_train_quantised(const struct channel *channel, uint32_t tick_ns);
 
 /* Whether it gives pulse A alone. */
-bool channel_is_single(const struct channel *channel);
+bool pulse_train_is_single(const struct channel *channel);
 
 /* ERROR_NO_TRAIN if no channel is used, else the first limit that a used channel breaks. */
-enum error train_check(const struct pulse_train *train);
+enum error pulse_train_check(const struct pulse_train *train);
 
 /* Trigger of the shot until the last output has fallen. */
-uint32_t train_length_ns(const struct pulse_train *train);
+uint32_t pulse_train_length_ns(const struct pulse_train *train);
 
 #endif

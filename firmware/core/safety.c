@@ -5,173 +5,173 @@
 #include "shooting.h"
 
 /* Dark first. Then what the trigger input had started before is counted, and the waiting times begin. */
-void safety_outputs_off(struct safety *safety)
+void safety_outputs_off(struct generator *generator)
 {
     port_off();
-    shooting_collect(safety);
+    shooting_collect(generator);
     const uint64_t now_us = port_now_us();
-    if (safety->outputs_live)
-        safety->settled_us = now_us + SETTLE_MS * 1000u;
-    if (safety->state == STATE_LIT)
-        safety->not_before_us = later_us(safety->not_before_us, now_us + LONGEST_PERIOD_US);
-    safety->outputs_live = false;
-    safety->permitted = false;
-    safety->shots_left = 0;
+    if (generator->outputs_live)
+        generator->settled_us = now_us + SETTLE_MS * 1000u;
+    if (generator->state == STATE_LIT)
+        generator->not_before_us = later_us(generator->not_before_us, now_us + LONGEST_PERIOD_US);
+    generator->outputs_live = false;
+    generator->permitted = false;
+    generator->shots_left = 0;
 }
 
-void safety_trip(struct safety *safety, enum fault fault)
+void safety_trip(struct generator *generator, enum fault fault)
 {
-    safety_outputs_off(safety);
-    safety->faults |= (uint32_t)fault;
-    safety->state = STATE_FAULT;
+    safety_outputs_off(generator);
+    generator->faults |= (uint32_t)fault;
+    generator->state = STATE_FAULT;
 }
 
-static bool gives_light(const struct safety *safety)
+static bool gives_light(const struct generator *generator)
 {
-    return safety->state == STATE_ARMED || safety->state == STATE_LIT;
+    return generator->state == STATE_ARMED || generator->state == STATE_LIT;
 }
 
-enum error safety_check_stops(struct safety *safety)
+enum error safety_check_stops(struct generator *generator)
 {
-    safety->estop_closed = port_estop_closed();
-    safety->interlock_closed = port_interlock_closed();
-    const bool lights = gives_light(safety); /* before the first of two trips */
-    if (!safety->estop_closed && !(safety->faults & FAULT_ESTOP))
-        safety_trip(safety, FAULT_ESTOP);
-    if (!safety->interlock_closed && lights)
-        safety_trip(safety, FAULT_INTERLOCK);
-    if (!safety->estop_closed)
+    generator->estop_closed = port_estop_closed();
+    generator->interlock_closed = port_interlock_closed();
+    const bool lights = gives_light(generator); /* before the first of two trips */
+    if (!generator->estop_closed && !(generator->faults & FAULT_ESTOP))
+        safety_trip(generator, FAULT_ESTOP);
+    if (!generator->interlock_closed && lights)
+        safety_trip(generator, FAULT_INTERLOCK);
+    if (!generator->estop_closed)
         return ERROR_ESTOP_OPEN;
-    return safety->interlock_closed ? ERROR_NONE : ERROR_INTERLOCK_OPEN;
+    return generator->interlock_closed ? ERROR_NONE : ERROR_INTERLOCK_OPEN;
 }
 
-enum error safety_check_safe(const struct safety *safety)
+enum error safety_check_safe(const struct generator *generator)
 {
-    if (safety->state == STATE_FAULT)
+    if (generator->state == STATE_FAULT)
         return ERROR_FAULT_LATCHED;
-    return safety->state == STATE_SAFE ? ERROR_NONE : ERROR_NOT_SAFE;
+    return generator->state == STATE_SAFE ? ERROR_NONE : ERROR_NOT_SAFE;
 }
 
-void safety_boot(struct safety *safety, enum cause cause)
+void safety_boot(struct generator *generator, enum cause cause)
 {
     const uint64_t now_us = port_now_us();
-    *safety = (struct safety){.state = STATE_SAFE, .not_before_us = now_us + LONGEST_PERIOD_US};
+    *generator = (struct generator){.state = STATE_SAFE, .not_before_us = now_us + LONGEST_PERIOD_US};
     for (int i = 0; i < CHANNEL_COUNT; i++)
-        safety->limits[i] = channel_limits_absolute();
-    safety_outputs_off(safety);
+        generator->limits[i] = channel_limits_absolute();
+    safety_outputs_off(generator);
     if (cause == CAUSE_WATCHDOG)
-        safety_trip(safety, FAULT_WATCHDOG);
+        safety_trip(generator, FAULT_WATCHDOG);
 }
 
-enum error safety_new_train(struct safety *safety)
+enum error safety_new_train(struct generator *generator)
 {
-    const enum error error = safety_check_safe(safety);
+    const enum error error = safety_check_safe(generator);
     if (error)
         return error;
-    safety->train = (struct pulse_train){0};
-    safety->loaded = safety->fired = false;
+    generator->train = (struct pulse_train){0};
+    generator->loaded = generator->fired = false;
     return ERROR_NONE;
 }
 
-enum error safety_set_channel(struct safety *safety, uint32_t number, const struct channel *requested)
+enum error safety_set_channel(struct generator *generator, uint32_t number, const struct channel *requested)
 {
-    enum error error = safety_check_safe(safety);
+    enum error error = safety_check_safe(generator);
     if (error)
         return error;
     if (number >= CHANNEL_COUNT)
         return ERROR_CHANNEL;
-    error = channel_check(requested);
+    error = pulse_train_check_channel(requested);
     if (error)
         return error;
-    if (!channel_within(requested, &safety->limits[number]))
+    if (!channel_limits_allow(requested, &generator->limits[number]))
         return ERROR_LIMIT;
-    struct channel actual = channel_quantised(requested, port_tick_ns);
-    error = channel_check(&actual);
+    struct channel actual = pulse_train_quantised(requested, port_tick_ns);
+    error = pulse_train_check_channel(&actual);
     if (error)
         return error;
     actual.used = true;
-    safety->train.channels[number] = actual;
-    safety->loaded = safety->fired = false;
+    generator->train.channels[number] = actual;
+    generator->loaded = generator->fired = false;
     return ERROR_NONE;
 }
 
 /* The absolute limits and those of the channels, which may have been tightened since a channel was set. */
-enum error safety_check_train(const struct safety *safety)
+enum error safety_check_train(const struct generator *generator)
 {
-    const enum error error = train_check(&safety->train);
+    const enum error error = pulse_train_check(&generator->train);
     if (error)
         return error;
-    return train_within(&safety->train, safety->limits) ? ERROR_NONE : ERROR_LIMIT;
+    return channel_limits_allow_train(&generator->train, generator->limits) ? ERROR_NONE : ERROR_LIMIT;
 }
 
-enum error safety_load(struct safety *safety)
+enum error safety_load(struct generator *generator)
 {
-    enum error error = safety_check_safe(safety);
+    enum error error = safety_check_safe(generator);
     if (!error)
-        error = safety_check_train(safety);
+        error = safety_check_train(generator);
     if (error)
         return error;
-    safety->loaded = true;
-    safety->train_id++;
+    generator->loaded = true;
+    generator->train_id++;
     return ERROR_NONE;
 }
 
-enum error safety_tighten(struct safety *safety, uint32_t number, struct channel_limits asked)
+enum error safety_tighten(struct generator *generator, uint32_t number, struct channel_limits asked)
 {
-    if (gives_light(safety))
+    if (gives_light(generator))
         return ERROR_NOT_SAFE;
     if (number >= CHANNEL_COUNT)
         return ERROR_CHANNEL;
-    safety->limits[number] = channel_limits_tightened(safety->limits[number], asked);
-    safety->loaded = false;
+    generator->limits[number] = channel_limits_tightened(generator->limits[number], asked);
+    generator->loaded = false;
     return ERROR_NONE;
 }
 
-void safety_off(struct safety *safety)
+void safety_off(struct generator *generator)
 {
-    safety_outputs_off(safety);
-    if (safety->state != STATE_FAULT)
-        safety->state = STATE_SAFE;
+    safety_outputs_off(generator);
+    if (generator->state != STATE_FAULT)
+        generator->state = STATE_SAFE;
 }
 
-enum error safety_clear(struct safety *safety)
+enum error safety_clear(struct generator *generator)
 {
-    if (gives_light(safety))
+    if (gives_light(generator))
         return ERROR_NOT_SAFE;
-    const enum error error = safety_check_stops(safety);
+    const enum error error = safety_check_stops(generator);
     if (error)
         return error;
     if (!port_set_points_confirmed())
         return ERROR_HARDWARE;
-    safety->faults = 0;
-    safety->state = STATE_SAFE;
+    generator->faults = 0;
+    generator->state = STATE_SAFE;
     return ERROR_NONE;
 }
 
-void safety_heard(struct safety *safety)
+void safety_heard(struct generator *generator)
 {
-    safety->heard_us = port_now_us();
+    generator->heard_us = port_now_us();
 }
 
-void safety_poll(struct safety *safety)
+void safety_poll(struct generator *generator)
 {
     const uint64_t now_us = port_now_us();
-    (void)safety_check_stops(safety); /* what it finds, it latches */
-    if (!port_set_points_confirmed() && !(safety->faults & FAULT_SETPOINT))
-        safety_trip(safety, FAULT_SETPOINT);
-    safety->counters.cameras += port_take_cameras();
-    if (gives_light(safety) && now_us - safety->heard_us > HEARTBEAT_MS * 1000u)
-        safety_trip(safety, FAULT_HEARTBEAT);
-    shooting_poll(safety);
-    light_poll(safety);
-    if (safety->state == STATE_SAFE && safety->outputs_live && now_us >= safety->train_over_us)
-        safety_outputs_off(safety);
+    (void)safety_check_stops(generator); /* what it finds, it latches */
+    if (!port_set_points_confirmed() && !(generator->faults & FAULT_SETPOINT))
+        safety_trip(generator, FAULT_SETPOINT);
+    generator->counters.cameras += port_take_cameras();
+    if (gives_light(generator) && now_us - generator->heard_us > HEARTBEAT_MS * 1000u)
+        safety_trip(generator, FAULT_HEARTBEAT);
+    shooting_poll(generator);
+    light_poll(generator);
+    if (generator->state == STATE_SAFE && generator->outputs_live && now_us >= generator->train_over_us)
+        safety_outputs_off(generator);
 }
 
-uint32_t safety_idle_us(const struct safety *safety)
+uint32_t safety_idle_us(const struct generator *generator)
 {
     const uint64_t now_us = port_now_us();
-    const uint64_t due_us = shooting_due_us(safety);
+    const uint64_t due_us = shooting_due_us(generator);
     if (due_us <= now_us)
         return 0;
     return due_us - now_us < POLL_US ? (uint32_t)(due_us - now_us) : (uint32_t)POLL_US;

@@ -1,17 +1,17 @@
 /* Whether light is allowed: states, faults, and the inputs and events that take the permission away.
  * What gives light is in shooting.h and light.h; nothing else does.
  *
- *            safety_arm                 stop opens, host silent, memory corrupt
+ *            shooting_arm               stop opens, host silent, memory corrupt
  *     SAFE ───────────────▶ ARMED ─────────────────────────────────────────────▶ FAULT
  *      ▲ ◀─────────────────── │                                                    │
  *      │  off, last shot fired                                                     │
- *      │     safety_light                                                          │
+ *      │     light_start                                                           │
  *      │ ─────────────────▶ LIT ──────────────────────────────────────────────────▶│
  *      │ ◀─────────────────── │                                                    │
  *      │  off, time is over                                                        │
  *      └──────────────────────── safety_clear, stops closed ───────────────────────┘
  *
- * Nothing but safety_arm leads to ARMED, nothing but safety_light to LIT. The emergency stop, and set-points that are
+ * Nothing but shooting_arm leads to ARMED, nothing but light_start to LIT. The emergency stop, and set-points that are
  * not known to be zero, lead to FAULT from everywhere. */
 #ifndef SAFETY_H
 #define SAFETY_H
@@ -66,7 +66,7 @@ struct counters {
     uint32_t crc_errors;
 };
 
-struct safety {
+struct generator {
     enum state state;
     uint32_t faults;
     bool interlock_closed; /* as the port told it last */
@@ -94,29 +94,29 @@ struct safety {
 enum { LONGEST_PERIOD_US = 2 * MAX_WIDTH_NS * 1000 / MAX_DUTY_PPM };
 
 /* Safe, or FAULT if the watchdog caused this boot. */
-void safety_boot(struct safety *safety, enum cause cause);
+void safety_boot(struct generator *generator, enum cause cause);
 
 /* Loading: only while SAFE. Quantises, checks requested and actual values, keeps the actual ones. */
-enum error safety_new_train(struct safety *safety);
-enum error safety_set_channel(struct safety *safety, uint32_t number, const struct channel *requested);
-enum error safety_load(struct safety *safety);
+enum error safety_new_train(struct generator *generator);
+enum error safety_set_channel(struct generator *generator, uint32_t number, const struct channel *requested);
+enum error safety_load(struct generator *generator);
 
 /* Tighten the limits of a channel; what is larger than the present limit changes nothing. The train must be loaded
  * again. Not while ARMED or LIT. */
-enum error safety_tighten(struct safety *safety, uint32_t number, struct channel_limits asked);
+enum error safety_tighten(struct generator *generator, uint32_t number, struct channel_limits asked);
 
-void safety_off(struct safety *safety);
-enum error safety_clear(struct safety *safety);
+void safety_off(struct generator *generator);
+enum error safety_clear(struct generator *generator);
 
 /* The host has sent a valid line. */
-void safety_heard(struct safety *safety);
+void safety_heard(struct generator *generator);
 
 /* Watch inputs and host, do what is due; call it at least every few milliseconds. */
-void safety_poll(struct safety *safety);
+void safety_poll(struct generator *generator);
 
 /* Time until safety_poll has something to do, at most POLL_US. */
 enum { POLL_US = 2000 };
-uint32_t safety_idle_us(const struct safety *safety);
+uint32_t safety_idle_us(const struct generator *generator);
 
 static inline uint64_t later_us(uint64_t a_us, uint64_t b_us)
 {
@@ -124,10 +124,10 @@ static inline uint64_t later_us(uint64_t a_us, uint64_t b_us)
 }
 
 /* For shooting.c and light.c. All reading of the stops goes through here: the port tells each opening once. */
-enum error safety_check_safe(const struct safety *safety);
-enum error safety_check_stops(struct safety *safety);
-enum error safety_check_train(const struct safety *safety);
-void safety_outputs_off(struct safety *safety);
-void safety_trip(struct safety *safety, enum fault fault);
+enum error safety_check_safe(const struct generator *generator);
+enum error safety_check_stops(struct generator *generator);
+enum error safety_check_train(const struct generator *generator);
+void safety_outputs_off(struct generator *generator);
+void safety_trip(struct generator *generator, enum fault fault);
 
 #endif

@@ -2,160 +2,161 @@
 
 #include "port.h"
 
-static enum error check_period(const struct safety *safety, enum source source, uint32_t period_us)
+static enum error check_period(const struct generator *generator, enum source source, uint32_t period_us)
 {
     if (!period_us && source != SOURCE_TIMER)
         return ERROR_NONE;
-    const uint32_t shortest_us = train_period_us(&safety->train, safety->limits);
+    const uint32_t shortest_us = channel_limits_period_us(&generator->train, generator->limits);
     return period_us >= shortest_us && period_us <= MAX_PERIOD_US ? ERROR_NONE : ERROR_PERIOD;
 }
 
-static enum error arm_permission(struct safety *safety, uint32_t shots, uint32_t source, uint32_t period_us)
+static enum error arm_permission(struct generator *generator, uint32_t shots, uint32_t source, uint32_t period_us)
 {
-    enum error error = safety_check_safe(safety);
+    enum error error = safety_check_safe(generator);
     if (!error)
-        error = safety_check_stops(safety);
+        error = safety_check_stops(generator);
     if (error)
         return error;
-    if (!safety->loaded)
+    if (!generator->loaded)
         return ERROR_NO_TRAIN;
     if (shots < 1 || shots > MAX_SHOTS)
         return ERROR_SHOTS;
-    return source > SOURCE_TIMER ? ERROR_SOURCE : check_period(safety, (enum source)source, period_us);
+    return source > SOURCE_TIMER ? ERROR_SOURCE : check_period(generator, (enum source)source, period_us);
 }
 
-enum error safety_arm(struct safety *safety, uint32_t shots, uint32_t source, uint32_t period_us)
+enum error shooting_arm(struct generator *generator, uint32_t shots, uint32_t source, uint32_t period_us)
 {
-    const enum error error = arm_permission(safety, shots, source, period_us);
+    const enum error error = arm_permission(generator, shots, source, period_us);
     if (error)
         return error;
-    safety->outputs_live = true; /* also where only a part can be loaded */
-    if (!port_load(&safety->train)) {
-        safety_outputs_off(safety);
+    generator->outputs_live = true; /* also where only a part can be loaded */
+    if (!port_load(&generator->train)) {
+        safety_outputs_off(generator);
         return ERROR_HARDWARE;
     }
-    safety->source = (enum source)source;
-    safety->timer_period_us = period_us;
-    safety->timer_due_us = later_us(port_now_us() + period_us, safety->not_before_us);
-    safety->shots_left = shots;
-    safety->state = STATE_ARMED;
+    generator->source = (enum source)source;
+    generator->timer_period_us = period_us;
+    generator->timer_due_us = later_us(port_now_us() + period_us, generator->not_before_us);
+    generator->shots_left = shots;
+    generator->state = STATE_ARMED;
     return ERROR_NONE;
 }
 
-static enum error fire_permission(struct safety *safety)
+static enum error fire_permission(struct generator *generator)
 {
-    if (safety->state == STATE_FAULT)
+    if (generator->state == STATE_FAULT)
         return ERROR_FAULT_LATCHED;
-    if (safety->state != STATE_ARMED)
+    if (generator->state != STATE_ARMED)
         return ERROR_NOT_ARMED;
-    const enum error error = safety_check_stops(safety);
+    const enum error error = safety_check_stops(generator);
     if (error)
         return error;
-    if (safety_check_train(safety) || !safety->shots_left) {
-        safety_trip(safety, FAULT_INTERNAL); /* both were checked when arming: memory has changed since */
+    if (safety_check_train(generator) || !generator->shots_left) {
+        safety_trip(generator, FAULT_INTERNAL); /* both were checked when arming: memory has changed since */
         return ERROR_FAULT_LATCHED;
     }
-    return port_now_us() < safety->not_before_us ? ERROR_EARLY : ERROR_NONE;
+    return port_now_us() < generator->not_before_us ? ERROR_EARLY : ERROR_NONE;
 }
 
 /* After the start: starting takes time, and the end must not be cut off. */
-static void count_shot(struct safety *safety)
+static void count_shot(struct generator *generator)
 {
     const uint64_t now_us = port_now_us();
-    safety->counters.fired++;
-    safety->fired = true;
-    safety->permitted = false;
-    safety->not_before_us = now_us + train_period_us(&safety->train, safety->limits);
-    safety->train_over_us = now_us + train_length_ns(&safety->train) / 1000u + 2u; /* both terms are rounded down */
-    if (--safety->shots_left == 0)
-        safety->state = STATE_SAFE; /* safety_poll switches the outputs off once this train is over */
+    generator->counters.fired++;
+    generator->fired = true;
+    generator->permitted = false;
+    generator->not_before_us = now_us + channel_limits_period_us(&generator->train, generator->limits);
+    generator->train_over_us =
+        now_us + pulse_train_length_ns(&generator->train) / 1000u + 2u; /* both terms are rounded down */
+    if (--generator->shots_left == 0)
+        generator->state = STATE_SAFE; /* safety_poll switches the outputs off once this train is over */
 }
 
 /* An interrupt has switched the outputs off before the shot could start: a stop, or the abort byte. */
-static enum error interrupted(struct safety *safety)
+static enum error interrupted(struct generator *generator)
 {
-    (void)safety_check_stops(safety);
-    safety_off(safety);
-    return safety->state == STATE_FAULT ? ERROR_FAULT_LATCHED : ERROR_NOT_ARMED;
+    (void)safety_check_stops(generator);
+    safety_off(generator);
+    return generator->state == STATE_FAULT ? ERROR_FAULT_LATCHED : ERROR_NOT_ARMED;
 }
 
-static enum error start(struct safety *safety)
+static enum error start(struct generator *generator)
 {
-    const enum error error = fire_permission(safety);
+    const enum error error = fire_permission(generator);
     if (error)
         return error;
-    return port_fire() ? ERROR_NONE : interrupted(safety);
+    return port_fire() ? ERROR_NONE : interrupted(generator);
 }
 
-static enum error shoot(struct safety *safety, enum source source)
+static enum error shoot(struct generator *generator, enum source source)
 {
-    safety->counters.requested++;
-    const bool other = safety->state == STATE_ARMED && safety->source != source;
-    const enum error error = other ? ERROR_OTHER_SOURCE : start(safety);
+    generator->counters.requested++;
+    const bool other = generator->state == STATE_ARMED && generator->source != source;
+    const enum error error = other ? ERROR_OTHER_SOURCE : start(generator);
     if (error) {
-        safety->counters.suppressed++;
-        safety->counters.early += error == ERROR_EARLY;
+        generator->counters.suppressed++;
+        generator->counters.early += error == ERROR_EARLY;
         return error;
     }
-    count_shot(safety);
+    count_shot(generator);
     return ERROR_NONE;
 }
 
-enum error safety_fire(struct safety *safety)
+enum error shooting_fire(struct generator *generator)
 {
-    return shoot(safety, SOURCE_COMMAND);
+    return shoot(generator, SOURCE_COMMAND);
 }
 
-void shooting_collect(struct safety *safety)
+void shooting_collect(struct generator *generator)
 {
-    if (safety->state != STATE_ARMED || safety->source != SOURCE_EXTERNAL)
+    if (generator->state != STATE_ARMED || generator->source != SOURCE_EXTERNAL)
         return;
     const struct port_edges edges = port_take_edges();
     const uint32_t fired = edges.fired;
     const uint32_t ignored = edges.rises > fired ? edges.rises - fired : 0;
-    safety->counters.requested += fired + ignored;
-    safety->counters.suppressed += ignored;
-    safety->counters.early += ignored;
+    generator->counters.requested += fired + ignored;
+    generator->counters.suppressed += ignored;
+    generator->counters.early += ignored;
     if (fired)
-        count_shot(safety);
+        count_shot(generator);
 }
 
-static void permit(struct safety *safety)
+static void permit(struct generator *generator)
 {
-    if (safety->state == STATE_ARMED && !safety->permitted && fire_permission(safety) == ERROR_NONE) {
+    if (generator->state == STATE_ARMED && !generator->permitted && fire_permission(generator) == ERROR_NONE) {
         port_permit();
-        safety->permitted = true;
+        generator->permitted = true;
     }
 }
 
-static void run_timer(struct safety *safety)
+static void run_timer(struct generator *generator)
 {
     const uint64_t now_us = port_now_us();
-    if (now_us < safety->timer_due_us)
+    if (now_us < generator->timer_due_us)
         return;
-    (void)shoot(safety, SOURCE_TIMER); /* refused: counted */
-    const uint64_t next_us = safety->timer_due_us + safety->timer_period_us;
-    safety->timer_due_us =
-        later_us(next_us > now_us ? next_us : now_us + safety->timer_period_us, safety->not_before_us);
+    (void)shoot(generator, SOURCE_TIMER); /* refused: counted */
+    const uint64_t next_us = generator->timer_due_us + generator->timer_period_us;
+    generator->timer_due_us =
+        later_us(next_us > now_us ? next_us : now_us + generator->timer_period_us, generator->not_before_us);
 }
 
-void shooting_poll(struct safety *safety)
+void shooting_poll(struct generator *generator)
 {
-    if (safety->state != STATE_ARMED)
+    if (generator->state != STATE_ARMED)
         return;
-    if (safety->source == SOURCE_EXTERNAL) {
-        shooting_collect(safety);
-        permit(safety);
-    } else if (safety->source == SOURCE_TIMER) {
-        run_timer(safety);
+    if (generator->source == SOURCE_EXTERNAL) {
+        shooting_collect(generator);
+        permit(generator);
+    } else if (generator->source == SOURCE_TIMER) {
+        run_timer(generator);
     }
 }
 
-uint64_t shooting_due_us(const struct safety *safety)
+uint64_t shooting_due_us(const struct generator *generator)
 {
-    if (safety->state == STATE_ARMED && safety->source == SOURCE_TIMER)
-        return safety->timer_due_us;
-    if (safety->state == STATE_ARMED && safety->source == SOURCE_EXTERNAL && !safety->permitted)
-        return safety->not_before_us;
+    if (generator->state == STATE_ARMED && generator->source == SOURCE_TIMER)
+        return generator->timer_due_us;
+    if (generator->state == STATE_ARMED && generator->source == SOURCE_EXTERNAL && !generator->permitted)
+        return generator->not_before_us;
     return UINT64_MAX;
 }

@@ -143,6 +143,6 @@ int main(void)
             protocol_receive(&protocol, byte);
         set_points_poll();
         protocol_poll(&protocol);
-        sleep(safety_idle_us(&protocol.safety));
+        sleep(safety_idle_us(&protocol.generator));
     }
 }

@@ -1,7 +1,7 @@
 /* The arithmetic of pulse_train.c and channel_limits.c without anything around it, for an oracle to check.
  *
  * A line of stdin is the eight fields of a channel and three limits; of stdout:
- *     ERROR                                                  what channel_check says of the requested values, or then
+ *     ERROR                                                  of the requested values, or then
  *     ERROR CAMERA A_START A_WIDTH B_START B_WIDTH           of the quantised ones, or then
  *     0 ... WITHIN LIGHT_WITHIN LENGTH_NS PERIOD_US          with the tightened limits; also as a current of light */
 #include <inttypes.h>
@@ -20,21 +20,22 @@ static void report_train(struct channel actual, struct channel_limits asked)
     struct channel_limits all[CHANNEL_COUNT];
     for (int i = 0; i < CHANNEL_COUNT; i++)
         all[i] = limits;
-    const bool within = train_within(&train, all);
-    printf(" %d %d %" PRIu32, within, light_within(actual.current_ma, &limits), train_length_ns(&train));
+    const bool within = channel_limits_allow_train(&train, all);
+    printf(" %d %d %" PRIu32, within, channel_limits_allow_light(actual.current_ma, &limits),
+           pulse_train_length_ns(&train));
     if (within)
-        printf(" %" PRIu32, train_period_us(&train, all));
+        printf(" %" PRIu32, channel_limits_period_us(&train, all));
 }
 
 static void report(const struct channel *requested, struct channel_limits asked)
 {
-    enum error error = channel_check(requested);
+    enum error error = pulse_train_check_channel(requested);
     if (error) {
         printf("%d\n", (int)error);
         return;
     }
-    const struct channel actual = channel_quantised(requested, TICK_NS);
-    error = channel_check(&actual);
+    const struct channel actual = pulse_train_quantised(requested, TICK_NS);
+    error = pulse_train_check_channel(&actual);
     printf("%d %" PRIu32 " %" PRIu32 " %" PRIu32 " %" PRIu32 " %" PRIu32, (int)error, actual.camera_ns,
            actual.a_start_ns, actual.a_width_ns, actual.b_start_ns, actual.b_width_ns);
     if (!error)

@@ -64,7 +64,7 @@ bool port_set_points_confirmed(void)
 
 bool port_load(const struct pulse_train *train)
 {
-    CHECK(train_check(train) == ERROR_NONE);
+    CHECK(pulse_train_check(train) == ERROR_NONE);
     fake.loaded = *train;
     fake.prepared = false;
     fake.edge_fired = false;

@@ -110,7 +110,7 @@ static void check_duty(void)
         const struct channel *channel = &fake.loaded.channels[i];
         if (!channel->used || !channel->current_ma)
             continue;
-        const struct channel_limits limits = protocol.safety.limits[i];
+        const struct channel_limits limits = protocol.generator.limits[i];
         CHECK(fake.now_us >= dark_until_us[i] && channel->current_ma <= limits.max_current_ma);
         CHECK(limits.max_duty_ppm <= MAX_DUTY_PPM);
         const uint64_t lit_ns = (uint64_t)channel->a_width_ns + channel->b_width_ns;
@@ -121,11 +121,11 @@ static void check_duty(void)
 /* Continuous light makes its channels wait like the train with most light. */
 static void check_light(void)
 {
-    CHECK(protocol.safety.state == STATE_LIT && fake.prepared);
+    CHECK(protocol.generator.state == STATE_LIT && fake.prepared);
     for (int i = 0; i < CHANNEL_COUNT; i++) {
         if (!fake.light_ma[i])
             continue;
-        const struct channel_limits limits = protocol.safety.limits[i];
+        const struct channel_limits limits = protocol.generator.limits[i];
         CHECK(fake.light_ma[i] <= limits.max_light_ma && fake.light_ma[i] <= limits.max_current_ma);
         CHECK(limits.max_duty_ppm > 0 && (was_lit || fake.now_us >= dark_until_us[i]));
         dark_until_us[i] = fake.now_us + 2 * MAX_WIDTH_NS * 1000 / MAX_DUTY_PPM;
@@ -144,14 +144,15 @@ static void restart(void)
 
 static void check_invariants(void)
 {
-    const struct safety *safety = &protocol.safety;
-    const struct counters *counters = &safety->counters;
+    const struct generator *generator = &protocol.generator;
+    const struct counters *counters = &generator->counters;
     CHECK(counters->requested == counters->fired + counters->suppressed && counters->fired == fake.fired);
-    CHECK((safety->state == STATE_FAULT) == (safety->faults != 0));
-    CHECK(safety->state != STATE_ARMED || (fake.live && safety->shots_left > 0 && !train_check(&safety->train)));
-    CHECK(safety->state != STATE_FAULT || !fake.live);
-    CHECK(!fake.permitted || (safety->state == STATE_ARMED && safety->source == SOURCE_EXTERNAL));
-    CHECK(safety->state != STATE_LIT || (fake.live && fake.prepared));
+    CHECK((generator->state == STATE_FAULT) == (generator->faults != 0));
+    CHECK(generator->state != STATE_ARMED ||
+          (fake.live && generator->shots_left > 0 && !pulse_train_check(&generator->train)));
+    CHECK(generator->state != STATE_FAULT || !fake.live);
+    CHECK(!fake.permitted || (generator->state == STATE_ARMED && generator->source == SOURCE_EXTERNAL));
+    CHECK(generator->state != STATE_LIT || (fake.live && fake.prepared));
     CHECK(fake.fired - fired_before <= 1);
     if (fake_lit())
         check_light();

@@ -92,7 +92,7 @@ static void test_damaged_lines_are_answered_and_counted(void)
         receive(damaged[i]);
         CHECK(!strncmp(fake.reply, "? 3 ERR 1*", 10));
     }
-    CHECK(protocol.safety.counters.crc_errors == 5 && fake.fired == 0);
+    CHECK(protocol.generator.counters.crc_errors == 5 && fake.fired == 0);
     CHECK_REPLY("5 FIRE", "5 3 OK fired=1 train=1 shots_left=4");
 }
 
@@ -121,7 +121,7 @@ static void test_the_abort_byte_works_inside_a_line(void)
     CHECK_REPLY("5 FIRE", "5 3 OK fired=1 train=1 shots_left=4");
     receive("6 OF");
     protocol_receive(&protocol, ABORT_BYTE);
-    CHECK(!fake.live && protocol.safety.state == STATE_SAFE && protocol.length == 4);
+    CHECK(!fake.live && protocol.generator.state == STATE_SAFE && protocol.length == 4);
     receive("\n");
     CHECK_REPLY("7 FIRE", "7 3 ERR 7");
 }
@@ -132,7 +132,7 @@ static void test_only_valid_lines_feed_the_heartbeat(void)
     fake.now_us += HEARTBEAT_MS * 1000u;
     receive("nonsense\n");
     protocol_poll(&protocol);
-    CHECK(protocol.safety.state == STATE_ARMED);
+    CHECK(protocol.generator.state == STATE_ARMED);
     fake.now_us++;
     CHECK_REPLY("5 BEAT", "5 3 OK state=2"); /* too late: the line itself finds the fault */
     CHECK_REPLY("6 CLEAR", "6 3 OK state=0");
@@ -152,8 +152,8 @@ static void test_status_tells_everything(void)
 static void test_the_longest_lines_fit(void)
 {
     boot();
-    protocol.boot = protocol.safety.faults = UINT32_MAX;
-    protocol.safety.counters =
+    protocol.boot = protocol.generator.faults = UINT32_MAX;
+    protocol.generator.counters =
         (struct counters){UINT32_MAX, UINT32_MAX, UINT32_MAX, UINT32_MAX, UINT32_MAX, UINT32_MAX};
     ASK("65535 STATUS");
     CHECK(strlen(fake.reply) < TEXT_SIZE - 64 && strstr(fake.reply, "crc_errors=4294967295"));

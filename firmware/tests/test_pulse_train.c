@@ -19,14 +19,14 @@ static enum error check_with(size_t offset, uint32_t value)
 {
     struct channel channel = LEGAL;
     *(uint32_t *)(void *)((char *)&channel + offset) = value;
-    return channel_check(&channel);
+    return pulse_train_check_channel(&channel);
 }
 
 #define WITH(member, value) check_with(offsetof(struct channel, member), value)
 
 static void test_each_limit_holds_to_the_nanosecond(void)
 {
-    CHECK(channel_check(&LEGAL) == ERROR_NONE);
+    CHECK(pulse_train_check_channel(&LEGAL) == ERROR_NONE);
     CHECK(WITH(a_width_ns, MIN_WIDTH_NS) == ERROR_NONE && WITH(a_width_ns, MIN_WIDTH_NS - 1) == ERROR_WIDTH);
     CHECK(WITH(a_width_ns, MAX_WIDTH_NS) == ERROR_NONE && WITH(a_width_ns, MAX_WIDTH_NS + 1) == ERROR_WIDTH);
     CHECK(WITH(b_width_ns, MIN_WIDTH_NS) == ERROR_NONE && WITH(b_width_ns, MIN_WIDTH_NS - 1) == ERROR_WIDTH);
@@ -44,11 +44,11 @@ static void test_pulses_keep_their_dark_time_and_order(void)
     struct channel channel = LEGAL;
     channel.frame_a_close_ns = channel.frame_b_open_ns = 20000; /* a boundary just where pulse A ends */
     channel.b_start_ns = channel.a_start_ns + channel.a_width_ns + MIN_DARK_NS;
-    CHECK(channel_check(&channel) == ERROR_NONE);
+    CHECK(pulse_train_check_channel(&channel) == ERROR_NONE);
     channel.b_start_ns--;
-    CHECK(channel_check(&channel) == ERROR_SEPARATION);
+    CHECK(pulse_train_check_channel(&channel) == ERROR_SEPARATION);
     channel.b_start_ns = 0;
-    CHECK(channel_check(&channel) == ERROR_SEPARATION);
+    CHECK(pulse_train_check_channel(&channel) == ERROR_SEPARATION);
 }
 
 static enum error check_single(uint32_t a_start_ns, uint32_t a_width_ns)
@@ -57,7 +57,7 @@ static enum error check_single(uint32_t a_start_ns, uint32_t a_width_ns)
     channel.a_start_ns = a_start_ns;
     channel.a_width_ns = a_width_ns;
     channel.b_start_ns = channel.b_width_ns = channel.frame_b_open_ns = 0;
-    return channel_check(&channel);
+    return pulse_train_check_channel(&channel);
 }
 
 static void test_a_single_pulse_keeps_the_limits_of_pulse_a(void)
@@ -90,10 +90,10 @@ static void test_a_frame_boundary_beyond_32_bits_does_not_wrap(void)
     channel.camera_ns = 30000;
     channel.frame_a_close_ns = UINT32_MAX - 6000; /* in 32 bits: 23999, a fine place between the pulses */
     channel.frame_b_open_ns = UINT32_MAX - 5000;
-    CHECK(channel_check(&channel) == ERROR_STRADDLE);
+    CHECK(pulse_train_check_channel(&channel) == ERROR_STRADDLE);
     channel.frame_b_open_ns = 0;
     channel.b_start_ns = 31000;
-    CHECK(channel_check(&channel) == ERROR_STRADDLE);
+    CHECK(pulse_train_check_channel(&channel) == ERROR_STRADDLE);
 }
 
 static void test_every_edge_goes_to_the_nearest_tick(void)
@@ -102,7 +102,7 @@ static void test_every_edge_goes_to_the_nearest_tick(void)
         struct channel requested = LEGAL;
         requested.a_start_ns += offset;
         requested.b_start_ns += offset;
-        const struct channel actual = channel_quantised(&requested, 8);
+        const struct channel actual = pulse_train_quantised(&requested, 8);
         const int32_t moved_ns = (int32_t)(actual.a_start_ns - requested.a_start_ns);
         CHECK(actual.a_start_ns % 8 == 0 && moved_ns >= -4 && moved_ns <= 4);
         CHECK(actual.b_start_ns - actual.a_start_ns == 6400); /* 800 ticks, wherever pulse A stands */
@@ -112,11 +112,11 @@ static void test_every_edge_goes_to_the_nearest_tick(void)
 static void test_a_train_is_as_long_as_its_last_output(void)
 {
     struct pulse_train train = {0};
-    CHECK(train_check(&train) == ERROR_NO_TRAIN && train_length_ns(&train) == 0);
+    CHECK(pulse_train_check(&train) == ERROR_NO_TRAIN && pulse_train_length_ns(&train) == 0);
     train.channels[2] = LEGAL;
-    CHECK(train_check(&train) == ERROR_NONE && train_length_ns(&train) == 27400);
+    CHECK(pulse_train_check(&train) == ERROR_NONE && pulse_train_length_ns(&train) == 27400);
     train.channels[2].camera_ns = 20000;
-    CHECK(train_length_ns(&train) == 20000 + CAMERA_PULSE_NS && train_check(&train) == ERROR_STRADDLE);
+    CHECK(pulse_train_length_ns(&train) == 20000 + CAMERA_PULSE_NS && pulse_train_check(&train) == ERROR_STRADDLE);
 }
 
 static void test_more_light_lengthens_the_period(void)
@@ -126,17 +126,17 @@ static void test_more_light_lengthens_the_period(void)
     for (int i = 0; i < CHANNEL_COUNT; i++)
         limits[i] = channel_limits_absolute();
     train.channels[0] = train.channels[3] = LEGAL;
-    CHECK(train_period_us(&train, limits) == MIN_PERIOD_US); /* 2 us of light, 200 ppm */
+    CHECK(channel_limits_period_us(&train, limits) == MIN_PERIOD_US); /* 2 us of light, 200 ppm */
     train.channels[3].a_width_ns = 2000;
-    CHECK(train_period_us(&train, limits) == 15000);
+    CHECK(channel_limits_period_us(&train, limits) == 15000);
     train.channels[3].a_width_ns = 2001 - 1000;
-    CHECK(train_period_us(&train, limits) == 10005);
+    CHECK(channel_limits_period_us(&train, limits) == 10005);
     train.channels[3].current_ma = 0; /* dark: its widths do not count */
-    CHECK(train_period_us(&train, limits) == MIN_PERIOD_US);
+    CHECK(channel_limits_period_us(&train, limits) == MIN_PERIOD_US);
     limits[3].max_duty_ppm = 0; /* forbids light, and is no divisor */
-    CHECK(train_period_us(&train, limits) == MIN_PERIOD_US);
+    CHECK(channel_limits_period_us(&train, limits) == MIN_PERIOD_US);
     limits[0].max_duty_ppm = 1;
-    CHECK(train_period_us(&train, limits) == 2000000);
+    CHECK(channel_limits_period_us(&train, limits) == 2000000);
 }
 
 static void test_a_train_is_over_before_the_next_one(void)
@@ -147,8 +147,8 @@ static void test_a_train_is_over_before_the_next_one(void)
         limits[i] = channel_limits_absolute();
     train.channels[1] = LEGAL;
     train.channels[1].camera_ns = 15000000;
-    const uint32_t length_us = train_length_ns(&train) / 1000u;
-    CHECK(length_us == 15010 && train_period_us(&train, limits) > length_us);
+    const uint32_t length_us = pulse_train_length_ns(&train) / 1000u;
+    CHECK(length_us == 15010 && channel_limits_period_us(&train, limits) > length_us);
 }
 
 static void test_limits_only_become_tighter(void)
@@ -166,13 +166,13 @@ static void test_a_channel_keeps_its_own_limits(void)
 {
     struct pulse_train train = {.channels = {[1] = LEGAL}};
     struct channel_limits limits[CHANNEL_COUNT] = {[1] = {20000, 1, 0}};
-    CHECK(train_within(&train, limits)); /* unused channels have no light that could be forbidden */
+    CHECK(channel_limits_allow_train(&train, limits)); /* unused channels have no light that could be forbidden */
     limits[1].max_current_ma = 19999;
-    CHECK(!train_within(&train, limits));
+    CHECK(!channel_limits_allow_train(&train, limits));
     limits[1] = (struct channel_limits){20000, 0, 0};
-    CHECK(!train_within(&train, limits));
+    CHECK(!channel_limits_allow_train(&train, limits));
     train.channels[1].current_ma = 0;
-    CHECK(train_within(&train, limits));
+    CHECK(channel_limits_allow_train(&train, limits));
 }
 
 /* Self-protection of a published LED controller: longest pulse and highest duty up to a current. */

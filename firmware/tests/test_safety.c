@@ -3,7 +3,7 @@
 #include "safety.h"
 #include "shooting.h"
 
-static struct safety safety;
+static struct generator generator;
 
 static const struct channel LEGAL = {
     .a_start_ns = 20000,
@@ -18,41 +18,41 @@ static const struct channel LEGAL = {
 static void wait_us(uint32_t time_us)
 {
     fake.now_us += time_us;
-    safety_heard(&safety);
-    safety_poll(&safety);
+    safety_heard(&generator);
+    safety_poll(&generator);
 }
 
 static enum error arm(uint32_t shots)
 {
-    return safety_arm(&safety, shots, SOURCE_COMMAND, 0);
+    return shooting_arm(&generator, shots, SOURCE_COMMAND, 0);
 }
 
 static void boot(void)
 {
     fake_reset();
-    safety_boot(&safety, CAUSE_POWER);
+    safety_boot(&generator, CAUSE_POWER);
     wait_us(2 * MIN_PERIOD_US);
 }
 
 static void boot_armed(uint32_t shots)
 {
     boot();
-    CHECK(!safety_new_train(&safety) && !safety_set_channel(&safety, 0, &LEGAL) && !safety_load(&safety));
-    CHECK(arm(shots) == ERROR_NONE && safety.state == STATE_ARMED && fake.live);
+    CHECK(!safety_new_train(&generator) && !safety_set_channel(&generator, 0, &LEGAL) && !safety_load(&generator));
+    CHECK(arm(shots) == ERROR_NONE && generator.state == STATE_ARMED && fake.live);
 }
 
 static void check_counters_add_up(void)
 {
-    CHECK(safety.counters.requested == safety.counters.fired + safety.counters.suppressed);
-    CHECK(safety.counters.early <= safety.counters.suppressed && safety.counters.fired == fake.fired);
+    CHECK(generator.counters.requested == generator.counters.fired + generator.counters.suppressed);
+    CHECK(generator.counters.early <= generator.counters.suppressed && generator.counters.fired == fake.fired);
 }
 
 static void test_nothing_works_before_arming(void)
 {
     boot();
-    CHECK(safety.state == STATE_SAFE && !fake.live);
-    CHECK(safety_fire(&safety) == ERROR_NOT_ARMED && arm(1) == ERROR_NO_TRAIN);
-    CHECK(safety_load(&safety) == ERROR_NO_TRAIN && fake.fired == 0);
+    CHECK(generator.state == STATE_SAFE && !fake.live);
+    CHECK(shooting_fire(&generator) == ERROR_NOT_ARMED && arm(1) == ERROR_NO_TRAIN);
+    CHECK(safety_load(&generator) == ERROR_NO_TRAIN && fake.fired == 0);
     check_counters_add_up();
 }
 
@@ -60,17 +60,17 @@ static void test_the_budget_is_exact(void)
 {
     boot_armed(3);
     for (uint32_t left = 3; left-- > 0;) {
-        CHECK(safety_fire(&safety) == ERROR_NONE && safety.shots_left == left);
+        CHECK(shooting_fire(&generator) == ERROR_NONE && generator.shots_left == left);
         wait_us(MIN_PERIOD_US);
     }
-    CHECK(safety.state == STATE_SAFE && safety_fire(&safety) == ERROR_NOT_ARMED && fake.fired == 3);
+    CHECK(generator.state == STATE_SAFE && shooting_fire(&generator) == ERROR_NOT_ARMED && fake.fired == 3);
     check_counters_add_up();
 }
 
 static void test_the_last_train_ends_before_the_outputs_are_cut(void)
 {
     boot_armed(1);
-    CHECK(safety_fire(&safety) == ERROR_NONE && safety.state == STATE_SAFE);
+    CHECK(shooting_fire(&generator) == ERROR_NONE && generator.state == STATE_SAFE);
     wait_us(28); /* the train lasts 27.4 */
     CHECK(fake.live);
     wait_us(1);
@@ -80,58 +80,59 @@ static void test_the_last_train_ends_before_the_outputs_are_cut(void)
 static void test_the_budget_has_bounds(void)
 {
     boot_armed(MAX_SHOTS);
-    safety_off(&safety);
+    safety_off(&generator);
     CHECK(arm(0) == ERROR_SHOTS && arm(MAX_SHOTS + 1) == ERROR_SHOTS);
 }
 
 static void test_an_early_shot_is_ignored_and_counted(void)
 {
     boot_armed(5);
-    CHECK(safety_fire(&safety) == ERROR_NONE);
+    CHECK(shooting_fire(&generator) == ERROR_NONE);
     wait_us(MIN_PERIOD_US - 1);
-    CHECK(safety_fire(&safety) == ERROR_EARLY && safety.state == STATE_ARMED && safety.shots_left == 4);
-    CHECK(fake.fired == 1 && safety.counters.early == 1);
+    CHECK(shooting_fire(&generator) == ERROR_EARLY && generator.state == STATE_ARMED && generator.shots_left == 4);
+    CHECK(fake.fired == 1 && generator.counters.early == 1);
     wait_us(1);
-    CHECK(safety_fire(&safety) == ERROR_NONE && fake.fired == 2);
+    CHECK(shooting_fire(&generator) == ERROR_NONE && fake.fired == 2);
     check_counters_add_up();
 }
 
 static void test_arming_again_does_not_shorten_the_period(void)
 {
     boot_armed(1);
-    CHECK(safety_fire(&safety) == ERROR_NONE);
+    CHECK(shooting_fire(&generator) == ERROR_NONE);
     wait_us(5000);
-    CHECK(arm(1) == ERROR_NONE && safety_fire(&safety) == ERROR_EARLY);
+    CHECK(arm(1) == ERROR_NONE && shooting_fire(&generator) == ERROR_EARLY);
 }
 
 /* It does not know what was fired before: it waits as long as the longest train demands, 4 us of light at 200 ppm. */
 static void test_a_start_does_not_shorten_the_period(void)
 {
     boot_armed(1);
-    CHECK(safety_fire(&safety) == ERROR_NONE);
-    safety_boot(&safety, CAUSE_POWER);
-    CHECK(!safety_set_channel(&safety, 0, &LEGAL) && !safety_load(&safety) && !arm(1));
+    CHECK(shooting_fire(&generator) == ERROR_NONE);
+    safety_boot(&generator, CAUSE_POWER);
+    CHECK(!safety_set_channel(&generator, 0, &LEGAL) && !safety_load(&generator) && !arm(1));
     wait_us(20000 - 1);
-    CHECK(safety_fire(&safety) == ERROR_EARLY);
+    CHECK(shooting_fire(&generator) == ERROR_EARLY);
     wait_us(1);
-    CHECK(safety_fire(&safety) == ERROR_NONE);
+    CHECK(shooting_fire(&generator) == ERROR_NONE);
 }
 
 static void test_an_armed_generator_takes_no_other_train(void)
 {
     boot_armed(1);
-    CHECK(safety_new_train(&safety) == ERROR_NOT_SAFE && safety_set_channel(&safety, 1, &LEGAL) == ERROR_NOT_SAFE);
-    CHECK(safety_load(&safety) == ERROR_NOT_SAFE && arm(9) == ERROR_NOT_SAFE);
-    CHECK(safety_clear(&safety) == ERROR_NOT_SAFE && safety.shots_left == 1);
+    CHECK(safety_new_train(&generator) == ERROR_NOT_SAFE &&
+          safety_set_channel(&generator, 1, &LEGAL) == ERROR_NOT_SAFE);
+    CHECK(safety_load(&generator) == ERROR_NOT_SAFE && arm(9) == ERROR_NOT_SAFE);
+    CHECK(safety_clear(&generator) == ERROR_NOT_SAFE && generator.shots_left == 1);
 }
 
 static void test_a_changed_channel_must_be_loaded_again(void)
 {
     boot_armed(1);
-    safety_off(&safety);
-    CHECK(safety_set_channel(&safety, 1, &LEGAL) == ERROR_NONE && arm(1) == ERROR_NO_TRAIN);
-    CHECK(safety_set_channel(&safety, CHANNEL_COUNT, &LEGAL) == ERROR_CHANNEL);
-    CHECK(safety_load(&safety) == ERROR_NONE && arm(1) == ERROR_NONE && safety.train_id == 2);
+    safety_off(&generator);
+    CHECK(safety_set_channel(&generator, 1, &LEGAL) == ERROR_NONE && arm(1) == ERROR_NO_TRAIN);
+    CHECK(safety_set_channel(&generator, CHANNEL_COUNT, &LEGAL) == ERROR_CHANNEL);
+    CHECK(safety_load(&generator) == ERROR_NONE && arm(1) == ERROR_NONE && generator.train_id == 2);
 }
 
 static void test_actual_values_must_keep_the_limits_too(void)
@@ -143,72 +144,72 @@ static void test_actual_values_must_keep_the_limits_too(void)
     channel.b_start_ns = 20004 + 1004 + MIN_DARK_NS; /* and this one stays */
     channel.frame_a_close_ns = 21100;
     channel.frame_b_open_ns = 21200;
-    CHECK(channel_check(&channel) == ERROR_NONE);
-    CHECK(safety_set_channel(&safety, 0, &channel) == ERROR_SEPARATION);
+    CHECK(pulse_train_check_channel(&channel) == ERROR_NONE);
+    CHECK(safety_set_channel(&generator, 0, &channel) == ERROR_SEPARATION);
 }
 
 static void test_a_channel_refuses_more_than_its_own_limit(void)
 {
     boot();
-    CHECK(safety_tighten(&safety, CHANNEL_COUNT, (struct channel_limits){1, 1, UINT32_MAX}) == ERROR_CHANNEL);
-    CHECK(safety_tighten(&safety, 0, (struct channel_limits){19999, MAX_DUTY_PPM, UINT32_MAX}) == ERROR_NONE);
-    CHECK(safety_set_channel(&safety, 0, &LEGAL) == ERROR_LIMIT && safety_load(&safety) == ERROR_NO_TRAIN);
-    CHECK(safety_set_channel(&safety, 1, &LEGAL) == ERROR_NONE);
-    CHECK(safety_tighten(&safety, 0, (struct channel_limits){UINT32_MAX, UINT32_MAX, UINT32_MAX}) == ERROR_NONE);
-    CHECK(safety_set_channel(&safety, 0, &LEGAL) == ERROR_LIMIT);
+    CHECK(safety_tighten(&generator, CHANNEL_COUNT, (struct channel_limits){1, 1, UINT32_MAX}) == ERROR_CHANNEL);
+    CHECK(safety_tighten(&generator, 0, (struct channel_limits){19999, MAX_DUTY_PPM, UINT32_MAX}) == ERROR_NONE);
+    CHECK(safety_set_channel(&generator, 0, &LEGAL) == ERROR_LIMIT && safety_load(&generator) == ERROR_NO_TRAIN);
+    CHECK(safety_set_channel(&generator, 1, &LEGAL) == ERROR_NONE);
+    CHECK(safety_tighten(&generator, 0, (struct channel_limits){UINT32_MAX, UINT32_MAX, UINT32_MAX}) == ERROR_NONE);
+    CHECK(safety_set_channel(&generator, 0, &LEGAL) == ERROR_LIMIT);
 }
 
 static void test_a_loaded_train_does_not_survive_a_tighter_limit(void)
 {
     boot_armed(5);
-    CHECK(safety_tighten(&safety, 0, (struct channel_limits){1, 1, UINT32_MAX}) == ERROR_NOT_SAFE);
-    safety_off(&safety);
-    CHECK(safety_tighten(&safety, 0, (struct channel_limits){10000, MAX_DUTY_PPM, UINT32_MAX}) == ERROR_NONE);
-    CHECK(arm(1) == ERROR_NO_TRAIN && safety_load(&safety) == ERROR_LIMIT);
-    safety_boot(&safety, CAUSE_POWER);
-    CHECK(safety.limits[0].max_current_ma == MAX_CURRENT_MA);
+    CHECK(safety_tighten(&generator, 0, (struct channel_limits){1, 1, UINT32_MAX}) == ERROR_NOT_SAFE);
+    safety_off(&generator);
+    CHECK(safety_tighten(&generator, 0, (struct channel_limits){10000, MAX_DUTY_PPM, UINT32_MAX}) == ERROR_NONE);
+    CHECK(arm(1) == ERROR_NO_TRAIN && safety_load(&generator) == ERROR_LIMIT);
+    safety_boot(&generator, CAUSE_POWER);
+    CHECK(generator.limits[0].max_current_ma == MAX_CURRENT_MA);
 }
 
 static void test_a_tighter_duty_lengthens_the_period(void)
 {
     boot_armed(5);
-    safety_off(&safety);
-    CHECK(safety_tighten(&safety, 0, (struct channel_limits){30000, 20, UINT32_MAX}) == ERROR_NONE &&
-          safety_load(&safety) == ERROR_NONE);
-    CHECK(arm(5) == ERROR_NONE && safety_fire(&safety) == ERROR_NONE);
+    safety_off(&generator);
+    CHECK(safety_tighten(&generator, 0, (struct channel_limits){30000, 20, UINT32_MAX}) == ERROR_NONE &&
+          safety_load(&generator) == ERROR_NONE);
+    CHECK(arm(5) == ERROR_NONE && shooting_fire(&generator) == ERROR_NONE);
     wait_us(100000 - 1); /* 2 us of light at 20 ppm */
-    CHECK(safety_fire(&safety) == ERROR_EARLY);
+    CHECK(shooting_fire(&generator) == ERROR_EARLY);
     wait_us(1);
-    CHECK(safety_fire(&safety) == ERROR_NONE);
+    CHECK(shooting_fire(&generator) == ERROR_NONE);
 }
 
 static void test_a_limit_that_was_broken_in_memory_is_not_fired(void)
 {
     boot_armed(2);
-    safety.limits[0].max_current_ma = 1;
-    CHECK(safety_fire(&safety) == ERROR_FAULT_LATCHED && fake.fired == 0 && safety.faults == FAULT_INTERNAL);
+    generator.limits[0].max_current_ma = 1;
+    CHECK(shooting_fire(&generator) == ERROR_FAULT_LATCHED && fake.fired == 0 && generator.faults == FAULT_INTERNAL);
 }
 
 static void test_off_disarms_and_forgets_the_budget(void)
 {
     boot_armed(7);
-    safety_off(&safety);
-    CHECK(safety.state == STATE_SAFE && !fake.live && safety.shots_left == 0);
-    CHECK(safety_fire(&safety) == ERROR_NOT_ARMED);
+    safety_off(&generator);
+    CHECK(generator.state == STATE_SAFE && !fake.live && generator.shots_left == 0);
+    CHECK(shooting_fire(&generator) == ERROR_NOT_ARMED);
 }
 
 static void test_an_open_interlock_trips_and_latches(void)
 {
     boot_armed(2);
     fake.interlock_closed = false;
-    safety_poll(&safety);
-    CHECK(safety.state == STATE_FAULT && safety.faults == FAULT_INTERLOCK && !fake.live);
-    CHECK(safety_clear(&safety) == ERROR_INTERLOCK_OPEN);
+    safety_poll(&generator);
+    CHECK(generator.state == STATE_FAULT && generator.faults == FAULT_INTERLOCK && !fake.live);
+    CHECK(safety_clear(&generator) == ERROR_INTERLOCK_OPEN);
     fake.interlock_closed = true;
-    safety_poll(&safety);
-    CHECK(safety.state == STATE_FAULT && safety_fire(&safety) == ERROR_FAULT_LATCHED);
-    CHECK(arm(1) == ERROR_FAULT_LATCHED && safety_new_train(&safety) == ERROR_FAULT_LATCHED);
-    CHECK(safety_clear(&safety) == ERROR_NONE && safety.state == STATE_SAFE && safety.shots_left == 0);
+    safety_poll(&generator);
+    CHECK(generator.state == STATE_FAULT && shooting_fire(&generator) == ERROR_FAULT_LATCHED);
+    CHECK(arm(1) == ERROR_FAULT_LATCHED && safety_new_train(&generator) == ERROR_FAULT_LATCHED);
+    CHECK(safety_clear(&generator) == ERROR_NONE && generator.state == STATE_SAFE && generator.shots_left == 0);
     check_counters_add_up();
 }
 
@@ -216,81 +217,81 @@ static void test_the_interlock_is_asked_at_the_moment_of_firing(void)
 {
     boot_armed(2);
     fake.interlock_closed = false;
-    CHECK(safety_fire(&safety) == ERROR_INTERLOCK_OPEN && fake.fired == 0 && safety.state == STATE_FAULT);
+    CHECK(shooting_fire(&generator) == ERROR_INTERLOCK_OPEN && fake.fired == 0 && generator.state == STATE_FAULT);
 }
 
 static void test_an_open_interlock_forbids_arming_without_a_fault(void)
 {
     boot_armed(1);
-    safety_off(&safety);
+    safety_off(&generator);
     fake.interlock_closed = false;
-    safety_poll(&safety);
-    CHECK(arm(1) == ERROR_INTERLOCK_OPEN && safety.state == STATE_SAFE && safety.faults == 0);
+    safety_poll(&generator);
+    CHECK(arm(1) == ERROR_INTERLOCK_OPEN && generator.state == STATE_SAFE && generator.faults == 0);
 }
 
 static void test_a_silent_host_trips(void)
 {
     boot_armed(2);
     fake.now_us += HEARTBEAT_MS * 1000u;
-    safety_poll(&safety);
-    CHECK(safety.state == STATE_ARMED);
+    safety_poll(&generator);
+    CHECK(generator.state == STATE_ARMED);
     fake.now_us++;
-    safety_poll(&safety);
-    CHECK(safety.state == STATE_FAULT && safety.faults == FAULT_HEARTBEAT && !fake.live);
+    safety_poll(&generator);
+    CHECK(generator.state == STATE_FAULT && generator.faults == FAULT_HEARTBEAT && !fake.live);
 }
 
 static void test_a_safe_generator_needs_no_host(void)
 {
     boot();
     fake.now_us += HEARTBEAT_MS * 5000u;
-    safety_poll(&safety);
-    CHECK(safety.state == STATE_SAFE);
+    safety_poll(&generator);
+    CHECK(generator.state == STATE_SAFE);
 }
 
 static void test_set_points_that_are_not_confirmed_as_zero_trip_and_latch(void)
 {
     boot_armed(2);
-    safety_off(&safety);
+    safety_off(&generator);
     fake.set_points_stuck = true;
-    safety_poll(&safety);
-    CHECK(safety.state == STATE_FAULT && safety.faults == FAULT_SETPOINT && !fake.live);
-    CHECK(arm(1) == ERROR_FAULT_LATCHED && safety_clear(&safety) == ERROR_HARDWARE);
+    safety_poll(&generator);
+    CHECK(generator.state == STATE_FAULT && generator.faults == FAULT_SETPOINT && !fake.live);
+    CHECK(arm(1) == ERROR_FAULT_LATCHED && safety_clear(&generator) == ERROR_HARDWARE);
     fake.set_points_stuck = false;
-    safety_poll(&safety);
-    CHECK(safety.state == STATE_FAULT && arm(1) == ERROR_FAULT_LATCHED);
-    CHECK(safety_clear(&safety) == ERROR_NONE && safety.state == STATE_SAFE && arm(1) == ERROR_NONE);
+    safety_poll(&generator);
+    CHECK(generator.state == STATE_FAULT && arm(1) == ERROR_FAULT_LATCHED);
+    CHECK(safety_clear(&generator) == ERROR_NONE && generator.state == STATE_SAFE && arm(1) == ERROR_NONE);
 }
 
 static void test_set_points_that_stay_after_the_last_shot_trip_too(void)
 {
     boot_armed(2);
     fake.set_points_stuck = true;
-    safety_poll(&safety);
-    CHECK(safety.state == STATE_FAULT && safety.shots_left == 0 && !fake.live);
+    safety_poll(&generator);
+    CHECK(generator.state == STATE_FAULT && generator.shots_left == 0 && !fake.live);
 }
 
 static void test_a_watchdog_reset_boots_into_a_fault(void)
 {
     fake_reset();
-    safety_boot(&safety, CAUSE_WATCHDOG);
-    CHECK(safety.state == STATE_FAULT && safety.faults == FAULT_WATCHDOG &&
-          safety_load(&safety) == ERROR_FAULT_LATCHED);
-    CHECK(safety_clear(&safety) == ERROR_NONE && safety.state == STATE_SAFE);
+    safety_boot(&generator, CAUSE_WATCHDOG);
+    CHECK(generator.state == STATE_FAULT && generator.faults == FAULT_WATCHDOG &&
+          safety_load(&generator) == ERROR_FAULT_LATCHED);
+    CHECK(safety_clear(&generator) == ERROR_NONE && generator.state == STATE_SAFE);
 }
 
 static void test_a_train_that_changed_in_memory_is_not_fired(void)
 {
     boot_armed(2);
-    safety.train.channels[0].a_width_ns = 1u << 20;
-    CHECK(safety_fire(&safety) == ERROR_FAULT_LATCHED && fake.fired == 0 && safety.faults == FAULT_INTERNAL);
+    generator.train.channels[0].a_width_ns = 1u << 20;
+    CHECK(shooting_fire(&generator) == ERROR_FAULT_LATCHED && fake.fired == 0 && generator.faults == FAULT_INTERNAL);
 }
 
 static void test_hardware_that_cannot_produce_the_train_stays_dark(void)
 {
     boot_armed(1);
-    safety_off(&safety);
+    safety_off(&generator);
     fake.can_load = false;
-    CHECK(arm(1) == ERROR_HARDWARE && safety.state == STATE_SAFE && !fake.live);
+    CHECK(arm(1) == ERROR_HARDWARE && generator.state == STATE_SAFE && !fake.live);
 }
 
 int main(void)

@@ -5,7 +5,7 @@
 
 enum { PERIOD_US = 100000 };
 
-static struct safety safety;
+static struct generator generator;
 
 static const struct channel LEGAL = {
     .a_start_ns = 20000,
@@ -20,28 +20,29 @@ static const struct channel LEGAL = {
 static void wait_us(uint32_t time_us)
 {
     fake.now_us += time_us;
-    safety_heard(&safety);
-    safety_poll(&safety);
+    safety_heard(&generator);
+    safety_poll(&generator);
 }
 
 static void boot_loaded(void)
 {
     fake_reset();
-    safety_boot(&safety, CAUSE_POWER);
-    CHECK(!safety_set_channel(&safety, 0, &LEGAL) && !safety_set_channel(&safety, 2, &LEGAL) && !safety_load(&safety));
+    safety_boot(&generator, CAUSE_POWER);
+    CHECK(!safety_set_channel(&generator, 0, &LEGAL) && !safety_set_channel(&generator, 2, &LEGAL) &&
+          !safety_load(&generator));
 }
 
 static void boot_armed(uint32_t shots, enum source source, uint32_t period_us)
 {
     boot_loaded();
     wait_us(LONGEST_PERIOD_US);
-    CHECK(safety_arm(&safety, shots, source, period_us) == ERROR_NONE);
-    safety_poll(&safety);
+    CHECK(shooting_arm(&generator, shots, source, period_us) == ERROR_NONE);
+    safety_poll(&generator);
 }
 
 static void check_counters(uint32_t fired, uint32_t suppressed, uint32_t early)
 {
-    const struct counters *counters = &safety.counters;
+    const struct counters *counters = &generator.counters;
     CHECK(counters->fired == fired && counters->suppressed == suppressed && counters->early == early);
     CHECK(counters->requested == fired + suppressed && fake.fired == fired);
 }
@@ -50,31 +51,32 @@ static void test_sources_and_periods_have_bounds(void)
 {
     boot_loaded();
     wait_us(LONGEST_PERIOD_US);
-    CHECK(safety_arm(&safety, 1, SOURCE_TIMER + 1, 0) == ERROR_SOURCE);
-    CHECK(safety_arm(&safety, 1, UINT32_MAX, 0) == ERROR_SOURCE &&
-          safety_arm(&safety, 1, SOURCE_TIMER, 0) == ERROR_PERIOD);
+    CHECK(shooting_arm(&generator, 1, SOURCE_TIMER + 1, 0) == ERROR_SOURCE);
+    CHECK(shooting_arm(&generator, 1, UINT32_MAX, 0) == ERROR_SOURCE &&
+          shooting_arm(&generator, 1, SOURCE_TIMER, 0) == ERROR_PERIOD);
     for (uint32_t source = SOURCE_COMMAND; source <= SOURCE_TIMER; source++) {
-        CHECK(safety_arm(&safety, 1, source, MIN_PERIOD_US - 1) == ERROR_PERIOD);
-        CHECK(safety_arm(&safety, 1, source, MAX_PERIOD_US + 1) == ERROR_PERIOD && safety.state == STATE_SAFE);
-        CHECK(safety_arm(&safety, 1, source, MIN_PERIOD_US) == ERROR_NONE);
-        safety_off(&safety);
-        CHECK(safety_arm(&safety, 1, source, MAX_PERIOD_US) == ERROR_NONE);
-        safety_off(&safety);
+        CHECK(shooting_arm(&generator, 1, source, MIN_PERIOD_US - 1) == ERROR_PERIOD);
+        CHECK(shooting_arm(&generator, 1, source, MAX_PERIOD_US + 1) == ERROR_PERIOD && generator.state == STATE_SAFE);
+        CHECK(shooting_arm(&generator, 1, source, MIN_PERIOD_US) == ERROR_NONE);
+        safety_off(&generator);
+        CHECK(shooting_arm(&generator, 1, source, MAX_PERIOD_US) == ERROR_NONE);
+        safety_off(&generator);
     }
 }
 
 static void test_a_period_that_the_duty_forbids_is_refused_when_arming(void)
 {
     boot_loaded();
-    CHECK(!safety_tighten(&safety, 2, (struct channel_limits){UINT32_MAX, 20, UINT32_MAX}) && !safety_load(&safety));
-    CHECK(safety_arm(&safety, 1, SOURCE_COMMAND, 100000 - 1) == ERROR_PERIOD);
-    CHECK(safety_arm(&safety, 1, SOURCE_COMMAND, 100000) == ERROR_NONE);
+    CHECK(!safety_tighten(&generator, 2, (struct channel_limits){UINT32_MAX, 20, UINT32_MAX}) &&
+          !safety_load(&generator));
+    CHECK(shooting_arm(&generator, 1, SOURCE_COMMAND, 100000 - 1) == ERROR_PERIOD);
+    CHECK(shooting_arm(&generator, 1, SOURCE_COMMAND, 100000) == ERROR_NONE);
 }
 
 static void test_only_its_source_starts_a_shot(void)
 {
     boot_armed(5, SOURCE_TIMER, PERIOD_US);
-    CHECK(safety_fire(&safety) == ERROR_OTHER_SOURCE);
+    CHECK(shooting_fire(&generator) == ERROR_OTHER_SOURCE);
     fake_edge();
     wait_us(1);
     check_counters(0, 1, 0);
@@ -87,12 +89,12 @@ static void test_only_its_source_starts_a_shot(void)
 static void test_an_edge_starts_exactly_one_shot(void)
 {
     boot_armed(2, SOURCE_EXTERNAL, 0);
-    CHECK(fake.permitted && safety_fire(&safety) == ERROR_OTHER_SOURCE);
+    CHECK(fake.permitted && shooting_fire(&generator) == ERROR_OTHER_SOURCE);
     fake_edge();
     fake_edge();
     wait_us(0);
     check_counters(1, 2, 1);
-    CHECK(safety.shots_left == 1 && !fake.permitted);
+    CHECK(generator.shots_left == 1 && !fake.permitted);
 }
 
 static void test_an_early_edge_is_counted_and_never_queued(void)
@@ -120,7 +122,7 @@ static void test_the_budget_binds_the_trigger_input(void)
         wait_us(0);
         wait_us(MIN_PERIOD_US);
     }
-    CHECK(fake.fired == 2 && safety.state == STATE_SAFE && !fake.live && !fake.permitted);
+    CHECK(fake.fired == 2 && generator.state == STATE_SAFE && !fake.live && !fake.permitted);
 }
 
 static void test_a_late_processor_gives_the_full_period(void)
@@ -139,7 +141,7 @@ static void test_whatever_disarms_takes_the_permission_away(void)
     for (int what = 0; what < 5; what++) {
         boot_armed(3, SOURCE_EXTERNAL, 0);
         if (what == 0)
-            safety_off(&safety);
+            safety_off(&generator);
         else if (what == 1)
             fake.interlock_closed = false;
         else if (what == 2)
@@ -147,17 +149,17 @@ static void test_whatever_disarms_takes_the_permission_away(void)
         else if (what == 3)
             fake.now_us += HEARTBEAT_MS * 1000u + 1;
         else
-            safety.train.channels[0].a_width_ns = 1u << 20;
+            generator.train.channels[0].a_width_ns = 1u << 20;
         if (what == 4) { /* found when the next permission is asked for */
             fake_edge();
-            safety_poll(&safety);
+            safety_poll(&generator);
             fake.now_us += MIN_PERIOD_US;
         }
-        safety_poll(&safety);
+        safety_poll(&generator);
         const unsigned fired = fake.fired;
-        CHECK(safety.state != STATE_ARMED && !fake.permitted && !fake.live);
+        CHECK(generator.state != STATE_ARMED && !fake.permitted && !fake.live);
         fake_edge();
-        safety_poll(&safety);
+        safety_poll(&generator);
         CHECK(fake.fired == fired);
     }
 }
@@ -165,8 +167,8 @@ static void test_whatever_disarms_takes_the_permission_away(void)
 static void test_an_edge_is_permitted_anew_after_an_off(void)
 {
     boot_armed(3, SOURCE_EXTERNAL, 0);
-    safety_off(&safety);
-    CHECK(safety_arm(&safety, 3, SOURCE_EXTERNAL, 0) == ERROR_NONE);
+    safety_off(&generator);
+    CHECK(shooting_arm(&generator, 3, SOURCE_EXTERNAL, 0) == ERROR_NONE);
     wait_us(PERIOD_US);
     CHECK(fake.permitted);
     fake_edge();
@@ -178,9 +180,9 @@ static void test_a_shot_that_started_before_an_off_counts(void)
 {
     boot_armed(3, SOURCE_EXTERNAL, 0);
     fake_edge();
-    safety_off(&safety);
+    safety_off(&generator);
     check_counters(1, 0, 0);
-    CHECK(safety_arm(&safety, 1, SOURCE_COMMAND, 0) == ERROR_NONE && safety_fire(&safety) == ERROR_EARLY);
+    CHECK(shooting_arm(&generator, 1, SOURCE_COMMAND, 0) == ERROR_NONE && shooting_fire(&generator) == ERROR_EARLY);
 }
 
 static void test_edges_count_from_arming_on(void)
@@ -188,7 +190,7 @@ static void test_edges_count_from_arming_on(void)
     boot_loaded();
     wait_us(LONGEST_PERIOD_US);
     fake_edge();
-    CHECK(!safety_arm(&safety, 1, SOURCE_EXTERNAL, 0));
+    CHECK(!shooting_arm(&generator, 1, SOURCE_EXTERNAL, 0));
     wait_us(0);
     check_counters(0, 0, 0);
 }
@@ -204,7 +206,7 @@ static void test_the_timer_fires_every_period_and_stops_by_itself(void)
     }
     wait_us(10 * PERIOD_US);
     check_counters(3, 0, 0);
-    CHECK(safety.state == STATE_SAFE && !fake.live);
+    CHECK(generator.state == STATE_SAFE && !fake.live);
 }
 
 static void test_the_timer_never_catches_up(void)
@@ -238,7 +240,7 @@ static void test_the_timer_keeps_the_shortest_period(void)
 static void test_a_timer_armed_after_a_start_waits_for_both(void)
 {
     boot_loaded();
-    CHECK(!safety_arm(&safety, 1, SOURCE_TIMER, MIN_PERIOD_US));
+    CHECK(!shooting_arm(&generator, 1, SOURCE_TIMER, MIN_PERIOD_US));
     wait_us(LONGEST_PERIOD_US - 1);
     check_counters(0, 0, 0);
     wait_us(1);
@@ -251,42 +253,42 @@ static void test_a_timed_shot_that_is_refused_is_counted(void)
     fake.interrupted = true;
     wait_us(PERIOD_US);
     check_counters(0, 1, 0);
-    CHECK(safety.state == STATE_SAFE);
+    CHECK(generator.state == STATE_SAFE);
 }
 
 static void test_a_shot_that_could_not_start_is_not_counted_as_fired(void)
 {
     boot_armed(2, SOURCE_COMMAND, 0);
     fake.interrupted = true; /* by the abort byte, which the core has not seen yet */
-    CHECK(safety_fire(&safety) == ERROR_NOT_ARMED && safety.state == STATE_SAFE);
+    CHECK(shooting_fire(&generator) == ERROR_NOT_ARMED && generator.state == STATE_SAFE);
     check_counters(0, 1, 0);
-    CHECK(safety.counters.cameras == 0);
+    CHECK(generator.counters.cameras == 0);
 }
 
 static void test_cameras_count_their_triggers(void)
 {
     boot_armed(2, SOURCE_COMMAND, 0);
-    CHECK(safety_fire(&safety) == ERROR_NONE);
+    CHECK(shooting_fire(&generator) == ERROR_NONE);
     wait_us(MIN_PERIOD_US);
-    CHECK(safety.counters.cameras == 2);
+    CHECK(generator.counters.cameras == 2);
 }
 
 static void test_the_core_says_when_it_wants_to_be_polled(void)
 {
     boot_armed(2, SOURCE_COMMAND, 0);
-    CHECK(safety_idle_us(&safety) == POLL_US);
+    CHECK(safety_idle_us(&generator) == POLL_US);
     boot_armed(2, SOURCE_TIMER, PERIOD_US);
-    CHECK(safety_idle_us(&safety) == POLL_US);
+    CHECK(safety_idle_us(&generator) == POLL_US);
     fake.now_us += PERIOD_US - 7;
-    CHECK(safety_idle_us(&safety) == 7);
+    CHECK(safety_idle_us(&generator) == 7);
     fake.now_us += 8;
-    CHECK(safety_idle_us(&safety) == 0);
+    CHECK(safety_idle_us(&generator) == 0);
     boot_armed(2, SOURCE_EXTERNAL, 0);
-    CHECK(safety_idle_us(&safety) == POLL_US);
+    CHECK(safety_idle_us(&generator) == POLL_US);
     fake_edge();
     wait_us(0);
     fake.now_us += MIN_PERIOD_US - 3;
-    CHECK(safety_idle_us(&safety) == 3);
+    CHECK(safety_idle_us(&generator) == 3);
 }
 
 int main(void)

@@ -14,14 +14,14 @@ static bool lit[CHANNEL_COUNT];
 
 static void give_light_pins(void)
 {
-    machines_write_program(LIGHT, LIT_PROGRAM, PROGRAM_LENGTH(LIT_PROGRAM));
+    state_machines_write_program(LIGHT, LIT_PROGRAM, PROGRAM_LENGTH(LIT_PROGRAM));
     for (uint32_t i = 0; i < MACHINES; i++) {
-        machine_set_up(LIGHT, i, PIN_LIGHT + i, PROGRAM_LENGTH(LIT_PROGRAM));
-        machine_divide_clock(LIGHT, i, LIT_DIVIDER);
+        state_machines_set_up(LIGHT, i, PIN_LIGHT + i, PROGRAM_LENGTH(LIT_PROGRAM));
+        state_machines_divide_clock(LIGHT, i, LIT_DIVIDER);
         if (lit[i])
             outputs_give_light(i);
     }
-    machines_enable(LIGHT);
+    state_machines_enable(LIGHT);
 }
 
 bool continuous_light_prepare(const uint32_t *current_ma)

@@ -69,7 +69,7 @@ static bool encode_light(const struct channel *channel, struct words *words)
     uint32_t b = 0;
     const uint32_t gap_ns = channel->b_start_ns - channel->a_start_ns - channel->a_width_ns;
     words->used = channel->used && channel->current_ma;
-    words->single = channel_is_single(channel);
+    words->single = pulse_train_is_single(channel);
     words->delay = channel->a_start_ns / TICK_NS;
     if (!words->used)
         return true;
@@ -97,18 +97,19 @@ static bool encode_train(const struct pulse_train *train)
 
 static void set_up_light(void)
 {
-    machines_write_program(LIGHT, LIGHT_PROGRAM, PROGRAM_LENGTH(LIGHT_PROGRAM));
+    state_machines_write_program(LIGHT, LIGHT_PROGRAM, PROGRAM_LENGTH(LIGHT_PROGRAM));
     for (uint32_t i = 0; i < MACHINES; i++)
-        machine_set_up(LIGHT, i, PIN_LIGHT + i, light[i].single ? LIGHT_SINGLE_LENGTH : PROGRAM_LENGTH(LIGHT_PROGRAM));
-    machines_enable(LIGHT);
+        state_machines_set_up(LIGHT, i, PIN_LIGHT + i,
+                              light[i].single ? LIGHT_SINGLE_LENGTH : PROGRAM_LENGTH(LIGHT_PROGRAM));
+    state_machines_enable(LIGHT);
 }
 
 static void set_up_cameras(void)
 {
-    machines_write_program(CAMERA, CAMERA_PROGRAM, PROGRAM_LENGTH(CAMERA_PROGRAM));
+    state_machines_write_program(CAMERA, CAMERA_PROGRAM, PROGRAM_LENGTH(CAMERA_PROGRAM));
     for (uint32_t i = 0; i < MACHINES; i++)
-        machine_set_up(CAMERA, i, PIN_CAMERA + i, PROGRAM_LENGTH(CAMERA_PROGRAM));
-    machines_enable(CAMERA);
+        state_machines_set_up(CAMERA, i, PIN_CAMERA + i, PROGRAM_LENGTH(CAMERA_PROGRAM));
+    state_machines_enable(CAMERA);
 }
 
 void outputs_give_light(uint32_t channel)

@@ -12,14 +12,14 @@ enum {
     SIDE_SET_1 = 1 << 29,
 };
 
-void machine_divide_clock(uint32_t pio, uint32_t machine, uint32_t cycles)
+void state_machines_divide_clock(uint32_t pio, uint32_t machine, uint32_t cycles)
 {
     REG(PIO_CLKDIV(pio, machine)) = cycles << 16;
 }
 
-void machine_set_up(uint32_t pio, uint32_t machine, uint32_t pin, uint32_t length)
+void state_machines_set_up(uint32_t pio, uint32_t machine, uint32_t pin, uint32_t length)
 {
-    machine_divide_clock(pio, machine, 1);
+    state_machines_divide_clock(pio, machine, 1);
     REG(PIO_EXECCTRL(pio, machine)) = (length - 1) << 12; /* wrap after the last instruction */
     REG(PIO_SHIFTCTRL(pio, machine)) = SHIFT_RIGHT;
     REG(PIO_PINCTRL(pio, machine)) = SIDE_SET_1 | PIN_TRIGGER << 15 | pin << 10;
@@ -28,14 +28,14 @@ void machine_set_up(uint32_t pio, uint32_t machine, uint32_t pin, uint32_t lengt
     REG(PIO_INSTR(pio, machine)) = PIO_LOW | PIO_JMP(0);
 }
 
-void machines_write_program(uint32_t pio, const uint16_t *program, uint32_t length)
+void state_machines_write_program(uint32_t pio, const uint16_t *program, uint32_t length)
 {
     REG(PIO_CTRL(pio)) = RESTART_ALL;
     for (uint32_t i = 0; i < length; i++)
         REG(PIO_INSTR_MEM(pio, i)) = program[i];
 }
 
-void machines_enable(uint32_t pio)
+void state_machines_enable(uint32_t pio)
 {
     REG(PIO_CTRL(pio)) = ENABLE_ALL;
 }

@@ -15,14 +15,14 @@ enum {
 #define PROGRAM_LENGTH(program) (uint32_t)(sizeof(program) / sizeof *(program))
 
 /* Stop all machines of a block and give them a program. */
-void machines_write_program(uint32_t pio, const uint16_t *program, uint32_t length);
+void state_machines_write_program(uint32_t pio, const uint16_t *program, uint32_t length);
 
 /* Its pin, and the first so many instructions of the program; it starts at their beginning, without words. */
-void machine_set_up(uint32_t pio, uint32_t machine, uint32_t pin, uint32_t length);
+void state_machines_set_up(uint32_t pio, uint32_t machine, uint32_t pin, uint32_t length);
 
-/* An instruction takes this many cycles; after machine_set_up. */
-void machine_divide_clock(uint32_t pio, uint32_t machine, uint32_t cycles);
+/* An instruction takes this many cycles; after state_machines_set_up. */
+void state_machines_divide_clock(uint32_t pio, uint32_t machine, uint32_t cycles);
 
-void machines_enable(uint32_t pio);
+void state_machines_enable(uint32_t pio);
 
 #endif

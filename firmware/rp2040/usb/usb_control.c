@@ -95,7 +95,7 @@ static struct setup parsed(uint32_t first, uint32_t second)
 static void answer_question(const struct setup *setup)
 {
     static const uint8_t STATUS[2];
-    const struct usb_bytes descriptor = usb_descriptor(setup->value >> 8, setup->value & 0xffu);
+    const struct usb_bytes descriptor = usb_descriptors_find(setup->value >> 8, setup->value & 0xffu);
     switch (setup->request) {
     case GET_DESCRIPTOR:
         if (descriptor.bytes)

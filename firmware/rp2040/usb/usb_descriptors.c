@@ -85,7 +85,7 @@ static struct usb_bytes string_descriptor(uint32_t index)
     }
 }
 
-struct usb_bytes usb_descriptor(uint32_t type, uint32_t index)
+struct usb_bytes usb_descriptors_find(uint32_t type, uint32_t index)
 {
     if (type == DEVICE)
         return (struct usb_bytes){DEVICE_DESCRIPTOR, sizeof DEVICE_DESCRIPTOR};

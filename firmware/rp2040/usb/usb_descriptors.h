@@ -14,6 +14,6 @@ struct usb_bytes {
     uint32_t count;
 };
 
-struct usb_bytes usb_descriptor(uint32_t type, uint32_t index);
+struct usb_bytes usb_descriptors_find(uint32_t type, uint32_t index);
 
 #endif
