@@ -12,7 +12,8 @@ from tests.support.rp2040_board import PAPER, PERIOD_MS, Board, Channel
 
 FIRST_SHOT_MS = 20
 EDGES_OF_A_SHOT = 6
-TIMER_JITTER_US = 100
+TIMER_JITTER_US = 200
+"""A shot that is due while a line is carried out waits for its end: at worst SHOT, 183 us."""
 SHOTS_WHILE_BUSY = 3
 
 
