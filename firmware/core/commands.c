@@ -2,6 +2,7 @@
 
 #include "light.h"
 #include "port.h"
+#include "safety.h"
 #include "shooting.h"
 
 typedef enum error (*action)(struct generator *generator, const uint32_t *fields, struct text *reply);

@@ -5,7 +5,7 @@
 #include <stdint.h>
 
 #include "error.h"
-#include "safety.h"
+#include "generator_state.h"
 #include "text.h"
 
 #define MODEL "tomoshadow-pulse"

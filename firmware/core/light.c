@@ -1,6 +1,7 @@
 #include "light.h"
 
 #include "port.h"
+#include "safety.h"
 
 static enum error check_currents(const struct generator *generator, const uint32_t *current_ma)
 {
@@ -44,7 +45,7 @@ enum error light_start(struct generator *generator, uint32_t time_ms, const uint
         return ERROR_HARDWARE;
     }
     generator->light_over_us = port_now_us() + time_ms * 1000u;
-    generator->state = STATE_LIT; /* safety_poll lights */
+    generator->state = STATE_LIT; /* generator_poll lights */
     return ERROR_NONE;
 }
 

@@ -2,14 +2,16 @@
 
 #include "commands.h"
 #include "crc16.h"
+#include "generator.h"
 #include "port.h"
+#include "safety.h"
 
 enum { CRC_LENGTH = 5 }; /* *1A2B */
 
 void protocol_boot(struct protocol *protocol, uint32_t boot, enum cause cause)
 {
     *protocol = (struct protocol){.boot = boot, .cause = cause};
-    safety_boot(&protocol->generator, cause);
+    generator_boot(&protocol->generator, cause);
 }
 
 /* Cut the CRC off the line; false where it is missing or wrong. */
@@ -93,7 +95,7 @@ static void write_reply(struct protocol *protocol, struct text *reply)
         write_unreadable(protocol, reply, protocol->overflow ? ERROR_LINE_TOO_LONG : ERROR_CRC);
         return;
     }
-    safety_poll(&protocol->generator); /* a host that comes back too late still finds the fault */
+    generator_poll(&protocol->generator); /* a host that comes back too late still finds the fault */
     safety_heard(&protocol->generator);
     if (!span_number(span_next_word(&rest), &sequence) || sequence > MAX_SEQUENCE) {
         write_unreadable(protocol, reply, ERROR_SYNTAX);
@@ -133,5 +135,5 @@ void protocol_receive(struct protocol *protocol, char byte)
 
 void protocol_poll(struct protocol *protocol)
 {
-    safety_poll(&protocol->generator);
+    generator_poll(&protocol->generator);
 }

@@ -1,14 +1,13 @@
 #include "safety.h"
 
-#include "light.h"
 #include "port.h"
-#include "shooting.h"
+#include "shot_count.h"
 
 /* Dark first. Then what the trigger input had started before is counted, and the waiting times begin. */
 void safety_outputs_off(struct generator *generator)
 {
     port_off();
-    shooting_collect(generator);
+    shot_count_collect(generator);
     const uint64_t now_us = port_now_us();
     if (generator->outputs_live)
         generator->settled_us = now_us + SETTLE_MS * 1000u;
@@ -50,17 +49,6 @@ enum error safety_check_safe(const struct generator *generator)
     if (generator->state == STATE_FAULT)
         return ERROR_FAULT_LATCHED;
     return generator->state == STATE_SAFE ? ERROR_NONE : ERROR_NOT_SAFE;
-}
-
-void safety_boot(struct generator *generator, enum cause cause)
-{
-    const uint64_t now_us = port_now_us();
-    *generator = (struct generator){.state = STATE_SAFE, .not_before_us = now_us + LONGEST_PERIOD_US};
-    for (int i = 0; i < CHANNEL_COUNT; i++)
-        generator->limits[i] = channel_limits_absolute();
-    safety_outputs_off(generator);
-    if (cause == CAUSE_WATCHDOG)
-        safety_trip(generator, FAULT_WATCHDOG);
 }
 
 enum error safety_new_train(struct generator *generator)
@@ -153,26 +141,11 @@ void safety_heard(struct generator *generator)
     generator->heard_us = port_now_us();
 }
 
-void safety_poll(struct generator *generator)
+void safety_watch(struct generator *generator, uint64_t now_us)
 {
-    const uint64_t now_us = port_now_us();
     (void)safety_check_stops(generator); /* what it finds, it latches */
     if (!port_set_points_confirmed() && !(generator->faults & FAULT_SETPOINT))
         safety_trip(generator, FAULT_SETPOINT);
-    generator->counters.cameras += port_take_cameras();
     if (gives_light(generator) && now_us - generator->heard_us > HEARTBEAT_MS * 1000u)
         safety_trip(generator, FAULT_HEARTBEAT);
-    shooting_poll(generator);
-    light_poll(generator);
-    if (generator->state == STATE_SAFE && generator->outputs_live && now_us >= generator->train_over_us)
-        safety_outputs_off(generator);
-}
-
-uint32_t safety_idle_us(const struct generator *generator)
-{
-    const uint64_t now_us = port_now_us();
-    const uint64_t due_us = shooting_due_us(generator);
-    if (due_us <= now_us)
-        return 0;
-    return due_us - now_us < POLL_US ? (uint32_t)(due_us - now_us) : (uint32_t)POLL_US;
 }

@@ -1,6 +1,8 @@
 #include "shooting.h"
 
 #include "port.h"
+#include "safety.h"
+#include "shot_count.h"
 
 static enum error check_period(const struct generator *generator, enum source source, uint32_t period_us)
 {
@@ -58,20 +60,6 @@ static enum error fire_permission(struct generator *generator)
     return port_now_us() < generator->not_before_us ? ERROR_EARLY : ERROR_NONE;
 }
 
-/* After the start: starting takes time, and the end must not be cut off. */
-static void count_shot(struct generator *generator)
-{
-    const uint64_t now_us = port_now_us();
-    generator->counters.fired++;
-    generator->fired = true;
-    generator->permitted = false;
-    generator->not_before_us = now_us + channel_limits_period_us(&generator->train, generator->limits);
-    generator->train_over_us =
-        now_us + pulse_train_length_ns(&generator->train) / 1000u + 2u; /* both terms are rounded down */
-    if (--generator->shots_left == 0)
-        generator->state = STATE_SAFE; /* safety_poll switches the outputs off once this train is over */
-}
-
 /* An interrupt has switched the outputs off before the shot could start: a stop, or the abort byte. */
 static enum error interrupted(struct generator *generator)
 {
@@ -98,27 +86,13 @@ static enum error shoot(struct generator *generator, enum source source)
         generator->counters.early += error == ERROR_EARLY;
         return error;
     }
-    count_shot(generator);
+    shot_count_fired(generator);
     return ERROR_NONE;
 }
 
 enum error shooting_fire(struct generator *generator)
 {
     return shoot(generator, SOURCE_COMMAND);
-}
-
-void shooting_collect(struct generator *generator)
-{
-    if (generator->state != STATE_ARMED || generator->source != SOURCE_EXTERNAL)
-        return;
-    const struct port_edges edges = port_take_edges();
-    const uint32_t fired = edges.fired;
-    const uint32_t ignored = edges.rises > fired ? edges.rises - fired : 0;
-    generator->counters.requested += fired + ignored;
-    generator->counters.suppressed += ignored;
-    generator->counters.early += ignored;
-    if (fired)
-        count_shot(generator);
 }
 
 static void permit(struct generator *generator)
@@ -145,7 +119,7 @@ void shooting_poll(struct generator *generator)
     if (generator->state != STATE_ARMED)
         return;
     if (generator->source == SOURCE_EXTERNAL) {
-        shooting_collect(generator);
+        shot_count_collect(generator);
         permit(generator);
     } else if (generator->source == SOURCE_TIMER) {
         run_timer(generator);

@@ -10,17 +10,14 @@
 #ifndef SHOOTING_H
 #define SHOOTING_H
 
-#include "safety.h"
+#include "generator_state.h"
 
 /* The period: of the timer, and for the other sources a promise of the host, or 0. A period that the train does not
  * permit is refused here rather than shot by shot. */
 enum error shooting_arm(struct generator *generator, uint32_t shots, uint32_t source, uint32_t period_us);
 enum error shooting_fire(struct generator *generator);
 
-/* Count what the trigger input has done. */
-void shooting_collect(struct generator *generator);
-
-/* Do what is due; for safety_poll. */
+/* Do what is due; for generator_poll. */
 void shooting_poll(struct generator *generator);
 uint64_t shooting_due_us(const struct generator *generator);
 

@@ -19,6 +19,7 @@
 
 #include "bench.h"
 #include "control.h"
+#include "generator.h"
 #include "protocol.h"
 
 enum { POLL_MS = 10 };
@@ -89,7 +90,7 @@ static void run(struct protocol *protocol)
     bool open = true;
     while (open) {
         poll(waiting, 2,
-             protocol->generator.state == STATE_ARMED ? (int)safety_idle_us(&protocol->generator) / 1000 : POLL_MS);
+             protocol->generator.state == STATE_ARMED ? (int)generator_idle_us(&protocol->generator) / 1000 : POLL_MS);
         if (waiting[1].revents)
             open = read_control(protocol);
         if (open && waiting[0].revents)

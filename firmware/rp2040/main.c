@@ -1,6 +1,7 @@
 /* The port of the core to the RP2040, and its main loop. */
 #include "clocks.h"
 #include "continuous_light.h"
+#include "generator.h"
 #include "identity.h"
 #include "interlock.h"
 #include "outputs.h"
@@ -143,6 +144,6 @@ int main(void)
             protocol_receive(&protocol, byte);
         set_points_poll();
         protocol_poll(&protocol);
-        sleep(safety_idle_us(&protocol.generator));
+        sleep(generator_idle_us(&protocol.generator));
     }
 }

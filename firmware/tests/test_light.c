@@ -1,5 +1,6 @@
 /* Continuous light: how little it may be, for how long, and what ends it. */
 #include "fake_port.h"
+#include "generator.h"
 #include "light.h"
 #include "safety.h"
 #include "shooting.h"
@@ -19,13 +20,13 @@ static void wait_us(uint32_t time_us)
 {
     fake.now_us += time_us;
     safety_heard(&generator);
-    safety_poll(&generator);
+    generator_poll(&generator);
 }
 
 static void boot(void)
 {
     fake_reset();
-    safety_boot(&generator, CAUSE_POWER);
+    generator_boot(&generator, CAUSE_POWER);
     wait_us(LONGEST_PERIOD_US);
 }
 
@@ -33,7 +34,7 @@ static void boot_lit(uint32_t time_ms)
 {
     boot();
     CHECK(light_start(&generator, time_ms, LOW_MA) == ERROR_NONE && generator.state == STATE_LIT && !fake_lit());
-    safety_poll(&generator);
+    generator_poll(&generator);
     CHECK(fake_lit());
 }
 
@@ -95,15 +96,15 @@ static void test_every_stop_ends_it(void)
     CHECK(generator.state == STATE_SAFE && !fake_lit() && !fake.live);
     boot_lit(1000);
     fake.interlock_closed = false;
-    safety_poll(&generator);
+    generator_poll(&generator);
     CHECK(generator.state == STATE_FAULT && generator.faults == FAULT_INTERLOCK && !fake_lit());
     boot_lit(1000);
     fake.estop_closed = false;
-    safety_poll(&generator);
+    generator_poll(&generator);
     CHECK(generator.state == STATE_FAULT && generator.faults == FAULT_ESTOP && !fake_lit());
     boot_lit(10000);
     fake.now_us += HEARTBEAT_MS * 1000u + 1;
-    safety_poll(&generator);
+    generator_poll(&generator);
     CHECK(generator.state == STATE_FAULT && generator.faults == FAULT_HEARTBEAT && !fake_lit());
 }
 

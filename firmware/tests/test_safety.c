@@ -1,5 +1,6 @@
 /* When light is allowed, and what takes the permission away. */
 #include "fake_port.h"
+#include "generator.h"
 #include "safety.h"
 #include "shooting.h"
 
@@ -19,7 +20,7 @@ static void wait_us(uint32_t time_us)
 {
     fake.now_us += time_us;
     safety_heard(&generator);
-    safety_poll(&generator);
+    generator_poll(&generator);
 }
 
 static enum error arm(uint32_t shots)
@@ -30,7 +31,7 @@ static enum error arm(uint32_t shots)
 static void boot(void)
 {
     fake_reset();
-    safety_boot(&generator, CAUSE_POWER);
+    generator_boot(&generator, CAUSE_POWER);
     wait_us(2 * MIN_PERIOD_US);
 }
 
@@ -109,7 +110,7 @@ static void test_a_start_does_not_shorten_the_period(void)
 {
     boot_armed(1);
     CHECK(shooting_fire(&generator) == ERROR_NONE);
-    safety_boot(&generator, CAUSE_POWER);
+    generator_boot(&generator, CAUSE_POWER);
     CHECK(!safety_set_channel(&generator, 0, &LEGAL) && !safety_load(&generator) && !arm(1));
     wait_us(20000 - 1);
     CHECK(shooting_fire(&generator) == ERROR_EARLY);
@@ -166,7 +167,7 @@ static void test_a_loaded_train_does_not_survive_a_tighter_limit(void)
     safety_off(&generator);
     CHECK(safety_tighten(&generator, 0, (struct channel_limits){10000, MAX_DUTY_PPM, UINT32_MAX}) == ERROR_NONE);
     CHECK(arm(1) == ERROR_NO_TRAIN && safety_load(&generator) == ERROR_LIMIT);
-    safety_boot(&generator, CAUSE_POWER);
+    generator_boot(&generator, CAUSE_POWER);
     CHECK(generator.limits[0].max_current_ma == MAX_CURRENT_MA);
 }
 
@@ -202,11 +203,11 @@ static void test_an_open_interlock_trips_and_latches(void)
 {
     boot_armed(2);
     fake.interlock_closed = false;
-    safety_poll(&generator);
+    generator_poll(&generator);
     CHECK(generator.state == STATE_FAULT && generator.faults == FAULT_INTERLOCK && !fake.live);
     CHECK(safety_clear(&generator) == ERROR_INTERLOCK_OPEN);
     fake.interlock_closed = true;
-    safety_poll(&generator);
+    generator_poll(&generator);
     CHECK(generator.state == STATE_FAULT && shooting_fire(&generator) == ERROR_FAULT_LATCHED);
     CHECK(arm(1) == ERROR_FAULT_LATCHED && safety_new_train(&generator) == ERROR_FAULT_LATCHED);
     CHECK(safety_clear(&generator) == ERROR_NONE && generator.state == STATE_SAFE && generator.shots_left == 0);
@@ -225,7 +226,7 @@ static void test_an_open_interlock_forbids_arming_without_a_fault(void)
     boot_armed(1);
     safety_off(&generator);
     fake.interlock_closed = false;
-    safety_poll(&generator);
+    generator_poll(&generator);
     CHECK(arm(1) == ERROR_INTERLOCK_OPEN && generator.state == STATE_SAFE && generator.faults == 0);
 }
 
@@ -233,10 +234,10 @@ static void test_a_silent_host_trips(void)
 {
     boot_armed(2);
     fake.now_us += HEARTBEAT_MS * 1000u;
-    safety_poll(&generator);
+    generator_poll(&generator);
     CHECK(generator.state == STATE_ARMED);
     fake.now_us++;
-    safety_poll(&generator);
+    generator_poll(&generator);
     CHECK(generator.state == STATE_FAULT && generator.faults == FAULT_HEARTBEAT && !fake.live);
 }
 
@@ -244,7 +245,7 @@ static void test_a_safe_generator_needs_no_host(void)
 {
     boot();
     fake.now_us += HEARTBEAT_MS * 5000u;
-    safety_poll(&generator);
+    generator_poll(&generator);
     CHECK(generator.state == STATE_SAFE);
 }
 
@@ -253,11 +254,11 @@ static void test_set_points_that_are_not_confirmed_as_zero_trip_and_latch(void)
     boot_armed(2);
     safety_off(&generator);
     fake.set_points_stuck = true;
-    safety_poll(&generator);
+    generator_poll(&generator);
     CHECK(generator.state == STATE_FAULT && generator.faults == FAULT_SETPOINT && !fake.live);
     CHECK(arm(1) == ERROR_FAULT_LATCHED && safety_clear(&generator) == ERROR_HARDWARE);
     fake.set_points_stuck = false;
-    safety_poll(&generator);
+    generator_poll(&generator);
     CHECK(generator.state == STATE_FAULT && arm(1) == ERROR_FAULT_LATCHED);
     CHECK(safety_clear(&generator) == ERROR_NONE && generator.state == STATE_SAFE && arm(1) == ERROR_NONE);
 }
@@ -266,14 +267,14 @@ static void test_set_points_that_stay_after_the_last_shot_trip_too(void)
 {
     boot_armed(2);
     fake.set_points_stuck = true;
-    safety_poll(&generator);
+    generator_poll(&generator);
     CHECK(generator.state == STATE_FAULT && generator.shots_left == 0 && !fake.live);
 }
 
 static void test_a_watchdog_reset_boots_into_a_fault(void)
 {
     fake_reset();
-    safety_boot(&generator, CAUSE_WATCHDOG);
+    generator_boot(&generator, CAUSE_WATCHDOG);
     CHECK(generator.state == STATE_FAULT && generator.faults == FAULT_WATCHDOG &&
           safety_load(&generator) == ERROR_FAULT_LATCHED);
     CHECK(safety_clear(&generator) == ERROR_NONE && generator.state == STATE_SAFE);

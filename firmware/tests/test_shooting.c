@@ -1,5 +1,6 @@
 /* Who may start a shot, when, and how honestly it is counted. */
 #include "fake_port.h"
+#include "generator.h"
 #include "safety.h"
 #include "shooting.h"
 
@@ -21,13 +22,13 @@ static void wait_us(uint32_t time_us)
 {
     fake.now_us += time_us;
     safety_heard(&generator);
-    safety_poll(&generator);
+    generator_poll(&generator);
 }
 
 static void boot_loaded(void)
 {
     fake_reset();
-    safety_boot(&generator, CAUSE_POWER);
+    generator_boot(&generator, CAUSE_POWER);
     CHECK(!safety_set_channel(&generator, 0, &LEGAL) && !safety_set_channel(&generator, 2, &LEGAL) &&
           !safety_load(&generator));
 }
@@ -37,7 +38,7 @@ static void boot_armed(uint32_t shots, enum source source, uint32_t period_us)
     boot_loaded();
     wait_us(LONGEST_PERIOD_US);
     CHECK(shooting_arm(&generator, shots, source, period_us) == ERROR_NONE);
-    safety_poll(&generator);
+    generator_poll(&generator);
 }
 
 static void check_counters(uint32_t fired, uint32_t suppressed, uint32_t early)
@@ -152,14 +153,14 @@ static void test_whatever_disarms_takes_the_permission_away(void)
             generator.train.channels[0].a_width_ns = 1u << 20;
         if (what == 4) { /* found when the next permission is asked for */
             fake_edge();
-            safety_poll(&generator);
+            generator_poll(&generator);
             fake.now_us += MIN_PERIOD_US;
         }
-        safety_poll(&generator);
+        generator_poll(&generator);
         const unsigned fired = fake.fired;
         CHECK(generator.state != STATE_ARMED && !fake.permitted && !fake.live);
         fake_edge();
-        safety_poll(&generator);
+        generator_poll(&generator);
         CHECK(fake.fired == fired);
     }
 }
@@ -276,19 +277,19 @@ static void test_cameras_count_their_triggers(void)
 static void test_the_core_says_when_it_wants_to_be_polled(void)
 {
     boot_armed(2, SOURCE_COMMAND, 0);
-    CHECK(safety_idle_us(&generator) == POLL_US);
+    CHECK(generator_idle_us(&generator) == POLL_US);
     boot_armed(2, SOURCE_TIMER, PERIOD_US);
-    CHECK(safety_idle_us(&generator) == POLL_US);
+    CHECK(generator_idle_us(&generator) == POLL_US);
     fake.now_us += PERIOD_US - 7;
-    CHECK(safety_idle_us(&generator) == 7);
+    CHECK(generator_idle_us(&generator) == 7);
     fake.now_us += 8;
-    CHECK(safety_idle_us(&generator) == 0);
+    CHECK(generator_idle_us(&generator) == 0);
     boot_armed(2, SOURCE_EXTERNAL, 0);
-    CHECK(safety_idle_us(&generator) == POLL_US);
+    CHECK(generator_idle_us(&generator) == POLL_US);
     fake_edge();
     wait_us(0);
     fake.now_us += MIN_PERIOD_US - 3;
-    CHECK(safety_idle_us(&generator) == 3);
+    CHECK(generator_idle_us(&generator) == 3);
 }
 
 int main(void)

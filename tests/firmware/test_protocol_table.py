@@ -59,16 +59,16 @@ def test_errors_agree() -> None:
 
 
 def test_states_and_faults_agree() -> None:
-    in_c = without("STATE_", c_enum("safety.h", "state"))
+    in_c = without("STATE_", c_enum("generator_state.h", "state"))
     assert in_c == named_numbers("States") == {state.name: state.value for state in State}
-    in_c = without("FAULT_", c_enum("safety.h", "fault"))
+    in_c = without("FAULT_", c_enum("generator_state.h", "fault"))
     assert in_c == named_numbers("Faults") == {str(fault.name): fault.value for fault in Fault}
 
 
 def test_sources_and_causes_agree() -> None:
-    in_c = without("SOURCE_", c_enum("safety.h", "source"))
+    in_c = without("SOURCE_", c_enum("generator_state.h", "source"))
     assert in_c == named_numbers("Sources") == {source.name: source.value for source in Source}
-    in_c = without("CAUSE_", c_enum("safety.h", "cause"))
+    in_c = without("CAUSE_", c_enum("generator_state.h", "cause"))
     assert in_c == named_numbers("Causes") == {cause.name: cause.value for cause in Cause}
 
 

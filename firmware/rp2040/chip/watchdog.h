@@ -4,7 +4,7 @@
 
 #include <stdint.h>
 
-#include "safety.h"
+#include "generator_state.h"
 
 enum { WATCHDOG_MS = 200 }; /* the longest reply takes 30 */
 

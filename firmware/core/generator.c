@@ -1,0 +1,37 @@
+#include "generator.h"
+
+#include "light.h"
+#include "port.h"
+#include "safety.h"
+#include "shooting.h"
+
+void generator_boot(struct generator *generator, enum cause cause)
+{
+    const uint64_t now_us = port_now_us();
+    *generator = (struct generator){.state = STATE_SAFE, .not_before_us = now_us + LONGEST_PERIOD_US};
+    for (int i = 0; i < CHANNEL_COUNT; i++)
+        generator->limits[i] = channel_limits_absolute();
+    safety_outputs_off(generator);
+    if (cause == CAUSE_WATCHDOG)
+        safety_trip(generator, FAULT_WATCHDOG);
+}
+
+void generator_poll(struct generator *generator)
+{
+    const uint64_t now_us = port_now_us();
+    safety_watch(generator, now_us);
+    generator->counters.cameras += port_take_cameras();
+    shooting_poll(generator);
+    light_poll(generator);
+    if (generator->state == STATE_SAFE && generator->outputs_live && now_us >= generator->train_over_us)
+        safety_outputs_off(generator);
+}
+
+uint32_t generator_idle_us(const struct generator *generator)
+{
+    const uint64_t now_us = port_now_us();
+    const uint64_t due_us = shooting_due_us(generator);
+    if (due_us <= now_us)
+        return 0;
+    return due_us - now_us < POLL_US ? (uint32_t)(due_us - now_us) : (uint32_t)POLL_US;
+}
