@@ -6,6 +6,7 @@
 
 #include "error.h"
 #include "generator_state.h"
+#include "span.h"
 #include "text.h"
 
 #define MODEL "tomoshadow-pulse"

@@ -5,6 +5,7 @@
 #include "generator.h"
 #include "port.h"
 #include "safety.h"
+#include "span.h"
 
 enum { CRC_LENGTH = 5 }; /* *1A2B */
 

@@ -3,6 +3,7 @@
 
 #include "crc16.h"
 #include "fake_port.h"
+#include "span.h"
 #include "text.h"
 
 static struct span span(const char *text)
