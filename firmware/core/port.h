@@ -12,6 +12,8 @@
 
 #include "pulse_train.h"
 
+enum { ABORT_BYTE = 0x18 };
+
 extern const char port_build[];     /* one word: which port this is */
 extern const char port_git[];       /* one word, up to 40 characters: revision of the sources */
 extern const uint32_t port_tick_ns; /* all edges are multiples of it */
@@ -61,7 +63,8 @@ void port_sustain_light(void);
 /* Every light and trigger output to its safe level, set-points to zero, at once; also in mid-pulse. */
 void port_off(void);
 
-/* Send the bytes of one reply. */
-void port_send(const char *bytes, size_t length);
+/* Send the first bytes of what is left of a reply, as many as can go at once, at least one; returns how many. Between two
+ * calls the core does what is due. */
+size_t port_send(const char *bytes, size_t length);
 
 #endif

@@ -106,7 +106,16 @@ static void write_reply(struct protocol *protocol, struct text *reply)
     answer(protocol, sequence, crc, rest, reply);
 }
 
-/* The one place that sends. */
+/* The one place that sends. Triggers and light do not wait for a reply. */
+static void send(struct protocol *protocol, const struct text *reply)
+{
+    size_t sent = 0;
+    while (sent < reply->length) {
+        sent += port_send(reply->bytes + sent, reply->length - sent);
+        protocol_poll(protocol);
+    }
+}
+
 static void end_line(struct protocol *protocol)
 {
     struct text reply = {.length = 0};
@@ -115,7 +124,7 @@ static void end_line(struct protocol *protocol)
     text_word(&reply, "*");
     text_hex16(&reply, crc);
     text_word(&reply, "\n");
-    port_send(reply.bytes, reply.length);
+    send(protocol, &reply);
     protocol->length = 0;
     protocol->overflow = false;
 }

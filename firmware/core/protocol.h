@@ -16,7 +16,7 @@
 #include "generator_state.h"
 #include "text.h"
 
-enum { ABORT_BYTE = 0x18, MAX_SEQUENCE = 65535 };
+enum { MAX_SEQUENCE = 65535 };
 
 struct protocol {
     struct generator generator;
@@ -36,8 +36,7 @@ void protocol_boot(struct protocol *protocol, uint32_t boot, enum cause cause);
 /* Take one byte from the serial line. ABORT_BYTE switches the light off wherever it stands in the stream. */
 void protocol_receive(struct protocol *protocol, char byte);
 
-/* To be called all the time by the main loop, also while port_send waits for its line; generator_idle_us tells how long
- * that may take. */
+/* To be called all the time by the main loop; generator_idle_us tells how long it may wait. */
 void protocol_poll(struct protocol *protocol);
 
 #endif

@@ -175,12 +175,12 @@ void port_off(void)
     lit = false;
 }
 
-void port_send(const char *bytes, size_t length)
+size_t port_send(const char *bytes, size_t length)
 {
     char sent[512];
     if (bench.replies_to_lose) {
         bench.replies_to_lose--;
-        return;
+        return length;
     }
     if (length > sizeof sent)
         length = sizeof sent;
@@ -190,4 +190,5 @@ void port_send(const char *bytes, size_t length)
         sent[length / 2] = (char)(sent[length / 2] ^ 1);
     }
     bench_send(sent, length);
+    return length;
 }

@@ -3,7 +3,6 @@
 #include "outputs.h"
 #include "pins.h"
 #include "rp2040.h"
-#include "vectors.h"
 
 /* One register has them all. */
 _Static_assert(PIN_TRIGGER / 8 == PIN_INTERLOCK / 8 && PIN_ESTOP / 8 == PIN_INTERLOCK / 8, "pins 8 to 15");
@@ -28,7 +27,7 @@ void interlock_start(void)
 }
 
 /* Whether a rise has started the shot is asked here, for each of them: later two would look like one. */
-void isr_io_bank0(void)
+void interlock_isr(void)
 {
     const uint32_t pending = REG(IO_INTS(PIN_INTERLOCK));
     if (pending & OPENED)

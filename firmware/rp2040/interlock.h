@@ -8,6 +8,7 @@
 #include "port.h"
 
 void interlock_start(void);
+void interlock_isr(void);
 bool interlock_take_closed(void);             /* as port_interlock_closed */
 bool interlock_take_estop_closed(void);       /* as port_estop_closed */
 struct port_edges interlock_take_edges(void); /* as port_take_edges */

@@ -17,9 +17,9 @@ NODE = re.compile(r'^node: { title: "([^"]+)" label: "[^"]*?(?:(\d+) bytes \((\w
 EDGE = re.compile(r'^edge: { sourcename: "([^"]+)" targetname: "([^"]+)"', re.MULTILINE)
 CONTEXTS = {
     "main loop": ("main",),
-    "lower interrupt": ("isr_timer0", "isr_uart0", "isr_usb"),
-    "higher interrupt": ("isr_io_bank0",),
-    "fault": ("fault",),
+    "lower interrupt": ("timer_isr", "serial_uart_isr", "usb_isr"),
+    "higher interrupt": ("interlock_isr",),
+    "fault": ("start_fault",),
 }
 EXCEPTION_BYTES = 36
 LIBRARY_BYTES = 16
@@ -50,7 +50,7 @@ class CallGraph:
     def only_by_pointer(self) -> set[str]:
         """What nobody calls by name must be called through a pointer, or be where a context starts."""
         called = set().union(*self.calls.values())
-        starts = {"reset", *(name for names in CONTEXTS.values() for name in names)}
+        starts = {"start_reset", *(name for names in CONTEXTS.values() for name in names)}
         return {name for name in self.frames if name not in called and name not in starts}
 
 

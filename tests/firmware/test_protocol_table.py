@@ -118,8 +118,9 @@ def test_commands_agree() -> None:
 def test_protocol_version_and_line_constants_agree() -> None:
     commands = (FIRMWARE / "core" / "commands.h").read_text()
     protocol = (FIRMWARE / "core" / "protocol.h").read_text()
+    port = (FIRMWARE / "core" / "port.h").read_text()
     assert f"PROTOCOL_VERSION = {pulse_protocol.PROTOCOL_VERSION}," in commands
-    assert f"ABORT_BYTE = 0x{pulse_protocol.ABORT_BYTE.hex()}" in protocol
+    assert f"ABORT_BYTE = 0x{pulse_protocol.ABORT_BYTE.hex()}" in port
     assert f"MAX_SEQUENCE = {pulse_protocol.MAX_SEQUENCE}" in protocol
 
 

@@ -1,6 +1,6 @@
 /* Second boot stage. The boot ROM copies these 256 bytes into RAM, checks the CRC that image.py puts into the last
  * four, and runs them: execute-in-place by plain serial reads (command 03h), which every NOR flash understands.
- * Fast enough: flash is read once, by reset() in start.c. RP2040 data sheet, sections 2.8.1.3 and 4.10. */
+ * Fast enough: flash is read once, by start_reset in start.c. RP2040 data sheet, sections 2.8.1.3 and 4.10. */
     .syntax unified
     .cpu cortex-m0plus
     .thumb

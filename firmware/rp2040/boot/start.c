@@ -3,7 +3,6 @@
 
 #include "outputs.h"
 #include "rp2040.h"
-#include "vectors.h"
 
 /* From image.ld. */
 extern uint32_t flash_copy[];
@@ -14,7 +13,11 @@ extern uint32_t bss_end[];
 
 int main(void);
 
-__attribute__((section(".flash_text"))) void reset(void)
+/* For vectors.S. */
+_Noreturn void start_reset(void);
+_Noreturn void start_fault(void);
+
+__attribute__((section(".flash_text"))) void start_reset(void)
 {
     __asm__ volatile("cpsid i" ::: "memory");
     const volatile uint32_t *from = flash_copy;
@@ -24,11 +27,11 @@ __attribute__((section(".flash_text"))) void reset(void)
         *word = 0;
     REG(SCB_VTOR) = (uint32_t)(uintptr_t)image_start; /* vectors.S comes first */
     (void)main();
-    fault();
+    start_fault();
 }
 
 /* Dark first; then the watchdog restarts the chip. */
-void fault(void)
+void start_fault(void)
 {
     __asm__ volatile("cpsid i" ::: "memory");
     outputs_off();

@@ -1,29 +1,29 @@
 /* Vector tables: the one that the second boot stage starts from, and the one in RAM. */
     .section .flash_vectors, "a"
     .word stack_top
-    .word reset
+    .word start_reset
 
     .section .vectors, "a"
     .word stack_top
-    .word reset
+    .word start_reset
     .rept 14
-    .word fault
+    .word start_fault
     .endr
-    .word isr_timer0                                  /* interrupt 0 */
+    .word timer_isr                                   /* interrupt 0 */
     .rept 4
-    .word fault
+    .word start_fault
     .endr
-    .word isr_usb                                     /* 5 */
+    .word usb_isr                                     /* 5 */
     .rept 7
-    .word fault
+    .word start_fault
     .endr
-    .word isr_io_bank0                                /* 13 */
+    .word interlock_isr                               /* 13: pins */
     .rept 6
-    .word fault
+    .word start_fault
     .endr
-    .word isr_uart0                                   /* 20 */
+    .word serial_uart_isr                             /* 20 */
     .rept 11
-    .word fault
+    .word start_fault
     .endr
 
 /* An image has one of these two; the other one would be a fault. */
@@ -31,10 +31,10 @@
     .cpu cortex-m0plus
     .thumb
     .section .text.absent, "ax"
-    .weak isr_usb
-    .weak isr_uart0
+    .weak usb_isr
+    .weak serial_uart_isr
     .thumb_func
-isr_usb:
+usb_isr:
     .thumb_func
-isr_uart0:
-    bl fault
+serial_uart_isr:
+    bl start_fault

@@ -1,5 +1,6 @@
 #include "clocks.h"
 
+#include "resets.h"
 #include "rp2040.h"
 
 enum {
@@ -40,14 +41,6 @@ enum {
 _Static_assert((CRYSTAL_MHZ * SYS_FEEDBACK) == CLOCK_MHZ * SYS_DIVIDER_1 * SYS_DIVIDER_2, "the PLL gives the clock");
 _Static_assert((CRYSTAL_MHZ * USB_FEEDBACK) == USB_MHZ * USB_DIVIDER * USB_DIVIDER, "the other one that of the USB");
 
-void blocks_restart(uint32_t reset_bits)
-{
-    REG_SET(RESETS_RESET) = reset_bits;
-    REG_CLEAR(RESETS_RESET) = reset_bits;
-    while ((REG(RESETS_DONE) & reset_bits) != reset_bits)
-        ;
-}
-
 static void start_crystal(void)
 {
     REG(XOSC_STARTUP) = XOSC_START_CYCLES;
@@ -58,7 +51,7 @@ static void start_crystal(void)
 
 static void start_pll(const struct pll *pll)
 {
-    blocks_restart(pll->reset_bit);
+    resets_restart(pll->reset_bit);
     REG(PLL_CS(pll->base)) = 1; /* reference divider */
     REG(PLL_FBDIV(pll->base)) = pll->feedback;
     REG_CLEAR(PLL_PWR(pll->base)) = PLL_PD | PLL_VCO_PD;

@@ -3,14 +3,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "clocks.h"
-#include "port.h"
 #include "rp2040.h"
-
-/* From the Makefile. */
-const char port_build[] = BUILD_NAME;
-const char port_git[] = REVISION;
-const uint32_t port_tick_ns = TICK_NS;
 
 enum {
     READ_UNIQUE_ID = 0x4b, /* of every flash that the boot ROM can start from; four bytes later come 64 bits */
@@ -77,7 +70,7 @@ void identity_read_board(void)
     serial[2 * ID_BYTES] = '\0';
 }
 
-const char *port_serial(void)
+const char *identity_serial(void)
 {
     return serial;
 }

@@ -1,6 +1,5 @@
 #include "continuous_light.h"
 
-#include "clocks.h"
 #include "outputs.h"
 #include "pins.h"
 #include "pio_program.h"

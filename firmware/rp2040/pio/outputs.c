@@ -3,6 +3,7 @@
 #include "clocks.h"
 #include "pins.h"
 #include "pio_program.h"
+#include "resets.h"
 #include "rp2040.h"
 #include "set_points.h"
 #include "state_machines.h"
@@ -46,7 +47,7 @@ static void set_pad(uint32_t pin)
 
 void outputs_start(void)
 {
-    blocks_restart(RESET_IO_BANK0 | RESET_PADS_BANK0 | RESET_PIO0 | RESET_PIO1);
+    resets_restart(RESET_IO_BANK0 | RESET_PADS_BANK0 | RESET_PIO0 | RESET_PIO1);
     outputs_off();
     for (uint32_t i = 0; i < CHANNEL_COUNT; i++) {
         set_pad(PIN_LIGHT + i);

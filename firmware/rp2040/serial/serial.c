@@ -3,7 +3,7 @@
 #include <stdint.h>
 
 #include "outputs.h"
-#include "protocol.h"
+#include "port.h"
 #include "rp2040.h"
 
 enum { RING = 256 }; /* two of the longest lines */

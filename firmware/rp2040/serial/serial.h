@@ -11,6 +11,8 @@ bool serial_waiting(void); /* is there a byte? */
 bool serial_take(char *byte);
 void serial_send(const char *bytes, size_t length);
 
+void serial_uart_isr(void);
+
 /* From the receive interrupt. A byte that finds no room is lost; the CRC of its line tells. */
 void serial_received(char byte);
 

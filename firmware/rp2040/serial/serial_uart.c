@@ -3,9 +3,9 @@
 
 #include "clocks.h"
 #include "pins.h"
+#include "resets.h"
 #include "rp2040.h"
 #include "serial.h"
-#include "vectors.h"
 
 enum {
     BAUD = 115200,
@@ -14,7 +14,7 @@ enum {
 
 void serial_start(void)
 {
-    blocks_restart(RESET_UART0);
+    resets_restart(RESET_UART0);
     REG(UART0_IBRD) = DIVIDER_64 / 64;
     REG(UART0_FBRD) = DIVIDER_64 % 64;
     REG(UART0_LCR_H) = UART_LCR_8_BITS; /* no FIFO: the abort byte interrupts when it arrives, not 32 bits later */
@@ -25,7 +25,7 @@ void serial_start(void)
     REG(IO_CTRL(PIN_UART_RX)) = FUNCTION_UART;
 }
 
-void isr_uart0(void)
+void serial_uart_isr(void)
 {
     while (!(REG(UART0_FR) & UART_FR_RX_EMPTY))
         serial_received((char)(REG(UART0_DR) & 0xffu));

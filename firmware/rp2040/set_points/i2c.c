@@ -2,6 +2,7 @@
 
 #include "clocks.h"
 #include "pins.h"
+#include "resets.h"
 #include "rp2040.h"
 
 enum {
@@ -66,7 +67,7 @@ static void clear_bus(void)
 void i2c_restart(void)
 {
     started = false;
-    blocks_restart(RESET_I2C0); /* forgets what is queued */
+    resets_restart(RESET_I2C0); /* forgets what is queued */
     clear_bus();
     REG(I2C_CON) = I2C_CON_MASTER;
     REG(I2C_TAR) = DEVICE;

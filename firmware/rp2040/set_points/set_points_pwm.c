@@ -1,6 +1,6 @@
 /* PWM at 41.7 kHz, full scale is MAX_CURRENT_MA; nothing comes back from it. */
-#include "clocks.h"
 #include "pins.h"
+#include "resets.h"
 #include "rp2040.h"
 #include "set_points.h"
 
@@ -28,7 +28,7 @@ void set_points_zero(void)
 
 void set_points_start(void)
 {
-    blocks_restart(RESET_PWM);
+    resets_restart(RESET_PWM);
     set_points_zero();
     for (uint32_t slice = 0; slice < SLICES; slice++) {
         REG(PWM_TOP(slice)) = FULL_SCALE - 1;

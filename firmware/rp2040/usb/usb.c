@@ -2,10 +2,10 @@
 #include "usb.h"
 
 #include "clocks.h"
+#include "resets.h"
 #include "rp2040.h"
 #include "usb_controller.h"
 #include "usb_descriptors.h"
-#include "vectors.h"
 
 enum {
     ENDPOINTS = USB_DATA + 1,
@@ -158,7 +158,7 @@ static bool take_buffer(uint32_t endpoint, enum usb_direction direction)
 }
 
 /* Buffers before a new request: they belong to the transfer before it. Data first: the abort byte may be in it. */
-void isr_usb(void)
+void usb_isr(void)
 {
     REG(USB_INTF) = 0;
     if (REG(USB_INTS) & USB_INT_BUS_RESET)
@@ -177,7 +177,7 @@ void isr_usb(void)
 void usb_start(void)
 {
     clocks_start_usb();
-    blocks_restart(RESET_USB);
+    resets_restart(RESET_USB);
     for (uint32_t address = USB_SETUP_PACKET; address < USB_BUFFERS; address += 4)
         REG(address) = 0;
     REG(USB_MUXING) = USB_TO_PHY | USB_SOFTCON;

@@ -8,6 +8,7 @@
 enum { USB_PACKET = 64 };
 
 void usb_start(void);
+void usb_isr(void);
 
 /* There is something to send: usb_fill will be called as soon as the pipe is open and free. */
 void usb_notify(void);

@@ -2,7 +2,7 @@
 
 #include <stddef.h>
 
-#include "port.h"
+#include "identity.h"
 #include "usb.h"
 
 enum {
@@ -79,7 +79,7 @@ static struct usb_bytes string_descriptor(uint32_t index)
     case 2:
         return string("tomoshadow pulse generator");
     case SERIAL_NUMBER:
-        return string(port_serial());
+        return string(identity_serial());
     default:
         return (struct usb_bytes){NULL, 0};
     }

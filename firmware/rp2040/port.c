@@ -1,0 +1,89 @@
+/* The port of the core to the RP2040: everything that the core asks of its machine, and who does it. */
+#include "port.h"
+
+#include "clocks.h"
+#include "continuous_light.h"
+#include "identity.h"
+#include "interlock.h"
+#include "outputs.h"
+#include "serial.h"
+#include "set_points.h"
+#include "timer.h"
+
+/* From the Makefile. */
+const char port_build[] = BUILD_NAME;
+const char port_git[] = REVISION;
+const uint32_t port_tick_ns = TICK_NS;
+
+const char *port_serial(void)
+{
+    return identity_serial();
+}
+
+uint64_t port_now_us(void)
+{
+    return timer_now_us();
+}
+
+bool port_interlock_closed(void)
+{
+    return interlock_take_closed();
+}
+
+bool port_estop_closed(void)
+{
+    return interlock_take_estop_closed();
+}
+
+bool port_set_points_confirmed(void)
+{
+    return set_points_confirmed();
+}
+
+bool port_load(const struct pulse_train *train)
+{
+    (void)interlock_take_edges(); /* they are of no concern to this train */
+    return outputs_load(train);
+}
+
+bool port_fire(void)
+{
+    return outputs_fire();
+}
+
+void port_permit(void)
+{
+    outputs_permit();
+}
+
+struct port_edges port_take_edges(void)
+{
+    return interlock_take_edges();
+}
+
+uint32_t port_take_cameras(void)
+{
+    return outputs_take_cameras();
+}
+
+bool port_prepare_light(const uint32_t *current_ma)
+{
+    return continuous_light_prepare(current_ma);
+}
+
+void port_sustain_light(void)
+{
+    continuous_light_sustain();
+}
+
+void port_off(void)
+{
+    outputs_off();
+}
+
+size_t port_send(const char *bytes, size_t length)
+{
+    (void)length;
+    serial_send(bytes, 1);
+    return 1;
+}
