@@ -9,7 +9,17 @@ from pathlib import Path
 import pytest
 
 FIRMWARE = Path(__file__).resolve().parents[2] / "firmware"
-COMPILERS = {"host": ("cc",)}
+COMPILERS = {"host": ("cc",), "rp2040": ("arm-none-eabi-gcc", "-mcpu=cortex-m0plus", "-mthumb")}
+IMPLEMENTED = {
+    "bench": "port",
+    "serial_uart": "serial",
+    "serial_usb": "serial",
+    "set_points_dac": "set_points",
+    "set_points_pwm": "set_points",
+}
+"""Sources that do what a header of another name says."""
+GIVEN = {"main", "memcpy", "memset"}
+"""Names that the compiler asks for."""
 Graph = dict[str, set[str]]
 
 
@@ -82,6 +92,13 @@ def test_a_circle_would_be_found(build: Build) -> None:
     graph = build.graph()
     graph["core/port"].add("core/protocol")
     assert circle(graph) is not None
+
+
+def test_functions_carry_the_name_of_their_file(build: Build) -> None:
+    for source, (defined, _) in build.symbols.items():
+        stem = Path(source).name
+        words = tuple(f"{word}_" for word in (stem, IMPLEMENTED.get(stem, stem)))
+        assert not {name for name in defined - GIVEN if name != stem and not name.startswith(words)}, source
 
 
 def test_includes_and_calls_are_both_seen(build: Build) -> None:

@@ -13,7 +13,7 @@
     .rept 4
     .word start_fault
     .endr
-    .word usb_isr                                     /* 5 */
+    .word serial_usb_isr                              /* 5 */
     .rept 7
     .word start_fault
     .endr
@@ -31,10 +31,10 @@
     .cpu cortex-m0plus
     .thumb
     .section .text.absent, "ax"
-    .weak usb_isr
+    .weak serial_usb_isr
     .weak serial_uart_isr
     .thumb_func
-usb_isr:
+serial_usb_isr:
     .thumb_func
 serial_uart_isr:
     bl start_fault

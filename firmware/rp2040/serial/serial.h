@@ -11,7 +11,9 @@ bool serial_waiting(void); /* is there a byte? */
 bool serial_take(char *byte);
 void serial_send(const char *bytes, size_t length);
 
+/* For vectors.S; an image has one of them. */
 void serial_uart_isr(void);
+void serial_usb_isr(void);
 
 /* From the receive interrupt. A byte that finds no room is lost; the CRC of its line tells. */
 void serial_received(char byte);

@@ -1,9 +1,11 @@
-/* The virtual serial port. Nothing here waits for the host: a reply that it does not fetch is lost, as on a wire. */
-#include <stdbool.h>
+/* The virtual serial port: a USB device with one bulk pipe in each direction. Nothing here waits for the host: a reply
+ * that it does not fetch is lost, as on a wire. */
 #include <stdint.h>
 
+#include "rp2040.h"
 #include "serial.h"
-#include "usb.h"
+#include "usb_control.h"
+#include "usb_endpoints.h"
 
 enum { RING = 512 }; /* more than the longest reply */
 
@@ -15,7 +17,7 @@ _Static_assert((RING & (RING - 1)) == 0, "indices run on and wrap");
 
 void serial_start(void)
 {
-    usb_start();
+    usb_endpoints_start();
 }
 
 /* Bytes come one by one; packets go when they are full or a line ends. */
@@ -28,10 +30,11 @@ void serial_send(const char *bytes, size_t length)
         complete = complete || bytes[i] == '\n' || head - tail >= USB_PACKET - 1;
     }
     if (complete)
-        usb_notify();
+        REG(USB_INTF) = USB_INT_BUFFER; /* nothing is masked for it: the interlock comes in between */
 }
 
-uint32_t usb_fill(volatile uint8_t *packet)
+/* Less than USB_PACKET, so that every packet ends a transfer and none has to be followed by an empty one. */
+static uint32_t fill(volatile uint8_t *packet)
 {
     uint32_t count = 0;
     for (; tail != head && count < USB_PACKET - 1; tail++)
@@ -39,14 +42,41 @@ uint32_t usb_fill(volatile uint8_t *packet)
     return count;
 }
 
-/* What nobody has fetched was meant for the program before. */
-void usb_opened(void)
+static void send_packet(void)
 {
-    tail = head;
+    if (!usb_endpoints_can_give(USB_DATA))
+        return;
+    const uint32_t count = fill(usb_endpoints_buffer(USB_DATA, USB_IN));
+    if (count)
+        usb_endpoints_give(USB_DATA, count);
 }
 
-void usb_received(const volatile uint8_t *bytes, uint32_t count)
+static void receive_packet(void)
 {
+    const volatile uint8_t *bytes = usb_endpoints_buffer(USB_DATA, USB_OUT);
+    const uint32_t count = usb_endpoints_received(USB_DATA);
     for (uint32_t i = 0; i < count; i++)
         serial_received((char)bytes[i]);
+    usb_endpoints_expect(USB_DATA);
+}
+
+static void on_bus_reset(void)
+{
+    usb_endpoints_reset();
+    usb_control_reset();
+}
+
+/* Data first: the abort byte may be in it. */
+void serial_usb_isr(void)
+{
+    REG(USB_INTF) = 0;
+    if (REG(USB_INTS) & USB_INT_BUS_RESET)
+        on_bus_reset();
+    if (usb_endpoints_take(USB_DATA, USB_OUT))
+        receive_packet();
+    (void)usb_endpoints_take(USB_DATA, USB_IN); /* whose buffer is free again */
+    usb_control_poll();
+    if (usb_control_take_opened())
+        tail = head; /* what nobody has fetched was meant for the program before */
+    send_packet();
 }

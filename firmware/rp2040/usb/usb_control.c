@@ -1,9 +1,9 @@
-/* Requests on the control endpoint: USB 2.0, chapter 9, and PSTN 1.2, section 6.3. */
+#include "usb_control.h"
+
 #include <stddef.h>
 
-#include "usb.h"
-#include "usb_controller.h"
 #include "usb_descriptors.h"
+#include "usb_endpoints.h"
 
 enum { LINE_CODING_SIZE = 7 };
 
@@ -42,25 +42,26 @@ static enum stage stage;
 static struct usb_bytes left; /* to be sent in STAGE_DATA_IN */
 static uint8_t configuration;
 static uint8_t new_address;
+static bool opened; /* the port, by a program on the host */
 static uint8_t line_coding[LINE_CODING_SIZE] = {0x00, 0xc2, 0x01, 0x00, 0, 0, 8}; /* 115200, 8N1; means nothing */
 
 static void refuse(void)
 {
     stage = STAGE_IDLE;
-    usb_stall_control();
+    usb_endpoints_stall_control();
 }
 
 static void acknowledge(void)
 {
     stage = STAGE_STATUS;
-    usb_restart_control(USB_IN);
-    usb_transmit(USB_CONTROL, NULL, 0);
+    usb_endpoints_restart_control(USB_IN);
+    usb_endpoints_give(USB_CONTROL, 0);
 }
 
 static void send_left(void)
 {
     const uint32_t count = left.count < USB_PACKET ? left.count : USB_PACKET;
-    usb_transmit(USB_CONTROL, left.bytes, count);
+    usb_endpoints_copy(USB_CONTROL, left.bytes, count);
     left.bytes += count;
     left.count -= count;
 }
@@ -76,7 +77,7 @@ static void answer(struct usb_bytes bytes, uint32_t length)
 
 static void take_line_coding(void)
 {
-    const volatile uint8_t *from = usb_buffer(USB_CONTROL, USB_OUT);
+    const volatile uint8_t *from = usb_endpoints_buffer(USB_CONTROL, USB_OUT);
     for (uint32_t i = 0; i < sizeof line_coding; i++)
         line_coding[i] = from[i];
     acknowledge();
@@ -132,16 +133,16 @@ static void carry_out(const struct setup *setup)
             break;
         }
         configuration = (uint8_t)setup->value;
-        usb_configure(configuration);
+        usb_endpoints_configure(configuration);
         acknowledge();
         break;
     case CLEAR_HALT:
-        usb_configure(configuration);
+        usb_endpoints_configure(configuration);
         acknowledge();
         break;
     case SET_CONTROL_LINES:
         if (setup->value & TERMINAL_READY)
-            usb_opened();
+            opened = true;
         acknowledge();
         break;
     case SET_LINE_CODING:
@@ -150,19 +151,19 @@ static void carry_out(const struct setup *setup)
             break;
         }
         stage = STAGE_DATA_OUT;
-        usb_restart_control(USB_OUT);
-        usb_expect(USB_CONTROL);
+        usb_endpoints_restart_control(USB_OUT);
+        usb_endpoints_expect(USB_CONTROL);
         break;
     default:
         refuse();
     }
 }
 
-void usb_control_setup(uint32_t first, uint32_t second)
+static void on_setup(uint32_t first, uint32_t second)
 {
     const struct setup setup = parsed(first, second);
-    usb_forget_control(); /* whatever was before, the host has given it up */
-    usb_restart_control(USB_IN);
+    usb_endpoints_forget_control(); /* whatever was before, the host has given it up */
+    usb_endpoints_restart_control(USB_IN);
     new_address = 0;
     if (setup.request & 0x8000u)
         answer_question(&setup);
@@ -170,24 +171,44 @@ void usb_control_setup(uint32_t first, uint32_t second)
         carry_out(&setup);
 }
 
-void usb_control_sent(void)
+static void on_sent(void)
 {
     if (stage == STAGE_DATA_IN && left.count) {
         send_left();
     } else if (stage == STAGE_DATA_IN) {
         stage = STAGE_STATUS;
-        usb_restart_control(USB_OUT);
-        usb_expect(USB_CONTROL);
+        usb_endpoints_restart_control(USB_OUT);
+        usb_endpoints_expect(USB_CONTROL);
     } else if (new_address) {
-        usb_set_address(new_address);
+        usb_endpoints_set_address(new_address);
         new_address = 0;
     }
 }
 
-void usb_control_received(void)
+static void on_received(void)
 {
-    if (stage == STAGE_DATA_OUT && usb_received_count(USB_CONTROL) == LINE_CODING_SIZE)
+    if (stage == STAGE_DATA_OUT && usb_endpoints_received(USB_CONTROL) == LINE_CODING_SIZE)
         take_line_coding();
+}
+
+/* Packets before a new request: they belong to the transfer before it. */
+void usb_control_poll(void)
+{
+    uint32_t first = 0;
+    uint32_t second = 0;
+    if (usb_endpoints_take(USB_CONTROL, USB_OUT))
+        on_received();
+    if (usb_endpoints_take(USB_CONTROL, USB_IN))
+        on_sent();
+    if (usb_endpoints_take_setup(&first, &second))
+        on_setup(first, second);
+}
+
+bool usb_control_take_opened(void)
+{
+    const bool taken = opened;
+    opened = false;
+    return taken;
 }
 
 void usb_control_reset(void)

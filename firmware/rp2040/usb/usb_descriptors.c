@@ -3,7 +3,7 @@
 #include <stddef.h>
 
 #include "identity.h"
-#include "usb.h"
+#include "usb_endpoints.h"
 
 enum {
     DEVICE = 1,

@@ -4,11 +4,6 @@
 
 #include <stdint.h>
 
-enum usb_endpoints {
-    USB_NOTIFICATIONS = 1, /* in; required by the class, silent */
-    USB_DATA = 2,          /* in and out */
-};
-
 struct usb_bytes {
     const uint8_t *bytes; /* NULL: there is none */
     uint32_t count;
