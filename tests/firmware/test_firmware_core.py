@@ -10,7 +10,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 FIRMWARE = ROOT / "firmware"
 BUILD = ROOT / "build" / "firmware"
-CORPUS = FIRMWARE / "tests" / "corpus"
+CORPUS = BUILD / "corpus"
 FUZZ_S = 4
 
 
