@@ -88,9 +88,13 @@ build/.toolchain: Makefile
 	@$(call install,$(FIRMWARE_PACKAGES))
 	@touch $@
 
+# Both OpenCV packages own the folder cv2: whichever goes takes it from the one that stays.
+REMOVE_CV2 := $(PYTHON) -m pip uninstall -qq --yes opencv-python-headless opencv-contrib-python-headless
+
 .venv/.python: requirements.lock | .venv/.debian
 	@echo "Installing Python packages into .venv"
 	@/usr/bin/python3 -m venv --system-site-packages .venv
+	@if compgen -G '.venv/lib/*/site-packages/opencv_python_headless-*' >/dev/null; then $(REMOVE_CV2); fi
 	@$(PYTHON) -m pip install --quiet --disable-pip-version-check -r requirements.lock
 	@touch $@
 

@@ -20,7 +20,7 @@ from processing.calibration.calibration_record import (
 )
 from processing.calibration.errors import CalibrationError
 
-_SOFTWARE = ("tomoshadow", "numpy", "scipy", "opencv-python-headless")
+_SOFTWARE = ("tomoshadow", "numpy", "scipy", "opencv-contrib-python-headless")
 
 
 def save_calibration(calibration: Calibration, path: Path, *, overwrite: bool = False) -> None:
