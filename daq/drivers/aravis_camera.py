@@ -3,20 +3,39 @@
 import logging
 from threading import Thread
 from types import TracebackType
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 from daq.devices import DeviceIdentity
-from daq.drivers.aravis_device import AravisDevice
 from daq.drivers.camera_profile import CameraProfile, FeatureWrite
 from daq.drivers.exposure_pairing import ExposureFormat, double_frame
 from daq.drivers.frame_receiver import FrameReceiver, StreamCounters
-from daq.errors import DeviceError, DeviceRefused
+from daq.errors import DeviceError, DeviceRefused, DeviceUnavailable
 from daq.shot import DoubleFrame, Image
 from daq.timing import CameraTiming
 
+if TYPE_CHECKING:
+    from daq.drivers.aravis_device import AravisDevice
+
 _log = logging.getLogger(__name__)
 
+ARAVIS_REMEDY = "apt install python3-gi gir1.2-aravis-0.8, and a virtual environment with --system-site-packages"
+"""No package index has them, so Debian's must be seen."""
 _RELEASE_LIMIT_S = 2.0
+
+
+def load_aravis(name: str) -> "type[AravisDevice]":
+    """Import Aravis, here and not above: all but cameras works on a computer without it.
+
+    Raises
+    ------
+    DeviceUnavailable
+        It is missing; the text names the packages to install.
+    """
+    try:
+        from daq.drivers.aravis_device import AravisDevice
+    except (ImportError, ValueError) as error:  # ValueError: gi is there, the typelib of Aravis is not
+        raise DeviceUnavailable(name, f"Aravis cannot be loaded ({error}): {ARAVIS_REMEDY}") from error
+    return AravisDevice
 
 
 class AravisCamera:
@@ -59,7 +78,7 @@ class AravisCamera:
         self._latest: Image | None = None
 
     def __enter__(self) -> Self:
-        self._device = AravisDevice(self._name, self._ip)
+        self._device = self._open()
         self._is_open = True
         return self
 
@@ -168,7 +187,7 @@ class AravisCamera:
         frame = self._latest if self._receiver is None else self._receiver.latest
         return None if frame is None else self._form.exposure_of(frame, -1)
 
-    def _settings(self, device: AravisDevice) -> list[FeatureWrite]:
+    def _settings(self, device: "AravisDevice") -> list[FeatureWrite]:
         rows, columns = self._form.shape
         offsets = [FeatureWrite(feature=name, value=0) for name in ("OffsetX", "OffsetY") if device.has(name)]
         image = [
@@ -180,12 +199,15 @@ class AravisCamera:
         ours = [setting for setting in (*offsets, *image) if setting.feature not in named]
         return [*ours, *self._profile.features]
 
-    def _connected(self) -> AravisDevice:
+    def _connected(self) -> "AravisDevice":
         if not self._is_open:
             raise DeviceRefused(self._name, "the camera is not open")
         if self._device is None:
-            self._device = AravisDevice(self._name, self._ip)
+            self._device = self._open()
         return self._device
+
+    def _open(self) -> "AravisDevice":
+        return load_aravis(self._name)(self._name, self._ip)
 
     def _armed(self) -> FrameReceiver:
         if self._receiver is None:
@@ -204,7 +226,7 @@ class AravisCamera:
             self._device = None
 
 
-def _release(device: AravisDevice, receiver: FrameReceiver | None, keep: bool) -> None:
+def _release(device: "AravisDevice", receiver: FrameReceiver | None, keep: bool) -> None:
     if receiver is not None:
         try:
             device.stop()

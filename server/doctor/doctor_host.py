@@ -1,4 +1,4 @@
-"""What ``tomoshadow doctor`` asks of the computer: system, packages, kernels, network buffers, disk."""
+"""What ``tomoshadow doctor`` asks of the computer: system, packages, Aravis, kernels, network buffers, disk."""
 
 import os
 import platform
@@ -11,6 +11,8 @@ from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
 
+from daq.drivers.aravis_camera import ARAVIS_REMEDY, load_aravis
+from daq.errors import DeviceUnavailable
 from processing.kernels import _native
 from server.doctor.checkup import Checkup, Status
 
@@ -35,6 +37,7 @@ def check_host(data_dir: Path) -> Iterator[Checkup]:
     """
     yield check_system()
     yield check_packages()
+    yield check_aravis()
     yield check_kernels()
     yield check_namespaces()
     yield check_receive_buffer()
@@ -69,6 +72,15 @@ def _is_installed(name: str) -> bool:
     except PackageNotFoundError:
         return False
     return True
+
+
+def check_aravis() -> Checkup:
+    """Aravis, which opens cameras; a computer that has none does without."""
+    try:
+        load_aravis("doctor")
+    except DeviceUnavailable:
+        return Checkup("aravis", Status.WARN, "cannot be loaded: no camera can be opened from here", ARAVIS_REMEDY)
+    return Checkup("aravis", Status.OK, "cameras can be opened")
 
 
 def check_kernels() -> Checkup:

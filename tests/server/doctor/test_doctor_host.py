@@ -16,7 +16,7 @@ def test_without_configuration_the_computer_is_looked_at(capsys: pytest.CaptureF
     output, progress = capsys.readouterr()
     checks = json.loads(output.splitlines()[-1])["checks"]
     names = [check["name"] for check in checks]
-    assert names == ["host", "python packages", "kernels", "user namespaces", "receive buffer", "disk"]
+    assert names == ["host", "python packages", "aravis", "kernels", "user namespaces", "receive buffer", "disk"]
     for check in checks:
         assert set(check) == {"name", "status", "detail", "remedy"}
         assert check["detail"]
