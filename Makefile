@@ -1,9 +1,10 @@
 # Each target does its own set-up on a bare Debian 12 or 13 machine, is quick when that is done, and says what it does.
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint serve firmware bench lock clean mutants fuzz
+.PHONY: help setup demo test test-wheel wheel lint serve firmware bench lock clean mutants fuzz
 
 PYTHON := .venv/bin/python
+TOOLS := env PATH="$(CURDIR)/.venv/bin:$$PATH"
 DEBIAN_PACKAGES := python3-venv python3-dev python3-gi gir1.2-aravis-0.8 iproute2 gcc g++ gcc-arm-none-eabi make chromium fonts-dejavu-core
 # For tests and linters alone: compiler and emulator of another processor, and npm, from wherever it came.
 TEST_PACKAGES := cppcheck g++-aarch64-linux-gnu qemu-user $(shell command -v npm >/dev/null || echo nodejs npm)
@@ -35,6 +36,17 @@ demo: setup ## Run the whole chain on the simulated bench; writes demo-out/repor
 
 test: lint build/rp2040js/node_modules ## Run linters and all tests.
 	$(PRIVATE_NETWORK) $(PYTHON) -m pytest $(TEST_OPTIONS)
+
+wheel: setup ## Build a wheel, for all Linux whose glibc is not older than this one's, and an sdist; into dist/.
+	@rm -rf build/wheel dist
+	@$(TOOLS) pyproject-build --no-isolation --sdist --wheel --outdir build/wheel . >/dev/null
+	@$(TOOLS) auditwheel repair --wheel-dir dist build/wheel/*.whl
+	@mv build/wheel/*.tar.gz dist && ls dist
+
+test-wheel: wheel ## Install the wheel into an environment without Aravis, and use it there.
+	@/usr/bin/python3 -m venv --clear build/analysis
+	@build/analysis/bin/python -m pip install --quiet --disable-pip-version-check -c requirements.lock dist/*.whl
+	$(PRIVATE_NETWORK) env TOMOSHADOW_PROGRAMS=$(CURDIR)/build/analysis/bin $(PYTHON) -m pytest tests/system/test_wheel.py
 
 lint: setup build/.test-packages ## Run ruff, mypy, import-linter and cppcheck.
 	.venv/bin/ruff check .
@@ -71,7 +83,7 @@ lock: .venv/.python ## Pin the newest versions of all Python packages.
 	.venv/bin/uv pip compile --universal --python-version 3.11 --extra dev --no-emit-index-url --upgrade --quiet pyproject.toml -o requirements.lock
 
 clean: ## Remove everything that was built.
-	rm -rf .venv build demo-out .mypy_cache .ruff_cache .pytest_cache
+	rm -rf .venv build dist demo-out .mypy_cache .ruff_cache .pytest_cache
 
 .venv/.debian: Makefile
 	@mkdir -p .venv
