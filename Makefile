@@ -10,7 +10,7 @@ DEBIAN_PACKAGES := python3-venv python3-dev python3-gi gir1.2-aravis-0.8 iproute
 TEST_PACKAGES := cppcheck g++-aarch64-linux-gnu qemu-user $(shell command -v npm >/dev/null || echo nodejs npm)
 FIRMWARE_PACKAGES := gcc gcc-arm-none-eabi libc6-dev make python3
 AS_ROOT := $(shell [ "$$(id -u)" = 0 ] || echo sudo)
-KERNEL_SOURCES := $(wildcard processing/kernels/*.hpp processing/kernels/*/*.[ch]pp processing/kernels/CMakeLists.txt)
+KERNEL_SOURCES := $(shell find processing/kernels -name '*.[ch]pp' -o -name CMakeLists.txt)
 FIRMWARE_SOURCES := $(wildcard firmware/*/*.[chS] firmware/rp2040/image.* firmware/Makefile)
 
 # Those of the Debian packages that are missing.
@@ -110,7 +110,14 @@ REMOVE_CV2 := $(PYTHON) -m pip uninstall -qq --yes opencv-python-headless opencv
 	@$(PYTHON) -m pip install --quiet --disable-pip-version-check -r requirements.lock
 	@touch $@
 
-.venv/.native: .venv/.python pyproject.toml $(KERNEL_SOURCES)
-	@echo "Building the reconstruction kernels"
+# An editable install remembers where each module was, and finds one that has moved no more.
+MODULES := $(sort $(shell find daq processing server -name '*.py'))
+build/.modules: FORCE
+	@mkdir -p build
+	@echo $(MODULES) | cmp -s - $@ || echo $(MODULES) >$@
+FORCE:
+
+.venv/.native: .venv/.python pyproject.toml build/.modules $(KERNEL_SOURCES)
+	@echo "Building the reconstruction kernels, installing tomoshadow into .venv"
 	@$(PYTHON) -m pip install --quiet --disable-pip-version-check --no-build-isolation --no-deps --editable .
 	@touch $@
