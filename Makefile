@@ -1,7 +1,7 @@
 # Each target does its own set-up on a bare Debian 12 or 13 machine, is quick when that is done, and says what it does.
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-wheel wheel lint serve firmware bench lock clean mutants fuzz
+.PHONY: help setup demo test test-wheel test-debian13 wheel lint serve firmware bench lock clean mutants fuzz
 
 PYTHON := .venv/bin/python
 TOOLS := env PATH="$(CURDIR)/.venv/bin:$$PATH"
@@ -9,6 +9,8 @@ DEBIAN_PACKAGES := python3-venv python3-dev python3-gi gir1.2-aravis-0.8 iproute
 # For tests and linters alone: compiler and emulator of another processor, and npm, from wherever it came.
 TEST_PACKAGES := cppcheck g++-aarch64-linux-gnu qemu-user $(shell command -v npm >/dev/null || echo nodejs npm)
 FIRMWARE_PACKAGES := gcc gcc-arm-none-eabi libc6-dev make python3
+DEBIAN13 := build/debian13
+TARGETS := demo test
 AS_ROOT := $(shell [ "$$(id -u)" = 0 ] || echo sudo)
 KERNEL_SOURCES := $(shell find processing/kernels -name '*.[ch]pp' -o -name CMakeLists.txt)
 FIRMWARE_SOURCES := $(wildcard firmware/*/*.[chS] firmware/rp2040/image.* firmware/Makefile)
@@ -47,6 +49,10 @@ test-wheel: wheel ## Install the wheel into an environment without Aravis, and u
 	@/usr/bin/python3 -m venv --clear build/analysis
 	@build/analysis/bin/python -m pip install --quiet --disable-pip-version-check -c requirements.lock dist/*.whl
 	$(PRIVATE_NETWORK) env TOMOSHADOW_PROGRAMS=$(CURDIR)/build/analysis/bin $(PYTHON) -m pytest tests/system/test_wheel.py
+
+test-debian13: ## Run TARGETS="demo test" on a Debian 13 that debootstrap lays below DEBIAN13=build/debian13; needs root.
+	@$(call install,debootstrap git)
+	@$(AS_ROOT) .ci/debian13 $(DEBIAN13) $(TARGETS)
 
 lint: setup build/.test-packages ## Run ruff, mypy, import-linter and cppcheck.
 	.venv/bin/ruff check .
