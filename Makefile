@@ -13,7 +13,7 @@ DEBIAN13 := build/debian13
 TARGETS := demo test
 AS_ROOT := $(shell [ "$$(id -u)" = 0 ] || echo sudo)
 KERNEL_SOURCES := $(shell find processing/kernels -name '*.[ch]pp' -o -name CMakeLists.txt)
-FIRMWARE_SOURCES := $(wildcard firmware/*/*.[chS] firmware/rp2040/image.* firmware/Makefile)
+FIRMWARE_SOURCES := $(shell find firmware -name '*.[chS]' -o -name 'image.*' -o -name Makefile)
 
 # Those of the Debian packages that are missing.
 define install
