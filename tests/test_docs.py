@@ -5,7 +5,10 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.write_rig_file import rig_file_page
+
 ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
 PAGES = [page for pattern in ("*.md", "docs/**/*.md", "firmware/**/*.md") for page in sorted(ROOT.glob(pattern))]
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 
@@ -29,3 +32,9 @@ def test_links_lead_somewhere(page: Path) -> None:
         there = page.parent / path if path else page
         assert there.exists(), link
         assert not anchor or anchor in anchors(there), link
+
+
+def test_the_page_of_the_rig_file_is_that_of_the_models() -> None:
+    assert (DOCS / "rig-file.md").read_text() == rig_file_page(), (
+        "a key has changed: write the page with\n  python -m tests.support.write_rig_file > docs/rig-file.md"
+    )

@@ -54,7 +54,10 @@ class CameraProfile(FrozenModel):
     """Settings and timing of one camera model in double-frame operation."""
 
     model: Annotated[str, Field(min_length=1, description="camera this was written for")]
-    pixel_format: Literal["Mono8", "Mono10", "Mono12", "Mono14", "Mono16"]
+    pixel_format: Annotated[
+        Literal["Mono8", "Mono10", "Mono12", "Mono14", "Mono16"],
+        Field(description="unpacked grey values of so many bits"),
+    ]
     frames_per_trigger: Annotated[Literal[1, 2], Field(description="exposures that one trigger edge starts")] = 2
     features: Annotated[tuple[FeatureWrite, ...], Field(description="written in this order, then read back")]
     timing: TimingModel

@@ -31,8 +31,8 @@ class _Entry(BaseModel):
 class ShotEntry(_Entry):
     """One exposure or two of all cameras."""
 
-    frame_a: Images
-    frame_b: Images | None = None
+    frame_a: Annotated[Images, Field(description="image file of every camera")]
+    frame_b: Annotated[Images | None, Field(description="the second exposure; all shots have it, or none")] = None
 
     @property
     def frames(self) -> tuple[Images, ...]:
@@ -43,11 +43,13 @@ class ShotEntry(_Entry):
 class RunEntry(_Entry):
     """Shots that become a run."""
 
-    polarity: Literal["shadow", "bright"]
-    separation_ns: Annotated[int | None, Field(gt=0)] = None
-    shot: Annotated[tuple[ShotEntry, ...], Field(min_length=1)]
-    background: tuple[ShotEntry, ...] = ()
-    dark: tuple[ShotEntry, ...] = ()
+    polarity: Annotated[
+        Literal["shadow", "bright"], Field(description="dark droplets before light, or bright particles on black")
+    ]
+    separation_ns: Annotated[int | None, Field(gt=0, description="from exposure A to B; kept with the run")] = None
+    shot: Annotated[tuple[ShotEntry, ...], Field(min_length=1, description="the shots, in order")]
+    background: Annotated[tuple[ShotEntry, ...], Field(description="light without spray; their mean is used")] = ()
+    dark: Annotated[tuple[ShotEntry, ...], Field(description="without light; their mean is used")] = ()
 
     @model_validator(mode="after")
     def _shots_agree(self) -> Self:
@@ -68,7 +70,10 @@ class RunEntry(_Entry):
 class Manifest(_Entry):
     """A whole manifest."""
 
-    root: str | None = None
+    root: Annotated[
+        str | None,
+        Field(description="folder that paths start from, may begin with $VARIABLE; default: that of the manifest"),
+    ] = None
     calibration: CalibrationEntry | None = None
     run: RunEntry | None = None
 

@@ -47,17 +47,17 @@ class CameraConfig(FrozenModel):
 class LensConfig(FrozenModel):
     """Lens of a view (Table 1)."""
 
-    f_number: Annotated[float, Field(ge=0.7, le=64)]
-    focal_length_mm: Annotated[float, Field(gt=0, le=2000)]
-    magnification: Annotated[float, Field(gt=0, le=20)]
+    f_number: Annotated[float, Field(ge=0.7, le=64, description="aperture f#")]
+    focal_length_mm: Annotated[float, Field(gt=0, le=2000, description="focal length of the lens")]
+    magnification: Annotated[float, Field(gt=0, le=20, description="image size over object size")]
 
 
 class SensorConfig(FrozenModel):
     """Sensor of a camera."""
 
-    pixel_pitch_um: Annotated[float, Field(gt=0, le=100)]
-    width_px: Annotated[int, Field(ge=64, le=16384)]
-    height_px: Annotated[int, Field(ge=64, le=16384)]
+    pixel_pitch_um: Annotated[float, Field(gt=0, le=100, description="from pixel to pixel; binned ones count as one")]
+    width_px: Annotated[int, Field(ge=64, le=16384, description="columns of an image")]
+    height_px: Annotated[int, Field(ge=64, le=16384, description="rows of one exposure")]
 
 
 class ViewConfig(FrozenModel):
@@ -85,30 +85,30 @@ class ViewConfig(FrozenModel):
 class TargetConfig(FrozenModel):
     """Calibration target: inner corners of a checkerboard, or dots."""
 
-    kind: Literal["checkerboard", "dots"] = "checkerboard"
-    columns: Annotated[int, Field(ge=3, le=200)] = 23
-    rows: Annotated[int, Field(ge=3, le=200)] = 17
-    pitch_mm: Annotated[float, Field(gt=0, le=100)] = 1.0
+    kind: Annotated[Literal["checkerboard", "dots"], Field(description="what its points are")] = "checkerboard"
+    columns: Annotated[int, Field(ge=3, le=200, description="inner corners or dots along x")] = 23
+    rows: Annotated[int, Field(ge=3, le=200, description="inner corners or dots along y")] = 17
+    pitch_mm: Annotated[float, Field(gt=0, le=100, description="distance of neighbouring points")] = 1.0
 
 
 class PulseGeneratorConfig(FrozenModel):
     """The microcontroller that fires light and cameras."""
 
-    port: Annotated[str, Field(min_length=1)]
+    port: Annotated[str, Field(min_length=1, description="serial port, best by its id: /dev/serial/by-id/...")]
 
 
 class InterlockConfig(FrozenModel):
     """Input line of the door and enclosure switches."""
 
     chip: Annotated[str, Field(min_length=1, description="for example /dev/gpiochip0")]
-    line: Annotated[int, Field(ge=0, le=1023)]
+    line: Annotated[int, Field(ge=0, le=1023, description="line of that chip")]
     active_low: Annotated[bool, Field(description="the closed chain connects the line to ground")] = False
 
 
 class StageConfig(FrozenModel):
     """Motorised stage of the calibration target; absent from a rig that has none."""
 
-    port: Annotated[str, Field(min_length=1)]
+    port: Annotated[str, Field(min_length=1, description="serial port, for example /dev/ttyUSB0")]
     range_mm: Annotated[tuple[float, float], Field(description="lowest and highest z")]
     zero_mm: Annotated[float, Field(description="position on the stage's own scale where z is 0")] = 0.0
     microstep_um: Annotated[float, Field(gt=0, le=100, description="data sheet of the stage")] = 0.047625
@@ -124,9 +124,13 @@ class StageConfig(FrozenModel):
 class ServerConfig(FrozenModel):
     """Where the server listens and where runs are kept."""
 
-    host: str = "127.0.0.1"
-    port: Annotated[int, Field(ge=1, le=65535)] = 8080
-    data_dir: Annotated[Path, Field(description="relative to the working directory")] = Path("runs")
+    host: Annotated[str, Field(description="address to listen at; another than a loopback one needs a token")] = (
+        "127.0.0.1"
+    )
+    port: Annotated[int, Field(ge=1, le=65535, description="TCP port")] = 8080
+    data_dir: Annotated[
+        Path, Field(description="folder of runs and calibrations, relative to the working directory")
+    ] = Path("runs")
     token: Annotated[SecretStr | None, Field(description="asked of every browser and script")] = None
 
     def moved(self, host: str | None, port: int | None) -> "ServerConfig":
@@ -160,8 +164,10 @@ class AcquisitionConfig(FrozenModel):
 class SimulationConfig(FrozenModel):
     """Makes the rig a simulated one: real drivers, simulated devices at the other end of every wire."""
 
-    seed: int = 1
-    spray: Literal["hollow_cone", "flat_fan"] = "hollow_cone"
+    seed: Annotated[
+        int, Field(description="draws the true cameras and the sprays; the same seed, the same laboratory")
+    ] = 1
+    spray: Annotated[Literal["hollow_cone", "flat_fan"], Field(description="nozzle of the paper")] = "hollow_cone"
     firmware: Annotated[
         Literal["host", "emulated"],
         Field(description="core built for this computer, or the Pico's image in an emulator"),
@@ -169,14 +175,16 @@ class SimulationConfig(FrozenModel):
     gpio: Annotated[
         Literal["auto", "chip", "memory"], Field(description="simulated GPIO chip, interlock in memory, or what works")
     ] = "auto"
-    faults: tuple[ScriptedFault, ...] = ()
+    faults: Annotated[tuple[ScriptedFault, ...], Field(description="what goes wrong, and at which shot")] = ()
 
 
 class RigConfig(FrozenModel):
     """Everything that is known about a rig before it is opened."""
 
-    name: Annotated[str, Field(min_length=1, max_length=80)]
-    views: Annotated[dict[RigViewName, ViewConfig], Field(min_length=2, max_length=4)]
+    name: Annotated[str, Field(min_length=1, max_length=80, description="of the rig, for people")]
+    views: Annotated[
+        dict[RigViewName, ViewConfig], Field(min_length=2, max_length=4, description="lines of sight by name")
+    ]
     target: TargetConfig = TargetConfig()
     pulse_generator: PulseGeneratorConfig | None = None
     interlock: InterlockConfig | None = None

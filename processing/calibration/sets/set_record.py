@@ -20,8 +20,8 @@ class _Entry(BaseModel):
 class PlaneEntry(_Entry):
     """Images of one target position; without ``z_mm`` a board in a free pose."""
 
-    z_mm: float | None = None
-    images: Annotated[dict[CameraName, str], Field(min_length=1)]
+    z_mm: Annotated[float | None, Field(description="of the target; left out where a board was held freely")] = None
+    images: Annotated[dict[CameraName, str], Field(min_length=1, description="image file by camera")]
     origin_px: Annotated[dict[CameraName, Pixel], Field(description="overrides the origin_px of the set")] = {}
 
     @model_validator(mode="after")
@@ -34,8 +34,8 @@ class PlaneEntry(_Entry):
 class PointsEntry(_Entry):
     """Points of one camera that were measured elsewhere, or dots of a solid target to be found in an image."""
 
-    camera: CameraName
-    file: str
+    camera: Annotated[CameraName, Field(description="whose points they are")]
+    file: Annotated[str, Field(description="text file of numbers, a point per line")]
     columns: Annotated[tuple[Column, ...], Field(description="what the columns of the file are")]
     image_size_px: Annotated[tuple[int, int] | None, Field(description="width, height; default: as in the run")] = None
     image: Annotated[str | None, Field(description="find the dots here; the file then has id, x, y, z")] = None
@@ -64,8 +64,8 @@ class CalibrationEntry(_Entry):
     azimuth_deg: Annotated[
         dict[CameraName, float], Field(description="where cameras stand, roughly; the fit is checked against it")
     ] = {}
-    plane: tuple[PlaneEntry, ...] = ()
-    points: tuple[PointsEntry, ...] = ()
+    plane: Annotated[tuple[PlaneEntry, ...], Field(description="images of the target, position by position")] = ()
+    points: Annotated[tuple[PointsEntry, ...], Field(description="points instead of images")] = ()
 
     @model_validator(mode="after")
     def _has_something(self) -> Self:

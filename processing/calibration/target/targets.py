@@ -39,7 +39,7 @@ class Target(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
-    kind: Literal["checkerboard", "dots"]
+    kind: Annotated[Literal["checkerboard", "dots"], Field(description="what its points are")]
     columns: Annotated[int, Field(ge=2, le=1000, description="inner corners or dots along x")] | None = None
     rows: Annotated[int, Field(ge=2, le=1000, description="inner corners or dots along y")] | None = None
     pitch_mm: Annotated[float, Field(gt=0, description="distance of neighbouring points")]
