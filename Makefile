@@ -1,7 +1,7 @@
 # Each target does its own set-up on a bare Debian 12 or 13 machine, is quick when that is done, and says what it does.
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-wheel test-debian13 wheel lint serve firmware bench lock clean mutants fuzz
+.PHONY: help setup demo test test-wheel test-debian13 wheel lint serve firmware bench measured lock clean mutants fuzz
 
 PYTHON := .venv/bin/python
 TOOLS := env PATH="$(CURDIR)/.venv/bin:$$PATH"
@@ -33,7 +33,7 @@ help: ## Show this list.
 
 setup: .venv/.native firmware ## Install Debian packages, the Python environment and the native parts.
 
-demo: setup ## Run the whole chain on the simulated bench; writes demo-out/report.html.
+demo: setup ## Run the whole chain on the simulated rig; writes demo-out/report.html.
 	$(PRIVATE_NETWORK) $(PYTHON) -m server.cli demo --out demo-out $(DEMO_OPTIONS)
 
 test: lint build/rp2040js/node_modules ## Run linters and all tests.
@@ -61,11 +61,14 @@ lint: setup build/.test-packages ## Run ruff, mypy, import-linter and cppcheck.
 	.venv/bin/lint-imports --no-cache
 	@$(MAKE) --no-print-directory -C firmware lint
 
-serve: setup ## Start server and web page on the simulated bench, http://127.0.0.1:8080.
+serve: setup ## Start server and web page on the simulated rig, http://127.0.0.1:8080.
 	$(PYTHON) -m server.cli serve --config configs/simulated.toml
 
-bench: setup ## Measure kernels and recorder, four minutes; writes bench.json. BENCH_OPTIONS="--table README.md" renews its table.
+bench: setup ## Measure kernels and recorder, four minutes; writes bench.json. BENCH_OPTIONS="--table docs/measured.md" renews the table there.
 	@env -u OPENBLAS_CORETYPE -u OPENBLAS_L2_SIZE $(PYTHON) -m server.cli bench --json $(BENCH_OPTIONS) | tail -n 1 >bench.json
+
+measured: setup ## Write the tables of docs/measured.md anew, those of bench apart; ten minutes.
+	@$(PRIVATE_NETWORK) $(PYTHON) -m tests.support.write_measured $(MEASURED)
 
 firmware: $(FIRMWARE_SOURCES) | build/.toolchain ## Build the firmware: image for the Pico, core for this computer.
 	@$(MAKE) --no-print-directory -C firmware host

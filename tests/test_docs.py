@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.write_measured import PARTS
 from tests.support.write_rig_file import rig_file_page
 
 ROOT = Path(__file__).parents[1]
@@ -38,3 +39,10 @@ def test_the_page_of_the_rig_file_is_that_of_the_models() -> None:
     assert (DOCS / "rig-file.md").read_text() == rig_file_page(), (
         "a key has changed: write the page with\n  python -m tests.support.write_rig_file > docs/rig-file.md"
     )
+
+
+def test_every_measured_table_is_there() -> None:
+    page = (DOCS / "measured.md").read_text()
+    for name in [*PARTS, "bench"]:
+        table = page.partition(f"<!-- {name} -->")[2].partition(f"<!-- /{name} -->")[0]
+        assert table.count("\n|") >= 3, name

@@ -1,0 +1,104 @@
+"""Write the tables of docs/measured.md anew from what the commands say: ``python -m tests.support.write_measured``.
+
+Without arguments all of them; else those that are named. ``tomoshadow bench --table docs/measured.md`` writes its own.
+"""
+
+import json
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from processing.synthetic.paper_rig import TABLE_1
+
+ROOT = Path(__file__).parents[2]
+PAGE = ROOT / "docs" / "measured.md"
+STUDIES = ("density", "ghosts", "average", "residuals", "calibration", "sensitivity")
+
+
+@dataclass(frozen=True)
+class Part:
+    """A table of the page: the command that knows its figures, and how they become a table."""
+
+    command: tuple[str, ...]
+    table: Callable[[Mapping[str, Any]], str]
+
+
+def write_measured(names: Iterable[str]) -> None:
+    """Run the commands of these parts, one after the other, and put their tables into the page."""
+    for name in names:
+        table = PARTS[name].table(_said(PARTS[name].command))
+        PAGE.write_text(replaced(PAGE.read_text(), name, table))
+
+
+def replaced(page: str, name: str, table: str) -> str:
+    """The page with another table between the marks of that name."""
+    before, begin, rest = page.partition(f"<!-- {name} -->\n")
+    _old, end, after = rest.partition(f"<!-- /{name} -->\n")
+    if not begin or not end:
+        raise ValueError(f"{PAGE}: has no marks for {name}")
+    return f"{before}{begin}\n{table}\n{end}{after}"
+
+
+def _said(command: Sequence[str]) -> dict[str, Any]:
+    """What a command prints with ``--json``."""
+    with tempfile.TemporaryDirectory() as out:
+        arguments = [argument.format(out=out) for argument in command]
+        finished = subprocess.run(
+            [sys.executable, "-m", "server.cli", *arguments, "--json"], cwd=ROOT, stdout=subprocess.PIPE, check=True
+        )
+    said: dict[str, Any] = json.loads(finished.stdout.splitlines()[-1])
+    return said
+
+
+def _markdown(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    lines = [head, ["---"] * len(head), *rows]
+    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+
+
+def _statements(said: Mapping[str, Any]) -> str:
+    rows = [(one["topic"], one["paper"], one["ours"]) for one in said["statements"]]
+    return _markdown(("what", "the paper", "here"), rows)
+
+
+def _qualities(said: Mapping[str, Any]) -> str:
+    """Quality factors by method and density, then the statements."""
+    densities = sorted({row["density_per_mm3"] for row in said["rows"]})
+    methods = dict.fromkeys(row["method"] for row in said["rows"])
+    found = {(row["method"], row["density_per_mm3"]): f"{row['quality_factor']:.2f}" for row in said["rows"]}
+    head = ("quality factor, droplets/mm³:", *(f"{density:.1f}" for density in densities))
+    rows = [(method, *(found[method, density] for density in densities)) for method in methods]
+    return f"{_markdown(head, rows)}\n{_statements(said)}"
+
+
+def _demonstration(said: Mapping[str, Any]) -> str:
+    errors = ("mean_error_px", "holdout_error_px", "true_error_px")
+    head = ("view", "mean error [px]", "on planes not seen [px]", "true error, largest in the volume [px]", "verdict")
+    rows = [(name, *(f"{view[key]:.4f}" for key in errors), view["verdict"]) for name, view in said["views"].items()]
+    quality = f"Quality factor of MLOS against the true spray: {said['quality_factor']:.2f}"
+    return f"{_markdown(head, rows)}\n{quality}; {said['shots_valid']} of {said['shots_planned']} shots valid.\n"
+
+
+def _airy_disks(said: Mapping[str, Any]) -> str:
+    rows = [
+        (name, f"{TABLE_1[name].airy_diameter_um:g}", f"{view['airy_diameter_um']:.1f}")
+        for name, view in said["views"].items()
+    ]
+    return _markdown(("view", "Airy disk in Table 1 [µm]", "here [µm]"), rows)
+
+
+PARTS = {
+    "demo": Part(("demo", "--out", "{out}/demo"), _demonstration),
+    "optics": Part(("optics", "--config", "configs/spray4view.toml"), _airy_disks),
+    **{
+        name: Part(("study", name, "--out", "{out}"), _qualities if name == "density" else _statements)
+        for name in STUDIES
+    },
+}
+"""Tables by the name of their marks."""
+
+if __name__ == "__main__":
+    write_measured(sys.argv[1:] or PARTS)
