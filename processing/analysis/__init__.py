@@ -1,4 +1,4 @@
-"""What a volume says: pure functions on arrays and tables.
+"""What a volume says: pure functions on arrays.
 
 It may import everything down to ``reconstruction``; figures, studies and runs import it.
 """

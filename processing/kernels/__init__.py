@@ -1,5 +1,6 @@
 """The compiled kernels: C++17 behind one binding, ``_native``.
 
+``simd`` is compiled once per instruction set, ``host`` deals its work to threads, ``binding`` is what Python sees.
 They know no other module; ``preprocessing`` and ``reconstruction`` are their callers.
 """
 
