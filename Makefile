@@ -1,7 +1,7 @@
 # Each target does its own set-up on a bare Debian 12 or 13 machine, is quick when that is done, and says what it does.
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-wheel test-debian13 wheel lint serve firmware bench measured lock clean mutants fuzz
+.PHONY: help setup demo test test-fast test-wheel test-debian13 wheel lint serve firmware bench measured lock clean mutants fuzz
 
 PYTHON := .venv/bin/python
 TOOLS := env PATH="$(CURDIR)/.venv/bin:$$PATH"
@@ -38,6 +38,15 @@ demo: setup ## Run the whole chain on the simulated rig; writes demo-out/report.
 
 test: lint build/rp2040js/node_modules ## Run linters and all tests.
 	$(PRIVATE_NETWORK) $(PYTHON) -m pytest $(TEST_OPTIONS)
+
+# Quick ones; calibration, reconstruction, firmware, pages and cameras need the rest.
+FAST_TESTS := $(wildcard tests/test_*.py tests/processing/test_*.py) tests/daq \
+	$(addprefix tests/processing/,analysis runs synthetic) $(addprefix tests/server/,doctor pictures rig)
+test-fast: setup ## Run ruff, import-linter and the quick tests, in less than two minutes of CPU.
+	.venv/bin/ruff check .
+	.venv/bin/ruff format --check .
+	.venv/bin/lint-imports --no-cache
+	$(PRIVATE_NETWORK) $(PYTHON) -m pytest -q -m "not slow and not network" $(FAST_TESTS)
 
 wheel: setup ## Build a wheel, for all Linux whose glibc is not older than this one's, and an sdist; into dist/.
 	@rm -rf build/wheel dist

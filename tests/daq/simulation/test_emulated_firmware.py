@@ -17,6 +17,8 @@ from daq.simulation.pico.rp2040_chip import TRIGGER
 from daq.simulation.pico.rp2040_emulator import START_CYCLES, Edge
 from daq.timing import CameraTiming, ShotTiming, plan_shot_timing
 
+pytestmark = pytest.mark.slow
+
 CHANNELS = {"left": 1, "right": 3}
 CAMERA = CameraTiming(1_000, 20_000, 500, 30_000_000, 1_000_000)
 PERIOD_MS = 10

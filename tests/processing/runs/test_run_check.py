@@ -10,6 +10,8 @@ from processing.runs.run_check import ShotCheck, check_exposures
 from processing.studies.drifting_views import direction
 from tests.support.drifting_views import calibration_of, droplet_shots, inside_mm, views
 
+pytestmark = pytest.mark.slow
+
 CALIBRATION = calibration_of(views())
 MAPPINGS = [view.mapping for view in CALIBRATION.views.values()]
 
