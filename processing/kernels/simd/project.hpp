@@ -2,7 +2,7 @@
 #pragma once
 
 #include "simd/rows.hpp"
-#include "simd/sample.hpp"
+#include "simd/sampling/sample.hpp"
 
 namespace tomoshadow::TOMOSHADOW_ISA {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <cstdlib>
 
-#include "simd/sample.hpp"
+#include "simd/sampling/sample.hpp"
 
 namespace tomoshadow::TOMOSHADOW_ISA {
 namespace {

@@ -1,8 +1,8 @@
 // What a view sees at the voxels of a block: bilinear interpolation of its image, zero outside.
 #pragma once
 
-#include "simd/nodes.hpp"
-#include "simd/rectified.hpp"
+#include "simd/sampling/nodes.hpp"
+#include "simd/sampling/rectified.hpp"
 
 namespace tomoshadow::TOMOSHADOW_ISA {
 namespace {

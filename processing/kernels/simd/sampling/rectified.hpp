@@ -1,7 +1,7 @@
 // Samples of rectified views, from windows of contiguous pixels.
 #pragma once
 
-#include "simd/tile.hpp"
+#include "simd/sampling/tile.hpp"
 
 namespace tomoshadow::TOMOSHADOW_ISA {
 namespace {

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "job.hpp"
-#include "simd/windows.hpp"
+#include "simd/sampling/windows.hpp"
 
 namespace tomoshadow::TOMOSHADOW_ISA {
 namespace {

@@ -1,7 +1,7 @@
 // Samples of any mapping, known at nodes and linear in between.
 #pragma once
 
-#include "simd/tile.hpp"
+#include "simd/sampling/tile.hpp"
 
 namespace tomoshadow::TOMOSHADOW_ISA {
 namespace {
