@@ -4,7 +4,7 @@
     mutants.py [NAME ...]      all of mutants*.toml, or those whose name contains one of the words
 
 Faults of the core are found by its own tests; those of the port to the Pico by tests of the real image in an emulator,
-run by pytest. Prints a table; exit status 1 if a fault survives.
+run by pytest. Prints a table; exit status 1 if a fault survives, or cannot be planted.
 """
 
 import os
@@ -178,29 +178,37 @@ def _run(*command: str, stdin: str = "", images: str = "") -> subprocess.Complet
     )
 
 
-def _found(mutant: Mutant) -> str | None:
-    """What finds it; most faults need no sanitizer. One that cannot be planted is not found either."""
+@dataclass(frozen=True)
+class Verdict:
+    """What became of a planted fault: the check that found it, and if none did, what is to be said."""
+
+    killer: str | None
+    said: str
+
+
+def verdict_of(mutant: Mutant) -> Verdict:
+    """Plant a fault and look for it; most need no sanitizer. One that does not compile proves nothing."""
     try:
-        return killer_of(mutant, _NO_SANITIZERS) or (None if mutant.tests else killer_of(mutant))
+        killer = killer_of(mutant, _NO_SANITIZERS) or (None if mutant.tests else killer_of(mutant))
     except MutantError as error:
-        print(f"{mutant.name}: {error}", file=sys.stderr)
-        return None
+        return Verdict(None, f"NOT PLANTED: {error}")
+    return Verdict(killer, killer or "SURVIVED")
 
 
 def main(words: Sequence[str]) -> int:
     """Kill the chosen mutants; the exit status."""
     mutants = [mutant for mutant in load_mutants() if not words or any(word in mutant.name for word in words)]
-    survivors = 0
+    found = 0
     with ThreadPoolExecutor(os.cpu_count()) as workers:
         healthy = [workers.submit(killer_of, None), workers.submit(killer_of_healthy_images, mutants)]
         if killer := next((each.result() for each in healthy if each.result()), None):
             print(f"the healthy firmware fails already: {killer}", file=sys.stderr)
             return 1
-        for mutant, killer in zip(mutants, workers.map(_found, mutants), strict=True):
-            survivors += killer is None
-            print(f"{mutant.name:52}{killer or 'SURVIVED'}", flush=True)
-    print(f"{len(mutants) - survivors} of {len(mutants)} planted faults found")
-    return 1 if survivors or not mutants else 0
+        for mutant, verdict in zip(mutants, workers.map(verdict_of, mutants), strict=True):
+            found += verdict.killer is not None
+            print(f"{mutant.name:52}{verdict.said}", flush=True)
+    print(f"{found} of {len(mutants)} planted faults found")
+    return 0 if mutants and found == len(mutants) else 1
 
 
 if __name__ == "__main__":

@@ -1,11 +1,12 @@
 """The core's tests find planted faults: a few of ``firmware/tests/mutants.toml`` here, all by ``make mutants``."""
 
+import re
 import shutil
 from pathlib import Path
 
 import pytest
 
-from firmware.tests.mutants import FIRMWARE, Mutant, MutantError, killer_of, load_mutants
+from firmware.tests.mutants import FIRMWARE, Mutant, MutantError, killer_of, load_mutants, verdict_of
 
 MUTANTS = {mutant.name: mutant for mutant in load_mutants()}
 SAMPLE = (
@@ -51,3 +52,10 @@ def test_a_list_that_no_longer_fits_is_told(tmp_path: Path) -> None:
     (tmp_path / "core" / "shooting.c").write_text("")
     with pytest.raises(MutantError, match=r"no rate limit: .* stands 0 times"):
         MUTANTS["no rate limit"].apply(tmp_path)
+
+
+def test_one_that_does_not_compile_is_not_said_to_survive() -> None:
+    nonsense = Mutant("nonsense", "limits.h", "CAMERA_PULSE_NS = 10000,", "CAMERA_PULSE_NS = ten,")
+    verdict = verdict_of(nonsense)
+    assert verdict.killer is None
+    assert re.match(r"NOT PLANTED: \w+ does not compile: .*'ten'", verdict.said, re.DOTALL)
