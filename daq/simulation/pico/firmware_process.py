@@ -67,13 +67,16 @@ class FirmwareProcess:
         try:
             self._port = self._answer("start").removeprefix("port ")
         except DeviceTimeout:
-            self._process.kill()
+            self._end()
             raise
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        self._end()
+
+    def _end(self) -> None:
         process = self._running()
         process.kill()
         process.wait(_ANSWER_LIMIT_S)

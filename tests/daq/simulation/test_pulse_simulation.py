@@ -1,5 +1,6 @@
 """The simulated pulse generator as a process: what it says of its shots, how it ends, how it is built."""
 
+import gc
 import os
 import signal
 import subprocess
@@ -11,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from daq.drivers.serial_pulse_generator import SerialPulseGenerator
-from daq.errors import DeviceUnavailable
+from daq.errors import DeviceTimeout, DeviceUnavailable
 from daq.run_plan import PulsePair, RunPlan
 from daq.shot import FiredTrain
 from daq.simulation.pico.firmware_build import build_firmware
@@ -128,3 +129,14 @@ def test_a_failed_build_shows_the_compiler_s_words(monkeypatch: pytest.MonkeyPat
     monkeypatch.setenv("CFLAGS", "-include no_such_header.h")
     with pytest.raises(DeviceUnavailable, match=r"no_such_header\.h"):
         build_firmware(tmp_path / "build")
+
+
+def test_one_that_never_answers_is_ended_and_leaves_nothing_open(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("daq.simulation.pico.firmware_process._ANSWER_LIMIT_S", 0.2)
+    monkeypatch.setattr("daq.simulation.pico.firmware_process._host_command", lambda: ["sleep", "60"])
+    silent = FirmwareProcess({}, lambda train: None)
+    with pytest.raises(DeviceTimeout, match=r"simulated pulse generator: start .* 0\.2"), silent:
+        pass
+    with pytest.raises(ProcessLookupError):
+        os.kill(silent.pid, 0)
+    gc.collect()  # an open pipe is an error of the test
