@@ -123,6 +123,11 @@ def demonstrate(
 
 
 def _simulated_rig(config_file: Path, firmware: str | None) -> RigConfig:
+    if not config_file.exists():
+        raise ConfigError(
+            f"{config_file}: no such file; run the demonstration in a clone of tomoshadow, which has the rig and the "
+            "sources of its firmware, or name a simulated rig by --config"
+        )
     config = load_config(config_file)
     if config.simulation is None:
         raise ConfigError(f"{config_file}: the demonstration needs a rig with [simulation]")
