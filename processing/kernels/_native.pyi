@@ -30,6 +30,7 @@ class View:
         scale: NDArray[np.float64],
         shift_u: NDArray[np.float64],
         shift_v: NDArray[np.float64],
+        foot: tuple[float, float, float],
         cull: bool = True,
     ) -> View: ...
     @staticmethod

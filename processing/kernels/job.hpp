@@ -53,16 +53,24 @@ struct Occupancy {
     }
 };
 
+// How far the line of sight through pixel (u, v) goes in one plane of voxels, 1 / |cos| of its angle to z:
+// sqrt(1 + ((u - foot_u)^2 + (v - foot_v)^2) per_distance^2). A rectified image is what a camera sees that looks along z,
+// right above its pixel (foot_u, foot_v), from a distance of 1 / per_distance pixels.
+struct Path {
+    float foot_u, foot_v, per_distance;
+};
+
 // One view: an image in fixed point, `unit` times a pixel (0 .. 32767) is an intensity; and where voxels are seen
 // in it. Either rectified: voxel (x, y) of plane z is seen at column scale[z] x + shift_u[z] and row
 // scale[z] y + shift_v[z]. Or mapped by nodes: channels u, v, area on a lattice of every `spacing`-th voxel,
-// linear in between; `area` is the pixel area of a voxel, seen along z.
+// linear in between; `area` is the pixel area of a voxel, seen along the line of sight, and all paths are 1.
 struct View {
     const int16_t *pixels;
     int rows, columns;
     float unit;
     Occupancy occupancy;
     const double *scale, *shift_u, *shift_v;  // rectified, else null
+    Path path;
     const float *nodes;                       // (3, nodes_z, nodes_y, nodes_x), else null
     int nodes_z, nodes_y, nodes_x, spacing;
 };
@@ -141,8 +149,10 @@ struct SmartPass {
     Shape shape;
 };
 
-// The ratio image of a view: (recorded / projected)^exponent; the projection is the sum of its parts, times `unit`.
+// The ratio image of a view: (recorded / projected)^exponent; the projection is the sum of its parts, times `unit` and
+// the path of each line of sight.
 struct Correction {
+    Path path;
     const int16_t *recorded;
     float recorded_unit, unit, exponent, ratio_counts;  // ratio_counts: of the ratio 1
     int rows, columns;

@@ -97,13 +97,14 @@ def planned_line_of_sight(plan: Plan, images: Sequence[NDArray[np.float32]], met
 
 
 def project_rectified(view: RectifiedView, volume: Array, shape: tuple[int, int]) -> Array:
-    """Every pixel sums the bilinear interpolations of all planes."""
+    """Every pixel sums the bilinear interpolations of all planes, times the path through one of them."""
     rows, columns = (np.arange(n, dtype=float) for n in shape)
     image = np.zeros(shape)
     for plane, scale, left, top in zip(volume, view.scale, view.shift_u_px, view.shift_v_px, strict=True):
         y, x = np.meshgrid((rows - top) / scale, (columns - left) / scale, indexing="ij")
         image += bilinear(plane, x, y)
-    return image
+    foot_u, foot_v, distance = view.foot
+    return image * np.hypot(1, np.hypot((columns - foot_u) / distance, (rows[:, None] - foot_v) / distance))
 
 
 def project_nodes(view: NodeView, volume: Array, shape: tuple[int, int]) -> Array:

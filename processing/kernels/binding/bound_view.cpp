@@ -21,7 +21,8 @@ BoundView::BoundView(PixelArray pixels, float unit) : pixels_(std::move(pixels))
     view_.unit = unit;
 }
 
-BoundView BoundView::rectified(PixelArray pixels, float unit, PlaneArray scale, PlaneArray shift_u, PlaneArray shift_v, bool cull) {
+BoundView BoundView::rectified(PixelArray pixels, float unit, PlaneArray scale, PlaneArray shift_u, PlaneArray shift_v,
+                               const Foot &foot, bool cull) {
     require(scale.shape(0) == shift_u.shape(0) && scale.shape(0) == shift_v.shape(0),
             "rectified view: scale and shifts differ in length");
     BoundView bound(std::move(pixels), unit);
@@ -29,6 +30,9 @@ BoundView BoundView::rectified(PixelArray pixels, float unit, PlaneArray scale, 
     bound.view_.scale = bound.planes_[0].data();
     bound.view_.shift_u = bound.planes_[1].data();
     bound.view_.shift_v = bound.planes_[2].data();
+    const auto [foot_u, foot_v, distance] = foot;
+    require(distance > 0, "rectified view: its distance must be positive");
+    bound.view_.path = {static_cast<float>(foot_u), static_cast<float>(foot_v), static_cast<float>(1 / distance)};
     if (cull) bound.find_occupied();
     return bound;
 }

@@ -14,10 +14,13 @@ namespace tomoshadow {
 using PlaneArray = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using NodeArray = nb::ndarray<const float, nb::shape<3, -1, -1, -1>, nb::c_contig, nb::device::cpu>;
 
+using Foot = std::tuple<double, double, double>;  // column, row and distance, see Path
+
 // An image with its geometry; owns references to the arrays.
 class BoundView {
 public:
-    static BoundView rectified(PixelArray pixels, float unit, PlaneArray scale, PlaneArray shift_u, PlaneArray shift_v, bool cull);
+    static BoundView rectified(PixelArray pixels, float unit, PlaneArray scale, PlaneArray shift_u, PlaneArray shift_v,
+                               const Foot &foot, bool cull);
     static BoundView mapped(PixelArray pixels, float unit, NodeArray nodes, int spacing, bool cull);
 
     // The view, once it is certain that no voxel of the grid leads outside its arrays.

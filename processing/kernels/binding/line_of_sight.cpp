@@ -1,6 +1,7 @@
 #include "host/line_of_sight.hpp"
 
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
 
 #include "binding/bind.hpp"
 #include "binding/bound_view.hpp"
@@ -73,7 +74,7 @@ void bind_line_of_sight(nb::module_ &module) {
     module.attr("METHODS") = nb::tuple(names);
     nb::class_<BoundView>(module, "View")
         .def_static("rectified", &BoundView::rectified, "pixels"_a, "unit"_a, "scale"_a, "shift_u"_a, "shift_v"_a,
-                    "cull"_a = true)
+                    "foot"_a, "cull"_a = true)
         .def_static("mapped", &BoundView::mapped, "pixels"_a, "unit"_a, "nodes"_a, "spacing"_a, "cull"_a = true);
     module.def("line_of_sight", &line_of_sight, "views"_a, "method"_a, "volume"_a, "threads"_a, "first_row"_a = 0,
                "grid_rows"_a = 0);

@@ -73,7 +73,7 @@ public:
             require(recorded.shape(axis) == size && ratio.shape(axis) == size, "projections and images differ in shape");
         }
         require_threads(threads);
-        const Correction job{recorded.data(), recorded_unit, unit, exponent, ratio_counts, seen.rows,
+        const Correction job{{}, recorded.data(), recorded_unit, unit, exponent, ratio_counts, seen.rows,
                              seen.columns, nullptr, 0, ratio.data()};
         const Kernels &kernels = selected_kernels();
         nb::gil_scoped_release release;

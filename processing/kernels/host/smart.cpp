@@ -33,6 +33,21 @@ Range rows_seen(const View &view, const Shape &shape, int y0, int y1) {
     return rows;
 }
 
+double path_length(const Path &path, int row, int column) {
+    const double along = (column - path.foot_u) * path.per_distance, across = (row - path.foot_v) * path.per_distance;
+    return std::sqrt(1 + along * along + across * across);
+}
+
+double sum_of(const View &view, const Projection &part) {
+    double sum = 0;
+    for (int row = 0; row < part.rows; ++row) {
+        const float *pixels = part.pixels + row * part.stride;
+        for (int column = 0; column < view.columns; ++column)
+            if (pixels[column] != 0.0f) sum += pixels[column] * path_length(view.path, part.first_row + row, column);
+    }
+    return sum;
+}
+
 }  // namespace
 
 Projections::Band::Band(const std::vector<View> &views, const Shape &shape, int first_slab, int end_slab)
@@ -82,13 +97,13 @@ void Projections::pass(const Kernels &kernels, Blocks &blocks, const std::vector
 
 double Projections::sum(int view) const {
     double sum = 0;
-    for (const Projection &part : parts(view))
-        for (int64_t i = 0; i < part.rows * part.stride; ++i) sum += part.pixels[i];
+    for (const Projection &part : parts(view)) sum += sum_of(views_[view], part);
     return sum;
 }
 
 double Projections::correct(const Kernels &kernels, int view, Correction job, int threads) const {
     const auto found = parts(view);
+    job.path = views_[view].path;
     job.parts = found.data();
     job.n_parts = static_cast<int>(found.size());
     std::vector<double> missed(job.rows);

@@ -24,8 +24,8 @@ public:
               int threads);
     // The sum of the latest projection onto a view, in units of the volume.
     double sum(int view) const;
-    // Set the ratio image of a view from its latest projection: the parts that `job` lacks, in order. Returns the sum
-    // of (projected - recorded)^2.
+    // Set the ratio image of a view from its latest projection: the path and the parts that `job` lacks, in order. Returns
+    // the sum of (projected - recorded)^2.
     double correct(const Kernels &kernels, int view, Correction job, int threads) const;
 
 private:

@@ -39,10 +39,27 @@ inline Floats power(Floats x, float exponent) {
     return x > least ? power_of_2(exponent * logarithm_2(x > least ? x : least)) : zero;
 }
 
+// The path of each line of sight of a row.
+class RowOfPaths {
+public:
+    RowOfPaths(const Path &path, int row) : path_(path) {
+        const float across = (static_cast<float>(row) - path.foot_v) * path.per_distance;
+        across_ = all(1.0f + across * across);
+    }
+    Floats from(int column) const {
+        const Floats along = (lane_numbers() + all(static_cast<float>(column) - path_.foot_u)) * path_.per_distance;
+        return square_root(multiply_add(along, along, across_));
+    }
+
+private:
+    Path path_;
+    Floats across_;
+};
+
 // What the bands of the volume add to a row of an image.
 class RowOfParts {
 public:
-    RowOfParts(const Correction &job, int row) : unit_(job.unit) {
+    RowOfParts(const Correction &job, int row) : unit_(job.unit), paths_(job.path, row) {
         for (int i = 0; i < job.n_parts; ++i) {
             const Projection &part = job.parts[i];
             if (row >= part.first_row && row < part.first_row + part.rows)
@@ -52,11 +69,12 @@ public:
     Floats sum(int column) const {
         Floats sum{};
         for (int i = 0; i < count_; ++i) sum += load<Floats>(rows_[i] + column);
-        return sum * unit_;
+        return sum * unit_ * paths_.from(column);
     }
 
 private:
     float unit_;
+    RowOfPaths paths_;
     int count_ = 0;
     const float *rows_[max_bands];
 };

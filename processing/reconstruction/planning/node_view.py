@@ -30,7 +30,8 @@ class NodeView:
     Parameters
     ----------
     nodes : (3, nodes_z, nodes_y, nodes_x) float32 array
-        Column and row in px, in the averaged image with its frame; and the area of a voxel in px^2, seen along z.
+        Column and row in px, in the averaged image with its frame; and the area of a voxel in px^2, seen along the
+        line of sight.
     spacing : int
         Voxels from node to node.
     binning : int
@@ -90,10 +91,11 @@ def sample_mapping(mapping: ViewMapping, grid: VoxelGrid, max_deviation_px: floa
 
 
 def _node_view(mapping: ViewMapping, nodes_px: FloatArray, spacing: int, deviation_px: float) -> NodeView:
-    along_y, along_x = (np.gradient(nodes_px, spacing, axis=axis) for axis in (1, 2))
+    along_z, along_y, along_x = (np.gradient(nodes_px, spacing, axis=axis) for axis in (0, 1, 2))
     pixels_per_voxel = max(float(np.linalg.norm(step, axis=-1).max()) for step in (along_x, along_y))
     binning = int(np.ceil(pixels_per_voxel / MAX_PIXELS_PER_VOXEL))
-    area = np.abs(along_x[..., 0] * along_y[..., 1] - along_x[..., 1] * along_y[..., 0]) / binning**2
+    gradient_u, gradient_v = np.moveaxis(np.stack([along_x, along_y, along_z], axis=-1), -2, 0)
+    area = np.linalg.norm(np.cross(gradient_u, gradient_v), axis=-1) / binning**2
     framed_px = (nodes_px - 0.5 * (binning - 1)) / binning + FRAME_BEFORE_PX
     return NodeView(
         nodes=np.ascontiguousarray(np.stack([framed_px[..., 0], framed_px[..., 1], area]), dtype=np.float32),

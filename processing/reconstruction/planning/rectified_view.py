@@ -58,6 +58,9 @@ class RectifiedView:
         Pixels of the resampled image per voxel, for each plane.
     shift_u_px, shift_v_px : (nz,) float64 arrays
         Where voxel (z, 0, 0) is seen in the resampled image.
+    foot : tuple[float, float, float]
+        Column and row of the resampled image where its line of sight runs along z, and how many of its pixels the
+        plane z_ref is away from where all lines of sight meet.
     image_size_px : tuple[int, int]
         (width, height) of the recorded image.
     deviation_px : float
@@ -69,6 +72,7 @@ class RectifiedView:
     scale: FloatArray
     shift_u_px: FloatArray
     shift_v_px: FloatArray
+    foot: tuple[float, float, float]
     image_size_px: tuple[int, int]
     deviation_px: float
 
@@ -78,7 +82,9 @@ class RectifiedView:
 
     def bind(self, image: FixedPoint, *, cull: bool) -> _native.View:
         """A resampled image with the geometry of this view, for the kernels."""
-        return _native.View.rectified(image.pixels, image.unit, self.scale, self.shift_u_px, self.shift_v_px, cull)
+        return _native.View.rectified(
+            image.pixels, image.unit, self.scale, self.shift_u_px, self.shift_v_px, self.foot, cull
+        )
 
 
 def rectify(mapping: ViewMapping, grid: VoxelGrid, pixels_per_voxel: float, max_deviation_px: float) -> RectifiedView:
@@ -109,12 +115,14 @@ def rectify(mapping: ViewMapping, grid: VoxelGrid, pixels_per_voxel: float, max_
     deviation_px = bend_px(nodes_px, points_at) + _deviation_px(mapping, grid, centre, to_reference)
     if deviation_px > max_deviation_px:
         raise NotRectifiable(f"rectified it would be off by {deviation_px:.2g} px, limit {max_deviation_px} px")
+    foot_v, foot_u = reference_scale * centre[1:] + (top, left)
     return RectifiedView(
         shape_px=(rows, columns),
         nodes_px=np.ascontiguousarray(nodes_px, dtype=np.float32),
         scale=scale,
         shift_u_px=shift_u + left,
         shift_v_px=shift_v + top,
+        foot=(float(foot_u), float(foot_v), float(reference_scale * abs(z_ref - centre[0]))),
         image_size_px=mapping.image_size_px,
         deviation_px=deviation_px,
     )

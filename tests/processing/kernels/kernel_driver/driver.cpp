@@ -76,6 +76,7 @@ private:
         view.shift_u = planes.back().data();
         planes.push_back(std::move(shifts_v));
         view.shift_v = planes.back().data();
+        view.path = {-20.0f, 30.0f, 0.01f};
     }
     void add_mapped(Random &random) {
         const int spacing = node_spacings[random.below(4)], nz = (shape.nz - 1) / spacing + 2, ny = (shape.ny - 1) / spacing + 2,
@@ -159,7 +160,7 @@ void iterate(const Kernels &kernels, int number) {
         for (int i = 0; i < n_views; ++i) {
             const View &seen = scene.views[i];
             missed += images.correct(kernels, i,
-                                     {seen.pixels, seen.unit, blocks.unit(), 1.0f / static_cast<float>(n_views), 2048.0f,
+                                     {{}, seen.pixels, seen.unit, blocks.unit(), 1.0f / static_cast<float>(n_views), 2048.0f,
                                       seen.rows, seen.columns, nullptr, 0, ratios[i].data()},
                                      2);
         }

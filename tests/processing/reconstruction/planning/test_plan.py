@@ -145,7 +145,7 @@ def test_a_rough_mapping_is_refused() -> None:
 def test_the_node_area_is_that_of_a_voxel() -> None:
     view = sample_mapping(camera(60.0), GRID, MAX_DEVIATION_PX)
     assert view.binning == 1
-    np.testing.assert_allclose(view.nodes[2], np.cos(np.deg2rad(60)), rtol=0.02)
+    np.testing.assert_allclose(view.nodes[2], 1, rtol=0.02)
 
 
 def test_a_camera_beside_the_volume_takes_the_nodes() -> None:
@@ -173,7 +173,7 @@ def test_two_to_eight_views() -> None:
 
 
 def rectified(pixels: NDArray[np.int16], scale: FloatArray, shift_u: FloatArray, shift_v: FloatArray) -> _native.View:
-    return _native.View.rectified(pixels, 1.0, scale, shift_u, shift_v)
+    return _native.View.rectified(pixels, 1.0, scale, shift_u, shift_v, (0.0, 0.0, 1000.0))
 
 
 def test_kernels_refuse_geometry_that_leads_outside() -> None:
