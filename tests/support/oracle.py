@@ -138,8 +138,13 @@ def start_of(plan: Plan, images: Sequence[NDArray[np.float32]]) -> Array:
 def smart(
     plan: Plan, images: Sequence[NDArray[np.float32]], iterations: int, *, relaxation: float = 1, by_views: bool = False
 ) -> tuple[Array, list[float]]:
-    """SMART, or MART by views, from MLOS; volume and relative residuals."""
-    recorded = [image.intensity.astype(np.float64) for image in plan.resample(images)]
+    """SMART, or MART by views, from MLOS; volume and relative residuals.
+
+    Nothing is corrected where the projection is the image to half a count, or nothing.
+    """
+    resampled = plan.resample(images)
+    recorded, half_counts = [image.intensity.astype(np.float64) for image in resampled], [i.unit / 2 for i in resampled]
+    nothing = 1e-7 * 2 ** np.ceil(np.log2(max(image.max() for image in images)))
     positions = [planned_positions(view, plan.grid) for view in plan.views]
     volume = start_of(plan, images)
 
@@ -155,10 +160,11 @@ def smart(
     volume, projected = volume * factor, [p * factor for p in projected]
     residuals = [residual(projected)]
     for _ in range(iterations):
-        for number, (image, position) in enumerate(zip(recorded, positions, strict=True)):
+        for number, (image, half, position) in enumerate(zip(recorded, half_counts, positions, strict=True)):
             p = projections()[number] if by_views else projected[number]
             exponent = relaxation if by_views else relaxation / len(recorded)
-            ratio = np.where(p > 1e-7, (image / np.maximum(p, 1e-7)) ** exponent, 0)
+            wrong = (p > nothing) & (np.abs(p - image) > half)
+            ratio = np.where(wrong, (image / np.maximum(p, nothing)) ** exponent, 1)
             volume = volume * bilinear(np.minimum(ratio, MOST_RATIO), *position)
         projected = projections()
         residuals.append(residual(projected))

@@ -7,7 +7,7 @@
 namespace tomoshadow::TOMOSHADOW_ISA {
 namespace {
 
-constexpr float nothing = 1e-7f;  // projected intensity below which a pixel sees nothing
+constexpr float nothing = 1e-7f;  // projected intensity below which a pixel sees nothing; of images as bright as 1/2 to 1
 
 typedef int16_t Shorts __attribute__((vector_size(2 * lanes)));
 
@@ -86,13 +86,19 @@ inline bool all_zero(const Shorts &counts) {
     return !any;
 }
 
-// Ratios in counts, of the exponent's power.
-inline Shorts ratio_counts(const Correction &job, Floats recorded, Floats projected) {
-    const Floats zero{}, floor = zero + nothing, most = zero + 32767.0f;
-    const Floats ratio = recorded / (projected > floor ? projected : floor);
-    const Floats scaled = power(ratio, job.exponent) * job.ratio_counts + 0.5f;
-    const Ints seen = projected > floor;
-    return __builtin_convertvector(__builtin_convertvector(lesser(scaled, most), Ints) & seen, Shorts);
+// Ratios in counts, of the exponent's power: 1 where nothing is to be corrected, because the projection is what was recorded,
+// as far as that is known, which is to half a count; or because no voxel is seen in a pixel that it could be corrected by.
+inline Shorts ratio_counts(const Correction &job, const Shorts &counts, Floats recorded, Floats projected) {
+    const Floats floor = all(nothing), most = all(32767.0f), half = all(0.5f * job.recorded_unit);
+    const Ints wrong = (projected > floor) & ((projected - recorded > half) | (recorded - projected > half));
+    const Ints one = Ints{} + static_cast<int32_t>(job.ratio_counts);
+    Ints ratios{};
+    if (!all_zero(counts)) {
+        const Floats ratio = recorded / (projected > floor ? projected : floor);
+        const Floats scaled = power(ratio, job.exponent) * job.ratio_counts + 0.5f;
+        ratios = __builtin_convertvector(lesser(scaled, most), Ints);
+    }
+    return __builtin_convertvector((ratios & wrong) | (one & ~wrong), Shorts);
 }
 
 double correct(const Correction &job, int row) {
@@ -106,7 +112,7 @@ double correct(const Correction &job, int row) {
         const Floats seen = __builtin_convertvector(__builtin_convertvector(counts, Ints), Floats) * job.recorded_unit;
         const Floats projected = parts.sum(column), difference = projected - seen;
         missed += difference * difference;
-        store(to, all_zero(counts) ? counts : ratio_counts(job, seen, projected));
+        store(to, ratio_counts(job, counts, seen, projected));
     };
     int column = 0;
     for (; column + lanes <= job.columns; column += lanes) correct_vector(recorded + column, ratio + column, column);
