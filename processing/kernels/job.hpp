@@ -5,6 +5,9 @@
 
 namespace tomoshadow {
 
+// Throws std::bad_alloc; kernels have nothing of the standard library.
+[[noreturn]] void out_of_memory();
+
 // Volumes are (z, y, x), images (row, column), both contiguous.
 struct Shape {
     int nz, ny, nx;

@@ -5,7 +5,8 @@
 
 namespace tomoshadow {
 
-// Call work(i) for i = 0 .. count - 1; whichever thread is free takes the next one.
+// Call work(i) for i = 0 .. count - 1; whichever thread is free takes the next one. Throws what the first call throws that
+// fails; the others are finished, and those that have not begun are left out.
 void for_each(int count, int threads, const std::function<void(int)> &work);
 
 // The same for the rows of an image, a few at once: work(first row, end row).

@@ -12,7 +12,7 @@ namespace {
 class Memory {
 public:
     explicit Memory(int64_t bytes) : start_(std::aligned_alloc(64, static_cast<size_t>((bytes + 127) / 64 * 64))) {
-        if (!start_) std::abort();
+        if (!start_) out_of_memory();
         std::memset(start_, 0, static_cast<size_t>(bytes));
     }
     ~Memory() { std::free(start_); }
