@@ -83,7 +83,11 @@ class Blocks:
     @property
     def unit(self) -> float: ...
     def write(
-        self, volume: NDArray[np.float32] | NDArray[np.float16] | NDArray[np.uint8], threads: int, first_row: int = 0
+        self,
+        volume: NDArray[np.float32] | NDArray[np.float16] | NDArray[np.uint8],
+        threads: int,
+        first_row: int = 0,
+        factor: float = 1.0,
     ) -> None: ...
     @property
     def shape(self) -> tuple[int, int, int]: ...

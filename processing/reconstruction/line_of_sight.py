@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from processing.kernels import DEFAULT_THREADS, _native
 from processing.reconstruction.choices import ReconstructionMethod
+from processing.reconstruction.planning.fixed_point import FixedPoint
 from processing.reconstruction.planning.plan import Plan
 from processing.reconstruction.slab_volume import SLAB_ROWS, slabs_in
 
@@ -48,13 +49,15 @@ def line_of_sight(
     Raises
     ------
     ValueError
-        Images or ``out`` do not fit the plan, or the method is an iterative one.
+        Images or ``out`` do not fit the plan, ``out`` has no room for their intensities, a pixel is negative, infinite
+        or not a number, or the method is an iterative one.
     """
     check_method(method)
     volume = np.empty(plan.grid.shape, dtype=np.float32) if out is None else out
     check_volume(volume, plan, (np.float32, np.float16, np.uint8))
-    views = plan.bind(plan.resample(images, threads, resampled))
-    _native.line_of_sight(views, method, volume, threads)
+    seen = plan.resample(images, threads, resampled)
+    check_brightness(seen, method, volume.dtype)
+    _native.line_of_sight(plan.bind(seen), method, volume, threads)
     return volume
 
 
@@ -67,7 +70,7 @@ def slabs_of_sight(
     resampled: Sequence[NDArray[np.int16]] | None = None,
     threads: int = DEFAULT_THREADS,
 ) -> Iterator[tuple[int, NDArray[Any]]]:
-    """Reconstruct a volume slab by slab, for all that needs no more at once.
+    """Reconstruct a volume slab by slab, for all that needs no more at once. The images are read before the first.
 
     Parameters
     ----------
@@ -98,9 +101,16 @@ def slabs_of_sight(
     rows = memory.shape[1]
     if rows < 1 or memory.shape != (nz, rows, nx):
         raise ValueError(f"slabs of shape {memory.shape}, they need ({nz}, one or more, {nx})")
-    views = plan.bind(plan.resample(images, threads, resampled))
-    for first_row, slab in slabs_in(memory, ny):
-        _native.line_of_sight(views, method, slab, threads, first_row, ny)
+    seen = plan.resample(images, threads, resampled)
+    check_brightness(seen, method, memory.dtype)
+    return _slabs_seen(plan.bind(seen), method, memory, ny, threads)
+
+
+def _slabs_seen(
+    views: Sequence[_native.View], method: ReconstructionMethod, memory: NDArray[Any], grid_rows: int, threads: int
+) -> Iterator[tuple[int, NDArray[Any]]]:
+    for first_row, slab in slabs_in(memory, grid_rows):
+        _native.line_of_sight(views, method, slab, threads, first_row, grid_rows)
         yield first_row, slab
 
 
@@ -108,6 +118,20 @@ def check_method(method: ReconstructionMethod) -> None:
     """Raise ValueError for an iterative method."""
     if method not in _native.METHODS:
         raise ValueError(f"{method.value} is not a line-of-sight method: {list(_native.METHODS)}")
+
+
+def check_brightness(images: Sequence[FixedPoint], method: ReconstructionMethod, dtype: np.dtype[Any]) -> None:
+    """Raise ValueError where a voxel could be brighter than its type has room for."""
+    brightest = [image.brightest for image in images]
+    product = float(np.prod(brightest, dtype=np.float64))
+    most = {
+        ReconstructionMethod.GAVLOS: product ** (1 / len(images)),
+        ReconstructionMethod.MINLOS: min(brightest),
+        ReconstructionMethod.MLOS: product,
+    }[method]
+    room = 1.0 if dtype == np.uint8 else float(np.finfo(dtype).max)
+    if most > room * (1 + 1e-6):
+        raise ValueError(f"voxels of {dtype} hold intensities up to {room:.3g}, these may reach {most:.3g}")
 
 
 def check_volume(volume: NDArray[Any], plan: Plan, dtypes: tuple[type, ...]) -> None:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from processing.kernels import DEFAULT_THREADS, _native
 from processing.reconstruction.choices import ReconstructionMethod
-from processing.reconstruction.line_of_sight import check_method, check_volume
+from processing.reconstruction.line_of_sight import check_brightness, check_method, check_volume
 from processing.reconstruction.planning.plan import Plan
 
 BATCH_BYTES, BATCH_EXPOSURES = 1 << 30, 128
@@ -51,8 +51,14 @@ def mean_line_of_sight(
     count, coming = 0, iter(exposures)
     fitting = max(1, min(BATCH_EXPOSURES, BATCH_BYTES // plan.resampled_bytes))
     memory = [plan.empty_images() for _ in range(fitting)]
+
+    def bound(images: Exposure, own: Sequence[NDArray[np.int16]]) -> list[_native.View]:
+        seen = plan.resample(images, threads, own)
+        check_brightness(seen, method, mean.dtype)
+        return plan.bind(seen)
+
     # in this order: where the memory ends, no exposure is taken
-    while batch := [plan.bind(plan.resample(one, threads, own)) for own, one in zip(memory, coming, strict=False)]:
+    while batch := [bound(one, own) for own, one in zip(memory, coming, strict=False)]:
         _native.sum_of_sight(batch, method, mean, threads)
         count += len(batch)
     if not count:

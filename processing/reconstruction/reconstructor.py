@@ -1,7 +1,7 @@
 """Reconstructor: what the exposures of a run share, so that each reconstruction finds its memory warm."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ from processing.reconstruction.choices import ReconstructionMethod
 from processing.reconstruction.line_of_sight import slabs_of_sight
 from processing.reconstruction.planning.plan import Plan
 from processing.reconstruction.settings import ReconstructionSettings
-from processing.reconstruction.slab_volume import SLAB_ROWS, SlabVolume
+from processing.reconstruction.slab_volume import SLAB_ROWS, Slabs, SlabVolume
 from processing.reconstruction.smart import SmartResult, mart, smart
 
 
@@ -21,7 +21,7 @@ from processing.reconstruction.smart import SmartResult, mart, smart
 class Reconstructor:
     """A plan with the memory that reconstructions by it use again: fresh memory costs more than they do.
 
-    It serves one exposure at a time.
+    It serves one exposure at a time, and one thread.
 
     Parameters
     ----------
@@ -46,6 +46,7 @@ class Reconstructor:
     memory: NDArray[Any]
     threads: int = DEFAULT_THREADS
     _refined: SmartResult | None = field(default=None, init=False, repr=False)
+    _exposures: int = field(default=0, init=False, repr=False)
 
     @classmethod
     def of(cls, plan: Plan, settings: ReconstructionSettings, threads: int = DEFAULT_THREADS) -> "Reconstructor":
@@ -71,18 +72,30 @@ class Reconstructor:
         Returns
         -------
         SlabVolume
-            To be used before the next exposure, which takes its memory; a line-of-sight method computes each slab when
-            it is asked for.
+            Its slabs are made when they are asked for, in memory that the next exposure takes: from then on they are
+            a RuntimeError.
         tuple of float
             The residuals of SMART and MART, see ``processing.reconstruction.smart.SmartResult``.
         """
+        self._exposures += 1
+        volume, residuals = self._refine(images) if self.settings.method.iterative else (self._look(images), ())
+        return replace(volume, slabs=self._while_latest(volume.slabs, self._exposures)), residuals
+
+    def _while_latest(self, slabs: Slabs, exposure: int) -> Slabs:
+        coming = iter(slabs)
+        while self._exposures == exposure:
+            slab = next(coming, None)
+            if slab is None:
+                return
+            yield slab
+        raise RuntimeError(f"slabs of exposure {exposure} are gone: exposure {self._exposures} took their memory")
+
+    def _look(self, images: Sequence[Intensity]) -> SlabVolume:
         method, voxels = self.settings.method, self.settings.voxels
-        if method.iterative:
-            return self._refine(images)
         slabs = slabs_of_sight(
             self.plan, images, method, out=self.memory, resampled=self.resampled, threads=self.threads
         )
-        return SlabVolume(slabs, voxels, voxels.unit), ()
+        return SlabVolume(slabs, voxels, voxels.unit)
 
     def _refine(self, images: Sequence[Intensity]) -> tuple[SlabVolume, tuple[float, ...]]:
         solve = smart if self.settings.method is ReconstructionMethod.SMART else mart

@@ -9,6 +9,12 @@ from processing.preprocessing import Polarity, Preprocessing
 from processing.reconstruction.choices import Accuracy, ReconstructionMethod, VoxelType
 from processing.volume import VoxelGrid
 
+METHOD_VERSION = 2
+"""Of what the numbers in a volume mean; results without one are of version 1.
+
+2: SMART and MART count the path of each line of sight; Keys' kernel resamples images with a = -0.6, not -0.75.
+"""
+
 
 class FrozenValue(BaseModel):
     """A value: frozen, and a misspelt field is an error."""
@@ -56,9 +62,9 @@ class ReconstructionSettings(FrozenValue):
         ),
     ] = 0.0
     grid: Annotated[GridSettings | None, Field(description="default: what all views see, one voxel per pixel")] = None
-    minimum_window_px: Annotated[int, Field(ge=0, le=2001, description="sliding minimum; 0 leaves it out")] = (
-        Preprocessing.minimum_window_px
-    )
+    minimum_window_px: Annotated[
+        int, Field(ge=0, le=2001, description="sliding minimum, wider than a droplet; 0 leaves it out")
+    ] = Preprocessing.minimum_window_px
     noise_floor: Annotated[float, Field(ge=0, lt=1, description="intensity that counts as nothing")] = (
         Preprocessing.noise_floor
     )
@@ -68,6 +74,6 @@ class ReconstructionSettings(FrozenValue):
         return Preprocessing(polarity, self.minimum_window_px, self.noise_floor)
 
     def results_id(self, calibration: str) -> str:
-        """Name of the results directory: method, and a hash of all settings and of the calibration's name."""
-        digest = hashlib.sha256(f"{calibration}\n{self.model_dump_json()}".encode()).hexdigest()
+        """Name of the results directory: method, and a hash of its version, all settings and the calibration's name."""
+        digest = hashlib.sha256(f"{calibration}\n{METHOD_VERSION}\n{self.model_dump_json()}".encode()).hexdigest()
         return f"{self.method.value}-{digest[:8]}"

@@ -1,7 +1,8 @@
 """SmartState: what an iteration of SMART changes. ``smart`` says which views correct, and when."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import frexp
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ Image = NDArray[np.float32]
 
 START_VIEWS = 4
 """The product of more views spans more than float16 does; the power 4 / n_views of it is as bright as that of four."""
+DARK_UNIT = 1 / 32767
 RATIO_COUNTS = 2048
 """Ratios are kept in 16 bit: up to 16, in steps of 1 / 2048. So much brighter a view makes a voxel at most at once:
 with 8 and finer steps, voxels that start with nearly nothing lag behind, which costs more than the steps do."""
@@ -56,8 +58,8 @@ class SmartState:
 
     def __init__(self, plan: Plan, images: Sequence[Image], start: FirstGuess, exponent: float, threads: int) -> None:
         self._exponent, self._threads = exponent, threads
-        self._images = plan.resample(images, threads)
-        self.volume = _first_guess(plan, self._images, start, threads)
+        self._images, scale = _normalised(plan.resample(images, threads))
+        self.volume = _first_guess(plan, self._images, start, scale, threads)
         self._ratios = [np.zeros(image.pixels.shape, np.int16) for image in self._images]
         views = plan.bind([FixedPoint(ratio, 1 / RATIO_COUNTS) for ratio in self._ratios], cull=False)
         self._projections = _native.Projections(views, plan.grid.shape)
@@ -107,18 +109,33 @@ class SmartState:
             )
 
 
+def _normalised(images: Sequence[FixedPoint]) -> tuple[list[FixedPoint], float]:
+    """The images over a power of two, and that power: their brightest pixel is 1/2 to 1, as the kernels want it.
+
+    A dark image has no brightness of its own.
+    """
+    lit = [bool(image.pixels.any()) for image in images]
+    brightest = max((image.brightest for image, any_light in zip(images, lit, strict=True) if any_light), default=1.0)
+    scale = 2.0 ** frexp(brightest)[1]
+    units = (image.unit / scale if any_light else DARK_UNIT for image, any_light in zip(images, lit, strict=True))
+    return [FixedPoint(image.pixels, unit) for image, unit in zip(images, units, strict=True)], scale
+
+
 def _energy(image: FixedPoint) -> float:
     rows = (float(np.vdot(row, row)) for row in image.pixels.astype(np.float64))
     return image.unit**2 * sum(rows)
 
 
-def _first_guess(plan: Plan, resampled: Sequence[FixedPoint], start: FirstGuess, threads: int) -> SparseVolume:
+def _first_guess(
+    plan: Plan, resampled: Sequence[FixedPoint], start: FirstGuess, scale: float, threads: int
+) -> SparseVolume:
     volume = start.volume
     if volume is None:
         exponent = min(1.0, START_VIEWS / len(resampled))
-        return SparseVolume.of_sight(plan, resampled, exponent, threads=threads, memory=start.memory)
+        found = SparseVolume.of_sight(plan, resampled, exponent, threads=threads, memory=start.memory)
+        return replace(found, unit=scale)
     check_volume(volume, plan, (np.float32,))
     least, most = float(volume.min()), float(volume.max())
     if not (least >= 0 and np.isfinite(most)):
         raise ValueError(f"start must not be negative and finite, its values are {least} to {most}")
-    return SparseVolume.of(volume, threads=threads, memory=start.memory)
+    return replace(SparseVolume.of(volume, threads=threads, memory=start.memory), unit=scale)

@@ -15,8 +15,11 @@ from processing.reconstruction.slab_volume import SlabVolume, slabs_in
 
 NEGLIGIBLE = 1e-8
 """Blocks in which MLOS is nowhere brighter than this share of what it could be stay empty."""
-SEARCH_ROWS = 2 * _native.BLOCK_ROWS
+SEARCH_ROWS = _native.BLOCK_ROWS
 """Rows in which the brightest voxel is looked for at a time."""
+
+FAR_FROM_ONE = 256.0
+"""Images so much brighter or darker than 1 leave no room in float16 for their voxels."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,9 +30,12 @@ class SparseVolume:
     ----------
     blocks : Blocks
         Where the kernels keep it.
+    unit : float
+        Intensity of a 1 in them.
     """
 
     blocks: _native.Blocks
+    unit: float = 1.0
 
     @classmethod
     def of_sight(
@@ -87,14 +93,16 @@ class SparseVolume:
         Raises
         ------
         ValueError
-            ``out`` has another shape.
+            ``out`` has another shape, or is of float16 and intensities are far from 1.
         """
+        if out is not None and out.dtype == np.float16 and not 1 / FAR_FROM_ONE <= self.unit <= FAR_FROM_ONE:
+            raise ValueError(f"float16 has no room for intensities of about {self.unit:.3g}, take float32")
         volume = np.empty(self.blocks.shape, np.float32) if out is None else out
-        self.blocks.write(volume, threads)
+        self.blocks.write(volume, threads, factor=self.unit)
         return volume
 
     def slabs(self, voxels: VoxelType, out: NDArray[Any], threads: int = DEFAULT_THREADS) -> SlabVolume:
-        """The volume slab by slab; its scale changes where voxels are bytes.
+        """The volume slab by slab.
 
         Parameters
         ----------
@@ -105,22 +113,16 @@ class SparseVolume:
         threads : int
             The result does not depend on it.
         """
-        unit = voxels.unit
-        if voxels is VoxelType.UINT8:
-            brightest = self._brightest(threads)
-            self.blocks.scale(1 / brightest)
-            unit *= brightest
-        return SlabVolume(self._written(out, threads), voxels, unit)
+        brightest = self._brightest(threads) if voxels is VoxelType.UINT8 else 1.0
+        return SlabVolume(self._written(out, 1 / brightest, threads), voxels, voxels.unit * brightest * self.unit)
 
-    def _written(self, out: NDArray[Any], threads: int) -> Iterator[tuple[int, NDArray[Any]]]:
+    def _written(self, out: NDArray[Any], factor: float, threads: int) -> Iterator[tuple[int, NDArray[Any]]]:
         for first_row, slab in slabs_in(out, self.blocks.shape[1]):
-            self.blocks.write(slab, threads, first_row)
+            self.blocks.write(slab, threads, first_row, factor)
             yield first_row, slab
 
     def _brightest(self, threads: int) -> float:
-        """Largest voxel, or 1 where all are empty."""
+        """Largest voxel in the blocks, or 1 where all are empty."""
         nz, _, nx = self.blocks.shape
-        halves = np.empty((nz, SEARCH_ROWS, nx), np.float16)
-        # halves that are not negative are in the order of their bits, which numpy compares faster
-        bits = max(slab.view(np.int16).max() for _, slab in self._written(halves, threads))
-        return float(bits.view(np.float16)) or 1.0
+        memory = np.empty((nz, SEARCH_ROWS, nx), np.float32)
+        return max(float(slab.max()) for _, slab in self._written(memory, 1.0, threads)) or 1.0

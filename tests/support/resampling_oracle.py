@@ -8,7 +8,7 @@ from processing.reconstruction.planning.rectified_view import MAP_SPACING_PX, Re
 from processing.volume import VoxelGrid
 from tests.support.oracle import Array, bilinear
 
-KEYS_SLOPE = -0.75
+KEYS_SLOPE = -0.6
 """Of the cubic kernel at distance 1 (a of Keys 1981)."""
 
 

@@ -31,7 +31,10 @@ Blocks blocks_of_volume(const FloatVolume &volume, float most, int threads, Bloc
     return Blocks::of_volume(kernels, volume.data(), shape, most, threads, memory);
 }
 
-void write_blocks(Blocks &blocks, const AnyVolume &volume, int threads, int first_row) {
+void require_not_lent(const Blocks &blocks) { require(!blocks.lent(), "blocks: a later volume took their memory"); }
+
+void write_blocks(const Blocks &blocks, const AnyVolume &volume, int threads, int first_row, float factor) {
+    require_not_lent(blocks);
     const Shape shape = shape_of(volume), &stored = blocks.shape();
     require(shape.nz == stored.nz && shape.nx == stored.nx && shape.ny <= stored.ny, "volume: another shape than the blocks");
     require(first_row >= 0 && first_row <= stored.ny - shape.ny, "volume: more rows than the blocks");
@@ -41,7 +44,7 @@ void write_blocks(Blocks &blocks, const AnyVolume &volume, int threads, int firs
     const Kernels &kernels = selected_kernels();
     const Format format = format_of(volume);
     nb::gil_scoped_release release;
-    blocks.write(kernels, format, volume.data(), first_row, shape.ny, threads);
+    blocks.write(kernels, format, volume.data(), first_row, shape.ny, factor, threads);
 }
 
 // Projections that keep their views alive.
@@ -52,6 +55,7 @@ public:
 
     void pass(Blocks &blocks, const std::vector<bool> &update, const std::vector<bool> &project, int threads) {
         const Shape &shape = projections_.shape(), &other = blocks.shape();
+        require_not_lent(blocks);
         require(shape.nz == other.nz && shape.ny == other.ny && shape.nx == other.nx,
                 "projections: of another shape than the blocks");
         require(update.size() == bound_.size() && project.size() == bound_.size(), "two flags per view, please");
@@ -104,7 +108,7 @@ void bind_smart(nb::module_ &module) {
         .def_static("of_volume", &blocks_of_volume, "volume"_a, "most"_a, "threads"_a, "memory"_a = nb::none())
         .def("scale", &Blocks::scale, "factor"_a)
         .def_prop_ro("unit", &Blocks::unit)
-        .def("write", &write_blocks, "volume"_a, "threads"_a, "first_row"_a = 0)
+        .def("write", &write_blocks, "volume"_a, "threads"_a, "first_row"_a = 0, "factor"_a = 1.0f)
         .def_prop_ro("shape", [](const Blocks &blocks) {
             return Size(blocks.shape().nz, blocks.shape().ny, blocks.shape().nx);
         })

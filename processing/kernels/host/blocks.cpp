@@ -2,7 +2,6 @@
 
 #include <cmath>
 #include <cstdlib>
-#include <new>
 #include <utility>
 
 #include "host/parallel.hpp"
@@ -23,8 +22,9 @@ uint16_t *Blocks::Slab::next() {
     const size_t count = positions_.size();
     if (count == chunks_.size() * BlockList::per_chunk) {
         constexpr size_t bytes = sizeof(uint16_t) * BlockList::per_chunk * BlockList::size;
-        memory_.emplace_back(static_cast<uint16_t *>(std::aligned_alloc(64, bytes)));
-        if (!memory_.back()) throw std::bad_alloc();
+        std::unique_ptr<uint16_t[], Free> chunk(static_cast<uint16_t *>(std::aligned_alloc(64, bytes)));
+        if (!chunk) out_of_memory();
+        memory_.push_back(std::move(chunk));
         chunks_.push_back(memory_.back().get());
     }
     return list().voxels(static_cast<int>(count));
@@ -37,7 +37,10 @@ NewBlocks Blocks::Slab::growing() {
 
 std::vector<Blocks::Slab> Blocks::slabs_in(Blocks *memory, int count) {
     std::vector<Slab> slabs;
-    if (memory) slabs = std::exchange(memory->slabs_, std::vector<Slab>(memory->slabs_.size()));
+    if (memory) {
+        slabs = std::exchange(memory->slabs_, {});
+        memory->lent_ = true;
+    }
     slabs.resize(count);
     for (Slab &slab : slabs) slab.forget();
     return slabs;
@@ -61,10 +64,10 @@ Blocks Blocks::of_volume(const Kernels &kernels, const float *volume, const Shap
     return {kernels, {nullptr, 0, volume, shape, 1.0f, 0.0f, 0.0f}, most, threads, memory};
 }
 
-void Blocks::write(const Kernels &kernels, Format format, void *volume, int first_row, int rows, int threads) {
+void Blocks::write(const Kernels &kernels, Format format, void *volume, int first_row, int rows, float factor, int threads) const {
     const Shape part{shape_.nz, rows, shape_.nx};
     for_each((rows + smart_rows - 1) / smart_rows, threads, [&](int slab) {
-        kernels.write_blocks(part, slab, this->slab(first_row / smart_rows + slab), unit(), format, volume);
+        kernels.write_blocks(part, slab, this->slab(first_row / smart_rows + slab), unit() * factor, format, volume);
     });
 }
 

@@ -14,7 +14,7 @@ class Blocks {
 public:
     Blocks(Blocks &&) = default;
     // A power of the product of what all views see, where it exceeds `floor` somewhere in a block. `most` is what it
-    // could be. Other blocks may become empty and give their memory.
+    // could be. Other blocks may lend their memory, and with it lose their volume.
     static Blocks of_views(const Kernels &kernels, const std::vector<View> &views, const Shape &shape, float exponent,
                            float floor, float most, int threads, Blocks *memory = nullptr);
     // A volume (z, y, x) of float32, not negative, nowhere above `most`.
@@ -28,11 +28,10 @@ public:
     void scale(float factor) { gain_ *= factor; }
     float gain() const { return gain_; }
     void gain_applied() { gain_ = 1.0f; }
-    // Rows [first_row, first_row + rows) of the volume; first_row is a multiple of smart_rows.
-    void write(const Kernels &kernels, Format format, void *volume, int first_row, int rows, int threads);
-    void write(const Kernels &kernels, Format format, void *volume, int threads) {
-        write(kernels, format, volume, 0, shape_.ny, threads);
-    }
+    // Rows [first_row, first_row + rows) of the volume, times a factor; first_row is a multiple of smart_rows.
+    void write(const Kernels &kernels, Format format, void *volume, int first_row, int rows, float factor, int threads) const;
+    // Whether other blocks took the memory: there is no volume any more.
+    bool lent() const { return lent_; }
 
     const Shape &shape() const { return shape_; }
     int64_t count() const;
@@ -62,6 +61,7 @@ private:
 
     Shape shape_;
     float unit_, gain_ = 1.0f;
+    bool lent_ = false;
     std::vector<Slab> slabs_;
 };
 

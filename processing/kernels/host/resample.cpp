@@ -57,13 +57,26 @@ private:
     size_t count_ = 0;
 };
 
-float unit_of(const Kernels &kernels, const Recorded &image, int threads) {
+// The brightest pixel of a row within a box, or what is no intensity, wherever in the row that is.
+float brightest_of_row(const Kernels &kernels, const Recorded &image, const PixelBox &box, int row) {
+    const bool inside = row >= box.top && row < box.bottom;
+    const int left = inside ? box.left : 0, right = inside ? box.right : 0;
+    const float *pixels = image.row(row);
+    const float around = kernels.brightest(pixels, left) + kernels.brightest(pixels + right, image.columns - right);
+    return std::isfinite(around) ? kernels.brightest(pixels + left, right - left) : around;
+}
+
+// Of the brightest pixel in a box; not finite where a pixel of the image is no intensity.
+float unit_of(const Kernels &kernels, const Recorded &image, const PixelBox &box, int threads) {
     std::vector<float> brightest(static_cast<size_t>(image.rows), 0.0f);
     for_rows(image.rows, threads, [&](int first, int end) {
-        for (int row = first; row < end; ++row)
-            brightest[row] = kernels.brightest(image.row(row), image.columns);
+        for (int row = first; row < end; ++row) brightest[row] = brightest_of_row(kernels, image, box, row);
     });
-    const float largest = *std::max_element(brightest.begin(), brightest.end());
+    float largest = 0.0f;
+    for (const float row : brightest) {
+        if (!std::isfinite(row)) return row;
+        largest = std::max(largest, row);
+    }
     return (largest > 0.0f ? largest : 1.0f) / 32767.0f;
 }
 
@@ -81,7 +94,8 @@ void quantise_row(const Kernels &kernels, const Recorded &image, int row, int be
 }  // namespace
 
 float quantise(const Kernels &kernels, const Recorded &image, int before, int after, int16_t *to, int threads) {
-    const float unit = unit_of(kernels, image, threads);
+    const float unit = unit_of(kernels, image, {0, image.rows, 0, image.columns}, threads);
+    if (!std::isfinite(unit)) return unit;
     const int columns = image.columns + before + after;
     for_rows(image.rows + before + after, threads, [&](int first, int end) {
         for (int row = first; row < end; ++row)
@@ -94,6 +108,8 @@ float resample(const Kernels &kernels, const Recorded &image, const float *nodes
                int columns, int threads) {
     constexpr int margin = Resampling::margin;
     const PixelBox box = pixels_needed(image, nodes, ((rows - 1) / Resampling::node_spacing + 2) * nodes_x);
+    const float unit = unit_of(kernels, image, box, threads);
+    if (!std::isfinite(unit)) return unit;
     const Recorded needed = part(image, box);
     const int from_rows = needed.rows + 2 * margin, from_columns = needed.columns + 2 * margin;
     const int64_t cells = FilledCells::stride(from_columns);
@@ -101,7 +117,6 @@ float resample(const Kernels &kernels, const Recorded &image, const float *nodes
     thread_local Scratch<uint8_t> flags;
     int16_t *const from = pixels.of(static_cast<size_t>(from_rows) * from_columns);
     uint8_t *const filled = flags.of(static_cast<size_t>(from_rows * cells));
-    const float unit = unit_of(kernels, needed, threads);
     for_rows(from_rows, threads, [&](int first, int end) {
         for (int row = first; row < end; ++row) {
             int16_t *line = from + static_cast<int64_t>(row) * from_columns;

@@ -8,7 +8,7 @@ namespace tomoshadow::TOMOSHADOW_ISA {
 namespace {
 
 constexpr int spacing = Resampling::node_spacing;
-constexpr float keys = -0.75f;  // slope of the kernel at distance 1
+constexpr float keys = -0.6f;  // slope of the kernel at distance 1
 
 // Weights of the four pixels around a position with this fraction; they add up to one.
 template <class Value>
@@ -158,21 +158,31 @@ inline void resample_segment(const Resampling &job, const Segment &at, const Box
     }
 }
 
-// In four chains, because one would wait for itself.
+// Not a number where any pixel is negative or not a number. In four chains, because one would wait for itself.
 float brightest(const float *pixels, int count) {
     constexpr int chains = 4, at_once = chains * lanes;
+    const Floats zero{};
     Floats most[chains] = {};
+    Ints wrong[chains] = {};
     int k = 0;
     for (; k + at_once <= count; k += at_once)
         for (int chain = 0; chain < chains; ++chain) {
             const Floats some = load<Floats>(pixels + k + chain * lanes);
             most[chain] = some > most[chain] ? some : most[chain];
+            wrong[chain] |= ~(some >= zero);
         }
     float largest = 0.0f;
-    for (; k < count; ++k) largest = greater(pixels[k], largest);
-    for (const Floats &some : most)
-        for (int lane = 0; lane < lanes; ++lane) largest = greater(some[lane], largest);
-    return largest;
+    int32_t any_wrong = 0;
+    for (; k < count; ++k) {
+        largest = greater(pixels[k], largest);
+        any_wrong |= !(pixels[k] >= 0.0f);
+    }
+    for (int chain = 0; chain < chains; ++chain)
+        for (int lane = 0; lane < lanes; ++lane) {
+            largest = greater(most[chain][lane], largest);
+            any_wrong |= wrong[chain][lane];
+        }
+    return any_wrong ? __builtin_nanf("") : largest;
 }
 
 void quantise(const float *pixels, float counts_per_unit, int16_t *to, int count) {

@@ -58,8 +58,13 @@ class NodeView:
         return height, width
 
     def resample(self, image: NDArray[np.float32], out: NDArray[np.int16], threads: int) -> FixedPoint:
-        """The image, averaged and framed with zeros, in ``out``."""
+        """The image, averaged and framed with zeros, in ``out``.
+
+        Its unit is not finite where a pixel is no intensity.
+        """
         if self.binning > 1:
+            if not (image.min() >= 0 and image.max() < np.inf):
+                return FixedPoint(out, np.nan)
             height, width = (n // self.binning * self.binning for n in image.shape)
             blocks = image[:height, :width].reshape(height // self.binning, self.binning, -1, self.binning)
             image = blocks.mean(axis=(1, 3), dtype=np.float32)

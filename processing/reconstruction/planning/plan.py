@@ -30,10 +30,17 @@ class Plan:
         The volume to reconstruct.
     views : tuple
         One per mapping, in the same order: rectified where the camera is central, by nodes otherwise.
+    names : tuple of str
+        Of the views, for errors; by default their numbers, from 1.
     """
 
     grid: VoxelGrid
     views: tuple[RectifiedView | NodeView, ...]
+    names: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.names:
+            object.__setattr__(self, "names", tuple(f"view {number}" for number in range(1, len(self.views) + 1)))
 
     @property
     def deviation_px(self) -> float:
@@ -60,7 +67,7 @@ class Plan:
         Parameters
         ----------
         images : sequence of (rows, columns) float32 arrays
-            Inverted shadow intensities, one image per view; less than 0 and not-a-number count as 0.
+            Inverted shadow intensities, one image per view; finite and not negative.
         threads : int
             The result does not depend on it.
         out : sequence of int16 arrays, optional
@@ -69,21 +76,21 @@ class Plan:
         Raises
         ------
         ValueError
-            Number or shape of the images do not fit the plan, or a pixel is infinite.
+            Number or shape of the images do not fit the plan, or a pixel is negative, infinite or not a number.
         """
         memory = self.empty_images() if out is None else out
         if len(images) != len(self.views):
             raise ValueError(f"{len(images)} images for a plan of {len(self.views)} views")
-        for number, (image, view) in enumerate(zip(images, self.views, strict=True)):
+        for name, image, view in zip(self.names, images, self.views, strict=True):
             if np.shape(image) != view.image_size_px[::-1]:
-                raise ValueError(f"image {number} has shape {np.shape(image)}, its view {view.image_size_px[::-1]}")
+                raise ValueError(f"{name}: its image has shape {np.shape(image)}, its view {view.image_size_px[::-1]}")
         resampled = [
             view.resample(np.ascontiguousarray(image, dtype=np.float32), pixels, threads)
             for image, pixels, view in zip(images, memory, self.views, strict=True)
         ]
-        for number, made in enumerate(resampled):
+        for name, image, made in zip(self.names, images, resampled, strict=True):
             if not np.isfinite(made.unit):
-                raise ValueError(f"image {number}: its brightest pixel is {made.brightest}")
+                raise ValueError(f"{name}: {_first_fault(image)}; intensities are finite and not negative")
         return resampled
 
     def bind(self, resampled: Sequence[FixedPoint], *, cull: bool = True) -> list[_native.View]:
@@ -122,9 +129,14 @@ def plan_reconstruction(
     _check_instructions()
     if not MIN_VIEWS <= len(mappings) <= _native.MAX_VIEWS:
         raise ReconstructionError(f"{len(mappings)} views, a reconstruction takes {MIN_VIEWS} to {_native.MAX_VIEWS}")
-    named = names or [f"view {number}" for number in range(1, len(mappings) + 1)]
+    named = tuple(names or (f"view {number}" for number in range(1, len(mappings) + 1)))
     views = (_plan_named(name, mapping, grid, accuracy) for name, mapping in zip(named, mappings, strict=True))
-    return Plan(grid, tuple(views))
+    return Plan(grid, tuple(views), named)
+
+
+def _first_fault(image: NDArray[np.float32]) -> str:
+    row, column = np.argwhere(~((image >= 0) & np.isfinite(image)))[0]
+    return f"pixel (column {column}, row {row}) is {image[row, column]}"
 
 
 def _plan_named(name: str, mapping: ViewMapping, grid: VoxelGrid, accuracy: Accuracy) -> RectifiedView | NodeView:

@@ -8,7 +8,6 @@ through the full camera model with all its distortion; from there on no camera m
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,25 +22,22 @@ GUARD_PX = 2.025
 """Kept above and left of the volume. With 0.95 px per voxel, pixels come closer to voxels by 1 / 19 voxel from one to
 the next; begun at 2.025 px, none comes closer than half of that. If one met a voxel, rounding would let it see a
 millionth of the next one, which SMART then brightens until it explains all light of the pixel."""
+LINES_PER_AXIS, LINES_BEYOND = 5, 4.0
+"""Lines of sight that are asked where they meet; and voxels that they lie apart where the grid is but one voxel."""
+MAX_PATH_ERROR = 0.005
+"""Of the length of a line of sight in one plane, by the point where all are said to meet."""
 MAP_SPACING_PX = _native.MAP_SPACING_PX
 """Pixels of the resampled image from one evaluation of the camera model to the next; it is straight in between."""
 MAX_PIXELS_PER_VOXEL = 1.5
 """Of the recorded image; coarser voxels would skip pixels."""
+RESAMPLING_PX = 0.016
+"""Largest displacement of a droplet by cubic convolution, if its standard deviation is 0.75 px or more."""
 MIN_RELATIVE_SCALE = 0.63
 """Smallest scale of any plane against the largest one; beyond it the volume is too deep for its distance."""
 
 
 class NotRectifiable(Exception):
     """A view cannot be rectified for a grid, or not exactly; the text says why."""
-
-
-@runtime_checkable
-class CentralMapping(ViewMapping, Protocol):
-    """A mapping whose lines of sight meet in one point."""
-
-    @property
-    def centre_mm(self) -> FloatArray:
-        """Where they meet, (3,)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +60,7 @@ class RectifiedView:
     image_size_px : tuple[int, int]
         (width, height) of the recorded image.
     deviation_px : float
-        Largest distance to the full camera model, in the recorded image.
+        Largest distance to the full camera model, in the recorded image, and what resampling displaces.
     """
 
     shape_px: tuple[int, int]
@@ -77,7 +73,10 @@ class RectifiedView:
     deviation_px: float
 
     def resample(self, image: NDArray[np.float32], out: NDArray[np.int16], threads: int) -> FixedPoint:
-        """The image on the plane z_ref, in ``out``: cubic, zero outside of the recorded image, limited to its range."""
+        """The image on the plane z_ref, in ``out``: cubic, zero outside of the recorded image, limited to its range.
+
+        Its unit is not finite where a pixel is no intensity.
+        """
         return FixedPoint(out, _native.resample(image, self.nodes_px, out, threads))
 
     def bind(self, image: FixedPoint, *, cull: bool) -> _native.View:
@@ -94,7 +93,7 @@ def rectify(mapping: ViewMapping, grid: VoxelGrid, pixels_per_voxel: float, max_
     ------
     NotRectifiable
         Its lines of sight do not meet, or too near; voxels are coarse; or it would be off by more than
-        ``max_deviation_px``.
+        ``max_deviation_px``, which is of the geometry alone.
     """
     centre, to_reference = _central_projection(mapping, grid)
     z_ref = 0.5 * (grid.shape[0] - 1)
@@ -124,18 +123,20 @@ def rectify(mapping: ViewMapping, grid: VoxelGrid, pixels_per_voxel: float, max_
         shift_v_px=shift_v + top,
         foot=(float(foot_u), float(foot_v), float(reference_scale * abs(z_ref - centre[0]))),
         image_size_px=mapping.image_size_px,
-        deviation_px=deviation_px,
+        deviation_px=deviation_px + RESAMPLING_PX,
     )
 
 
 def _central_projection(mapping: ViewMapping, grid: VoxelGrid) -> tuple[FloatArray, FloatArray]:
     """Voxel index (z, y, x) where lines of sight meet; and by what planes (nz,) are scaled onto the middle one."""
-    if not isinstance(mapping, CentralMapping):
-        raise NotRectifiable("its lines of sight do not meet in one point")
-    centre = grid.to_index(np.asarray(mapping.centre_mm)[None])[0]
+    voxels, along = _lines_of_sight(mapping, grid)
+    centre = _meeting_point(voxels, along)
     depth = np.arange(grid.shape[0]) - centre[0]
     if depth[0] * depth[-1] <= 0:
         raise NotRectifiable("its lines of sight meet beside the volume, or inside")
+    inclined = np.abs((voxels - centre)[:, 0]) / np.linalg.norm(voxels - centre, axis=1) / np.abs(along[:, 0])
+    if not np.abs(inclined - 1).max() < MAX_PATH_ERROR:
+        raise NotRectifiable("its lines of sight do not meet in one point")
     to_reference: FloatArray = (0.5 * (grid.shape[0] - 1) - centre[0]) / depth
     relative_scale = to_reference.min() / to_reference.max()
     if relative_scale < MIN_RELATIVE_SCALE:
@@ -144,6 +145,29 @@ def _central_projection(mapping: ViewMapping, grid: VoxelGrid) -> tuple[FloatArr
             f"limit {MIN_RELATIVE_SCALE}"
         )
     return centre, to_reference
+
+
+def _lines_of_sight(mapping: ViewMapping, grid: VoxelGrid) -> tuple[FloatArray, FloatArray]:
+    """Voxel indices (N, 3) all over the grid, and unit vectors (N, 3) along which their image points stay."""
+    axes = [np.linspace(-LINES_BEYOND, n - 1 + LINES_BEYOND, LINES_PER_AXIS) for n in grid.shape]
+    voxels = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    with np.errstate(all="ignore"):  # a mapping may run away: then there are no numbers, and no point where lines meet
+        slopes = np.stack([_seen(mapping, grid, voxels + d) - _seen(mapping, grid, voxels - d) for d in np.eye(3)])
+        along = np.cross(slopes[:, :, 0], slopes[:, :, 1], axis=0).T
+        return voxels, along / np.linalg.norm(along, axis=1, keepdims=True)
+
+
+def _seen(mapping: ViewMapping, grid: VoxelGrid, voxels: FloatArray) -> FloatArray:
+    return mapping.project(grid.to_mm(voxels))
+
+
+def _meeting_point(points: FloatArray, along: FloatArray) -> FloatArray:
+    """The point (3,) that is nearest to all lines, as the sum of squared distances goes."""
+    across = np.eye(3) - along[:, :, None] * along[:, None, :]
+    try:
+        return np.asarray(np.linalg.solve(across.sum(axis=0), np.einsum("nij,nj->i", across, points)))
+    except np.linalg.LinAlgError as error:
+        raise NotRectifiable("its lines of sight are parallel") from error
 
 
 def _project_plane(
@@ -161,7 +185,7 @@ def _project_plane(
     )
     y, x = np.meshgrid(origin[1] + along_v, origin[2] + along_u, indexing="ij")
     indices = np.stack([np.full(x.shape, origin[0]), y, x], axis=-1)
-    return mapping.project(grid.to_mm(indices.reshape(-1, 3))).reshape(*x.shape, 2)
+    return _seen(mapping, grid, indices.reshape(-1, 3)).reshape(*x.shape, 2)
 
 
 def _deviation_px(mapping: ViewMapping, grid: VoxelGrid, centre: FloatArray, to_reference: FloatArray) -> float:
@@ -169,5 +193,5 @@ def _deviation_px(mapping: ViewMapping, grid: VoxelGrid, centre: FloatArray, to_
     axes = [np.unique(np.linspace(0, n - 1, 17).round()) for n in grid.shape]
     voxels = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     on_reference = centre + (voxels - centre) * to_reference[voxels[:, 0].astype(np.intp), None]
-    difference_px = mapping.project(grid.to_mm(voxels)) - mapping.project(grid.to_mm(on_reference))
+    difference_px = _seen(mapping, grid, voxels) - _seen(mapping, grid, on_reference)
     return float(np.linalg.norm(difference_px, axis=1).max())

@@ -9,6 +9,7 @@ from processing.reconstruction.choices import ReconstructionMethod
 from processing.reconstruction.line_of_sight import line_of_sight
 from processing.reconstruction.planning.node_view import NodeView, sample_mapping
 from processing.reconstruction.planning.plan import MAX_DEVIATION_PX, Plan, plan_view
+from processing.reconstruction.planning.rectified_view import RESAMPLING_PX, RectifiedView
 from processing.volume import VoxelGrid
 from tests.support import oracle
 from tests.support.sight_bounds import assert_equals_textbook
@@ -95,13 +96,15 @@ def test_plans_of_every_kind_see_what_the_mapping_sees(kind: Kind) -> None:
 @pytest.mark.parametrize("z_mm", [-0.7, -0.2, 0.0, 0.5])
 @pytest.mark.parametrize("planes", [1, 2, 5])
 def test_the_middle_of_a_polynomial_is_not_taken_for_a_camera(planes: int, z_mm: float) -> None:
-    """It has a ``centre_mm`` too, in which no lines of sight meet: what a plan makes of it is as exact as any."""
-    mapping = polynomial_of(cameras(1, 5.0)[0])
+    """It has a ``centre_mm`` too, in which no lines of sight meet; those of this one meet where its camera is."""
+    camera = cameras(1, 5.0)[0]
     grid = VoxelGrid((planes, 21, 75), (-0.6, -0.15, z_mm), PITCH_MM)
-    view = plan_view(mapping, grid)
-    assert view.deviation_px <= MAX_DEVIATION_PX
-    if planes > 1:
-        assert isinstance(view, NodeView)
+    view, expected = plan_view(polynomial_of(camera), grid), plan_view(camera, grid)
+    assert isinstance(view, RectifiedView)
+    assert isinstance(expected, RectifiedView)
+    assert view.deviation_px - RESAMPLING_PX <= MAX_DEVIATION_PX
+    np.testing.assert_allclose(view.scale, expected.scale, rtol=1e-3)
+    assert view.foot == pytest.approx(expected.foot, rel=0.02)
 
 
 def test_positions_in_large_images_are_in_single_precision(isa: str) -> None:

@@ -193,7 +193,8 @@ def test_an_earlier_result_lends_its_memory_and_nothing_else() -> None:
     np.testing.assert_array_equal(again.volume, fresh.volume)
     assert again.residuals == fresh.residuals
     assert earlier.sparse.nbytes == 0
-    assert not earlier.volume.any()
+    with pytest.raises(ValueError, match="a later volume took their memory"):
+        earlier.sparse.dense()
 
 
 def test_memory_of_another_grid_serves_too() -> None:
@@ -250,7 +251,7 @@ def test_less_relaxation_goes_slower(solve: type(smart)) -> None:  # type: ignor
     assert fast < middle < slow
 
 
-@pytest.mark.parametrize("least_gain", [0.02, 0.1, 0.5, 0.9])
+@pytest.mark.parametrize("least_gain", [0.1, 0.3, 0.5, 0.9])
 @pytest.mark.parametrize("solve", [smart, mart])
 def test_the_first_iteration_that_gains_too_little_is_the_last(
     solve: type(smart),  # type: ignore[valid-type]
@@ -285,8 +286,13 @@ def test_dark_images_give_an_empty_volume() -> None:
 def test_what_cannot_be_done_is_refused() -> None:
     mappings = oracle.cameras(2)
     plan, images = make_plan(mappings, False), images_of(droplets(3), mappings)
-    with pytest.raises(ValueError, match=r"iterations 0 and relaxation 1\.0 must be positive"):
+    with pytest.raises(ValueError, match="iterations 0 must be positive"):
         smart(plan, images, iterations=0)
+    for relaxation in (0.0, np.nan, np.inf):
+        with pytest.raises(ValueError, match=f"relaxation {relaxation} must be positive"):
+            smart(plan, images, relaxation=relaxation)
+    with pytest.raises(TypeError, match="iteration"):
+        smart(plan, images, iteration=3)  # type: ignore[call-arg]
     with pytest.raises(ValueError, match=r"volume has shape \(1, 1, 1\)"):
         mart(plan, images, start=np.ones((1, 1, 1), np.float32))
     for least_gain in (-0.1, 1.0):

@@ -64,9 +64,11 @@ def test_a_volume_comes_back_as_fine_as_float16() -> None:
     np.testing.assert_array_equal(SparseVolume.of(sparse.dense()).dense(), sparse.dense())
 
 
-def test_it_lends_its_memory_and_becomes_empty() -> None:
+def test_it_lends_its_memory_and_says_so() -> None:
     volume = np.ones((5, 21, 70), np.float32)
     earlier = SparseVolume.of(volume)
     later = SparseVolume.of(2 * volume, memory=earlier)
     assert earlier.nbytes == 0
+    with pytest.raises(ValueError, match="a later volume took their memory"):
+        earlier.dense()
     np.testing.assert_array_equal(later.dense(), 2)

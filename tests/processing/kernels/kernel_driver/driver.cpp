@@ -165,7 +165,7 @@ void iterate(const Kernels &kernels, int number) {
                                      2);
         }
     }
-    blocks.write(kernels, Format::single, volume.get(), 2);
+    blocks.write(kernels, Format::single, volume.get(), 0, shape.ny, 1.0f, 2);
     std::printf("smart %d %.6f %.6f\n", number, sum_of(volume.get(), voxels(shape)), missed);
 }
 
@@ -174,7 +174,7 @@ void resample(const Kernels &kernels, int number) {
     Random random(static_cast<uint32_t>(number) * 3266489917u + 3);
     const int rows = 1 + random.below(60), columns = 1 + random.below(150);
     std::vector<float> image(static_cast<size_t>(rows) * columns);
-    for (float &pixel : image) pixel = random.below(2) ? static_cast<float>(random.uniform(-0.1, 1)) : 0.0f;
+    for (float &pixel : image) pixel = random.below(2) ? static_cast<float>(random.uniform(0, 1)) : 0.0f;
     const int to_rows = 1 + random.below(70), nodes_y = (to_rows - 1) / 16 + 2, nodes_x = 2 + random.below(8);
     const double roll[] = {random.uniform(-0.5, 2), random.uniform(-0.5, 0.5)};
     const double at[] = {random.uniform(-10, 0.5 * columns), random.uniform(-10, 0.5 * rows)};
