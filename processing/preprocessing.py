@@ -20,6 +20,8 @@ Frame = NDArray[np.uint8] | NDArray[np.uint16]
 
 FIELD_WINDOW_PX = 201
 """Over which the light field is estimated where the settings state no window."""
+DIM = 1 / 8
+"""Of the full scale: a frame without a brighter pixel is dim."""
 
 
 @dataclass(frozen=True)
@@ -99,6 +101,11 @@ def intensity(
         threads,
     )
     return result
+
+
+def is_dim(frame: Frame, bits: int) -> bool:
+    """Whether no grey value of that many significant bits is above 1/8 of the full scale."""
+    return bool(frame.max() < DIM * (2**bits - 1))
 
 
 def sliding_minimum(

@@ -5,30 +5,27 @@ import resource
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
 
 from daq.files.run_directory import RunReader, Shot
-from daq.files.run_file import RUN_FILE
 from processing.calibration.calibration import Calibration, Verdict
 from processing.calibration.calibration_file import file_sha256, load_calibration
 from processing.calibration.errors import CalibrationError
 from processing.kernels import DEFAULT_THREADS
-from processing.preprocessing import Intensity, intensity
+from processing.preprocessing import Frame, Intensity, intensity, is_dim
 from processing.reconstruction.choices import ReconstructionMethod
 from processing.reconstruction.planning.common_volume import common_volume
 from processing.reconstruction.planning.plan import plan_reconstruction
 from processing.reconstruction.planning.planned_view import PlannedView
 from processing.reconstruction.reconstructor import Reconstructor
-from processing.reconstruction.settings import FrozenValue, GridSettings, ReconstructionSettings
+from processing.reconstruction.settings import METHOD_VERSION, FrozenValue, GridSettings, ReconstructionSettings
 from processing.reconstruction.volume_file import write_slabs
 from processing.runs.clocked_slabs import ClockedSlabs
 from processing.runs.errors import PipelineError
 from processing.runs.results_file import FrameName, Provenance, claim_results, volume_path
+from processing.runs.workbench import References, Workbench, read_references
 from processing.volume import VoxelGrid
-
-_References = dict[str, tuple[Intensity | None, Intensity | None]]
 
 
 class Stopped(Exception):
@@ -40,6 +37,8 @@ class VolumeRecord(FrozenValue):
 
     ``residuals`` are those of SMART and MART, see ``processing.reconstruction.smart.SmartResult``. ``blind_views``
     see nothing in this exposure, no pixel above the noise floor: a shot may be empty, or a lens be covered.
+    ``dim_views`` have no grey value above 1/8 of the full scale: light is missing, or the run states too many bits.
+    ``empty``: no voxel is above 0.
     """
 
     shot: int
@@ -48,6 +47,8 @@ class VolumeRecord(FrozenValue):
     seconds: float
     residuals: tuple[float, ...] = ()
     blind_views: tuple[str, ...] = ()
+    dim_views: tuple[str, ...] = ()
+    empty: bool = False
 
 
 class ShotResult(FrozenValue):
@@ -70,6 +71,7 @@ def reconstruct_shot(
     results_dir: Path,
     should_stop: Callable[[], bool] = lambda: False,
     *,
+    workbench: Workbench | None = None,
     threads: int = DEFAULT_THREADS,
 ) -> ShotResult:
     """Reconstruct every exposure of one shot and write its volumes.
@@ -88,6 +90,8 @@ def reconstruct_shot(
         Receives the volumes; a volume of the same shot and settings is replaced atomically.
     should_stop : callable
         Asked between the steps.
+    workbench : Workbench, optional
+        For shot after shot: the volumes are the same without it, but come later.
     threads : int
         The volumes do not depend on it.
 
@@ -104,12 +108,15 @@ def reconstruct_shot(
     """
     started_cpu_s = time.process_time()
     calibration = load_calibration(calibration_file)
-    with RunReader(run_dir) as run:
+    with (workbench or Workbench()).occupied() as bench, RunReader(run_dir) as run:
         recorded = run.read_shot(shot)
         require_match(run_dir.name, recorded, calibration)
         made_by = _provenance(run, calibration, calibration_file, settings)
-        named_by = str(made_by["calibration_sha256"])
-        reconstructor = _reconstructor(calibration_file, named_by, settings, tuple(recorded.views), threads)
+        shown, named_by = tuple(recorded.views), made_by["calibration_sha256"]
+        reconstructor = bench.reconstructor(
+            (named_by, settings, shown, threads), lambda: _reconstructor(calibration, settings, shown, threads)
+        )
+        references = bench.references(run)
         planned = zip(recorded.views, reconstructor.plan.views, strict=True)
         views = {name: PlannedView.of(view) for name, view in planned}
         provenance = {**made_by, "views": json.dumps({name: view.model_dump() for name, view in views.items()})}
@@ -118,11 +125,15 @@ def reconstruct_shot(
         for frame in frame_names(run):
             if should_stop():
                 raise Stopped(f"{run_dir.name}, shot {shot}: stopped before exposure {frame}")
-            images = shot_intensities(run, recorded, frame, settings, reconstructor.images, threads=threads)
+            images = shot_intensities(
+                run, recorded, frame, settings, reconstructor.images, references=references, threads=threads
+            )
             blind = tuple(view for view, image in zip(recorded.views, images, strict=True) if not image.any())
-            named = {**provenance, "blind_views": json.dumps(blind)} if blind else provenance
-            written = _reconstruct_frame(reconstructor, images, results_dir, shot, frame, named)
-            volumes.append(written.model_copy(update={"blind_views": blind}))
+            bits = {view: run.header.views[view].bits for view in recorded.views}
+            dim = tuple(view for view in bits if is_dim(_grey_values(recorded, view, frame), bits[view]))
+            told = {name: json.dumps(which) for name, which in (("blind_views", blind), ("dim_views", dim)) if which}
+            written = _reconstruct_frame(reconstructor, images, results_dir, shot, frame, {**provenance, **told})
+            volumes.append(written.model_copy(update={"blind_views": blind, "dim_views": dim}))
     return ShotResult(
         shot=shot,
         method=settings.method,
@@ -152,6 +163,7 @@ def shot_intensities(
     settings: ReconstructionSettings,
     out: Sequence[Intensity | None] | None = None,
     *,
+    references: References | None = None,
     threads: int = DEFAULT_THREADS,
 ) -> list[Intensity]:
     """Preprocessed images of one exposure.
@@ -168,6 +180,8 @@ def shot_intensities(
         Sliding minimum and noise floor.
     out : sequence of (rows, columns) float32 arrays, optional
         Receive the images.
+    references : mapping, optional
+        Those of the run, where somebody has read them already.
     threads : int
         The images do not depend on it.
 
@@ -181,17 +195,15 @@ def shot_intensities(
     PipelineError
         A view has no such exposure.
     """
-    header, references, number = run.header, _references(run), "ab".index(frame)
+    header, number = run.header, "ab".index(frame)
+    references = read_references(run) if references is None else references
     preprocessing = settings.preprocessing(header.polarity)
     images = []
-    for (view, exposures), image in zip(shot.views.items(), out or [None] * len(shot.views), strict=True):
-        pixels = (exposures.frame_a, exposures.frame_b)[number]
-        if pixels is None:
-            raise PipelineError(f"{header.run_id}, shot {shot.index}: {view} has no exposure {frame}")
+    for view, image in zip(shot.views, out or [None] * len(shot.views), strict=True):
         dark, background = references[view]
         images.append(
             intensity(
-                pixels,
+                _grey_values(shot, view, frame),
                 preprocessing,
                 bits=header.views[view].bits,
                 dark=None if dark is None else dark[number],
@@ -201,17 +213,6 @@ def shot_intensities(
             )
         )
     return images
-
-
-def _references(run: RunReader) -> _References:
-    return _read_references(run.run_dir, (run.run_dir / RUN_FILE).stat().st_mtime_ns)
-
-
-@lru_cache(maxsize=1)
-def _read_references(run_dir: Path, _written_ns: int) -> _References:
-    """Dark and background of every view; to unpack them takes longer than to reconstruct a shot."""
-    with RunReader(run_dir) as run:
-        return {view: (run.dark(view), run.background(view)) for view in run.header.views}
 
 
 def _reconstruct_frame(
@@ -232,7 +233,15 @@ def _reconstruct_frame(
     named = {**provenance, "shot": shot, "frame": frame, **convergence}
     write_slabs(file, replace(volume, slabs=slabs), reconstructor.plan.grid, named)
     seconds = round(begun_s + slabs.seconds, 4)
-    return VolumeRecord(shot=shot, frame=frame, file=file.name, seconds=seconds, residuals=residuals)
+    return VolumeRecord(shot=shot, frame=frame, file=file.name, seconds=seconds, residuals=residuals, empty=slabs.empty)
+
+
+def _grey_values(shot: Shot, view: str, frame: FrameName) -> Frame:
+    exposures = shot.views[view]
+    pixels = exposures.frame_a if frame == "a" else exposures.frame_b
+    if pixels is None:
+        raise PipelineError(f"shot {shot.index}: {view} has no exposure {frame}")
+    return pixels
 
 
 def frame_names(run: RunReader) -> tuple[FrameName, ...]:
@@ -272,15 +281,14 @@ def _provenance(
         "calibration_file": calibration_file.name,
         "calibration_sha256": file_sha256(calibration_file),
         "settings": settings.model_dump_json(),
+        "method_version": METHOD_VERSION,
         "tomoshadow": version("tomoshadow"),
     }
 
 
-@lru_cache(maxsize=1)
 def _reconstructor(
-    calibration_file: Path, _sha256: str, settings: ReconstructionSettings, views: tuple[str, ...], threads: int
+    calibration: Calibration, settings: ReconstructionSettings, views: Sequence[str], threads: int
 ) -> Reconstructor:
-    calibration = load_calibration(calibration_file)
     grid = settings.grid.to_grid() if settings.grid else default_grid(calibration)
     plan = plan_reconstruction([calibration.views[view].mapping for view in views], grid, settings.accuracy, views)
     return Reconstructor.of(plan, settings, threads)

@@ -72,10 +72,11 @@ def average_volumes(files: list[Path]) -> tuple[Intensity, VoxelGrid]:
 
 
 def _made_by(provenance: Provenance) -> dict[str, object]:
-    """Calibration and settings of a volume, one by one; empty where it does not say. Its grid speaks for itself."""
+    """Calibration, version of the methods, and settings of a volume, one by one. Its grid speaks for itself."""
     settings = json.loads(str(provenance.get("settings", "{}")))
     settings.pop("grid", None)
-    return {"calibration": provenance.get("calibration"), **settings}
+    version = provenance.get("method_version", 1)
+    return {"calibration": provenance.get("calibration"), "method_version": version, **settings}
 
 
 def _differing(its: Mapping[str, object], others: Mapping[str, object]) -> str:

@@ -14,7 +14,9 @@ from processing.reconstruction.mean_line_of_sight import mean_line_of_sight
 from processing.reconstruction.planning.plan import plan_reconstruction
 from processing.reconstruction.reconstructor import Reconstructor
 from processing.reconstruction.settings import ReconstructionSettings
-from processing.runs.pipeline import default_grid, frame_names, require_match, shot_intensities
+from processing.runs.pipeline import default_grid, require_match, shot_intensities
+from processing.runs.results_file import FrameName
+from processing.runs.workbench import read_references
 from processing.volume import VoxelGrid
 
 Exposures = Iterator[list[Intensity]]
@@ -31,7 +33,7 @@ class RunAverage:
     grid : VoxelGrid
         Where it lies.
     exposures : int
-        How many; A and B count apart.
+        How many.
     """
 
     volume: Intensity
@@ -46,9 +48,10 @@ def average_run(
     settings: ReconstructionSettings,
     done: Callable[[int], None] = lambda _: None,
     *,
+    frame: FrameName = "a",
     threads: int = DEFAULT_THREADS,
 ) -> RunAverage:
-    """Mean of what ``reconstruct_shot`` makes of every exposure of some shots.
+    """Mean of what ``reconstruct_shot`` makes of one exposure of some shots.
 
     Parameters
     ----------
@@ -62,6 +65,8 @@ def average_run(
         Method, grid and preprocessing.
     done : callable
         Told the number of exposures that have been read, after each.
+    frame : {"a", "b"}
+        Which exposure: A and B are different times.
     threads : int
         The mean does not depend on it.
 
@@ -78,30 +83,29 @@ def average_run(
         require_match(run_dir.name, first, calibration)
         mappings = [calibration.views[view].mapping for view in first.views]
         plan = plan_reconstruction(mappings, grid, settings.accuracy, list(first.views))
-        exposures = _exposures(run, shots, calibration, settings, done, threads)
+        exposures = _exposures(run, shots, frame, calibration, settings, done, threads)
         if settings.method.iterative:
             volume = _mean_of_each(Reconstructor.of(plan, settings, threads), exposures)
         else:
             volume = mean_line_of_sight(plan, exposures, settings.method, threads=threads)
-        return RunAverage(volume, grid, len(shots) * len(frame_names(run)))
+        return RunAverage(volume, grid, len(shots))
 
 
 def _exposures(
     run: RunReader,
     shots: Sequence[int],
+    frame: FrameName,
     calibration: Calibration,
     settings: ReconstructionSettings,
     done: Callable[[int], None],
     threads: int,
 ) -> Exposures:
-    count = 0
-    for index in shots:
+    references = read_references(run)
+    for count, index in enumerate(shots, start=1):
         shot = run.read_shot(index)
         require_match(run.header.run_id, shot, calibration)
-        for frame in frame_names(run):
-            yield shot_intensities(run, shot, frame, settings, threads=threads)
-            count += 1
-            done(count)
+        yield shot_intensities(run, shot, frame, settings, references=references, threads=threads)
+        done(count)
 
 
 def _mean_of_each(reconstructor: Reconstructor, exposures: Exposures) -> Intensity:

@@ -18,6 +18,7 @@ from processing.reconstruction.settings import ReconstructionSettings
 from processing.runs.errors import PipelineError
 from processing.runs.pipeline import shot_intensities
 from processing.runs.results_file import FrameName
+from processing.runs.workbench import read_references
 
 ALARM_PX, STOP_PX = LIMITS_PX[Verdict.USABLE], LIMITS_PX[Verdict.WARN]
 """Disparity of a view above which an operator should know, and above which volumes are not worth having."""
@@ -154,14 +155,15 @@ def _droplets(run_dir: Path, shots: Sequence[int], calibration: Calibration) -> 
     settings = ReconstructionSettings()
     with RunReader(run_dir) as run:
         _check_views(run, calibration)
-        found = []
+        found, references = [], read_references(run)
         for index in shots:
             shot = run.read_shot(index)
             if not shot.valid:
                 raise PipelineError(f"{run_dir.name}, shot {index}: exposures are missing, nothing to check")
             exposures = []
             for frame in _FRAMES[: run.header.frames_per_shot]:
-                images = dict(zip(shot.views, shot_intensities(run, shot, frame, settings), strict=True))
+                seen = shot_intensities(run, shot, frame, settings, references=references)
+                images = dict(zip(shot.views, seen, strict=True))
                 exposures.append([find_droplets(images[name]) for name in calibration.views])
             found.append(exposures)
     return found

@@ -30,6 +30,9 @@ def add(verbs: Verbs) -> None:
     )
     parser.add_argument("results", type=Path, help="directory of results; or a run, with --calibration")
     parser.add_argument("-o", "--out", type=Path, required=True, help="volume file to write; slices beside it")
+    parser.add_argument(
+        "--exposure", choices=["a", "b"], default="a", help="of each shot, default a; A and B are never mixed"
+    )
     parser.add_argument("--calibration", type=Path, help="of the run; no volume of a single exposure is stored")
     add_reconstruction(parser)
     parser.set_defaults(voxels=VoxelType.FLOAT32)  # a mean has finer steps than one exposure
@@ -42,24 +45,26 @@ def average(options: Namespace) -> Outcome:
         raise PipelineError(f"{options.results} is a run: name its --calibration to average it")
     result = _average_results(options) if options.calibration is None else _average_run(options)
     grid = describe_grid(result["grid"]["shape"], result["grid"]["pitch_mm"])
-    return Outcome(
-        result, f"{result['file']}: mean of {result['volumes']} volumes, {grid}; slices in {result['figure']}"
-    )
+    what = f"mean of {result['volumes']} volumes of exposure {options.exposure.upper()}"
+    return Outcome(result, f"{result['file']}: {what}, {grid}; slices in {result['figure']}")
 
 
 def _average_results(options: Namespace) -> dict[str, Any]:
     from processing.reconstruction.volume_file import VolumeFileError
     from processing.runs.results_file import average_volumes, volume_files
 
-    files = volume_files(options.results)
+    files = volume_files(options.results, options.exposure)
     if not files:
-        raise VolumeFileError(f"{options.results}: there are no volumes to average")
+        raise VolumeFileError(
+            f"{options.results}: there are no volumes of exposure {options.exposure.upper()} to average"
+        )
     volume, grid = average_volumes(files)
     return _written(options, volume, grid, len(files), {})
 
 
 def _average_run(options: Namespace) -> dict[str, Any]:
     from processing.calibration.calibration_file import load_calibration
+    from processing.reconstruction.settings import METHOD_VERSION
     from processing.runs.run_average import average_run
 
     calibration = load_calibration(options.calibration)
@@ -71,9 +76,14 @@ def _average_run(options: Namespace) -> dict[str, Any]:
         calibration,
         settings,
         lambda done: progress(f"{options.results.name}: {done} exposures"),
+        frame=options.exposure,
         threads=usable_processors(),
     )
-    made_by = {"calibration": calibration.id, "settings": settings.model_dump_json()}
+    made_by: Provenance = {
+        "calibration": calibration.id,
+        "settings": settings.model_dump_json(),
+        "method_version": METHOD_VERSION,
+    }
     written = _written(options, mean.volume, mean.grid, mean.exposures, made_by)
     return {**written, "method": settings.method.value}
 
@@ -83,12 +93,14 @@ def _written(options: Namespace, volume: Any, grid: "VoxelGrid", count: int, mad
     from processing.reconstruction.settings import GridSettings
     from processing.reconstruction.volume_file import write_volume
 
-    write_volume(options.out, volume, grid, {"average_of": str(options.results), "volumes": count, **made_by})
+    source: Provenance = {"average_of": str(options.results), "frame": options.exposure, "volumes": count}
+    write_volume(options.out, volume, grid, {**source, **made_by})
     figure = picture_beside(options.out)
     slices_figure(volume, grid, f"mean of {count} volumes").savefig(figure, dpi=120)
     return {
         "file": str(options.out),
         "figure": str(figure),
+        "exposure": options.exposure,
         "volumes": count,
         "grid": GridSettings.of(grid).model_dump(),
     }

@@ -25,6 +25,18 @@ Command = Callable[[Namespace], Outcome]
 MAX_VOXELS = 10**12
 """More fill any disk: a thousand times the largest volume of the paper's rig."""
 
+OPTIONS = (
+    "method",
+    "accuracy",
+    "voxels",
+    "iterations",
+    "relaxation",
+    "least_gain",
+    "minimum_window_px",
+    "noise_floor",
+)
+"""Settings that have an option of their name."""
+
 MIN_SIGMA_VOXEL, MAX_SIGMA_VOXEL = 0.3, 10.0
 
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,2})?"
@@ -62,6 +74,8 @@ def add_reconstruction(parser: ArgumentParser) -> None:
     _add_limited(parser, "relaxation", "X", "exponent of SMART and MART; the paper's is 1")
     summary = "SMART and MART stop when an iteration lowers the residual by less than this share"
     _add_limited(parser, "least_gain", "X", summary)
+    _add_limited(parser, "minimum_window_px", "PX", "sliding minimum, wider than a droplet; 0 leaves it out")
+    _add_limited(parser, "noise_floor", "X", "intensity that counts as nothing")
     add_shots(parser)
     parser.add_argument(
         "--grid",
@@ -126,8 +140,7 @@ def reconstruction_settings(options: Namespace, calibration: "Calibration") -> "
     from processing.runs.pipeline import default_grid
 
     grid = parse_grid(options.grid, calibration) if options.grid else default_grid(calibration)
-    names = ("method", "accuracy", "voxels", "iterations", "relaxation", "least_gain")
-    said = {name: value for name in names if (value := getattr(options, name)) is not None}
+    said = {name: value for name in OPTIONS if (value := getattr(options, name)) is not None}
     return ReconstructionSettings.model_validate({**said, "grid": GridSettings.of(grid)})
 
 

@@ -22,6 +22,9 @@ from server.cli.output import Outcome, progress, table
 if TYPE_CHECKING:
     from processing.runs.pipeline import ShotResult
 
+STATED = {"method", "accuracy", "voxels", "grid", "minimum_window_px", "noise_floor"}
+"""Settings that are told with the result."""
+
 
 def add(verbs: Verbs) -> None:
     """Add the command."""
@@ -37,20 +40,22 @@ def reconstruct(options: Namespace) -> Outcome:
     """Reconstruct shot by shot."""
     from processing.calibration.calibration_file import load_calibration
     from processing.runs.pipeline import reconstruct_shot
+    from processing.runs.workbench import Workbench
 
     settings = reconstruction_settings(options, load_calibration(options.calibration))
     shots: list[ShotResult] = []
+    workbench, threads = Workbench(), usable_processors()
     for index in selected_shots(options.run, options.shots):
         progress(f"{options.run.name}: shot {index} by {settings.method}")
         shot = reconstruct_shot(
-            options.run, index, options.calibration, settings, options.out, threads=usable_processors()
+            options.run, index, options.calibration, settings, options.out, workbench=workbench, threads=threads
         )
         if not shots:
             _tell_slow_views(shot)
-        _tell_blind_views(shot)
+        _tell_faults(shot)
         shots.append(shot)
     result = {
-        **settings.model_dump(mode="json", include={"method", "accuracy", "voxels", "grid"}),
+        **settings.model_dump(mode="json", include=STATED),
         "views": {name: view.model_dump() for name, view in shots[0].views.items()},
         "volumes": [volume.model_dump(mode="json") for shot in shots for volume in shot.volumes],
         "cpu_s": sum(shot.cpu_s for shot in shots),
@@ -66,13 +71,17 @@ def _tell_slow_views(shot: "ShotResult") -> None:
             progress(f"{name} takes the exact way, which is slower ({nodes}): {view.reason}")
 
 
-def _tell_blind_views(shot: "ShotResult") -> None:
+def _tell_faults(shot: "ShotResult") -> None:
     for volume in shot.volumes:
+        where = f"shot {volume.shot}, exposure {volume.frame}"
         for name in volume.blind_views:
+            progress(f"{where}: {name} sees nothing; is the shot empty, or a lens covered, a light off?")
+        for name in volume.dim_views:
             progress(
-                f"shot {volume.shot}, exposure {volume.frame}: {name} sees nothing; "
-                "is the shot empty, or a lens covered, a light off?"
+                f"{where}: {name} uses less than 1/8 of its grey values; is light missing, or are its bits too many?"
             )
+        if volume.empty:
+            progress(f"{where}: the volume is empty, no voxel is above 0")
 
 
 def volumes_table(result: dict[str, Any]) -> str:

@@ -25,6 +25,7 @@ from processing.reconstruction.settings import GridSettings, ReconstructionSetti
 from processing.reconstruction.volume_file import read_volume
 from processing.runs.pipeline import ShotResult, default_grid, reconstruct_shot
 from processing.runs.results_file import volume_path
+from processing.runs.workbench import Workbench
 from processing.synthetic.spray import droplet_volume
 from processing.synthetic.truth_file import read_true_cameras, read_true_spray
 from processing.volume import VoxelGrid
@@ -100,11 +101,11 @@ def demonstrate(
     settings = ReconstructionSettings(grid=GridSettings.of(grid))
     results_dir = sample / "results" / settings.results_id(calibration.id)
     with watch.step("reconstruct"):
-        results = []
+        results, workbench = [], Workbench()
         for shot in valid:
             progress(f"reconstructing shot {shot} by {settings.method.value}")
             file = calibration_path(out, calibration.id)
-            results.append(reconstruct_shot(sample, shot, file, settings, results_dir))
+            results.append(reconstruct_shot(sample, shot, file, settings, results_dir, workbench=workbench))
     with watch.step("judge"):
         progress("comparing with the truth")
         qualities = tuple(_quality(sample, results_dir, result.shot) for result in results)

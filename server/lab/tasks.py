@@ -11,9 +11,13 @@ from processing.calibration.sets.calibration_set import load_calibration_set
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.runs.pipeline import reconstruct_shot
 from processing.runs.run_check import check_shot
+from processing.runs.workbench import Workbench
 from server.lab.engine import Task
 from server.lab.jobs import JobKind
 from server.lab.results import write_preview
+
+WORKBENCH = Workbench()
+"""Of this worker process, which does one job at a time."""
 
 
 def reconstruct(job: dict[str, Any], should_stop: Callable[[], bool]) -> dict[str, Any]:
@@ -21,7 +25,13 @@ def reconstruct(job: dict[str, Any], should_stop: Callable[[], bool]) -> dict[st
     results_dir = Path(job["results_dir"])
     settings = ReconstructionSettings.model_validate(job["settings"])
     result = reconstruct_shot(
-        Path(job["run_dir"]), job["shot"], Path(job["calibration_file"]), settings, results_dir, should_stop
+        Path(job["run_dir"]),
+        job["shot"],
+        Path(job["calibration_file"]),
+        settings,
+        results_dir,
+        should_stop,
+        workbench=WORKBENCH,
     )
     for volume in result.volumes:
         write_preview(results_dir / volume.file)

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,25 +45,33 @@ def shadowgraph(camera: PinholeCamera, droplets_mm: NDArray[np.float64]) -> NDAr
     return image
 
 
-def write_run(run_dir: Path, shots: int = 1, invalid: tuple[int, ...] = (), covered: tuple[str, ...] = ()) -> Path:
-    """Record shots; in the invalid ones exposure B of view2 is missing; covered views are dark."""
-    views = {name: ViewFormat(SHAPE, 8) for name in cameras()}
+def grey_values(image: NDArray[Any], bits: int) -> NDArray[np.uint8] | NDArray[np.uint16]:
+    return image.astype(np.uint8) if bits == 8 else image.astype(np.uint16)
+
+
+def write_run(
+    run_dir: Path, shots: int = 1, invalid: tuple[int, ...] = (), covered: tuple[str, ...] = (), bits: int = 8
+) -> Path:
+    """Record shots; in the invalid ones exposure B of view2 is missing; covered views are dark. ``bits`` are stated."""
+    views = {name: ViewFormat(SHAPE, bits) for name in cameras()}
     header = RunHeader(run_id=run_dir.name, created_utc="2026-01-01T00:00:00+00:00", views=views, separation_ns=6400)
     with RunWriter(run_dir, header) as writer:
         for index in range(shots):
-            writer.write_shot(_shot(index, valid=index not in invalid, covered=covered))
+            writer.write_shot(_shot(index, valid=index not in invalid, covered=covered, bits=bits))
         writer.finish("completed")
     return run_dir
 
 
-def _shot(index: int, *, valid: bool, covered: tuple[str, ...]) -> Shot:
+def _shot(index: int, *, valid: bool, covered: tuple[str, ...], bits: int) -> Shot:
     views = {}
     for name, camera in cameras().items():
         light = name not in covered
-        frame_a, frame_b = (light * shadowgraph(camera, DROPLETS_A_MM + step * MOTION_MM) for step in (0, 1))
+        frame_a, frame_b = (
+            grey_values(light * shadowgraph(camera, DROPLETS_A_MM + step * MOTION_MM), bits) for step in (0, 1)
+        )
         views[name] = DoubleFrame(frame_a, frame_b, SEEN, SEEN)
     if not valid:
-        views["view2"] = replace(views["view2"], frame_b=np.zeros(SHAPE, np.uint8), record_b=MISSING)
+        views["view2"] = replace(views["view2"], frame_b=grey_values(np.zeros(SHAPE), bits), record_b=MISSING)
     return Shot(index, ImageKey.SAMPLE if valid else ImageKey.INVALID, views)
 
 

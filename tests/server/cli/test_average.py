@@ -17,9 +17,27 @@ def test_average_of_results(
     common = ["reconstruct", run_dir, "--calibration", calibration_file, f"--grid={GRID}"]
     assert told(capsys, *common, "-o", tmp_path / "out", "--voxels", voxels)["voxels"] == voxels
     result = told(capsys, "average", tmp_path / "out", "-o", tmp_path / "mean.vtkhdf")
-    assert result["volumes"] == 4
+    assert (result["volumes"], result["exposure"]) == (2, "a")
     assert read_volume(tmp_path / "mean.vtkhdf")[0].shape == (21, 21, 21)
     assert Path(result["figure"]).stat().st_size > 1000
+
+
+@pytest.mark.parametrize("exposure", ["a", "b"])
+def test_exposures_a_and_b_are_not_mixed(
+    exposure: str, run_dir: Path, calibration_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    options = ["--calibration", calibration_file, f"--grid={GRID}"]
+    told(capsys, "reconstruct", run_dir, *options, "-o", tmp_path / "out")
+    means = []
+    sources: list[list[object]] = [[tmp_path / "out"], [run_dir, *options]]
+    for number, arguments in enumerate(sources):
+        told(capsys, "average", *arguments, "--exposure", exposure, "-o", tmp_path / f"{number}.vtkhdf")
+        mean, _, provenance = read_volume(tmp_path / f"{number}.vtkhdf")
+        assert provenance["frame"] == exposure
+        means.append(mean)
+    shots = [read_volume(file)[0] for file in sorted((tmp_path / "out").glob(f"shot_*_{exposure}.vtkhdf"))]
+    for mean in means:
+        np.testing.assert_allclose(mean, np.mean(shots, axis=0), atol=1e-3 * mean.max())
 
 
 @pytest.mark.parametrize("method", ["mlos", "gavlos", "smart"])
@@ -45,7 +63,7 @@ def test_a_run_is_averaged_with_a_calibration_only(
 def test_average_of_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "empty").mkdir()
     complaint = refused(capsys, "average", tmp_path / "empty", "-o", tmp_path / "mean.vtkhdf")
-    assert complaint == f"{tmp_path / 'empty'}: there are no volumes to average"
+    assert complaint == f"{tmp_path / 'empty'}: there are no volumes of exposure A to average"
     assert not (tmp_path / "mean.vtkhdf").exists()
 
 
@@ -54,7 +72,7 @@ def test_people_are_told_where_the_mean_is(
 ) -> None:
     out, grid = tmp_path / "mean.vtkhdf", "21 x 21 x 21 voxels of 0.1 mm"
     text = shown(capsys, "average", run_dir, "--calibration", calibration_file, f"--grid={GRID}", "-o", out)
-    assert text == f"{out}: mean of 4 volumes, {grid}; slices in {tmp_path / 'mean.png'}\n"
+    assert text == f"{out}: mean of 2 volumes of exposure A, {grid}; slices in {tmp_path / 'mean.png'}\n"
 
 
 def test_a_mean_is_kept_as_float32_unless_asked_for(

@@ -71,7 +71,7 @@ def test_a_command_takes_the_processors_that_it_may_use(
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def tell(*_: object, threads: int) -> None:
+    def tell(*_: object, threads: int, **__: object) -> None:
         raise PipelineError(f"{threads} threads")
 
     monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0, 2, 5})
@@ -80,7 +80,7 @@ def test_a_command_takes_the_processors_that_it_may_use(
     assert refused(capsys, *arguments) == "3 threads"
 
 
-@pytest.mark.parametrize("name", ["accuracy", "voxels", "iterations", "relaxation", "least_gain"])
+@pytest.mark.parametrize("name", ["accuracy", "voxels", "iterations", "relaxation", "least_gain", "minimum_window_px"])
 def test_an_option_says_what_the_setting_of_its_name_says(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     """Help does without the settings, which are slow to load."""
     with pytest.raises(SystemExit):
@@ -92,8 +92,11 @@ def test_an_option_says_what_the_setting_of_its_name_says(name: str, capsys: pyt
 
 def test_what_is_not_said_is_left_to_the_settings(calibration_file: Path) -> None:
     options = Namespace(method="smart", accuracy=None, voxels=None, iterations=7, relaxation=None, least_gain=None)
+    options.minimum_window_px, options.noise_floor = None, 0.02
     options.grid = GRID
     calibration = load_calibration(calibration_file)
     settings = reconstruction_settings(options, calibration)
     grid = GridSettings.of(parse_grid(GRID, calibration))
-    assert settings == ReconstructionSettings(method=ReconstructionMethod.SMART, iterations=7, grid=grid)
+    assert settings == ReconstructionSettings(
+        method=ReconstructionMethod.SMART, iterations=7, noise_floor=0.02, grid=grid
+    )
