@@ -1,12 +1,15 @@
 """Least squares for a few parameters and many points: Levenberg and Marquardt on the normal equations.
 
 A camera has 15 to 17 parameters and thousands of points; the small normal equations, their columns scaled, are
-exact enough and an order of magnitude quicker than a decomposition of the whole Jacobian.
+exact enough and an order of magnitude quicker than a decomposition of the whole Jacobian. Products of a few columns are
+too small for the threads of a BLAS, which would wait for each other for three times as long as the work takes.
 """
 
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
+from threadpoolctl import ThreadpoolController
 
 from processing.geometry import FloatArray
 
@@ -50,7 +53,20 @@ def minimise(
     (P,) array
         The best parameters found.
     """
-    parameters, damping = np.array(start, dtype=np.float64), 1e-3
+    with _blas().limit(limits=1, user_api="blas"):
+        return _descend(residuals_at, derivatives_at, np.array(start, dtype=np.float64), robust_scale)
+
+
+@cache
+def _blas() -> ThreadpoolController:
+    """The thread pools of this process; to look for them takes longer than a fit."""
+    return ThreadpoolController()
+
+
+def _descend(
+    residuals_at: Function, derivatives_at: Function, parameters: FloatArray, robust_scale: float | None
+) -> FloatArray:
+    damping = 1e-3
     residuals = residuals_at(parameters)
     cost, weights = _cost_and_weights(residuals, robust_scale)
     matrix, gradient, scale = _normal_equations(residuals, derivatives_at(parameters), weights)
