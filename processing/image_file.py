@@ -1,4 +1,8 @@
-"""Reading images from elsewhere: any format OpenCV knows by its content, 8 to 16 bit, as grey values."""
+"""Reading images from elsewhere: any format OpenCV knows by its content, 8 to 16 bit, as grey values.
+
+Rows and columns are those of the file: tags that ask a viewer to turn an image are ignored in every format, as cameras
+are calibrated by the pixels of their sensors.
+"""
 
 from pathlib import Path
 
@@ -7,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from processing.errors import BadInput
+from processing.tiff_pages import page_offsets, show_page
 
 GreyImage = NDArray[np.uint8] | NDArray[np.uint16]
 
@@ -15,18 +20,26 @@ class ImageFileError(BadInput):
     """An image file cannot be read; the text names the file."""
 
 
-def read_image(path: Path) -> GreyImage:
+def read_image(path: Path, page: int | None = None) -> GreyImage:
     """Grey values (row, column), uint8 or uint16. Colour is converted; the file's name does not matter.
+
+    Parameters
+    ----------
+    path : Path
+        Image file.
+    page : int, optional
+        Which image of a stack, counted from 0.
 
     Raises
     ------
     ImageFileError
-        The file is missing, or is not such an image.
+        The file is missing, is not such an image, has no such page, or holds several and nobody said which.
     """
-    try:
-        content = np.fromfile(path, dtype=np.uint8)
-    except OSError as error:
-        raise ImageFileError(f"{path}: {error.strerror}") from error
+    content = _content(path)
+    offsets = page_offsets(content)
+    chosen = _chosen_page(path, page, len(offsets) or 1)
+    if offsets:
+        show_page(content, offsets[chosen])
     image = cv2.imdecode(content, cv2.IMREAD_UNCHANGED) if content.size else None
     if image is None:
         raise ImageFileError(f"{path}: not an image that OpenCV reads")
@@ -37,3 +50,32 @@ def read_image(path: Path) -> GreyImage:
     if image.dtype == np.uint16:
         return np.asarray(image, dtype=np.uint16)
     raise ImageFileError(f"{path}: grey values of type {image.dtype}, integers of 8 to 16 bit are needed")
+
+
+def page_count(path: Path) -> int:
+    """How many images a file holds.
+
+    Raises
+    ------
+    ImageFileError
+        It cannot be opened.
+    """
+    return len(page_offsets(_content(path))) or 1
+
+
+def _content(path: Path) -> NDArray[np.uint8]:
+    """Bytes of a file, which may be changed in memory; of a large stack only what is looked at is read."""
+    try:
+        if not path.stat().st_size:
+            return np.empty(0, np.uint8)
+        return np.asarray(np.memmap(path, np.uint8, mode="c"))
+    except OSError as error:
+        raise ImageFileError(f"{path}: {error.strerror}") from error
+
+
+def _chosen_page(path: Path, page: int | None, count: int) -> int:
+    if page is None and count > 1:
+        raise ImageFileError(f"{path}: holds {count} images; say by page = 0 to {count - 1} which one is meant")
+    if (page or 0) >= count:
+        raise ImageFileError(f"{path}: has no page {page}, it holds {count} images, the first one is page 0")
+    return page or 0

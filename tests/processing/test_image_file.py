@@ -1,12 +1,16 @@
 """Images are read by content, whatever they are called."""
 
+import struct
 from pathlib import Path
+from typing import Literal
 
 import cv2
 import numpy as np
 import pytest
+import tifffile
+from PIL import Image
 
-from processing.image_file import ImageFileError, read_image
+from processing.image_file import ImageFileError, page_count, read_image
 
 
 @pytest.mark.parametrize(
@@ -42,3 +46,62 @@ def test_other_files_are_refused_by_name(tmp_path: Path, content: bytes) -> None
         read_image(tmp_path / "a.png")
     with pytest.raises(ImageFileError, match=r"b\.png: No such file"):
         read_image(tmp_path / "b.png")
+
+
+STORED = np.arange(24, dtype=np.uint8).reshape(4, 6)
+
+
+@pytest.mark.parametrize("orientation", range(1, 9))
+@pytest.mark.parametrize("kind", ["tif", "png"])
+def test_pixels_lie_as_stored_whatever_an_orientation_tag_asks_for(tmp_path: Path, kind: str, orientation: int) -> None:
+    tags = Image.Exif()
+    tags[274] = orientation
+    Image.fromarray(STORED).save(tmp_path / f"a.{kind}", exif=tags)
+    np.testing.assert_array_equal(read_image(tmp_path / f"a.{kind}"), STORED)
+
+
+def test_a_jpeg_lies_as_stored_too(tmp_path: Path) -> None:
+    tags = Image.Exif()
+    tags[274] = 3
+    halves = np.repeat(np.array([0, 255], np.uint8), 32)[None, :].repeat(16, axis=0)
+    Image.fromarray(halves).save(tmp_path / "a.jpg", exif=tags)
+    np.testing.assert_allclose(read_image(tmp_path / "a.jpg"), halves, atol=3)
+
+
+STACK = np.random.default_rng(1).integers(0, 2**16, (3, 5, 7), dtype=np.uint16)
+
+
+@pytest.mark.parametrize("order", ["<", ">"])
+@pytest.mark.parametrize("big", [False, True])
+def test_every_page_of_a_stack_can_be_read(tmp_path: Path, order: Literal["<", ">"], big: bool) -> None:
+    with tifffile.TiffWriter(tmp_path / "a.tif", bigtiff=big, byteorder=order) as stack:
+        for image in STACK:
+            stack.write(image, photometric="minisblack", contiguous=False, extratags=[(274, 3, 1, 3, True)])
+    before = (tmp_path / "a.tif").read_bytes()
+    assert page_count(tmp_path / "a.tif") == 3
+    for page, image in enumerate(STACK):
+        np.testing.assert_array_equal(read_image(tmp_path / "a.tif", page), image)
+    assert (tmp_path / "a.tif").read_bytes() == before
+
+
+def test_a_stack_is_not_read_without_a_word_which_page(tmp_path: Path) -> None:
+    tifffile.imwrite(tmp_path / "a.tif", STACK, photometric="minisblack")
+    with pytest.raises(ImageFileError, match=r"a\.tif: holds 3 images; say by page = 0 to 2 which one is meant"):
+        read_image(tmp_path / "a.tif")
+    with pytest.raises(ImageFileError, match=r"a\.tif: has no page 3, it holds 3 images, the first one is page 0"):
+        read_image(tmp_path / "a.tif", 3)
+
+
+def test_a_torn_stack_is_no_image(tmp_path: Path) -> None:
+    tifffile.imwrite(tmp_path / "a.tif", STACK, photometric="minisblack")
+    whole = (tmp_path / "a.tif").read_bytes()
+    for length in (3, 7, 9, 12, 40):
+        (tmp_path / "torn.tif").write_bytes(whole[:length])
+        with pytest.raises(ImageFileError, match=r"torn\.tif: not an image"):
+            read_image(tmp_path / "torn.tif")
+
+
+def test_directories_in_a_circle_end(tmp_path: Path) -> None:
+    circle = b"II*\0" + struct.pack("<IHHHIII", 8, 1, 256, 3, 1, 4, 8)
+    (tmp_path / "a.tif").write_bytes(circle)
+    assert page_count(tmp_path / "a.tif") == 1
