@@ -146,7 +146,7 @@ def reconstruct_shot(
 
 
 def default_grid(calibration: Calibration, pitch_mm: float | None = None) -> VoxelGrid:
-    """The volume that all views see within the calibrated z range; x and y reach a quarter beyond the target."""
+    """The largest box that all views see within the calibrated z range; x and y reach a quarter beyond the target."""
     return common_volume(
         [view.mapping for view in calibration.views.values()],
         x_range_mm=_widened(calibration.x_range_mm),

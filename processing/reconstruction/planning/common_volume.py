@@ -10,7 +10,9 @@ from processing.reconstruction.errors import ReconstructionError
 from processing.volume import VoxelGrid
 
 LATTICE = 81
-"""Points per axis at which visibility is looked up."""
+"""Points along x and y at which visibility is looked up."""
+LEVELS = 17
+"""Planes of z at which it is, and at which the box may begin and end."""
 
 
 def common_volume(
@@ -21,7 +23,7 @@ def common_volume(
     z_range_mm: tuple[float, float],
     pitch_mm: float | None = None,
 ) -> VoxelGrid:
-    """Largest box with z faces at ``z_range_mm`` that all views see completely.
+    """Largest box that all views see completely.
 
     Parameters
     ----------
@@ -42,19 +44,20 @@ def common_volume(
     if z_range_mm[0] >= z_range_mm[1]:
         raise ReconstructionError(f"the views share no range along z: it would go from {_both(z_range_mm)} mm")
     x_mm, y_mm = np.linspace(*x_range_mm, LATTICE), np.linspace(*y_range_mm, LATTICE)
-    seen = np.ones((LATTICE, LATTICE), dtype=bool)
-    for z_mm in np.linspace(*z_range_mm, 5):
+    z_mm = np.linspace(*z_range_mm, LEVELS)
+    seen = np.ones((LEVELS, LATTICE, LATTICE), dtype=bool)
+    for level, height_mm in zip(seen, z_mm, strict=True):
         for mapping in mappings:
-            seen &= _visible(mapping, x_mm, y_mm, float(z_mm))
-    box = largest_rectangle(seen)
+            level &= _visible(mapping, x_mm, y_mm, float(height_mm))
+    box = largest_box(seen)
     if box is None:
         raise ReconstructionError(
             f"the {len(mappings)} views see no common volume within x {_both(x_range_mm)}, y {_both(y_range_mm)}, "
             f"z {_both(z_range_mm)} mm"
         )
-    top, bottom, left, right = box
-    lower_mm = np.array([x_mm[left], y_mm[top], z_range_mm[0]])
-    upper_mm = np.array([x_mm[right], y_mm[bottom], z_range_mm[1]])
+    first, last, top, bottom, left, right = box
+    lower_mm = np.array([x_mm[left], y_mm[top], z_mm[first]])
+    upper_mm = np.array([x_mm[right], y_mm[bottom], z_mm[last]])
     pitch_mm = pitch_mm or 1 / max(scale_px_per_mm(mapping, (lower_mm + upper_mm) / 2) for mapping in mappings)
     nx, ny, nz = (int(extent_mm / pitch_mm) + 1 for extent_mm in upper_mm - lower_mm)
     return VoxelGrid((nz, ny, nx), (float(lower_mm[0]), float(lower_mm[1]), float(lower_mm[2])), float(pitch_mm))
@@ -64,27 +67,57 @@ def _both(range_mm: tuple[float, float]) -> str:
     return f"{range_mm[0]:g} to {range_mm[1]:g}"
 
 
-def largest_rectangle(mask: NDArray[np.bool_]) -> tuple[int, int, int, int] | None:
-    """Largest all-true rectangle of a mask: (top, bottom, left, right), inclusive; None where all is false."""
-    best_area, best = 0, None
-    for top in range(mask.shape[0]):
-        columns = mask[top].copy()
-        for bottom in range(top, mask.shape[0]):
-            columns &= mask[bottom]
-            left, right = _longest_run(columns)
-            area = (bottom - top + 1) * (right - left)
-            if area > best_area:
-                best_area, best = area, (top, bottom, left, right - 1)
+def share_within(
+    grid: VoxelGrid,
+    x_range_mm: tuple[float, float],
+    y_range_mm: tuple[float, float],
+    z_range_mm: tuple[float, float],
+) -> float:
+    """Which part of a box lies within a grid, by volume; its faces are the outermost voxels' centres."""
+    shares = []
+    for within_mm, (low_mm, high_mm) in zip(
+        (grid.x_mm, grid.y_mm, grid.z_mm), (x_range_mm, y_range_mm, z_range_mm), strict=True
+    ):
+        held_mm = min(within_mm[-1], high_mm) - max(within_mm[0], low_mm)
+        shares.append(max(held_mm, 0.0) / (high_mm - low_mm))
+    return float(np.prod(shares))
+
+
+def largest_box(seen: NDArray[np.bool_]) -> tuple[int, int, int, int, int, int] | None:
+    """Largest all-true box of at least two levels: (first, last, top, bottom, left, right), inclusive.
+
+    Parameters
+    ----------
+    seen : (levels, rows, columns) array
+        None is the answer where there is no such box. Of boxes of one size the deepest is taken.
+    """
+    best_size, best = 0, None
+    for depth in range(len(seen) - 1, 0, -1):
+        for first in range(len(seen) - depth):
+            mask = np.logical_and.reduce(seen[first : first + depth + 1])
+            if depth * np.count_nonzero(mask) <= best_size or (rectangle := largest_rectangle(mask)) is None:
+                continue
+            top, bottom, left, right = rectangle
+            size = depth * (bottom - top + 1) * (right - left + 1)
+            if size > best_size:
+                best_size, best = size, (first, first + depth, top, bottom, left, right)
     return best
 
 
-def _longest_run(flags: NDArray[np.bool_]) -> tuple[int, int]:
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
-    starts, ends = edges[::2], edges[1::2]
-    if not len(starts):
-        return 0, 0
-    longest = int(np.argmax(ends - starts))
-    return int(starts[longest]), int(ends[longest])
+def largest_rectangle(mask: NDArray[np.bool_]) -> tuple[int, int, int, int] | None:
+    """Largest all-true rectangle of a mask: (top, bottom, left, right), inclusive; None where all is false."""
+    best_area, best = 0, None
+    columns = np.arange(mask.shape[1])
+    for top in range(mask.shape[0]):
+        free = np.logical_and.accumulate(mask[top:], axis=0)
+        lengths = columns - np.maximum.accumulate(np.where(free, -1, columns), axis=1)
+        longest = lengths.max(axis=1)
+        areas = longest * np.arange(1, len(free) + 1)
+        row = int(np.argmax(areas))
+        if areas[row] > best_area:
+            right = int(np.argmax(lengths[row]))
+            best_area, best = int(areas[row]), (top, top + row, right - int(longest[row]) + 1, right)
+    return best
 
 
 def _visible(mapping: ViewMapping, x_mm: FloatArray, y_mm: FloatArray, z_mm: float) -> NDArray[np.bool_]:

@@ -1,11 +1,13 @@
 """The default grid: seen by all views, as large as can be, one voxel per pixel."""
 
+from itertools import combinations_with_replacement, product
+
 import numpy as np
 import pytest
 
 from processing.geometry import PinholeCamera, view_camera
 from processing.reconstruction.errors import ReconstructionError
-from processing.reconstruction.planning.common_volume import common_volume, largest_rectangle
+from processing.reconstruction.planning.common_volume import common_volume, largest_box, largest_rectangle, share_within
 from processing.volume import VoxelGrid
 
 
@@ -55,3 +57,40 @@ def test_largest_rectangle_of_a_mask_with_a_hole() -> None:
     mask[2, 3] = False
     assert largest_rectangle(mask) == (0, 5, 4, 7)
     assert largest_rectangle(np.zeros((3, 3), dtype=bool)) is None
+
+
+def test_views_from_all_sides_get_a_box_that_ends_before_the_calibrated_depth() -> None:
+    """At 120 mm a view sees 25.2 mm: the whole depth of the cube in a sliver of 2 mm only, or 22 mm each way."""
+    around = [
+        view_camera(azimuth_deg, focal_length_mm=40, magnification=0.5, scale_px_per_mm=20, image_size_px=(504, 504))
+        for azimuth_deg in (90, -90, 0, 180)
+    ]
+    cube_mm = (-12.5, 12.5)
+    grid = common_volume(around, x_range_mm=cube_mm, y_range_mm=cube_mm, z_range_mm=cube_mm, pitch_mm=0.5)
+    extents_mm = [np.ptp(axis_mm) for axis_mm in (grid.x_mm, grid.y_mm, grid.z_mm)]
+    corners_mm = np.array(list(product(*(axis_mm[[0, -1]] for axis_mm in (grid.x_mm, grid.y_mm, grid.z_mm)))))
+    for camera in around:
+        image_px = camera.project(corners_mm)
+        assert ((image_px >= 0) & (image_px <= 503)).all()
+    assert min(extents_mm) > 20, "of a cube of 25 mm"
+
+
+def test_largest_box_beats_every_other_box() -> None:
+    seen = np.random.default_rng(3).random((4, 5, 6)) < 0.85
+    box = largest_box(seen)
+    assert box is not None
+    first, last, top, bottom, left, right = box
+    assert seen[first : last + 1, top : bottom + 1, left : right + 1].all()
+    sizes = [
+        (z1 - z0) * (y1 - y0 + 1) * (x1 - x0 + 1)
+        for (z0, z1), (y0, y1), (x0, x1) in product(*(combinations_with_replacement(range(n), 2) for n in seen.shape))
+        if seen[z0 : z1 + 1, y0 : y1 + 1, x0 : x1 + 1].all()
+    ]
+    assert (last - first) * (bottom - top + 1) * (right - left + 1) == max(sizes)
+    assert largest_box(np.zeros((3, 3, 3), dtype=bool)) is None
+
+
+def test_the_share_of_a_box_counts_what_lies_in_both() -> None:
+    grid = VoxelGrid((11, 11, 11), (-0.5, 0.0, 0.0), 0.1)
+    assert share_within(grid, (-1, 1), (0, 1), (0.5, 1.5)) == pytest.approx(0.5 * 1 * 0.5)
+    assert share_within(grid, (5, 6), (0, 1), (0, 1)) == 0
