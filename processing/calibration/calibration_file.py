@@ -48,18 +48,6 @@ def save_calibration(calibration: Calibration, path: Path, *, overwrite: bool = 
         part.unlink(missing_ok=True)
 
 
-def require_free(path: Path) -> None:
-    """Refuse a calibration file that exists, before its successor is computed.
-
-    Raises
-    ------
-    CalibrationError
-        It exists.
-    """
-    if Path(path).exists():
-        raise _exists(path)
-
-
 def _publish(part: Path, path: Path) -> None:
     """Give a file its name unless that is taken; a disk without hard links (FAT) has the name claimed first."""
     try:

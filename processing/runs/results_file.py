@@ -11,6 +11,7 @@ from processing.preprocessing import Intensity
 from processing.reconstruction.volume_file import VolumeFileError, open_volume
 from processing.volume import VoxelGrid
 
+SETTINGS_FILE = "settings.json"
 FrameName = Literal["a", "b"]
 Provenance = Mapping[str, str | int | float]
 
@@ -34,7 +35,7 @@ def claim_results(results_dir: Path, provenance: Provenance) -> None:
         It holds results of something else; they stay as they are.
     """
     results_dir.mkdir(parents=True, exist_ok=True)
-    file, text = results_dir / "settings.json", json.dumps(dict(provenance), indent=2) + "\n"
+    file, text = results_dir / SETTINGS_FILE, json.dumps(dict(provenance), indent=2) + "\n"
     if file.exists():
         if file.read_text() != text:
             raise VolumeFileError(

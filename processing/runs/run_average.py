@@ -46,7 +46,7 @@ def average_run(
     shots: Sequence[int],
     calibration: Calibration,
     settings: ReconstructionSettings,
-    done: Callable[[int], None] = lambda _: None,
+    done: Callable[[int, int], None] = lambda _done, _of: None,
     *,
     frame: FrameName = "a",
     threads: int = DEFAULT_THREADS,
@@ -64,7 +64,7 @@ def average_run(
     settings : ReconstructionSettings
         Method, grid and preprocessing.
     done : callable
-        Told the number of exposures that have been read, after each.
+        Told how many exposures of how many have been read, after each.
     frame : {"a", "b"}
         Which exposure: A and B are different times.
     threads : int
@@ -97,7 +97,7 @@ def _exposures(
     frame: FrameName,
     calibration: Calibration,
     settings: ReconstructionSettings,
-    done: Callable[[int], None],
+    done: Callable[[int, int], None],
     threads: int,
 ) -> Exposures:
     references = read_references(run)
@@ -105,7 +105,7 @@ def _exposures(
         shot = run.read_shot(index)
         require_match(run.header.run_id, shot, calibration)
         yield shot_intensities(run, shot, frame, settings, references=references, threads=threads)
-        done(count)
+        done(count, len(shots))
 
 
 def _mean_of_each(reconstructor: Reconstructor, exposures: Exposures) -> Intensity:

@@ -8,15 +8,18 @@ from processing.reconstruction.choices import VoxelType
 from processing.runs.errors import PipelineError
 from server.cli.options import (
     Verbs,
+    add_out,
     add_reconstruction,
     add_verb,
+    calibrated_share,
     describe_grid,
     picture_beside,
     reconstruction_settings,
+    run_directory,
     selected_shots,
     usable_processors,
 )
-from server.cli.output import Outcome, progress
+from server.cli.output import Bar, Outcome
 
 if TYPE_CHECKING:
     from processing.runs.results_file import Provenance
@@ -28,8 +31,10 @@ def add(verbs: Verbs) -> None:
     parser = add_verb(
         verbs, "average", average, "mean volume and slices of results, or straight from the shots of a run"
     )
-    parser.add_argument("results", type=Path, help="directory of results; or a run, with --calibration")
-    parser.add_argument("-o", "--out", type=Path, required=True, help="volume file to write; slices beside it")
+    parser.add_argument(
+        "results", type=run_directory, help="directory of results; or a run or import, with --calibration"
+    )
+    add_out(parser, "volume file to write; slices beside it")
     parser.add_argument(
         "--exposure", choices=["a", "b"], default="a", help="of each shot, default a; A and B are never mixed"
     )
@@ -40,7 +45,9 @@ def add(verbs: Verbs) -> None:
 
 def average(options: Namespace) -> Outcome:
     """Average what there is: volumes, or shots with a calibration."""
-    picture_beside(options.out)
+    from processing.runs.overwriting import require_free
+
+    require_free(options.out, picture_beside(options.out), overwrite=options.overwrite)
     if options.calibration is None and (options.results / "run.h5").is_file():
         raise PipelineError(f"{options.results} is a run: name its --calibration to average it")
     result = _average_results(options) if options.calibration is None else _average_run(options)
@@ -70,33 +77,37 @@ def _average_run(options: Namespace) -> dict[str, Any]:
     calibration = load_calibration(options.calibration)
     settings = reconstruction_settings(options, calibration)
     shots = selected_shots(options.results, options.shots)
-    mean = average_run(
-        options.results,
-        shots,
-        calibration,
-        settings,
-        lambda done: progress(f"{options.results.name}: {done} exposures"),
-        frame=options.exposure,
-        threads=usable_processors(),
-    )
+    share = calibrated_share(options, settings, calibration)
+    with Bar() as bar:
+        mean = average_run(
+            options.results,
+            shots,
+            calibration,
+            settings,
+            lambda done, of: bar.step(done, of, f"{options.results.name}: {done} exposures"),
+            frame=options.exposure,
+            threads=usable_processors(),
+        )
     made_by: Provenance = {
         "calibration": calibration.id,
         "settings": settings.model_dump_json(),
         "method_version": METHOD_VERSION,
     }
     written = _written(options, mean.volume, mean.grid, mean.exposures, made_by)
-    return {**written, "method": settings.method.value}
+    return {**written, "method": settings.method.value, "calibrated_share": share}
 
 
 def _written(options: Namespace, volume: Any, grid: "VoxelGrid", count: int, made_by: "Provenance") -> dict[str, Any]:
     from processing.figures.volume_figures import slices_figure
     from processing.reconstruction.settings import GridSettings
     from processing.reconstruction.volume_file import write_volume
+    from processing.runs.overwriting import replacing
 
     source: Provenance = {"average_of": str(options.results), "frame": options.exposure, "volumes": count}
-    write_volume(options.out, volume, grid, {**source, **made_by})
     figure = picture_beside(options.out)
-    slices_figure(volume, grid, f"mean of {count} volumes").savefig(figure, dpi=120)
+    with replacing(options.out) as out:
+        write_volume(out, volume, grid, {**source, **made_by})
+        slices_figure(volume, grid, f"mean of {count} volumes").savefig(out.with_name(figure.name), dpi=120)
     return {
         "file": str(options.out),
         "figure": str(figure),

@@ -6,7 +6,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from server.cli.options import NUMBER, Verbs, add_verb, picture_beside
+from server.cli.options import NUMBER, Verbs, add_out, add_verb, picture_beside
 from server.cli.output import Outcome, progress, table
 
 if TYPE_CHECKING:
@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 def add(verbs: Verbs) -> None:
     """Add the command."""
     parser = add_verb(verbs, "calibrate", calibrate_views, "fit the camera of every view to a calibration set")
-    parser.add_argument("set", type=Path, help="calibration run, or an imported set")
-    parser.add_argument("-o", "--out", type=Path, required=True, help="calibration file to write")
+    parser.add_argument("set", type=Path, help="calibration run, or the directory of an import which has a set")
+    add_out(parser, "calibration file to write; pictures beside it")
     parser.add_argument(
         "--model",
         choices=("pinhole", "pinhole_tilted", "polynomial", "auto"),
@@ -62,18 +62,21 @@ def calibrate_views(options: Namespace) -> Outcome:
     """Fit, and write the calibration; it has not passed where a view is refused."""
     from processing.calibration.calibrate import calibrate
     from processing.calibration.calibration import Verdict
-    from processing.calibration.calibration_file import require_free, save_calibration
+    from processing.calibration.calibration_file import save_calibration
     from processing.calibration.sets.calibration_set import load_calibration_set
     from processing.figures.residual_figures import residuals_figure
-    from server.pictures.calibration_pictures import calibration_pictures
+    from processing.runs.overwriting import replacing, require_free
+    from server.pictures.calibration_pictures import calibration_pictures, picture_paths
 
     figure = picture_beside(options.out)
-    require_free(options.out)
+    require_free(options.out, figure, *picture_paths(options.out), overwrite=options.overwrite)
     calibration_set = load_calibration_set(options.set, dict(options.origin or ()), dict(options.roll or ()))
     calibration = calibrate(calibration_set, model=options.model)
-    save_calibration(calibration, options.out)
-    residuals_figure(calibration).savefig(figure, dpi=120)
-    figures = calibration_pictures(options.set, calibration_set, calibration, options.out)
+    with replacing(options.out) as out:
+        save_calibration(calibration, out)
+        residuals_figure(calibration).savefig(out.with_name(figure.name), dpi=120)
+        drawn = calibration_pictures(options.set, calibration_set, calibration, out)
+    figures = [options.out.with_name(picture.name) for picture in drawn]
     for note in calibration.notes:
         progress(note)
     refused = {name: view for name, view in calibration.views.items() if view.verdict is Verdict.REFUSE}
@@ -90,8 +93,8 @@ def calibrate_views(options: Namespace) -> Outcome:
         "notes": list(calibration.notes),
         **view_errors(calibration),
     }
-    pictures = ", ".join(map(str, [figure, *figures]))
-    return Outcome(result, f"{views_table(calibration)}\n{calibration.id}: {options.out}, pictures in {pictures}")
+    drawn_in = ", ".join(map(str, [figure, *figures]))
+    return Outcome(result, f"{views_table(calibration)}\n{calibration.id}: {options.out}, pictures in {drawn_in}")
 
 
 def views_table(calibration: "Calibration") -> str:

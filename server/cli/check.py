@@ -5,7 +5,7 @@ from statistics import median
 from typing import TYPE_CHECKING, Any
 
 from server.cli.options import Verbs, add_calibrated_run, add_shots, add_verb, selected_shots
-from server.cli.output import Outcome, progress, table
+from server.cli.output import Outcome, progress, table, tracked
 
 if TYPE_CHECKING:
     from processing.runs.run_check import ShotCheck
@@ -29,7 +29,7 @@ def check(options: Namespace) -> Outcome:
 
     calibration = load_calibration(options.calibration)
     shots = []
-    for index in selected_shots(options.run, options.shots):
+    for index in tracked(selected_shots(options.run, options.shots)):
         measured = check_shot(options.run, index, calibration)
         progress(f"{options.run.name}: {check_line(measured)}")
         shots.append(measured)

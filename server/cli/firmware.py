@@ -9,7 +9,7 @@ from threading import Event
 from typing import TYPE_CHECKING, Any
 
 from daq.errors import DeviceError, PlanError
-from server.cli.options import Verbs, add_rig, add_verb
+from server.cli.options import Verbs, add_out, add_rig, add_verb
 from server.cli.output import Outcome, progress, table
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ def add(verbs: Verbs) -> None:
 
 def _add_scope_options(parser: ArgumentParser) -> None:
     add_rig(parser)
-    parser.add_argument("-o", "--out", type=Path, default=Path("timing.svg"), help="SVG and PNG of this name")
+    add_out(parser, "SVG and PNG of this name; default timing.svg", default=Path("timing.svg"))
     parser.add_argument("--plan", type=Path, metavar="PLAN.json", help="run plan; default: nominal currents")
     parser.add_argument("--width", type=int, metavar="NS", help="pulse width of the default plan")
     parser.add_argument("--separation", type=int, metavar="NS", help="pulse separation of the default plan")
@@ -128,11 +128,14 @@ def selftest(options: Namespace) -> Outcome:
 def scope(options: Namespace) -> Outcome:
     """Draw the train; it is loaded and never armed, so there is no light."""
     from daq.timing import plan_shot_timing
+    from processing.runs.overwriting import require_free
     from server.pictures.timing_diagram import picture, timing_diagram
     from server.rig.assembly import open_generator
     from server.rig.config import load_config
     from server.rig.shot_timing import camera_timings, fired_timing, load_plan, nominal_plan, timing_table
 
+    files = {kind: options.out.with_suffix(f".{kind}") for kind in ("svg", "png")}
+    require_free(*files.values(), overwrite=options.overwrite)
     config = load_config(options.config)
     plan = load_plan(options.plan) if options.plan else nominal_plan(config, options.width, options.separation)
     cameras = camera_timings(config)
@@ -141,7 +144,6 @@ def scope(options: Namespace) -> Outcome:
         identity = generator.identity()
         actual = fired_timing(requested, cameras, generator.configure(requested))
     figure = timing_diagram(actual, f"{config.name}: pulse train as loaded, {identity.model} {identity.firmware}")
-    files = {kind: options.out.with_suffix(f".{kind}") for kind in ("svg", "png")}
     options.out.parent.mkdir(parents=True, exist_ok=True)
     files["svg"].write_bytes(picture(figure, "svg"))
     files["png"].write_bytes(picture(figure, "png"))

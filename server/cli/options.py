@@ -57,8 +57,25 @@ def add_rig(parser: ArgumentParser) -> None:
 
 def add_calibrated_run(parser: ArgumentParser) -> None:
     """Let a command be told a run, and the calibration of its views."""
-    parser.add_argument("run", type=Path, help="run directory")
+    parser.add_argument("run", type=run_directory, help="run directory, or that of an import which has a run")
     parser.add_argument("--calibration", type=Path, required=True)
+
+
+def run_directory(text: str) -> Path:
+    """The run in the directory of an import, or the directory that is named."""
+    path, imported = Path(text), Path(text) / "run"
+    return imported if not (path / "run.h5").exists() and (imported / "run.h5").exists() else path
+
+
+def add_out(parser: ArgumentParser, summary: str, default: Path | None = None) -> None:
+    """Let a command be told where to write, and whether what is there may be replaced."""
+    parser.add_argument("-o", "--out", type=Path, required=default is None, default=default, help=summary)
+    add_overwrite(parser)
+
+
+def add_overwrite(parser: ArgumentParser) -> None:
+    """Let a command replace what exists."""
+    parser.add_argument("--overwrite", action="store_true", help="replace what is there, once all is computed")
 
 
 def add_shots(parser: ArgumentParser) -> None:
@@ -80,7 +97,7 @@ def add_reconstruction(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--grid",
         metavar="X0:X1,Y0:Y1,Z0:Z1[@PITCH]",
-        help="box in mm, voxel edge in mm; default: what all views see within the calibrated z range, one pixel",
+        help="box in mm, voxel edge in mm; default: the largest that all views see where they are calibrated",
     )
 
 
@@ -142,6 +159,25 @@ def reconstruction_settings(options: Namespace, calibration: "Calibration") -> "
     grid = parse_grid(options.grid, calibration) if options.grid else default_grid(calibration)
     said = {name: value for name in OPTIONS if (value := getattr(options, name)) is not None}
     return ReconstructionSettings.model_validate({**said, "grid": GridSettings.of(grid)})
+
+
+def calibrated_share(options: Namespace, settings: "ReconstructionSettings", calibration: "Calibration") -> float:
+    """Which part of the calibrated volume the grid holds; of a grid that nobody stated, the user is told."""
+    from processing.reconstruction.planning.common_volume import share_within
+    from processing.runs.pipeline import default_grid
+
+    grid = settings.grid.to_grid() if settings.grid else default_grid(calibration)
+    ranges_mm = (calibration.x_range_mm, calibration.y_range_mm, calibration.z_range_mm)
+    share = share_within(grid, *ranges_mm)
+    if not options.grid:
+        extents = ", ".join(
+            f"{axis} {low:.4g} to {high:.4g}" for axis, (low, high) in zip("xyz", ranges_mm, strict=True)
+        )
+        progress(
+            f"the largest box that all views see holds {100 * share:.0f} % of the calibrated volume "
+            f"({extents} mm); --grid takes another box"
+        )
+    return share
 
 
 def parse_grid(text: str, calibration: "Calibration") -> "VoxelGrid":

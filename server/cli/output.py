@@ -3,9 +3,15 @@
 import json
 import os
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, TextIO
+from shutil import get_terminal_size
+from time import monotonic
+from typing import Any, Self, TextIO, TypeVar
+
+T = TypeVar("T")
+BAR_WIDTH = 24
+_CLEAR_LINE = "\r\x1b[K"
 
 
 @dataclass(frozen=True)
@@ -38,8 +44,53 @@ def tell(outcome: Outcome, as_json: bool) -> None:
 
 
 def progress(text: str) -> None:
-    """Tell the user what happens, on stderr."""
-    say(text, sys.stderr)
+    """Tell the user what happens, on stderr; on a terminal in place of a bar, which its next step draws again."""
+    say(f"{_CLEAR_LINE}{text}" if sys.stderr.isatty() else text, sys.stderr)
+
+
+class Bar:
+    """How far a long command is: a bar on a terminal, elsewhere a line per step.
+
+    Parameters
+    ----------
+    clock : callable
+        Seconds; tells how long the rest will take.
+    """
+
+    def __init__(self, clock: Callable[[], float] = monotonic) -> None:
+        self._clock = clock
+        self._started_s = clock()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if sys.stderr.isatty():
+            say(_CLEAR_LINE, sys.stderr, end="")
+
+    def step(self, done: int, total: int, text: str = "") -> None:
+        """Show that so many of so many are done; the text says of what, and is the line where there is no terminal."""
+        if not sys.stderr.isatty():
+            if text:
+                say(text, sys.stderr)
+            return
+        filled = BAR_WIDTH * done // max(total, 1)
+        line = f"[{'#' * filled}{'.' * (BAR_WIDTH - filled)}] {done}/{total}{self._left(done, total)}  {text}"
+        say(_CLEAR_LINE + line[: get_terminal_size().columns - 1], sys.stderr, end="")
+
+    def _left(self, done: int, total: int) -> str:
+        if not 0 < done < total:
+            return ""
+        minutes, seconds = divmod(round((self._clock() - self._started_s) * (total - done) / done), 60)
+        return f", {minutes}:{seconds:02d} left"
+
+
+def tracked(items: Sequence[T], text: Callable[[T], str] = lambda _: "") -> Iterator[T]:
+    """Items one by one with a bar that says, before each, what is done with it."""
+    with Bar() as bar:
+        for done, item in enumerate(items):
+            bar.step(done, len(items), text(item))
+            yield item
 
 
 def say(text: str, stream: TextIO, end: str = "\n") -> None:

@@ -10,16 +10,19 @@ from server.cli.options import (
     Verbs,
     add_calibrated_run,
     add_choice,
+    add_out,
     add_reconstruction,
     add_verb,
+    calibrated_share,
     describe_grid,
     reconstruction_settings,
     selected_shots,
     usable_processors,
 )
-from server.cli.output import Outcome, progress, table
+from server.cli.output import Outcome, progress, table, tracked
 
 if TYPE_CHECKING:
+    from processing.reconstruction.settings import ReconstructionSettings
     from processing.runs.pipeline import ShotResult
 
 STATED = {"method", "accuracy", "voxels", "grid", "minimum_window_px", "noise_floor"}
@@ -30,7 +33,7 @@ def add(verbs: Verbs) -> None:
     """Add the command."""
     parser = add_verb(verbs, "reconstruct", reconstruct, "turn the shots of a run into volumes")
     add_calibrated_run(parser)
-    parser.add_argument("-o", "--out", type=Path, required=True, help="directory of the results")
+    add_out(parser, "directory of the results; further shots of the same settings may join them")
     add_reconstruction(parser)
     summary = "how volumes are stored: float16 keeps 11 bits in half the file of float32, uint8 256 steps"
     add_choice(parser, "voxels", VoxelType, summary)
@@ -39,29 +42,49 @@ def add(verbs: Verbs) -> None:
 def reconstruct(options: Namespace) -> Outcome:
     """Reconstruct shot by shot."""
     from processing.calibration.calibration_file import load_calibration
-    from processing.runs.pipeline import reconstruct_shot
-    from processing.runs.workbench import Workbench
+    from processing.runs.overwriting import replacing, require_free
+    from processing.runs.results_file import SETTINGS_FILE, volume_path
 
-    settings = reconstruction_settings(options, load_calibration(options.calibration))
-    shots: list[ShotResult] = []
-    workbench, threads = Workbench(), usable_processors()
-    for index in selected_shots(options.run, options.shots):
-        progress(f"{options.run.name}: shot {index} by {settings.method}")
-        shot = reconstruct_shot(
-            options.run, index, options.calibration, settings, options.out, workbench=workbench, threads=threads
-        )
-        if not shots:
-            _tell_slow_views(shot)
-        _tell_faults(shot)
-        shots.append(shot)
+    calibration = load_calibration(options.calibration)
+    settings = reconstruction_settings(options, calibration)
+    indices = selected_shots(options.run, options.shots)
+    share = calibrated_share(options, settings, calibration)
+    volumes = [volume_path(options.out, index, frame) for index in indices for frame in ("a", "b")]
+    if options.overwrite:
+        require_free(options.out, overwrite=True, made_with=(SETTINGS_FILE,))
+        with replacing(options.out) as out:
+            shots = _reconstruct_shots(options, settings, indices, out)
+    else:
+        require_free(*volumes, overwrite=False)
+        shots = _reconstruct_shots(options, settings, indices, options.out)
     result = {
         **settings.model_dump(mode="json", include=STATED),
+        "calibrated_share": share,
         "views": {name: view.model_dump() for name, view in shots[0].views.items()},
         "volumes": [volume.model_dump(mode="json") for shot in shots for volume in shot.volumes],
         "cpu_s": sum(shot.cpu_s for shot in shots),
         "peak_rss_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
     }
     return Outcome(result, f"{volumes_table(result)}\n{options.out}: {_summary(result)}")
+
+
+def _reconstruct_shots(
+    options: Namespace, settings: "ReconstructionSettings", indices: list[int], out: Path
+) -> "list[ShotResult]":
+    from processing.runs.pipeline import reconstruct_shot
+    from processing.runs.workbench import Workbench
+
+    shots: list[ShotResult] = []
+    workbench, threads = Workbench(), usable_processors()
+    for index in tracked(indices, lambda index: f"{options.run.name}: shot {index} by {settings.method}"):
+        shot = reconstruct_shot(
+            options.run, index, options.calibration, settings, out, workbench=workbench, threads=threads
+        )
+        if not shots:
+            _tell_slow_views(shot)
+        _tell_faults(shot)
+        shots.append(shot)
+    return shots
 
 
 def _tell_slow_views(shot: "ShotResult") -> None:

@@ -1,10 +1,9 @@
 """``tomoshadow self-calibrate``: a calibration is corrected by the droplets in the shots of a run."""
 
 from argparse import Namespace
-from pathlib import Path
 from typing import Any
 
-from server.cli.options import Verbs, add_calibrated_run, add_shots, add_verb, selected_shots
+from server.cli.options import Verbs, add_calibrated_run, add_out, add_shots, add_verb, selected_shots
 from server.cli.output import Outcome, progress, table
 
 
@@ -13,20 +12,21 @@ def add(verbs: Verbs) -> None:
     parser = add_verb(verbs, "self-calibrate", self_calibrate, "correct a calibration by the droplets in shots")
     add_calibrated_run(parser)
     add_shots(parser)
-    parser.add_argument("-o", "--out", type=Path, required=True, help="calibration file to write")
+    add_out(parser, "calibration file to write")
 
 
 def self_calibrate(options: Namespace) -> Outcome:
     """Correct, and write the new calibration."""
-    from processing.calibration.calibration_file import load_calibration, require_free, save_calibration
+    from processing.calibration.calibration_file import load_calibration, save_calibration
+    from processing.runs.overwriting import require_free
     from processing.runs.run_check import self_calibrate_run
 
-    require_free(options.out)
+    require_free(options.out, overwrite=options.overwrite)
     calibration = load_calibration(options.calibration)
     shots = selected_shots(options.run, options.shots)
     progress(f"{options.run.name}: droplets of {len(shots)} shots")
     corrected = self_calibrate_run(options.run, shots, calibration)
-    save_calibration(corrected.calibration, options.out)
+    save_calibration(corrected.calibration, options.out, overwrite=options.overwrite)
     progress(corrected.calibration.notes[-1])
     result = {
         "calibration": str(options.out),

@@ -8,8 +8,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from server.cli.options import Verbs, add_verb, count, positive, seed, width
-from server.cli.output import Outcome, progress
+from server.cli.options import Verbs, add_out, add_verb, count, positive, seed, width
+from server.cli.output import Bar, Outcome, progress
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from processing.studies.residuals import ResidualRow
     from processing.studies.sensitivity import SensitivityRow
 
+ENDINGS = (".csv", ".png", "-profiles.csv")  # of the files that studies write
 _EVERY_METHOD = "all, SMART after 5, 10 and 20 iterations, MART after 5"
 Row = TypeVar("Row")
 Study = Callable[[Namespace], dict[str, Any]]
@@ -38,15 +39,18 @@ def add(verbs: Verbs) -> None:
 
 
 def _add_study(studies: Verbs, name: str, study: Study, summary: str) -> ArgumentParser:
-    parser = add_verb(studies, name, partial(_run, study), summary)
+    parser = add_verb(studies, name, partial(_run, name, study), summary)
     out = Path(f"study-{name}")
-    parser.add_argument("-o", "--out", type=Path, default=out, help=f"directory of CSV and figure; default {out}")
+    add_out(parser, f"directory of CSV and figure; default {out}", default=out)
     return parser
 
 
-def _run(study: Study, options: Namespace) -> Outcome:
-    """Say how long a study took; complain of a directory that cannot be written to before, not after."""
+def _run(name: str, study: Study, options: Namespace) -> Outcome:
+    """Say how long a study took; complain of what cannot be written, or is there already, before and not after."""
+    from processing.runs.overwriting import require_free
+
     options.out.mkdir(parents=True, exist_ok=True)
+    require_free(*(options.out / f"{name}{ending}" for ending in ENDINGS), overwrite=options.overwrite)
     wall_s, cpu_s = time.perf_counter(), time.process_time()
     result = study(options)
     seconds = {"wall": time.perf_counter() - wall_s, "cpu": time.process_time() - cpu_s}
@@ -178,7 +182,8 @@ def average(options: Namespace) -> dict[str, Any]:
     from processing.studies.report import csv_text
 
     study = AverageStudy(shots=options.shots, binning=options.binning, seed=options.seed)
-    mean = average_study(study, lambda done: progress(f"shot {done} of {study.shots}"))
+    with Bar() as bar:
+        mean = average_study(study, lambda done: bar.step(done, study.shots, f"shot {done} of {study.shots}"))
     rows = average_rows(mean)
     result = _report(options.out, "average", rows, average_figure(mean), average_statements(rows))
     profiles = options.out / "average-profiles.csv"
@@ -280,11 +285,13 @@ def _report(
     out: Path, name: str, rows: Sequence[Any], figure: "Figure", statements: "Sequence[Statement]"
 ) -> dict[str, Any]:
     """Write CSV and figure; the JSON object of the study."""
+    from processing.runs.overwriting import replacing
     from processing.studies.report import csv_text
 
     csv, picture = out / f"{name}.csv", out / f"{name}.png"
-    csv.write_text(csv_text(rows), encoding="utf-8")
-    figure.savefig(picture, dpi=150)
+    with replacing(csv) as part:
+        part.write_text(csv_text(rows), encoding="utf-8")
+        figure.savefig(part.with_name(picture.name), dpi=150)
     return {
         "csv": str(csv),
         "figure": str(picture),

@@ -82,3 +82,17 @@ def test_a_mean_is_kept_as_float32_unless_asked_for(
     assert told(capsys, "average", run_dir, *options)["method"] == "mlos"
     settings = json.loads(str(read_volume(tmp_path / "mean.vtkhdf")[2]["settings"]))
     assert settings["voxels"] == "float32"
+
+
+def test_a_mean_and_its_picture_are_replaced_only_if_asked_for(
+    run_dir: Path, calibration_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "mean.png").write_text("a photograph")
+    options = ["--calibration", calibration_file, f"--grid={GRID}", "--shots", "0:1", "-o", tmp_path / "mean.vtkhdf"]
+    assert (
+        refused(capsys, "average", run_dir, *options)
+        == f"{tmp_path / 'mean.png'}: exists; only --overwrite replaces it"
+    )
+    assert (tmp_path / "mean.png").read_text() == "a photograph"
+    told(capsys, "average", run_dir, *options, "--overwrite")
+    assert (tmp_path / "mean.png").read_bytes().startswith(b"\x89PNG")

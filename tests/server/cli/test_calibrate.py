@@ -40,8 +40,12 @@ def test_calibrate_measured_points_and_never_overwrite(tmp_path: Path, capsys: p
         assert plane["mean_error_px"] < plane["rms_px"] < plane["max_error_px"] <= view["max_error_px"]
         assert 0 < plane["holdout_error_px"] < 0.01
     before = (tmp_path / "calibration.json").read_bytes()
-    assert "not overwritten" in refused(capsys, *arguments)
+    assert refused(capsys, *arguments) == f"{tmp_path / 'calibration.json'}: exists; only --overwrite replaces it"
     assert (tmp_path / "calibration.json").read_bytes() == before
+    picture = tmp_path / "calibration-errors.png"
+    picture.write_text("old")
+    told(capsys, *arguments, "--overwrite")
+    assert picture.read_bytes().startswith(b"\x89PNG")
 
 
 @pytest.mark.parametrize(
@@ -52,7 +56,7 @@ def test_a_calibration_that_exists_is_refused_before_anything_is_computed(
 ) -> None:
     (tmp_path / "calibration.json").write_text("kept")
     complaint = refused(capsys, *command, "-o", tmp_path / "calibration.json")
-    assert complaint == f"{tmp_path / 'calibration.json'}: exists; a calibration is not overwritten unless asked to"
+    assert complaint == f"{tmp_path / 'calibration.json'}: exists; only --overwrite replaces it"
     assert (tmp_path / "calibration.json").read_text() == "kept"
 
 

@@ -1,6 +1,7 @@
 """``tomoshadow reconstruct``: bad input gets one clear error, an exit status, and loses nothing."""
 
 import json
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -111,6 +112,44 @@ def test_finer_images_are_asked_for_by_name(
     volumes = [read_volume(tmp_path / name / "shot_00000_a.vtkhdf") for name in ("nominal", "fine")]
     assert json.loads(str(volumes[1][2]["settings"]))["accuracy"] == "fine"
     assert 0 < np.abs(volumes[1][0] - volumes[0][0]).max() < 0.2
+
+
+def test_volumes_are_replaced_only_if_asked_for_and_further_shots_may_join(
+    run_dir: Path, calibration_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    common = ["reconstruct", run_dir, "--calibration", calibration_file, f"--grid={GRID}", "-o", out]
+    told(capsys, *common, "--shots", "0:1")
+    before = (out / "shot_00000_a.vtkhdf").read_bytes()
+    assert refused(capsys, *common) == f"{out / 'shot_00000_a.vtkhdf'}: exists; only --overwrite replaces it"
+    assert "choose another" in refused(capsys, *common, "--shots", "2:3", "--method", "minlos")
+    told(capsys, *common, "--shots", "2:3")
+    assert (out / "shot_00000_a.vtkhdf").read_bytes() == before
+    told(capsys, *common, "--shots", "2:3", "--method", "minlos", "--overwrite")
+    assert sorted(file.name for file in out.glob("*.vtkhdf")) == ["shot_00002_a.vtkhdf", "shot_00002_b.vtkhdf"]
+    (run_dir / "shots" / "0.h5").write_bytes(b"torn")
+    refused(capsys, *common, "--shots", "0:1", "--overwrite")
+    assert (out / "shot_00002_a.vtkhdf").exists()
+    (tmp_path / "home" / "letters").mkdir(parents=True)
+    message = refused(capsys, *common[:-1], tmp_path / "home", "--shots", "2:3", "--overwrite")
+    assert message == f"{tmp_path / 'home'}: is a folder that this command has not made; it is not replaced"
+
+
+def test_a_grid_that_nobody_stated_says_what_it_holds(
+    run_dir: Path, calibration_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    common = ["reconstruct", run_dir, "--calibration", calibration_file, "--shots", "0:1"]
+    assert main([*map(str, common), "-o", str(tmp_path / "out"), "--json"]) == 0
+    output, progress = capsys.readouterr()
+    told_percent = re.search(
+        r"all views see holds (\d+) % of the calibrated volume \(x -3 to 3, .*; --grid takes", progress
+    )
+    assert told_percent is not None
+    share = json.loads(output)["calibrated_share"]
+    assert int(told_percent[1]) == round(100 * share)
+    assert 0.5 < share <= 1
+    small = told(capsys, *common, "-o", tmp_path / "small", "--grid=-3:0,-2.5:2.5,-1.5:1.5@0.1")
+    assert small["calibrated_share"] == pytest.approx(0.5, abs=0.02)
 
 
 def edited(calibration_file: Path, edit: Callable[[Any], None]) -> Path:
