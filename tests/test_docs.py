@@ -205,8 +205,8 @@ def test_the_first_hour_goes_as_written(capsys: pytest.CaptureFixture[str]) -> N
     commands = re.findall(r"^\.venv/bin/tomoshadow (.*first.*)$", page.read_text(), flags=re.MULTILINE)
     importing, calibrating, reconstructing = (command.split() for command in commands)
     assert main(importing) == 0, capsys.readouterr().err
-    assert calibrating == ["calibrate", "first/calibration", "-o", "first.json"]
-    found = load_calibration_set(Path("first/calibration"))
+    assert calibrating == ["calibrate", "first", "-o", "first.json"]
+    found = load_calibration_set(Path("first"))
     assert [len(view.planes) for view in found.views.values()] == [3, 3, 3]
     shutil.copy(next(OLD_DATA.glob("runs/calibrations/*-pinhole.json")), "first.json")
     assert main([*reconstructing, "--grid=-0.6:0.6,-0.6:0.6,-0.3:0.3@0.05"]) == 0, capsys.readouterr().err

@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from processing.calibration.sets.set_record import CalibrationEntry, CameraName
 from processing.errors import BadInput
 from processing.kernels import _native
+from processing.runs.image_pattern import ImagePattern
 from processing.runs.toml_lines import Key, line_of
 
 _VARIABLE = re.compile(r"^\$(\w+|\{\w+\})")
@@ -28,16 +29,58 @@ class _Entry(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
+Page = Annotated[int | None, Field(ge=0, description="which image of a stack, counted from 0; of frame_b too")]
+PageB = Annotated[int | None, Field(ge=0, description="which image of the stack that frame_b is in; default: as page")]
+
+
 class ShotEntry(_Entry):
     """One exposure or two of all cameras."""
 
     frame_a: Annotated[Images, Field(description="image file of every camera")]
     frame_b: Annotated[Images | None, Field(description="the second exposure; all shots have it, or none")] = None
+    page: Page = None
+    page_b: PageB = None
 
     @property
     def frames(self) -> tuple[Images, ...]:
         """Exposure A, and B where there is one."""
         return (self.frame_a,) if self.frame_b is None else (self.frame_a, self.frame_b)
+
+
+class ShotsEntry(_Entry):
+    """Many shots of all cameras, by a pattern of their file names."""
+
+    frame_a: Annotated[
+        str,
+        Field(description="file name with {view} and {shot:04d}; without {shot} the pages of a stack are the shots"),
+    ]
+    frame_b: Annotated[
+        str | None, Field(description="the second exposure; where it is the same stack, its pages are A, B, A, B, ...")
+    ] = None
+    shots: Annotated[
+        tuple[int, int] | None, Field(description="first and last number, both are taken; default: all that are there")
+    ] = None
+    views: Annotated[
+        tuple[CameraName, ...] | None,
+        Field(min_length=2, description="cameras; default: as other shots, as [calibration], or all that are there"),
+    ] = None
+    page: Page = None
+    page_b: PageB = None
+
+    @model_validator(mode="after")
+    def _is_a_pattern(self) -> Self:
+        if len({pattern.counts_shots for pattern in self.frames}) > 1:
+            raise ValueError("frame_b: both exposures have {shot} in their names, or none")
+        if not self.frames[0].counts_shots and (self.page, self.page_b) != (None, None):
+            raise ValueError("page: the pages of a stack are its shots where {shot} is not in its name")
+        if self.shots is not None and not 0 <= self.shots[0] <= self.shots[1]:
+            raise ValueError(f"shots: {list(self.shots)} are not the first number and the last, from 0 on")
+        return self
+
+    @property
+    def frames(self) -> tuple[ImagePattern, ...]:
+        """Exposure A, and B where there is one."""
+        return tuple(ImagePattern(text) for text in (self.frame_a, self.frame_b) if text is not None)
 
 
 class RunEntry(_Entry):
@@ -46,25 +89,42 @@ class RunEntry(_Entry):
     polarity: Annotated[
         Literal["shadow", "bright"], Field(description="dark droplets before light, or bright particles on black")
     ]
+    bits: Annotated[
+        int | None, Field(ge=8, le=16, description="of a grey value in files of 16 bit, 12 if they reach to 4095")
+    ] = None
     separation_ns: Annotated[int | None, Field(gt=0, description="from exposure A to B; kept with the run")] = None
-    shot: Annotated[tuple[ShotEntry, ...], Field(min_length=1, description="the shots, in order")]
+    double_height: Annotated[bool, Field(description="every image is exposure A above exposure B")] = False
+    shot: Annotated[tuple[ShotEntry, ...], Field(description="the shots, in order")] = ()
+    shots: Annotated[tuple[ShotsEntry, ...], Field(description="more of them, by patterns of file names")] = ()
     background: Annotated[tuple[ShotEntry, ...], Field(description="light without spray; their mean is used")] = ()
+    backgrounds: Annotated[tuple[ShotsEntry, ...], Field(description="more of them, by patterns of file names")] = ()
     dark: Annotated[tuple[ShotEntry, ...], Field(description="without light; their mean is used")] = ()
+    darks: Annotated[tuple[ShotsEntry, ...], Field(description="more of them, by patterns of file names")] = ()
 
     @model_validator(mode="after")
     def _shots_agree(self) -> Self:
-        first = self.shot[0]
-        cameras = set(first.frame_a)
-        if len(cameras) < 2:
+        if not self.shot and not self.shots:
+            raise ValueError("neither shot nor shots")
+        cameras = set(self.shot[0].frame_a) if self.shot else None
+        if cameras is not None and len(cameras) < 2:
             raise ValueError(f"shot: {len(cameras)} camera, a run has 2 to {_native.MAX_VIEWS}")
-        for kind in ("shot", "background", "dark"):
-            entries: tuple[ShotEntry, ...] = getattr(self, kind)
-            for number, entry in enumerate(entries):
-                if any(set(images) != cameras for images in entry.frames):
-                    raise ValueError(f"{kind} {number + 1}: cameras differ from {', '.join(sorted(cameras))}")
-                if len(entry.frames) != len(first.frames):
-                    raise ValueError(f"{kind} {number + 1}: all of them have frame_b, or none")
+        single = self.frames_per_shot == 1 or self.double_height
+        for kind in ("shot", "shots", "background", "backgrounds", "dark", "darks"):
+            entries: tuple[ShotEntry | ShotsEntry, ...] = getattr(self, kind)
+            for number, entry in enumerate(entries, start=1):
+                if cameras and isinstance(entry, ShotEntry) and any(set(images) != cameras for images in entry.frames):
+                    raise ValueError(f"{kind} {number}: cameras differ from {', '.join(sorted(cameras))}")
+                if self.double_height and entry.frame_b is not None:
+                    raise ValueError(f"{kind} {number}: with double_height exposure B is below A, not in frame_b")
+                if (entry.frame_b is None) != single:
+                    raise ValueError(f"{kind} {number}: all of them have frame_b, or none")
         return self
+
+    @property
+    def frames_per_shot(self) -> Literal[1, 2]:
+        """2: exposures A and B."""
+        first = self.shot[0] if self.shot else self.shots[0]
+        return 2 if self.double_height or first.frame_b is not None else 1
 
 
 class Manifest(_Entry):
@@ -130,7 +190,7 @@ def read_manifest(path: Path) -> ManifestFile:
 
 
 def named_files(manifest: Manifest) -> Iterator[tuple[Key, str]]:
-    """Key and name of every file that a manifest names."""
+    """Key and name of every file of a calibration; for those of a run see ``processing.runs.shot_sources``."""
     if manifest.calibration is not None:
         for number, plane in enumerate(manifest.calibration.plane):
             for camera, file in plane.images.items():
@@ -139,16 +199,6 @@ def named_files(manifest: Manifest) -> Iterator[tuple[Key, str]]:
             yield ("calibration", "points", number, "file"), points.file
             if points.image is not None:
                 yield ("calibration", "points", number, "image"), points.image
-    if manifest.run is not None:
-        for kind in ("shot", "background", "dark"):
-            for number, entry in enumerate(getattr(manifest.run, kind)):
-                yield from _shot_files(("run", kind, number), entry)
-
-
-def _shot_files(key: Key, entry: ShotEntry) -> Iterator[tuple[Key, str]]:
-    for frame, images in zip(("frame_a", "frame_b"), entry.frames, strict=False):
-        for camera, file in images.items():
-            yield (*key, frame, camera), file
 
 
 def _root(path: Path, text: str, root: str | None) -> Path:

@@ -4,22 +4,26 @@ from argparse import Namespace
 from pathlib import Path
 from typing import Any
 
-from server.cli.options import Verbs, add_verb
-from server.cli.output import Outcome
+from server.cli.options import Verbs, add_out, add_verb
+from server.cli.output import Bar, Outcome, progress
 
 
 def add(verbs: Verbs) -> None:
     """Add the command."""
     parser = add_verb(verbs, "import", import_images, "images from elsewhere become a run or a calibration set")
     parser.add_argument("manifest", type=Path, metavar="MANIFEST.toml")
-    parser.add_argument("-o", "--out", type=Path, required=True, help="directory to create")
+    add_out(parser, "directory to create; calibrate, reconstruct, check and average take it as it is")
 
 
 def import_images(options: Namespace) -> Outcome:
     """Import all that a manifest names."""
     from processing.runs.importing import import_manifest
 
-    result = {"out": str(options.out), **import_manifest(options.manifest, options.out)}
+    with Bar() as bar:
+        parts = import_manifest(options.manifest, options.out, overwrite=options.overwrite, done=bar.step)
+    for note in parts["notes"]:
+        progress(note)
+    result = {"out": str(options.out), **parts}
     return Outcome(result, imported(result))
 
 

@@ -22,6 +22,7 @@ class PlaneEntry(_Entry):
 
     z_mm: Annotated[float | None, Field(description="of the target; left out where a board was held freely")] = None
     images: Annotated[dict[CameraName, str], Field(min_length=1, description="image file by camera")]
+    page: Annotated[int | None, Field(ge=0, description="which image of stacks, counted from 0")] = None
     origin_px: Annotated[dict[CameraName, Pixel], Field(description="overrides the origin_px of the set")] = {}
 
     @model_validator(mode="after")

@@ -14,6 +14,7 @@ from processing.calibration.errors import CalibrationError
 from processing.calibration.sets.calibration_set import load_calibration_set
 from processing.runs.import_manifest import ManifestError
 from processing.runs.importing import import_manifest
+from processing.runs.overwriting import OutputExistsError
 from processing.synthetic.paper_rig import paper_cameras, paper_optics
 from processing.synthetic.target import Checkerboard, render_target
 from tests.support.calibration_cases import true_errors_px
@@ -23,10 +24,10 @@ Image = NDArray[np.uint8] | NDArray[np.uint16]
 
 
 def image(camera: str, value: int) -> Image:
-    """8 bits on the left, 16 on the right."""
+    """8 bits on the left, 16 that are in use on the right."""
     rows, columns = SIZES[camera]
     ramp = np.tile(np.arange(value, value + columns), (rows, 1))
-    return ramp.astype(np.uint8) if camera == "left" else ramp.astype(np.uint16)
+    return ramp.astype(np.uint8) if camera == "left" else (800 * ramp).astype(np.uint16)
 
 
 @pytest.fixture
@@ -167,7 +168,7 @@ def test_mistakes_name_the_line_and_write_nothing(folder: Path, text: str, compl
 def test_nothing_is_overwritten(folder: Path) -> None:
     out = run_import(folder, RUN)
     run_file = (out / "run" / "run.h5").read_bytes()
-    with pytest.raises(ManifestError, match="out: exists; an import never overwrites"):
+    with pytest.raises(OutputExistsError, match="out: exists; only --overwrite replaces it"):
         run_import(folder, RUN)
     assert (out / "run" / "run.h5").read_bytes() == run_file
 
