@@ -5,6 +5,7 @@ are calibrated by the pixels of their sensors.
 """
 
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -36,11 +37,11 @@ def read_image(path: Path, page: int | None = None) -> GreyImage:
         The file is missing, is not such an image, has no such page, or holds several and nobody said which.
     """
     content = _content(path)
-    offsets = page_offsets(content)
+    offsets = _pages(path, content)
     chosen = _chosen_page(path, page, len(offsets) or 1)
     if offsets:
         show_page(content, offsets[chosen])
-    image = cv2.imdecode(content, cv2.IMREAD_UNCHANGED) if content.size else None
+    image = _decoded(content)
     if image is None:
         raise ImageFileError(f"{path}: not an image that OpenCV reads")
     if image.ndim == 3:
@@ -58,9 +59,24 @@ def page_count(path: Path) -> int:
     Raises
     ------
     ImageFileError
-        It cannot be opened.
+        It cannot be opened, or is an animation.
     """
-    return len(page_offsets(_content(path))) or 1
+    return len(_pages(path, _content(path))) or 1
+
+
+def _pages(path: Path, content: NDArray[np.uint8]) -> tuple[int, ...]:
+    """Where the pages of a TIFF begin; empty for every other image, of which OpenCV reads the first one alone."""
+    offsets = page_offsets(content)
+    if not offsets and (count := cv2.imcount(str(path), cv2.IMREAD_UNCHANGED)) > 1:
+        raise ImageFileError(f"{path}: is an animation of {count} images; of all formats only TIFF may hold several")
+    return offsets
+
+
+def _decoded(content: NDArray[np.uint8]) -> NDArray[Any] | None:
+    try:
+        return cv2.imdecode(content, cv2.IMREAD_UNCHANGED) if content.size else None
+    except cv2.error:
+        return None
 
 
 def _content(path: Path) -> NDArray[np.uint8]:

@@ -29,6 +29,8 @@ class ImagePattern:
     text: str
 
     def __post_init__(self) -> None:
+        if not self.text.isprintable():
+            raise ValueError(f"{self.text!r}: a file name has no control characters")
         for _, name, written, conversion in self._parts:
             if name is not None and name not in _FIELDS:
                 raise ValueError(f"{self.text}: {{{name}}} is neither {{view}} nor {{shot}}")

@@ -18,6 +18,9 @@ from processing.runs.toml_lines import Key, line_of
 
 _VARIABLE = re.compile(r"^\$(\w+|\{\w+\})")
 
+MAX_SHOTS = 100_000
+"""Of one pattern: what is beyond is a slip of the pen."""
+
 Images = Annotated[dict[CameraName, str], Field(min_length=1, max_length=_native.MAX_VIEWS)]
 
 
@@ -75,6 +78,8 @@ class ShotsEntry(_Entry):
             raise ValueError("page: the pages of a stack are its shots where {shot} is not in its name")
         if self.shots is not None and not 0 <= self.shots[0] <= self.shots[1]:
             raise ValueError(f"shots: {list(self.shots)} are not the first number and the last, from 0 on")
+        if self.shots is not None and self.shots[1] - self.shots[0] >= MAX_SHOTS:
+            raise ValueError(f"shots: {list(self.shots)} are more than {MAX_SHOTS}")
         return self
 
     @property

@@ -92,6 +92,15 @@ def test_a_stack_is_not_read_without_a_word_which_page(tmp_path: Path) -> None:
         read_image(tmp_path / "a.tif", 3)
 
 
+@pytest.mark.parametrize("kind", ["gif", "png", "webp"])
+def test_an_animation_is_not_read_by_its_first_image(tmp_path: Path, kind: str) -> None:
+    first, *others = (Image.fromarray(np.full((8, 9), value, np.uint8)) for value in (10, 100, 200))
+    first.save(tmp_path / f"a.{kind}", save_all=True, append_images=others)
+    for read in (read_image, page_count):
+        with pytest.raises(ImageFileError, match=rf"a\.{kind}: is an animation of 3 images"):
+            read(tmp_path / f"a.{kind}")
+
+
 def test_a_torn_stack_is_no_image(tmp_path: Path) -> None:
     tifffile.imwrite(tmp_path / "a.tif", STACK, photometric="minisblack")
     whole = (tmp_path / "a.tif").read_bytes()
@@ -99,6 +108,23 @@ def test_a_torn_stack_is_no_image(tmp_path: Path) -> None:
         (tmp_path / "torn.tif").write_bytes(whole[:length])
         with pytest.raises(ImageFileError, match=r"torn\.tif: not an image"):
             read_image(tmp_path / "torn.tif")
+
+
+@pytest.mark.parametrize("kind", ["tif", "png", "jpg", "bmp", "pgm"])
+def test_a_damaged_file_is_read_or_refused(tmp_path: Path, kind: str) -> None:
+    rng = np.random.default_rng(1)
+    cv2.imwrite(str(tmp_path / f"whole.{kind}"), rng.integers(0, 255, (9, 8), dtype=np.uint8))
+    whole = np.fromfile(tmp_path / f"whole.{kind}", np.uint8)
+    refused = 0
+    for _ in range(100):
+        damaged = whole[: rng.integers(1, len(whole) + 1)].copy()
+        damaged[rng.integers(0, len(damaged), 2)] = rng.integers(0, 256, 2)
+        damaged.tofile(tmp_path / f"damaged.{kind}")
+        try:
+            assert read_image(tmp_path / f"damaged.{kind}").ndim == 2
+        except ImageFileError:
+            refused += 1
+    assert refused
 
 
 def test_directories_in_a_circle_end(tmp_path: Path) -> None:

@@ -104,12 +104,31 @@ def test_backgrounds_and_darks_have_patterns_too(folder: Path, capsys: Capture) 
         (PAIRS + 'views = ["left", "top"]\n', "", "top has 0 images, left has 5: shot 3 of top is missing"),
         (PAIRS.replace("{shot:04d}", "{shot}"), "", "{folder}/{{view}}/im{{shot}}_a.png: no file has such a name"),
         (PAIRS + "shots = [7, 3]\n", "", "line 3: run.shots.0: shots: [7, 3] are not the first number and the last"),
+        (
+            PAIRS + "shots = [0, 999999999999]\n",
+            "",
+            "line 3: run.shots.0: shots: [0, 999999999999] are more than 100000",
+        ),
+        (PAIRS.replace("im", "\\u0000"), "", "a file name has no control characters"),
         (PAIRS.replace("{view}/", "left/"), "", "left/im{{shot:04d}}_a.png: {{view}} must say where"),
         (PAIRS.replace("{view}", "{camera}"), "", "{{camera}} is neither {{view}} nor {{shot}}"),
         (PAIRS.replace("04d", "04x"), "", "{{shot:04x}}: only numbers are padded, as {{shot:04d}}"),
         (PAIRS.replace("im{shot:04d}_a.png", "stack.tif"), "", "both exposures have {{shot}} in their names, or none"),
     ],
-    ids=["frame_a", "frame_b", "range", "view", "padding", "backwards", "no view", "field", "width", "stack"],
+    ids=[
+        "frame_a",
+        "frame_b",
+        "range",
+        "view",
+        "padding",
+        "backwards",
+        "endless",
+        "control",
+        "no view",
+        "field",
+        "width",
+        "stack",
+    ],
 )
 def test_what_a_pattern_lacks_is_named(folder: Path, run: str, lost: str, complaint: str, capsys: Capture) -> None:
     if lost:
