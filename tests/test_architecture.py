@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-PACKAGES = ("daq", "processing", "server")
+PACKAGES = ("daq", "processing", "server", "tomoshadow")
 NAMELESS = {"utils", "util", "helper", "helpers", "manager", "common", "base", "misc"}
 SOURCES = [path for package in PACKAGES for path in sorted((ROOT / package).rglob("*.py"))]
 ROOMS = sorted({path.parent for path in SOURCES})

@@ -20,9 +20,9 @@ OLD_DATA = ROOT / "tests" / "fixtures" / "v0.1.0"
 
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 CODE = re.compile(r"^```(\w*)\n(.*?)^```|`([^`\n]+)`", re.DOTALL | re.MULTILINE)
-FOLDERS = "daq|processing|server|firmware|configs|tests|docs"
+FOLDERS = "daq|processing|server|tomoshadow|firmware|configs|tests|docs"
 NAMED = re.compile(rf"(?<![\w/.$-])((?:{FOLDERS})/[\w./*-]*)(?:::([\w.]+))?")
-COMMAND = re.compile(r"(?:^|[\s/])tomoshadow((?: +[a-z|-]+)+)([^\n]*)")
+COMMAND = re.compile(r"(?:^|[\s/])(?<!import )tomoshadow((?: +[a-z|-]+)+)([^\n]*)")
 TARGET = re.compile(r"(?<![\w-])make +([a-z][a-z0-9-]*)")
 
 in_pages = pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))

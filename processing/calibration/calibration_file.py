@@ -23,8 +23,17 @@ from processing.calibration.errors import CalibrationError
 _SOFTWARE = ("tomoshadow", "numpy", "scipy", "opencv-contrib-python-headless")
 
 
-def save_calibration(calibration: Calibration, path: Path, *, overwrite: bool = False) -> None:
-    """Write a calibration file; it appears whole or not at all.
+def save_calibration(calibration: Calibration, path: str | Path, *, overwrite: bool = False) -> None:
+    """Write a calibration file, JSON that a person can read; it appears whole or not at all.
+
+    Parameters
+    ----------
+    calibration : Calibration
+        What ``calibrate`` found.
+    path : path
+        Usually ``*.json``.
+    overwrite : bool
+        Replace a file that exists.
 
     Raises
     ------
@@ -63,8 +72,13 @@ def _exists(path: Path) -> CalibrationError:
     return CalibrationError(f"{path}: exists; a calibration is not overwritten unless asked to")
 
 
-def load_calibration(path: Path) -> Calibration:
+def load_calibration(path: str | Path) -> Calibration:
     """Read a calibration file.
+
+    Parameters
+    ----------
+    path : path
+        The file, of this version of the program or an older one.
 
     Raises
     ------

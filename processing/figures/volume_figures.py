@@ -21,6 +21,20 @@ def slices_figure(volume: Volume, grid: VoxelGrid, title: str = "") -> Figure:
     """Slices through the fullest planes (top) and maximum projections (bottom) of a volume along its three axes.
 
     Colours follow the square root of the intensity, so that single droplets show beside dense liquid.
+
+    Parameters
+    ----------
+    volume : (z, y, x) array
+        Intensities.
+    grid : VoxelGrid
+        Where its voxels lie.
+    title : str
+        Title of the figure.
+
+    Returns
+    -------
+    Figure
+        Of matplotlib: ``figure.savefig("slices.png")``.
     """
     figure = Figure(figsize=(11, 5.8), layout="constrained")
     panels = figure.subplots(2, 3)
@@ -46,7 +60,7 @@ def isosurface_figure(frames: Mapping[str, Volume], grid: VoxelGrid, level: floa
     Parameters
     ----------
     frames : Mapping[str, Volume]
-        Volumes (z, y, x) by the name of the exposure.
+        Volumes (z, y, x) of the exposures "a" and "b", or of one of them.
     grid : VoxelGrid
         Grid of all of them; a few million voxels at most.
     level : float
@@ -60,8 +74,8 @@ def isosurface_figure(frames: Mapping[str, Volume], grid: VoxelGrid, level: floa
         mesh = _surface(volume, grid, level)
         if mesh is not None:
             vertices_mm, faces = mesh
-            axes.add_collection3d(_shaded(vertices_mm[faces][..., [0, 2, 1]], FRAME_COLOURS[name]))
-        axes.plot([], [], [], color=FRAME_COLOURS[name], linewidth=6, label=f"exposure {name}")
+            axes.add_collection3d(_shaded(vertices_mm[faces][..., [0, 2, 1]], FRAME_COLOURS[name.upper()]))
+        axes.plot([], [], [], color=FRAME_COLOURS[name.upper()], linewidth=6, label=f"exposure {name}")
     axes.set(xlim=grid.x_mm[[0, -1]], ylim=grid.z_mm[[0, -1]], zlim=grid.y_mm[[-1, 0]])
     axes.set(xlabel="x [mm]", ylabel="z [mm]", zlabel="y [mm]")
     axes.set_box_aspect([float(np.ptp(extent_mm)) or 1.0 for extent_mm in (grid.x_mm, grid.z_mm, grid.y_mm)], zoom=0.85)
@@ -73,7 +87,15 @@ def isosurface_figure(frames: Mapping[str, Volume], grid: VoxelGrid, level: floa
 
 
 def shadowgraph_figure(images: Mapping[str, NDArray[np.generic]], title: str = "") -> Figure:
-    """One exposure of every view, side by side."""
+    """One exposure of every view, side by side.
+
+    Parameters
+    ----------
+    images : mapping of view to (rows, columns) array
+        Grey values or intensities.
+    title : str
+        Title of the figure.
+    """
     figure = Figure(figsize=(3.4 * len(images), 2.9), layout="constrained")
     panels: Sequence[Axes] = np.atleast_1d(figure.subplots(1, len(images))).tolist()
     for axes, (name, image) in zip(panels, images.items(), strict=True):

@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import h5py
@@ -29,19 +30,28 @@ PROVENANCE = "tomoshadow"
 SCHEMA = {"schema": "tomoshadow/volume", "schema_version": 1}
 Value = str | int | float
 Intensities = NDArray[np.float32]
+NO_PROVENANCE: Mapping[str, Value] = MappingProxyType({})
 
 
 class VolumeFileError(BadInput):
     """A file does not hold a volume that can be read; the text names it."""
 
 
-def write_volume(path: Path, volume: NDArray[Any], grid: VoxelGrid, provenance: Mapping[str, Value]) -> None:
-    """Write a volume that is in memory; otherwise as ``write_slabs``.
+def write_volume(
+    path: str | Path, volume: NDArray[Any], grid: VoxelGrid, provenance: Mapping[str, Value] = NO_PROVENANCE
+) -> None:
+    """Write a volume that is in memory as VTKHDF ImageData, which ParaView opens; whole, or not at all.
 
     Parameters
     ----------
+    path : path
+        Usually ``*.vtkhdf``; an existing file is replaced.
     volume : (z, y, x) float32, float16 or uint8 array
         Intensities; 255 is 1 where they are bytes.
+    grid : VoxelGrid
+        Where its voxels lie; VTK sees the same x, y, z in mm.
+    provenance : Mapping[str, str | int | float]
+        Where it comes from: kept as attributes of the group ``/tomoshadow``.
 
     Raises
     ------
@@ -50,7 +60,7 @@ def write_volume(path: Path, volume: NDArray[Any], grid: VoxelGrid, provenance: 
     """
     if volume.shape != grid.shape:
         raise ValueError(f"{path}: volume has shape {volume.shape}, its grid {grid.shape}")
-    write_slabs(path, SlabVolume.of(volume), grid, provenance)
+    write_slabs(Path(path), SlabVolume.of(volume), grid, provenance)
 
 
 def write_slabs(path: Path, volume: SlabVolume, grid: VoxelGrid, provenance: Mapping[str, Value]) -> None:
@@ -147,21 +157,29 @@ def open_volume(path: Path) -> Iterator[StoredVolume]:
         yield stored
 
 
-def read_volume(path: Path) -> tuple[Intensities, VoxelGrid, dict[str, Value]]:
-    """Read a volume that ``write_volume`` or ``write_slabs`` wrote.
+def read_volume(path: str | Path) -> tuple[Intensities, VoxelGrid, dict[str, Value]]:
+    """Read a volume of the product: ``tomoshadow reconstruct``, the server or ``write_volume`` wrote it.
+
+    Parameters
+    ----------
+    path : path
+        The file, ``*.vtkhdf``.
 
     Returns
     -------
     volume : (z, y, x) float32 array
+        Intensities.
     grid : VoxelGrid
+        Where its voxels lie.
     provenance : dict
+        Where it comes from: run, shot, calibration, settings, versions.
 
     Raises
     ------
     VolumeFileError
         The file is missing, truncated, or not a volume.
     """
-    with open_volume(path) as stored:
+    with open_volume(Path(path)) as stored:
         return stored[:], stored.grid, dict(stored.provenance)
 
 

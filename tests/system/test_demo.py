@@ -7,8 +7,10 @@ from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
+import tomoshadow
 from server.cli.main import main
 
 pytestmark = pytest.mark.network
@@ -75,3 +77,19 @@ def test_a_demonstration_of_a_real_rig_is_refused(tmp_path: Path, capsys: pytest
     config = ROOT / "configs" / "spray4view.toml"
     assert main(["demo", "--config", str(config), "--out", str(tmp_path)]) == 2
     assert "needs a rig with [simulation]" in capsys.readouterr().err
+
+
+def test_the_notebook_shows_its_first_volume(
+    demonstrated: tuple[Path, dict[str, Any]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out, _ = demonstrated
+    monkeypatch.setenv("TOMOSHADOW_DEMO", str(out))
+    cells = json.loads((ROOT / "docs" / "notebooks" / "first-volume.ipynb").read_text(encoding="utf-8"))["cells"]
+    names: dict[str, Any] = {}
+    for cell in cells:
+        if cell["cell_type"] == "code":
+            exec("".join(cell["source"]), names)
+    volume, grid, provenance = tomoshadow.read_volume(out / "first-volume.vtkhdf")
+    np.testing.assert_allclose(volume, names["exposures"]["a"], atol=1e-3)
+    assert (grid, provenance["frame"]) == (names["grid"], "a")
+    assert volume.max() > 0.5

@@ -1,0 +1,97 @@
+"""Images by the names of their views: none can be taken for another, none is left out in silence."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import tomoshadow as ts
+from processing.calibration.calibration import Calibration, Verdict
+from processing.calibration.errors import CalibrationError
+from processing.reconstruction.choices import ReconstructionMethod
+from processing.reconstruction.line_of_sight import line_of_sight
+from processing.reconstruction.planning.plan import plan_reconstruction
+from processing.synthetic.example import BINNING
+from processing.synthetic.paper_rig import paper_cameras
+from tests.support.drifting_views import calibration_of
+
+GRID = ts.VoxelGrid.centred((12, 30, 40), 0.1)
+CAMERAS = paper_cameras(BINNING)
+DROPLET_MM = np.array([[0.4, -0.3, 0.2]])
+
+
+def calibration() -> Calibration:
+    unnamed = calibration_of(list(CAMERAS.values()))
+    return replace(unnamed, views=dict(zip(CAMERAS, unnamed.views.values(), strict=True)))
+
+
+def images(scale: float = 1.0) -> dict[str, NDArray[np.float32]]:
+    """A round droplet in all views, each a little darker than the one before: exchanged views are seen."""
+    return {name: scale * spot(name) * np.float32(1 - 0.1 * number) for number, name in enumerate(CAMERAS)}
+
+
+def spot(name: str) -> NDArray[np.float32]:
+    width_px, height_px = CAMERAS[name].image_size_px
+    u_px, v_px = CAMERAS[name].project(DROPLET_MM)[0]
+    column, row = np.meshgrid(np.arange(width_px), np.arange(height_px))
+    return np.asarray(np.exp(-((column - u_px) ** 2 + (row - v_px) ** 2) / 8), np.float32)
+
+
+@pytest.mark.parametrize("method", ["mlos", "minlos", "gavlos"])
+def test_images_belong_to_views_by_name_whatever_their_order(method: str) -> None:
+    plan = ts.plan(calibration(), GRID)
+    seen = images()
+    reconstruct = getattr(ts, method)
+    backwards = reconstruct(plan, dict(reversed(seen.items())))
+    np.testing.assert_array_equal(reconstruct(plan, seen), backwards)
+    by_hand = line_of_sight(
+        plan_reconstruction(list(CAMERAS.values()), GRID), list(seen.values()), ReconstructionMethod(method)
+    )
+    np.testing.assert_array_equal(backwards, by_hand)
+
+
+@pytest.mark.parametrize("method", ["mlos", "smart", "mart"])
+def test_an_image_too_few_or_too_many_is_an_error_that_names_it(method: str) -> None:
+    plan, seen = ts.plan(calibration(), GRID), images()
+    reconstruct = getattr(ts, method)
+    with pytest.raises(ValueError, match=r"images of \['view1', 'view2', 'view3'\], the plan has views .*'view4'"):
+        reconstruct(plan, {name: image for name, image in seen.items() if name != "view4"})
+    with pytest.raises(ValueError, match="'view5'"):
+        reconstruct(plan, {**seen, "view5": seen["view1"]})
+
+
+def test_some_of_the_views_make_a_plan_of_their_own() -> None:
+    plan = ts.plan(calibration(), GRID, ["view3", "view1"])
+    seen = images()
+    two = ts.minlos(plan, {name: seen[name] for name in ("view1", "view3")})
+    assert np.all(two >= ts.minlos(ts.plan(calibration(), GRID), seen) - 1e-3)
+
+
+def test_a_view_that_nobody_calibrated_or_that_was_refused_makes_no_plan() -> None:
+    with pytest.raises(ValueError, match=r"views \['view9'\] are not in the calibration, it has .*'view1'"):
+        ts.plan(calibration(), GRID, ["view1", "view9"])
+    good = calibration()
+    refused = replace(good, views={**good.views, "view2": replace(good.views["view2"], verdict=Verdict.REFUSE)})
+    with pytest.raises(CalibrationError, match="view2: refused"):
+        ts.plan(refused, GRID)
+
+
+def test_iterative_methods_bring_projections_nearer_to_the_images() -> None:
+    plan, seen = ts.plan(calibration(), GRID), {name: spot(name) for name in CAMERAS}
+    for solve in (ts.smart, ts.mart):
+        residuals = solve(plan, seen, iterations=5).residuals
+        assert len(residuals) == 6
+        assert residuals[-1] < 0.7 * residuals[0]
+
+
+def test_a_misspelt_option_is_an_error() -> None:
+    with pytest.raises(TypeError, match="iteration"):
+        ts.smart(ts.plan(calibration(), GRID), images(), iteration=3)  # type: ignore[call-arg]
+
+
+def test_intensities_of_an_array_are_those_of_the_formula() -> None:
+    frame = np.array([[200, 100], [50, 0]], np.uint16)
+    background, dark = np.full((2, 2), 210.0), np.full((2, 2), 10.0)
+    found = ts.intensity(frame, bits=12, background=background, dark=dark, minimum_window_px=0, noise_floor=0.0)
+    np.testing.assert_allclose(found, [[0.05, 0.55], [0.8, 1.0]], atol=1e-6)
