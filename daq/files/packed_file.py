@@ -19,19 +19,21 @@ def pack_run(run_dir: Path, header: RunHeader, shot_count: int, out: Path) -> No
 
     Raises
     ------
-    RecorderError
-        ``out`` exists.
     ShotFileError
         A shot cannot be read: a packed run is complete or not there.
     """
-    if out.exists():
-        raise RecorderError(f"{out}: exists already, it is not overwritten")
     with replacing(out) as part:
         shutil.copyfile(run_dir / RUN_FILE, part)
         with h5py.File(part, "r+", libver=LIBRARY_VERSIONS) as packed:
             _replace_view(packed, header, shot_count)
             for index in range(shot_count):
                 _copy_shot(shot_path(run_dir, index), header, index, packed)
+
+
+def require_free(out: Path) -> None:
+    """Raise RecorderError if ``out`` exists."""
+    if out.exists():
+        raise RecorderError(f"{out}: exists already, it is not overwritten")
 
 
 def _replace_view(packed: h5py.File, header: RunHeader, shot_count: int) -> None:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from daq.errors import RecorderError, ShotFileError
 from daq.files.atomic_file import commit, part_path, sync
 from daq.files.header import RunHeader, ViewFormat
-from daq.files.packed_file import pack_run
+from daq.files.packed_file import pack_run, require_free
 from daq.files.run_file import (
     RUN_FILE,
     SHOTS_FOLDER,
@@ -186,6 +186,9 @@ class RunReader:
     @property
     def shot_count(self) -> int:
         """Number of slots up to the last committed shot; a shot lost since keeps its slot."""
+        if not (self.run_dir / SHOTS_FOLDER).is_dir():
+            reason = f"no folder {SHOTS_FOLDER}: it was packed into one file, or its shots were taken away"
+            raise ShotFileError(f"{self.run_dir}: has {reason}")
         indices = [int(path.stem) for path in (self.run_dir / SHOTS_FOLDER).glob("*.h5") if path.stem.isdecimal()]
         return max(indices, default=-1) + 1
 
@@ -219,6 +222,7 @@ def list_runs(data_dir: Path) -> tuple[Path, ...]:
 
 def pack(run_dir: Path, out: Path) -> None:
     """Copy a run into one plain HDF5 file that needs no other file; ``out`` must not exist."""
+    require_free(out)
     reader = RunReader(run_dir)
     pack_run(run_dir, reader.header, reader.shot_count, out)
 

@@ -120,7 +120,7 @@ def reading(run_dir: Path) -> Iterator[h5py.File]:
             if schema != RUN_SCHEMA or version > SCHEMA_VERSION:
                 raise ShotFileError(f"{path}: {schema} {version}, this program reads {RUN_SCHEMA} {SCHEMA_VERSION}")
             yield file
-    except (OSError, KeyError, ValueError, TypeError, RuntimeError) as error:
+    except (OSError, KeyError, ValueError, TypeError, AttributeError, RuntimeError) as error:
         raise ShotFileError(f"{path}: cannot be read: {error}") from error
 
 

@@ -76,7 +76,7 @@ def reading_shot(path: Path, header: RunHeader) -> Iterator[h5py.File]:
             if file.attrs["schema"] != SHOT_SCHEMA or file.attrs["run_id"] != header.run_id:
                 raise ShotFileError(f"{path}: not a shot of run {header.run_id}")
             yield file
-    except (OSError, KeyError, ValueError, IndexError, TypeError, RuntimeError) as error:
+    except (OSError, KeyError, ValueError, IndexError, TypeError, AttributeError, RuntimeError) as error:
         raise ShotFileError(f"{path}: cannot be read: {error}") from error
 
 
@@ -102,7 +102,7 @@ def read_image_key(path: Path) -> ImageKey:
     try:
         with h5py.File(path, "r") as file:
             return ImageKey(int(file["/shots/image_key"][0]))
-    except (OSError, KeyError, ValueError, RuntimeError):
+    except (OSError, KeyError, ValueError, IndexError, TypeError, AttributeError, RuntimeError):
         return ImageKey.INVALID
 
 
@@ -121,6 +121,7 @@ def create_frames(file: h5py.File, view: str, view_format: ViewFormat, leading: 
         frames_path(view),
         (*leading, *view_format.shape),
         view_format.dtype,
+        maxshape=(max(1, leading[0]), leading[1], *view_format.shape),  # h5py: no chunk is longer than its axis may be
         chunks=(1, 1, *view_format.shape),
         compression="gzip",
         compression_opts=1,

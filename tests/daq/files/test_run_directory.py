@@ -330,6 +330,25 @@ def test_packed_run_is_plain_and_the_same(tmp_path: Path) -> None:
         pack(tmp_path / "run", out)
 
 
+def test_an_empty_run_can_be_packed(tmp_path: Path) -> None:
+    header = write_run(tmp_path / "run", 0)
+    try:
+        pack(tmp_path / "run", tmp_path / "packed.h5")
+    except ValueError as error:
+        pytest.fail(f"an empty run is not packed: {error}")
+    with h5py.File(tmp_path / "packed.h5") as packed:
+        for view, view_format in header.views.items():
+            assert packed[f"/cameras/{view}/frames"].shape == (0, 2, *view_format.shape)
+        assert packed["/shots/index"].shape == (0,)
+
+
+def test_a_run_whose_shots_were_taken_away_says_so_instead_of_counting_none(tmp_path: Path) -> None:
+    write_run(tmp_path / "run", 1)
+    shutil.rmtree(tmp_path / "run" / "shots")
+    with pytest.raises(ShotFileError, match="no folder shots"):
+        _ = RunReader(tmp_path / "run").shot_count
+
+
 def test_packing_a_torn_run_leaves_nothing(tmp_path: Path) -> None:
     write_run(tmp_path / "run")
     os.truncate(tmp_path / "run" / "shots" / "2.h5", 100)
