@@ -1,7 +1,7 @@
 """GigE Vision double-frame camera: arms it by its profile, and proves that two frames are exposures A and B."""
 
 import logging
-from threading import Thread
+from threading import Lock, Thread
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
@@ -43,6 +43,7 @@ class AravisCamera:
 
     Every call ends within seconds: Aravis gives up on a register after 2.5 s, ``collect`` has its own deadline,
     and ``disarm`` takes 2 s at most. A camera that was lost is opened anew by the next ``arm``.
+    Any thread may ask for counters and pictures, and disarm, while another one arms and collects.
 
     Parameters
     ----------
@@ -76,6 +77,7 @@ class AravisCamera:
         self._receiver: FrameReceiver | None = None
         self._last_id: int | None = None
         self._latest: Image | None = None
+        self._letting_go = Lock()
 
     def __enter__(self) -> Self:
         self._device = self._open()
@@ -118,7 +120,8 @@ class AravisCamera:
     @property
     def counters(self) -> StreamCounters:
         """What the stream has done since the camera was armed."""
-        return StreamCounters() if self._receiver is None else self._receiver.counters
+        receiver = self._receiver
+        return StreamCounters() if receiver is None else receiver.counters
 
     def identity(self) -> DeviceIdentity:
         """Vendor, model, serial number and firmware version, as the device answers."""
@@ -140,8 +143,9 @@ class AravisCamera:
         for setting in settings:
             device.write(setting)
         device.set_packet_bytes(self._packet_bytes)
-        self._receiver = FrameReceiver(self._name, device.open_stream(self._form))
-        self._receiver.start()
+        receiver = FrameReceiver(self._name, device.open_stream(self._form))
+        receiver.start()
+        self._receiver = receiver
         self._last_id = 0
         try:
             device.start()
@@ -178,13 +182,15 @@ class AravisCamera:
 
     def disarm(self) -> None:
         """Stop acquisition, within 2 s; a camera that does not answer is let go, and ``arm`` opens it anew."""
-        if self._receiver is not None:
-            self._latest = self._receiver.latest
+        receiver = self._receiver
+        if receiver is not None:
+            self._latest = receiver.latest
             self._release(keep=True)
 
     def latest(self) -> Image | None:
         """Newest exposure seen, for the live view; None before the first."""
-        frame = self._latest if self._receiver is None else self._receiver.latest
+        receiver = self._receiver
+        frame = self._latest if receiver is None else receiver.latest
         return None if frame is None else self._form.exposure_of(frame, -1)
 
     def _settings(self, device: "AravisDevice") -> list[FeatureWrite]:
@@ -202,21 +208,24 @@ class AravisCamera:
     def _connected(self) -> "AravisDevice":
         if not self._is_open:
             raise DeviceRefused(self._name, "the camera is not open")
-        if self._device is None:
-            self._device = self._open()
-        return self._device
+        device = self._device
+        if device is None:
+            device = self._device = self._open()
+        return device
 
     def _open(self) -> "AravisDevice":
         return load_aravis(self._name)(self._name, self._ip)
 
     def _armed(self) -> FrameReceiver:
-        if self._receiver is None:
+        receiver = self._receiver
+        if receiver is None:
             raise DeviceRefused(self._name, "the camera is not armed")
-        return self._receiver
+        return receiver
 
     def _release(self, *, keep: bool) -> None:
         """Aravis asks a silent camera again and again, for up to ten seconds: the rig does not wait for that."""
-        device, receiver, self._receiver = self._device, self._receiver, None
+        with self._letting_go:
+            device, receiver, self._receiver = self._device, self._receiver, None
         if device is None:
             return
         release = Thread(target=_release, args=(device, receiver, keep), name=f"{self._name} release", daemon=True)

@@ -2,7 +2,7 @@
 
 import socket
 import struct
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from itertools import count
@@ -15,6 +15,7 @@ import pytest
 from daq.drivers import aravis_device
 from daq.drivers.aravis_camera import AravisCamera
 from daq.drivers.camera_profile import FeatureWrite, PairSpacing, load_camera_profile
+from daq.drivers.frame_receiver import FrameReceiver, StreamCounters
 from daq.errors import DeviceError, DeviceRefused, DeviceTimeout, DeviceUnavailable
 from daq.shot import DoubleFrame, FiredTrain, Image, LightPulse
 from daq.simulation.camera.gige_camera import SimulatedCamera
@@ -365,3 +366,37 @@ def test_four_cameras_deliver_every_pair_of_a_run() -> None:
             assert all(shot.valid for shot in shots)
             assert {int(shot.frame_a[-1, -1]) for shot in shots} == {sequence}
         assert all(wire.camera.counters.frames == 10 for wire in wires)
+
+
+class Overtaken(AravisCamera):
+    """A camera that another thread disarms between any two looks at its receiver."""
+
+    looks = 0
+
+    @property
+    def _receiver(self) -> FrameReceiver | None:
+        self.looks += 1
+        return FrameReceiver("view", EndlessStream()) if self.looks == 1 else None
+
+    @_receiver.setter
+    def _receiver(self, _: FrameReceiver | None) -> None:
+        self.looks = 0
+
+
+class EndlessStream:
+    def pop(self) -> None:
+        return None
+
+    def close(self) -> None:
+        pass
+
+
+@pytest.mark.parametrize("ask", [AravisCamera.latest, lambda camera: camera.counters, AravisCamera.disarm])
+def test_a_camera_that_is_disarmed_meanwhile_answers_as_one_that_is_not_armed(
+    ask: Callable[[AravisCamera], object],
+) -> None:
+    camera = Overtaken("view", IP, PROFILE, SHAPE)
+    try:
+        assert ask(camera) in (None, StreamCounters())
+    except AttributeError as error:
+        pytest.fail(f"the receiver went between being looked for and being used: {error}")
