@@ -90,7 +90,7 @@ def prepare_run(
     _check_currents(rig, plan)
     _check_stage(rig, plan)
     views = {view: ViewFormat(camera.image_shape, camera.bits) for view, camera in rig.cameras.items()}
-    references = find_references(data_dir, plan.references, views)
+    references = find_references(data_dir, plan, views)
     _check_disk(data_dir, plan, views)
     light.check_permitted(rig)
     calibration_sha256 = hash_calibration(plan.calibration) if plan.calibration else None

@@ -8,27 +8,27 @@ from numpy.typing import NDArray
 
 from daq.errors import PlanError, ShotFileError
 from daq.files.run_directory import ReferenceImages, RunReader, ViewFormat, list_runs
-from daq.run_plan import RunKind
+from daq.run.state import RunOutcome
+from daq.run_plan import PulsePair, RunKind, RunPlan
 
 REFERENCE_KINDS = (RunKind.DARK, RunKind.BACKGROUND)
 
 
-def find_references(
-    data_dir: Path, run_ids: tuple[str, ...], views: Mapping[str, ViewFormat]
-) -> dict[RunKind, tuple[Path, ...]]:
-    """Run directories by kind.
+def find_references(data_dir: Path, plan: RunPlan, views: Mapping[str, ViewFormat]) -> dict[RunKind, tuple[Path, ...]]:
+    """Directories of the reference runs of a plan, by kind.
 
     Raises
     ------
     PlanError
-        A run does not exist, is neither dark nor background, has no valid shot, or other views or formats.
+        A run does not exist, is neither dark nor background, was not completed, has no valid shot, other views or
+        formats, or is a background that was lit otherwise; the text names the difference.
     """
     known = {path.name: path for path in list_runs(data_dir)}
     found: dict[RunKind, tuple[Path, ...]] = dict.fromkeys(REFERENCE_KINDS, ())
-    for run_id in run_ids:
+    for run_id in plan.references:
         if run_id not in known:
             raise PlanError(f"references: no run {run_id!r} in {data_dir}")
-        kind = _checked_kind(run_id, RunReader(known[run_id]), views)
+        kind = _checked_kind(run_id, RunReader(known[run_id]), views, plan.pulse)
         found[kind] = (*found[kind], known[run_id])
     return found
 
@@ -52,16 +52,32 @@ def mean_images(run_dirs: tuple[Path, ...]) -> ReferenceImages:
     return {view: (total / count).astype(np.float32) for view, total in sums.items()}
 
 
-def _checked_kind(run_id: str, reader: RunReader, views: Mapping[str, ViewFormat]) -> RunKind:
+def _checked_kind(run_id: str, reader: RunReader, views: Mapping[str, ViewFormat], pulse: PulsePair) -> RunKind:
     try:
-        header, image_keys = reader.header, reader.image_keys()
+        header, image_keys, outcome = reader.header, reader.image_keys(), reader.outcome or RunOutcome.INTERRUPTED
     except ShotFileError as error:
         raise PlanError(f"references: {error}") from error
     kind = header.plan.kind if header.plan else None
-    if kind not in REFERENCE_KINDS:
+    if header.plan is None or kind not in REFERENCE_KINDS:
         raise PlanError(f"references: run {run_id!r} is {kind or 'imported'}, not dark or background")
     if header.views != views:
         raise PlanError(f"references: run {run_id!r} has views {header.views}, the rig {dict(views)}")
     if kind.image_key not in image_keys:
         raise PlanError(f"references: run {run_id!r} has no valid shot")
+    if outcome != RunOutcome.COMPLETED:
+        raise PlanError(f"references: run {run_id!r} is {outcome}, not {RunOutcome.COMPLETED}: {reader.cause}")
+    if kind is RunKind.BACKGROUND and (differing := _differing(header.plan.pulse, pulse)):
+        raise PlanError(f"references: background {run_id!r} has other light than the plan: {differing}")
     return kind
+
+
+def _differing(its: PulsePair, planned: PulsePair) -> str:
+    """How the light in an exposure of a background differs from the planned one.
+
+    Each exposure gets one pulse, so that their separation does not matter. A dark run has no light, whatever it names.
+    """
+    lights = [
+        ("width_ns", its.width_ns, planned.width_ns),
+        *((f"current_a of {view}", its.current_a.get(view), planned.current_a[view]) for view in planned.current_a),
+    ]
+    return ", ".join(f"{name} {lit} instead of {wanted}" for name, lit, wanted in lights if lit != wanted)

@@ -415,6 +415,38 @@ def test_only_dark_and_background_runs_of_this_rig_are_references(lab: Laborator
         lab.acquisition.start(plan_of(references=(dark.run_dir.name,)))
 
 
+@pytest.mark.parametrize(
+    ("pulse", "difference"),
+    [
+        ({"current_a": {"view1": 20.0, "view2": 6.0}}, r"current_a of view2 12\.0 instead of 6\.0$"),
+        ({"current_a": {"view1": 20.0, "view2": 12.0}, "width_ns": 500}, "width_ns 1000 instead of 500$"),
+    ],
+)
+def test_a_background_that_was_lit_otherwise_is_refused_with_the_difference(
+    lab: Laboratory, pulse: dict[str, Any], difference: str
+) -> None:
+    background = lab.run(plan_of(1, kind=RunKind.BACKGROUND)).run_dir.name
+    with pytest.raises(PlanError, match=difference):
+        lab.acquisition.start(plan_of(references=(background,), pulse=PulsePair(**pulse)))
+
+
+def test_the_separation_of_the_pulses_and_the_light_of_a_dark_run_do_not_matter(lab: Laboratory) -> None:
+    dark, background = (lab.run(plan_of(1, kind=kind)).run_dir.name for kind in (RunKind.DARK, RunKind.BACKGROUND))
+    pulse = PulsePair(current_a={"view1": 20.0, "view2": 12.0}, separation_ns=20_000)
+    lab.run(plan_of(1, references=(dark, background), pulse=pulse))
+    lab.run(plan_of(1, references=(dark,), pulse=PulsePair(current_a={"view1": 20.0, "view2": 6.0})))
+
+
+def test_a_reference_that_was_not_completed_is_refused_with_its_outcome(lab: Laboratory) -> None:
+    lab.acquisition.start(plan_of(50, rate_hz=10, kind=RunKind.DARK))
+    while not lab.acquisition.status().shots_recorded:
+        threading.Event().wait(0.01)
+    lab.acquisition.stop()
+    dark = lab.acquisition.wait(DEADLINE_S).run_id
+    with pytest.raises(PlanError, match=f"{dark}' is stopped, not completed: stopped by the operator"):
+        lab.acquisition.start(plan_of(references=(str(dark),)))
+
+
 @pytest.mark.parametrize("which", ["door", "generator"])
 def test_no_light_while_an_interlock_is_open(lab: Laboratory, which: str) -> None:
     if which == "door":
