@@ -5,6 +5,7 @@
     DaqError
     ├── PlanError             the plan cannot run on this rig; names value and limit
     ├── BusyError             a run is active; there is no queue of runs
+    ├── AlreadyHeld           another process holds the rig, the data directory or the port
     ├── DeviceError           a device did not do what it was asked to
     │   ├── DeviceUnavailable   it is absent, or held by somebody else
     │   ├── DeviceTimeout       it did not answer before the deadline
@@ -28,6 +29,10 @@ class PlanError(DaqError):
 
 class BusyError(DaqError):
     """Another run is active."""
+
+
+class AlreadyHeld(DaqError):
+    """Somebody else holds the rig, the data directory or the port; the text says who."""
 
 
 class DeviceError(DaqError):

@@ -31,6 +31,7 @@ from processing.synthetic.truth_file import read_true_cameras, read_true_spray
 from processing.volume import VoxelGrid
 from server.rig.assembly import AssembledRig, open_rig
 from server.rig.config import ConfigError, RigConfig, load_config
+from server.rig.rig_lock import hold_data_dir
 from server.rig.simulated_operator import TRUTH_FILE
 
 STAGE_Z_MM = tuple(float(z) for z in np.linspace(-4.5, 4.5, 10))
@@ -90,7 +91,7 @@ def demonstrate(
     """
     config = _simulated_rig(config_file, firmware)
     watch = Stopwatch()
-    with open_rig(config) as assembled:
+    with hold_data_dir(out / "runs"), open_rig(config) as assembled:
         recorder = _Runs(config, assembled, out / "runs", progress)
         with watch.step("calibrate"):
             calibration = _calibrate(recorder, out)

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from daq.devices import Camera, Device, GeneratorState, Interlock, PulseGenerator
-from daq.errors import DaqError, DeviceError
+from daq.errors import AlreadyHeld, DaqError, DeviceError
 from server.doctor.checkup import Checkup, Status
 from server.rig.assembly import wire_rig
 from server.rig.config import RigConfig
@@ -35,6 +35,10 @@ def check_rig(config: RigConfig) -> Iterator[Checkup]:
             yield check_interlock(rig.interlock)
             if rig.stage is not None:
                 yield _opened(rig.stage, "stage", _SERIAL_REMEDY)
+    except AlreadyHeld as error:
+        yield Checkup(
+            "rig", Status.WARN, str(error), "the lamps of its page tell how it is; looking here would end a run"
+        )
     except DaqError as error:
         yield Checkup("rig", Status.FAIL, str(error), "mend what the text names")
 

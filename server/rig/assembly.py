@@ -28,6 +28,7 @@ from server.rig.config import (
     StageConfig,
     ViewConfig,
 )
+from server.rig.rig_lock import hold_generator, hold_rig
 from server.rig.simulated_operator import SimulatedOperator
 from server.rig.simulated_scene import SimulatedScene
 
@@ -62,6 +63,8 @@ def open_rig(config: RigConfig) -> Iterator[AssembledRig]:
 
     Raises
     ------
+    AlreadyHeld
+        Another process works with this rig, or with one that has a device of it; names the process.
     DeviceError
         A device is absent, held by somebody else, or does not answer; names it.
     PlanError
@@ -79,13 +82,15 @@ def wire_rig(config: RigConfig) -> Iterator[AssembledRig]:
 
     Raises
     ------
+    AlreadyHeld
+        Another process works with this rig, or with one that has a device of it; names the process.
     DeviceError
         A simulated far end cannot run.
     PlanError
         A camera profile cannot be read.
     """
     profiles = {name: load_camera_profile(view.camera.profile) for name, view in config.views.items()}
-    with ExitStack() as far_ends:
+    with hold_rig(config), ExitStack() as far_ends:
         if config.simulation is None:
             yield AssembledRig(_rig(config, profiles, _gpio_interlock(config)))
         else:
@@ -116,7 +121,8 @@ def open_pulse_line(config: RigConfig) -> Iterator[tuple[PulseLine, Reply]]:
 def _generator_wired(config: RigConfig) -> Iterator[RigConfig]:
     """Yield the configuration with the port of a simulated generator in it, where the rig is simulated."""
     if config.simulation is None:
-        yield config
+        with hold_generator(config):
+            yield config
         return
     with _simulated_generator(config, lambda _: None) as firmware:
         yield config.model_copy(update={"pulse_generator": PulseGeneratorConfig(port=firmware.port)})

@@ -1,8 +1,10 @@
 """The web application: REST, events, live view and page in one process; ``serve`` runs it."""
 
 import asyncio
+import contextlib
 import logging
 import signal
+import socket
 from collections.abc import AsyncIterator, Coroutine, Iterator
 from contextlib import AsyncExitStack, asynccontextmanager, contextmanager
 from importlib.metadata import version
@@ -13,6 +15,7 @@ from fastapi import Depends, FastAPI, Request
 from starlette.exceptions import HTTPException
 from starlette.routing import Match
 
+from daq.errors import AlreadyHeld, DaqError
 from server.lab.calibrations import CalibrationStore
 from server.lab.jobs import JobTable, jobs_on_disk
 from server.lab.live import LiveFeed
@@ -70,23 +73,48 @@ def create_api(services: Services) -> FastAPI:
     return app
 
 
-def serve(app: FastAPI, host: str = "127.0.0.1", port: int = 8080) -> None:
-    """Serve until SIGINT or SIGTERM, then return. One process: acquisition, jobs and pages share its state."""
+@contextmanager
+def listening(host: str, port: int) -> Iterator[socket.socket]:
+    """Hold a port until the block ends; whoever asks meanwhile waits for ``serve``.
+
+    Raises
+    ------
+    AlreadyHeld
+        The port is taken, or the address is none of this computer.
+    """
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    try:
+        listener = socket.create_server((host, port), family=family)
+    except OSError as error:
+        reason = (
+            f"{host}, port {port}: cannot listen there ({error.strerror}): end the server that does, or choose --port"
+        )
+        raise AlreadyHeld(reason) from error
+    with listener:
+        yield listener
+
+
+def serve(app: FastAPI, listener: socket.socket) -> None:
+    """Serve until SIGINT or SIGTERM, then return. One process: acquisition, jobs and pages share its state.
+
+    Raises
+    ------
+    DaqError
+        The application did not start; the log says why.
+    """
+    server = uvicorn.Server(
+        uvicorn.Config(app, timeout_graceful_shutdown=_SHUTDOWN_S, access_log=False, log_level="warning")
+    )
     # The server passes a signal on once it has ended. By default SIGTERM would then kill the process before the caller
     # has switched off the light and closed the devices.
     previous = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
-        uvicorn.run(
-            app,
-            host=host,
-            port=port,
-            workers=1,
-            timeout_graceful_shutdown=_SHUTDOWN_S,
-            access_log=False,
-            log_level="warning",
-        )
+        with contextlib.suppress(KeyboardInterrupt):
+            server.run(sockets=[listener])
     finally:
         signal.signal(signal.SIGTERM, previous)
+    if not server.started:
+        raise DaqError("the server did not start: the lines above say why")
 
 
 @asynccontextmanager

@@ -11,7 +11,8 @@ from server.lab.services import Services
 from server.lab.tasks import TASKS
 from server.rig.assembly import AssembledRig, open_rig
 from server.rig.config import RigConfig, load_config
-from server.web.app import create_app, serve
+from server.rig.rig_lock import hold_data_dir
+from server.web.app import create_app, listening, serve
 
 
 def serve_rig(config_file: Path, host: str | None = None, port: int | None = None) -> None:
@@ -21,12 +22,19 @@ def serve_rig(config_file: Path, host: str | None = None, port: int | None = Non
     ------
     ConfigError
         The configuration is wrong.
+    AlreadyHeld
+        Another process has the port, the data directory or the rig; it goes on undisturbed.
     DeviceError
         A device is absent or does not answer.
     """
     config = load_config(config_file)
-    config = config.model_copy(update={"server": config.server.moved(host, port)})
-    with open_rig(config) as assembled:
+    server = config.server.moved(host, port)
+    config = config.model_copy(update={"server": server})
+    with (
+        listening(server.host, server.port) as port_held,
+        hold_data_dir(server.data_dir),
+        open_rig(config) as assembled,
+    ):
         events = EventPublisher()
         with _acquisition(config, assembled, events) as acquisition:
             services = Services(
@@ -38,7 +46,7 @@ def serve_rig(config_file: Path, host: str | None = None, port: int | None = Non
                 tasks=TASKS,
                 laboratory=assembled.laboratory,
             )
-            serve(create_app(services), config.server.host, config.server.port)
+            serve(create_app(services), port_held)
 
 
 def _acquisition(config: RigConfig, assembled: AssembledRig, events: EventPublisher) -> Acquisition:

@@ -17,25 +17,32 @@ from playwright.sync_api import Page
 
 from tests.support.operator import VIEWS, drive_the_page
 
-pytestmark = pytest.mark.network
+pytestmark = [pytest.mark.network, pytest.mark.timeout(900)]
 
 ROOT = Path(__file__).parents[2]
 CONFIG = ROOT / "configs" / "simulated_small.toml"
 CURRENT_A = {"view1": 25.0, "view2": 9.9, "view3": 10.0, "view4": 26.0}
-DEADLINE_S = 60.0
+DEADLINE_S = 180.0
+ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT)}
+
+
+def free_port() -> int:
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        return int(free.getsockname()[1])
+
+
+def command(port: int) -> list[str]:
+    return [sys.executable, "-m", "server.cli", "serve", "--config", str(CONFIG), "--port", str(port)]
 
 
 @contextmanager
 def served(work_dir: Path) -> Iterator[tuple[httpx.Client, subprocess.Popen[bytes]]]:
     """A server process of its own, and a client of it."""
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    command = [sys.executable, "-m", "server.cli", "serve", "--config", str(CONFIG), "--port", str(port)]
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    port = free_port()
     with (
-        subprocess.Popen(command, cwd=work_dir, env=environment) as process,
-        httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=20) as client,
+        subprocess.Popen(command(port), cwd=work_dir, env=ENVIRONMENT) as process,
+        httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=DEADLINE_S) as client,
     ):
         try:
             eventually(lambda: _answers(client), "the server answers")
@@ -91,4 +98,33 @@ def test_from_target_to_volume_in_a_browser(tmp_path: Path, page: Page) -> None:
         eventually(lambda: len(client.get(f"/api/runs/{sample['run_id']}/results").json()) > 0, "there are results")
         assert (tmp_path / "runs" / sample["run_id"] / "truth" / "truth.h5").is_file()
         process.send_signal(signal.SIGTERM)
-        assert process.wait(20) == 0
+        assert process.wait(DEADLINE_S) == 0
+
+
+def refused(port: int, work_dir: Path) -> str:
+    """What a server says that does not start."""
+    work_dir.mkdir(exist_ok=True)
+    late = subprocess.run(
+        command(port), cwd=work_dir, env=ENVIRONMENT, capture_output=True, text=True, timeout=DEADLINE_S, check=False
+    )
+    assert late.returncode in (1, 2), f"a second server ended with {late.returncode}: {late.stderr}"
+    assert "Traceback" not in late.stderr
+    return late.stderr
+
+
+def test_a_second_server_is_refused_and_leaves_the_run_of_the_first_one_alone(tmp_path: Path) -> None:
+    with served(tmp_path) as (client, process):
+        plan = {"name": "long", "kind": "dark", "shots": 2000, "rate_hz": 1, "pulse": {"current_a": CURRENT_A}}
+        run_url = client.post("/api/runs", json=plan).headers["location"]
+        eventually(lambda: client.get(run_url).json()["shots_recorded"] > 0, "there is a shot")
+        assert "cannot listen there" in refused(int(client.base_url.port or 0), tmp_path / "port")
+        holder = f"is held by process {process.pid}, since "
+        assert f"data directory runs {holder}" in refused(free_port(), tmp_path)
+        assert holder in refused(free_port(), tmp_path / "elsewhere")
+        shots = client.get(run_url).json()["shots_recorded"]
+        eventually(lambda: client.get(run_url).json()["shots_recorded"] > shots, "the run goes on")
+        assert client.get(run_url).json()["outcome"] == "active"
+        client.post(f"{run_url}/stop")
+        eventually(lambda: client.get(run_url).json()["outcome"] != "active", "the run stops")
+        run = client.get(run_url).json()
+        assert (run["outcome"], run["shots_valid"]) == ("stopped", run["shots_recorded"])

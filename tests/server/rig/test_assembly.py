@@ -25,6 +25,15 @@ def small(simulation: SimulationConfig) -> RigConfig:
     return load_config(Path("configs/simulated_small.toml")).model_copy(update={"simulation": simulation})
 
 
+def elsewhere(config: RigConfig) -> RigConfig:
+    """The same rig at other addresses: those of ``assembled`` are held."""
+    views = {
+        name: view.model_copy(update={"camera": view.camera.model_copy(update={"ip": f"127.0.5.{number}"})})
+        for number, (name, view) in enumerate(config.views.items(), 1)
+    }
+    return config.model_copy(update={"views": views})
+
+
 @pytest.fixture(scope="module")
 def assembled() -> Iterator[AssembledRig]:
     with open_rig(small(SimulationConfig())) as opened:
@@ -154,7 +163,7 @@ def test_scripted_faults_happen_at_their_firing_and_the_light_ends_with_the_rig(
         ScriptedFault(sequence=2, kind=FaultKind.DROPPED_A, view="view4"),
         ScriptedFault(sequence=3, kind=FaultKind.INTERLOCK_OPEN),
     )
-    with open_rig(small(SimulationConfig(gpio="memory", faults=script))) as opened:
+    with open_rig(elsewhere(small(SimulationConfig(gpio="memory", faults=script)))) as opened:
         assert type(opened.rig.interlock).__name__ == "MemoryInterlock"
         first, second, _ = shoot(opened, shots=3)
         assert all(frames.valid for frames in first.values())

@@ -14,7 +14,7 @@ import sys
 from contextlib import contextmanager
 from pathlib import Path
 import uvicorn
-from server.web.app import create_app, serve
+from server.web.app import create_app, listening, serve
 from tests.support import serving
 
 def talkative_serve(services):
@@ -24,7 +24,8 @@ def talkative_serve(services):
         await started(server, sockets)
         print(server.servers[0].sockets[0].getsockname()[1], flush=True)
     uvicorn.Server.startup = startup
-    serve(app, port=0)
+    with listening("127.0.0.1", 0) as listener:
+        serve(app, listener)
     print("served", flush=True)
 
 with serving.assembled(Path(sys.argv[1])) as services:
