@@ -51,7 +51,7 @@ LABORATORY_FAULTS = frozenset(
 class Fault(FrozenModel):
     """One thing that goes wrong."""
 
-    kind: FaultKind
+    kind: Annotated[FaultKind, Field(description="what goes wrong")]
     view: Annotated[str | None, Field(description="whose camera or light; none for the faults of the bench")] = None
     amount: Annotated[float, Field(ge=0, description="how much; see the kind")] = 1.0
 

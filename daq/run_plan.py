@@ -57,11 +57,13 @@ class PulsePair(FrozenModel):
 class RunPlan(FrozenModel):
     """A planned sequence of shots of one kind."""
 
-    name: RunName
-    kind: RunKind = RunKind.SAMPLE
+    name: Annotated[RunName, Field(description="what the operator calls the run; its id adds the time")]
+    kind: Annotated[RunKind, Field(description="what was prepared: spray, no spray, no light, or the target")] = (
+        RunKind.SAMPLE
+    )
     shots: Annotated[int, Field(ge=1, le=100_000, description="number of double exposures")]
     rate_hz: Annotated[float, Field(gt=0, le=100, description="shots per second")] = 1.0
-    pulse: PulsePair
+    pulse: Annotated[PulsePair, Field(description="the light of every shot")]
     stage_z_mm: Annotated[
         tuple[float, ...], Field(description="target positions; shots are taken at each; empty: the stage stays")
     ] = ()

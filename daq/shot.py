@@ -2,9 +2,11 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from daq.run_plan import ImageKey
 
@@ -13,25 +15,13 @@ Image = NDArray[np.uint8] | NDArray[np.uint16]
 
 @dataclass(frozen=True)
 class ExposureRecord:
-    """What the camera said of one exposure.
+    """What the camera said of one exposure."""
 
-    Parameters
-    ----------
-    valid : bool
-        The exposure arrived complete and belongs to this shot.
-    frame_id : int
-        Frame id of the camera (16 bit, 1 to 65535); 0 where the exposure is missing.
-    device_timestamp_ns : int
-        Camera clock at the exposure; 0 where missing.
-    missing_packets, resent_packets : int
-        Network packets that never came, and that came on the second request.
-    """
-
-    valid: bool
-    frame_id: int = 0
-    device_timestamp_ns: int = 0
-    missing_packets: int = 0
-    resent_packets: int = 0
+    valid: Annotated[bool, Field(description="it arrived complete and belongs to this shot")]
+    frame_id: Annotated[int, Field(description="16 bit, 1 to 65535; 0 where the exposure is missing")] = 0
+    device_timestamp_ns: Annotated[int, Field(description="camera clock at the exposure; 0 where missing")] = 0
+    missing_packets: Annotated[int, Field(description="network packets that never came")] = 0
+    resent_packets: Annotated[int, Field(description="network packets that came on the second request")] = 0
 
 
 @dataclass(frozen=True)
@@ -62,28 +52,22 @@ class DoubleFrame:
 class LightPulse:
     """One light pulse as it was fired; zero is the trigger of the shot."""
 
-    start_ns: int
-    width_ns: int
-    current_a: float
+    start_ns: Annotated[int, Field(description="rising edge")]
+    width_ns: Annotated[int, Field(description="duration")]
+    current_a: Annotated[float, Field(description="peak current of the LED")]
 
 
 @dataclass(frozen=True)
 class FiredTrain:
-    """The pulse train of one shot as the generator quantised and fired it.
+    """The pulse train of one shot as the generator quantised and fired it."""
 
-    Parameters
-    ----------
-    sequence : int
-        Trigger sequence number, counted by the generator.
-    camera_trigger_ns : Mapping[str, int]
-        Rising edge of each view's camera trigger; zero is the trigger of the shot.
-    pulses : Mapping[str, tuple[LightPulse, ...]]
-        Light pulses of each view; empty for a dark exposure.
-    """
-
-    sequence: int
-    camera_trigger_ns: Mapping[str, int] = field(default_factory=dict)
-    pulses: Mapping[str, tuple[LightPulse, ...]] = field(default_factory=dict)
+    sequence: Annotated[int, Field(description="trigger sequence number, counted by the generator")]
+    camera_trigger_ns: Annotated[
+        Mapping[str, int], Field(description="rising edge of each camera trigger; zero is the trigger of the shot")
+    ] = field(default_factory=dict)
+    pulses: Annotated[
+        Mapping[str, tuple[LightPulse, ...]], Field(description="light pulses by view; none for a dark exposure")
+    ] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

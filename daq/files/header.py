@@ -13,18 +13,12 @@ from daq.run_plan import RunPlan
 
 @dataclass(frozen=True)
 class ViewFormat:
-    """How the frames of one view are stored.
+    """How the frames of one view are stored."""
 
-    Parameters
-    ----------
-    shape : tuple[int, int]
-        (rows, columns).
-    bits : int
-        Significant bits of a grey value, 8 to 16.
-    """
-
-    shape: tuple[Annotated[int, Field(ge=1)], Annotated[int, Field(ge=1)]]
-    bits: Annotated[int, Field(ge=8, le=16)]
+    shape: Annotated[
+        tuple[Annotated[int, Field(ge=1)], Annotated[int, Field(ge=1)]], Field(description="(rows, columns)")
+    ]
+    bits: Annotated[int, Field(ge=8, le=16, description="significant bits of a grey value")]
 
     @property
     def dtype(self) -> np.dtype[Any]:
@@ -38,46 +32,31 @@ class ViewFormat:
 
 
 class RunHeader(FrozenModel):
-    """What a run is, written before its first shot and never changed.
+    """What a run is, written before its first shot and never changed."""
 
-    Parameters
-    ----------
-    run_id : str
-        Name of the run directory.
-    created_utc : str
-        ISO 8601, UTC.
-    views : dict[str, ViewFormat]
-        One to eight views; sizes and bit depths may differ.
-    frames_per_shot : {1, 2}
-        2: exposures A and B; 1: single exposures.
-    plan : RunPlan | None
-        None for imported images.
-    configuration : dict
-        The resolved configuration of the rig, JSON.
-    devices : dict[str, dict[str, str]]
-        Vendor, model, serial and firmware by device name.
-    software : dict[str, str]
-        Versions by package.
-    calibration_id, calibration_sha256 : str | None
-        The calibration that belongs to this run.
-    polarity : {"shadow", "bright"}
-        Dark objects before light, or bright ones before dark.
-    separation_ns : int | None
-        Time between exposures A and B; None for single exposures.
-    """
-
-    run_id: Annotated[str, Field(min_length=1)]
-    created_utc: str
-    views: Annotated[dict[ViewName, ViewFormat], Field(min_length=1, max_length=8)]
-    frames_per_shot: Literal[1, 2] = 2
-    plan: RunPlan | None = None
-    configuration: dict[str, Any] = Field(default_factory=dict)
-    devices: dict[str, dict[str, str]] = Field(default_factory=dict)
-    software: dict[str, str] = Field(default_factory=dict)
-    calibration_id: str | None = None
-    calibration_sha256: str | None = None
-    polarity: Literal["shadow", "bright"] = "shadow"
-    separation_ns: int | None = None
+    run_id: Annotated[str, Field(min_length=1, description="name of the run directory")]
+    created_utc: Annotated[str, Field(description="ISO 8601, UTC")]
+    views: Annotated[
+        dict[ViewName, ViewFormat],
+        Field(min_length=1, max_length=8, description="how the frames of each view are stored; sizes may differ"),
+    ]
+    frames_per_shot: Annotated[Literal[1, 2], Field(description="2: exposures A and B; 1: single exposures")] = 2
+    plan: Annotated[RunPlan | None, Field(description="as the operator wrote it; null for imported images")] = None
+    configuration: Annotated[dict[str, Any], Field(description="the resolved configuration of the rig")] = Field(
+        default_factory=dict
+    )
+    devices: Annotated[
+        dict[str, dict[str, str]], Field(description="vendor, model, serial and firmware by device name")
+    ] = Field(default_factory=dict)
+    software: Annotated[dict[str, str], Field(description="versions by package")] = Field(default_factory=dict)
+    calibration_id: Annotated[str | None, Field(description="the calibration that belongs to this run")] = None
+    calibration_sha256: Annotated[str | None, Field(description="SHA-256 of its file when the run started")] = None
+    polarity: Annotated[
+        Literal["shadow", "bright"], Field(description="dark objects before light, or bright ones before dark")
+    ] = "shadow"
+    separation_ns: Annotated[
+        int | None, Field(description="time between exposures A and B; null for single exposures")
+    ] = None
 
     @property
     def shot_bytes(self) -> int:

@@ -45,7 +45,9 @@ class GridSettings(FrozenValue):
 class ReconstructionSettings(FrozenValue):
     """How shots become volumes; travels with every result."""
 
-    method: ReconstructionMethod = ReconstructionMethod.MLOS
+    method: Annotated[ReconstructionMethod, Field(description="line of sight, fast; or iterative, fewer ghosts")] = (
+        ReconstructionMethod.MLOS
+    )
     accuracy: Annotated[Accuracy, Field(description="fine: two to three times more accurate, at twice the cost")] = (
         Accuracy.NOMINAL
     )

@@ -2,10 +2,14 @@
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+from pydantic import Field
+
+from daq.files.atomic_file import replacing
 from daq.frozen_model import FrozenModel
-from server.lab.errors import NotFound
+from daq.names import is_identifier
+from server.lab.errors import Damaged, NotFound
 
 _CURRENT = "current"
 
@@ -13,8 +17,8 @@ _CURRENT = "current"
 class CalibrationSummary(FrozenModel):
     """One calibration in a list."""
 
-    id: str
-    current: bool
+    id: Annotated[str, Field(description="name of its file, without the ending")]
+    current: Annotated[bool, Field(description="it is used for runs that name none")]
 
 
 class CalibrationStore:
@@ -31,35 +35,54 @@ class CalibrationStore:
         self._folder = folder
 
     def path(self, calibration_id: str) -> Path:
-        """File of a calibration, whether it exists or not."""
+        """File of a calibration, whether it exists or not; NotFound for what is no id and could lead elsewhere."""
+        if not is_identifier(calibration_id):
+            raise NotFound(f"there is no calibration {calibration_id!r}")
         return self._folder / f"{calibration_id}.json"
+
+    def has(self, calibration_id: str) -> bool:
+        """Whether there is such a calibration."""
+        return is_identifier(calibration_id) and self.path(calibration_id).is_file()
 
     def list(self) -> list[CalibrationSummary]:
         """All calibrations, newest first."""
         current = self.current
-        files = sorted(self._folder.glob("*.json"), key=lambda path: path.stat().st_mtime_ns, reverse=True)
+        files = [path for path in self._folder.glob("*.json") if is_identifier(path.stem)]
+        files.sort(key=_time_ns, reverse=True)
         return [CalibrationSummary(id=path.stem, current=path.stem == current) for path in files]
 
     def document(self, calibration_id: str) -> dict[str, Any]:
-        """The calibration as it is stored; NotFound if there is none."""
-        document: dict[str, Any] = json.loads(self._existing(calibration_id).read_text())
+        """The calibration as it is stored; NotFound if there is none, Damaged if it is no JSON."""
+        path = self.path(calibration_id)
+        try:
+            document = json.loads(path.read_text())
+        except FileNotFoundError as error:
+            raise NotFound(f"there is no calibration {calibration_id!r}") from error
+        except (OSError, ValueError) as error:
+            raise Damaged(f"{path}: cannot be read: {error}") from error
+        if not isinstance(document, dict):
+            raise Damaged(f"{path}: is no calibration")
         return document
 
     @property
     def current(self) -> str | None:
-        """Id of the calibration for runs that name none."""
-        marker = self._folder / _CURRENT
-        return marker.read_text().strip() if marker.exists() else None
+        """Id of the calibration for runs that name none; None where none was chosen, or nobody can read which."""
+        try:
+            chosen = (self._folder / _CURRENT).read_text().strip()
+        except (OSError, ValueError):
+            return None
+        return chosen if is_identifier(chosen) else None
 
     def choose(self, calibration_id: str) -> None:
-        """Make a calibration the current one; NotFound if there is none."""
-        self._existing(calibration_id)
-        part = self._folder / f"{_CURRENT}.part"
-        part.write_text(calibration_id + "\n")
-        part.replace(self._folder / _CURRENT)
+        """Make a calibration the current one; NotFound if there is none, Damaged if it cannot be read."""
+        self.document(calibration_id)
+        with replacing(self._folder / _CURRENT) as part:
+            part.write_text(calibration_id + "\n")
 
-    def _existing(self, calibration_id: str) -> Path:
-        path = self.path(calibration_id)
-        if not path.is_file():
-            raise NotFound(f"there is no calibration {calibration_id!r}")
-        return path
+
+def _time_ns(path: Path) -> int:
+    """When a file was written; long ago if it has gone meanwhile."""
+    try:
+        return path.stat().st_mtime_ns
+    except OSError:
+        return 0

@@ -13,5 +13,9 @@ class Conflict(ServerError):
     """The thing is not in a state that allows this; the text names the state."""
 
 
+class Damaged(ServerError):
+    """A file that the server keeps cannot be read; the text names it."""
+
+
 class Unprocessable(ServerError):
     """The request is well formed and makes no sense here."""

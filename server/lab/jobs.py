@@ -2,24 +2,24 @@
 
 ::
 
-    QUEUED ──▶ RUNNING ──▶ DONE
+    QUEUED ──▶ RUNNING ──▶ DONE ────▶ QUEUED   (its files are gone, and it was asked for again)
       │ ▲         ├──────▶ FAILED ──▶ QUEUED   (asked for again)
       │ └─────────┤                            (the server died)
       └───────────┴──────▶ ABORTED ─▶ QUEUED   (asked for again)
 
-The table is a catalogue: run directories hold the truth, and ``jobs_on_disk`` finds it there.
+The table is a catalogue: run directories hold the truth, and ``server.lab.job_recovery`` finds it there.
 """
 
 import json
 import sqlite3
 import threading
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from datetime import UTC, datetime
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import Field
+from pydantic import Field, ValidationError
 
 from daq.frozen_model import FrozenModel
 from server.lab.errors import Conflict, NotFound
@@ -46,12 +46,13 @@ class JobState(StrEnum):
 TRANSITIONS: Mapping[JobState, frozenset[JobState]] = {
     JobState.QUEUED: frozenset({JobState.RUNNING, JobState.ABORTED}),
     JobState.RUNNING: frozenset({JobState.DONE, JobState.FAILED, JobState.ABORTED, JobState.QUEUED}),
-    JobState.DONE: frozenset(),
+    JobState.DONE: frozenset({JobState.QUEUED}),
     JobState.FAILED: frozenset({JobState.QUEUED}),
     JobState.ABORTED: frozenset({JobState.QUEUED}),
 }
 """State -> states that may follow."""
 _UNSUCCESSFUL = (JobState.FAILED, JobState.ABORTED)
+_STRANGE = "strange"
 ENDED = (JobState.DONE, *_UNSUCCESSFUL)
 """States of jobs that do not run or wait."""
 
@@ -65,24 +66,41 @@ class Job(FrozenModel):
     """One piece of work of the processing side, by itself a complete account of it."""
 
     id: Annotated[str, Field(description="made of run, results and shot: the same work has the same id")]
-    kind: JobKind
-    run_id: str
+    kind: Annotated[JobKind, Field(description="what is done")]
+    run_id: Annotated[str, Field(description="run that it works on")]
     shot: Annotated[int | None, Field(description="index of the shot; null for a calibration")] = None
     calibration: Annotated[str, Field(description="id of the calibration that is used, or made")]
     results_id: Annotated[str | None, Field(description="directory of the results in the run; null if there are none")]
     settings: Annotated[dict[str, Any], Field(description="what the work function is told")]
-    state: JobState = JobState.QUEUED
+    state: Annotated[JobState, Field(description="where it stands")] = JobState.QUEUED
     result: Annotated[dict[str, Any] | None, Field(description="what it said when done")] = None
     error: Annotated[str | None, Field(description="why it failed")] = None
-    created_utc: str = Field(default_factory=now_utc)
-    changed_utc: str = Field(default_factory=now_utc)
+    created_utc: Annotated[str, Field(description="when it was asked for, ISO 8601")] = Field(default_factory=now_utc)
+    changed_utc: Annotated[str, Field(description="when its state last changed, ISO 8601")] = Field(
+        default_factory=now_utc
+    )
 
 
-def reconstruction_job(
-    run_id: str, shot: int, calibration: str, settings_id: str, settings: Mapping[str, Any], **more: Any
+def reconstruction_job(run_id: str, shot: int, calibration: str, results_id: str, settings: Mapping[str, Any]) -> Job:
+    """Job for one shot; ``results_id`` stands for settings and calibration, and names the directory of the results."""
+    return Job(
+        id=f"{run_id}.{results_id}.{shot:05d}",
+        kind=JobKind.RECONSTRUCTION,
+        run_id=run_id,
+        shot=shot,
+        calibration=calibration,
+        results_id=results_id,
+        settings=dict(settings),
+    )
+
+
+def finished_reconstruction(
+    run_id: str, shot: int, calibration: str, results_id: str, settings: Mapping[str, Any]
 ) -> Job:
-    """Job for one shot; its results lie in a directory of their own per settings and calibration."""
-    return _reconstruction(run_id, shot, calibration, f"{settings_id}-{calibration}", settings, more)
+    """Such a job whose volumes are there."""
+    return reconstruction_job(run_id, shot, calibration, results_id, settings).model_copy(
+        update={"state": JobState.DONE}
+    )
 
 
 def calibration_job(run_id: str, calibration: str, model: str) -> Job:
@@ -107,21 +125,6 @@ def check_job(run_id: str, shot: int, calibration: str) -> Job:
         calibration=calibration,
         results_id=None,
         settings={},
-    )
-
-
-def _reconstruction(
-    run_id: str, shot: int, calibration: str, results_id: str, settings: Mapping[str, Any], more: Mapping[str, Any]
-) -> Job:
-    return Job(
-        id=f"{run_id}.{results_id}.{shot:05d}",
-        kind=JobKind.RECONSTRUCTION,
-        run_id=run_id,
-        shot=shot,
-        calibration=calibration,
-        results_id=results_id,
-        settings=dict(settings),
-        **more,
     )
 
 
@@ -160,14 +163,17 @@ class JobTable:
         with self._lock:  # SQLite crashes the process where a connection is closed under a statement
             self._database.close()
 
-    def add(self, job: Job) -> Job:
-        """Queue a job. The same work is not done twice: a waiting, running or done job is returned as it is."""
+    def add(self, job: Job, is_lost: Callable[[Job], bool] = lambda _: False) -> Job:
+        """Queue a job. The same work is not done twice: a waiting, running or done job is returned as it is.
+
+        ``is_lost`` tells of a done job whether it has to be done again, because what it made is gone.
+        """
         with self._lock, self._database:
             known = self._find(job.id)
             if known is None:
                 self._insert(job)
                 return job
-            if known.state not in _UNSUCCESSFUL:
+            if known.state not in _UNSUCCESSFUL and not (known.state is JobState.DONE and is_lost(known)):
                 return known
             return self._replace(known, JobState.QUEUED, result=None, error=None)
 
@@ -206,12 +212,12 @@ class JobTable:
         """Jobs in one state, the longest waiting first; -1 for all of them."""
         return self._select(f"{_SELECT} ORDER BY number LIMIT ?4", None, [state], limit, kinds)
 
-    def requeue_interrupted(self) -> int:
-        """Queue again what was running when the server died; how many jobs that were."""
-        running = self.oldest(JobState.RUNNING)
-        for job in running:
+    def requeue_interrupted(self, running: Collection[str] = ()) -> int:
+        """Queue again what is said to run and does not, as after the death of a server; how many jobs that were."""
+        interrupted = [job for job in self.oldest(JobState.RUNNING) if job.id not in running]
+        for job in interrupted:
             self.move(job.id, JobState.QUEUED)
-        return len(running)
+        return len(interrupted)
 
     def restore(self, jobs: Iterable[Job]) -> int:
         """Take in jobs that the table does not know; how many."""
@@ -221,6 +227,15 @@ class JobTable:
                 self._insert(job)
         return len(new)
 
+    def set_strangers_aside(self) -> list[str]:
+        """Take rows that are no jobs of this version out of queue and lists; their ids. They stay in the file."""
+        with self._lock, self._database:
+            rows = self._database.execute("SELECT id, document FROM job WHERE state <> ?", (_STRANGE,))
+            strangers = [job_id for job_id, document in rows if not _is_job(document)]
+            for job_id in strangers:
+                self._database.execute("UPDATE job SET state = ? WHERE id = ?", (_STRANGE, job_id))
+        return strangers
+
     def _select(
         self, query: str, run_id: str | None, states: Iterable[JobState], limit: int, kinds: Iterable[JobKind]
     ) -> list[Job]:
@@ -229,7 +244,9 @@ class JobTable:
         return [Job.model_validate_json(document) for (document,) in rows]
 
     def _find(self, job_id: str) -> Job | None:
-        row = self._database.execute("SELECT document FROM job WHERE id = ?", (job_id,)).fetchone()
+        row = self._database.execute(
+            "SELECT document FROM job WHERE id = ? AND state <> ?", (job_id, _STRANGE)
+        ).fetchone()
         return Job.model_validate_json(row[0]) if row else None
 
     def _known(self, job_id: str) -> Job:
@@ -240,7 +257,7 @@ class JobTable:
 
     def _insert(self, job: Job) -> None:
         self._database.execute(
-            "INSERT INTO job (id, run_id, state, document) VALUES (?, ?, ?, ?)",
+            "INSERT OR REPLACE INTO job (id, run_id, state, document) VALUES (?, ?, ?, ?)",
             (job.id, job.run_id, job.state, job.model_dump_json()),
         )
 
@@ -256,16 +273,9 @@ def _listed(names: Iterable[StrEnum]) -> str:
     return json.dumps([name.value for name in names])
 
 
-def jobs_on_disk(data_dir: Path) -> Iterator[Job]:
-    """Finished reconstructions, as the results in the run directories tell them."""
-    for record in sorted(data_dir.glob("*/results/*/settings.json")):
-        written = json.loads(record.read_text())
-        for volume in sorted(record.parent.glob("shot_*_a.vtkhdf")):
-            yield _reconstruction(
-                run_id=record.parents[2].name,
-                shot=int(volume.name.split("_")[1]),
-                calibration=Path(written["calibration_file"]).stem,
-                results_id=record.parent.name,
-                settings=json.loads(written["settings"]),
-                more={"state": JobState.DONE},
-            )
+def _is_job(document: str) -> bool:
+    try:
+        Job.model_validate_json(document)
+    except ValidationError:
+        return False
+    return True

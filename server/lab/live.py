@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from daq.devices import Camera
 from daq.shot import Image
+from server.lab.duty import Duty, pause
 from server.pictures.pictures import preview_jpeg
 
 _PERIOD_S = 0.1
@@ -41,11 +42,11 @@ class LiveFeed:
         self._wanted = asyncio.Event()
         self._tick = asyncio.Event()
 
-    async def run(self) -> None:
+    async def run(self, duty: Duty) -> None:
         """Encode new exposures until cancelled."""
         while True:
             await self._wanted.wait()
-            await asyncio.to_thread(self._encode_new_exposures)
+            await asyncio.to_thread(self._encode_new_exposures, duty)
             tick, self._tick = self._tick, asyncio.Event()
             tick.set()
             await pause(_PERIOD_S)
@@ -68,15 +69,14 @@ class LiveFeed:
             if self._readers == 0:
                 self._wanted.clear()
 
-    def _encode_new_exposures(self) -> None:
+    def _encode_new_exposures(self, duty: Duty) -> None:
         for view, camera in enumerate(self._cameras):
-            exposure = camera.latest()
-            if exposure is not None and exposure is not self._exposures[view]:
-                self._exposures[view] = exposure
-                jpeg = preview_jpeg(exposure, camera.bits, _WIDTH_PX)
-                self._pictures[view] = LivePicture(self._pictures[view].number + 1, bytes([view]) + jpeg)
+            with duty.item(camera.name):
+                self._encode_new_exposure(view, camera)
 
-
-async def pause(period_s: float) -> None:
-    """Let the event loop do other things for a while: the pace of a loop, never a wait for something."""
-    await asyncio.sleep(period_s)
+    def _encode_new_exposure(self, view: int, camera: Camera) -> None:
+        exposure = camera.latest()
+        if exposure is not None and exposure is not self._exposures[view]:
+            jpeg = preview_jpeg(exposure, camera.bits, _WIDTH_PX)
+            self._pictures[view] = LivePicture(self._pictures[view].number + 1, bytes([view]) + jpeg)
+            self._exposures[view] = exposure

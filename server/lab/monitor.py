@@ -3,34 +3,18 @@
 import asyncio
 import contextlib
 import shutil
-from collections.abc import Iterator
-from enum import StrEnum
+import time
+from collections.abc import Callable
 from pathlib import Path
 
 from daq.devices import Device, DeviceIdentity, GeneratorState, Rig
 from daq.errors import DaqError
-from daq.frozen_model import FrozenModel
-from server.lab.live import pause
+from server.lab.duty import Duty, Health, Lamp, pause
 
 _PERIOD_S = 1.0
+STALE_S = 5.0
+"""Answers older than this are told with their age: devices give up on each question sooner."""
 _LOW_DISK_BYTES = 20e9
-
-
-class Health(StrEnum):
-    """Colour of a lamp: green, amber, red."""
-
-    OK = "ok"
-    WARN = "warn"
-    FAULT = "fault"
-
-
-class Lamp(FrozenModel):
-    """State of one part of the rig."""
-
-    name: str
-    kind: str
-    health: Health
-    detail: str
 
 
 class RigMonitor:
@@ -42,62 +26,85 @@ class RigMonitor:
         Opened devices.
     data_dir : Path
         Its file system must have room for runs.
+    now_s : Callable[[], float]
+        A clock that never goes back.
     """
 
-    def __init__(self, rig: Rig, data_dir: Path) -> None:
+    def __init__(self, rig: Rig, data_dir: Path, now_s: Callable[[], float] = time.monotonic) -> None:
         self._rig = rig
         self._data_dir = data_dir
+        self._now_s = now_s
         self._identities: dict[str, DeviceIdentity] = {}
-        self.lamps: tuple[Lamp, ...] = ()
+        self._answers: tuple[Lamp, ...] = ()
+        self._answered_s = now_s()
 
-    async def run(self) -> None:
+    @property
+    def lamps(self) -> tuple[Lamp, ...]:
+        """What every device last answered; never green where that is long ago."""
+        age_s = self._now_s() - self._answered_s
+        return self._answers if age_s < STALE_S else tuple(_aged(lamp, age_s) for lamp in self._answers)
+
+    async def run(self, duty: Duty) -> None:
         """Ask until cancelled."""
         while True:
-            await self.ask()
+            with duty.item("devices"):
+                await self.ask()
             await pause(_PERIOD_S)
 
     async def ask(self) -> None:
         """Ask every device once."""
-        self.lamps = tuple(await asyncio.to_thread(lambda: list(self._lamps())))
+        self._answers = await asyncio.to_thread(self._asked)
+        self._answered_s = self._now_s()
 
-    def _lamps(self) -> Iterator[Lamp]:
-        for view, camera in self._rig.cameras.items():
-            lost = Lamp(name=view, kind="camera", health=Health.FAULT, detail="has stopped answering")
-            yield lost if camera.is_lost else self._identity_lamp(view, "camera", camera)
-        yield self._generator_lamp()
-        yield self._interlock_lamp()
-        if self._rig.stage is not None:
-            yield self._identity_lamp("stage", "stage", self._rig.stage)
-        yield self._disk_lamp()
+    def _asked(self) -> tuple[Lamp, ...]:
+        stage = self._rig.stage
+        return (
+            *(_lit(view, "camera", self._camera) for view in self._rig.cameras),
+            _lit("pulse generator", "generator", self._generator),
+            _lit("interlock", "interlock", self._interlock),
+            *(() if stage is None else (_lit("stage", "stage", lambda name: self._identity(name, stage)),)),
+            _lit("disk", "disk", self._disk),
+        )
 
-    def _identity_lamp(self, name: str, kind: str, device: Device) -> Lamp:
+    def _camera(self, view: str) -> tuple[Health, str]:
+        camera = self._rig.cameras[view]
+        return (Health.FAULT, "has stopped answering") if camera.is_lost else self._identity(view, camera)
+
+    def _identity(self, name: str, device: Device) -> tuple[Health, str]:
         """A camera is asked who it is once: later questions would come between the commands of a run."""
         with contextlib.suppress(DaqError):
             if name not in self._identities:
                 self._identities[name] = device.identity()
         known = self._identities.get(name)
         if known is None:
-            return Lamp(name=name, kind=kind, health=Health.FAULT, detail="does not answer")
-        return Lamp(name=name, kind=kind, health=Health.OK, detail=f"{known.vendor} {known.model}, {known.serial}")
+            return Health.FAULT, "does not answer"
+        return Health.OK, f"{known.vendor} {known.model}, {known.serial}"
 
-    def _generator_lamp(self) -> Lamp:
-        try:
-            status = self._rig.generator.status()
-        except DaqError as error:
-            return Lamp(name="pulse generator", kind="generator", health=Health.FAULT, detail=str(error))
-        detail = ", ".join([status.state.value, *status.faults])
+    def _generator(self, _: str) -> tuple[Health, str]:
+        status = self._rig.generator.status()
         health = Health.FAULT if status.state is GeneratorState.FAULT else Health.OK
-        return Lamp(name="pulse generator", kind="generator", health=health, detail=detail)
+        return health, ", ".join([status.state.value, *status.faults])
 
-    def _interlock_lamp(self) -> Lamp:
-        try:
-            closed = self._rig.interlock.is_closed()
-        except DaqError as error:
-            return Lamp(name="interlock", kind="interlock", health=Health.FAULT, detail=str(error))
-        detail = "closed" if closed else "open: the light is locked"
-        return Lamp(name="interlock", kind="interlock", health=Health.OK if closed else Health.FAULT, detail=detail)
+    def _interlock(self, _: str) -> tuple[Health, str]:
+        closed = self._rig.interlock.is_closed()
+        return (Health.OK, "closed") if closed else (Health.FAULT, "open: the light is locked")
 
-    def _disk_lamp(self) -> Lamp:
+    def _disk(self, _: str) -> tuple[Health, str]:
         free = shutil.disk_usage(self._data_dir).free
-        health = Health.WARN if free < _LOW_DISK_BYTES else Health.OK
-        return Lamp(name="disk", kind="disk", health=health, detail=f"{free / 1e9:.0f} GB free")
+        return Health.WARN if free < _LOW_DISK_BYTES else Health.OK, f"{free / 1e9:.0f} GB free"
+
+
+def _lit(name: str, kind: str, ask: Callable[[str], tuple[Health, str]]) -> Lamp:
+    """Lamp of one device; an error of any kind is a red one, and hides no other device."""
+    try:
+        health, detail = ask(name)
+    except DaqError as error:
+        health, detail = Health.FAULT, str(error)
+    except Exception as error:  # noqa: BLE001  a driver's own mistake must not freeze the lamps
+        health, detail = Health.FAULT, f"{type(error).__name__}: {error}"
+    return Lamp(name=name, kind=kind, health=health, detail=detail)
+
+
+def _aged(lamp: Lamp, age_s: float) -> Lamp:
+    health = Health.WARN if lamp.health is Health.OK else lamp.health
+    return lamp.model_copy(update={"health": health, "detail": f"no answer for {age_s:.0f} s; before: {lamp.detail}"})

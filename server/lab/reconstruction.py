@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from daq.run.events import ShotRecorded
 from daq.run_plan import ImageKey, RunKind
 from processing.reconstruction.settings import ReconstructionSettings
+from server.lab.duty import Duty
 from server.lab.errors import Unprocessable
 from server.lab.events import RUN_EVENTS
 from server.lab.jobs import Job, reconstruction_job
@@ -14,12 +15,13 @@ from server.lab.services import Context
 _SHOT_RECORDED = RUN_EVENTS[ShotRecorded]
 
 
-async def follow_acquisition(context: Context) -> None:
+async def follow_acquisition(context: Context, duty: Duty) -> None:
     """Queue a job for every shot that is recorded from now on; acquisition knows nothing of it."""
     events = context.services.events
     async for event in events.follow(events.newest):
         if event is not None and event.name == _SHOT_RECORDED and event.data["valid"]:
-            await asyncio.to_thread(reconstruct_by_itself, context, event.data["run_id"], event.data["index"])
+            with duty.item("recorded shots"):
+                await asyncio.to_thread(reconstruct_by_itself, context, event.data["run_id"], event.data["index"])
 
 
 def reconstruct_by_itself(context: Context, run_id: str, shot: int) -> None:
@@ -53,6 +55,7 @@ def request_reconstruction(
     if chosen is None:
         raise Unprocessable(f"run {run_id} names no calibration, and none is current")
     context.calibrations.document(chosen)
+    context.runs.require_sound(summary)
     wanted = _valid_shots(context, run_id) if shots is None else list(shots)
     if absent := [shot for shot in wanted if shot >= summary.shots_recorded]:
         raise Unprocessable(f"run {run_id} has {summary.shots_recorded} shots, not {absent}")

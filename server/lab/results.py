@@ -1,42 +1,60 @@
 """Results of a run on disk: sets of volumes by settings and calibration, and the previews of the volumes."""
 
 import json
+import re
 import threading
+import zipfile
+from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import Field
 
 from daq.frozen_model import FrozenModel
-from processing.reconstruction.volume_file import open_volume
+from processing.reconstruction.volume_file import VolumeFileError, open_volume
 from processing.runs.results_file import volume_files
-from server.lab.errors import NotFound
+from server.lab.errors import Damaged, NotFound
 from server.pictures.previews import VolumePreview, load_preview, make_preview, preview_path, save_preview
 from server.pictures.surfaces import surface_glb
 
+VOLUME_NAME = re.compile(r"shot_(?P<shot>[0-9]{5,7})_(?P<frame>[ab])")
+"""Name of a volume, without the ending of its file."""
 _MAKING = threading.Lock()  # a full volume takes seconds: who waits for a preview does not make it again
 
 
 class VolumeSummary(FrozenModel):
     """One volume of a result set."""
 
-    name: str
-    shot: int
-    frame: str
-    size_bytes: int
+    name: Annotated[str, Field(description="of its file, without the ending")]
+    shot: Annotated[int, Field(description="position in the run, from 0")]
+    frame: Annotated[str, Field(description="exposure, a or b")]
+    size_bytes: Annotated[int, Field(description="of its file")]
 
 
 class ResultSet(FrozenModel):
     """Volumes that were made with the same settings and calibration."""
 
-    id: str
-    provenance: dict[str, Any]
-    volumes: tuple[VolumeSummary, ...]
+    id: Annotated[str, Field(description="name of the directory; stands for settings and calibration")]
+    provenance: Annotated[
+        dict[str, Any], Field(description="what the volumes were made of; empty if it cannot be read")
+    ]
+    volumes: Annotated[tuple[VolumeSummary, ...], Field(description="those that are there, by shot and exposure")]
+    problem: Annotated[str | None, Field(description="why the provenance cannot be read; null if it can")] = None
 
 
 def result_sets(run_dir: Path) -> list[ResultSet]:
-    """All result sets of a run, newest first."""
-    records = sorted(run_dir.glob("results/*/settings.json"), key=lambda path: path.stat().st_mtime_ns, reverse=True)
-    return [_result_set(record) for record in records]
+    """All result sets of a run, newest first; one that cannot be read says so, and hides no other."""
+    records = sorted(_dated(run_dir.glob("results/*/settings.json")), reverse=True)
+    return [_result_set(record) for _, record in records]
+
+
+def _dated(records: Iterator[Path]) -> Iterator[tuple[int, Path]]:
+    for record in records:
+        try:
+            yield record.stat().st_mtime_ns, record
+        except FileNotFoundError:
+            continue  # taken away meanwhile
 
 
 def volume_file(run_dir: Path, results_id: str, name: str) -> Path:
@@ -48,12 +66,25 @@ def volume_file(run_dir: Path, results_id: str, name: str) -> Path:
 
 
 def preview_of(volume: Path) -> VolumePreview:
-    """Preview of a volume; made now if the volume was written by other hands."""
+    """Preview of a volume; made now if the volume was written by other hands, or its preview is damaged.
+
+    Raises
+    ------
+    Damaged
+        The volume cannot be read; the text names it.
+    """
     stored = preview_path(volume)
-    with _MAKING:
-        if not stored.is_file() or stored.stat().st_mtime_ns < volume.stat().st_mtime_ns:
-            write_preview(volume)
-    return _load(stored, stored.stat().st_mtime_ns)
+    try:
+        with _MAKING:
+            if not stored.is_file() or stored.stat().st_mtime_ns < volume.stat().st_mtime_ns:
+                write_preview(volume)
+            try:
+                return _load(stored, stored.stat().st_mtime_ns)
+            except (OSError, ValueError, KeyError, zipfile.BadZipFile):
+                write_preview(volume)
+                return _load(stored, stored.stat().st_mtime_ns)
+    except (VolumeFileError, OSError) as error:
+        raise Damaged(f"{volume.name} cannot be shown: {error}") from error
 
 
 def write_preview(volume: Path) -> None:
@@ -74,10 +105,17 @@ def _load(stored: Path, _mtime_ns: int) -> VolumePreview:
 
 
 def _result_set(record: Path) -> ResultSet:
-    volumes = tuple(_volume_summary(path) for path in volume_files(record.parent))
-    return ResultSet(id=record.parent.name, provenance=json.loads(record.read_text()), volumes=volumes)
+    volumes = tuple(_volume_summaries(record.parent))
+    try:
+        provenance = json.loads(record.read_text())
+        return ResultSet(id=record.parent.name, provenance=provenance, volumes=volumes)
+    except (OSError, ValueError) as error:
+        problem = f"{record}: cannot be read: {error}"
+        return ResultSet(id=record.parent.name, provenance={}, volumes=volumes, problem=problem)
 
 
-def _volume_summary(path: Path) -> VolumeSummary:
-    _, shot, frame = path.stem.split("_")
-    return VolumeSummary(name=path.stem, shot=int(shot), frame=frame, size_bytes=path.stat().st_size)
+def _volume_summaries(results_dir: Path) -> Iterator[VolumeSummary]:
+    for path in volume_files(results_dir):
+        if (name := VOLUME_NAME.fullmatch(path.stem)) and path.is_file():
+            shot, frame, size_bytes = int(name["shot"]), name["frame"], path.stat().st_size
+            yield VolumeSummary(name=path.stem, shot=shot, frame=frame, size_bytes=size_bytes)

@@ -18,7 +18,7 @@ def start_run(context: Context, plan: RunPlan) -> str:
     DaqError
         Acquisition refuses, see ``daq.errors``.
     """
-    if plan.calibration is not None and not context.calibrations.path(plan.calibration).is_file():
+    if plan.calibration is not None and not context.calibrations.has(plan.calibration):
         raise Unprocessable(f"calibration: there is no calibration {plan.calibration!r}")
     if plan.calibration is None and plan.kind is RunKind.SAMPLE:
         plan = plan.model_copy(update={"calibration": context.calibrations.current})

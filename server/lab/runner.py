@@ -4,12 +4,14 @@ The table is the queue. Whatever is asked for while the server is down, or was r
 """
 
 import asyncio
+import contextlib
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from server.lab.calibrations import CalibrationStore
+from server.lab.duty import Duty, pause
 from server.lab.engine import Engine, Task, TaskAborted, TaskError
 from server.lab.errors import Conflict
 from server.lab.events import EventPublisher
@@ -17,6 +19,8 @@ from server.lab.jobs import Job, JobKind, JobState, JobTable
 from server.lab.watch import CalibrationWatch
 
 _CHECKS_REMEMBERED = 1000
+_LOOK_AGAIN_S = 5.0
+_REST_S = 1.0
 
 
 class JobRunner:
@@ -64,7 +68,7 @@ class JobRunner:
 
     def submit(self, job: Job) -> Job:
         """Queue a job; from any thread. The same work is not done twice."""
-        queued = self._table.add(job)
+        queued = self._table.add(job, self._is_lost)
         self._tell(queued)
         self._loop.call_soon_threadsafe(self._changed.set)
         if following := self._watch.learn(queued):
@@ -91,26 +95,33 @@ class JobRunner:
             return await asyncio.to_thread(self._table.get, job_id)
         return await self._move(job_id, JobState.ABORTED)
 
-    async def run(self) -> None:
+    async def run(self, duty: Duty) -> None:
         """Work until cancelled; jobs that are then unfinished are taken up by the next start."""
         await asyncio.to_thread(self._take_up)
         async with asyncio.TaskGroup() as group:
             while True:
                 self._changed.clear()
-                for job in await asyncio.to_thread(self._waiting):
-                    if self._may_start(job):
-                        self._running.add(job.id)
-                        self._checked_last = job.kind is JobKind.CHECK
-                        group.create_task(self._perform(job))
-                await self._changed.wait()
+                with duty.item("queue"):
+                    for job in await asyncio.to_thread(self._waiting, frozenset(self._running)):
+                        if self._may_start(job):
+                            self._running.add(job.id)
+                            self._checked_last = job.kind is JobKind.CHECK
+                            group.create_task(self._perform(job, duty))
+                await self._wait_for_change()
+
+    async def _wait_for_change(self) -> None:
+        """Look again after a while even so: a look that failed is not the last one."""
+        with contextlib.suppress(TimeoutError):
+            await asyncio.wait_for(self._changed.wait(), _LOOK_AGAIN_S)
 
     def _take_up(self) -> None:
         self._table.requeue_interrupted()
         for job in reversed(self._table.newest(limit=_CHECKS_REMEMBERED, kinds=[JobKind.CHECK])):
             self._watch.learn(job)
 
-    def _waiting(self) -> list[Job]:
+    def _waiting(self, running: frozenset[str]) -> list[Job]:
         """Who may be next: checks and all else take turns, so that neither keeps the other waiting."""
+        self._table.requeue_interrupted(running)
         checks = self._table.oldest(JobState.QUEUED, self._engine.workers, [JobKind.CHECK])
         others = self._table.oldest(JobState.QUEUED, self._engine.workers, set(JobKind) - {JobKind.CHECK})
         return [*others, *checks] if self._checked_last else [*checks, *others]
@@ -119,15 +130,25 @@ class JobRunner:
         has_room = len(self._running) < self._engine.workers
         return has_room and job.id not in self._running and not self._watch.holds(job)
 
-    async def _perform(self, job: Job) -> None:
+    async def _perform(self, job: Job, duty: Duty) -> None:
+        try:
+            with duty.item("jobs"):
+                await self._attempt(job)
+        finally:
+            self._running.discard(job.id)
+            self._changed.set()
+
+    async def _attempt(self, job: Job) -> None:
+        """Bring a job to its end; one that the server itself cannot do has failed, with the reason."""
         try:
             await self._move(job.id, JobState.RUNNING)
             await self._settle(job)
         except Conflict:
             return  # aborted between being read from the table and being started
-        finally:
-            self._running.discard(job.id)
-            self._changed.set()
+        except Exception as error:
+            await pause(_REST_S)  # what is queued again at once would be tried again at once, for ever
+            await self._move(job.id, JobState.FAILED, error=f"{type(error).__name__}: {error}")
+            raise
 
     async def _settle(self, job: Job) -> None:
         if refusal := self._watch.refusal(job):
@@ -144,6 +165,16 @@ class JobRunner:
             await self._move(job.id, JobState.FAILED, error=str(error))
         else:
             await self._move(job.id, JobState.DONE, result=result)
+
+    def _is_lost(self, job: Job) -> bool:
+        """Whether the files of a done job are gone, or some of them."""
+        if job.kind is JobKind.CALIBRATION:
+            return not self._calibrations.path(job.calibration).is_file()
+        if job.kind is not JobKind.RECONSTRUCTION or job.results_id is None:
+            return False
+        results_dir = self._data_dir / job.run_id / "results" / job.results_id
+        written = (job.result or {}).get("volumes") or [{"file": f"shot_{job.shot:05d}_a.vtkhdf"}]
+        return not all((results_dir / volume["file"]).is_file() for volume in written)
 
     def _arguments(self, job: Job) -> dict[str, Any]:
         run_dir = self._data_dir / job.run_id

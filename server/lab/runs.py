@@ -1,5 +1,6 @@
 """RunStore: what lies in the run directories, for lists and pages. The directories are the truth; nothing is copied."""
 
+import re
 from collections.abc import Callable
 from datetime import UTC, datetime
 from functools import lru_cache
@@ -9,8 +10,10 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
+from daq.errors import ShotFileError
 from daq.files.run_directory import RunReader, list_runs
 from daq.frozen_model import FrozenModel
+from daq.names import is_identifier
 from daq.run.events import RunStatus
 from daq.run.state import RunOutcome
 from daq.run_plan import ImageKey, RunKind, RunPlan
@@ -18,23 +21,28 @@ from server.lab.errors import NotFound
 
 ACTIVE = "active"
 """Stands in the place of the outcome while a run is being recorded."""
+DAMAGED = "damaged"
+"""Stands in the place of the outcome of a run that cannot be read; the cause says why."""
+_TIME_IN_ID = re.compile(r"(\d{8}T\d{6})-")
 
 
 class RunSummary(FrozenModel):
     """One run in a list."""
 
-    run_id: str
-    name: str
-    kind: RunKind | None
-    created_utc: str
-    outcome: str
-    cause: str
-    views: tuple[str, ...]
-    frames_per_shot: int
-    shots_planned: int | None
-    shots_recorded: int
+    run_id: Annotated[str, Field(description="name of the run directory")]
+    name: Annotated[str, Field(description="what the operator calls it")]
+    kind: Annotated[RunKind | None, Field(description="what was prepared; null for imported images")]
+    created_utc: Annotated[str, Field(description="when it was started, ISO 8601")]
+    outcome: Annotated[
+        str, Field(description="completed, stopped, aborted, failed, interrupted; active; damaged: it cannot be read")
+    ]
+    cause: Annotated[str, Field(description="why it ended, or why it cannot be read; empty if it was completed")]
+    views: Annotated[tuple[str, ...], Field(description="names of the lines of sight")]
+    frames_per_shot: Annotated[int, Field(description="2: exposures A and B; 1: single ones; 0: nobody knows")]
+    shots_planned: Annotated[int | None, Field(description="null for imported images")]
+    shots_recorded: Annotated[int, Field(description="shots on the disk")]
     shots_valid: Annotated[int | None, Field(description="null before the run has ended")]
-    calibration: str | None
+    calibration: Annotated[str | None, Field(description="that reconstructs it, where the run names one")]
 
 
 class RunStore:
@@ -55,7 +63,7 @@ class RunStore:
     def directory(self, run_id: str) -> Path:
         """Directory of a run; NotFound if there is none."""
         path = self._data_dir / run_id
-        if not (path / "run.h5").is_file():
+        if not is_identifier(run_id) or not (path / "run.h5").is_file():
             raise NotFound(f"there is no run {run_id!r}")
         return path
 
@@ -70,14 +78,21 @@ class RunStore:
             return _summary_of_beginning(run_id, status, status.plan)
         return self._summary_of(self.directory(run_id))
 
+    def require_sound(self, summary: RunSummary) -> None:
+        """Raise ShotFileError if a run is damaged."""
+        if summary.outcome == DAMAGED:
+            raise ShotFileError(summary.cause)
+
     def newest(self, limit: int = 100) -> list[RunSummary]:
-        """Runs, newest first."""
-        directories = sorted(list_runs(self._data_dir), key=lambda path: path.stat().st_ctime_ns, reverse=True)
+        """Runs, newest first by their own time, whatever has been done to their directories since."""
+        directories = sorted(list_runs(self._data_dir), key=_started, reverse=True)
         return [self._summary_of(path) for path in directories[:limit]]
 
     def _summary_of(self, run_dir: Path) -> RunSummary:
-        shots = run_dir / "shots"
-        read = _read_summary(run_dir, (run_dir / "run.h5").stat().st_mtime_ns, shots.stat().st_mtime_ns)
+        try:
+            read = _read_summary(run_dir, _changed_ns(run_dir / "run.h5"), _changed_ns(run_dir / "shots"))
+        except ShotFileError as error:
+            return _summary_of_damaged(run_dir, str(error))
         status = self._status()
         if not (status.active and status.run_id == run_dir.name):
             return read
@@ -100,6 +115,52 @@ def _summary_of_beginning(run_id: str, status: RunStatus, plan: RunPlan) -> RunS
         shots_valid=None,
         calibration=plan.calibration,
     )
+
+
+def _summary_of_damaged(run_dir: Path, cause: str) -> RunSummary:
+    """A run that cannot be read: it hides no other."""
+    return RunSummary(
+        run_id=run_dir.name,
+        name=run_dir.name,
+        kind=None,
+        created_utc=_started(run_dir).isoformat(),
+        outcome=DAMAGED,
+        cause=cause,
+        views=(),
+        frames_per_shot=0,
+        shots_planned=None,
+        shots_recorded=0,
+        shots_valid=None,
+        calibration=None,
+    )
+
+
+def _started(run_dir: Path) -> datetime:
+    """When a run was started. Its id says so, as its header does; imported runs have no time in their ids."""
+    if written := _TIME_IN_ID.match(run_dir.name):
+        try:
+            return datetime.strptime(written[1], "%Y%m%dT%H%M%S").replace(tzinfo=UTC)
+        except ValueError:
+            pass  # digits, but no time
+    return _created(run_dir, _changed_ns(run_dir / "run.h5"))
+
+
+@lru_cache(maxsize=4096)
+def _created(run_dir: Path, changed_ns: int) -> datetime:
+    """What the header says; if nobody can read it, when its file was changed."""
+    try:
+        created = datetime.fromisoformat(RunReader(run_dir).header.created_utc)
+    except (ShotFileError, ValueError):
+        return datetime.fromtimestamp(changed_ns / 1e9, UTC)
+    return created if created.tzinfo else created.replace(tzinfo=UTC)
+
+
+def _changed_ns(path: Path) -> int:
+    """When a file or folder was changed; 0 if it is gone."""
+    try:
+        return path.stat().st_mtime_ns
+    except OSError:
+        return 0
 
 
 @lru_cache(maxsize=512)

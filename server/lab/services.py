@@ -11,6 +11,7 @@ from daq.run.events import RunStatus
 from daq.run_plan import RunPlan
 from processing.reconstruction.settings import ReconstructionSettings
 from server.lab.calibrations import CalibrationStore
+from server.lab.duty import Duty, Lamp
 from server.lab.engine import Engine, Task
 from server.lab.events import EventPublisher
 from server.lab.jobs import JobKind, JobTable
@@ -99,6 +100,12 @@ class Context:
     watch: CalibrationWatch
     monitor: RigMonitor
     live: LiveFeed
+    duties: tuple[Duty, ...]
+
+    @property
+    def lamps(self) -> tuple[Lamp, ...]:
+        """Of all devices, and of the work in the background that fails."""
+        return (*self.monitor.lamps, *(lamp for duty in self.duties if (lamp := duty.lamp)))
 
     @property
     def standing(self) -> CalibrationStanding | None:

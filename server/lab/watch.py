@@ -30,13 +30,13 @@ _REMEDY_BEYOND = (
 class CalibrationStanding(FrozenModel):
     """What the newest check that could tell says of a calibration and a run."""
 
-    run_id: str
-    calibration: str
+    run_id: Annotated[str, Field(description="run of the shot that was checked")]
+    calibration: Annotated[str, Field(description="calibration that was checked")]
     shot: Annotated[int, Field(description="the shot that was checked")]
     verdict: Annotated[Verdict, Field(description="warn: an alarm; refuse: nothing is reconstructed")]
     moved: Annotated[str | None, Field(description="the view whose motion alone explains what is seen")]
     views: Annotated[dict[str, float], Field(description="disparity by view, px; none where it cannot be measured")]
-    uncertainty_px: dict[str, float]
+    uncertainty_px: Annotated[dict[str, float], Field(description="of the disparity, by view")]
     problem: Annotated[str | None, Field(description="what is wrong where no disparity can be measured")] = None
     shots_checked: Annotated[int, Field(description="of this run with this calibration")]
 

@@ -2,11 +2,11 @@
 
 import asyncio
 import contextlib
-import logging
 import signal
 import socket
 from collections.abc import AsyncIterator, Coroutine, Iterator
 from contextlib import AsyncExitStack, asynccontextmanager, contextmanager
+from functools import partial
 from importlib.metadata import version
 from typing import Any
 
@@ -17,7 +17,9 @@ from starlette.routing import Match
 
 from daq.errors import AlreadyHeld, DaqError
 from server.lab.calibrations import CalibrationStore
-from server.lab.jobs import JobTable, jobs_on_disk
+from server.lab.duty import Duty, Work
+from server.lab.job_recovery import opened_table
+from server.lab.jobs import JobTable
 from server.lab.live import LiveFeed
 from server.lab.monitor import RigMonitor
 from server.lab.reconstruction import follow_acquisition
@@ -31,10 +33,10 @@ from server.web.api.parameters import forbid_unknown_query
 from server.web.guard import Guard
 from server.web.ui.page import mount_page
 
-_LOG = logging.getLogger(__name__)
 _RESOURCES = (rig, runs, shots, results, calibrations, jobs, events, bench, timing)
 _METHODS = ["GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"]
 _SHUTDOWN_S = 3
+_DUTIES = ("processing", "automatic reconstruction", "lamps", "live view")
 
 
 def create_app(services: Services) -> FastAPI:
@@ -123,26 +125,15 @@ async def _life(app: FastAPI, services: Services) -> AsyncIterator[None]:
     services.events.attach()
     async with AsyncExitStack() as stack:
         stack.callback(services.events.detach)
-        jobs_table = stack.enter_context(_job_table(services))
+        jobs_table = stack.enter_context(opened_table(services.data_dir, services.events))
         await stack.enter_async_context(services.engine)
         context = app.state.context = _context(services, jobs_table)
         await context.monitor.ask()
-        for work in (context.runner.run(), follow_acquisition(context), context.monitor.run(), context.live.run()):
-            await stack.enter_async_context(_in_background(work))
+        follow = partial(follow_acquisition, context)
+        works: tuple[Work, ...] = (context.runner.run, follow, context.monitor.run, context.live.run)
+        for duty, work in zip(context.duties, works, strict=True):
+            await stack.enter_async_context(_in_background(duty.keep(work)))
         yield
-
-
-@contextmanager
-def _job_table(services: Services) -> Iterator[JobTable]:
-    path = services.data_dir / "jobs.sqlite"
-    is_new = not path.exists()
-    table = JobTable(path)
-    try:
-        if is_new:
-            table.restore(jobs_on_disk(services.data_dir))
-        yield table
-    finally:
-        table.close()
 
 
 def _context(services: Services, table: JobTable) -> Context:
@@ -157,23 +148,18 @@ def _context(services: Services, table: JobTable) -> Context:
         watch=watch,
         monitor=RigMonitor(services.rig, services.data_dir),
         live=LiveFeed(services.rig.cameras),
+        duties=tuple(Duty(name, services.events) for name in _DUTIES),
     )
 
 
 @asynccontextmanager
 async def _in_background(work: Coroutine[Any, Any, None]) -> AsyncIterator[None]:
     task = asyncio.create_task(work)
-    task.add_done_callback(_report_death)
     try:
         yield
     finally:
         task.cancel()
         await asyncio.wait([task])
-
-
-def _report_death(task: asyncio.Task[None]) -> None:
-    if not task.cancelled() and (error := task.exception()):
-        _LOG.critical("background work %s died", task.get_coro(), exc_info=error)
 
 
 async def _nothing_here(request: Request) -> None:

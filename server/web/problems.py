@@ -20,7 +20,7 @@ from daq.errors import (
     RecorderError,
     ShotFileError,
 )
-from server.lab.errors import Conflict, NotFound, ServerError, Unprocessable
+from server.lab.errors import Conflict, Damaged, NotFound, ServerError, Unprocessable
 
 MEDIA_TYPE = "application/problem+json"
 _LOG = logging.getLogger(__name__)
@@ -32,9 +32,9 @@ class Problem(BaseModel):
     model_config = ConfigDict(extra="allow")
 
     type: str = Field("about:blank", description="kind of problem, urn:tomoshadow:<error>")
-    title: str
-    status: int
-    detail: str | None = None
+    title: str = Field(description="phrase of the status")
+    status: int = Field(description="HTTP status")
+    detail: str | None = Field(None, description="what is wrong, for the operator")
     instance: str | None = Field(None, description="path of the request")
 
 
@@ -49,6 +49,7 @@ STATUS_OF: dict[type[Exception], HTTPStatus] = {
     DaqError: HTTPStatus.INTERNAL_SERVER_ERROR,
     NotFound: HTTPStatus.NOT_FOUND,
     Conflict: HTTPStatus.CONFLICT,
+    Damaged: HTTPStatus.INTERNAL_SERVER_ERROR,
     Unprocessable: HTTPStatus.UNPROCESSABLE_ENTITY,
 }
 """The nearest base class in this table decides."""

@@ -1,6 +1,7 @@
 """The operator's page in a real browser: headless Chromium, a real server, every device honest."""
 
 import os
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -10,6 +11,7 @@ import pytest
 from fastapi import FastAPI
 from playwright.sync_api import Page, expect
 
+from daq.run.events import ShotRecorded
 from processing.calibration.calibration import Calibration
 from processing.calibration.calibration_file import save_calibration
 from server.lab.jobs import JobKind
@@ -19,10 +21,13 @@ from server.web.app import create_app
 from tests.support.drifting_run import DRIFT_PX, write_droplet_run
 from tests.support.drifting_views import calibration_of, views
 from tests.support.operator import VIEWS, drive_the_page
-from tests.support.serving import Serving, serving, tell_nothing
+from tests.support.serving import Serving, plan_of, serving, tell_nothing
+
+pytestmark = pytest.mark.timeout(900)
 
 PICTURES = os.environ.get("TOMOSHADOW_PICTURES")
 DRIFTED = "drifted"
+PULSE = {"current_a": dict.fromkeys(VIEWS, 5)}
 
 
 def check_drifted(job: dict[str, Any], should_stop: Callable[[], bool]) -> dict[str, Any]:
@@ -37,6 +42,8 @@ def build(services: Services) -> FastAPI:
 @pytest.fixture(scope="module")
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
     data_dir = tmp_path_factory.mktemp("browser") / "runs"
+    data_dir.mkdir()
+    (data_dir / "draft.json").write_text('{"shots": 7')
     with serving(data_dir, build=build, views=VIEWS) as server:
         (data_dir / "calibrations" / "paper.json").write_text('{"id": "paper"}')
         server.http.put("/api/calibrations/current", json={"id": "paper"})
@@ -74,6 +81,39 @@ def test_a_drift_raises_an_alarm_and_a_larger_one_stops_reconstruction(page: Pag
     _take_picture(page, "page-calibration-stop")
     _reconstruct(server, "good", _calibration_off_by(0))
     expect(alarm).to_be_hidden()
+
+
+def test_a_torn_draft_does_not_keep_the_page_from_opening(page: Page, server: Serving) -> None:
+    page.goto(str(server.http.base_url))
+    expect(page.get_by_role("button", name="Start run")).to_be_visible()
+    (aside,) = server.services.data_dir.glob("draft.json.damaged-*")
+    assert aside.read_text() == '{"shots": 7'
+
+
+def test_a_reference_that_the_operator_chose_is_not_replaced_by_a_newer_one(page: Page, server: Serving) -> None:
+    older, _ = server.run_to_its_end(plan_of(kind="dark", name="older", shots=1, pulse=PULSE))
+    server.run_to_its_end(plan_of(kind="dark", name="proposed", shots=1, pulse=PULSE))
+    page.goto(str(server.http.base_url))
+    chosen = page.get_by_role("region", name="New run").locator(".q-chip")
+    expect(chosen.filter(has_text="proposed")).to_have_count(1)
+    page.get_by_label("Dark and background runs").click()
+    page.get_by_role("option", name="dark: proposed").click()
+    page.get_by_role("option", name="dark: older").click()
+    page.keyboard.press("Escape")
+    expect(chosen).to_have_text(re.compile("dark: older"))
+    newer, _ = server.run_to_its_end(plan_of(kind="dark", name="newer", shots=1, pulse=PULSE))
+    expect(page.get_by_role("region", name="Runs").get_by_text("newer")).to_be_visible()
+    page.reload()
+    expect(page.get_by_role("region", name="Runs").get_by_text("newer")).to_be_visible()
+    expect(chosen).to_have_text(re.compile("dark: older"))
+    assert (older, newer) == tuple(sorted((older, newer)))
+
+
+def test_work_that_fails_has_a_red_lamp(page: Page, server: Serving) -> None:
+    page.goto(str(server.http.base_url))
+    server.services.events.publish_run_event(ShotRecorded("gone", 0, valid=True))
+    lamp = page.get_by_role("status", name=re.compile("^automatic reconstruction: fault, .*no run 'gone'"))
+    expect(lamp).to_be_visible()
 
 
 def _calibration_off_by(error_px: float) -> Calibration:

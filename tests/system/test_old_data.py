@@ -18,7 +18,8 @@ from processing.runs.importing import import_manifest
 from processing.runs.pipeline import ShotResult, reconstruct_shot
 from processing.runs.results_file import volume_path
 from server.lab.events import EventPublisher
-from server.lab.jobs import Job, JobKind, JobState, JobTable, jobs_on_disk
+from server.lab.job_recovery import jobs_on_disk
+from server.lab.jobs import Job, JobKind, JobState, JobTable
 from server.lab.watch import CalibrationWatch
 from server.rig.config import load_config
 from server.web.ui.draft import DraftStore, first_draft, plan_of
@@ -174,7 +175,7 @@ def test_a_job_that_was_running_is_queued_again_and_can_be_done(old: Path) -> No
 
 
 def test_a_lost_job_table_is_told_by_the_results(old: Path) -> None:
-    restored = {job.id: job.settings for job in jobs_on_disk(old / "runs")}
+    restored = {job.id: job.settings for job in jobs_on_disk(old / "runs", EventPublisher())}
     assert restored == {job.id: job.settings for job in reconstructions(old)}
 
 
@@ -219,7 +220,7 @@ def test_the_draft_of_a_plan_is_kept(old: Path, monkeypatch: pytest.MonkeyPatch)
     path, config = old / "runs" / "draft.json", load_config(Path("rig.toml"))
     stored: dict[str, Any] = json.loads(path.read_text())
     assert stored.keys() <= first_draft(config).keys(), "the form has no place for these"
-    values = DraftStore(path, config).values
+    values = DraftStore(path, config, EventPublisher()).values
     assert_holds(values, stored)
     plan = plan_of(values).model_dump(mode="json")
     pulse = {name: stored[name] for name in ("width_ns", "separation_ns", "current_a")}

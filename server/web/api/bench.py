@@ -1,6 +1,9 @@
 """/api/bench: the laboratory of a simulated rig, where doors open and things go wrong. A real rig answers 404."""
 
+from typing import Annotated
+
 from fastapi import APIRouter
+from pydantic import Field
 
 from daq.faults import Fault
 from daq.frozen_model import FrozenModel
@@ -15,7 +18,7 @@ router = APIRouter(prefix="/api/bench", tags=["bench"])
 class Door(FrozenModel):
     """The laboratory door; open, it locks the light."""
 
-    open: bool
+    open: Annotated[bool, Field(description="true: open")]
 
 
 @router.post("/faults", status_code=202, responses=responses(404))

@@ -6,6 +6,7 @@ from fastapi import APIRouter, Query
 from pydantic import Field
 
 from daq.frozen_model import FrozenModel
+from daq.names import Identifier
 from processing.reconstruction.settings import ReconstructionSettings
 from server.lab.jobs import Job, JobKind, JobState
 from server.lab.reconstruction import request_reconstruction
@@ -18,27 +19,29 @@ router = APIRouter(prefix="/api/jobs", tags=["jobs"])
 class ReconstructionRequest(FrozenModel):
     """Reconstruct shots of a run."""
 
-    run_id: str
+    run_id: Annotated[Identifier, Field(description="a run whose images show a spray")]
     shots: Annotated[
         tuple[Annotated[int, Field(ge=0)], ...] | None, Field(description="indices; null: all valid shots")
     ] = None
-    calibration: Annotated[str | None, Field(description="null: the run's own, or the current one")] = None
-    settings: ReconstructionSettings = ReconstructionSettings()
+    calibration: Annotated[Identifier | None, Field(description="null: the run's own, or the current one")] = None
+    settings: Annotated[ReconstructionSettings, Field(description="how; default: by MLOS, what all views see")] = (
+        ReconstructionSettings()
+    )
 
 
 @router.get("")
 def list_jobs(
     context: ContextOf,
-    run_id: str | None = None,
-    state: JobState | None = None,
-    kind: JobKind | None = None,
-    limit: Annotated[int, Query(ge=1, le=10_000)] = 200,
+    run_id: Annotated[Identifier | None, Query(description="of this run alone")] = None,
+    state: Annotated[JobState | None, Query(description="in this state alone")] = None,
+    kind: Annotated[JobKind | None, Query(description="of this kind alone")] = None,
+    limit: Annotated[int, Query(ge=1, le=10_000, description="at most so many")] = 200,
 ) -> list[Job]:
     """Jobs, newest first."""
     return context.jobs.newest(run_id, [state] if state else JobState, limit, [kind] if kind else JobKind)
 
 
-@router.post("", status_code=202, responses=responses(404))
+@router.post("", status_code=202, responses=responses(404, 500))
 def create_jobs(request: ReconstructionRequest, context: ContextOf) -> list[Job]:
     """Queue one job per shot; work that is waiting, running or done already is not repeated."""
     return request_reconstruction(context, request.run_id, request.shots, request.calibration, request.settings)

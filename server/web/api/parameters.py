@@ -7,9 +7,8 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.routing import APIRoute
 from starlette.requests import HTTPConnection
 
+from daq.names import Identifier
 from server.lab.services import Context
-
-_NAME = r"^[A-Za-z0-9][A-Za-z0-9 ._-]{0,127}$"
 
 
 def context_of(connection: HTTPConnection) -> Context:
@@ -33,7 +32,11 @@ def forbid_unknown_query(request: Request) -> None:
 
 
 ContextOf = Annotated[Context, Depends(context_of)]
-RunId = Annotated[str, Path(pattern=_NAME, description="name of the run directory")]
-CalibrationId = Annotated[str, Path(pattern=_NAME)]
-JobId = Annotated[str, Path(pattern=r"^[A-Za-z0-9][A-Za-z0-9 ._-]{0,400}$")]
+RunId = Annotated[Identifier, Path(description="name of the run directory")]
+CalibrationId = Annotated[Identifier, Path(description="name of the calibration file, without its ending")]
+ResultsId = Annotated[Identifier, Path(description="name of the directory of the results in the run")]
+JobId = Annotated[
+    str,
+    Path(pattern=r"^[A-Za-z0-9][A-Za-z0-9 ._-]{0,699}$", description="made of run, results or calibration, and shot"),
+]
 ShotIndex = Annotated[int, Path(ge=0, description="position in the run, from 0")]

@@ -10,32 +10,32 @@ import numpy as np
 from fastapi import APIRouter, Path, Query, Response
 from fastapi.responses import FileResponse
 from numpy.typing import NDArray
+from pydantic import Field
 
 from daq.frozen_model import FrozenModel
 from server.lab.errors import NotFound
 from server.lab.results import ResultSet, preview_of, result_sets, surface_of, volume_file
 from server.pictures.pictures import plane_png
 from server.pictures.previews import VolumePreview
-from server.web.api.parameters import ContextOf, RunId
+from server.web.api.parameters import ContextOf, ResultsId, RunId
 from server.web.problems import responses
 
 router = APIRouter(prefix="/api/runs/{run_id}/results", tags=["results"])
 
-Axis = Literal["x", "y", "z"]
-ResultsId = Annotated[str, Path(pattern=r"^[A-Za-z0-9][A-Za-z0-9 ._-]{0,200}$")]
+Axis = Annotated[Literal["x", "y", "z"], Path(description="axis of the world across which the picture lies")]
 VolumeName = Annotated[str, Path(pattern=r"^shot_[0-9]{5,7}_[ab]$", description="for example shot_00012_a")]
 _SHORTLY = {"Cache-Control": "private, max-age=60"}
-_PNG = {**responses(404), 200: {"content": {"image/png": {}}}}
+_PNG = {**responses(404, 500), 200: {"content": {"image/png": {}}}}
 
 
 class PreviewView(FrozenModel):
     """Where the voxels of a preview lie; slices are numbered along its axes."""
 
-    shape: Annotated[tuple[int, int, int], "voxels along z, y, x"]
-    origin_mm: Annotated[tuple[float, float, float], "centre of voxel [0, 0, 0], x, y, z"]
-    pitch_mm: float
-    limit: float
-    full_shape: tuple[int, int, int]
+    shape: Annotated[tuple[int, int, int], Field(description="voxels along z, y, x")]
+    origin_mm: Annotated[tuple[float, float, float], Field(description="centre of voxel [0, 0, 0], x, y, z")]
+    pitch_mm: Annotated[float, Field(description="edge of a voxel of the preview")]
+    limit: Annotated[float, Field(description="largest intensity of the volume; the brightest colour stands for it")]
+    full_shape: Annotated[tuple[int, int, int], Field(description="voxels of the volume itself along z, y, x")]
 
 
 @router.get("", responses=responses(404))
@@ -44,7 +44,7 @@ def list_results(run_id: RunId, context: ContextOf) -> list[ResultSet]:
     return result_sets(context.runs.directory(run_id))
 
 
-@router.get("/{results_id}/{volume}", responses=responses(404))
+@router.get("/{results_id}/{volume}", responses=responses(404, 500))
 def show_preview(run_id: RunId, results_id: ResultsId, volume: VolumeName, context: ContextOf) -> PreviewView:
     """Size and place of a preview."""
     preview = preview_of(volume_file(context.runs.directory(run_id), results_id, volume))
@@ -71,7 +71,7 @@ def show_slice(
     results_id: ResultsId,
     volume: VolumeName,
     axis: Axis,
-    index: Annotated[int, Path(ge=0)],
+    index: Annotated[int, Path(ge=0, description="number of the plane along the axis, from 0")],
     context: ContextOf,
 ) -> Response:
     """One plane of the preview, coloured from 0 to the largest value of the volume."""
@@ -91,7 +91,7 @@ def show_projection(
 @router.get(
     "/{results_id}/{volume}/surface.glb",
     response_class=Response,
-    responses={**responses(404), 200: {"content": {"model/gltf-binary": {}}}},
+    responses={**responses(404, 500), 200: {"content": {"model/gltf-binary": {}}}},
 )
 def show_surface(
     run_id: RunId,

@@ -7,7 +7,7 @@ from pydantic import ConfigDict, Field
 
 from daq.frozen_model import FrozenModel
 from daq.run.state import RunOutcome, RunState
-from server.lab.monitor import Lamp
+from server.lab.duty import Lamp
 from server.lab.watch import CalibrationStanding
 from server.web.api.parameters import ContextOf
 from server.web.problems import responses
@@ -20,23 +20,23 @@ class AcquisitionView(FrozenModel):
 
     model_config = ConfigDict(from_attributes=True)
 
-    state: RunState
+    state: Annotated[RunState, Field(description="where acquisition stands")]
     outcome: Annotated[RunOutcome | None, Field(description="of the last run; null while one is active")]
-    run_id: str | None
-    shots_planned: int
-    shots_recorded: int
-    shots_valid: int
-    message: str
+    run_id: Annotated[str | None, Field(description="the active run, or the last one; null before the first")]
+    shots_planned: Annotated[int, Field(description="of that run")]
+    shots_recorded: Annotated[int, Field(description="shots on the disk")]
+    shots_valid: Annotated[int, Field(description="shots with every exposure, and light where it belongs")]
+    message: Annotated[str, Field(description="what happened last; the cause where a run has failed")]
 
 
 class RigView(FrozenModel):
     """The rig at a glance."""
 
-    name: str
-    simulated: bool
-    views: list[str]
-    lamps: tuple[Lamp, ...]
-    acquisition: AcquisitionView
+    name: Annotated[str, Field(description="of the rig, from its configuration")]
+    simulated: Annotated[bool, Field(description="true: its devices are simulated")]
+    views: Annotated[list[str], Field(description="names of the lines of sight, in the order of the live view")]
+    lamps: Annotated[tuple[Lamp, ...], Field(description="every device, and work in the background that fails")]
+    acquisition: Annotated[AcquisitionView, Field(description="what acquisition does")]
     calibration: Annotated[
         CalibrationStanding | None,
         Field(description="how the calibration in use fitted the last shot that was checked; null: nothing is known"),
@@ -51,7 +51,7 @@ async def show_rig(context: ContextOf) -> RigView:
         name=config.name,
         simulated=config.simulation is not None,
         views=list(config.views),
-        lamps=context.monitor.lamps,
+        lamps=context.lamps,
         acquisition=view_of_acquisition(context),
         calibration=context.standing,
     )

@@ -17,7 +17,9 @@ router = APIRouter(prefix="/api/runs", tags=["runs"])
 
 
 @router.get("")
-def list_runs(context: ContextOf, limit: Annotated[int, Query(ge=1, le=1000)] = 100) -> list[RunSummary]:
+def list_runs(
+    context: ContextOf, limit: Annotated[int, Query(ge=1, le=1000, description="at most so many")] = 100
+) -> list[RunSummary]:
     """Runs, newest first."""
     return context.runs.newest(limit)
 
@@ -36,7 +38,7 @@ def show_run(run_id: RunId, context: ContextOf) -> RunSummary:
     return context.runs.summary(run_id)
 
 
-@router.get("/{run_id}/header", responses=responses(404))
+@router.get("/{run_id}/header", responses=responses(404, 500))
 def show_header(run_id: RunId, context: ContextOf) -> RunHeader:
     """Plan, configuration, devices and versions, as they were when the run started."""
     return context.runs.reader(run_id).header

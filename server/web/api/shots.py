@@ -2,10 +2,12 @@
 
 from typing import Annotated, Literal
 
-from fastapi import APIRouter, Query, Response
+from fastapi import APIRouter, Path, Query, Response
+from pydantic import Field
 
 from daq.files.run_directory import ExposureRecord, FiredTrain, Shot
 from daq.frozen_model import FrozenModel
+from daq.names import ViewName
 from daq.run_plan import ImageKey
 from server.lab.errors import NotFound
 from server.lab.runs import RunStore
@@ -20,29 +22,31 @@ _FOR_EVER = {"Cache-Control": "private, max-age=31536000, immutable"}  # a commi
 class ShotView(FrozenModel):
     """One shot in a list."""
 
-    index: int
-    image_key: str
+    index: Annotated[int, Field(description="position in the run, from 0")]
+    image_key: Annotated[str, Field(description="what it shows: sample, flat, dark, invalid or background")]
 
 
 class ShotDetail(FrozenModel):
     """One shot: what each camera and the pulse generator said."""
 
-    index: int
-    image_key: str
-    host_time_ns: int
-    stage_z_mm: float | None
-    fired: FiredTrain | None
-    exposures: dict[str, dict[str, ExposureRecord]]
+    index: Annotated[int, Field(description="position in the run, from 0")]
+    image_key: Annotated[str, Field(description="what it shows: sample, flat, dark, invalid or background")]
+    host_time_ns: Annotated[int, Field(description="Unix time of the firing; 0 for imported images")]
+    stage_z_mm: Annotated[float | None, Field(description="position of the calibration target, where there is one")]
+    fired: Annotated[FiredTrain | None, Field(description="the actual pulse train; null for imported images")]
+    exposures: Annotated[
+        dict[str, dict[str, ExposureRecord]], Field(description="what each camera said, by view and by exposure a, b")
+    ]
 
 
-@router.get("", responses=responses(404))
+@router.get("", responses=responses(404, 500))
 def list_shots(run_id: RunId, context: ContextOf) -> list[ShotView]:
     """All shots of a run."""
     keys = context.runs.reader(run_id).image_keys().tolist()
     return [ShotView(index=index, image_key=ImageKey(key).name.lower()) for index, key in enumerate(keys)]
 
 
-@router.get("/{shot}", responses=responses(404))
+@router.get("/{shot}", responses=responses(404, 500))
 def show_shot(run_id: RunId, shot: ShotIndex, context: ContextOf) -> ShotDetail:
     """Frame ids, timestamps, packet counters and the actual pulse train."""
     recorded = _read(context.runs, run_id, shot)
@@ -59,13 +63,13 @@ def show_shot(run_id: RunId, shot: ShotIndex, context: ContextOf) -> ShotDetail:
 @router.get(
     "/{shot}/{view}/{frame}.png",
     response_class=Response,
-    responses={**responses(404), 200: {"content": {"image/png": {}}}},
+    responses={**responses(404, 500), 200: {"content": {"image/png": {}}}},
 )
 def show_frame(
     run_id: RunId,
     shot: ShotIndex,
-    view: str,
-    frame: Literal["a", "b"],
+    view: Annotated[ViewName, Path(description="name of a view of the run")],
+    frame: Annotated[Literal["a", "b"], Path(description="first or second exposure")],
     context: ContextOf,
     stretch: Annotated[
         Stretch, Query(description="auto: 0.1 % to 99.9 % quantile; full: the whole bit depth")

@@ -4,10 +4,12 @@ import json
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import BaseModel, TypeAdapter, ValidationError
 from pydantic.fields import FieldInfo
 
 from daq.run_plan import PulsePair, RunKind, RunPlan
+from server.lab.damage import set_aside
+from server.lab.events import EventPublisher
 from server.rig.config import RigConfig
 
 PLAN_FIELDS = RunPlan.model_fields
@@ -25,26 +27,64 @@ def first_draft(config: RigConfig) -> dict[str, Any]:
         "separation_ns": 6400,
         "stage_z_mm": "-4, -2, 0, 2, 4",
         "references": [],
+        "are_references_chosen": False,
         "calibration": None,
         "current_a": {name: view.nominal_current_a for name, view in config.views.items()},
     }
 
 
-class DraftStore:
-    """One draft per rig, in a JSON file beside the runs; small, and written only when something changed."""
+class StoredDraft(BaseModel):
+    """What may stand in the file of a draft: a field that the operator has left empty is null."""
 
-    def __init__(self, path: Path, config: RigConfig) -> None:
+    kind: RunKind = RunKind.SAMPLE
+    name: str | None = None
+    shots: float | None = None
+    rate_hz: float | None = None
+    width_ns: float | None = None
+    separation_ns: float | None = None
+    stage_z_mm: str | None = None
+    references: list[str] = []
+    are_references_chosen: bool = False
+    calibration: str | None = None
+    current_a: dict[str, float | None] = {}
+
+
+class DraftStore:
+    """One draft per rig, in a JSON file beside the runs; small, and written only when something changed.
+
+    Parameters
+    ----------
+    path : Path
+        The file. One that cannot be read is set aside, and the first draft is shown.
+    config : RigConfig
+        Of the rig.
+    events : EventPublisher
+        Told of a damaged file.
+    """
+
+    def __init__(self, path: Path, config: RigConfig, events: EventPublisher) -> None:
         self._path = path
-        self.values = first_draft(config)
-        if path.is_file():
-            self.values |= json.loads(path.read_text())
+        self._events = events
+        self.values = first_draft(config) | self._stored()
 
     def set(self, name: str, value: Any) -> None:
-        """Remember a value of the form."""
+        """Remember a value of the form; what another page has changed meanwhile stays as it is in the file."""
         self.values[name] = value
         part = self._path.with_suffix(".part")
-        part.write_text(json.dumps(self.values))
+        part.write_text(json.dumps({**self._stored(), name: value}))
         part.replace(self._path)
+
+    def _stored(self) -> dict[str, Any]:
+        if not self._path.is_file():
+            return {}
+        try:
+            stored = StoredDraft.model_validate_json(self._path.read_bytes())
+        except (OSError, ValidationError) as error:
+            set_aside(self._path, f"draft of a run: {error}", self._events)
+            return {}
+        values = stored.model_dump(mode="json", exclude_unset=True)
+        values.setdefault("are_references_chosen", bool(stored.references))  # an older draft does not say
+        return values
 
 
 def problem_of(fields: dict[str, FieldInfo], name: str, value: Any) -> str | None:

@@ -38,6 +38,10 @@ def line_of(event: Event) -> str | None:
             text = f"{what}: {data['state']}" + (f", {data['error']}" if data["error"] else "")
         case "calibration_alarm":
             text = data["message"] or f"calibration {data['calibration']} fits run {data['run']} again"
+        case "background_work":
+            text = f"{data['work']}, {data['part']}: {data['error'] or 'works again'}"
+        case "file_damaged":
+            text = f"{data['file']}: {data['reason']}"
         case _:
             return None
     return f"{datetime.fromisoformat(event.time_utc).astimezone():%H:%M:%S}  {text}"

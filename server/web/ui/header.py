@@ -3,7 +3,7 @@
 from nicegui import ui
 
 from daq.run.state import RunState
-from server.lab.monitor import Lamp
+from server.lab.duty import Lamp
 from server.lab.services import Context
 
 _STATE_COLOURS = {
@@ -44,8 +44,9 @@ class Header:
         state = self._context.services.acquisition.status().state
         self._state.set_text(state.upper())
         self._state.props(f"color={_STATE_COLOURS[state]}")
-        if self._context.monitor.lamps != self._shown:
-            self._shown = self._context.monitor.lamps
+        lamps = self._context.lamps
+        if lamps != self._shown:
+            self._shown = lamps
             self._lamps.clear()
             with self._lamps:
                 for lamp in self._shown:

@@ -40,7 +40,7 @@ class Page:
         self._seen = max(0, self._events.newest - _EVENTS_SHOWN)
         self._are_lists_old = True
         dark = theme.apply()
-        draft = DraftStore(context.services.data_dir / "draft.json", context.services.config)
+        draft = DraftStore(context.services.data_dir / "draft.json", context.services.config, self._events)
         self._header = Header(context, dark)
         self._alarm = AlarmBanner(context)
         with ui.element("div").classes("screen"):

@@ -42,7 +42,7 @@ class RunForm:
     def __init__(self, context: Context, draft: DraftStore) -> None:
         self._context = context
         self._draft = draft
-        self._known_references: set[str] = set()
+        self._shown: list[str] = []
         self._fields: list[ui.input | ui.number] = []
         with panel("New run"):
             self._add_kind_and_name()
@@ -68,21 +68,26 @@ class RunForm:
             asyncio.to_thread(self._context.runs.newest), asyncio.to_thread(self._context.calibrations.list)
         )
         references = [run for run in runs if run.kind in _REFERENCE_KINDS and run.outcome == RunOutcome.COMPLETED]
-        self._references.set_options(
-            {run.run_id: _reference_label(run) for run in references}, value=self._proposed(references)
-        )
+        self._show_references(references)
         known = {item.id: item.id + (" (current)" if item.current else "") for item in calibrations}
         calibration = self._draft.values["calibration"]
         self._calibration.set_options(known, value=calibration if calibration in known else None)
 
-    def _proposed(self, references: list[RunSummary]) -> list[str]:
-        """What the operator chose; the newest run of each kind where nothing is chosen or a new one has come."""
-        known, self._known_references = self._known_references, {run.run_id for run in references}
-        chosen = [run_id for run_id in self._draft.values["references"] if run_id in self._known_references]
-        if chosen and known >= self._known_references:
-            return chosen
-        newest = {run.kind: run.run_id for run in reversed(references)}
-        return sorted(newest.values())
+    def _show_references(self, references: list[RunSummary]) -> None:
+        """Offer the reference runs. What the operator chose stays chosen; until then the newest of each kind are."""
+        values, labels = self._draft.values, {run.run_id: _reference_label(run) for run in references}
+        newest = sorted({run.kind: run.run_id for run in reversed(references)}.values())
+        self._shown = values["references"] if values["are_references_chosen"] else newest
+        gone = {run_id: f"{run_id}: is gone" for run_id in self._shown if run_id not in labels}
+        self._references.set_options(labels | gone, value=self._shown)
+
+    def _keep_references(self, event: Any) -> None:
+        """Whatever is not what we show is a choice; a browser may also repeat what it was told."""
+        self._draft.values["references"] = event.value
+        if self._draft.values["are_references_chosen"] or sorted(event.value) != sorted(self._shown):
+            self._draft.set("are_references_chosen", True)
+            self._draft.set("references", event.value)
+        self._check()
 
     def _add_kind_and_name(self) -> None:
         kinds = {kind.value: kind.value.capitalize() for kind in RunKind}
@@ -131,9 +136,7 @@ class RunForm:
         self._fields.append(positions.props("dense outlined hide-bottom-space").classes("w-full"))
         self._positions = positions
         self._references = (
-            ui.select(
-                {}, label="Dark and background runs", multiple=True, value=[], on_change=self._changed("references")
-            )
+            ui.select({}, label="Dark and background runs", multiple=True, value=[], on_change=self._keep_references)
             .props("dense outlined use-chips options-dense")
             .classes("w-full")
         )

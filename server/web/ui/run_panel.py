@@ -8,7 +8,7 @@ from starlette.concurrency import run_in_threadpool
 from daq.errors import DaqError
 from daq.run.events import RunStatus
 from daq.run.state import RunState
-from server.lab.monitor import Health, Lamp
+from server.lab.duty import Health, Lamp
 from server.lab.services import Context
 from server.web.ui.theme import panel
 
@@ -87,4 +87,5 @@ def outcome_colour(outcome: str | None) -> str:
         "aborted": "warning",
         "interrupted": "warning",
         "failed": "negative",
+        "damaged": "negative",
     }.get(outcome or "", "primary")

@@ -15,7 +15,7 @@ from processing.reconstruction.settings import ReconstructionSettings
 from server.lab.errors import ServerError
 from server.lab.jobs import Job, JobKind, JobState, calibration_job
 from server.lab.reconstruction import request_reconstruction
-from server.lab.runs import ACTIVE, RunSummary
+from server.lab.runs import ACTIVE, DAMAGED, RunSummary
 from server.lab.services import Context
 from server.web.ui.run_panel import outcome_colour
 from server.web.ui.theme import panel
@@ -119,7 +119,7 @@ def _run_row(run: RunSummary) -> dict[str, Any]:
     actions = {RunKind.CALIBRATION: "Calibrate", RunKind.SAMPLE: "Reconstruct"}
     return {
         "id": run.run_id,
-        "name": run.name,
+        "name": f"{run.name}: {run.cause}" if run.outcome == DAMAGED else run.name,
         "kind": run.kind,
         "shots": f"{valid} / {run.shots_recorded}",
         "outcome": run.outcome,

@@ -7,7 +7,7 @@ from pathlib import Path
 from nicegui import ui
 
 from processing.volume import VoxelGrid
-from server.lab.errors import NotFound
+from server.lab.errors import ServerError
 from server.lab.jobs import Job, JobKind, JobState
 from server.lab.results import preview_of, volume_file
 from server.lab.services import Context
@@ -92,7 +92,7 @@ class VolumePanel:
         run_id, results_id, name = path.split("/")
         try:
             preview = await asyncio.to_thread(self._preview, run_id, results_id, name)
-        except NotFound as error:
+        except ServerError as error:
             ui.notify(str(error), type="negative")
             return
         self._folder, self._grid = path, preview

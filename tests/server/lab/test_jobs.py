@@ -1,4 +1,3 @@
-import json
 import sqlite3
 import threading
 from collections.abc import Iterator
@@ -16,7 +15,6 @@ from server.lab.jobs import (
     JobState,
     JobTable,
     calibration_job,
-    jobs_on_disk,
     reconstruction_job,
 )
 
@@ -91,21 +89,6 @@ def test_what_was_running_when_the_server_died_waits_again(tmp_path: Path) -> No
     assert after.requeue_interrupted() == 1
     assert [job.state for job in after.newest()] == [JobState.QUEUED, JobState.ABORTED, JobState.QUEUED]
     after.close()
-
-
-def test_a_lost_table_comes_back_from_the_run_directories(table: JobTable, tmp_path: Path) -> None:
-    job = job_of(7)
-    assert job.results_id is not None
-    results = tmp_path / "run-1" / "results" / job.results_id
-    results.mkdir(parents=True)
-    record = {"calibration_file": "cal-1.json", "settings": json.dumps({"method": "mlos"})}
-    (results / "settings.json").write_text(json.dumps(record))
-    (results / "shot_00007_a.vtkhdf").touch()
-    assert table.restore(jobs_on_disk(tmp_path)) == 1
-    assert table.restore(jobs_on_disk(tmp_path)) == 0
-    found = table.get(job.id)
-    assert found.state is JobState.DONE
-    assert (found.shot, found.settings, found.calibration) == (7, job.settings, "cal-1")
 
 
 def test_an_unknown_job_is_named(table: JobTable) -> None:

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from server.lab.calibrations import CalibrationStore
+from server.lab.duty import Duty
 from server.lab.engine import InlineEngine
 from server.lab.errors import Conflict
 from server.lab.events import EventPublisher
@@ -63,7 +64,7 @@ async def at_work(tmp_path: Path, task: Callable[..., dict[str, Any]]) -> AsyncI
         watch = CalibrationWatch(events)
         tasks = dict.fromkeys((JobKind.RECONSTRUCTION, JobKind.CHECK), task)
         runner = JobRunner(engine, table, tasks, events, tmp_path, store, watch)
-        work = asyncio.create_task(runner.run())
+        work = asyncio.create_task(runner.run(Duty("processing", events)))
         yield Laboratory(runner, table, events)
         work.cancel()
         await asyncio.wait([work])
@@ -75,9 +76,7 @@ def test_jobs_are_done_in_the_order_in_which_they_were_asked_for(tmp_path: Path)
         async with at_work(tmp_path, answer) as laboratory:
             jobs = [laboratory.runner.submit(job_of(shot)) for shot in range(3)]
             done = [await laboratory.reach(job, JobState.DONE) for job in jobs]
-        assert [job.result for job in done] == [
-            {"shot": shot, "in": "mlos-0-cal", "with": "cal.json"} for shot in range(3)
-        ]
+        assert [job.result for job in done] == [{"shot": shot, "in": "mlos-0", "with": "cal.json"} for shot in range(3)]
         assert [job.changed_utc for job in done] == sorted(job.changed_utc for job in done)
 
     asyncio.run(go())

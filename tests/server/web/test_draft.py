@@ -3,10 +3,12 @@ from pathlib import Path
 import pytest
 
 from daq.run_plan import RunKind
+from server.lab.events import EventPublisher
 from server.web.ui.draft import (
     PLAN_FIELDS,
     PULSE_FIELDS,
     DraftStore,
+    first_draft,
     plan_of,
     positions,
     problem_of,
@@ -18,19 +20,38 @@ from tests.support.memory_rig import memory_config
 
 def test_a_draft_outlives_the_server(tmp_path: Path) -> None:
     config = memory_config(tmp_path / "runs")
-    DraftStore(tmp_path / "draft.json", config).set("shots", 77)
-    assert DraftStore(tmp_path / "draft.json", config).values["shots"] == 77
+    DraftStore(tmp_path / "draft.json", config, EventPublisher()).set("shots", 77)
+    assert DraftStore(tmp_path / "draft.json", config, EventPublisher()).values["shots"] == 77
+
+
+@pytest.mark.parametrize("text", ['{"shots": 7', "[]", '{"kind": "party"}', '{"current_a": 3}', "\x00\x01", ""])
+def test_a_torn_draft_is_kept_aside_and_the_first_one_is_shown(tmp_path: Path, text: str) -> None:
+    config, events, path = memory_config(tmp_path / "runs"), EventPublisher(), tmp_path / "draft.json"
+    path.write_text(text)
+    assert DraftStore(path, config, events).values == first_draft(config)
+    (aside,) = tmp_path.glob("draft.json.damaged-*")
+    assert aside.read_text() == text
+    (event,) = events.since(0)
+    assert aside.name in event.data["reason"]
+
+
+def test_references_of_an_older_draft_are_taken_for_chosen(tmp_path: Path) -> None:
+    config, path = memory_config(tmp_path / "runs"), tmp_path / "draft.json"
+    path.write_text('{"references": ["dark-1"]}')
+    assert DraftStore(path, config, EventPublisher()).values["are_references_chosen"] is True
+    path.write_text('{"references": []}')
+    assert DraftStore(path, config, EventPublisher()).values["are_references_chosen"] is False
 
 
 def test_the_first_draft_is_a_plan_for_this_rig(tmp_path: Path) -> None:
     config = memory_config(tmp_path / "runs")
-    plan = plan_of(DraftStore(tmp_path / "draft.json", config).values)
+    plan = plan_of(DraftStore(tmp_path / "draft.json", config, EventPublisher()).values)
     assert plan.pulse.current_a == {"view1": 10.0, "view2": 10.0}
     assert plan.stage_z_mm == ()
 
 
 def test_only_a_calibration_run_moves_the_target_and_only_a_sample_run_has_references(tmp_path: Path) -> None:
-    values = DraftStore(tmp_path / "draft.json", memory_config(tmp_path / "runs")).values
+    values = DraftStore(tmp_path / "draft.json", memory_config(tmp_path / "runs"), EventPublisher()).values
     values |= {"references": ["dark-1"], "calibration": "paper"}
     calibration = plan_of(values | {"kind": "calibration"})
     assert (calibration.kind, calibration.references, calibration.calibration) == (RunKind.CALIBRATION, (), None)
@@ -63,3 +84,12 @@ def test_positions_are_read_from_a_list() -> None:
     assert positions(" -4, 0,2.5 ,") == (-4.0, 0.0, 2.5)
     assert problem_of_positions("1, two") is not None
     assert problem_of_positions(None) is None
+
+
+def test_a_page_does_not_undo_what_another_one_has_changed(tmp_path: Path) -> None:
+    config, path = memory_config(tmp_path / "runs"), tmp_path / "draft.json"
+    first, second = DraftStore(path, config, EventPublisher()), DraftStore(path, config, EventPublisher())
+    first.set("shots", 77)
+    second.set("name", "fan")
+    kept = DraftStore(path, config, EventPublisher()).values
+    assert (kept["shots"], kept["name"]) == (77, "fan")

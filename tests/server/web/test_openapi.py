@@ -40,3 +40,26 @@ def test_no_body_accepts_unknown_fields(schema: dict[str, Any]) -> None:
     assert len(bodies) >= 6
     for name in bodies:
         assert schema["components"]["schemas"][name]["additionalProperties"] is False, name
+
+
+def test_every_operation_parameter_and_field_is_described(schema: dict[str, Any]) -> None:
+    silent = [
+        f"{method} {path}"
+        for path, methods in schema["paths"].items()
+        for method, operation in methods.items()
+        if not operation.get("description")
+    ]
+    silent += [
+        f"{method} {path}: {parameter['name']}"
+        for path, methods in schema["paths"].items()
+        for method, operation in methods.items()
+        for parameter in operation.get("parameters", ())
+        if not parameter.get("description")
+    ]
+    silent += [
+        f"{name}.{field}"
+        for name, described in schema["components"]["schemas"].items()
+        for field, value in described.get("properties", {}).items()
+        if not value.get("description")
+    ]
+    assert silent == []

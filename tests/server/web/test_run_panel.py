@@ -2,7 +2,7 @@ import pytest
 
 from daq.run.events import RunStatus
 from daq.run.state import RunState
-from server.lab.monitor import Health, Lamp
+from server.lab.duty import Health, Lamp
 from server.web.ui.run_panel import counts_text, waits_for_acknowledgement
 
 
