@@ -114,9 +114,10 @@ def refused(port: int, work_dir: Path) -> str:
 
 def test_a_second_server_is_refused_and_leaves_the_run_of_the_first_one_alone(tmp_path: Path) -> None:
     with served(tmp_path) as (client, process):
-        plan = {"name": "long", "kind": "dark", "shots": 2000, "rate_hz": 1, "pulse": {"current_a": CURRENT_A}}
+        plan = {"name": "long", "kind": "dark", "shots": 600, "rate_hz": 1, "pulse": {"current_a": CURRENT_A}}
         run_url = client.post("/api/runs", json=plan).headers["location"]
         eventually(lambda: client.get(run_url).json()["shots_recorded"] > 0, "there is a shot")
+        assert client.get(run_url).json()["outcome"] == "active"
         assert "cannot listen there" in refused(int(client.base_url.port or 0), tmp_path / "port")
         holder = f"is held by process {process.pid}, since "
         assert f"data directory runs {holder}" in refused(free_port(), tmp_path)
