@@ -198,7 +198,7 @@ def test_what_does_not_fit_is_refused() -> None:
         line_of_sight(plan, images, ReconstructionMethod.SMART)
     with pytest.raises(ValueError, match="1 images for a plan of 2 views"):
         line_of_sight(plan, images[:1])
-    with pytest.raises(ValueError, match=r"image 1 has shape \(5, 5\)"):
+    with pytest.raises(ValueError, match=r"view 2: its image has shape \(5, 5\)"):
         line_of_sight(plan, [images[0], np.zeros((5, 5), np.float32)])
     with pytest.raises(ValueError, match=r"volume has shape \(2, 2, 2\)"):
         line_of_sight(plan, images, out=np.zeros((2, 2, 2), np.float32))

@@ -32,15 +32,16 @@ def test_what_is_no_recipe_is_refused(name: str, message: str) -> None:
         Recipe.named(name)
 
 
-@pytest.mark.parametrize(("method", "reconstruct"), [("smart", smart), ("mart", mart)])
-def test_iterations_go_on_as_if_never_stopped(method: str, reconstruct: type) -> None:
+@pytest.mark.parametrize(("method", "reconstruct", "nowhere_more"), [("smart", smart, 1e-3), ("mart", mart, 2e-2)])
+def test_iterations_go_on_as_if_never_stopped(method: str, reconstruct: type, nowhere_more: float) -> None:
     plan, shot = plan_reconstruction(CAMERAS, GRID), simulate_shot(GRID, 30, 1.5, CAMERAS)
     volume = np.empty(GRID.shape, np.float32)
     recipes = [Recipe.named(f"{method}-{iterations}") for iterations in (2, 5)]
     for recipe in reconstruct_each(plan, shot.images, recipes, volume):
         straight = reconstruct(plan, shot.images, iterations=recipe.iterations).volume
-        # each correction rounds to float16, and MART corrects twelve times after the stop
-        np.testing.assert_allclose(volume, straight, rtol=4 * 2**-11, atol=1e-3 * float(straight.max()))
+        # each correction rounds to float16; MART corrects twelve times more, unless half a count decides
+        np.testing.assert_allclose(volume, straight, rtol=4 * 2**-11, atol=nowhere_more * float(straight.max()))
+        assert np.linalg.norm(volume - straight) < 3e-3 * np.linalg.norm(straight)
 
 
 def test_other_recipes_start_anew() -> None:
