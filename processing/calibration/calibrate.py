@@ -4,29 +4,40 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from processing.calibration.calibration import Calibration, Model, ViewCalibration
+from processing.calibration.calibration import Calibration, Doubt, Model, ViewCalibration
 from processing.calibration.calibration_record import content_id
 from processing.calibration.errors import CalibrationError
 from processing.calibration.fit.covariance import parameter_covariance
 from processing.calibration.fit.free_pose import board_errors_px, fit_free_poses, free_pose_holdout_px
+from processing.calibration.fit.handedness import check_handedness
 from processing.calibration.fit.health import (
     check_motion,
+    check_seen_motion,
     errors_px,
     holdout_distances_px,
     judge,
     outline_mm,
     plane_error,
+    shortfalls,
 )
 from processing.calibration.fit.model_choice import AUTO, fit_mapping, holdout_by_model, simplest_that_holds
+from processing.calibration.fit.not_checked import not_checked
 from processing.calibration.fit.placement_check import check_placements
+from processing.calibration.fit.ray_check import check_rays, rays_miss_px
+from processing.calibration.fit.scale_check import check_scales
 from processing.calibration.observation import CalibrationSet, PlaneObservation, ViewObservations, stacked
-from processing.geometry import FloatArray, PinholeCamera, ViewMapping
+from processing.geometry import FloatArray, ViewMapping
 
-MAX_STRETCH = 1.1
-"""Pixels are square; a sensor tilted by 24 deg looks like one of pixels of 1.095 to a model without tilt."""
+UNFIT = (
+    "its points are those of no camera: are they where the table or the target says? A target of one plane is needed, "
+    "a plate with dots on two levels is not supported"
+)
+PLACEHOLDERS = 3
+"""So many wrong points on one spot of the image stand for points that were not seen."""
 
 
 def calibrate(
@@ -47,11 +58,14 @@ def calibrate(
     Raises
     ------
     CalibrationError
-        Views cannot be calibrated; names each of them, value and limit.
+        Views cannot be calibrated, or cannot belong to one world; names each of them, value and limit.
     """
     views = _all_views(calibration_set, None if model == AUTO else Model(model))
-    mirrored = tuple(_mirrored(calibration_set, views))
-    placements = () if mirrored else tuple(_placements(calibration_set, views))
+    placed = not any(view.intrinsics_only for view in views.values())
+    undirected = check_handedness(calibration_set, views) if placed else []
+    if placed:
+        missed_px = rays_miss_px(calibration_set.views, {name: view.mapping for name, view in views.items()})
+        views = {name: replace(view, rays_miss_px=missed_px.get(name)) for name, view in views.items()}
     undated = Calibration(
         id="",
         created_utc=created_utc or datetime.now(UTC).isoformat(timespec="seconds"),
@@ -59,8 +73,9 @@ def calibrate(
         views=views,
         z_range_mm=_common_z_range_mm(calibration_set),
         source=calibration_set.source,
-        notes=(*calibration_set.notes, *mirrored, *_stretched(views), *placements),
-    )
+        notes=calibration_set.notes,
+        not_checked=tuple(not_checked(calibration_set, undirected)) if placed else (),
+    ).doubted(_doubts(calibration_set, views) if placed else ())
     return undated.with_id(content_id(undated))
 
 
@@ -70,42 +85,21 @@ def _all_views(calibration_set: CalibrationSet, wanted: Model | None) -> dict[st
     for name, seen in calibration_set.views.items():
         try:
             views[name] = _free_view(seen, wanted) if seen.free_pose else _placed_view(name, seen, wanted)
+        except (np.linalg.LinAlgError, cv2.error):
+            problems.append(f"{name}: {UNFIT}")
         except CalibrationError as error:
-            problems.append(str(error) if str(error).startswith(name) else f"{name}: {error}")
+            problem = str(error) if str(error).startswith(name) else f"{name}: {error}"
+            problems += [problem, *(note for note in calibration_set.notes if note.startswith(f"{name},"))]
     if problems:
         raise CalibrationError("; ".join(problems))
     return views
 
 
-def _mirrored(calibration_set: CalibrationSet, views: Mapping[str, ViewCalibration]) -> Iterator[str]:
-    """Notes on views that a left-handed world puts behind the camera: volumes would come out mirrored."""
-    for name, view in views.items():
-        camera = view.mapping
-        if isinstance(camera, PinholeCamera) and not view.intrinsics_only:
-            points_mm, _ = stacked(calibration_set.views[name].planes)
-            if np.mean(points_mm @ camera.rotation[2] + camera.translation_mm[2]) < 0:
-                yield (
-                    f"{name}: the target lies behind the camera: its axes are left-handed, volumes come out mirrored; "
-                    'does y point up (y_axis = "up"), or z towards the views?'
-                )
-
-
-def _stretched(views: Mapping[str, ViewCalibration]) -> Iterator[str]:
-    """Notes on pixels that are not square: a wrong pitch, or a wrong scale of the stage, fits as well as the right."""
-    for name, view in views.items():
-        if isinstance(view.mapping, PinholeCamera) and not view.intrinsics_only:
-            height_to_width = float(view.mapping.camera_matrix[0, 0] / view.mapping.camera_matrix[1, 1])
-            if not 1 / MAX_STRETCH < height_to_width < MAX_STRETCH:
-                yield (
-                    f"{name}: its pixels seem {height_to_width:.2f} times as high as wide: is pitch_mm of the target "
-                    f"right, and the position of its planes in mm?"
-                )
-
-
-def _placements(calibration_set: CalibrationSet, views: Mapping[str, ViewCalibration]) -> Iterator[str]:
-    """Notes on where views stand; nothing where boards in free poses do not tell."""
-    if not any(view.intrinsics_only for view in views.values()):
-        yield from check_placements(calibration_set, {name: view.mapping for name, view in views.items()})
+def _doubts(calibration_set: CalibrationSet, views: Mapping[str, ViewCalibration]) -> Iterator[Doubt]:
+    """What speaks against views that fit their own points."""
+    yield from check_scales(calibration_set, views)
+    yield from check_placements(calibration_set, {name: view.mapping for name, view in views.items()})
+    yield from check_rays(views)
 
 
 def _placed_view(name: str, seen: ViewObservations, wanted: Model | None) -> ViewCalibration:
@@ -123,12 +117,25 @@ def _fitted_view(seen: ViewObservations, model: Model) -> ViewCalibration:
     mapping, used = fit_mapping(seen.planes, seen.image_size_px, model)
     masks = [_counted(mask) for mask in _by_plane(seen.planes, used)]
     planes = [plane.select(mask) for plane, mask in zip(seen.planes, masks, strict=True)]
+    points_mm, image_px = (values[used] for values in stacked(seen.planes))
+    check_seen_motion(mapping, points_mm, image_px)
     holdout_px = holdout_distances_px(planes, lambda training: fit_mapping(training, seen.image_size_px, model)[0])
     errors = [errors_px(mapping, plane) for plane in planes]
     n_rejected = len(used) - sum(len(plane) for plane in planes)
     summary = _summary(mapping, model, planes, errors, holdout_px, n_rejected, extent_mm=outline_mm(planes))
-    points_mm, image_px = (values[used] for values in stacked(seen.planes))
-    return replace(summary, covariance=parameter_covariance(mapping, points_mm, image_px, model))
+    return replace(
+        summary,
+        covariance=parameter_covariance(mapping, points_mm, image_px, model),
+        reasons=(*summary.reasons, *_placeholders(stacked(seen.planes)[1][~used])),
+    )
+
+
+def _placeholders(wrong_px: FloatArray) -> Iterator[str]:
+    """Wrong points (N, 2) that lie on one spot of the image: tables write so what was not seen."""
+    spots_px, counts = np.unique(wrong_px, axis=0, return_counts=True)
+    for (u, v), count in zip(spots_px, counts, strict=True):
+        if count >= PLACEHOLDERS:
+            yield f"{count} points that were left out lie on one spot ({u:g}, {v:g}): were these not seen?"
 
 
 def _free_view(seen: ViewObservations, wanted: Model | None) -> ViewCalibration:
@@ -167,6 +174,7 @@ def _summary(
         mapping=mapping,
         extent_mm=extent_mm,
         boards_in_free_poses=(),
+        reasons=shortfalls(holdout_error_px, n_rejected, len(distances_px)),
         planes=tuple(plane_error(*one) for one in zip(planes, errors, holdout_px, strict=True)),
     )
 

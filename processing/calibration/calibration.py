@@ -3,7 +3,7 @@
 Views stand in a calibration file as they are here: names and order of their fields are those of the file.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Annotated
@@ -35,6 +35,47 @@ class Verdict(StrEnum):
     USABLE = "usable"
     WARN = "warn"
     REFUSE = "refuse"
+
+
+def worse(one: Verdict, other: Verdict) -> Verdict:
+    """The less favourable of two verdicts."""
+    return max(one, other, key=list(Verdict).index)
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """What speaks against views although each of them fits its own points well.
+
+    Parameters
+    ----------
+    views : tuple[str, ...]
+        Whom it concerns.
+    text : str
+        What does not agree, by value and limit, and what to ask oneself.
+    verdict : Verdict
+        The best that these views deserve.
+    """
+
+    views: tuple[str, ...]
+    text: str
+    verdict: Verdict = Verdict.WARN
+
+
+@with_config(_STRICT)
+@dataclass(frozen=True)
+class Unchecked:
+    """What nothing told, and what would tell it.
+
+    Parameters
+    ----------
+    what : str
+        What may be wrong without showing.
+    state : str
+        What to state so that it is checked.
+    """
+
+    what: str
+    state: str
 
 
 @with_config(_STRICT)
@@ -142,6 +183,10 @@ class ViewCalibration:
         Of the parameters of the mapping; None for boards in free poses, and after a correction.
     candidates_holdout_error_px : Mapping[Model, float]
         Where the model was chosen among several: the hold-out error of each, all on the same points.
+    reasons : tuple[str, ...]
+        Why the verdict is not better than it is.
+    rays_miss_px : float | None
+        Median distance between where the view sees points of the target and where all views put them, if others do.
     """
 
     verdict: Verdict
@@ -158,6 +203,12 @@ class ViewCalibration:
     planes: tuple[PlaneError, ...]
     covariance: ParameterCovariance | None = None
     candidates_holdout_error_px: Mapping[Model, ErrorPx] = field(default_factory=dict)
+    reasons: tuple[str, ...] = ()
+    rays_miss_px: ErrorPx | None = None
+
+    def doubted(self, doubt: Doubt) -> "ViewCalibration":
+        """The same with a verdict that is no better than a doubt leaves it."""
+        return replace(self, verdict=worse(self.verdict, doubt.verdict), reasons=(*self.reasons, doubt.text))
 
     @property
     def worst_plane(self) -> PlaneError:
@@ -192,6 +243,8 @@ class Calibration:
         Images that were left out, and why.
     parent : str | None
         Id of the calibration that this one corrects.
+    not_checked : tuple[Unchecked, ...]
+        What may be wrong without showing, as nothing was stated that would tell.
     """
 
     id: str
@@ -202,10 +255,19 @@ class Calibration:
     source: str
     notes: tuple[str, ...] = ()
     parent: str | None = None
+    not_checked: tuple[Unchecked, ...] = ()
 
     def with_id(self, calibration_id: str) -> "Calibration":
         """The same under another id."""
         return replace(self, id=calibration_id)
+
+    def doubted(self, doubts: Iterable[Doubt]) -> "Calibration":
+        """The same with the verdicts that doubts leave; each is a note too."""
+        views, notes = dict(self.views), list(self.notes)
+        for doubt in doubts:
+            notes.append(doubt.text)
+            views.update({name: views[name].doubted(doubt) for name in doubt.views})
+        return replace(self, views=views, notes=tuple(notes))
 
     @property
     def x_range_mm(self) -> tuple[float, float]:

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from processing.calibration.calibration import Calibration, ViewCalibration
+from processing.calibration.calibration import Calibration, Unchecked, ViewCalibration
 from processing.calibration.stored_fields import Pair
 from processing.calibration.target.targets import Target
 from processing.kernels import _native
@@ -20,7 +20,10 @@ AXES = (
     "pixel centres at integers. Rotation and translation: world to camera. Angles in rad."
 )
 
-_LATER = ("parent", "covariance", "candidates_holdout_error_px", "max_error_px", "holdout_error_px")
+_LATER = (
+    *("parent", "covariance", "candidates_holdout_error_px", "max_error_px", "holdout_error_px"),
+    *("reasons", "rays_miss_px", "not_checked"),
+)
 """Fields that files may lack, as they came later."""
 
 
@@ -40,6 +43,7 @@ class CalibrationRecord(BaseModel):
     target: Target | None
     z_range_mm: Pair
     notes: tuple[str, ...]
+    not_checked: tuple[Unchecked, ...] = ()
     views: Annotated[dict[str, ViewCalibration], Field(min_length=1, max_length=_native.MAX_VIEWS)]
 
 
@@ -71,7 +75,7 @@ def to_json(record: CalibrationRecord) -> dict[str, Any]:
     views = content["views"].values()
     for described in (content, *views, *(plane for view in views for plane in view["planes"])):
         for optional in _LATER:
-            if optional in described and described[optional] in (None, {}):
+            if optional in described and described[optional] in (None, {}, []):
                 del described[optional]
     CalibrationRecord.model_validate(content)  # nothing is written that could not be read again
     return content

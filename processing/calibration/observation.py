@@ -81,6 +81,14 @@ class CalibrationSet:
         Where the rig says that views stand; the fit is checked against it.
     rolls_deg : Mapping[str, float]
         How cameras were said to be turned about their axes; the others count as upright.
+    mirrored : tuple[str, ...]
+        Views that are said to look by a mirror: their images are flipped, their lines of sight are not.
+    scales_px_per_mm : Mapping[str, float]
+        Scale of views in the middle of the target, as it was stated or as the rig's magnification gives it.
+    unit_stated : bool
+        Somebody said what lengths are in.
+    unplaced_pixels : tuple[str, ...]
+        Views of measured points of which nobody said where u and v count from.
     """
 
     source: str
@@ -89,6 +97,16 @@ class CalibrationSet:
     notes: tuple[str, ...] = ()
     azimuths_deg: Mapping[str, float] = field(default_factory=dict)
     rolls_deg: Mapping[str, float] = field(default_factory=dict)
+    mirrored: tuple[str, ...] = ()
+    scales_px_per_mm: Mapping[str, float] = field(default_factory=dict)
+    unit_stated: bool = False
+    unplaced_pixels: tuple[str, ...] = ()
+
+    @property
+    def middle_mm(self) -> FloatArray:
+        """Middle (3,) of the points of all views."""
+        middles_mm = [stacked(seen.planes)[0].mean(axis=0) for seen in self.views.values()]
+        return np.asarray(np.mean(middles_mm, axis=0), dtype=np.float64)
 
 
 def stacked(planes: Sequence[PlaneObservation]) -> tuple[FloatArray, FloatArray]:

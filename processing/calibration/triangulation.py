@@ -7,14 +7,27 @@ import numpy as np
 from processing.geometry import FloatArray, ViewMapping
 
 _STEP_MM = 0.05
+_STEP_RANGE_PX, _STEP_PX = (0.3, 30.0), 3.0
+"""Steps that the images show by less or more are made such that they show them by 3 px: metres and micrometres too."""
 _ITERATIONS = 8
 
 
 def linearise(mapping: ViewMapping, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Image points (N, 2) of world points (N, 3), and their derivatives (N, 2, 3) in px/mm."""
     image_px = mapping.project(points_mm)
-    steps = [(mapping.project(points_mm + step_mm) - image_px) / _STEP_MM for step_mm in _STEP_MM * np.eye(3)]
-    return image_px, np.stack(steps, axis=-1)
+    step_mm = _STEP_MM
+    for _ in range(_ITERATIONS):
+        slopes = _differences(mapping, points_mm, image_px, step_mm)
+        shown_px = step_mm * float(np.median(np.linalg.norm(slopes, axis=(1, 2)))) if len(slopes) else _STEP_PX
+        if not shown_px or _STEP_RANGE_PX[0] < shown_px < _STEP_RANGE_PX[1]:
+            break
+        step_mm *= _STEP_PX / shown_px
+    return image_px, slopes
+
+
+def _differences(mapping: ViewMapping, points_mm: FloatArray, image_px: FloatArray, step_mm: float) -> FloatArray:
+    ahead_px = [mapping.project(points_mm + step) for step in step_mm * np.eye(3)]
+    return np.stack([(there_px - image_px) / step_mm for there_px in ahead_px], axis=-1)
 
 
 def back_project(mapping: ViewMapping, image_px: FloatArray, z_mm: float, near_mm: FloatArray) -> FloatArray:

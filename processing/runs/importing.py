@@ -8,13 +8,16 @@ from typing import TypedDict
 import cv2
 
 from daq.files.run_directory import ImageKey
+from processing.calibration.errors import CalibrationError
 from processing.calibration.sets.calibration_set import SET_FILE, write_set_file
+from processing.calibration.sets.points_table import read_table
 from processing.calibration.sets.set_record import CalibrationEntry, PlaneEntry, PointsEntry
 from processing.image_file import GreyImage
 from processing.runs.import_manifest import ManifestFile, named_files, read_manifest
 from processing.runs.overwriting import replacing, require_free
 from processing.runs.run_import import Done, ExposureReader, read_source, write_run
 from processing.runs.shot_sources import ImageSource, ShotSource, shot_sources
+from processing.runs.toml_lines import Key
 
 CALIBRATION_FOLDER, RUN_FOLDER = "calibration", "run"
 _MADE_WITH = (f"{CALIBRATION_FOLDER}/{SET_FILE}", f"{RUN_FOLDER}/run.h5")
@@ -59,6 +62,7 @@ def import_manifest(
     run = source.manifest.run
     shots = shot_sources(source, run) if run else []
     _check_files(source, shots)
+    _check_tables(source)
     with replacing(out_dir) as part:
         part.mkdir()
         notes = _write_parts(source, shots, part, done)
@@ -73,6 +77,18 @@ def _check_files(source: ManifestFile, shots: Sequence[ShotSource]) -> None:
         key, file = missing[0]
         others = f" (and {len(missing) - 1} more)" if len(missing) > 1 else ""
         raise source.error(key, f"{source.resolve(file)} does not exist{others}")
+
+
+def _check_tables(source: ManifestFile) -> None:
+    """Refuse tables that calibration could not read; all of them are named at once."""
+    problems: list[tuple[Key, str]] = []
+    for number, entry in enumerate(source.manifest.calibration.points if source.manifest.calibration else ()):
+        try:
+            read_table(source.resolve(entry.file), entry.columns)
+        except CalibrationError as error:
+            problems.append((("calibration", "points", number, "file"), str(error)))
+    if problems:
+        raise source.error(problems[0][0], "; ".join(text for _, text in problems))
 
 
 def _write_parts(source: ManifestFile, shots: Sequence[ShotSource], part: Path, done: Done) -> tuple[str, ...]:
@@ -136,6 +152,9 @@ def _copy_points(
         copied["image"] = _copy(source.resolve(entry.image), folder, place)
     elif entry.image_size_px is None:
         copied["image_size_px"] = sizes.get(entry.camera)
+        if entry.v_axis == "up" and entry.camera not in sizes:
+            key: Key = ("calibration", "points", number, "v_axis")
+            raise source.error(key, "counted from the bottom of an image of which size? Say image_size_px")
     return entry.model_copy(update=copied)
 
 

@@ -267,9 +267,8 @@ def require_match(run_name: str, shot: Shot, calibration: Calibration) -> None:
                 f"{run_name}, {name}: image of {columns} x {rows} px, calibrated for {view.mapping.image_size_px}"
             )
         if view.verdict is Verdict.REFUSE:
-            raise CalibrationError(
-                f"calibration {calibration.id}, {name}: hold-out error {view.holdout_error_px:.3g} px is refused"
-            )
+            reason = "; ".join(view.reasons) or f"hold-out error {view.holdout_error_px:.3g} px"
+            raise CalibrationError(f"calibration {calibration.id}, {name} is refused: {reason}")
 
 
 def _provenance(

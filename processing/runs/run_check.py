@@ -1,25 +1,36 @@
 """Does a calibration still fit the shots of a run? Asked of the droplets in them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from daq.files.run_directory import RunReader
-from processing.calibration.calibration import Calibration, Verdict
+import numpy as np
+
+from daq.files.run_directory import ImageKey, RunReader
+from daq.files.run_file import RUN_FILE
+from processing.calibration.calibration import Calibration, Doubt, Verdict
+from processing.calibration.calibration_record import content_id
+from processing.calibration.droplets.agreement import strangers
 from processing.calibration.droplets.disparity import MIN_VIEWS, REACH_PX, ViewDisparity, measured_box, shot_disparity
-from processing.calibration.droplets.displaced_view import displaced_view, would_agree
+from processing.calibration.droplets.displaced_view import displaced_view
 from processing.calibration.droplets.droplet_images import find_droplets
 from processing.calibration.droplets.self_calibration import CLEARER, NOISE_PX, SelfCalibration, self_calibrate
 from processing.calibration.errors import CalibrationError, OutOfRange
 from processing.calibration.fit.health import LIMITS_PX, judge
+from processing.calibration.fit.not_checked import DROPLETS
+from processing.calibration.sets.calibration_set import SET_FILE
 from processing.geometry import FloatArray
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.runs.errors import PipelineError
+from processing.runs.importing import CALIBRATION_FOLDER, RUN_FOLDER
 from processing.runs.pipeline import shot_intensities
 from processing.runs.results_file import FrameName
 from processing.runs.workbench import read_references
 
+CHECKED_SHOTS = 3
+"""Shots of a run that a calibration is checked by; the watch over a run checks more of them."""
 ALARM_PX, STOP_PX = LIMITS_PX[Verdict.USABLE], LIMITS_PX[Verdict.WARN]
 """Disparity of a view above which an operator should know, and above which volumes are not worth having."""
 
@@ -120,18 +131,63 @@ def _unmeasured(
 ) -> ShotCheck:
     """A shot without disparities: a view has moved too far for that, or the droplets do not tell."""
     names = list(calibration.views)
-    if len(names) < MIN_VIEWS:
-        return ShotCheck(shot, {}, str(error))
-    mappings = [view.mapping for view in calibration.views.values()]
-    displaced = displaced_view(mappings, exposures, measured_box(calibration))
-    if displaced is not None:
-        name = names[displaced]
+    mappings, box = [view.mapping for view in calibration.views.values()], measured_box(calibration)
+    displaced = displaced_view(mappings, exposures, box)
+    alone = strangers(mappings, exposures, box) if displaced is None else [displaced]
+    if len(alone) == 1:
+        name = names[alone[0]]
         problem = f"{name} has moved further than {REACH_PX:g} px, or shows other droplets: the other views agree"
         return ShotCheck(shot, {}, problem, (name,))
-    if isinstance(error, OutOfRange) or would_agree(exposures):
+    if alone or isinstance(error, OutOfRange):
         problem = f"{error}: a view has moved further than {REACH_PX:g} px, or several have"
-        return ShotCheck(shot, {}, problem, tuple(names))
-    return ShotCheck(shot, {}, f"{error}: too few droplets, or too many, to tell whether a view has moved")
+        return ShotCheck(shot, {}, problem, tuple(names[number] for number in alone) or tuple(names))
+    told = "too few droplets, or too many, to tell whether a view has moved"
+    return ShotCheck(shot, {}, f"{error}: {told}" if len(names) >= MIN_VIEWS else str(error))
+
+
+def run_beside(calibration_set: Path) -> Path | None:
+    """The run of the import that a calibration set, or its folder, is a part of; None where there is none."""
+    folder = calibration_set if (calibration_set / SET_FILE).exists() else calibration_set / CALIBRATION_FOLDER
+    run_dir = folder.parent / RUN_FOLDER
+    return run_dir if (folder / SET_FILE).exists() and (run_dir / RUN_FILE).exists() else None
+
+
+def checked_by_run(calibration: Calibration, run_dir: Path) -> Calibration:
+    """The calibration with verdicts that the droplets of the first shots of a run agree with.
+
+    A run that does not tell, as it has few droplets or other views, is noted.
+    """
+    try:
+        checks = [check_shot(run_dir, shot, calibration) for shot in _first_shots(run_dir)]
+    except CalibrationError as error:
+        return _noted(calibration, run_dir, str(error))
+    doubts = [_doubt(run_dir.name, check, check.verdict) for check in checks if check.verdict is not None]
+    if not doubts:
+        return _noted(calibration, run_dir, checks[0].problem if checks else "it has no shot with all exposures")
+    known = replace(calibration, not_checked=tuple(one for one in calibration.not_checked if one != DROPLETS))
+    worst = max(doubts, key=lambda doubt: list(Verdict).index(doubt.verdict))
+    checked = known.doubted([worst] if worst.verdict in (Verdict.WARN, Verdict.REFUSE) else [])
+    return checked.with_id(content_id(checked))
+
+
+def _first_shots(run_dir: Path) -> list[int]:
+    """The first shots with all exposures; references are none."""
+    with RunReader(run_dir) as run:
+        samples = np.flatnonzero(run.image_keys() == ImageKey.SAMPLE)
+        valid = (int(index) for index in samples if run.read_shot(int(index)).valid)
+        return list(islice(valid, CHECKED_SHOTS))
+
+
+def _noted(calibration: Calibration, run_dir: Path, problem: str) -> Calibration:
+    noted = replace(calibration, notes=(*calibration.notes, f"run {run_dir.name} does not tell: {problem}"))
+    return noted.with_id(content_id(noted))
+
+
+def _doubt(run: str, check: ShotCheck, verdict: Verdict) -> Doubt:
+    """What the droplets of a shot say of the views that it names, or of all."""
+    views = (check.moved,) if check.moved else check.beyond or tuple(check.views)
+    problem = check.problem or f"droplets are seen {check.worst_px:.2g} px beside where the other views put them"
+    return Doubt(views, f"shot {check.shot} of run {run}: {problem}", verdict)
 
 
 def self_calibrate_run(run_dir: Path, shots: Sequence[int], calibration: Calibration) -> SelfCalibration:

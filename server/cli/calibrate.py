@@ -40,6 +40,18 @@ def add(verbs: Verbs) -> None:
         help="how a camera of a run is turned about its axis: 180 if it hangs upside down",
     )
 
+    parser.add_argument(
+        "--mirrored",
+        action="append",
+        metavar="VIEW",
+        help="a view of a run that looks by a mirror",
+    )
+    parser.add_argument(
+        "--run",
+        type=Path,
+        help="a run of these views: the verdict then asks its droplets too; default: that of the same import",
+    )
+
 
 def stated_origin(text: str) -> tuple[tuple[str, float], tuple[float, float]]:
     """View, position in mm and image point of ``VIEW@Z=U,V``."""
@@ -66,12 +78,18 @@ def calibrate_views(options: Namespace) -> Outcome:
     from processing.calibration.sets.calibration_set import load_calibration_set
     from processing.figures.residual_figures import residuals_figure
     from processing.runs.overwriting import replacing, require_free
+    from processing.runs.run_check import checked_by_run, run_beside
     from server.pictures.calibration_pictures import calibration_pictures, picture_paths
 
     figure = picture_beside(options.out)
     require_free(options.out, figure, *picture_paths(options.out), overwrite=options.overwrite)
-    calibration_set = load_calibration_set(options.set, dict(options.origin or ()), dict(options.roll or ()))
+    calibration_set = load_calibration_set(
+        options.set, dict(options.origin or ()), dict(options.roll or ()), options.mirrored or ()
+    )
     calibration = calibrate(calibration_set, model=options.model)
+    run_dir = options.run or run_beside(options.set)
+    if run_dir is not None:
+        calibration = checked_by_run(calibration, run_dir)
     with replacing(options.out) as out:
         save_calibration(calibration, out)
         residuals_figure(calibration).savefig(out.with_name(figure.name), dpi=120)
@@ -81,9 +99,9 @@ def calibrate_views(options: Namespace) -> Outcome:
         progress(note)
     refused = {name: view for name, view in calibration.views.items() if view.verdict is Verdict.REFUSE}
     for name, view in refused.items():
-        progress(
-            f"{name}: REFUSED, hold-out error {view.holdout_error_px:.3g} px: reconstruction does not start with it"
-        )
+        progress(f"{name}: REFUSED, {view.reasons[0]}: reconstruction does not start with it")
+    for unchecked in calibration.not_checked:
+        progress(f"not checked: {unchecked.what}; it would be by {unchecked.state}")
     result = {
         "passed": not refused,
         "calibration": str(options.out),
@@ -91,6 +109,7 @@ def calibrate_views(options: Namespace) -> Outcome:
         "figure": str(figure),
         "figures": [str(picture) for picture in figures],
         "notes": list(calibration.notes),
+        "not_checked": [asdict(unchecked) for unchecked in calibration.not_checked],
         **view_errors(calibration),
     }
     drawn_in = ", ".join(map(str, [figure, *figures]))
@@ -106,16 +125,21 @@ def views_table(calibration: "Calibration") -> str:
             view.verdict.value,
             f"{view.holdout_error_px:.4f}",
             str(view.n_points),
+            str(view.n_rejected),
             *_scale_and_azimuth(view, middle_mm),
         ]
         for name, view in calibration.views.items()
     ]
-    return table(["view", "verdict", "hold-out [px]", "points", "px/mm", "azimuth [deg]"], rows)
+    heads = ["view", "verdict", "hold-out [px]", "points", "left out", "px/mm", "azimuth [deg]"]
+    reasons = [
+        f"{name}: {view.verdict}: {'; '.join(view.reasons)}" for name, view in calibration.views.items() if view.reasons
+    ]
+    return "\n".join([table(heads, rows), *reasons])
 
 
 def _scale_and_azimuth(view: "ViewCalibration", middle_mm: "FloatArray | None") -> tuple[str, str]:
     from processing.calibration.fit.placement import placement
-    from processing.reconstruction.planning.common_volume import scale_px_per_mm
+    from processing.calibration.fit.scale_check import scale_px_per_mm
 
     if middle_mm is None:
         return "", ""
@@ -132,10 +156,12 @@ def view_errors(calibration: "Calibration") -> dict[str, Any]:
             name: {
                 "model": view.model.value,
                 "n_points": view.n_points,
+                "n_rejected": view.n_rejected,
                 "mean_error_px": view.mean_error_px,
                 "rms_px": view.rms_px,
                 "max_error_px": view.max_error_px,
                 "holdout_error_px": view.holdout_error_px,
+                "rays_miss_px": view.rays_miss_px,
                 "candidates_holdout_error_px": dict(view.candidates_holdout_error_px),
                 "position_std_px": worst_position_std_px(view),
                 "planes": [
@@ -152,6 +178,7 @@ def view_errors(calibration: "Calibration") -> dict[str, Any]:
                 "worst_plane": view.worst_plane.name,
                 "placement": _placement(view, middle_mm),
                 "verdict": view.verdict.value,
+                "reasons": list(view.reasons),
             }
             for name, view in calibration.views.items()
         }

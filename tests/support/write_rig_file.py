@@ -150,7 +150,7 @@ def _kind(described: Schema, defs: Schema) -> str:
     if "properties" in target:
         return "table"
     if "anyOf" in target:
-        return "any of " + ", ".join(NAMES[one["type"]] for one in target["anyOf"])
+        return "any of " + ", ".join(_kind(one, defs) for one in target["anyOf"] if one.get("type") != "null")
     return FORMATS.get(target.get("format", ""), NAMES[target["type"]])
 
 
@@ -164,6 +164,8 @@ def _plural(described: Schema, defs: Schema) -> str:
 
 
 def _unit(key: str, described: Schema) -> str:
+    if key.endswith("_px_per_mm"):
+        return "px/mm"
     suffix = key.rpartition("_")[2]
     return UNITS[suffix] if suffix in UNITS and suffix != key and "string" not in str(described) else ""
 

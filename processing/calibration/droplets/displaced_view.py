@@ -1,13 +1,8 @@
-"""Views that have moved further than a disparity can be measured: what the droplets of a shot still tell of them.
-
-Where all views together agree on nothing, the others may still agree without the one that moved. Where they do
-not either, only their number speaks: droplets that stand alone, and are many, agree if the views are in place.
-"""
+"""A view that has moved further than a disparity can be measured: all others still agree without it."""
 
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from processing.calibration.droplets.disparity import MIN_DROPLETS, MIN_VIEWS, SEARCH_PX, local_disparities
 from processing.calibration.droplets.droplet_matching import Box, match_exposures
@@ -18,11 +13,7 @@ IN_PLACE_PX = 1.0
 EXPECTED_DROPLETS = 5 * MIN_DROPLETS
 """So many must be expected to agree in all views, were these in place, before their silence is an alarm."""
 MANY_DROPLETS = 300
-"""Where so many stand alone, a twentieth of them is enough for a peak."""
-ALONE_PX = 12.0
-"""Mean distance of neighbours from which on droplets do not hide each other."""
-_FOURTH_NEIGHBOUR = 1.08
-"""Median distance of the fourth neighbour, relative to the mean distance, of points that lie at random."""
+"""So many in one exposure tell enough; more would only take longer."""
 
 
 def displaced_view(mappings: Sequence[ViewMapping], exposures: Sequence[Sequence[FloatArray]], box: Box) -> int | None:
@@ -47,14 +38,8 @@ def displaced_view(mappings: Sequence[ViewMapping], exposures: Sequence[Sequence
     return int(displaced[0])
 
 
-def would_agree(exposures: Sequence[Sequence[FloatArray]]) -> bool:
-    """Whether every view sees so many droplets, and so far apart, that views in place agree on some of them."""
-    many = min(_counts(exposures)) >= MANY_DROPLETS
-    return many and min(_apart_px(seen) for exposure in exposures for seen in exposure) >= ALONE_PX
-
-
 def _enough(exposures: Sequence[Sequence[FloatArray]]) -> Sequence[Sequence[FloatArray]]:
-    """The first exposure, if its droplets are many: more would only take longer."""
+    """The first exposure, if its droplets are many."""
     return exposures[:1] if min(_counts(exposures[:1]), default=0) >= MANY_DROPLETS else exposures
 
 
@@ -78,9 +63,3 @@ def _expected(view: int, agreed: int, exposures: Sequence[Sequence[FloatArray]])
 def _counts(exposures: Sequence[Sequence[FloatArray]]) -> list[int]:
     """Droplets of each view in all exposures."""
     return [sum(map(len, seen)) for seen in zip(*exposures, strict=True)]
-
-
-def _apart_px(droplets_px: FloatArray) -> float:
-    """Mean distance of neighbours where most of the droplets (N, 2) are; infinite for fewer than five."""
-    distance_px, _ = cKDTree(droplets_px).query(droplets_px, k=[5])
-    return float(np.median(distance_px)) / _FOURTH_NEIGHBOUR if len(droplets_px) else np.inf

@@ -11,7 +11,7 @@ from datetime import UTC, datetime
 
 import numpy as np
 
-from processing.calibration.calibration import Calibration, Verdict, ViewCalibration
+from processing.calibration.calibration import Calibration, Doubt, ViewCalibration, worse
 from processing.calibration.calibration_record import content_id
 from processing.calibration.droplets.disparity import (
     SEARCH_PX,
@@ -263,9 +263,6 @@ def _corrected_view(view: ViewCalibration, mapping: ViewMapping, distance_px: fl
     if distance_px == 0:
         return view
     holdout_px = max(view.holdout_error_px, left_px)
-    verdict = _worse(view.verdict, judge(holdout_px))
-    return replace(view, mapping=mapping, holdout_error_px=holdout_px, verdict=verdict, covariance=None)
-
-
-def _worse(one: Verdict, other: Verdict) -> Verdict:
-    return max(one, other, key=list(Verdict).index)
+    corrected = replace(view, mapping=mapping, holdout_error_px=holdout_px, covariance=None)
+    left = Doubt((), f"droplets disagree by {left_px:.2g} px after the correction", judge(holdout_px))
+    return corrected if worse(view.verdict, left.verdict) is view.verdict else corrected.doubted(left)

@@ -26,6 +26,10 @@ MIN_PLANES = 4
 """With fewer planes, holding one out leaves too little of the depth: single points are held out instead."""
 FOLDS = 5
 """Parts that are held out in turn."""
+STILL, STILL_PX, MOST_STILL_PX = 3.0, 0.02, 1.0
+"""Where x and y alone describe the images to so many times what the camera leaves, or so well, z does not show."""
+STEPPED = 0.5
+"""But of a solid target, z too follows from x and y, to this part of its spread: it need not move."""
 
 Fit = Callable[[Sequence[PlaneObservation]], ViewMapping]
 HeldOut = list[NDArray[np.bool_]]
@@ -57,6 +61,19 @@ def judge(holdout_error_px: float, rejected: float = 0.0) -> Verdict:
     return Verdict.WARN if doubtful else verdict
 
 
+def shortfalls(holdout_error_px: float, n_rejected: int, n_points: int) -> tuple[str, ...]:
+    """Why ``judge`` does not call this good, of so many points left out and used; nothing where it does."""
+    exceeded_px = [limit_px for limit_px in LIMITS_PX.values() if holdout_error_px > limit_px]
+    reasons = [f"hold-out error {holdout_error_px:.3g} px, above {limit_px:g} px" for limit_px in exceeded_px[-1:]]
+    rejected = n_rejected / (n_rejected + n_points)
+    if rejected > MAX_REJECTED:
+        reasons.append(
+            f"{n_rejected} of {n_rejected + n_points} points were left out as wrong, {100 * rejected:.0f} %, "
+            f"more than {100 * MAX_REJECTED:.0f} %"
+        )
+    return tuple(reasons)
+
+
 def check_motion(view: str, planes: Sequence[PlaneObservation]) -> None:
     """Refuse targets that cannot determine a camera: too few points, or all in one plane.
 
@@ -86,6 +103,41 @@ def degeneracy(planes: Sequence[PlaneObservation]) -> str | None:
         f"(z range {z_range_mm:.3g} mm), "
         f"{100 * ratio:.2g} % of their extent; a camera needs {100 * MIN_DEPTH_RATIO:.0f} %"
     )
+
+
+def check_seen_motion(mapping: ViewMapping, points_mm: FloatArray, image_px: FloatArray) -> None:
+    """Refuse images that do not depend on where the target stood: it did not move, or they are one image.
+
+    Parameters
+    ----------
+    mapping : ViewMapping
+        The fit.
+    points_mm, image_px : (N, 3) and (N, 2) arrays
+        The points it was fitted to.
+
+    Raises
+    ------
+    CalibrationError
+        A map of x and y alone describes the images as well as the fit does.
+    """
+    left_px = float(np.sqrt(((mapping.project(points_mm) - image_px) ** 2).sum(axis=1).mean()))
+    flat_px = _left_by_x_and_y(points_mm, image_px)
+    solid = _left_by_x_and_y(points_mm, points_mm[:, 2:]) < STEPPED * points_mm[:, 2].std()
+    if solid or flat_px > np.clip(STILL * left_px, STILL_PX, MOST_STILL_PX):
+        return
+    raise CalibrationError(
+        f"what it sees does not depend on z: {np.ptp(points_mm[:, 2]):.3g} mm along z change it by {flat_px:.2g} px. "
+        "Did the target not move, or is one image, or one page of a stack, named for all planes?"
+    )
+
+
+def _left_by_x_and_y(points_mm: FloatArray, values: FloatArray) -> float:
+    """What a polynomial in x and y leaves of values (N, k), rms per point, the freedom of its terms counted out."""
+    order = 3 if len(points_mm) >= 40 else 2
+    x, y = ((points_mm - points_mm.mean(axis=0)) / max(float(points_mm[:, :2].std()), 1e-12)).T[:2]
+    terms = np.stack([x**i * y**j for i in range(order + 1) for j in range(order + 1 - i)], axis=1)
+    left = values - terms @ np.linalg.lstsq(terms, values, rcond=None)[0]
+    return float(np.sqrt((left**2).sum() / max(len(terms) - terms.shape[1], 1)))
 
 
 def holdout_distances_px(planes: Sequence[PlaneObservation], fit: Fit) -> list[FloatArray]:

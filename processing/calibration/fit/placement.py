@@ -1,9 +1,9 @@
 """Where views stand, and whether that can be: a camera that hangs upside down sees the target's axes turned.
 
 A target that looks the same from both ways up is labelled by how it lies in the image. Turned with its camera by half a
-turn about z, it gives a calibration that fits as well as any other, of a camera on the mirrored side; lines of sight of
-the other views then never meet its own. Nothing in one view's points tells. What tells is where the rig says that the
-camera stands; or that two cameras seem to stand in one place.
+turn about z, or seen by a mirror, it gives a calibration that fits as well as any other, of a camera on the mirrored
+side; lines of sight of the other views then never meet its own. Nothing in one view's points tells. What tells is where
+the rig says that the camera stands; or that two cameras seem to stand in one place.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
 
 from processing.calibration.triangulation import linearise
 from processing.geometry import FloatArray, PinholeCamera, ViewMapping, rotation_from_angles
@@ -19,8 +21,12 @@ TURNS_DEG = (0, 180, 90, -90)
 """How labels may be turned about z, the likely ones first."""
 CLEARER_DEG = 5.0
 """A turned view must agree by so much better with the rig's azimuth than one that is not."""
-DOUBTFUL_DEG = 20.0
-"""Views that disagree with the rig's azimuth by more, however they are turned, are noted."""
+DOUBTFUL_DEG = 3.0
+"""Views that disagree with the rig's azimuth by more, however they are turned, are doubted: so well it is known."""
+OBLIQUE_DEG = 10.0
+"""Only views beyond show by their azimuth that x and z are not in one unit."""
+SAME_STRETCH = 0.03
+"""Views whose azimuths ask for the same stretch of x, to this part, have the pitch wrong, or the positions."""
 SAME_PLACE_DEG, SAME_PLACE = 5.0, 0.1
 """Cameras whose lines of sight and places, relative to their distance, differ by less stand in each other's way."""
 
@@ -34,7 +40,7 @@ class Placement:
     azimuth_deg, pitch_deg : float
         Of its line of sight through the middle of the target.
     roll_deg : float
-        Around that line.
+        Around that line; of a mirrored view that of its image flipped left to right.
     centre_mm : tuple[float, float, float] | None
         Centre of projection; None for mappings that have none.
     """
@@ -48,7 +54,7 @@ class Placement:
 def placement(mapping: ViewMapping, middle_mm: FloatArray) -> Placement:
     """Where a view of any kind stands, by its line of sight through a point (3,)."""
     direction, to_right = _axes(mapping, middle_mm)
-    azimuth_rad, pitch_rad = np.arctan2(direction[0], direction[2]), np.arcsin(np.clip(-direction[1], -1, 1))
+    azimuth_rad, pitch_rad = np.deg2rad(_azimuth_deg(direction)), np.arcsin(np.clip(-direction[1], -1, 1))
     across, down, _ = rotation_from_angles(azimuth_rad, pitch_rad)
     roll_rad = np.arctan2(to_right @ down, to_right @ across)
     azimuth_deg, pitch_deg, roll_deg = (float(np.rad2deg(angle)) for angle in (azimuth_rad, pitch_rad, roll_rad))
@@ -80,13 +86,33 @@ def turned_views(
 
 def exchanged_views(
     mappings: Mapping[str, ViewMapping], middle_mm: FloatArray, azimuths_deg: Mapping[str, float]
-) -> Iterator[tuple[str, str]]:
-    """Pairs of views that need only change places in the rig for all views to agree with it, none of them turned."""
-    for one, other in combinations([name for name in mappings if name in azimuths_deg], 2):
-        exchanged_deg = {**azimuths_deg, one: azimuths_deg[other], other: azimuths_deg[one]}
-        off_deg = _disagreements_deg(mappings, middle_mm, exchanged_deg)
-        if all(angles[0] < CLEARER_DEG for angles in off_deg.values()):
-            yield one, other
+) -> dict[str, str]:
+    """By view: in whose place of the rig it stands; all views then agree with the rig, none of them turned.
+
+    All orders are considered. Empty where none agrees, or the views stand in their own places.
+    """
+    names = [name for name in mappings if name in azimuths_deg]
+    stands_deg = np.array([sight_azimuth_deg(mappings[name], middle_mm) for name in names])
+    beside_deg = stands_deg[:, None] - np.array([azimuths_deg[name] for name in names])
+    orders = [_best_order(beside_deg, offset_deg) for offset_deg in (0.0, *beside_deg.ravel())]
+    order, left_deg = min(orders, key=lambda found: float(found[1].sum()), default=(np.arange(0), np.zeros(0)))
+    if left_deg.max(initial=0.0) > DOUBTFUL_DEG:
+        return {}
+    return {name: names[place] for name, place in zip(names, order, strict=True) if names[place] != name}
+
+
+def common_stretch(
+    mappings: Mapping[str, ViewMapping], middle_mm: FloatArray, azimuths_deg: Mapping[str, float]
+) -> float | None:
+    """By what x must be stretched against z for oblique views to stand where the rig says; None unless all agree."""
+    stretches = [
+        float(np.tan(np.deg2rad(said_deg)) / np.tan(np.deg2rad(sight_azimuth_deg(mappings[name], middle_mm))))
+        for name, said_deg in azimuths_deg.items()
+        if name in mappings and OBLIQUE_DEG < line_angle_deg(said_deg) < 90 - OBLIQUE_DEG
+    ]
+    if len(stretches) < 2 or max(stretches) > (1 + SAME_STRETCH) * min(stretches) or min(stretches) <= 0:
+        return None
+    return float(np.mean(stretches))
 
 
 def doubtful_views(
@@ -105,7 +131,7 @@ def same_either_way(
     undecided = []
     for name, mapping in mappings.items():
         azimuths_deg = _turned_azimuths_deg(_axes(mapping, middle_mm)[0])
-        if name not in turned_deg and (_line_angle_deg(azimuths_deg[turns] - azimuths_deg[0]) < CLEARER_DEG).any():
+        if name not in turned_deg and (line_angle_deg(azimuths_deg[turns] - azimuths_deg[0]) < CLEARER_DEG).any():
             undecided.append(name)
     return undecided
 
@@ -122,11 +148,37 @@ def in_one_place(mappings: Mapping[str, ViewMapping], middle_mm: FloatArray) -> 
             yield one, other
 
 
+def sight_azimuth_deg(mapping: ViewMapping, middle_mm: FloatArray) -> float:
+    """Azimuth of a view's line of sight through a point (3,)."""
+    return _azimuth_deg(_axes(mapping, middle_mm)[0])
+
+
+def line_angle_deg(angles_deg: FloatArray | float) -> FloatArray:
+    """Angles between lines, which have no direction: 0 to 90 degrees."""
+    return np.abs((np.asarray(angles_deg, dtype=np.float64) + 90) % 180 - 90)
+
+
 def _axes(mapping: ViewMapping, middle_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Unit vectors (3,) along the line of sight, and towards growing u across it."""
+    """Unit vectors (3,) along the line of sight, away from a camera, and to the right of who looks along it.
+
+    The right is where u grows, but in a mirrored image. A mapping without a centre counts as one that is not mirrored.
+    """
     ((to_right, downwards),) = linearise(mapping, middle_mm[None])[1]
     direction = np.cross(to_right, downwards)
+    if isinstance(mapping, PinholeCamera) and direction @ (middle_mm - mapping.centre_mm) < 0:
+        direction, to_right = -direction, -to_right
     return direction / np.linalg.norm(direction), to_right / np.linalg.norm(to_right)
+
+
+def _azimuth_deg(direction: FloatArray) -> float:
+    return float(np.rad2deg(np.arctan2(direction[0], direction[2])))
+
+
+def _best_order(beside_deg: FloatArray, offset_deg: float) -> tuple[NDArray[np.intp], FloatArray]:
+    """Which place of the rig (N,) suits each view best, one each, and by how much the views (N,) miss them."""
+    off_deg = line_angle_deg(beside_deg - offset_deg)
+    views, places = linear_sum_assignment(off_deg)
+    return places, off_deg[views, places]
 
 
 def _disagreements_deg(
@@ -140,7 +192,7 @@ def _disagreements_deg(
     }
     offsets_deg = [0.0, *(float(angles[0]) for angles in beside_deg.values())]
     likeliest_deg = min(offsets_deg, key=lambda offset_deg: _cost_deg(list(beside_deg.values()), offset_deg))
-    return {name: _line_angle_deg(angles - likeliest_deg) for name, angles in beside_deg.items()}
+    return {name: line_angle_deg(angles - likeliest_deg) for name, angles in beside_deg.items()}
 
 
 def _turned_azimuths_deg(direction: FloatArray) -> FloatArray:
@@ -152,9 +204,4 @@ def _turned_azimuths_deg(direction: FloatArray) -> FloatArray:
 
 def _cost_deg(beside_deg: Sequence[FloatArray], offset_deg: float) -> float:
     dearer_deg = CLEARER_DEG * (np.arange(len(TURNS_DEG)) > 0)
-    return sum(float((_line_angle_deg(angles - offset_deg) + dearer_deg).min()) for angles in beside_deg)
-
-
-def _line_angle_deg(angles_deg: FloatArray) -> FloatArray:
-    """Angles between lines, which have no direction: 0 to 90 degrees."""
-    return np.abs((angles_deg + 90) % 180 - 90)
+    return sum(float((line_angle_deg(angles - offset_deg) + dearer_deg).min()) for angles in beside_deg)

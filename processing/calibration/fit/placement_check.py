@@ -1,39 +1,40 @@
-"""Do the views of a calibration stand where they can? Refuses what a camera that hangs upside down would give."""
+"""Do the views of a calibration stand where they can? Refuses what turned cameras, mirrors and exchanged files give."""
 
 from collections.abc import Iterator, Mapping
 
-import numpy as np
-
+from processing.calibration.calibration import Doubt
 from processing.calibration.errors import CalibrationError
 from processing.calibration.fit.placement import (
+    SAME_STRETCH,
+    common_stretch,
     doubtful_views,
     exchanged_views,
     in_one_place,
-    placement,
     same_either_way,
+    sight_azimuth_deg,
     turned_views,
 )
-from processing.calibration.observation import CalibrationSet, stacked
+from processing.calibration.observation import CalibrationSet
 from processing.geometry import FloatArray, ViewMapping
 
 
-def check_placements(calibration_set: CalibrationSet, mappings: Mapping[str, ViewMapping]) -> Iterator[str]:
-    """Notes on views that stand where they hardly can.
+def check_placements(calibration_set: CalibrationSet, mappings: Mapping[str, ViewMapping]) -> Iterator[Doubt]:
+    """What speaks against views by where they stand.
 
     Parameters
     ----------
     calibration_set : CalibrationSet
         What the mappings were fitted to, at known places.
     mappings : Mapping[str, ViewMapping]
-        The fits, in a right-handed world.
+        The fits.
 
     Raises
     ------
     CalibrationError
-        Some views agree with the rig, others only with the target's axes turned; names them and the remedy.
+        Some views agree with the rig, others only with the target's axes turned, or in the places of others; names
+        them and the remedy.
     """
-    middle_mm = np.mean([stacked(seen.planes)[0].mean(axis=0) for seen in calibration_set.views.values()], axis=0)
-    azimuths_deg = calibration_set.azimuths_deg
+    middle_mm, azimuths_deg = calibration_set.middle_mm, calibration_set.azimuths_deg
     turned_deg = turned_views(mappings, middle_mm, azimuths_deg)
     if turned_deg and (len(turned_deg) < len(mappings) or len(set(turned_deg.values())) > 1):
         texts = [_turned(calibration_set, name, mappings[name], middle_mm, turn) for name, turn in turned_deg.items()]
@@ -43,24 +44,52 @@ def check_placements(calibration_set: CalibrationSet, mappings: Mapping[str, Vie
         raise CalibrationError("; ".join(texts))
     if turned_deg:
         turn_deg = next(iter(turned_deg.values()))
-        yield f"every view sees the target's axes turned by {turn_deg} deg about z: so do x and y of all results"
-    doubtful_deg = doubtful_views(mappings, middle_mm, azimuths_deg)
-    for name, off_deg in doubtful_deg.items():
-        yield f"{name}: {_both_azimuths(calibration_set, name, mappings[name], middle_mm)}, {off_deg:.0f} deg apart"
-    if doubtful_deg:
-        yield from _exchanged(mappings, middle_mm, azimuths_deg)
+        yield Doubt(
+            tuple(turned_deg),
+            f"every view sees the target's axes turned by {turn_deg} deg about z: so do x and y of all results, unless "
+            "azimuths count the other way, or all images are mirrored",
+        )
+    yield from _doubtful(calibration_set, mappings, middle_mm)
     for one, other in in_one_place(mappings, middle_mm):
-        yield (
-            f"{one} and {other} seem to stand in one place: if one of them hangs upside down, say so (roll_deg), "
-            "else their lines of sight do not meet"
+        yield Doubt(
+            (one, other),
+            f"{one} and {other} seem to stand in one place: if one of them hangs upside down (roll_deg) or looks by a "
+            "mirror (mirrored), say so, else their lines of sight do not meet",
+        )
+
+
+def _doubtful(
+    calibration_set: CalibrationSet, mappings: Mapping[str, ViewMapping], middle_mm: FloatArray
+) -> Iterator[Doubt]:
+    """Views beside their azimuths, and what would explain it; refuses those that stand in the places of others."""
+    azimuths_deg = calibration_set.azimuths_deg
+    doubtful_deg = doubtful_views(mappings, middle_mm, azimuths_deg)
+    if not doubtful_deg:
+        return
+    if exchanged := list(_exchanged(mappings, middle_mm, azimuths_deg)):
+        both = [f"{name} {_both_azimuths(calibration_set, name, mappings[name], middle_mm)}" for name in doubtful_deg]
+        raise CalibrationError("; ".join([*both, *exchanged]))
+    for name, off_deg in doubtful_deg.items():
+        text = f"{_both_azimuths(calibration_set, name, mappings[name], middle_mm)}, {off_deg:.1f} deg apart"
+        yield Doubt((name,), f"{name}: {text}")
+    stretch = common_stretch(mappings, middle_mm, azimuths_deg)
+    if stretch is not None and abs(stretch - 1) > SAME_STRETCH:
+        pitch = calibration_set.target and f"pitch_mm {stretch * calibration_set.target.pitch_mm:.3g}"
+        yield Doubt(
+            tuple(azimuths_deg),
+            f"all views would stand where the rig says if x were {stretch:.3g} times as long: is "
+            f"{pitch or 'the unit of x and y'} right, or z counted in other steps?",
         )
 
 
 def _exchanged(
     mappings: Mapping[str, ViewMapping], middle_mm: FloatArray, azimuths_deg: Mapping[str, float]
 ) -> Iterator[str]:
-    for one, other in exchanged_views(mappings, middle_mm, azimuths_deg):
-        yield f"have {one} and {other} been exchanged? Then all views agree with the rig"
+    exchanged = exchanged_views(mappings, middle_mm, azimuths_deg)
+    if exchanged:
+        places = ", ".join(f"{name} stands in the place of {place}" for name, place in exchanged.items())
+        names = " and ".join([", ".join(list(exchanged)[:-1]), list(exchanged)[-1]])
+        yield f"have {names} been exchanged? Then all views agree with the rig ({places})"
 
 
 def _turned(
@@ -69,13 +98,18 @@ def _turned(
     said_deg = calibration_set.rolls_deg.get(name, 0.0)
     roll_deg = 180 - (180 - said_deg - turn_deg) % 360  # above -180, up to 180
     both = _both_azimuths(calibration_set, name, mapping, middle_mm)
+    mirror = (
+        f"Does it look by a mirror? Say --mirrored {name} (mirrored in the manifest). Or is "
+        if turn_deg == 180
+        else "Is "
+    )
     return (
-        f"{name}: {both}; with x and y turned by {turn_deg} deg both agree. Is the camera turned about its axis? "
+        f"{name}: {both}; with x and y turned by {turn_deg} deg both agree. {mirror}the camera turned about its axis? "
         f"Say --roll {name}={roll_deg:g} (roll_deg in configuration or manifest), "
         f"or --roll {name}={said_deg:g} if it is not, and the rig is wrong"
     )
 
 
 def _both_azimuths(calibration_set: CalibrationSet, name: str, mapping: ViewMapping, middle_mm: FloatArray) -> str:
-    fitted_deg = placement(mapping, middle_mm).azimuth_deg
-    return f"stands at {fitted_deg:.0f} deg by the target, at {calibration_set.azimuths_deg[name]:g} deg by the rig"
+    fitted_deg = sight_azimuth_deg(mapping, middle_mm)
+    return f"stands at {fitted_deg:.3g} deg by the target, at {calibration_set.azimuths_deg[name]:g} deg by the rig"

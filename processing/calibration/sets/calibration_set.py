@@ -7,6 +7,7 @@
     SET/points/...   the tables of measured points as they came
 """
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from pydantic import ValidationError
@@ -20,7 +21,9 @@ from processing.calibration.sets.set_record import CalibrationEntry, SetRecord
 SET_FILE = "set.json"
 
 
-def load_calibration_set(path: Path, origins: Origins = NO_ORIGINS, rolls_deg: Rolls = NO_ROLLS) -> CalibrationSet:
+def load_calibration_set(
+    path: Path, origins: Origins = NO_ORIGINS, rolls_deg: Rolls = NO_ROLLS, mirrored: Sequence[str] = ()
+) -> CalibrationSet:
     """Detect the target in a recorded calibration run or in an imported set.
 
     Parameters
@@ -32,23 +35,26 @@ def load_calibration_set(path: Path, origins: Origins = NO_ORIGINS, rolls_deg: R
         An imported set states them itself.
     rolls_deg : mapping of view to angle
         How cameras of a run are turned about their axes, where its configuration does not say so. Likewise.
+    mirrored : sequence of views
+        Those of a run that look by a mirror. Likewise.
 
     Raises
     ------
     CalibrationError
-        The path is neither, a view never sees the target, or an origin or a roll is stated where it cannot be; names
-        the file.
+        The path is neither, a view never sees the target, or an origin, a roll or a mirror is stated where it cannot
+        be; names the file.
     """
     path = Path(path)
     folder = next((one for one in (path, path / "calibration") if (one / SET_FILE).exists()), None)
-    if folder is not None and (origins or rolls_deg):
+    if folder is not None and (origins or rolls_deg or mirrored):
         raise CalibrationError(
-            f"{folder / SET_FILE}: an imported set states its origins and rolls itself (origin_px, roll_deg)"
+            f"{folder / SET_FILE}: an imported set states its origins, rolls and mirrors itself "
+            "(origin_px, roll_deg, mirrored)"
         )
     if folder is not None:
         return _read_imported(folder)
     if (path / "run.h5").exists():
-        return detect_recorded(path, origins, rolls_deg)
+        return detect_recorded(path, origins, rolls_deg, mirrored)
     raise CalibrationError(f"{path}: neither a calibration run (run.h5) nor a calibration set ({SET_FILE})")
 
 

@@ -1,7 +1,7 @@
 """Calibration sets from images and tables that came from elsewhere."""
 
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 
@@ -11,7 +11,9 @@ from processing.calibration.errors import CalibrationError, TargetNotFound
 from processing.calibration.observation import CalibrationSet, PlaneObservation, ViewObservations
 from processing.calibration.sets.known_dots import find_known_dots
 from processing.calibration.sets.plane_detection import DetectedPlanes, PlaneImage, Size, detect_planes
+from processing.calibration.sets.points_table import Table, read_table
 from processing.calibration.sets.set_record import CalibrationEntry, PointsEntry
+from processing.calibration.target.targets import Target
 from processing.geometry import FloatArray
 from processing.image_file import GreyImage, ImageFileError, read_image
 
@@ -46,71 +48,66 @@ def detect_imported(source: str, entry: CalibrationEntry, folder: Path) -> Calib
             raise CalibrationError(f"{file}: {size} px, other images of {camera} have {sizes[camera]} px")
         planes[camera] += levels
     views = {camera: ViewObservations(sizes[camera], _in_order(planes[camera])) for camera in entry.cameras}
-    azimuths_deg = {name: azimuth for name, azimuth in entry.azimuth_deg.items() if name not in entry.roll_deg}
-    return CalibrationSet(source, entry.target, views, detected.notes, azimuths_deg, entry.roll_deg)
-
-
-def read_table(path: Path, columns: Sequence[str]) -> dict[str, FloatArray]:
-    """Columns of a table of numbers, separated by blanks, tabs, commas or semicolons; # starts a comment.
-
-    Raises
-    ------
-    CalibrationError
-        The file is missing, or a line does not have these columns; names file and line.
-    """
-    try:
-        lines = path.read_text(encoding="utf-8-sig", errors="replace").splitlines()
-    except OSError as error:
-        raise CalibrationError(f"{path}: {error.strerror}") from error
-    rows = []
-    for number, line in enumerate(lines, start=1):
-        fields = line.split("#")[0].replace(",", " ").replace(";", " ").split()
-        if not fields:
-            continue
-        if len(fields) != len(columns):
-            raise CalibrationError(f"{path}, line {number}: {len(fields)} values, columns are {', '.join(columns)}")
-        try:
-            rows.append([float(field) for field in fields])
-        except ValueError as error:
-            raise CalibrationError(f"{path}, line {number}: {error}") from error
-        if not np.isfinite(rows[-1]).all():
-            raise CalibrationError(f"{path}, line {number}: {', '.join(fields)}: values must be finite")
-    if not rows:
-        raise CalibrationError(f"{path}: no points in it")
-    return dict(zip(columns, np.array(rows).T, strict=True))
+    unplaced = [one.camera for one in entry.points if one.image is None and None in (one.pixel_origin, one.v_axis)]
+    return CalibrationSet(
+        source,
+        _target_mm(entry),
+        views,
+        detected.notes,
+        azimuths_deg=entry.azimuth_deg,
+        rolls_deg=entry.roll_deg,
+        mirrored=entry.mirrored,
+        scales_px_per_mm=entry.scales_px_per_mm,
+        unit_stated=entry.unit is not None,
+        unplaced_pixels=tuple(dict.fromkeys(unplaced)),
+    )
 
 
 def _detected(folder: Path, entry: CalibrationEntry) -> DetectedPlanes:
-    if entry.target is None:
+    target = _target_mm(entry)
+    if target is None:
         return DetectedPlanes({}, ())
-    return detect_planes(str(folder), list(_plane_images(entry, folder)), entry.target, entry.roll_deg)
+    return detect_planes(str(folder), list(_plane_images(entry, folder)), target, entry.roll_deg, entry.mirrored)
+
+
+def _target_mm(entry: CalibrationEntry) -> Target | None:
+    """The target, its pitch in mm whatever the unit."""
+    return entry.target and entry.target.model_copy(update={"pitch_mm": entry.target.pitch_mm * entry.unit_mm})
 
 
 def _plane_images(entry: CalibrationEntry, folder: Path) -> Iterator[PlaneImage]:
     for plane in entry.plane:
         for camera, file in plane.images.items():
             origin_px = plane.origin_px.get(camera, entry.origin_px.get(camera))
-            yield PlaneImage(camera, Path(file).name, file, plane.z_mm, partial(_image, folder / file), origin_px)
+            z_mm = None if plane.z_mm is None else plane.z_mm * entry.unit_mm
+            yield PlaneImage(camera, Path(file).name, file, z_mm, partial(_image, folder / file), origin_px)
 
 
 def _measured(entry: CalibrationEntry, folder: Path) -> Iterator[tuple[str, Path, Size, list[PlaneObservation]]]:
     """Camera, table, size of its images and levels of every entry of points."""
     for points in entry.points:
-        size, levels = _dot_levels(points, folder) if points.image else _measured_levels(points, folder)
+        table = read_table(folder / points.file, points.columns)
+        world_mm = entry.unit_mm * np.column_stack([table["x_mm"], table["y_mm"], table["z_mm"]])
+        if points.image:
+            size, levels = _dot_levels(points, folder, table, world_mm)
+        else:
+            size, levels = _measured_levels(points, table, world_mm)
         yield points.camera, folder / points.file, size, levels
 
 
-def _measured_levels(points: PointsEntry, folder: Path) -> tuple[Size, list[PlaneObservation]]:
-    table = read_table(folder / points.file, points.columns)
-    image_px = np.column_stack([table["u_px"], table["v_px"]])
-    size = points.image_size_px or (int(image_px[:, 0].max()) + 1, int(image_px[:, 1].max()) + 1)
-    return size, _levels(Path(points.file).name, _world_mm(table), image_px)
+def _measured_levels(points: PointsEntry, table: Table, world_mm: FloatArray) -> tuple[Size, list[PlaneObservation]]:
+    image_px = np.column_stack([table["u_px"], table["v_px"]]) - (points.pixel_origin or 0)
+    width_px, height_px = points.image_size_px or (int(image_px[:, 0].max()) + 1, int(image_px[:, 1].max()) + 1)
+    if points.v_axis == "up":
+        image_px[:, 1] = height_px - 1 - image_px[:, 1]
+    return (width_px, height_px), _levels(Path(points.file).name, world_mm, image_px)
 
 
-def _dot_levels(points: PointsEntry, folder: Path) -> tuple[Size, list[PlaneObservation]]:
-    table = read_table(folder / points.file, points.columns)
+def _dot_levels(
+    points: PointsEntry, folder: Path, table: Table, world_mm: FloatArray
+) -> tuple[Size, list[PlaneObservation]]:
     file = folder / str(points.image)
-    image, world_mm = _image(file), _world_mm(table)
+    image = _image(file)
     index_of = {int(name): index for index, name in enumerate(table["id"])}
     unknown = [name for name in points.seeds_px if not name.isdecimal() or int(name) not in index_of]
     if unknown:
@@ -128,10 +125,6 @@ def _image(file: Path) -> GreyImage:
         return read_image(file)
     except ImageFileError as error:
         raise CalibrationError(str(error)) from error
-
-
-def _world_mm(table: dict[str, FloatArray]) -> FloatArray:
-    return np.column_stack([table["x_mm"], table["y_mm"], table["z_mm"]])
 
 
 def _levels(name: str, world_mm: FloatArray, image_px: FloatArray) -> list[PlaneObservation]:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from processing.calibration.errors import TargetNotFound
+from processing.calibration.fit.health import MIN_DEPTH_RATIO
 from processing.calibration.fit.pinhole_fit import direct_linear_transformation, projected_px
 from processing.geometry import FloatArray
 
@@ -64,6 +65,9 @@ def find_known_dots(
         raise TargetNotFound(f"{len(seeds_px)} seeds, at least {MIN_SEEDS} are needed")
     peaks_px, signal = _specks(np.ascontiguousarray(image, dtype=np.float32), diameter_px)
     indices = np.fromiter(seeds_px, np.int64, len(seeds_px))
+    spread_mm = np.linalg.svd(points_mm[indices] - points_mm[indices].mean(axis=0), compute_uv=False)
+    if spread_mm[2] < MIN_DEPTH_RATIO * spread_mm[0]:
+        raise TargetNotFound("the seeds lie in one plane: seeds_px must name dots at different depths")
     expected_px = np.array([seeds_px[int(index)] for index in indices], dtype=np.float64)
     seed_signal = [signal[near].max() for near in _near(expected_px, peaks_px, diameter_px) if len(near)]
     enough = MIN_SIGNAL * float(np.median(seed_signal)) if seed_signal else np.inf

@@ -1,8 +1,9 @@
 """Planes of a target, recorded or imported: each image tells for itself, or the other planes of its view tell."""
 
 from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,11 +12,15 @@ from processing.calibration.errors import CalibrationError, OriginUnknown, Targe
 from processing.calibration.observation import PlaneObservation, ViewObservations
 from processing.calibration.sets.partial_views import detect_by_others
 from processing.calibration.target.targets import Target, TargetPoints, detect_target
+from processing.geometry import FloatArray
 
 Image = NDArray[np.generic]
 Size = tuple[int, int]
 Found = dict[int, PlaneObservation]
 """By index of the image."""
+
+MIN_FREE_POINTS = 8
+"""Half of a board's points pose it in the hold-out test, and a pose needs four."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +68,11 @@ class DetectedPlanes:
 
 
 def detect_planes(
-    source: str, images: Sequence[PlaneImage], target: Target, rolls_deg: Mapping[str, float]
+    source: str,
+    images: Sequence[PlaneImage],
+    target: Target,
+    rolls_deg: Mapping[str, float],
+    mirrored: Collection[str] = (),
 ) -> DetectedPlanes:
     """Find the target in all images.
 
@@ -81,17 +90,23 @@ def detect_planes(
         What to look for.
     rolls_deg : mapping of view to angle
         How cameras are turned about their axes; the others count as upright.
+    mirrored : collection of views
+        Those that look by a mirror: the target is looked for in their flipped images.
 
     Raises
     ------
     CalibrationError
         A view never sees the target, or its images differ in size.
     """
-    sizes_px, found, missed = _first_look(source, images, target, rolls_deg)
+    images = [
+        replace(image, read=partial(_flipped, image.read)) if image.view in mirrored else image for image in images
+    ]
+    sizes_px, found, missed = _first_look(source, images, target, rolls_deg, mirrored)
     more, notes = _second_look(images, target, found, missed, rolls_deg)
     planes: dict[str, list[PlaneObservation]] = defaultdict(list)
     for index, plane in sorted((found | more).items()):
-        planes[images[index].view].append(plane)
+        view = images[index].view
+        planes[view].append(_flipped_back(plane, sizes_px[view]) if view in mirrored else plane)
     for view in sizes_px:
         if view not in planes:
             reason = next(note for note in notes if note.startswith(f"{view}, "))
@@ -106,8 +121,26 @@ def place_points(points: TargetPoints, target: Target, name: str, z_mm: float | 
     return PlaneObservation(name, world_mm, points.image_px, z_mm, free_pose=z_mm is None)
 
 
+def _flipped(read: Callable[[], Image]) -> Image:
+    """An image as it would be without the mirror."""
+    return read()[:, ::-1]
+
+
+def _flipped_back(plane: PlaneObservation, size_px: Size) -> PlaneObservation:
+    """What was found in the flipped image, where the image itself has it."""
+    return replace(plane, image_px=_flip_u(plane.image_px, size_px))
+
+
+def _flip_u(image_px: FloatArray, size_px: Size) -> FloatArray:
+    return image_px * (-1.0, 1.0) + (size_px[0] - 1.0, 0.0)
+
+
 def _first_look(
-    source: str, images: Sequence[PlaneImage], target: Target, rolls_deg: Mapping[str, float]
+    source: str,
+    images: Sequence[PlaneImage],
+    target: Target,
+    rolls_deg: Mapping[str, float],
+    mirrored: Collection[str],
 ) -> tuple[dict[str, Size], Found, dict[int, TargetNotFound]]:
     """Sizes by view; what each image tells by itself, and why the others do not."""
     sizes_px: dict[str, Size] = {}
@@ -118,8 +151,15 @@ def _first_look(
         if sizes_px.setdefault(image.view, size_px) != size_px:
             others = f"other images of {image.view} have {sizes_px[image.view]} px"
             raise CalibrationError(f"{source}: {image.where}: {size_px} px, {others}")
+        origin_px = image.origin_px
+        if origin_px is not None and image.view in mirrored:
+            origin_px = (size_px[0] - 1 - origin_px[0], origin_px[1])
         try:
-            points = detect_target(pixels, target, image.origin_px, rolls_deg.get(image.view, 0.0))
+            points = detect_target(pixels, target, origin_px, rolls_deg.get(image.view, 0.0))
+            if image.z_mm is None and len(points) < MIN_FREE_POINTS:
+                raise TargetNotFound(
+                    f"{len(points)} of its points are sharp; a board in a free pose needs {MIN_FREE_POINTS}"
+                )
             found[index] = place_points(points, target, image.name, image.z_mm)
         except TargetNotFound as error:
             missed[index] = error

@@ -1,7 +1,7 @@
 """Calibration sets from recorded runs: the target at known positions of the stage."""
 
 from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import lru_cache, partial
 from pathlib import Path
 from types import MappingProxyType
@@ -16,6 +16,7 @@ from processing.calibration.errors import CalibrationError
 from processing.calibration.observation import CalibrationSet
 from processing.calibration.sets.plane_detection import PlaneImage, detect_planes
 from processing.calibration.target.targets import Target
+from processing.optics import image_scale_px_per_mm
 
 Place = tuple[str, float]
 """A view, and a position of the stage in mm."""
@@ -34,7 +35,9 @@ NO_ROLLS: Rolls = MappingProxyType({})
 _SHOWS_TARGET = (ImageKey.SAMPLE, ImageKey.FLAT)
 
 
-def detect_recorded(run_dir: Path, origins: Origins = NO_ORIGINS, rolls_deg: Rolls = NO_ROLLS) -> CalibrationSet:
+def detect_recorded(
+    run_dir: Path, origins: Origins = NO_ORIGINS, rolls_deg: Rolls = NO_ROLLS, mirrored: Sequence[str] = ()
+) -> CalibrationSet:
     """Detect the target in exposures A, averaged over the valid shots of each stage position.
 
     What single images do not tell, see ``plane_detection.detect_planes``.
@@ -48,6 +51,8 @@ def detect_recorded(run_dir: Path, origins: Origins = NO_ORIGINS, rolls_deg: Rol
     rolls_deg : mapping of view to angle
         How cameras are turned about their axes, 180 where one hangs upside down; else as the run's configuration says.
         Where a view that is named here stands is not checked against the configuration.
+    mirrored : sequence of str
+        Views that look by a mirror.
 
     Raises
     ------
@@ -62,13 +67,24 @@ def detect_recorded(run_dir: Path, origins: Origins = NO_ORIGINS, rolls_deg: Rol
             raise CalibrationError(f"{run_dir}: no valid shot has a stage position; is it a calibration run?")
         configuration, views = run.header.configuration, list(run.header.views)
         _check_origins(run_dir, origins, views, list(positions))
-        _check_rolls(run_dir, rolls_deg, views)
+        _check_views(run_dir, "a roll", rolls_deg, views)
+        _check_views(run_dir, "a mirror", mirrored, views)
         believed_deg = {**_of_views(configuration, "roll_deg"), **rolls_deg}
-        detected = detect_planes(str(run_dir), _plane_images(run, positions, origins), target, believed_deg)
+        detected = detect_planes(str(run_dir), _plane_images(run, positions, origins), target, believed_deg, mirrored)
         source = run.header.run_id
     azimuths_deg = _of_views(configuration, "azimuth_deg")
     checked_deg = {name: azimuths_deg[name] for name in views if name in azimuths_deg and name not in rolls_deg}
-    return CalibrationSet(source, target, detected.views, detected.notes, checked_deg, believed_deg)
+    return CalibrationSet(
+        source,
+        target,
+        detected.views,
+        detected.notes,
+        azimuths_deg=checked_deg,
+        rolls_deg=believed_deg,
+        mirrored=tuple(mirrored),
+        scales_px_per_mm=_nominal_scales(configuration),
+        unit_stated=True,
+    )
 
 
 def _plane_images(run: RunReader, positions: Positions, origins: Origins) -> list[PlaneImage]:
@@ -101,15 +117,24 @@ def _check_origins(run_dir: Path, origins: Origins, views: Sequence[str], positi
             )
 
 
-def _check_rolls(run_dir: Path, rolls_deg: Rolls, views: Sequence[str]) -> None:
-    if strangers := sorted(set(rolls_deg).difference(views)):
-        raise CalibrationError(f"{run_dir}: a roll is stated for {', '.join(strangers)}; views are {', '.join(views)}")
+def _check_views(run_dir: Path, what: str, stated: Iterable[str], views: Sequence[str]) -> None:
+    if strangers := sorted(set(stated).difference(views)):
+        raise CalibrationError(f"{run_dir}: {what} is stated for {', '.join(strangers)}; views are {', '.join(views)}")
 
 
 def _of_views(configuration: dict[str, Any], key: str) -> dict[str, float]:
     """A number of every view that the rig's configuration has; runs from elsewhere may not say."""
     views = configuration.get("views", {})
     return {name: float(view[key]) for name, view in views.items() if key in view}
+
+
+def _nominal_scales(configuration: dict[str, Any]) -> dict[str, float]:
+    """Scale of every view by magnification and pixels; runs from elsewhere may not say."""
+    return {
+        name: image_scale_px_per_mm(view["lens"]["magnification"], view["sensor"]["pixel_pitch_um"])
+        for name, view in configuration.get("views", {}).items()
+        if "lens" in view and "sensor" in view
+    }
 
 
 def mean_target_images(run_dir: Path, z_mm: float) -> MeanFrames:

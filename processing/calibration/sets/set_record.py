@@ -10,6 +10,7 @@ SCHEMA: Literal["tomoshadow.calibration_set"] = "tomoshadow.calibration_set"
 
 CameraName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
 Pixel = tuple[float, float]
+Positive = Annotated[float, Field(gt=0)]
 Column = Literal["id", "u_px", "v_px", "x_mm", "y_mm", "z_mm", "skip"]
 
 
@@ -40,6 +41,13 @@ class PointsEntry(_Entry):
     columns: Annotated[tuple[Column, ...], Field(description="what the columns of the file are")]
     image_size_px: Annotated[tuple[int, int] | None, Field(description="width, height; default: as in the run")] = None
     image: Annotated[str | None, Field(description="find the dots here; the file then has id, x, y, z")] = None
+    pixel_origin: Annotated[
+        Literal[0, 1] | None,
+        Field(description="what the middle of the first pixel counts as; default: 0, and a question"),
+    ] = None
+    v_axis: Annotated[
+        Literal["down", "up"] | None, Field(description="up: v counts from the bottom of the image; default: down")
+    ] = None
     seeds_px: Annotated[dict[str, Pixel], Field(description="id of a dot: where it is seen, six or more")] = {}
     dot_diameter_px: Annotated[float, Field(gt=1, description="size of a dot in the image")] = 9.0
 
@@ -51,6 +59,8 @@ class PointsEntry(_Entry):
             raise ValueError(f"columns: {', '.join(wrong)} must appear once")
         if self.image and not self.seeds_px:
             raise ValueError("seeds_px: dots to be found in an image need seeds")
+        if self.image and (self.pixel_origin is not None or self.v_axis is not None):
+            raise ValueError("pixel_origin and v_axis are of measured points; here an image is searched for dots")
         return self
 
 
@@ -63,8 +73,17 @@ class CalibrationEntry(_Entry):
         dict[CameraName, float], Field(description="how cameras are turned about their axes; 180: upside down")
     ] = {}
     azimuth_deg: Annotated[
-        dict[CameraName, float], Field(description="where cameras stand, roughly; the fit is checked against it")
+        dict[CameraName, float], Field(description="where cameras stand, to 3°; the fit is checked against it")
     ] = {}
+    mirrored: Annotated[tuple[CameraName, ...], Field(description="cameras that look by a mirror")] = ()
+    scale_px_per_mm: Annotated[
+        Positive | dict[CameraName, Positive] | None,
+        Field(description="of all images, or by camera, to a tenth; the fit is checked against it"),
+    ] = None
+    unit: Annotated[
+        Literal["mm", "m", "inch", "um"] | None,
+        Field(description="what z_mm, pitch_mm and x, y, z of tables are in; default: mm"),
+    ] = None
     plane: Annotated[tuple[PlaneEntry, ...], Field(description="images of the target, position by position")] = ()
     points: Annotated[tuple[PointsEntry, ...], Field(description="points instead of images")] = ()
 
@@ -74,7 +93,7 @@ class CalibrationEntry(_Entry):
             raise ValueError("neither planes nor points")
         if self.plane and self.target is None:
             raise ValueError("target: planes need a target")
-        for key in ("origin_px", "roll_deg", "azimuth_deg"):
+        for key in ("origin_px", "roll_deg", "azimuth_deg", "mirrored", "scales_px_per_mm"):
             if strangers := sorted(set(getattr(self, key)).difference(self.cameras)):
                 raise ValueError(f"{key}: there is no camera {', '.join(strangers)}")
         if len({plane.z_mm is None for plane in self.plane}) > 1:
@@ -86,6 +105,17 @@ class CalibrationEntry(_Entry):
         """Names of all cameras, in order of appearance."""
         named = [camera for plane in self.plane for camera in plane.images]
         return tuple(dict.fromkeys([*named, *(points.camera for points in self.points)]))
+
+    @property
+    def scales_px_per_mm(self) -> dict[str, float]:
+        """The scale of every camera of which it is stated."""
+        stated = self.scale_px_per_mm
+        return stated or {} if isinstance(stated, dict | None) else dict.fromkeys(self.cameras, stated)
+
+    @property
+    def unit_mm(self) -> float:
+        """What lengths count, in mm."""
+        return {"mm": 1.0, "m": 1000.0, "inch": 25.4, "um": 0.001}[self.unit or "mm"]
 
 
 class SetRecord(_Entry):

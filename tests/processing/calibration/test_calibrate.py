@@ -58,12 +58,12 @@ def test_camera_on_the_other_side_of_the_target_is_found() -> None:
     assert true_errors_px(fitted.camera, camera).mean() < 0.004
 
 
-def test_left_handed_axes_are_noted() -> None:
+def test_left_handed_axes_are_refused() -> None:
     planes = seen_planes(paper_camera(15.0))
     mirrored = tuple(PlaneObservation(plane.name, plane.points_mm * (1, 1, -1), plane.image_px) for plane in planes)
     assert calibrate(calibration_set(only=planes)).notes == ()
-    (note,) = calibrate(calibration_set(only=mirrored)).notes
-    assert note.startswith("only: the target lies behind the camera: its axes are left-handed")
+    with pytest.raises(CalibrationError, match=r"^only: the target's axes are left-handed"):
+        calibrate(calibration_set(only=mirrored))
 
 
 @pytest.mark.parametrize(("model", "pitch"), [("pinhole", 0.5), ("pinhole", 1.25), ("pinhole_tilted", 2.0)])
@@ -71,7 +71,8 @@ def test_a_wrong_pitch_fits_nearly_as_well_and_shows_in_the_pixels(model: str, p
     planes = seen_planes(paper_camera(45.0), z_mm=(-4, -1, 1, 4), columns=15, rows=11)
     wrong = tuple(replace(plane, points_mm=plane.points_mm * (pitch, pitch, 1)) for plane in planes)
     calibration = calibrate(calibration_set(right=planes, wrong=wrong), model)
-    assert calibration.views["wrong"].verdict in ("good", "usable")
+    assert calibration.views["right"].verdict == "usable"
+    assert calibration.views["wrong"].verdict == "warn"
     (note,) = calibration.notes
     assert note.startswith("wrong: its pixels seem ")
     assert note.endswith("is pitch_mm of the target right, and the position of its planes in mm?")

@@ -184,7 +184,7 @@ def test_a_shot_with_missing_exposures_is_refused(run_dir: Path, calibration_fil
 
 def test_a_refused_calibration_makes_no_volumes(run_dir: Path, tmp_path: Path) -> None:
     bad = write_calibration(tmp_path / "bad.json", Verdict.REFUSE, holdout_px=1.7)
-    with pytest.raises(CalibrationError, match=r"view1: hold-out error 1\.7 px is refused"):
+    with pytest.raises(CalibrationError, match=r"view1 is refused: hold-out error 1\.7 px"):
         reconstructed(run_dir, bad)
 
 

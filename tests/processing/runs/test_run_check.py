@@ -104,8 +104,8 @@ def test_only_what_is_certain_of_a_disparity_is_judged(uncertainty_px: float, ve
     assert check.verdict is verdict
 
 
-@pytest.mark.parametrize(("density_per_mm3", "drift_px"), [(0.0, 0.0), (0.05, 0.0), (0.05, 30.0), (60.0, 30.0)])
-def test_too_few_and_too_many_droplets_do_not_tell(density_per_mm3: float, drift_px: float) -> None:
+@pytest.mark.parametrize(("density_per_mm3", "drift_px"), [(0.0, 0.0), (0.05, 0.0), (0.05, 30.0)])
+def test_too_few_droplets_do_not_tell(density_per_mm3: float, drift_px: float) -> None:
     check = photographed(density_per_mm3, 2, drift_px)
     assert (check.verdict, check.moved, check.beyond) == (None, None, ())
     assert check.problem.endswith("too few droplets, or too many, to tell whether a view has moved")

@@ -65,14 +65,14 @@ def test_origins_are_stated_for_runs(tmp_path: Path, capsys: pytest.CaptureFixtu
     told(capsys, "import", tmp_path / "manifest.toml", "-o", tmp_path / "set")
     arguments = ["calibrate", tmp_path / "set", "-o", tmp_path / "calibration.json", "--origin"]
     message = refused(capsys, *arguments, "view1@-4.5=812,604.5")
-    assert "set.json: an imported set states its origins and rolls itself" in message
+    assert "set.json: an imported set states its origins, rolls and mirrors itself" in message
     with pytest.raises(SystemExit):
         main([*map(str, arguments), "view1=812,604"])
     assert "not of the form VIEW@Z=U,V" in capsys.readouterr().err
     with pytest.raises(SystemExit):
         main([*map(str, arguments[:-1]), "--roll", "view1"])
     assert "not of the form VIEW=DEG" in capsys.readouterr().err
-    assert "states its origins and rolls itself" in refused(capsys, *arguments[:-1], "--roll", "view1=-90")
+    assert "states its origins, rolls and mirrors itself" in refused(capsys, *arguments[:-1], "--roll", "view1=-90")
 
 
 def test_a_refused_view_is_written_and_fails_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -85,8 +85,9 @@ def test_a_refused_view_is_written_and_fails_the_command(tmp_path: Path, capsys:
     output, progress = capsys.readouterr()
     error_px = result["views"]["view1"]["holdout_error_px"]
     assert f"view1: REFUSED, hold-out error {error_px:.3g} px" in progress
-    heads, view1, written = output.splitlines()
-    assert heads == "view   verdict  hold-out [px]  points  px/mm  azimuth [deg]"
+    heads, view1, reason, written = output.splitlines()
+    assert heads == "view   verdict  hold-out [px]  points  left out  px/mm  azimuth [deg]"
+    assert reason.startswith(f"view1: refuse: hold-out error {error_px:.3g} px, above 0.8 px")
     scale_px_per_mm, azimuth_deg = map(float, view1.split()[-2:])
     assert view1.split()[:4] == ["view1", "refuse", f"{error_px:.4f}", str(27 * 9)]
     assert scale_px_per_mm == pytest.approx(SCALE_PX_PER_MM, rel=0.02)

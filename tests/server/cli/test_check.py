@@ -1,6 +1,7 @@
 """check and self-calibrate: a camera that moved after calibration is told from the shots, and put right."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,8 @@ import pytest
 from processing.calibration.calibration import Verdict
 from processing.calibration.calibration_file import load_calibration, save_calibration
 from processing.calibration.droplets.disparity import ViewDisparity
-from processing.runs.run_check import ShotCheck
+from processing.calibration.fit.not_checked import DROPLETS
+from processing.runs.run_check import ShotCheck, checked_by_run
 from server.cli.check import check_line, views_table
 from tests.support.command_line import told
 from tests.support.drifting_run import DRIFT_PX, write_droplet_run
@@ -55,6 +57,23 @@ def test_moved_view_stops_and_a_corrected_calibration_is_good_again(
     assert max(after["shots"][0]["views"].values()) < 0.2
     assert after["verdict"] in ("good", "usable")
     assert after["passed"] is True
+
+
+def test_droplets_are_part_of_the_verdict_of_a_calibration(
+    run_dir: Path, calibration_file: Path, tmp_path: Path
+) -> None:
+    fitted = replace(load_calibration(calibration_file), not_checked=(DROPLETS,))
+    checked = checked_by_run(fitted, run_dir)
+    assert checked.not_checked == ()
+    assert {name: view.verdict for name, view in checked.views.items() if view.reasons} == {"view2": "refuse"}
+    (reason,) = checked.views["view2"].reasons
+    assert reason.startswith("shot 0 of run droplets: droplets are seen ")
+    assert reason in checked.notes
+    assert checked.id != fitted.id
+    empty = write_droplet_run(tmp_path / "empty", density_per_mm3=0.05)
+    silent = checked_by_run(fitted, empty)
+    assert (silent.views, silent.not_checked) == (fitted.views, (DROPLETS,))
+    assert silent.notes[-1].startswith("run empty does not tell: ")
 
 
 def test_shots_without_droplets_say_so_and_correct_nothing(

@@ -106,7 +106,8 @@ def test_overfitting_shows_in_the_holdout_error_only() -> None:
 def test_a_stage_that_lied_about_one_position_is_found() -> None:
     planes = list(seen_planes(paper_camera(), noise_px=0.02))
     planes[3] = shifted(planes[3], mm=(0, 0, 0.01))
-    calibration = calibrate(calibration_set(honest=seen_planes(paper_camera(), noise_px=0.02), lying=tuple(planes)))
+    honest = seen_planes(paper_camera(-45.0), noise_px=0.02)
+    calibration = calibrate(calibration_set(honest=honest, lying=tuple(planes)))
     lying = calibration.views["lying"]
     assert lying.holdout_error_px > 2 * calibration.views["honest"].holdout_error_px
     assert lying.worst_plane.name == planes[3].name

@@ -13,7 +13,7 @@ from processing.calibration.calibrate import calibrate
 from processing.calibration.errors import CalibrationError
 from processing.calibration.fit.placement import placement
 from processing.calibration.sets.calibration_set import load_calibration_set, write_set_file
-from processing.calibration.sets.imported_set import read_table
+from processing.calibration.sets.points_table import read_table
 from processing.calibration.sets.set_record import CalibrationEntry, PointsEntry
 from processing.synthetic.paper_rig import paper_cameras, paper_optics
 from processing.synthetic.target import Checkerboard, render_target
@@ -34,10 +34,11 @@ class Planned:
     key: ImageKey = ImageKey.SAMPLE
 
 
-def see(view: str, z_mm: float, seed: int, hanging: Sequence[str] = ()) -> Frame:
+def see(view: str, z_mm: float, seed: int, hanging: Sequence[str] = (), mirrored: Sequence[str] = ()) -> Frame:
     clear = render_target(paper_cameras(BINNING)[view], Checkerboard(), z_mm, paper_optics(BINNING)[view])
     upright = np.clip(np.random.default_rng(seed).normal(3000 * clear + 80, 20), 0, 4095).astype(np.uint16)
-    return upright[::-1, ::-1] if view in hanging else upright
+    turned = upright[::-1, ::-1] if view in hanging else upright
+    return turned[:, ::-1] if view in mirrored else turned
 
 
 def record(
@@ -46,10 +47,11 @@ def record(
     configuration: dict[str, object],
     columns: slice = slice(None),
     hanging: Sequence[str] = (),
+    mirrored: Sequence[str] = (),
 ) -> Path:
     """A run of these shots, of some columns of the images; exposures B, and shots that do not count, show nothing.
 
-    Some cameras may hang upside down.
+    Some cameras may hang upside down, or look by a mirror.
     """
     shape = see("view1", 0.0, 0)[:, columns].shape
     dark, fine = np.zeros(shape, np.uint16), ExposureRecord(valid=True, frame_id=1)
@@ -62,7 +64,10 @@ def record(
     with RunWriter(run_dir, header) as writer:
         for index, shot in enumerate(planned):
             lit = shot.key is ImageKey.SAMPLE and shot.z_mm is not None
-            frames = {view: see(view, shot.z_mm or 0.0, index, hanging)[:, columns] if lit else dark for view in VIEWS}
+            frames = {
+                view: see(view, shot.z_mm or 0.0, index, hanging, mirrored)[:, columns] if lit else dark
+                for view in VIEWS
+            }
             exposures = {view: DoubleFrame(frame, dark, fine, fine) for view, frame in frames.items()}
             writer.write_shot(Shot(index, shot.key, exposures, stage_z_mm=shot.z_mm))
         writer.finish("completed")
@@ -88,7 +93,7 @@ def test_a_camera_that_hangs_upside_down_must_be_said_to(tmp_path: Path) -> None
     views = {"view1": {"azimuth_deg": 45.0}, "view3": {"azimuth_deg": -15.0}}
     planned = [Planned(z_mm) for z_mm in Z_MM]
     run_dir = record(tmp_path / "run", planned, {"target": TARGET, "views": views}, hanging=["view3"])
-    with pytest.raises(CalibrationError, match=r"^view3: stands at 15 deg .* Say --roll view3=180"):
+    with pytest.raises(CalibrationError, match=r"^view3: stands at 1\S+ deg .* Say --roll view3=180"):
         calibrate(load_calibration_set(run_dir))
     hanging = views | {"view3": {"azimuth_deg": -15.0, "roll_deg": 180.0}}
     configured = record(tmp_path / "said", planned, {"target": TARGET, "views": hanging}, hanging=["view3"])
@@ -100,6 +105,20 @@ def test_a_camera_that_hangs_upside_down_must_be_said_to(tmp_path: Path) -> None
         assert abs(stands.roll_deg) == pytest.approx(180.0, abs=0.5)
     with pytest.raises(CalibrationError, match="a roll is stated for view9; views are view1, view3"):
         load_calibration_set(run_dir, rolls_deg={"view9": 180.0})
+
+
+def test_a_camera_that_looks_by_a_mirror_must_be_said_to(tmp_path: Path) -> None:
+    views = {"view1": {"azimuth_deg": 45.0}, "view3": {"azimuth_deg": -15.0}}
+    planned = [Planned(z_mm) for z_mm in (-4.0, 0.0, 4.0)]
+    run_dir = record(tmp_path / "run", planned, {"target": TARGET, "views": views}, mirrored=["view3"])
+    with pytest.raises(CalibrationError, match=r"^view3: .* Does it look by a mirror\? Say --mirrored view3"):
+        calibrate(load_calibration_set(run_dir))
+    calibration = calibrate(load_calibration_set(run_dir, mirrored=["view3"]))
+    assert {view.verdict for view in calibration.views.values()} == {"good"}
+    stands = placement(calibration.views["view3"].mapping, np.zeros(3))
+    assert (stands.azimuth_deg, stands.roll_deg) == pytest.approx((-15.0, 0.0), abs=0.5)
+    with pytest.raises(CalibrationError, match="a mirror is stated for view9; views are view1, view3"):
+        load_calibration_set(run_dir, mirrored=["view9"])
 
 
 def test_position_without_target_is_left_out_and_noted(tmp_path: Path) -> None:
@@ -156,7 +175,11 @@ def test_measured_points_are_split_by_level(tmp_path: Path) -> None:
     ("text", "complaint"),
     [
         ("1 2 3\n4 5\n", "line 2: 2 values, columns are u_px, v_px, x_mm"),
-        ("1 2 3\n\n4 five 6\n", "line 3: could not convert"),
+        ("1 2 3\n\n4 five 6\n", "line 3: five: not a number"),
+        ("u v x\n1 2 3\n", "line 1: 'u v x': a header line"),
+        ("1,5;2,5;3,5\n", "line 1: .*: decimal commas"),
+        ("1,5,2,5,3,5\n", "line 1: .*: decimal commas"),
+        ("1\0 2 3", "not a table in plain text"),
         ("1 2 3\n4 5 nan\n", "line 2: 4, 5, nan: values must be finite"),
         ("1 2 3\n-inf 5 6\n", "line 2: -inf, 5, 6: values must be finite"),
         ("# nothing\n", "no points in it"),

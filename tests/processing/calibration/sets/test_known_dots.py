@@ -46,4 +46,6 @@ def test_few_seeds_are_refused() -> None:
 
 def test_seeds_on_empty_ground_are_refused() -> None:
     with pytest.raises(TargetNotFound, match="dots where 6 or more"):
-        find_known_dots(np.zeros((100, 100)), DOTS_MM, {n: (10.0 * n, 50.0) for n in range(8)}, diameter_px=9.0)
+        find_known_dots(
+            np.zeros((100, 100)), DOTS_MM, {n: (10.0 * number, 50.0) for number, n in enumerate(SEEDS)}, diameter_px=9.0
+        )

@@ -1,0 +1,47 @@
+"""What may be wrong with a calibration without showing, as nothing was stated that would tell."""
+
+from collections.abc import Iterator, Sequence
+
+from processing.calibration.calibration import Unchecked
+from processing.calibration.observation import CalibrationSet
+
+DROPLETS = Unchecked(
+    "whether all views saw the target in the same places, and none of them by a mirror or upside down",
+    "a run that was recorded with these views: calibrate --run RUN, or check RUN",
+)
+"""Told by droplets alone: the points of each view are labelled by what that view shows."""
+
+
+def not_checked(calibration_set: CalibrationSet, undirected: Sequence[str]) -> Iterator[Unchecked]:
+    """What nothing tells of a set at known places.
+
+    Parameters
+    ----------
+    calibration_set : CalibrationSet
+        With all that was stated.
+    undirected : sequence of str
+        Views whose perspective is too weak to tell right-handed axes from left-handed ones.
+    """
+    if undirected:
+        yield Unchecked(
+            f"whether z and the images of {', '.join(undirected)} count the right way, as sights hardly diverge",
+            "azimuth_deg of these views",
+        )
+    if unplaced := [name for name in calibration_set.views if name not in calibration_set.azimuths_deg]:
+        yield Unchecked(
+            f"where {', '.join(unplaced)} should stand: files of two cameras may be exchanged, or a camera turned",
+            f"azimuth_deg of {', '.join(unplaced)}",
+        )
+    if unscaled := [name for name in calibration_set.views if name not in calibration_set.scales_px_per_mm]:
+        yield Unchecked(
+            f"whether the scale of {', '.join(unscaled)} is right: pitch_mm, z_mm, and their unit",
+            f"scale_px_per_mm of {', '.join(unscaled)}, by magnification and pixel pitch",
+        )
+    if calibration_set.unplaced_pixels:
+        names = ", ".join(calibration_set.unplaced_pixels)
+        yield Unchecked(
+            f"whether u and v of {names} count from 0 in the middle of the first pixel, and v downwards, as in a run",
+            f"pixel_origin and v_axis of the points of {names}",
+        )
+    if len(calibration_set.views) > 1:
+        yield DROPLETS

@@ -1,0 +1,81 @@
+"""Are lengths what they are said to be? A wrong pitch, or another unit, fits as well as the right one."""
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from processing.calibration.calibration import Doubt, Model, ViewCalibration
+from processing.calibration.observation import CalibrationSet
+from processing.calibration.triangulation import linearise
+from processing.geometry import FloatArray, PinholeCamera, ViewMapping
+
+MAX_STRETCH = 1.1
+"""Pixels are square; a sensor tilted by 24 deg looks like one of pixels of 1.095 to a model without tilt."""
+MAX_TILTED_STRETCH = 1.03
+"""Where the model has a tilt of its own, less is left to it."""
+SCALE_TOLERANCE = 0.1
+"""Magnifications of lenses are known to a tenth, or better."""
+USUAL_PX_PER_MM = (0.2, 250.0)
+"""Scales beyond are those of rooms and microscopes, or of metres, inches and micrometres that count as mm."""
+NEAREST_MM = 5.0
+"""No lens stands closer to what it sees, with room for another beside it."""
+
+
+def scale_px_per_mm(mapping: ViewMapping, point_mm: FloatArray) -> float:
+    """Image scale at a point (3,), across the line of sight: the mean of both directions."""
+    ((along_u, along_v),) = linearise(mapping, point_mm[None])[1]
+    return float(np.sqrt(np.linalg.norm(np.cross(along_u, along_v))))
+
+
+def check_scales(calibration_set: CalibrationSet, views: Mapping[str, ViewCalibration]) -> Iterator[Doubt]:
+    """What speaks against the lengths that views were fitted to."""
+    scales_px_per_mm = {name: scale_px_per_mm(view.mapping, calibration_set.middle_mm) for name, view in views.items()}
+    yield from _other_scales(scales_px_per_mm, calibration_set.scales_px_per_mm)
+    if not calibration_set.unit_stated and not calibration_set.scales_px_per_mm:
+        yield from _unusual(calibration_set, views, scales_px_per_mm)
+    yield from _stretched(views)
+
+
+def _other_scales(found_px_per_mm: Mapping[str, float], said_px_per_mm: Mapping[str, float]) -> Iterator[Doubt]:
+    for name, said in said_px_per_mm.items():
+        ratio = found_px_per_mm[name] / said
+        if not 1 / (1 + SCALE_TOLERANCE) < ratio < 1 + SCALE_TOLERANCE:
+            yield Doubt(
+                (name,),
+                f"{name}: {found_px_per_mm[name]:.4g} px/mm by the target, {said:.4g} px/mm by the rig, "
+                f"{ratio:.3g} times as much: are pitch_mm, z_mm and their unit right?",
+            )
+
+
+def _unusual(
+    calibration_set: CalibrationSet, views: Mapping[str, ViewCalibration], found_px_per_mm: Mapping[str, float]
+) -> Iterator[Doubt]:
+    """Questions about scales and distances that are more likely those of another unit."""
+    least, most = USUAL_PX_PER_MM
+    for name, view in views.items():
+        mapping = view.mapping
+        away_mm = (
+            float(np.linalg.norm(mapping.centre_mm - calibration_set.middle_mm))
+            if isinstance(mapping, PinholeCamera)
+            else np.inf
+        )
+        if not least < found_px_per_mm[name] < most or away_mm < NEAREST_MM:
+            stands = f", {away_mm:.3g} mm from the target" if np.isfinite(away_mm) else ""
+            yield Doubt(
+                (name,),
+                f"{name}: {found_px_per_mm[name]:.4g} px/mm{stands}: are lengths in mm? Say unit or scale_px_per_mm",
+            )
+
+
+def _stretched(views: Mapping[str, ViewCalibration]) -> Iterator[Doubt]:
+    """Pixels that are not square: a wrong pitch, or a wrong scale of the stage, fits as well as the right."""
+    for name, view in views.items():
+        if isinstance(view.mapping, PinholeCamera):
+            most = MAX_TILTED_STRETCH if view.model is Model.PINHOLE_TILTED else MAX_STRETCH
+            height_to_width = float(view.mapping.camera_matrix[0, 0] / view.mapping.camera_matrix[1, 1])
+            if not 1 / most < height_to_width < most:
+                yield Doubt(
+                    (name,),
+                    f"{name}: its pixels seem {height_to_width:.2f} times as high as wide: is pitch_mm of the target "
+                    f"right, and the position of its planes in mm?",
+                )
