@@ -253,8 +253,8 @@ def test_a_generator_fault_ends_the_wait_for_the_next_shot(lab: Laboratory) -> N
 
 
 def test_a_shot_that_cannot_be_stored_fails_the_run(lab: Laboratory) -> None:
-    reader = lab.start_and_await_shot(plan_of(1000, rate_hz=30), 0)
-    for index in range(20, 40):
+    reader = lab.start_and_await_shot(plan_of(1000, rate_hz=10), 0)
+    for index in range(10, 40):
         path = reader.run_dir / "shots" / f"{index}.h5"
         if not path.exists():
             path.mkdir()
@@ -319,7 +319,7 @@ def test_a_stop_ends_the_wait_and_completes_the_shot(lab: Laboratory) -> None:
 
 
 def test_an_abort_between_shots_is_an_abort_and_no_failure(lab: Laboratory) -> None:
-    reader = lab.start_and_await_shot(plan_of(1000, rate_hz=30), 2)
+    reader = lab.start_and_await_shot(plan_of(1000, rate_hz=10), 2)
     lab.acquisition.abort()
     status = lab.acquisition.wait(DEADLINE_S)
     assert (status.state, status.outcome) == (RunState.IDLE, RunOutcome.ABORTED)

@@ -74,7 +74,7 @@ def await_true(condition: Callable[[], bool]) -> None:
 
 
 def test_the_firmware_fires_every_shot_as_asked(laboratory: FirmwareLaboratory, acquisition: Acquisition) -> None:
-    reader = RunReader(laboratory.data_dir / acquisition.start(plan_of(20, 50)))
+    reader = RunReader(laboratory.data_dir / acquisition.start(plan_of(20, 10)))
     status = acquisition.wait(DEADLINE_S)
     assert (status.outcome, status.shots_valid) == (RunOutcome.COMPLETED, 20)
     trains = [reader.read_shot(index).fired for index in range(20)]
