@@ -1,7 +1,7 @@
 # Each target does its own set-up on a bare Debian 12 or 13 machine, is quick when that is done, and says what it does.
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-fast test-wheel test-debian13 wheel lint serve firmware bench measured lock clean mutants fuzz
+.PHONY: help setup demo test test-fast test-wheel test-debian13 wheel lint serve firmware bench measured lock clean mutants fuzz fuzz-import
 
 PYTHON := .venv/bin/python
 TOOLS := env PATH="$(CURDIR)/.venv/bin:$$PATH"
@@ -87,6 +87,9 @@ firmware: $(FIRMWARE_SOURCES) | build/.toolchain ## Build the firmware: image fo
 mutants: setup build/rp2040js/node_modules ## Shoot a long series, plant faults in the firmware, and show that its tests find each; seven minutes of CPU time.
 	@TOMOSHADOW_SERIES_SHOTS=1000 $(PYTHON) -m pytest -q tests/firmware/test_rp2040_waveform.py::test_a_series_has_no_jitter
 	@$(PYTHON) firmware/tests/mutants.py $(MUTANTS)
+
+fuzz-import: setup ## Damage manifests, tables and images in FUZZ_IMPORTS=2000 ways: each is imported or refused in a sentence.
+	@$(PYTHON) -m tests.support.fuzz_import $(FUZZ_IMPORTS) 2>/dev/null
 
 fuzz: | build/.toolchain ## Feed the firmware's core hostile input by libFuzzer, for FUZZ_S=60 seconds.
 	@$(call install,clang libclang-rt-dev)
