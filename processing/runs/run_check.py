@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from daq.files.run_directory import ImageKey, RunReader
-from daq.files.run_file import RUN_FILE
 from processing.calibration.calibration import Calibration, Doubt, Verdict
 from processing.calibration.calibration_record import content_id
 from processing.calibration.droplets.agreement import strangers
@@ -20,11 +19,9 @@ from processing.calibration.droplets.self_calibration import CLEARER, NOISE_PX, 
 from processing.calibration.errors import CalibrationError, OutOfRange
 from processing.calibration.fit.health import LIMITS_PX, judge
 from processing.calibration.fit.not_checked import DROPLETS
-from processing.calibration.sets.calibration_set import SET_FILE
 from processing.geometry import FloatArray
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.runs.errors import PipelineError
-from processing.runs.importing import CALIBRATION_FOLDER, RUN_FOLDER
 from processing.runs.pipeline import shot_intensities
 from processing.runs.results_file import FrameName
 from processing.runs.workbench import read_references
@@ -143,13 +140,6 @@ def _unmeasured(
         return ShotCheck(shot, {}, problem, tuple(names[number] for number in alone) or tuple(names))
     told = "too few droplets, or too many, to tell whether a view has moved"
     return ShotCheck(shot, {}, f"{error}: {told}" if len(names) >= MIN_VIEWS else str(error))
-
-
-def run_beside(calibration_set: Path) -> Path | None:
-    """The run of the import that a calibration set, or its folder, is a part of; None where there is none."""
-    folder = calibration_set if (calibration_set / SET_FILE).exists() else calibration_set / CALIBRATION_FOLDER
-    run_dir = folder.parent / RUN_FOLDER
-    return run_dir if (folder / SET_FILE).exists() and (run_dir / RUN_FILE).exists() else None
 
 
 def checked_by_run(calibration: Calibration, run_dir: Path) -> Calibration:
