@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from daq.files.run_directory import ImageKey, RunReader
+from daq.files.run_file import RUN_FILE
 from processing.calibration.calibration import Calibration, Doubt, Verdict
 from processing.calibration.calibration_record import content_id
 from processing.calibration.droplets.agreement import strangers
@@ -19,9 +20,11 @@ from processing.calibration.droplets.self_calibration import CLEARER, NOISE_PX, 
 from processing.calibration.errors import CalibrationError, OutOfRange
 from processing.calibration.fit.health import LIMITS_PX, judge
 from processing.calibration.fit.not_checked import DROPLETS
+from processing.calibration.sets.calibration_set import SET_FILE
 from processing.geometry import FloatArray
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.runs.errors import PipelineError
+from processing.runs.importing import CALIBRATION_FOLDER, RUN_FOLDER
 from processing.runs.pipeline import shot_intensities
 from processing.runs.results_file import FrameName
 from processing.runs.workbench import read_references
@@ -142,6 +145,13 @@ def _unmeasured(
     return ShotCheck(shot, {}, f"{error}: {told}" if len(names) >= MIN_VIEWS else str(error))
 
 
+def run_beside(calibration_set: Path) -> Path | None:
+    """The run of the import that a calibration set, or its folder, is a part of; None where there is none."""
+    folder = calibration_set if (calibration_set / SET_FILE).exists() else calibration_set / CALIBRATION_FOLDER
+    run_dir = folder.parent / RUN_FOLDER
+    return run_dir if (folder / SET_FILE).exists() and (run_dir / RUN_FILE).exists() else None
+
+
 def checked_by_run(calibration: Calibration, run_dir: Path) -> Calibration:
     """The calibration with verdicts that the droplets of the first shots of a run agree with.
 
@@ -174,9 +184,14 @@ def _noted(calibration: Calibration, run_dir: Path, problem: str) -> Calibration
 
 
 def _doubt(run: str, check: ShotCheck, verdict: Verdict) -> Doubt:
-    """What the droplets of a shot say of the views that it names, or of all."""
+    """What the droplets of a shot say of the views that it names, or of all.
+
+    Where no views agree, none is known to be wrong: the spots of noisy images are no droplets. That is a warning.
+    """
     views = (check.moved,) if check.moved else check.beyond or tuple(check.views)
     problem = check.problem or f"droplets are seen {check.worst_px:.2g} px beside where the other views put them"
+    if check.beyond and not check.moved:
+        problem, verdict = f"{problem}; or most spots in its images are noise and no droplets", Verdict.WARN
     return Doubt(views, f"shot {check.shot} of run {run}: {problem}", verdict)
 
 

@@ -49,7 +49,7 @@ def add(verbs: Verbs) -> None:
     parser.add_argument(
         "--run",
         type=Path,
-        help="a run of these views: the verdict then asks its droplets too",
+        help="a run of these views: the verdict then asks its droplets too; default: that of the same import",
     )
 
 
@@ -78,7 +78,7 @@ def calibrate_views(options: Namespace) -> Outcome:
     from processing.calibration.sets.calibration_set import load_calibration_set
     from processing.figures.residual_figures import residuals_figure
     from processing.runs.overwriting import replacing, require_free
-    from processing.runs.run_check import checked_by_run
+    from processing.runs.run_check import checked_by_run, run_beside
     from server.pictures.calibration_pictures import calibration_pictures, picture_paths
 
     figure = picture_beside(options.out)
@@ -87,8 +87,9 @@ def calibrate_views(options: Namespace) -> Outcome:
         options.set, dict(options.origin or ()), dict(options.roll or ()), options.mirrored or ()
     )
     calibration = calibrate(calibration_set, model=options.model)
-    if options.run is not None:
-        calibration = checked_by_run(calibration, options.run)
+    run_dir = options.run or run_beside(options.set)
+    if run_dir is not None:
+        calibration = checked_by_run(calibration, run_dir)
     with replacing(options.out) as out:
         save_calibration(calibration, out)
         residuals_figure(calibration).savefig(out.with_name(figure.name), dpi=120)

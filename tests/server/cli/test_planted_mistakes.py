@@ -1,15 +1,19 @@
 """Mistakes of a calibration set that every view fits perfectly: none of them ends as good, and right sets do."""
 
 import json
+import os
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 
 from processing.geometry import FloatArray, PinholeCamera, view_camera
 from server.cli.main import main
+from tests.support.command_line import told
 
 AZIMUTHS_DEG = {"cam0": -30.0, "cam1": -15.0, "cam2": 15.0}
 COLUMNS = ["u_px", "v_px", "x_mm", "y_mm", "z_mm"]
@@ -107,6 +111,27 @@ def test_a_target_that_never_moved_is_refused(
     answer = calibrated(tmp_path, capsys, of(still, stays), AZIMUTHS)
     assert not_good(answer), answer["views"]
     assert "does not depend on z" in answer["error"]
+
+
+@pytest.mark.skipif("TOMOSHADOW_DATA" not in os.environ, reason="TOMOSHADOW_DATA is not set: no images from elsewhere")
+@pytest.mark.parametrize(("key", "passes"), [("roll_deg = { cam2 = 180 }", False), ('mirrored = ["cam2"]', True)])
+def test_a_board_by_a_mirror_is_not_good_by_the_wrong_word(
+    key: str, passes: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A board looks the same by a mirror and upside down: only the particles of the run beside it tell."""
+    given = Path(os.environ["TOMOSHADOW_DATA"], "faults", "02_planes_of_one_view_reversed")
+    for path in given.glob("cam*.png"):
+        image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+        assert image is not None
+        cv2.imwrite(str(tmp_path / path.name), image[:, ::-1] if path.name.startswith("cam2") else image)
+    text = (given / "manifest.toml").read_text(encoding="utf-8").replace("[calibration]", f"[calibration]\n{key}", 1)
+    exchanged = {"cam2_0.png": "cam2_2.png", "cam2_2.png": "cam2_0.png"}  # its planes in the right order
+    text = re.sub("|".join(exchanged), lambda found: exchanged[found[0]], text)
+    (tmp_path / "manifest.toml").write_text(text, encoding="utf-8")
+    told(capsys, "import", tmp_path / "manifest.toml", "-o", tmp_path / "set")
+    answer = told(capsys, "calibrate", tmp_path / "set", "-o", tmp_path / "calibration.json")
+    assert not_good(answer) is not passes, answer["views"]
+    assert passes or "agree within 4 px" in answer["views"]["cam2"]["reasons"][0]
 
 
 def test_right_sets_stay_good_and_all_is_checked_that_is_stated(
