@@ -12,6 +12,7 @@ from pydantic import Field
 
 from daq.errors import ShotFileError
 from daq.files.run_directory import RunReader, list_runs
+from daq.files.run_file import RUN_FILE
 from daq.frozen_model import FrozenModel
 from daq.names import is_identifier
 from daq.run.events import RunStatus
@@ -63,7 +64,7 @@ class RunStore:
     def directory(self, run_id: str) -> Path:
         """Directory of a run; NotFound if there is none."""
         path = self._data_dir / run_id
-        if not is_identifier(run_id) or not (path / "run.h5").is_file():
+        if not is_identifier(run_id) or not (path / RUN_FILE).is_file():
             raise NotFound(f"there is no run {run_id!r}")
         return path
 
@@ -74,7 +75,7 @@ class RunStore:
     def summary(self, run_id: str) -> RunSummary:
         """What a run is and how it went, from the moment it was accepted; NotFound if there is none."""
         status = self._status()
-        if status.run_id == run_id and status.plan and not (self._data_dir / run_id / "run.h5").is_file():
+        if status.run_id == run_id and status.plan and not (self._data_dir / run_id / RUN_FILE).is_file():
             return _summary_of_beginning(run_id, status, status.plan)
         return self._summary_of(self.directory(run_id))
 
@@ -84,13 +85,17 @@ class RunStore:
             raise ShotFileError(summary.cause)
 
     def newest(self, limit: int = 100) -> list[RunSummary]:
-        """Runs, newest first by their own time, whatever has been done to their directories since."""
-        directories = sorted(list_runs(self._data_dir), key=_started, reverse=True)
-        return [self._summary_of(path) for path in directories[:limit]]
+        """Runs, newest first by their own time, whatever has been done to their directories since.
+
+        Ids tell it to the second, so that a long list need not be read; headers tell two of the same second apart.
+        """
+        directories = sorted(list_runs(self._data_dir), key=_started, reverse=True)[:limit]
+        directories.sort(key=lambda path: (_started(path), _created(path, _changed_ns(path / RUN_FILE))), reverse=True)
+        return [self._summary_of(path) for path in directories]
 
     def _summary_of(self, run_dir: Path) -> RunSummary:
         try:
-            read = _read_summary(run_dir, _changed_ns(run_dir / "run.h5"), _changed_ns(run_dir / "shots"))
+            read = _read_summary(run_dir, _changed_ns(run_dir / RUN_FILE), _changed_ns(run_dir / "shots"))
         except ShotFileError as error:
             return _summary_of_damaged(run_dir, str(error))
         status = self._status()
@@ -142,7 +147,7 @@ def _started(run_dir: Path) -> datetime:
             return datetime.strptime(written[1], "%Y%m%dT%H%M%S").replace(tzinfo=UTC)
         except ValueError:
             pass  # digits, but no time
-    return _created(run_dir, _changed_ns(run_dir / "run.h5"))
+    return _created(run_dir, _changed_ns(run_dir / RUN_FILE))
 
 
 @lru_cache(maxsize=4096)

@@ -21,7 +21,7 @@ from server.web.app import create_app
 from tests.support.drifting_run import DRIFT_PX, write_droplet_run
 from tests.support.drifting_views import calibration_of, views
 from tests.support.operator import VIEWS, drive_the_page
-from tests.support.serving import Serving, serving, tell_nothing
+from tests.support.serving import Serving, plan_of, serving, tell_nothing
 
 pytestmark = pytest.mark.timeout(900)
 
@@ -88,6 +88,25 @@ def test_a_torn_draft_does_not_keep_the_page_from_opening(page: Page, server: Se
     expect(page.get_by_role("button", name="Start run")).to_be_visible()
     (aside,) = server.services.data_dir.glob("draft.json.damaged-*")
     assert aside.read_text() == '{"shots": 7'
+
+
+def test_a_reference_that_the_operator_chose_is_not_replaced_by_a_newer_one(page: Page, server: Serving) -> None:
+    older, _ = server.run_to_its_end(plan_of(kind="dark", name="older", shots=1, pulse=PULSE))
+    server.run_to_its_end(plan_of(kind="dark", name="proposed", shots=1, pulse=PULSE))
+    page.goto(str(server.http.base_url))
+    chosen = page.get_by_role("region", name="New run").locator(".q-chip")
+    expect(chosen.filter(has_text="proposed")).to_have_count(1)
+    page.get_by_label("Dark and background runs").click()
+    page.get_by_role("option", name="dark: proposed").click()
+    page.get_by_role("option", name="dark: older").click()
+    page.keyboard.press("Escape")
+    expect(chosen).to_have_text(re.compile("dark: older"))
+    newer, _ = server.run_to_its_end(plan_of(kind="dark", name="newer", shots=1, pulse=PULSE))
+    expect(page.get_by_role("region", name="Runs").get_by_text("newer")).to_be_visible()
+    page.reload()
+    expect(page.get_by_role("region", name="Runs").get_by_text("newer")).to_be_visible()
+    expect(chosen).to_have_text(re.compile("dark: older"))
+    assert (older, newer) == tuple(sorted((older, newer)))
 
 
 def test_work_that_fails_has_a_red_lamp(page: Page, server: Serving) -> None:

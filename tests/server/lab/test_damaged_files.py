@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from daq.files.run_directory import pack
+from daq.files.run_directory import RunReader, RunWriter, pack
 from tests.server.web.test_api import use_a_calibration, wait_for_jobs
 from tests.support.serving import Serving, plan_of, serving
 
@@ -96,6 +96,19 @@ def test_runs_are_listed_by_their_own_time(server: Serving) -> None:
     assert list(listed(server)) == [older, SOUND]
     (data_dir / SOUND / "results").mkdir()
     assert list(listed(server)) == [older, SOUND]
+
+
+def test_two_runs_of_the_same_second_are_listed_by_their_headers(server: Serving) -> None:
+    data_dir = server.services.data_dir
+    first, _ = server.run_to_its_end(plan_of(shots=1))
+    with RunReader(data_dir / first) as run:
+        header = run.header
+    for name, second in [("a", "00.7"), ("b", "00.1"), ("c", "00.9"), ("d", "00.3")]:
+        run_id = f"20990101T000000-{name}"
+        created = f"2099-01-01T00:00:{second}+00:00"
+        with RunWriter(data_dir / run_id, header.model_copy(update={"run_id": run_id, "created_utc": created})):
+            pass
+    assert [run_id[-1] for run_id in listed(server)][:4] == ["c", "a", "d", "b"]
 
 
 TABLE_HARMS = {
