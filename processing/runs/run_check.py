@@ -52,12 +52,15 @@ class ShotCheck:
         Why they do not tell.
     beyond : tuple of str
         Views one of which, at least, has moved further than can be measured; none, where droplets do not tell that.
+    agreed : bool
+        Some views agree. Where none do, none is known to be wrong: the spots of noisy images are no droplets.
     """
 
     shot: int
     views: dict[str, ViewDisparity]
     problem: str = ""
     beyond: tuple[str, ...] = ()
+    agreed: bool = True
 
     @property
     def worst_px(self) -> float:
@@ -79,10 +82,10 @@ class ShotCheck:
     def verdict(self) -> Verdict | None:
         """By the limits of a hold-out error: ``warn`` is an alarm, ``refuse`` stops reconstruction.
 
-        A view that has moved further than can be measured is refused too.
+        A view that has moved further than can be measured is refused too; where no views agree, that is an alarm.
         """
         if self.beyond:
-            return Verdict.REFUSE
+            return Verdict.REFUSE if self.agreed else Verdict.WARN
         return judge(self._certain_px) if self.views else None
 
     def record(self) -> dict[str, Any]:
@@ -138,9 +141,12 @@ def _unmeasured(
         name = names[alone[0]]
         problem = f"{name} has moved further than {REACH_PX:g} px, or shows other droplets: the other views agree"
         return ShotCheck(shot, {}, problem, (name,))
-    if alone or isinstance(error, OutOfRange):
+    if isinstance(error, OutOfRange):
         problem = f"{error}: a view has moved further than {REACH_PX:g} px, or several have"
         return ShotCheck(shot, {}, problem, tuple(names[number] for number in alone) or tuple(names))
+    if alone:
+        problem = f"{error}: several views have moved further than {REACH_PX:g} px, or most spots are noise"
+        return ShotCheck(shot, {}, problem, tuple(names[number] for number in alone), agreed=False)
     told = "too few droplets, or too many, to tell whether a view has moved"
     return ShotCheck(shot, {}, f"{error}: {told}" if len(names) >= MIN_VIEWS else str(error))
 
@@ -161,7 +167,7 @@ def checked_by_run(calibration: Calibration, run_dir: Path) -> Calibration:
         checks = [check_shot(run_dir, shot, calibration) for shot in _first_shots(run_dir)]
     except CalibrationError as error:
         return _noted(calibration, run_dir, str(error))
-    doubts = [_doubt(run_dir.name, check, check.verdict) for check in checks if check.verdict is not None]
+    doubts = [_doubt(run_dir.name, check, check.verdict) for check in checks if check.verdict]
     if not doubts:
         return _noted(calibration, run_dir, checks[0].problem if checks else "it has no shot with all exposures")
     known = replace(calibration, not_checked=tuple(one for one in calibration.not_checked if one != DROPLETS))
@@ -184,14 +190,9 @@ def _noted(calibration: Calibration, run_dir: Path, problem: str) -> Calibration
 
 
 def _doubt(run: str, check: ShotCheck, verdict: Verdict) -> Doubt:
-    """What the droplets of a shot say of the views that it names, or of all.
-
-    Where no views agree, none is known to be wrong: the spots of noisy images are no droplets. That is a warning.
-    """
+    """What the droplets of a shot say of the views that it names, or of all."""
     views = (check.moved,) if check.moved else check.beyond or tuple(check.views)
     problem = check.problem or f"droplets are seen {check.worst_px:.2g} px beside where the other views put them"
-    if check.beyond and not check.moved:
-        problem, verdict = f"{problem}; or most spots in its images are noise and no droplets", Verdict.WARN
     return Doubt(views, f"shot {check.shot} of run {run}: {problem}", verdict)
 
 

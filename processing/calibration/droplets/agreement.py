@@ -53,7 +53,7 @@ def _shares(mappings: Sequence[ViewMapping], exposures: Exposures, box: Box) -> 
     """By view: the least and the largest share of its droplets that may be those of the others, beyond chance."""
     counts = [sum(min(len(droplets), MAX_SEEDS) for droplets in seen) for seen in zip(*exposures, strict=True)]
     met = _met(mappings, exposures, box)
-    by_chance = np.mean([_met(mappings, _dealt(exposures, deal), box) for deal in range(DEALS)], axis=0)
+    by_chance = _met_by_chance(mappings, exposures, box) if _may_agree(met, counts) else [0.0] * len(met)
     for count, number, chance in zip(counts, met, by_chance, strict=True):
         if count - chance < 1:
             yield 0.0, 1.0
@@ -61,6 +61,19 @@ def _shares(mappings: Sequence[ViewMapping], exposures: Exposures, box: Box) -> 
         uncertainty = np.sqrt((number + 1) * (1 - number / (count + 1))) / (count - chance)
         share = (number - chance) / (count - chance)
         yield float(share - CERTAIN * uncertainty), float(share + CERTAIN * uncertainty)
+
+
+def _may_agree(met: Sequence[int], counts: Sequence[int]) -> bool:
+    """Enough of some view's droplets are met, even if none of them were by chance."""
+    return any(
+        number + CERTAIN * np.sqrt(number + 1) >= AGREED_SHARE * count
+        for number, count in zip(met, counts, strict=True)
+    )
+
+
+def _met_by_chance(mappings: Sequence[ViewMapping], exposures: Exposures, box: Box) -> list[float]:
+    dealt = [_met(mappings, _dealt(exposures, deal), box) for deal in range(DEALS)]
+    return [float(np.mean(numbers)) for numbers in zip(*dealt, strict=True)]
 
 
 def _met(mappings: Sequence[ViewMapping], exposures: Exposures, box: Box) -> list[int]:

@@ -40,5 +40,6 @@ def test_a_thousand_droplets_that_disagree_are_an_alarm_however_close_they_are()
     """Their neighbours stand less than 12 px apart; in three views no view can be named."""
     three = calibration_of(views()[:3])
     check = check_exposures(0, [seen(1000, mirrored=(1,))[:3]], three)
-    assert (check.verdict, check.beyond) == (Verdict.REFUSE, tuple(three.views))
+    assert (check.verdict, check.beyond) == (Verdict.WARN, tuple(three.views))
+    assert check.problem.endswith("several views have moved further than 3 px, or most spots are noise")
     assert check_exposures(0, [seen(1000)[:3]], three).verdict in (Verdict.GOOD, Verdict.USABLE, None)
