@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from processing import preprocessing
-from processing.calibration.calibration import Calibration, Verdict
-from processing.calibration.errors import CalibrationError
+from processing.calibration.calibration import Calibration
 from processing.kernels import DEFAULT_THREADS
 from processing.preprocessing import Intensity, Polarity, Preprocessing
 from processing.reconstruction import smart as iterative
@@ -72,25 +71,14 @@ def plan(
     Raises
     ------
     CalibrationError
-        The calibration has no common world, or a view was refused.
+        A view is not in the calibration or was refused, or the calibration has no common world.
     ReconstructionError
         Too few or too many views, or a mapping too rough to be sampled.
-    ValueError
-        A view is not in the calibration.
     """
     names = tuple(calibration.views if views is None else views)
-    if unknown := sorted(set(names) - set(calibration.views)):
-        raise ValueError(f"views {unknown} are not in the calibration, it has {sorted(calibration.views)}")
-    calibration.require_world()
-    _refuse_bad(calibration, names)
+    calibration.require_usable(names)
     mappings = [calibration.views[name].mapping for name in names]
     return plan_reconstruction(mappings, grid, Accuracy(accuracy), names)
-
-
-def _refuse_bad(calibration: Calibration, names: Sequence[str]) -> None:
-    refused = [name for name in names if calibration.views[name].verdict is Verdict.REFUSE]
-    if refused:
-        raise CalibrationError(f"calibration {calibration.id}: {', '.join(refused)}: refused, see its errors and notes")
 
 
 def intensity(

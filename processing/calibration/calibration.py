@@ -279,6 +279,24 @@ class Calibration:
         """Range of calibrated points along y, over all views."""
         return self._range_mm(1)
 
+    def require_usable(self, names: Iterable[str]) -> None:
+        """Refuse to reconstruct from views that are unknown, not placed or refused.
+
+        Raises
+        ------
+        CalibrationError
+            One of these views is.
+        """
+        names = list(names)
+        if unknown := sorted(set(names) - set(self.views)):
+            raise CalibrationError(f"views {unknown} are not in calibration {self.id}, it has {sorted(self.views)}")
+        self.require_world()
+        for name in names:
+            view = self.views[name]
+            if view.verdict is Verdict.REFUSE:
+                reason = "; ".join(view.reasons) or f"hold-out error {view.holdout_error_px:.3g} px"
+                raise CalibrationError(f"calibration {self.id}, {name} is refused: {reason}")
+
     def require_world(self) -> None:
         """Refuse to reconstruct where nobody knows how the views stand to each other.
 

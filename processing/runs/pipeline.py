@@ -9,9 +9,8 @@ from importlib.metadata import version
 from pathlib import Path
 
 from daq.files.run_directory import RunReader, Shot
-from processing.calibration.calibration import Calibration, Verdict
+from processing.calibration.calibration import Calibration
 from processing.calibration.calibration_file import file_sha256, load_calibration
-from processing.calibration.errors import CalibrationError
 from processing.kernels import DEFAULT_THREADS
 from processing.preprocessing import Frame, Intensity, intensity, is_dim
 from processing.reconstruction.choices import ReconstructionMethod
@@ -253,22 +252,11 @@ def require_match(run_name: str, shot: Shot, calibration: Calibration) -> None:
     """Refuse a shot that is not whole, and a calibration that is not made for it or not good enough."""
     if not shot.valid:
         raise PipelineError(f"{run_name}, shot {shot.index}: exposures are missing, nothing to reconstruct")
-    calibration.require_world()
-    unknown = sorted(set(shot.views) - set(calibration.views))
-    if unknown:
-        raise PipelineError(
-            f"{run_name}: views {unknown} are not in the calibration, it has {sorted(calibration.views)}"
-        )
+    calibration.require_usable(shot.views)
     for name, exposures in shot.views.items():
-        rows, columns = exposures.frame_a.shape
-        view = calibration.views[name]
-        if (columns, rows) != view.mapping.image_size_px:
-            raise PipelineError(
-                f"{run_name}, {name}: image of {columns} x {rows} px, calibrated for {view.mapping.image_size_px}"
-            )
-        if view.verdict is Verdict.REFUSE:
-            reason = "; ".join(view.reasons) or f"hold-out error {view.holdout_error_px:.3g} px"
-            raise CalibrationError(f"calibration {calibration.id}, {name} is refused: {reason}")
+        (rows, columns), size_px = exposures.frame_a.shape, calibration.views[name].mapping.image_size_px
+        if (columns, rows) != size_px:
+            raise PipelineError(f"{run_name}, {name}: image of {columns} x {rows} px, calibrated for {size_px}")
 
 
 def _provenance(
