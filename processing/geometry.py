@@ -5,13 +5,13 @@ along +z. Points are (N, 3) arrays (x, y, z); image points are (N, 2) arrays (u,
 pixel centres at integers. Angles are radians here, degrees in configuration files.
 """
 
+import math
 from dataclasses import dataclass, field
 from typing import Protocol
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 FloatArray = NDArray[np.float64]
 
@@ -39,8 +39,24 @@ def rotation_from_angles(yaw_rad: float, pitch_rad: float = 0.0, roll_rad: float
 
 
 def rotation_vector_of(rotation: FloatArray) -> FloatArray:
-    """Axis times angle (3,) of a rotation (3, 3), however small; OpenCV's own takes angles below 1e-5 for none."""
-    return np.asarray(Rotation.from_matrix(rotation).as_rotvec(), dtype=np.float64)
+    """Axis times angle (3,) of a rotation (3, 3), however small; OpenCV's own takes angles below 1e-5 for none.
+
+    By way of the quaternion whose largest element is computed first (Shepperd 1978): exact at any angle.
+    """
+    trace, diagonal = float(np.trace(rotation)), np.diagonal(rotation)
+    twist = np.array(
+        [rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1]]
+    )
+    if trace >= diagonal.max():
+        scalar, vector = 1 + trace, twist
+    else:
+        largest = int(diagonal.argmax())
+        vector = rotation[largest] + rotation[:, largest]
+        vector[largest] += 1 - trace
+        scalar = float(twist[largest])
+    size = float(np.linalg.norm(vector))
+    angle_rad = 2 * math.atan2(size, abs(scalar))
+    return np.asarray(vector * (math.copysign(angle_rad, scalar) / size if size else 0.0), dtype=np.float64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,13 +98,32 @@ class PinholeCamera:
 
     def project(self, points_mm: FloatArray) -> FloatArray:
         """Image points (N, 2) in px of world points (N, 3) in mm, distortion included."""
-        points_mm = np.ascontiguousarray(points_mm, dtype=np.float64).reshape(-1, 3)
-        if not len(points_mm):
-            return np.empty((0, 2))
-        image_px, _ = cv2.projectPoints(
-            points_mm, rotation_vector_of(self.rotation), self.translation_mm, self.camera_matrix, self.coefficients
+        x_mm, y_mm, depth_mm = self.rotation @ np.asarray(points_mm, np.float64).reshape(-1, 3).T + np.reshape(
+            self.translation_mm, (3, 1)
         )
-        return np.asarray(image_px, dtype=np.float64).reshape(-1, 2)
+        x, y = self._on_sensor(x_mm / depth_mm, y_mm / depth_mm)
+        (focal_u, _, centre_u), (_, focal_v, centre_v) = self.camera_matrix[:2]
+        return np.column_stack([focal_u * x + centre_u, focal_v * y + centre_v])
+
+    def _on_sensor(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Ideal image points at focal length 1, after distortion (Brown 1971) and tilt: OpenCV's model."""
+        k1, k2, p1, p2, k3 = self.distortion
+        r2 = x * x + y * y
+        radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
+        u = x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)
+        v = y * radial + 2 * p2 * x * y + p1 * (r2 + 2 * y * y)
+        if not any(self.tilt_rad):
+            return u, v
+        tilted = self._tilt @ np.stack([u, v, np.ones_like(u)])
+        return tilted[0] / tilted[2], tilted[1] / tilted[2]
+
+    @property
+    def _tilt(self) -> FloatArray:
+        """Homography (3, 3) of the lens's image onto the tilted sensor."""
+        (cx, cy), (sx, sy) = np.cos(self.tilt_rad), np.sin(self.tilt_rad)
+        turned = np.array([[cy, 0, -sy], [0, 1, 0], [sy, 0, cy]]) @ np.array([[1, 0, 0], [0, cx, sx], [0, -sx, cx]])
+        along = np.array([[turned[2, 2], 0, -turned[0, 2]], [0, turned[2, 2], -turned[1, 2]], [0, 0, 1]])
+        return np.asarray(along @ turned, dtype=np.float64)
 
     def undistort(self, image_px: FloatArray) -> FloatArray:
         """Image points (N, 2) that the same camera without distortion and tilt would see."""

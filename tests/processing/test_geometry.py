@@ -72,3 +72,35 @@ def test_rotation_vectors_keep_the_smallest_turns(axis: list[float], decades: fl
     vector = 10**-decades * np.array(axis) / np.linalg.norm([*axis, 1.0])
     rotation = np.asarray(cv2.Rodrigues(vector)[0], dtype=np.float64)
     np.testing.assert_allclose(rotation_vector_of(rotation), vector, rtol=1e-9, atol=1e-15)
+
+
+@pytest.mark.parametrize("angle_rad", [0.0, 1e-9, 1.0, 2.09, 2.1, 3.1, 3.14159, np.pi])
+def test_rotation_vectors_are_exact_at_any_angle(angle_rad: float) -> None:
+    axis = np.array([0.6, -0.64, 0.48])
+    rotation = np.asarray(cv2.Rodrigues(angle_rad * axis)[0], dtype=np.float64) if angle_rad > 1e-6 else np.eye(3)
+    vector = rotation_vector_of(rotation)
+    np.testing.assert_allclose(cv2.Rodrigues(vector)[0], rotation, atol=1e-14)
+    assert np.linalg.norm(vector) == pytest.approx(angle_rad if angle_rad > 1e-6 else 0.0, abs=1e-12)
+
+
+@given(
+    st.integers(0, 2**32 - 1),
+    st.floats(-1.5, 1.5),
+    st.tuples(st.floats(-0.3, 0.3), st.floats(-0.3, 0.3)),
+    st.booleans(),
+)
+def test_projection_is_that_of_opencv(seed: int, yaw_rad: float, tilt_rad: tuple[float, float], tilted: bool) -> None:
+    rng = np.random.default_rng(seed)
+    view = PinholeCamera(
+        camera_matrix=np.array([[rng.uniform(4e3, 3e4), 0, 800], [0, rng.uniform(4e3, 3e4), 600], [0, 0, 1.0]]),
+        rotation=rotation_from_angles(yaw_rad, *rng.uniform(-0.5, 0.5, 2)),
+        translation_mm=np.array([*rng.uniform(-5, 5, 2), rng.uniform(50, 400)]),
+        image_size_px=(1600, 1200),
+        distortion=rng.uniform(-1, 1, 5) * [1, 30, 0.01, 0.01, 500],
+        tilt_rad=tilt_rad if tilted else (0.0, 0.0),
+    )
+    points_mm = rng.uniform(-10, 10, (20, 3))
+    expected_px, _ = cv2.projectPoints(
+        points_mm, cv2.Rodrigues(view.rotation)[0], view.translation_mm, view.camera_matrix, view.coefficients
+    )
+    np.testing.assert_allclose(view.project(points_mm), expected_px.reshape(-1, 2), rtol=1e-9, atol=1e-6)

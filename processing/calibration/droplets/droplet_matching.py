@@ -133,13 +133,15 @@ def _pairs(
         chord_px = end_px - begin_px
         length_px = np.maximum(np.linalg.norm(chord_px, axis=1, keepdims=True), 1e-9)
         along, across = chord_px / length_px, np.column_stack([-chord_px[:, 1], chord_px[:, 0]]) / length_px
-        position = (along @ second_px.T - (along * begin_px).sum(axis=1, keepdims=True)) / length_px
-        halfway = ((middle_px - begin_px) * along).sum(axis=1, keepdims=True) / length_px
-        bend_px = ((middle_px - begin_px) * across).sum(axis=1, keepdims=True) / (halfway * (1 - halfway))
+        halfway = ((middle_px - begin_px) * along).sum(axis=1) / length_px[:, 0]
+        bend_px = ((middle_px - begin_px) * across).sum(axis=1) / (halfway * (1 - halfway))
         offset_px = across @ second_px.T - (across * begin_px).sum(axis=1, keepdims=True)
-        near = np.abs(offset_px - bend_px * position * (1 - position)) < tolerance_px
-        seed, partner = np.nonzero(near & (position > -0.05) & (position < 1.05))
-        depth = _depth(position[seed, partner], halfway[seed, 0])[:, None]
+        seed, partner = np.nonzero(np.abs(offset_px) < tolerance_px + np.abs(bend_px[:, None]) / 4)
+        position = ((second_px[partner] - begin_px[seed]) * along[seed]).sum(axis=1) / length_px[seed, 0]
+        beside_px = offset_px[seed, partner] - bend_px[seed] * position * (1 - position)
+        near = (np.abs(beside_px) < tolerance_px) & (position > -0.05) & (position < 1.05)
+        seed, partner, position = seed[near], partner[near], position[near]
+        depth = _depth(position, halfway[seed])[:, None]
         begin_mm, end_mm = lines_mm[0][seed], lines_mm[2][seed]
         chosen.append(np.column_stack([seeds[seed], partner]))
         points.append(begin_mm + depth * (end_mm - begin_mm))
