@@ -59,6 +59,19 @@ def rotation_vector_of(rotation: FloatArray) -> FloatArray:
     return np.asarray(vector * (math.copysign(angle_rad, scalar) / size if size else 0.0), dtype=np.float64)
 
 
+def tilt_matrix(tilt_rad: FloatArray) -> FloatArray:
+    """Homographies (..., 3, 3) of the lens's image onto sensors tilted by (..., 2) around x and y, as in OpenCV."""
+    (cos_x, cos_y), (sin_x, sin_y) = np.moveaxis(np.cos(tilt_rad), -1, 0), np.moveaxis(np.sin(tilt_rad), -1, 0)
+    homography = np.zeros((*cos_x.shape, 3, 3))
+    homography[..., 0, 0] = cos_x
+    homography[..., 1, 0] = -sin_x * sin_y
+    homography[..., 1, 1] = cos_y
+    homography[..., 2, 0] = sin_y
+    homography[..., 2, 1] = -cos_y * sin_x
+    homography[..., 2, 2] = cos_y * cos_x
+    return homography
+
+
 @dataclass(frozen=True, eq=False)
 class PinholeCamera:
     """A pinhole camera with lens distortion and Scheimpflug tilt (eq. 3; OpenCV's tilted model).
@@ -114,16 +127,8 @@ class PinholeCamera:
         v = y * radial + 2 * p2 * x * y + p1 * (r2 + 2 * y * y)
         if not any(self.tilt_rad):
             return u, v
-        tilted = self._tilt @ np.stack([u, v, np.ones_like(u)])
+        tilted = tilt_matrix(np.array(self.tilt_rad)) @ np.stack([u, v, np.ones_like(u)])
         return tilted[0] / tilted[2], tilted[1] / tilted[2]
-
-    @property
-    def _tilt(self) -> FloatArray:
-        """Homography (3, 3) of the lens's image onto the tilted sensor."""
-        (cx, cy), (sx, sy) = np.cos(self.tilt_rad), np.sin(self.tilt_rad)
-        turned = np.array([[cy, 0, -sy], [0, 1, 0], [sy, 0, cy]]) @ np.array([[1, 0, 0], [0, cx, sx], [0, -sx, cx]])
-        along = np.array([[turned[2, 2], 0, -turned[0, 2]], [0, turned[2, 2], -turned[1, 2]], [0, 0, 1]])
-        return np.asarray(along @ turned, dtype=np.float64)
 
     def undistort(self, image_px: FloatArray) -> FloatArray:
         """Image points (N, 2) that the same camera without distortion and tilt would see."""

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from processing.geometry import FloatArray, rotation_vector_of
+from processing.geometry import FloatArray, rotation_vector_of, tilt_matrix
 
 _KILO_PX = 1000.0
 """Image positions count in units of so many px, so that all values are of the order of 1."""
@@ -53,7 +53,7 @@ class Aim:
         """What the image shows of a camera with these parameters (15,) or (17,)."""
         rotation, ray, distance_mm = _line_of_sight(parameters, self.middle_mm)
         focal_px, centre_px, tilt_rad = parameters[6:8], parameters[_CENTRE], parameters[_TILT]
-        tilt = _tilt_matrix(tilt_rad)
+        tilt = _tilt(tilt_rad)
         seen = tilt @ ray
         seen_px = centre_px + focal_px * seen[:2] / seen[2]
         scale_px = focal_px * _scales(tilt)
@@ -73,26 +73,27 @@ class Aim:
         )
 
     def parameters(self, values: FloatArray) -> FloatArray:
-        """Parameters (15,) or (17,) of the camera that shows this."""
-        distance_mm = values[3] * self.distance_mm
-        seen_px, centre_px, scale_px = values[4:6] * _KILO_PX, values[_CENTRE] * _KILO_PX, values[6:8] * distance_mm
-        oblique = values[_TILT]
-        tilt_rad = oblique - _obliquity(seen_px, centre_px, scale_px)[: len(oblique)]
-        tilt = _tilt_matrix(tilt_rad)
+        """Parameters (..., 15) or (..., 17) of the cameras that show this."""
+        distance_mm = values[..., 3:4] * self.distance_mm
+        seen_px, centre_px = values[..., 4:6] * _KILO_PX, values[..., _CENTRE] * _KILO_PX
+        scale_px, oblique = values[..., 6:8] * distance_mm, values[..., _TILT]
+        tilt_rad = oblique - _obliquity(seen_px, centre_px, scale_px)[..., : oblique.shape[-1]]
+        tilt = _tilt(tilt_rad)
         focal_px = scale_px / _scales(tilt)
-        ray = _unit(np.linalg.solve(tilt, np.append((seen_px - centre_px) / focal_px, 1.0)))
-        roll = np.array(cv2.Rodrigues(np.array([0.0, 0.0, values[2]]))[0])
-        rotation = _to_axis(ray).T @ roll @ _to_axis(_unit(np.append(values[:2], 1.0))) @ self.frame
+        on_sensor = _with_one((seen_px - centre_px) / focal_px)[..., None]
+        ray = _unit(np.asarray(np.linalg.solve(tilt, on_sensor)[..., 0], dtype=np.float64))
+        turned = _about_axis(values[..., 2]) @ _to_axis(_unit(_with_one(values[..., :2]))) @ self.frame
+        rotation = _to_axis(ray).swapaxes(-1, -2) @ turned
         translation_mm = distance_mm * ray - rotation @ self.middle_mm
-        turn = rotation_vector_of(rotation)
-        return np.concatenate([turn, translation_mm, focal_px, centre_px, values[_LENS], tilt_rad])
+        turn = np.reshape([rotation_vector_of(one) for one in rotation.reshape(-1, 3, 3)], ray.shape)
+        return np.concatenate([turn, translation_mm, focal_px, centre_px, values[..., _LENS], tilt_rad], axis=-1)
 
     def derivatives(self, values: FloatArray) -> FloatArray:
         """Derivatives (P, P) of the parameters by the values."""
-        here, change = self.parameters(values), np.eye(len(values))
-        for number in [*range(_LENS.start), *range(_LENS.stop, len(values))]:
-            ahead = self.parameters(values + _STEP * np.eye(len(values))[number])
-            change[:, number] = (ahead - here) / _STEP
+        change = np.eye(len(values))
+        moved = [*range(_LENS.start), *range(_LENS.stop, len(values))]
+        here, *ahead = self.parameters(values + _STEP * np.vstack([np.zeros(len(values)), change[moved]]))
+        change[:, moved] = (np.array(ahead) - here).T / _STEP
         return change
 
     def with_centre(self, parameters: FloatArray, centre_px: FloatArray) -> FloatArray:
@@ -111,34 +112,39 @@ def _line_of_sight(parameters: FloatArray, middle_mm: FloatArray) -> tuple[Float
 
 
 def _obliquity(seen_px: FloatArray, centre_px: FloatArray, scale_px: FloatArray) -> FloatArray:
-    """Angles (2,) at which a line of sight beside the optical axis meets the sensor, as tilts of OpenCV's sense."""
-    beside = (seen_px - centre_px) / scale_px
-    return np.array([beside[1], -beside[0]])
+    """Angles (..., 2) at which a line of sight beside the optical axis meets the sensor, as tilts of OpenCV's sense."""
+    return np.asarray(((seen_px - centre_px) / scale_px)[..., ::-1] * [1.0, -1.0])
 
 
 def _scales(tilt: FloatArray) -> FloatArray:
-    """Scales (2,) of the image along u and v on the optical axis, relative to a sensor without tilt."""
-    return np.asarray(tilt.diagonal()[:2] / tilt[2, 2], dtype=np.float64)
+    """Scales (..., 2) of the image along u and v on the optical axis, relative to a sensor without tilt."""
+    return np.asarray(tilt.diagonal(axis1=-2, axis2=-1)[..., :2] / tilt[..., 2:, 2], dtype=np.float64)
 
 
-def _tilt_matrix(tilt_rad: FloatArray) -> FloatArray:
-    """Homography (3, 3) of a tilted sensor, as in OpenCV; the identity without tilt."""
-    if not len(tilt_rad):
-        return np.eye(3)
-    (cos_x, cos_y), (sin_x, sin_y) = np.cos(tilt_rad), np.sin(tilt_rad)
-    about_x = np.array([[1, 0, 0], [0, cos_x, sin_x], [0, -sin_x, cos_x]])
-    about_y = np.array([[cos_y, 0, -sin_y], [0, 1, 0], [sin_y, 0, cos_y]])
-    turn = about_y @ about_x
-    onto_sensor = np.array([[turn[2, 2], 0, -turn[0, 2]], [0, turn[2, 2], -turn[1, 2]], [0, 0, 1]])
-    return np.asarray(onto_sensor @ turn, dtype=np.float64)
+def _tilt(tilt_rad: FloatArray) -> FloatArray:
+    """Homographies (..., 3, 3) of sensors tilted by (..., 2); the identity without tilt, (..., 0)."""
+    return tilt_matrix(tilt_rad) if tilt_rad.shape[-1] else np.broadcast_to(np.eye(3), (*tilt_rad.shape[:-1], 3, 3))
 
 
 def _to_axis(unit: FloatArray) -> FloatArray:
-    """The smallest rotation (3, 3) that brings a unit vector onto the third axis."""
-    x, y, z = unit
-    across = np.array([[0, 0, -x], [0, 0, -y], [x, y, 0]])
-    return np.asarray(np.eye(3) + across + across @ across / (1 + z), dtype=np.float64)
+    """The smallest rotations (..., 3, 3) that bring unit vectors (..., 3) onto the third axis."""
+    across = np.zeros((*unit.shape, 3))
+    across[..., :2, 2], across[..., 2, :2] = -unit[..., :2], unit[..., :2]
+    return np.asarray(np.eye(3) + across + across @ across / (1 + unit[..., 2, None, None]), dtype=np.float64)
 
 
-def _unit(vector: FloatArray) -> FloatArray:
-    return np.asarray(vector / np.linalg.norm(vector), dtype=np.float64)
+def _about_axis(angle_rad: FloatArray) -> FloatArray:
+    """Rotations (..., 3, 3) by angles (...) around the third axis."""
+    rotation = np.zeros((*angle_rad.shape, 3, 3))
+    rotation[..., 0, 0] = rotation[..., 1, 1] = np.cos(angle_rad)
+    rotation[..., 1, 0], rotation[..., 0, 1], rotation[..., 2, 2] = np.sin(angle_rad), -np.sin(angle_rad), 1.0
+    return rotation
+
+
+def _with_one(vectors: FloatArray) -> FloatArray:
+    """Vectors (..., 2) with a third element of 1."""
+    return np.concatenate([vectors, np.ones((*vectors.shape[:-1], 1))], axis=-1)
+
+
+def _unit(vectors: FloatArray) -> FloatArray:
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True), dtype=np.float64)
