@@ -49,7 +49,7 @@ class Fields:
 _EDGES = ("camera_ns", "a_start_ns", "a_width_ns", "b_start_ns", "b_width_ns", "current_ma")
 _TICKS = ("camera_ticks", "a_start_ticks", "a_width_ticks", "b_start_ticks", "b_width_ticks", "current_ma")
 _LIMITS = ("max_current_ma", "max_duty_ppm", "max_light_ma")
-COUNTERS = ("requested", "fired", "suppressed", "early", "cameras", "crc_errors")
+COUNTERS = ("requested", "fired", "suppressed", "early", "cameras", "lights", "crc_errors")
 """Counters of STATUS, since start."""
 
 FIELDS: Mapping[Command, Fields] = {
@@ -108,6 +108,7 @@ class Fault(IntFlag):
     INTERNAL = 8
     ESTOP = 16
     SETPOINT = 32
+    OUTPUT = 64
 
 
 class ErrorNumber(IntEnum):
@@ -160,7 +161,7 @@ ERROR_TEXT: Mapping[ErrorNumber, str] = {
     ErrorNumber.CURRENT: "the current is above 30000 mA",
     ErrorNumber.STRADDLE: "pulse A ends after frame A closes, or pulse B starts before frame B opens",
     ErrorNumber.SHOTS: "the shot budget is not 1 to 1000000",
-    ErrorNumber.HARDWARE: "the hardware cannot produce this, or a set-point does not read as it was set",
+    ErrorNumber.HARDWARE: "the hardware cannot produce this, or something in it does not read as it should",
     ErrorNumber.LIMIT: "the current is above the limit that was set for this channel, or its light was forbidden",
     ErrorNumber.LIGHT: "continuous light is not 1 to 500 mA on any channel, or not for 1 to 600000 ms",
     ErrorNumber.ESTOP_OPEN: "the emergency stop is open",

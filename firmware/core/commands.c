@@ -145,9 +145,9 @@ static enum error shot(struct generator *generator, const uint32_t *fields, stru
 
 static void counter_fields(struct text *reply, const struct counters *counters)
 {
-    static const char *const names[] = {"requested", "fired", "suppressed", "early", "cameras", "crc_errors"};
-    const uint32_t counts[] = {counters->requested, counters->fired,   counters->suppressed,
-                               counters->early,     counters->cameras, counters->crc_errors};
+    static const char *const names[] = {"requested", "fired", "suppressed", "early", "cameras", "lights", "crc_errors"};
+    const uint32_t counts[] = {counters->requested, counters->fired,  counters->suppressed, counters->early,
+                               counters->cameras,   counters->lights, counters->crc_errors};
     for (size_t i = 0; i < sizeof names / sizeof *names; i++)
         text_field(reply, names[i], counts[i]);
 }

@@ -1,6 +1,7 @@
 #include "generator.h"
 
 #include "light.h"
+#include "light_check.h"
 #include "port.h"
 #include "safety.h"
 #include "shooting.h"
@@ -12,6 +13,7 @@ void generator_boot(struct generator *generator, enum cause cause)
     for (int i = 0; i < CHANNEL_COUNT; i++)
         generator->limits[i] = channel_limits_absolute();
     safety_outputs_off(generator);
+    (void)port_take_lights(); /* of what was before */
     if (cause == CAUSE_WATCHDOG)
         safety_trip(generator, FAULT_WATCHDOG);
 }
@@ -19,6 +21,7 @@ void generator_boot(struct generator *generator, enum cause cause)
 void generator_poll(struct generator *generator)
 {
     const uint64_t now_us = port_now_us();
+    light_check_poll(generator);
     safety_watch(generator, now_us);
     generator->counters.cameras += port_take_cameras();
     shooting_poll(generator);
@@ -31,7 +34,8 @@ uint32_t generator_idle_us(const struct generator *generator)
 {
     const uint64_t now_us = port_now_us();
     const uint64_t due_us = shooting_due_us(generator);
+    const uint32_t longest_us = generator->outputs_live ? LIVE_POLL_US : POLL_US;
     if (due_us <= now_us)
         return 0;
-    return due_us - now_us < POLL_US ? (uint32_t)(due_us - now_us) : (uint32_t)POLL_US;
+    return due_us - now_us < longest_us ? (uint32_t)(due_us - now_us) : longest_us;
 }

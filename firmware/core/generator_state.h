@@ -11,7 +11,7 @@
  *      └──────────────────────── safety_clear, stops closed ───────────────────────┘
  *
  * Nothing but shooting_arm leads to ARMED, nothing but light_start to LIT. The emergency stop, and set-points that are
- * not known to be zero, lead to FAULT from everywhere. */
+ * not known to be zero, a light output that is high for no reason and a changed memory lead to FAULT from everywhere. */
 #ifndef GENERATOR_STATE_H
 #define GENERATOR_STATE_H
 
@@ -36,6 +36,7 @@ enum fault {
     FAULT_INTERNAL = 8,
     FAULT_ESTOP = 16,
     FAULT_SETPOINT = 32,
+    FAULT_OUTPUT = 64,
 };
 
 /* What starts the shots of an armed generator. */
@@ -62,6 +63,7 @@ struct counters {
     uint32_t suppressed;
     uint32_t early;
     uint32_t cameras;
+    uint32_t lights;
     uint32_t crc_errors;
 };
 
@@ -86,7 +88,10 @@ struct generator {
     uint64_t train_over_us; /* the latest one */
     uint64_t settled_us;    /* the set-points that pulses had */
     uint64_t light_over_us;
-    uint64_t heard_us; /* last valid line of the host */
+    uint32_t shot_lights; /* bits of the light outputs that the newest shot uses, until its train is over */
+    uint32_t seen_lights; /* those of them that were seen high */
+    uint32_t lit_lights;  /* likewise, of continuous light */
+    uint64_t heard_us;    /* last valid line of the host */
 };
 
 /* Of any train within the absolute limits: what has forgotten the light before it waits as long. */

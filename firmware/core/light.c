@@ -44,6 +44,8 @@ enum error light_start(struct generator *generator, uint32_t time_ms, const uint
         safety_outputs_off(generator);
         return ERROR_HARDWARE;
     }
+    for (uint32_t i = 0; i < CHANNEL_COUNT; i++)
+        generator->lit_lights |= current_ma[i] ? 1u << i : 0u;
     generator->light_over_us = port_now_us() + time_ms * 1000u;
     generator->state = STATE_LIT; /* generator_poll lights */
     return ERROR_NONE;

@@ -54,6 +54,13 @@ struct port_edges port_take_edges(void);
 /* Camera triggers that were really given since the last call: rises of the outputs. */
 uint32_t port_take_cameras(void);
 
+/* Bit i: light output i is high, or was since the last call, whoever drives it. */
+uint32_t port_take_lights(void);
+
+/* False where the program, or what was made of the train, does not read as it was written. Looks at a part of it with
+ * each call. */
+bool port_intact(void);
+
 /* Make ready for light for adjustment: set-points, read back; still dark. False as port_load. */
 bool port_prepare_light(const uint32_t *current_ma);
 

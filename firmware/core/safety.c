@@ -129,7 +129,7 @@ enum error safety_clear(struct generator *generator)
     const enum error error = safety_check_stops(generator);
     if (error)
         return error;
-    if (!port_set_points_confirmed())
+    if (!port_set_points_confirmed() || port_take_lights() || !port_intact())
         return ERROR_HARDWARE;
     generator->faults = 0;
     generator->state = STATE_SAFE;
@@ -146,6 +146,8 @@ void safety_watch(struct generator *generator, uint64_t now_us)
     (void)safety_check_stops(generator); /* what it finds, it latches */
     if (!port_set_points_confirmed() && !(generator->faults & FAULT_SETPOINT))
         safety_trip(generator, FAULT_SETPOINT);
+    if (!port_intact() && !(generator->faults & FAULT_INTERNAL))
+        safety_trip(generator, FAULT_INTERNAL);
     if (gives_light(generator) && now_us - generator->heard_us > HEARTBEAT_MS * 1000u)
         safety_trip(generator, FAULT_HEARTBEAT);
 }

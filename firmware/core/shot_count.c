@@ -2,12 +2,22 @@
 
 #include "port.h"
 
+static uint32_t lights_of(const struct pulse_train *train)
+{
+    uint32_t lights = 0;
+    for (uint32_t i = 0; i < CHANNEL_COUNT; i++)
+        if (train->channels[i].used && train->channels[i].current_ma)
+            lights |= 1u << i;
+    return lights;
+}
+
 void shot_count_fired(struct generator *generator)
 {
     const uint64_t now_us = port_now_us();
     generator->counters.fired++;
     generator->fired = true;
     generator->permitted = false;
+    generator->shot_lights |= lights_of(&generator->train);
     generator->not_before_us = now_us + channel_limits_period_us(&generator->train, generator->limits);
     /* Both terms are rounded down. */
     generator->train_over_us = now_us + pulse_train_length_ns(&generator->train) / 1000u + 2u;

@@ -21,16 +21,19 @@ bool span_equals(struct span span, const char *word)
 
 bool span_number(struct span span, uint32_t *number)
 {
-    uint64_t value = 0;
+    uint32_t value = 0;
     if (span.length == 0 || span.length > 10)
         return false;
     for (size_t i = 0; i < span.length; i++) {
         if (span.start[i] < '0' || span.start[i] > '9')
             return false;
-        value = value * 10u + (uint64_t)(span.start[i] - '0');
+        const uint32_t digit = (uint32_t)(span.start[i] - '0');
+        if (value > (UINT32_MAX - digit) / 10u)
+            return false;
+        value = value * 10u + digit;
     }
-    *number = (uint32_t)value;
-    return value <= UINT32_MAX;
+    *number = value;
+    return true;
 }
 
 static int hex_digit(char character)

@@ -19,13 +19,14 @@ static uint32_t fired;
 static bool permitted;
 static struct port_edges edges;
 static uint32_t cameras;
+static uint32_t lights;
 static uint32_t light_ma[CHANNEL_COUNT];
 static bool lit;
 
 void bench_power_up(void)
 {
     port_off();
-    fired = cameras = 0;
+    fired = cameras = lights = 0;
     edges = (struct port_edges){0};
 }
 
@@ -114,6 +115,7 @@ static void give_shot(void)
                                    channel->current_ma);
         length += (size_t)added;
         cameras++;
+        lights |= channel->current_ma ? 1u << i : 0u;
     }
     bench_print_event("fired %u%.*s\n", ++fired, (int)length, line);
 }
@@ -153,6 +155,18 @@ uint32_t port_take_cameras(void)
     return taken;
 }
 
+uint32_t port_take_lights(void)
+{
+    const uint32_t taken = lights;
+    lights = 0;
+    return taken;
+}
+
+bool port_intact(void)
+{
+    return true;
+}
+
 bool port_prepare_light(const uint32_t *current_ma)
 {
     memcpy(light_ma, current_ma, sizeof light_ma);
@@ -164,6 +178,8 @@ void port_sustain_light(void)
     if (!lit)
         bench_print_event("lit 0 %u 1 %u 2 %u 3 %u\n", light_ma[0], light_ma[1], light_ma[2], light_ma[3]);
     lit = true;
+    for (int i = 0; i < CHANNEL_COUNT; i++)
+        lights |= light_ma[i] ? 1u << i : 0u;
 }
 
 void port_off(void)

@@ -2,8 +2,9 @@
 
     image.py IMAGE.bin IMAGE.uf2
 
-Puts the CRC of the second boot stage into the image (RP2040 data sheet, 2.8.1.3.1), in place, and wraps the image
-into UF2 blocks (https://github.com/microsoft/uf2). The same image gives the same bytes.
+Puts the CRC of the second boot stage into the image (RP2040 data sheet, 2.8.1.3.1), in place, and the sums of its two
+other parts, which the firmware checks (boot/start.c); then wraps the image into UF2 blocks
+(https://github.com/microsoft/uf2). The same image gives the same bytes.
 """
 
 import struct
@@ -37,6 +38,25 @@ def with_boot_crc(image: bytes) -> bytes:
     return boot2 + struct.pack("<I", crc32_of_boot_rom(boot2)) + image[BOOT2_SIZE:]
 
 
+def checksum(words: bytes) -> int:
+    """Sum over words of chip/checksum.h."""
+    total = 0x746F_6D6F
+    for (word,) in struct.iter_unpack("<I", words):
+        mixed = (total ^ word) * 0x9E37_79B1 & 0xFFFF_FFFF
+        total = (mixed >> 13 | mixed << 19) & 0xFFFF_FFFF
+    return total
+
+
+def with_sums(image: bytes) -> bytes:
+    """The image with a sum as the last word of each part: what runs in flash, and what is copied into RAM.
+
+    The third word behind the boot stage says where the copy starts.
+    """
+    (address,) = struct.unpack_from("<I", image, BOOT2_SIZE + 8)
+    parts = (image[:BOOT2_SIZE], image[BOOT2_SIZE : address - FLASH], image[address - FLASH :])
+    return parts[0] + b"".join(part[:-4] + struct.pack("<I", checksum(part[:-4])) for part in parts[1:])
+
+
 def uf2(image: bytes) -> bytes:
     """One block of 512 bytes per flash page; the last page is filled with zeros."""
     pages = [image[start : start + PAGE].ljust(PAGE, b"\0") for start in range(0, len(image), PAGE)]
@@ -60,7 +80,7 @@ def uf2(image: bytes) -> bytes:
 
 def main() -> None:
     binary, drive_file = map(Path, sys.argv[1:])
-    image = with_boot_crc(binary.read_bytes())
+    image = with_sums(with_boot_crc(binary.read_bytes()))
     binary.write_bytes(image)
     drive_file.write_bytes(uf2(image))
 

@@ -12,13 +12,13 @@ _Static_assert(PIN_TRIGGER / 8 == PIN_INTERLOCK / 8 && PIN_ESTOP / 8 == PIN_INTE
 static volatile uint32_t opened; /* since the core last asked */
 static volatile struct port_edges edges;
 
-static void set_input(uint32_t pin)
+ONCE static void set_input(uint32_t pin)
 {
     REG(PAD(pin)) = PAD_INPUT | PAD_PULL_DOWN | PAD_SCHMITT; /* a cut wire reads as open */
     REG(IO_CTRL(pin)) = FUNCTION_SIO;
 }
 
-void interlock_start(void)
+ONCE void interlock_start(void)
 {
     set_input(PIN_INTERLOCK);
     set_input(PIN_ESTOP);

@@ -2,12 +2,14 @@
 #include "clocks.h"
 #include "generator.h"
 #include "identity.h"
+#include "image_check.h"
 #include "interlock.h"
 #include "outputs.h"
 #include "protocol.h"
 #include "rp2040.h"
 #include "serial.h"
 #include "set_points.h"
+#include "state_machines.h"
 #include "timer.h"
 #include "watchdog.h"
 
@@ -44,13 +46,13 @@ int main(void)
     char byte = 0;
     outputs_start();
     clocks_start();
-    identity_read_board();
     timer_start();
     const struct start start = watchdog_read_start();
     watchdog_start();
     set_points_start();
     interlock_start();
     serial_start();
+    identity_read_board(); /* the last one: nothing reads from flash after it */
     protocol_boot(&protocol, start.boot, start.cause);
     start_interrupts();
     for (;;) {
@@ -58,6 +60,8 @@ int main(void)
         while (serial_take(&byte))
             protocol_receive(&protocol, byte);
         set_points_poll();
+        state_machines_poll();
+        image_check_poll();
         protocol_poll(&protocol);
         sleep(generator_idle_us(&protocol.generator));
     }

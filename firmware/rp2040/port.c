@@ -4,6 +4,7 @@
 #include "clocks.h"
 #include "continuous_light.h"
 #include "identity.h"
+#include "image_check.h"
 #include "interlock.h"
 #include "outputs.h"
 #include "serial.h"
@@ -64,6 +65,16 @@ struct port_edges port_take_edges(void)
 uint32_t port_take_cameras(void)
 {
     return outputs_take_cameras();
+}
+
+uint32_t port_take_lights(void)
+{
+    return outputs_take_lights();
+}
+
+bool port_intact(void)
+{
+    return image_check_intact() && outputs_intact();
 }
 
 bool port_prepare_light(const uint32_t *current_ma)

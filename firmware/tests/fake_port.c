@@ -18,8 +18,11 @@ void fake_reset(void)
 static void start_shot(void)
 {
     fake.fired++;
-    for (int i = 0; i < CHANNEL_COUNT; i++)
-        fake.cameras += fake.loaded.channels[i].used;
+    for (int i = 0; i < CHANNEL_COUNT; i++) {
+        const struct channel *channel = &fake.loaded.channels[i];
+        fake.cameras += channel->used;
+        fake.lights |= channel->used && channel->current_ma ? 1u << i : 0u;
+    }
 }
 
 void fake_edge(void)
@@ -106,6 +109,18 @@ uint32_t port_take_cameras(void)
     return cameras;
 }
 
+uint32_t port_take_lights(void)
+{
+    const uint32_t lights = fake.lights | fake.stuck_lights;
+    fake.lights = 0;
+    return lights;
+}
+
+bool port_intact(void)
+{
+    return !fake.damaged;
+}
+
 bool port_prepare_light(const uint32_t *current_ma)
 {
     CHECK(!fake.live && !fake.permitted);
@@ -122,6 +137,8 @@ void port_sustain_light(void)
 {
     CHECK(fake.live && fake.prepared);
     fake.lit_until_us = fake.now_us + LIGHT_SUSTAIN_MS * 1000u;
+    for (int i = 0; i < CHANNEL_COUNT; i++)
+        fake.lights |= fake.light_ma[i] ? 1u << i : 0u;
 }
 
 void port_off(void)

@@ -23,6 +23,9 @@ struct fake_port {
     bool edge_fired;  /* since the core last asked */
     uint32_t rises;   /* likewise */
     uint32_t cameras; /* likewise */
+    uint32_t lights;  /* bits of those that were high, likewise */
+    uint32_t stuck_lights;
+    bool damaged; /* the memory of the program */
     uint32_t light_ma[CHANNEL_COUNT];
     bool prepared; /* for light */
     uint64_t lit_until_us;

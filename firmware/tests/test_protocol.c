@@ -145,7 +145,7 @@ static void test_status_tells_everything(void)
     ASK("6 FIRE");
     fake.interlock_closed = false;
     CHECK_REPLY("7 STATUS", "7 3 OK state=2 faults=1 interlock=0 estop=1 source=0 shots_left=0 requested=2 fired=1 "
-                            "suppressed=1 early=1 cameras=1 crc_errors=0");
+                            "suppressed=1 early=1 cameras=1 lights=0 crc_errors=0");
     CHECK_REPLY("8 CLEAR", "8 3 ERR 9");
 }
 
@@ -154,9 +154,9 @@ static void test_the_longest_lines_fit(void)
     boot();
     protocol.boot = protocol.generator.faults = UINT32_MAX;
     protocol.generator.counters =
-        (struct counters){UINT32_MAX, UINT32_MAX, UINT32_MAX, UINT32_MAX, UINT32_MAX, UINT32_MAX};
+        (struct counters){UINT32_MAX, UINT32_MAX, UINT32_MAX, UINT32_MAX, UINT32_MAX, UINT32_MAX, UINT32_MAX};
     ASK("65535 STATUS");
-    CHECK(strlen(fake.reply) < TEXT_SIZE - 64 && strstr(fake.reply, "crc_errors=4294967295"));
+    CHECK(strlen(fake.reply) < TEXT_SIZE - 32 && strstr(fake.reply, "crc_errors=4294967295"));
     CHECK(strstr(ASK("65534 CHANNEL 4294967295 4294967295 4294967295 4294967295 4294967295 4294967295 4294967295 "
                      "4294967295 4294967295"),
                  " ERR 12"));

@@ -277,15 +277,15 @@ static void test_cameras_count_their_triggers(void)
 static void test_the_core_says_when_it_wants_to_be_polled(void)
 {
     boot_armed(2, SOURCE_COMMAND, 0);
-    CHECK(generator_idle_us(&generator) == POLL_US);
+    CHECK(generator_idle_us(&generator) == LIVE_POLL_US);
     boot_armed(2, SOURCE_TIMER, PERIOD_US);
-    CHECK(generator_idle_us(&generator) == POLL_US);
+    CHECK(generator_idle_us(&generator) == LIVE_POLL_US);
     fake.now_us += PERIOD_US - 7;
     CHECK(generator_idle_us(&generator) == 7);
     fake.now_us += 8;
     CHECK(generator_idle_us(&generator) == 0);
     boot_armed(2, SOURCE_EXTERNAL, 0);
-    CHECK(generator_idle_us(&generator) == POLL_US);
+    CHECK(generator_idle_us(&generator) == LIVE_POLL_US);
     fake_edge();
     wait_us(0);
     fake.now_us += MIN_PERIOD_US - 3;

@@ -146,7 +146,7 @@ def test_light_is_off_after_opening(generator: PulseGenerator) -> None:
     status = generator.status()
     assert status.state is GeneratorState.SAFE
     assert status.shots_left == 0
-    assert set(status.counters) == {"requested", "fired", "suppressed", "early", "cameras", "crc_errors"}
+    assert set(status.counters) == {"requested", "fired", "suppressed", "early", "cameras", "lights", "crc_errors"}
 
 
 def test_it_names_itself(generator: PulseGenerator) -> None:
@@ -231,7 +231,7 @@ def test_nothing_fires_before_arming(stand: Stand) -> None:
     with pytest.raises(DeviceRefused, match="not armed"):
         stand.generator.fire()
     assert stand.generator.status().counters == {
-        "requested": 2, "fired": 0, "suppressed": 2, "early": 0, "cameras": 0, "crc_errors": 0
+        "requested": 2, "fired": 0, "suppressed": 2, "early": 0, "cameras": 0, "lights": 0, "crc_errors": 0
     }  # fmt: skip
     assert stand.light == []
 

@@ -25,7 +25,7 @@ WATCHDOG_MS = 200
 DARK_WITHIN_NS = 450
 """Measured: 368 ns for the last of four channels, 408 ns inside the serial interrupt. The emulator leaves
 out entering the interrupt, about 20 cycles."""
-RAM, STACK_SIZE, STACK_BOUND = 0x2000_0000, 1536, 1108
+RAM, STACK_SIZE, STACK_BOUND = 0x2000_0000, 1280, 1108
 PAINT = 0xA5A5_A5A5
 ABORT_WITHIN_NS = 600
 PIO_BLOCKS = (0x5020_0000, 0x5030_0000)
@@ -327,7 +327,7 @@ def test_the_outputs_never_move_while_it_starts() -> None:
 
 
 def test_the_stack_stays_within_what_was_computed_for_it(board: Board) -> None:
-    words = range(RAM, RAM + STACK_SIZE - 512, 4)
+    words = range(RAM, RAM + STACK_SIZE - 256, 4)
     for address in words:
         board.pico.write_word(address, PAINT)
     board.when("light0", True, 5, lambda: board.pico.set_interlock(False))

@@ -109,6 +109,7 @@ class EmulatedPico:
     def power_up(self) -> None:
         """Cut the power and give it back; RAM, registers and what is on the serial line are lost."""
         self._received.clear()
+        self._shorted: set[str] = set()
         self._restarting = False
         self._chip = powered_chip(self._image, self._noise, self.sent.append, self._on_edge)
         self._chip.watchdog.on_watchdog_trigger = self._on_watchdog
@@ -174,6 +175,11 @@ class EmulatedPico:
     def set_points_ma(self) -> tuple[int, ...]:
         """What the set-point outputs ask of the LED drivers, by channel."""
         return pwm_set_points_ma(self._chip) if has_pwm_set_points(self._chip) else self.converter.outputs_ma()
+
+    def short(self, output: str) -> None:
+        """Connect an output to the supply, outside the chip, until the next power-up; its own level stays as it is."""
+        self._shorted.add(output)
+        self._chip.gpio[OUTPUT_PINS[output]].set_input_value(True)
 
     def read_word(self, address: int) -> int:
         """A word of RAM or a register."""
@@ -268,6 +274,8 @@ class EmulatedPico:
     def _on_edge(self, output: str, high: bool) -> None:
         if output == TRIGGER and high:
             self.shot_set_points_ma = self.set_points_ma()
+        if output in self._shorted:
+            self._chip.gpio[OUTPUT_PINS[output]].set_input_value(True)
         edge = Edge(self.cycle, output, high)
         self.edges.append(edge)
         if self.on_edge is not None:
@@ -281,5 +289,6 @@ class EmulatedPico:
         self._chip.enter_reset(from_watchdog=from_watchdog)
         for output, high in self.levels().items():  # pins that were reset tell nobody
             if high != before[output]:
+                self._chip.gpio[OUTPUT_PINS[output]].set_input_value(high)
                 self._on_edge(output, high)
         start_boot_rom(self._chip)

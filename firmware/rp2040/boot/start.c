@@ -1,13 +1,17 @@
-/* From the second boot stage to main: copy the image into RAM, where all of it runs; flash is not read again. */
+/* From the second boot stage to main: copy the image into RAM, where all of it runs; flash is not read again. An image
+ * that is not what image.py has summed up is not run: after a reset the pads pull down, which is dark. */
 #include <stdint.h>
 
+#include "checksum.h"
 #include "outputs.h"
 #include "rp2040.h"
 
 /* From image.ld. */
+extern uint32_t flash_start[];
+extern uint32_t flash_sum[];
 extern uint32_t flash_copy[];
 extern uint32_t image_start[];
-extern uint32_t image_end[];
+extern uint32_t image_sum[];
 extern uint32_t bss_start[];
 extern uint32_t bss_end[];
 
@@ -17,12 +21,20 @@ int main(void);
 _Noreturn void start_reset(void);
 _Noreturn void start_fault(void);
 
-__attribute__((section(".flash_text"))) void start_reset(void)
+ONCE void start_reset(void)
 {
     __asm__ volatile("cpsid i" ::: "memory");
     const volatile uint32_t *from = flash_copy;
-    for (volatile uint32_t *to = image_start; to < image_end; to++)
-        *to = *from++;
+    uint32_t sum = CHECKSUM_START;
+    for (volatile uint32_t *to = image_start; to < image_sum; to++) {
+        const uint32_t word = *from++;
+        *to = word;
+        sum = checksum_step(sum, word);
+    }
+    *(volatile uint32_t *)image_sum = *from;
+    if (sum != *from || checksum_words(flash_start, flash_sum) != *flash_sum)
+        for (;;)
+            __asm__ volatile("wfi");
     for (volatile uint32_t *word = bss_start; word < bss_end; word++)
         *word = 0;
     REG(SCB_VTOR) = (uint32_t)(uintptr_t)image_start; /* vectors.S comes first */

@@ -2,6 +2,7 @@
     .section .flash_vectors, "a"
     .word stack_top
     .word start_reset
+    .word flash_copy                                  /* for image.py */
 
     .section .vectors, "a"
     .word stack_top

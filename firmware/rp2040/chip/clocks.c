@@ -41,7 +41,7 @@ enum {
 _Static_assert((CRYSTAL_MHZ * SYS_FEEDBACK) == CLOCK_MHZ * SYS_DIVIDER_1 * SYS_DIVIDER_2, "the PLL gives the clock");
 _Static_assert((CRYSTAL_MHZ * USB_FEEDBACK) == USB_MHZ * USB_DIVIDER * USB_DIVIDER, "the other one that of the USB");
 
-static void start_crystal(void)
+ONCE static void start_crystal(void)
 {
     REG(XOSC_STARTUP) = XOSC_START_CYCLES;
     REG(XOSC_CTRL) = XOSC_ENABLE | XOSC_1_TO_15_MHZ;
@@ -49,7 +49,7 @@ static void start_crystal(void)
         ;
 }
 
-static void start_pll(const struct pll *pll)
+ONCE static void start_pll(const struct pll *pll)
 {
     resets_restart(pll->reset_bit);
     REG(PLL_CS(pll->base)) = 1; /* reference divider */
@@ -61,14 +61,14 @@ static void start_pll(const struct pll *pll)
     REG_CLEAR(PLL_PWR(pll->base)) = PLL_POST_DIVIDER_PD;
 }
 
-static void select_source(uint32_t control, uint32_t selected, uint32_t source)
+ONCE static void select_source(uint32_t control, uint32_t selected, uint32_t source)
 {
     REG(control) = source;
     while (REG(selected) != 1u << source)
         ;
 }
 
-void clocks_start(void)
+ONCE void clocks_start(void)
 {
     static const struct pll SYS = {PLL_SYS, RESET_PLL_SYS, SYS_FEEDBACK, SYS_DIVIDER_1, SYS_DIVIDER_2};
     REG(CLK_SYS_RESUS_CTRL) = 0;
@@ -81,7 +81,7 @@ void clocks_start(void)
     REG(WATCHDOG_TICK) = TICK_ENABLE | CRYSTAL_MHZ; /* counts for the timer too */
 }
 
-void clocks_start_usb(void)
+ONCE void clocks_start_usb(void)
 {
     static const struct pll USB = {PLL_USB, RESET_PLL_USB, USB_FEEDBACK, USB_DIVIDER, USB_DIVIDER};
     start_pll(&USB);

@@ -14,7 +14,7 @@ enum {
 };
 
 /* The RP2040 has no number of its own; its flash has one. */
-static char serial[2 * ID_BYTES + 1] = "unknown";
+static char serial[2 * ID_BYTES + 1];
 
 _Static_assert(sizeof serial == 17, "16 characters");
 
@@ -72,5 +72,5 @@ void identity_read_board(void)
 
 const char *identity_serial(void)
 {
-    return serial;
+    return serial[0] ? serial : "unknown";
 }

@@ -5,6 +5,8 @@
 #include <stdint.h>
 
 #define REG(address) (*(volatile uint32_t *)(uintptr_t)(address))
+/* A function that runs once, before interrupts do: it stays in flash, where reading may take its time. */
+#define ONCE __attribute__((section(".flash_text"), noinline))
 /* Atomic aliases of every peripheral register, section 2.1.2. */
 #define REG_SET(address) REG((address) + 0x2000u)
 #define REG_CLEAR(address) REG((address) + 0x3000u)
@@ -61,6 +63,14 @@ enum reset_bits {
 #define SIO_GPIO_OUT_CLR 0xd0000018u
 #define SIO_GPIO_OE_SET 0xd0000024u
 #define SIO_GPIO_OE_CLR 0xd0000028u
+
+/* 2.3.1.7 */
+#define SIO_DIV_UDIVIDEND 0xd0000060u
+#define SIO_DIV_UDIVISOR 0xd0000064u
+#define SIO_DIV_QUOTIENT 0xd0000070u
+#define SIO_DIV_REMAINDER 0xd0000074u
+#define SIO_DIV_CSR 0xd0000078u
+enum { SIO_DIV_READY = 1 << 0 };
 
 enum io_ctrl {
     FUNCTION_UART = 2,

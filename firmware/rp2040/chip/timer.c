@@ -5,7 +5,7 @@
 
 enum { ALARM0 = 1 };
 
-void timer_start(void)
+ONCE void timer_start(void)
 {
     resets_restart(RESET_TIMER);
     REG(TIMER_INTE) = ALARM0;

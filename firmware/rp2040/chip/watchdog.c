@@ -23,7 +23,7 @@ enum {
 _Static_assert(TICKS < 1 << 24, "the counter has 24 bits");
 
 /* From the jitter of the ring oscillator, section 2.17.5: a host that slept through a power cut sees the change. */
-static uint32_t random_number(void)
+ONCE static uint32_t random_number(void)
 {
     uint32_t number = 0;
     for (int i = 0; i < RANDOM_BITS; i++)
@@ -33,7 +33,7 @@ static uint32_t random_number(void)
 
 /* The watchdog leaves the register of the chip as it was. Its own registers survive its resets, and no others. The boot
  * loader ends with a watchdog reset too, but leaves no mark. */
-static enum cause read_cause(bool marked)
+ONCE static enum cause read_cause(bool marked)
 {
     const uint32_t reason = REG(WATCHDOG_REASON);
     const uint32_t chip = REG(CHIP_RESET);
@@ -48,7 +48,7 @@ static enum cause read_cause(bool marked)
     return chip & HAD_POWER ? CAUSE_POWER : CAUSE_UNKNOWN;
 }
 
-struct start watchdog_read_start(void)
+ONCE struct start watchdog_read_start(void)
 {
     const bool marked = REG(WATCHDOG_SCRATCH(SCRATCH_MARK)) == MARK;
     const struct start start = {
@@ -60,7 +60,7 @@ struct start watchdog_read_start(void)
     return start;
 }
 
-void watchdog_start(void)
+ONCE void watchdog_start(void)
 {
     REG(PSM_WDSEL) = DOMAINS; /* 0 after power-up: the watchdog would then reset nothing */
     watchdog_feed();

@@ -1,5 +1,6 @@
 #include "outputs.h"
 
+#include "checksum.h"
 #include "clocks.h"
 #include "pins.h"
 #include "pio_program.h"
@@ -12,18 +13,25 @@ enum {
     OUTPUT_OFF = OUTPUT_ENABLE | OUTPUT_LOW,
     OUTPUT_LIVE = OUTPUT_ENABLE,
     READY_POLLS = 16,
+    CAMERAS_BELOW_8 = 8 - PIN_CAMERA, /* eight pins have one register */
 };
+
+_Static_assert(CHANNEL_COUNT == 4 && PIN_LIGHT + CHANNEL_COUNT <= 8 && (int)CAMERAS_BELOW_8 < (int)CHANNEL_COUNT,
+               "registers of edges");
 
 /* The two words of a machine; a machine without a shot stays without words. */
 struct words {
-    bool used;
-    bool single; /* pulse A alone */
+    uint32_t used;
+    uint32_t single; /* pulse A alone */
     uint32_t delay;
     uint32_t pattern;
 };
 
-static struct words light[CHANNEL_COUNT];
-static struct words camera[CHANNEL_COUNT];
+static struct words words_of[CAMERA + 1][CHANNEL_COUNT];
+static struct words *const light = words_of[LIGHT];
+static struct words *const camera = words_of[CAMERA];
+static uint32_t words_sum;
+static bool words_changed;
 static volatile uint32_t off_count;
 static volatile bool permitted; /* until the shot has started */
 
@@ -88,11 +96,18 @@ static bool encode_camera(const struct channel *channel, struct words *words)
     return encode(CAMERA_PULSE_NS, CAMERA_CYCLES_MAX, &words->pattern) && channel->camera_ns % TICK_NS == 0;
 }
 
+static uint32_t sum_of_words(void)
+{
+    return checksum_words((const uint32_t *)words_of, (const uint32_t *)(words_of + CAMERA + 1));
+}
+
 static bool encode_train(const struct pulse_train *train)
 {
     bool fits = true;
     for (uint32_t i = 0; i < CHANNEL_COUNT; i++)
         fits = encode_light(&train->channels[i], &light[i]) && encode_camera(&train->channels[i], &camera[i]) && fits;
+    words_sum = sum_of_words();
+    words_changed = false;
     return fits;
 }
 
@@ -196,6 +211,10 @@ static bool all_stand_at(uint32_t pio, const struct words *words, uint32_t addre
 static bool push_shot(uint32_t address)
 {
     bool ready = false;
+    words_changed = words_changed || sum_of_words() != words_sum;
+    if (words_changed)
+        return false;
+    state_machines_refresh();
     push_words(LIGHT, light);
     push_words(CAMERA, camera);
     for (int i = 0; i < READY_POLLS && !ready; i++)
@@ -256,14 +275,36 @@ bool outputs_take_start(void)
     return started;
 }
 
-/* The edges are latched by the pins themselves, without an interrupt. */
+bool outputs_intact(void)
+{
+    return !words_changed;
+}
+
+/* Rises of the next pins, bits 3, 7, 11, 15; they are latched by the pins themselves, without an interrupt. */
+static uint32_t take_rises(uint32_t pin, uint32_t pins)
+{
+    const uint32_t shift = 4u * (pin % 8u);
+    const uint32_t rises = REG(IO_INTR(pin)) & 0x8888u >> 4u * (4u - pins) << shift;
+    if (rises)
+        REG(IO_INTR(pin)) = rises;
+    return rises >> shift;
+}
+
+uint32_t outputs_take_lights(void)
+{
+    const uint32_t rises = take_rises(PIN_LIGHT, CHANNEL_COUNT);
+    uint32_t lights = REG(SIO_GPIO_IN) >> PIN_LIGHT & ((1u << CHANNEL_COUNT) - 1u);
+    for (uint32_t i = 0; rises && i < CHANNEL_COUNT; i++)
+        lights |= rises & 8u << 4u * i ? 1u << i : 0u;
+    return lights;
+}
+
 uint32_t outputs_take_cameras(void)
 {
-    uint32_t rises = 0;
-    for (uint32_t i = 0; i < CHANNEL_COUNT; i++) {
-        const uint32_t edge = IO_EDGE_HIGH(PIN_CAMERA + i);
-        rises += (REG(IO_INTR(PIN_CAMERA + i)) & edge) != 0;
-        REG(IO_INTR(PIN_CAMERA + i)) = edge;
-    }
-    return rises;
+    uint32_t count = 0;
+    uint32_t rises = take_rises(PIN_CAMERA, CAMERAS_BELOW_8);
+    rises |= take_rises(8, CHANNEL_COUNT - CAMERAS_BELOW_8) << 16;
+    for (; rises; rises &= rises - 1u)
+        count++;
+    return count;
 }

@@ -27,6 +27,12 @@ bool outputs_take_start(void);
 /* Rises of the camera outputs since the last call. */
 uint32_t outputs_take_cameras(void);
 
+/* As port_take_lights. */
+uint32_t outputs_take_lights(void);
+
+/* False from a shot on whose words have changed in memory, to the next train. */
+bool outputs_intact(void);
+
 /* All low, from any context, interrupts included: light pins first, then cameras, trigger, machines, set-points. */
 void outputs_off(void);
 

@@ -8,9 +8,17 @@ enum {
     RESTART_ALL = 0x0f0,
     ENABLE_ALL = 0x00f,
     FIFO_DEPTH = 4,
+    MEMORY_SIZE = 16, /* of the longest program, and more */
     SHIFT_RIGHT = 1 << 18 | 1 << 19,
     SIDE_SET_1 = 1 << 29,
 };
+
+struct program {
+    const uint16_t *instructions;
+    uint32_t length;
+};
+
+static struct program programs[CAMERA + 1];
 
 void state_machines_divide_clock(uint32_t pio, uint32_t machine, uint32_t cycles)
 {
@@ -28,11 +36,39 @@ void state_machines_set_up(uint32_t pio, uint32_t machine, uint32_t pin, uint32_
     REG(PIO_INSTR(pio, machine)) = PIO_LOW | PIO_JMP(0);
 }
 
+static void write_instruction(uint32_t pio, uint32_t address)
+{
+    if (address < programs[pio].length)
+        REG(PIO_INSTR_MEM(pio, address)) = programs[pio].instructions[address];
+}
+
+static void write_instructions(uint32_t pio)
+{
+    for (uint32_t address = 0; address < programs[pio].length; address++)
+        write_instruction(pio, address);
+}
+
 void state_machines_write_program(uint32_t pio, const uint16_t *program, uint32_t length)
 {
     REG(PIO_CTRL(pio)) = RESTART_ALL;
-    for (uint32_t i = 0; i < length; i++)
-        REG(PIO_INSTR_MEM(pio, i)) = program[i];
+    programs[pio] = (struct program){program, length};
+    write_instructions(pio);
+}
+
+void state_machines_refresh(void)
+{
+    for (uint32_t pio = LIGHT; pio <= CAMERA; pio++)
+        if (REG(PIO_CTRL(pio)))
+            write_instructions(pio);
+}
+
+void state_machines_poll(void)
+{
+    static uint32_t address;
+    address = (address + 1u) % MEMORY_SIZE;
+    for (uint32_t pio = LIGHT; pio <= CAMERA; pio++)
+        if (REG(PIO_CTRL(pio)))
+            write_instruction(pio, address);
 }
 
 void state_machines_enable(uint32_t pio)

@@ -17,6 +17,11 @@ enum {
 /* Stop all machines of a block and give them a program. */
 void state_machines_write_program(uint32_t pio, const uint16_t *program, uint32_t length);
 
+/* Their memory cannot be read, so the programs of machines that run are written once more: whole, and, from the main loop
+ * all the time, instruction by instruction. */
+void state_machines_refresh(void);
+void state_machines_poll(void);
+
 /* Its pin, and the first so many instructions of the program; it starts at their beginning, without words. */
 void state_machines_set_up(uint32_t pio, uint32_t machine, uint32_t pin, uint32_t length);
 

@@ -12,7 +12,7 @@ enum {
     DIVIDER_64 = (CLOCK_MHZ * 1000000 * 4 + BAUD / 2) / BAUD, /* clock / (16 x baud), in 1/64 */
 };
 
-void serial_start(void)
+ONCE void serial_start(void)
 {
     resets_restart(RESET_UART0);
     REG(UART0_IBRD) = DIVIDER_64 / 64;

@@ -26,7 +26,7 @@ void set_points_zero(void)
         REG(PWM_CC(slice)) = 0;
 }
 
-void set_points_start(void)
+ONCE void set_points_start(void)
 {
     resets_restart(RESET_PWM);
     set_points_zero();

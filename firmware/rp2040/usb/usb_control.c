@@ -42,8 +42,8 @@ static enum stage stage;
 static struct usb_bytes left; /* to be sent in STAGE_DATA_IN */
 static uint8_t configuration;
 static uint8_t new_address;
-static bool opened; /* the port, by a program on the host */
-static uint8_t line_coding[LINE_CODING_SIZE] = {0x00, 0xc2, 0x01, 0x00, 0, 0, 8}; /* 115200, 8N1; means nothing */
+static bool opened;                           /* the port, by a program on the host */
+static uint8_t line_coding[LINE_CODING_SIZE]; /* as the host has set it; means nothing */
 
 static void refuse(void)
 {

@@ -145,7 +145,7 @@ void usb_endpoints_stall_control(void)
     REG(USB_BUFFER_CONTROL(USB_CONTROL, USB_OUT)) = USB_BUFFER_STALL;
 }
 
-void usb_endpoints_start(void)
+ONCE void usb_endpoints_start(void)
 {
     clocks_start_usb();
     resets_restart(RESET_USB);
