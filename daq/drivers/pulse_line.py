@@ -2,7 +2,8 @@
 
 import threading
 import time
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from enum import Enum, auto
 
@@ -20,6 +21,8 @@ from daq.drivers.pulse_protocol import (
     Request,
     decode_reply,
     encode_request,
+    is_echo,
+    is_older_reply,
 )
 from daq.errors import (
     DeviceError,
@@ -43,6 +46,15 @@ _LONGEST_LINE = 512
 class _Heard(Enum):
     NOTHING = auto()
     DAMAGED = auto()
+    ECHO = auto()
+    OLDER = auto()
+
+
+def _other_protocol(spoken: str) -> str:
+    return (
+        f"speaks protocol {spoken}, this driver speaks {PROTOCOL_VERSION}: "
+        "flash the firmware of this release (tomoshadow firmware flash)"
+    )
 
 
 class PulseLine:
@@ -86,7 +98,7 @@ class PulseLine:
         identity = self._converse(Request(0, Command.ID), OPENING_LIMIT_S, offs=None)
         spoken = identity.fields.get("protocol")
         if spoken is not None and spoken != str(PROTOCOL_VERSION):
-            raise ProtocolError(self._name, f"speaks protocol {spoken}, this driver speaks {PROTOCOL_VERSION}")
+            raise ProtocolError(self._name, _other_protocol(spoken))
         self._check_fields(Command.ID, identity)
         self._sequence = identity.number("last")
         self._boot = identity.boot
@@ -139,7 +151,7 @@ class PulseLine:
             self._write(line, what, LIMIT_S)
             while time.monotonic() < deadline_s:
                 received = self._next_line()
-                if received is not None:
+                if received is not None and not is_echo(received):
                     return self._decoded(received)
         raise DeviceTimeout(self._name, what, LIMIT_S)
 
@@ -173,7 +185,7 @@ class PulseLine:
     def _converse(self, request: Request, limit_s: float, offs: int | None) -> Reply:
         """Send until answered: the generator carries out a repeated line only once."""
         deadline_s = time.monotonic() + limit_s
-        damaged = 0
+        heard: Counter[_Heard] = Counter()
         while time.monotonic() < deadline_s:
             self._check_not_overtaken(request.command, offs)
             self._write(encode_request(request), request.command, limit_s)
@@ -183,18 +195,31 @@ class PulseLine:
                 reply = self._next_reply(request)
                 if isinstance(reply, Reply):
                     return reply
+                heard[reply] += 1
                 if reply is _Heard.DAMAGED:
-                    damaged += 1
                     repeat_s = min(repeat_s, time.monotonic() + _REPEAT_DAMAGED_S)
-        if damaged:
-            raise ProtocolError(self._name, f"only damaged lines ({damaged}) in answer to {request.command}")
+        self._explain_silence(request.command, heard)
         raise DeviceTimeout(self._name, request.command.value, limit_s)
 
+    def _explain_silence(self, command: Command, heard: Mapping[_Heard, int]) -> None:
+        if heard[_Heard.OLDER]:
+            raise ProtocolError(self._name, _other_protocol("2 or older"))
+        if heard[_Heard.DAMAGED]:
+            raise ProtocolError(self._name, f"only damaged lines ({heard[_Heard.DAMAGED]}) in answer to {command}")
+        if heard[_Heard.ECHO]:
+            raise ProtocolError(
+                self._name, f"{self._path} gives back what is sent, {command} among it, and nobody answers: an echo"
+            )
+
     def _next_reply(self, request: Request) -> Reply | _Heard:
-        """Reply to this request; an older one is NOTHING, one that cannot be read, here or there, is DAMAGED."""
+        """Reply to this request; one to another is NOTHING, one that cannot be read, here or there, is DAMAGED."""
         line = self._next_line()
         if line is None:
             return _Heard.NOTHING
+        if is_echo(line):
+            return _Heard.ECHO
+        if is_older_reply(line):
+            return _Heard.OLDER
         try:
             reply = decode_reply(line)
         except DamagedLine:

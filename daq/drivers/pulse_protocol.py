@@ -2,22 +2,26 @@ r"""The pulse generator's protocol: bytes <-> frozen values. Pure; ``firmware/RE
 
 ::
 
-    request   SEQUENCE COMMAND [FIELD ...]*CRC\n
-    reply     SEQUENCE BOOT OK [NAME=VALUE ...]*CRC\n
-              SEQUENCE BOOT ERR NUMBER*CRC\n          SEQUENCE is ? where the request's could not be read
+    request   >SEQUENCE COMMAND [FIELD ...]*CRC\n
+    reply     <SEQUENCE BOOT OK [NAME=VALUE ...]*CRC\n
+              <SEQUENCE BOOT ERR NUMBER*CRC\n         SEQUENCE is ? where the request's could not be read
 """
 
 import binascii
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum, IntFlag, StrEnum
 
-PROTOCOL_VERSION = 2
+PROTOCOL_VERSION = 3
 CHANNEL_COUNT = 4
 MAX_SEQUENCE = 65_535
 HEARTBEAT_MS = 3000
 ABORT_BYTE = b"\x18"
 UNCHANGED = 2**32 - 1  # asks for a limit without tightening it
+
+_REQUEST_MARK, _REPLY_MARK = ">", "<"
+_OLDER_REPLY = re.compile(r"(\?|\d+) \d+ (OK|ERR)\b")
 
 
 class Command(StrEnum):
@@ -227,7 +231,7 @@ def encode_request(request: Request) -> bytes:
     for name, value in zip(names, request.fields, strict=True):
         if not 0 <= value < 2**32:
             raise ValueError(f"{request.command}: {name} is {value}, not within 0 to {2**32 - 1}")
-    return framed(" ".join(map(str, (request.sequence, request.command, *request.fields))))
+    return framed(" ".join((f"{_REQUEST_MARK}{request.sequence}", request.command, *map(str, request.fields))))
 
 
 def decode_request(line: bytes) -> Request:
@@ -238,7 +242,7 @@ def decode_request(line: bytes) -> Request:
     DamagedLine
         It is no such line.
     """
-    sequence, command, *fields = _unframed(line)
+    sequence, command, *fields = _words(line, _REQUEST_MARK)
     try:
         request = Request(int(sequence), Command(command), tuple(map(int, fields)))
         if encode_request(request) == line:
@@ -257,7 +261,7 @@ def decode_reply(line: bytes) -> Reply:
         CRC or form is wrong.
     """
     try:
-        sequence, boot, verdict, *rest = _unframed(line)
+        sequence, boot, verdict, *rest = _words(line, _REPLY_MARK)
         number = None if sequence == "?" else int(sequence)
         if verdict == "OK":
             return Reply(number, int(boot), fields=_named(rest))
@@ -270,7 +274,7 @@ def decode_reply(line: bytes) -> Reply:
 
 def encode_reply(reply: Reply) -> bytes:
     """Inverse of `decode_reply`."""
-    head = f"{'?' if reply.sequence is None else reply.sequence} {reply.boot}"
+    head = f"{_REPLY_MARK}{'?' if reply.sequence is None else reply.sequence} {reply.boot}"
     if reply.error is not None:
         return framed(f"{head} ERR {reply.error.value}")
     return framed(" ".join([head, "OK", *(f"{name}={value}" for name, value in reply.fields.items())]))
@@ -289,11 +293,31 @@ def framed(body: str) -> bytes:
     return encoded + b"*%04X\n" % _crc16(encoded)
 
 
-def _unframed(line: bytes) -> list[str]:
+def is_echo(line: bytes) -> bool:
+    """Whether the line begins as only a host's does: a serial line that echoes gives it back."""
+    return line.startswith((_REQUEST_MARK.encode(), ABORT_BYTE))
+
+
+def is_older_reply(line: bytes) -> bool:
+    """Whether it is a reply as firmware up to protocol 2 sends it, without a mark."""
+    try:
+        return _OLDER_REPLY.match(_unframed(line)) is not None
+    except ValueError:
+        return False
+
+
+def _words(line: bytes, mark: str) -> list[str]:
+    body = _unframed(line)
+    if not body.startswith(mark):
+        raise DamagedLine(f"{line!r} does not begin with {mark}")
+    return body.removeprefix(mark).split(" ")
+
+
+def _unframed(line: bytes) -> str:
     body, star, crc = line[:-6], line[-6:-5], line[-5:]
     if star != b"*" or crc != b"%04X\n" % _crc16(body):
         raise DamagedLine(f"{line!r}: the CRC is missing or wrong")
-    return body.decode("ascii").split(" ")
+    return body.decode("ascii")
 
 
 def _crc16(body: bytes) -> int:

@@ -120,7 +120,7 @@ def _nonsense(probe: Probe) -> str:
     number = decode_request(probe.numbered(Command.BEAT)).sequence
     for body, error in (("FLY", ErrorNumber.UNKNOWN_COMMAND), ("ARM many 0 0", ErrorNumber.SYNTAX)):
         number = number % MAX_SEQUENCE + 1
-        reply = probe.line.exchange(framed(f"{number} {body}"))
+        reply = probe.line.exchange(framed(f">{number} {body}"))
         expect(reply.error is error, f"{body} was answered by {outcome(reply)} instead of {error.name}")
     return "unknown command and missing number refused"
 

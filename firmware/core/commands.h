@@ -10,9 +10,9 @@
 #include "text.h"
 
 #define MODEL "tomoshadow-pulse"
-#define VERSION "2.0.0"
+#define VERSION "3.0.0"
 
-enum { PROTOCOL_VERSION = 2, MAX_FIELDS = 9 };
+enum { PROTOCOL_VERSION = 3, MAX_FIELDS = 9 };
 
 /* Carry out one command, given its word and the rest of the line; append the fields of the reply. */
 enum error commands_run(struct generator *generator, struct span word, struct span rest, struct text *reply);

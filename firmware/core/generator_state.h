@@ -91,7 +91,7 @@ struct generator {
     uint32_t shot_lights; /* bits of the light outputs that the newest shot uses, until its train is over */
     uint32_t seen_lights; /* those of them that were seen high */
     uint32_t lit_lights;  /* likewise, of continuous light */
-    uint64_t heard_us;    /* last valid line of the host */
+    uint64_t heard_us;    /* last command of the host that was carried out */
 };
 
 /* Of any train within the absolute limits: what has forgotten the light before it waits as long. */

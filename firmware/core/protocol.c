@@ -45,7 +45,7 @@ static void write_ok(struct text *reply, uint32_t boot)
 
 static void write_unreadable(const struct protocol *protocol, struct text *reply, enum error error)
 {
-    text_word(reply, "?");
+    text_word(reply, "<?");
     write_error(reply, protocol->boot, error);
 }
 
@@ -57,6 +57,8 @@ static void run_command(struct protocol *protocol, struct span word, struct span
     if (error) {
         reply->length = after_sequence;
         write_error(reply, protocol->boot, error);
+    } else {
+        safety_heard(&protocol->generator);
     }
 }
 
@@ -65,14 +67,19 @@ static bool is_newest(const struct protocol *protocol, uint32_t sequence)
     return protocol->answered && protocol->sequence == sequence;
 }
 
-/* A line with a good CRC and a sequence number; the number already stands in the reply. */
+static void identify(const struct protocol *protocol, struct text *reply)
+{
+    write_ok(reply, protocol->boot);
+    commands_identify(reply, protocol->cause, protocol->sequence);
+}
+
+/* A line with a good CRC and a sequence number; the number already stands in the reply. Only a command that is carried out
+ * is a sign of life: what is repeated, refused or no command may come from a line that runs by itself. */
 static void answer(struct protocol *protocol, uint32_t sequence, uint16_t crc, struct span rest, struct text *reply)
 {
     const struct span word = span_next_word(&rest);
     if (span_equals(word, "ID") && !rest.length) {
-        /* Opens a session: always answered afresh, and leaves the kept reply alone. */
-        write_ok(reply, protocol->boot);
-        commands_identify(reply, protocol->cause, protocol->sequence);
+        identify(protocol, reply); /* opens a session: always answered afresh, and leaves the kept reply alone */
     } else if (!is_newest(protocol, sequence)) {
         run_command(protocol, word, rest, reply);
         protocol->answered = true;
@@ -86,6 +93,31 @@ static void answer(struct protocol *protocol, uint32_t sequence, uint16_t crc, s
     }
 }
 
+static bool take_sequence(struct span *rest, uint32_t *sequence)
+{
+    return span_number(span_next_word(rest), sequence) && *sequence <= MAX_SEQUENCE;
+}
+
+/* Of a line without mark, which is that of an older host, or of none. */
+static void answer_older(struct protocol *protocol, struct span rest, struct text *reply)
+{
+    uint32_t sequence = 0;
+    if (take_sequence(&rest, &sequence) && span_equals(rest, "ID")) {
+        text_number(reply, sequence);
+        identify(protocol, reply);
+    } else {
+        write_unreadable(protocol, reply, ERROR_SYNTAX);
+    }
+}
+
+static bool take_mark(struct span *rest)
+{
+    const bool marked = rest->length && rest->start[0] == REQUEST_MARK;
+    rest->start += marked;
+    rest->length -= marked;
+    return marked;
+}
+
 static void write_reply(struct protocol *protocol, struct text *reply)
 {
     struct span rest = {protocol->line, protocol->length};
@@ -97,13 +129,15 @@ static void write_reply(struct protocol *protocol, struct text *reply)
         return;
     }
     generator_poll(&protocol->generator); /* a host that comes back too late still finds the fault */
-    safety_heard(&protocol->generator);
-    if (!span_number(span_next_word(&rest), &sequence) || sequence > MAX_SEQUENCE) {
+    if (!take_mark(&rest)) {
+        answer_older(protocol, rest, reply);
+    } else if (!take_sequence(&rest, &sequence)) {
         write_unreadable(protocol, reply, ERROR_SYNTAX);
-        return;
+    } else {
+        text_word(reply, "<");
+        text_number(reply, sequence);
+        answer(protocol, sequence, crc, rest, reply);
     }
-    text_number(reply, sequence);
-    answer(protocol, sequence, crc, rest, reply);
 }
 
 /* The one place that sends. Triggers and light do not wait for a reply. */
@@ -116,7 +150,7 @@ static void send(struct protocol *protocol, const struct text *reply)
     }
 }
 
-static void end_line(struct protocol *protocol)
+static void answer_line(struct protocol *protocol)
 {
     struct text reply = {.length = 0};
     write_reply(protocol, &reply);
@@ -125,6 +159,12 @@ static void end_line(struct protocol *protocol)
     text_hex16(&reply, crc);
     text_word(&reply, "\n");
     send(protocol, &reply);
+}
+
+static void end_line(struct protocol *protocol)
+{
+    if (protocol->line[0] != REPLY_MARK)
+        answer_line(protocol);
     protocol->length = 0;
     protocol->overflow = false;
 }

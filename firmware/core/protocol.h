@@ -1,11 +1,13 @@
 /* Lines in, lines out.
  *
- *     request   SEQUENCE COMMAND [FIELD ...]*CRC\n
- *     reply     SEQUENCE BOOT OK [NAME=VALUE ...]*CRC\n
- *               SEQUENCE BOOT ERR NUMBER*CRC\n        SEQUENCE is ? where the request's could not be read
+ *     request   >SEQUENCE COMMAND [FIELD ...]*CRC\n
+ *     reply     <SEQUENCE BOOT OK [NAME=VALUE ...]*CRC\n
+ *               <SEQUENCE BOOT ERR NUMBER*CRC\n       SEQUENCE is ? where the request's could not be read
  *
- * Every line gets exactly one reply, sent from one place. The newest reply is kept: the same line again gets it
- * again, without doing anything twice. */
+ * Every line gets exactly one reply, sent from one place; but for one that begins like a reply: it has come back from a
+ * line that echoes, and is dropped. The newest reply is kept: the same line again gets it again, without doing anything
+ * twice. Up to protocol 2 lines began with the sequence number; ID is still answered in this form, so that an older host
+ * can name what it does not understand. */
 #ifndef PROTOCOL_H
 #define PROTOCOL_H
 
@@ -16,7 +18,7 @@
 #include "generator_state.h"
 #include "text.h"
 
-enum { MAX_SEQUENCE = 65535 };
+enum { MAX_SEQUENCE = 65535, REQUEST_MARK = '>', REPLY_MARK = '<' };
 
 struct protocol {
     struct generator generator;

@@ -20,7 +20,7 @@ enum error safety_tighten(struct generator *generator, uint32_t number, struct c
 void safety_off(struct generator *generator);
 enum error safety_clear(struct generator *generator);
 
-/* The host has sent a valid line. */
+/* A command of the host has been carried out. */
 void safety_heard(struct generator *generator);
 
 /* Look at inputs, set-points and host, and latch what is wrong. */

@@ -160,10 +160,13 @@ const char *exchange(struct protocol *protocol, const char *body)
 {
     char line[MAX_LINE + 16];
     const unsigned replies = fake.replies;
-    snprintf(line, sizeof line, "%s*%04X\n", body, crc16(body, strlen(body)));
+    char marked[MAX_LINE + 8];
+    snprintf(marked, sizeof marked, ">%s", body);
+    snprintf(line, sizeof line, "%s*%04X\n", marked, crc16(marked, strlen(marked)));
     for (const char *byte = line; *byte; byte++)
         protocol_receive(protocol, *byte);
     CHECK(fake.replies == replies + 1);
+    CHECK(fake.reply[0] == '<');
     *strrchr(fake.reply, '*') = '\0';
-    return fake.reply;
+    return fake.reply + 1;
 }

@@ -43,7 +43,7 @@ void fake_edge(void);
 
 bool fake_lit(void);
 
-/* Send a body as a line with its CRC; returns the body of the reply, without CRC and line feed. */
+/* Send a body as a line with mark and CRC; returns the body of the reply, without mark, CRC and line feed. */
 const char *exchange(struct protocol *protocol, const char *body);
 
 #define CHECK(condition) \

@@ -1,6 +1,7 @@
 /* Lines: framing, numbering, repetition, damage, the abort byte. */
 #include <string.h>
 
+#include "crc16.h"
 #include "fake_port.h"
 
 static struct protocol protocol;
@@ -87,10 +88,10 @@ static void test_malformed_lines_have_numbered_errors(void)
 static void test_damaged_lines_are_answered_and_counted(void)
 {
     boot_armed();
-    const char *damaged[] = {"5 FIRE\n", "5 FIRE*0000\n", "5 FIRE*12\n", "*\n", "5 FIRE*zzzz\n"};
+    const char *damaged[] = {">5 FIRE\n", ">5 FIRE*0000\n", ">5 FIRE*12\n", "*\n", ">5 FIRE*zzzz\n"};
     for (size_t i = 0; i < sizeof damaged / sizeof *damaged; i++) {
         receive(damaged[i]);
-        CHECK(!strncmp(fake.reply, "? 3 ERR 1*", 10));
+        CHECK(!strncmp(fake.reply, "<? 3 ERR 1*", 11));
     }
     CHECK(protocol.generator.counters.crc_errors == 5 && fake.fired == 0);
     CHECK_REPLY("5 FIRE", "5 3 OK fired=1 train=1 shots_left=4");
@@ -104,7 +105,7 @@ static void test_an_overlong_line_is_one_error(void)
         protocol_receive(&protocol, 'A');
     CHECK(fake.replies == replies);
     receive("\n");
-    CHECK(fake.replies == replies + 1 && !strncmp(fake.reply, "? 3 ERR 2*", 10));
+    CHECK(fake.replies == replies + 1 && !strncmp(fake.reply, "<? 3 ERR 2*", 11));
     CHECK_REPLY("1 BEAT", "1 3 OK state=0");
 }
 
@@ -119,14 +120,14 @@ static void test_the_abort_byte_works_inside_a_line(void)
 {
     boot_armed();
     CHECK_REPLY("5 FIRE", "5 3 OK fired=1 train=1 shots_left=4");
-    receive("6 OF");
+    receive(">6 OF");
     protocol_receive(&protocol, ABORT_BYTE);
-    CHECK(!fake.live && protocol.generator.state == STATE_SAFE && protocol.length == 4);
+    CHECK(!fake.live && protocol.generator.state == STATE_SAFE && protocol.length == 5);
     receive("\n");
     CHECK_REPLY("7 FIRE", "7 3 ERR 7");
 }
 
-static void test_only_valid_lines_feed_the_heartbeat(void)
+static void test_damaged_lines_do_not_feed_the_heartbeat(void)
 {
     boot_armed();
     fake.now_us += HEARTBEAT_MS * 1000u;
@@ -136,6 +137,94 @@ static void test_only_valid_lines_feed_the_heartbeat(void)
     fake.now_us++;
     CHECK_REPLY("5 BEAT", "5 3 OK state=2"); /* too late: the line itself finds the fault */
     CHECK_REPLY("6 CLEAR", "6 3 OK state=0");
+}
+
+/* What is sent, word for word; the newest reply, or NULL if there is none. */
+static const char *raw(const char *line)
+{
+    const unsigned replies = fake.replies;
+    receive(line);
+    return fake.replies == replies ? NULL : fake.reply;
+}
+
+static const char *with_crc(const char *body)
+{
+    static char line[TEXT_SIZE];
+    snprintf(line, sizeof line, "%s*%04X\n", body, crc16(body, strlen(body)));
+    return line;
+}
+
+static void test_a_reply_that_comes_back_is_dropped(void)
+{
+    boot_armed();
+    CHECK(!raw("<4 3 OK train=1 shots_left=5*0000\n") && !raw(with_crc("<5 FIRE")) && !raw("<\n"));
+    for (int i = 0; i < 2 * MAX_LINE; i++)
+        protocol_receive(&protocol, '<');
+    CHECK(!raw("\n") && protocol.generator.counters.crc_errors == 0);
+    CHECK_REPLY("5 BEAT", "5 3 OK state=1");
+}
+
+/* Of a line that gives back whatever is sent, damaged or not, in this form or the older one. */
+static void test_an_echo_ends_and_does_not_keep_it_armed(void)
+{
+    const char *first[] = {">5 BEAT*0000\n", with_crc("5 BEAT"), "noise\n"};
+    for (size_t i = 0; i < sizeof first / sizeof *first; i++) {
+        boot_armed();
+        const char *said = raw(first[i]);
+        for (int echoes = 0; said && echoes < 4; echoes++) {
+            char copy[TEXT_SIZE];
+            strcpy(copy, said);
+            said = raw(copy);
+        }
+        CHECK(!said);
+    }
+    boot_armed();
+    for (int ms = 0; ms <= HEARTBEAT_MS; ms += 100) {
+        char copy[TEXT_SIZE];
+        strcpy(copy, raw(with_crc("0 ID")));
+        CHECK(copy[0] == '0');
+        raw(copy);
+        fake.now_us += 100000;
+    }
+    protocol_poll(&protocol);
+    CHECK(protocol.generator.faults == FAULT_HEARTBEAT);
+}
+
+/* Each line is answered, and none is a sign of life. */
+static void test_only_what_is_carried_out_is_a_sign_of_life(void)
+{
+    const char *lines[] = {"4 ARM 5 0 0", "4 FIRE", "0 ID", "9 FLY", "9 ARM", "9 LOAD", "x BEAT", "65536 BEAT"};
+    for (size_t i = 0; i < sizeof lines / sizeof *lines; i++) {
+        boot_armed();
+        for (int ms = 0; ms < HEARTBEAT_MS; ms += 500) {
+            CHECK(protocol.generator.state == STATE_ARMED);
+            ASK(lines[i]);
+            fake.now_us += 500000;
+        }
+        fake.now_us++;
+        protocol_poll(&protocol);
+        CHECK(protocol.generator.faults == FAULT_HEARTBEAT);
+    }
+    boot_armed();
+    for (int beat = 0; beat < 20; beat++) {
+        char body[16];
+        snprintf(body, sizeof body, "%d BEAT", 10 + beat);
+        fake.now_us += HEARTBEAT_MS * 1000u;
+        ASK(body);
+        CHECK(protocol.generator.state == STATE_ARMED);
+    }
+}
+
+static void test_an_older_host_learns_the_protocol_and_nothing_else(void)
+{
+    boot_armed();
+    CHECK(!strncmp(raw(with_crc("0 ID")), "0 3 OK model=tomoshadow-pulse ", 30) && strstr(fake.reply, " protocol=3 "));
+    const char *lines[] = {"5 FIRE", "0 ID 1", "x ID", "65536 ID", "ID", "5 OFF"};
+    for (size_t i = 0; i < sizeof lines / sizeof *lines; i++)
+        CHECK(!strncmp(raw(with_crc(lines[i])), "<? 3 ERR 4*", 11));
+    CHECK(fake.fired == 0 && protocol.generator.state == STATE_ARMED);
+    protocol_receive(&protocol, ABORT_BYTE);
+    CHECK(protocol.generator.state == STATE_SAFE);
 }
 
 static void test_status_tells_everything(void)
@@ -173,7 +262,11 @@ int main(void)
     test_an_overlong_line_is_one_error();
     test_empty_lines_and_carriage_returns_are_no_lines();
     test_the_abort_byte_works_inside_a_line();
-    test_only_valid_lines_feed_the_heartbeat();
+    test_damaged_lines_do_not_feed_the_heartbeat();
+    test_a_reply_that_comes_back_is_dropped();
+    test_an_echo_ends_and_does_not_keep_it_armed();
+    test_only_what_is_carried_out_is_a_sign_of_life();
+    test_an_older_host_learns_the_protocol_and_nothing_else();
     test_status_tells_everything();
     test_the_longest_lines_fit();
     return 0;

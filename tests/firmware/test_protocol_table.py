@@ -125,7 +125,7 @@ def test_protocol_version_and_line_constants_agree() -> None:
 
 
 def test_example_lines_have_the_right_crc() -> None:
-    examples = re.findall(r"(\d+ (?:ARM|1 OK|1 ERR) ?[^*\n]*)\*([0-9A-F]{4})$", README, re.MULTILINE)
+    examples = re.findall(r"([<>]\d+ (?:ARM|1 OK|1 ERR) ?[^*\n]*)\*([0-9A-F]{4})$", README, re.MULTILINE)
     assert len(examples) == 3
     assert [f"{binascii.crc_hqx(body.encode(), 0xFFFF):04X}" for body, _ in examples] == [crc for _, crc in examples]
 

@@ -13,6 +13,7 @@ from daq.drivers.pulse_protocol import (
     ErrorNumber,
     Fault,
     Request,
+    Source,
     State,
     decode_reply,
     encode_request,
@@ -208,7 +209,7 @@ def test_the_pads_of_all_outputs_pull_down(board: Board) -> None:
 
 
 def test_the_abort_byte_disarms_from_inside_a_line(board: Board) -> None:
-    torn = board.say(b"9 FI" + ABORT_BYTE + b"\n")
+    torn = board.say(b">9 FI" + ABORT_BYTE + b"\n")
     assert decode_reply(torn).error is ErrorNumber.CRC
     assert state_and_faults(board) == (State.SAFE, Fault(0))
     assert board.pico.set_points_ma() == (0, 0, 0, 0)
@@ -236,6 +237,19 @@ def test_a_silent_host_ends_in_a_latched_fault(board: Board) -> None:
     assert board.pico.set_points_ma() == (0, 0, 0, 0)
     assert state_and_faults(board) == (State.FAULT, Fault.HEARTBEAT)
     assert board.ask(Command.FIRE).error is ErrorNumber.FAULT_LATCHED
+
+
+def test_an_echo_does_not_outlive_the_host(board: Board) -> None:
+    """Of the generator's own replies, by a line that gives them back; the timer fires until the heartbeat ends it."""
+    board.ask(Command.OFF)
+    board.arm(1000, Source.TIMER, period_us=100_000)
+    board.send(Command.BEAT)
+    for _ in range(HEARTBEAT_MS // 10 + 10):
+        board.pico.run_ms(10)
+        board.pico.receive(bytes(board.pico.sent))
+        board.pico.sent.clear()
+    assert board.pico.set_points_ma() == (0, 0, 0, 0)
+    assert state_and_faults(board) == (State.FAULT, Fault.HEARTBEAT)
 
 
 def test_the_trigger_pin_fires_nothing_whatever_its_level(board: Board) -> None:

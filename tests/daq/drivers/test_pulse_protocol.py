@@ -16,6 +16,8 @@ from daq.drivers.pulse_protocol import (
     decode_request,
     encode_reply,
     encode_request,
+    is_echo,
+    is_older_reply,
 )
 
 NUMBERS = st.integers(0, 2**32 - 1)
@@ -70,7 +72,19 @@ def test_garbage_is_damage(garbage: bytes) -> None:
 
 
 @pytest.mark.parametrize(
-    "body", [b"1", b"1 1", b"1 1 MAYBE", b"x 1 OK", b"1 1 ERR", b"1 1 ERR 99", b"1 1 OK a", b"1 1 OK =2"]
+    "body",
+    [
+        b"<1",
+        b"<1 1",
+        b"<1 1 MAYBE",
+        b"<x 1 OK",
+        b"<1 1 ERR",
+        b"<1 1 ERR 99",
+        b"<1 1 OK a",
+        b"<1 1 OK =2",
+        b"1 1 OK",
+        b"",
+    ],
 )
 def test_a_good_crc_does_not_save_a_bad_form(body: bytes) -> None:
     framed = encode_request(Request(1, Command.ID))
@@ -86,6 +100,24 @@ def _framed(body: bytes) -> bytes:
         for _ in range(8):
             crc = (crc << 1 ^ 0x1021 if crc & 0x8000 else crc << 1) & 0xFFFF
     return body + b"*%04X\n" % crc
+
+
+@given(requests(), answers | refusals)
+def test_a_request_is_no_reply_and_a_reply_no_request(request_: Request, reply: Reply) -> None:
+    """Whatever a line gives back."""
+    with pytest.raises(DamagedLine):
+        decode_reply(encode_request(request_))
+    with pytest.raises(DamagedLine):
+        decode_request(encode_reply(reply))
+    assert is_echo(encode_request(request_))
+    assert not is_echo(encode_reply(reply))
+
+
+def test_replies_of_older_firmware_are_known() -> None:
+    assert is_older_reply(_framed(b"? 1 ERR 4"))
+    assert is_older_reply(_framed(b"0 77 OK model=tomoshadow-pulse protocol=2"))
+    assert not is_older_reply(b"? 1 ERR 4*0000\n")
+    assert not is_older_reply(encode_reply(Reply(None, 1, ErrorNumber.SYNTAX)))
 
 
 @pytest.mark.parametrize(

@@ -104,4 +104,4 @@ def test_an_exchange_without_answer_ends_at_its_limit(firmware: FirmwareProcess)
     with opened(firmware) as line:
         firmware.lose_replies(1)
         with pytest.raises(DeviceError, match=r"no answer to .*BEAT"):
-            line.exchange(b"1 BEAT*0000\n")
+            line.exchange(b">1 BEAT*0000\n")

@@ -1,5 +1,6 @@
 """The driver on a bad line, and against a generator that dies, hangs or is somebody else."""
 
+import binascii
 import os
 import pty
 import signal
@@ -14,7 +15,9 @@ import serial
 
 from daq.devices import GeneratorState
 from daq.drivers.pulse_protocol import (
+    FIELDS,
     MAX_SEQUENCE,
+    PROTOCOL_VERSION,
     Command,
     DamagedLine,
     Reply,
@@ -81,7 +84,7 @@ def test_a_damaged_reply_does_not_fire_twice(
 
 
 def test_garbage_from_the_line_is_passed_over(firmware: FirmwareProcess, generator: SerialPulseGenerator) -> None:
-    firmware.garbage(b"\n".join([bytes(range(32, 256)), b"", b"? 1 ERR 1*0000", b"1 1 OK torn"]))
+    firmware.garbage(b"\n".join([bytes(range(32, 256)), b"", b"<? 1 ERR 1*0000", b"<1 1 OK torn"]))
     with within(1.0):
         assert generator.fire().sequence == 1
     assert generator.status().counters["requested"] == 1
@@ -282,10 +285,45 @@ def test_another_protocol_is_named() -> None:
     numbers = {"protocol": "1", "channels": "4", "tick_ns": "8", "last": "0"}
     with (
         instrument(answering(**fields, **numbers)) as port,
-        pytest.raises(ProtocolError, match="speaks protocol 1, this driver speaks 2"),
+        pytest.raises(ProtocolError, match="speaks protocol 1, this driver speaks 3: flash"),
         SerialPulseGenerator("generator", port, CHANNELS),
     ):
         pass
+
+
+def test_firmware_of_an_older_protocol_is_named() -> None:
+    """To it, no line of this driver has a number: error 4, in its own form."""
+    with (
+        instrument(lambda _: b"? 1 ERR 4*%04X\n" % binascii.crc_hqx(b"? 1 ERR 4", 0xFFFF)) as port,
+        pytest.raises(ProtocolError, match="speaks protocol 2 or older, this driver speaks 3: flash"),
+        SerialPulseGenerator("generator", port, CHANNELS),
+    ):
+        pass
+
+
+def test_a_line_that_only_echoes_is_named() -> None:
+    with (
+        instrument(lambda line: line) as port,
+        pytest.raises(ProtocolError, match="gives back what is sent, ID among it, and nobody answers"),
+        SerialPulseGenerator("generator", port, CHANNELS),
+    ):
+        pass
+
+
+def test_a_generator_behind_an_echo_is_heard() -> None:
+    """Two wires for both directions: what is sent comes back before the answer."""
+    fields = dict.fromkeys(FIELDS[Command.ID].reply, "0") | {"protocol": str(PROTOCOL_VERSION), "state": "0"}
+
+    def answer(line: bytes) -> bytes:
+        try:
+            request = decode_request(line)
+        except DamagedLine:
+            return line
+        names = FIELDS[request.command].reply
+        return line + encode_reply(Reply(request.sequence, 1, fields={name: fields[name] for name in names}))
+
+    with instrument(answer) as port, SerialPulseGenerator("generator", port, CHANNELS) as generator:
+        generator.off()
 
 
 def test_a_reply_without_its_fields_is_named() -> None:

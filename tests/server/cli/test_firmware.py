@@ -25,7 +25,7 @@ def result_of(capsys: pytest.CaptureFixture[str], *arguments: str, status: int =
 
 def test_info_tells_identity_state_and_counters(capsys: pytest.CaptureFixture[str]) -> None:
     info = result_of(capsys, "info", *CONFIG)
-    assert (info["identity"]["model"], info["identity"]["protocol"]) == ("tomoshadow-pulse", "2")
+    assert (info["identity"]["model"], info["identity"]["protocol"]) == ("tomoshadow-pulse", "3")
     assert (info["state"], info["faults"], info["start_cause"]) == ("SAFE", [], "POWER")
     assert info["identity"]["git"] == Path("build/firmware/revision").read_text().strip()
     assert info["interlock_closed"]
