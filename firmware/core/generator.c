@@ -10,8 +10,7 @@ void generator_boot(struct generator *generator, enum cause cause)
 {
     const uint64_t now_us = port_now_us();
     *generator = (struct generator){.state = STATE_SAFE, .not_before_us = now_us + LONGEST_PERIOD_US};
-    for (int i = 0; i < CHANNEL_COUNT; i++)
-        generator->limits[i] = channel_limits_absolute();
+    safety_forget_limits(generator);
     safety_outputs_off(generator);
     (void)port_take_lights(); /* of what was before */
     if (cause == CAUSE_WATCHDOG)
@@ -21,8 +20,8 @@ void generator_boot(struct generator *generator, enum cause cause)
 void generator_poll(struct generator *generator)
 {
     const uint64_t now_us = port_now_us();
-    light_check_poll(generator);
     safety_watch(generator, now_us);
+    light_check_poll(generator);
     generator->counters.cameras += port_take_cameras();
     shooting_poll(generator);
     light_poll(generator);

@@ -73,7 +73,9 @@ struct generator {
     bool interlock_closed; /* as the port told it last */
     bool estop_closed;
     struct channel_limits limits[CHANNEL_COUNT];
+    uint32_t limits_sum;      /* of what safety.c has written there */
     struct pulse_train train; /* actual values */
+    uint32_t train_sum;       /* likewise */
     bool loaded;
     bool fired; /* the train as it is now is that of the newest shot */
     bool outputs_live;

@@ -23,6 +23,8 @@ static enum error light_permission(struct generator *generator, uint32_t time_ms
         error = safety_check_stops(generator);
     if (error)
         return error;
+    if (!safety_check_memory(generator))
+        return ERROR_FAULT_LATCHED;
     if (time_ms < 1 || time_ms > MAX_LIGHT_MS)
         return ERROR_LIGHT;
     error = check_currents(generator, current_ma);
@@ -34,21 +36,23 @@ static enum error light_permission(struct generator *generator, uint32_t time_ms
     return quiet ? ERROR_NONE : ERROR_EARLY;
 }
 
-enum error light_start(struct generator *generator, uint32_t time_ms, const uint32_t *current_ma)
+enum error light_start(struct generator *generator, uint32_t time_ms, const uint32_t *requested_ma)
 {
-    const enum error error = light_permission(generator, time_ms, current_ma);
+    uint32_t current_ma[CHANNEL_COUNT];
+    for (int i = 0; i < CHANNEL_COUNT; i++)
+        current_ma[i] = requested_ma[i] / port_current_step_ma * port_current_step_ma;
+    enum error error = light_permission(generator, time_ms, requested_ma);
+    if (!error)
+        error = check_currents(generator, current_ma);
     if (error)
         return error;
     generator->outputs_live = true; /* also where only a part can be prepared */
-    if (!port_prepare_light(current_ma)) {
-        safety_outputs_off(generator);
-        return ERROR_HARDWARE;
-    }
+    generator->state = STATE_LIT;   /* generator_poll lights */
+    const bool ready = port_prepare_light(current_ma);
     for (uint32_t i = 0; i < CHANNEL_COUNT; i++)
         generator->lit_lights |= current_ma[i] ? 1u << i : 0u;
     generator->light_over_us = port_now_us() + time_ms * 1000u;
-    generator->state = STATE_LIT; /* generator_poll lights */
-    return ERROR_NONE;
+    return safety_made_ready(generator, ready);
 }
 
 void light_poll(struct generator *generator)

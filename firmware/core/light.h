@@ -7,7 +7,7 @@
 
 /* Light on the channels whose current is not 0, for this time at most. Only while SAFE, with the set-points of pulses
  * long gone. */
-enum error light_start(struct generator *generator, uint32_t time_ms, const uint32_t *current_ma);
+enum error light_start(struct generator *generator, uint32_t time_ms, const uint32_t *requested_ma);
 
 /* Keep it on, or end it; for generator_poll. */
 void light_poll(struct generator *generator);

@@ -14,9 +14,10 @@
 
 enum { ABORT_BYTE = 0x18 };
 
-extern const char port_build[];     /* one word: which port this is */
-extern const char port_git[];       /* one word, up to 40 characters: revision of the sources */
-extern const uint32_t port_tick_ns; /* all edges are multiples of it */
+extern const char port_build[];             /* one word: which port this is */
+extern const char port_git[];               /* one word, up to 40 characters: revision of the sources */
+extern const uint32_t port_tick_ns;         /* all edges are multiples of it */
+extern const uint32_t port_current_step_ma; /* all currents are multiples of it */
 
 /* One word, up to 16 characters: which board this is; no other one answers the same. */
 const char *port_serial(void);

@@ -58,7 +58,7 @@ static uint32_t nearest(uint32_t ns, uint32_t tick_ns)
     return (ns + tick_ns / 2u) / tick_ns * tick_ns;
 }
 
-struct channel pulse_train_quantised(const struct channel *channel, uint32_t tick_ns)
+struct channel pulse_train_quantised(const struct channel *channel, uint32_t tick_ns, uint32_t step_ma)
 {
     struct channel actual = *channel;
     actual.camera_ns = nearest(channel->camera_ns, tick_ns);
@@ -66,6 +66,7 @@ struct channel pulse_train_quantised(const struct channel *channel, uint32_t tic
     actual.a_width_ns = nearest(channel->a_width_ns, tick_ns);
     actual.b_start_ns = nearest(channel->b_start_ns, tick_ns);
     actual.b_width_ns = nearest(channel->b_width_ns, tick_ns);
+    actual.current_ma = channel->current_ma / step_ma * step_ma;
     return actual;
 }
 

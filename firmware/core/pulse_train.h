@@ -18,7 +18,7 @@ struct channel {
     uint32_t current_ma;       /* 0: the camera is triggered, no light */
     uint32_t frame_a_close_ns; /* from the camera trigger, not from the trigger of the shot */
     uint32_t frame_b_open_ns;  /* likewise */
-    bool used;
+    uint32_t used;             /* 0 or 1; all are words, for sum.h */
 };
 
 struct pulse_train {
@@ -28,8 +28,9 @@ struct pulse_train {
 /* First limit that the channel breaks, or ERROR_NONE. Safe for any field values. */
 enum error pulse_train_check_channel(const struct channel *channel);
 
-/* Every edge and width at the nearest multiple of the tick. Only for a channel that passed the check. */
-struct channel pulse_train_quantised(const struct channel *channel, uint32_t tick_ns);
+/* Every edge and width at the nearest multiple of the tick, the current at the next lower one of its step. Only for a
+ * channel that passed the check. */
+struct channel pulse_train_quantised(const struct channel *channel, uint32_t tick_ns, uint32_t step_ma);
 
 /* Whether it gives pulse A alone. */
 bool pulse_train_is_single(const struct channel *channel);

@@ -2,6 +2,7 @@
 
 #include "port.h"
 #include "shot_count.h"
+#include "sum.h"
 
 /* Dark first. Then what the trigger input had started before is counted, and the waiting times begin. */
 void safety_outputs_off(struct generator *generator)
@@ -23,6 +24,8 @@ void safety_trip(struct generator *generator, enum fault fault)
     safety_outputs_off(generator);
     generator->faults |= (uint32_t)fault;
     generator->state = STATE_FAULT;
+    if (fault == FAULT_INTERNAL)
+        generator->loaded = false;
 }
 
 static bool gives_light(const struct generator *generator)
@@ -51,13 +54,45 @@ enum error safety_check_safe(const struct generator *generator)
     return generator->state == STATE_SAFE ? ERROR_NONE : ERROR_NOT_SAFE;
 }
 
+static bool train_is_sound(const struct generator *generator)
+{
+    return sum_of(&generator->train, sizeof generator->train) == generator->train_sum;
+}
+
+static bool limits_are_sound(const struct generator *generator)
+{
+    return sum_of(generator->limits, sizeof generator->limits) == generator->limits_sum;
+}
+
+bool safety_check_memory(struct generator *generator)
+{
+    const bool sound = train_is_sound(generator) && limits_are_sound(generator);
+    if (!sound)
+        safety_trip(generator, FAULT_INTERNAL);
+    return sound;
+}
+
+static void forget_train(struct generator *generator)
+{
+    generator->train = (struct pulse_train){0};
+    generator->train_sum = sum_of(&generator->train, sizeof generator->train);
+    generator->loaded = generator->fired = false;
+}
+
+void safety_forget_limits(struct generator *generator)
+{
+    for (int i = 0; i < CHANNEL_COUNT; i++)
+        generator->limits[i] = channel_limits_absolute();
+    generator->limits_sum = sum_of(generator->limits, sizeof generator->limits);
+    forget_train(generator);
+}
+
 enum error safety_new_train(struct generator *generator)
 {
     const enum error error = safety_check_safe(generator);
     if (error)
         return error;
-    generator->train = (struct pulse_train){0};
-    generator->loaded = generator->fired = false;
+    forget_train(generator);
     return ERROR_NONE;
 }
 
@@ -68,17 +103,20 @@ enum error safety_set_channel(struct generator *generator, uint32_t number, cons
         return error;
     if (number >= CHANNEL_COUNT)
         return ERROR_CHANNEL;
+    if (!safety_check_memory(generator))
+        return ERROR_FAULT_LATCHED;
     error = pulse_train_check_channel(requested);
     if (error)
         return error;
     if (!channel_limits_allow(requested, &generator->limits[number]))
         return ERROR_LIMIT;
-    struct channel actual = pulse_train_quantised(requested, port_tick_ns);
+    struct channel actual = pulse_train_quantised(requested, port_tick_ns, port_current_step_ma);
     error = pulse_train_check_channel(&actual);
     if (error)
         return error;
     actual.used = true;
     generator->train.channels[number] = actual;
+    generator->train_sum = sum_of(&generator->train, sizeof generator->train);
     generator->loaded = generator->fired = false;
     return ERROR_NONE;
 }
@@ -95,8 +133,11 @@ enum error safety_check_train(const struct generator *generator)
 enum error safety_load(struct generator *generator)
 {
     enum error error = safety_check_safe(generator);
-    if (!error)
-        error = safety_check_train(generator);
+    if (error)
+        return error;
+    if (!safety_check_memory(generator))
+        return ERROR_FAULT_LATCHED;
+    error = safety_check_train(generator);
     if (error)
         return error;
     generator->loaded = true;
@@ -110,7 +151,10 @@ enum error safety_tighten(struct generator *generator, uint32_t number, struct c
         return ERROR_NOT_SAFE;
     if (number >= CHANNEL_COUNT)
         return ERROR_CHANNEL;
+    if (!safety_check_memory(generator))
+        return ERROR_FAULT_LATCHED;
     generator->limits[number] = channel_limits_tightened(generator->limits[number], asked);
+    generator->limits_sum = sum_of(generator->limits, sizeof generator->limits);
     generator->loaded = false;
     return ERROR_NONE;
 }
@@ -129,11 +173,22 @@ enum error safety_clear(struct generator *generator)
     const enum error error = safety_check_stops(generator);
     if (error)
         return error;
-    if (!port_set_points_confirmed() || port_take_lights() || !port_intact())
+    if (!port_set_points_confirmed() || port_take_lights() || !port_intact() || !limits_are_sound(generator))
         return ERROR_HARDWARE;
+    if (!train_is_sound(generator))
+        forget_train(generator);
     generator->faults = 0;
     generator->state = STATE_SAFE;
     return ERROR_NONE;
+}
+
+enum error safety_made_ready(struct generator *generator, bool ready)
+{
+    const enum error error = safety_check_stops(generator);
+    if (error || ready)
+        return error;
+    safety_off(generator);
+    return ERROR_HARDWARE;
 }
 
 void safety_heard(struct generator *generator)
@@ -143,11 +198,12 @@ void safety_heard(struct generator *generator)
 
 void safety_watch(struct generator *generator, uint64_t now_us)
 {
-    (void)safety_check_stops(generator); /* what it finds, it latches */
+    const bool lights = gives_light(generator); /* before the first of several trips: all causes are named */
+    (void)safety_check_stops(generator);
     if (!port_set_points_confirmed() && !(generator->faults & FAULT_SETPOINT))
         safety_trip(generator, FAULT_SETPOINT);
     if (!port_intact() && !(generator->faults & FAULT_INTERNAL))
         safety_trip(generator, FAULT_INTERNAL);
-    if (gives_light(generator) && now_us - generator->heard_us > HEARTBEAT_MS * 1000u)
+    if (lights && now_us - generator->heard_us > HEARTBEAT_MS * 1000u)
         safety_trip(generator, FAULT_HEARTBEAT);
 }

@@ -13,6 +13,9 @@ enum error safety_new_train(struct generator *generator);
 enum error safety_set_channel(struct generator *generator, uint32_t number, const struct channel *requested);
 enum error safety_load(struct generator *generator);
 
+/* At the start: the absolute limits, and no train. */
+void safety_forget_limits(struct generator *generator);
+
 /* Tighten the limits of a channel; what is larger than the present limit changes nothing. The train must be loaded
  * again. Not while ARMED or LIT. */
 enum error safety_tighten(struct generator *generator, uint32_t number, struct channel_limits asked);
@@ -30,6 +33,13 @@ void safety_watch(struct generator *generator, uint64_t now_us);
 enum error safety_check_safe(const struct generator *generator);
 enum error safety_check_stops(struct generator *generator);
 enum error safety_check_train(const struct generator *generator);
+
+/* False, and a fault, where train or limits are not what they were when they were set. */
+bool safety_check_memory(struct generator *generator);
+
+/* What is left of making ready for light, while ARMED or LIT: a stop that has opened meanwhile trips, and hardware that is
+ * not ready is switched off. */
+enum error safety_made_ready(struct generator *generator, bool ready);
 void safety_outputs_off(struct generator *generator);
 void safety_trip(struct generator *generator, enum fault fault);
 

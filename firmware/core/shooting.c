@@ -12,6 +12,17 @@ static enum error check_period(const struct generator *generator, enum source so
     return period_us >= shortest_us && period_us <= MAX_PERIOD_US ? ERROR_NONE : ERROR_PERIOD;
 }
 
+/* Memory has changed since the train was loaded, or it has not. */
+static bool train_is_sound(struct generator *generator)
+{
+    if (!safety_check_memory(generator))
+        return false;
+    if (!safety_check_train(generator))
+        return true;
+    safety_trip(generator, FAULT_INTERNAL);
+    return false;
+}
+
 static enum error arm_permission(struct generator *generator, uint32_t shots, uint32_t source, uint32_t period_us)
 {
     enum error error = safety_check_safe(generator);
@@ -21,9 +32,14 @@ static enum error arm_permission(struct generator *generator, uint32_t shots, ui
         return error;
     if (!generator->loaded)
         return ERROR_NO_TRAIN;
+    if (!train_is_sound(generator))
+        return ERROR_FAULT_LATCHED;
     if (shots < 1 || shots > MAX_SHOTS)
         return ERROR_SHOTS;
-    return source > SOURCE_TIMER ? ERROR_SOURCE : check_period(generator, (enum source)source, period_us);
+    error = source > SOURCE_TIMER ? ERROR_SOURCE : check_period(generator, (enum source)source, period_us);
+    if (error)
+        return error;
+    return generator->outputs_live ? ERROR_EARLY : ERROR_NONE; /* the last train may still be under way */
 }
 
 enum error shooting_arm(struct generator *generator, uint32_t shots, uint32_t source, uint32_t period_us)
@@ -32,16 +48,13 @@ enum error shooting_arm(struct generator *generator, uint32_t shots, uint32_t so
     if (error)
         return error;
     generator->outputs_live = true; /* also where only a part can be loaded */
-    if (!port_load(&generator->train)) {
-        safety_outputs_off(generator);
-        return ERROR_HARDWARE;
-    }
     generator->source = (enum source)source;
-    generator->timer_period_us = period_us;
-    generator->timer_due_us = later_us(port_now_us() + period_us, generator->not_before_us);
     generator->shots_left = shots;
     generator->state = STATE_ARMED;
-    return ERROR_NONE;
+    const bool ready = port_load(&generator->train);
+    generator->timer_period_us = period_us;
+    generator->timer_due_us = later_us(port_now_us() + period_us, generator->not_before_us);
+    return safety_made_ready(generator, ready);
 }
 
 static enum error fire_permission(struct generator *generator)
@@ -51,10 +64,13 @@ static enum error fire_permission(struct generator *generator)
     if (generator->state != STATE_ARMED)
         return ERROR_NOT_ARMED;
     const enum error error = safety_check_stops(generator);
+    const bool sound = train_is_sound(generator);
     if (error)
         return error;
-    if (safety_check_train(generator) || !generator->shots_left) {
-        safety_trip(generator, FAULT_INTERNAL); /* both were checked when arming: memory has changed since */
+    if (!sound)
+        return ERROR_FAULT_LATCHED;
+    if (!generator->shots_left) {
+        safety_trip(generator, FAULT_INTERNAL); /* it was checked when arming */
         return ERROR_FAULT_LATCHED;
     }
     return port_now_us() < generator->not_before_us ? ERROR_EARLY : ERROR_NONE;

@@ -5,7 +5,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-enum { TEXT_SIZE = 320 };
+enum { TEXT_SIZE = 288 };
 
 /* A line being written. What does not fit is cut; the longest reply is far shorter. */
 struct text {

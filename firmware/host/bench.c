@@ -13,6 +13,7 @@ struct bench bench = {.serial = -1, .interlock_closed = true, .estop_closed = tr
 const char port_build[] = "host";
 const char port_git[] = REVISION;
 const uint32_t port_tick_ns = 8; /* as the RP2040 at 125 MHz */
+const uint32_t port_current_step_ma = 10;
 
 static struct pulse_train loaded;
 static uint32_t fired;

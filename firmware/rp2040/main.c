@@ -41,9 +41,9 @@ static void sleep(uint32_t time_us)
     interrupts_restore(before);
 }
 
-int main(void)
+/* From flash, as a whole: so few calls lead from RAM to there. */
+ONCE static struct start start_chip(void)
 {
-    char byte = 0;
     outputs_start();
     clocks_start();
     timer_start();
@@ -52,7 +52,14 @@ int main(void)
     set_points_start();
     interlock_start();
     serial_start();
-    identity_read_board(); /* the last one: nothing reads from flash after it */
+    return start;
+}
+
+int main(void)
+{
+    char byte = 0;
+    const struct start start = start_chip();
+    identity_read_board(); /* nothing reads from flash after it */
     protocol_boot(&protocol, start.boot, start.cause);
     start_interrupts();
     for (;;) {

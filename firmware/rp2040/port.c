@@ -15,6 +15,7 @@
 const char port_build[] = BUILD_NAME;
 const char port_git[] = REVISION;
 const uint32_t port_tick_ns = TICK_NS;
+const uint32_t port_current_step_ma = SET_POINT_STEP_MA;
 
 const char *port_serial(void)
 {

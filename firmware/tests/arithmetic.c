@@ -34,7 +34,7 @@ static void report(const struct channel *requested, struct channel_limits asked)
         printf("%d\n", (int)error);
         return;
     }
-    const struct channel actual = pulse_train_quantised(requested, TICK_NS);
+    const struct channel actual = pulse_train_quantised(requested, TICK_NS, 10);
     error = pulse_train_check_channel(&actual);
     printf("%d %" PRIu32 " %" PRIu32 " %" PRIu32 " %" PRIu32 " %" PRIu32, (int)error, actual.camera_ns,
            actual.a_start_ns, actual.a_width_ns, actual.b_start_ns, actual.b_width_ns);

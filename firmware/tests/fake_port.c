@@ -9,6 +9,7 @@ struct fake_port fake;
 const char port_build[] = "test";
 const char port_git[] = "unknown";
 const uint32_t port_tick_ns = 8;
+const uint32_t port_current_step_ma = 10;
 
 void fake_reset(void)
 {
@@ -65,6 +66,15 @@ bool port_set_points_confirmed(void)
     return !fake.set_points_stuck;
 }
 
+static bool is_ready(void)
+{
+    const bool ready = fake.can_load && !fake.opens;
+    if (fake.opens)
+        *fake.opens = false;
+    fake.opens = NULL;
+    return ready;
+}
+
 bool port_load(const struct pulse_train *train)
 {
     CHECK(pulse_train_check(train) == ERROR_NONE);
@@ -73,7 +83,7 @@ bool port_load(const struct pulse_train *train)
     fake.edge_fired = false;
     fake.rises = 0;
     fake.live = true; /* also where only a part could be loaded */
-    return fake.can_load;
+    return is_ready();
 }
 
 bool port_fire(void)
@@ -130,7 +140,7 @@ bool port_prepare_light(const uint32_t *current_ma)
     }
     fake.live = fake.prepared = true;
     fake.lit_until_us = 0;
-    return fake.can_load;
+    return is_ready();
 }
 
 void port_sustain_light(void)

@@ -16,6 +16,7 @@ struct fake_port {
     bool estop_closed;
     bool can_load;
     bool set_points_stuck; /* cannot be confirmed as zero */
+    bool *opens;           /* a stop that opens while the next train or light is made ready, which fails then */
     bool interrupted;      /* an interrupt switches the outputs off just before the next shot */
     struct pulse_train loaded;
     bool live; /* between port_load and port_off */

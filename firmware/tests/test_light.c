@@ -1,4 +1,6 @@
 /* Continuous light: how little it may be, for how long, and what ends it. */
+#include <string.h>
+
 #include "fake_port.h"
 #include "generator.h"
 #include "light.h"
@@ -182,8 +184,29 @@ static void test_set_points_that_do_not_read_as_set_stay_dark(void)
     CHECK(light_of(100) == ERROR_HARDWARE && generator.state == STATE_SAFE && !fake.live && !fake_lit());
 }
 
+static void test_currents_are_whole_steps_below_what_was_asked(void)
+{
+    boot();
+    const uint32_t asked_ma[CHANNEL_COUNT] = {9, 105, 0, 500};
+    const uint32_t actual_ma[CHANNEL_COUNT] = {0, 100, 0, 500};
+    const uint32_t none_ma[CHANNEL_COUNT] = {9, 0, 0, 9};
+    CHECK(light_start(&generator, 100, none_ma) == ERROR_LIGHT && !fake.live);
+    CHECK(light_start(&generator, 100, asked_ma) == ERROR_NONE && !memcmp(fake.light_ma, actual_ma, sizeof actual_ma));
+}
+
+static void test_a_stop_that_opens_while_light_is_made_ready_trips(void)
+{
+    const uint32_t current_ma[CHANNEL_COUNT] = {100, 0, 0, 0};
+    boot();
+    fake.opens = &fake.interlock_closed;
+    CHECK(light_start(&generator, 100, current_ma) == ERROR_INTERLOCK_OPEN && !fake.live);
+    CHECK(generator.state == STATE_FAULT && generator.faults == FAULT_INTERLOCK);
+}
+
 int main(void)
 {
+    test_currents_are_whole_steps_below_what_was_asked();
+    test_a_stop_that_opens_while_light_is_made_ready_trips();
     test_current_and_time_have_bounds();
     test_the_limits_of_an_led_bind_it_too();
     test_it_ends_by_itself_when_its_time_is_over();

@@ -102,7 +102,7 @@ static void test_every_edge_goes_to_the_nearest_tick(void)
         struct channel requested = LEGAL;
         requested.a_start_ns += offset;
         requested.b_start_ns += offset;
-        const struct channel actual = pulse_train_quantised(&requested, 8);
+        const struct channel actual = pulse_train_quantised(&requested, 8, 10);
         const int32_t moved_ns = (int32_t)(actual.a_start_ns - requested.a_start_ns);
         CHECK(actual.a_start_ns % 8 == 0 && moved_ns >= -4 && moved_ns <= 4);
         CHECK(actual.b_start_ns - actual.a_start_ns == 6400); /* 800 ticks, wherever pulse A stands */

@@ -295,8 +295,106 @@ static void test_hardware_that_cannot_produce_the_train_stays_dark(void)
     CHECK(arm(1) == ERROR_HARDWARE && generator.state == STATE_SAFE && !fake.live);
 }
 
+static void test_arming_waits_for_the_end_of_the_last_train(void)
+{
+    boot_armed(1);
+    CHECK(shooting_fire(&generator) == ERROR_NONE && generator.state == STATE_SAFE && fake.live);
+    CHECK(arm(1) == ERROR_EARLY && fake.live && generator.state == STATE_SAFE);
+    wait_us(28);
+    CHECK(arm(1) == ERROR_EARLY);
+    wait_us(1);
+    CHECK(arm(1) == ERROR_NONE);
+}
+
+static void test_a_stop_that_opens_while_arming_trips_and_latches(void)
+{
+    for (int estop = 0; estop < 2; estop++) {
+        boot_armed(1);
+        safety_off(&generator);
+        fake.opens = estop ? &fake.estop_closed : &fake.interlock_closed;
+        CHECK(arm(5) == (estop ? ERROR_ESTOP_OPEN : ERROR_INTERLOCK_OPEN) && !fake.live);
+        CHECK(generator.state == STATE_FAULT && generator.faults == (estop ? FAULT_ESTOP : FAULT_INTERLOCK));
+        fake.estop_closed = fake.interlock_closed = true;
+        CHECK(arm(5) == ERROR_FAULT_LATCHED && !generator.shots_left);
+    }
+}
+
+/* Another legal value, which no limit would find. */
+static void test_a_changed_train_is_not_armed_and_not_cleared_into_one(void)
+{
+    boot_armed(1);
+    safety_off(&generator);
+    generator.train.channels[0].a_width_ns += 8;
+    CHECK(arm(1) == ERROR_FAULT_LATCHED && generator.faults == FAULT_INTERNAL && !fake.live);
+    CHECK(safety_clear(&generator) == ERROR_NONE && arm(1) == ERROR_NO_TRAIN &&
+          safety_load(&generator) == ERROR_NO_TRAIN);
+    CHECK(!safety_set_channel(&generator, 0, &LEGAL) && !safety_load(&generator) && !arm(1));
+    generator.train.channels[0].b_start_ns += 8;
+    CHECK(shooting_fire(&generator) == ERROR_FAULT_LATCHED && fake.fired == 0 && generator.faults == FAULT_INTERNAL);
+    CHECK(safety_clear(&generator) == ERROR_NONE && arm(1) == ERROR_NO_TRAIN);
+    CHECK(!safety_set_channel(&generator, 0, &LEGAL));
+    generator.train.channels[3].used = true;
+    CHECK(safety_load(&generator) == ERROR_FAULT_LATCHED);
+}
+
+static void test_a_changed_limit_stays_a_fault(void)
+{
+    boot_armed(1);
+    safety_off(&generator);
+    generator.limits[1].max_light_ma--;
+    CHECK(safety_tighten(&generator, 0, (struct channel_limits){1, 1, 1}) == ERROR_FAULT_LATCHED);
+    CHECK(generator.faults == FAULT_INTERNAL && safety_clear(&generator) == ERROR_HARDWARE);
+    boot();
+    generator.limits[1].max_duty_ppm++;
+    CHECK(safety_set_channel(&generator, 0, &LEGAL) == ERROR_FAULT_LATCHED && generator.faults == FAULT_INTERNAL);
+}
+
+static void test_currents_are_whole_steps_and_never_above_what_was_asked(void)
+{
+    const uint32_t asked_ma[] = {0, 5, 9, 10, 25996, 29999, 30000};
+    const uint32_t actual_ma[] = {0, 0, 0, 10, 25990, 29990, 30000};
+    boot();
+    for (size_t i = 0; i < sizeof asked_ma / sizeof *asked_ma; i++) {
+        struct channel channel = LEGAL;
+        channel.current_ma = asked_ma[i];
+        CHECK(!safety_set_channel(&generator, 0, &channel));
+        CHECK(generator.train.channels[0].current_ma == actual_ma[i]);
+    }
+    CHECK(!safety_tighten(&generator, 0, (struct channel_limits){19996, MAX_DUTY_PPM, 0}));
+    struct channel channel = LEGAL;
+    channel.current_ma = 19996;
+    CHECK(!safety_set_channel(&generator, 0, &channel) && generator.train.channels[0].current_ma == 19990);
+    channel.current_ma = 19997;
+    CHECK(safety_set_channel(&generator, 0, &channel) == ERROR_LIMIT);
+}
+
+static void test_all_causes_at_once_are_named(void)
+{
+    boot_armed(2);
+    fake.interlock_closed = fake.estop_closed = false;
+    fake.set_points_stuck = fake.damaged = true;
+    fake.stuck_lights = 8;
+    fake.now_us += HEARTBEAT_MS * 1000u + 1u;
+    generator_poll(&generator);
+    CHECK(generator.faults ==
+          (FAULT_INTERLOCK | FAULT_ESTOP | FAULT_SETPOINT | FAULT_INTERNAL | FAULT_OUTPUT | FAULT_HEARTBEAT));
+    boot_armed(2);
+    fake.interlock_closed = false;
+    generator.train.channels[0].a_width_ns += 8;
+    CHECK(shooting_fire(&generator) == ERROR_INTERLOCK_OPEN && generator.faults == (FAULT_INTERLOCK | FAULT_INTERNAL));
+    boot_armed(2);
+    fake.interlock_closed = fake.estop_closed = false;
+    CHECK(shooting_fire(&generator) == ERROR_ESTOP_OPEN && generator.faults == (FAULT_INTERLOCK | FAULT_ESTOP));
+}
+
 int main(void)
 {
+    test_arming_waits_for_the_end_of_the_last_train();
+    test_a_stop_that_opens_while_arming_trips_and_latches();
+    test_a_changed_train_is_not_armed_and_not_cleared_into_one();
+    test_a_changed_limit_stays_a_fault();
+    test_currents_are_whole_steps_and_never_above_what_was_asked();
+    test_all_causes_at_once_are_named();
     test_nothing_works_before_arming();
     test_the_budget_is_exact();
     test_the_last_train_ends_before_the_outputs_are_cut();

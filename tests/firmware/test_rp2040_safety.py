@@ -189,7 +189,7 @@ def test_an_interlock_that_opens_just_before_interrupts_are_masked_cuts_the_outp
     board.ask(Command.OFF)
     longest = CYCLES_PER_MS * ARM_LIMIT_MS
     given = while_arming(board, range(0, longest, LOADING_CYCLES), longest)[0]
-    before_live = range(given - 4 * LOADING_CYCLES, given - LOADING_CYCLES)
+    before_live = range(given - 6 * LOADING_CYCLES, given - LOADING_CYCLES)
     masked = while_arming(board, before_live, longest, lambda board: not board.pico.interrupts_masked)[-1]
     for moment in range(masked - 16, masked + 2):
         watched = range(given, given + 4 * LOADING_CYCLES, LOOK_CYCLES)

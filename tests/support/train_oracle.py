@@ -7,6 +7,7 @@ from pathlib import Path
 from daq.drivers.pulse_protocol import ErrorNumber
 
 TICK_NS = 8
+CURRENT_STEP_MA = 10
 HEADER = (Path(__file__).resolve().parents[2] / "firmware" / "core" / "limits.h").read_text()
 LIMIT = {name: int(value) for name, value in re.findall(r"(\w+) = (\d+)", HEADER)}
 START_US = 10
@@ -31,7 +32,8 @@ class OracleChannel:
             return (time_ns + TICK_NS // 2) // TICK_NS * TICK_NS
 
         names = ("camera_ns", "a_start_ns", "a_width_ns", "b_start_ns", "b_width_ns")
-        return replace(self, **{name: nearest(getattr(self, name)) for name in names})
+        actual = {name: nearest(getattr(self, name)) for name in names}
+        return replace(self, **actual, current_ma=self.current_ma // CURRENT_STEP_MA * CURRENT_STEP_MA)
 
     @property
     def single(self) -> bool:

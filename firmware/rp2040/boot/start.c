@@ -29,7 +29,7 @@ ONCE void start_reset(void)
     for (volatile uint32_t *to = image_start; to < image_sum; to++) {
         const uint32_t word = *from++;
         *to = word;
-        sum = checksum_step(sum, word);
+        sum = sum_on(sum, word);
     }
     *(volatile uint32_t *)image_sum = *from;
     if (sum != *from || checksum_words(flash_start, flash_sum) != *flash_sum)

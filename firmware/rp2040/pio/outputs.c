@@ -1,6 +1,5 @@
 #include "outputs.h"
 
-#include "checksum.h"
 #include "clocks.h"
 #include "pins.h"
 #include "pio_program.h"
@@ -8,6 +7,7 @@
 #include "rp2040.h"
 #include "set_points.h"
 #include "state_machines.h"
+#include "sum.h"
 
 enum {
     OUTPUT_OFF = OUTPUT_ENABLE | OUTPUT_LOW,
@@ -48,12 +48,12 @@ void outputs_off(void)
     off_count++;
 }
 
-static void set_pad(uint32_t pin)
+ONCE static void set_pad(uint32_t pin)
 {
     REG(PAD(pin)) = PAD_INPUT | PAD_4_MA | PAD_PULL_DOWN | PAD_SCHMITT;
 }
 
-void outputs_start(void)
+ONCE void outputs_start(void)
 {
     resets_restart(RESET_IO_BANK0 | RESET_PADS_BANK0 | RESET_PIO0 | RESET_PIO1);
     outputs_off();
@@ -96,17 +96,12 @@ static bool encode_camera(const struct channel *channel, struct words *words)
     return encode(CAMERA_PULSE_NS, CAMERA_CYCLES_MAX, &words->pattern) && channel->camera_ns % TICK_NS == 0;
 }
 
-static uint32_t sum_of_words(void)
-{
-    return checksum_words((const uint32_t *)words_of, (const uint32_t *)(words_of + CAMERA + 1));
-}
-
 static bool encode_train(const struct pulse_train *train)
 {
     bool fits = true;
     for (uint32_t i = 0; i < CHANNEL_COUNT; i++)
         fits = encode_light(&train->channels[i], &light[i]) && encode_camera(&train->channels[i], &camera[i]) && fits;
-    words_sum = sum_of_words();
+    words_sum = sum_of(words_of, sizeof words_of);
     words_changed = false;
     return fits;
 }
@@ -211,7 +206,7 @@ static bool all_stand_at(uint32_t pio, const struct words *words, uint32_t addre
 static bool push_shot(uint32_t address)
 {
     bool ready = false;
-    words_changed = words_changed || sum_of_words() != words_sum;
+    words_changed = words_changed || sum_of(words_of, sizeof words_of) != words_sum;
     if (words_changed)
         return false;
     state_machines_refresh();
@@ -295,7 +290,7 @@ uint32_t outputs_take_lights(void)
     const uint32_t rises = take_rises(PIN_LIGHT, CHANNEL_COUNT);
     uint32_t lights = REG(SIO_GPIO_IN) >> PIN_LIGHT & ((1u << CHANNEL_COUNT) - 1u);
     for (uint32_t i = 0; rises && i < CHANNEL_COUNT; i++)
-        lights |= rises & 8u << 4u * i ? 1u << i : 0u;
+        lights |= (rises >> (4u * i + 3u) & 1u) << i;
     return lights;
 }
 

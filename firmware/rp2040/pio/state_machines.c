@@ -36,30 +36,25 @@ void state_machines_set_up(uint32_t pio, uint32_t machine, uint32_t pin, uint32_
     REG(PIO_INSTR(pio, machine)) = PIO_LOW | PIO_JMP(0);
 }
 
-static void write_instruction(uint32_t pio, uint32_t address)
+static void write_instructions(uint32_t pio, uint32_t from, uint32_t end)
 {
-    if (address < programs[pio].length)
-        REG(PIO_INSTR_MEM(pio, address)) = programs[pio].instructions[address];
-}
-
-static void write_instructions(uint32_t pio)
-{
-    for (uint32_t address = 0; address < programs[pio].length; address++)
-        write_instruction(pio, address);
+    const struct program *program = &programs[pio];
+    for (uint32_t address = from; address < end && address < program->length; address++)
+        REG(PIO_INSTR_MEM(pio, address)) = program->instructions[address];
 }
 
 void state_machines_write_program(uint32_t pio, const uint16_t *program, uint32_t length)
 {
     REG(PIO_CTRL(pio)) = RESTART_ALL;
     programs[pio] = (struct program){program, length};
-    write_instructions(pio);
+    write_instructions(pio, 0, length);
 }
 
 void state_machines_refresh(void)
 {
     for (uint32_t pio = LIGHT; pio <= CAMERA; pio++)
         if (REG(PIO_CTRL(pio)))
-            write_instructions(pio);
+            write_instructions(pio, 0, MEMORY_SIZE);
 }
 
 void state_machines_poll(void)
@@ -68,7 +63,7 @@ void state_machines_poll(void)
     address = (address + 1u) % MEMORY_SIZE;
     for (uint32_t pio = LIGHT; pio <= CAMERA; pio++)
         if (REG(PIO_CTRL(pio)))
-            write_instruction(pio, address);
+            write_instructions(pio, address, address + 1u);
 }
 
 void state_machines_enable(uint32_t pio)

@@ -6,11 +6,8 @@
 #include "port.h"
 #include "rp2040.h"
 
-enum { RING = 256 }; /* two of the longest lines */
+_Static_assert(SERIAL_RING == UINT8_MAX + 1, "indices wrap by themselves");
 
-_Static_assert(RING == UINT8_MAX + 1, "indices wrap by themselves");
-
-static volatile char ring[RING];
 static volatile uint8_t head; /* written by the interrupt */
 static volatile uint8_t tail;
 
@@ -21,7 +18,7 @@ void serial_received(char byte)
         tail = head;
     }
     if ((uint8_t)(head + 1u) != tail) {
-        ring[head] = byte;
+        serial_ring()[head] = byte;
         head = (uint8_t)(head + 1u);
     }
 }
@@ -36,7 +33,7 @@ bool serial_take(char *byte)
     const uint32_t before = interrupts_mask(); /* the interrupt moves the tail too */
     const bool any = serial_waiting();
     if (any) {
-        *byte = ring[tail];
+        *byte = serial_ring()[tail];
         tail = (uint8_t)(tail + 1u);
     }
     interrupts_restore(before);

@@ -12,6 +12,13 @@ enum {
     DIVIDER_64 = (CLOCK_MHZ * 1000000 * 4 + BAUD / 2) / BAUD, /* clock / (16 x baud), in 1/64 */
 };
 
+static volatile char ring[SERIAL_RING];
+
+volatile char *serial_ring(void)
+{
+    return ring;
+}
+
 ONCE void serial_start(void)
 {
     resets_restart(RESET_UART0);

@@ -9,11 +9,21 @@
 
 enum { RING = 512 }; /* more than the longest reply */
 
-static volatile uint8_t ring[RING];
 static volatile uint32_t head;
 static volatile uint32_t tail; /* moved by the interrupt alone */
 
 _Static_assert((RING & (RING - 1)) == 0, "indices run on and wrap");
+
+/* In the memory of the USB controller, which has room: bytes on their way to a packet. */
+static volatile uint8_t *place(uint32_t index)
+{
+    return usb_endpoints_spare() + index % RING;
+}
+
+volatile char *serial_ring(void)
+{
+    return (volatile char *)usb_endpoints_spare() + RING;
+}
 
 void serial_start(void)
 {
@@ -25,7 +35,7 @@ void serial_send(const char *bytes, size_t length)
 {
     bool complete = false;
     for (size_t i = 0; i < length && head - tail < RING; i++) {
-        ring[head % RING] = (uint8_t)bytes[i];
+        *place(head) = (uint8_t)bytes[i];
         head++;
         complete = complete || bytes[i] == '\n' || head - tail >= USB_PACKET - 1;
     }
@@ -38,7 +48,7 @@ static uint32_t fill(volatile uint8_t *packet)
 {
     uint32_t count = 0;
     for (; tail != head && count < USB_PACKET - 1; tail++)
-        packet[count++] = ring[tail % RING];
+        packet[count++] = *place(tail);
     return count;
 }
 

@@ -22,6 +22,11 @@ volatile uint8_t *usb_endpoints_buffer(uint32_t endpoint, enum usb_direction dir
     return (volatile uint8_t *)(uintptr_t)(USB_BUFFERS + buffer_offset(endpoint, direction));
 }
 
+volatile uint8_t *usb_endpoints_spare(void)
+{
+    return (volatile uint8_t *)(uintptr_t)(USB_BUFFERS + USB_PACKET * 2 * USB_ENDPOINTS);
+}
+
 /* The buffer goes to the controller by a write of its own, when the rest has arrived in the clock of the USB: section
  * 4.1.2.5.1. */
 static void hand_over(uint32_t endpoint, enum usb_direction direction, uint32_t control)
