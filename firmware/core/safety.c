@@ -24,8 +24,6 @@ void safety_trip(struct generator *generator, enum fault fault)
     safety_outputs_off(generator);
     generator->faults |= (uint32_t)fault;
     generator->state = STATE_FAULT;
-    if (fault == FAULT_INTERNAL)
-        generator->loaded = false;
 }
 
 static bool gives_light(const struct generator *generator)

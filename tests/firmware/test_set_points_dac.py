@@ -1,6 +1,6 @@
 """The converter of the set-points: set and read back before ARM answers, zero after every OFF, and honest errors."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import pytest
@@ -17,6 +17,8 @@ OFF = 1
 """Power-down by 1 kOhm."""
 ZEROED_WITHIN_MS = 0.25
 """A fast write: nine bytes at 400 kHz."""
+LOOK_MS = 1.0
+"""To give up a look at the converter, and zero it then."""
 WATCHDOG_MS = 200
 TRIED_AGAIN_MS = 150
 HALF_SCALE = Register(internal=False, power_down=0, double=True, steps=2048)
@@ -190,6 +192,107 @@ def test_a_restart_amid_a_transfer_frees_the_bus(board: Board) -> None:
     board.pico.run_ms(WATCHDOG_MS + BOOT_MS)
     assert len(board.pico.watchdog_resets) == 1
     assert is_off(board)
+
+
+CHANGES: dict[str, Callable[[Mcp4728], None]] = {
+    "gain": lambda chip: change(chip, 2, double=True),
+    "reference": lambda chip: change(chip, 1, internal=False),
+    "power-down": lambda chip: change(chip, 3, power_down=2),
+    "steps": lambda chip: change(chip, 0, steps=2),
+    "unplugged": lambda chip: setattr(chip, "connected", False),
+    "stuck": lambda chip: setattr(chip, "wedged", True),
+}
+NOTICED_WITHIN_MS = 40
+"""Two looks at all of it, 10 ms apart."""
+
+
+def change(chip: Mcp4728, channel: int, **fields: int | bool) -> None:
+    chip.registers[channel] = replace(chip.registers[channel], **fields)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("what", CHANGES)
+def test_a_converter_that_changes_while_armed_trips(board: Board, what: str) -> None:
+    assert arm(board).error is None
+    board.pico.run_ms(3 * PERIOD_MS)
+    assert State(board.ask(Command.STATUS).number("state")) is State.ARMED
+    converter(board).holding = what == "stuck"
+    CHANGES[what](converter(board))
+    board.pico.run_ms(NOTICED_WITHIN_MS)
+    assert board.ask(Command.FIRE).error is ErrorNumber.FAULT_LATCHED
+    converter(board).connected, converter(board).wedged = True, False
+    assert set_point_fault(board)
+    board.pico.run_ms(TRIED_AGAIN_MS)
+    assert board.ask(Command.CLEAR).error is None
+    assert is_off(board)
+
+
+def test_a_converter_that_changes_while_safe_is_a_fault_too(board: Board) -> None:
+    change(converter(board), 1, power_down=0, steps=3000)
+    board.pico.run_ms(2 * TRIED_AGAIN_MS)
+    assert set_point_fault(board)
+    assert is_off(board)
+
+
+def test_a_single_disturbed_answer_is_asked_again(board: Board) -> None:
+    assert arm(board).error is None
+    converter(board).disturbed = 1
+    board.pico.run_ms(5 * PERIOD_MS)
+    assert converter(board).disturbed == 0
+    assert State(board.ask(Command.STATUS).number("state")) is State.ARMED
+
+
+def test_a_bus_that_its_clocks_set_free_while_armed_is_no_fault(board: Board) -> None:
+    assert arm(board).error is None
+    converter(board).holding = True
+    board.pico.run_ms(5 * PERIOD_MS)
+    assert not converter(board).holding
+    assert State(board.ask(Command.STATUS).number("state")) is State.ARMED
+
+
+def test_an_off_while_it_is_being_looked_at_zeroes_it_at_once(board: Board) -> None:
+    for wait_us in range(0, 12_000, 1_700):
+        assert board.ask(Command.ARM, 1, 0, 0).error is None
+        board.pico.run(board.pico.cycle + wait_us * CYCLES_PER_MS // 1000)
+        board.pico.feed(ABORT_BYTE[0])
+        board.pico.run_ms(ZEROED_WITHIN_MS + LOOK_MS)
+        assert board.pico.set_points_ma() == DARK_MA, wait_us
+        board.pico.run_ms(PERIOD_MS)
+
+
+def test_an_eeprom_that_is_not_zero_is_written(board: Board) -> None:
+    converter(board).eeprom = (HALF_SCALE,) * 4
+    board.pico.power_up()
+    board.pico.run_ms(TRIED_AGAIN_MS)
+    assert all(kept.output_mv == 0 for kept in converter(board).eeprom)
+    board.pico.power_up()
+    assert board.pico.set_points_ma() == DARK_MA
+    board.pico.run_ms(BOOT_MS)
+    assert board.ask(Command.STATUS).number("faults") == 0
+
+
+def test_an_eeprom_that_cannot_be_written_is_a_fault(board: Board) -> None:
+    converter(board).eeprom = (HALF_SCALE,) * 4
+    board.pico.power_up()
+    converter(board).registers = [Register(internal=True, power_down=OFF, double=False, steps=0)] * 4
+    converter(board).frozen = True
+    board.pico.run_ms(5 * TRIED_AGAIN_MS)
+    assert set_point_fault(board)
+    assert board.ask(Command.CLEAR).error is ErrorNumber.HARDWARE
+
+
+def test_a_current_that_changed_in_memory_does_not_reach_the_gain(board: Board) -> None:
+    """In the last moment, behind all checks of the core: 60 A would be half of them, at gain 2."""
+    wanted = [a for a in range(0x2000_0000, 0x2000_4000, 4) if board.pico.read_word(a) == CURRENTS_MA[1]]
+    board.pico.receive(encode_request(Request(60_000, Command.ARM, (1, 0, 0))))
+    while board.pico.receiving:
+        board.pico.run(board.pico.cycle + 1)
+    for _ in range(400):
+        board.pico.run(board.pico.cycle + 125)
+        stack = [a for a in range(0x2000_0000, 0x2000_0500, 4) if board.pico.read_word(a) == CURRENTS_MA[1]]
+        for address in set(stack) - set(wanted):
+            board.pico.write_word(address, 60_000)
+    board.pico.run_ms(PERIOD_MS)
+    assert not any(register.double for register in converter(board).registers)
 
 
 def test_the_board_without_a_converter_sets_currents_by_pwm() -> None:

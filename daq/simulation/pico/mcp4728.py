@@ -21,6 +21,7 @@ _CYCLE_NS = 8
 _BYTE_BITS = 9
 _READY = 0xC0
 _RECOVERY_CLOCKS = 9
+_EEPROM_NS = 50_000_000
 
 
 @dataclass(frozen=True)
@@ -74,6 +75,8 @@ class Mcp4728:
         False: nobody answers at the address.
     frozen : bool
         True: every command is acknowledged and none carried out.
+    disturbed : int
+        So many of the next answers have a wrong bit.
     holding : bool
         True: the data line is held low, as by a converter that was cut off in the middle of a byte; nine clocks end it.
     wedged : bool
@@ -84,6 +87,9 @@ class Mcp4728:
         self.eeprom = (FACTORY,) * CHANNELS
         self.registers = list(self.eeprom)
         self.connected, self.frozen, self.holding, self.wedged = True, False, False, False
+        self.disturbed = 0
+        self._busy_ns = 0.0
+        self._now_ns: Callable[[], float] = lambda: 0.0
         self._written = bytearray()
         self._unread = b""
         self._clocks = 0
@@ -96,6 +102,8 @@ class Mcp4728:
         """Connect it to I2C0 of a chip that has just been powered up, as it has been itself."""
         self.registers = list(self.eeprom)
         self.holding = False
+        self._busy_ns = 0.0
+        self._now_ns = lambda: chip.clock.nanos
         bus = chip.i2c[0]
         finish: list[Callable[[], None]] = []
         alarm = chip.clock.create_alarm(lambda: finish.pop()())
@@ -142,10 +150,14 @@ class Mcp4728:
 
     def _begin(self, mode: I2CMode) -> None:
         self._written.clear()
-        status = [bytes((_READY | i << 4,)) for i in range(CHANNELS)]
+        ready = _READY if self._now_ns() >= self._busy_ns else _READY & 0x7F
+        status = [bytes((ready | i << 4,)) for i in range(CHANNELS)]
         channels = zip(status, self.registers, self.eeprom, strict=True)
         read = mode is I2CMode.READ
         self._unread = b"".join(s + now.packed() + s + kept.packed() for s, now, kept in channels) if read else b""
+        if read and self.disturbed:
+            self.disturbed -= 1
+            self._unread = bytes((self._unread[0] ^ 0x10, *self._unread[1:]))
 
     def _end(self, then: Callable[[], None]) -> None:
         self._unread = b""
@@ -162,6 +174,8 @@ class Mcp4728:
             self._fast_write()
         elif command == 2 and not self._written[0] & 0x18:
             self._multi_write()
+        elif command == 2 and self._written[0] & 0x18 == 0x10:
+            self._sequential_write()
         else:
             return False
         return True
@@ -185,6 +199,18 @@ class Mcp4728:
                 steps=(upper & 0xF) << 8 | lower,
             )
 
+    def _sequential_write(self) -> None:
+        """Section 5.6.3: register and EEPROM of all channels from the named one on; then it is busy."""
+        first = self._written[0] >> 1 & 3
+        if len(self._written) == 1 + 2 * (CHANNELS - first):
+            for channel in range(first, CHANNELS):
+                upper, lower = self._written[1 + 2 * (channel - first) :][:2]
+                fields = {"internal": bool(upper & 0x80), "power_down": upper >> 5 & 3, "double": bool(upper & 0x10)}
+                self._set(channel, **fields, steps=(upper & 0xF) << 8 | lower)
+            if not self.frozen:
+                self.eeprom = (*self.eeprom[:first], *self.registers[first:])
+            self._busy_ns = self._now_ns() + _EEPROM_NS
+
     def _set(self, channel: int, **fields: int | bool) -> None:
-        if not self.frozen:
+        if not self.frozen and self._now_ns() >= self._busy_ns:
             self.registers[channel] = replace(self.registers[channel], **fields)  # type: ignore[arg-type]

@@ -20,6 +20,8 @@ enum {
 
 static const uint32_t LINES = 1u << PIN_I2C_SDA | 1u << PIN_I2C_SCL;
 static volatile bool started;
+static uint32_t asked; /* bytes of the read under way */
+static uint32_t taken;
 
 static uint32_t now_us(void)
 {
@@ -118,25 +120,33 @@ bool i2c_write(const uint8_t *bytes, uint32_t count)
     return wait_idle() && i2c_post(bytes, count) && wait_idle() && !refused();
 }
 
-/* Keeps the queue of commands filled without overrunning the one of the bytes that come back. */
-static bool transfer(uint8_t *bytes, uint32_t count)
+bool i2c_start_read(void)
 {
-    const uint32_t start_us = now_us();
-    uint32_t asked = 0;
-    uint32_t taken = 0;
-    while (taken < count && !refused() && now_us() - start_us <= LIMIT_US) {
-        const uint32_t status = REG(I2C_STATUS);
-        if (asked < count && asked - taken < I2C_FIFO && status & I2C_STATUS_TX_NOT_FULL) {
-            asked++;
-            REG(I2C_DATA_CMD) = I2C_CMD_READ | (asked == count ? I2C_CMD_STOP : 0u);
-        }
-        if (status & I2C_STATUS_RX_ANY)
-            bytes[taken++] = (uint8_t)REG(I2C_DATA_CMD);
+    asked = taken = 0;
+    return i2c_post(0, 0);
+}
+
+/* Keeps the queue of commands filled without overrunning the one of the bytes that come back. */
+enum i2c_progress i2c_go_on(uint8_t *bytes, uint32_t count)
+{
+    while (asked < count && asked - taken < I2C_FIFO && REG(I2C_STATUS) & I2C_STATUS_TX_NOT_FULL) {
+        asked++;
+        REG(I2C_DATA_CMD) = I2C_CMD_READ | (asked == count ? I2C_CMD_STOP : 0u);
     }
-    return taken == count;
+    while (taken < count && REG(I2C_STATUS) & I2C_STATUS_RX_ANY)
+        bytes[taken++] = (uint8_t)REG(I2C_DATA_CMD);
+    if (refused())
+        return I2C_REFUSED;
+    return taken == count ? I2C_DONE : I2C_UNDER_WAY;
 }
 
 bool i2c_read(uint8_t *bytes, uint32_t count)
 {
-    return wait_idle() && i2c_post(bytes, 0) && transfer(bytes, count) && wait_idle();
+    enum i2c_progress progress = I2C_UNDER_WAY;
+    if (!wait_idle() || !i2c_start_read())
+        return false;
+    const uint32_t start_us = now_us();
+    while (progress == I2C_UNDER_WAY && now_us() - start_us <= LIMIT_US)
+        progress = i2c_go_on(bytes, count);
+    return progress == I2C_DONE && wait_idle();
 }

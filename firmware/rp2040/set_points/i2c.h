@@ -23,4 +23,14 @@ bool i2c_write(const uint8_t *bytes, uint32_t count);
 /* Any number of bytes from the device, likewise. */
 bool i2c_read(uint8_t *bytes, uint32_t count);
 
+enum i2c_progress {
+    I2C_UNDER_WAY,
+    I2C_DONE,
+    I2C_REFUSED,
+};
+
+/* The same without waiting: start, if the bus is idle, and go on until it is done. To give it up, i2c_restart. */
+bool i2c_start_read(void);
+enum i2c_progress i2c_go_on(uint8_t *bytes, uint32_t count);
+
 #endif

@@ -21,10 +21,11 @@ bool set_points_set(const uint32_t current_ma[CHANNEL_COUNT]);
 /* To zero, from any context, without waiting. */
 void set_points_zero(void);
 
-/* From the main loop, all the time: goes on until the zero that was asked for reads back. */
+/* From the main loop, all the time: goes on until the zero that was asked for reads back, and looks from time to time
+ * whether what was set still does. */
 void set_points_poll(void);
 
-/* False from a zero that does not read back to the first set-points that do. */
+/* False from set-points that do not read back to the first ones that do. */
 bool set_points_confirmed(void);
 
 #endif

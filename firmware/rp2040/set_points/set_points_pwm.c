@@ -40,7 +40,8 @@ ONCE void set_points_start(void)
 
 static uint32_t level(uint32_t current_ma)
 {
-    return (current_ma + SET_POINT_STEP_MA / 2u) / SET_POINT_STEP_MA;
+    const uint32_t permitted_ma = current_ma < MAX_CURRENT_MA ? current_ma : MAX_CURRENT_MA;
+    return (permitted_ma + SET_POINT_STEP_MA / 2u) / SET_POINT_STEP_MA;
 }
 
 bool set_points_set(const uint32_t current_ma[CHANNEL_COUNT])
