@@ -1,7 +1,7 @@
 # Each target does its own set-up on a bare Debian 12 or 13 machine, is quick when that is done, and says what it does.
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-fast test-wheel test-debian13 wheel lint serve firmware bench measured lock clean mutants fuzz fuzz-import
+.PHONY: help setup demo test test-fast test-wheel test-debian13 wheel lint serve firmware bench measured lock clean mutants flips fuzz fuzz-import
 
 PYTHON := .venv/bin/python
 TOOLS := env PATH="$(CURDIR)/.venv/bin:$$PATH"
@@ -90,6 +90,9 @@ mutants: setup build/rp2040js/node_modules ## Shoot a long series, plant faults 
 
 fuzz-import: setup ## Damage manifests, tables and images in FUZZ_IMPORTS=2000 ways: each is imported or refused in a sentence.
 	@$(PYTHON) -m tests.support.fuzz_import $(FUZZ_IMPORTS) 2>/dev/null
+
+flips: setup ## Flip 200 bits in flash, RAM and the state machines of an armed board, one at a time; six minutes of CPU time.
+	@TOMOSHADOW_FLIPS=200 $(PYTHON) -m pytest -q tests/firmware/test_rp2040_bit_flips.py
 
 fuzz: | build/.toolchain ## Feed the firmware's core hostile input by libFuzzer, for FUZZ_S=60 seconds.
 	@$(call install,clang libclang-rt-dev)

@@ -108,7 +108,7 @@ class GeneratorStatus:
     shots_left : int
         Shot budget that remains.
     counters : Mapping[str, int]
-        ``requested, fired, suppressed, early, cameras, crc_errors``, since boot.
+        ``requested, fired, suppressed, early, cameras, lights, crc_errors``, since boot.
     estop_closed : bool
         The generator's own emergency stop.
     """

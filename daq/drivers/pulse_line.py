@@ -9,20 +9,17 @@ from enum import Enum, auto
 
 import serial
 
+from daq.drivers.pulse_framing import ABORT_BYTE, DamagedLine, is_echo, is_older_reply
 from daq.drivers.pulse_protocol import (
-    ABORT_BYTE,
     ERROR_TEXT,
     FIELDS,
     MAX_SEQUENCE,
     PROTOCOL_VERSION,
     Command,
-    DamagedLine,
     Reply,
     Request,
     decode_reply,
     encode_request,
-    is_echo,
-    is_older_reply,
 )
 from daq.errors import (
     DeviceError,

@@ -7,21 +7,17 @@ r"""The pulse generator's protocol: bytes <-> frozen values. Pure; ``firmware/RE
               <SEQUENCE BOOT ERR NUMBER*CRC\n         SEQUENCE is ? where the request's could not be read
 """
 
-import binascii
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum, IntFlag, StrEnum
+
+from daq.drivers.pulse_framing import REPLY_MARK, REQUEST_MARK, DamagedLine, framed, unframed
 
 PROTOCOL_VERSION = 3
 CHANNEL_COUNT = 4
 MAX_SEQUENCE = 65_535
 HEARTBEAT_MS = 3000
-ABORT_BYTE = b"\x18"
 UNCHANGED = 2**32 - 1  # asks for a limit without tightening it
-
-_REQUEST_MARK, _REPLY_MARK = ">", "<"
-_OLDER_REPLY = re.compile(r"(\?|\d+) \d+ (OK|ERR)\b")
 
 
 class Command(StrEnum):
@@ -167,17 +163,13 @@ ERROR_TEXT: Mapping[ErrorNumber, str] = {
     ErrorNumber.SHOTS: "the shot budget is not 1 to 1000000",
     ErrorNumber.HARDWARE: "the hardware cannot produce this, or something in it does not read as it should",
     ErrorNumber.LIMIT: "the current is above the limit that was set for this channel, or its light was forbidden",
-    ErrorNumber.LIGHT: "continuous light is not 1 to 500 mA on any channel, or not for 1 to 600000 ms",
+    ErrorNumber.LIGHT: "continuous light is not 10 to 500 mA on any channel, or not for 1 to 600000 ms",
     ErrorNumber.ESTOP_OPEN: "the emergency stop is open",
     ErrorNumber.SOURCE: "there is no such trigger source",
     ErrorNumber.PERIOD: "the period is shorter than the train permits, or longer than 10000000 us",
     ErrorNumber.OTHER_SOURCE: "the generator is armed for another trigger source",
     ErrorNumber.NO_SHOT: "no shot of this train has been fired on this channel",
 }
-
-
-class DamagedLine(ValueError):
-    """The line is not one that the generator sends."""
 
 
 @dataclass(frozen=True)
@@ -231,7 +223,7 @@ def encode_request(request: Request) -> bytes:
     for name, value in zip(names, request.fields, strict=True):
         if not 0 <= value < 2**32:
             raise ValueError(f"{request.command}: {name} is {value}, not within 0 to {2**32 - 1}")
-    return framed(" ".join((f"{_REQUEST_MARK}{request.sequence}", request.command, *map(str, request.fields))))
+    return framed(" ".join((f"{REQUEST_MARK}{request.sequence}", request.command, *map(str, request.fields))))
 
 
 def decode_request(line: bytes) -> Request:
@@ -242,7 +234,7 @@ def decode_request(line: bytes) -> Request:
     DamagedLine
         It is no such line.
     """
-    sequence, command, *fields = _words(line, _REQUEST_MARK)
+    sequence, command, *fields = _words(line, REQUEST_MARK)
     try:
         request = Request(int(sequence), Command(command), tuple(map(int, fields)))
         if encode_request(request) == line:
@@ -261,7 +253,7 @@ def decode_reply(line: bytes) -> Reply:
         CRC or form is wrong.
     """
     try:
-        sequence, boot, verdict, *rest = _words(line, _REPLY_MARK)
+        sequence, boot, verdict, *rest = _words(line, REPLY_MARK)
         number = None if sequence == "?" else int(sequence)
         if verdict == "OK":
             return Reply(number, int(boot), fields=_named(rest))
@@ -274,10 +266,17 @@ def decode_reply(line: bytes) -> Reply:
 
 def encode_reply(reply: Reply) -> bytes:
     """Inverse of `decode_reply`."""
-    head = f"{_REPLY_MARK}{'?' if reply.sequence is None else reply.sequence} {reply.boot}"
+    head = f"{REPLY_MARK}{'?' if reply.sequence is None else reply.sequence} {reply.boot}"
     if reply.error is not None:
         return framed(f"{head} ERR {reply.error.value}")
     return framed(" ".join([head, "OK", *(f"{name}={value}" for name, value in reply.fields.items())]))
+
+
+def _words(line: bytes, mark: str) -> list[str]:
+    body = unframed(line)
+    if not body.startswith(mark):
+        raise DamagedLine(f"{line!r} does not begin with {mark}")
+    return body.removeprefix(mark).split(" ")
 
 
 def _named(words: list[str]) -> dict[str, str]:
@@ -285,41 +284,3 @@ def _named(words: list[str]) -> dict[str, str]:
     if not all(name and separator and value for name, separator, value in pairs):
         raise ValueError("a field is not NAME=VALUE")
     return {name: value for name, _, value in pairs}
-
-
-def framed(body: str) -> bytes:
-    """Line of any body: CRC and line feed appended."""
-    encoded = body.encode("ascii")
-    return encoded + b"*%04X\n" % _crc16(encoded)
-
-
-def is_echo(line: bytes) -> bool:
-    """Whether the line begins as only a host's does: a serial line that echoes gives it back."""
-    return line.startswith((_REQUEST_MARK.encode(), ABORT_BYTE))
-
-
-def is_older_reply(line: bytes) -> bool:
-    """Whether it is a reply as firmware up to protocol 2 sends it, without a mark."""
-    try:
-        return _OLDER_REPLY.match(_unframed(line)) is not None
-    except ValueError:
-        return False
-
-
-def _words(line: bytes, mark: str) -> list[str]:
-    body = _unframed(line)
-    if not body.startswith(mark):
-        raise DamagedLine(f"{line!r} does not begin with {mark}")
-    return body.removeprefix(mark).split(" ")
-
-
-def _unframed(line: bytes) -> str:
-    body, star, crc = line[:-6], line[-6:-5], line[-5:]
-    if star != b"*" or crc != b"%04X\n" % _crc16(body):
-        raise DamagedLine(f"{line!r}: the CRC is missing or wrong")
-    return body.decode("ascii")
-
-
-def _crc16(body: bytes) -> int:
-    """CRC-16/CCITT-FALSE."""
-    return binascii.crc_hqx(body, 0xFFFF)

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import partial
 
+from daq.drivers.pulse_framing import ABORT_BYTE, framed
 from daq.drivers.pulse_line import PulseLine
 from daq.drivers.pulse_probe import DARK, Probe, ProbeFailure, ProbeImpossible, expect, outcome
 from daq.drivers.pulse_protocol import (
-    ABORT_BYTE,
     CHANNEL_COUNT,
     MAX_SEQUENCE,
     UNCHANGED,
@@ -23,7 +23,6 @@ from daq.drivers.pulse_protocol import (
     State,
     decode_request,
     encode_request,
-    framed,
 )
 from daq.errors import DeviceError
 

@@ -51,6 +51,12 @@ static void test_a_repeated_line_is_answered_but_not_done_again(void)
         fake.now_us += MIN_PERIOD_US;
     }
     CHECK(fake.fired == 1 && fake.replies == replies + 3);
+    boot_armed();
+    for (int i = 0; i < 3; i++) {
+        CHECK_REPLY("0 FIRE", "0 3 OK fired=1 train=1 shots_left=4");
+        fake.now_us += MIN_PERIOD_US;
+    }
+    CHECK(fake.fired == 1);
 }
 
 static void test_a_number_cannot_be_used_for_another_line(void)
@@ -125,6 +131,11 @@ static void test_the_abort_byte_works_inside_a_line(void)
     CHECK(!fake.live && protocol.generator.state == STATE_SAFE && protocol.length == 5);
     receive("\n");
     CHECK_REPLY("7 FIRE", "7 3 ERR 7");
+    boot_armed();
+    for (int i = 0; i < 2 * MAX_LINE; i++)
+        protocol_receive(&protocol, 'A');
+    protocol_receive(&protocol, ABORT_BYTE);
+    CHECK(!fake.live && protocol.generator.state == STATE_SAFE && protocol.generator.shots_left == 0);
 }
 
 static void test_damaged_lines_do_not_feed_the_heartbeat(void)
@@ -193,18 +204,30 @@ static void test_an_echo_ends_and_does_not_keep_it_armed(void)
 /* Each line is answered, and none is a sign of life. */
 static void test_only_what_is_carried_out_is_a_sign_of_life(void)
 {
-    const char *lines[] = {"4 ARM 5 0 0", "4 FIRE", "0 ID", "9 FLY", "9 ARM", "9 LOAD", "x BEAT", "65536 BEAT"};
+    const char *lines[] = {"4 ARM 5 0 0", "4 FIRE", "0 ID", "%d FLY", "%d ARM", "%d LOAD", "x BEAT", "65536 BEAT"};
     for (size_t i = 0; i < sizeof lines / sizeof *lines; i++) {
         boot_armed();
         for (int ms = 0; ms < HEARTBEAT_MS; ms += 500) {
             CHECK(protocol.generator.state == STATE_ARMED);
-            ASK(lines[i]);
+            char body[32];
+            snprintf(body, sizeof body, lines[i], 10 + ms);
+            ASK(body);
             fake.now_us += 500000;
         }
         fake.now_us++;
         protocol_poll(&protocol);
         CHECK(protocol.generator.faults == FAULT_HEARTBEAT);
     }
+    boot_armed();
+    for (int ms = 0; ms < HEARTBEAT_MS; ms += 500) {
+        for (int i = 0; i < 2 * MAX_LINE; i++)
+            protocol_receive(&protocol, 'A');
+        receive("\n");
+        fake.now_us += 500000;
+    }
+    fake.now_us++;
+    protocol_poll(&protocol);
+    CHECK(protocol.generator.faults == FAULT_HEARTBEAT);
     boot_armed();
     for (int beat = 0; beat < 20; beat++) {
         char body[16];

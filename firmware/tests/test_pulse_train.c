@@ -68,6 +68,18 @@ static void test_a_single_pulse_keeps_the_limits_of_pulse_a(void)
     CHECK(WITH(b_width_ns, 0) == ERROR_WIDTH && WITH(b_start_ns, 0) == ERROR_SEPARATION);
 }
 
+static void test_every_channel_of_a_train_is_checked(void)
+{
+    for (int i = 0; i < CHANNEL_COUNT; i++) {
+        struct pulse_train train = {{LEGAL, LEGAL, LEGAL, LEGAL}};
+        CHECK(pulse_train_check(&train) == ERROR_NONE);
+        train.channels[i].a_width_ns = MAX_WIDTH_NS + 1;
+        CHECK(pulse_train_check(&train) == ERROR_WIDTH);
+        train.channels[i].used = false;
+        CHECK(pulse_train_check(&train) == ERROR_NONE);
+    }
+}
+
 static void test_frame_boundaries_count_from_the_camera_trigger(void)
 {
     CHECK(WITH(frame_a_close_ns, 20000) == ERROR_NONE && WITH(frame_a_close_ns, 19999) == ERROR_STRADDLE);
@@ -194,6 +206,7 @@ int main(void)
     test_each_limit_holds_to_the_nanosecond();
     test_pulses_keep_their_dark_time_and_order();
     test_a_single_pulse_keeps_the_limits_of_pulse_a();
+    test_every_channel_of_a_train_is_checked();
     test_frame_boundaries_count_from_the_camera_trigger();
     test_no_field_can_overflow_a_sum();
     test_a_frame_boundary_beyond_32_bits_does_not_wrap();

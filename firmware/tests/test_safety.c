@@ -3,6 +3,7 @@
 #include "generator.h"
 #include "safety.h"
 #include "shooting.h"
+#include "sum.h"
 
 static struct generator generator;
 
@@ -332,6 +333,14 @@ static void test_a_changed_train_is_not_armed_and_not_cleared_into_one(void)
     generator.train.channels[0].b_start_ns += 8;
     CHECK(shooting_fire(&generator) == ERROR_FAULT_LATCHED && fake.fired == 0 && generator.faults == FAULT_INTERNAL);
     CHECK(safety_clear(&generator) == ERROR_NONE && arm(1) == ERROR_NO_TRAIN);
+    CHECK(!safety_set_channel(&generator, 0, &LEGAL) && !safety_load(&generator) && !arm(1));
+    generator.train.channels[0].a_width_ns = MAX_WIDTH_NS + 8; /* with a sum that fits */
+    generator.train_sum = sum_of(&generator.train, sizeof generator.train);
+    CHECK(shooting_fire(&generator) == ERROR_FAULT_LATCHED && generator.faults == FAULT_INTERNAL);
+    boot_armed(1);
+    generator.shots_left = 0;
+    CHECK(shooting_fire(&generator) == ERROR_FAULT_LATCHED && generator.faults == FAULT_INTERNAL && fake.fired == 0);
+    boot();
     CHECK(!safety_set_channel(&generator, 0, &LEGAL));
     generator.train.channels[3].used = true;
     CHECK(safety_load(&generator) == ERROR_FAULT_LATCHED);

@@ -159,7 +159,7 @@ def test_it_says_who_it_is(board: Board) -> None:
     identity = board.generator.identity()
     assert identity.model == "tomoshadow-pulse"
     assert identity.serial
-    assert identity.firmware.startswith("2.")
+    assert identity.firmware.startswith("3.")
 
 
 def test_light_is_off_after_closing() -> None:
@@ -381,7 +381,7 @@ def test_set_points_that_are_not_confirmed_as_zero_are_a_fault(board: Board) -> 
     board.around.advance(CONVERTER_FOUND_MS)
     status = board.generator.status()
     assert (status.state, status.faults) == (GeneratorState.FAULT, ("setpoint",))
-    with pytest.raises(DeviceRefused, match="a set-point does not read as it was set"):
+    with pytest.raises(DeviceRefused, match="something in it does not read as it should"):
         board.generator.clear()
     board.around.set_converter(True)
     board.around.advance(CONVERTER_FOUND_MS)
@@ -496,7 +496,7 @@ def test_continuous_light_ends_with_its_time(stand: Stand) -> None:
 
 @pytest.mark.parametrize("current_a", [0.0, 0.501, 20.0])
 def test_continuous_light_has_a_limit_of_its_own(stand: Stand, current_a: float) -> None:
-    with pytest.raises(DeviceRefused, match="continuous light is not 1 to 500 mA"):
+    with pytest.raises(DeviceRefused, match="continuous light is not 10 to 500 mA"):
         stand.generator.light({"left": current_a}, 1.0)
     with pytest.raises(PlanError, match="behind"):
         stand.generator.light({"behind": 0.1}, 1.0)

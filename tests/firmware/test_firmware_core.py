@@ -85,7 +85,7 @@ def test_a_changed_reply_fails_the_golden_vectors() -> None:
     vectors = (FIRMWARE / "tests" / "golden_vectors.txt").read_text()
     finished = run("run_vectors", stdin=vectors.replace("shots_left=2*", "shots_left=3*"))
     assert finished.returncode == 1
-    assert "expected 6 1 OK train=1 shots_left=3" in finished.stderr
+    assert "expected <6 1 OK train=1 shots_left=3" in finished.stderr
 
 
 def test_core_links_without_a_c_library(tmp_path: Path) -> None:

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from daq.drivers import pulse_protocol
+from daq.drivers import pulse_framing, pulse_protocol
+from daq.drivers.pulse_framing import DamagedLine
 from daq.drivers.pulse_protocol import (
     ERROR_TEXT,
     FIELDS,
     Cause,
     Command,
-    DamagedLine,
     ErrorNumber,
     Fault,
     Source,
@@ -120,7 +120,7 @@ def test_protocol_version_and_line_constants_agree() -> None:
     protocol = (FIRMWARE / "core" / "protocol.h").read_text()
     port = (FIRMWARE / "core" / "port.h").read_text()
     assert f"PROTOCOL_VERSION = {pulse_protocol.PROTOCOL_VERSION}," in commands
-    assert f"ABORT_BYTE = 0x{pulse_protocol.ABORT_BYTE.hex()}" in port
+    assert f"ABORT_BYTE = 0x{pulse_framing.ABORT_BYTE.hex()}" in port
     assert f"MAX_SEQUENCE = {pulse_protocol.MAX_SEQUENCE}" in protocol
 
 

@@ -5,7 +5,8 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from daq.drivers.pulse_protocol import ABORT_BYTE, Command, ErrorNumber, Fault, State
+from daq.drivers.pulse_framing import ABORT_BYTE
+from daq.drivers.pulse_protocol import Command, ErrorNumber, Fault, State
 from daq.simulation.pico.rp2040_emulator import CYCLE_NS
 from tests.firmware.test_protocol_table import c_enum
 from tests.support.rp2040_board import BOOT_MS, PAPER, PERIOD_MS, Board
@@ -96,7 +97,7 @@ def test_it_ends_when_its_time_is_over() -> None:
     board = Board()
     board.pico.run_ms(READY_MS)
     board.pico.edges.clear()
-    board.ask(Command.LIGHT, 10, 0, 0, 1, 0)
+    board.ask(Command.LIGHT, 10, 0, 0, 10, 0)
     board.pico.run_ms(30)
     lit = edges(board, "light2")
     assert 8e6 < (lit[-1][0] - lit[0][0]) * CYCLE_NS < 13e6

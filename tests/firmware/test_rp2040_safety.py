@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import pytest
 
+from daq.drivers.pulse_framing import ABORT_BYTE
 from daq.drivers.pulse_protocol import (
-    ABORT_BYTE,
     HEARTBEAT_MS,
     Command,
     ErrorNumber,

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from daq.drivers.pulse_protocol import ABORT_BYTE, HEARTBEAT_MS, Command, ErrorNumber, Fault, Source, State
+from daq.drivers.pulse_framing import ABORT_BYTE
+from daq.drivers.pulse_protocol import HEARTBEAT_MS, Command, ErrorNumber, Fault, Source, State
 from daq.simulation.pico.rp2040_emulator import CYCLE_NS, CYCLES_PER_MS, START_CYCLES
 from tests.support.rp2040_board import PAPER, PERIOD_MS, Board, Channel
 

@@ -85,8 +85,9 @@ def waveform(board: Board, symbols: dict[str, tuple[int, int]], output: str) -> 
     """Of the four machines for this output, with the words that FIRE would push."""
     code = memory(board, symbols[f"{output.upper()}_PROGRAM"])
     opcodes = [opcode for (opcode,) in struct.iter_unpack("<H", code)]
-    shots = [Words(bool(used), *rest) for used, *rest in struct.iter_unpack("<BxxxII", memory(board, symbols[output]))]
-    assert len(shots) == 4
+    tables = list(struct.iter_unpack("<IxxxxII", memory(board, symbols["words_of"])))
+    assert len(tables) == 8, "lights, then cameras"
+    shots = [Words(bool(used), *rest) for used, *rest in tables[4 * OUTPUTS.index(output) :][:4]]
     used = {f"{output}{i}": shot for i, shot in enumerate(shots) if shot.used}
     return [(at_ns, name, high) for name, shot in used.items() for at_ns, high in edges(opcodes, shot)]
 

@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from daq.drivers.pulse_protocol import ABORT_BYTE, Command, ErrorNumber, Fault, Reply, Request, State, encode_request
+from daq.drivers.pulse_framing import ABORT_BYTE
+from daq.drivers.pulse_protocol import Command, ErrorNumber, Fault, Reply, Request, State, encode_request
 from daq.simulation.pico.firmware_build import ImageKind
 from daq.simulation.pico.mcp4728 import MA_PER_MV, Mcp4728, Register
 from daq.simulation.pico.rp2040_emulator import CYCLES_PER_MS

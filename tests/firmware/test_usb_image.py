@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from daq.drivers.pulse_protocol import ABORT_BYTE, Command, ErrorNumber, Request, State, decode_reply, encode_request
+from daq.drivers.pulse_framing import ABORT_BYTE
+from daq.drivers.pulse_protocol import Command, ErrorNumber, Request, State, decode_reply, encode_request
 from daq.simulation.pico.firmware_build import ImageKind
 from daq.simulation.pico.rp2040_chip import TRIGGER
 from daq.simulation.pico.rp2040_emulator import CYCLE_NS, CYCLES_PER_MS

@@ -20,7 +20,7 @@ TICK_NS = 8
 DUTY = 200e-6
 MAX_SHOTS = 1_000_000
 MAX_LIGHT_A = 0.5
-COUNTERS = ("requested", "fired", "suppressed", "early", "cameras", "crc_errors")
+COUNTERS = ("requested", "fired", "suppressed", "early", "cameras", "lights", "crc_errors")
 
 
 class MemoryDevice:
@@ -184,7 +184,7 @@ class MemoryGenerator(MemoryDevice):
         self._check_views(current_a)
         self._check_safe()
         if not all(0 < current <= MAX_LIGHT_A for current in current_a.values()):
-            raise DeviceRefused(self.name, f"continuous light is not 1 to 500 mA: {dict(current_a)}")
+            raise DeviceRefused(self.name, f"continuous light is not 10 to 500 mA: {dict(current_a)}")
         self.state, self._light_a, self._dark_at_s = GeneratorState.LIT, dict(current_a), self._now_s() + time_s
 
     def arm(self, shots: int, source: TriggerSource = TriggerSource.COMMAND, period_us: int = 0) -> None:
@@ -232,6 +232,7 @@ class MemoryGenerator(MemoryDevice):
     def _fire(self, loaded: FiredTrain) -> FiredTrain:
         self.counters["fired"] += 1
         self.counters["cameras"] += len(loaded.camera_trigger_ns)
+        self.counters["lights"] += sum(bool(pulses) for pulses in loaded.pulses.values())
         self._shots_left -= 1
         if not self._shots_left:
             self.state = GeneratorState.SAFE

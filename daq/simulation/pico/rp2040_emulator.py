@@ -189,6 +189,10 @@ class EmulatedPico:
         """Change a word of RAM or a register behind the firmware's back."""
         self._chip.write_uint32(address, word)
 
+    def flip_instruction(self, block: int, address: int, bit: int) -> None:
+        """Change a bit in the memory of the state machines of a PIO block, which the processor cannot read."""
+        self._chip.pio[block].instructions[address] ^= 1 << bit
+
     def hang(self) -> None:
         """Let the processor sleep from now on, deaf to interrupts."""
         self._chip.write_uint32(_NVIC_DISABLE, 0xFFFF_FFFF)

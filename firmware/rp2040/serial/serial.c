@@ -8,8 +8,14 @@
 
 _Static_assert(SERIAL_RING == UINT8_MAX + 1, "indices wrap by themselves");
 
+static volatile char *ring;
 static volatile uint8_t head; /* written by the interrupt */
 static volatile uint8_t tail;
+
+void serial_use_ring(volatile char *place)
+{
+    ring = place;
+}
 
 void serial_received(char byte)
 {
@@ -18,7 +24,7 @@ void serial_received(char byte)
         tail = head;
     }
     if ((uint8_t)(head + 1u) != tail) {
-        serial_ring()[head] = byte;
+        ring[head] = byte;
         head = (uint8_t)(head + 1u);
     }
 }
@@ -33,7 +39,7 @@ bool serial_take(char *byte)
     const uint32_t before = interrupts_mask(); /* the interrupt moves the tail too */
     const bool any = serial_waiting();
     if (any) {
-        *byte = serial_ring()[tail];
+        *byte = ring[tail];
         tail = (uint8_t)(tail + 1u);
     }
     interrupts_restore(before);

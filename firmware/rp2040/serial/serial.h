@@ -15,9 +15,9 @@ void serial_send(const char *bytes, size_t length);
 void serial_uart_isr(void);
 void serial_usb_isr(void);
 
-/* Where received bytes wait for the main loop: room for two of the longest lines. */
+/* For serial_start: where received bytes wait for the main loop, room for two of the longest lines. */
 enum { SERIAL_RING = 256 };
-volatile char *serial_ring(void);
+void serial_use_ring(volatile char *place);
 
 /* From the receive interrupt. A byte that finds no room is lost; the CRC of its line tells. */
 void serial_received(char byte);

@@ -14,13 +14,9 @@ enum {
 
 static volatile char ring[SERIAL_RING];
 
-volatile char *serial_ring(void)
-{
-    return ring;
-}
-
 ONCE void serial_start(void)
 {
+    serial_use_ring(ring);
     resets_restart(RESET_UART0);
     REG(UART0_IBRD) = DIVIDER_64 / 64;
     REG(UART0_FBRD) = DIVIDER_64 % 64;

@@ -20,13 +20,9 @@ static volatile uint8_t *place(uint32_t index)
     return usb_endpoints_spare() + index % RING;
 }
 
-volatile char *serial_ring(void)
-{
-    return (volatile char *)usb_endpoints_spare() + RING;
-}
-
 void serial_start(void)
 {
+    serial_use_ring((volatile char *)usb_endpoints_spare() + RING);
     usb_endpoints_start();
 }
 

@@ -4,11 +4,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from daq.drivers.pulse_framing import DamagedLine, is_echo, is_older_reply
 from daq.drivers.pulse_protocol import (
     FIELDS,
     MAX_SEQUENCE,
     Command,
-    DamagedLine,
     ErrorNumber,
     Reply,
     Request,
@@ -16,8 +16,6 @@ from daq.drivers.pulse_protocol import (
     decode_request,
     encode_reply,
     encode_request,
-    is_echo,
-    is_older_reply,
 )
 
 NUMBERS = st.integers(0, 2**32 - 1)

@@ -14,12 +14,12 @@ import pytest
 import serial
 
 from daq.devices import GeneratorState
+from daq.drivers.pulse_framing import DamagedLine
 from daq.drivers.pulse_protocol import (
     FIELDS,
     MAX_SEQUENCE,
     PROTOCOL_VERSION,
     Command,
-    DamagedLine,
     Reply,
     Request,
     decode_reply,
