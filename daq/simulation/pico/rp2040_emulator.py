@@ -4,7 +4,6 @@ Built on rp2040py, whose own loop steps the PIO once per processor instruction; 
 that every edge has its exact time. Not modelled there: clock tree, input synchronisers, flash timing.
 """
 
-import math
 import random
 from collections import deque
 from collections.abc import Callable
@@ -14,6 +13,7 @@ from rp2040py.peripherals.vreg_and_chip_reset import HAD_RUN
 
 from daq.simulation.pico.board_number import give_number
 from daq.simulation.pico.mcp4728 import Mcp4728
+from daq.simulation.pico.processor import NEVER_DUE, Processor
 from daq.simulation.pico.rp2040_chip import (
     OUTPUT_PINS,
     PIN_ESTOP,
@@ -21,6 +21,7 @@ from daq.simulation.pico.rp2040_chip import (
     PIN_INTERLOCK,
     TRIGGER,
     drive_trigger,
+    hang,
     has_pwm_set_points,
     is_high,
     powered_chip,
@@ -36,9 +37,6 @@ START_CYCLES = 2
 """From the rise of the trigger line to an output whose delay is 0; on the chip, the input synchroniser adds two."""
 
 _BYTE_CYCLES = 10 * CYCLES_PER_MS * 1000 // 115_200
-_NEVER = 1 << 62
-_NVIC_DISABLE = 0xE000_E180
-_HANG_ADDRESS, _HANG = 0x2003_0000, 0xE7FD_BF30  # wfi; b .-2
 
 
 @dataclass(frozen=True)
@@ -96,8 +94,8 @@ class EmulatedPico:
         self._received: deque[int] = deque()
         self._next_byte_cycle = 0
         self._visits: list[tuple[int, Callable[[], None]]] = []
-        self._next_visit = _NEVER
-        self.cycle = 0
+        self._next_visit = NEVER_DUE
+        self.cycle = self._began = 0
         self.edges: list[Edge] = []
         self.sent = bytearray()
         self.on_edge: Callable[[Edge], None] | None = None
@@ -113,6 +111,7 @@ class EmulatedPico:
         self._restarting = False
         self._chip = powered_chip(self._image, self._noise, self.sent.append, self._on_edge)
         self._chip.watchdog.on_watchdog_trigger = self._on_watchdog
+        self._processor = Processor(self._chip, CYCLE_NS, self._follow_processor)
         self.converter.power_up(self._chip, PIN_I2C_SCL)
         self.usb = UsbHost(self._chip)
         give_number(self._chip)
@@ -166,7 +165,7 @@ class EmulatedPico:
     @property
     def shooting(self) -> bool:
         """Whether a state machine runs; false between shots, and when the outputs went off."""
-        return any(pio.next_due_fp < _NEVER for pio in self._chip.pio)
+        return any(pio.next_due_fp < NEVER_DUE for pio in self._chip.pio)
 
     def levels(self) -> dict[str, bool]:
         """Levels at the pads of all lights and cameras."""
@@ -195,11 +194,7 @@ class EmulatedPico:
 
     def hang(self) -> None:
         """Let the processor sleep from now on, deaf to interrupts."""
-        self._chip.write_uint32(_NVIC_DISABLE, 0xFFFF_FFFF)
-        self._chip.write_uint32(_HANG_ADDRESS, _HANG)
-        self._chip.core.waiting = False
-        self._chip.core.pc = _HANG_ADDRESS
-        self._chip.core.pm = True
+        hang(self._chip)
 
     def at(self, cycle: int, action: Callable[[], None]) -> None:
         """Do something at a cycle that is still to come."""
@@ -234,45 +229,51 @@ class EmulatedPico:
     def _visit(self) -> None:
         while self._visits and self._visits[0][0] <= self.cycle:
             self._visits.pop(0)[1]()
-        self._next_visit = self._visits[0][0] if self._visits else _NEVER
+        self._next_visit = self._visits[0][0] if self._visits else NEVER_DUE
 
     def _next_from_outside(self, until_cycle: int) -> int:
-        next_byte = self._next_byte_cycle if self._received else _NEVER
+        next_byte = self._next_byte_cycle if self._received else NEVER_DUE
         return max(self.cycle + 1, min(until_cycle, next_byte, self._next_visit))
-
-    def _next_alarm(self) -> int:
-        clock = self._chip.clock
-        if not clock.has_scheduled_alarm:
-            return _NEVER
-        return self.cycle + max(1, math.ceil(clock.nanos_to_next_alarm / CYCLE_NS))
 
     def _run_slice(self, end: int) -> None:
         """Time in which nothing comes from outside: up to its end, or until the processor sleeps."""
         core, tick, (pio0, pio1) = self._chip.core, self._chip.clock.tick, self._chip.pio
-        execute = core.execute_instruction
         while self.cycle < end and not self._restarting:
             start = self.cycle
-            cycles = min(end, self._next_alarm()) - start if core.waiting else execute()
-            if pio0.next_due_fp < _NEVER or pio1.next_due_fp < _NEVER:
-                self._advance_machines(cycles)
+            if pio0.next_due_fp == pio1.next_due_fp == NEVER_DUE:
+                self._run_processor(end)
             else:
-                self.cycle = start + cycles
-                pio0.cycle_fp = pio1.cycle_fp = self.cycle << 8
-            tick(float((self.cycle - start) * CYCLE_NS))
+                asleep = core.waiting
+                self._advance_machines(self._processor.sleep(end - start) if asleep else core.execute_instruction())
+                tick(float((self.cycle - start) * CYCLE_NS))
             if core.waiting:
                 return
+
+    def _run_processor(self, end: int) -> None:
+        """Without state machines; those that its last instruction starts have to catch up with that."""
+        self._began = self.cycle
+        took = self._processor.run(end - self._began)
+        if self.shooting:
+            self._advance_machines(self._began + took - self.cycle)
+        else:
+            self._follow_processor(took)
+
+    def _follow_processor(self, cycles: int) -> None:
+        self.cycle = self._began + cycles
+        for pio in self._chip.pio:
+            pio.cycle_fp = self.cycle << 8
 
     def _advance_machines(self, cycles: int) -> None:
         """Cycle by cycle; while the processor sleeps, until it wakes or all state machines are stopped or stall."""
         (pio0, pio1), core = self._chip.pio, self._chip.core
-        asleep = core.waiting
+        advance0, advance1, asleep = pio0.advance, pio1.advance, core.waiting
         for now in range(self.cycle + 1, self.cycle + cycles + 1):
             self.cycle = now
             if now >= self._next_visit:
                 self._visit()
-            pio0.advance(1)
-            pio1.advance(1)
-            if asleep and (not core.waiting or not self.shooting):
+            advance0(1)
+            advance1(1)
+            if asleep and not (core.waiting and (pio0.next_due_fp < NEVER_DUE or pio1.next_due_fp < NEVER_DUE)):
                 return
 
     def _on_edge(self, output: str, high: bool) -> None:
@@ -287,6 +288,7 @@ class EmulatedPico:
 
     def _on_watchdog(self) -> None:
         self._restarting = True
+        self._processor.interrupt()
 
     def _restart(self, from_watchdog: bool) -> None:
         before = self.levels()
