@@ -204,13 +204,12 @@ def _print(line: str) -> None:
     sys.stdout.flush()
 
 
-def _open_terminal() -> int:
-    """The slave end stays open here too: without a reader the master would report a hang-up for ever."""
+def _open_terminal() -> tuple[int, str]:
+    """Master end, and name of the slave, which stays open here: without a reader the master would report a hang-up."""
     master, slave = pty.openpty()
     tty.setraw(slave)
     os.set_blocking(master, False)
-    _print(f"port {os.ttyname(slave)}")
-    return master
+    return master, os.ttyname(slave)
 
 
 def _serve(firmware: EmulatedFirmware, serial_line: int) -> None:
@@ -232,9 +231,11 @@ def _serve(firmware: EmulatedFirmware, serial_line: int) -> None:
 
 
 def main() -> None:
-    """Serve until stdin ends."""
-    serial_line = _open_terminal()
-    _serve(EmulatedFirmware(Path(sys.argv[1]).read_bytes(), serial_line, _print), serial_line)
+    """Serve until stdin ends; nobody is told the port before the firmware has started."""
+    serial_line, port = _open_terminal()
+    firmware = EmulatedFirmware(Path(sys.argv[1]).read_bytes(), serial_line, _print)
+    _print(f"port {port}")
+    _serve(firmware, serial_line)
 
 
 if __name__ == "__main__":
