@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from processing.calibration.calibration import Calibration, Doubt, Model, ViewCalibration
 from processing.calibration.calibration_record import content_id
-from processing.calibration.errors import CalibrationError
+from processing.calibration.errors import UNFIT, CalibrationError
 from processing.calibration.fit.covariance import parameter_covariance
 from processing.calibration.fit.free_pose import board_errors_px, fit_free_poses, free_pose_holdout_px
 from processing.calibration.fit.handedness import check_handedness
@@ -32,10 +32,6 @@ from processing.calibration.fit.scale_check import check_scales
 from processing.calibration.observation import CalibrationSet, PlaneObservation, ViewObservations, stacked
 from processing.geometry import FloatArray, ViewMapping
 
-UNFIT = (
-    "its points are those of no camera: are they where the table or the target says? A target of one plane is needed, "
-    "a plate with dots on two levels is not supported"
-)
 PLACEHOLDERS = 3
 """So many wrong points on one spot of the image stand for points that were not seen."""
 

@@ -10,6 +10,11 @@
 
 from processing.errors import BadInput
 
+UNFIT = (
+    "its points are those of no camera: are they where the table or the target says? A target of one plane is needed, "
+    "a plate with dots on two levels is not supported"
+)
+
 
 class CalibrationError(BadInput):
     """A calibration cannot be made, read or trusted; the text names view or file, value and limit."""

@@ -10,6 +10,8 @@ _STEP_MM = 0.05
 _STEP_RANGE_PX, _STEP_PX = (0.3, 30.0), 3.0
 """Steps that the images show by less or more are made such that they show them by 3 px: metres and micrometres too."""
 _ITERATIONS = 8
+_FIRMNESS = 1e-12
+"""Share of the normal matrix that is added to it, so that it can be solved where views stand in one place."""
 
 
 def linearise(mapping: ViewMapping, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -30,8 +32,10 @@ def _differences(mapping: ViewMapping, points_mm: FloatArray, image_px: FloatArr
     return np.stack([(there_px - image_px) / step_mm for there_px in ahead_px], axis=-1)
 
 
-def back_project(mapping: ViewMapping, image_px: FloatArray, z_mm: float, near_mm: FloatArray) -> FloatArray:
-    """World points (N, 3) on the plane z that a mapping of any kind sees at image points (N, 2).
+def back_project(
+    mapping: ViewMapping, image_px: FloatArray, near_mm: FloatArray, axis: int, place_mm: float
+) -> FloatArray:
+    """World points (N, 3) on a plane that a mapping of any kind sees at image points (N, 2).
 
     Parameters
     ----------
@@ -39,19 +43,28 @@ def back_project(mapping: ViewMapping, image_px: FloatArray, z_mm: float, near_m
         The view.
     image_px : (N, 2) array
         Where the points are seen.
-    z_mm : float
-        Their plane.
     near_mm : (3,) array
         A point of the measured volume, from where the search starts.
+    axis : int
+        The plane's normal: 0 is x, 1 is y, 2 is z. Lines of sight must cross the plane: see ``steepest_axis``.
+    place_mm : float
+        Where the plane is on that axis.
     """
-    points_mm = np.tile([near_mm[0], near_mm[1], z_mm], (len(image_px), 1)).astype(np.float64)
+    points_mm = np.tile(np.asarray(near_mm, dtype=np.float64), (len(image_px), 1))
+    points_mm[:, axis] = place_mm
+    within = [number for number in range(3) if number != axis]
     for _ in range(_ITERATIONS):
         seen_px, slopes = linearise(mapping, points_mm)
-        step_mm = np.linalg.solve(slopes[:, :, :2], (image_px - seen_px)[:, :, None])[:, :, 0]
-        points_mm[:, :2] += step_mm
+        step_mm = np.linalg.solve(slopes[:, :, within], (image_px - seen_px)[:, :, None])[:, :, 0]
+        points_mm[:, within] += step_mm
         if not len(step_mm) or np.abs(step_mm).max() < 1e-7:
             break
     return points_mm
+
+
+def steepest_axis(mapping: ViewMapping, point_mm: FloatArray) -> int:
+    """The axis of the world that the line of sight through a point runs along most."""
+    return int(np.abs(_direction(mapping, point_mm)).argmax())
 
 
 def triangulate(
@@ -66,7 +79,7 @@ def triangulate(
     seen_px : (N, n, 2) array
         Where each view sees each point.
     start_mm : (N, 3) array
-        First guess.
+        First guess; where all lines of sight are one, a point keeps its place along it.
     iterations : int
         Gauss-Newton steps; in a volume that is small against its distance one is nearly exact.
 
@@ -81,6 +94,7 @@ def triangulate(
         slopes = np.concatenate([slope for _, slope in seen], axis=1)
         residual_px = np.concatenate([seen_px[:, view] - image for view, (image, _) in enumerate(seen)], axis=1)
         normal = slopes.transpose(0, 2, 1) @ slopes
+        normal += _FIRMNESS * np.trace(normal, axis1=1, axis2=2)[:, None, None] * np.eye(3)
         points_mm += np.linalg.solve(normal, slopes.transpose(0, 2, 1) @ residual_px[:, :, None])[:, :, 0]
     reprojected_px = np.stack([mapping.project(points_mm) for mapping in mappings], axis=1)
     return points_mm, seen_px - reprojected_px
@@ -95,7 +109,12 @@ def unseen(slopes: FloatArray) -> FloatArray:
 
 def crossing_angle_rad(mappings: Sequence[ViewMapping], point_mm: FloatArray) -> FloatArray:
     """Angles (n, n) between the lines of sight of all views through one point."""
-    slopes = [linearise(mapping, point_mm[None])[1][0] for mapping in mappings]
-    directions = np.array([np.cross(slope[0], slope[1]) for slope in slopes])
-    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    directions = np.array([_direction(mapping, point_mm) for mapping in mappings])
     return np.asarray(np.arccos(np.clip(np.abs(directions @ directions.T), 0, 1)), dtype=np.float64)
+
+
+def _direction(mapping: ViewMapping, point_mm: FloatArray) -> FloatArray:
+    """Unit vector (3,) along the line of sight through a point: along it, neither u nor v changes."""
+    slope_u, slope_v = linearise(mapping, point_mm[None])[1][0]
+    along = np.cross(slope_u, slope_v)
+    return np.asarray(along / np.linalg.norm(along), dtype=np.float64)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from processing.calibration.triangulation import back_project, crossing_angle_rad, triangulate
+from processing.calibration.triangulation import back_project, crossing_angle_rad, steepest_axis, triangulate
 from processing.geometry import FloatArray, ViewMapping
 
 MAX_SEEDS = 1500
@@ -124,11 +124,12 @@ def _pairs(
     tolerance_px: float,
 ) -> tuple[NDArray[np.intp], FloatArray]:
     """Droplets (M, 2) of two views whose lines of sight meet in the box, and where (M, 3)."""
-    depths_mm = [box.lower_mm[2], box.middle_mm[2], box.upper_mm[2]]
+    axis = steepest_axis(first, box.middle_mm)
+    places_mm = [box.lower_mm[axis], float(box.middle_mm[axis]), box.upper_mm[axis]]
     chosen, points = [np.empty((0, 2), np.intp)], [np.empty((0, 3))]
     for start in range(0, min(len(first_px), MAX_SEEDS), _CHUNK):
         seeds = np.arange(start, min(start + _CHUNK, len(first_px), MAX_SEEDS))
-        lines_mm = [back_project(first, first_px[seeds], z_mm, box.middle_mm) for z_mm in depths_mm]
+        lines_mm = [back_project(first, first_px[seeds], box.middle_mm, axis, place_mm) for place_mm in places_mm]
         begin_px, middle_px, end_px = (second.project(points_mm) for points_mm in lines_mm)
         chord_px = end_px - begin_px
         length_px = np.maximum(np.linalg.norm(chord_px, axis=1, keepdims=True), 1e-9)

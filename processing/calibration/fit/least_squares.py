@@ -51,9 +51,9 @@ def minimise(
     Returns
     -------
     (P,) array
-        The best parameters found.
+        The best parameters found, finite as the first guess is; they may be far from any that fit.
     """
-    with _blas().limit(limits=1, user_api="blas"):
+    with _blas().limit(limits=1, user_api="blas"), np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         return _descend(residuals_at, derivatives_at, np.array(start, dtype=np.float64), robust_scale)
 
 
@@ -71,6 +71,8 @@ def _descend(
     cost, weights = _cost_and_weights(residuals, robust_scale)
     matrix, gradient, scale = _normal_equations(residuals, derivatives_at(parameters), weights)
     for _ in range(MAX_TRIALS):
+        if not np.isfinite(matrix).all():
+            break
         step = np.linalg.solve(matrix + damping * np.eye(len(matrix)), gradient) / scale
         residuals = residuals_at(parameters - step)
         new_cost, weights = _cost_and_weights(residuals, robust_scale)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from processing.calibration.calibration import Model
-from processing.calibration.errors import CalibrationError
+from processing.calibration.errors import UNFIT, CalibrationError
 from processing.calibration.fit.health import holdout_distances_px
 from processing.calibration.fit.pinhole_fit import fit_pinhole
 from processing.calibration.fit.polynomial import fit_polynomial
@@ -21,6 +21,8 @@ AUTO: Literal["auto"] = "auto"
 SIMPLEST_FIRST = (Model.PINHOLE, Model.PINHOLE_TILTED, Model.POLYNOMIAL)
 CLEARLY_BETTER = 0.95
 """A model that is less simple must lower the hold-out error at least to this part of it."""
+NOTHING_TOLD = 0.25
+"""A mapping that leaves so much of how far points are spread in the image is none."""
 SIGNIFICANCE = 3.0
 """And by so many standard errors of the difference, point by point: few points tell little."""
 
@@ -28,8 +30,25 @@ SIGNIFICANCE = 3.0
 def fit_mapping(
     planes: Sequence[PlaneObservation], image_size_px: tuple[int, int], model: Model
 ) -> tuple[ViewMapping, NDArray[np.bool_]]:
-    """Fit one mapping to all points of a view; also which of them (N,) it was fitted to."""
+    """Fit one mapping to all points of a view; also which of them (N,) it was fitted to.
+
+    Raises
+    ------
+    CalibrationError
+        There are too few points, or the best mapping hardly tells them apart.
+    """
     points_mm, image_px = stacked(planes)
+    mapping, used = _fit(points_mm, image_px, image_size_px, model)
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        missed_px = float((mapping.project(points_mm[used]) - image_px[used]).std(axis=0).max())
+    if not missed_px < NOTHING_TOLD * image_px[used].std(axis=0).max():
+        raise CalibrationError(UNFIT)
+    return mapping, used
+
+
+def _fit(
+    points_mm: FloatArray, image_px: FloatArray, image_size_px: tuple[int, int], model: Model
+) -> tuple[ViewMapping, NDArray[np.bool_]]:
     if model is Model.POLYNOMIAL:
         return fit_polynomial(points_mm, image_px, image_size_px)
     fitted = fit_pinhole(points_mm, image_px, image_size_px, tilted=model is Model.PINHOLE_TILTED)

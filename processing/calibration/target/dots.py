@@ -1,5 +1,7 @@
 """Dots of a calibration target: bright or dark blobs, their centroids, and the one that carries a marker."""
 
+from collections.abc import Sequence
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -40,11 +42,21 @@ def find_dots(image: Image32, signal: Image32) -> FloatArray:
     if level <= 0:
         return np.empty((0, 2))
     _, _, stats, _ = cv2.connectedComponentsWithStats((signal > level).astype(np.uint8))
-    boxes, areas = stats[1:, :4], stats[1:, 4]
+    boxes, areas = _without_rings(np.asarray(stats[1:], dtype=np.int32))
     median_area = np.median(areas[areas >= 2]) if np.any(areas >= 2) else 0
     usual = (areas >= max(2, AREA_RANGE[0] * median_area)) & (areas <= AREA_RANGE[1] * median_area)
     centroids = [_centroid(image, box) for box in boxes[usual]]
     return np.array([centre for centre in centroids if centre is not None]).reshape(-1, 2)
+
+
+def _without_rings(found: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Boxes (N, 4) and areas (N,) of what surrounds the middle of nothing else: rings are markers, no dots."""
+    boxes, areas = found[:, :4], found[:, 4]
+    middles, sizes = boxes[:, :2] + boxes[:, 2:] / 2, boxes[:, 2:]
+    around = (np.abs(middles[None] - middles[:, None]) < sizes[:, None] / 4).all(axis=2)
+    larger = sizes.prod(axis=1)[:, None] > sizes.prod(axis=1)
+    dots = ~(around & larger & (areas >= 2)).any(axis=1)
+    return boxes[dots], areas[dots]
 
 
 def assign_dots(points_px: FloatArray) -> Lattice:
@@ -66,7 +78,9 @@ def marked_dot(signal: Image32, points_px: FloatArray) -> int | None:
     """Index of the one dot that a marker (square, ring) surrounds; None where there is no such dot."""
     distances_px = np.asarray(KDTree(points_px).query(points_px, k=2)[0])
     half_px = int(0.42 * np.median(distances_px[:, 1]))
-    quadrants = np.array([_surroundings(signal, point, half_px) for point in points_px])
+    patches = [_patch(signal, point, half_px) for point in points_px]
+    hole_px = min(_radius_px(patches) + 1, half_px // 2)
+    quadrants = np.array([_surroundings(patch, hole_px) for patch in patches])
     light = quadrants.mean(axis=1) - np.median(quadrants.mean(axis=1))
     marked = int(np.argmax(light))
     others = np.delete(light, marked)
@@ -109,14 +123,28 @@ def _ground(patch: FloatArray) -> FloatArray:
     return np.asarray(mean + (bottom - top) * v[:, None] + (right - left) * u, dtype=np.float64)
 
 
-def _surroundings(signal: Image32, point_px: FloatArray, half_px: int) -> FloatArray:
-    """Mean signal in the four quadrants around a dot, the dot itself left out; zeros at the image border."""
+def _patch(signal: Image32, point_px: FloatArray, half_px: int) -> Image32 | None:
+    """Signal around a dot; None at the image border."""
     column, row = (round(float(value)) for value in point_px)
-    hole_px = half_px // 4
     if min(column, row) < half_px or row + half_px >= signal.shape[0] or column + half_px >= signal.shape[1]:
+        return None
+    return signal[row - half_px : row + half_px + 1, column - half_px : column + half_px + 1]
+
+
+def _radius_px(patches: Sequence[Image32 | None]) -> int:
+    """Of most dots."""
+    areas = [
+        np.count_nonzero(patch > patch[len(patch) // 2, len(patch) // 2] / 2) for patch in patches if patch is not None
+    ]
+    return round(float(np.sqrt(np.median(areas) / np.pi))) if areas else 0
+
+
+def _surroundings(patch: Image32 | None, hole_px: int) -> FloatArray:
+    """Mean signal in the four quadrants around a dot, the dot itself left out; zeros at the image border."""
+    if patch is None:
         return np.zeros(4)
-    patch = signal[row - half_px : row + half_px + 1, column - half_px : column + half_px + 1].copy()
-    patch[half_px - hole_px : half_px + hole_px + 1, half_px - hole_px : half_px + hole_px + 1] = 0
+    middle, patch = len(patch) // 2, patch.copy()
+    patch[middle - hole_px : middle + hole_px + 1, middle - hole_px : middle + hole_px + 1] = 0
     halves = np.array_split(patch, 2)
     return np.array([part.mean() for half in halves for part in np.array_split(half, 2, axis=1)], dtype=np.float64)
 

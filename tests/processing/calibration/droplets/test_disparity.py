@@ -10,7 +10,7 @@ from processing.calibration.droplets.disparity import local_disparities, measure
 from processing.calibration.droplets.droplet_images import find_droplets
 from processing.calibration.droplets.droplet_matching import Box, Matches, match_droplets
 from processing.calibration.errors import CalibrationError, OutOfRange
-from processing.calibration.triangulation import back_project, triangulate
+from processing.calibration.triangulation import back_project, steepest_axis, triangulate
 from processing.studies.seen_droplets import droplet_image
 from tests.support.drifting_views import HALF_MM, calibration_of, droplet_shots, inside_mm, views
 
@@ -43,13 +43,17 @@ def test_an_empty_image_has_no_droplets() -> None:
 
 
 @given(
-    x=st.floats(-2.5, 2.5), y=st.floats(-2.0, 2.0), z=st.floats(-1.5, 1.5), azimuth_deg=st.sampled_from([45, 15, -45])
+    x=st.floats(-2.5, 2.5),
+    y=st.floats(-2.0, 2.0),
+    z=st.floats(-1.5, 1.5),
+    azimuth_deg=st.sampled_from([45, 15, -45, 90, 180, -120]),
 )
 @settings(max_examples=25)
 def test_lines_of_sight_lead_back_to_the_point(x: float, y: float, z: float, azimuth_deg: float) -> None:
     (camera,) = views([azimuth_deg])
     point_mm = np.array([[x, y, z]])
-    found_mm = back_project(camera, camera.project(point_mm), z, np.zeros(3))
+    axis = steepest_axis(camera, np.zeros(3))
+    found_mm = back_project(camera, camera.project(point_mm), np.zeros(3), axis, float(point_mm[0, axis]))
     np.testing.assert_allclose(found_mm, point_mm, atol=1e-6)
 
 
@@ -61,8 +65,17 @@ def test_triangulation_inverts_projection() -> None:
     assert np.abs(left_px).max() < 1e-3
 
 
-def test_every_droplet_that_all_views_see_is_matched() -> None:
-    points_mm, cameras = inside_mm(30), views()
+def test_views_in_one_place_leave_points_where_they_are_along_the_line_of_sight() -> None:
+    points_mm, (camera,) = inside_mm(20), views([15])
+    seen_px = np.stack([camera.project(points_mm)] * 2, axis=1)
+    found_mm, left_px = triangulate([camera, camera], seen_px, points_mm)
+    np.testing.assert_allclose(found_mm, points_mm, atol=1e-6)
+    assert np.abs(left_px).max() < 1e-6
+
+
+@pytest.mark.parametrize("azimuths_deg", [(45.0, 15.0, -15.0, -45.0), (90.0, -90.0, 0.0, 180.0), (90.0, 60.0, 120.0)])
+def test_every_droplet_that_all_views_see_is_matched(azimuths_deg: tuple[float, ...]) -> None:
+    points_mm, cameras = inside_mm(30), views(azimuths_deg)
     seen_px = [camera.project(points_mm) for camera in cameras]
     matches = match_droplets(cameras, seen_px, BOX, 2.0)
     distance_mm = np.linalg.norm(matches.points_mm[:, None] - points_mm, axis=2).min(axis=0)

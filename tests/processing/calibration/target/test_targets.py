@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from processing.calibration.errors import TargetNotFound
 from processing.calibration.target.targets import Target, TargetPoints, detect_target
-from processing.geometry import FloatArray, PinholeCamera
+from processing.geometry import FloatArray, PinholeCamera, view_camera
 from processing.synthetic.paper_rig import paper_cameras, paper_optics
 from processing.synthetic.target import Checkerboard, DotTarget, render_target
 from processing.synthetic.target import Target as Pattern
@@ -147,6 +147,40 @@ def test_marked_dot_is_the_origin_whatever_the_hint_says() -> None:
     points = detect_target(bright_dots((4, 6)), Target(kind="dots", pitch_mm=3.0), origin_px=(20.0, 20.0))
     origin_px = points.image_px[(points.ids == 0).all(axis=1)]
     np.testing.assert_allclose(origin_px, [[11.3 + 4 * 41.3, 9.6 + 6 * 41.3]], atol=0.03)
+
+
+@pytest.mark.parametrize("azimuth_deg", [-40.0, -30.0, 0.0, 30.0])
+def test_a_ring_marks_the_dot_that_it_surrounds(azimuth_deg: float) -> None:
+    """Dots of 0.4 mm at a pitch of 1 mm, a thin ring of 0.28 to 0.36 mm radius: drawn finely, then seen coarsely."""
+    camera = view_camera(
+        azimuth_deg, focal_length_mm=50.0, magnification=1.0, scale_px_per_mm=25.0, image_size_px=(400, 300)
+    )
+    v, u = np.indices((1200, 1600)) / 4 - 0.375
+    x, y, _ = camera.back_project(np.column_stack([u.ravel(), v.ravel()]), 0.0).T.reshape(3, *u.shape)
+    radius = np.hypot(x - np.clip(np.round(x), -5, 5), y - np.clip(np.round(y), -4, 4))
+    bright = (radius < 0.2) | ((radius > 0.28) & (radius < 0.36) & (np.round(x) == 2) & (np.round(y) == -1))
+    fine = cv2.GaussianBlur(bright.astype(np.float32), (0, 0), 3.0)
+    image = cv2.resize(fine, (400, 300), interpolation=cv2.INTER_AREA)
+    points = detect_target(20 + 200 * image, Target(kind="dots", pitch_mm=1.0))
+    assert len(points) == 11 * 9
+    true_px = camera.project(np.column_stack([points.ids + (2, -1), np.zeros(len(points))]))
+    np.testing.assert_allclose(points.image_px, true_px, atol=0.1)
+
+
+@pytest.mark.parametrize(("square_px", "blur_px"), [(100.0, 12.0), (60.0, 9.0)])
+def test_a_large_board_may_be_blurred_as_much_as_a_small_one(square_px: float, blur_px: float) -> None:
+    v, u = np.mgrid[: int(8 * square_px), : int(10 * square_px)]
+    turned = np.deg2rad(4.0)
+    x = (np.cos(turned) * (u - u.mean()) + np.sin(turned) * (v - v.mean())) / square_px
+    y = (np.cos(turned) * (v - v.mean()) - np.sin(turned) * (u - u.mean())) / square_px
+    within = (np.abs(x) < 4) & (np.abs(y) < 3)
+    board = np.where(within, (np.floor(x) + np.floor(y)) % 2, 0.5).astype(np.float32)
+    image = 20 + 200 * cv2.GaussianBlur(board, (0, 0), blur_px)
+    points = detect_target(image, Target(kind="checkerboard", columns=7, rows=5, pitch_mm=1.0))
+    x_px = u.mean() + square_px * (np.cos(turned) * points.ids[:, 0] - np.sin(turned) * points.ids[:, 1])
+    y_px = v.mean() + square_px * (np.sin(turned) * points.ids[:, 0] + np.cos(turned) * points.ids[:, 1])
+    assert len(points) == 35
+    np.testing.assert_allclose(points.image_px, np.column_stack([x_px, y_px]), atol=0.2)
 
 
 def test_dots_without_marker_or_hint_are_refused() -> None:
