@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from processing.calibration.calibration import Calibration, Doubt, Model, ViewCalibration
+from processing.calibration.calibration import Calibration, Model, ViewCalibration
 from processing.calibration.calibration_record import content_id
 from processing.calibration.errors import UNFIT, CalibrationError
 from processing.calibration.fit.covariance import parameter_covariance
@@ -30,6 +30,7 @@ from processing.calibration.fit.placement_check import check_placements
 from processing.calibration.fit.ray_check import check_rays, rays_miss_px
 from processing.calibration.fit.scale_check import check_scales
 from processing.calibration.observation import CalibrationSet, PlaneObservation, ViewObservations, stacked
+from processing.calibration.verdict import Doubt
 from processing.geometry import FloatArray, ViewMapping
 
 PLACEHOLDERS = 3

@@ -14,6 +14,7 @@ from pydantic import ConfigDict, Field, with_config
 from processing.calibration.errors import CalibrationError
 from processing.calibration.stored_fields import Matrix, Square, StoredMapping, Vector
 from processing.calibration.target.targets import Target
+from processing.calibration.verdict import Doubt, Unchecked, Verdict, worse
 
 Count = Annotated[int, Field(ge=0)]
 ErrorPx = Annotated[float, Field(ge=0)]
@@ -26,56 +27,6 @@ class Model(StrEnum):
     PINHOLE = "pinhole"
     PINHOLE_TILTED = "pinhole_tilted"
     POLYNOMIAL = "polynomial"
-
-
-class Verdict(StrEnum):
-    """What a view is good for, by its hold-out error."""
-
-    GOOD = "good"
-    USABLE = "usable"
-    WARN = "warn"
-    REFUSE = "refuse"
-
-
-def worse(one: Verdict, other: Verdict) -> Verdict:
-    """The less favourable of two verdicts."""
-    return max(one, other, key=list(Verdict).index)
-
-
-@dataclass(frozen=True)
-class Doubt:
-    """What speaks against views although each of them fits its own points well.
-
-    Parameters
-    ----------
-    views : tuple[str, ...]
-        Whom it concerns.
-    text : str
-        What does not agree, by value and limit, and what to ask oneself.
-    verdict : Verdict
-        The best that these views deserve.
-    """
-
-    views: tuple[str, ...]
-    text: str
-    verdict: Verdict = Verdict.WARN
-
-
-@with_config(_STRICT)
-@dataclass(frozen=True)
-class Unchecked:
-    """What nothing told, and what would tell it.
-
-    Parameters
-    ----------
-    what : str
-        What may be wrong without showing.
-    state : str
-        What to state so that it is checked.
-    """
-
-    what: str
-    state: str
 
 
 @with_config(_STRICT)

@@ -8,9 +8,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from processing.calibration.calibration import Calibration, Unchecked, ViewCalibration
+from processing.calibration.calibration import Calibration, ViewCalibration
 from processing.calibration.stored_fields import Pair
 from processing.calibration.target.targets import Target
+from processing.calibration.verdict import Unchecked
 from processing.kernels import _native
 
 SCHEMA: Literal["tomoshadow.calibration"] = "tomoshadow.calibration"

@@ -10,7 +10,7 @@ import numpy as np
 
 from daq.files.run_directory import ImageKey, RunReader
 from daq.files.run_file import RUN_FILE
-from processing.calibration.calibration import Calibration, Doubt, Verdict
+from processing.calibration.calibration import Calibration
 from processing.calibration.calibration_record import content_id
 from processing.calibration.droplets.agreement import strangers
 from processing.calibration.droplets.disparity import MIN_VIEWS, REACH_PX, ViewDisparity, measured_box, shot_disparity
@@ -21,6 +21,7 @@ from processing.calibration.errors import CalibrationError, OutOfRange
 from processing.calibration.fit.health import LIMITS_PX, judge
 from processing.calibration.fit.not_checked import DROPLETS
 from processing.calibration.sets.calibration_set import SET_FILE
+from processing.calibration.verdict import Doubt, Verdict
 from processing.geometry import FloatArray
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.runs.errors import PipelineError

@@ -9,11 +9,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from processing.calibration.calibration import Calibration, Verdict
+from processing.calibration.calibration import Calibration
 from processing.calibration.droplets.disparity import ViewDisparity, measured_box, shot_disparity
 from processing.calibration.droplets.self_calibration import self_calibrate
 from processing.calibration.errors import CalibrationError
 from processing.calibration.fit.health import LIMITS_PX
+from processing.calibration.verdict import Verdict
 from processing.geometry import FloatArray, PinholeCamera
 from processing.studies.calibration_rows import DRIFT_LIMIT_PX, CalibrationRow, CalibrationStudy, rms_px
 from processing.studies.seen_droplets import droplet_calibration, droplet_views, seen_droplets

@@ -4,9 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from processing.calibration.calibration import Calibration, Model, PlaneError, Verdict, ViewCalibration
+from processing.calibration.calibration import Calibration, Model, PlaneError, ViewCalibration
 from processing.calibration.calibration_record import content_id
 from processing.calibration.droplets.droplet_images import find_droplets
+from processing.calibration.verdict import Verdict
 from processing.geometry import FloatArray, PinholeCamera, ViewMapping, view_camera
 from processing.studies.simulated_droplets import AZIMUTHS_DEG, SCALE_VOXEL_PER_MM
 from processing.synthetic.stamping import Discs, FloatImage, stamp_discs

@@ -73,9 +73,9 @@ def stated_roll(text: str) -> tuple[str, float]:
 def calibrate_views(options: Namespace) -> Outcome:
     """Fit, and write the calibration; it has not passed where a view is refused."""
     from processing.calibration.calibrate import calibrate
-    from processing.calibration.calibration import Verdict
     from processing.calibration.calibration_file import save_calibration
     from processing.calibration.sets.calibration_set import load_calibration_set
+    from processing.calibration.verdict import Verdict
     from processing.figures.residual_figures import residuals_figure
     from processing.runs.overwriting import replacing, require_free
     from processing.runs.run_check import checked_by_run, run_beside

@@ -23,8 +23,8 @@ def add(verbs: Verbs) -> None:
 
 def check(options: Namespace) -> Outcome:
     """Check shot by shot; it has not passed where a shot would stop reconstruction."""
-    from processing.calibration.calibration import Verdict
     from processing.calibration.calibration_file import load_calibration
+    from processing.calibration.verdict import Verdict
     from processing.runs.run_check import ALARM_PX, STOP_PX, check_shot
 
     calibration = load_calibration(options.calibration)

@@ -11,7 +11,7 @@ from typing import Annotated
 from pydantic import Field
 
 from daq.frozen_model import FrozenModel
-from processing.calibration.calibration import Verdict
+from processing.calibration.verdict import Verdict
 from processing.runs.run_check import ALARM_PX, STOP_PX
 from server.lab.events import EventPublisher
 from server.lab.jobs import ENDED, Job, JobKind, JobState, check_job

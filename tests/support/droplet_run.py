@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.files.run_directory import DoubleFrame, ExposureRecord, ImageKey, RunHeader, RunWriter, Shot, ViewFormat
-from processing.calibration.calibration import Verdict
 from processing.calibration.calibration_file import save_calibration
 from processing.calibration.calibration_record import content_id
+from processing.calibration.verdict import Verdict
 from processing.geometry import PinholeCamera, view_camera
 from processing.studies.seen_droplets import droplet_calibration
 

@@ -7,8 +7,9 @@ import pytest
 from numpy.typing import NDArray
 
 import tomoshadow as ts
-from processing.calibration.calibration import Calibration, Verdict
+from processing.calibration.calibration import Calibration
 from processing.calibration.errors import CalibrationError
+from processing.calibration.verdict import Verdict
 from processing.reconstruction.choices import ReconstructionMethod
 from processing.reconstruction.line_of_sight import line_of_sight
 from processing.reconstruction.planning.plan import plan_reconstruction

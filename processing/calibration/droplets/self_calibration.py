@@ -11,7 +11,7 @@ from datetime import UTC, datetime
 
 import numpy as np
 
-from processing.calibration.calibration import Calibration, Doubt, ViewCalibration, worse
+from processing.calibration.calibration import Calibration, ViewCalibration
 from processing.calibration.calibration_record import content_id
 from processing.calibration.droplets.disparity import (
     SEARCH_PX,
@@ -27,6 +27,7 @@ from processing.calibration.droplets.motion_fit import FAINTEST, largest_uncerta
 from processing.calibration.errors import CalibrationError
 from processing.calibration.fit.health import judge
 from processing.calibration.triangulation import linearise, unseen
+from processing.calibration.verdict import Doubt, worse
 from processing.geometry import FloatArray, ViewMapping
 
 DIVISIONS = ((3, 3, 3), (2, 2, 2))

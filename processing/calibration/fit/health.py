@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
-from processing.calibration.calibration import PlaneError, Verdict
+from processing.calibration.calibration import PlaneError
 from processing.calibration.errors import CalibrationError
 from processing.calibration.observation import PlaneObservation, stacked
+from processing.calibration.verdict import Verdict
 from processing.geometry import FloatArray, ViewMapping
 
 LIMITS_PX = {Verdict.GOOD: 0.05, Verdict.USABLE: 0.3, Verdict.WARN: 0.8}

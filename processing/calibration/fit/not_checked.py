@@ -2,8 +2,8 @@
 
 from collections.abc import Iterator, Sequence
 
-from processing.calibration.calibration import Unchecked
 from processing.calibration.observation import CalibrationSet
+from processing.calibration.verdict import Unchecked
 
 DROPLETS = Unchecked(
     "whether all views saw the target in the same places, and none of them by a mirror or upside down",

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Mapping
 
-from processing.calibration.calibration import Doubt
 from processing.calibration.errors import CalibrationError
 from processing.calibration.fit.placement import (
     SAME_STRETCH,
@@ -15,6 +14,7 @@ from processing.calibration.fit.placement import (
     turned_views,
 )
 from processing.calibration.observation import CalibrationSet
+from processing.calibration.verdict import Doubt
 from processing.geometry import FloatArray, ViewMapping
 
 

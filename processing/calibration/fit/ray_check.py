@@ -5,10 +5,11 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from processing.calibration.calibration import Doubt, Verdict, ViewCalibration
+from processing.calibration.calibration import ViewCalibration
 from processing.calibration.fit.health import judge
 from processing.calibration.observation import ViewObservations, stacked
 from processing.calibration.triangulation import triangulate
+from processing.calibration.verdict import Doubt, Verdict
 from processing.geometry import FloatArray, ViewMapping
 
 _SAME = 1e-6

@@ -4,9 +4,10 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from processing.calibration.calibration import Doubt, Model, ViewCalibration
+from processing.calibration.calibration import Model, ViewCalibration
 from processing.calibration.observation import CalibrationSet
 from processing.calibration.triangulation import linearise
+from processing.calibration.verdict import Doubt
 from processing.geometry import FloatArray, PinholeCamera, ViewMapping
 
 MAX_STRETCH = 1.1

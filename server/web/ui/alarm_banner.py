@@ -2,7 +2,7 @@
 
 from nicegui import ui
 
-from processing.calibration.calibration import Verdict
+from processing.calibration.verdict import Verdict
 from server.lab.services import Context
 from server.lab.watch import CalibrationStanding
 

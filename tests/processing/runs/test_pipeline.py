@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from daq.files.run_directory import RunReader
 from daq.files.run_file import add_references
-from processing.calibration.calibration import Verdict
 from processing.calibration.calibration_file import load_calibration
 from processing.calibration.errors import CalibrationError
+from processing.calibration.verdict import Verdict
 from processing.reconstruction.choices import ReconstructionMethod, VoxelType
 from processing.reconstruction.planning.plan import plan_reconstruction
 from processing.reconstruction.planning.planned_view import PlannedView

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from processing.calibration.calibration import Verdict
 from processing.calibration.droplets.disparity import ViewDisparity
+from processing.calibration.verdict import Verdict
 from processing.geometry import FloatArray
 from processing.runs.run_check import ShotCheck, check_exposures
 from processing.studies.drifting_views import direction

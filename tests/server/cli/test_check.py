@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from processing.calibration.calibration import Verdict
 from processing.calibration.calibration_file import load_calibration, save_calibration
 from processing.calibration.droplets.disparity import ViewDisparity
 from processing.calibration.fit.not_checked import DROPLETS
+from processing.calibration.verdict import Verdict
 from processing.runs.run_check import ShotCheck, checked_by_run
 from server.cli.check import check_line, views_table
 from tests.support.command_line import told

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import pytest
 
-from processing.calibration.calibration import Verdict
 from processing.calibration.fit.health import judge
+from processing.calibration.verdict import Verdict
 from processing.runs.run_check import ALARM_PX
 from server.lab.events import EventPublisher
 from server.lab.jobs import Job, JobState, check_job, reconstruction_job

@@ -1,0 +1,56 @@
+"""Verdict: what a view is good for, what speaks against it, and what nothing told."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from pydantic import ConfigDict, with_config
+
+
+class Verdict(StrEnum):
+    """What a view is good for, by its hold-out error."""
+
+    GOOD = "good"
+    USABLE = "usable"
+    WARN = "warn"
+    REFUSE = "refuse"
+
+
+def worse(one: Verdict, other: Verdict) -> Verdict:
+    """The less favourable of two verdicts."""
+    return max(one, other, key=list(Verdict).index)
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """What speaks against views although each of them fits its own points well.
+
+    Parameters
+    ----------
+    views : tuple[str, ...]
+        Whom it concerns.
+    text : str
+        What does not agree, by value and limit, and what to ask oneself.
+    verdict : Verdict
+        The best that these views deserve.
+    """
+
+    views: tuple[str, ...]
+    text: str
+    verdict: Verdict = Verdict.WARN
+
+
+@with_config(ConfigDict(extra="forbid", allow_inf_nan=False))
+@dataclass(frozen=True)
+class Unchecked:
+    """What nothing told, and what would tell it.
+
+    Parameters
+    ----------
+    what : str
+        What may be wrong without showing.
+    state : str
+        What to state so that it is checked.
+    """
+
+    what: str
+    state: str
