@@ -55,16 +55,22 @@ class Ended:
 
     damage: str
     imported: bool
+    calibrated: bool
     error: str = ""
 
 
-def damaged_imports(count: int, seed: int) -> Iterator[Ended]:
-    """Import so many damaged copies, the same ones for the same seed."""
+def damaged_imports(count: int, seed: int, calibrations: int | None = None) -> Iterator[Ended]:
+    """Import so many damaged copies, the same ones for the same seed, and calibrate the first of those that can be."""
+    calibrated = 0
     for number in range(count):
         chosen = random.Random(f"{seed} {number}")
         with tempfile.TemporaryDirectory() as folder:
             copy = shutil.copytree(VALID, Path(folder, "given"))
-            yield _ended(damage(copy, chosen), copy, Path(folder, "out"))
+            ended = _ended(
+                damage(copy, chosen), copy, Path(folder, "out"), calibrations is None or calibrated < calibrations
+            )
+            calibrated += ended.calibrated
+            yield ended
 
 
 def damage(folder: Path, chosen: random.Random) -> str:
@@ -75,20 +81,22 @@ def damage(folder: Path, chosen: random.Random) -> str:
     return f"{file.name}: {how.__name__.strip('_').replace('_', ' ')}"
 
 
-def _ended(what: str, given: Path, out: Path) -> Ended:
-    imported = False
+def _ended(what: str, given: Path, out: Path, fit: bool) -> Ended:
+    imported, fitted, error = False, False, ""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             import_manifest(given / "manifest.toml", out)
             imported = True
             if (out / "calibration").exists() and not what.startswith(_SHOTS):
-                calibrate(load_calibration_set(out))
+                detected = load_calibration_set(out)
+                if fitted := fit:
+                    calibrate(detected)
     except BadInput:
-        return Ended(what, imported)
+        pass
     except Exception:  # noqa: BLE001 - whatever it is, it is what is looked for
-        return Ended(what, imported, traceback.format_exc())
-    return Ended(what, imported)
+        error = traceback.format_exc()
+    return Ended(what, imported, fitted, error)
 
 
 def _a_line_is_lost(file: Path, chosen: random.Random) -> None:
