@@ -1,12 +1,15 @@
 """A results directory: ``settings.json`` and one volume per exposure, ``shot_00012_a.vtkhdf``."""
 
 import json
+import os
+import threading
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
+from daq.files.atomic_file import commit, part_path, sync
 from processing.preprocessing import Intensity
 from processing.reconstruction.volume_file import VolumeFileError, open_volume
 from processing.volume import VoxelGrid
@@ -32,19 +35,21 @@ def claim_results(results_dir: Path, provenance: Provenance) -> None:
     Raises
     ------
     VolumeFileError
-        It holds results of something else; they stay as they are.
+        It holds results of something else, or nobody can read of what; they stay as they are.
     """
     results_dir.mkdir(parents=True, exist_ok=True)
-    file, text = results_dir / SETTINGS_FILE, json.dumps(dict(provenance), indent=2) + "\n"
-    if file.exists():
-        if file.read_text() != text:
-            raise VolumeFileError(
-                f"{results_dir}: holds results of another run, calibration or settings; choose another"
-            )
-        return
-    part = file.with_suffix(".part")
-    part.write_text(text)
-    part.replace(file)
+    file = results_dir / SETTINGS_FILE
+    if not file.exists():
+        part = part_path(file.with_suffix(f".{os.getpid()}-{threading.get_ident()}"))  # others may claim it just now
+        part.write_text(json.dumps(dict(provenance), indent=2) + "\n", encoding="utf-8")
+        sync(part)
+        commit(part, file)
+    try:
+        written = json.loads(file.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise VolumeFileError(f"{file}: damaged ({error}); choose another directory, or --overwrite it") from error
+    if written != json.loads(json.dumps(dict(provenance))):
+        raise VolumeFileError(f"{results_dir}: holds results of another run, calibration or settings; choose another")
 
 
 def average_volumes(files: list[Path]) -> tuple[Intensity, VoxelGrid]:

@@ -1,6 +1,7 @@
 """The work functions of jobs: they run in worker processes, on paths and JSON values."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import asdict
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -51,9 +52,12 @@ def calibrate_run(job: dict[str, Any], should_stop: Callable[[], bool]) -> dict[
                 "mean_error_px": view.mean_error_px,
                 "holdout_error_px": view.holdout_error_px,
                 "verdict": view.verdict,
+                "reasons": list(view.reasons),
+                "n_rejected": view.n_rejected,
             }
             for name, view in calibration.views.items()
         },
+        "not_checked": [asdict(one) for one in calibration.not_checked],
     }
 
 

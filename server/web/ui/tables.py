@@ -9,6 +9,7 @@ from nicegui import ui
 
 from daq.errors import DaqError
 from daq.run_plan import RunKind
+from processing.calibration.verdict import Verdict
 from processing.reconstruction.choices import Accuracy, VoxelType
 from processing.reconstruction.choices import ReconstructionMethod as Method
 from processing.reconstruction.settings import ReconstructionSettings
@@ -83,7 +84,7 @@ class JobPanel:
     async def reload(self) -> None:
         """Read the job table again."""
         jobs = await asyncio.to_thread(self._context.jobs.newest, None, JobState, _SHOWN)
-        self._table.rows = [_job_row(job) for job in jobs]
+        self._table.rows = [job_row(job) for job in jobs]
         self._table.update()
 
     async def _on_act(self, event: Any) -> None:
@@ -128,7 +129,8 @@ def _run_row(run: RunSummary) -> dict[str, Any]:
     }
 
 
-def _job_row(job: Job) -> dict[str, Any]:
+def job_row(job: Job) -> dict[str, Any]:
+    """One job in the table, what came of it included."""
     is_calibration = job.kind is JobKind.CALIBRATION
     choices = {JobState.QUEUED: "Abort", JobState.RUNNING: "Abort", JobState.DONE: "Use" if is_calibration else ""}
     return {
@@ -162,10 +164,22 @@ def _disparity(job: Job) -> str:
 
 
 def _quality(job: Job) -> str:
-    """Hold-out error and verdict of the worst view of a calibration; nothing before it has ended."""
-    views = (job.result or {}).get("views", {}).values()
-    worst = max(views, key=lambda view: view["holdout_error_px"] or math.inf, default=None)
-    return "" if worst is None else f"hold-out {worst['holdout_error_px'] or math.nan:.3f} px, {worst['verdict']}"
+    """Hold-out error, verdict and reasons of the worst view of a calibration; nothing before it has ended."""
+    result = job.result or {"views": {}}
+    badness = {
+        name: (list(Verdict).index(view["verdict"]), _holdout_px(view)) for name, view in result["views"].items()
+    }
+    if not badness:
+        return ""
+    worst = max(badness, key=badness.__getitem__)
+    view = result["views"][worst]
+    told = f"{worst}: hold-out {_holdout_px(view):.3f} px, {view['verdict']}"
+    unchecked = [f"not checked {one['what']}" for one in result.get("not_checked", [])]
+    return "; ".join([told, *view.get("reasons", []), *unchecked])
+
+
+def _holdout_px(view: dict[str, Any]) -> float:
+    return math.inf if view["holdout_error_px"] is None else float(view["holdout_error_px"])
 
 
 def _slow_views(job: Job) -> str:

@@ -23,7 +23,7 @@ from processing.reconstruction.settings import GridSettings, ReconstructionSetti
 from processing.reconstruction.volume_file import VolumeFileError, open_volume, read_volume
 from processing.runs.errors import PipelineError
 from processing.runs.pipeline import ShotResult, Stopped, default_grid, reconstruct_shot, shot_intensities
-from processing.runs.results_file import average_volumes, volume_files, volume_path
+from processing.runs.results_file import average_volumes, claim_results, volume_files, volume_path
 from processing.runs.workbench import Workbench
 from processing.volume import VoxelGrid
 from tests.support.droplet_run import DROPLETS_A_MM, MOTION_MM, SHAPE, cameras, write_calibration, write_run
@@ -186,6 +186,24 @@ def test_a_refused_calibration_makes_no_volumes(run_dir: Path, tmp_path: Path) -
     bad = write_calibration(tmp_path / "bad.json", Verdict.REFUSE, holdout_px=1.7)
     with pytest.raises(CalibrationError, match=r"view1 is refused: hold-out error 1\.7 px"):
         reconstructed(run_dir, bad)
+
+
+def test_results_are_claimed_by_many_at_once(tmp_path: Path) -> None:
+    with ThreadPoolExecutor(8) as pool:
+        for number in range(20):
+            claims = [pool.submit(claim_results, tmp_path / str(number), {"run": "run"}) for _ in range(8)]
+            assert [claim.result() for claim in claims] == [None] * 8
+    assert not list(tmp_path.rglob("*.part"))
+
+
+@pytest.mark.parametrize("left", [b"", b'{"run": "run", "cal', b"\xff\xfe\x00"])
+def test_torn_settings_of_results_are_called_damaged(run_dir: Path, calibration_file: Path, left: bytes) -> None:
+    reconstructed(run_dir, calibration_file)
+    (file,) = run_dir.rglob("settings.json")
+    file.write_bytes(left)
+    with pytest.raises(VolumeFileError, match=r"settings\.json: damaged .*--overwrite"):
+        reconstructed(run_dir, calibration_file)
+    assert file.read_bytes() == left
 
 
 def test_results_of_other_settings_are_not_mixed(run_dir: Path, calibration_file: Path) -> None:
