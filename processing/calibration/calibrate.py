@@ -32,13 +32,18 @@ from processing.calibration.fit.scale_check import check_scales
 from processing.calibration.observation import CalibrationSet, PlaneObservation, ViewObservations, stacked
 from processing.calibration.verdict import Doubt
 from processing.geometry import FloatArray, ViewMapping
+from processing.progress import Counted, in_silence
 
 PLACEHOLDERS = 3
 """So many wrong points on one spot of the image stand for points that were not seen."""
 
 
 def calibrate(
-    calibration_set: CalibrationSet, model: Model | str = Model.PINHOLE, *, created_utc: str | None = None
+    calibration_set: CalibrationSet,
+    model: Model | str = Model.PINHOLE,
+    *,
+    created_utc: str | None = None,
+    counted: Counted = in_silence,
 ) -> Calibration:
     """Fit the camera of every view and judge it.
 
@@ -51,13 +56,15 @@ def calibrate(
         simplest of them unless another predicts unseen points clearly better (boards in free poses: ``pinhole``).
     created_utc : str, optional
         ISO 8601; now, if not given.
+    counted : Counted
+        Told of the views, one by one.
 
     Raises
     ------
     CalibrationError
         Views cannot be calibrated, or cannot belong to one world; names each of them, value and limit.
     """
-    views = _all_views(calibration_set, None if model == AUTO else Model(model))
+    views = _all_views(calibration_set, None if model == AUTO else Model(model), counted)
     placed = not any(view.intrinsics_only for view in views.values())
     undirected = check_handedness(calibration_set, views) if placed else []
     if placed:
@@ -76,10 +83,10 @@ def calibrate(
     return undated.with_id(content_id(undated))
 
 
-def _all_views(calibration_set: CalibrationSet, wanted: Model | None) -> dict[str, ViewCalibration]:
+def _all_views(calibration_set: CalibrationSet, wanted: Model | None, counted: Counted) -> dict[str, ViewCalibration]:
     """Every view, or what is wrong with all of those that are bad: who mends one should not meet the next one after."""
     views, problems = {}, []
-    for name, seen in calibration_set.views.items():
+    for name, seen in counted(list(calibration_set.views.items()), lambda view: f"camera of {view[0]}"):
         try:
             views[name] = _free_view(seen, wanted) if seen.free_pose else _placed_view(name, seen, wanted)
         except (np.linalg.LinAlgError, cv2.error):

@@ -23,6 +23,7 @@ from processing.calibration.fit.not_checked import DROPLETS
 from processing.calibration.sets.calibration_set import SET_FILE
 from processing.calibration.verdict import Doubt, Verdict
 from processing.geometry import FloatArray
+from processing.progress import Counted, in_silence
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.runs.errors import PipelineError
 from processing.runs.importing import CALIBRATION_FOLDER, RUN_FOLDER
@@ -197,8 +198,12 @@ def _doubt(run: str, check: ShotCheck, verdict: Verdict) -> Doubt:
     return Doubt(views, f"shot {check.shot} of run {run}: {problem}", verdict)
 
 
-def self_calibrate_run(run_dir: Path, shots: Sequence[int], calibration: Calibration) -> SelfCalibration:
+def self_calibrate_run(
+    run_dir: Path, shots: Sequence[int], calibration: Calibration, counted: Counted = in_silence
+) -> SelfCalibration:
     """Correct a calibration by the droplets in recorded shots, exposures A and B alike.
+
+    ``counted`` is told of the shots, one by one.
 
     Raises
     ------
@@ -207,19 +212,21 @@ def self_calibrate_run(run_dir: Path, shots: Sequence[int], calibration: Calibra
     PipelineError
         An exposure is missing.
     """
-    exposures = [exposure for of_shot in _droplets(run_dir, shots, calibration) for exposure in of_shot]
+    exposures = [exposure for of_shot in _droplets(run_dir, shots, calibration, counted) for exposure in of_shot]
     _require_droplets(calibration, exposures)
     return self_calibrate(calibration, exposures, run_dir.name)
 
 
-def _droplets(run_dir: Path, shots: Sequence[int], calibration: Calibration) -> list[list[Exposure]]:
+def _droplets(
+    run_dir: Path, shots: Sequence[int], calibration: Calibration, counted: Counted = in_silence
+) -> list[list[Exposure]]:
     """Droplets by shot, exposure and view, in the order of the views of the calibration."""
     calibration.require_world()
     settings = ReconstructionSettings()
     with RunReader(run_dir) as run:
         _check_views(run, calibration)
         found, references = [], read_references(run)
-        for index in shots:
+        for index in counted(shots, lambda index: f"droplets of shot {index}"):
             shot = run.read_shot(index)
             if not shot.valid:
                 raise PipelineError(f"{run_dir.name}, shot {index}: exposures are missing, nothing to check")

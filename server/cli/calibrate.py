@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from server.cli.options import NUMBER, Verbs, add_out, add_verb, picture_beside
-from server.cli.output import Outcome, progress, table
+from server.cli.output import Outcome, progress, table, tracked
 
 if TYPE_CHECKING:
     from processing.calibration.calibration import Calibration, ViewCalibration
@@ -84,9 +84,9 @@ def calibrate_views(options: Namespace) -> Outcome:
     figure = picture_beside(options.out)
     require_free(options.out, figure, *picture_paths(options.out), overwrite=options.overwrite)
     calibration_set = load_calibration_set(
-        options.set, dict(options.origin or ()), dict(options.roll or ()), options.mirrored or ()
+        options.set, dict(options.origin or ()), dict(options.roll or ()), options.mirrored or (), tracked
     )
-    calibration = calibrate(calibration_set, model=options.model)
+    calibration = calibrate(calibration_set, model=options.model, counted=tracked)
     run_dir = options.run or run_beside(options.set)
     if run_dir is not None:
         calibration = checked_by_run(calibration, run_dir)

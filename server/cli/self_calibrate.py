@@ -4,7 +4,7 @@ from argparse import Namespace
 from typing import Any
 
 from server.cli.options import Verbs, add_calibrated_run, add_out, add_shots, add_verb, selected_shots
-from server.cli.output import Outcome, progress, table
+from server.cli.output import Outcome, progress, table, tracked
 
 
 def add(verbs: Verbs) -> None:
@@ -24,8 +24,7 @@ def self_calibrate(options: Namespace) -> Outcome:
     require_free(options.out, overwrite=options.overwrite)
     calibration = load_calibration(options.calibration)
     shots = selected_shots(options.run, options.shots)
-    progress(f"{options.run.name}: droplets of {len(shots)} shots")
-    corrected = self_calibrate_run(options.run, shots, calibration)
+    corrected = self_calibrate_run(options.run, shots, calibration, tracked)
     save_calibration(corrected.calibration, options.out, overwrite=options.overwrite)
     progress(corrected.calibration.notes[-1])
     result = {

@@ -17,12 +17,17 @@ from processing.calibration.observation import CalibrationSet
 from processing.calibration.sets.imported_set import detect_imported
 from processing.calibration.sets.recorded_set import NO_ORIGINS, NO_ROLLS, Origins, Rolls, detect_recorded
 from processing.calibration.sets.set_record import CalibrationEntry, SetRecord
+from processing.progress import Counted, in_silence
 
 SET_FILE = "set.json"
 
 
 def load_calibration_set(
-    path: Path, origins: Origins = NO_ORIGINS, rolls_deg: Rolls = NO_ROLLS, mirrored: Sequence[str] = ()
+    path: Path,
+    origins: Origins = NO_ORIGINS,
+    rolls_deg: Rolls = NO_ROLLS,
+    mirrored: Sequence[str] = (),
+    counted: Counted = in_silence,
 ) -> CalibrationSet:
     """Detect the target in a recorded calibration run or in an imported set.
 
@@ -37,6 +42,8 @@ def load_calibration_set(
         How cameras of a run are turned about their axes, where its configuration does not say so. Likewise.
     mirrored : sequence of views
         Those of a run that look by a mirror. Likewise.
+    counted : Counted
+        Told of the images in which the target is looked for.
 
     Raises
     ------
@@ -52,9 +59,9 @@ def load_calibration_set(
             "(origin_px, roll_deg, mirrored)"
         )
     if folder is not None:
-        return _read_imported(folder)
+        return _read_imported(folder, counted)
     if (path / "run.h5").exists():
-        return detect_recorded(path, origins, rolls_deg, mirrored)
+        return detect_recorded(path, origins, rolls_deg, mirrored, counted)
     raise CalibrationError(f"{path}: neither a calibration run (run.h5) nor a calibration set ({SET_FILE})")
 
 
@@ -64,7 +71,7 @@ def write_set_file(folder: Path, source: str, calibration: CalibrationEntry) -> 
     (folder / SET_FILE).write_text(record.model_dump_json(indent=2, by_alias=True) + "\n", encoding="utf-8")
 
 
-def _read_imported(folder: Path) -> CalibrationSet:
+def _read_imported(folder: Path, counted: Counted) -> CalibrationSet:
     file = folder / SET_FILE
     try:
         record = SetRecord.model_validate_json(file.read_bytes())
@@ -72,4 +79,4 @@ def _read_imported(folder: Path) -> CalibrationSet:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"]) or "text"
         raise CalibrationError(f"{file}: {where}: {first['msg']}") from error
-    return detect_imported(record.source, record.calibration, folder)
+    return detect_imported(record.source, record.calibration, folder, counted)

@@ -16,12 +16,15 @@ from processing.calibration.sets.set_record import CalibrationEntry, PointsEntry
 from processing.calibration.target.targets import Target
 from processing.geometry import FloatArray
 from processing.image_file import GreyImage, ImageFileError, read_image
+from processing.progress import Counted, in_silence
 
 MIN_LEVEL_POINTS = 3
 """Measured points are reported by z level where each level has so many points."""
 
 
-def detect_imported(source: str, entry: CalibrationEntry, folder: Path) -> CalibrationSet:
+def detect_imported(
+    source: str, entry: CalibrationEntry, folder: Path, counted: Counted = in_silence
+) -> CalibrationSet:
     """Detect the target in all images and read all tables.
 
     What single images do not tell, see ``plane_detection.detect_planes``.
@@ -34,13 +37,15 @@ def detect_imported(source: str, entry: CalibrationEntry, folder: Path) -> Calib
         What there is.
     folder : Path
         Paths in the entry are relative to it.
+    counted : Counted
+        Told of the images, one by one.
 
     Raises
     ------
     CalibrationError
         A camera never sees the target, sizes differ within a camera, or a table is wrong; names the file.
     """
-    detected = _detected(folder, entry)
+    detected = _detected(folder, entry, counted)
     planes = defaultdict(list, {camera: list(seen.planes) for camera, seen in detected.views.items()})
     sizes = {camera: seen.image_size_px for camera, seen in detected.views.items()}
     for camera, file, size, levels in _measured(entry, folder):
@@ -63,11 +68,12 @@ def detect_imported(source: str, entry: CalibrationEntry, folder: Path) -> Calib
     )
 
 
-def _detected(folder: Path, entry: CalibrationEntry) -> DetectedPlanes:
+def _detected(folder: Path, entry: CalibrationEntry, counted: Counted) -> DetectedPlanes:
     target = _target_mm(entry)
     if target is None:
         return DetectedPlanes({}, ())
-    return detect_planes(str(folder), list(_plane_images(entry, folder)), target, entry.roll_deg, entry.mirrored)
+    images = list(_plane_images(entry, folder))
+    return detect_planes(str(folder), images, target, entry.roll_deg, entry.mirrored, counted)
 
 
 def _target_mm(entry: CalibrationEntry) -> Target | None:

@@ -13,6 +13,7 @@ from processing.calibration.observation import PlaneObservation, ViewObservation
 from processing.calibration.sets.partial_views import detect_by_others
 from processing.calibration.target.targets import Target, TargetPoints, detect_target
 from processing.geometry import FloatArray
+from processing.progress import Counted, in_silence
 
 Image = NDArray[np.generic]
 Size = tuple[int, int]
@@ -73,6 +74,7 @@ def detect_planes(
     target: Target,
     rolls_deg: Mapping[str, float],
     mirrored: Collection[str] = (),
+    counted: Counted = in_silence,
 ) -> DetectedPlanes:
     """Find the target in all images.
 
@@ -92,6 +94,8 @@ def detect_planes(
         How cameras are turned about their axes; the others count as upright.
     mirrored : collection of views
         Those that look by a mirror: the target is looked for in their flipped images.
+    counted : Counted
+        Told of the images, one by one.
 
     Raises
     ------
@@ -101,7 +105,7 @@ def detect_planes(
     images = [
         replace(image, read=partial(_flipped, image.read)) if image.view in mirrored else image for image in images
     ]
-    sizes_px, found, missed = _first_look(source, images, target, rolls_deg, mirrored)
+    sizes_px, found, missed = _first_look(source, images, target, rolls_deg, mirrored, counted)
     more, notes = _second_look(images, target, found, missed, rolls_deg)
     planes: dict[str, list[PlaneObservation]] = defaultdict(list)
     for index, plane in sorted((found | more).items()):
@@ -141,11 +145,12 @@ def _first_look(
     target: Target,
     rolls_deg: Mapping[str, float],
     mirrored: Collection[str],
+    counted: Counted,
 ) -> tuple[dict[str, Size], Found, dict[int, TargetNotFound]]:
     """Sizes by view; what each image tells by itself, and why the others do not."""
     sizes_px: dict[str, Size] = {}
     found, missed = {}, {}
-    for index, image in enumerate(images):
+    for index, image in enumerate(counted(images, lambda image: f"target in {image.where}")):
         pixels = image.read()
         size_px = (pixels.shape[1], pixels.shape[0])
         if sizes_px.setdefault(image.view, size_px) != size_px:

@@ -17,6 +17,7 @@ from processing.calibration.observation import CalibrationSet
 from processing.calibration.sets.plane_detection import PlaneImage, detect_planes
 from processing.calibration.target.targets import Target
 from processing.optics import image_scale_px_per_mm
+from processing.progress import Counted, in_silence
 
 Place = tuple[str, float]
 """A view, and a position of the stage in mm."""
@@ -36,7 +37,11 @@ _SHOWS_TARGET = (ImageKey.SAMPLE, ImageKey.FLAT)
 
 
 def detect_recorded(
-    run_dir: Path, origins: Origins = NO_ORIGINS, rolls_deg: Rolls = NO_ROLLS, mirrored: Sequence[str] = ()
+    run_dir: Path,
+    origins: Origins = NO_ORIGINS,
+    rolls_deg: Rolls = NO_ROLLS,
+    mirrored: Sequence[str] = (),
+    counted: Counted = in_silence,
 ) -> CalibrationSet:
     """Detect the target in exposures A, averaged over the valid shots of each stage position.
 
@@ -53,6 +58,8 @@ def detect_recorded(
         Where a view that is named here stands is not checked against the configuration.
     mirrored : sequence of str
         Views that look by a mirror.
+    counted : Counted
+        Told of the images, one by one.
 
     Raises
     ------
@@ -70,7 +77,8 @@ def detect_recorded(
         _check_views(run_dir, "a roll", rolls_deg, views)
         _check_views(run_dir, "a mirror", mirrored, views)
         believed_deg = {**_of_views(configuration, "roll_deg"), **rolls_deg}
-        detected = detect_planes(str(run_dir), _plane_images(run, positions, origins), target, believed_deg, mirrored)
+        images = _plane_images(run, positions, origins)
+        detected = detect_planes(str(run_dir), images, target, believed_deg, mirrored, counted)
         source = run.header.run_id
     azimuths_deg = _of_views(configuration, "azimuth_deg")
     checked_deg = {name: azimuths_deg[name] for name in views if name in azimuths_deg and name not in rolls_deg}
