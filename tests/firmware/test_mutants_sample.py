@@ -21,14 +21,11 @@ def test_there_are_many_different_ones() -> None:
 
 @pytest.mark.parametrize("mutant", MUTANTS.values(), ids=MUTANTS.keys())
 def test_each_can_be_planted(mutant: Mutant, tmp_path: Path) -> None:
-    copy = shutil.copytree(FIRMWARE, tmp_path / "firmware")
-    mutant.apply(copy)
-    changed = [path for path in copy.rglob("*.[chS]") if path.read_text() != source_of(path, copy).read_text()]
-    assert [path.name for path in changed] == [Path(mutant.file).name]
-
-
-def source_of(path: Path, copy: Path) -> Path:
-    return FIRMWARE / path.relative_to(copy)
+    file = mutant.file if "/" in mutant.file else f"core/{mutant.file}"
+    (tmp_path / file).parent.mkdir(parents=True)
+    shutil.copy(FIRMWARE / file, tmp_path / file)
+    mutant.apply(tmp_path)
+    assert (tmp_path / file).read_text() != (FIRMWARE / file).read_text()
 
 
 @pytest.mark.parametrize("mutant", [m for m in MUTANTS.values() if m.tests], ids=lambda mutant: mutant.name)

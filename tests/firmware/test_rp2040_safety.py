@@ -113,7 +113,7 @@ def test_the_interlock_is_served_before_the_serial_line(board: Board) -> None:
         opened = shoot_into_open_interlock(board, delay_cycles)
         late_ns.append((dark_at(board) - opened) * CYCLE_NS)
         board.pico.set_interlock(True)
-        assert board.ask(Command.CLEAR).error is None
+        assert board.ask_in_bursts(Command.CLEAR).error is None
         board.pico.run_ms(2 * PERIOD_MS)
         board.arm(100)
     assert max(late_ns) < DARK_WITHIN_NS, late_ns
@@ -163,11 +163,11 @@ def while_arming(
     board.pico.feed(line[-1])
     board.pico.run(start + watched_cycles.stop)
     board.pico.run_ms(PERIOD_MS)
-    assert state_and_faults(board)[0] is not State.ARMED
+    assert State(board.ask_in_bursts(Command.STATUS).number("state")) is not State.ARMED
     assert board.pico.set_points_ma() == (0, 0, 0, 0)
     board.pico.set_interlock(True)
-    board.ask(Command.OFF)
-    assert board.ask(Command.CLEAR).error is None
+    board.ask_in_bursts(Command.OFF)
+    assert board.ask_in_bursts(Command.CLEAR).error is None
     return found
 
 

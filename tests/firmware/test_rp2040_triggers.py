@@ -228,8 +228,7 @@ def ask_to_fire(board: Board) -> int:
     board.arm(1000)
     board.pico.edges.clear()
     board.send(Command.FIRE)
-    while board.pico.receiving:
-        board.pico.run(board.pico.cycle + 10)
+    board.pico.run_until_received()
     return board.pico.cycle
 
 

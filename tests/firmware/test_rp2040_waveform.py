@@ -14,8 +14,9 @@ from daq.drivers.pulse_protocol import COUNTERS, FIELDS, Command, ErrorNumber, R
 from tests.support.rp2040_board import CAMERA_PULSE_NS, PAPER, PERIOD_MS, Board, Channel, Waveform
 
 TICK_NS = 8
-SERIES_SHOTS = int(os.environ.get("TOMOSHADOW_SERIES_SHOTS", "200"))
-"""An emulated second takes a minute of this computer; ``make mutants`` shoots 1000."""
+SERIES_SHOTS = int(os.environ.get("TOMOSHADOW_SERIES_SHOTS", "80"))
+PLANS = int(os.environ.get("TOMOSHADOW_PLANS", "12"))
+"""``make mutants`` shoots 1000, and tries 100 plans."""
 HEADER = (Path(__file__).resolve().parents[2] / "firmware" / "core" / "limits.h").read_text()
 LIMIT = {name: int(value) for name, value in re.findall(r"(\w+) = (\d+)", HEADER)}
 
@@ -131,7 +132,7 @@ def channels(draw: st.DrawFn) -> Channel:
     ).straddling()
 
 
-@settings(max_examples=30)
+@settings(max_examples=PLANS)
 @given(plan=st.lists(st.none() | channels(), min_size=4, max_size=4).filter(any))
 def test_any_plan_is_fired_as_answered(shared: Board, plan: list[Channel | None]) -> None:
     replies = iter(shared.configure(plan))

@@ -53,8 +53,7 @@ def set_point_fault(board: Board) -> bool:
 def start_arming(board: Board, time_us: int) -> None:
     """Up to this time after the last byte of the line."""
     board.pico.receive(encode_request(Request(60_000, Command.ARM, (1, 0, 0))))
-    while board.pico.receiving:
-        board.pico.run(board.pico.cycle + 1)
+    board.pico.run_until_received()
     board.pico.run(board.pico.cycle + time_us * CYCLES_PER_MS // 1000)
 
 
@@ -285,8 +284,7 @@ def test_a_current_that_changed_in_memory_does_not_reach_the_gain(board: Board) 
     """In the last moment, behind all checks of the core: 60 A would be half of them, at gain 2."""
     wanted = [a for a in range(0x2000_0000, 0x2000_4000, 4) if board.pico.read_word(a) == CURRENTS_MA[1]]
     board.pico.receive(encode_request(Request(60_000, Command.ARM, (1, 0, 0))))
-    while board.pico.receiving:
-        board.pico.run(board.pico.cycle + 1)
+    board.pico.run_until_received()
     for _ in range(400):
         board.pico.run(board.pico.cycle + 125)
         stack = [a for a in range(0x2000_0000, 0x2000_0500, 4) if board.pico.read_word(a) == CURRENTS_MA[1]]

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from daq.drivers.pulse_framing import ABORT_BYTE
-from daq.drivers.pulse_protocol import Command, ErrorNumber, Request, State, decode_reply, encode_request
+from daq.drivers.pulse_protocol import Command, ErrorNumber, Reply, Request, State, decode_reply, encode_request
 from daq.simulation.pico.firmware_build import ImageKind
 from daq.simulation.pico.rp2040_chip import TRIGGER
 from daq.simulation.pico.rp2040_emulator import CYCLE_NS, CYCLES_PER_MS
@@ -47,6 +47,9 @@ class UsbBoard(Board):
         limit = self.pico.cycle + REPLY_LIMIT_MS * CYCLES_PER_MS
         assert self.pico.run(limit, lambda: received.endswith(b"\n")), bytes(received)
         return bytes(received)
+
+    def ask_in_bursts(self, command: Command, *fields: int) -> Reply:
+        return self.ask(command, *fields)
 
     def request(self, setup: Setup, data: bytes = b"") -> bytes | None:
         outcome = self.usb.ask(setup, data)

@@ -5,6 +5,7 @@ that every edge has its exact time. Not modelled there: clock tree, input synchr
 """
 
 import random
+from bisect import insort
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -157,10 +158,10 @@ class EmulatedPico:
         """A byte that arrives now."""
         self._chip.uart[0].feed_byte(byte)
 
-    @property
-    def receiving(self) -> bool:
-        """Whether bytes are still on their way."""
-        return bool(self._received)
+    def run_until_received(self) -> None:
+        """Let time pass until the last byte has arrived."""
+        while self._received:
+            self.run(max(self.cycle, self._next_byte_cycle) + 1)
 
     @property
     def shooting(self) -> bool:
@@ -198,8 +199,7 @@ class EmulatedPico:
 
     def at(self, cycle: int, action: Callable[[], None]) -> None:
         """Do something at a cycle that is still to come."""
-        self._visits.append((cycle, action))
-        self._visits.sort(key=lambda visit: visit[0])
+        insort(self._visits, (cycle, action), key=lambda visit: visit[0])
         self._next_visit = self._visits[0][0]
 
     def run(self, until_cycle: int, stop: Callable[[], bool] | None = None) -> bool:
