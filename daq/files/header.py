@@ -57,6 +57,7 @@ class RunHeader(FrozenModel):
     separation_ns: Annotated[
         int | None, Field(description="time between exposures A and B; null for single exposures")
     ] = None
+    rate_hz: Annotated[float | None, Field(description="of shots at even times; null where nobody stated it")] = None
 
     @property
     def shot_bytes(self) -> int:

@@ -54,12 +54,13 @@ class ShotsEntry(_Entry):
     """Many shots of all cameras, by a pattern of their file names."""
 
     frame_a: Annotated[
-        str,
+        str | None,
         Field(description="file name with {view} and {shot:04d}; without {shot} the pages of a stack are the shots"),
-    ]
+    ] = None
     frame_b: Annotated[
         str | None, Field(description="the second exposure; where it is the same stack, its pages are A, B, A, B, ...")
     ] = None
+    frames: Annotated[str | None, Field(description="in place of frame_a and frame_b: single exposures")] = None
     shots: Annotated[
         tuple[int, int] | None, Field(description="first and last number, both are taken; default: all that are there")
     ] = None
@@ -72,9 +73,11 @@ class ShotsEntry(_Entry):
 
     @model_validator(mode="after")
     def _is_a_pattern(self) -> Self:
-        if len({pattern.counts_shots for pattern in self.frames}) > 1:
+        if (self.frames is None) == (self.frame_a is None) or None not in (self.frames, self.frame_b):
+            raise ValueError("either frame_a, with or without frame_b, or frames for single exposures")
+        if len({pattern.counts_shots for pattern in self.patterns.values()}) > 1:
             raise ValueError("frame_b: both exposures have {shot} in their names, or none")
-        if not self.frames[0].counts_shots and (self.page, self.page_b) != (None, None):
+        if not self.counts_shots and (self.page, self.page_b) != (None, None):
             raise ValueError("page: the pages of a stack are its shots where {shot} is not in its name")
         if self.shots is not None and not 0 <= self.shots[0] <= self.shots[1]:
             raise ValueError(f"shots: {list(self.shots)} are not the first number and the last, from 0 on")
@@ -83,9 +86,15 @@ class ShotsEntry(_Entry):
         return self
 
     @property
-    def frames(self) -> tuple[ImagePattern, ...]:
-        """Exposure A, and B where there is one."""
-        return tuple(ImagePattern(text) for text in (self.frame_a, self.frame_b) if text is not None)
+    def patterns(self) -> dict[str, ImagePattern]:
+        """By key: of exposure A, and B where there is one."""
+        texts = {"frames": self.frames, "frame_a": self.frame_a, "frame_b": self.frame_b}
+        return {key: ImagePattern(text) for key, text in texts.items() if text is not None}
+
+    @property
+    def counts_shots(self) -> bool:
+        """Whether every shot has files of its own; else the pages of one file are the shots."""
+        return next(iter(self.patterns.values())).counts_shots
 
 
 class RunEntry(_Entry):
@@ -98,6 +107,7 @@ class RunEntry(_Entry):
         int | None, Field(ge=8, le=16, description="of a grey value in files of 16 bit, 12 if they reach to 4095")
     ] = None
     separation_ns: Annotated[int | None, Field(gt=0, description="from exposure A to B; kept with the run")] = None
+    rate_hz: Annotated[float | None, Field(gt=0, description="shots per second, all alike; kept with the run")] = None
     double_height: Annotated[bool, Field(description="every image is exposure A above exposure B")] = False
     shot: Annotated[tuple[ShotEntry, ...], Field(description="the shots, in order")] = ()
     shots: Annotated[tuple[ShotsEntry, ...], Field(description="more of them, by patterns of file names")] = ()

@@ -133,6 +133,7 @@ def write_run(
         software={"tomoshadow": version("tomoshadow")},
         polarity=run.polarity,
         separation_ns=run.separation_ns,
+        rate_hz=run.rate_hz,
     )
     references = {ImageKey.DARK: _Mean(), ImageKey.BACKGROUND: _Mean()}
     with RunWriter(run_dir, header) as writer:

@@ -3,6 +3,8 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from daq.files.run_directory import ImageKey
 from processing.image_file import ImageFileError, page_count
 from processing.kernels import _native
@@ -75,15 +77,16 @@ def _pages(entry: ShotEntry | ShotsEntry) -> tuple[int | None, int | None]:
 
 
 def _by_pattern(source: ManifestFile, key: Key, entry: ShotsEntry) -> Iterator[tuple[dict[str, ImageSource], ...]]:
-    found = entry.frames[0].found(source.root)
+    first, pattern = next(iter(entry.patterns.items()))
+    found = pattern.found(source.root)
     views = entry.views or _other_views(source.manifest) or tuple(found)
-    if entry.frames[0].counts_shots:
+    if entry.counts_shots:
         shots, starts, step = _numbers(source, key, entry, views, found), _pages(entry), 0
     else:
-        step = 2 if entry.frame_b == entry.frame_a else 1
+        step = 2 if entry.frame_b is not None and entry.frame_b == entry.frame_a else 1
         shots, starts = _numbers_in_stacks(source, key, entry, views, step), (0, step - 1)
     if not views or not shots:
-        raise source.error((*key, "frame_a"), f"{source.resolve(entry.frame_a)}: no file has such a name")
+        raise source.error((*key, first), f"{source.resolve(pattern.text)}: no file has such a name")
     for shot in shots:
         yield tuple(
             {
@@ -92,7 +95,7 @@ def _by_pattern(source: ManifestFile, key: Key, entry: ShotsEntry) -> Iterator[t
                 )
                 for view in views
             }
-            for name, pattern, page in zip(_FRAMES, entry.frames, starts, strict=False)
+            for (name, pattern), page in zip(entry.patterns.items(), starts, strict=False)
         )
 
 
@@ -115,7 +118,12 @@ def _numbers(
         if missing := sorted(set(every).difference(numbers)):
             fullest = max(found, key=lambda name: len(found[name]))
             counts = f"{view} has {len(numbers)} images, {fullest} has {len(found[fullest])}"
-            raise source.error((*key, "frame_a"), f"{counts}: shot {missing[0]} of {view} is missing")
+            raise source.error((*key, next(iter(entry.patterns))), f"{counts}: shot {missing[0]} of {view} is missing")
+    if len(np.unique(np.diff(every))) > 1:
+        gap = int(np.argmax(np.diff(every)))
+        lost = f"between {every[gap]} and {every[gap + 1]} shots are missing of all views"
+        remedy = "say shots = [first, last] of what there is, once for each part"
+        raise source.error((*key, next(iter(entry.patterns))), f"{lost}; {remedy}")
     return every
 
 
@@ -124,7 +132,7 @@ def _numbers_in_stacks(
 ) -> range:
     """Numbers of the shots in stacks: one per view and exposure, or one per view for both."""
     count = first = None
-    for name, pattern in zip(_FRAMES, entry.frames, strict=False):
+    for name, pattern in entry.patterns.items():
         for view in views:
             pages = _page_count(source, (*key, name, view), pattern.file(view, 0))
             count, first = count or pages, first or f"{view} has {pages} in {name}"

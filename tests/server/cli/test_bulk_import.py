@@ -82,6 +82,34 @@ def test_the_first_and_the_last_number_are_both_taken(folder: Path, capsys: Capt
     assert_pairs(folder / "out" / "run", [4, 5, 6])
 
 
+def test_single_exposures_at_even_times_keep_their_rate(folder: Path, capsys: Capture) -> None:
+    frames = 'rate_hz = 2500.0\n[[run.shots]]\nframes = "{view}/im{shot:04d}_a.png"\n'
+    result = told(capsys, "import", write_manifest(folder, frames), "-o", folder / "out")
+    assert result["shots"] == 5
+    with RunReader(folder / "out" / "run") as run:
+        assert (run.header.frames_per_shot, run.header.rate_hz) == (1, 2500.0)
+        np.testing.assert_array_equal(run.read_shot(4).views["right"].frame_a, image("right", 7))
+
+
+def test_shots_that_all_views_have_lost_are_told(folder: Path, capsys: Capture) -> None:
+    for view in VIEWS:
+        for frame in "ab":
+            (folder / view / f"im0005_{frame}.png").unlink()
+    error = refused(capsys, "import", write_manifest(folder, PAIRS), "-o", folder / "out")
+    assert "between 4 and 6 shots are missing of all views; say shots = [first, last]" in error
+    parts = PAIRS + "shots = [3, 4]\n" + PAIRS + "shots = [6, 7]\n"
+    told(capsys, "import", write_manifest(folder, parts), "-o", folder / "out")
+    assert_pairs(folder / "out" / "run", [3, 4, 6, 7])
+
+
+def test_every_second_number_is_no_loss(folder: Path, capsys: Capture) -> None:
+    for view in VIEWS:
+        for shot in (4, 6):
+            (folder / view / f"im{shot:04d}_a.png").unlink()
+    told(capsys, "import", write_manifest(folder, PAIRS), "-o", folder / "out")
+    assert_pairs(folder / "out" / "run", [3, 5, 7])
+
+
 def test_backgrounds_and_darks_have_patterns_too(folder: Path, capsys: Capture) -> None:
     more = PAIRS.replace("run.shots", "run.backgrounds") + "shots = [5, 6]\n"
     more += PAIRS.replace("run.shots", "run.darks") + "shots = [7, 7]\n"
@@ -103,6 +131,7 @@ def test_backgrounds_and_darks_have_patterns_too(folder: Path, capsys: Capture) 
         (PAIRS + "shots = [3, 9]\n", "", "{folder}/left/im0008_a.png does not exist (and 7 more)"),
         (PAIRS + 'views = ["left", "top"]\n', "", "top has 0 images, left has 5: shot 3 of top is missing"),
         (PAIRS.replace("{shot:04d}", "{shot}"), "", "{folder}/{{view}}/im{{shot}}_a.png: no file has such a name"),
+        (PAIRS + 'frames = "{view}.tif"\n', "", "either frame_a, with or without frame_b, or frames"),
         (PAIRS + "shots = [7, 3]\n", "", "line 3: run.shots.0: shots: [7, 3] are not the first number and the last"),
         (
             PAIRS + "shots = [0, 999999999999]\n",
@@ -119,6 +148,7 @@ def test_backgrounds_and_darks_have_patterns_too(folder: Path, capsys: Capture) 
         "frame_a",
         "frame_b",
         "range",
+        "both keys",
         "view",
         "padding",
         "backwards",
