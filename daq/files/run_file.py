@@ -25,6 +25,8 @@ from daq.files.header import RunHeader
 from daq.files.shot_file import LIBRARY_VERSIONS, SCHEMA_VERSION, create_groups
 
 RUN_FILE = "run.h5"
+_LATER_FIELDS = ("rate_hz",)
+"""Of the header; runs from before have their defaults."""
 SHOTS_FOLDER = "shots"
 RUN_SCHEMA = "tomoshadow-run"
 Reference = Literal["dark", "background"]
@@ -55,7 +57,8 @@ def read_header(run_dir: Path) -> RunHeader:
     """
     with reading(run_dir) as file:
         entry = file["entry"]
-        return RunHeader.model_validate({name: json.loads(entry[name].asstr()[()]) for name in RunHeader.model_fields})
+        written = [name for name in RunHeader.model_fields if name in entry or name not in _LATER_FIELDS]
+        return RunHeader.model_validate({name: json.loads(entry[name].asstr()[()]) for name in written})
 
 
 def add_outcome(run_dir: Path, outcome: str, cause: str) -> None:
