@@ -89,6 +89,16 @@ def test_smart_explains_the_images_of_all_views(sampled: bool, roll_deg: float, 
     assert result.volume.sum() == pytest.approx(len(POSITIONS) * DROPLET, rel=0.01)
 
 
+@pytest.mark.parametrize("azimuths_deg", [(70, 20, -20, -70), (80, 20, -20, -80), (90, -90, 0, 180), (100, 45, 0, -45)])
+def test_views_from_the_side_are_explained_as_well(azimuths_deg: tuple[float, ...]) -> None:
+    views = [camera(azimuth_deg) for azimuth_deg in azimuths_deg]
+    images = [image_of(view) for view in views]
+    result = smart(plan_reconstruction(views, GRID), images)
+    shares = [light_of(result.volume, view) / image.sum() for view, image in zip(views, images, strict=True)]
+    np.testing.assert_allclose(shares, 1, atol=0.01)
+    assert result.residuals[-1] <= 0.025
+
+
 def test_mart_finds_the_same_total_in_every_order_of_views() -> None:
     totals = []
     for views in permutations(cameras()):
