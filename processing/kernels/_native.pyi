@@ -19,6 +19,11 @@ MAP_SPACING_PX: int
 NODE_SPACINGS: tuple[int, ...]
 """Voxels from node to node that a mapped view may have, widest first."""
 
+MAX_BLOB_WINDOW_PX: int
+"""Rows and columns of an image that a blob may reach, and that an image needs."""
+BLOB_REACH_SIGMAS: float
+"""Where a blob ends."""
+
 @final
 class View:
     """An image and where voxels are seen in it; immutable, keeps its arrays alive."""
@@ -115,5 +120,40 @@ class Projections:
         threads: int,
     ) -> float: ...
 
+def draw_blobs(
+    residuals: Sequence[NDArray[np.float32]],
+    nodes: NDArray[np.float64],
+    spacing: int,
+    optics: NDArray[np.float64],
+    positions: NDArray[np.float64],
+    amplitudes: NDArray[np.float64],
+    factor: float,
+    threads: int,
+) -> None: ...
+def sweep_blobs(
+    residuals: Sequence[NDArray[np.float32]],
+    nodes: NDArray[np.float64],
+    spacing: int,
+    optics: NDArray[np.float64],
+    positions: NDArray[np.float64],
+    amplitudes: NDArray[np.float64],
+    most: int,
+    move: bool,
+    scale: float,
+    damping: float,
+    max_step: float,
+    tolerance: float,
+) -> int: ...
+def weigh_blobs(
+    residuals: Sequence[NDArray[np.float32]],
+    nodes: NDArray[np.float64],
+    spacing: int,
+    optics: NDArray[np.float64],
+    positions: NDArray[np.float64],
+    amplitudes: NDArray[np.float64],
+    out: NDArray[np.float64],
+    threads: int,
+) -> None: ...
+def find_peaks(volume: NDArray[np.float32], first_row: int, end_row: int, threshold: float) -> NDArray[np.float64]: ...
 def available_isas() -> list[str]: ...
 def selected_isa() -> str: ...

@@ -198,6 +198,44 @@ struct Exposure {
     float *intensity;   // the result; meanwhile minima and their means
 };
 
+constexpr int max_blob_window = 64;    // columns and rows of an image that a blob may reach
+constexpr double blob_reach = 3.6;     // in sigma: where a blob ends
+
+// A view of Gaussian blobs. Its residual is what was recorded less all blobs. A blob of amplitude a that is seen at
+// (u, v) adds a gain exp(-((column - u) / sigma_u)^2 / 2 - ((row - v) / sigma_v)^2 / 2). Nodes are pairs (u, v).
+struct BlobView {
+    float *residual;
+    int rows, columns;    // max_blob_window or more
+    const double *nodes;  // (nodes_z, nodes_y, nodes_x, 2)
+    double shift_u, shift_v, gain, sigma_u, sigma_v;
+};
+
+// Blobs in a volume whose views are known at every `spacing`-th voxel, linear in between.
+struct Blobs {
+    const BlobView *views;
+    int n_views;
+    int nodes_z, nodes_y, nodes_x, spacing;
+    double *positions;   // (count, 3): x, y, z in voxels
+    double *amplitudes;  // (count)
+    int64_t count;
+};
+
+// How blobs are fitted, one after the other, all others fixed: amplitudes alone, or positions too.
+struct BlobSweeps {
+    int most;          // sweeps over all blobs
+    bool move;
+    double scale;      // a typical amplitude
+    double damping;    // of positions, relative to what a blob of that amplitude is held by
+    double max_step;   // in voxels, per sweep
+    double tolerance;  // of amplitudes relative to the typical one, and of positions in voxels: less is no change
+    uint8_t *awake;    // (count): blobs that changed in the last sweep
+};
+
+// What a view says of a blob: sums over its window of residual x shape, shape squared, residual squared, and pixels.
+struct BlobSupport {
+    double product, shape, residual, pixels;
+};
+
 constexpr int strip_columns = 64;  // columns that are worked on at once
 
 struct Kernels {
@@ -216,6 +254,9 @@ struct Kernels {
     void (*column_minima)(const Exposure &job, int strip);
     void (*row_means)(const Exposure &job, int first_row, int end_row);
     void (*subtract_veil)(const Exposure &job, int first_row, int end_row);
+    void (*draw_blobs)(const Blobs &blobs, int view, double factor);  // residual += factor x blobs
+    int (*sweep_blobs)(const Blobs &blobs, const BlobSweeps &sweeps);   // returns how many sweeps it took
+    void (*weigh_blobs)(const Blobs &blobs, int view, BlobSupport *support);
 };
 
 }  // namespace tomoshadow

@@ -1,30 +1,22 @@
 """``tomoshadow study``: each study writes CSV and figure, and says what the paper says beside what it found."""
 
-import time
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import asdict, replace
-from functools import partial
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
-from server.cli.options import Verbs, add_out, add_verb, count, positive, seed, width
-from server.cli.output import Bar, Outcome, progress
+from server.cli.options import Verbs, count, positive, seed, width
+from server.cli.output import Bar, progress
+from server.cli.studies.droplets import add_droplets
+from server.cli.studies.study_command import add_study, collected, report
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from processing.studies.density import DensityRow
     from processing.studies.ghosts import GhostRow
     from processing.studies.recipe import Recipe
-    from processing.studies.report import Statement
     from processing.studies.residuals import ResidualRow
     from processing.studies.sensitivity import SensitivityRow
 
-ENDINGS = (".csv", ".png", "-profiles.csv")  # of the files that studies write
 _EVERY_METHOD = "all, SMART after 5, 10 and 20 iterations, MART after 5"
-Row = TypeVar("Row")
-Study = Callable[[Namespace], dict[str, Any]]
 
 
 def add(verbs: Verbs) -> None:
@@ -36,33 +28,7 @@ def add(verbs: Verbs) -> None:
     _add_residuals(studies)
     _add_calibration(studies)
     _add_sensitivity(studies)
-
-
-def _add_study(studies: Verbs, name: str, study: Study, summary: str) -> ArgumentParser:
-    parser = add_verb(studies, name, partial(_run, name, study), summary)
-    out = Path(f"study-{name}")
-    add_out(parser, f"directory of CSV and figure; default {out}", default=out)
-    return parser
-
-
-def _run(name: str, study: Study, options: Namespace) -> Outcome:
-    """Say how long a study took; complain of what cannot be written, or is there already, before and not after."""
-    from processing.runs.overwriting import require_free
-
-    options.out.mkdir(parents=True, exist_ok=True)
-    require_free(*(options.out / f"{name}{ending}" for ending in ENDINGS), overwrite=options.overwrite)
-    wall_s, cpu_s = time.perf_counter(), time.process_time()
-    result = study(options)
-    seconds = {"wall": time.perf_counter() - wall_s, "cpu": time.process_time() - cpu_s}
-    progress(f"took {seconds['wall']:.0f} s, {seconds['cpu']:.0f} CPU-s")
-    return Outcome({**result, "seconds": seconds}, _summary(result))
-
-
-def _summary(result: dict[str, Any]) -> str:
-    from processing.studies.report import Statement
-
-    statements = [str(Statement(**statement)) for statement in result["statements"]]
-    return "\n".join([*statements, f"{len(result['rows'])} rows in {result['csv']}, {result['figure']}"])
+    add_droplets(studies)
 
 
 def _add_methods(parser: ArgumentParser, default: str) -> None:
@@ -87,7 +53,7 @@ def recipe_name(text: str) -> str:
 
 
 def _add_density(studies: Verbs) -> None:
-    parser = _add_study(studies, "density", density, "reconstruction quality against droplet density, Fig. 7")
+    parser = add_study(studies, "density", density, "reconstruction quality against droplet density, Fig. 7")
     parser.add_argument("--sigma", type=width, action="append", help="blob width in voxel, repeatable; default 1.5")
     parser.add_argument("--iterations", type=count, help="of smart and mart without -N, 20 by default")
     _add_methods(parser, _EVERY_METHOD)
@@ -106,9 +72,9 @@ def density(options: Namespace) -> dict[str, Any]:
 
     sigmas_voxel = ALL_SIGMAS_VOXEL if options.all else tuple(options.sigma or (1.5,))
     study = DensityStudy(sigmas_voxel=sigmas_voxel, recipes=_recipes(options))
-    rows = _collected(density_study(study), _density_line)
+    rows = collected(density_study(study), _density_line)
     progress(f"Q is mean-subtracted in windows of {study.window}^3 voxel at steps of {study.step}")
-    result = _report(options.out, "density", rows, density_figure(rows, study), density_statements(rows))
+    result = report(options.out, "density", rows, density_figure(rows, study), density_statements(rows))
     return {**result, "window_voxel": study.window, "step_voxel": study.step, "mean_subtracted": True}
 
 
@@ -127,7 +93,7 @@ def _density_line(row: "DensityRow") -> str:
 
 
 def _add_ghosts(studies: Verbs) -> None:
-    parser = _add_study(studies, "ghosts", ghosts, "found and ghost droplets against droplet density")
+    parser = add_study(studies, "ghosts", ghosts, "found and ghost droplets against droplet density")
     parser.add_argument("--sigma", type=width, default=1.0, help="blob width in voxel")
     _add_methods(parser, _EVERY_METHOD)
 
@@ -147,8 +113,8 @@ def ghosts(options: Namespace) -> dict[str, Any]:
     from processing.studies.recipe import ALL_RECIPES, Recipe
 
     recipes = tuple(Recipe.named(name) for name in options.method) if options.method else ALL_RECIPES
-    rows = _collected(ghost_study(GhostStudy(sigma_voxel=options.sigma, recipes=recipes)), _ghost_line)
-    result = _report(options.out, "ghosts", rows, ghost_figure(rows), ghost_statements(rows))
+    rows = collected(ghost_study(GhostStudy(sigma_voxel=options.sigma, recipes=recipes)), _ghost_line)
+    result = report(options.out, "ghosts", rows, ghost_figure(rows), ghost_statements(rows))
     passed = meets_target(rows)
     if passed is None:
         return result
@@ -163,7 +129,7 @@ def _ghost_line(row: "GhostRow") -> str:
 
 
 def _add_average(studies: Verbs) -> None:
-    parser = _add_study(studies, "average", average, "mean of many shots of the hollow cone, Fig. 6")
+    parser = add_study(studies, "average", average, "mean of many shots of the hollow cone, Fig. 6")
     parser.add_argument("--shots", type=count, default=266, help="realisations of the spray")
     parser.add_argument("--binning", type=int, choices=(1, 2, 4), default=2, help="of pixels; 1 is the paper's")
     parser.add_argument("--seed", type=seed, default=0, help="of spray, dust and noise")
@@ -185,14 +151,14 @@ def average(options: Namespace) -> dict[str, Any]:
     with Bar() as bar:
         mean = average_study(study, lambda done: bar.step(done, study.shots, f"shot {done} of {study.shots}"))
     rows = average_rows(mean)
-    result = _report(options.out, "average", rows, average_figure(mean), average_statements(rows))
+    result = report(options.out, "average", rows, average_figure(mean), average_statements(rows))
     profiles = options.out / "average-profiles.csv"
     profiles.write_text(csv_text(profile_rows(mean)), encoding="utf-8")
     return {**result, "profiles": str(profiles)}
 
 
 def _add_residuals(studies: Verbs) -> None:
-    parser = _add_study(studies, "residuals", residuals, "back-projection error plane by plane, Fig. 3")
+    parser = add_study(studies, "residuals", residuals, "back-projection error plane by plane, Fig. 3")
     parser.add_argument("--binning", type=int, choices=(1, 2), default=1, help="of pixels; 1 is the paper's")
     parser.add_argument("--seed", type=seed, default=0, help="of light, dust and noise")
 
@@ -201,8 +167,8 @@ def residuals(options: Namespace) -> dict[str, Any]:
     """``tomoshadow study residuals``."""
     from processing.studies.residuals import ResidualStudy, residual_figure, residual_statements, residual_study
 
-    rows = _collected(residual_study(ResidualStudy(binning=options.binning, seed=options.seed)), _residual_line)
-    return _report(options.out, "residuals", rows, residual_figure(rows), residual_statements(rows))
+    rows = collected(residual_study(ResidualStudy(binning=options.binning, seed=options.seed)), _residual_line)
+    return report(options.out, "residuals", rows, residual_figure(rows), residual_statements(rows))
 
 
 def _residual_line(row: "ResidualRow") -> str:
@@ -211,7 +177,7 @@ def _residual_line(row: "ResidualRow") -> str:
 
 def _add_calibration(studies: Verbs) -> None:
     summary = "true errors of cameras, corners and self-calibration, beside their limits"
-    parser = _add_study(studies, "calibration", calibration, summary)
+    parser = add_study(studies, "calibration", calibration, summary)
     parser.add_argument(
         "--density",
         type=positive,
@@ -236,15 +202,15 @@ def calibration(options: Namespace) -> dict[str, Any]:
     study = CalibrationStudy(shots=options.shots, seed=options.seed)
     if options.density:
         study = replace(study, densities_per_mm3=tuple(options.density))
-    rows = _collected(calibration_study(study), calibration_line)
-    result = _report(options.out, "calibration", rows, calibration_figure(rows), calibration_statements(rows))
+    rows = collected(calibration_study(study), calibration_line)
+    result = report(options.out, "calibration", rows, calibration_figure(rows), calibration_statements(rows))
     progress(f"every figure within its limit: {'PASSED' if all_kept(rows) else 'FAILED'}")
     return {**result, "passed": all_kept(rows)}
 
 
 def _add_sensitivity(studies: Verbs) -> None:
     summary = "what calibration error, number and spread of views, and noise do to droplets found"
-    parser = _add_study(studies, "sensitivity", sensitivity, summary)
+    parser = add_study(studies, "sensitivity", sensitivity, summary)
     parser.add_argument("--density", type=positive, default=13.8, help="droplets per mm^3")
     parser.add_argument("--sigma", type=width, default=1.0, help="blob width in voxel")
     parser.add_argument("--repeats", type=count, default=3, help="realisations to average")
@@ -264,37 +230,10 @@ def sensitivity(options: Namespace) -> dict[str, Any]:
     study = SensitivityStudy(density_per_mm3=options.density, sigma_voxel=options.sigma, repeats=options.repeats)
     if options.method:
         study = replace(study, recipes=tuple(Recipe.named(name) for name in options.method))
-    rows = _collected(sensitivity_study(study), _sensitivity_line)
-    return _report(options.out, "sensitivity", rows, sensitivity_figure(rows), sensitivity_statements(rows))
+    rows = collected(sensitivity_study(study), _sensitivity_line)
+    return report(options.out, "sensitivity", rows, sensitivity_figure(rows), sensitivity_statements(rows))
 
 
 def _sensitivity_line(row: "SensitivityRow") -> str:
     place = f"{row.influence} {row.value:g}, {row.method}"
     return f"{place}: {100 * row.found:.1f} % found, {100 * row.ghosts:.1f} % ghosts"
-
-
-def _collected(rows: Iterable[Row], line: Callable[[Row], str]) -> list[Row]:
-    collected = []
-    for row in rows:
-        progress(line(row))
-        collected.append(row)
-    return collected
-
-
-def _report(
-    out: Path, name: str, rows: Sequence[Any], figure: "Figure", statements: "Sequence[Statement]"
-) -> dict[str, Any]:
-    """Write CSV and figure; the JSON object of the study."""
-    from processing.runs.overwriting import replacing
-    from processing.studies.report import csv_text
-
-    csv, picture = out / f"{name}.csv", out / f"{name}.png"
-    with replacing(csv) as part:
-        part.write_text(csv_text(rows), encoding="utf-8")
-        figure.savefig(part.with_name(picture.name), dpi=150)
-    return {
-        "csv": str(csv),
-        "figure": str(picture),
-        "rows": [asdict(row) for row in rows],
-        "statements": [asdict(statement) for statement in statements],
-    }

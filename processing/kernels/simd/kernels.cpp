@@ -2,6 +2,7 @@
 // namespace of that set and calls no inline function of the standard library, so that the linker cannot hand
 // code for a newer processor to an older one.
 #include "job.hpp"
+#include "simd/blobs.hpp"
 #include "simd/blocks.hpp"
 #include "simd/line_of_sight.hpp"
 #include "simd/preprocess.hpp"
@@ -17,6 +18,7 @@ namespace tomoshadow::TOMOSHADOW_ISA {
 extern const Kernels kernels;
 const Kernels kernels{
     TOMOSHADOW_TEXT(TOMOSHADOW_ISA), line_of_sight, sum_of_sight, find_blocks, write_blocks, smart_pass, correct,
-    resample, brightest, quantise, find_filled, row_minima, column_minima, row_means, subtract_veil};
+    resample, brightest, quantise, find_filled, row_minima, column_minima, row_means, subtract_veil,
+    draw_blobs, sweep_blobs, weigh_blobs};
 
 }  // namespace tomoshadow::TOMOSHADOW_ISA

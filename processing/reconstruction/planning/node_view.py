@@ -85,8 +85,8 @@ def sample_mapping(mapping: ViewMapping, grid: VoxelGrid, max_deviation_px: floa
     """
     deviation_px = np.inf
     for spacing in _native.NODE_SPACINGS:
-        nodes_px = _project_lattice(mapping, grid, spacing)
-        deviation_px = bend_px(nodes_px, partial(_project_lattice, mapping, grid, spacing))
+        nodes_px = project_lattice(mapping, grid, spacing)
+        deviation_px = bend_px(nodes_px, partial(project_lattice, mapping, grid, spacing))
         if deviation_px <= max_deviation_px:
             return _node_view(mapping, nodes_px, spacing, deviation_px)
     raise ReconstructionError(
@@ -111,7 +111,7 @@ def _node_view(mapping: ViewMapping, nodes_px: FloatArray, spacing: int, deviati
     )
 
 
-def _project_lattice(
+def project_lattice(
     mapping: ViewMapping, grid: VoxelGrid, spacing: int, offset: Sequence[float] = (0.0, 0.0, 0.0)
 ) -> FloatArray:
     """Image points (nodes_z, nodes_y, nodes_x, 2) of every ``spacing``-th voxel; the last nodes enclose the grid."""

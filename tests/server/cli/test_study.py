@@ -30,7 +30,9 @@ def test_a_study_writes_csv_and_figure_and_says_what_the_paper_says(
     assert progress.endswith(f"4 rows in {result['csv']}, {result['figure']}\n")
 
 
-@pytest.mark.parametrize("study", ["density", "ghosts", "average", "residuals", "calibration", "sensitivity"])
+@pytest.mark.parametrize(
+    "study", ["density", "ghosts", "average", "residuals", "calibration", "sensitivity", "droplets"]
+)
 def test_every_study_explains_itself(study: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as stopped:
         main(["study", study, "--help"])
@@ -49,6 +51,7 @@ def test_every_study_explains_itself(study: str, capsys: pytest.CaptureFixture[s
         (["average", "--seed", "-1"], "-1 must be 0 or more"),
         (["ghosts", "--method", "mlos-3"], "mlos does not take 3 iterations"),
         (["average", "--shots", "0"], "0 must be 1 or more"),
+        (["droplets", "--views", "9"], "9: 2 to 8 views are measured"),
     ],
 )
 def test_bad_usage_exits_with_2_and_names_the_value(

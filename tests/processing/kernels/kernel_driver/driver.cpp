@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <memory>
 
+#include "host/blobs.hpp"
 #include "host/instruction_set.hpp"
 #include "host/line_of_sight.hpp"
 #include "host/occupancy.hpp"
@@ -217,6 +218,45 @@ void prepare(const Kernels &kernels, int number) {
     std::printf("prepare %d %.6f %.6f\n", number, sum_of(intensity.get(), pixels), sum_of(minimum.get(), pixels));
 }
 
+// Blobs within and beyond a lattice and the images, fitted to noise and drawn; and the peaks of an image as a volume.
+void fit_blobs(const Kernels &kernels, int number) {
+    Random random(static_cast<uint32_t>(number) * 374761393u + 9);
+    constexpr int n_views = 3, n_blobs = 40;
+    const int nodes = 2 + random.below(3), spacing = 1 << (1 + random.below(4));
+    std::vector<std::vector<float>> residuals;
+    std::vector<std::vector<double>> lattices;
+    std::vector<BlobView> views;
+    for (int k = 0; k < n_views; ++k) {
+        const int rows = max_blob_window + random.below(20), columns = max_blob_window + random.below(40);
+        residuals.push_back(grey_image<float>(random, static_cast<size_t>(rows) * columns));
+        lattices.emplace_back();
+        for (int z = 0; z < nodes; ++z)
+            for (int y = 0; y < nodes; ++y)
+                for (int x = 0; x < nodes; ++x) {
+                    lattices.back().push_back(spacing * (x + 0.3 * (k - 1) * z) + 20 * k);
+                    lattices.back().push_back(spacing * (y + 0.01 * x) + 10);
+                }
+        views.push_back({residuals[k].data(), rows, columns, lattices[k].data(), 0.1, -0.2, random.uniform(0.5, 2),
+                         random.uniform(0.4, 8.6), random.uniform(0.4, 8.6)});
+    }
+    std::vector<double> positions, amplitudes;
+    for (int k = 0; k < 3 * n_blobs; ++k) positions.push_back(random.uniform(-60, nodes * spacing + 60));
+    for (int k = 0; k < n_blobs; ++k) amplitudes.push_back(random.uniform(0, 2));
+    const Blobs blobs{views.data(), n_views, nodes, nodes, nodes, spacing, positions.data(), amplitudes.data(), n_blobs};
+    std::vector<uint8_t> awake(n_blobs);
+    kernels.sweep_blobs(blobs, {2, number % 2 == 1, 1.0, 0.02, 0.3, 0.0, awake.data()});
+    std::vector<BlobSupport> support(n_blobs);
+    double shapes = 0, light = 0;
+    for (int k = 0; k < n_views; ++k) {
+        kernels.draw_blobs(blobs, k, 1.0);
+        kernels.weigh_blobs(blobs, k, support.data());
+        for (const BlobSupport &one : support) shapes += one.shape;
+        light += sum_of(residuals[k].data(), residuals[k].size());
+    }
+    const auto peaks = find_peaks(residuals[0].data(), {2, views[0].rows / 2, views[0].columns}, 1, views[0].rows / 2, 200.0f);
+    std::printf("blobs %d %.6f %.6f\n", number, light / residuals[0].size(), shapes + static_cast<double>(peaks.size()));
+}
+
 }  // namespace
 
 int main() {
@@ -225,4 +265,5 @@ int main() {
     for (int number = 0; number < 14; ++number) iterate(kernels, number);
     for (int number = 0; number < 60; ++number) resample(kernels, number);
     for (int number = 0; number < 60; ++number) prepare(kernels, number);
+    for (int number = 0; number < 20; ++number) fit_blobs(kernels, number);
 }

@@ -1,0 +1,89 @@
+"""DropletSearch: where droplets are looked for, and how the views see it. Made once per calibration and grid."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from processing.analysis.droplets.sight_lattice import SightLattice, sight_lattice
+from processing.geometry import ViewMapping
+from processing.reconstruction.errors import ReconstructionError
+from processing.reconstruction.planning.plan import Plan, plan_reconstruction
+from processing.volume import VoxelGrid
+
+MARGIN_VOXEL = 20
+"""Droplets that are seen, but not looked for, become ghosts: so far around the grid they are looked for too."""
+LEAST_PX_PER_VOXEL, MOST_PX_PER_VOXEL = 0.4, 1.3
+CANDIDATE_PITCH_VOXEL = 1.5
+"""Candidates need be no nearer to their droplet: the fit moves them."""
+
+
+@dataclass(frozen=True, eq=False)
+class DropletSearch:
+    """A grid, and around it a margin, as the views see them.
+
+    Parameters
+    ----------
+    grid : VoxelGrid
+        Droplets in it are measured.
+    searched : VoxelGrid
+        The same with its margin; positions in voxels are indices of this one.
+    lattice : SightLattice
+        Where the views see it.
+    plan : Plan
+        Of a coarser grid, for candidates.
+    names : tuple of str
+        Of the views.
+    """
+
+    grid: VoxelGrid
+    searched: VoxelGrid
+    lattice: SightLattice
+    plan: Plan
+    names: tuple[str, ...]
+
+
+def plan_droplets(
+    mappings: Sequence[ViewMapping],
+    grid: VoxelGrid,
+    names: Sequence[str] | None = None,
+    *,
+    margin_voxel: int = MARGIN_VOXEL,
+) -> DropletSearch:
+    """Plan the measurement of droplets in a grid from views of any mapping.
+
+    Parameters
+    ----------
+    mappings : sequence of ViewMapping
+        Two to eight views.
+    grid : VoxelGrid
+        Where droplets are to be measured, about one voxel per pixel.
+    names : sequence of str, optional
+        Of the views; by default their numbers, from 1.
+    margin_voxel : int
+        How far around the grid droplets are looked for; it must hold all that all views see.
+
+    Raises
+    ------
+    ReconstructionError
+        Too few or too many views, voxels much wider or narrower than pixels, or a mapping that is too rough to be
+        sampled.
+    """
+    searched = _widened(grid, margin_voxel)
+    lattice = sight_lattice(mappings, searched)
+    if not LEAST_PX_PER_VOXEL <= lattice.pixels_per_voxel <= MOST_PX_PER_VOXEL:
+        raise ReconstructionError(
+            f"a voxel of {grid.pitch_mm:.4g} mm is {lattice.pixels_per_voxel:.3g} px wide: droplets are looked for "
+            f"with {LEAST_PX_PER_VOXEL} to {MOST_PX_PER_VOXEL} px per voxel"
+        )
+    plan = plan_reconstruction(mappings, _coarser(searched), names=names)
+    return DropletSearch(grid, searched, lattice, plan, plan.names)
+
+
+def _widened(grid: VoxelGrid, margin_voxel: int) -> VoxelGrid:
+    nz, ny, nx = (n + 2 * margin_voxel for n in grid.shape)
+    x_mm, y_mm, z_mm = (origin_mm - margin_voxel * grid.pitch_mm for origin_mm in grid.origin_mm)
+    return VoxelGrid((nz, ny, nx), (x_mm, y_mm, z_mm), grid.pitch_mm)
+
+
+def _coarser(grid: VoxelGrid) -> VoxelGrid:
+    nz, ny, nx = (int((n - 1) / CANDIDATE_PITCH_VOXEL) + 2 for n in grid.shape)
+    return VoxelGrid((nz, ny, nx), grid.origin_mm, CANDIDATE_PITCH_VOXEL * grid.pitch_mm)

@@ -1,0 +1,82 @@
+"""SightLattice: where every view sees any point of a grid, as quickly as a fit needs it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from processing.geometry import FloatArray, ViewMapping
+from processing.kernels import _native
+from processing.reconstruction.errors import ReconstructionError
+from processing.reconstruction.planning.bending import bend_px
+from processing.reconstruction.planning.node_view import project_lattice
+from processing.volume import VoxelGrid
+
+MAX_DEVIATION_PX = 0.01
+"""What the lattice may add to the position of a droplet, which is measured to 0.02 px."""
+
+
+@dataclass(frozen=True, eq=False)
+class SightLattice:
+    """The calibrated mappings at every ``spacing``-th voxel, linear in between.
+
+    Parameters
+    ----------
+    nodes_px : (views, nodes_z, nodes_y, nodes_x, 2) array
+        Column and row in px.
+    spacing : int
+        Voxels from node to node.
+    deviation_px : float
+        Largest distance to the mappings between the nodes.
+    """
+
+    nodes_px: FloatArray
+    spacing: int
+    deviation_px: float
+
+    @property
+    def motion_px(self) -> FloatArray:
+        """What a motion of the whole volume by a voxel along x, y, z moves on average in the images: (2 views, 3)."""
+        spans = [np.diff(self.nodes_px, axis=axis).mean(axis=(1, 2, 3)) for axis in (3, 2, 1)]
+        return np.stack(spans, axis=-1).reshape(-1, 3) / self.spacing
+
+    @property
+    def pixels_per_voxel(self) -> float:
+        """How wide a voxel is seen at most, mean over the views."""
+        return float(np.linalg.norm(self.motion_px.reshape(-1, 2, 3), axis=1).max(axis=1).mean())
+
+    def slopes_px(self, positions_voxel: FloatArray) -> FloatArray:
+        """How image points move with positions (N, 3) x, y, z of the grid: (views, N, 2, 3) px per voxel."""
+        nodes = np.asarray(positions_voxel)[:, ::-1].T / self.spacing
+        most = np.array(self.nodes_px.shape[1:4])[:, None] - 2
+        cells = np.clip(np.floor(nodes), 0, most).astype(np.intp)
+        z, y, x = cells[:, None, :] + np.arange(2)[:, None]
+        corners = self.nodes_px[:, z[:, None, None], y[None, :, None], x[None, None, :]]
+        level = np.stack([1 - (nodes - cells), nodes - cells], axis=1)
+        slope = np.broadcast_to(np.array([-1.0, 1.0])[None, :, None] / self.spacing, level.shape)
+        weights = [np.where(np.arange(3)[:, None, None] == axis, slope, level) for axis in (2, 1, 0)]
+        return np.stack([np.einsum("kzyxnc,zn,yn,xn->knc", corners, *ends) for ends in weights], axis=-1)
+
+
+def sight_lattice(mappings: Sequence[ViewMapping], grid: VoxelGrid) -> SightLattice:
+    """Sample mappings as densely as it takes to know them everywhere to ``MAX_DEVIATION_PX``.
+
+    Raises
+    ------
+    ReconstructionError
+        A mapping is too rough even for nodes two voxels apart.
+    """
+    deviation_px = np.inf
+    for spacing in _native.NODE_SPACINGS:
+        nodes_px = [project_lattice(mapping, grid, spacing) for mapping in mappings]
+        deviation_px = max(
+            bend_px(nodes, partial(project_lattice, mapping, grid, spacing))
+            for nodes, mapping in zip(nodes_px, mappings, strict=True)
+        )
+        if deviation_px <= MAX_DEVIATION_PX:
+            return SightLattice(np.ascontiguousarray(nodes_px, dtype=np.float64), spacing, deviation_px)
+    raise ReconstructionError(
+        f"a mapping bends by {deviation_px:.3g} px within {_native.NODE_SPACINGS[-1]} voxels, limit "
+        f"{MAX_DEVIATION_PX} px: droplets cannot be measured; does the grid reach beyond what was calibrated?"
+    )

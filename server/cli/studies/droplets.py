@@ -1,0 +1,76 @@
+"""``tomoshadow study droplets``: droplets found and ghosts, where the truth is known."""
+
+from argparse import ArgumentTypeError, Namespace
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from server.cli.options import Verbs, count, positive, seed, usable_processors, width
+from server.cli.output import progress
+from server.cli.studies.study_command import add_study, collected, report
+
+if TYPE_CHECKING:
+    from processing.studies.droplets import DropletCase
+
+VARIED = {
+    "density": "density_per_mm3",
+    "sigma": "sigma_px",
+    "noise": "noise_percent",
+    "views": "views",
+    "calibration_error": "calibration_error_px",
+}
+"""Options, and what they change of a case."""
+
+
+def add_droplets(studies: Verbs) -> None:
+    """Add the study; without options that vary a case, it tries all cases for which something is asked for."""
+    parser = add_study(studies, "droplets", droplets, "droplets found and ghosts when images are explained by droplets")
+    parser.add_argument("--seed", type=seed, default=101, help="of the first shot of a case")
+    parser.add_argument("--repeats", type=count, default=5, help="shots of a case")
+    parser.add_argument("--density", type=positive, help="droplets per mm^3")
+    parser.add_argument("--sigma", type=width, help="width of droplets in px")
+    parser.add_argument("--noise", type=positive, metavar="PERCENT", help="of the median amplitude")
+    parser.add_argument("--views", type=_views, help="2 to 8, over the paper's angles")
+    parser.add_argument("--calibration-error", type=positive, metavar="PX", help="of every view")
+    parser.add_argument("--twins", type=seed, default=0, help="simulated twins per shot that tell ghosts")
+
+
+def _views(text: str) -> int:
+    if not 2 <= (value := int(text)) <= 8:
+        raise ArgumentTypeError(f"{text}: 2 to 8 views are measured")
+    return value
+
+
+def droplets(options: Namespace) -> dict[str, Any]:
+    """Run the study."""
+    from processing.studies.droplets import (
+        DropletStudy,
+        all_reached,
+        droplet_figure,
+        droplet_line,
+        droplet_statements,
+        droplet_study,
+    )
+
+    study = DropletStudy(seeds=tuple(range(options.seed, options.seed + options.repeats)), twins=options.twins)
+    case = _stated_case(options)
+    if case:
+        study = replace(study, cases=(case,))
+    rows = collected(droplet_study(study, usable_processors()), droplet_line)
+    result = report(options.out, "droplets", rows, droplet_figure(rows), droplet_statements(rows))
+    passed = all_reached(rows)
+    if passed is None:
+        progress("nothing is asked for of this case")
+        return result
+    progress(f"every mean reaches what is asked for: {'PASSED' if passed else 'FAILED'}")
+    return {**result, "passed": passed}
+
+
+def _stated_case(options: Namespace) -> "DropletCase | None":
+    """The case of the options; with what is asked for, where it is one of those."""
+    from processing.studies.droplets import ASKED_FOR, DropletCase
+
+    stated = {field: value for name, field in VARIED.items() if (value := getattr(options, name)) is not None}
+    if not stated:
+        return None
+    case = DropletCase(**stated)
+    return next((asked for asked in ASKED_FOR if asked.name == case.name), case)

@@ -1,0 +1,77 @@
+"""A study as a command: it writes CSV and figure, and says what it found."""
+
+import time
+from argparse import ArgumentParser, Namespace
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import asdict
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from server.cli.options import Verbs, add_out, add_verb
+from server.cli.output import Outcome, progress
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from processing.studies.report import Statement
+
+ENDINGS = (".csv", ".png", "-profiles.csv")  # of the files that studies write
+Row = TypeVar("Row")
+Study = Callable[[Namespace], dict[str, Any]]
+
+
+def add_study(studies: Verbs, name: str, study: Study, summary: str) -> ArgumentParser:
+    """Add a study by its name."""
+    parser = add_verb(studies, name, partial(_run, name, study), summary)
+    out = Path(f"study-{name}")
+    add_out(parser, f"directory of CSV and figure; default {out}", default=out)
+    return parser
+
+
+def _run(name: str, study: Study, options: Namespace) -> Outcome:
+    """Say how long a study took; complain of what cannot be written, or is there already, before and not after."""
+    from processing.runs.overwriting import require_free
+
+    options.out.mkdir(parents=True, exist_ok=True)
+    require_free(*(options.out / f"{name}{ending}" for ending in ENDINGS), overwrite=options.overwrite)
+    wall_s, cpu_s = time.perf_counter(), time.process_time()
+    result = study(options)
+    seconds = {"wall": time.perf_counter() - wall_s, "cpu": time.process_time() - cpu_s}
+    progress(f"took {seconds['wall']:.0f} s, {seconds['cpu']:.0f} CPU-s")
+    return Outcome({**result, "seconds": seconds}, _summary(result))
+
+
+def _summary(result: dict[str, Any]) -> str:
+    from processing.studies.report import Statement
+
+    statements = [str(Statement(**statement)) for statement in result["statements"]]
+    return "\n".join([*statements, f"{len(result['rows'])} rows in {result['csv']}, {result['figure']}"])
+
+
+def collected(rows: Iterable[Row], line: Callable[[Row], str]) -> list[Row]:
+    """All rows; each is told when it comes."""
+    collected = []
+    for row in rows:
+        progress(line(row))
+        collected.append(row)
+    return collected
+
+
+def report(
+    out: Path, name: str, rows: Sequence[Any], figure: "Figure", statements: "Sequence[Statement]"
+) -> dict[str, Any]:
+    """Write CSV and figure; the JSON object of the study."""
+    from processing.runs.overwriting import replacing
+    from processing.studies.report import csv_text
+
+    csv, picture = out / f"{name}.csv", out / f"{name}.png"
+    with replacing(csv) as part:
+        part.write_text(csv_text(rows), encoding="utf-8")
+        figure.savefig(part.with_name(picture.name), dpi=150)
+    return {
+        "csv": str(csv),
+        "figure": str(picture),
+        "rows": [asdict(row) for row in rows],
+        "statements": [asdict(statement) for statement in statements],
+    }

@@ -1,0 +1,162 @@
+"""Bright particles against truth that shares no code with the finder, and what must not matter."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from processing.analysis.droplets.bright_shot import BrightShot, ShotVerdict, measure_bright
+from processing.analysis.droplets.droplet_search import plan_droplets
+from processing.analysis.droplets.ghost_share import matches
+from processing.reconstruction.errors import ReconstructionError
+from processing.studies.droplets import BrightScene, DropletCase
+from processing.volume import VoxelGrid
+from tests.support.bright_scenes import GRID, MARGIN_VOXEL, scene, search_of
+
+
+def found_and_ghosts(shot: BrightShot, truth: BrightScene) -> tuple[float, float]:
+    of_found, of_truth = matches(shot.droplets.points_mm, truth.points_mm, GRID.pitch_mm)
+    return float(np.mean(of_truth >= 0)), float(np.mean(of_found < 0))
+
+
+@pytest.fixture(scope="module")
+def truth() -> BrightScene:
+    return scene()
+
+
+@pytest.fixture(scope="module")
+def shot(truth: BrightScene) -> BrightShot:
+    return measure_bright(truth.images, search_of(truth), twins=1)
+
+
+def test_droplets_are_found_where_they_are_as_bright_as_they_are(truth: BrightScene, shot: BrightShot) -> None:
+    found, ghosts = found_and_ghosts(shot, truth)
+    assert found >= 0.98
+    assert ghosts <= 0.02
+    match, _ = matches(shot.droplets.points_mm, truth.points_mm, GRID.pitch_mm)
+    real = match >= 0
+    errors_mm = (shot.droplets.points_mm - truth.points_mm[match])[real]
+    assert np.sqrt(np.mean(errors_mm**2)) < 0.06 * GRID.pitch_mm
+    ratio = shot.droplets.amplitudes[real] / truth.heights[match[real]]
+    assert np.median(ratio) == pytest.approx(1, abs=0.01)
+    assert shot.verdict is ShotVerdict.GOOD
+    assert shot.residual_over_noise == pytest.approx(1, abs=0.03)
+
+
+def test_covariances_say_how_far_droplets_are_off(truth: BrightScene, shot: BrightShot) -> None:
+    match, _ = matches(shot.droplets.points_mm, truth.points_mm, GRID.pitch_mm)
+    real = match >= 0
+    errors_mm = (shot.droplets.points_mm - truth.points_mm[match])[real]
+    scores = errors_mm / np.sqrt(np.einsum("nii->ni", shot.droplets.covariance_mm2[real]))
+    assert 0.8 < np.median(np.abs(scores)) / 0.6745 < 1.3
+
+
+def test_noise_and_widths_come_from_the_images(shot: BrightShot) -> None:
+    for view in shot.views.values():
+        assert view.noise == pytest.approx(0.03, rel=0.03)
+        assert (view.sigma_u_px, view.sigma_v_px) == pytest.approx((1, 1), abs=0.01)
+        assert view.offset == pytest.approx(0, abs=0.002)
+
+
+def test_twins_of_a_shot_without_ghosts_have_none_or_few(shot: BrightShot) -> None:
+    assert shot.ghosts is not None
+    assert shot.ghosts.found > 0.8 * len(shot.droplets)
+    assert shot.ghosts.share is not None
+    assert shot.ghosts.share < 0.03
+    assert shot.ghosts.interval is not None
+    assert shot.ghosts.interval[1] > shot.ghosts.share
+
+
+def test_neither_scale_nor_level_of_the_images_matters(truth: BrightScene, shot: BrightShot) -> None:
+    scaled = measure_bright([8 * image + np.float32(2) for image in truth.images], search_of(truth))
+    assert len(scaled.droplets) == len(shot.droplets)
+    np.testing.assert_allclose(scaled.droplets.points_mm, shot.droplets.points_mm, atol=1e-3 * GRID.pitch_mm)
+    np.testing.assert_allclose(scaled.droplets.amplitudes, 8 * shot.droplets.amplitudes, rtol=1e-3)
+    np.testing.assert_allclose([view.offset for view in scaled.views.values()], 2, atol=0.02)
+
+
+def test_the_order_of_views_does_not_matter(truth: BrightScene, shot: BrightShot) -> None:
+    order = [2, 0, 3, 1]
+    turned = replace(truth, images=[truth.images[k] for k in order], believed=[truth.believed[k] for k in order])
+    other = measure_bright(turned.images, search_of(turned))
+    match, missed = matches(other.droplets.points_mm, shot.droplets.points_mm, 0.1 * GRID.pitch_mm)
+    assert np.mean(match >= 0) > 0.98
+    assert np.mean(missed >= 0) > 0.98
+
+
+def test_threads_do_not_change_a_bit(truth: BrightScene) -> None:
+    one, three = (measure_bright(truth.images, search_of(truth), threads=threads).droplets for threads in (1, 3))
+    for first, second in zip(one.columns().values(), three.columns().values(), strict=True):
+        np.testing.assert_array_equal(first, second)
+
+
+def test_droplets_beside_the_grid_are_told_by_the_residual_without_a_margin_and_do_no_harm_with_one() -> None:
+    x_mm, y_mm, z_mm = GRID.origin_mm
+    beside_mm = 12 * GRID.pitch_mm
+    truth = scene(grid=VoxelGrid((104, 40, 184), (x_mm - beside_mm, y_mm, z_mm - beside_mm), GRID.pitch_mm))
+    alone = measure_bright(truth.images, search_of(truth, margin_voxel=0), twins=1)
+    assert alone.verdict in (ShotVerdict.DOUBTFUL, ShotVerdict.REFUSED)
+    assert alone.ghosts is None
+    with_margin = measure_bright(truth.images, search_of(truth, margin_voxel=14))
+    assert with_margin.verdict is ShotVerdict.GOOD
+    assert found_and_ghosts(with_margin, truth)[1] < 0.02
+
+
+@pytest.mark.parametrize("level", [0.0, 0.2])
+def test_images_without_droplets_are_empty(truth: BrightScene, level: float) -> None:
+    rng = np.random.default_rng(0)
+    noise = [(level + rng.normal(0, 0.03, image.shape)).astype(np.float32) for image in truth.images]
+    shot = measure_bright(noise, search_of(truth))
+    assert (shot.verdict, len(shot.droplets), shot.reasons) == (ShotVerdict.EMPTY, 0, ("no view sees a droplet",))
+    dark = measure_bright([np.full_like(image, level) for image in truth.images], search_of(truth))
+    assert dark.verdict is ShotVerdict.EMPTY
+
+
+def test_a_black_view_is_named_and_nothing_is_told(truth: BrightScene) -> None:
+    images = [*truth.images[:2], np.zeros_like(truth.images[2]), truth.images[3]]
+    shot = measure_bright(images, search_of(truth))
+    assert (shot.verdict, len(shot.droplets)) == (ShotVerdict.REFUSED, 0)
+    assert "view 3 sees nothing while the others see droplets" in shot.reasons[0]
+
+
+def test_exchanged_views_are_refused(truth: BrightScene) -> None:
+    images = [truth.images[3], *truth.images[1:3], truth.images[0]]
+    shot = measure_bright(images, search_of(truth), twins=1)
+    assert (shot.verdict, len(shot.droplets), shot.ghosts) == (ShotVerdict.REFUSED, 0, None)
+    assert shot.residual_over_noise is not None
+    assert shot.residual_over_noise > 1.5
+
+
+def test_a_calibration_that_is_off_by_a_tenth_of_a_pixel_does_no_harm() -> None:
+    truth = scene(DropletCase(28, calibration_error_px=0.1))
+    shot = measure_bright(truth.images, search_of(truth))
+    found, ghosts = found_and_ghosts(shot, truth)
+    assert found >= 0.97
+    assert ghosts <= 0.02
+    assert max(abs(view.shift_u_px) for view in shot.views.values()) > 0.03
+
+
+def test_a_calibration_that_is_off_by_half_a_pixel_is_refused_with_a_remedy() -> None:
+    truth = scene(DropletCase(28, calibration_error_px=0.6))
+    shot = measure_bright(truth.images, search_of(truth))
+    assert shot.verdict is ShotVerdict.REFUSED
+    assert "px beside its calibration, limit 0.3 px" in shot.reasons[0]
+    assert "self-calibrate" in shot.reasons[0]
+
+
+def test_bad_images_are_named(truth: BrightScene) -> None:
+    search = search_of(truth)
+    broken = truth.images[1].copy()
+    broken[3, 7] = np.nan
+    with pytest.raises(ValueError, match=r"view 2: pixel \(column 7, row 3\) is nan"):
+        measure_bright([truth.images[0], broken, *truth.images[2:]], search)
+    with pytest.raises(ValueError, match="3 images for 4 views"):
+        measure_bright(truth.images[:3], search)
+    with pytest.raises(ValueError, match=r"view 1: its image has shape \(99, 240\)"):
+        measure_bright([truth.images[0][:-1], *truth.images[1:]], search)
+
+
+def test_voxels_must_be_about_as_wide_as_pixels(truth: BrightScene) -> None:
+    coarse = VoxelGrid((20, 12, 40), GRID.origin_mm, 4 * GRID.pitch_mm)
+    with pytest.raises(ReconstructionError, match=r"px wide: droplets are looked for with 0\.4 to 1\.3 px per voxel"):
+        plan_droplets(truth.believed, coarse, margin_voxel=MARGIN_VOXEL)
