@@ -7,8 +7,10 @@ Calibrate
     Checkerboard, Dots, find_target, calibrate, Calibration, load_calibration, save_calibration
 Reconstruct
     intensity, common_grid, VoxelGrid, plan, mlos, minlos, gavlos, smart, mart
+Measure
+    measure
 Files
-    read_run, shot_intensities, read_volume, write_volume
+    read_run, shot_intensities, read_volume, write_volume, read_droplets
 Judge and look
     quality_factor, slices_figure, isosurface_figure, shadowgraph_figure
 Try, and err
@@ -19,6 +21,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from processing.analysis.droplets.droplet_file import read_droplets as read_droplets
     from processing.analysis.quality import quality_factor as quality_factor
     from processing.calibration.calibrate import calibrate as calibrate
     from processing.calibration.calibration import Calibration as Calibration
@@ -33,6 +36,7 @@ if TYPE_CHECKING:
     from processing.reconstruction.volume_file import write_volume as write_volume
     from processing.synthetic.example import example as example
     from processing.volume import VoxelGrid as VoxelGrid
+    from tomoshadow.droplets import measure as measure
     from tomoshadow.reconstruction import common_grid as common_grid
     from tomoshadow.reconstruction import gavlos as gavlos
     from tomoshadow.reconstruction import intensity as intensity
@@ -47,6 +51,7 @@ if TYPE_CHECKING:
     from tomoshadow.targets import Dots as Dots
 
 _HOMES = {
+    "processing.analysis.droplets.droplet_file": ("read_droplets",),
     "processing.analysis.quality": ("quality_factor",),
     "processing.calibration.calibrate": ("calibrate",),
     "processing.calibration.calibration": ("Calibration",),
@@ -57,6 +62,7 @@ _HOMES = {
     "processing.reconstruction.volume_file": ("read_volume", "write_volume"),
     "processing.synthetic.example": ("example",),
     "processing.volume": ("VoxelGrid",),
+    "tomoshadow.droplets": ("measure",),
     "tomoshadow.reconstruction": ("common_grid", "gavlos", "intensity", "mart", "minlos", "mlos", "plan", "smart"),
     "tomoshadow.runs": ("read_run", "shot_intensities"),
     "tomoshadow.targets": ("Checkerboard", "Dots"),

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -18,7 +19,7 @@ SHAPE = (80, 40, 160)
 IMAGE_SIZE_PX = (240, 100)
 GRID = study_grid(SHAPE)
 MARGIN_VOXEL = 6
-BOX = "-1.3:1.3,-0.3:0.3,-0.6:0.6"
+BOX = "-1.325:1.325,-0.325:0.325,-0.6583:0.6583"
 BITS = 12
 FULL_SCALE = 4095
 LEVEL = 100.0
@@ -33,28 +34,29 @@ def search_of(shot: BrightScene, grid: VoxelGrid = GRID, margin_voxel: int = MAR
     return plan_droplets(shot.believed, grid, margin_voxel=margin_voxel)
 
 
-def write_bright_run(run_dir: Path, shots: int = 1, covered: tuple[str, ...] = ()) -> tuple[Path, BrightScene]:
-    """Double frames of one scene each, B the same as A; covered views record their noise only."""
-    truth = scene()
+def write_bright_run(run_dir: Path, shots: int = 1, frames: Literal[1, 2] = 1, covered: tuple[str, ...] = ()) -> Path:
+    """Shots of the same scene, B the same as A; covered views record noise alone."""
+    truth, rng = scene(), np.random.default_rng(0)
     names = [f"view{number}" for number in range(1, 5)]
     header = RunHeader(
         run_id=run_dir.name,
         created_utc="2026-01-01T00:00:00+00:00",
         views={name: ViewFormat(IMAGE_SIZE_PX[::-1], BITS) for name in names},
-        separation_ns=6400,
+        frames_per_shot=frames,
+        separation_ns=6400 if frames == 2 else None,
         polarity="bright",
     )
     recorded = ExposureRecord(valid=True, frame_id=1, device_timestamp_ns=1)
     views = {}
     for name, image in zip(names, truth.images, strict=True):
-        light = 0.01 * (image - np.median(image)) if name in covered else image
+        light = rng.normal(0, 0.03, image.shape) if name in covered else image
         grey = np.clip(np.rint(LEVEL + 400 * light), 0, FULL_SCALE).astype(np.uint16)
-        views[name] = DoubleFrame(grey, grey, recorded, recorded)
+        views[name] = DoubleFrame(grey, grey if frames == 2 else None, recorded, recorded)
     with RunWriter(run_dir, header) as writer:
         for index in range(shots):
             writer.write_shot(Shot(index, ImageKey.SAMPLE, views))
         writer.finish("completed")
-    return run_dir, truth
+    return run_dir
 
 
 def write_bright_calibration(path: Path) -> Path:

@@ -19,7 +19,7 @@ from processing.analysis.droplets.gaussian_blobs import BlobImages, BlobOptics, 
 from processing.analysis.droplets.point_spread import first_optics, refined_optics
 from processing.geometry import FloatArray
 
-MOST_ROUNDS = 60
+MOST_ROUNDS = 160
 FALLING_ROUNDS = 6
 """In which the threshold falls from ``FIRST`` to ``LAST`` median amplitudes; after a purge it begins at a quarter."""
 FIRST, LAST = 0.6, 0.1
@@ -28,7 +28,7 @@ LEAST_GAIN = 0.003
 PRUNE_FIRST, PRUNE_LAST = 0.08, 0.1
 """Droplets below so many median amplitudes are dropped, at the first and at the last threshold. At the last, 0.3 would
 lose one or two of a hundred droplets whose amplitudes spread as exp(N(0, 0.5))."""
-NOISE_SIGMAS = 4.0
+NOISE_SIGMAS = 5.0
 """No droplet is fainter than so many standard deviations of its amplitude."""
 SEEN_FROM_ASIDE = 0.6
 """What is left of a droplet at the nearest candidate of the coarser grid."""
@@ -36,7 +36,7 @@ ALONE_SIGMAS = 3.0
 """Of candidates that are closer, only the highest is tried; the others are if light is left."""
 APART_VOXEL = 1.2
 """Droplets that are closer become one."""
-PURGES, PURGE_BELOW, SETTLED = 8, 0.5, 0.99
+PURGES, PURGE_BELOW, SETTLED = 16, 0.5, 0.99
 """So often at most droplets below so many median amplitudes are dropped and found anew; it ends when their number falls
 no lower than to such a share."""
 SWEEPS, FINAL_SWEEPS = 12, 60

@@ -1,0 +1,94 @@
+"""Droplets of a shot in an HDF5 file: 1-D columns, a row per droplet and exposure."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from daq.files.atomic_file import replacing
+from processing.analysis.droplets.droplet_table import P_REAL_UNKNOWN, Droplets
+from processing.errors import BadInput
+
+SCHEMA = {"schema": "tomoshadow/droplets", "schema_version": 1}
+GROUP, PROVENANCE, FRAME = "droplets", "tomoshadow", "frame"
+UNITS = MappingProxyType({"mm": "mm", "mm2": "mm^2"})
+"""By the ending of a column's name; all others are numbers, or as bright as the images."""
+Value = str | int | float
+
+
+class DropletFileError(BadInput):
+    """A file does not hold droplets that can be read; the text names it."""
+
+
+@dataclass(frozen=True, eq=False)
+class StoredDroplets:
+    """Droplets as a file has them.
+
+    Parameters
+    ----------
+    columns : dict of name to (N,) array
+        ``frame`` is ``a`` or ``b``.
+    provenance : dict
+        Where they come from.
+    """
+
+    columns: dict[str, NDArray[np.generic]]
+    provenance: dict[str, Value]
+
+
+def write_droplets(path: Path, exposures: Mapping[str, Droplets], provenance: Mapping[str, Value]) -> None:
+    """Write the droplets of all exposures of a shot; the file appears whole or not at all, an old one is replaced.
+
+    Parameters
+    ----------
+    path : Path
+        Usually ``*.h5``.
+    exposures : mapping of frame name to Droplets
+        ``a``, and ``b`` where there is one.
+    provenance : Mapping[str, str | int | float]
+        Where they come from: kept as attributes of the group ``/tomoshadow``.
+    """
+    tables = [exposure.columns() for exposure in exposures.values()]
+    frames = [np.full(len(exposure), frame, "S1") for frame, exposure in exposures.items()]
+    columns = {FRAME: np.concatenate(frames)} | {
+        name: np.concatenate([table[name] for table in tables]) for name in tables[0]
+    }
+    with replacing(path) as part, h5py.File(part, "w") as file:
+        group = file.create_group(GROUP, track_order=True)
+        for name, values in columns.items():
+            group.create_dataset(name, data=values).attrs["units"] = UNITS.get(name.rpartition("_")[2], "1")
+        group["p_real"].attrs["reason"] = P_REAL_UNKNOWN
+        file.create_group(PROVENANCE).attrs.update({**provenance, **SCHEMA})
+
+
+def read_droplets(path: str | Path) -> StoredDroplets:
+    """Read a file of ``tomoshadow measure``.
+
+    Parameters
+    ----------
+    path : path
+        The file, ``shot_00012_droplets.h5``.
+
+    Returns
+    -------
+    StoredDroplets
+        ``columns`` by name, a row per droplet and exposure, and ``provenance``.
+
+    Raises
+    ------
+    DropletFileError
+        The file is missing, truncated, or not of droplets.
+    """
+    try:
+        with h5py.File(path, "r") as file:
+            columns = {name: column[:] for name, column in file[GROUP].items()}
+            attributes = dict(file[PROVENANCE].attrs)
+    except (OSError, KeyError, ValueError) as error:
+        raise DropletFileError(f"{path}: not a readable file of droplets: {error}") from error
+    columns[FRAME] = columns[FRAME].astype("U1")
+    plain = {name: value.item() if isinstance(value, np.generic) else value for name, value in attributes.items()}
+    return StoredDroplets(columns, {name: value for name, value in plain.items() if name not in SCHEMA})

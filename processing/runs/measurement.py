@@ -1,0 +1,288 @@
+"""One shot + one calibration -> droplets on disk. Every shot by itself, whoever asks for it."""
+
+import json
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+from scipy.stats import chi2
+
+from daq.files.run_directory import RunReader, Shot
+from processing.analysis.droplets.bright_shot import BrightShot, ShotVerdict, measure_bright
+from processing.analysis.droplets.droplet_file import write_droplets
+from processing.analysis.droplets.droplet_search import MARGIN_VOXEL, DropletSearch, plan_droplets
+from processing.analysis.droplets.droplet_table import Droplets
+from processing.analysis.droplets.ghost_share import CONFIDENCE, GhostShare, pooled
+from processing.calibration.calibration import Calibration
+from processing.calibration.calibration_file import file_sha256, load_calibration
+from processing.kernels import DEFAULT_THREADS
+from processing.preprocessing import Intensity, Polarity
+from processing.reconstruction.settings import FrozenValue, GridSettings
+from processing.runs.errors import PipelineError
+from processing.runs.pipeline import default_grid, frame_names, require_match
+from processing.runs.results_file import FrameName, Provenance, claim_results
+from processing.runs.workbench import References, read_references
+from processing.volume import VoxelGrid
+
+METHOD_VERSION = 1
+"""Of what the numbers in a file of droplets mean."""
+
+
+class MeasureSettings(FrozenValue):
+    """How droplets are measured; travels with every result."""
+
+    polarity: Annotated[Polarity, Field(description="bright particles on black; shadows are not measured yet")] = (
+        "bright"
+    )
+    grid: Annotated[GridSettings | None, Field(description="default: what all views see, one voxel per pixel")] = None
+    margin_voxel: Annotated[int, Field(ge=0, le=500, description="so far around the grid droplets are looked for")] = (
+        MARGIN_VOXEL
+    )
+    twins: Annotated[int, Field(ge=0, le=100, description="simulated twins per exposure that tell ghosts; 0: none")] = 0
+    seed: Annotated[int, Field(ge=0, description="of the twins")] = 0
+
+
+class Estimate(FrozenValue):
+    """A number, and where it lies with 95 % confidence."""
+
+    value: float
+    low: float
+    high: float
+
+
+class ShotDroplets(FrozenValue):
+    """What became of one shot; of two exposures, the less favourable verdict and ratio."""
+
+    shot: int
+    droplets: int
+    ghost_share: float | None
+    ghost_interval: tuple[float, float] | None
+    ghost_reason: str | None
+    residual_over_noise: float | None
+    verdict: ShotVerdict
+    reasons: tuple[str, ...]
+    cpu_s: float
+    file: str
+
+
+def require_measurable(run_name: str, recorded: Polarity, polarity: Polarity) -> None:
+    """Refuse what cannot be measured, before anything is read.
+
+    Raises
+    ------
+    PipelineError
+        Shadows, or a polarity other than the run's.
+    """
+    if polarity != recorded:
+        raise PipelineError(f"{run_name}: its images are recorded as {recorded}, they are not measured as {polarity}")
+    if polarity == "shadow":
+        raise PipelineError(
+            f"{run_name}: polarity shadow is not supported yet: only bright particles on black are measured as "
+            "droplets; tomoshadow reconstruct makes volumes of shadows"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredShot:
+    """A shot that was measured.
+
+    Parameters
+    ----------
+    summary : ShotDroplets
+        What became of it.
+    exposures : tuple of BrightShot
+        All that was measured.
+    """
+
+    summary: ShotDroplets
+    exposures: tuple[BrightShot, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class RunMeasurement:
+    """What the shots of a run share when they are measured.
+
+    Parameters
+    ----------
+    run : RunReader
+        The recorded run.
+    calibration : Calibration
+        Of its views.
+    settings : MeasureSettings
+        How.
+    search : DropletSearch
+        Where droplets are looked for.
+    references : References
+        Of the run.
+    provenance : Provenance
+        Where the droplets come from, but for the shot.
+    """
+
+    run: RunReader
+    calibration: Calibration
+    settings: MeasureSettings
+    search: DropletSearch
+    references: References
+    provenance: Provenance
+
+    @classmethod
+    def of(cls, run: RunReader, shot: int, calibration_file: Path, settings: MeasureSettings) -> "RunMeasurement":
+        """Plan the measurement of all shots by one of them.
+
+        Raises
+        ------
+        PipelineError
+            The shot is not valid, or run and calibration do not belong together.
+        CalibrationError
+            The calibration was refused.
+        ReconstructionError
+            Its views see too little in common, or are too few.
+        """
+        calibration = load_calibration(calibration_file)
+        require_match(run.run_dir.name, run.read_shot(shot), calibration)
+        views = tuple(run.header.views)
+        grid = settings.grid.to_grid() if settings.grid else default_grid(calibration)
+        search = plan_droplets(
+            [calibration.views[view].mapping for view in views], grid, views, margin_voxel=settings.margin_voxel
+        )
+        provenance = _provenance(run, calibration, calibration_file, settings)
+        return cls(run, calibration, settings, search, read_references(run), provenance)
+
+    def measure(self, shot: int, results_dir: Path, threads: int = DEFAULT_THREADS) -> MeasuredShot:
+        """Measure every exposure of one shot and write its droplets.
+
+        Parameters
+        ----------
+        shot : int
+            Index of the shot.
+        results_dir : Path
+            Receives the droplets; a file of the same shot and settings is replaced atomically.
+        threads : int
+            The droplets do not depend on it.
+
+        Raises
+        ------
+        PipelineError
+            The shot is not valid.
+        VolumeFileError
+            The directory holds results of something else.
+        """
+        started_cpu_s = time.process_time()
+        recorded = self.run.read_shot(shot)
+        require_match(self.run.run_dir.name, recorded, self.calibration)
+        claim_results(results_dir, self.provenance)
+        frames = frame_names(self.run)
+        exposures = tuple(self._exposure(recorded, frame, threads) for frame in frames)
+        told = {frame: _told(exposure) for frame, exposure in zip(frames, exposures, strict=True)}
+        droplets: dict[str, Droplets] = {
+            frame: exposure.droplets for frame, exposure in zip(frames, exposures, strict=True)
+        }
+        file = droplets_path(results_dir, shot)
+        write_droplets(file, droplets, {**self.provenance, "shot": shot, "exposures": json.dumps(told)})
+        return MeasuredShot(_summary(shot, exposures, time.process_time() - started_cpu_s, file), exposures)
+
+    def _exposure(self, shot: Shot, frame: FrameName, threads: int) -> BrightShot:
+        images = bright_images(self.run, shot, frame, self.references)
+        seed = self.settings.seed + shot.index
+        return measure_bright(images, self.search, twins=self.settings.twins, seed=seed, threads=threads)
+
+
+def bright_images(run: RunReader, shot: Shot, frame: FrameName, references: References) -> list[Intensity]:
+    """Images of one exposure less dark, over the full scale; not clipped, so that noise can be judged."""
+    images = []
+    for view, exposures in shot.views.items():
+        pixels = exposures.frame_a if frame == "a" else exposures.frame_b
+        if pixels is None:
+            raise PipelineError(f"shot {shot.index}: {view} has no exposure {frame}")
+        dark = references[view][0]
+        grey = pixels.astype(np.float32)
+        if dark is not None:
+            grey -= dark["ab".index(frame)]
+        images.append(grey / np.float32(2 ** run.header.views[view].bits - 1))
+    return images
+
+
+def _provenance(
+    run: RunReader, calibration: Calibration, calibration_file: Path, settings: MeasureSettings
+) -> Provenance:
+    return {
+        "run": run.header.run_id,
+        "calibration": calibration.id,
+        "calibration_file": calibration_file.name,
+        "calibration_sha256": file_sha256(calibration_file),
+        "settings": settings.model_dump_json(),
+        "method_version": METHOD_VERSION,
+        "tomoshadow": version("tomoshadow"),
+    }
+
+
+def droplets_path(results_dir: Path, shot: int) -> Path:
+    """Where the droplets of one shot lie."""
+    return results_dir / f"shot_{shot:05d}_droplets.h5"
+
+
+def statistics_of(exposures: Sequence[BrightShot], grid: VoxelGrid) -> dict[str, object]:
+    """Number of droplets, their density and share of ghosts over all exposures that are not refused."""
+    counted = [exposure for exposure in exposures if exposure.verdict is not ShotVerdict.REFUSED]
+    n, volume_mm3 = sum(len(exposure.droplets) for exposure in counted), len(counted) * grid.volume_mm3
+    ghosts = pooled(exposure.ghosts for exposure in counted if exposure.ghosts)
+    return {
+        "n": n,
+        "exposures": len(counted),
+        "number_density_per_mm3": _density(n, volume_mm3).model_dump() if counted else None,
+        "ghost_share": _share(ghosts),
+    }
+
+
+def _density(n: int, volume_mm3: float) -> Estimate:
+    """By counting alone (Garwood); shots of a spray scatter more."""
+    tail = (1 - CONFIDENCE) / 2
+    low = chi2.ppf(tail, 2 * n) / 2 if n else 0.0
+    return Estimate(
+        value=n / volume_mm3, low=float(low) / volume_mm3, high=float(chi2.isf(tail, 2 * n + 2)) / 2 / volume_mm3
+    )
+
+
+def _share(ghosts: GhostShare) -> dict[str, float] | None:
+    if ghosts.share is None or ghosts.interval is None:
+        return None
+    return Estimate(value=ghosts.share, low=ghosts.interval[0], high=ghosts.interval[1]).model_dump()
+
+
+def _told(exposure: BrightShot) -> Mapping[str, object]:
+    return {
+        "verdict": exposure.verdict.value,
+        "reasons": exposure.reasons,
+        "residual_over_noise": exposure.residual_over_noise,
+        "views": {name: asdict(view) for name, view in exposure.views.items()},
+        "ghosts": asdict(exposure.ghosts) if exposure.ghosts else None,
+    }
+
+
+def _summary(shot: int, exposures: tuple[BrightShot, ...], cpu_s: float, file: Path) -> ShotDroplets:
+    ghosts = pooled(exposure.ghosts for exposure in exposures if exposure.ghosts)
+    ratios = [exposure.residual_over_noise for exposure in exposures if exposure.residual_over_noise is not None]
+    verdict = max((exposure.verdict for exposure in exposures), key=list(ShotVerdict).index)
+    return ShotDroplets(
+        shot=shot,
+        droplets=sum(len(exposure.droplets) for exposure in exposures),
+        ghost_share=ghosts.share,
+        ghost_interval=ghosts.interval,
+        ghost_reason=None if ghosts.share is not None else _why_no_share(exposures, verdict),
+        residual_over_noise=max(ratios, default=None),
+        verdict=verdict,
+        reasons=tuple(dict.fromkeys(reason for exposure in exposures for reason in exposure.reasons)),
+        cpu_s=cpu_s,
+        file=file.name,
+    )
+
+
+def _why_no_share(exposures: Sequence[BrightShot], verdict: ShotVerdict) -> str:
+    if verdict is not ShotVerdict.GOOD:
+        return "; ".join(reason for exposure in exposures for reason in exposure.reasons)
+    return "no twins were asked for (--twins)"

@@ -1,0 +1,124 @@
+"""``tomoshadow measure``: droplets of a run in files, and bad input that gets one clear sentence."""
+
+import json
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from processing.analysis.droplets.droplet_file import read_droplets
+from processing.analysis.droplets.ghost_share import matches
+from server.cli.main import main
+from tests.support.bright_scenes import BOX, GRID, scene, write_bright_calibration, write_bright_run
+from tests.support.command_line import refused, shown, told
+from tests.support.droplet_run import write_calibration, write_run
+
+
+@pytest.fixture(scope="module")
+def bright(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a run of two double exposures and its calibration, and one of two single exposures."""
+    folder = tmp_path_factory.mktemp("bright")
+    write_bright_run(folder / "run", shots=2, frames=2)
+    write_bright_run(folder / "single", shots=2)
+    write_bright_calibration(folder / "calibration.json")
+    return folder
+
+
+def command(folder: Path, out: Path, *more: object, run: str = "run") -> list[object]:
+    return [
+        "measure", folder / run, "--calibration", folder / "calibration.json", "-o", out, f"--grid={BOX}", *more
+    ]  # fmt: skip
+
+
+def test_droplets_of_a_run_lie_in_files_where_they_are(
+    bright: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    result = told(capsys, *command(bright, tmp_path / "out", "--twins", "1", "--shots", "0:1", run="single"))
+    (shot,) = result["shots"]
+    assert set(shot) >= {
+        "shot", "droplets", "ghost_share", "ghost_interval", "residual_over_noise", "verdict", "cpu_s", "file"
+    }  # fmt: skip
+    assert (shot["shot"], shot["verdict"], result["polarity"]) == (0, "good", "bright")
+    assert shot["ghost_share"] < 0.03
+    assert shot["ghost_interval"][0] <= shot["ghost_share"] <= shot["ghost_interval"][1]
+    stored = read_droplets(tmp_path / "out" / shot["file"])
+    assert {len(column) for column in stored.columns.values()} == {shot["droplets"]}
+    first = stored.columns["frame"] == "a"
+    points_mm = np.column_stack([stored.columns[f"{axis}_mm"][first] for axis in "xyz"])
+    truth = scene()
+    of_found, of_truth = matches(points_mm, truth.points_mm, GRID.pitch_mm)
+    assert np.mean(of_truth >= 0) > 0.97
+    assert np.mean(of_found < 0) < 0.03
+    amplitudes = stored.columns["amplitude"][first][of_found >= 0] * 4095 / 400
+    assert np.median(amplitudes / truth.heights[of_found[of_found >= 0]]) == pytest.approx(1, abs=0.02)
+    density = result["statistics"]["number_density_per_mm3"]
+    assert density["low"] < density["value"] < density["high"]
+    assert result["statistics"]["n"] == shot["droplets"]
+
+
+def test_a_file_says_where_it_comes_from_and_what_each_column_is(
+    bright: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    result = told(capsys, *command(bright, tmp_path / "out", "--shots", "1:2"))
+    (shot,) = result["shots"]
+    assert (shot["ghost_share"], shot["ghost_reason"]) == (None, "no twins were asked for (--twins)")
+    with h5py.File(tmp_path / "out" / shot["file"]) as file:
+        columns = file["droplets"]
+        assert {column.ndim for column in columns.values()} == {1}
+        assert columns["x_mm"].attrs["units"] == "mm"
+        assert columns["cov_xz_mm2"].attrs["units"] == "mm^2"
+        assert "ghost_share" in columns["p_real"].attrs["reason"]
+        assert np.isnan(columns["p_real"][:]).all()
+        attributes = dict(file["tomoshadow"].attrs)
+    assert (attributes["schema"], attributes["schema_version"]) == ("tomoshadow/droplets", 1)
+    assert (attributes["run"], attributes["shot"]) == ("run", 1)
+    exposures = json.loads(attributes["exposures"])
+    assert list(exposures) == ["a", "b"]
+    assert set(exposures["a"]["views"]) == {"view1", "view2", "view3", "view4"}
+    assert exposures["a"]["verdict"] == "good"
+
+
+def test_what_exists_is_replaced_only_when_asked(
+    bright: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = command(bright, tmp_path / "out", "--shots", "0:1", run="single")
+    assert "droplets in 1 exposures" in shown(capsys, *arguments)
+    assert "exists; only --overwrite replaces it" in refused(capsys, *arguments)
+    told(capsys, *command(bright, tmp_path / "out", "--shots", "1:2", run="single"))
+    told(capsys, *arguments, "--overwrite")
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["settings.json", "shot_00000_droplets.h5"]
+
+
+def test_a_covered_view_is_refused_and_the_command_fails(
+    bright: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run_dir = write_bright_run(tmp_path / "run", covered=("view3",))
+    calibration = bright / "calibration.json"
+    arguments = ["measure", run_dir, "--calibration", calibration, "-o", tmp_path / "out", f"--grid={BOX}", "--json"]
+    assert main([*map(str, arguments)]) == 1
+    output = capsys.readouterr()
+    assert "shot 0: refused: view3 sees nothing while the others see droplets" in output.err
+    result = json.loads(output.out.splitlines()[-1])
+    assert result["shots"][0]["droplets"] == 0
+    assert result["statistics"]["number_density_per_mm3"] is None
+
+
+def test_shadows_are_not_measured_yet_and_say_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run_dir, calibration = write_run(tmp_path / "run"), write_calibration(tmp_path / "calibration.json")
+    arguments = ["measure", run_dir, "--calibration", calibration, "-o", tmp_path / "out"]
+    assert "polarity shadow is not supported yet" in refused(capsys, *arguments)
+    assert "polarity shadow is not supported yet" in refused(capsys, *arguments, "--polarity", "shadow")
+    assert "recorded as shadow, they are not measured as bright" in refused(capsys, *arguments, "--polarity", "bright")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_file_that_has_no_droplets_is_named(tmp_path: Path) -> None:
+    from processing.analysis.droplets.droplet_file import DropletFileError
+
+    path = tmp_path / "none.h5"
+    with pytest.raises(DropletFileError, match=r"none\.h5: not a readable file of droplets"):
+        read_droplets(path)
+    path.write_bytes(b"no HDF5")
+    with pytest.raises(DropletFileError, match=r"none\.h5"):
+        read_droplets(path)

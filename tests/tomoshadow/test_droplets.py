@@ -1,0 +1,32 @@
+"""``tomoshadow.measure``: droplets of images by the names of their views."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import tomoshadow as ts
+from tests.support.bright_scenes import GRID, MARGIN_VOXEL, scene, write_bright_calibration
+
+
+def test_droplets_of_named_images_are_measured_in_any_order(tmp_path: Path) -> None:
+    calibration, truth = ts.load_calibration(write_bright_calibration(tmp_path / "calibration.json")), scene()
+    images = dict(zip(calibration.views, truth.images, strict=True))
+    first, second = (
+        ts.measure(calibration, {name: images[name] for name in names}, GRID, margin_voxel=MARGIN_VOXEL)
+        for names in (list(images), list(images)[::-1])
+    )
+    assert first.verdict == "good"
+    assert list(second.views) == list(images)[::-1]
+    assert len(first.droplets) == pytest.approx(len(truth.heights), abs=2)
+    assert len(second.droplets) == pytest.approx(len(first.droplets), abs=1)
+    assert {len(column) for column in first.droplets.columns().values()} == {len(first.droplets)}
+
+
+def test_what_cannot_be_measured_is_named(tmp_path: Path) -> None:
+    calibration, truth = ts.load_calibration(write_bright_calibration(tmp_path / "calibration.json")), scene()
+    images = dict(zip(calibration.views, truth.images, strict=True))
+    with pytest.raises(ValueError, match="polarity shadow is not supported yet"):
+        ts.measure(calibration, images, GRID, polarity="shadow")
+    with pytest.raises(ts.BadInput, match=r"views \['view9'\] are not in calibration"):
+        ts.measure(calibration, {"view9": np.zeros((100, 240), np.float32)}, GRID)

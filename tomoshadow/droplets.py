@@ -1,0 +1,66 @@
+"""Droplets of images, by the names of their views."""
+
+from collections.abc import Mapping
+
+from processing.analysis.droplets.bright_shot import BrightShot, measure_bright
+from processing.analysis.droplets.droplet_search import MARGIN_VOXEL, plan_droplets
+from processing.calibration.calibration import Calibration
+from processing.kernels import DEFAULT_THREADS
+from processing.preprocessing import Intensity, Polarity
+from processing.volume import VoxelGrid
+
+
+def measure(
+    calibration: Calibration,
+    images: Mapping[str, Intensity],
+    grid: VoxelGrid,
+    *,
+    polarity: Polarity = "bright",
+    twins: int = 0,
+    seed: int = 0,
+    margin_voxel: int = MARGIN_VOXEL,
+    threads: int = DEFAULT_THREADS,
+) -> BrightShot:
+    """Measure the droplets of one exposure: where they are, how bright, how sure, and whether to believe it.
+
+    Parameters
+    ----------
+    calibration : Calibration
+        Of the views.
+    images : mapping of view to (rows, columns) float32 array
+        Bright particles on black, less the dark image, of any unit; not clipped at black, or noise cannot be judged.
+    grid : VoxelGrid
+        Where droplets are measured, about one voxel per pixel, see ``common_grid``.
+    polarity : {"bright"}
+        Shadows are not measured yet.
+    twins : int
+        Simulated twins of the exposure that tell how many are ghosts; each costs as much as the exposure itself.
+    seed : int
+        Of the twins.
+    margin_voxel : int
+        So far around the grid droplets are looked for: it must hold all that all views see.
+    threads : int
+        The result does not depend on it.
+
+    Returns
+    -------
+    BrightShot
+        ``droplets`` with ``points_mm``, ``covariance_mm2``, ``amplitudes`` and ``columns()``; ``verdict``, ``reasons``,
+        ``residual_over_noise``, ``views`` as they were found to be, and ``ghosts`` with ``share`` and ``interval``.
+
+    Raises
+    ------
+    CalibrationError
+        A view is not in the calibration or was refused, or the calibration has no common world.
+    ReconstructionError
+        Too few or too many views, or voxels much wider or narrower than pixels.
+    ValueError
+        Shadows, images that do not fit the calibration, or a pixel that is not finite.
+    """
+    if polarity != "bright":
+        raise ValueError(f"polarity {polarity} is not supported yet: only bright particles on black are measured")
+    names = tuple(images)
+    calibration.require_usable(names)
+    mappings = [calibration.views[name].mapping for name in names]
+    search = plan_droplets(mappings, grid, names, margin_voxel=margin_voxel)
+    return measure_bright(list(images.values()), search, twins=twins, seed=seed, threads=threads)
