@@ -102,7 +102,7 @@ class DropletStudy:
     """
 
     cases: tuple[DropletCase, ...] = ASKED_FOR
-    seeds: tuple[int, ...] = (201, 202, 203, 204, 205)
+    seeds: tuple[int, ...] = (301, 302, 303, 304, 305)
     shape: tuple[int, int, int] = SLAB
     image_size_px: tuple[int, int] = IMAGE_SIZE_PX
     margin_voxel: int = MARGIN_VOXEL

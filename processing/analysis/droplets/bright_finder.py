@@ -36,7 +36,7 @@ ALONE_SIGMAS = 3.0
 """Of candidates that are closer, only the highest is tried; the others are if light is left."""
 APART_VOXEL = 1.2
 """Droplets that are closer become one."""
-PURGES, PURGE_BELOW, SETTLED = 16, 0.5, 0.99
+PURGES, PURGE_BELOW, SETTLED = 16, 0.5, 0.995
 """So often at most droplets below so many median amplitudes are dropped and found anew; it ends when their number falls
 no lower than to such a share."""
 SWEEPS, FINAL_SWEEPS = 12, 60

@@ -17,8 +17,10 @@ from processing.kernels import DEFAULT_THREADS, _native
 
 MOST_SHIFT_PX = 0.3
 """Views that lie farther beside their calibration are refused."""
-TRUSTED_RATIO, REFUSED_RATIO = 1.10, 1.5
+TRUSTED_RATIO, REFUSED_RATIO = 1.05, 1.5
 """Of residual over noise: ghosts are not told from droplets from the first on, nothing is believed from the second."""
+MANY_GHOSTS = 0.1
+"""Share in a twin from which on a shot is doubtful: ghosts can explain images as well as the truth does."""
 LIT_SIGMAS, LIT_PIXELS = 6.0, 4
 """A view that has fewer pixels above so many standard deviations of its noise sees nothing."""
 TWIN_MOVE_VOXEL = 15.0
@@ -135,7 +137,18 @@ def measure_bright(
     rng = np.random.default_rng(seed)
     counted = [_twin_ghosts(shot, fit, search, left, rng) for _ in range(twins)]
     ghosts, found = (sum(counts) for counts in zip(*counted, strict=True))
-    return replace(told, ghosts=GhostShare(ghosts, found))
+    return judged_by_twins(told, GhostShare(ghosts, found))
+
+
+def judged_by_twins(shot: BrightShot, ghosts: GhostShare) -> BrightShot:
+    """A shot with the ghosts of its twins; doubtful where they are many, however well droplets explain the images."""
+    if ghosts.share is None or ghosts.share <= MANY_GHOSTS:
+        return replace(shot, ghosts=ghosts)
+    reason = (
+        f"of the droplets of a twin {100 * ghosts.share:.0f} % are ghosts, limit {100 * MANY_GHOSTS:.0f} %: too many "
+        "droplets for so few views"
+    )
+    return replace(shot, ghosts=ghosts, verdict=ShotVerdict.DOUBTFUL, reasons=(*shot.reasons, reason))
 
 
 def _check(images: Sequence[Image], search: DropletSearch) -> None:

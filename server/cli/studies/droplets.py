@@ -24,7 +24,7 @@ VARIED = {
 def add_droplets(studies: Verbs) -> None:
     """Add the study; without options that vary a case, it tries all cases for which something is asked for."""
     parser = add_study(studies, "droplets", droplets, "droplets found and ghosts when images are explained by droplets")
-    parser.add_argument("--seed", type=seed, default=201, help="of the first shot of a case")
+    parser.add_argument("--seed", type=seed, default=301, help="of the first shot of a case")
     parser.add_argument("--repeats", type=count, default=5, help="shots of a case")
     parser.add_argument("--density", type=positive, help="droplets per mm^3")
     parser.add_argument("--sigma", type=width, help="width of droplets in px")

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from processing.analysis.droplets.bright_shot import BrightShot, ShotVerdict, measure_bright
+from processing.analysis.droplets.bright_shot import BrightShot, ShotVerdict, judged_by_twins, measure_bright
 from processing.analysis.droplets.droplet_search import plan_droplets
-from processing.analysis.droplets.ghost_share import matches
+from processing.analysis.droplets.ghost_share import GhostShare, matches
 from processing.reconstruction.errors import ReconstructionError
 from processing.studies.droplets import BrightScene, DropletCase
 from processing.volume import VoxelGrid
@@ -65,6 +65,15 @@ def test_twins_of_a_shot_without_ghosts_have_none_or_few(shot: BrightShot) -> No
     assert shot.ghosts.share < 0.03
     assert shot.ghosts.interval is not None
     assert shot.ghosts.interval[1] > shot.ghosts.share
+
+
+def test_a_shot_whose_twin_is_full_of_ghosts_is_doubtful(shot: BrightShot) -> None:
+    doubtful = judged_by_twins(shot, GhostShare(30, 100))
+    assert doubtful.verdict is ShotVerdict.DOUBTFUL
+    assert doubtful.reasons == (
+        "of the droplets of a twin 30 % are ghosts, limit 10 %: too many droplets for so few views",
+    )
+    assert judged_by_twins(shot, GhostShare(0, 0)).verdict is ShotVerdict.GOOD
 
 
 def test_neither_scale_nor_level_of_the_images_matters(truth: BrightScene, shot: BrightShot) -> None:
