@@ -13,8 +13,10 @@ from processing.geometry import FloatArray
 
 Image32 = NDArray[np.float32]
 
-SMOOTHINGS_PX = (2.0, 4.0, 1.0, 8.0, 16.0)
-"""Scales of the derivatives, tried in turn: for most boards, for blurred and noisy ones, tiny squares, large blur."""
+SMOOTHINGS_PX = (2.0, 4.0, 1.0)
+"""Scales of the derivatives, tried in turn: for most boards, for blurred and noisy ones, for tiny squares."""
+COARSE_SMOOTHINGS_PX = (8.0, 16.0)
+"""Likewise, where none of these shows a grid: for large squares with large blur. Of smaller ones they show a part."""
 MIN_STRENGTH = 0.2
 """Saddle strength that a corner needs; an ideal sharp corner has 1."""
 MIN_CONTRAST = 0.12

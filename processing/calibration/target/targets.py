@@ -14,7 +14,13 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from processing.calibration.errors import OriginUnknown, TargetNotFound
-from processing.calibration.target.checkerboard import SMOOTHINGS_PX, corner_lattices, find_saddles, refine_corners
+from processing.calibration.target.checkerboard import (
+    COARSE_SMOOTHINGS_PX,
+    SMOOTHINGS_PX,
+    corner_lattices,
+    find_saddles,
+    refine_corners,
+)
 from processing.calibration.target.dots import assign_dots, dot_signal, find_dots, marked_dot
 from processing.calibration.target.lattice import (
     Lattice,
@@ -151,10 +157,14 @@ def _find_corners(
 
 def _candidate_boards(pixels: NDArray[np.float32], roll_deg: float) -> Iterator[tuple[Lattice, FloatArray]]:
     """Grids of corners and the corners; several scales and starts, as noise and dust can mislead one."""
-    for smoothing_px in SMOOTHINGS_PX:
+    seen = False
+    for smoothing_px in (*SMOOTHINGS_PX, *COARSE_SMOOTHINGS_PX):
+        if seen and smoothing_px in COARSE_SMOOTHINGS_PX:
+            return
         saddles = find_saddles(pixels, smoothing_px)
         for lattice in corner_lattices(saddles):
             if len(lattice) >= MIN_POINTS:
+                seen = True
                 yield trim_frame(orient(lattice, saddles.points_px, roll_deg), saddles.strength), saddles.points_px
 
 
