@@ -5,6 +5,7 @@ from itertools import product
 import numpy as np
 
 from processing.calibration.calibration import Model, ParameterCovariance, ViewCalibration
+from processing.calibration.fit.least_squares import one_blas_thread
 from processing.calibration.fit.pinhole_fit import PARAMETER_NAMES, PINHOLE_PARAMETERS, camera_derivatives
 from processing.calibration.fit.polynomial import COEFFICIENT_NAMES, polynomial_derivatives
 from processing.calibration.polynomial_mapping import PolynomialMapping
@@ -49,7 +50,8 @@ def least_covariance(mapping: ViewMapping, points_mm: FloatArray, model: Model, 
     """
     jacobian = _derivatives(mapping, points_mm, model)
     scale = np.linalg.norm(jacobian, axis=0)
-    triangle = np.linalg.qr(jacobian / scale, mode="r")
+    with one_blas_thread():
+        triangle = np.linalg.qr(jacobian / scale, mode="r")
     root = noise_px * np.linalg.inv(triangle) / scale[:, None]
     return ParameterCovariance(_names(model), _rounded(np.triu(root)))
 

@@ -6,6 +6,7 @@ too small for the threads of a BLAS, which would wait for each other for three t
 """
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from functools import cache
 
 import numpy as np
@@ -53,8 +54,13 @@ def minimise(
     (P,) array
         The best parameters found, finite as the first guess is; they may be far from any that fit.
     """
-    with _blas().limit(limits=1, user_api="blas"), np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+    with one_blas_thread(), np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         return _descend(residuals_at, derivatives_at, np.array(start, dtype=np.float64), robust_scale)
+
+
+def one_blas_thread() -> AbstractContextManager[object]:
+    """While it is entered, products and decompositions of a few columns do not wait for threads."""
+    return _blas().limit(limits=1, user_api="blas")
 
 
 @cache

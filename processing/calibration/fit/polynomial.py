@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from processing.calibration.errors import CalibrationError
-from processing.calibration.fit.least_squares import REJECT_FLOOR_PX, REJECT_SCALE, ROBUST_SCALE
+from processing.calibration.fit.least_squares import REJECT_FLOOR_PX, REJECT_SCALE, ROBUST_SCALE, one_blas_thread
 from processing.calibration.polynomial_mapping import EXPONENTS, ORDER_Z, PolynomialMapping, polynomial_terms
 from processing.geometry import FloatArray
 
@@ -65,5 +65,6 @@ def polynomial_derivatives(mapping: PolynomialMapping, points_mm: FloatArray) ->
 
 
 def _solve(terms: FloatArray, image_px: FloatArray, weights: FloatArray) -> FloatArray:
-    solution, *_ = np.linalg.lstsq(terms * weights[:, None], image_px * weights[:, None], rcond=None)
+    with one_blas_thread():
+        solution, *_ = np.linalg.lstsq(terms * weights[:, None], image_px * weights[:, None], rcond=None)
     return np.asarray(solution, dtype=np.float64)
