@@ -60,7 +60,8 @@ def minimise(
 
 def one_blas_thread() -> AbstractContextManager[object]:
     """While it is entered, products and decompositions of a few columns do not wait for threads."""
-    return _blas().limit(limits=1, user_api="blas")
+    limited: AbstractContextManager[object] = _blas().limit(limits=1, user_api="blas")
+    return limited
 
 
 @cache
