@@ -4,7 +4,7 @@
 
 #include "checksum.h"
 
-enum { WORDS_PER_LOOK = 4 }; /* a round takes two seconds */
+enum { WORDS_PER_LOOK = 4 }; /* a round takes less than two seconds */
 
 /* From image.ld. */
 extern uint32_t image_start[];
