@@ -3,7 +3,7 @@
 import threading
 import time
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from enum import Enum, auto
 
@@ -63,11 +63,14 @@ class PulseLine:
         Name of the device, for errors.
     port : str
         Path of the serial port.
+    clock_s : Callable[[], float]
+        The generator's time, in which it has to answer. A simulated one can be slower than the clock on the wall.
     """
 
-    def __init__(self, name: str, port: str) -> None:
+    def __init__(self, name: str, port: str, clock_s: Callable[[], float] = time.monotonic) -> None:
         self._name = name
         self._path = port
+        self._clock_s = clock_s
         self._port: serial.Serial | None = None
         self._asking = threading.Lock()
         self._counting = threading.Lock()
@@ -106,6 +109,11 @@ class PulseLine:
         """Name of the device."""
         return self._name
 
+    @property
+    def now_s(self) -> float:
+        """The generator's time."""
+        return self._clock_s()
+
     def close(self) -> None:
         """Give the port back; safe to call twice."""
         port, self._port = self._port, None
@@ -143,10 +151,10 @@ class PulseLine:
     def exchange(self, line: bytes) -> Reply:
         """Send a line once and as it is, damaged or not, and return the next reply; for the self-test."""
         what = repr(line)
-        deadline_s = time.monotonic() + LIMIT_S
+        deadline_s = self._clock_s() + LIMIT_S
         with self._alone(what):
             self._write(line, what, LIMIT_S)
-            while time.monotonic() < deadline_s:
+            while self._clock_s() < deadline_s:
                 received = self._next_line()
                 if received is not None and not is_echo(received):
                     return self._decoded(received)
@@ -168,8 +176,10 @@ class PulseLine:
 
     @contextmanager
     def _alone(self, command: str) -> Iterator[None]:
-        if not self._asking.acquire(timeout=2 * LIMIT_S):
-            raise DeviceTimeout(self._name, str(command), 2 * LIMIT_S)
+        deadline_s = self._clock_s() + 2 * LIMIT_S
+        while not self._asking.acquire(timeout=_SLICE_S):
+            if self._clock_s() >= deadline_s:
+                raise DeviceTimeout(self._name, str(command), 2 * LIMIT_S)
         try:
             yield
         finally:
@@ -181,20 +191,20 @@ class PulseLine:
 
     def _converse(self, request: Request, limit_s: float, offs: int | None) -> Reply:
         """Send until answered: the generator carries out a repeated line only once."""
-        deadline_s = time.monotonic() + limit_s
+        deadline_s = self._clock_s() + limit_s
         heard: Counter[_Heard] = Counter()
-        while time.monotonic() < deadline_s:
+        while self._clock_s() < deadline_s:
             self._check_not_overtaken(request.command, offs)
             self._write(encode_request(request), request.command, limit_s)
-            repeat_s = min(deadline_s, time.monotonic() + _REPEAT_S)
-            while time.monotonic() < repeat_s:
+            repeat_s = min(deadline_s, self._clock_s() + _REPEAT_S)
+            while self._clock_s() < repeat_s:
                 self._check_not_overtaken(request.command, offs)
                 reply = self._next_reply(request)
                 if isinstance(reply, Reply):
                     return reply
                 heard[reply] += 1
                 if reply is _Heard.DAMAGED:
-                    repeat_s = min(repeat_s, time.monotonic() + _REPEAT_DAMAGED_S)
+                    repeat_s = min(repeat_s, self._clock_s() + _REPEAT_DAMAGED_S)
         self._explain_silence(request.command, heard)
         raise DeviceTimeout(self._name, request.command.value, limit_s)
 

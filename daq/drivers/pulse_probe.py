@@ -1,7 +1,6 @@
 """Probe: asks a pulse generator for what it must do or must refuse, with pulse trains that give no light."""
 
 from dataclasses import dataclass
-from time import monotonic
 
 from daq.drivers.pulse_line import LIMIT_S, PulseLine
 from daq.drivers.pulse_protocol import MAX_SEQUENCE, Command, ErrorNumber, Reply, Request, encode_request
@@ -85,8 +84,8 @@ class Probe:
     def fire_when_allowed(self) -> int:
         """Fire until the period is over; how many shots were refused because they came early."""
         early = 0
-        deadline_s = monotonic() + LIMIT_S
-        while monotonic() < deadline_s:
+        deadline_s = self.line.now_s + LIMIT_S
+        while self.line.now_s < deadline_s:
             reply = self.line.answer(Command.FIRE)
             if reply.error is None:
                 return early

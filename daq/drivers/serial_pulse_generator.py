@@ -4,7 +4,8 @@
 the trigger of the shot, where nothing can be. All edges are shifted by the same whole number of ticks.
 """
 
-from collections.abc import Iterable, Mapping
+import time
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from types import TracebackType
 from typing import Self
@@ -51,6 +52,8 @@ class SerialPulseGenerator:
     max_current_a, max_light_a : Mapping[str, float]
         Limits of the LED of each view, for its pulses and its continuous light, which the generator itself shall keep;
         views that are not named keep the generator's own.
+    clock_s : Callable[[], float]
+        The generator's time, in which it has to answer.
 
     Raises
     ------
@@ -65,6 +68,7 @@ class SerialPulseGenerator:
         channels: Mapping[str, int],
         max_current_a: Mapping[str, float] | None = None,
         max_light_a: Mapping[str, float] | None = None,
+        clock_s: Callable[[], float] = time.monotonic,
     ) -> None:
         numbers = list(channels.values())
         if len(set(numbers)) < len(numbers) or not set(numbers) <= set(range(CHANNEL_COUNT)):
@@ -73,7 +77,7 @@ class SerialPulseGenerator:
         self._channels = dict(channels)
         self._max_current_a = dict(max_current_a or {})
         self._max_light_a = dict(max_light_a or {})
-        self._line = PulseLine(name, port)
+        self._line = PulseLine(name, port, clock_s)
         self._identity: Reply | None = None
         self._loaded: _LoadedTrain | None = None
 

@@ -1,5 +1,6 @@
 """Assembly: the only module that names concrete devices. Drivers are the same on a real and on a simulated rig."""
 
+import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
@@ -33,6 +34,7 @@ from server.rig.simulated_operator import SimulatedOperator
 from server.rig.simulated_scene import SimulatedScene
 
 Profiles = Mapping[str, CameraProfile]
+Clock = Callable[[], float]
 
 _GENERATOR = "pulse_generator"
 _STAGE_SPEED_MM_S = 100.0
@@ -100,15 +102,15 @@ def wire_rig(config: RigConfig) -> Iterator[AssembledRig]:
 @contextmanager
 def open_generator(config: RigConfig) -> Iterator[SerialPulseGenerator]:
     """Open the pulse generator alone, without the cameras; on a simulated rig nobody sees its light."""
-    with _generator_wired(config) as wired, _pulse_generator(wired) as generator:
+    with _generator_wired(config) as (wired, clock_s), _pulse_generator(wired, clock_s) as generator:
         yield generator
 
 
 @contextmanager
 def open_pulse_line(config: RigConfig) -> Iterator[tuple[PulseLine, Reply]]:
     """Open the line of the pulse generator and return what it says it is; the generator is off at the end."""
-    with _generator_wired(config) as wired:
-        line = PulseLine(_GENERATOR, _port_of(wired))
+    with _generator_wired(config) as (wired, clock_s):
+        line = PulseLine(_GENERATOR, _port_of(wired), clock_s)
         identity = line.open()
         try:
             yield line, identity
@@ -118,14 +120,15 @@ def open_pulse_line(config: RigConfig) -> Iterator[tuple[PulseLine, Reply]]:
 
 
 @contextmanager
-def _generator_wired(config: RigConfig) -> Iterator[RigConfig]:
-    """Yield the configuration with the port of a simulated generator in it, where the rig is simulated."""
+def _generator_wired(config: RigConfig) -> Iterator[tuple[RigConfig, Clock]]:
+    """Yield the configuration, with the port of a simulated generator where the rig is simulated, and its time."""
     if config.simulation is None:
         with hold_generator(config):
-            yield config
+            yield config, time.monotonic
         return
     with _simulated_generator(config, lambda _: None) as firmware:
-        yield config.model_copy(update={"pulse_generator": PulseGeneratorConfig(port=firmware.port)})
+        port = PulseGeneratorConfig(port=firmware.port)
+        yield config.model_copy(update={"pulse_generator": port}), firmware.clock_s
 
 
 def _simulated_generator(config: RigConfig, on_fired: Callable[[FiredTrain], None]) -> FirmwareProcess:
@@ -133,19 +136,20 @@ def _simulated_generator(config: RigConfig, on_fired: Callable[[FiredTrain], Non
     return FirmwareProcess(channels_of(config), on_fired, emulated=emulated)
 
 
-def _rig(config: RigConfig, profiles: Profiles, interlock: Interlock) -> Rig:
+def _rig(config: RigConfig, profiles: Profiles, interlock: Interlock, clock_s: Clock = time.monotonic) -> Rig:
     stage = None if config.stage is None else _stage(config.stage)
     cameras = {
         name: AravisCamera(name, view.camera.ip, profiles[name], (view.sensor.height_px, view.sensor.width_px))
         for name, view in config.views.items()
     }
-    return Rig(cameras, _pulse_generator(config), interlock, stage, max_current_a=_current_limits_a(config))
+    generator = _pulse_generator(config, clock_s)
+    return Rig(cameras, generator, interlock, stage, max_current_a=_current_limits_a(config))
 
 
-def _pulse_generator(config: RigConfig) -> SerialPulseGenerator:
+def _pulse_generator(config: RigConfig, clock_s: Clock) -> SerialPulseGenerator:
     max_light_a = {name: view.max_light_a for name, view in config.views.items()}
     return SerialPulseGenerator(
-        _GENERATOR, _port_of(config), channels_of(config), _current_limits_a(config), max_light_a
+        _GENERATOR, _port_of(config), channels_of(config), _current_limits_a(config), max_light_a, clock_s
     )
 
 
@@ -197,7 +201,7 @@ def _simulation(
         }
     )
     operator = SimulatedOperator(scene, laboratory)
-    return AssembledRig(_rig(wired, profiles, interlock), laboratory, (operator,))
+    return AssembledRig(_rig(wired, profiles, interlock, generator.clock_s), laboratory, (operator,))
 
 
 def _interlock_and_switch(simulation: SimulationConfig) -> tuple[Interlock, DoorSwitch]:

@@ -85,7 +85,7 @@ class Board(Stand):
 def board_with(*, emulated: bool) -> Iterator[Board]:
     with (
         FirmwareProcess(CHANNELS, lambda train: opened.see(train), emulated=emulated) as firmware,
-        SerialPulseGenerator("generator", firmware.port, CHANNELS) as generator,
+        SerialPulseGenerator("generator", firmware.port, CHANNELS, clock_s=firmware.clock_s) as generator,
     ):
         opened = Board(generator, firmware)
         yield opened

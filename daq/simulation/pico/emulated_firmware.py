@@ -2,14 +2,16 @@
 
 Run as a program, it speaks like the host build of the firmware, ``firmware/host/main.c``::
 
-    python -m daq.simulation.pico.emulated_firmware IMAGE.bin
+    python -m daq.simulation.pico.emulated_firmware IMAGE.bin CLOCK
 
+CLOCK is the descriptor of an open file, whose first eight bytes are the Pico's time in seconds, a native double.
 What it says of a shot is not what the firmware meant to do, but what its pins did.
 """
 
 import os
 import pty
 import select
+import struct
 import sys
 import time
 import tty
@@ -42,17 +44,21 @@ class EmulatedFirmware:
         Told one line per shot: ``fired COUNT {CHANNEL CAMERA_NS A_START_NS A_WIDTH_NS B_START_NS B_WIDTH_NS
         CURRENT_MA}...``; a pulse that was not given has width 0. ``lit {CHANNEL CURRENT_MA}...`` and ``dark`` when
         continuous light begins and ends.
+    clock : int
+        File descriptor of the clock.
     """
 
-    def __init__(self, image: bytes, serial_line: int, tell: Callable[[str], None]) -> None:
+    def __init__(self, image: bytes, serial_line: int, tell: Callable[[str], None], clock: int) -> None:
         self._pico = EmulatedPico(image)
         self._serial_line = serial_line
         self._tell = tell
+        self._clock = clock
         self._fired = 0
         self._lit = False
         self._to_lose = 0
         self._to_damage = 0
         self._pico.run_ms(_BOOT_MS)
+        self._show_time()
         self._zero_s = time.monotonic() - self._pico.cycle / _CYCLES_PER_S
         self._instructions: Mapping[str, Callable[[str], None]] = {
             "interlock": lambda level: self._pico.set_interlock(level == "1"),
@@ -108,6 +114,10 @@ class EmulatedFirmware:
             self._report_light()
             self._report_shot()
             self._forward_replies()
+            self._show_time()
+
+    def _show_time(self) -> None:
+        os.pwrite(self._clock, struct.pack("d", self._pico.cycle / _CYCLES_PER_S), 0)
 
     def _reset(self, cause: str) -> None:
         if cause == "watchdog":
@@ -233,7 +243,7 @@ def _serve(firmware: EmulatedFirmware, serial_line: int) -> None:
 def main() -> None:
     """Serve until stdin ends; nobody is told the port before the firmware has started."""
     serial_line, port = _open_terminal()
-    firmware = EmulatedFirmware(Path(sys.argv[1]).read_bytes(), serial_line, _print)
+    firmware = EmulatedFirmware(Path(sys.argv[1]).read_bytes(), serial_line, _print, int(sys.argv[2]))
     _print(f"port {port}")
     _serve(firmware, serial_line)
 

@@ -5,15 +5,19 @@ and the light of the simulated cameras.
 """
 
 import importlib.util
+import os
 import queue
 import signal
+import struct
 import subprocess
 import sys
+import tempfile
 import threading
+import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from types import TracebackType
-from typing import Self
+from typing import IO, Self
 
 from daq.errors import DeviceTimeout, DeviceUnavailable
 from daq.shot import FiredTrain, LightPulse
@@ -22,11 +26,12 @@ from daq.simulation.pico.firmware_build import build_firmware, build_image
 _DEVICE = "simulated pulse generator"
 _ANSWER_LIMIT_S = 20.0
 """Three seconds of an emulated board that is armed take two of a processor, which others use too."""
+STANDSTILL_S = _ANSWER_LIMIT_S
 _FIELDS_PER_CHANNEL = 7
 
 
 class FirmwareProcess:
-    """A pulse generator that runs on this computer, in real time.
+    """A pulse generator that runs on this computer: in real time, but for an emulated one where that is too slow.
 
     Parameters
     ----------
@@ -41,7 +46,8 @@ class FirmwareProcess:
     def __init__(
         self, channels: Mapping[str, int], on_fired: Callable[[FiredTrain], None], *, emulated: bool = False
     ) -> None:
-        self._command = _emulator_command if emulated else _host_command
+        self._emulated = emulated
+        self._clock: IO[bytes] | None = None
         self._views = {number: view for view, number in channels.items()}
         self._on_fired = on_fired
         self._process: subprocess.Popen[str] | None = None
@@ -62,7 +68,7 @@ class FirmwareProcess:
         return self._running().pid
 
     def __enter__(self) -> Self:
-        self._process = subprocess.Popen(self._command(), stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        self._process = self._start_emulator() if self._emulated else _start(_host_command())
         self._reader = threading.Thread(target=self._read_events, args=(self._process,), name=_DEVICE, daemon=True)
         self._reader.start()
         try:
@@ -77,6 +83,30 @@ class FirmwareProcess:
     ) -> None:
         self._end()
 
+    def _start_emulator(self) -> subprocess.Popen[str]:
+        if importlib.util.find_spec("rp2040py") is None:
+            missing = "rp2040py, which emulates the Pico, is missing (pip install rp2040py==0.3.6)"
+            raise DeviceUnavailable(_DEVICE, missing)
+        self._clock = tempfile.TemporaryFile()  # noqa: SIM115 - open as long as the process
+        clock = self._clock.fileno()
+        program = [sys.executable, "-m", "daq.simulation.pico.emulated_firmware", str(build_image()), str(clock)]
+        return _start(program, clock)
+
+    def clock_s(self) -> float:
+        """The generator's own time, which does not go on while an emulated one is not given a processor.
+
+        Raises
+        ------
+        DeviceUnavailable
+            It stands still.
+        """
+        if self._clock is None:
+            return time.monotonic()
+        if time.time() - os.fstat(self._clock.fileno()).st_mtime > STANDSTILL_S:
+            raise DeviceUnavailable(_DEVICE, f"has stood still for {STANDSTILL_S:g} s")
+        (now_s,) = struct.unpack("d", os.pread(self._clock.fileno(), 8, 0))
+        return float(now_s)
+
     def _end(self) -> None:
         process = self._running()
         process.kill()
@@ -87,6 +117,8 @@ class FirmwareProcess:
             if pipe is not None:
                 with suppress(BrokenPipeError):  # an instruction to a generator that had died before
                     pipe.close()
+        if self._clock is not None:
+            self._clock.close()
 
     def set_interlock(self, closed: bool) -> None:
         """Open or close the generator's interlock input."""
@@ -205,10 +237,8 @@ def _host_command() -> list[str]:
     return [str(build_firmware())]
 
 
-def _emulator_command() -> list[str]:
-    if importlib.util.find_spec("rp2040py") is None:
-        raise DeviceUnavailable(_DEVICE, "rp2040py, which emulates the Pico, is missing (pip install rp2040py==0.3.6)")
-    return [sys.executable, "-m", "daq.simulation.pico.emulated_firmware", str(build_image())]
+def _start(command: list[str], *files: int) -> subprocess.Popen[str]:
+    return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, pass_fds=files)
 
 
 def _lines(process: subprocess.Popen[str]) -> Iterator[str]:

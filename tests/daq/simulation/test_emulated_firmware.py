@@ -1,5 +1,8 @@
 """The driver on the real image: an emulated Pico behind a pseudo-terminal, in the time of the wall clock."""
 
+import os
+import signal
+import threading
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
@@ -7,10 +10,12 @@ from dataclasses import replace
 import pytest
 
 from daq.devices import GeneratorState, TriggerSource
+from daq.drivers.pulse_line import LIMIT_S
 from daq.drivers.serial_pulse_generator import SerialPulseGenerator
-from daq.errors import DeviceError, DeviceRefused, DeviceUnavailable
+from daq.errors import DeviceError, DeviceRefused, DeviceTimeout, DeviceUnavailable
 from daq.run_plan import PulsePair, RunPlan
 from daq.shot import FiredTrain
+from daq.simulation.pico import firmware_process
 from daq.simulation.pico.emulated_firmware import measured_shot
 from daq.simulation.pico.firmware_process import FirmwareProcess
 from daq.simulation.pico.rp2040_chip import TRIGGER
@@ -42,9 +47,13 @@ def firmware(light: list[FiredTrain]) -> Iterator[FirmwareProcess]:
         yield process
 
 
+def driver_of(firmware: FirmwareProcess) -> SerialPulseGenerator:
+    return SerialPulseGenerator("generator", firmware.port, CHANNELS, clock_s=firmware.clock_s)
+
+
 def test_a_day_at_the_bench(firmware: FirmwareProcess, light: list[FiredTrain]) -> None:
     """Twenty shots, a lost reply, an abort, external triggers, the interlock, the emergency stop, the watchdog."""
-    with SerialPulseGenerator("generator", firmware.port, CHANNELS) as generator:
+    with driver_of(firmware) as generator:
         assert generator.identity().firmware.split()[-1].startswith("rp2040")
         configured = generator.configure(shot_timing())
         generator.arm(SHOTS + 10)
@@ -65,7 +74,7 @@ def test_a_day_at_the_bench(firmware: FirmwareProcess, light: list[FiredTrain]) 
         firmware.reset(by_watchdog=True)
         with pytest.raises(DeviceError, match="reset"):
             generator.status()
-    with SerialPulseGenerator("generator", firmware.port, CHANNELS) as generator:
+    with driver_of(firmware) as generator:
         status = generator.status()
         assert (status.state, status.faults) == (GeneratorState.FAULT, ("watchdog",))
 
@@ -109,8 +118,38 @@ def press_the_stop(firmware: FirmwareProcess, generator: SerialPulseGenerator) -
     assert generator.status().state is GeneratorState.SAFE
 
 
+def test_a_busy_computer_is_no_silent_generator(firmware: FirmwareProcess) -> None:
+    """The driver waits in the time of the board, which is given no processor for longer than the driver would wait."""
+    with driver_of(firmware) as generator:
+        os.kill(firmware.pid, signal.SIGSTOP)
+        going_on = threading.Timer(1.5 * LIMIT_S, os.kill, (firmware.pid, signal.SIGCONT))
+        going_on.start()
+        stopped_s = firmware.clock_s()
+        assert generator.status().state is GeneratorState.SAFE
+        assert firmware.clock_s() - stopped_s < LIMIT_S
+        going_on.join()
+
+
+def test_a_silent_generator_is_named_in_its_own_time(firmware: FirmwareProcess) -> None:
+    with driver_of(firmware) as generator:
+        firmware.lose_replies(100)
+        asked_s = firmware.clock_s()
+        with pytest.raises(DeviceTimeout, match="STATUS"):
+            generator.status()
+        assert LIMIT_S <= firmware.clock_s() - asked_s < 2 * LIMIT_S
+        firmware.lose_replies(0)
+
+
+def test_a_generator_that_stands_still_is_named(firmware: FirmwareProcess, monkeypatch: pytest.MonkeyPatch) -> None:
+    with suppress(DeviceError), driver_of(firmware) as generator:
+        monkeypatch.setattr(firmware_process, "STANDSTILL_S", 0.3)
+        os.kill(firmware.pid, signal.SIGSTOP)
+        with pytest.raises(DeviceUnavailable, match="stood still"):
+            generator.status()
+
+
 def test_a_pulled_plug_is_named(firmware: FirmwareProcess) -> None:
-    with suppress(DeviceError), SerialPulseGenerator("generator", firmware.port, CHANNELS) as generator:
+    with suppress(DeviceError), driver_of(firmware) as generator:
         generator.configure(shot_timing())
         firmware.kill()
         with pytest.raises(DeviceUnavailable):
