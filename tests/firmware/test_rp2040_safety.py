@@ -28,6 +28,10 @@ DARK_WITHIN_NS = 450
 out entering the interrupt, about 20 cycles."""
 CUT_WITHIN_NS = 800
 """The camera triggers too; measured: 640 ns. What is only noticed after arming is cut in 2200 ns."""
+NVIC_ENABLE, NVIC_PEND = 0xE000_E100, 0xE000_E200
+WATCHDOG_LOAD, WATCHDOG_TICKS_PER_MS = 0x4005_8004, 2000
+UNEXPECTED = 1 << 3
+"""The interrupt of an alarm that nobody uses."""
 RAM, STACK_SIZE, STACK_BOUND = 0x2000_0000, 1280, 1108
 PAINT = 0xA5A5_A5A5
 ABORT_WITHIN_NS = 600
@@ -330,6 +334,39 @@ def test_a_hung_processor_is_restarted_dark_and_says_so(board: Board) -> None:
     assert board.ask(Command.FIRE).error is ErrorNumber.FAULT_LATCHED
 
 
+def test_a_hang_that_still_serves_interrupts_is_restarted_too(board: Board) -> None:
+    """A line that is never silent and a trigger pin that never rests are no sign of life."""
+    board.pico.hang(deaf=False)
+    edge_ms = 2
+    for edge in range((WATCHDOG_MS + 20) // edge_ms):
+        board.send(Command.BEAT)
+        board.pico.set_trigger_pin(edge % 2 == 0)
+        board.pico.run_ms(edge_ms)
+    assert len(board.pico.watchdog_resets) == 1
+    assert state_and_faults(board) == (State.FAULT, Fault.WATCHDOG)
+
+
+def test_an_exception_that_nobody_expects_ends_a_pulse_and_restarts_the_chip(board: Board) -> None:
+    raised: list[int] = []
+
+    def disturb() -> None:
+        raised.append(board.pico.cycle)
+        board.pico.write_word(NVIC_ENABLE, UNEXPECTED)
+        board.pico.write_word(NVIC_PEND, UNEXPECTED)
+
+    board.when("light0", True, 10, disturb)
+    board.send(Command.FIRE)
+    board.pico.run_ms(PERIOD_MS / 2)
+    assert (dark_at(board) - raised[0]) * CYCLE_NS < DARK_WITHIN_NS
+    assert not lit_after(board, raised[0]), "pulse B is not given"
+    assert not any(board.pico.levels().values())
+    assert board.pico.set_points_ma() == (0, 0, 0, 0)
+    board.pico.write_word(WATCHDOG_LOAD, WATCHDOG_TICKS_PER_MS)  # as if the rest of its time were over
+    board.pico.run_ms(1 + BOOT_MS)
+    assert len(board.pico.watchdog_resets) == 1
+    assert state_and_faults(board) == (State.FAULT, Fault.WATCHDOG)
+
+
 def test_the_watchdog_takes_pio_and_pins_with_it(board: Board) -> None:
     """The light is high when the processor dies; only reset domains that hold PIO and pins make it dark."""
     high = 3 << 8
@@ -348,6 +385,18 @@ def test_a_new_power_up_is_told_from_the_old_one(board: Board) -> None:
     reply = board.ask(Command.STATUS)
     assert reply.boot != before
     assert (State(reply.number("state")), reply.number("faults"), reply.number("fired")) == (State.SAFE, 0, 0)
+
+
+def test_a_stop_that_is_pressed_before_the_power_comes_is_a_fault(board: Board) -> None:
+    """There is no edge to be seen."""
+    board.pico.set_estop(False)
+    board.pico.power_up()
+    board.pico.run_ms(BOOT_MS)
+    assert state_and_faults(board) == (State.FAULT, Fault.ESTOP)
+    assert board.ask(Command.CLEAR).error is ErrorNumber.ESTOP_OPEN
+    board.pico.set_estop(True)
+    assert state_and_faults(board) == (State.FAULT, Fault.ESTOP)
+    assert board.ask(Command.CLEAR).error is None
 
 
 def test_the_outputs_never_move_while_it_starts() -> None:

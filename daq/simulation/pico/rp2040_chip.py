@@ -70,13 +70,14 @@ def start_boot_rom(chip: RP2040) -> None:
     chip.core.reset()
 
 
-def hang(chip: RP2040) -> None:
-    """Let the processor sleep from now on, deaf to interrupts."""
-    chip.write_uint32(_NVIC_DISABLE, 0xFFFF_FFFF)
+def hang(chip: RP2040, *, deaf: bool) -> None:
+    """Let the processor sleep from now on."""
+    if deaf:
+        chip.write_uint32(_NVIC_DISABLE, 0xFFFF_FFFF)
     chip.write_uint32(_HANG_ADDRESS, _HANG)
     chip.core.waiting = False
     chip.core.pc = _HANG_ADDRESS
-    chip.core.pm = True
+    chip.core.pm = deaf
 
 
 def is_high(chip: RP2040, output: str) -> bool:

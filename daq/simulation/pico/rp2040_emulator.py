@@ -193,9 +193,9 @@ class EmulatedPico:
         """Change a bit in the memory of the state machines of a PIO block, which the processor cannot read."""
         self._chip.pio[block].instructions[address] ^= 1 << bit
 
-    def hang(self) -> None:
-        """Let the processor sleep from now on, deaf to interrupts."""
-        hang(self._chip)
+    def hang(self, *, deaf: bool = True) -> None:
+        """Let the processor sleep from now on, but for interrupts, or deaf to those too."""
+        hang(self._chip, deaf=deaf)
 
     def at(self, cycle: int, action: Callable[[], None]) -> None:
         """Do something at a cycle that is still to come."""
