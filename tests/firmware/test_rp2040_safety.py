@@ -29,7 +29,8 @@ out entering the interrupt, about 20 cycles."""
 CUT_WITHIN_NS = 800
 """The camera triggers too; measured: 640 ns. What is only noticed after arming is cut in 2200 ns."""
 NVIC_ENABLE, NVIC_PEND = 0xE000_E100, 0xE000_E200
-WATCHDOG_LOAD, WATCHDOG_TICKS_PER_MS = 0x4005_8004, 2000
+WATCHDOG_CTRL, WATCHDOG_LOAD, WATCHDOG_TICKS_PER_MS = 0x4005_8000, 0x4005_8004, 2000
+PSM_WDSEL, UART_LCR_H = 0x4001_0008, 0x4003_402C
 UNEXPECTED = 1 << 3
 """The interrupt of an alarm that nobody uses."""
 RAM, STACK_SIZE, STACK_BOUND = 0x2000_0000, 1280, 1108
@@ -332,6 +333,20 @@ def test_a_hung_processor_is_restarted_dark_and_says_so(board: Board) -> None:
     assert (State(reply.number("state")), Fault(reply.number("faults"))) == (State.FAULT, Fault.WATCHDOG)
     assert reply.boot == before + 1
     assert board.ask(Command.FIRE).error is ErrorNumber.FAULT_LATCHED
+
+
+def test_the_watchdog_runs_on_under_a_debugger_and_takes_all_but_the_oscillators(board: Board) -> None:
+    control = board.pico.read_word(WATCHDOG_CTRL)
+    enabled, paused_by_debugger_or_jtag = control >> 30 & 1, control >> 24 & 7
+    assert (enabled, paused_by_debugger_or_jtag) == (1, 0)
+    assert board.pico.read_word(PSM_WDSEL) == 0x1FFFF & ~0b11
+
+
+def test_bytes_interrupt_one_by_one(board: Board) -> None:
+    """A FIFO would keep the abort byte back for the time of 32 bits."""
+    control = board.pico.read_word(UART_LCR_H)
+    word_length, fifo, parity = control >> 5 & 3, control >> 4 & 1, control >> 1 & 1
+    assert (word_length, fifo, parity) == (3, 0, 0)
 
 
 def test_a_hang_that_still_serves_interrupts_is_restarted_too(board: Board) -> None:
