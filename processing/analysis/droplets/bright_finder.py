@@ -39,6 +39,10 @@ APART_VOXEL = 1.2
 PURGES, PURGE_BELOW, SETTLED = 16, 0.5, 0.995
 """So often at most droplets below so many median amplitudes are dropped and found anew; it ends when their number falls
 no lower than to such a share."""
+HOPELESS = 1.5
+"""A fit that leaves so many times what it may is not purged: it is refused, however long it would go on."""
+MODEL_SHARE = 0.01
+"""Of the height of a droplet, to which it is round and Gaussian: without noise, so much may be left of it."""
 SWEEPS, FINAL_SWEEPS = 12, 60
 TOLERANCE, FINAL_TOLERANCE = 3e-3, 3e-4
 OPTICS_EVERY = 3
@@ -70,6 +74,11 @@ class BrightFit:
         """Amplitude below which noise cannot be told from a droplet."""
         return NOISE_SIGMAS * self.optics.amplitude_sigma
 
+    @property
+    def allowed(self) -> FloatArray:
+        """Root mean square that may be left of the images (K,): their noise, which is 1, or what the model is off."""
+        return np.maximum(1.0, MODEL_SHARE * self.scale * self.optics.gains)
+
     def brighter_than(self, amplitude: float) -> "BrightFit":
         """Without the droplets that are fainter."""
         return replace(self, blobs=self.blobs.where(self.blobs.amplitudes > amplitude))
@@ -94,6 +103,8 @@ def find_bright(shot: BlobImages, search: DropletSearch) -> BrightFit:
         number, before = number + 1, left
         if not at_rest:
             continue
+        if left > HOPELESS * rms_of(fit.allowed):
+            break
         purged = fit.brighter_than(PURGE_BELOW * fit.scale)
         if not purges or len(purged.blobs) == len(fit.blobs) or len(fit.blobs) > SETTLED * known:
             break
@@ -166,6 +177,11 @@ def rms(images: Sequence[Image]) -> float:
     """Root mean square of all pixels."""
     squares = sum(float(np.vdot(image, image)) for image in images)
     return float(np.sqrt(squares / sum(image.size for image in images)))
+
+
+def rms_of(values: FloatArray) -> float:
+    """Root mean square of a few values."""
+    return float(np.sqrt(np.mean(values**2)))
 
 
 def _first_scale(images: Sequence[Image], optics: BlobOptics) -> float:

@@ -6,7 +6,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from processing.analysis.droplets.bright_finder import BrightFit, find_bright, rms
+from processing.analysis.droplets.bright_finder import MODEL_SHARE, BrightFit, find_bright, rms, rms_of
 from processing.analysis.droplets.droplet_search import DropletSearch
 from processing.analysis.droplets.droplet_table import Droplets
 from processing.analysis.droplets.gaussian_blobs import BlobImages, BlobOptics, Blobs, Image
@@ -125,7 +125,7 @@ def measure_bright(
     fit = find_bright(shot, search)
     residuals = shot.residuals(fit.optics, fit.blobs)
     left = np.array([noise_of(residual) for residual in residuals])
-    ratio = rms(residuals) / float(np.sqrt(np.mean(left**2)))
+    ratio = rms(residuals) / rms_of(np.maximum(left, MODEL_SHARE * fit.scale * fit.optics.gains))
     views = _seen(fit.optics, noises, left, search.names)
     verdict, reasons = _judged(views, ratio)
     if verdict is ShotVerdict.REFUSED:
