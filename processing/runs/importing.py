@@ -62,6 +62,7 @@ def import_manifest(
     run = source.manifest.run
     shots = shot_sources(source, run) if run else []
     _check_files(source, shots)
+    _check_once(source, shots)
     _check_tables(source)
     with replacing(out_dir) as part:
         part.mkdir()
@@ -77,6 +78,19 @@ def _check_files(source: ManifestFile, shots: Sequence[ShotSource]) -> None:
         key, file = missing[0]
         others = f" (and {len(missing) - 1} more)" if len(missing) > 1 else ""
         raise source.error(key, f"{source.resolve(file)} does not exist{others}")
+
+
+def _check_once(source: ManifestFile, shots: Sequence[ShotSource]) -> None:
+    """Refuse an image of a shot that is named again, for another camera, exposure, or as a background."""
+    of_shots: set[tuple[Path, int | None]] = set()
+    for shot in sorted(shots, key=lambda one: one.image_key != ImageKey.SAMPLE):
+        for image in (image for images in shot.frames for image in images.values()):
+            place = source.resolve(image.file).resolve(), image.page
+            if place in of_shots:
+                page = "" if image.page is None else f", page {image.page},"
+                raise source.error(image.key, f"{place[0]}{page} is named twice; it is one exposure of one camera")
+            if shot.image_key == ImageKey.SAMPLE:
+                of_shots.add(place)
 
 
 def _check_tables(source: ManifestFile) -> None:

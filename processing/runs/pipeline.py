@@ -12,6 +12,7 @@ from daq.files.run_directory import RunReader, Shot
 from processing.calibration.calibration import Calibration
 from processing.calibration.calibration_file import file_sha256, load_calibration
 from processing.kernels import DEFAULT_THREADS
+from processing.light import odd_light
 from processing.preprocessing import Frame, Intensity, intensity, is_dim
 from processing.reconstruction.choices import ReconstructionMethod
 from processing.reconstruction.planning.common_volume import common_volume
@@ -37,7 +38,7 @@ class VolumeRecord(FrozenValue):
     ``residuals`` are those of SMART and MART, see ``processing.reconstruction.smart.SmartResult``. ``blind_views``
     see nothing in this exposure, no pixel above the noise floor: a shot may be empty, or a lens be covered.
     ``dim_views`` have no grey value above 1/8 of the full scale: light is missing, or the run states too many bits.
-    ``empty``: no voxel is above 0.
+    ``odd_light`` says of a view what does not fit its background or the polarity. ``empty``: no voxel is above 0.
     """
 
     shot: int
@@ -47,6 +48,7 @@ class VolumeRecord(FrozenValue):
     residuals: tuple[float, ...] = ()
     blind_views: tuple[str, ...] = ()
     dim_views: tuple[str, ...] = ()
+    odd_light: Mapping[str, str] = {}
     empty: bool = False
 
 
@@ -130,9 +132,11 @@ def reconstruct_shot(
             blind = tuple(view for view, image in zip(recorded.views, images, strict=True) if not image.any())
             bits = {view: run.header.views[view].bits for view in recorded.views}
             dim = tuple(view for view in bits if is_dim(_grey_values(recorded, view, frame), bits[view]))
-            told = {name: json.dumps(which) for name, which in (("blind_views", blind), ("dim_views", dim)) if which}
+            odd = _odd_light(run, recorded, frame, references)
+            faults = {"blind_views": blind, "dim_views": dim, "odd_light": odd}
+            told = {name: json.dumps(which) for name, which in faults.items() if which}
             written = _reconstruct_frame(reconstructor, images, results_dir, shot, frame, {**provenance, **told})
-            volumes.append(written.model_copy(update={"blind_views": blind, "dim_views": dim}))
+            volumes.append(written.model_copy(update=faults))
     return ShotResult(
         shot=shot,
         method=settings.method,
@@ -233,6 +237,21 @@ def _reconstruct_frame(
     write_slabs(file, replace(volume, slabs=slabs), reconstructor.plan.grid, named)
     seconds = round(begun_s + slabs.seconds, 4)
     return VolumeRecord(shot=shot, frame=frame, file=file.name, seconds=seconds, residuals=residuals, empty=slabs.empty)
+
+
+def _odd_light(run: RunReader, shot: Shot, frame: FrameName, references: References) -> dict[str, str]:
+    """What is odd with the light of the views of an exposure."""
+    said = {}
+    for view in shot.views:
+        dark, background = (None if one is None else one["ab".index(frame)] for one in references[view])
+        said[view] = odd_light(
+            _grey_values(shot, view, frame),
+            run.header.polarity,
+            bits=run.header.views[view].bits,
+            dark=dark,
+            background=background,
+        )
+    return {view: what for view, what in said.items() if what}
 
 
 def _grey_values(shot: Shot, view: str, frame: FrameName) -> Frame:

@@ -58,23 +58,34 @@ def average_volumes(files: list[Path]) -> tuple[Intensity, VoxelGrid]:
     Raises
     ------
     VolumeFileError
-        There are none, or their grids, calibrations or settings differ.
+        There are none, their grids, calibrations or settings differ, or two are of one exposure.
     """
     if not files:
         raise VolumeFileError("there are no volumes to average")
     with open_volume(files[0]) as first:
         grid, made_by = first.grid, _made_by(first.provenance)
     total = np.zeros(grid.shape, np.float32)
+    counted: dict[str, Path] = {}
     for file in files:
         with open_volume(file) as volume:
             if volume.grid != grid:
                 raise VolumeFileError(f"{file}: its grid {volume.grid} differs from {grid}, that of {files[0].name}")
             if differing := _differing(_made_by(volume.provenance), made_by):
                 raise VolumeFileError(f"{file}: {differing} of {files[0].name}; these have no common mean")
+            if (first_file := counted.setdefault(_exposure(volume.provenance) or str(file), file)) != file:
+                raise VolumeFileError(f"{file}: the same exposure as {first_file.name}; it would count twice")
             for first_row, slab in volume.slabs():
                 total[:, first_row : first_row + slab.shape[1]] += slab
     total /= np.float32(len(files))
     return total, grid
+
+
+def _exposure(provenance: Provenance) -> str:
+    """Run, shot and frame of a volume; empty where it does not say."""
+    names = ("run", "shot", "frame")
+    return (
+        ", ".join(f"{name} {provenance[name]}" for name in names) if all(name in provenance for name in names) else ""
+    )
 
 
 def _made_by(provenance: Provenance) -> dict[str, object]:

@@ -103,6 +103,8 @@ def _tell_faults(shot: "ShotResult") -> None:
             progress(
                 f"{where}: {name} uses less than 1/8 of its grey values; is light missing, or are its bits too many?"
             )
+        for name, what in volume.odd_light.items():
+            progress(f"{where}: {name} {what}")
         if volume.empty:
             progress(f"{where}: the volume is empty, no voxel is above 0")
 

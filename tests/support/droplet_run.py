@@ -12,6 +12,7 @@ from processing.calibration.calibration_file import save_calibration
 from processing.calibration.calibration_record import content_id
 from processing.calibration.verdict import Verdict
 from processing.geometry import PinholeCamera, view_camera
+from processing.preprocessing import Polarity
 from processing.studies.seen_droplets import droplet_calibration
 
 SHAPE = (120, 160)
@@ -50,11 +51,22 @@ def grey_values(image: NDArray[Any], bits: int) -> NDArray[np.uint8] | NDArray[n
 
 
 def write_run(
-    run_dir: Path, shots: int = 1, invalid: tuple[int, ...] = (), covered: tuple[str, ...] = (), bits: int = 8
+    run_dir: Path,
+    shots: int = 1,
+    invalid: tuple[int, ...] = (),
+    covered: tuple[str, ...] = (),
+    bits: int = 8,
+    polarity: Polarity = "shadow",
 ) -> Path:
-    """Record shots; in the invalid ones exposure B of view2 is missing; covered views are dark. ``bits`` are stated."""
+    """Record shots; in the invalid ones exposure B of view2 is missing; covered views are dark."""
     views = {name: ViewFormat(SHAPE, bits) for name in cameras()}
-    header = RunHeader(run_id=run_dir.name, created_utc="2026-01-01T00:00:00+00:00", views=views, separation_ns=6400)
+    header = RunHeader(
+        run_id=run_dir.name,
+        created_utc="2026-01-01T00:00:00+00:00",
+        views=views,
+        polarity=polarity,
+        separation_ns=6400,
+    )
     with RunWriter(run_dir, header) as writer:
         for index in range(shots):
             writer.write_shot(_shot(index, valid=index not in invalid, covered=covered, bits=bits))

@@ -34,7 +34,7 @@ def image(camera: str, value: int) -> Image:
 def folder(tmp_path: Path) -> Path:
     """Images ``left_7.png`` of grey value 7 and so on."""
     for camera in SIZES:
-        for value in (1, 2, 3, 4, 10, 20, 30, 40):
+        for value in (1, 2, 3, 4, 5, 6, 10, 20, 30, 40):
             cv2.imwrite(str(tmp_path / f"{camera}_{value}.png"), image(camera, value))
     return tmp_path
 
@@ -56,7 +56,7 @@ REFERENCES = f"""
 [[run.background]]
 {frames("a", 20)}{frames("b", 40)}
 [[run.dark]]
-{frames("a", 1)}{frames("b", 2)}"""
+{frames("a", 5)}{frames("b", 6)}"""
 
 
 BOARD = """[calibration]
@@ -97,7 +97,7 @@ def test_references_are_kept_and_averaged_a_and_b_apart(folder: Path) -> None:
         assert background is not None
         assert dark is not None
         np.testing.assert_array_equal(background, np.stack([image("right", 15), image("right", 35)]))
-        np.testing.assert_array_equal(dark, np.stack([image("left", 1), image("left", 2)]))
+        np.testing.assert_array_equal(dark, np.stack([image("left", 5), image("left", 6)]))
 
 
 def test_single_exposures_need_no_frame_b(folder: Path) -> None:
@@ -129,7 +129,10 @@ def test_root_may_come_from_the_environment(folder: Path, monkeypatch: pytest.Mo
         (RUN.replace("_3.", "_9."), r"line 9: .*left_9\.png does not exist \(and 1 more\)"),
         (RUN.replace(frames("b", 4), ""), r"line 1: run: shot 2: all of them have frame_b, or none"),
         (RUN.replace(', right = "right_2.png"', ""), r"line 1: run: shot 1: cameras differ from left, right"),
-        (RUN.replace('left_4.png"', 'right_4.png"'), r"line 10: run\.shot\.1\.frame_b\.left: .*40 x 20 px of 16 bit"),
+        (RUN.replace('left_4.png"', 'right_6.png"'), r"line 10: run\.shot\.1\.frame_b\.left: .*40 x 20 px of 16 bit"),
+        (RUN.replace("left_2", "left_1"), r"line 6: run\.shot\.0\.frame_b\.left: .*left_1\.png is named twice"),
+        (RUN.replace("right_3", "left_3"), r"line 9: run\.shot\.1\.frame_a\.right: .*left_3\.png is named twice"),
+        (RUN + REFERENCES.replace("left_10", "left_1"), r"run\.background\.0\.frame_a\.left: .*_1\.png is named twice"),
         (RUN.replace("left_2.png", "manifest.toml"), r"line 6: run\.shot\.0\.frame_b\.left: .*not an image"),
         ('[run]\npolarity = "shadow"\n[[run.shot]]\nframe_a = { left = "left_1.png" }\n', "1 camera, a run has 2 to 8"),
         ("[calibration]\norigin_px = { a = [1, 2] }\n", r"line 1: calibration: neither planes nor points"),

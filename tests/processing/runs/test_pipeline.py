@@ -176,6 +176,24 @@ def test_twelve_bits_in_words_of_sixteen_are_told(calibration_file: Path, tmp_pa
     assert {volume.dim_views for volume in reconstructed(run_dir, calibration_file).volumes} == {tuple(cameras())}
 
 
+def test_shadows_that_are_said_to_be_bright_are_told_with_the_volume(calibration_file: Path, tmp_path: Path) -> None:
+    run_dir = write_run(tmp_path / "run", polarity="bright")
+    volume = reconstructed(run_dir, calibration_file).volumes[0]
+    assert set(volume.odd_light) == set(cameras())
+    _, _, provenance = read_volume(run_dir / "results" / volume.file)
+    assert json.loads(str(provenance["odd_light"])) == volume.odd_light
+    assert reconstructed(write_run(tmp_path / "fine"), calibration_file).volumes[0].odd_light == {}
+
+
+def test_an_exposure_counts_once_in_a_mean(run_dir: Path, calibration_file: Path) -> None:
+    reconstructed(run_dir, calibration_file)
+    file = volume_path(run_dir / "results", 0, "a")
+    copy = volume_path(run_dir / "results", 7, "a")
+    copy.write_bytes(file.read_bytes())
+    with pytest.raises(VolumeFileError, match=r"shot_00007_a.vtkhdf: the same exposure as shot_00000_a"):
+        average_volumes([file, copy])
+
+
 def test_a_shot_with_missing_exposures_is_refused(run_dir: Path, calibration_file: Path) -> None:
     with pytest.raises(PipelineError, match="run, shot 1: exposures are missing"):
         reconstruct_shot(run_dir, 1, calibration_file, SETTINGS, run_dir / "results")

@@ -1,0 +1,70 @@
+"""Does the light of an exposure fit its background and its polarity? What does not makes volumes that look fine."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from processing.preprocessing import Frame, Intensity, Polarity
+
+STRIDE_PX = 4
+"""Every so many rows and columns are asked: light varies slowly."""
+GAIN = 1.25
+"""A pixel with that many times the light of its background is brighter than it, beyond flicker."""
+NOISE = 0.05
+"""Of the full scale: smaller differences are noise, darker backgrounds no light."""
+BRIGHTER_SHARE = 0.003
+"""So many pixels are brighter: more than glare and hot pixels."""
+LEAST_LIGHT = 0.8
+"""Of the background, somewhere: hardly a spray covers all of a view."""
+SHADOWS_ABOVE = 0.6
+"""Of the span of grey values: if half of the pixels are above, dark spots lie on bright ground."""
+
+
+def odd_light(
+    frame: Frame,
+    polarity: Polarity,
+    *,
+    bits: int,
+    dark: Intensity | None = None,
+    background: Intensity | None = None,
+) -> str:
+    """What is odd with the light of an exposure; empty where nothing is.
+
+    Parameters
+    ----------
+    frame : (rows, columns) uint8 or uint16 array
+        Grey values.
+    polarity : {"shadow", "bright"}
+        What the run states.
+    bits : int
+        Significant bits of a grey value.
+    dark, background : (rows, columns) float32 array, optional
+        As for ``processing.preprocessing.intensity``.
+    """
+    coarse = np.s_[::STRIDE_PX, ::STRIDE_PX]
+    floor = np.float32(0) if dark is None else dark[coarse]
+    light = (frame[coarse] - floor) / np.float32(2**bits - 1)
+    if polarity == "bright":
+        return _not_bright(light)
+    return "" if background is None else _unlike((light, (background[coarse] - floor) / np.float32(2**bits - 1)))
+
+
+def _not_bright(light: NDArray[np.float32]) -> str:
+    least, most = np.percentile(light, (0.1, 99.9))
+    if most - least > 2 * NOISE and (np.median(light) - least) / (most - least) > SHADOWS_ABOVE:
+        return 'shows dark spots on bright ground, and the run states polarity "bright"; is it "shadow"?'
+    return ""
+
+
+def _unlike(lights: tuple[NDArray[np.float32], NDArray[np.float32]]) -> str:
+    """Compare an exposure with its background where that has light."""
+    light, full = (one[lights[1] > NOISE] for one in lights)
+    if not full.size:
+        return "has a background without light; are background and dark exchanged?"
+    if np.mean(light > GAIN * full + NOISE) > BRIGHTER_SHARE or np.median(light / full) > GAIN:
+        return (
+            "is brighter than its background; is there spray in the background, was it taken with less light, "
+            'or are these bright particles (polarity = "bright")?'
+        )
+    if (share := np.percentile(light / full, 98)) < LEAST_LIGHT:
+        return f"has at most {100 * share:.0f} % of the light of its background; was that taken with more light?"
+    return ""

@@ -1,0 +1,71 @@
+"""Exposures whose light does not fit what the run states of them."""
+
+import re
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from processing.light import odd_light
+from processing.preprocessing import Polarity
+
+Grey = NDArray[np.float64]
+ROWS, COLUMNS = np.mgrid[:96, :128]
+LIGHT: Grey = 180.0 - 0.006 * ((ROWS - 48.0) ** 2 + (COLUMNS - 64.0) ** 2)
+
+
+def droplets(seed: int) -> Grey:
+    """Share of light that is missing."""
+    random = np.random.default_rng(seed)
+    missing = np.zeros(LIGHT.shape)
+    for v, u in random.uniform(5, (91, 123), (40, 2)):
+        missing = np.maximum(missing, 0.9 * np.exp(-((ROWS - v) ** 2 + (COLUMNS - u) ** 2) / 8))
+    return missing
+
+
+def grey(light: Grey) -> NDArray[np.uint8]:
+    noise = np.random.default_rng(9).normal(0, 2, light.shape)
+    return np.clip(np.round(light + noise), 0, 255).astype(np.uint8)
+
+
+def told(shot: Grey, background: Grey | None, polarity: Polarity = "shadow", dark: Grey | None = None) -> str:
+    references = {
+        name: grey(image).astype(np.float32)
+        for name, image in (("dark", dark), ("background", background))
+        if image is not None
+    }
+    return odd_light(grey(shot), polarity, bits=8, **references)
+
+
+SHOT = LIGHT * (1 - droplets(1))
+
+
+@pytest.mark.parametrize("gain", [0.9, 1.0, 1.1], ids=lambda gain: f"light of {gain:g}")
+def test_shadows_before_their_own_light_are_fine(gain: float) -> None:
+    assert told(gain * SHOT, LIGHT, dark=0 * LIGHT + 3) == ""
+    assert told(SHOT, None) == ""
+
+
+def test_bright_particles_on_black_are_fine() -> None:
+    assert told(5 + 200 * droplets(1), None, "bright") == ""
+    assert told(5 + 0 * LIGHT, None, "bright") == ""
+
+
+def test_half_a_view_of_liquid_is_fine() -> None:
+    assert told(np.where(COLUMNS < 64, 0.1, 1.0) * LIGHT, LIGHT) == ""
+
+
+@pytest.mark.parametrize(
+    ("shot", "background", "polarity", "words"),
+    [
+        pytest.param(SHOT, None, "bright", 'is it "shadow"', id="shadows said to be bright"),
+        pytest.param(SHOT, LIGHT, "bright", 'is it "shadow"', id="shadows said to be bright, with a background"),
+        pytest.param(255 - SHOT, 255 - LIGHT, "shadow", 'polarity = "bright"', id="inverted"),
+        pytest.param(SHOT, LIGHT * (1 - droplets(2)), "shadow", "spray in the background", id="a shot as background"),
+        pytest.param(SHOT, 0.6 * LIGHT, "shadow", "with less light", id="background with less light"),
+        pytest.param(0.5 * SHOT, LIGHT, "shadow", "at most 5[0-9] % of the light", id="background with more light"),
+        pytest.param(SHOT, 0 * LIGHT, "shadow", "background without light", id="background without light"),
+    ],
+)
+def test_what_does_not_fit_is_told(shot: Grey, background: Grey | None, polarity: Polarity, words: str) -> None:
+    assert re.search(words, told(shot, background, polarity))
