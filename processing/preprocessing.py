@@ -85,6 +85,8 @@ def intensity(
     for name, reference in (("dark", dark), ("background", background), ("output", out)):
         if reference is not None and reference.shape != frame.shape:
             raise ValueError(f"{name} image {reference.shape} does not fit the frame {frame.shape}")
+    if frame.ndim != 2:
+        raise ValueError(f"a frame is (rows, columns), not {frame.shape}: colour images must be made grey first")
     if frame.dtype not in (np.uint8, np.uint16):
         raise ValueError(f"a frame has grey values of uint8 or uint16, not {frame.dtype}")
     result = _result(frame.shape, out)

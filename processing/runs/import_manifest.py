@@ -199,8 +199,9 @@ def read_manifest(path: Path) -> ManifestFile:
     except tomllib.TOMLDecodeError as error:
         raise ManifestError(f"{path}: {error}") from error
     except ValidationError as error:
-        first = error.errors()[0]
-        raise _error(path, text, first["loc"], first["msg"].removeprefix("Value error, ")) from error
+        unknown_first = sorted(error.errors(), key=lambda problem: problem["type"] != "extra_forbidden")
+        first = unknown_first[0]
+        raise _error(path, text, first["loc"], _problem(first["type"], first["msg"])) from error
     return ManifestFile(path, text, manifest, _root(path, text, manifest.root))
 
 
@@ -226,6 +227,14 @@ def _root(path: Path, text: str, root: str | None) -> Path:
     if name not in os.environ:
         raise _error(path, text, ("root",), f"the environment variable {name} is not set")
     return Path(os.environ[name] + root[variable.end() :])
+
+
+def _problem(kind: str, message: str) -> str:
+    texts = {
+        "extra_forbidden": "there is no such key here; is it misspelt? docs/rig-file.md lists all keys",
+        "missing": "this key is missing",
+    }
+    return texts.get(kind, message.removeprefix("Value error, "))
 
 
 def _error(path: Path, text: str, key: Key, problem: str) -> ManifestError:

@@ -172,3 +172,8 @@ def test_memory_of_the_result_is_reused() -> None:
 def test_a_result_that_would_not_be_written_in_place_is_refused(out: NDArray[np.float32]) -> None:
     with pytest.raises(ValueError, match="output"):
         intensity(np.zeros((4, 4), np.uint8), Preprocessing(), bits=8, out=out)
+
+
+def test_a_colour_image_is_refused_in_words() -> None:
+    with pytest.raises(ValueError, match=r"\(4, 5, 3\): colour"):
+        intensity(np.zeros((4, 5, 3), np.uint8), Preprocessing(), bits=8)
