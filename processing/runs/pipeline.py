@@ -12,8 +12,7 @@ from daq.files.run_directory import RunReader, Shot
 from processing.calibration.calibration import Calibration
 from processing.calibration.calibration_file import file_sha256, load_calibration
 from processing.kernels import DEFAULT_THREADS
-from processing.light import odd_light
-from processing.preprocessing import Frame, Intensity, intensity, is_dim
+from processing.preprocessing import Intensity, intensity
 from processing.reconstruction.choices import ReconstructionMethod
 from processing.reconstruction.planning.common_volume import common_volume
 from processing.reconstruction.planning.plan import plan_reconstruction
@@ -23,6 +22,7 @@ from processing.reconstruction.settings import METHOD_VERSION, FrozenValue, Grid
 from processing.reconstruction.volume_file import write_slabs
 from processing.runs.clocked_slabs import ClockedSlabs
 from processing.runs.errors import PipelineError
+from processing.runs.exposure_faults import exposure_faults, grey_values
 from processing.runs.results_file import FrameName, Provenance, claim_results, volume_path
 from processing.runs.workbench import References, Workbench, read_references
 from processing.volume import VoxelGrid
@@ -129,11 +129,7 @@ def reconstruct_shot(
             images = shot_intensities(
                 run, recorded, frame, settings, reconstructor.images, references=references, threads=threads
             )
-            blind = tuple(view for view, image in zip(recorded.views, images, strict=True) if not image.any())
-            bits = {view: run.header.views[view].bits for view in recorded.views}
-            dim = tuple(view for view in bits if is_dim(_grey_values(recorded, view, frame), bits[view]))
-            odd = _odd_light(run, recorded, frame, references)
-            faults = {"blind_views": blind, "dim_views": dim, "odd_light": odd}
+            faults = exposure_faults(run, recorded, frame, images, references)
             told = {name: json.dumps(which) for name, which in faults.items() if which}
             written = _reconstruct_frame(reconstructor, images, results_dir, shot, frame, {**provenance, **told})
             volumes.append(written.model_copy(update=faults))
@@ -206,7 +202,7 @@ def shot_intensities(
         dark, background = references[view]
         images.append(
             intensity(
-                _grey_values(shot, view, frame),
+                grey_values(shot, view, frame),
                 preprocessing,
                 bits=header.views[view].bits,
                 dark=None if dark is None else dark[number],
@@ -237,29 +233,6 @@ def _reconstruct_frame(
     write_slabs(file, replace(volume, slabs=slabs), reconstructor.plan.grid, named)
     seconds = round(begun_s + slabs.seconds, 4)
     return VolumeRecord(shot=shot, frame=frame, file=file.name, seconds=seconds, residuals=residuals, empty=slabs.empty)
-
-
-def _odd_light(run: RunReader, shot: Shot, frame: FrameName, references: References) -> dict[str, str]:
-    """What is odd with the light of the views of an exposure."""
-    said = {}
-    for view in shot.views:
-        dark, background = (None if one is None else one["ab".index(frame)] for one in references[view])
-        said[view] = odd_light(
-            _grey_values(shot, view, frame),
-            run.header.polarity,
-            bits=run.header.views[view].bits,
-            dark=dark,
-            background=background,
-        )
-    return {view: what for view, what in said.items() if what}
-
-
-def _grey_values(shot: Shot, view: str, frame: FrameName) -> Frame:
-    exposures = shot.views[view]
-    pixels = exposures.frame_a if frame == "a" else exposures.frame_b
-    if pixels is None:
-        raise PipelineError(f"shot {shot.index}: {view} has no exposure {frame}")
-    return pixels
 
 
 def frame_names(run: RunReader) -> tuple[FrameName, ...]:

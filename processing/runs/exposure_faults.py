@@ -1,0 +1,45 @@
+"""What is wrong with the images of an exposure, so that its volume may look fine and be none: told with the volume."""
+
+from collections.abc import Sequence
+
+from daq.files.run_directory import RunReader, Shot
+from processing.light import odd_light
+from processing.preprocessing import Frame, Intensity, is_dim
+from processing.runs.errors import PipelineError
+from processing.runs.results_file import FrameName
+from processing.runs.workbench import References
+
+
+def exposure_faults(
+    run: RunReader, shot: Shot, frame: FrameName, images: Sequence[Intensity], references: References
+) -> dict[str, tuple[str, ...] | dict[str, str]]:
+    """Views that see nothing, that are dim, and whose light is odd; as ``VolumeRecord`` keeps them."""
+    bits = {view: run.header.views[view].bits for view in shot.views}
+    return {
+        "blind_views": tuple(view for view, image in zip(shot.views, images, strict=True) if not image.any()),
+        "dim_views": tuple(view for view in bits if is_dim(grey_values(shot, view, frame), bits[view])),
+        "odd_light": _odd_light(run, shot, frame, references),
+    }
+
+
+def grey_values(shot: Shot, view: str, frame: FrameName) -> Frame:
+    """Pixels of an exposure as they were recorded; PipelineError if it is missing."""
+    exposures = shot.views[view]
+    pixels = exposures.frame_a if frame == "a" else exposures.frame_b
+    if pixels is None:
+        raise PipelineError(f"shot {shot.index}: {view} has no exposure {frame}")
+    return pixels
+
+
+def _odd_light(run: RunReader, shot: Shot, frame: FrameName, references: References) -> dict[str, str]:
+    said = {}
+    for view in shot.views:
+        dark, background = (None if one is None else one["ab".index(frame)] for one in references[view])
+        said[view] = odd_light(
+            grey_values(shot, view, frame),
+            run.header.polarity,
+            bits=run.header.views[view].bits,
+            dark=dark,
+            background=background,
+        )
+    return {view: what for view, what in said.items() if what}
