@@ -5,6 +5,8 @@ from numpy.typing import NDArray
 
 from processing.preprocessing import Frame, Intensity, Polarity
 
+FULL = 0.998
+"""Of the full scale: nobody knows how much more light it was."""
 STRIDE_PX = 4
 """Every so many rows and columns are asked: light varies slowly."""
 GAIN = 1.25
@@ -15,6 +17,8 @@ BRIGHTER_SHARE = 0.003
 """So many pixels are brighter: more than glare and hot pixels."""
 LEAST_LIGHT = 0.8
 """Of the background, somewhere: hardly a spray covers all of a view."""
+SATURATED_SHARE = 0.01
+"""So many pixels of a background at full scale: more light than the camera can tell."""
 SHADOWS_ABOVE = 0.6
 """Of the span of grey values: if half of the pixels are above, dark spots lie on bright ground."""
 
@@ -40,12 +44,16 @@ def odd_light(
     dark, background : (rows, columns) float32 array, optional
         As for ``processing.preprocessing.intensity``.
     """
-    coarse = np.s_[::STRIDE_PX, ::STRIDE_PX]
+    coarse, most = np.s_[::STRIDE_PX, ::STRIDE_PX], np.float32(2**bits - 1)
     floor = np.float32(0) if dark is None else dark[coarse]
-    light = (frame[coarse] - floor) / np.float32(2**bits - 1)
+    light = (frame[coarse] - floor) / most
     if polarity == "bright":
         return _not_bright(light)
-    return "" if background is None else _unlike((light, (background[coarse] - floor) / np.float32(2**bits - 1)))
+    if background is None:
+        return ""
+    if (share := np.mean(background[coarse] > FULL * most)) > SATURATED_SHARE:
+        return f"has a background of which {100 * share:.0f} % are saturated: shadows are too pale there"
+    return _unlike((light, (background[coarse] - floor) / most))
 
 
 def _not_bright(light: NDArray[np.float32]) -> str:

@@ -118,8 +118,15 @@ def intensity(
     Raises
     ------
     ValueError
-        A reference image has another shape than the frame, or the frame other grey values.
+        A reference image has another shape than the frame or is not finite, or the frame has other grey values than
+        ``bits`` can hold.
     """
+    if not 1 <= bits <= 16 or (frame.size and int(frame.max()) >= 2**bits):
+        raise ValueError(f"bits {bits} of 1 to 16 reach to {2**bits - 1}, a pixel is {frame.max(initial=0)}")
+    for name, reference in (("background", background), ("dark", dark)):
+        if reference is not None and not np.isfinite(reference).all():
+            row, column = np.argwhere(~np.isfinite(reference))[0]
+            raise ValueError(f"{name}: pixel (column {column}, row {row}) is {reference[row, column]}")
     return preprocessing.intensity(
         frame,
         Preprocessing(polarity, minimum_window_px, noise_floor),

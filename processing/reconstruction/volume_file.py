@@ -56,10 +56,13 @@ def write_volume(
     Raises
     ------
     ValueError
-        Volume and grid differ in shape.
+        Volume and grid differ in shape, or a voxel is infinite or not a number.
     """
     if volume.shape != grid.shape:
         raise ValueError(f"{path}: volume has shape {volume.shape}, its grid {grid.shape}")
+    if not np.isfinite(volume).all():
+        z, y, x = np.argwhere(~np.isfinite(volume))[0]
+        raise ValueError(f"{path}: voxel (z {z}, y {y}, x {x}) is {volume[z, y, x]}")
     write_slabs(Path(path), SlabVolume.of(volume), grid, provenance)
 
 

@@ -46,6 +46,13 @@ def test_shadows_before_their_own_light_are_fine(gain: float) -> None:
     assert told(SHOT, None) == ""
 
 
+def test_light_that_the_camera_cannot_tell_is_odd() -> None:
+    assert re.fullmatch(
+        r"has a background of which \d+ % are saturated: shadows are too pale there", told(1.6 * SHOT, 1.6 * LIGHT)
+    )
+    assert told(1.6 * SHOT, 1.6 * LIGHT, dark=0 * LIGHT + 8).startswith("has a background of which")
+
+
 def test_bright_particles_on_black_are_fine() -> None:
     assert told(5 + 200 * droplets(1), None, "bright") == ""
     assert told(5 + 0 * LIGHT, None, "bright") == ""

@@ -1,6 +1,7 @@
 """Images by the names of their views: none can be taken for another, none is left out in silence."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -96,3 +97,19 @@ def test_intensities_of_an_array_are_those_of_the_formula() -> None:
     background, dark = np.full((2, 2), 210.0), np.full((2, 2), 10.0)
     found = ts.intensity(frame, bits=12, background=background, dark=dark, minimum_window_px=0, noise_floor=0.0)
     np.testing.assert_allclose(found, [[0.05, 0.55], [0.8, 1.0]], atol=1e-6)
+
+
+def test_what_is_no_grey_value_or_no_intensity_is_refused(tmp_path: Path) -> None:
+    frame, even = np.full((4, 5), 200, np.uint16), np.full((4, 5), 210.0)
+    with pytest.raises(ValueError, match="bits 7 of 1 to 16 reach to 127, a pixel is 200"):
+        ts.intensity(frame, bits=7, background=even)
+    with pytest.raises(ValueError, match="bits 17"):
+        ts.intensity(frame, bits=17, background=even)
+    even[2, 3] = np.nan
+    with pytest.raises(ValueError, match=r"background: pixel \(column 3, row 2\) is nan"):
+        ts.intensity(frame, bits=8, background=even)
+    volume = np.zeros(GRID.shape, np.float32)
+    volume[1, 2, 3] = np.inf
+    with pytest.raises(ValueError, match=r"voxel \(z 1, y 2, x 3\) is inf"):
+        ts.write_volume(tmp_path / "volume.vtkhdf", volume, GRID)
+    assert not list(tmp_path.iterdir())

@@ -24,7 +24,7 @@ the next; begun at 2.025 px, none comes closer than half of that. If one met a v
 millionth of the next one, which SMART then brightens until it explains all light of the pixel."""
 LINES_PER_AXIS, LINES_BEYOND = 5, 4.0
 """Lines of sight that are asked where they meet; and voxels that they lie apart where the grid is but one voxel."""
-MIN_COSINE = 1 / 3
+MIN_COSINE = 0.342
 """Between line of sight and z axis: flatter ones pass droplets between two planes; at 80 deg SMART is off by 17 %."""
 MAX_PATH_ERROR = 0.005
 """Of the length of a line of sight in one plane, by the point where all are said to meet."""
@@ -112,7 +112,10 @@ def rectify(mapping: ViewMapping, grid: VoxelGrid, pixels_per_voxel: float, max_
     nodes_px = points_at((0.0, 0.0))
     recorded_px_per_voxel = reference_scale * np.linalg.norm(np.diff(nodes_px, axis=1), axis=-1).mean() / MAP_SPACING_PX
     if recorded_px_per_voxel > MAX_PIXELS_PER_VOXEL:
-        raise NotRectifiable(f"a voxel covers {recorded_px_per_voxel:.2g} px, limit {MAX_PIXELS_PER_VOXEL} px")
+        raise NotRectifiable(
+            f"a voxel covers {recorded_px_per_voxel:.2g} px, limit {MAX_PIXELS_PER_VOXEL} px; "
+            "what is smaller than a voxel may lie between two"
+        )
     deviation_px = bend_px(nodes_px, points_at) + _deviation_px(mapping, grid, centre, to_reference)
     if deviation_px > max_deviation_px:
         raise NotRectifiable(f"rectified it would be off by {deviation_px:.2g} px, limit {max_deviation_px} px")
@@ -132,14 +135,14 @@ def rectify(mapping: ViewMapping, grid: VoxelGrid, pixels_per_voxel: float, max_
 def _central_projection(mapping: ViewMapping, grid: VoxelGrid) -> tuple[FloatArray, FloatArray]:
     """Voxel index (z, y, x) where lines of sight meet; and by what planes (nz,) are scaled onto the middle one."""
     voxels, along = _lines_of_sight(mapping, grid)
-    flattest = float(np.abs(along[:, 0]).min())
-    if flattest < MIN_COSINE:
-        angles_deg = np.rad2deg(np.arccos([flattest, MIN_COSINE]))
-        raise NotRectifiable("it looks {:.0f} deg beside the z axis, limit {:.0f} deg".format(*angles_deg))
     centre = _meeting_point(voxels, along)
     depth = np.arange(grid.shape[0]) - centre[0]
     if depth[0] * depth[-1] <= 0:
         raise NotRectifiable("its lines of sight meet beside the volume, or inside")
+    flattest = float(np.abs(along[:, 0]).min())
+    if flattest < MIN_COSINE:
+        angles_deg = np.rad2deg(np.arccos([flattest, MIN_COSINE]))
+        raise NotRectifiable("it looks {:.0f} deg beside the z axis, limit {:.0f} deg".format(*angles_deg))
     inclined = np.abs((voxels - centre)[:, 0]) / np.linalg.norm(voxels - centre, axis=1) / np.abs(along[:, 0])
     if not np.abs(inclined - 1).max() < MAX_PATH_ERROR:
         raise NotRectifiable("its lines of sight do not meet in one point")

@@ -35,7 +35,10 @@ def test_reconstruct_tells_grid_and_volumes(
         (2, "b"),
     ]
     assert {view["mapping"] for view in result["views"].values()} == {"exact"}, "voxels of 2 px are averaged"
-    assert result["views"]["view2"]["reason"] == "a voxel covers 2 px, limit 1.5 px"
+    assert (
+        result["views"]["view2"]["reason"]
+        == "a voxel covers 2 px, limit 1.5 px; what is smaller than a voxel may lie between two"
+    )
     assert result["cpu_s"] > 0
     assert result["peak_rss_mb"] > 0
     assert all((tmp_path / "out" / volume["file"]).is_file() for volume in result["volumes"])
