@@ -41,6 +41,8 @@ def check_placements(calibration_set: CalibrationSet, mappings: Mapping[str, Vie
         undecided = same_either_way(mappings, middle_mm, turned_deg)
         texts += [f"{name}: looks the same either way; if it is turned too, say --roll for it" for name in undecided]
         texts += [f"or {question}" for question in _exchanged(mappings, middle_mm, azimuths_deg)]
+        if stretched := _stretched(calibration_set, mappings, middle_mm):
+            texts = [stretched, *(f"else: {text}" for text in texts)]
         raise CalibrationError("; ".join(texts))
     if turned_deg:
         turn_deg = next(iter(turned_deg.values()))
@@ -72,14 +74,20 @@ def _doubtful(
     for name, off_deg in doubtful_deg.items():
         text = f"{_both_azimuths(calibration_set, name, mappings[name], middle_mm)}, {off_deg:.1f} deg apart"
         yield Doubt((name,), f"{name}: {text}")
-    stretch = common_stretch(mappings, middle_mm, azimuths_deg)
-    if stretch is not None and abs(stretch - 1) > SAME_STRETCH:
-        pitch = calibration_set.target and f"pitch_mm {stretch * calibration_set.target.pitch_mm:.3g}"
-        yield Doubt(
-            tuple(azimuths_deg),
-            f"all views would stand where the rig says if x were {stretch:.3g} times as long: is "
-            f"{pitch or 'the unit of x and y'} right, or z counted in other steps?",
-        )
+    if stretched := _stretched(calibration_set, mappings, middle_mm):
+        yield Doubt(tuple(azimuths_deg), stretched)
+
+
+def _stretched(calibration_set: CalibrationSet, mappings: Mapping[str, ViewMapping], middle_mm: FloatArray) -> str:
+    """A question where one length that is wrong explains where all views stand; else nothing."""
+    stretch = common_stretch(mappings, middle_mm, calibration_set.azimuths_deg)
+    if stretch is None or abs(stretch - 1) <= SAME_STRETCH:
+        return ""
+    pitch = calibration_set.target and f"pitch_mm {stretch * calibration_set.target.pitch_mm:.3g}"
+    return (
+        f"all views would stand where the rig says if x were {stretch:.3g} times as long: is "
+        f"{pitch or 'the unit of x and y'} right, or z counted in other steps?"
+    )
 
 
 def _exchanged(

@@ -125,6 +125,21 @@ def test_exchanged_views_that_no_turn_explains_are_refused() -> None:
         calibrate(replace(rig(said_deg | {"far": -48.0, "near": -70.0}), azimuths_deg=said_deg))
 
 
+def test_a_pitch_that_explains_all_views_is_asked_for_before_a_turn_that_explains_one() -> None:
+    """Twice the pitch puts the view at -35 deg where it would stand if it were turned by 90 deg, nearly."""
+    seen = rig({"left": 40.0, "middle": 5.0, "right": -35.0})
+    views = {
+        name: replace(
+            view, planes=tuple(replace(plane, points_mm=plane.points_mm * (2.0, 2.0, 1.0)) for plane in view.planes)
+        )
+        for name, view in seen.views.items()
+    }
+    with pytest.raises(
+        CalibrationError, match=r"^all views would stand .* if x were 0\.5 times as long.*; else: right"
+    ):
+        calibrate(replace(seen, views=views))
+
+
 def test_a_view_from_the_front_cannot_be_checked_and_is_asked_about() -> None:
     with pytest.raises(CalibrationError, match=r"^left: stands at .*; front: looks the same either way; if it is"):
         calibrate(rig({"left": 40.0, "front": 0.0, "right": -40.0}, left=180.0))
