@@ -127,8 +127,6 @@ class RunEntry(_Entry):
         for kind in ("shot", "shots", "background", "backgrounds", "dark", "darks"):
             entries: tuple[ShotEntry | ShotsEntry, ...] = getattr(self, kind)
             for number, entry in enumerate(entries, start=1):
-                if cameras and isinstance(entry, ShotEntry) and any(set(images) != cameras for images in entry.frames):
-                    raise ValueError(f"{kind} {number}: cameras differ from {', '.join(sorted(cameras))}")
                 if self.double_height and entry.frame_b is not None:
                     raise ValueError(f"{kind} {number}: with double_height exposure B is below A, not in frame_b")
                 if (entry.frame_b is None) != single:

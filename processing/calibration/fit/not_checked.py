@@ -35,7 +35,7 @@ def not_checked(calibration_set: CalibrationSet, undirected: Sequence[str]) -> I
     if unscaled := [name for name in calibration_set.views if name not in calibration_set.scales_px_per_mm]:
         yield Unchecked(
             f"whether the scale of {', '.join(unscaled)} is right: pitch_mm, z_mm, and their unit",
-            f"scale_px_per_mm of {', '.join(unscaled)}, by magnification and pixel pitch",
+            f"scale_px_per_mm of {', '.join(unscaled)}: magnification over pixel pitch",
         )
     if calibration_set.unplaced_pixels:
         names = ", ".join(calibration_set.unplaced_pixels)

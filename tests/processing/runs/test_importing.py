@@ -129,7 +129,10 @@ def test_root_may_come_from_the_environment(folder: Path, monkeypatch: pytest.Mo
         (RUN.replace("left_3", "left_99"), r"line 9: run\.shot\.1\.frame_a\.left: .*left_99\.png does not exist$"),
         (RUN.replace("_3.", "_9."), r"line 9: .*left_9\.png does not exist \(and 1 more\)"),
         (RUN.replace(frames("b", 4), ""), r"line 1: run: shot 2: all of them have frame_b, or none"),
-        (RUN.replace(', right = "right_2.png"', ""), r"line 1: run: shot 1: cameras differ from left, right"),
+        (
+            RUN.replace(', right = "right_2.png"', ""),
+            r"line 6: run\.shot\.0\.frame_b: cameras left differ from left, r",
+        ),
         (RUN.replace('left_4.png"', 'right_6.png"'), r"line 10: run\.shot\.1\.frame_b\.left: .*40 x 20 px of 16 bit"),
         (RUN.replace("left_2", "left_1"), r"line 6: run\.shot\.0\.frame_b\.left: .*left_1\.png is named twice"),
         (RUN.replace("right_3", "left_3"), r"line 9: run\.shot\.1\.frame_a\.right: .*left_3\.png is named twice"),
