@@ -99,7 +99,7 @@ static bool take_sequence(struct span *rest, uint32_t *sequence)
 }
 
 /* Of a line without mark, which is that of an older host, or of none. */
-static void answer_older(struct protocol *protocol, struct span rest, struct text *reply)
+static void answer_older(const struct protocol *protocol, struct span rest, struct text *reply)
 {
     uint32_t sequence = 0;
     if (take_sequence(&rest, &sequence) && span_equals(rest, "ID")) {
