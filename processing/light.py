@@ -51,6 +51,8 @@ def odd_light(
         return _not_bright(light)
     if background is None:
         return ""
+    if np.array_equal(frame[coarse], background[coarse]):
+        return "is its own background, pixel by pixel: whatever there was is divided out"
     if (share := np.mean(background[coarse] > FULL * most)) > SATURATED_SHARE:
         return f"has a background of which {100 * share:.0f} % are saturated: shadows are too pale there"
     return _unlike((light, (background[coarse] - floor) / most))

@@ -46,6 +46,10 @@ def test_shadows_before_their_own_light_are_fine(gain: float) -> None:
     assert told(SHOT, None) == ""
 
 
+def test_a_shot_before_itself_is_odd() -> None:
+    assert told(SHOT, SHOT).startswith("is its own background")
+
+
 def test_light_that_the_camera_cannot_tell_is_odd() -> None:
     assert re.fullmatch(
         r"has a background of which \d+ % are saturated: shadows are too pale there", told(1.6 * SHOT, 1.6 * LIGHT)
