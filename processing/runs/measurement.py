@@ -24,6 +24,7 @@ from processing.kernels import DEFAULT_THREADS
 from processing.preprocessing import Intensity, Polarity
 from processing.reconstruction.settings import FrozenValue, GridSettings
 from processing.runs.errors import PipelineError
+from processing.runs.exposure_faults import grey_values
 from processing.runs.pipeline import default_grid, frame_names, require_match
 from processing.runs.results_file import FrameName, Provenance, claim_results
 from processing.runs.workbench import References, read_references
@@ -195,12 +196,9 @@ class RunMeasurement:
 def bright_images(run: RunReader, shot: Shot, frame: FrameName, references: References) -> list[Intensity]:
     """Images of one exposure less dark, over the full scale; not clipped, so that noise can be judged."""
     images = []
-    for view, exposures in shot.views.items():
-        pixels = exposures.frame_a if frame == "a" else exposures.frame_b
-        if pixels is None:
-            raise PipelineError(f"shot {shot.index}: {view} has no exposure {frame}")
+    for view in shot.views:
         dark = references[view][0]
-        grey = pixels.astype(np.float32)
+        grey = grey_values(shot, view, frame).astype(np.float32)
         if dark is not None:
             grey -= dark["ab".index(frame)]
         images.append(grey / np.float32(2 ** run.header.views[view].bits - 1))
