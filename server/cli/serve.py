@@ -15,8 +15,15 @@ def add(verbs: Verbs) -> None:
 
 
 def serve(options: Namespace) -> Outcome:
-    """Serve until interrupted."""
-    from server.web.serve import serve_rig
+    """Serve until interrupted; another server that has the port or the data directory is told before all else."""
+    from server.rig.config import load_config
+    from server.rig.rig_lock import hold_data_dir
+    from server.web.port import listening
 
-    serve_rig(options.config, options.host, options.port)
+    config = load_config(options.config)
+    server = config.server.moved(options.host, options.port)
+    with listening(server.host, server.port) as port_held, hold_data_dir(server.data_dir):
+        from server.web.serve import serve_rig
+
+        serve_rig(config.model_copy(update={"server": server}), port_held)
     return Outcome({})

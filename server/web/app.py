@@ -4,8 +4,8 @@ import asyncio
 import contextlib
 import signal
 import socket
-from collections.abc import AsyncIterator, Coroutine, Iterator
-from contextlib import AsyncExitStack, asynccontextmanager, contextmanager
+from collections.abc import AsyncIterator, Coroutine
+from contextlib import AsyncExitStack, asynccontextmanager
 from functools import partial
 from importlib.metadata import version
 from typing import Any
@@ -15,7 +15,7 @@ from fastapi import Depends, FastAPI, Request
 from starlette.exceptions import HTTPException
 from starlette.routing import Match
 
-from daq.errors import AlreadyHeld, DaqError
+from daq.errors import DaqError
 from server.lab.calibrations import CalibrationStore
 from server.lab.duty import Duty, Work
 from server.lab.job_recovery import opened_table
@@ -73,27 +73,6 @@ def create_api(services: Services) -> FastAPI:
     problems.describe(app)
     app.add_middleware(Guard, host_names=services.host_names, token=token.get_secret_value() if token else None)
     return app
-
-
-@contextmanager
-def listening(host: str, port: int) -> Iterator[socket.socket]:
-    """Hold a port until the block ends; whoever asks meanwhile waits for ``serve``.
-
-    Raises
-    ------
-    AlreadyHeld
-        The port is taken, or the address is none of this computer.
-    """
-    family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    try:
-        listener = socket.create_server((host, port), family=family)
-    except OSError as error:
-        reason = (
-            f"{host}, port {port}: cannot listen there ({error.strerror}): end the server that does, or choose --port"
-        )
-        raise AlreadyHeld(reason) from error
-    with listener:
-        yield listener
 
 
 def serve(app: FastAPI, listener: socket.socket) -> None:

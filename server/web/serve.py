@@ -1,6 +1,6 @@
 """Open a rig and serve it: what ``tomoshadow serve`` does."""
 
-from pathlib import Path
+import socket
 
 from daq.run.acquisition import Acquisition
 from processing.calibration.calibration_file import file_sha256
@@ -10,31 +10,28 @@ from server.lab.events import EventPublisher
 from server.lab.services import Services
 from server.lab.tasks import TASKS
 from server.rig.assembly import AssembledRig, open_rig
-from server.rig.config import RigConfig, load_config
-from server.rig.rig_lock import hold_data_dir
-from server.web.app import create_app, listening, serve
+from server.rig.config import RigConfig
+from server.web.app import create_app, serve
 
 
-def serve_rig(config_file: Path, host: str | None = None, port: int | None = None) -> None:
-    """Serve the rig of a configuration until SIGINT or SIGTERM; the light is off before and after.
+def serve_rig(config: RigConfig, port_held: socket.socket) -> None:
+    """Serve a rig until SIGINT or SIGTERM; the light is off before and after.
+
+    Parameters
+    ----------
+    config : RigConfig
+        What to serve; its data directory is held by the caller.
+    port_held : socket
+        Where to listen.
 
     Raises
     ------
-    ConfigError
-        The configuration is wrong.
     AlreadyHeld
-        Another process has the port, the data directory or the rig; it goes on undisturbed.
+        Another process has the rig; it goes on undisturbed.
     DeviceError
         A device is absent or does not answer.
     """
-    config = load_config(config_file)
-    server = config.server.moved(host, port)
-    config = config.model_copy(update={"server": server})
-    with (
-        listening(server.host, server.port) as port_held,
-        hold_data_dir(server.data_dir),
-        open_rig(config) as assembled,
-    ):
+    with open_rig(config) as assembled:
         events = EventPublisher()
         with _acquisition(config, assembled, events) as acquisition:
             services = Services(

@@ -14,7 +14,8 @@ import sys
 from contextlib import contextmanager
 from pathlib import Path
 import uvicorn
-from server.web.app import create_app, listening, serve
+from server.web.app import create_app, serve
+from server.web.port import listening
 from tests.support import serving
 
 def talkative_serve(services):
