@@ -26,7 +26,10 @@ missing=$$(for name in $(1); do dpkg-query -W -f='$${db:Status-Status}' $$name 2
 endef
 
 # A network of its own, so that no camera broadcast leaves the machine; without it where the machine forbids user namespaces.
-PRIVATE_NETWORK := $(shell unshare -rn true 2>/dev/null && echo "unshare -rn bash -c 'ip link set lo up && exec \"\$$@\"' --")
+PRIVATE_NETWORK := $(shell unshare -rn true 2>/dev/null && echo .ci/private-network)
+# Tests run side by side, up to four at a time, where each can have such a network; the addresses of cameras are the same.
+TEST_WORKERS := $(shell n=$$(nproc); echo $$((n < 4 ? n : 4)))
+SIDE_BY_SIDE := $(if $(PRIVATE_NETWORK),--dist worksteal --tx "$(TEST_WORKERS)*popen//python=$(PRIVATE_NETWORK) $(PYTHON)")
 
 help: ## Show this list.
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z0-9-]+):.*## /  make \1\t/' | expand -t 22
@@ -37,7 +40,7 @@ demo: setup ## Run the whole chain on the simulated rig; writes demo-out/report.
 	$(PRIVATE_NETWORK) $(PYTHON) -m server.cli demo --out demo-out $(DEMO_OPTIONS)
 
 test: lint build/rp2040js/node_modules ## Run linters and all tests.
-	$(PRIVATE_NETWORK) $(PYTHON) -m pytest $(TEST_OPTIONS)
+	$(PYTHON) -m pytest $(SIDE_BY_SIDE) $(TEST_OPTIONS)
 
 # Quick ones; calibration, reconstruction, firmware, pages and cameras need the rest.
 FAST_TESTS := $(wildcard tests/test_*.py tests/processing/test_*.py) tests/daq \
