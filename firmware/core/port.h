@@ -2,7 +2,8 @@
  *
  * All functions are called from one context, the main loop; none may block longer than a line takes to send.
  * A port that sees ABORT_BYTE in its receive interrupt switches its outputs off there, forgets the bytes
- * that it has not handed over yet, and then hands over ABORT_BYTE like any other byte. */
+ * that it has not handed over yet, and then hands over ABORT_BYTE like any other byte. A port that notices that its
+ * host has gone does the same with HANG_UP_BYTE. */
 #ifndef PORT_H
 #define PORT_H
 
@@ -12,7 +13,7 @@
 
 #include "pulse_train.h"
 
-enum { ABORT_BYTE = 0x18 };
+enum { ABORT_BYTE = 0x18, HANG_UP_BYTE = 0x04 };
 
 extern const char port_build[];             /* one word: which port this is */
 extern const char port_git[];               /* one word, up to 40 characters: revision of the sources */

@@ -173,6 +173,8 @@ void protocol_receive(struct protocol *protocol, char byte)
 {
     if (byte == ABORT_BYTE) {
         safety_off(&protocol->generator);
+    } else if (byte == HANG_UP_BYTE) {
+        safety_hung_up(&protocol->generator);
     } else if (byte == '\n') {
         if (protocol->length || protocol->overflow)
             end_line(protocol); /* an empty line is no line: a host may send it to end a torn one */

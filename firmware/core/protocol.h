@@ -35,7 +35,8 @@ struct protocol {
 
 void protocol_boot(struct protocol *protocol, uint32_t boot, enum cause cause);
 
-/* Take one byte from the serial line. ABORT_BYTE switches the light off wherever it stands in the stream. */
+/* Take one byte from the serial line. ABORT_BYTE switches the light off wherever it stands in the stream, HANG_UP_BYTE
+ * trips. */
 void protocol_receive(struct protocol *protocol, char byte);
 
 /* To be called all the time by the main loop; generator_idle_us tells how long it may wait. */

@@ -194,6 +194,14 @@ void safety_heard(struct generator *generator)
     generator->heard_us = port_now_us();
 }
 
+void safety_hung_up(struct generator *generator)
+{
+    if (gives_light(generator))
+        safety_trip(generator, FAULT_HEARTBEAT);
+    else
+        safety_outputs_off(generator);
+}
+
 void safety_watch(struct generator *generator, uint64_t now_us)
 {
     const bool lights = gives_light(generator); /* before the first of several trips: all causes are named */

@@ -26,6 +26,9 @@ enum error safety_clear(struct generator *generator);
 /* A command of the host has been carried out. */
 void safety_heard(struct generator *generator);
 
+/* The host has gone, as far as the port can tell: no silence needs to be waited for. */
+void safety_hung_up(struct generator *generator);
+
 /* Look at inputs, set-points and host, and latch what is wrong. */
 void safety_watch(struct generator *generator, uint64_t now_us);
 

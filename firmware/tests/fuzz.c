@@ -266,7 +266,7 @@ static bool random_stop(bool closed)
 
 static void abort_all(void)
 {
-    protocol_receive(&protocol, ABORT_BYTE);
+    protocol_receive(&protocol, random_below(4) ? ABORT_BYTE : HANG_UP_BYTE);
     budget = 0;
 }
 

@@ -138,6 +138,26 @@ static void test_the_abort_byte_works_inside_a_line(void)
     CHECK(!fake.live && protocol.generator.state == STATE_SAFE && protocol.generator.shots_left == 0);
 }
 
+static void test_a_host_that_has_gone_trips_at_once(void)
+{
+    boot_armed();
+    receive(">6 OF");
+    protocol_receive(&protocol, HANG_UP_BYTE);
+    CHECK(!fake.live && protocol.generator.state == STATE_FAULT && protocol.generator.faults == FAULT_HEARTBEAT);
+    CHECK(protocol.generator.shots_left == 0);
+    receive("\n");
+    CHECK_REPLY("7 CLEAR", "7 3 OK state=0");
+    protocol_receive(&protocol, HANG_UP_BYTE);
+    CHECK(!fake.live && protocol.generator.state == STATE_SAFE && protocol.generator.faults == 0);
+    boot_armed();
+    ASK("5 OFF");
+    ASK("6 ARM 1 0 0");
+    ASK("7 FIRE");
+    CHECK(fake.live && protocol.generator.state == STATE_SAFE); /* the last train still runs */
+    protocol_receive(&protocol, HANG_UP_BYTE);
+    CHECK(!fake.live && protocol.generator.state == STATE_SAFE && protocol.generator.faults == 0);
+}
+
 static void test_damaged_lines_do_not_feed_the_heartbeat(void)
 {
     boot_armed();
@@ -285,6 +305,7 @@ int main(void)
     test_an_overlong_line_is_one_error();
     test_empty_lines_and_carriage_returns_are_no_lines();
     test_the_abort_byte_works_inside_a_line();
+    test_a_host_that_has_gone_trips_at_once();
     test_damaged_lines_do_not_feed_the_heartbeat();
     test_a_reply_that_comes_back_is_dropped();
     test_an_echo_ends_and_does_not_keep_it_armed();

@@ -1,11 +1,12 @@
 """The image with a virtual serial port: a host finds out what it is, opens it, and talks as on the serial line."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
 
 from daq.drivers.pulse_framing import ABORT_BYTE
-from daq.drivers.pulse_protocol import Command, ErrorNumber, Reply, Request, State, decode_reply, encode_request
+from daq.drivers.pulse_protocol import Command, ErrorNumber, Fault, Reply, Request, State, decode_reply, encode_request
 from daq.simulation.pico.firmware_build import ImageKind
 from daq.simulation.pico.rp2040_chip import TRIGGER
 from daq.simulation.pico.rp2040_emulator import CYCLE_NS, CYCLES_PER_MS
@@ -15,6 +16,7 @@ from tests.support.rp2040_board import PAPER, PERIOD_MS, Board
 ENUMERATION_MS = 20
 REPLY_LIMIT_MS = 5
 WATCHDOG_MS = 200
+HEARTBEAT_MS = 3000
 KEPT_BYTES = 512 + PACKET
 PACKET_NS = 10_000
 """The emulated bus takes so long for any packet."""
@@ -67,6 +69,7 @@ def shared() -> UsbBoard:
 @pytest.fixture
 def board(shared: UsbBoard) -> UsbBoard:
     shared.ask(Command.OFF)
+    shared.ask(Command.CLEAR)
     return shared
 
 
@@ -161,6 +164,50 @@ def test_the_abort_byte_acts_in_the_interrupt(board: UsbBoard) -> None:
     dark_ns = max(at for at, _, high in lights if not high)
     assert dark_ns - LONG.a_start_ns - into_pulse_ns < ABORT_WITHIN_NS
     assert State(board.ask(Command.STATUS).number("state")) is State.SAFE
+
+
+def gone(board: UsbBoard, how: str) -> None:
+    """The program closes the port, or the computer lets go of the bus."""
+    if how == "closed":
+        assert board.request(Setup(0x21, 0x22)) == b""
+    elif how == "suspended":
+        board.usb.suspend()
+    else:
+        board.usb.reset()
+        board.pico.run_ms(1)
+        board.open()
+
+
+@pytest.mark.parametrize("how", ["closed", "suspended", "reset"])
+def test_a_host_that_has_gone_from_the_bus_trips_at_once(board: UsbBoard, how: str) -> None:
+    gone(board, how)
+    assert State(board.ask(Command.STATUS).number("state")) is State.SAFE, "nothing was armed"
+    board.configure([PAPER] * 4)
+    board.arm(5)
+    armed_at = board.pico.cycle
+    gone(board, how)
+    board.pico.run_ms(1)
+    status = board.ask(Command.STATUS)
+    assert (State(status.number("state")), Fault(status.number("faults"))) == (State.FAULT, Fault.HEARTBEAT)
+    assert board.pico.cycle - armed_at < 0.1 * HEARTBEAT_MS * CYCLES_PER_MS, "no silence was waited for"
+    assert board.ask(Command.FIRE).error is ErrorNumber.FAULT_LATCHED
+    assert board.ask(Command.CLEAR).error is None
+
+
+@pytest.mark.parametrize("lose_the_bus", [UsbHost.suspend, UsbHost.reset])
+def test_a_bus_that_is_lost_ends_a_pulse(board: UsbBoard, lose_the_bus: Callable[[UsbHost], None]) -> None:
+    board.configure([LONG] * 4)
+    board.arm(5)
+    board.pico.run_ms(2 * PERIOD_MS)
+    into_pulse_ns = 300
+    board.when(TRIGGER, True, (LONG.a_start_ns + into_pulse_ns) // CYCLE_NS, lambda: lose_the_bus(board.usb))
+    board.pico.edges.clear()
+    board.usb.send(encode_request(Request(2300, Command.FIRE, ())))
+    board.pico.run_ms(1)
+    lights = [edge for edge in board.waveform() if edge[1].startswith("light")]
+    assert len(lights) == 8, "four pulses A, no pulse B"
+    assert max(at for at, _, high in lights if not high) - LONG.a_start_ns - into_pulse_ns < ABORT_WITHIN_NS
+    board.open()
 
 
 def test_a_host_that_does_not_read_stops_nothing(board: UsbBoard) -> None:

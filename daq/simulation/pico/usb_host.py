@@ -14,8 +14,9 @@ DEVICE, CONFIGURATION, STRING = 1, 2, 3
 
 _MEMORY_CONTROL, _MEMORY_BUFFERS = 0x80, 0x100
 _AVAILABLE, _DATA1 = 1 << 10, 1 << 13
-_ADDR_ENDP, _SIE_CTRL, _STALL_ARM = 0x00, 0x4C, 0x68
+_ADDR_ENDP, _SIE_CTRL, _SIE_STATUS, _STALL_ARM = 0x00, 0x4C, 0x50, 0x68
 _PULL_UP = 1 << 16
+_SIE_SUSPENDED = 1 << 4
 _TO_DEVICE, _FROM_DEVICE, _CLASS_INTERFACE = 0x00, 0x80, 0x21
 _GET_DESCRIPTOR, _SET_ADDRESS, _SET_CONFIGURATION = 6, 5, 9
 _SET_LINE_CODING, _GET_LINE_CODING, _SET_CONTROL_LINES = 0x20, 0x21, 0x22
@@ -92,6 +93,15 @@ class UsbHost:
         while reading and self._withheld:
             self._tell_memory(*self._withheld.pop(0))
 
+    def suspend(self) -> None:
+        """The bus falls silent for more than 3 ms, as before a computer sleeps."""
+        self._usb._sie_status |= _SIE_SUSPENDED
+        self._usb._sie_status_updated()
+
+    def reset(self) -> None:
+        """The bus is reset, and the device enumerated anew."""
+        self._usb._on_reset_alarm()
+
     def ask(self, setup: Setup, data: bytes = b"") -> Callable[[], tuple[bool, bytes | None]]:
         """Start a control transfer; the function tells whether it has ended, and what came: None for a refusal."""
         outcome: list[bytes | None] = []
@@ -142,6 +152,8 @@ class UsbHost:
         write = self._usb.write_uint32
 
         def write_and_tell(offset: int, value: int) -> None:
+            if offset == _SIE_STATUS:  # the emulator does not clear this bit of it
+                self._usb._sie_status &= ~(self._usb.raw_write_value & _SIE_SUSPENDED)
             write(offset, value)
             if offset == _STALL_ARM and value:
                 self._stalled = True

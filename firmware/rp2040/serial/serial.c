@@ -19,7 +19,7 @@ void serial_use_ring(volatile char *place)
 
 void serial_received(char byte)
 {
-    if (byte == ABORT_BYTE) {
+    if (byte == ABORT_BYTE || byte == HANG_UP_BYTE) {
         outputs_off();
         tail = head;
     }

@@ -1,5 +1,5 @@
 /* The line to the host. Two implementations of start and send: serial_uart.c, and serial_usb.c, a virtual serial port.
- * The abort byte acts in the receive interrupt of either. */
+ * The abort byte acts in the receive interrupt of either, and so does a host that goes away from USB. */
 #ifndef SERIAL_H
 #define SERIAL_H
 

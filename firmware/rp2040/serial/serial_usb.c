@@ -2,6 +2,7 @@
  * that it does not fetch is lost, as on a wire. */
 #include <stdint.h>
 
+#include "port.h"
 #include "rp2040.h"
 #include "serial.h"
 #include "usb_control.h"
@@ -72,17 +73,27 @@ static void on_bus_reset(void)
     usb_control_reset();
 }
 
-/* Data first: the abort byte may be in it. */
+/* What it has not fetched is for no other. */
+static void on_host_gone(void)
+{
+    serial_received(HANG_UP_BYTE);
+    tail = head;
+    REG_CLEAR(USB_SIE_STATUS) = USB_SIE_SUSPENDED;
+}
+
+/* Before a request, the data: the abort byte may be in it. */
 void serial_usb_isr(void)
 {
     REG(USB_INTF) = 0;
-    if (REG(USB_INTS) & USB_INT_BUS_RESET)
+    const uint32_t pending = REG(USB_INTS);
+    if (pending & (USB_INT_BUS_RESET | USB_INT_SUSPEND))
+        on_host_gone();
+    if (pending & USB_INT_BUS_RESET)
         on_bus_reset();
     if (usb_endpoints_take(USB_DATA, USB_OUT))
         receive_packet();
     (void)usb_endpoints_take(USB_DATA, USB_IN); /* whose buffer is free again */
-    usb_control_poll();
-    if (usb_control_take_opened())
-        tail = head; /* what nobody has fetched was meant for the program before */
+    if (usb_control_poll())
+        on_host_gone();
     send_packet();
 }

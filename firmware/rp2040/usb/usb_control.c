@@ -20,7 +20,6 @@ enum request {
     CLEAR_HALT = 0x0201,
     SET_LINE_CODING = 0x2120,
     SET_CONTROL_LINES = 0x2122,
-    TERMINAL_READY = 1, /* in the value of SET_CONTROL_LINES */
 };
 
 /* Of a control transfer. */
@@ -42,7 +41,6 @@ static enum stage stage;
 static struct usb_bytes left; /* to be sent in STAGE_DATA_IN */
 static uint8_t configuration;
 static uint8_t new_address;
-static bool opened;                           /* the port, by a program on the host */
 static uint8_t line_coding[LINE_CODING_SIZE]; /* as the host has set it; means nothing */
 
 static void refuse(void)
@@ -141,8 +139,6 @@ static void carry_out(const struct setup *setup)
         acknowledge();
         break;
     case SET_CONTROL_LINES:
-        if (setup->value & TERMINAL_READY)
-            opened = true;
         acknowledge();
         break;
     case SET_LINE_CODING:
@@ -159,7 +155,8 @@ static void carry_out(const struct setup *setup)
     }
 }
 
-static void on_setup(uint32_t first, uint32_t second)
+/* Whether a program on the host has opened or closed the port. */
+static bool on_setup(uint32_t first, uint32_t second)
 {
     const struct setup setup = parsed(first, second);
     usb_endpoints_forget_control(); /* whatever was before, the host has given it up */
@@ -169,6 +166,7 @@ static void on_setup(uint32_t first, uint32_t second)
         answer_question(&setup);
     else
         carry_out(&setup);
+    return setup.request == SET_CONTROL_LINES;
 }
 
 static void on_sent(void)
@@ -192,7 +190,7 @@ static void on_received(void)
 }
 
 /* Packets before a new request: they belong to the transfer before it. */
-void usb_control_poll(void)
+bool usb_control_poll(void)
 {
     uint32_t first = 0;
     uint32_t second = 0;
@@ -200,15 +198,7 @@ void usb_control_poll(void)
         on_received();
     if (usb_endpoints_take(USB_CONTROL, USB_IN))
         on_sent();
-    if (usb_endpoints_take_setup(&first, &second))
-        on_setup(first, second);
-}
-
-bool usb_control_take_opened(void)
-{
-    const bool taken = opened;
-    opened = false;
-    return taken;
+    return usb_endpoints_take_setup(&first, &second) && on_setup(first, second);
 }
 
 void usb_control_reset(void)

@@ -7,10 +7,7 @@
 /* Forget what was under way; after a reset of the bus. */
 void usb_control_reset(void);
 
-/* Carry on with what the host has sent or fetched. */
-void usb_control_poll(void);
-
-/* True once after a program on the host has opened the port. */
-bool usb_control_take_opened(void);
+/* Carry on with what the host has sent or fetched; true when a program there has opened or closed the port. */
+bool usb_control_poll(void);
 
 #endif
