@@ -8,7 +8,7 @@ Calibrate
 Reconstruct
     intensity, common_grid, VoxelGrid, plan, mlos, minlos, gavlos, smart, mart
 Measure
-    measure
+    measure, mean_diameters, size_classes, droplet_statistics
 Files
     read_run, shot_intensities, read_volume, write_volume, read_droplets
 Judge and look
@@ -22,6 +22,9 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from processing.analysis.droplets.droplet_file import read_droplets as read_droplets
+    from processing.analysis.droplets.droplet_statistics import droplet_statistics as droplet_statistics
+    from processing.analysis.droplets.size_statistics import mean_diameters as mean_diameters
+    from processing.analysis.droplets.size_statistics import size_classes as size_classes
     from processing.analysis.quality import quality_factor as quality_factor
     from processing.calibration.calibrate import calibrate as calibrate
     from processing.calibration.calibration import Calibration as Calibration
@@ -52,6 +55,8 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "processing.analysis.droplets.droplet_file": ("read_droplets",),
+    "processing.analysis.droplets.droplet_statistics": ("droplet_statistics",),
+    "processing.analysis.droplets.size_statistics": ("mean_diameters", "size_classes"),
     "processing.analysis.quality": ("quality_factor",),
     "processing.calibration.calibrate": ("calibrate",),
     "processing.calibration.calibration": ("Calibration",),

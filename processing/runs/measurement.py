@@ -10,14 +10,13 @@ from typing import Annotated
 
 import numpy as np
 from pydantic import Field
-from scipy.stats import chi2
 
 from daq.files.run_directory import RunReader, Shot
 from processing.analysis.droplets.bright_shot import BrightShot, ShotVerdict, measure_bright
 from processing.analysis.droplets.droplet_file import write_droplets
 from processing.analysis.droplets.droplet_search import MARGIN_VOXEL, DropletSearch, plan_droplets
 from processing.analysis.droplets.droplet_table import Droplets
-from processing.analysis.droplets.ghost_share import CONFIDENCE, GhostShare, pooled
+from processing.analysis.droplets.ghost_share import pooled
 from processing.calibration.calibration import Calibration
 from processing.calibration.calibration_file import file_sha256, load_calibration
 from processing.kernels import DEFAULT_THREADS
@@ -28,7 +27,6 @@ from processing.runs.exposure_faults import grey_values
 from processing.runs.pipeline import default_grid, frame_names, require_match
 from processing.runs.results_file import FrameName, Provenance, claim_results
 from processing.runs.workbench import References, read_references
-from processing.volume import VoxelGrid
 
 METHOD_VERSION = 1
 """Of what the numbers in a file of droplets mean."""
@@ -46,14 +44,6 @@ class MeasureSettings(FrozenValue):
     )
     twins: Annotated[int, Field(ge=0, le=100, description="simulated twins per exposure that tell ghosts; 0: none")] = 0
     seed: Annotated[int, Field(ge=0, description="of the twins")] = 0
-
-
-class Estimate(FrozenValue):
-    """A number, and where it lies with 95 % confidence."""
-
-    value: float
-    low: float
-    high: float
 
 
 class ShotDroplets(FrozenValue):
@@ -184,8 +174,12 @@ class RunMeasurement:
             frame: exposure.droplets for frame, exposure in zip(frames, exposures, strict=True)
         }
         file = droplets_path(results_dir, shot)
-        write_droplets(file, droplets, {**self.provenance, "shot": shot, "exposures": json.dumps(told)})
+        write_droplets(file, droplets, {**self.provenance, **self._told_of(shot, told)})
         return MeasuredShot(_summary(shot, exposures, time.process_time() - started_cpu_s, file), exposures)
+
+    def _told_of(self, shot: int, exposures: Mapping[FrameName, Mapping[str, object]]) -> Provenance:
+        grid = GridSettings.of(self.search.grid).model_dump_json()
+        return {"shot": shot, "grid": grid, "exposures": json.dumps(exposures)}
 
     def _exposure(self, shot: Shot, frame: FrameName, threads: int) -> BrightShot:
         images = bright_images(self.run, shot, frame, self.references)
@@ -222,34 +216,6 @@ def _provenance(
 def droplets_path(results_dir: Path, shot: int) -> Path:
     """Where the droplets of one shot lie."""
     return results_dir / f"shot_{shot:05d}_droplets.h5"
-
-
-def statistics_of(exposures: Sequence[BrightShot], grid: VoxelGrid) -> dict[str, object]:
-    """Number of droplets, their density and share of ghosts over all exposures that are not refused."""
-    counted = [exposure for exposure in exposures if exposure.verdict is not ShotVerdict.REFUSED]
-    n, volume_mm3 = sum(len(exposure.droplets) for exposure in counted), len(counted) * grid.volume_mm3
-    ghosts = pooled(exposure.ghosts for exposure in counted if exposure.ghosts)
-    return {
-        "n": n,
-        "exposures": len(counted),
-        "number_density_per_mm3": _density(n, volume_mm3).model_dump() if counted else None,
-        "ghost_share": _share(ghosts),
-    }
-
-
-def _density(n: int, volume_mm3: float) -> Estimate:
-    """By counting alone (Garwood); shots of a spray scatter more."""
-    tail = (1 - CONFIDENCE) / 2
-    low = chi2.ppf(tail, 2 * n) / 2 if n else 0.0
-    return Estimate(
-        value=n / volume_mm3, low=float(low) / volume_mm3, high=float(chi2.isf(tail, 2 * n + 2)) / 2 / volume_mm3
-    )
-
-
-def _share(ghosts: GhostShare) -> dict[str, float] | None:
-    if ghosts.share is None or ghosts.interval is None:
-        return None
-    return Estimate(value=ghosts.share, low=ghosts.interval[0], high=ghosts.interval[1]).model_dump()
 
 
 def _told(exposure: BrightShot) -> Mapping[str, object]:

@@ -74,8 +74,10 @@ def _grid(options: Namespace, calibration: "Calibration") -> "GridSettings | Non
 
 def _measure_shots(options: Namespace, settings: "MeasureSettings", indices: list[int], out: Path) -> dict[str, Any]:
     from daq.files.run_directory import RunReader
+    from processing.analysis.droplets.droplet_file import read_droplets
+    from processing.analysis.droplets.droplet_statistics import droplet_statistics
     from processing.reconstruction.settings import GridSettings
-    from processing.runs.measurement import RunMeasurement, statistics_of
+    from processing.runs.measurement import RunMeasurement
 
     with RunReader(options.run) as run:
         measurement = RunMeasurement.of(run, indices[0], options.calibration, settings)
@@ -83,12 +85,12 @@ def _measure_shots(options: Namespace, settings: "MeasureSettings", indices: lis
         for index in tracked(indices, lambda index: f"{options.run.name}: shot {index}"):
             shots.append(measurement.measure(index, out, usable_processors()))
             _tell_faults(shots[-1])
-    grid = measurement.search.grid
+    statistics = droplet_statistics([read_droplets(out / shot.summary.file) for shot in shots])
     return {
         "polarity": settings.polarity,
-        "grid": GridSettings.of(grid).model_dump(mode="json"),
+        "grid": GridSettings.of(measurement.search.grid).model_dump(mode="json"),
         "shots": [shot.summary.model_dump(mode="json") for shot in shots],
-        "statistics": statistics_of([exposure for shot in shots for exposure in shot.exposures], grid),
+        "statistics": statistics.model_dump(mode="json"),
         "passed": any(shot.summary.verdict != "refused" for shot in shots),
     }
 
@@ -122,9 +124,13 @@ def _number(value: float | None, digits: int) -> str:
 def _summary(result: dict[str, Any]) -> str:
     statistics = result["statistics"]
     grid = describe_grid(result["grid"]["shape"], result["grid"]["pitch_mm"])
-    density = statistics["number_density_per_mm3"]
-    if density is None:
+    if not statistics["exposures"]:
         return f"no shot could be measured, {grid}"
-    span = f"{density['low']:.3g} to {density['high']:.3g}"
     counted = f"{statistics['n']} droplets in {statistics['exposures']} exposures"
-    return f"{counted}, {density['value']:.3g} per mm3 ({span}), {grid}"
+    density = _with_interval(statistics["number_density_per_mm3"])
+    d32 = f", D32 {_with_interval(statistics['d32_um'])} um" if statistics["d32_um"] else ""
+    return f"{counted}, {density} per mm3{d32}, {grid}"
+
+
+def _with_interval(estimate: dict[str, float]) -> str:
+    return f"{estimate['value']:.3g} ({estimate['low']:.3g} to {estimate['high']:.3g})"

@@ -9,6 +9,7 @@ import pytest
 
 from processing.analysis.droplets.droplet_file import read_droplets
 from processing.analysis.droplets.ghost_share import matches
+from processing.reconstruction.settings import GridSettings
 from server.cli.main import main
 from tests.support.bright_scenes import BOX, GRID, scene, write_bright_calibration, write_bright_run
 from tests.support.command_line import refused, shown, told
@@ -55,6 +56,8 @@ def test_droplets_of_a_run_lie_in_files_where_they_are(
     density = result["statistics"]["number_density_per_mm3"]
     assert density["low"] < density["value"] < density["high"]
     assert result["statistics"]["n"] == shot["droplets"]
+    assert result["statistics"]["d32_um"] is None
+    assert "bright particles have no diameter" in result["statistics"]["reason"]
 
 
 def test_a_file_says_where_it_comes_from_and_what_each_column_is(
@@ -77,6 +80,7 @@ def test_a_file_says_where_it_comes_from_and_what_each_column_is(
     assert list(exposures) == ["a", "b"]
     assert set(exposures["a"]["views"]) == {"view1", "view2", "view3", "view4"}
     assert exposures["a"]["verdict"] == "good"
+    assert GridSettings.model_validate_json(attributes["grid"]).model_dump(mode="json") == result["grid"]
 
 
 def test_what_exists_is_replaced_only_when_asked(
@@ -102,6 +106,7 @@ def test_a_covered_view_is_refused_and_the_command_fails(
     result = json.loads(output.out.splitlines()[-1])
     assert result["shots"][0]["droplets"] == 0
     assert result["statistics"]["number_density_per_mm3"] is None
+    assert result["statistics"]["number_density_reason"] == "no exposure could be measured"
 
 
 def test_shadows_are_not_measured_yet_and_say_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,0 +1,102 @@
+"""What the droplets of some shots say of a spray, as their files have them."""
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field
+
+from processing.analysis.droplets.droplet_file import DropletFileError, StoredDroplets
+from processing.analysis.droplets.ghost_share import GhostShare, pooled
+from processing.analysis.droplets.size_statistics import Estimate, SizeStatistics, mean_diameters, number_density
+from processing.reconstruction.settings import GridSettings
+
+DIAMETER, REFUSED = "diameter_um", "refused"
+NO_DIAMETERS = "bright particles have no diameter: only shadows tell how large a droplet is"
+NOTHING_COUNTED = "no exposure could be measured"
+NO_VOLUME = "a file does not say in which volume its droplets were measured"
+
+
+class DropletStatistics(SizeStatistics):
+    """Droplets of all exposures that are not refused."""
+
+    exposures: Annotated[int, Field(description="that were measured and not refused")]
+    number_density_per_mm3: Annotated[Estimate | None, Field(description="its interval by counting alone")] = None
+    number_density_reason: Annotated[str | None, Field(description="why it is null")] = None
+    ghost_share: Annotated[Estimate | None, Field(description="of the twins of all exposures; null without")] = None
+
+
+def droplet_statistics(shots: Sequence[StoredDroplets]) -> DropletStatistics:
+    """Number, density, sizes and share of ghosts.
+
+    Parameters
+    ----------
+    shots : sequence of StoredDroplets
+        A shot each, as ``read_droplets`` gives it; of one run or several.
+
+    Raises
+    ------
+    DropletFileError
+        A file does not say what became of its exposures.
+    """
+    told = [_exposures(shot) for shot in shots]
+    counted = [(shot, len(exposures)) for shot, exposures in zip(shots, told, strict=True) if exposures]
+    exposures = sum(number for _, number in counted)
+    per_shot = exposures / max(len(counted), 1)
+    sizes = _sizes([shot for shot, _ in counted], per_shot)
+    density, reason = _density(sizes.n, counted, per_shot)
+    return DropletStatistics(
+        **dict(sizes),
+        exposures=exposures,
+        number_density_per_mm3=density,
+        number_density_reason=reason,
+        ghost_share=_ghost_share(exposure for shot in told for exposure in shot),
+    )
+
+
+def _exposures(shot: StoredDroplets) -> list[Mapping[str, Any]]:
+    """What was told of the exposures that are not refused."""
+    if "exposures" not in shot.provenance:
+        raise DropletFileError(f"{_named(shot)}: its file does not say what became of its exposures")
+    exposures = json.loads(str(shot.provenance["exposures"])).values()
+    return [exposure for exposure in exposures if exposure["verdict"] != REFUSED]
+
+
+def _named(shot: StoredDroplets) -> str:
+    return f"{shot.provenance.get('run', 'a run')}, shot {shot.provenance.get('shot', '?')}"
+
+
+def _sizes(shots: Sequence[StoredDroplets], per_shot: float) -> SizeStatistics:
+    n = sum(len(shot.columns["frame"]) for shot in shots)
+    if not shots:
+        return SizeStatistics(n=0, shots=0, reason=NOTHING_COUNTED)
+    if any(DIAMETER not in shot.columns for shot in shots):
+        return SizeStatistics(n=n, shots=len(shots), reason=NO_DIAMETERS)
+    diameters_um = [np.asarray(shot.columns[DIAMETER], np.float64) for shot in shots]
+    return mean_diameters(diameters_um, per_shot)
+
+
+def _density(
+    n: int, counted: Sequence[tuple[StoredDroplets, int]], per_shot: float
+) -> tuple[Estimate | None, str | None]:
+    if not counted:
+        return None, NOTHING_COUNTED
+    volumes_mm3 = [(_volume_mm3(shot), exposures) for shot, exposures in counted]
+    if any(volume_mm3 is None for volume_mm3, _ in volumes_mm3):
+        return None, NO_VOLUME
+    total_mm3 = sum((volume_mm3 or 0.0) * exposures for volume_mm3, exposures in volumes_mm3)
+    return number_density(n, total_mm3, per_shot), None
+
+
+def _volume_mm3(shot: StoredDroplets) -> float | None:
+    """Volume of the grid; files that do not state it have it in their settings, if the user named a grid."""
+    grid = json.loads(str(shot.provenance.get("grid", "null"))) or json.loads(str(shot.provenance["settings"]))["grid"]
+    return GridSettings.model_validate(grid).to_grid().volume_mm3 if grid else None
+
+
+def _ghost_share(exposures: Iterator[Mapping[str, Any]]) -> Estimate | None:
+    ghosts = pooled(GhostShare(**exposure["ghosts"]) for exposure in exposures if exposure["ghosts"])
+    if ghosts.share is None or ghosts.interval is None:
+        return None
+    return Estimate(value=ghosts.share, low=ghosts.interval[0], high=ghosts.interval[1])

@@ -1,0 +1,83 @@
+"""What droplets of several shots say together."""
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+
+from processing.analysis.droplets.droplet_file import DropletFileError, StoredDroplets
+from processing.analysis.droplets.droplet_statistics import droplet_statistics
+from processing.analysis.droplets.size_statistics import mean_diameters, number_density
+from processing.reconstruction.settings import GridSettings
+
+GRID = GridSettings(shape=(2, 4, 6), origin_mm=(0, 0, 0), pitch_mm=0.5)
+VOLUME_MM3 = 6.0
+
+
+def shot(sizes_um: list[float] | None, n: int = 0, **told: Any) -> StoredDroplets:
+    """A shot of one exposure unless it is told otherwise."""
+    diameters = {} if sizes_um is None else {"diameter_um": np.array(sizes_um)}
+    rows = n if sizes_um is None else len(sizes_um)
+    exposures = told.pop("exposures", {"a": exposure()})
+    provenance = {"run": "spray", "shot": 3, "settings": '{"grid": null}', "grid": GRID.model_dump_json(), **told}
+    return StoredDroplets(
+        {"frame": np.full(rows, "a"), **diameters}, {**provenance, "exposures": json.dumps(exposures)}
+    )
+
+
+def exposure(verdict: str = "good", ghosts: tuple[int, int] | None = None) -> dict[str, Any]:
+    counted = {"ghosts": ghosts[0], "found": ghosts[1]} if ghosts else None
+    return {"verdict": verdict, "ghosts": counted}
+
+
+def test_shots_are_pooled() -> None:
+    told = {"a": exposure(ghosts=(1, 40))}, {"a": exposure("doubtful", ghosts=(2, 60))}
+    statistics = droplet_statistics([shot([20.0, 30.0], exposures=told[0]), shot([40.0], exposures=told[1])])
+    sizes = mean_diameters([[20.0, 30.0], [40.0]])
+    assert (statistics.n, statistics.shots, statistics.exposures) == (3, 2, 2)
+    assert {name: getattr(statistics, name) for name in type(sizes).model_fields} == dict(sizes)
+    assert statistics.number_density_per_mm3 == number_density(3, 2 * VOLUME_MM3)
+    assert statistics.ghost_share
+    assert statistics.ghost_share.value == pytest.approx(0.03)
+
+
+def test_exposures_of_one_shot_show_the_same_droplets_twice() -> None:
+    both = {"a": exposure(), "b": exposure()}
+    statistics = droplet_statistics([shot([20.0, 30.0, 20.0, 30.0], exposures=both)])
+    assert statistics.exposures == 2
+    assert statistics.number_density_per_mm3 == number_density(2, VOLUME_MM3)
+    assert statistics.d32_um == mean_diameters([[20.0, 30.0, 20.0, 30.0]], exposures_per_shot=2).d32_um
+
+
+def test_refused_exposures_have_no_volume_and_empty_ones_have() -> None:
+    one_of_two = {"a": exposure(), "b": exposure("refused")}
+    statistics = droplet_statistics(
+        [shot([20.0, 30.0], exposures=one_of_two), shot([], exposures={"a": exposure("empty")})]
+    )
+    assert (statistics.exposures, statistics.number_density_per_mm3) == (2, number_density(2, 2 * VOLUME_MM3))
+
+
+def test_where_a_number_is_missing_a_reason_is_told() -> None:
+    nothing = droplet_statistics([shot([], exposures={"a": exposure("refused")})])
+    assert (nothing.n, nothing.number_density_per_mm3, nothing.d32_um) == (0, None, None)
+    assert nothing.reason == nothing.number_density_reason == "no exposure could be measured"
+    bright = droplet_statistics([shot(None, n=7)])
+    assert (bright.n, bright.d32_um) == (7, None)
+    assert "only shadows tell" in (bright.reason or "")
+    assert bright.number_density_per_mm3 == number_density(7, VOLUME_MM3)
+    assert droplet_statistics([]).exposures == 0
+
+
+def test_files_from_before_the_grid_was_stated_have_it_in_their_settings_or_say_so() -> None:
+    named = json.dumps({"grid": GRID.model_dump(mode="json")})
+    assert droplet_statistics([shot([9.0], grid="null", settings=named)]).number_density_per_mm3
+    default = droplet_statistics([shot([9.0], grid="null")])
+    assert default.number_density_per_mm3 is None
+    assert "does not say in which volume" in (default.number_density_reason or "")
+
+
+def test_a_file_that_says_nothing_of_its_exposures_is_named() -> None:
+    foreign = StoredDroplets({"frame": np.full(2, "a")}, {"run": "spray", "shot": 3})
+    with pytest.raises(DropletFileError, match="spray, shot 3: its file does not say what became of its exposures"):
+        droplet_statistics([foreign])
