@@ -10,7 +10,7 @@ Reconstruct
 Measure
     measure, mean_diameters, size_classes, droplet_statistics
 Files
-    read_run, shot_intensities, read_volume, write_volume, read_droplets
+    read_run, shot_intensities, read_volume, write_volume, read_droplets, export_droplets
 Judge and look
     quality_factor, slices_figure, isosurface_figure, shadowgraph_figure
 Try, and err
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from processing.analysis.droplets.droplet_statistics import droplet_statistics as droplet_statistics
     from processing.analysis.droplets.size_statistics import mean_diameters as mean_diameters
     from processing.analysis.droplets.size_statistics import size_classes as size_classes
+    from processing.analysis.exports.export import export_droplets as export_droplets
     from processing.analysis.quality import quality_factor as quality_factor
     from processing.calibration.calibrate import calibrate as calibrate
     from processing.calibration.calibration import Calibration as Calibration
@@ -57,6 +58,7 @@ _HOMES = {
     "processing.analysis.droplets.droplet_file": ("read_droplets",),
     "processing.analysis.droplets.droplet_statistics": ("droplet_statistics",),
     "processing.analysis.droplets.size_statistics": ("mean_diameters", "size_classes"),
+    "processing.analysis.exports.export": ("export_droplets",),
     "processing.analysis.quality": ("quality_factor",),
     "processing.calibration.calibrate": ("calibrate",),
     "processing.calibration.calibration": ("Calibration",),

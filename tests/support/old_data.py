@@ -20,6 +20,8 @@ from numpy.typing import NDArray
 from daq.files.run_directory import RunReader, Shot, list_runs
 from daq.run.events import RunStatus
 from daq.shot import DoubleFrame, FiredTrain
+from processing.analysis.droplets.droplet_file import read_droplets
+from processing.analysis.droplets.droplet_statistics import droplet_statistics
 from processing.calibration.calibration_file import load_calibration
 from processing.calibration.sets.calibration_set import load_calibration_set
 from processing.reconstruction.volume_file import open_volume
@@ -149,6 +151,16 @@ def preview(path: Path) -> Description:
     }
 
 
+def droplets(path: Path) -> Description:
+    """Columns of a file of droplets, where they come from, and what they say of the spray."""
+    stored = read_droplets(path)
+    return {
+        "columns": {name: _column(column) for name, column in stored.columns.items()},
+        "provenance": stored.provenance,
+        "statistics": droplet_statistics([stored]).model_dump(mode="json"),
+    }
+
+
 def job_table(path: Path) -> list[Description]:
     """All jobs, the oldest first."""
     table = JobTable(path)
@@ -177,6 +189,7 @@ DESCRIPTIONS: Mapping[str, tuple[tuple[str, ...], Callable[[Path], Any]]] = {
     "calibration set": (("imported/calibration", "runs/*-target"), calibration_set),
     "volume": (("runs/*/results/*/*.vtkhdf", "*.vtkhdf"), volume),
     "preview": (("runs/*/results/*/*.preview.npz",), preview),
+    "droplets": (("droplets/**/*_droplets.h5",), droplets),
     "job table": (("runs/jobs.sqlite",), job_table),
     "data folder": (("runs",), data_folder),
 }
@@ -206,6 +219,11 @@ def _described(folder: Path, places: tuple[str, ...], read: Callable[[Path], Any
 
 def _results(run_dir: Path) -> Description:
     return {found.id: found.model_dump(mode="json") for found in result_sets(run_dir)}
+
+
+def _column(column: NDArray[Any]) -> Description:
+    known = column if column.dtype.kind == "U" else column[~np.isnan(column)]
+    return {"rows": len(column), "known": len(known), "first": known[:1].tolist(), "last": known[-1:].tolist()}
 
 
 def _shot(shot: Shot) -> Description:

@@ -109,6 +109,10 @@ def test_volumes_open(old: Path) -> None:
     assert_kind_holds(old, "volume")
 
 
+def test_droplets_open_and_say_the_same_of_the_spray(old: Path) -> None:
+    assert_kind_holds(old, "droplets")
+
+
 def test_previews_open(old: Path) -> None:
     assert_kind_holds(old, "preview")
 

@@ -1,0 +1,33 @@
+"""Droplets as CSV (RFC 4180): names with units, then a row per droplet and exposure; what is no number is empty."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq.files.atomic_file import replacing
+from processing.analysis.droplets.droplet_file import StoredDroplets
+from processing.analysis.exports.shot_table import shot_table
+
+
+def write_csv(path: Path, droplets: StoredDroplets) -> None:
+    """Write a table; numbers have all digits that tell them apart, and a point, whatever the country.
+
+    Parameters
+    ----------
+    path : Path
+        Usually ``*.csv``; an existing file is replaced.
+    droplets : StoredDroplets
+        Of a shot.
+    """
+    table = shot_table(droplets)
+    with replacing(path) as part, part.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(table)
+        writer.writerows(zip(*map(_cells, table.values()), strict=True))
+
+
+def _cells(column: NDArray[np.generic]) -> list[object]:
+    values: list[object] = column.tolist()
+    return ["" if isinstance(value, float) and np.isnan(value) else value for value in values]

@@ -1,0 +1,58 @@
+"""Droplets as Parquet, by pyarrow, which is an extra: ``pip install 'tomoshadow[tables]'``."""
+
+import json
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from daq.files.atomic_file import replacing
+from processing.analysis.droplets.droplet_file import StoredDroplets
+from processing.analysis.exports.shot_table import shot_table
+from processing.errors import BadInput
+
+PROVENANCE = "tomoshadow"
+"""Key of the metadata of the table that holds the provenance, as JSON."""
+
+
+class MissingLibraryError(BadInput):
+    """What was asked for needs a library that is not installed; the text says which."""
+
+
+def require_pyarrow() -> tuple[Any, Any]:
+    """The library, and its part for Parquet.
+
+    Raises
+    ------
+    MissingLibraryError
+        It is not installed.
+    """
+    try:
+        return import_module("pyarrow"), import_module("pyarrow.parquet")
+    except ImportError as error:
+        raise MissingLibraryError(
+            "Parquet needs pyarrow, which is not installed: pip install 'tomoshadow[tables]', or export csv"
+        ) from error
+
+
+def write_parquet(path: Path, droplets: StoredDroplets) -> None:
+    """Write a table.
+
+    Parameters
+    ----------
+    path : Path
+        Usually ``*.parquet``; an existing file is replaced.
+    droplets : StoredDroplets
+        Of a shot; its provenance becomes metadata of the table.
+
+    Raises
+    ------
+    MissingLibraryError
+        pyarrow is not installed.
+    """
+    pyarrow, parquet = require_pyarrow()
+    table = pyarrow.table(
+        {name: pyarrow.array(column, from_pandas=True) for name, column in shot_table(droplets).items()}
+    )
+    metadata = {PROVENANCE: json.dumps(droplets.provenance)}
+    with replacing(path) as part:
+        parquet.write_table(table.replace_schema_metadata(metadata), part)
