@@ -25,6 +25,7 @@ from processing.reconstruction.settings import FrozenValue, GridSettings
 from processing.runs.errors import PipelineError
 from processing.runs.exposure_faults import grey_values
 from processing.runs.pipeline import default_grid, frame_names, require_match
+from processing.runs.recipe import recipe_sha256
 from processing.runs.results_file import FrameName, Provenance, claim_results
 from processing.runs.workbench import References, read_references
 
@@ -179,7 +180,8 @@ class RunMeasurement:
 
     def _told_of(self, shot: int, exposures: Mapping[FrameName, Mapping[str, object]]) -> Provenance:
         grid = GridSettings.of(self.search.grid).model_dump_json()
-        return {"shot": shot, "grid": grid, "exposures": json.dumps(exposures)}
+        recipe = recipe_sha256("measure", METHOD_VERSION, self.settings)
+        return {"shot": shot, "grid": grid, "recipe_sha256": recipe, "exposures": json.dumps(exposures)}
 
     def _exposure(self, shot: Shot, frame: FrameName, threads: int) -> BrightShot:
         images = bright_images(self.run, shot, frame, self.references)

@@ -23,6 +23,7 @@ from processing.reconstruction.volume_file import write_slabs
 from processing.runs.clocked_slabs import ClockedSlabs
 from processing.runs.errors import PipelineError
 from processing.runs.exposure_faults import exposure_faults, grey_values
+from processing.runs.recipe import recipe_sha256
 from processing.runs.results_file import FrameName, Provenance, claim_results, volume_path
 from processing.runs.workbench import References, Workbench, read_references
 from processing.volume import VoxelGrid
@@ -122,6 +123,7 @@ def reconstruct_shot(
         views = {name: PlannedView.of(view) for name, view in planned}
         provenance = {**made_by, "views": json.dumps({name: view.model_dump() for name, view in views.items()})}
         claim_results(results_dir, provenance)
+        recipe = recipe_sha256("reconstruct", METHOD_VERSION, settings)
         volumes = []
         for frame in frame_names(run):
             if should_stop():
@@ -130,7 +132,7 @@ def reconstruct_shot(
                 run, recorded, frame, settings, reconstructor.images, references=references, threads=threads
             )
             faults = exposure_faults(run, recorded, frame, images, references)
-            told = {name: json.dumps(which) for name, which in faults.items() if which}
+            told = {name: json.dumps(which) for name, which in faults.items() if which} | {"recipe_sha256": recipe}
             written = _reconstruct_frame(reconstructor, images, results_dir, shot, frame, {**provenance, **told})
             volumes.append(written.model_copy(update=faults))
     return ShotResult(

@@ -1,12 +1,11 @@
 """``tomoshadow measure``: the shots of a run become droplets."""
 
-from argparse import Namespace
+from argparse import ArgumentTypeError, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from server.cli.options import (
     Verbs,
-    add_calibrated_run,
     add_out,
     add_shots,
     add_verb,
@@ -17,17 +16,26 @@ from server.cli.options import (
     usable_processors,
 )
 from server.cli.output import Outcome, progress, table, tracked
+from server.cli.runs.batch import add_runs, over_runs
+from server.cli.runs.recipes import add_recipe, keep_recipe, settings_of, with_grid
 
 if TYPE_CHECKING:
+    from processing.analysis.exports.export import Export
     from processing.calibration.calibration import Calibration
-    from processing.reconstruction.settings import GridSettings
+    from processing.preprocessing import Polarity
     from processing.runs.measurement import MeasuredShot, MeasureSettings
+
+NAME = "measure"
+SAID = ("polarity", "grid", "twins")
+"""Options that a recipe takes the place of."""
 
 
 def add(verbs: Verbs) -> None:
     """Add the command."""
-    parser = add_verb(verbs, "measure", measure, "measure the droplets in the shots of a run")
-    add_calibrated_run(parser)
+    parser = add_verb(verbs, NAME, measure, "measure the droplets in the shots of runs")
+    add_runs(parser)
+    parser.add_argument("--calibration", type=Path, required=True)
+    add_recipe(parser)
     add_out(parser, "directory of the results; further shots of the same settings may join them")
     add_shots(parser)
     parser.add_argument("--polarity", choices=("shadow", "bright"), help="default: as the run is recorded")
@@ -37,57 +45,96 @@ def add(verbs: Verbs) -> None:
         help="box in mm; default: the largest that all views see where they are calibrated",
     )
     parser.add_argument(
-        "--twins", type=seed, default=0, metavar="N", help="simulated twins per exposure that tell ghosts; default none"
+        "--twins", type=seed, metavar="N", help="simulated twins per exposure that tell ghosts; default none"
+    )
+    parser.add_argument(
+        "--export", type=_exports, default=(), metavar="csv,vtk,parquet", help="write droplets in these formats too"
     )
 
 
+def _exports(text: str) -> "tuple[Export, ...]":
+    from processing.analysis.exports.export import Export
+
+    try:
+        return tuple(dict.fromkeys(Export(name) for name in text.split(",")))
+    except ValueError as error:
+        raise ArgumentTypeError(f"{text}: formats are {', '.join(Export)}, with commas between them") from error
+
+
 def measure(options: Namespace) -> Outcome:
-    """Measure shot by shot."""
-    from daq.files.run_directory import RunReader
+    """Measure run by run, shot by shot."""
     from processing.calibration.calibration_file import load_calibration
-    from processing.runs.measurement import MeasureSettings, droplets_path, require_measurable
+    from processing.runs.measurement import METHOD_VERSION, MeasureSettings, require_measurable
+
+    for export in options.export:
+        export.require()
+    calibration = load_calibration(options.calibration)
+    recorded = _polarity(options.runs[0])
+    command = (NAME, METHOD_VERSION)
+    said = settings_of(options, command, MeasureSettings, SAID, lambda: _by_options(options, recorded, calibration))
+    settings = with_grid(said, calibration)
+    require_measurable(options.runs[0].name, recorded, settings.polarity)
+    keep_recipe(options, command, settings)
+    return over_runs(options, lambda run_dir, out: _measure_run(options, settings, run_dir, out))
+
+
+def _polarity(run_dir: Path) -> "Polarity":
+    from daq.files.run_directory import RunReader
+
+    with RunReader(run_dir) as run:
+        return run.header.polarity
+
+
+def _by_options(options: Namespace, recorded: "Polarity", calibration: "Calibration") -> "MeasureSettings":
+    from processing.reconstruction.settings import GridSettings
+    from processing.runs.measurement import MeasureSettings
+
+    grid = GridSettings.of(parse_grid(options.grid, calibration)) if options.grid else None
+    return MeasureSettings(polarity=options.polarity or recorded, grid=grid, twins=options.twins or 0)
+
+
+def _measure_run(options: Namespace, settings: "MeasureSettings", run_dir: Path, place: Path) -> Outcome:
+    from processing.analysis.exports.export import export_path
+    from processing.runs.measurement import droplets_path, require_measurable
     from processing.runs.overwriting import replacing, require_free
     from processing.runs.results_file import SETTINGS_FILE
 
-    calibration = load_calibration(options.calibration)
-    with RunReader(options.run) as run:
-        recorded = run.header.polarity
-    polarity = options.polarity or recorded
-    require_measurable(options.run.name, recorded, polarity)
-    settings = MeasureSettings(polarity=polarity, grid=_grid(options, calibration), twins=options.twins)
-    indices = selected_shots(options.run, options.shots)
+    require_measurable(run_dir.name, _polarity(run_dir), settings.polarity)
+    indices = selected_shots(run_dir, options.shots)
     if options.overwrite:
-        require_free(options.out, overwrite=True, made_with=(SETTINGS_FILE,))
-        with replacing(options.out) as out:
-            result = _measure_shots(options, settings, indices, out)
+        require_free(place, overwrite=True, made_with=(SETTINGS_FILE,))
+        with replacing(place) as out:
+            result = _measure_shots(options, settings, run_dir, indices, out)
     else:
-        require_free(*(droplets_path(options.out, index) for index in indices), overwrite=False)
-        result = _measure_shots(options, settings, indices, options.out)
-    return Outcome(result, f"{droplets_table(result)}\n{options.out}: {_summary(result)}")
+        files = [droplets_path(place, index) for index in indices]
+        require_free(*files, *(export_path(file, kind) for file in files for kind in options.export), overwrite=False)
+        result = _measure_shots(options, settings, run_dir, indices, place)
+    return Outcome(result, f"{droplets_table(result)}\n{place}: {_summary(result)}")
 
 
-def _grid(options: Namespace, calibration: "Calibration") -> "GridSettings | None":
-    from processing.reconstruction.settings import GridSettings
-
-    return GridSettings.of(parse_grid(options.grid, calibration)) if options.grid else None
-
-
-def _measure_shots(options: Namespace, settings: "MeasureSettings", indices: list[int], out: Path) -> dict[str, Any]:
+def _measure_shots(
+    options: Namespace, settings: "MeasureSettings", run_dir: Path, indices: list[int], out: Path
+) -> dict[str, Any]:
     from daq.files.run_directory import RunReader
     from processing.analysis.droplets.droplet_file import read_droplets
     from processing.analysis.droplets.droplet_statistics import droplet_statistics
+    from processing.analysis.exports.export import export_droplets
     from processing.reconstruction.settings import GridSettings
-    from processing.runs.measurement import RunMeasurement
+    from processing.runs.measurement import METHOD_VERSION, RunMeasurement
+    from processing.runs.recipe import recipe_sha256
 
-    with RunReader(options.run) as run:
+    with RunReader(run_dir) as run:
         measurement = RunMeasurement.of(run, indices[0], options.calibration, settings)
         shots: list[MeasuredShot] = []
-        for index in tracked(indices, lambda index: f"{options.run.name}: shot {index}"):
+        for index in tracked(indices, lambda index: f"{run_dir.name}: shot {index}"):
             shots.append(measurement.measure(index, out, usable_processors()))
+            for export in options.export:
+                export_droplets(out / shots[-1].summary.file, export)
             _tell_faults(shots[-1])
     statistics = droplet_statistics([read_droplets(out / shot.summary.file) for shot in shots])
     return {
         "polarity": settings.polarity,
+        "recipe_sha256": recipe_sha256(NAME, METHOD_VERSION, settings),
         "grid": GridSettings.of(measurement.search.grid).model_dump(mode="json"),
         "shots": [shot.summary.model_dump(mode="json") for shot in shots],
         "statistics": statistics.model_dump(mode="json"),

@@ -169,7 +169,7 @@ def calibrated_share(options: Namespace, settings: "ReconstructionSettings", cal
     grid = settings.grid.to_grid() if settings.grid else default_grid(calibration)
     ranges_mm = (calibration.x_range_mm, calibration.y_range_mm, calibration.z_range_mm)
     share = share_within(grid, *ranges_mm)
-    if not options.grid:
+    if not options.grid and not getattr(options, "recipe", None):
         extents = ", ".join(
             f"{axis} {low:.4g} to {high:.4g}" for axis, (low, high) in zip("xyz", ranges_mm, strict=True)
         )

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from processing.reconstruction.choices import VoxelType
 from server.cli.options import (
+    OPTIONS,
     Verbs,
-    add_calibrated_run,
     add_choice,
     add_out,
     add_reconstruction,
@@ -20,19 +20,24 @@ from server.cli.options import (
     usable_processors,
 )
 from server.cli.output import Outcome, progress, table, tracked
+from server.cli.runs.batch import add_runs, over_runs
+from server.cli.runs.recipes import add_recipe, keep_recipe, settings_of, with_grid
 
 if TYPE_CHECKING:
     from processing.reconstruction.settings import ReconstructionSettings
     from processing.runs.pipeline import ShotResult
 
+NAME = "reconstruct"
 STATED = {"method", "accuracy", "voxels", "grid", "minimum_window_px", "noise_floor"}
 """Settings that are told with the result."""
 
 
 def add(verbs: Verbs) -> None:
     """Add the command."""
-    parser = add_verb(verbs, "reconstruct", reconstruct, "turn the shots of a run into volumes")
-    add_calibrated_run(parser)
+    parser = add_verb(verbs, NAME, reconstruct, "turn the shots of a run into volumes")
+    add_runs(parser)
+    parser.add_argument("--calibration", type=Path, required=True)
+    add_recipe(parser)
     add_out(parser, "directory of the results; further shots of the same settings may join them")
     add_reconstruction(parser)
     summary = "how volumes are stored: float16 keeps 11 bits in half the file of float32, uint8 256 steps"
@@ -40,45 +45,65 @@ def add(verbs: Verbs) -> None:
 
 
 def reconstruct(options: Namespace) -> Outcome:
-    """Reconstruct shot by shot."""
+    """Reconstruct run by run, shot by shot."""
     from processing.calibration.calibration_file import load_calibration
-    from processing.runs.overwriting import replacing, require_free
-    from processing.runs.results_file import SETTINGS_FILE, volume_path
+    from processing.reconstruction.settings import METHOD_VERSION, ReconstructionSettings
 
     calibration = load_calibration(options.calibration)
-    settings = reconstruction_settings(options, calibration)
-    indices = selected_shots(options.run, options.shots)
+    command = (NAME, METHOD_VERSION)
+    said = settings_of(
+        options,
+        command,
+        ReconstructionSettings,
+        (*OPTIONS, "grid"),
+        lambda: reconstruction_settings(options, calibration),
+    )
+    settings = with_grid(said, calibration)
     share = calibrated_share(options, settings, calibration)
-    volumes = [volume_path(options.out, index, frame) for index in indices for frame in ("a", "b")]
+    keep_recipe(options, command, settings)
+    return over_runs(options, lambda run_dir, out: _reconstruct_run(options, settings, share, run_dir, out))
+
+
+def _reconstruct_run(
+    options: Namespace, settings: "ReconstructionSettings", share: float, run_dir: Path, place: Path
+) -> Outcome:
+    from processing.reconstruction.settings import METHOD_VERSION
+    from processing.runs.overwriting import replacing, require_free
+    from processing.runs.recipe import recipe_sha256
+    from processing.runs.results_file import SETTINGS_FILE, volume_path
+
+    indices = selected_shots(run_dir, options.shots)
+    volumes = [volume_path(place, index, frame) for index in indices for frame in ("a", "b")]
     if options.overwrite:
-        require_free(options.out, overwrite=True, made_with=(SETTINGS_FILE,))
-        with replacing(options.out) as out:
-            shots = _reconstruct_shots(options, settings, indices, out)
+        require_free(place, overwrite=True, made_with=(SETTINGS_FILE,))
+        with replacing(place) as out:
+            shots = _reconstruct_shots(options, settings, run_dir, indices, out)
     else:
         require_free(*volumes, overwrite=False)
-        shots = _reconstruct_shots(options, settings, indices, options.out)
+        shots = _reconstruct_shots(options, settings, run_dir, indices, place)
     result = {
         **settings.model_dump(mode="json", include=STATED),
+        "recipe_sha256": recipe_sha256(NAME, METHOD_VERSION, settings),
         "calibrated_share": share,
         "views": {name: view.model_dump() for name, view in shots[0].views.items()},
         "volumes": [volume.model_dump(mode="json") for shot in shots for volume in shot.volumes],
         "cpu_s": sum(shot.cpu_s for shot in shots),
         "peak_rss_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
     }
-    return Outcome(result, f"{volumes_table(result)}\n{options.out}: {_summary(result)}")
+    return Outcome(result, f"{volumes_table(result)}\n{place}: {_summary(result)}")
 
 
 def _reconstruct_shots(
-    options: Namespace, settings: "ReconstructionSettings", indices: list[int], out: Path
+    options: Namespace, settings: "ReconstructionSettings", run_dir: Path, indices: list[int], out: Path
 ) -> "list[ShotResult]":
     from processing.runs.pipeline import reconstruct_shot
     from processing.runs.workbench import Workbench
 
     shots: list[ShotResult] = []
     workbench, threads = Workbench(), usable_processors()
-    for index in tracked(indices, lambda index: f"{options.run.name}: shot {index} by {settings.method}"):
+    for index in tracked(indices, lambda index: f"{run_dir.name}: shot {index} by {settings.method}"):
         shot = reconstruct_shot(
-            options.run, index, options.calibration, settings, out, workbench=workbench, threads=threads
+            run_dir, index, options.calibration, settings, out, workbench=workbench, threads=threads
         )
         if not shots:
             _tell_slow_views(shot)

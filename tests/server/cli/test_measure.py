@@ -1,6 +1,7 @@
 """``tomoshadow measure``: droplets of a run in files, and bad input that gets one clear sentence."""
 
 import json
+import sys
 from pathlib import Path
 
 import h5py
@@ -81,6 +82,50 @@ def test_a_file_says_where_it_comes_from_and_what_each_column_is(
     assert set(exposures["a"]["views"]) == {"view1", "view2", "view3", "view4"}
     assert exposures["a"]["verdict"] == "good"
     assert GridSettings.model_validate_json(attributes["grid"]).model_dump(mode="json") == result["grid"]
+
+
+def test_droplets_are_exported_beside_their_file_and_not_over_another(
+    bright: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "shot_00000_droplets.csv").write_text("mine")
+    arguments = command(bright, tmp_path / "out", "--shots", "0:1", "--export", "csv,vtk", run="single")
+    assert "shot_00000_droplets.csv: exists" in refused(capsys, *arguments)
+    (tmp_path / "out" / "shot_00000_droplets.csv").unlink()
+    (shot,) = told(capsys, *arguments)["shots"]
+    rows = (tmp_path / "out" / "shot_00000_droplets.csv").read_text().splitlines()
+    assert len(rows) == shot["droplets"] + 1
+    assert (tmp_path / "out" / "shot_00000_droplets.vtkhdf").is_file()
+
+
+def test_formats_that_are_not_there_are_refused_before_anything_is_measured(
+    bright: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with pytest.raises(SystemExit):
+        main([*map(str, command(bright, tmp_path / "out", "--export", "csv,xlsx"))])
+    assert "formats are csv, vtk, parquet, with commas between them" in capsys.readouterr().err
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    assert "pip install 'tomoshadow[tables]'" in refused(
+        capsys, *command(bright, tmp_path / "out", "--export", "parquet")
+    )
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_recipe_that_was_written_measures_the_same(
+    bright: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    recipe = tmp_path / "recipe.toml"
+    first = told(capsys, *command(bright, tmp_path / "one", "--shots", "0:1", "--write-recipe", recipe, run="single"))
+    by_recipe = ["measure", bright / "single", "--calibration", bright / "calibration.json", "--recipe", recipe]
+    again = told(capsys, *by_recipe, "-o", tmp_path / "two", "--shots", "0:1")
+    assert again["recipe_sha256"] == first["recipe_sha256"]
+    one, two = (read_droplets(tmp_path / name / "shot_00000_droplets.h5") for name in ("one", "two"))
+    assert two.provenance == one.provenance
+    assert one.provenance["recipe_sha256"] == first["recipe_sha256"]
+    for name, column in one.columns.items():
+        np.testing.assert_array_equal(two.columns[name], column, name)
+    assert "recipe.toml: exists" in refused(capsys, *by_recipe, "-o", tmp_path / "three", "--write-recipe", recipe)
+    assert "--twins: " in refused(capsys, *by_recipe, "-o", tmp_path / "three", "--twins", "0")
 
 
 def test_what_exists_is_replaced_only_when_asked(
