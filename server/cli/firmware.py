@@ -1,5 +1,6 @@
 """``tomoshadow firmware``: identity and limits, self-test, timing diagram, continuous light, flashing."""
 
+import sys
 from argparse import ArgumentParser, Namespace
 from collections import Counter
 from collections.abc import Iterator
@@ -15,6 +16,8 @@ from server.cli.output import Outcome, progress, table
 if TYPE_CHECKING:
     from daq.devices import GeneratorStatus, PulseGenerator
     from daq.drivers.pulse_line import PulseLine
+    from daq.drivers.pulse_self_test import Check
+    from server.rig.config import RigConfig
 
 _HEARTBEAT_S = 0.5
 
@@ -24,13 +27,18 @@ def add(verbs: Verbs) -> None:
     tools = verbs.add_parser("firmware", help="the pulse generator").add_subparsers(required=True, metavar="TOOL")
     add_rig(add_verb(tools, "info", info, "identity, state and counters of the pulse generator"))
     summary = "try everything that needs no light: protocol, refusals, limits, budget, off"
-    add_rig(add_verb(tools, "selftest", selftest, summary))
+    _add_selftest_options(add_verb(tools, "selftest", selftest, summary))
     summary = "timing diagram of a pulse train as the generator loads it; nothing is fired"
     _add_scope_options(add_verb(tools, "scope", scope, summary))
     summary = "continuous light of low current, as the back light of the calibration target; Ctrl-C ends it"
     _add_light_options(add_verb(tools, "light", light, summary))
     summary = "check a UF2 image and copy it to a board that waits for one"
     _add_flash_options(add_verb(tools, "flash", flash, summary))
+
+
+def _add_selftest_options(parser: ArgumentParser) -> None:
+    add_rig(parser)
+    parser.add_argument("--light", action="store_true", help="then, with somebody at an oscilloscope, what needs light")
 
 
 def _add_scope_options(parser: ArgumentParser) -> None:
@@ -110,19 +118,48 @@ def _closed(closed: bool) -> str:
 
 
 def selftest(options: Namespace) -> Outcome:
-    """Let the generator prove itself; no LED is lit."""
-    from daq.drivers.pulse_self_test import Verdict, self_test
-    from server.rig.assembly import open_pulse_line
+    """Let the generator prove itself; no LED is lit before somebody has said so."""
+    from daq.drivers.pulse_self_test import Verdict
     from server.rig.config import load_config
 
+    config = load_config(options.config)
     checks = []
-    with open_pulse_line(load_config(options.config)) as (line, identity):
-        for check in self_test(line, identity):
-            progress(f"{check.verdict:8}{check.name}: {check.detail}")
-            checks.append(check)
+    for check in _checks(config, light=options.light):
+        progress(f"{check.verdict:8}{check.name}: {check.detail}")
+        checks.append(check)
     found = Counter(check.verdict for check in checks)
     result = {"passed": not found[Verdict.FAIL], "checks": [asdict(check) for check in checks]}
     return Outcome(result, ", ".join(f"{found[verdict]} {verdict}" for verdict in Verdict))
+
+
+def _checks(config: "RigConfig", *, light: bool) -> "Iterator[Check]":
+    from daq.drivers.pulse_light_test import light_test
+    from daq.drivers.pulse_self_test import self_test
+    from daq.timing import plan_shot_timing
+    from server.rig.assembly import open_generator, open_pulse_line
+    from server.rig.shot_timing import camera_timings, nominal_plan
+
+    with open_pulse_line(config) as (line, identity):
+        yield from self_test(line, identity)
+    if light:
+        timing = plan_shot_timing(nominal_plan(config), camera_timings(config))
+        with open_generator(config) as generator:
+            yield from light_test(generator, timing, _Terminal())
+
+
+class _Terminal:
+    """Somebody who reads and types."""
+
+    def ready(self, task: str) -> bool:
+        return not self._asked(f"{task}. Enter: ready; s: leave it out").startswith("s")
+
+    def confirms(self, question: str) -> bool:
+        return self._asked(f"{question} y or n").startswith("y")
+
+    @staticmethod
+    def _asked(question: str) -> str:
+        progress(question)
+        return sys.stdin.readline().strip().lower()
 
 
 def scope(options: Namespace) -> Outcome:

@@ -1,5 +1,6 @@
 """``tomoshadow firmware`` on the simulated bench, through the command line."""
 
+import io
 import json
 import re
 import shutil
@@ -46,6 +47,15 @@ def test_selftest_passes_and_lists_its_checks(capsys: pytest.CaptureFixture[str]
     assert result["passed"] is True
     assert {check["verdict"] for check in result["checks"]} == {"ok", "skipped"}
     assert len(result["checks"]) >= 10
+
+
+def test_selftest_with_light_asks_before_each_flash(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sys.stdin", io.StringIO("\ny\n" + "s\n" * 7))
+    checks = result_of(capsys, "selftest", "--light", *CONFIG)["checks"][-8:]
+    assert [check["name"] for check in checks[:2]] == ["pulses of view1", "pulses of view2"]
+    assert [check["verdict"] for check in checks] == ["ok", *7 * ["skipped"]]
 
 
 def test_a_failed_selftest_shows_in_the_exit_status(
