@@ -10,7 +10,8 @@ from daq.drivers.pulse_protocol import Command, ErrorNumber, Fault, Reply, Reque
 from daq.simulation.pico.firmware_build import ImageKind
 from daq.simulation.pico.rp2040_chip import TRIGGER
 from daq.simulation.pico.rp2040_emulator import CYCLE_NS, CYCLES_PER_MS
-from daq.simulation.pico.usb_host import CONFIGURATION, DEVICE, PACKET, Setup, UsbHost
+from daq.simulation.pico.usb_host import CONFIGURATION, DEVICE, PACKET, UsbHost
+from daq.simulation.pico.usb_setup import Setup
 from tests.support.rp2040_board import PAPER, PERIOD_MS, Board
 
 ENUMERATION_MS = 20

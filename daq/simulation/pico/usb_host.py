@@ -4,9 +4,10 @@ It looks at every packet with the eyes of USB 2.0, chapters 8 and 9. Bits on the
 """
 
 from collections.abc import Callable, Generator
-from dataclasses import dataclass
 
 from rp2040py.rp2040 import RP2040
+
+from daq.simulation.pico.usb_setup import Setup
 
 PACKET = 64
 ADDRESS = 5
@@ -26,22 +27,6 @@ _ENGLISH = 0x0409
 
 class BrokenDevice(Exception):
     """The device did what a host does not accept."""
-
-
-@dataclass(frozen=True)
-class Setup:
-    """A request; the direction is the upper bit of its type."""
-
-    request_type: int
-    request: int
-    value: int = 0
-    index: int = 0
-    length: int = 0
-
-    def packed(self) -> bytes:
-        """As it is on the bus."""
-        words = (self.value, self.index, self.length)
-        return bytes((self.request_type, self.request)) + b"".join(word.to_bytes(2, "little") for word in words)
 
 
 _Steps = Generator[None, None, bytes | None]
