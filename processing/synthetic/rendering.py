@@ -1,13 +1,16 @@
-"""Shadow images of a spray: every ball is a dark disc, blurred by diffraction, defocus, pixel and motion.
+"""Shadow images of a spray: opaque balls are dark discs that unite and are blurred; film lets light through.
 
 The focal plane of every view is the plane z = 0: its Scheimpflug adaptor is adjusted to the target at z = 0.
 """
+
+from dataclasses import replace
 
 import numpy as np
 
 from processing.geometry import PinholeCamera
 from processing.synthetic.spray import Spray
 from processing.synthetic.stamping import Discs, FloatArray, FloatImage, stamp_discs
+from processing.synthetic.union import blurred_union
 from processing.synthetic.view_optics import ViewOptics
 
 
@@ -16,8 +19,9 @@ def render_transmittance(
 ) -> FloatImage:
     """Transmittance of a spray as one view sees it.
 
-    Balls are opaque (1 - opacity) discs around their projected centres; overlapping shadows multiply. Refraction,
-    the bright spots in the middle of large droplets, and perspective's ellipticity (below 0.3 %) are left out.
+    Balls are discs around their projected centres. Opaque ones unite, and the union is blurred (``union``); those
+    of a film, with an opacity below 1, multiply with each other and with the union. Refraction, the bright spots in
+    the middle of large droplets, and perspective's ellipticity (below 0.3 %) are left out.
 
     Parameters
     ----------
@@ -38,15 +42,20 @@ def render_transmittance(
     path_mm = 0.5 * exposure_s * spray.velocities_mm_per_s
     first_px = camera.project(spray.positions_mm - path_mm)[:, ::-1]
     last_px = camera.project(spray.positions_mm + path_mm)[:, ::-1]
+    depths_mm = depth_out_of_focus_mm(camera, spray.positions_mm)
     discs = Discs(
         centres=0.5 * (first_px + last_px),
         radii_px=0.5 * spray.diameters_mm * image_scale_px_per_mm(camera, spray.positions_mm),
-        sigmas_px=optics.blur_sigma_px(depth_out_of_focus_mm(camera, spray.positions_mm)),
+        sigmas_px=optics.defocus_sigma_px(depths_mm),
         opacities=spray.opacities,
         smears=last_px - first_px,
     )
     width_px, height_px = camera.image_size_px
-    return stamp_discs(discs, (height_px, width_px))
+    shape, opaque = (height_px, width_px), spray.opacities >= 1
+    film = replace(discs, sigmas_px=optics.blur_sigma_px(depths_mm)).select(np.flatnonzero(~opaque))
+    transmittance = blurred_union(discs.select(np.flatnonzero(opaque)), optics.diffraction_sigma_px, shape)
+    transmittance *= stamp_discs(film, shape)
+    return transmittance
 
 
 def image_scale_px_per_mm(camera: PinholeCamera, points_mm: FloatArray) -> FloatArray:

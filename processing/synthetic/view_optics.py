@@ -42,15 +42,18 @@ class ViewOptics:
         airy_um = airy_diameter_um(self.f_number, self.magnification, self.wavelength_um)
         return _CORE_SIGMA * airy_um / self.pixel_pitch_um
 
-    def optical_sigma_px(self, depth_mm: FloatArray) -> FloatArray:
-        """Diffraction and defocus as one Gaussian, for points ``depth_mm`` (N,) out of focus along the view axis.
+    def defocus_sigma_px(self, depth_mm: FloatArray) -> FloatArray:
+        """Blur of points ``depth_mm`` (N,) out of focus along the view axis, as a Gaussian, (N,).
 
         The blur circle in the object, depth x M / (f# (M + 1)), is a uniform disc: sigma = diameter / 4. The light
         of a real, collimated LED fills less than the aperture, and blurs less.
         """
         circle_mm = np.abs(depth_mm) * self.magnification / (self.f_number * (self.magnification + 1))
-        defocus_px = circle_mm * self.magnification * 1000 / self.pixel_pitch_um / 4
-        return np.hypot(self.diffraction_sigma_px, defocus_px)
+        return np.asarray(circle_mm * self.magnification * 1000 / self.pixel_pitch_um / 4, dtype=np.float64)
+
+    def optical_sigma_px(self, depth_mm: FloatArray) -> FloatArray:
+        """Diffraction and defocus as one Gaussian, (N,)."""
+        return np.hypot(self.diffraction_sigma_px, self.defocus_sigma_px(depth_mm))
 
     def blur_sigma_px(self, depth_mm: FloatArray) -> FloatArray:
         """``optical_sigma_px`` with the area of the pixel, (N,)."""

@@ -22,6 +22,7 @@ NB_MODULE(_native, module) {
     bind_images(module);
     bind_line_of_sight(module);
     bind_smart(module);
+    bind_stamping(module);
     module.def("available_isas", &available_isas);
     module.def("selected_isa", [] { return std::string(selected_kernels().name); });
 }

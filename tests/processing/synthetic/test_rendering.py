@@ -41,6 +41,18 @@ def test_shadow_has_the_area_of_the_droplet(view: str) -> None:
     assert weights.sum() == pytest.approx(np.pi / 4 * (0.1 * scale) ** 2, rel=0.01)
 
 
+@pytest.mark.parametrize("view", sorted(CAMERAS))
+def test_a_droplet_behind_a_larger_one_takes_no_light(view: str) -> None:
+    """Its middle is seen 0.05 mm beside that of the larger one, a millimetre further away."""
+    camera = CAMERAS[view]
+    towards_light = camera.ray_directions(np.zeros((1, 3)))[0]
+    across = np.array([0.0, 0.05, 0.0])
+    larger = Spray.of_droplets(np.zeros((1, 3)), np.array([0.2]))
+    both = Spray.of_droplets(np.array([[0.0, 0.0, 0.0], towards_light + across]), np.array([0.2, 0.06]))
+    alone_light, both_light = (render_transmittance(camera, spray, OPTICS[view]) for spray in (larger, both))
+    np.testing.assert_allclose(both_light, alone_light, atol=2e-3)
+
+
 def variance_px2(view: str, z_mm: float) -> float:
     spray = Spray.of_droplets(np.array([[0.0, 0.0, z_mm]]), np.array([0.02]))
     weights, pixels = shadow_of(view, spray)

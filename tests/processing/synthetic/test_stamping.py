@@ -25,7 +25,7 @@ def centroid(shadow: FloatImage) -> FloatArray:
 @settings(max_examples=60)
 def test_disc_has_its_area_and_its_centre(row: float, column: float, radius_px: float, sigma_px: float) -> None:
     shadow = 1 - stamp_discs(one_disc([row, column], radius_px, sigma_px), (65, 65))
-    assert shadow.sum(dtype=float) == pytest.approx(np.pi * radius_px**2, rel=0.012)
+    assert shadow.sum(dtype=float) == pytest.approx(np.pi * radius_px**2, rel=1e-3)
     np.testing.assert_allclose(centroid(shadow), [row, column], atol=0.005)
 
 
@@ -36,7 +36,7 @@ def test_profile_is_a_disc_under_a_gaussian() -> None:
     expected = gaussian_filter(disc, 1.3 * fine)[fine // 2 :: fine, fine // 2 :: fine]
     offset = 32 - 0.5 / fine
     shadow = 1 - stamp_discs(one_disc([offset, offset], 4.2, 1.3), (65, 65))
-    np.testing.assert_allclose(shadow, expected, atol=0.012)
+    np.testing.assert_allclose(shadow, expected, atol=0.005)
 
 
 def test_overlapping_transmittances_multiply() -> None:
@@ -80,3 +80,10 @@ def test_ball_is_round_in_three_dimensions() -> None:
     np.testing.assert_allclose(ball[12], disc, atol=1e-6)
     np.testing.assert_allclose(centroid(ball), [12, 13, 14], atol=1e-3)
     np.testing.assert_allclose(ball[:, 13, 14], ball[12, :, 14][1:-1], atol=1e-6)
+
+
+def test_what_is_no_disc_is_refused() -> None:
+    with pytest.raises(ValueError, match="finite places"):
+        stamp_discs(one_disc([np.nan, 3.0], 4, 1), (32, 24))
+    with pytest.raises(ValueError, match="opacities"):
+        stamp_discs(one_disc([3.0, 3.0], 4, 1, opacity=1.5), (32, 24))

@@ -1,5 +1,6 @@
 // Runs all kernels on small random cases without Python, for sanitizers and other processors: prints what comes out.
 // All memory is on the heap and no larger than the binding demands, so that a sanitizer sees every step beyond it.
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <memory>
@@ -11,6 +12,7 @@
 #include "host/preprocess.hpp"
 #include "host/resample.hpp"
 #include "host/smart.hpp"
+#include "host/stamping.hpp"
 
 using namespace tomoshadow;
 
@@ -257,6 +259,32 @@ void fit_blobs(const Kernels &kernels, int number) {
     std::printf("blobs %d %.6f %.6f\n", number, light / residuals[0].size(), shapes + static_cast<double>(peaks.size()));
 }
 
+// Balls within, across and far beyond the borders of a volume, still and moving.
+void stamp(int number) {
+    Random random(static_cast<uint32_t>(number) * 2246822519u + 3);
+    constexpr int profile_rows = 3, profile_columns = 8;
+    const Shape shape{1 + random.below(3), 1 + random.below(20), 1 + random.below(30)};
+    std::vector<float> table;
+    for (int k = 0; k < profile_rows * profile_columns; ++k)
+        table.push_back(static_cast<float>(k % profile_columns == profile_columns - 1 ? 0 : random.uniform(0, 1)));
+    std::vector<Stamp> stamps;
+    for (int k = 0; k < 30; ++k) {
+        const double reach = random.uniform(0, 9), way = k % 2 ? random.uniform(-3, 3) : 0;
+        const double far = k % 7 ? 1 : 1e12;
+        stamps.push_back({{random.uniform(-2, 4), random.uniform(-9, 30) * far, random.uniform(-9, 40)},
+                          {0, way, -way},
+                          reach,
+                          (profile_columns - 1) / (reach * reach + 1e-9),
+                          random.uniform(0, 0.2),
+                          double(random.below(profile_rows))});
+    }
+    const auto voxels = std::make_unique<float[]>(shape.nz * shape.ny * shape.nx);
+    const size_t count = static_cast<size_t>(shape.nz) * shape.ny * shape.nx;
+    std::fill(voxels.get(), voxels.get() + count, 1.0f);
+    stamp_balls(voxels.get(), shape, stamps.data(), 30, {table.data(), profile_rows, profile_columns}, number % 2 == 1);
+    std::printf("stamps %d %.6f %.6f\n", number, sum_of(voxels.get(), count), double(count));
+}
+
 }  // namespace
 
 int main() {
@@ -266,4 +294,5 @@ int main() {
     for (int number = 0; number < 60; ++number) resample(kernels, number);
     for (int number = 0; number < 60; ++number) prepare(kernels, number);
     for (int number = 0; number < 20; ++number) fit_blobs(kernels, number);
+    for (int number = 0; number < 40; ++number) stamp(number);
 }
