@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from processing.geometry import PinholeCamera
 from processing.preprocessing import Preprocessing, intensity
-from processing.synthetic.nozzles import HOLLOW_CONE_FLOW
+from processing.synthetic.liquid.nozzles import HOLLOW_CONE_FLOW
 from processing.synthetic.paper_rig import IMAGE_SCALE_PX_PER_MM, paper_cameras, paper_optics
 from processing.synthetic.scene import NOMINAL_WIDTH_NS, Scene, SceneKind
 from processing.volume import VoxelGrid

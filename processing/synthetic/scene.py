@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from processing.geometry import PinholeCamera
 from processing.synthetic.illumination import dust_transmittance, light_field
-from processing.synthetic.nozzles import hollow_cone_spray
+from processing.synthetic.liquid.nozzles import hollow_cone_spray
 from processing.synthetic.rendering import render_transmittance
 from processing.synthetic.sensor import Image, Sensor, camera_image
 from processing.synthetic.shadow_cache import ShadowCache

@@ -11,7 +11,7 @@ from daq.shot import FiredTrain, Image
 from daq.simulation.camera.light import Exposure
 from processing.geometry import PinholeCamera, view_camera
 from processing.optics import image_scale_px_per_mm
-from processing.synthetic.nozzles import flat_fan_spray, hollow_cone_spray
+from processing.synthetic.liquid.nozzles import flat_fan_spray, hollow_cone_spray
 from processing.synthetic.scene import Scene
 from processing.synthetic.target import Checkerboard, DotTarget
 from processing.synthetic.truth_file import FiredSpray, write_truth

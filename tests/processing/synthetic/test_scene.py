@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from processing.synthetic.illumination import dust_transmittance, light_field
-from processing.synthetic.nozzles import flat_fan_spray
+from processing.synthetic.liquid.nozzles import flat_fan_spray
 from processing.synthetic.paper_rig import paper_cameras, paper_optics
 from processing.synthetic.rendering import render_transmittance
 from processing.synthetic.scene import Pulse, Scene

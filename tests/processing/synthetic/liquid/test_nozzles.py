@@ -5,10 +5,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from processing.synthetic.breakup import perforate, sheet_film
-from processing.synthetic.nozzles import FLAT_FAN_FLOW, HOLLOW_CONE_FLOW, flat_fan_spray, hollow_cone_spray
+from processing.synthetic.liquid.breakup import perforate, sheet_film
+from processing.synthetic.liquid.nozzles import FLAT_FAN_FLOW, HOLLOW_CONE_FLOW, flat_fan_spray, hollow_cone_spray
+from processing.synthetic.liquid.sheet import FlatFan, Sheet
 from processing.synthetic.paper_rig import paper_cameras
-from processing.synthetic.sheet import FlatFan, Sheet
 from processing.synthetic.spray import LiquidKind, Spray
 from processing.synthetic.stamping import FloatArray
 

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from processing.synthetic.sheet import Periodic, Sheet
+from processing.synthetic.liquid.sheet import Periodic, Sheet
 from processing.synthetic.spray import LiquidKind, Spray
 from processing.synthetic.stamping import FloatArray
 

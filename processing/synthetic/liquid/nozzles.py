@@ -8,8 +8,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from processing.synthetic.breakup import droplets, free_rims, leading_rim, ligaments, perforate, sheet_film
-from processing.synthetic.sheet import FlatFan, HollowCone, NozzleFlow, Sheet, SprayShape
+from processing.synthetic.liquid.breakup import droplets, free_rims, leading_rim, ligaments, perforate, sheet_film
+from processing.synthetic.liquid.sheet import FlatFan, HollowCone, NozzleFlow, Sheet, SprayShape
 from processing.synthetic.spray import Spray
 
 Seed = int | Sequence[int]
