@@ -1,10 +1,12 @@
 """Are lengths what they are said to be? A wrong pitch, or another unit, fits as well as the right one."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from processing.calibration.calibration import Model, ViewCalibration
+from processing.calibration.fit.placement import OBLIQUE_DEG, line_angle_deg, sight_azimuth_deg
 from processing.calibration.observation import CalibrationSet
 from processing.calibration.triangulation import linearise
 from processing.calibration.verdict import Doubt
@@ -20,6 +22,13 @@ USUAL_PX_PER_MM = (0.2, 250.0)
 """Scales beyond are those of rooms and microscopes, or of metres, inches and micrometres that count as mm."""
 NEAREST_MM = 5.0
 """No lens stands closer to what it sees, with room for another beside it."""
+LENGTHENED = 0.015
+"""Shapes of pixels tell a length of z that is wrong by more."""
+SQUARE = 0.003
+"""How square pixels are once it is right; a fit knows them to a thousandth."""
+NEARER = 0.6
+"""By this factor must azimuths then come nearer to those of the rig: a sensor's tilt looks like a longer z, and brings
+them no nearer."""
 
 
 def scale_px_per_mm(mapping: ViewMapping, point_mm: FloatArray) -> float:
@@ -35,6 +44,7 @@ def check_scales(calibration_set: CalibrationSet, views: Mapping[str, ViewCalibr
     if not calibration_set.unit_stated and not calibration_set.scales_px_per_mm:
         yield from _unusual(calibration_set, views, scales_px_per_mm)
     yield from _stretched(views)
+    yield from _longer(calibration_set, {name: view.mapping for name, view in views.items()})
 
 
 def _other_scales(found_px_per_mm: Mapping[str, float], said_px_per_mm: Mapping[str, float]) -> Iterator[Doubt]:
@@ -80,3 +90,42 @@ def _stretched(views: Mapping[str, ViewCalibration]) -> Iterator[Doubt]:
                     f"{name}: its pixels seem {height_to_width:.2f} times as high as wide: is pitch_mm of the target "
                     f"right, and the position of its planes in mm?",
                 )
+
+
+def _longer(calibration_set: CalibrationSet, mappings: Mapping[str, ViewMapping]) -> Iterator[Doubt]:
+    """One length of z for which all pixels are square, and views stand where the rig says."""
+    said_deg = calibration_set.azimuths_deg
+    cameras = {name: each for name, each in mappings.items() if isinstance(each, PinholeCamera) and name in said_deg}
+    if sum(OBLIQUE_DEG < line_angle_deg(said_deg[name]) < 90 - OBLIQUE_DEG for name in cameras) < 2:
+        return
+    longer = _longer_by(list(cameras.values()))
+    uneven = _unevenness(longer, list(cameras.values()))
+    stands_deg = np.array([sight_azimuth_deg(camera, calibration_set.middle_mm) for camera in cameras.values()])
+    beside_deg = stands_deg - np.array([said_deg[name] for name in cameras])
+    then_deg = beside_deg - stands_deg + np.rad2deg(np.arctan2(np.tan(np.deg2rad(stands_deg)), longer))
+    apart_deg, then_apart_deg = (float(np.std((angles + 90) % 180)) for angles in (beside_deg, then_deg))
+    if abs(longer - 1) < LENGTHENED or uneven > SQUARE or then_apart_deg > NEARER * apart_deg:
+        return
+    pitch = calibration_set.target and f"pitch_mm {calibration_set.target.pitch_mm / longer:.3g}"
+    yield Doubt(
+        tuple(cameras),
+        f"if z were {longer:.3g} times as long, all pixels would be square, and azimuths {then_apart_deg:.1f} deg "
+        f"beside those of the rig, not {apart_deg:.1f}: is the step of the stage right, or is it {pitch or 'x and y'}?",
+    )
+
+
+def _longer_by(cameras: Sequence[PinholeCamera]) -> float:
+    """Factor of z with which the pixels of all cameras are as square as can be."""
+    found = minimize_scalar(_unevenness, bounds=(0.7, 1.4), args=(cameras,), method="bounded")
+    return float(found.x)
+
+
+def _unevenness(longer: float, cameras: Sequence[PinholeCamera]) -> float:
+    """Root mean square of ln(height / width) of pixels if z is so many times as long as it was said to be.
+
+    A camera ``K R`` of the lengths that were said is ``K R diag(1, 1, 1 / longer)`` of the true ones; its focal lengths
+    in pixels are ``|m1 x m3|`` and ``|m2 x m3|`` over ``|m3|^2``, with the rows of that matrix.
+    """
+    rows = [camera.camera_matrix @ camera.rotation / (1, 1, longer) for camera in cameras]
+    shapes = [np.linalg.norm(np.cross(m1, m3)) / np.linalg.norm(np.cross(m2, m3)) for m1, m2, m3 in rows]
+    return float(np.sqrt(np.mean(np.log(shapes) ** 2)))

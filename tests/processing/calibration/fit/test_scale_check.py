@@ -1,0 +1,51 @@
+"""Lengths that are wrong by a few percent fit as well as the right ones; shapes of pixels and azimuths tell them."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from processing.calibration.calibrate import calibrate
+from processing.calibration.calibration import Calibration
+from tests.support.calibration_cases import calibration_set, paper_camera, seen_planes
+
+AZIMUTHS_DEG = {"view1": 45.0, "view2": 15.0, "view3": -15.0, "view4": -45.0}
+Z_MM = (-4, 0, 4)
+
+
+def calibrated(
+    said_of_true: tuple[float, float, float] = (1, 1, 1),
+    beside_deg: tuple[float, ...] = (0, 0, 0, 0),
+    tilts_deg: tuple[float, ...] = (0, 0, 0, 0),
+    model: str = "pinhole",
+) -> Calibration:
+    """Views of true cameras, whose points are said to be elsewhere, and that stand beside what the rig says."""
+    views = {}
+    for (name, azimuth_deg), tilt_deg in zip(AZIMUTHS_DEG.items(), tilts_deg, strict=True):
+        camera = replace(paper_camera(azimuth_deg, (0, 0), (0, 0, 0, 0, 0)), tilt_rad=(0.0, np.deg2rad(tilt_deg)))
+        planes = seen_planes(camera, Z_MM, seed=int(azimuth_deg) + 50, columns=11, rows=9)
+        views[name] = tuple(replace(plane, points_mm=plane.points_mm * said_of_true) for plane in planes)
+    said_deg = {name: angle + off for (name, angle), off in zip(AZIMUTHS_DEG.items(), beside_deg, strict=True)}
+    return calibrate(replace(calibration_set(**views), azimuths_deg=said_deg), model)
+
+
+@pytest.mark.parametrize(("longer", "said_of_true"), [(0.95, (1, 1, 1 / 0.95)), (1.03, (1.03, 1.03, 1))])
+def test_a_length_that_is_a_few_percent_wrong_is_told(longer: float, said_of_true: tuple[float, float, float]) -> None:
+    calibration = calibrated(said_of_true)
+    (note,) = calibration.notes
+    told = re.fullmatch(r"if z were ([\d.]+) times as long, all pixels .* or is it pitch_mm ([\d.]+)\?", note)
+    assert told
+    assert float(told[1]) == pytest.approx(longer, abs=0.004)
+    assert float(told[2]) == pytest.approx(1 / longer, abs=0.006)
+    assert {view.verdict for view in calibration.views.values()} == {"warn"}
+
+
+def test_right_lengths_are_not_doubted_because_the_rig_knows_its_azimuths_badly() -> None:
+    assert calibrated(beside_deg=(0.7, -0.5, 0.6, -0.7)).notes == ()
+
+
+def test_tilted_sensors_are_no_wrong_length() -> None:
+    """By Scheimpflug's rule, at a magnification of 0.45; a model without tilt sees pixels that are not square."""
+    tilts_deg = tuple(np.rad2deg(np.arctan(0.45 * np.tan(np.deg2rad(angle)))) for angle in AZIMUTHS_DEG.values())
+    assert not any("if z were" in note for note in calibrated(tilts_deg=tilts_deg).notes)
