@@ -1,8 +1,9 @@
 """One shot + one calibration -> droplets on disk. Every shot by itself, whoever asks for it."""
 
+import hashlib
 import json
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -24,7 +25,7 @@ from processing.preprocessing import Intensity, Polarity
 from processing.reconstruction.settings import FrozenValue, GridSettings
 from processing.runs.errors import PipelineError
 from processing.runs.exposure_faults import grey_values
-from processing.runs.pipeline import default_grid, frame_names, require_match
+from processing.runs.pipeline import Stopped, default_grid, frame_names, require_match
 from processing.runs.recipe import recipe_sha256
 from processing.runs.results_file import FrameName, Provenance, claim_results
 from processing.runs.workbench import References, read_references
@@ -45,6 +46,11 @@ class MeasureSettings(FrozenValue):
     )
     twins: Annotated[int, Field(ge=0, le=100, description="simulated twins per exposure that tell ghosts; 0: none")] = 0
     seed: Annotated[int, Field(ge=0, description="of the twins")] = 0
+
+    def results_id(self, calibration: str) -> str:
+        """Name of the results directory: droplets, and a hash of method, settings and the calibration's name."""
+        digest = hashlib.sha256(f"{calibration}\n{recipe_sha256('measure', METHOD_VERSION, self)}".encode()).hexdigest()
+        return f"droplets-{digest[:8]}"
 
 
 class ShotDroplets(FrozenValue):
@@ -145,7 +151,13 @@ class RunMeasurement:
         provenance = _provenance(run, calibration, calibration_file, settings)
         return cls(run, calibration, settings, search, read_references(run), provenance)
 
-    def measure(self, shot: int, results_dir: Path, threads: int = DEFAULT_THREADS) -> MeasuredShot:
+    def measure(
+        self,
+        shot: int,
+        results_dir: Path,
+        threads: int = DEFAULT_THREADS,
+        should_stop: Callable[[], bool] = lambda: False,
+    ) -> MeasuredShot:
         """Measure every exposure of one shot and write its droplets.
 
         Parameters
@@ -156,11 +168,15 @@ class RunMeasurement:
             Receives the droplets; a file of the same shot and settings is replaced atomically.
         threads : int
             The droplets do not depend on it.
+        should_stop : callable
+            Asked before each exposure.
 
         Raises
         ------
         PipelineError
             The shot is not valid.
+        Stopped
+            ``should_stop`` said so.
         VolumeFileError
             The directory holds results of something else.
         """
@@ -169,7 +185,7 @@ class RunMeasurement:
         require_match(self.run.run_dir.name, recorded, self.calibration)
         claim_results(results_dir, self.provenance)
         frames = frame_names(self.run)
-        exposures = tuple(self._exposure(recorded, frame, threads) for frame in frames)
+        exposures = tuple(self._exposure(recorded, frame, threads, should_stop) for frame in frames)
         told = {frame: _told(exposure) for frame, exposure in zip(frames, exposures, strict=True)}
         droplets: dict[str, Droplets] = {
             frame: exposure.droplets for frame, exposure in zip(frames, exposures, strict=True)
@@ -183,7 +199,9 @@ class RunMeasurement:
         recipe = recipe_sha256("measure", METHOD_VERSION, self.settings)
         return {"shot": shot, "grid": grid, "recipe_sha256": recipe, "exposures": json.dumps(exposures)}
 
-    def _exposure(self, shot: Shot, frame: FrameName, threads: int) -> BrightShot:
+    def _exposure(self, shot: Shot, frame: FrameName, threads: int, should_stop: Callable[[], bool]) -> BrightShot:
+        if should_stop():
+            raise Stopped(f"{self.run.run_dir.name}, shot {shot.index}: stopped before exposure {frame}")
         images = bright_images(self.run, shot, frame, self.references)
         seed = self.settings.seed + shot.index
         return measure_bright(images, self.search, twins=self.settings.twins, seed=seed, threads=threads)

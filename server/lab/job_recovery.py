@@ -8,8 +8,8 @@ from pathlib import Path
 
 from server.lab.damage import set_aside, tell
 from server.lab.events import EventPublisher
-from server.lab.jobs import Job, JobTable, finished_reconstruction
-from server.lab.results import VOLUME_NAME
+from server.lab.jobs import Job, JobKind, JobTable, finished, shot_job
+from server.lab.results import droplet_summaries, volume_summaries
 
 TABLE_FILE = "jobs.sqlite"
 _COMPANIONS = ("-wal", "-shm")
@@ -21,7 +21,7 @@ def opened_table(data_dir: Path, events: EventPublisher) -> Iterator[JobTable]:
     """The table of a data directory, sound and as complete as the directory can make it, until the block ends."""
     path = data_dir / TABLE_FILE
     if path.exists() and (damage := damage_of(path)):
-        lost = "finished reconstructions are found again, what waited must be asked for again"
+        lost = "finished reconstructions and measurements are found again, what waited must be asked for again"
         set_aside(path, f"table of jobs, {damage}: {lost}", events, _COMPANIONS)
     with closing(JobTable(path)) as table:
         if strangers := table.set_strangers_aside():
@@ -46,20 +46,22 @@ def damage_of(path: Path) -> str | None:
 
 
 def jobs_on_disk(data_dir: Path, events: EventPublisher) -> Iterator[Job]:
-    """Finished reconstructions, as the results in the run directories tell them; damaged results are told."""
+    """Finished reconstructions and measurements, as the run directories have them; damaged results are told."""
     for record in sorted(data_dir.glob("*/results/*/settings.json")):
         try:
             yield from _jobs_of(record)
         except (OSError, ValueError, KeyError, TypeError) as error:
-            tell(record, f"cannot be read ({error}): its reconstructions are not in the table of jobs", events)
+            tell(record, f"cannot be read ({error}): its jobs are not in the table of jobs", events)
 
 
 def _jobs_of(record: Path) -> list[Job]:
     written = json.loads(record.read_text())
     calibration, settings = Path(written["calibration_file"]).stem, json.loads(written["settings"])
-    shots = [VOLUME_NAME.fullmatch(path.stem) for path in sorted(record.parent.glob("*.vtkhdf"))]
+    run_id, results_id = record.parents[2].name, record.parent.name
+    volumes = [
+        (JobKind.RECONSTRUCTION, volume.shot) for volume in volume_summaries(record.parent) if volume.frame == "a"
+    ]
+    droplets = [(JobKind.MEASUREMENT, droplets.shot) for droplets in droplet_summaries(record.parent)]
     return [
-        finished_reconstruction(record.parents[2].name, int(name["shot"]), calibration, record.parent.name, settings)
-        for name in shots
-        if name and name["frame"] == "a"
+        finished(shot_job(kind, run_id, shot, calibration, results_id, settings)) for kind, shot in volumes + droplets
     ]

@@ -29,6 +29,7 @@ class JobKind(StrEnum):
     """What a job does."""
 
     RECONSTRUCTION = "reconstruction"
+    MEASUREMENT = "measurement"
     CALIBRATION = "calibration"
     CHECK = "check"
 
@@ -81,11 +82,13 @@ class Job(FrozenModel):
     )
 
 
-def reconstruction_job(run_id: str, shot: int, calibration: str, results_id: str, settings: Mapping[str, Any]) -> Job:
+def shot_job(
+    kind: JobKind, run_id: str, shot: int, calibration: str, results_id: str, settings: Mapping[str, Any]
+) -> Job:
     """Job for one shot; ``results_id`` stands for settings and calibration, and names the directory of the results."""
     return Job(
         id=f"{run_id}.{results_id}.{shot:05d}",
-        kind=JobKind.RECONSTRUCTION,
+        kind=kind,
         run_id=run_id,
         shot=shot,
         calibration=calibration,
@@ -94,13 +97,14 @@ def reconstruction_job(run_id: str, shot: int, calibration: str, results_id: str
     )
 
 
-def finished_reconstruction(
-    run_id: str, shot: int, calibration: str, results_id: str, settings: Mapping[str, Any]
-) -> Job:
-    """Such a job whose volumes are there."""
-    return reconstruction_job(run_id, shot, calibration, results_id, settings).model_copy(
-        update={"state": JobState.DONE}
-    )
+def reconstruction_job(run_id: str, shot: int, calibration: str, results_id: str, settings: Mapping[str, Any]) -> Job:
+    """Job that makes the volumes of a shot."""
+    return shot_job(JobKind.RECONSTRUCTION, run_id, shot, calibration, results_id, settings)
+
+
+def finished(job: Job) -> Job:
+    """Such a job whose files are there."""
+    return job.model_copy(update={"state": JobState.DONE})
 
 
 def calibration_job(run_id: str, calibration: str, model: str) -> Job:

@@ -50,6 +50,26 @@ def request_reconstruction(
     Unprocessable
         No calibration is known, or the run has no such shot.
     """
+    chosen, wanted = requested_shots(context, run_id, shots, calibration)
+    described = settings.model_dump(mode="json")
+    return [
+        context.runner.submit(reconstruction_job(run_id, shot, chosen, settings.results_id(chosen), described))
+        for shot in wanted
+    ]
+
+
+def requested_shots(
+    context: Context, run_id: str, shots: Iterable[int] | None, calibration: str | None
+) -> tuple[str, list[int]]:
+    """The calibration and the shots of a request, and a check of the last of them, which comes first.
+
+    Raises
+    ------
+    NotFound
+        There is no such run or calibration.
+    Unprocessable
+        No calibration is known, or the run has no such shot.
+    """
     summary = context.runs.summary(run_id)
     chosen = calibration or summary.calibration or context.calibrations.current
     if chosen is None:
@@ -61,11 +81,7 @@ def request_reconstruction(
         raise Unprocessable(f"run {run_id} has {summary.shots_recorded} shots, not {absent}")
     if wanted:
         context.runner.check(run_id, chosen, wanted[-1])
-    described = settings.model_dump(mode="json")
-    return [
-        context.runner.submit(reconstruction_job(run_id, shot, chosen, settings.results_id(chosen), described))
-        for shot in wanted
-    ]
+    return chosen, wanted
 
 
 def _valid_shots(context: Context, run_id: str) -> list[int]:

@@ -1,4 +1,4 @@
-"""Results of a run on disk: sets of volumes by settings and calibration, and the previews of the volumes."""
+"""Results of a run on disk: sets of volumes or droplets by settings and calibration, and previews of the volumes."""
 
 import json
 import re
@@ -20,6 +20,8 @@ from server.pictures.surfaces import surface_glb
 
 VOLUME_NAME = re.compile(r"shot_(?P<shot>[0-9]{5,7})_(?P<frame>[ab])")
 """Name of a volume, without the ending of its file."""
+DROPLETS_NAME = re.compile(r"shot_(?P<shot>[0-9]{5,7})_droplets")
+"""Name of a file of droplets, without its ending."""
 _MAKING = threading.Lock()  # a full volume takes seconds: who waits for a preview does not make it again
 
 
@@ -32,14 +34,23 @@ class VolumeSummary(FrozenModel):
     size_bytes: Annotated[int, Field(description="of its file")]
 
 
+class DropletsSummary(FrozenModel):
+    """The droplets of one shot of a result set."""
+
+    name: Annotated[str, Field(description="of their file, without the ending")]
+    shot: Annotated[int, Field(description="position in the run, from 0")]
+    size_bytes: Annotated[int, Field(description="of their file")]
+
+
 class ResultSet(FrozenModel):
-    """Volumes that were made with the same settings and calibration."""
+    """Volumes, or droplets, that were made with the same settings and calibration."""
 
     id: Annotated[str, Field(description="name of the directory; stands for settings and calibration")]
     provenance: Annotated[
         dict[str, Any], Field(description="what the volumes were made of; empty if it cannot be read")
     ]
     volumes: Annotated[tuple[VolumeSummary, ...], Field(description="those that are there, by shot and exposure")]
+    droplets: Annotated[tuple[DropletsSummary, ...], Field(description="those that are there, by shot")] = ()
     problem: Annotated[str | None, Field(description="why the provenance cannot be read; null if it can")] = None
 
 
@@ -105,16 +116,23 @@ def _load(stored: Path, _mtime_ns: int) -> VolumePreview:
 
 
 def _result_set(record: Path) -> ResultSet:
-    volumes = tuple(_volume_summaries(record.parent))
+    volumes, droplets = tuple(volume_summaries(record.parent)), tuple(droplet_summaries(record.parent))
+    made = ResultSet(id=record.parent.name, provenance={}, volumes=volumes, droplets=droplets)
     try:
-        provenance = json.loads(record.read_text())
-        return ResultSet(id=record.parent.name, provenance=provenance, volumes=volumes)
+        return made.model_copy(update={"provenance": json.loads(record.read_text())})
     except (OSError, ValueError) as error:
-        problem = f"{record}: cannot be read: {error}"
-        return ResultSet(id=record.parent.name, provenance={}, volumes=volumes, problem=problem)
+        return made.model_copy(update={"problem": f"{record}: cannot be read: {error}"})
 
 
-def _volume_summaries(results_dir: Path) -> Iterator[VolumeSummary]:
+def droplet_summaries(results_dir: Path) -> Iterator[DropletsSummary]:
+    """Files of droplets in a result set, by shot."""
+    for path in sorted(results_dir.glob("shot_*_droplets.h5")):
+        if (name := DROPLETS_NAME.fullmatch(path.stem)) and path.is_file():
+            yield DropletsSummary(name=path.stem, shot=int(name["shot"]), size_bytes=path.stat().st_size)
+
+
+def volume_summaries(results_dir: Path) -> Iterator[VolumeSummary]:
+    """Volumes in a result set, by shot and exposure."""
     for path in volume_files(results_dir):
         if (name := VOLUME_NAME.fullmatch(path.stem)) and path.is_file():
             shot, frame, size_bytes = int(name["shot"]), name["frame"], path.stat().st_size

@@ -10,6 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from processing.runs.measurement import droplets_path
 from server.lab.calibrations import CalibrationStore
 from server.lab.duty import Duty, pause
 from server.lab.engine import Engine, Task, TaskAborted, TaskError
@@ -170,9 +171,11 @@ class JobRunner:
         """Whether the files of a done job are gone, or some of them."""
         if job.kind is JobKind.CALIBRATION:
             return not self._calibrations.path(job.calibration).is_file()
-        if job.kind is not JobKind.RECONSTRUCTION or job.results_id is None:
+        if job.kind is JobKind.CHECK or job.results_id is None or job.shot is None:
             return False
         results_dir = self._data_dir / job.run_id / "results" / job.results_id
+        if job.kind is JobKind.MEASUREMENT:
+            return not droplets_path(results_dir, job.shot).is_file()
         written = (job.result or {}).get("volumes") or [{"file": f"shot_{job.shot:05d}_a.vtkhdf"}]
         return not all((results_dir / volume["file"]).is_file() for volume in written)
 

@@ -6,10 +6,12 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from daq.files.run_directory import RunReader
 from processing.calibration.calibrate import calibrate
 from processing.calibration.calibration_file import load_calibration, save_calibration
 from processing.calibration.sets.calibration_set import load_calibration_set
 from processing.reconstruction.settings import ReconstructionSettings
+from processing.runs.measurement import MeasureSettings, RunMeasurement
 from processing.runs.pipeline import reconstruct_shot
 from processing.runs.run_check import check_shot
 from processing.runs.workbench import Workbench
@@ -37,6 +39,15 @@ def reconstruct(job: dict[str, Any], should_stop: Callable[[], bool]) -> dict[st
     for volume in result.volumes:
         write_preview(results_dir / volume.file)
     return result.model_dump(mode="json")
+
+
+def measure_shot(job: dict[str, Any], should_stop: Callable[[], bool]) -> dict[str, Any]:
+    """Measure the droplets of one shot; no volume is needed."""
+    settings = MeasureSettings.model_validate(job["settings"])
+    with RunReader(Path(job["run_dir"])) as run:
+        measurement = RunMeasurement.of(run, job["shot"], Path(job["calibration_file"]), settings)
+        measured = measurement.measure(job["shot"], Path(job["results_dir"]), should_stop=should_stop)
+    return measured.summary.model_dump(mode="json")
 
 
 def calibrate_run(job: dict[str, Any], should_stop: Callable[[], bool]) -> dict[str, Any]:
@@ -69,6 +80,11 @@ def check_run(job: dict[str, Any], should_stop: Callable[[], bool]) -> dict[str,
 
 
 TASKS: Mapping[JobKind, Task] = MappingProxyType(
-    {JobKind.RECONSTRUCTION: reconstruct, JobKind.CALIBRATION: calibrate_run, JobKind.CHECK: check_run}
+    {
+        JobKind.RECONSTRUCTION: reconstruct,
+        JobKind.MEASUREMENT: measure_shot,
+        JobKind.CALIBRATION: calibrate_run,
+        JobKind.CHECK: check_run,
+    }
 )
 """Work function of every kind of job."""

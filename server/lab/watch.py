@@ -16,6 +16,8 @@ from processing.runs.run_check import ALARM_PX, STOP_PX
 from server.lab.events import EventPublisher
 from server.lab.jobs import ENDED, Job, JobKind, JobState, check_job
 
+_TRUSTING = (JobKind.RECONSTRUCTION, JobKind.MEASUREMENT)
+"""Jobs that make nothing good of a calibration that does not fit."""
 _ALARMING = (Verdict.WARN, Verdict.REFUSE)
 _REMEDY = (
     "The shots are kept: correct the calibration by the droplets (tomoshadow self-calibrate) or calibrate anew, "
@@ -123,17 +125,17 @@ class CalibrationWatch:
         return None if following is None else self.next_check(job.run_id, job.calibration, following)
 
     def holds(self, job: Job) -> bool:
-        """Whether a reconstruction has to wait: the first check of its run and calibration is under way."""
+        """Whether a job that trusts the calibration has to wait: the first check of it on this run is under way."""
         account = self._accounts.get((job.run_id, job.calibration))
         waits = account is not None and account.under_way is not None and not account.has_ended
-        return waits and job.kind is JobKind.RECONSTRUCTION
+        return waits and job.kind in _TRUSTING
 
     def refusal(self, job: Job) -> str | None:
-        """Why a reconstruction must not be made; None if it may."""
+        """Why a job that trusts the calibration must not be done; None if it may."""
         account = self._accounts.get((job.run_id, job.calibration))
         standing = account.standing if account else None
         refused = standing is not None and standing.verdict is Verdict.REFUSE
-        return standing.message if standing and refused and job.kind is JobKind.RECONSTRUCTION else None
+        return standing.message if standing and refused and job.kind in _TRUSTING else None
 
     def _account(self, run_id: str, calibration: str) -> _Account:
         return self._accounts.setdefault((run_id, calibration), _Account())

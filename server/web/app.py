@@ -28,12 +28,12 @@ from server.lab.runs import RunStore
 from server.lab.services import Context, Services
 from server.lab.watch import CalibrationWatch
 from server.web import problems
-from server.web.api import bench, calibrations, events, jobs, live, results, rig, runs, shots, sign_in, timing
+from server.web.api import bench, calibrations, droplets, events, jobs, live, results, rig, runs, shots, sign_in, timing
 from server.web.api.parameters import forbid_unknown_query
 from server.web.guard import Guard
 from server.web.ui.page import mount_page
 
-_RESOURCES = (rig, runs, shots, results, calibrations, jobs, events, bench, timing)
+_RESOURCES = (rig, runs, shots, droplets, results, calibrations, jobs, events, bench, timing)
 _METHODS = ["GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"]
 _SHUTDOWN_S = 3
 _DUTIES = ("processing", "automatic reconstruction", "lamps", "live view")

@@ -34,9 +34,9 @@ _TAIL = (1 - CONFIDENCE) / 2
 class Estimate(FrozenValue):
     """A number, and where it lies with 95 % confidence."""
 
-    value: float
-    low: float
-    high: float
+    value: Annotated[float, Field(description="the number")]
+    low: Annotated[float, Field(description="it is not below this, with 97.5 %")]
+    high: Annotated[float, Field(description="it is not above this, with 97.5 %")]
 
 
 class SizeStatistics(FrozenValue):

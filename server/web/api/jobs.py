@@ -1,4 +1,4 @@
-"""/api/jobs: reconstructions, checks and calibrations, waiting, running and done."""
+"""/api/jobs: reconstructions, measurements, checks and calibrations, waiting, running and done."""
 
 from typing import Annotated
 
@@ -8,6 +8,8 @@ from pydantic import Field
 from daq.frozen_model import FrozenModel
 from daq.names import Identifier
 from processing.reconstruction.settings import ReconstructionSettings
+from processing.runs.measurement import MeasureSettings
+from server.lab.droplets.measurement import request_measurement
 from server.lab.jobs import Job, JobKind, JobState
 from server.lab.reconstruction import request_reconstruction
 from server.web.api.parameters import ContextOf, JobId
@@ -29,6 +31,17 @@ class ReconstructionRequest(FrozenModel):
     )
 
 
+class MeasurementRequest(FrozenModel):
+    """Measure the droplets in shots of a run."""
+
+    run_id: Annotated[Identifier, Field(description="a run whose images show droplets")]
+    shots: Annotated[
+        tuple[Annotated[int, Field(ge=0)], ...] | None, Field(description="indices; null: all valid shots")
+    ] = None
+    calibration: Annotated[Identifier | None, Field(description="null: the run's own, or the current one")] = None
+    settings: Annotated[MeasureSettings | None, Field(description="how; null: as the run is recorded")] = None
+
+
 @router.get("")
 def list_jobs(
     context: ContextOf,
@@ -45,6 +58,12 @@ def list_jobs(
 def create_jobs(request: ReconstructionRequest, context: ContextOf) -> list[Job]:
     """Queue one job per shot; work that is waiting, running or done already is not repeated."""
     return request_reconstruction(context, request.run_id, request.shots, request.calibration, request.settings)
+
+
+@router.post("/measurements", status_code=202, responses=responses(404, 500))
+def create_measurements(request: MeasurementRequest, context: ContextOf) -> list[Job]:
+    """Queue the measurement of droplets, one job per shot; no volume is needed, and nothing is done twice."""
+    return request_measurement(context, request.run_id, request.shots, request.calibration, request.settings)
 
 
 @router.get("/{job_id}", responses=responses(404))

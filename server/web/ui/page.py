@@ -8,6 +8,7 @@ from server.rig.config import RigConfig
 from server.web.ui import theme
 from server.web.ui.alarm_banner import AlarmBanner
 from server.web.ui.draft import DraftStore
+from server.web.ui.droplet_panel import DropletPanel
 from server.web.ui.event_log import EventLog
 from server.web.ui.header import Header
 from server.web.ui.live_tiles import LiveTiles
@@ -50,6 +51,7 @@ class Page:
                 self._runs, self._jobs = RunTable(context), JobPanel(context)
             with ui.element("div").classes("column wide"):
                 self._volume = VolumePanel(context)
+                self._droplets = DropletPanel(context)
             with ui.element("div").classes("column controls"):
                 self._run, self._form, self._log = RunPanel(context), RunForm(context, draft), EventLog()
         ui.timer(_REFRESH_S, self._refresh)
@@ -66,4 +68,5 @@ class Page:
             await self._runs.reload()
             await self._jobs.reload()
             await self._volume.reload()
+            await self._droplets.reload()
             await self._form.reload_choices()

@@ -13,6 +13,7 @@ from processing.calibration.verdict import Verdict
 from processing.reconstruction.choices import Accuracy, VoxelType
 from processing.reconstruction.choices import ReconstructionMethod as Method
 from processing.reconstruction.settings import ReconstructionSettings
+from server.lab.droplets.measurement import request_measurement
 from server.lab.errors import ServerError
 from server.lab.jobs import Job, JobKind, JobState, calibration_job
 from server.lab.reconstruction import request_reconstruction
@@ -28,7 +29,7 @@ _SHOWN = 60
 
 
 class RunTable:
-    """Runs, newest first; a calibration run can be fitted, a sample run reconstructed as chosen."""
+    """Runs, newest first; a calibration run can be fitted, a sample run reconstructed as chosen, or measured."""
 
     def __init__(self, context: Context) -> None:
         self._context = context
@@ -42,10 +43,17 @@ class RunTable:
                 self._accuracy = _choice("Accuracy", {one.value: one.value for one in Accuracy}, chosen.accuracy)
                 self._voxels = _choice("Voxels", {one.value: one.value for one in VoxelType}, chosen.voxels)
             self._table = _table(
-                ("name", "Run"), ("kind", "Kind"), ("shots", "Valid / shots"), ("outcome", "Outcome"), ("action", "")
+                ("name", "Run"),
+                ("kind", "Kind"),
+                ("shots", "Valid / shots"),
+                ("outcome", "Outcome"),
+                ("action", ""),
+                ("measure", ""),
             )
             self._table.add_slot("body-cell-action", _ACTION)
+            self._table.add_slot("body-cell-measure", _ACTION.replace("'act'", "'measure'"))
             self._table.on("act", self._on_act)
+            self._table.on("measure", self._on_measure)
 
     async def reload(self) -> None:
         """Read the run directories again."""
@@ -57,6 +65,10 @@ class RunTable:
         run_id, kind = event.args["id"], event.args["kind"]
         ask = self._calibrate if kind == RunKind.CALIBRATION else self._reconstruct
         await _try(lambda: asyncio.to_thread(ask, run_id))
+
+    async def _on_measure(self, event: Any) -> None:
+        run_id = event.args["id"]
+        await _try(lambda: asyncio.to_thread(request_measurement, self._context, run_id, None, None, None))
 
     def _calibrate(self, run_id: str) -> None:
         self._context.runner.submit(calibration_job(run_id, f"{run_id}-pinhole", "pinhole"))
@@ -126,6 +138,7 @@ def _run_row(run: RunSummary) -> dict[str, Any]:
         "outcome": run.outcome,
         "colour": outcome_colour(run.outcome),
         "action": "" if run.outcome == ACTIVE or run.kind is None else actions.get(run.kind, ""),
+        "measure": "Measure" if run.outcome != ACTIVE and run.kind is RunKind.SAMPLE else "",
     }
 
 
@@ -151,6 +164,7 @@ def _name(job: Job) -> str:
         JobKind.CALIBRATION: "calibration",
         JobKind.CHECK: f"check of shot {job.shot}",
         JobKind.RECONSTRUCTION: f"{method} shot {job.shot}",
+        JobKind.MEASUREMENT: f"droplets of shot {job.shot}",
     }[job.kind]
 
 
@@ -188,4 +202,16 @@ def _slow_views(job: Job) -> str:
     return "; ".join(f"{name} exact: {view['reason']}" for name, view in views.items() if view["reason"])
 
 
-_DETAIL = {JobKind.CALIBRATION: _quality, JobKind.CHECK: _disparity, JobKind.RECONSTRUCTION: _slow_views}
+def _found(job: Job) -> str:
+    """Droplets, verdict and reasons of a measurement; nothing before it has ended."""
+    if not job.result:
+        return ""
+    return "; ".join([f"{job.result['droplets']} droplets, {job.result['verdict']}", *job.result["reasons"]])
+
+
+_DETAIL = {
+    JobKind.CALIBRATION: _quality,
+    JobKind.CHECK: _disparity,
+    JobKind.RECONSTRUCTION: _slow_views,
+    JobKind.MEASUREMENT: _found,
+}

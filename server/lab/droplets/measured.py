@@ -1,0 +1,80 @@
+"""What the files of droplets of a run say: shot by shot, and of the spray as a whole."""
+
+import json
+from functools import lru_cache
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import Field
+
+from daq.frozen_model import FrozenModel
+from processing.analysis.droplets.bright_shot import ShotVerdict
+from processing.analysis.droplets.droplet_file import DropletFileError, StoredDroplets, read_droplets
+from processing.analysis.droplets.droplet_statistics import DropletStatistics, droplet_statistics
+from processing.runs.measurement import droplets_path
+from server.lab.errors import Damaged, NotFound
+from server.lab.results import droplet_summaries
+
+
+class ShotOfDroplets(FrozenModel):
+    """A shot that was measured; of two exposures, the less favourable verdict and ratio."""
+
+    shot: Annotated[int, Field(description="position in the run, from 0")]
+    droplets: Annotated[int, Field(description="in all exposures")]
+    verdict: Annotated[ShotVerdict, Field(description="what they are good for")]
+    reasons: Annotated[tuple[str, ...], Field(description="why it is no better, and what to do")]
+    residual_over_noise: Annotated[float | None, Field(description="1 is noise; null where nothing was fitted")]
+
+
+class MeasuredRun(FrozenModel):
+    """Droplets that were measured with the same settings and calibration."""
+
+    shots: Annotated[tuple[ShotOfDroplets, ...], Field(description="those that are there")]
+    statistics: Annotated[DropletStatistics, Field(description="of all of them; refused exposures do not count")]
+
+
+def measured_run(results_dir: Path) -> MeasuredRun:
+    """Read the droplets of a result set.
+
+    Raises
+    ------
+    NotFound
+        It has none.
+    Damaged
+        A file cannot be read; the text names it.
+    """
+    paths = [droplets_path(results_dir, summary.shot) for summary in droplet_summaries(results_dir)]
+    if not paths:
+        raise NotFound(f"{results_dir.parents[1].name} has no droplets in {results_dir.name}")
+    try:
+        return _read(tuple((path, path.stat().st_mtime_ns) for path in paths))
+    except (DropletFileError, OSError) as error:
+        raise Damaged(str(error)) from error
+
+
+def droplets_file(results_dir: Path, shot: int) -> Path:
+    """File of the droplets of a shot; NotFound if there is none."""
+    path = droplets_path(results_dir, shot)
+    if not path.is_file():
+        raise NotFound(f"{results_dir.parents[1].name} has no droplets of shot {shot} in {results_dir.name}")
+    return path
+
+
+@lru_cache(maxsize=16)
+def _read(files: tuple[tuple[Path, int], ...]) -> MeasuredRun:
+    """Once per change of the files."""
+    stored = [read_droplets(path) for path, _ in files]
+    return MeasuredRun(shots=tuple(map(_told, stored)), statistics=droplet_statistics(stored))
+
+
+def _told(stored: StoredDroplets) -> ShotOfDroplets:
+    exposures = json.loads(str(stored.provenance["exposures"])).values()
+    ratios = [ratio for exposure in exposures if (ratio := exposure["residual_over_noise"]) is not None]
+    verdicts = [ShotVerdict(exposure["verdict"]) for exposure in exposures]
+    return ShotOfDroplets(
+        shot=int(stored.provenance["shot"]),
+        droplets=len(stored.columns["frame"]),
+        verdict=max(verdicts, key=list(ShotVerdict).index),
+        reasons=tuple(dict.fromkeys(reason for exposure in exposures for reason in exposure["reasons"])),
+        residual_over_noise=max(ratios, default=None),
+    )

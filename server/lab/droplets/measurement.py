@@ -1,0 +1,43 @@
+"""Which shots are measured: those that an operator asks for."""
+
+from collections.abc import Iterable
+
+from processing.errors import BadInput
+from processing.runs.measurement import MeasureSettings, require_measurable
+from server.lab.errors import Unprocessable
+from server.lab.jobs import Job, JobKind, shot_job
+from server.lab.reconstruction import requested_shots
+from server.lab.services import Context
+
+
+def request_measurement(
+    context: Context,
+    run_id: str,
+    shots: Iterable[int] | None,
+    calibration: str | None,
+    settings: MeasureSettings | None,
+) -> list[Job]:
+    """Queue the measurement of shots; what is not said is as of ``request_reconstruction``.
+
+    Without ``settings`` a run is measured as it is recorded, with all defaults.
+
+    Raises
+    ------
+    NotFound
+        There is no such run or calibration.
+    Unprocessable
+        No calibration is known, the run has no such shot, or its images cannot be measured.
+    """
+    context.runs.require_sound(context.runs.summary(run_id))
+    recorded = context.runs.reader(run_id).header.polarity
+    chosen_settings = settings or MeasureSettings(polarity=recorded)
+    try:
+        require_measurable(run_id, recorded, chosen_settings.polarity)
+    except BadInput as error:
+        raise Unprocessable(str(error)) from error
+    chosen, wanted = requested_shots(context, run_id, shots, calibration)
+    results_id, described = chosen_settings.results_id(chosen), chosen_settings.model_dump(mode="json")
+    return [
+        context.runner.submit(shot_job(JobKind.MEASUREMENT, run_id, shot, chosen, results_id, described))
+        for shot in wanted
+    ]

@@ -1,0 +1,87 @@
+"""DropletPanel: what was measured of the droplets, a line per result set; hidden until something was."""
+
+import asyncio
+from collections import Counter
+from typing import Any
+
+from nicegui import ui
+
+from processing.analysis.droplets.size_statistics import Estimate
+from server.lab.droplets.measured import MeasuredRun, measured_run
+from server.lab.errors import ServerError
+from server.lab.jobs import JobKind, JobState
+from server.lab.services import Context
+from server.web.ui.theme import panel
+
+_JOBS, _SHOWN = 2000, 8
+_COLUMNS = {
+    "run": "Run",
+    "droplets": "Droplets",
+    "density": "per mm³",
+    "d32": "D32, µm",
+    "ghosts": "Ghosts, %",
+    "verdict": "Verdict",
+}
+
+
+class DropletPanel:
+    """Built once per page; shows what was measured last."""
+
+    def __init__(self, context: Context) -> None:
+        self._context = context
+        with panel("Droplets") as self._panel:
+            columns = [
+                {"name": name, "label": label, "field": name, "align": "left"} for name, label in _COLUMNS.items()
+            ]
+            self._table = ui.table(columns=columns, rows=[], row_key="id").classes("w-full")
+            self._table.props('dense flat wrap-cells hide-bottom :pagination="{rowsPerPage: 0}"')
+        self._panel.set_visibility(False)
+
+    async def reload(self) -> None:
+        """Read the newest result sets again."""
+        rows = await asyncio.to_thread(self._rows)
+        self._panel.set_visibility(bool(rows))
+        self._table.rows = rows
+        self._table.update()
+
+    def _rows(self) -> list[dict[str, Any]]:
+        jobs = self._context.jobs.newest(None, [JobState.DONE], _JOBS, [JobKind.MEASUREMENT])
+        measured = list(dict.fromkeys((job.run_id, str(job.results_id)) for job in jobs))[:_SHOWN]
+        return [self._row(run_id, results_id) for run_id, results_id in measured]
+
+    def _row(self, run_id: str, results_id: str) -> dict[str, Any]:
+        try:
+            run = measured_run(self._context.runs.directory(run_id) / "results" / results_id)
+        except ServerError as error:
+            return {"id": f"{run_id}/{results_id}", "run": run_id, "verdict": str(error)}
+        return {"id": f"{run_id}/{results_id}", "run": run_id, **droplet_row(run)}
+
+
+def droplet_row(run: MeasuredRun) -> dict[str, str]:
+    """Cells of a result set: each number with its interval, or why there is none."""
+    statistics = run.statistics
+    return {
+        "droplets": f"{statistics.n} in {statistics.exposures} exposures",
+        "density": _told(statistics.number_density_per_mm3, statistics.number_density_reason),
+        "d32": _told(statistics.d32_um, statistics.reason),
+        "ghosts": _told(statistics.ghost_share, "no twins", scale=100),
+        "verdict": _verdicts(run),
+    }
+
+
+def _told(estimate: Estimate | None, reason: str | None, scale: float = 1) -> str:
+    if estimate is None:
+        return reason or ""
+    value, low, high = (f"{scale * number:.3g}" for number in (estimate.value, estimate.low, estimate.high))
+    return f"{value} ({low} to {high})"
+
+
+def _verdicts(run: MeasuredRun) -> str:
+    """How many shots are good, and of all others the reasons, each with its shots."""
+    counts = Counter(str(shot.verdict) for shot in run.shots)
+    reasons: dict[str, list[int]] = {}
+    for shot in run.shots:
+        for reason in shot.reasons:
+            reasons.setdefault(reason, []).append(shot.shot)
+    told = [f"shot {', '.join(map(str, shots))}: {reason}" for reason, shots in reasons.items()]
+    return "; ".join([", ".join(f"{count} {verdict}" for verdict, count in counts.items()), *told])

@@ -1,0 +1,162 @@
+"""Droplets by the server: asked for, measured from images alone, listed, downloaded, and found again."""
+
+import json
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from processing.analysis.droplets.droplet_file import read_droplets
+from processing.runs.measurement import MeasureSettings
+from processing.runs.pipeline import Stopped
+from server.lab.droplets.measured import measured_run
+from server.lab.events import EventPublisher
+from server.lab.job_recovery import jobs_on_disk
+from server.lab.jobs import JobKind, JobState
+from server.lab.tasks import measure_shot
+from server.web.app import create_api
+from server.web.ui.droplet_panel import droplet_row
+from server.web.ui.tables import job_row
+from tests.server.web.test_api import wait_for_jobs
+from tests.support.bright_scenes import GRID, MARGIN_VOXEL, write_bright_calibration, write_bright_run
+from tests.support.droplet_run import write_run
+from tests.support.serving import Serving, serving
+
+SETTINGS = MeasureSettings.model_validate(
+    {
+        "grid": {"shape": GRID.shape, "origin_mm": GRID.origin_mm, "pitch_mm": GRID.pitch_mm},
+        "margin_voxel": MARGIN_VOXEL,
+    }
+)
+REQUEST = {"run_id": "bright", "calibration": "cal", "settings": SETTINGS.model_dump(mode="json")}
+
+
+@pytest.fixture(scope="module")
+def measured(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
+    """A server with a bright run of two shots, both measured, and one of shadows."""
+    data_dir = tmp_path_factory.mktemp("lab") / "runs"
+    write_bright_run(data_dir / "bright", shots=2)
+    write_run(data_dir / "shadows")
+    (data_dir / "calibrations").mkdir()
+    write_bright_calibration(data_dir / "calibrations" / "cal.json")
+
+    with serving(
+        data_dir,
+        build=lambda given: create_api(replace(given, tasks={**given.tasks, JobKind.MEASUREMENT: measure_shot})),
+    ) as server:
+        assert ask(server).status_code == 202
+        wait_for_jobs(server, 2, "measurement")
+        yield server
+
+
+def ask(server: Serving, **changes: Any) -> httpx.Response:
+    return server.http.post("/api/jobs/measurements", json={**REQUEST, **changes})
+
+
+def results_of(server: Serving) -> tuple[str, dict[str, Any]]:
+    """Address of the droplets, and their result set."""
+    (result_set,) = server.http.get("/api/runs/bright/results").json()
+    return f"/api/runs/bright/results/{result_set['id']}/droplets", result_set
+
+
+def test_a_job_per_shot_measures_without_any_volume(measured: Serving) -> None:
+    jobs = measured.http.get("/api/jobs", params={"kind": "measurement"}).json()
+    assert [(job["shot"], job["state"]) for job in jobs] == [(1, "done"), (0, "done")]
+    assert {job["results_id"] for job in jobs} == {SETTINGS.results_id("cal")}
+    _, result_set = results_of(measured)
+    assert [(droplets["name"], droplets["shot"]) for droplets in result_set["droplets"]] == [
+        ("shot_00000_droplets", 0),
+        ("shot_00001_droplets", 1),
+    ]
+    assert result_set["volumes"] == []
+    assert json.loads(result_set["provenance"]["settings"]) == SETTINGS.model_dump(mode="json")
+
+
+def test_shots_and_statistics_are_told_and_files_downloaded(measured: Serving, tmp_path: Path) -> None:
+    address, _ = results_of(measured)
+    told = measured.http.get(address).json()
+    assert [(shot["shot"], shot["verdict"]) for shot in told["shots"]] == [(0, "good"), (1, "good")]
+    statistics = told["statistics"]
+    assert statistics["n"] == sum(shot["droplets"] for shot in told["shots"])
+    density = statistics["number_density_per_mm3"]
+    assert density["low"] < 28 < density["high"]
+    assert (statistics["d32_um"], statistics["reason"][:16]) == (None, "bright particles")
+    path = tmp_path / "downloaded.h5"
+    path.write_bytes(measured.http.get(f"{address}/1.h5").content)
+    assert len(read_droplets(path).columns["x_mm"]) == told["shots"][1]["droplets"]
+    assert measured.http.get(f"{address}/7.h5").status_code == 404
+    assert measured.http.get(address.replace("droplets-", "mlos-")).status_code == 404
+
+
+def test_what_was_measured_is_measured_again_only_where_its_file_is_gone(measured: Serving) -> None:
+    assert [job["state"] for job in ask(measured).json()] == ["done", "done"]
+    lost = next(measured.services.data_dir.glob("bright/results/*/shot_00001_droplets.h5"))
+    lost.unlink()
+    assert [job["state"] for job in ask(measured).json()] == ["done", "queued"]
+    newest, _ = wait_for_jobs(measured, 2, "measurement")
+    assert (newest["shot"], newest["state"], lost.is_file()) == (1, "done", True)
+
+
+def test_measurements_are_found_again_when_the_table_of_jobs_is_lost(measured: Serving) -> None:
+    found = {job.id: job for job in jobs_on_disk(measured.services.data_dir, EventPublisher())}
+    jobs = measured.http.get("/api/jobs", params={"kind": "measurement"}).json()
+    assert found.keys() == {job["id"] for job in jobs}
+    assert {job.state for job in found.values()} == {JobState.DONE}
+    for job in jobs:
+        assert (found[job["id"]].kind, found[job["id"]].settings) == (JobKind.MEASUREMENT, job["settings"])
+
+
+def test_what_cannot_be_measured_is_refused_with_its_reason(measured: Serving) -> None:
+    for changes, status, text in (
+        ({"run_id": "none"}, 404, "no run 'none'"),
+        ({"calibration": "none"}, 404, "none"),
+        ({"shots": [0, 5]}, 422, "has 2 shots, not [5]"),
+        ({"run_id": "shadows", "settings": None}, 422, "shadow"),
+        ({"run_id": "shadows"}, 422, "recorded as shadow, they are not measured as bright"),
+        ({"settings": {"twinz": 1}}, 422, "twinz"),
+    ):
+        answer = ask(measured, **changes)
+        assert (answer.status_code, text in answer.text) == (status, True), answer.text
+
+
+def test_a_damaged_file_is_named(measured: Serving) -> None:
+    address, _ = results_of(measured)
+    path = next(measured.services.data_dir.glob("bright/results/*/shot_00000_droplets.h5"))
+    whole = path.read_bytes()
+    path.write_bytes(whole[:1000])
+    answer = measured.http.get(address)
+    path.write_bytes(whole)
+    assert answer.status_code == 500
+    assert "shot_00000_droplets.h5: not a readable file of droplets" in answer.json()["detail"]
+
+
+def test_the_page_tells_numbers_with_intervals_and_reasons(measured: Serving) -> None:
+    results_dir = next(measured.services.data_dir.glob("bright/results/droplets-*"))
+    row = droplet_row(measured_run(results_dir))
+    assert row["droplets"].endswith("in 2 exposures")
+    assert re.fullmatch(r"2\d(\.\d)? \(2\d(\.\d)? to 3\d(\.\d)?\)", row["density"])
+    assert row["d32"].startswith("bright particles have no diameter")
+    assert (row["ghosts"], row["verdict"]) == ("no twins", "2 good")
+    job, *_ = measured.http.get("/api/jobs", params={"kind": "measurement"}).json()
+    known = next(job for job in jobs_on_disk(measured.services.data_dir, EventPublisher()))
+    told = job_row(known.model_copy(update={"result": job["result"]}))
+    assert told["job"] == "droplets of shot 0"
+    assert told["detail"] == f"{job['result']['droplets']} droplets, good"
+
+
+def test_a_measurement_can_be_aborted_between_exposures(measured: Serving, tmp_path: Path) -> None:
+    data_dir = measured.services.data_dir
+    job = {
+        "run_dir": str(data_dir / "bright"),
+        "shot": 0,
+        "calibration_file": str(data_dir / "calibrations" / "cal.json"),
+        "results_dir": str(tmp_path / "out"),
+        "settings": REQUEST["settings"],
+    }
+    with pytest.raises(Stopped, match="shot 0: stopped before exposure a"):
+        measure_shot(job, lambda: True)
+    assert not list((tmp_path / "out").glob("*.h5"))
