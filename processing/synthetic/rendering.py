@@ -8,10 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from processing.geometry import PinholeCamera
+from processing.synthetic.coherence import with_coherence
 from processing.synthetic.spray import Spray
 from processing.synthetic.stamping import Discs, FloatArray, FloatImage, stamp_discs
 from processing.synthetic.union import blurred_union
-from processing.synthetic.view_optics import ViewOptics
+from processing.synthetic.view_optics import PIXEL_VARIANCE_PX2, ViewOptics
 
 
 def render_transmittance(
@@ -30,7 +31,7 @@ def render_transmittance(
     spray : Spray
         The liquid in the middle of the exposure.
     optics : ViewOptics
-        Diffraction and defocus.
+        Diffraction and defocus; partially coherent light if it has a ``condenser_ratio``.
     exposure_s : float
         Duration of the light pulse: moving balls are smeared along their path.
 
@@ -51,11 +52,20 @@ def render_transmittance(
         smears=last_px - first_px,
     )
     width_px, height_px = camera.image_size_px
-    shape, opaque = (height_px, width_px), spray.opacities >= 1
-    film = replace(discs, sigmas_px=optics.blur_sigma_px(depths_mm)).select(np.flatnonzero(~opaque))
-    transmittance = blurred_union(discs.select(np.flatnonzero(opaque)), optics.diffraction_sigma_px, shape)
-    transmittance *= stamp_discs(film, shape)
+    faint = spray.opacities < 1
+    film = replace(discs, sigmas_px=optics.blur_sigma_px(depths_mm)).select(np.flatnonzero(faint))
+    transmittance = _union(discs.select(np.flatnonzero(~faint)), optics, (height_px, width_px))
+    transmittance *= stamp_discs(film, (height_px, width_px))
     return transmittance
+
+
+def _union(opaque: Discs, optics: ViewOptics, shape: tuple[int, int]) -> FloatImage:
+    """Transmittance of opaque discs in the light of a view."""
+    transmittance = blurred_union(opaque, optics.diffraction_sigma_px, shape)
+    if optics.condenser_ratio is None:
+        return transmittance
+    with_pixel = replace(opaque, sigmas_px=np.sqrt(opaque.sigmas_px**2 + PIXEL_VARIANCE_PX2))
+    return with_coherence(transmittance, with_pixel, optics.airy_px, optics.condenser_ratio)
 
 
 def image_scale_px_per_mm(camera: PinholeCamera, points_mm: FloatArray) -> FloatArray:

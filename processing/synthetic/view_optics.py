@@ -7,9 +7,9 @@ import numpy as np
 from processing.optics import GREEN_UM, airy_diameter_um
 from processing.synthetic.stamping import FloatArray
 
-_CORE_SIGMA = 0.42 / 2.44
+CORE_SIGMA = 0.42 / 2.44
 """Sigma of the Gaussian with the core of the Airy pattern, relative to d_A."""
-_PIXEL_VARIANCE_PX2 = 1 / 12
+PIXEL_VARIANCE_PX2 = 1 / 12
 """Variance of a pixel of full fill factor."""
 
 
@@ -27,6 +27,9 @@ class ViewOptics:
         LED current that exposes half of the dynamic range within 1 us.
     wavelength_um : float
         Wavelength of the light.
+    condenser_ratio : float, optional
+        Numerical aperture of the light over that of the lens, above 0 to 1: partially coherent light, in which small
+        droplets look larger (``coherence``). Without it light is incoherent.
     """
 
     f_number: float
@@ -35,12 +38,17 @@ class ViewOptics:
     pixel_pitch_um: float
     nominal_current_a: float
     wavelength_um: float = GREEN_UM
+    condenser_ratio: float | None = None
+
+    @property
+    def airy_px(self) -> float:
+        """Airy disk d_A of eq. 1 on the sensor."""
+        return airy_diameter_um(self.f_number, self.magnification, self.wavelength_um) / self.pixel_pitch_um
 
     @property
     def diffraction_sigma_px(self) -> float:
-        """Gaussian of equal core for the Airy disk d_A of eq. 1, on the sensor."""
-        airy_um = airy_diameter_um(self.f_number, self.magnification, self.wavelength_um)
-        return _CORE_SIGMA * airy_um / self.pixel_pitch_um
+        """Gaussian of equal core for the Airy disk."""
+        return CORE_SIGMA * self.airy_px
 
     def defocus_sigma_px(self, depth_mm: FloatArray) -> FloatArray:
         """Blur of points ``depth_mm`` (N,) out of focus along the view axis, as a Gaussian, (N,).
@@ -57,4 +65,4 @@ class ViewOptics:
 
     def blur_sigma_px(self, depth_mm: FloatArray) -> FloatArray:
         """``optical_sigma_px`` with the area of the pixel, (N,)."""
-        return np.sqrt(self.optical_sigma_px(depth_mm) ** 2 + _PIXEL_VARIANCE_PX2)
+        return np.sqrt(self.optical_sigma_px(depth_mm) ** 2 + PIXEL_VARIANCE_PX2)
