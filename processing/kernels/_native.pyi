@@ -24,6 +24,17 @@ MAX_BLOB_WINDOW_PX: int
 BLOB_REACH_SIGMAS: float
 """Where a blob ends."""
 
+DISC_ROWS: int
+DISC_NODES: int
+DISC_ROWS_PER_OCTAVE: int
+DISC_REACH: float
+SMALLEST_DISC: float
+LARGEST_DISC: float
+"""Of a table of discs: rows of equal radius, its nodes along distance, and radii in units of the blur."""
+LEAST_BLUR_PX: float
+COVERAGE_CELLS: int
+"""Along a row and a column of a pixel."""
+
 @final
 class View:
     """An image and where voxels are seen in it; immutable, keeps its arrays alive."""
@@ -154,6 +165,48 @@ def weigh_blobs(
     out: NDArray[np.float64],
     threads: int,
 ) -> None: ...
+def draw_discs(
+    log_transmissions: Sequence[NDArray[np.float32]],
+    nodes: NDArray[np.float64],
+    spacing: int,
+    optics: NDArray[np.float64],
+    profiles: NDArray[np.float32],
+    positions: NDArray[np.float64],
+    squares: NDArray[np.float64],
+    factor: float,
+    threads: int,
+) -> None: ...
+def sweep_discs(
+    log_transmissions: Sequence[NDArray[np.float32]],
+    images: Sequence[NDArray[np.float32]],
+    weights: Sequence[NDArray[np.float32]],
+    nodes: NDArray[np.float64],
+    spacing: int,
+    optics: NDArray[np.float64],
+    profiles: NDArray[np.float32],
+    positions: NDArray[np.float64],
+    squares: NDArray[np.float64],
+    information: NDArray[np.float64],
+    most: int,
+    move: bool,
+    damping: float,
+    largest: float,
+    tolerance: float,
+) -> int: ...
+def weigh_discs(
+    log_transmissions: Sequence[NDArray[np.float32]],
+    images: Sequence[NDArray[np.float32]],
+    weights: Sequence[NDArray[np.float32]],
+    nodes: NDArray[np.float64],
+    spacing: int,
+    optics: NDArray[np.float64],
+    profiles: NDArray[np.float32],
+    positions: NDArray[np.float64],
+    squares: NDArray[np.float64],
+    out: NDArray[np.float64],
+    threads: int,
+) -> None: ...
+def cover(centres: NDArray[np.float64], radii: NDArray[np.float64], out: NDArray[np.float32]) -> None: ...
 def find_peaks(volume: NDArray[np.float32], first_row: int, end_row: int, threshold: float) -> NDArray[np.float64]: ...
 def stamp(
     volume: NDArray[np.float32], stamps: NDArray[np.float64], profiles: NDArray[np.float32], sampled_finely: bool

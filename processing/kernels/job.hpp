@@ -210,11 +210,15 @@ struct BlobView {
     double shift_u, shift_v, gain, sigma_u, sigma_v;
 };
 
-// Blobs in a volume whose views are known at every `spacing`-th voxel, linear in between.
+// Views of a volume are known at every `spacing`-th voxel, linear in between.
+struct NodeGrid {
+    int nodes_z, nodes_y, nodes_x, spacing;
+};
+
 struct Blobs {
     const BlobView *views;
     int n_views;
-    int nodes_z, nodes_y, nodes_x, spacing;
+    NodeGrid grid;
     double *positions;   // (count, 3): x, y, z in voxels
     double *amplitudes;  // (count)
     int64_t count;
@@ -234,6 +238,60 @@ struct BlobSweeps {
 // What a view says of a blob: sums over its window of residual x shape, shape squared, residual squared, and pixels.
 struct BlobSupport {
     double product, shape, residual, pixels;
+};
+
+// Opaque discs under a Gaussian blur, in units of the blur: a table of rows of equal radius, 16 per octave, over nodes that
+// are equally apart in the square of the distance, from where the shadow begins to be whole, `disc_reach` within the edge or
+// at the centre, to `disc_reach` beyond the edge.
+constexpr int disc_rows = 177, disc_nodes = 96;  // the last two nodes are beyond the disc
+constexpr int disc_rows_per_octave = 16;
+constexpr double disc_reach = 3.2;
+constexpr double least_blur_px = 0.2;
+constexpr double smallest_disc = disc_reach / 64, largest_disc = disc_reach * 32;  // radii of the first and the last row
+
+// A row of the table: binary logarithm of the transmission; the change of the natural one with distance, over distance; and
+// with the radius squared.
+struct DiscProfile {
+    float log_transmission[disc_nodes], pull[disc_nodes], growth[disc_nodes];
+};
+
+// A view of opaque discs. Its transmission is the product of those of all discs; `log_transmission` is the binary logarithm.
+struct DiscView {
+    float *log_transmission;
+    const float *image, *weight;  // what was recorded, and one over its variance, 0 where nothing is known
+    int rows, columns;            // 64 or more
+    const double *nodes;          // (nodes_z, nodes_y, nodes_x, 2)
+    double shift_u, shift_v;
+    double variance[3];  // of the blur in px^2: constant, and times z and z^2 in voxels
+};
+
+// Discs in a volume. Nodes are pairs (u, v).
+struct Discs {
+    const DiscView *views;
+    int n_views;
+    NodeGrid grid;
+    const DiscProfile *profiles;  // (disc_rows)
+    double *positions;            // (count, 3): x, y, z in voxels
+    double *squares;              // (count): of the radii, in voxels^2
+    int64_t count;
+};
+
+// How discs are fitted, one after the other, all others fixed: their sizes alone, or positions too.
+struct DiscSweeps {
+    int most;  // sweeps over all discs
+    bool move;
+    double damping;    // of positions: information per voxel^2 that holds each where it is
+    double largest;    // square of a radius
+    double tolerance;  // of positions and radii in voxels: less is no change
+    uint8_t *awake;    // (count): discs that changed in the last sweep
+    double *information;  // (count): result, on the squares with positions fixed, when a disc was last fitted
+};
+
+// What a view says of a disc: weighted sums over its window of products of the transmission's changes with u, v and the
+// square of the radius; of the change that the whole disc makes, squared and times the residual; of residuals squared; and
+// the number of pixels.
+struct DiscSupport {
+    double uu, uv, vv, us, vs, ss, whole, missing, residual, pixels;
 };
 
 constexpr int strip_columns = 64;  // columns that are worked on at once
@@ -257,6 +315,9 @@ struct Kernels {
     void (*draw_blobs)(const Blobs &blobs, int view, double factor);  // residual += factor x blobs
     int (*sweep_blobs)(const Blobs &blobs, const BlobSweeps &sweeps);   // returns how many sweeps it took
     void (*weigh_blobs)(const Blobs &blobs, int view, BlobSupport *support);
+    void (*draw_discs)(const Discs &discs, int view, double factor);  // log_transmission += factor x discs
+    int (*sweep_discs)(const Discs &discs, const DiscSweeps &sweeps);  // returns how many sweeps it took
+    void (*weigh_discs)(const Discs &discs, int view, DiscSupport *support);
 };
 
 }  // namespace tomoshadow

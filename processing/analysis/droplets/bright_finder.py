@@ -13,7 +13,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter
 from scipy.spatial import cKDTree
 
-from processing.analysis.droplets.candidates import candidates
+from processing.analysis.droplets.candidates import candidates, close_pairs, foremost
 from processing.analysis.droplets.droplet_search import CANDIDATE_PITCH_VOXEL, DropletSearch
 from processing.analysis.droplets.gaussian_blobs import BlobImages, BlobOptics, Blobs, Image
 from processing.analysis.droplets.point_spread import first_optics, refined_optics
@@ -138,8 +138,8 @@ def _new_places(
 ) -> FloatArray:
     """Candidates that are no droplets as yet, (N, 3) in voxels of the searched grid."""
     peaks = candidates(search.plan, residuals, fit.optics.gains, SEEN_FROM_ASIDE * threshold, shot.threads)
-    places = foremost(peaks, ALONE_SIGMAS * float(fit.optics.sigmas_px.mean()) / CANDIDATE_PITCH_VOXEL)
-    places *= CANDIDATE_PITCH_VOXEL
+    alone = foremost(peaks, ALONE_SIGMAS * float(fit.optics.sigmas_px.mean()) / CANDIDATE_PITCH_VOXEL)
+    places = CANDIDATE_PITCH_VOXEL * alone[:, :3]
     if not len(fit.blobs) or not len(places):
         return places
     distance_voxel = cKDTree(fit.blobs.positions_voxel).query(places)[0]
@@ -199,30 +199,12 @@ def _typical(amplitudes: FloatArray) -> float:
     return float(np.median(amplitudes[amplitudes >= 0.5 * np.median(amplitudes)]))
 
 
-def foremost(peaks: FloatArray, apart: float) -> FloatArray:
-    """Places (M, 3) of the peaks (N, 4), their heights in the last column, that have no higher one nearby."""
-    ordered = peaks[np.argsort(-peaks[:, 3], kind="stable"), :3]
-    kept = np.ones(len(ordered), bool)
-    for one, other in _pairs(ordered, apart):
-        if kept[one]:
-            kept[other] = False
-    return ordered[kept]
-
-
-def _pairs(positions: FloatArray, apart: float) -> list[list[int]]:
-    """Pairs of positions that are closer, in the order of the first and then of the second."""
-    if not len(positions):
-        return []
-    pairs = cKDTree(positions).query_pairs(apart, output_type="ndarray")
-    return list(pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))].tolist())
-
-
 def merged(blobs: Blobs, apart_voxel: float) -> Blobs:
     """Pairs of blobs that are closer become one, brightest first; where it is, their light decides."""
     order = np.argsort(-blobs.amplitudes, kind="stable")
     positions, amplitudes = blobs.positions_voxel[order], blobs.amplitudes[order]
     kept = np.ones(len(order), bool)
-    for one, other in _pairs(positions, apart_voxel):
+    for one, other in close_pairs(positions, apart_voxel):
         if kept[one] and kept[other]:
             total = amplitudes[one] + amplitudes[other]
             share = amplitudes[other] / total if total > 0 else 0.0

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from processing.analysis.droplets.gaussian_blobs import Image
 from processing.geometry import FloatArray
@@ -47,3 +48,21 @@ def candidates(plan: Plan, residuals: Sequence[Image], gains: FloatArray, thresh
 def _lit(residual: Image, gain: float, threshold: float) -> Image:
     amplitudes = residual * np.float32(1 / gain)
     return np.where(amplitudes > EMPTY * threshold, amplitudes, np.float32(0))
+
+
+def foremost(peaks: FloatArray, apart: float) -> FloatArray:
+    """The peaks (M, 4), of (N, 4) with heights in the last column, that have no higher one nearby; highest first."""
+    ordered = peaks[np.argsort(-peaks[:, 3], kind="stable")]
+    kept = np.ones(len(ordered), bool)
+    for one, other in close_pairs(ordered[:, :3], apart):
+        if kept[one]:
+            kept[other] = False
+    return ordered[kept]
+
+
+def close_pairs(positions: FloatArray, apart: float) -> list[list[int]]:
+    """Pairs of positions (N, 3) that are closer, in the order of the first and then of the second."""
+    if not len(positions):
+        return []
+    pairs = cKDTree(positions).query_pairs(apart, output_type="ndarray")
+    return list(pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))].tolist())

@@ -60,7 +60,7 @@ def refined_optics(shot: BlobImages, optics: BlobOptics, blobs: Blobs, *, shifts
     return BlobOptics(
         gains / gains.mean(),
         np.clip(widths, LEAST_SIGMA_PX, MOST_SIGMA_PX),
-        _without_motion(moved, shot.lattice.motion_px),
+        without_motion(moved, shot.lattice.motion_px),
         optics.offsets + np.array([np.median(residual) for residual in residuals]),
     )
 
@@ -86,6 +86,7 @@ def _varied(optics: BlobOptics, shifts: bool) -> list[BlobOptics]:
     return widths + [replace(optics, shifts_px=optics.shifts_px + step) for step in (along_u, along_v)]
 
 
-def _without_motion(shifts_px: FloatArray, motion_px: FloatArray) -> FloatArray:
+def without_motion(shifts_px: FloatArray, motion_px: FloatArray) -> FloatArray:
+    """Shifts (K, 2) of the views without what a motion of the whole volume explains: ``SightLattice.motion_px``."""
     common = np.linalg.lstsq(motion_px, shifts_px.ravel(), rcond=None)[0]
     return shifts_px - (motion_px @ common).reshape(-1, 2)

@@ -46,17 +46,34 @@ class SightLattice:
         """How wide a voxel is seen at most, mean over the views."""
         return float(np.linalg.norm(self.motion_px.reshape(-1, 2, 3), axis=1).max(axis=1).mean())
 
+    def seen_px(self, positions_voxel: FloatArray) -> FloatArray:
+        """Image points (views, N, 2) of positions (N, 3) x, y, z of the grid."""
+        level, _, corners = self._cells(positions_voxel)
+        return np.asarray(np.einsum("kzyxnc,zn,yn,xn->knc", corners, *(level[:, :, axis] for axis in (0, 1, 2))))
+
     def slopes_px(self, positions_voxel: FloatArray) -> FloatArray:
         """How image points move with positions (N, 3) x, y, z of the grid: (views, N, 2, 3) px per voxel."""
-        nodes = np.asarray(positions_voxel)[:, ::-1].T / self.spacing
-        most = np.array(self.nodes_px.shape[1:4])[:, None] - 2
-        cells = np.clip(np.floor(nodes), 0, most).astype(np.intp)
-        z, y, x = cells[:, None, :] + np.arange(2)[:, None]
+        level, slope, corners = self._cells(positions_voxel)
+        weights = [np.where(np.arange(3) == axis, slope, level) for axis in (2, 1, 0)]
+        return np.stack(
+            [np.einsum("kzyxnc,zn,yn,xn->knc", corners, *(ends[:, :, axis] for axis in (0, 1, 2))) for ends in weights],
+            axis=-1,
+        )
+
+    def scales_px(self, positions_voxel: FloatArray) -> FloatArray:
+        """Pixels per voxel across the line of sight (views, N): by the area that a square across it is seen as."""
+        slopes = self.slopes_px(positions_voxel)
+        return np.asarray(np.linalg.det(slopes @ np.swapaxes(slopes, -1, -2)) ** 0.25)
+
+    def _cells(self, positions_voxel: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Weights (2, N, zyx) of the ends of the cells for values and for slopes, and the corners of the cells."""
+        nodes = np.asarray(positions_voxel)[:, ::-1] / self.spacing
+        cells = np.clip(np.floor(nodes), 0, np.array(self.nodes_px.shape[1:4]) - 2).astype(np.intp)
+        z, y, x = cells.T[:, None, :] + np.arange(2)[:, None]
         corners = self.nodes_px[:, z[:, None, None], y[None, :, None], x[None, None, :]]
-        level = np.stack([1 - (nodes - cells), nodes - cells], axis=1)
-        slope = np.broadcast_to(np.array([-1.0, 1.0])[None, :, None] / self.spacing, level.shape)
-        weights = [np.where(np.arange(3)[:, None, None] == axis, slope, level) for axis in (2, 1, 0)]
-        return np.stack([np.einsum("kzyxnc,zn,yn,xn->knc", corners, *ends) for ends in weights], axis=-1)
+        level = np.stack([1 - (nodes - cells), nodes - cells])
+        slope = np.broadcast_to(np.array([-1.0, 1.0])[:, None, None] / self.spacing, level.shape)
+        return level, slope, corners
 
 
 def sight_lattice(mappings: Sequence[ViewMapping], grid: VoxelGrid) -> SightLattice:

@@ -20,6 +20,9 @@ using RecordedArray = nb::ndarray<const float, nb::ndim<2>, nb::c_contig, nb::de
 using ImageArray = nb::ndarray<float, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 using FloatVolume = nb::ndarray<float, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
 using AnyVolume = nb::ndarray<nb::ndim<3>, nb::c_contig, nb::device::cpu>;
+using LatticeArray = nb::ndarray<const double, nb::shape<-1, -1, -1, -1, 2>, nb::c_contig, nb::device::cpu>;
+using PositionArray = nb::ndarray<double, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
+using NumberArray = nb::ndarray<double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using Size = std::tuple<int, int, int>;  // (nz, ny, nx)
 
 inline void require(bool condition, const char *what) {
@@ -27,6 +30,12 @@ inline void require(bool condition, const char *what) {
 }
 
 inline void require_threads(int threads) { require(threads >= 1, "threads must be positive"); }
+
+inline NodeGrid node_grid(const LatticeArray &nodes, int spacing) {
+    require(nodes.shape(1) >= 2 && nodes.shape(2) >= 2 && nodes.shape(3) >= 2 && spacing >= 1,
+            "nodes: two or more along each axis");
+    return {static_cast<int>(nodes.shape(1)), static_cast<int>(nodes.shape(2)), static_cast<int>(nodes.shape(3)), spacing};
+}
 
 inline Shape volume_shape(const Size &size) {
     const Shape shape{std::get<0>(size), std::get<1>(size), std::get<2>(size)};

@@ -17,10 +17,7 @@ namespace tomoshadow {
 
 namespace {
 
-using NodeArray = nb::ndarray<const double, nb::shape<-1, -1, -1, -1, 2>, nb::c_contig, nb::device::cpu>;
 using OpticsArray = nb::ndarray<const double, nb::shape<-1, 5>, nb::c_contig, nb::device::cpu>;
-using PositionArray = nb::ndarray<double, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
-using AmplitudeArray = nb::ndarray<double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using SupportArray = nb::ndarray<double, nb::shape<-1, -1, 4>, nb::c_contig, nb::device::cpu>;
 using NumpyTable = nb::ndarray<nb::numpy, double, nb::shape<-1, 4>>;
 
@@ -40,31 +37,26 @@ struct BoundBlobs {
     std::vector<BlobView> views;
     Blobs blobs;
 
-    BoundBlobs(const std::vector<ImageArray> &residuals, const NodeArray &nodes, int spacing, const OpticsArray &optics,
-               const PositionArray &positions, const AmplitudeArray &amplitudes) {
+    BoundBlobs(const std::vector<ImageArray> &residuals, const LatticeArray &nodes, int spacing, const OpticsArray &optics,
+               const PositionArray &positions, const NumberArray &amplitudes) {
         require(!residuals.empty() && residuals.size() <= max_views, "blobs: one to eight views, please");
         require(nodes.shape(0) == residuals.size() && optics.shape(0) == residuals.size(),
                 "blobs: one lattice and optics per view");
-        require(nodes.shape(1) >= 2 && nodes.shape(2) >= 2 && nodes.shape(3) >= 2 && spacing >= 1,
-                "nodes: two or more along each axis");
         require(positions.shape(0) == amplitudes.shape(0), "blobs: as many positions as amplitudes, please");
         const size_t lattice = nodes.size() / nodes.shape(0);
         for (size_t k = 0; k < residuals.size(); ++k)
             views.push_back(view_of(residuals[k], nodes.data() + k * lattice, optics.data() + 5 * k));
         blobs = {views.data(),
                  static_cast<int>(views.size()),
-                 static_cast<int>(nodes.shape(1)),
-                 static_cast<int>(nodes.shape(2)),
-                 static_cast<int>(nodes.shape(3)),
-                 spacing,
+                 node_grid(nodes, spacing),
                  positions.data(),
                  amplitudes.data(),
                  static_cast<int64_t>(amplitudes.shape(0))};
     }
 };
 
-void draw(const std::vector<ImageArray> &residuals, const NodeArray &nodes, int spacing, const OpticsArray &optics,
-          const PositionArray &positions, const AmplitudeArray &amplitudes, double factor, int threads) {
+void draw(const std::vector<ImageArray> &residuals, const LatticeArray &nodes, int spacing, const OpticsArray &optics,
+          const PositionArray &positions, const NumberArray &amplitudes, double factor, int threads) {
     const BoundBlobs bound(residuals, nodes, spacing, optics, positions, amplitudes);
     require_threads(threads);
     const Kernels &kernels = selected_kernels();
@@ -72,8 +64,8 @@ void draw(const std::vector<ImageArray> &residuals, const NodeArray &nodes, int 
     for_each(bound.blobs.n_views, threads, [&](int view) { kernels.draw_blobs(bound.blobs, view, factor); });
 }
 
-int sweep(const std::vector<ImageArray> &residuals, const NodeArray &nodes, int spacing, const OpticsArray &optics,
-          const PositionArray &positions, const AmplitudeArray &amplitudes, int most, bool move, double scale, double damping,
+int sweep(const std::vector<ImageArray> &residuals, const LatticeArray &nodes, int spacing, const OpticsArray &optics,
+          const PositionArray &positions, const NumberArray &amplitudes, int most, bool move, double scale, double damping,
           double max_step, double tolerance) {
     const BoundBlobs bound(residuals, nodes, spacing, optics, positions, amplitudes);
     require(scale > 0 && damping >= 0 && max_step >= 0 && tolerance >= 0, "sweeps: scale positive, all else not negative");
@@ -84,8 +76,8 @@ int sweep(const std::vector<ImageArray> &residuals, const NodeArray &nodes, int 
     return kernels.sweep_blobs(bound.blobs, sweeps);
 }
 
-void weigh(const std::vector<ImageArray> &residuals, const NodeArray &nodes, int spacing, const OpticsArray &optics,
-           const PositionArray &positions, const AmplitudeArray &amplitudes, const SupportArray &out, int threads) {
+void weigh(const std::vector<ImageArray> &residuals, const LatticeArray &nodes, int spacing, const OpticsArray &optics,
+           const PositionArray &positions, const NumberArray &amplitudes, const SupportArray &out, int threads) {
     const BoundBlobs bound(residuals, nodes, spacing, optics, positions, amplitudes);
     require(out.shape(0) == bound.views.size() && out.shape(1) == amplitudes.shape(0), "support: (views, blobs, 4), please");
     static_assert(sizeof(BlobSupport) == 4 * sizeof(double), "a support is four numbers");

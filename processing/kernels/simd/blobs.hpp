@@ -5,53 +5,13 @@
 #include "job.hpp"
 #include "simd/lanes.hpp"
 #include "simd/ratios.hpp"
+#include "simd/sighting.hpp"
 
 namespace tomoshadow::TOMOSHADOW_ISA {
 namespace {
 
-// Where a view sees a position, and how that changes with x, y and z.
-struct Sighting {
-    double u, v, along_u[3], along_v[3];
-};
-
-struct NodeCell {
-    int at;
-    double along;
-};
-
-// Beyond the lattice its last cell goes on.
-inline NodeCell node_cell(double position, int spacing, int nodes) {
-    const double node = position / spacing, held = !(node > 0.0) ? 0.0 : node > nodes ? nodes : node;
-    const int at = smaller(floor_of(held), nodes - 2);
-    return {at, node - at};
-}
-
-inline Sighting seen_at(const Blobs &blobs, const BlobView &view, const double *position) {
-    const NodeCell x = node_cell(position[0], blobs.spacing, blobs.nodes_x),
-                   y = node_cell(position[1], blobs.spacing, blobs.nodes_y),
-                   z = node_cell(position[2], blobs.spacing, blobs.nodes_z);
-    const int64_t row = 2 * static_cast<int64_t>(blobs.nodes_x), plane = row * blobs.nodes_y;
-    const double *corner = view.nodes + z.at * plane + y.at * row + 2 * x.at;
-    double seen[2][4];  // value, and steps along x, y, z
-    for (int axis = 0; axis < 2; ++axis) {
-        double line[4], step[4];  // along x, at the four edges
-        for (int edge = 0; edge < 4; ++edge) {
-            const double *end = corner + (edge & 1) * row + (edge >> 1) * plane + axis;
-            step[edge] = end[2] - end[0];
-            line[edge] = end[0] + x.along * step[edge];
-        }
-        const double near = line[0] + y.along * (line[1] - line[0]), far = line[2] + y.along * (line[3] - line[2]);
-        const double near_x = step[0] + y.along * (step[1] - step[0]), far_x = step[2] + y.along * (step[3] - step[2]);
-        seen[axis][0] = near + z.along * (far - near);
-        seen[axis][1] = near_x + z.along * (far_x - near_x);
-        seen[axis][2] = (line[1] - line[0]) + z.along * ((line[3] - line[2]) - (line[1] - line[0]));
-        seen[axis][3] = far - near;
-    }
-    const double per_voxel = 1.0 / blobs.spacing;
-    return {seen[0][0] + view.shift_u,
-            seen[1][0] + view.shift_v,
-            {seen[0][1] * per_voxel, seen[0][2] * per_voxel, seen[0][3] * per_voxel},
-            {seen[1][1] * per_voxel, seen[1][2] * per_voxel, seen[1][3] * per_voxel}};
+inline Sighting seen_of(const Blobs &blobs, const BlobView &view, const double *position) {
+    return seen_at(blobs.grid, view.nodes, view.shift_u, view.shift_v, position);
 }
 
 constexpr int most_vectors = max_blob_window / lanes;
@@ -104,12 +64,6 @@ inline void add(const BlobView &view, const Patch &patch, double amplitude) {
         for (int k = 0; k < patch.vectors; ++k)
             store(pixels + k * lanes, multiply_add(height, patch.along_u[k], load<Floats>(pixels + k * lanes)));
     }
-}
-
-inline double sum_of(Floats values) {
-    double sum = 0;
-    for (int k = 0; k < lanes; ++k) sum += values[k];
-    return sum;
 }
 
 // Sums over a patch: residual x shape, the same x offset along u and v, and shape squared.
@@ -188,7 +142,7 @@ public:
         for (int view = 0; view < blobs.n_views; ++view) see(view, position);
     }
     void see(int view, const double *position) {
-        seen_[view] = seen_at(blobs_, blobs_.views[view], position);
+        seen_[view] = seen_of(blobs_, blobs_.views[view], position);
         place(patches_[view], blobs_.views[view], seen_[view].u, seen_[view].v);
         if (!patches_[view].empty) shape(patches_[view], blobs_.views[view], seen_[view].u, seen_[view].v);
     }
@@ -243,8 +197,6 @@ inline bool fit_blob(const Blobs &blobs, const BlobSweeps &sweeps, int64_t numbe
     return change > sweeps.tolerance;
 }
 
-constexpr int all_again = 4;  // sweeps after which blobs that rest are asked again, as their neighbours may have changed
-
 int sweep_blobs(const Blobs &blobs, const BlobSweeps &sweeps) {
     for (int sweep = 0; sweep < sweeps.most; ++sweep) {
         const bool everybody = sweep % all_again == 0;
@@ -260,7 +212,7 @@ int sweep_blobs(const Blobs &blobs, const BlobSweeps &sweeps) {
 }
 
 inline bool see_blob(const Blobs &blobs, const BlobView &view, int64_t number, Patch &patch) {
-    const Sighting seen = seen_at(blobs, view, blobs.positions + 3 * number);
+    const Sighting seen = seen_of(blobs, view, blobs.positions + 3 * number);
     place(patch, view, seen.u, seen.v);
     if (patch.empty) return false;
     shape(patch, view, seen.u, seen.v);

@@ -4,6 +4,7 @@
 #include "job.hpp"
 #include "simd/blobs.hpp"
 #include "simd/blocks.hpp"
+#include "simd/discs.hpp"
 #include "simd/line_of_sight.hpp"
 #include "simd/preprocess.hpp"
 #include "simd/ratios.hpp"
@@ -19,6 +20,7 @@ extern const Kernels kernels;
 const Kernels kernels{
     TOMOSHADOW_TEXT(TOMOSHADOW_ISA), line_of_sight, sum_of_sight, find_blocks, write_blocks, smart_pass, correct,
     resample, brightest, quantise, find_filled, row_minima, column_minima, row_means, subtract_veil,
-    draw_blobs, sweep_blobs, weigh_blobs};
+    draw_blobs, sweep_blobs, weigh_blobs,
+    draw_discs, sweep_discs, weigh_discs};
 
 }  // namespace tomoshadow::TOMOSHADOW_ISA

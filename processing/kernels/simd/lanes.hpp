@@ -97,6 +97,36 @@ inline Floats square_root(Floats x) {
 #endif
 }
 
+inline double sum_of(Floats values) {
+    double sum = 0;
+    for (int k = 0; k < lanes; ++k) sum += values[k];
+    return sum;
+}
+
+// What lies at places in a table, and what follows. Gathering by one instruction is slower on processors of AVX2.
+inline void look_up(const float *table, Ints at, Floats &one, Floats &next) {
+#if defined(__AVX512F__)
+    one = reinterpret_cast<Floats>(_mm512_i32gather_ps(reinterpret_cast<__m512i>(at), table, 4));
+    next = reinterpret_cast<Floats>(_mm512_i32gather_ps(reinterpret_cast<__m512i>(at), table + 1, 4));
+#elif defined(__AVX2__)
+    int place[lanes];
+    store(place, at);
+    const auto pairs = [&](int first, int second) {
+        const auto *low = reinterpret_cast<const __m64 *>(table + place[first]);
+        const auto *high = reinterpret_cast<const __m64 *>(table + place[second]);
+        return _mm_loadh_pi(_mm_loadl_pi(_mm_setzero_ps(), low), high);
+    };
+    const __m256 front = _mm256_set_m128(pairs(4, 5), pairs(0, 1)), back = _mm256_set_m128(pairs(6, 7), pairs(2, 3));
+    one = reinterpret_cast<Floats>(_mm256_shuffle_ps(front, back, 0x88));
+    next = reinterpret_cast<Floats>(_mm256_shuffle_ps(front, back, 0xdd));
+#else
+    for (int k = 0; k < lanes; ++k) {
+        one[k] = table[at[k]];
+        next[k] = table[at[k] + 1];
+    }
+#endif
+}
+
 // Two neighbouring pixels, by weights in the halves of a word: one word of pixels is all that is read.
 inline Floats weighted_pairs(const int16_t *pixels, Ints at, Ints weight) {
 #if defined(__AVX512BW__)

@@ -17,7 +17,7 @@ SOURCES = sorted(map(str, (KERNELS / "host").glob("*.cpp")))
 ARCHITECTURE = {"plain": [], "avx2": ["-march=x86-64-v3"], "avx512": ["-march=x86-64-v4"]}
 SANITIZERS = ["-O0", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
 DEADLINE_S = 200.0
-CASES = {"sight": 60, "smart": 14, "resample": 60, "prepare": 60, "blobs": 20, "stamps": 40}
+CASES = {"sight": 60, "smart": 14, "resample": 60, "prepare": 60, "blobs": 20, "stamps": 40, "discs": 20}
 Results = dict[tuple[str, int], tuple[float, float]]
 
 

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from processing.analysis.droplets.bright_finder import foremost, merged
+from processing.analysis.droplets.bright_finder import merged
+from processing.analysis.droplets.candidates import foremost
 from processing.analysis.droplets.gaussian_blobs import Blobs
 from processing.analysis.droplets.image_noise import noise_of
 from processing.analysis.droplets.point_spread import first_optics
@@ -26,8 +27,8 @@ def test_distant_droplets_and_none_stay_as_they_are() -> None:
 
 def test_only_the_highest_of_neighbouring_peaks_is_tried() -> None:
     peaks = np.array([[0.0, 0, 0, 1], [2, 0, 0, 3], [4, 0, 0, 2], [9, 0, 0, 0.5]])
-    assert {tuple(place) for place in foremost(peaks, 2.5).tolist()} == {(2.0, 0.0, 0.0), (9.0, 0.0, 0.0)}
-    assert foremost(np.empty((0, 4)), 2.5).shape == (0, 3)
+    assert {tuple(place) for place in foremost(peaks, 2.5).tolist()} == {(2, 0, 0, 3), (9, 0, 0, 0.5)}
+    assert foremost(np.empty((0, 4)), 2.5).shape == (0, 4)
 
 
 @pytest.mark.parametrize("noise_percent", [1.0, 3.0, 10.0])

@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "host/blobs.hpp"
+#include "host/coverage.hpp"
 #include "host/instruction_set.hpp"
 #include "host/line_of_sight.hpp"
 #include "host/occupancy.hpp"
@@ -285,6 +286,67 @@ void stamp(int number) {
     std::printf("stamps %d %.6f %.6f\n", number, sum_of(voxels.get(), count), double(count));
 }
 
+// Profiles that fall with distance as those of discs do, whatever their radius.
+std::vector<DiscProfile> some_profiles() {
+    std::vector<DiscProfile> profiles(disc_rows);
+    for (int row = 0; row < disc_rows; ++row)
+        for (int k = 0; k + 2 < disc_nodes; ++k) {
+            const float left = 1.0f - static_cast<float>(k) / (disc_nodes - 2), depth = 0.05f * static_cast<float>(row);
+            profiles[row].log_transmission[k] = -depth * left;
+            profiles[row].pull[k] = 0.5f * depth;
+            profiles[row].growth[k] = -0.1f * left;
+        }
+    return profiles;
+}
+
+// Discs of all sizes within and beyond a lattice and the images, fitted to noise and drawn; and the area they cover.
+void fit_discs(const Kernels &kernels, int number) {
+    Random random(static_cast<uint32_t>(number) * 2654435769u + 11);
+    constexpr int n_views = 2, n_discs = 30;
+    const int nodes = 2 + random.below(3), spacing = 1 << (1 + random.below(4));
+    static const std::vector<DiscProfile> profiles = some_profiles();
+    std::vector<std::vector<float>> logs, images, weights;
+    std::vector<std::vector<double>> lattices;
+    std::vector<DiscView> views;
+    for (int k = 0; k < n_views; ++k) {
+        const int rows = 64 + random.below(20), columns = 64 + random.below(40);
+        const size_t pixels = static_cast<size_t>(rows) * columns;
+        logs.emplace_back(pixels);
+        images.emplace_back();
+        weights.emplace_back();
+        for (size_t pixel = 0; pixel < pixels; ++pixel) {
+            images.back().push_back(static_cast<float>(random.uniform(0, 1)));
+            weights.back().push_back(static_cast<float>(random.uniform(0, 2)));
+        }
+        lattices.emplace_back();
+        for (int z = 0; z < nodes; ++z)
+            for (int y = 0; y < nodes; ++y)
+                for (int x = 0; x < nodes; ++x) {
+                    lattices.back().push_back(spacing * (x + 0.3 * (2 * k - 1) * z) + 20 * k);
+                    lattices.back().push_back(spacing * (y + 0.01 * x) + 10);
+                }
+        views.push_back({logs[k].data(), images[k].data(), weights[k].data(), rows, columns, lattices[k].data(), 0.1, -0.2,
+                         {random.uniform(0.2, 2), random.uniform(-0.01, 0.01), 1e-4}});
+    }
+    std::vector<double> positions, squares, information(n_discs);
+    for (int k = 0; k < 3 * n_discs; ++k) positions.push_back(random.uniform(-60, nodes * spacing + 60));
+    for (int k = 0; k < n_discs; ++k) squares.push_back(k % 7 ? random.uniform(0, 9) : random.uniform(0, 1e4));
+    const Discs discs{views.data(), n_views, {nodes, nodes, nodes, spacing}, profiles.data(), positions.data(), squares.data(), n_discs};
+    std::vector<uint8_t> awake(n_discs);
+    std::vector<DiscSupport> support(n_discs);
+    double light = 0, sizes = 0;
+    for (int k = 0; k < n_views; ++k) kernels.draw_discs(discs, k, 1.0);
+    kernels.sweep_discs(discs, {2, number % 2 == 1, 0.02, 100.0, 0.0, awake.data(), information.data()});
+    for (int k = 0; k < n_views; ++k) {
+        kernels.weigh_discs(discs, k, support.data());
+        light -= sum_of(logs[k].data(), logs[k].size());
+    }
+    for (const double square : squares) sizes += square;
+    std::vector<float> cells(static_cast<size_t>(4) * 64 * 64);
+    cover(positions.data(), squares.data(), n_discs, cells.data(), 64, 64);
+    std::printf("discs %d %.6f %.6f\n", number, light / logs[0].size(), sizes + sum_of(cells.data(), cells.size()));
+}
+
 }  // namespace
 
 int main() {
@@ -295,4 +357,5 @@ int main() {
     for (int number = 0; number < 60; ++number) prepare(kernels, number);
     for (int number = 0; number < 20; ++number) fit_blobs(kernels, number);
     for (int number = 0; number < 40; ++number) stamp(number);
+    for (int number = 0; number < 20; ++number) fit_discs(kernels, number);
 }

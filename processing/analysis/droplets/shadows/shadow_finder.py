@@ -1,0 +1,236 @@
+"""Droplets of shadow images, found by what the fit has left over, without any truth.
+
+Coarse to fine, large discs first: where all views miss light that the discs let through, a candidate enters without
+size and shares the shadow with the others; those that stay insignificant are dropped; the threshold falls. Blur, level
+and a shift of each image are re-estimated meanwhile, and what the product of shadows gets wrong about the very discs is
+taken off the images. A view that sees black has no say.
+
+Ghosts live on shadows that the views share out among too many droplets. When a fit has come to rest, all droplets are
+dropped that some view disputes, and found anew; now also such as one view cannot see beside a larger one, if three
+views support them alone. Ghosts do not come back.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from processing.analysis.droplets.candidates import close_pairs, foremost
+from processing.analysis.droplets.droplet_search import CANDIDATE_PITCH_VOXEL, DropletSearch
+from processing.analysis.droplets.shadows.disc_optics import first_disc_optics, refined_disc_optics
+from processing.analysis.droplets.shadows.opaque_discs import NO_DISC, DiscImages, Discs, DiscSupports, Sweeps
+from processing.analysis.droplets.shadows.shadow_candidates import Stage, shadow_peaks
+from processing.analysis.droplets.shadows.shadow_fit import ShadowFit, Transmissions, residuals, rms_over_noise, seen_by
+from processing.analysis.droplets.shadows.shadow_union import union_defects
+from processing.geometry import FloatArray
+
+COARSE_PX = (6.0, 4.0, 2.5, 1.5, 0.9)
+"""Blurs with which candidates are looked for, at first."""
+SHARP_PX = 0.6
+COARSE_SHARE = 0.5
+FIRST, LAST = 0.5, 0.04
+"""Missing share of the light from which on a candidate is tried, at first and at last."""
+FALLING_ROUNDS, AGAIN_ROUNDS = 10, 8
+"""In which it falls; after a purge."""
+LEAST_GAIN, MOST_ROUNDS = 0.003, 20
+"""A fit is at rest when a round lowers the residual by less than this share, or after so many rounds."""
+NOISE_SIGMAS, SIGNIFICANCE = 4.0, 5.0
+"""No candidate is fainter than so many standard deviations of its shadow, and no droplet than of its squared radius."""
+COARSE_LEAST, SHARP_LEAST = 0.15, 0.5
+"""Droplets with a fainter shadow are dropped: absolute, and as a share of the threshold."""
+PURGES, SETTLED = 4, 0.995
+"""So often at most disputed droplets are dropped and found anew; it ends when the others become no more."""
+UNDISPUTED_SHARE, UNDISPUTED_SIGMAS = 0.75, 15.0
+"""The squared radius that a view alone would give: over that of all, in the view that gives least; and over its
+standard deviation, in the view that gives the second least."""
+SUPPORTING_VIEWS, SUPPORT_SHARE, SUPPORT_SIGMAS = 3, 0.4, 5.0
+"""So many views must give a droplet such a share of its squared radius, and so surely."""
+OPTICS_EVERY = 2
+"""Rounds from one estimate of optics and defects to the next."""
+APART_VOXEL, APART_RADII = 1.2, 0.7
+"""A candidate keeps so far from droplets, or so many radii of theirs."""
+SAME_VOXEL, SAME_RADII = 1.0, 0.6
+"""A droplet that is closer to a larger one, or by so many radii of it, is the same."""
+SMALL_VOXEL2 = 2.0
+"""Squared radius below which a droplet takes over half of what was the same."""
+BEYOND_VOXEL = 1.5
+"""A droplet that leaves the searched grid farther than this is dropped."""
+SWEEPS = (Sweeps(6, move=False), Sweeps(4), Sweeps(8))
+FINAL_SWEEPS = Sweeps(30, tolerance=3e-4)
+
+
+def find_shadows(shot: Transmissions, search: DropletSearch) -> ShadowFit:
+    """Find the droplets of one exposure.
+
+    Parameters
+    ----------
+    shot : Transmissions
+        Images with the lattice of the search.
+    search : DropletSearch
+        Where to look: it must hold every droplet that the views show.
+    """
+    fit = ShadowFit(Discs.none(), first_disc_optics(shot.images), shot.noises_of(shot.images))
+    finder = _Finder(shot, search)
+    for number, smooth_px in enumerate(COARSE_PX):
+        fit = finder.round(fit, Stage(smooth_px, COARSE_SHARE, coarse=True), estimate=number > 0)
+    fit = finder.fallen(fit, FALLING_ROUNDS, joker=False)
+    known = 0
+    for _ in range(PURGES):
+        fit = finder.undisputed(fit)
+        if SETTLED * len(fit.discs) <= known:
+            break
+        known = len(fit.discs)
+        fit = finder.fallen(fit, AGAIN_ROUNDS, joker=True)
+    else:
+        return finder.finished(fit)
+    return finder.finished(finder.fallen(fit, AGAIN_ROUNDS, joker=True))
+
+
+class _Finder:
+    """The rounds of a search, all with the same images."""
+
+    def __init__(self, shot: Transmissions, search: DropletSearch) -> None:
+        self._shot = shot
+        self._search = search
+
+    def fallen(self, fit: ShadowFit, rounds: int, *, joker: bool) -> ShadowFit:
+        """Rounds with a falling threshold, and then at the last one until they explain no more."""
+        last = max(LAST, NOISE_SIGMAS * fit.amplitude_sigma)
+        for number, threshold in enumerate(np.geomspace(max(FIRST, last), last, rounds)):
+            unite = joker or number >= rounds // 2
+            fit = self.round(
+                fit,
+                Stage(SHARP_PX, float(threshold), joker=joker),
+                estimate=number % OPTICS_EVERY == 1,
+                unite=unite,
+            )
+        left, before = self._left(fit), np.inf
+        for _ in range(MOST_ROUNDS):
+            if left > (1 - LEAST_GAIN) * before:
+                break
+            fit = self.round(fit, Stage(SHARP_PX, last, joker=joker), estimate=True, unite=True)
+            left, before = self._left(fit), left
+        return fit
+
+    def round(self, fit: ShadowFit, stage: Stage, *, estimate: bool, unite: bool = False) -> ShadowFit:
+        """Candidates enter, all are fitted, some are dropped; then optics and defects are estimated anew."""
+        fit = self._fitted(self._joined(fit, stage), stage)
+        if stage.joker and len(fit.discs):
+            fit = fit.where(supported(self._supports(fit)))
+        if estimate and len(fit.discs):
+            fit = self._estimated(fit, depths=unite, unite=unite)
+        return fit
+
+    def undisputed(self, fit: ShadowFit) -> ShadowFit:
+        """Without the droplets that some view disputes."""
+        return fit.where(undisputed(self._supports(fit)))
+
+    def finished(self, fit: ShadowFit) -> ShadowFit:
+        """The droplets in place, all of them significant."""
+        if not len(fit.discs):
+            return fit
+        seen = self._seen(fit)
+        discs, information = seen.fitted(seen.drawn(fit.optics, fit.discs), fit.optics, fit.discs, FINAL_SWEEPS)
+        return fit.with_discs(discs.where(_significant(discs, information)))
+
+    def _joined(self, fit: ShadowFit, stage: Stage) -> ShadowFit:
+        drawn = self._recorded().drawn(fit.optics, fit.discs).transmissions
+        seen = seen_by(self._shot, fit, drawn)
+        peaks = shadow_peaks(self._search.plan, seen, drawn, stage)
+        blur_voxel = self._blur_voxel(fit)
+        width_voxel = float(np.hypot(blur_voxel, stage.smooth_px))
+        alone = foremost(peaks, max(1.0, 1.5 * width_voxel / CANDIDATE_PITCH_VOXEL))
+        places = CANDIDATE_PITCH_VOXEL * alone[:, :3]
+        squares = np.full(len(places), NO_DISC)
+        if stage.coarse:
+            squares = -np.log(1 - np.minimum(alone[:, 3], 0.95)) * width_voxel**2
+        if len(fit.discs) and len(places):
+            distance, near = cKDTree(fit.discs.positions_voxel).query(places)
+            free = distance > np.maximum(APART_VOXEL, APART_RADII * fit.discs.radii_voxel[near])
+            places, squares = places[free], squares[free]
+        return fit.with_discs(fit.discs.joined_by(places, squares))
+
+    def _fitted(self, fit: ShadowFit, stage: Stage) -> ShadowFit:
+        least = COARSE_LEAST if stage.coarse else SHARP_LEAST * stage.threshold
+        shadows = self._recorded().drawn(fit.optics, fit.discs)
+        seen = seen_by(self._shot, fit, shadows.transmissions)
+        discs = fit.discs
+        for sweeps in SWEEPS:
+            discs, information = seen.fitted(shadows, fit.optics, discs, sweeps)
+            kept = (self._depths(fit, discs) > least) & _significant(discs, information)
+            seen.add(shadows, fit.optics, discs.where(~kept), -1.0)
+            discs = discs.where(kept)
+            if sweeps is SWEEPS[0]:
+                seen = replace(seen, weights=seen_by(self._shot, fit, shadows.transmissions).weights)
+        return fit.with_discs(_inside(merged_discs(discs), self._search))
+
+    def _estimated(self, fit: ShadowFit, *, depths: bool, unite: bool) -> ShadowFit:
+        seen = self._seen(fit)
+        fit = replace(fit, optics=refined_disc_optics(seen, fit.optics, fit.discs, depths=depths))
+        if unite:
+            fit = replace(fit, defects=union_defects(seen, fit.optics, fit.discs))
+            drawn = seen.drawn(fit.optics, fit.discs).transmissions
+            fit = replace(fit, noises=self._shot.noises_of(residuals(seen_by(self._shot, fit, drawn), drawn)))
+        return fit
+
+    def _recorded(self) -> DiscImages:
+        """The images as they are, where weights do not matter."""
+        return DiscImages(self._shot.images, self._shot.trust, self._shot.lattice, self._shot.threads)
+
+    def _seen(self, fit: ShadowFit) -> DiscImages:
+        return seen_by(self._shot, fit, self._recorded().drawn(fit.optics, fit.discs).transmissions)
+
+    def _supports(self, fit: ShadowFit) -> DiscSupports:
+        shadows = self._recorded().drawn(fit.optics, fit.discs)
+        return seen_by(self._shot, fit, shadows.transmissions).supports(shadows, fit.optics, fit.discs)
+
+    def _left(self, fit: ShadowFit) -> float:
+        drawn = self._recorded().drawn(fit.optics, fit.discs).transmissions
+        return rms_over_noise(seen_by(self._shot, fit, drawn), drawn)
+
+    def _blur_voxel(self, fit: ShadowFit) -> float:
+        lattice = self._shot.lattice
+        middle = 0.5 * (lattice.nodes_px.shape[1] - 1) * lattice.spacing
+        return float(fit.optics.blurs_px(middle).mean()) / lattice.pixels_per_voxel
+
+    def _depths(self, fit: ShadowFit, discs: Discs) -> FloatArray:
+        """Share of the light that discs take at their centres."""
+        return np.asarray(1 - np.exp(-discs.squares_voxel2 / (2 * self._blur_voxel(fit) ** 2)))
+
+
+def _significant(discs: Discs, information: FloatArray) -> NDArray[np.bool_]:
+    return np.asarray(discs.squares_voxel2 * np.sqrt(information) > SIGNIFICANCE)
+
+
+def undisputed(supports: DiscSupports) -> NDArray[np.bool_]:
+    """Droplets (N,) to which every view gives about what all together do, and of which two at most are unsure."""
+    share = (supports.alone / supports.squares_voxel2).min(axis=0)
+    second = np.sort(supports.alone / supports.alone_sd, axis=0)[1]
+    return np.asarray((share > UNDISPUTED_SHARE) & (second > UNDISPUTED_SIGMAS))
+
+
+def supported(supports: DiscSupports) -> NDArray[np.bool_]:
+    """Droplets (N,) that enough views support, each alone."""
+    sure = supports.alone > SUPPORT_SIGMAS * supports.alone_sd
+    large = supports.alone > SUPPORT_SHARE * supports.squares_voxel2
+    return np.asarray(np.count_nonzero(sure & large, axis=0) >= SUPPORTING_VIEWS)
+
+
+def merged_discs(discs: Discs) -> Discs:
+    """Of discs whose centres are the same, or well within a larger one, the larger alone."""
+    order = np.argsort(-discs.squares_voxel2, kind="stable")
+    positions, squares = discs.positions_voxel[order], discs.squares_voxel2[order]
+    if not len(order):
+        return discs
+    apart, kept = np.maximum(SAME_VOXEL, SAME_RADII * np.sqrt(squares)), np.ones(len(order), bool)
+    for one, other in close_pairs(positions, float(apart[0])):
+        if kept[one] and kept[other] and np.linalg.norm(positions[one] - positions[other]) < apart[one]:
+            kept[other] = False
+            squares[one] += 0.5 * squares[other] if squares[one] < SMALL_VOXEL2 else 0.0
+    return Discs(positions[kept], squares[kept])
+
+
+def _inside(discs: Discs, search: DropletSearch) -> Discs:
+    most = np.array(search.searched.shape[::-1]) - 1 + BEYOND_VOXEL
+    return discs.where(np.all((discs.positions_voxel > -BEYOND_VOXEL) & (discs.positions_voxel < most), axis=1))

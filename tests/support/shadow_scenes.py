@@ -1,0 +1,76 @@
+"""Small shots of shadows with their truth, by an oracle: fine masks that are united, then blurred by scipy."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import gaussian_filter
+
+from processing.analysis.droplets.droplet_search import DropletSearch, plan_droplets
+from processing.geometry import FloatArray, PinholeCamera
+from processing.studies.simulated_droplets import droplet_centres, study_cameras, study_grid
+from processing.volume import VoxelGrid
+
+BLURS_PX = (0.95, 0.72, 0.72, 0.95)
+FINE = 5
+"""Samples per pixel along a row and a column; odd, so that one is at its centre."""
+
+
+@dataclass(frozen=True, eq=False)
+class ShadowScene:
+    """A simulated shot: droplets, their images, and the cameras."""
+
+    points_mm: FloatArray
+    diameters_mm: FloatArray
+    images: list[np.ndarray[tuple[int, int], np.dtype[np.float32]]]
+    cameras: list[PinholeCamera]
+    grid: VoxelGrid
+
+
+def scale_px_per_mm(camera: PinholeCamera, points_mm: FloatArray) -> FloatArray:
+    """By the plane across the optical axis: focal length over depth."""
+    depths_mm = points_mm @ camera.rotation[2] + camera.translation_mm[2]
+    return np.asarray(camera.camera_matrix[0, 0] / depths_mm)
+
+
+def united_shadow(centres_px: FloatArray, radii_px: FloatArray, blur_px: float, size_px: tuple[int, int]) -> FloatArray:
+    """What is let through by opaque discs that unite, then are blurred."""
+    width_px, height_px = size_px
+    mask = np.zeros((height_px * FINE, width_px * FINE), np.float32)
+    for (u, v), radius_px in zip((centres_px + 0.5) * FINE - 0.5, radii_px * FINE, strict=True):
+        columns, rows = (slice(max(0, int(at - radius_px - 2)), max(0, int(at + radius_px + 3))) for at in (u, v))
+        part = mask[rows, columns]
+        if not part.size:
+            continue
+        row, column = np.ogrid[rows.start : rows.start + part.shape[0], columns.start : columns.start + part.shape[1]]
+        edge = np.sqrt(max(radius_px**2 - 1 / 12, 0)) + 0.5
+        np.maximum(part, np.clip(edge - np.hypot(row - v, column - u), 0, 1), out=part)
+    blurred = gaussian_filter(mask, blur_px * FINE, truncate=5.0)
+    return np.asarray(1 - blurred[FINE // 2 :: FINE, FINE // 2 :: FINE], dtype=np.float64)
+
+
+def shadow_scene(
+    shape: tuple[int, int, int],
+    density_per_mm3: float,
+    image_size_px: tuple[int, int],
+    *,
+    seed: int = 1,
+    noise: float = 0.012,
+    median_mm: float = 0.04,
+    blurs_px: tuple[float, ...] = BLURS_PX,
+) -> ShadowScene:
+    """Droplets of lognormal size all over a grid, seen by the paper's views."""
+    rng = np.random.default_rng(seed)
+    grid, cameras = study_grid(shape), study_cameras(image_size_px)
+    count = round(density_per_mm3 * grid.volume_mm3)
+    points_mm = grid.to_mm(droplet_centres(shape, count, rng))
+    diameters_mm = np.clip(rng.lognormal(np.log(median_mm), 0.4, count), 0.01, 0.3)
+    images = []
+    for camera, blur_px in zip(cameras, blurs_px, strict=True):
+        radii_px = 0.5 * diameters_mm * scale_px_per_mm(camera, points_mm)
+        image = united_shadow(camera.project(points_mm), radii_px, blur_px, image_size_px)
+        images.append((image + rng.normal(0, noise, image.shape)).astype(np.float32))
+    return ShadowScene(points_mm, diameters_mm, images, cameras, grid)
+
+
+def search_of(scene: ShadowScene, margin_voxel: int) -> DropletSearch:
+    return plan_droplets(scene.cameras, scene.grid, margin_voxel=margin_voxel)
