@@ -8,7 +8,7 @@ Calibrate
 Reconstruct
     intensity, common_grid, VoxelGrid, plan, mlos, minlos, gavlos, smart, mart
 Measure
-    measure, mean_diameters, size_classes, droplet_statistics
+    measure, measure_flat, mean_diameters, size_classes, droplet_statistics
 Files
     read_run, shot_intensities, read_volume, write_volume, read_droplets, export_droplets
 Judge and look
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from processing.analysis.droplets.size_statistics import mean_diameters as mean_diameters
     from processing.analysis.droplets.size_statistics import size_classes as size_classes
     from processing.analysis.exports.export import export_droplets as export_droplets
+    from processing.analysis.flat.flat_droplets import measure_flat as measure_flat
     from processing.analysis.quality import quality_factor as quality_factor
     from processing.calibration.calibrate import calibrate as calibrate
     from processing.calibration.calibration import Calibration as Calibration
@@ -59,6 +60,7 @@ _HOMES = {
     "processing.analysis.droplets.droplet_statistics": ("droplet_statistics",),
     "processing.analysis.droplets.size_statistics": ("mean_diameters", "size_classes"),
     "processing.analysis.exports.export": ("export_droplets",),
+    "processing.analysis.flat.flat_droplets": ("measure_flat",),
     "processing.analysis.quality": ("quality_factor",),
     "processing.calibration.calibrate": ("calibrate",),
     "processing.calibration.calibration": ("Calibration",),

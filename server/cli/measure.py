@@ -1,4 +1,4 @@
-"""``tomoshadow measure``: the shots of a run become droplets."""
+"""``tomoshadow measure``: the shots of runs become droplets; images without calibration: ``runs.single_view``."""
 
 from argparse import ArgumentTypeError, Namespace
 from pathlib import Path
@@ -18,6 +18,7 @@ from server.cli.options import (
 from server.cli.output import Outcome, progress, table, tracked
 from server.cli.runs.batch import add_runs, over_runs
 from server.cli.runs.recipes import add_recipe, keep_recipe, settings_of, with_grid
+from server.cli.runs.single_view import IN_THE_IMAGE, add_single_view, measure_single_view, refuse
 
 if TYPE_CHECKING:
     from processing.analysis.exports.export import Export
@@ -34,7 +35,7 @@ def add(verbs: Verbs) -> None:
     """Add the command."""
     parser = add_verb(verbs, NAME, measure, "measure the droplets in the shots of runs")
     add_runs(parser)
-    parser.add_argument("--calibration", type=Path, required=True)
+    parser.add_argument("--calibration", type=Path, help="of the views; without it, droplets are measured in 2-D")
     add_recipe(parser)
     add_out(parser, "directory of the results; further shots of the same settings may join them")
     add_shots(parser)
@@ -50,6 +51,7 @@ def add(verbs: Verbs) -> None:
     parser.add_argument(
         "--export", type=_exports, default=(), metavar="csv,vtk,parquet", help="write droplets in these formats too"
     )
+    add_single_view(parser)
 
 
 def _exports(text: str) -> "tuple[Export, ...]":
@@ -68,6 +70,9 @@ def measure(options: Namespace) -> Outcome:
 
     for export in options.export:
         export.require()
+    if options.calibration is None:
+        return measure_single_view(options)
+    refuse(options, IN_THE_IMAGE, "is for droplets in 2-D, without --calibration")
     calibration = load_calibration(options.calibration)
     recorded = _polarity(options.runs[0])
     command = (NAME, METHOD_VERSION)

@@ -15,7 +15,7 @@ from processing.errors import BadInput
 
 SCHEMA = {"schema": "tomoshadow/droplets", "schema_version": 1}
 GROUP, PROVENANCE, FRAME = "droplets", "tomoshadow", "frame"
-UNITS = MappingProxyType({"mm": "mm", "mm2": "mm^2"})
+UNITS = MappingProxyType({"mm": "mm", "mm2": "mm^2", "um": "um", "px": "px"})
 """By the ending of a column's name; all others are numbers, or as bright as the images."""
 Value = str | int | float
 
@@ -57,11 +57,27 @@ def write_droplets(path: Path, exposures: Mapping[str, Droplets], provenance: Ma
     columns = {FRAME: np.concatenate(frames)} | {
         name: np.concatenate([table[name] for table in tables]) for name in tables[0]
     }
+    write_columns(path, columns, provenance)
+
+
+def write_columns(path: Path, columns: Mapping[str, NDArray[np.generic]], provenance: Mapping[str, Value]) -> None:
+    """Write a table of droplets; the file appears whole or not at all, an old one is replaced.
+
+    Parameters
+    ----------
+    path : Path
+        Usually ``*.h5``.
+    columns : mapping of name to (N,) array
+        ``frame`` among them, as bytes.
+    provenance : Mapping[str, str | int | float]
+        As of ``write_droplets``.
+    """
     with replacing(path) as part, h5py.File(part, "w") as file:
         group = file.create_group(GROUP, track_order=True)
         for name, values in columns.items():
             group.create_dataset(name, data=values).attrs["units"] = UNITS.get(name.rpartition("_")[2], "1")
-        group["p_real"].attrs["reason"] = P_REAL_UNKNOWN
+        if "p_real" in group:
+            group["p_real"].attrs["reason"] = P_REAL_UNKNOWN
         file.create_group(PROVENANCE).attrs.update({**provenance, **SCHEMA})
 
 

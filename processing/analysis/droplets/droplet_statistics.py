@@ -91,7 +91,9 @@ def _density(
 
 def _volume_mm3(shot: StoredDroplets) -> float | None:
     """Volume of the grid; files that do not state it have it in their settings, if the user named a grid."""
-    grid = json.loads(str(shot.provenance.get("grid", "null"))) or json.loads(str(shot.provenance["settings"]))["grid"]
+    grid = json.loads(str(shot.provenance.get("grid", "null"))) or json.loads(str(shot.provenance["settings"])).get(
+        "grid"
+    )
     return GridSettings.model_validate(grid).to_grid().volume_mm3 if grid else None
 
 

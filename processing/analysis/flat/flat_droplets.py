@@ -1,0 +1,252 @@
+"""Droplets of a single image: where in the image, how large, how sharp. In pixels; no depth, no volume."""
+
+from collections import Counter
+from dataclasses import dataclass
+from typing import Annotated
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from processing.analysis.flat.blurred_disc import LEVELS, flattening, unblurred
+from processing.analysis.flat.darkness import Darkness, Image, darkness_of
+from processing.analysis.flat.discs_in_outline import Disc, discs_in
+from processing.analysis.flat.outline import Outline, outline_around
+from processing.analysis.flat.spots import Spot, find_spots
+from processing.geometry import FloatArray
+from processing.preprocessing import Polarity
+from processing.reconstruction.settings import FrozenValue
+
+ROUNDS = 3
+"""Of the light around a droplet and its outline, which depend on one another."""
+NOISES = 6.0
+"""A spot must stand out by so many standard deviations of the noise of the smoothed image."""
+SMOOTHED_NOISE = 1 / 3
+"""Of the noise of a pixel, in the mean of 3 x 3."""
+
+
+class FlatSettings(FrozenValue):
+    """How droplets of single images are measured; travels with every result."""
+
+    polarity: Annotated[Polarity, Field(description="dark droplets before light, or bright particles on black")] = (
+        "shadow"
+    )
+    least_depth: Annotated[
+        float, Field(gt=0, lt=1, description="darkness, relative to the light, that a droplet stands out by")
+    ] = 0.2
+    least_diameter_px: Annotated[float, Field(ge=2, description="smaller ones are dust, or cannot be sized")] = 4.0
+    least_circularity: Annotated[
+        float, Field(gt=0, lt=1, description="4 pi area / perimeter^2; below, it is a ligament, or several droplets")
+    ] = 0.8
+    most_blur: Annotated[
+        float, Field(gt=0, le=0.8, description="blur over radius; above, it is too far out of focus to be sized")
+    ] = 0.6
+
+
+@dataclass(frozen=True, eq=False)
+class FlatDroplets:
+    """Droplets of one image.
+
+    Parameters
+    ----------
+    centres_px : (N, 2) array
+        Column and row.
+    diameters_px : (N,) array
+        Of the disc that, blurred, has the outlines that are seen.
+    raw_diameters_px : (N,) array
+        Of a circle as large as the outline at half of the droplet's own depth.
+    blur_px : (N,) array
+        Standard deviation of the blur of its edge: small is sharp.
+    depths : (N,) array
+        How much darker it is than what is around it, relative to the light.
+    circularity : (N,) array
+        4 pi area over perimeter squared, of the outline.
+    overlapping : (N,) bool array
+        Another shadow reaches into the outline; where it is that of several discs, each is the largest that finds
+        room in it, and its blur is not a number.
+    left_out : dict of reason to number
+        What was seen and is not among them: ``border``, ``not_round``, ``unsharp``, ``small``.
+    """
+
+    centres_px: FloatArray
+    diameters_px: FloatArray
+    raw_diameters_px: FloatArray
+    blur_px: FloatArray
+    depths: FloatArray
+    circularity: FloatArray
+    overlapping: NDArray[np.bool_]
+    left_out: dict[str, int]
+
+    @classmethod
+    def none(cls) -> "FlatDroplets":
+        """No droplets."""
+        empty = np.empty(0)
+        return cls(np.empty((0, 2)), empty, empty, empty, empty, empty, np.empty(0, bool), {})
+
+    def __len__(self) -> int:
+        return len(self.diameters_px)
+
+    def columns(self) -> dict[str, NDArray[np.generic]]:
+        """Columns by their names, as files have them."""
+        return {
+            "x_px": self.centres_px[:, 0],
+            "y_px": self.centres_px[:, 1],
+            "diameter_px": self.diameters_px,
+            "diameter_raw_px": self.raw_diameters_px,
+            "blur_px": self.blur_px,
+            "depth": self.depths,
+            "circularity": self.circularity,
+            "overlapping": self.overlapping.astype(np.uint8),
+        }
+
+
+@dataclass(frozen=True)
+class _Measured:
+    """A droplet: column, row, diameter, raw diameter, blur, depth, circularity, overlapping."""
+
+    row: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """A spot with its outline at half depth, radii at all levels, depth, and whether another shadow reaches into it."""
+
+    outline: Outline
+    radii_px: tuple[float, float, float]
+    depth: float
+    disturbed: bool
+
+
+def measure_flat(
+    image: NDArray[np.generic], settings: FlatSettings | None = None, background: NDArray[np.generic] | None = None
+) -> FlatDroplets:
+    """Measure the droplets of one image.
+
+    Parameters
+    ----------
+    image : (rows, columns) array
+        Grey values, less the dark image.
+    settings : FlatSettings, optional
+        How.
+    background : (rows, columns) array, optional
+        The light without droplets; by default a smooth one is fitted. A white frame around the image is no light.
+
+    Raises
+    ------
+    DarkImageError
+        There is no light that droplets could be dark before.
+    """
+    how = settings or FlatSettings()
+    seen = darkness_of(image, how.polarity, background)
+    smoothed = cv2.blur(seen.values, (3, 3)).astype(np.float32)
+    least = max(how.least_depth, NOISES * SMOOTHED_NOISE * seen.noise)
+    spots = find_spots(smoothed, 0.5 * least, least)
+    results = _measured_once(seen, smoothed, spots, how, least)
+    left_out = Counter(result for result in results if isinstance(result, str))
+    rows = [result.row for result in results if isinstance(result, _Measured)]
+    table = np.array(rows, dtype=np.float64).reshape(-1, 8)
+    return FlatDroplets(
+        centres_px=table[:, :2] + (seen.first_column, seen.first_row),
+        diameters_px=table[:, 2],
+        raw_diameters_px=table[:, 3],
+        blur_px=table[:, 4],
+        depths=table[:, 5],
+        circularity=table[:, 6],
+        overlapping=table[:, 7] > 0,
+        left_out=dict(left_out),
+    )
+
+
+def _measured_once(
+    seen: Darkness, smoothed: Image, spots: list[Spot], how: FlatSettings, least: float
+) -> list[_Measured | str]:
+    """All spots; one whose outline goes around a spot that was measured already is part of that."""
+    results: list[_Measured | str] = []
+    taken: set[tuple[int, int]] = set()
+    for spot in spots:
+        found = _outlined(seen.values, smoothed, spot, least)
+        if isinstance(found, str):
+            results.append(found)
+        elif found is not None:
+            row, column = (round(coordinate) for coordinate in found.outline.centre_px)
+            results += [] if (row, column) in taken else _judged(found, how)
+            taken.add((row, column))
+    return results
+
+
+def _outlined(values: Image, smoothed: Image, spot: Spot, least: float) -> _Seen | str | None:
+    """What is seen of a spot; ``border`` where that goes on beyond the image, None where it does not stand out."""
+    light = 0.0
+    for _ in range(ROUNDS):
+        depth = spot.peak - light
+        if depth < least:
+            return None
+        if merged := light + LEVELS[1] * depth < spot.base and spot.base > 0.5 * least:
+            light, depth = spot.base, spot.peak - spot.base
+            break
+        middle = _outline(values, light + LEVELS[1] * depth, spot)
+        if middle is None:
+            return "border"
+        light = _light_around(smoothed, middle, light)
+    disturbed = merged or max(light, spot.base - light) > LEVELS[0] * depth
+    first = _at_levels(values, light, depth, spot, disturbed)
+    if first is None:
+        return "border"
+    return _at_levels(values, light, depth / flattening(*unblurred(first.radii_px)), spot, disturbed) or first
+
+
+def _at_levels(values: Image, light: float, depth: float, spot: Spot, disturbed: bool) -> _Seen | None:
+    """Outlines of a spot; the outer one is mirrored from the inner one where something else is in the way."""
+    outer, middle, inner = (_outline(values, light + level * depth, spot) for level in LEVELS)
+    if middle is None:
+        return None
+    half_px, inner_px = middle.radius_px, (inner or middle).radius_px
+    outer_px = 2 * half_px - inner_px if disturbed or outer is None else outer.radius_px
+    return _Seen(middle, (outer_px, half_px, inner_px), depth, disturbed)
+
+
+def _outline(values: Image, level: float, spot: Spot) -> Outline | None:
+    """The outline around a spot, looked for in a part of the image that grows until it holds it."""
+    first_row, first_column, rows, columns = spot.box
+    pad = 4 + max(rows, columns) // 2
+    while True:
+        top, left = max(first_row - pad, 0), max(first_column - pad, 0)
+        part = values[top : first_row + rows + pad, left : first_column + columns + pad]
+        found = outline_around(part, level, (spot.row - top, spot.column - left))
+        if found is not None:
+            return Outline(found.points + (top, left))
+        if part.shape == values.shape or pad > max(values.shape):
+            return None
+        pad *= 3
+
+
+def _light_around(smoothed: Image, outline: Outline, before: float) -> float:
+    """Darkness of what is around a droplet: the median of a ring that its blur does not reach."""
+    (row, column), radius_px = outline.centre_px, outline.radius_px
+    near, far = 1.6 * radius_px + 2, 2.2 * radius_px + 5
+    top, left = max(int(row - far), 0), max(int(column - far), 0)
+    part = smoothed[top : int(row + far) + 2, left : int(column + far) + 2]
+    v, u = np.ogrid[: part.shape[0], : part.shape[1]]
+    distance = np.hypot(v + top - row, u + left - column)
+    ring = part[(distance >= near) & (distance <= far)]
+    return float(np.median(ring)) if ring.size else before
+
+
+def _judged(seen: _Seen, how: FlatSettings) -> list[_Measured | str]:
+    circularity, raw_px = min(seen.outline.circularity, 1.0), 2 * seen.outline.radius_px
+    if raw_px < how.least_diameter_px:
+        return ["small"]
+    if circularity < how.least_circularity:
+        discs = discs_in(seen.outline)
+        return [_overlapping(disc, seen.depth, circularity) for disc in discs] or ["not_round"]
+    radius_px, blur_px = unblurred(seen.radii_px)
+    if blur_px > how.most_blur * radius_px:
+        return ["unsharp"]
+    row, column = seen.outline.centre_px
+    return [_Measured((column, row, 2 * radius_px, raw_px, blur_px, seen.depth, circularity, float(seen.disturbed)))]
+
+
+def _overlapping(disc: Disc, depth: float, circularity: float) -> _Measured:
+    diameter_px = 2 * disc.radius_px
+    return _Measured((disc.column, disc.row, diameter_px, diameter_px, np.nan, depth, circularity, 1.0))

@@ -1,0 +1,159 @@
+"""``tomoshadow measure`` without a calibration: images, or one view of runs, become droplets in 2-D."""
+
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from processing.runs.errors import PipelineError
+from server.cli.options import positive, selected_shots
+from server.cli.output import Outcome, progress, table, tracked
+from server.cli.runs.batch import over_runs
+from server.cli.runs.recipes import keep_recipe, settings_of
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from processing.analysis.flat.flat_droplets import FlatSettings
+    from processing.preprocessing import Polarity
+    from processing.runs.results_file import Provenance
+    from processing.runs.single_view.measurement import FlatSource
+
+IN_SPACE = ("grid", "twins")
+"""Options that need a calibration."""
+IN_THE_IMAGE = ("view", "um_per_px", "background")
+"""Options that mean nothing with one."""
+
+
+def add_single_view(parser: ArgumentParser) -> None:
+    """Let a command be told of images without a calibration."""
+    group = parser.add_argument_group("without --calibration, droplets in 2-D, of image files or one view of runs")
+    group.add_argument("--view", metavar="NAME", help="of a run with several")
+    group.add_argument("--um-per-px", type=positive, metavar="X", help="width of a pixel in the spray: um for px")
+    group.add_argument("--background", type=Path, metavar="IMAGE", help="light without droplets; default: fitted")
+
+
+def measure_single_view(options: Namespace) -> Outcome:
+    """Measure image by image, or run by run.
+
+    Raises
+    ------
+    PipelineError
+        Images and runs at once, or options that need a calibration.
+    """
+    from processing.analysis.flat.flat_droplets import FlatSettings
+    from processing.runs.single_view.measurement import COMMAND, METHOD_VERSION, image_sources
+
+    refuse(options, IN_SPACE, "needs --calibration")
+    images = [path for path in options.runs if not path.is_dir()]
+    if images and len(images) < len(options.runs):
+        raise PipelineError(f"{images[0]}: images and runs are not measured at once; take one after the other")
+    command = (COMMAND, METHOD_VERSION)
+    settings = settings_of(
+        options, command, FlatSettings, ("polarity",), lambda: FlatSettings(polarity=_polarity(options, bool(images)))
+    )
+    if images:
+        sources = image_sources(images, options.background)
+        keep_recipe(options, command, settings)
+        return _measure(options, settings, sources, options.out, {"images": str(images[0].resolve().parent)})
+    refuse(options, ("background",), "is for images; a run has its own")
+    keep_recipe(options, command, settings)
+    return over_runs(options, lambda run_dir, out: _measure_run(options, settings, run_dir, out))
+
+
+def refuse(options: Namespace, names: "Sequence[str]", why: str) -> None:
+    """Refuse options that were given, with the reason."""
+    if given := [f"--{name.replace('_', '-')}" for name in names if getattr(options, name) is not None]:
+        raise PipelineError(f"{', '.join(given)}: {why}")
+
+
+def _polarity(options: Namespace, images: bool) -> "Polarity":
+    from daq.files.run_directory import RunReader
+
+    said: Polarity | None = options.polarity
+    if said or images:
+        return said or "shadow"
+    with RunReader(options.runs[0]) as run:
+        return run.header.polarity
+
+
+def _measure_run(options: Namespace, settings: "FlatSettings", run_dir: Path, out: Path) -> Outcome:
+    from daq.files.run_directory import RunReader
+    from processing.runs.single_view.measurement import shot_sources
+
+    with RunReader(run_dir) as run:
+        if run.header.polarity != settings.polarity:
+            raise PipelineError(
+                f"{run_dir.name}: its images are recorded as {run.header.polarity}, they are not measured as "
+                f"{settings.polarity}"
+            )
+        sources = shot_sources(run, options.view, selected_shots(run_dir, options.shots))
+        view = options.view or next(iter(run.header.views))
+        return _measure(options, settings, sources, out, {"run": run.header.run_id, "view": view})
+
+
+def _measure(
+    options: Namespace, settings: "FlatSettings", sources: "list[FlatSource]", place: Path, origin: "Provenance"
+) -> Outcome:
+    from processing.analysis.exports.export import export_path
+    from processing.runs.overwriting import replacing, require_free
+    from processing.runs.results_file import SETTINGS_FILE
+
+    if options.overwrite:
+        require_free(place, overwrite=True, made_with=(SETTINGS_FILE,))
+        with replacing(place) as out:
+            result = _measure_all(options, settings, sources, out, origin)
+    else:
+        files = [source.droplets_path(place) for source in sources]
+        require_free(*files, *(export_path(file, kind) for file in files for kind in options.export), overwrite=False)
+        result = _measure_all(options, settings, sources, place, origin)
+    return Outcome(result, f"{_table(result)}\n{place}: {_summary(result)}")
+
+
+def _measure_all(
+    options: Namespace, settings: "FlatSettings", sources: "list[FlatSource]", out: Path, origin: "Provenance"
+) -> dict[str, Any]:
+    from processing.analysis.droplets.droplet_file import read_droplets
+    from processing.analysis.exports.export import export_droplets
+    from processing.runs.recipe import recipe_sha256
+    from processing.runs.single_view.measurement import COMMAND, METHOD_VERSION, flat_statistics, measure_source
+
+    shots = []
+    for source in tracked(sources, lambda source: source.name):
+        shots.append(measure_source(source, settings, options.um_per_px, out, origin))
+        for export in options.export:
+            export_droplets(out / shots[-1].file, export)
+        for reason in shots[-1].reasons:
+            progress(f"{source.name}: {shots[-1].verdict}: {reason}")
+    return {
+        "polarity": settings.polarity,
+        "um_per_px": options.um_per_px,
+        "recipe_sha256": recipe_sha256(COMMAND, METHOD_VERSION, settings),
+        "shots": [shot.model_dump(mode="json") for shot in shots],
+        "statistics": flat_statistics([read_droplets(out / shot.file) for shot in shots]),
+        "passed": any(shot.verdict != "refused" for shot in shots),
+    }
+
+
+def _table(result: dict[str, Any]) -> str:
+    rows = [
+        [
+            shot["image"],
+            str(shot["droplets"]),
+            ", ".join(f"{number} {reason.replace('_', ' ')}" for reason, number in shot["left_out"].items()),
+            f"{shot['cpu_s']:.1f}",
+            shot["verdict"],
+            shot["file"],
+        ]
+        for shot in result["shots"]
+    ]
+    return table(["image", "droplets", "left out", "CPU-s", "verdict", "file"], rows)
+
+
+def _summary(result: dict[str, Any]) -> str:
+    unit = "px" if result["um_per_px"] is None else "um"
+    statistics = result["statistics"]
+    counted = f"{statistics['n']} droplets in {len(result['shots'])} images"
+    d32 = statistics[f"d32_{unit}"]
+    if d32 is None:
+        return f"{counted}: {statistics['reason']}"
+    return f"{counted}, D32 {d32['value']:.3g} ({d32['low']:.3g} to {d32['high']:.3g}) {unit}"

@@ -1,0 +1,144 @@
+"""``tomoshadow measure`` without a calibration: images and single views, in pixels or micrometres."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import cv2
+import h5py
+import numpy as np
+import pytest
+
+from daq.files.run_directory import DoubleFrame, ExposureRecord, ImageKey, RunHeader, RunWriter, Shot, ViewFormat
+from processing.analysis.droplets.droplet_file import read_droplets
+from server.cli.main import main
+from tests.processing.analysis.flat.test_flat_droplets import SHAPE, shadow
+from tests.support.command_line import refused, shown, told
+from tests.support.droplet_run import write_run
+
+DISCS = [(60.0, 60.0, 18.0), (150.0, 90.0, 25.0)]
+
+
+def grey(discs: list[tuple[float, float, float]], blur_px: float = 1.0) -> Any:
+    return np.round(shadow(discs, blur_px)).astype(np.uint8)
+
+
+@pytest.fixture
+def images(tmp_path: Path) -> list[Path]:
+    """Two images, one with a droplet at the border."""
+    paths = [tmp_path / "first.png", tmp_path / "second.tif"]
+    cv2.imwrite(str(paths[0]), grey(DISCS))
+    cv2.imwrite(str(paths[1]), grey([(100.0, 80.0, 20.0), (3.0, 50.0, 20.0)]))
+    return paths
+
+
+def test_images_are_measured_in_pixels(images: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    result = told(capsys, "measure", *images, "-o", tmp_path / "out")
+    assert [(shot["image"], shot["droplets"], shot["verdict"]) for shot in result["shots"]] == [
+        ("first", 2, "good"),
+        ("second", 1, "good"),
+    ]
+    assert result["shots"][1]["left_out"] == {"border": 1}
+    stored = read_droplets(tmp_path / "out" / "first_droplets.h5")
+    assert sorted(stored.columns["diameter_px"]) == pytest.approx([18, 25], rel=0.01)
+    assert {name for name in stored.columns if name.endswith("_um")} == set()
+    assert stored.columns["overlapping"].dtype == np.uint8
+    assert stored.provenance["image"] == "first"
+    assert stored.provenance["recipe_sha256"] == result["recipe_sha256"]
+    statistics = result["statistics"]
+    expected = (18**3 + 25**3 + 20**3) / (18**2 + 25**2 + 20**2)
+    assert statistics["d32_px"]["value"] == pytest.approx(expected, rel=0.01)
+    assert (statistics["n"], statistics["intervals_over"]) == (3, "shots")
+    assert "3 droplets in 2 images" in shown(capsys, "measure", *images, "-o", tmp_path / "again")
+
+
+def test_a_scale_turns_pixels_into_micrometres(
+    images: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["measure", images[0], "-o", tmp_path / "out", "--um-per-px", "4", "--export", "csv"]
+    result = told(capsys, *arguments)
+    path = tmp_path / "out" / "first_droplets.h5"
+    columns = read_droplets(path).columns
+    assert sorted(columns["diameter_um"]) == pytest.approx([72, 100], rel=0.01)
+    assert sorted(columns["x_um"]) == pytest.approx([240, 600], rel=0.01)
+    assert not [name for name in columns if name.endswith("_px")]
+    with h5py.File(path) as file:
+        assert file["droplets/blur_um"].attrs["units"] == "um"
+    assert result["statistics"]["d10_um"]["value"] == pytest.approx(86, rel=0.01)
+    assert "diameter_um" in (tmp_path / "out" / "first_droplets.csv").read_text()
+    assert "no place in space" in refused(capsys, *arguments[:3], tmp_path / "vtk", "--export", "vtk")
+
+
+def write_single(run_dir: Path) -> Path:
+    """A run of one view, dark image and background known, two exposures."""
+    header = RunHeader(
+        run_id=run_dir.name,
+        created_utc="2026-01-01T00:00:00+00:00",
+        views={"side": ViewFormat(SHAPE, 8)},
+        separation_ns=6400,
+    )
+    seen = ExposureRecord(valid=True, frame_id=1, device_timestamp_ns=1)
+    shot = Shot(0, ImageKey.SAMPLE, {"side": DoubleFrame(grey(DISCS), grey(DISCS[:1]), seen, seen)})
+    with RunWriter(run_dir, header) as writer:
+        writer.write_shot(shot)
+        writer.finish("completed")
+    return run_dir
+
+
+def test_a_run_of_one_view_is_measured_exposure_by_exposure(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    result = told(capsys, "measure", write_single(tmp_path / "single"), "-o", tmp_path / "out")
+    (shot,) = result["shots"]
+    assert (shot["shot"], shot["droplets"], shot["file"]) == (0, 3, "shot_00000_droplets.h5")
+    stored = read_droplets(tmp_path / "out" / shot["file"])
+    assert stored.columns["frame"].tolist() == ["a", "a", "b"]
+    assert (stored.provenance["run"], stored.provenance["view"]) == ("single", "side")
+
+
+def test_one_of_several_views_must_be_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run_dir = write_run(tmp_path / "run")
+    arguments = ["measure", run_dir, "-o", tmp_path / "out"]
+    assert "has views view1, view2, view3: --calibration says where they are" in refused(capsys, *arguments)
+    assert "has no view 'left', it has view1" in refused(capsys, *arguments, "--view", "left")
+    assert told(capsys, *arguments, "--view", "view2")["passed"]
+
+
+def test_what_makes_no_sense_is_refused_before_anything_is_written(
+    images: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run_dir = write_run(tmp_path / "run")
+    out = ["-o", tmp_path / "out"]
+    for arguments, text in (
+        (["measure", *images, run_dir, *out], "images and runs are not measured at once"),
+        (["measure", *images, *out, "--grid=0:1,0:1,0:1"], "--grid: needs --calibration"),
+        (["measure", images[0], tmp_path / "first.jpg", *out], "two images are called first"),
+        (["measure", tmp_path / "none.png", *out], "none.png"),
+        (["measure", images[0], *out, "--background", images[1].with_name("none.tif")], "none.tif"),
+        (["measure", run_dir, *out, "--view", "view1", "--background", images[0]], "--background: is for images"),
+        (["measure", run_dir, *out, "--view", "view1", "--polarity", "bright"], "not measured as bright"),
+        (["measure", run_dir, *out, "--calibration", "c.json", "--um-per-px", "3"], "--um-per-px: is for droplets"),
+    ):
+        assert text in refused(capsys, *arguments)
+        assert not (tmp_path / "out").exists()
+
+
+def test_a_dark_image_is_refused_by_itself(
+    images: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cv2.imwrite(str(tmp_path / "dark.png"), np.zeros(SHAPE, np.uint8))
+    result = told(capsys, "measure", images[0], tmp_path / "dark.png", "-o", tmp_path / "out")
+    assert [shot["verdict"] for shot in result["shots"]] == ["good", "refused"]
+    assert "is a lens covered" in result["shots"][1]["reasons"][0]
+    assert main(["measure", str(tmp_path / "dark.png"), "-o", str(tmp_path / "other"), "--json"]) == 1
+    alone = json.loads(capsys.readouterr().out.splitlines()[-1])
+    assert (alone["statistics"]["d32_px"], alone["statistics"]["reason"]) == (None, "no droplet was measured")
+
+
+def test_a_recipe_says_how(images: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    recipe = tmp_path / "recipe.toml"
+    first = told(capsys, "measure", images[0], "-o", tmp_path / "one", "--write-recipe", recipe)
+    assert "least_circularity = 0.8" in recipe.read_text()
+    recipe.write_text(recipe.read_text().replace("least_diameter_px = 4.0", "least_diameter_px = 20.0"))
+    second = told(capsys, "measure", images[0], "-o", tmp_path / "two", "--recipe", recipe)
+    assert (first["statistics"]["n"], second["statistics"]["n"]) == (2, 1)
+    assert second["shots"][0]["left_out"] == {"small": 1}
+    assert first["recipe_sha256"] != second["recipe_sha256"]
