@@ -12,7 +12,7 @@ Measure
 Files
     read_run, shot_intensities, read_volume, write_volume, read_droplets, export_droplets
 Judge and look
-    quality_factor, slices_figure, isosurface_figure, shadowgraph_figure
+    quality_factor, slices_figure, isosurface_figure, shadowgraph_figure, sizes_figure, droplets_in_space_figure
 Try, and err
     example, BadInput
 """
@@ -34,6 +34,8 @@ if TYPE_CHECKING:
     from processing.calibration.calibration_file import save_calibration as save_calibration
     from processing.calibration.sets.array_set import find_target as find_target
     from processing.errors import BadInput as BadInput
+    from processing.figures.size_figures import droplets_in_space_figure as droplets_in_space_figure
+    from processing.figures.size_figures import sizes_figure as sizes_figure
     from processing.figures.volume_figures import isosurface_figure as isosurface_figure
     from processing.figures.volume_figures import shadowgraph_figure as shadowgraph_figure
     from processing.figures.volume_figures import slices_figure as slices_figure
@@ -67,6 +69,7 @@ _HOMES = {
     "processing.calibration.calibration_file": ("load_calibration", "save_calibration"),
     "processing.calibration.sets.array_set": ("find_target",),
     "processing.errors": ("BadInput",),
+    "processing.figures.size_figures": ("droplets_in_space_figure", "sizes_figure"),
     "processing.figures.volume_figures": ("isosurface_figure", "shadowgraph_figure", "slices_figure"),
     "processing.reconstruction.volume_file": ("read_volume", "write_volume"),
     "processing.synthetic.example": ("example",),
