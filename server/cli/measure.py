@@ -66,7 +66,7 @@ def _exports(text: str) -> "tuple[Export, ...]":
 def measure(options: Namespace) -> Outcome:
     """Measure run by run, shot by shot."""
     from processing.calibration.calibration_file import load_calibration
-    from processing.runs.measurement import METHOD_VERSION, MeasureSettings, require_measurable
+    from processing.runs.measurement import METHOD_VERSION, MeasureSettings
 
     for export in options.export:
         export.require()
@@ -74,11 +74,9 @@ def measure(options: Namespace) -> Outcome:
         return measure_single_view(options)
     refuse(options, IN_THE_IMAGE, "is for droplets in 2-D, without --calibration")
     calibration = load_calibration(options.calibration)
-    recorded = _polarity(options.runs[0])
     command = (NAME, METHOD_VERSION)
-    said = settings_of(options, command, MeasureSettings, SAID, lambda: _by_options(options, recorded, calibration))
+    said = settings_of(options, command, MeasureSettings, SAID, lambda: _by_options(options, calibration))
     settings = with_grid(said, calibration)
-    require_measurable(options.runs[0].name, recorded, settings.polarity)
     keep_recipe(options, command, settings)
     return over_runs(options, lambda run_dir, out: _measure_run(options, settings, run_dir, out))
 
@@ -90,12 +88,13 @@ def _polarity(run_dir: Path) -> "Polarity":
         return run.header.polarity
 
 
-def _by_options(options: Namespace, recorded: "Polarity", calibration: "Calibration") -> "MeasureSettings":
+def _by_options(options: Namespace, calibration: "Calibration") -> "MeasureSettings":
     from processing.reconstruction.settings import GridSettings
     from processing.runs.measurement import MeasureSettings
 
     grid = GridSettings.of(parse_grid(options.grid, calibration)) if options.grid else None
-    return MeasureSettings(polarity=options.polarity or recorded, grid=grid, twins=options.twins or 0)
+    polarity = options.polarity or _polarity(options.runs[0])
+    return MeasureSettings(polarity=polarity, grid=grid, twins=options.twins or 0)
 
 
 def _measure_run(options: Namespace, settings: "MeasureSettings", run_dir: Path, place: Path) -> Outcome:

@@ -84,6 +84,17 @@ def test_a_file_says_where_it_comes_from_and_what_each_column_is(
     assert GridSettings.model_validate_json(attributes["grid"]).model_dump(mode="json") == result["grid"]
 
 
+def test_exposures_that_show_the_same_droplets_make_their_density_no_surer(
+    bright: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    widths = []
+    for run in ("single", "run"):
+        statistics = told(capsys, *command(bright, tmp_path / run, "--shots", "0:1", run=run))["statistics"]
+        density = statistics["number_density_per_mm3"]
+        widths.append((density["high"] - density["low"]) / density["value"])
+    assert widths[1] == pytest.approx(widths[0], rel=0.03)
+
+
 def test_droplets_are_exported_beside_their_file_and_not_over_another(
     bright: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -5,37 +5,18 @@ import os
 from collections import defaultdict
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter
 
 from processing.analysis.flat.darkness import DarkImageError
 from processing.analysis.flat.flat_droplets import FlatDroplets, FlatSettings, measure_flat
+from tests.support.flat_scenes import LIGHT, SHAPE, Disc, shadow
 
-FINER = 8
-SHAPE = (160, 220)
-LIGHT = 180.0
-EVERY = 3
+EVERY = 4
 """So many of the annotated images are taken; of all 273 droplets 98.9 % are found, and sized by 0.98 in the median."""
-Disc = tuple[float, float, float]
-"""Column, row, diameter in px."""
-
-
-def shadow(discs: Sequence[Disc], blur_px: float = 0.0, noise: float = 0.0, light: Any = LIGHT) -> NDArray[np.float32]:
-    """Opaque discs before a light; by many samples per pixel, so that the area is exact to 0.2 %."""
-    row, column = np.mgrid[: SHAPE[0] * FINER, : SHAPE[1] * FINER]
-    row, column = (row + 0.5) / FINER - 0.5, (column + 0.5) / FINER - 0.5
-    covered = np.zeros(row.shape, bool)
-    for x_px, y_px, diameter_px in discs:
-        covered |= (column - x_px) ** 2 + (row - y_px) ** 2 <= (diameter_px / 2) ** 2
-    coverage = covered.reshape(SHAPE[0], FINER, SHAPE[1], FINER).mean(axis=(1, 3))
-    dark = gaussian_filter(coverage, blur_px) if blur_px else coverage
-    image = light * (1 - 0.95 * dark) + np.random.default_rng(3).normal(0, noise * LIGHT, SHAPE)
-    return np.asarray(image, np.float32)
 
 
 @pytest.mark.parametrize(

@@ -12,9 +12,9 @@ import pytest
 from daq.files.run_directory import DoubleFrame, ExposureRecord, ImageKey, RunHeader, RunWriter, Shot, ViewFormat
 from processing.analysis.droplets.droplet_file import read_droplets
 from server.cli.main import main
-from tests.processing.analysis.flat.test_flat_droplets import SHAPE, shadow
 from tests.support.command_line import refused, shown, told
 from tests.support.droplet_run import write_run
+from tests.support.flat_scenes import SHAPE, shadow
 
 DISCS = [(60.0, 60.0, 18.0), (150.0, 90.0, 25.0)]
 
