@@ -17,7 +17,8 @@ from processing.analysis.droplets.droplet_file import FRAME, StoredDroplets, wri
 from processing.analysis.droplets.size_statistics import mean_diameters
 from processing.analysis.flat.darkness import DarkImageError
 from processing.analysis.flat.flat_droplets import FlatDroplets, FlatSettings, measure_flat
-from processing.image_file import read_image
+from processing.errors import BadInput
+from processing.image_file import ImageFileError, read_image
 from processing.preprocessing import Intensity
 from processing.reconstruction.settings import FrozenValue
 from processing.runs.errors import PipelineError
@@ -75,8 +76,10 @@ def image_sources(paths: Sequence[Path], background: Path | None = None) -> list
     Raises
     ------
     PipelineError
-        Two of them differ in their ending alone.
+        One of them or the background is not there, or two differ in their ending alone.
     """
+    if absent := [path for path in [*paths, *([background] if background else [])] if not path.is_file()]:
+        raise PipelineError(f"{absent[0]}: there is no such image or run")
     names = [path.stem for path in paths]
     if twice := {name for name in names if names.count(name) > 1}:
         raise PipelineError(f"two images are called {min(twice)}: their droplets would share a file")
@@ -147,8 +150,10 @@ def measure_source(
 
     Raises
     ------
-    BadInput
-        An image cannot be read, or the directory holds results of something else.
+    PipelineError
+        The background is not as large as the image, or an exposure is missing.
+    VolumeFileError
+        The directory holds results of something else.
     """
     started_cpu_s = time.process_time()
     made_by = {
@@ -158,7 +163,7 @@ def measure_source(
         "method_version": METHOD_VERSION,
         "tomoshadow": version("tomoshadow"),
     }
-    found = {frame: _measured(exposure, settings) for frame, exposure in source.exposures().items()}
+    found = _found(source, settings)
     claim_results(results_dir, made_by)
     told = {frame: _told(one) for frame, one in found.items()}
     named: Provenance = {
@@ -192,6 +197,15 @@ def _of_image(path: Path, background: Path | None) -> Mapping[str, Exposure]:
     return {"a": (grey, light)}
 
 
+def _found(source: FlatSource, settings: FlatSettings) -> Mapping[str, FlatDroplets | BadInput]:
+    """Droplets by exposure, or why there are none: an image that cannot be read stops no other."""
+    try:
+        exposures = source.exposures()
+    except ImageFileError as error:
+        return {"a": error}
+    return {frame: _measured(exposure, settings) for frame, exposure in exposures.items()}
+
+
 def _measured(exposure: Exposure, settings: FlatSettings) -> FlatDroplets | DarkImageError:
     image, light = exposure
     try:
@@ -200,17 +214,15 @@ def _measured(exposure: Exposure, settings: FlatSettings) -> FlatDroplets | Dark
         return error
 
 
-def _told(found: FlatDroplets | DarkImageError) -> dict[str, Any]:
+def _told(found: FlatDroplets | BadInput) -> dict[str, Any]:
     unmeasured = {"residual_over_noise": None, "ghosts": None}
-    if isinstance(found, DarkImageError):
+    if isinstance(found, BadInput):
         return {"verdict": "refused", "reasons": [str(found)], "droplets": 0, "left_out": {}, **unmeasured}
     verdict = "good" if len(found) else "empty"
     return {"verdict": verdict, "reasons": [], "droplets": len(found), "left_out": found.left_out, **unmeasured}
 
 
-def _columns(
-    found: Mapping[str, FlatDroplets | DarkImageError], um_per_px: float | None
-) -> dict[str, NDArray[np.generic]]:
+def _columns(found: Mapping[str, FlatDroplets | BadInput], um_per_px: float | None) -> dict[str, NDArray[np.generic]]:
     seen = {frame: one for frame, one in found.items() if isinstance(one, FlatDroplets)} or {"a": FlatDroplets.none()}
     tables = [one.columns() for one in seen.values()]
     frames = np.concatenate([np.full(len(one), frame, "S1") for frame, one in seen.items()])

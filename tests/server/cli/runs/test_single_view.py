@@ -65,7 +65,9 @@ def test_a_scale_turns_pixels_into_micrometres(
     with h5py.File(path) as file:
         assert file["droplets/blur_um"].attrs["units"] == "um"
     assert result["statistics"]["d10_um"]["value"] == pytest.approx(86, rel=0.01)
-    assert "diameter_um" in (tmp_path / "out" / "first_droplets.csv").read_text()
+    head, first, *_ = (tmp_path / "out" / "first_droplets.csv").read_text().splitlines()
+    assert head.startswith("image,frame,x_um,y_um,diameter_um")
+    assert first.startswith("first,a,")
     assert "no place in space" in refused(capsys, *arguments[:3], tmp_path / "vtk", "--export", "vtk")
 
 
@@ -110,7 +112,7 @@ def test_what_makes_no_sense_is_refused_before_anything_is_written(
     for arguments, text in (
         (["measure", *images, run_dir, *out], "images and runs are not measured at once"),
         (["measure", *images, *out, "--grid=0:1,0:1,0:1"], "--grid: needs --calibration"),
-        (["measure", images[0], tmp_path / "first.jpg", *out], "two images are called first"),
+        (["measure", images[0], images[0], *out], "two images are called first"),
         (["measure", tmp_path / "none.png", *out], "none.png"),
         (["measure", images[0], *out, "--background", images[1].with_name("none.tif")], "none.tif"),
         (["measure", run_dir, *out, "--view", "view1", "--background", images[0]], "--background: is for images"),
@@ -119,6 +121,15 @@ def test_what_makes_no_sense_is_refused_before_anything_is_written(
     ):
         assert text in refused(capsys, *arguments)
         assert not (tmp_path / "out").exists()
+
+
+def test_an_image_that_cannot_be_read_stops_no_other(
+    images: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "torn.png").write_bytes(images[0].read_bytes()[:99])
+    result = told(capsys, "measure", tmp_path / "torn.png", images[0], "-o", tmp_path / "out")
+    assert [(shot["verdict"], shot["droplets"]) for shot in result["shots"]] == [("refused", 0), ("good", 2)]
+    assert "torn.png" in result["shots"][0]["reasons"][0]
 
 
 def test_a_dark_image_is_refused_by_itself(
