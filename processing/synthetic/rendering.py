@@ -11,12 +11,16 @@ from processing.geometry import PinholeCamera
 from processing.synthetic.coherence import with_coherence
 from processing.synthetic.spray import Spray
 from processing.synthetic.stamping import Discs, FloatArray, FloatImage, stamp_discs
-from processing.synthetic.union import blurred_union
+from processing.synthetic.union import QUICK, Sampling, blurred_union
 from processing.synthetic.view_optics import PIXEL_VARIANCE_PX2, ViewOptics
 
 
 def render_transmittance(
-    camera: PinholeCamera, spray: Spray, optics: ViewOptics, exposure_s: float = 0.0
+    camera: PinholeCamera,
+    spray: Spray,
+    optics: ViewOptics,
+    exposure_s: float = 0.0,
+    sampling: Sampling = QUICK,
 ) -> FloatImage:
     """Transmittance of a spray as one view sees it.
 
@@ -34,6 +38,8 @@ def render_transmittance(
         Diffraction and defocus; partially coherent light if it has a ``condenser_ratio``.
     exposure_s : float
         Duration of the light pulse: moving balls are smeared along their path.
+    sampling : Sampling
+        ``QUICK`` for cameras, ``ACCURATE`` for truth that measurements are compared with.
 
     Returns
     -------
@@ -47,21 +53,21 @@ def render_transmittance(
     discs = Discs(
         centres=0.5 * (first_px + last_px),
         radii_px=0.5 * spray.diameters_mm * image_scale_px_per_mm(camera, spray.positions_mm),
-        sigmas_px=optics.defocus_sigma_px(depths_mm),
+        sigmas_px=np.copysign(optics.defocus_sigma_px(depths_mm), depths_mm),
         opacities=spray.opacities,
         smears=last_px - first_px,
     )
     width_px, height_px = camera.image_size_px
     faint = spray.opacities < 1
     film = replace(discs, sigmas_px=optics.blur_sigma_px(depths_mm)).select(np.flatnonzero(faint))
-    transmittance = _union(discs.select(np.flatnonzero(~faint)), optics, (height_px, width_px))
+    transmittance = _union(discs.select(np.flatnonzero(~faint)), optics, (height_px, width_px), sampling)
     transmittance *= stamp_discs(film, (height_px, width_px))
     return transmittance
 
 
-def _union(opaque: Discs, optics: ViewOptics, shape: tuple[int, int]) -> FloatImage:
+def _union(opaque: Discs, optics: ViewOptics, shape: tuple[int, int], sampling: Sampling) -> FloatImage:
     """Transmittance of opaque discs in the light of a view."""
-    transmittance = blurred_union(opaque, optics.diffraction_sigma_px, shape)
+    transmittance = blurred_union(opaque, optics.diffraction_sigma_px, shape, sampling)
     if optics.condenser_ratio is None:
         return transmittance
     with_pixel = replace(opaque, sigmas_px=np.sqrt(opaque.sigmas_px**2 + PIXEL_VARIANCE_PX2))

@@ -9,6 +9,7 @@ from processing.geometry import PinholeCamera
 from processing.synthetic.rendering import render_transmittance
 from processing.synthetic.spray import Spray
 from processing.synthetic.stamping import FloatImage
+from processing.synthetic.union import ACCURATE
 from processing.synthetic.view_optics import ViewOptics
 
 
@@ -64,7 +65,8 @@ def transmission_images(
 ) -> list[FloatImage]:
     """What several views see of a spray in the middle of an exposure, divided by their backgrounds.
 
-    The liquid may lie outside of what is measured: whatever a view sees of it darkens its image.
+    Drawn with rays that meet all droplets (``union.ACCURATE``). The liquid may lie outside of what is measured:
+    whatever a view sees of it darkens its image.
 
     Parameters
     ----------
@@ -86,6 +88,6 @@ def transmission_images(
         One per view.
     """
     return [
-        counting.transmission(render_transmittance(camera, spray, view, exposure_s), rng)
+        counting.transmission(render_transmittance(camera, spray, view, exposure_s, ACCURATE), rng)
         for camera, view in zip(cameras, optics, strict=True)
     ]

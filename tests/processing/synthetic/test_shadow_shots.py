@@ -9,6 +9,7 @@ from processing.synthetic.paper_rig import paper_optics
 from processing.synthetic.rendering import render_transmittance
 from processing.synthetic.shadow_shots import Counting, transmission_images
 from processing.synthetic.spray import Spray
+from processing.synthetic.union import ACCURATE
 
 CAMERAS, OPTICS = study_cameras((200, 120)), list(paper_optics().values())
 NOTHING = Spray.of_droplets(np.empty((0, 3)), np.empty(0))
@@ -42,7 +43,7 @@ def test_views_see_droplets_outside_of_the_grid_too() -> None:
     assert 0 < len(cloud.inside(grid)) < len(cloud)
     images = transmission_images(CAMERAS, OPTICS, cloud, Counting(), np.random.default_rng(4))
     for image, camera, optics in zip(images, CAMERAS, OPTICS, strict=True):
-        difference = image - render_transmittance(camera, cloud, optics)
+        difference = image - render_transmittance(camera, cloud, optics, sampling=ACCURATE)
         assert np.abs(difference.mean()) < 4e-4
         assert 0.8 * 0.012 < difference.std() < 1.1 * 0.012
 

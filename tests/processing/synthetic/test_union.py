@@ -14,7 +14,7 @@ from processing.studies.simulated_droplets import study_cameras
 from processing.synthetic.paper_rig import paper_optics
 from processing.synthetic.rendering import depth_out_of_focus_mm
 from processing.synthetic.stamping import Discs, FloatArray, stamp_discs
-from processing.synthetic.union import blurred_union
+from processing.synthetic.union import ACCURATE, QUICK, blurred_union
 
 SHAPE = (40, 44)
 FINE = 8
@@ -166,25 +166,39 @@ def test_what_multiplied_shadows_get_wrong(count: int, rms_of_product: float) ->
 
 
 def ray_traced(some: Discs, defocus_px: FloatArray, blur_px: float, shape: tuple[int, int]) -> FloatArray:
-    """Each ray of the aperture meets all discs where it passes their depths."""
-    k = np.arange(64) + 0.5
-    rays = np.sqrt(-2 * np.log(1 - k / 64)) * np.exp(1j * k * np.pi * (3 - 5**0.5))
+    """Each of 48 rays of the aperture meets all discs where it passes their depths."""
+    k = np.arange(48) + 0.5
+    rays = np.sqrt(-2 * np.log(1 - k / 48)) * np.exp(1j * k * np.pi * (3 - 5**0.5))
     rays -= rays.mean()
     rays *= np.sqrt(2 / np.mean(np.abs(rays) ** 2))
     offsets = [np.column_stack([ray.real * defocus_px, ray.imag * defocus_px]) for ray in rays]
-    masks = [mask_of(replace(some, centres=some.centres + offset), shape, 4) for offset in offsets]
-    return on_pixels(np.mean(masks, axis=0), blur_px, 4)
+    masks = [mask_of(replace(some, centres=some.centres + offset), shape) for offset in offsets]
+    return on_pixels(np.asarray(np.mean(masks, axis=0, dtype=np.float32)), blur_px)
 
 
 def test_defocus_against_traced_rays() -> None:
-    """7 droplets per mm^3 through 4 mm of depth, two of them on either side of the focus."""
-    positions_mm, diameters_mm = slab(400, np.random.default_rng(2))
-    camera, optics, shape = study_cameras((600, 160))[0], OPTICS["view1"], (160, 600)
+    """28 droplets per mm^3 through 4 mm of depth, the focus in its middle."""
+    shape, optics, inside = (64, 100), OPTICS["view1"], np.s_[8:-8, 8:-8]
+    camera = study_cameras(shape[::-1])[0]
+    positions_mm, diameters_mm = slab(1600, np.random.default_rng(2))
+    visible = np.all(np.abs(camera.project(positions_mm) - [49.5, 31.5]) < [65, 46], axis=1)
+    positions_mm, diameters_mm = positions_mm[visible], diameters_mm[visible]
     depths_mm = depth_out_of_focus_mm(camera, positions_mm)
-    defocus_px = optics.defocus_sigma_px(depths_mm)
+    defocus_px = np.copysign(optics.defocus_sigma_px(depths_mm), depths_mm)
     some = discs(camera.project(positions_mm)[:, ::-1].tolist(), (30 * diameters_mm).tolist())
-    traced = ray_traced(some, np.sign(depths_mm) * defocus_px, optics.diffraction_sigma_px, shape)
-    union = blurred_union(replace(some, sigmas_px=defocus_px), optics.diffraction_sigma_px, shape)
+    truth = ray_traced(some, defocus_px, optics.diffraction_sigma_px, shape)[inside]
     product = stamp_discs(replace(some, sigmas_px=optics.blur_sigma_px(depths_mm)), shape)
-    assert rms(union - traced) < 1.5e-3
-    assert rms(union - traced) < 0.35 * rms(product - traced)
+    quick, accurate = (
+        blurred_union(replace(some, sigmas_px=defocus_px), optics.diffraction_sigma_px, shape, sampling)
+        for sampling in (QUICK, ACCURATE)
+    )
+    assert rms(product[inside] - truth) > 0.015
+    assert rms(quick[inside] - truth) < 0.35 * rms(product[inside] - truth)
+    assert rms(accurate[inside] - truth) < 0.08 * rms(product[inside] - truth)
+
+
+@pytest.mark.parametrize("defocus_px", [0.3, -0.9, 2.5])
+def test_rays_add_up_to_the_defocus_of_a_lone_disc(defocus_px: float) -> None:
+    lone = discs([[19.3, 19.6]], [1.1], defocus_px)
+    quick, accurate = (blurred_union(lone, 0.9, SHAPE, sampling) for sampling in (QUICK, ACCURATE))
+    np.testing.assert_allclose(accurate, quick, atol=3e-3)
