@@ -17,7 +17,8 @@ using StampArray = nb::ndarray<const double, nb::shape<-1, stamp_numbers>, nb::c
 void check(const Stamp &stamp, const Profiles &profiles) {
     for (int axis = 0; axis < 3; ++axis)
         require(std::isfinite(stamp.centre[axis]) && std::isfinite(stamp.smear[axis]), "stamps: finite places, please");
-    require(stamp.reach >= 0 && stamp.per_area > 0, "stamps: reach and scale must be positive");
+    require(stamp.reach > 0 && std::isfinite(stamp.reach) && stamp.per_area > 0 && std::isfinite(stamp.per_area),
+            "stamps: radii and blurs must be positive");
     require(stamp.opacity >= 0 && stamp.opacity <= 1, "stamps: opacities of 0 to 1, please");
     require(stamp.profile >= 0 && stamp.profile < profiles.rows, "stamps: a profile that the table does not have");
 }

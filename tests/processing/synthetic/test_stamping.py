@@ -87,3 +87,5 @@ def test_what_is_no_disc_is_refused() -> None:
         stamp_discs(one_disc([np.nan, 3.0], 4, 1), (32, 24))
     with pytest.raises(ValueError, match="opacities"):
         stamp_discs(one_disc([3.0, 3.0], 4, 1, opacity=1.5), (32, 24))
+    with pytest.raises(ValueError, match="radii and blurs"), np.errstate(divide="ignore"):
+        stamp_discs(one_disc([3.0, 3.0], 0.0, 1), (32, 24))
