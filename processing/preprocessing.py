@@ -20,6 +20,8 @@ Frame = NDArray[np.uint8] | NDArray[np.uint16]
 
 FIELD_WINDOW_PX = 201
 """Over which the light field is estimated where the settings state no window."""
+LEAST_LIGHT, MOST_LIGHT = 1 / 64, 0.98
+"""Of the full scale: a background that is darker or brighter tells no transmission."""
 DIM = 1 / 8
 """Of the full scale: a frame without a brighter pixel is dim."""
 
@@ -103,6 +105,38 @@ def intensity(
         threads,
     )
     return result
+
+
+def transmission(
+    grey: Intensity, dark: Intensity | np.float32, background: Intensity, *, bits: int
+) -> tuple[Intensity, Intensity]:
+    """Light of an exposure over that of its background, and how sure each pixel is.
+
+    Parameters
+    ----------
+    grey : (rows, columns) float32 array
+        Grey values of the exposure.
+    dark, background : (rows, columns) float32 arrays
+        Mean image without light, which may be one number, and with light but without spray.
+    bits : int
+        Significant bits of a grey value.
+
+    Returns
+    -------
+    (rows, columns) float32 array
+        1 where nothing is in the way of light; not clipped.
+    (rows, columns) float32 array
+        Inverse variance relative to a typical pixel, as of counted light; 0 where the background is
+        dark or saturated, where the image is 1.
+    """
+    full_scale = np.float32(2**bits - 1)
+    light = background - dark
+    known = (light >= LEAST_LIGHT * full_scale) & (background <= MOST_LIGHT * full_scale)
+    sure = np.where(known, light, np.float32(0))
+    if known.any():
+        sure /= np.median(sure[known])
+    image = np.where(known, (grey - dark) / np.where(known, light, np.float32(1)), np.float32(1))
+    return image.astype(np.float32), sure.astype(np.float32)
 
 
 def is_dim(frame: Frame, bits: int) -> bool:

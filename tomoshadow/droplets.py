@@ -2,8 +2,9 @@
 
 from collections.abc import Mapping
 
-from processing.analysis.droplets.bright_shot import BrightShot, measure_bright
+from processing.analysis.droplets.bright_shot import BrightExposure, measure_bright
 from processing.analysis.droplets.droplet_search import MARGIN_VOXEL, plan_droplets
+from processing.analysis.droplets.shadows.shadow_shot import ShadowExposure, measure_shadows
 from processing.calibration.calibration import Calibration
 from processing.kernels import DEFAULT_THREADS
 from processing.preprocessing import Intensity, Polarity
@@ -20,7 +21,7 @@ def measure(
     seed: int = 0,
     margin_voxel: int = MARGIN_VOXEL,
     threads: int = DEFAULT_THREADS,
-) -> BrightShot:
+) -> BrightExposure | ShadowExposure:
     """Measure the droplets of one exposure: where they are, how bright, how sure, and whether to believe it.
 
     Parameters
@@ -28,11 +29,12 @@ def measure(
     calibration : Calibration
         Of the views.
     images : mapping of view to (rows, columns) float32 array
-        Bright particles on black, less the dark image, of any unit; not clipped at black, or noise cannot be judged.
+        Bright particles on black, less the dark image, of any unit; or, of shadows, the light over that of the
+        background, ``(image - dark) / (background - dark)``. Not clipped, or noise cannot be judged.
     grid : VoxelGrid
         Where droplets are measured, about one voxel per pixel, see ``common_grid``.
-    polarity : {"bright"}
-        Shadows are not measured yet.
+    polarity : {"bright", "shadow"}
+        Only shadows tell how large droplets are.
     twins : int
         Simulated twins of the exposure that tell how many are ghosts; each costs as much as the exposure itself.
     seed : int
@@ -44,9 +46,10 @@ def measure(
 
     Returns
     -------
-    BrightShot
-        ``droplets`` with ``points_mm``, ``covariance_mm2``, ``amplitudes`` and ``columns()``; ``verdict``, ``reasons``,
-        ``residual_over_noise``, ``views`` as they were found to be, and ``ghosts`` with ``share`` and ``interval``.
+    MeasuredExposure
+        ``droplets`` with ``points_mm``, ``covariance_mm2``, ``amplitudes`` or ``diameters_um``, and ``columns()``;
+        ``verdict``, ``reasons``, ``residual_over_noise``, ``views`` as they were found to be, and ``ghosts`` with
+        ``share`` and ``interval``.
 
     Raises
     ------
@@ -55,12 +58,12 @@ def measure(
     ReconstructionError
         Too few or too many views, or voxels much wider or narrower than pixels.
     ValueError
-        Shadows, images that do not fit the calibration, or a pixel that is not finite.
+        Images that do not fit the calibration, or a pixel that is not finite.
     """
-    if polarity != "bright":
-        raise ValueError(f"polarity {polarity} is not supported yet: only bright particles on black are measured")
     names = tuple(images)
     calibration.require_usable(names)
     mappings = [calibration.views[name].mapping for name in names]
     search = plan_droplets(mappings, grid, names, margin_voxel=margin_voxel)
+    if polarity == "shadow":
+        return measure_shadows(list(images.values()), search, twins=twins, seed=seed, threads=threads)
     return measure_bright(list(images.values()), search, twins=twins, seed=seed, threads=threads)

@@ -9,22 +9,22 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 from pydantic import Field
 
 from daq.files.run_directory import RunReader, Shot
-from processing.analysis.droplets.bright_shot import BrightShot, ShotVerdict, measure_bright
+from processing.analysis.droplets.bright_shot import BrightExposure, measure_bright
 from processing.analysis.droplets.droplet_file import write_droplets
 from processing.analysis.droplets.droplet_search import MARGIN_VOXEL, DropletSearch, plan_droplets
-from processing.analysis.droplets.droplet_table import Droplets
 from processing.analysis.droplets.ghost_share import pooled
+from processing.analysis.droplets.measured_exposure import ShotVerdict
+from processing.analysis.droplets.shadows.shadow_shot import ShadowExposure, measure_shadows
 from processing.calibration.calibration import Calibration
 from processing.calibration.calibration_file import file_sha256, load_calibration
 from processing.kernels import DEFAULT_THREADS
-from processing.preprocessing import Intensity, Polarity
+from processing.preprocessing import Polarity
 from processing.reconstruction.settings import FrozenValue, GridSettings
 from processing.runs.errors import PipelineError
-from processing.runs.exposure_faults import grey_values
+from processing.runs.measured_images import bright_images, require_backgrounds, shadow_images
 from processing.runs.pipeline import Stopped, default_grid, frame_names, require_match
 from processing.runs.recipe import recipe_sha256
 from processing.runs.results_file import FrameName, Provenance, claim_results
@@ -32,14 +32,13 @@ from processing.runs.workbench import References, read_references
 
 METHOD_VERSION = 1
 """Of what the numbers in a file of droplets mean."""
+Exposure = BrightExposure | ShadowExposure
 
 
 class MeasureSettings(FrozenValue):
     """How droplets are measured; travels with every result."""
 
-    polarity: Annotated[Polarity, Field(description="bright particles on black; shadows are not measured yet")] = (
-        "bright"
-    )
+    polarity: Annotated[Polarity, Field(description="bright particles on black, or shadows")] = "bright"
     grid: Annotated[GridSettings | None, Field(description="default: what all views see, one voxel per pixel")] = None
     margin_voxel: Annotated[int, Field(ge=0, le=500, description="so far around the grid droplets are looked for")] = (
         MARGIN_VOXEL
@@ -74,15 +73,10 @@ def require_measurable(run_name: str, recorded: Polarity, polarity: Polarity) ->
     Raises
     ------
     PipelineError
-        Shadows, or a polarity other than the run's.
+        A polarity other than the run's.
     """
     if polarity != recorded:
         raise PipelineError(f"{run_name}: its images are recorded as {recorded}, they are not measured as {polarity}")
-    if polarity == "shadow":
-        raise PipelineError(
-            f"{run_name}: polarity shadow is not supported yet: only bright particles on black are measured as "
-            "droplets; tomoshadow reconstruct makes volumes of shadows"
-        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,12 +87,12 @@ class MeasuredShot:
     ----------
     summary : ShotDroplets
         What became of it.
-    exposures : tuple of BrightShot
+    exposures : tuple of MeasuredExposure
         All that was measured.
     """
 
     summary: ShotDroplets
-    exposures: tuple[BrightShot, ...]
+    exposures: tuple[Exposure, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,7 +129,7 @@ class RunMeasurement:
         Raises
         ------
         PipelineError
-            The shot is not valid, or run and calibration do not belong together.
+            The shot is not valid, run and calibration do not belong together, or a run of shadows has no background.
         CalibrationError
             The calibration was refused.
         ReconstructionError
@@ -148,8 +142,11 @@ class RunMeasurement:
         search = plan_droplets(
             [calibration.views[view].mapping for view in views], grid, views, margin_voxel=settings.margin_voxel
         )
+        references = read_references(run)
+        if settings.polarity == "shadow":
+            require_backgrounds(run, references)
         provenance = _provenance(run, calibration, calibration_file, settings)
-        return cls(run, calibration, settings, search, read_references(run), provenance)
+        return cls(run, calibration, settings, search, references, provenance)
 
     def measure(
         self,
@@ -187,9 +184,7 @@ class RunMeasurement:
         frames = frame_names(self.run)
         exposures = tuple(self._exposure(recorded, frame, threads, should_stop) for frame in frames)
         told = {frame: _told(exposure) for frame, exposure in zip(frames, exposures, strict=True)}
-        droplets: dict[str, Droplets] = {
-            frame: exposure.droplets for frame, exposure in zip(frames, exposures, strict=True)
-        }
+        droplets = {str(frame): exposure.droplets for frame, exposure in zip(frames, exposures, strict=True)}
         file = droplets_path(results_dir, shot)
         write_droplets(file, droplets, {**self.provenance, **self._told_of(shot, told)})
         return MeasuredShot(_summary(shot, exposures, time.process_time() - started_cpu_s, file), exposures)
@@ -199,24 +194,15 @@ class RunMeasurement:
         recipe = recipe_sha256("measure", METHOD_VERSION, self.settings)
         return {"shot": shot, "grid": grid, "recipe_sha256": recipe, "exposures": json.dumps(exposures)}
 
-    def _exposure(self, shot: Shot, frame: FrameName, threads: int, should_stop: Callable[[], bool]) -> BrightShot:
+    def _exposure(self, shot: Shot, frame: FrameName, threads: int, should_stop: Callable[[], bool]) -> Exposure:
         if should_stop():
             raise Stopped(f"{self.run.run_dir.name}, shot {shot.index}: stopped before exposure {frame}")
-        images = bright_images(self.run, shot, frame, self.references)
-        seed = self.settings.seed + shot.index
-        return measure_bright(images, self.search, twins=self.settings.twins, seed=seed, threads=threads)
-
-
-def bright_images(run: RunReader, shot: Shot, frame: FrameName, references: References) -> list[Intensity]:
-    """Images of one exposure less dark, over the full scale; not clipped, so that noise can be judged."""
-    images = []
-    for view in shot.views:
-        dark = references[view][0]
-        grey = grey_values(shot, view, frame).astype(np.float32)
-        if dark is not None:
-            grey -= dark["ab".index(frame)]
-        images.append(grey / np.float32(2 ** run.header.views[view].bits - 1))
-    return images
+        twins, seed = self.settings.twins, self.settings.seed + shot.index
+        if self.settings.polarity == "bright":
+            images = bright_images(self.run, shot, frame, self.references)
+            return measure_bright(images, self.search, twins=twins, seed=seed, threads=threads)
+        images, trust = shadow_images(self.run, shot, frame, self.references)
+        return measure_shadows(images, self.search, trust=trust, twins=twins, seed=seed, threads=threads)
 
 
 def _provenance(
@@ -238,7 +224,7 @@ def droplets_path(results_dir: Path, shot: int) -> Path:
     return results_dir / f"shot_{shot:05d}_droplets.h5"
 
 
-def _told(exposure: BrightShot) -> Mapping[str, object]:
+def _told(exposure: Exposure) -> Mapping[str, object]:
     return {
         "verdict": exposure.verdict.value,
         "reasons": exposure.reasons,
@@ -248,7 +234,7 @@ def _told(exposure: BrightShot) -> Mapping[str, object]:
     }
 
 
-def _summary(shot: int, exposures: tuple[BrightShot, ...], cpu_s: float, file: Path) -> ShotDroplets:
+def _summary(shot: int, exposures: tuple[Exposure, ...], cpu_s: float, file: Path) -> ShotDroplets:
     ghosts = pooled(exposure.ghosts for exposure in exposures if exposure.ghosts)
     ratios = [exposure.residual_over_noise for exposure in exposures if exposure.residual_over_noise is not None]
     verdict = max((exposure.verdict for exposure in exposures), key=list(ShotVerdict).index)
@@ -266,7 +252,7 @@ def _summary(shot: int, exposures: tuple[BrightShot, ...], cpu_s: float, file: P
     )
 
 
-def _why_no_share(exposures: Sequence[BrightShot], verdict: ShotVerdict) -> str:
+def _why_no_share(exposures: Sequence[Exposure], verdict: ShotVerdict) -> str:
     if verdict is not ShotVerdict.GOOD:
         return "; ".join(reason for exposure in exposures for reason in exposure.reasons)
     return "no twins were asked for (--twins)"

@@ -1,12 +1,17 @@
 """Small shots of shadows with their truth, by an oracle: fine masks that are united, then blurred by scipy."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
+from daq.files.run_directory import DoubleFrame, ExposureRecord, ImageKey, RunHeader, RunWriter, Shot, ViewFormat
 from processing.analysis.droplets.droplet_search import DropletSearch, plan_droplets
+from processing.calibration.calibration_file import save_calibration
+from processing.calibration.calibration_record import content_id
 from processing.geometry import FloatArray, PinholeCamera
+from processing.studies.seen_droplets import droplet_calibration
 from processing.studies.simulated_droplets import droplet_centres, study_cameras, study_grid
 from processing.volume import VoxelGrid
 
@@ -74,3 +79,46 @@ def shadow_scene(
 
 def search_of(scene: ShadowScene, margin_voxel: int) -> DropletSearch:
     return plan_droplets(scene.cameras, scene.grid, margin_voxel=margin_voxel)
+
+
+BITS, DARK, LIGHT = 12, 80.0, 2400.0
+"""Of a recorded run, in grey values."""
+UNKNOWN = np.s_[:6]
+"""Rows of every view whose background is saturated."""
+
+
+def write_shadow_run(run_dir: Path, scene: ShadowScene, *, background: bool = True) -> Path:
+    """A shot of one exposure before a light that falls off to one side, with its references."""
+    names = [f"view{number}" for number in range(1, 5)]
+    rows, columns = scene.images[0].shape
+    light = np.repeat(np.linspace(LIGHT, 0.7 * LIGHT, columns)[None], rows, axis=0)
+    full_scale = 2**BITS - 1
+    recorded = ExposureRecord(valid=True, frame_id=1, device_timestamp_ns=1)
+    header = RunHeader(
+        run_id=run_dir.name,
+        created_utc="2026-01-01T00:00:00+00:00",
+        views={name: ViewFormat((rows, columns), BITS) for name in names},
+        frames_per_shot=1,
+        polarity="shadow",
+    )
+    views = {}
+    for name, image in zip(names, scene.images, strict=True):
+        grey = np.clip(np.rint(DARK + light * image), 0, full_scale).astype(np.uint16)
+        grey[UNKNOWN] = full_scale
+        views[name] = DoubleFrame(grey, None, recorded, recorded)
+    lit = (DARK + light).astype(np.float32)[None]
+    lit[:, UNKNOWN] = full_scale
+    with RunWriter(run_dir, header) as writer:
+        if background:
+            dark = np.full((1, rows, columns), DARK, np.float32)
+            writer.write_references(dict.fromkeys(names, dark), dict.fromkeys(names, lit))
+        writer.write_shot(Shot(0, ImageKey.SAMPLE, views))
+        writer.finish("completed")
+    return run_dir
+
+
+def write_shadow_calibration(path: Path, scene: ShadowScene) -> Path:
+    """The scene's cameras as a calibration."""
+    good = droplet_calibration(scene.cameras, np.array([3.0, 1.0, 2.0]))
+    save_calibration(replace(good, id=content_id(good)), path)
+    return path

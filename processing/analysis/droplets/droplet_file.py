@@ -10,10 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.files.atomic_file import replacing
-from processing.analysis.droplets.droplet_table import P_REAL_UNKNOWN, Droplets
+from processing.analysis.droplets.droplet_table import P_REAL_UNKNOWN, DropletRows
 from processing.errors import BadInput
 
-SCHEMA = {"schema": "tomoshadow/droplets", "schema_version": 1}
+SCHEMA, SCHEMA_VERSION = "tomoshadow/droplets", 1
+SIZED_VERSION = 2
+"""Of files whose droplets have diameters and no amplitudes."""
+SCHEMA_KEYS = ("schema", "schema_version")
+DIAMETER, RAW_DIAMETER = "diameter_um", "diameter_raw_um"
+NOT_CORRECTED = "none: no size calibration was given, diameter_um is diameter_raw_um, as fitted"
 GROUP, PROVENANCE, FRAME = "droplets", "tomoshadow", "frame"
 UNITS = MappingProxyType({"mm": "mm", "mm2": "mm^2", "um": "um", "px": "px"})
 """By the ending of a column's name; all others are numbers, or as bright as the images."""
@@ -40,14 +45,14 @@ class StoredDroplets:
     provenance: dict[str, Value]
 
 
-def write_droplets(path: Path, exposures: Mapping[str, Droplets], provenance: Mapping[str, Value]) -> None:
+def write_droplets(path: Path, exposures: Mapping[str, DropletRows], provenance: Mapping[str, Value]) -> None:
     """Write the droplets of all exposures of a shot; the file appears whole or not at all, an old one is replaced.
 
     Parameters
     ----------
     path : Path
         Usually ``*.h5``.
-    exposures : mapping of frame name to Droplets
+    exposures : mapping of frame name to Droplets or SizedDroplets
         ``a``, and ``b`` where there is one.
     provenance : Mapping[str, str | int | float]
         Where they come from: kept as attributes of the group ``/tomoshadow``.
@@ -78,7 +83,11 @@ def write_columns(path: Path, columns: Mapping[str, NDArray[np.generic]], proven
             group.create_dataset(name, data=values).attrs["units"] = UNITS.get(name.rpartition("_")[2], "1")
         if "p_real" in group:
             group["p_real"].attrs["reason"] = P_REAL_UNKNOWN
-        file.create_group(PROVENANCE).attrs.update({**provenance, **SCHEMA})
+        sized = RAW_DIAMETER in columns
+        if sized:
+            group[DIAMETER].attrs["correction"] = NOT_CORRECTED
+        schema = {"schema": SCHEMA, "schema_version": SIZED_VERSION if sized else SCHEMA_VERSION}
+        file.create_group(PROVENANCE).attrs.update({**provenance, **schema})
 
 
 def read_droplets(path: str | Path) -> StoredDroplets:
@@ -107,4 +116,4 @@ def read_droplets(path: str | Path) -> StoredDroplets:
         raise DropletFileError(f"{path}: not a readable file of droplets: {error}") from error
     columns[FRAME] = columns[FRAME].astype("U1")
     plain = {name: value.item() if isinstance(value, np.generic) else value for name, value in attributes.items()}
-    return StoredDroplets(columns, {name: value for name, value in plain.items() if name not in SCHEMA})
+    return StoredDroplets(columns, {name: value for name, value in plain.items() if name not in SCHEMA_KEYS})

@@ -1,6 +1,7 @@
 """Droplets: what is measured of every droplet of an exposure, a row for each. A value, whatever found them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Protocol, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,19 @@ from processing.volume import VoxelGrid
 P_REAL_UNKNOWN = "a single shot does not tell a ghost from a droplet; ghost_share says how many there are"
 """Why ``p_real`` is not a number as yet."""
 COVARIANCES = ("xx", "xy", "xz", "yy", "yz", "zz")
+Columns = dict[str, NDArray[np.generic]]
+
+
+class DropletRows(Protocol):
+    """Droplets of one exposure, a row each, whatever is known of them beside their place."""
+
+    def __len__(self) -> int: ...
+
+    def within(self, grid: VoxelGrid) -> Self:
+        """Those in a grid, to half a voxel beyond its outermost centres, its own volume."""
+
+    def columns(self) -> Columns:
+        """Columns by their names, as files have them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,32 +64,84 @@ class Droplets:
 
     def within(self, grid: VoxelGrid) -> "Droplets":
         """Those in a grid, to half a voxel beyond its outermost centres, its own volume."""
-        index = grid.to_index(self.points_mm)
-        inside = np.all((index >= -0.5) & (index < np.array(grid.shape) - 0.5), axis=1)
-        return Droplets(
-            self.points_mm[inside],
-            self.covariance_mm2[inside],
-            self.amplitudes[inside],
-            self.amplitude_sd[inside],
-            self.views[inside],
-            self.residual[inside],
-        )
+        return _rows(self, _inside(self.points_mm, grid))
 
-    def columns(self) -> dict[str, NDArray[np.generic]]:
+    def columns(self) -> Columns:
         """Columns by their names, as files have them; ``p_real`` is not a number, see ``P_REAL_UNKNOWN``."""
-        x_mm, y_mm, z_mm = self.points_mm.T
-        covariances = {
-            f"cov_{pair}_mm2": self.covariance_mm2[:, "xyz".index(pair[0]), "xyz".index(pair[1])]
-            for pair in COVARIANCES
-        }
         return {
-            "x_mm": x_mm,
-            "y_mm": y_mm,
-            "z_mm": z_mm,
+            **_places(self.points_mm),
             "amplitude": self.amplitudes,
             "amplitude_sd": self.amplitude_sd,
-            "p_real": np.full(len(self), np.nan),
-            "views": self.views,
-            "residual": self.residual,
-            **covariances,
+            **_sureness(self.views, self.residual, self.covariance_mm2),
         }
+
+
+@dataclass(frozen=True, eq=False)
+class SizedDroplets:
+    """Droplets of one exposure with their sizes: of shadows.
+
+    Parameters
+    ----------
+    points_mm, covariance_mm2, views, residual : arrays
+        As of ``Droplets``; here ``views`` are those that support the droplet, each alone.
+    diameters_raw_um : (N,) array
+        As fitted to the images.
+    diameters_um : (N,) array
+        Corrected by a size calibration; without one, as fitted.
+    diameter_sd_um : (N,) array
+        Standard deviation, by the noise of the images.
+    """
+
+    points_mm: FloatArray
+    covariance_mm2: FloatArray
+    diameters_um: FloatArray
+    diameters_raw_um: FloatArray
+    diameter_sd_um: FloatArray
+    views: NDArray[np.int64]
+    residual: FloatArray
+
+    @classmethod
+    def none(cls) -> "SizedDroplets":
+        """No droplets."""
+        empty = np.empty(0)
+        return cls(np.empty((0, 3)), np.empty((0, 3, 3)), empty, empty, empty, np.empty(0, np.int64), empty)
+
+    def __len__(self) -> int:
+        return len(self.diameters_um)
+
+    def within(self, grid: VoxelGrid) -> "SizedDroplets":
+        """Those in a grid, to half a voxel beyond its outermost centres, its own volume."""
+        return _rows(self, _inside(self.points_mm, grid))
+
+    def columns(self) -> Columns:
+        """Columns by their names, as files have them; ``p_real`` is not a number, see ``P_REAL_UNKNOWN``."""
+        return {
+            **_places(self.points_mm),
+            "diameter_um": self.diameters_um,
+            "diameter_raw_um": self.diameters_raw_um,
+            "diameter_sd_um": self.diameter_sd_um,
+            **_sureness(self.views, self.residual, self.covariance_mm2),
+        }
+
+
+Table = TypeVar("Table", Droplets, SizedDroplets)
+
+
+def _rows(table: Table, chosen: NDArray[np.bool_]) -> Table:
+    return type(table)(**{field.name: getattr(table, field.name)[chosen] for field in fields(table)})
+
+
+def _inside(points_mm: FloatArray, grid: VoxelGrid) -> NDArray[np.bool_]:
+    index = grid.to_index(points_mm)
+    return np.asarray(np.all((index >= -0.5) & (index < np.array(grid.shape) - 0.5), axis=1))
+
+
+def _places(points_mm: FloatArray) -> Columns:
+    return dict(zip(("x_mm", "y_mm", "z_mm"), points_mm.T, strict=True))
+
+
+def _sureness(views: NDArray[np.int64], residual: FloatArray, covariance_mm2: FloatArray) -> Columns:
+    covariances = {
+        f"cov_{pair}_mm2": covariance_mm2[:, "xyz".index(pair[0]), "xyz".index(pair[1])] for pair in COVARIANCES
+    }
+    return {"p_real": np.full(len(views), np.nan), "views": views, "residual": residual, **covariances}

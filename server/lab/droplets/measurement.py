@@ -3,7 +3,9 @@
 from collections.abc import Iterable
 
 from processing.errors import BadInput
+from processing.runs.measured_images import require_backgrounds
 from processing.runs.measurement import MeasureSettings, require_measurable
+from processing.runs.workbench import read_references
 from server.lab.errors import Unprocessable
 from server.lab.jobs import Job, JobKind, shot_job
 from server.lab.reconstruction import requested_shots
@@ -29,10 +31,12 @@ def request_measurement(
         No calibration is known, the run has no such shot, or its images cannot be measured.
     """
     context.runs.require_sound(context.runs.summary(run_id))
-    recorded = context.runs.reader(run_id).header.polarity
-    chosen_settings = settings or MeasureSettings(polarity=recorded)
+    run = context.runs.reader(run_id)
+    chosen_settings = settings or MeasureSettings(polarity=run.header.polarity)
     try:
-        require_measurable(run_id, recorded, chosen_settings.polarity)
+        require_measurable(run_id, run.header.polarity, chosen_settings.polarity)
+        if chosen_settings.polarity == "shadow":
+            require_backgrounds(run, read_references(run))
     except BadInput as error:
         raise Unprocessable(str(error)) from error
     chosen, wanted = requested_shots(context, run_id, shots, calibration)

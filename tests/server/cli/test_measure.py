@@ -15,6 +15,7 @@ from server.cli.main import main
 from tests.support.bright_scenes import BOX, GRID, scene, write_bright_calibration, write_bright_run
 from tests.support.command_line import refused, shown, told
 from tests.support.droplet_run import write_calibration, write_run
+from tests.support.shadow_scenes import ShadowScene, shadow_scene, write_shadow_calibration, write_shadow_run
 
 
 @pytest.fixture(scope="module")
@@ -165,11 +166,52 @@ def test_a_covered_view_is_refused_and_the_command_fails(
     assert result["statistics"]["number_density_reason"] == "no exposure could be measured"
 
 
-def test_shadows_are_not_measured_yet_and_say_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def shadow_run(folder: Path, *, background: bool = True) -> tuple[ShadowScene, list[object]]:
+    """A run of shadows with its truth, and the command that measures it."""
+    shot = shadow_scene((120, 24, 200), 14, (280, 80))
+    run_dir = write_shadow_run(folder / "run", shot, background=background)
+    calibration = write_shadow_calibration(folder / "calibration.json", shot)
+    low_mm, high_mm = (shot.grid.to_mm(np.array([index])).ravel() for index in (np.zeros(3), np.array([119, 23, 199])))
+    box = ",".join(f"{low}:{high}" for low, high in zip(low_mm, high_mm, strict=True))
+    return shot, ["measure", run_dir, "--calibration", calibration, "-o", folder / "out", f"--grid={box}"]
+
+
+def test_shadows_of_a_run_become_droplets_with_diameters(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    shot, arguments = shadow_run(tmp_path)
+    result = told(capsys, *arguments)
+    assert (result["polarity"], result["shots"][0]["verdict"]) == ("shadow", "good")
+    stored = read_droplets(tmp_path / "out" / result["shots"][0]["file"])
+    points_mm = np.column_stack([stored.columns[f"{axis}_mm"] for axis in "xyz"])
+    of_found, of_truth = matches(points_mm, shot.points_mm, shot.grid.pitch_mm)
+    large = shot.diameters_mm > 0.02
+    assert np.mean(of_truth[large] >= 0) >= 0.95
+    assert np.mean(of_found < 0) <= 0.03
+    real = of_found >= 0
+    errors_um = stored.columns["diameter_um"][real] - 1000 * shot.diameters_mm[of_found[real]]
+    assert np.median(np.abs(errors_um)) < 0.4
+    np.testing.assert_array_equal(stored.columns["diameter_um"], stored.columns["diameter_raw_um"])
+    d32_um = result["statistics"]["d32_um"]
+    assert d32_um["low"] < d32_um["value"] < d32_um["high"]
+    true_d32_um = 1000 * np.sum(shot.diameters_mm**3) / np.sum(shot.diameters_mm**2)
+    assert d32_um["value"] == pytest.approx(true_d32_um, rel=0.03)
+    with h5py.File(tmp_path / "out" / result["shots"][0]["file"]) as file:
+        assert file["droplets"]["diameter_um"].attrs["units"] == "um"
+        assert "no size calibration" in file["droplets"]["diameter_um"].attrs["correction"]
+        assert "amplitude" not in file["droplets"]
+        assert file["tomoshadow"].attrs["schema_version"] == 2
+
+
+def test_shadows_without_a_background_are_refused_in_a_sentence(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _, arguments = shadow_run(tmp_path, background=False)
+    assert "view1 has no background, and without one nobody knows how much light" in refused(capsys, *arguments)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_run_is_measured_as_it_is_recorded(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     run_dir, calibration = write_run(tmp_path / "run"), write_calibration(tmp_path / "calibration.json")
     arguments = ["measure", run_dir, "--calibration", calibration, "-o", tmp_path / "out"]
-    assert "polarity shadow is not supported yet" in refused(capsys, *arguments)
-    assert "polarity shadow is not supported yet" in refused(capsys, *arguments, "--polarity", "shadow")
     assert "recorded as shadow, they are not measured as bright" in refused(capsys, *arguments, "--polarity", "bright")
     assert not (tmp_path / "out").exists()
 

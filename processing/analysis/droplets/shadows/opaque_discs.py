@@ -264,6 +264,11 @@ class DiscSupports:
         """Their standard deviations (K, N); huge where a view sees nothing."""
         return 1 / np.sqrt(np.maximum(self.sums[:, :, 6], 1e-30))
 
+    @property
+    def residual(self) -> FloatArray:
+        """Root mean square (N,) of what is left around the discs, over the noise."""
+        return np.asarray(np.sqrt(self.sums[:, :, 8].sum(axis=0) / np.maximum(self.sums[:, :, 9].sum(axis=0), 1)))
+
     def information(self, slopes_px: FloatArray) -> FloatArray:
         """Information (N, 4, 4) on x, y, z and the squared radius, by the slopes (K, N, 2, 3) of the lattice."""
         uu, uv, vv, us, vs, ss = np.moveaxis(self.sums[:, :, :6], -1, 0)

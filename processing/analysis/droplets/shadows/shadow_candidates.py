@@ -32,7 +32,8 @@ class Stage:
     coarse : bool
         Whether candidates enter with a size of their own, or as good as without.
     joker : bool
-        Whether a view that sees little has no say, one for each candidate; else those that see black.
+        Whether a view that sees little, or knows nothing, has no say, one for each candidate; else those that see
+        black.
     """
 
     smooth_px: float
@@ -70,8 +71,9 @@ def _missing(seen: DiscImages, drawn: Sequence[Image], stage: Stage) -> Iterator
     shares, unseen = [], []
     for image, weight, model in zip(seen.images, seen.weights, drawn, strict=True):
         share = (model - image) / np.maximum(model, np.float32(most))
-        unseen.append(model <= most)
-        shares.append(np.where(unseen[-1], np.float32(0 if stage.joker else 1), share) * (weight > 0))
+        black, known = model <= most, weight > 0
+        unseen.append(black | ~known)
+        shares.append(np.where(black, np.float32(0 if stage.joker else 1), share) * known)
     smoothed = [_smoothed(share, stage.smooth_px) for share in shares]
     yield smoothed
     for view in range(len(drawn)) if stage.joker else ():

@@ -117,7 +117,7 @@ class _Finder:
         """Candidates enter, all are fitted, some are dropped; then optics and defects are estimated anew."""
         fit = self._fitted(self._joined(fit, stage), stage)
         if stage.joker and len(fit.discs):
-            fit = fit.where(supported(self._supports(fit)))
+            fit = fit.where(supporting_views(self._supports(fit)) >= SUPPORTING_VIEWS)
         if estimate and len(fit.discs):
             fit = self._estimated(fit, depths=unite, unite=unite)
         return fit
@@ -210,11 +210,11 @@ def undisputed(supports: DiscSupports) -> NDArray[np.bool_]:
     return np.asarray((share > UNDISPUTED_SHARE) & (second > UNDISPUTED_SIGMAS))
 
 
-def supported(supports: DiscSupports) -> NDArray[np.bool_]:
-    """Droplets (N,) that enough views support, each alone."""
+def supporting_views(supports: DiscSupports) -> NDArray[np.int64]:
+    """How many views (N,) support each droplet alone."""
     sure = supports.alone > SUPPORT_SIGMAS * supports.alone_sd
     large = supports.alone > SUPPORT_SHARE * supports.squares_voxel2
-    return np.asarray(np.count_nonzero(sure & large, axis=0) >= SUPPORTING_VIEWS)
+    return np.asarray(np.count_nonzero(sure & large, axis=0), dtype=np.int64)
 
 
 def merged_discs(discs: Discs) -> Discs:

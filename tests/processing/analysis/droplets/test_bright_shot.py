@@ -5,16 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from processing.analysis.droplets.bright_shot import BrightShot, ShotVerdict, judged_by_twins, measure_bright
+from processing.analysis.droplets.bright_shot import BrightExposure, measure_bright
 from processing.analysis.droplets.droplet_search import plan_droplets
 from processing.analysis.droplets.ghost_share import GhostShare, matches
+from processing.analysis.droplets.measured_exposure import ShotVerdict, judged_by_twins
 from processing.reconstruction.errors import ReconstructionError
 from processing.studies.droplets import BrightScene, DropletCase
 from processing.volume import VoxelGrid
 from tests.support.bright_scenes import GRID, MARGIN_VOXEL, scene, search_of
 
 
-def found_and_ghosts(shot: BrightShot, truth: BrightScene) -> tuple[float, float]:
+def found_and_ghosts(shot: BrightExposure, truth: BrightScene) -> tuple[float, float]:
     of_found, of_truth = matches(shot.droplets.points_mm, truth.points_mm, GRID.pitch_mm)
     return float(np.mean(of_truth >= 0)), float(np.mean(of_found < 0))
 
@@ -25,11 +26,11 @@ def truth() -> BrightScene:
 
 
 @pytest.fixture(scope="module")
-def shot(truth: BrightScene) -> BrightShot:
+def shot(truth: BrightScene) -> BrightExposure:
     return measure_bright(truth.images, search_of(truth), twins=1)
 
 
-def test_droplets_are_found_where_they_are_as_bright_as_they_are(truth: BrightScene, shot: BrightShot) -> None:
+def test_droplets_are_found_where_they_are_as_bright_as_they_are(truth: BrightScene, shot: BrightExposure) -> None:
     found, ghosts = found_and_ghosts(shot, truth)
     assert found >= 0.98
     assert ghosts <= 0.02
@@ -43,7 +44,7 @@ def test_droplets_are_found_where_they_are_as_bright_as_they_are(truth: BrightSc
     assert shot.residual_over_noise == pytest.approx(1, abs=0.03)
 
 
-def test_covariances_say_how_far_droplets_are_off(truth: BrightScene, shot: BrightShot) -> None:
+def test_covariances_say_how_far_droplets_are_off(truth: BrightScene, shot: BrightExposure) -> None:
     match, _ = matches(shot.droplets.points_mm, truth.points_mm, GRID.pitch_mm)
     real = match >= 0
     errors_mm = (shot.droplets.points_mm - truth.points_mm[match])[real]
@@ -51,14 +52,14 @@ def test_covariances_say_how_far_droplets_are_off(truth: BrightScene, shot: Brig
     assert 0.8 < np.median(np.abs(scores)) / 0.6745 < 1.3
 
 
-def test_noise_and_widths_come_from_the_images(shot: BrightShot) -> None:
+def test_noise_and_widths_come_from_the_images(shot: BrightExposure) -> None:
     for view in shot.views.values():
         assert view.noise == pytest.approx(0.03, rel=0.03)
         assert (view.sigma_u_px, view.sigma_v_px) == pytest.approx((1, 1), abs=0.01)
         assert view.offset == pytest.approx(0, abs=0.002)
 
 
-def test_twins_of_a_shot_without_ghosts_have_none_or_few(shot: BrightShot) -> None:
+def test_twins_of_a_shot_without_ghosts_have_none_or_few(shot: BrightExposure) -> None:
     assert shot.ghosts is not None
     assert shot.ghosts.found > 0.8 * len(shot.droplets)
     assert shot.ghosts.share is not None
@@ -67,7 +68,7 @@ def test_twins_of_a_shot_without_ghosts_have_none_or_few(shot: BrightShot) -> No
     assert shot.ghosts.interval[1] > shot.ghosts.share
 
 
-def test_a_shot_whose_twin_is_full_of_ghosts_is_doubtful(shot: BrightShot) -> None:
+def test_a_shot_whose_twin_is_full_of_ghosts_is_doubtful(shot: BrightExposure) -> None:
     doubtful = judged_by_twins(shot, GhostShare(30, 100))
     assert doubtful.verdict is ShotVerdict.DOUBTFUL
     assert doubtful.reasons == (
@@ -76,7 +77,7 @@ def test_a_shot_whose_twin_is_full_of_ghosts_is_doubtful(shot: BrightShot) -> No
     assert judged_by_twins(shot, GhostShare(0, 0)).verdict is ShotVerdict.GOOD
 
 
-def test_neither_scale_nor_level_of_the_images_matters(truth: BrightScene, shot: BrightShot) -> None:
+def test_neither_scale_nor_level_of_the_images_matters(truth: BrightScene, shot: BrightExposure) -> None:
     scaled = measure_bright([8 * image + np.float32(2) for image in truth.images], search_of(truth))
     assert len(scaled.droplets) == len(shot.droplets)
     np.testing.assert_allclose(scaled.droplets.points_mm, shot.droplets.points_mm, atol=1e-3 * GRID.pitch_mm)
@@ -84,7 +85,7 @@ def test_neither_scale_nor_level_of_the_images_matters(truth: BrightScene, shot:
     np.testing.assert_allclose([view.offset for view in scaled.views.values()], 2, atol=0.02)
 
 
-def test_the_order_of_views_does_not_matter(truth: BrightScene, shot: BrightShot) -> None:
+def test_the_order_of_views_does_not_matter(truth: BrightScene, shot: BrightExposure) -> None:
     order = [2, 0, 3, 1]
     turned = replace(truth, images=[truth.images[k] for k in order], believed=[truth.believed[k] for k in order])
     other = measure_bright(turned.images, search_of(turned))

@@ -6,7 +6,7 @@ import pytest
 from processing.analysis.droplets.ghost_share import matches
 from processing.analysis.droplets.shadows.disc_optics import first_disc_optics
 from processing.analysis.droplets.shadows.opaque_discs import Discs, DiscSupports
-from processing.analysis.droplets.shadows.shadow_finder import find_shadows, merged_discs, supported, undisputed
+from processing.analysis.droplets.shadows.shadow_finder import find_shadows, merged_discs, supporting_views, undisputed
 from processing.analysis.droplets.shadows.shadow_fit import ShadowFit, Transmissions
 from tests.support.shadow_scenes import BLURS_PX, ShadowScene, search_of, shadow_scene
 
@@ -67,13 +67,13 @@ def said(alone: list[float], sd: float) -> DiscSupports:
 @pytest.mark.parametrize(
     ("alone", "sd", "expected"),
     [
-        ([1.0, 1.0, 0.9, 1.1], 0.02, (True, True)),
-        ([1.0, 1.0, 1.0, 0.3], 0.02, (False, True)),
-        ([1.0, 1.0, 0.3, 0.3], 0.02, (False, False)),
-        ([1.0, 1.0, 1.0, 1.0], 0.1, (False, True)),
-        ([1.0, 1.0, 1.0, 1.0], 0.5, (False, False)),
+        ([1.0, 1.0, 0.9, 1.1], 0.02, (True, 4)),
+        ([1.0, 1.0, 1.0, 0.3], 0.02, (False, 3)),
+        ([1.0, 1.0, 0.3, 0.3], 0.02, (False, 2)),
+        ([1.0, 1.0, 1.0, 1.0], 0.1, (False, 4)),
+        ([1.0, 1.0, 1.0, 1.0], 0.5, (False, 0)),
     ],
 )
-def test_views_support_and_dispute_each_alone(alone: list[float], sd: float, expected: tuple[bool, bool]) -> None:
+def test_views_support_and_dispute_each_alone(alone: list[float], sd: float, expected: tuple[bool, int]) -> None:
     supports = said(alone, sd)
-    assert (bool(undisputed(supports)[0]), bool(supported(supports)[0])) == expected
+    assert (bool(undisputed(supports)[0]), int(supporting_views(supports)[0])) == expected

@@ -1,0 +1,181 @@
+"""What the measurement of an exposure comes to, bright particles or shadows: droplets, and whether to believe them."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import Generic, TypeVar
+
+import numpy as np
+
+from processing.analysis.droplets.droplet_search import DropletSearch
+from processing.analysis.droplets.droplet_table import DropletRows
+from processing.analysis.droplets.gaussian_blobs import Image
+from processing.analysis.droplets.ghost_share import GhostShare, matches
+from processing.geometry import FloatArray
+from processing.kernels import _native
+
+MOST_SHIFT_PX = 0.3
+"""Views that lie farther beside their calibration are refused."""
+MANY_GHOSTS = 0.1
+"""Share in a twin from which on a shot is doubtful: ghosts can explain images as well as the truth does."""
+LIT_SIGMAS, LIT_PIXELS = 6.0, 4
+"""A view that has fewer pixels above so many standard deviations of its noise sees nothing."""
+TWIN_MOVE_VOXEL = 15.0
+"""So far at most droplets of a twin are moved along every axis: chance alignments are new, density stays."""
+Rows = TypeVar("Rows", bound=DropletRows, covariant=True)
+Seen = TypeVar("Seen", covariant=True)
+
+
+class ShotVerdict(StrEnum):
+    """What droplets of an exposure are good for."""
+
+    GOOD = "good"
+    EMPTY = "empty"
+    DOUBTFUL = "doubtful"
+    REFUSED = "refused"
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredExposure(Generic[Rows, Seen]):
+    """One exposure.
+
+    Parameters
+    ----------
+    droplets : Droplets | SizedDroplets
+        Those within the grid; none where the exposure is refused.
+    views : dict of name to SeenView | SeenShadows
+        What each view looks like; empty where nothing was fitted.
+    residual_over_noise : float | None
+        Root mean square of what the droplets do not explain, over the noise; None where nothing was fitted.
+    verdict : ShotVerdict
+        What it is good for.
+    reasons : tuple of str
+        Why it is no better, and what to do.
+    ghosts : GhostShare | None
+        From twins; None where none were asked for, or where they would not tell.
+    """
+
+    droplets: Rows
+    views: dict[str, Seen]
+    residual_over_noise: float | None
+    verdict: ShotVerdict
+    reasons: tuple[str, ...] = ()
+    ghosts: GhostShare | None = None
+
+
+def check_images(images: Sequence[Image], search: DropletSearch) -> None:
+    """Refuse images that do not fit their views.
+
+    Raises
+    ------
+    ValueError
+        Their number or shape is another, one is too small, or a pixel is not finite.
+    """
+    if len(images) != len(search.names):
+        raise ValueError(f"{len(images)} images for {len(search.names)} views")
+    for name, image, view in zip(search.names, images, search.plan.views, strict=True):
+        if np.shape(image) != view.image_size_px[::-1]:
+            raise ValueError(f"{name}: its image has shape {np.shape(image)}, its view {view.image_size_px[::-1]}")
+        if min(image.shape) < _native.MAX_BLOB_WINDOW_PX:
+            raise ValueError(f"{name}: an image of {image.shape} px, at least {_native.MAX_BLOB_WINDOW_PX} are needed")
+        if not np.isfinite(image).all():
+            row, column = np.argwhere(~np.isfinite(image))[0]
+            raise ValueError(f"{name}: pixel (column {column}, row {row}) is {image[row, column]}")
+
+
+def blind_views(bright: Sequence[Image], noises: FloatArray, names: Sequence[str]) -> tuple[str, ...]:
+    """Names of the views that see nothing, from images in which droplets are bright."""
+    return tuple(
+        name
+        for name, image, noise in zip(names, bright, noises, strict=True)
+        if np.count_nonzero(image > np.median(image) + LIT_SIGMAS * noise) < LIT_PIXELS
+    )
+
+
+def blind_verdict(blind: Sequence[str], names: Sequence[str]) -> tuple[ShotVerdict, tuple[str, ...]]:
+    """Verdict and reasons where some views see nothing, or all."""
+    if len(blind) == len(names):
+        return ShotVerdict.EMPTY, ("no view sees a droplet",)
+    reason = (
+        f"{', '.join(blind)} sees nothing while the others see droplets: is a lens covered, or a light off? "
+        "Measure without the view, by a calibration that has only the others"
+    )
+    return ShotVerdict.REFUSED, (reason,)
+
+
+@dataclass(frozen=True)
+class RatioLimits:
+    """Of residual over noise.
+
+    Parameters
+    ----------
+    trusted : float
+        Ghosts are not told from droplets from here on.
+    refused : float
+        Nothing is believed from here on.
+    """
+
+    trusted: float
+    refused: float
+
+
+def judged(beside_px: Mapping[str, float], ratio: float, limits: RatioLimits) -> tuple[ShotVerdict, tuple[str, ...]]:
+    """Verdict and reasons, by how far views lie beside their calibration and by residual over noise."""
+    refused = [
+        f"{name} lies {shift_px:.2f} px beside its calibration, limit {MOST_SHIFT_PX} px: correct it by the droplets "
+        "(tomoshadow self-calibrate) or calibrate again"
+        for name, shift_px in beside_px.items()
+        if shift_px > MOST_SHIFT_PX
+    ]
+    if ratio >= limits.refused:
+        refused.append(
+            f"droplets explain the images to {ratio:.2f} times the noise only, limit {limits.refused}: do calibration "
+            "and views belong together (tomoshadow check), is the spray too dense, or are droplets seen outside "
+            "of what was searched?"
+        )
+    if refused:
+        return ShotVerdict.REFUSED, tuple(refused)
+    if ratio >= limits.trusted:
+        reason = (
+            f"droplets explain the images to {ratio:.2f} times the noise, more than {limits.trusted}: how many are "
+            "ghosts cannot be told"
+        )
+        return ShotVerdict.DOUBTFUL, (reason,)
+    return ShotVerdict.GOOD, ()
+
+
+def judged_by_twins(shot: "MeasuredExposure[Rows, Seen]", ghosts: GhostShare) -> "MeasuredExposure[Rows, Seen]":
+    """A shot with the ghosts of its twins; doubtful where they are many, however well droplets explain the images."""
+    if ghosts.share is None or ghosts.share <= MANY_GHOSTS:
+        return replace(shot, ghosts=ghosts)
+    reason = (
+        f"of the droplets of a twin {100 * ghosts.share:.0f} % are ghosts, limit {100 * MANY_GHOSTS:.0f} %: too many "
+        "droplets for so few views"
+    )
+    return replace(shot, ghosts=ghosts, verdict=ShotVerdict.DOUBTFUL, reasons=(*shot.reasons, reason))
+
+
+def ghosts_within(found_voxel: FloatArray, truth_voxel: FloatArray, search: DropletSearch) -> GhostShare:
+    """Ghosts among the found droplets (N, 3) within the grid of a search, in voxels of what is searched."""
+    low, high = _box(search)
+    inside = np.all((found_voxel >= low) & (found_voxel < high), axis=1)
+    ghost = matches(found_voxel, truth_voxel)[0] < 0
+    return GhostShare(int(np.count_nonzero(ghost & inside)), int(np.count_nonzero(inside)))
+
+
+def moved(positions_voxel: FloatArray, search: DropletSearch, rng: np.random.Generator) -> FloatArray:
+    """Positions of a twin: moved at random; what was within the grid, or in its margin, is reflected back into it."""
+    low, high = _box(search)
+    inside = np.all((positions_voxel >= low) & (positions_voxel < high), axis=1)[:, None]
+    least = np.where(inside, low, 0.0)
+    most = np.where(inside, high, np.array(search.searched.shape[::-1]) - 1.0)
+    there = positions_voxel + rng.uniform(-TWIN_MOVE_VOXEL, TWIN_MOVE_VOXEL, positions_voxel.shape)
+    above = least + np.abs(there - least)
+    back: FloatArray = np.clip(most - np.abs(most - above), least, most)
+    return back
+
+
+def _box(search: DropletSearch) -> tuple[FloatArray, FloatArray]:
+    """Lower and upper end of the grid, in voxels of what is searched."""
+    margin = (np.array(search.searched.shape[::-1]) - np.array(search.grid.shape[::-1])) / 2
+    return margin - 0.5, margin + np.array(search.grid.shape[::-1]) - 0.5

@@ -1,0 +1,174 @@
+"""Shadows of one exposure, measured: droplets with their sizes, what the views look like, and whether to believe it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from processing.analysis.droplets.droplet_search import DropletSearch
+from processing.analysis.droplets.droplet_table import SizedDroplets
+from processing.analysis.droplets.gaussian_blobs import Image
+from processing.analysis.droplets.ghost_share import GhostShare, pooled
+from processing.analysis.droplets.measured_exposure import (
+    MeasuredExposure,
+    RatioLimits,
+    ShotVerdict,
+    blind_verdict,
+    blind_views,
+    check_images,
+    ghosts_within,
+    judged,
+    judged_by_twins,
+    moved,
+)
+from processing.analysis.droplets.shadows.opaque_discs import DiscImages, Discs, Shadows
+from processing.analysis.droplets.shadows.shadow_finder import find_shadows, supporting_views
+from processing.analysis.droplets.shadows.shadow_fit import ShadowFit, Transmissions, rms_over_noise, seen_by
+from processing.analysis.droplets.shadows.shadow_union import union_defects
+from processing.kernels import DEFAULT_THREADS
+
+LIMITS = RatioLimits(trusted=1.15, refused=2.0)
+"""Of discs: overlapping shadows leave something even where all droplets are right."""
+
+
+@dataclass(frozen=True)
+class SeenShadows:
+    """What a view of an exposure looks like.
+
+    Parameters
+    ----------
+    noise, level : float
+        Standard deviation of the noise of a pixel, and transmission without droplets.
+    blur_px, focus_z_mm : float
+        Standard deviation of the blur where it is least, and where that is.
+    most_blur_px : float
+        Where it is largest within the grid.
+    shift_u_px, shift_v_px : float
+        How far the image lies beside its calibration, apart from a common motion of all.
+    """
+
+    noise: float
+    level: float
+    blur_px: float
+    focus_z_mm: float
+    most_blur_px: float
+    shift_u_px: float
+    shift_v_px: float
+
+
+ShadowExposure = MeasuredExposure[SizedDroplets, SeenShadows]
+
+
+def measure_shadows(
+    images: Sequence[Image],
+    search: DropletSearch,
+    *,
+    trust: Sequence[Image] | None = None,
+    twins: int = 0,
+    seed: int = 0,
+    threads: int = DEFAULT_THREADS,
+) -> ShadowExposure:
+    """Measure the droplets of one exposure of shadows.
+
+    Parameters
+    ----------
+    images : sequence of (rows, columns) float32 arrays
+        Transmissions, one per view: light over that of the background, 1 where nothing is in its way; not clipped.
+    search : DropletSearch
+        Where to look.
+    trust : sequence of (rows, columns) float32 arrays, optional
+        How sure pixels are: inverse variances, 1 for a typical one, 0 where nothing is known; by default all alike.
+    twins : int
+        Simulated twins of the exposure in which ghosts are counted: each costs as much as the exposure itself.
+    seed : int
+        Of the twins.
+    threads : int
+        The result does not depend on it.
+
+    Raises
+    ------
+    ValueError
+        Number or shape of images do not fit the views, an image is too small, or a pixel is not finite.
+    """
+    check_images(images, search)
+    trusts = [np.ones(np.shape(image), np.float32) for image in images] if trust is None else trust
+    check_images(trusts, search)
+    shot = Transmissions(
+        tuple(np.asarray(image, dtype=np.float32) for image in images),
+        tuple(np.ascontiguousarray(one, dtype=np.float32) for one in trusts),
+        search.lattice,
+        threads,
+    )
+    known_shadows = [(1 - image) * np.sqrt(one) for image, one in zip(shot.images, shot.trust, strict=True)]
+    blind = blind_views(known_shadows, shot.noises_of(shot.images), search.names)
+    if blind:
+        return MeasuredExposure(SizedDroplets.none(), {}, None, *blind_verdict(blind, search.names))
+    fit = find_shadows(shot, search)
+    shadows = _recorded(shot).drawn(fit.optics, fit.discs)
+    seen = seen_by(shot, fit, shadows.transmissions)
+    ratio = rms_over_noise(seen, shadows.transmissions)
+    views = _seen(fit, search)
+    beside_px = {name: float(np.hypot(view.shift_u_px, view.shift_v_px)) for name, view in views.items()}
+    verdict, reasons = judged(beside_px, ratio, LIMITS)
+    if verdict is ShotVerdict.REFUSED:
+        return MeasuredExposure(SizedDroplets.none(), views, ratio, verdict, reasons)
+    told = MeasuredExposure(_droplets(seen, shadows, fit, search).within(search.grid), views, ratio, verdict, reasons)
+    if not twins or verdict is not ShotVerdict.GOOD:
+        return told
+    rng = np.random.default_rng(seed)
+    return judged_by_twins(told, pooled(_twin_ghosts(shot, fit, search, rng) for _ in range(twins)))
+
+
+def _recorded(shot: Transmissions) -> DiscImages:
+    return DiscImages(shot.images, shot.trust, shot.lattice, shot.threads)
+
+
+def _seen(fit: ShadowFit, search: DropletSearch) -> dict[str, SeenShadows]:
+    margin = (search.searched.shape[0] - search.grid.shape[0]) // 2
+    z_voxel = margin + np.arange(search.grid.shape[0], dtype=np.float64)
+    blurs_px = fit.optics.blurs_px(z_voxel)
+    rows = np.column_stack(
+        [
+            fit.noises,
+            fit.optics.levels,
+            blurs_px.min(axis=1),
+            search.grid.z_mm[blurs_px.argmin(axis=1)],
+            blurs_px.max(axis=1),
+            fit.optics.shifts_px,
+        ]
+    )
+    return {name: SeenShadows(*row) for name, row in zip(search.names, rows.tolist(), strict=True)}
+
+
+def _droplets(seen: DiscImages, shadows: Shadows, fit: ShadowFit, search: DropletSearch) -> SizedDroplets:
+    """Droplets with the covariance of the fit, each as if it stood alone."""
+    discs = fit.discs
+    if not len(discs):
+        return SizedDroplets.none()
+    supports = seen.supports(shadows, fit.optics, discs)
+    information = supports.information(search.lattice.slopes_px(discs.positions_voxel))
+    covariance = np.asarray(np.linalg.pinv(information, hermitian=True), dtype=np.float64)
+    pitch_um = 1000 * search.searched.pitch_mm
+    diameters_um = 2 * discs.radii_voxel * pitch_um
+    return SizedDroplets(
+        points_mm=search.searched.to_mm(discs.positions_voxel[:, ::-1]),
+        covariance_mm2=covariance[:, :3, :3] * search.searched.pitch_mm**2,
+        diameters_um=diameters_um,
+        diameters_raw_um=diameters_um,
+        diameter_sd_um=np.sqrt(covariance[:, 3, 3]) / discs.radii_voxel * pitch_um,
+        views=supporting_views(supports),
+        residual=supports.residual,
+    )
+
+
+def _twin_ghosts(shot: Transmissions, fit: ShadowFit, search: DropletSearch, rng: np.random.Generator) -> GhostShare:
+    """Ghosts of a twin: the droplets moved, united, made noisy, and found again."""
+    recorded, truth = _recorded(shot), Discs(moved(fit.discs.positions_voxel, search, rng), fit.discs.squares_voxel2)
+    defects = union_defects(recorded, fit.optics, truth)
+    drawn = recorded.drawn(fit.optics, truth).transmissions
+    images = tuple(
+        (np.float32(level) * (image + defect) + rng.normal(0, noise, image.shape)).astype(np.float32)
+        for image, defect, level, noise in zip(drawn, defects, fit.optics.levels, fit.noises, strict=True)
+    )
+    found = find_shadows(replace(shot, images=images, trust=tuple(map(np.ones_like, images))), search).discs
+    return ghosts_within(found.positions_voxel, truth.positions_voxel, search)

@@ -1,0 +1,98 @@
+"""Shadows against truth that shares no code with the finder, and what must not matter."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from processing.analysis.droplets.ghost_share import matches
+from processing.analysis.droplets.measured_exposure import ShotVerdict
+from processing.analysis.droplets.shadows.shadow_shot import ShadowExposure, measure_shadows
+from tests.support.shadow_scenes import ShadowScene, search_of, shadow_scene
+
+SHAPE, IMAGE_SIZE_PX, MARGIN_VOXEL = (120, 30, 200), (280, 80), 8
+
+
+@pytest.fixture(scope="module")
+def scene() -> ShadowScene:
+    return shadow_scene(SHAPE, 14, IMAGE_SIZE_PX, seed=2)
+
+
+@pytest.fixture(scope="module")
+def shot(scene: ShadowScene) -> ShadowExposure:
+    return measure_shadows(scene.images, search_of(scene, MARGIN_VOXEL), twins=1)
+
+
+def test_a_shot_without_faults_is_good_and_its_twin_has_no_ghosts_or_few(shot: ShadowExposure) -> None:
+    assert shot.verdict is ShotVerdict.GOOD
+    assert shot.residual_over_noise == pytest.approx(1, abs=0.05)
+    assert shot.ghosts is not None
+    assert shot.ghosts.found > 0.8 * len(shot.droplets)
+    assert shot.ghosts.ghosts <= 2
+
+
+def test_covariances_say_how_far_places_and_diameters_are_off(scene: ShadowScene, shot: ShadowExposure) -> None:
+    match, _ = matches(shot.droplets.points_mm, scene.points_mm, scene.grid.pitch_mm)
+    real = match >= 0
+    errors_mm = (shot.droplets.points_mm - scene.points_mm[match])[real]
+    scores = errors_mm / np.sqrt(np.einsum("nii->ni", shot.droplets.covariance_mm2[real]))
+    assert 0.7 < np.median(np.abs(scores)) / 0.6745 < 1.3
+    errors_um = (shot.droplets.diameters_um - 1000 * scene.diameters_mm[match])[real]
+    assert 0.7 < np.median(np.abs(errors_um / shot.droplets.diameter_sd_um[real])) / 0.6745 < 1.4
+
+
+def test_light_that_is_dimmer_than_its_background_does_not_matter(scene: ShadowScene, shot: ShadowExposure) -> None:
+    dimmed = measure_shadows([image * np.float32(0.9) for image in scene.images], search_of(scene, MARGIN_VOXEL))
+    match, _ = matches(dimmed.droplets.points_mm, shot.droplets.points_mm, 0.05 * scene.grid.pitch_mm)
+    assert np.mean(match >= 0) > 0.97
+    np.testing.assert_allclose(
+        dimmed.droplets.diameters_um[match >= 0], shot.droplets.diameters_um[match[match >= 0]], atol=0.3
+    )
+    np.testing.assert_allclose([view.level for view in dimmed.views.values()], 0.9, atol=2e-3)
+
+
+def test_the_order_of_views_does_not_matter(scene: ShadowScene, shot: ShadowExposure) -> None:
+    order = [2, 0, 3, 1]
+    turned = replace(scene, images=[scene.images[k] for k in order], cameras=[scene.cameras[k] for k in order])
+    other = measure_shadows(turned.images, search_of(turned, MARGIN_VOXEL))
+    match, missed = matches(other.droplets.points_mm, shot.droplets.points_mm, 0.1 * scene.grid.pitch_mm)
+    assert np.mean(match >= 0) > 0.97
+    assert np.mean(missed >= 0) > 0.97
+
+
+def test_what_is_not_known_is_not_believed(scene: ShadowScene, shot: ShadowExposure) -> None:
+    trust = [np.ones_like(image) for image in scene.images]
+    spoilt = [image.copy() for image in scene.images]
+    for image, sure in zip(spoilt, trust, strict=True):
+        image[:, :20], sure[:, :20] = 0.3, 0.0
+    masked = measure_shadows(spoilt, search_of(scene, MARGIN_VOXEL), trust=trust)
+    match, missed = matches(masked.droplets.points_mm, shot.droplets.points_mm, scene.grid.pitch_mm)
+    assert masked.verdict is ShotVerdict.GOOD
+    assert np.mean(match >= 0) > 0.97
+    assert np.mean(missed >= 0) > 0.9
+
+
+def test_exchanged_views_are_refused(scene: ShadowScene) -> None:
+    images = [scene.images[k] for k in (3, 1, 2, 0)]
+    other = measure_shadows(images, search_of(scene, MARGIN_VOXEL), twins=1)
+    assert (other.verdict, len(other.droplets), other.ghosts) == (ShotVerdict.REFUSED, 0, None)
+    assert other.residual_over_noise is not None
+    assert other.residual_over_noise > 2
+
+
+def test_images_without_droplets_are_empty_and_a_covered_view_is_named(scene: ShadowScene) -> None:
+    rng, search = np.random.default_rng(0), search_of(scene, MARGIN_VOXEL)
+    empty = [rng.normal(1, 0.012, image.shape).astype(np.float32) for image in scene.images]
+    assert measure_shadows(empty, search).verdict is ShotVerdict.EMPTY
+    one_blind = measure_shadows([*scene.images[:2], empty[2], scene.images[3]], search)
+    assert one_blind.verdict is ShotVerdict.REFUSED
+    assert "view 3 sees nothing while the others see droplets" in one_blind.reasons[0]
+
+
+def test_bad_images_are_named(scene: ShadowScene) -> None:
+    search, broken = search_of(scene, MARGIN_VOXEL), scene.images[1].copy()
+    broken[3, 7] = np.nan
+    with pytest.raises(ValueError, match=r"view 2: pixel \(column 7, row 3\) is nan"):
+        measure_shadows([scene.images[0], broken, *scene.images[2:]], search)
+    with pytest.raises(ValueError, match="3 images for 4 views"):
+        measure_shadows(scene.images, search, trust=scene.images[:3])
