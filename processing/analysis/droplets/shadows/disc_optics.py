@@ -69,7 +69,7 @@ def refined_disc_optics(seen: DiscImages, optics: DiscOptics, discs: Discs, *, d
         variances[view] += sum(
             np.clip(value, -most, most) * power for value, power in zip(step[3:], powers, strict=True)
         )
-    return DiscOptics(_held(variances, middle), without_motion(shifts, seen.lattice.motion_px), levels)
+    return DiscOptics(held_variances(variances, middle), without_motion(shifts, seen.lattice.motion_px), levels)
 
 
 def _step(slopes: FloatArray, seen: DiscImages, view: int, drawn: Image, prior: FloatArray) -> FloatArray:
@@ -91,14 +91,16 @@ def _powers(middle: float, half: float) -> FloatArray:
     )
 
 
-def _held(variances: FloatArray, middle: float) -> FloatArray:
-    """Blurs that are neither sharper nor wider than any lens, and no sharper out of focus than in it."""
+def held_variances(variances: FloatArray, middle: float) -> FloatArray:
+    """Blurs (K, 3) that are neither sharper nor wider than any lens within a depth of ``2 middle``.
+
+    No view is sharper out of focus than in it: where a blur would be, it is the same at all depths.
+    """
     held = variances.copy()
-    held[:, 2] = np.maximum(held[:, 2], 0)
     flat = held[:, 2] <= 0
-    held[flat, 0] += held[flat, 1] * middle
-    held[flat, 1] = 0
-    focus = np.where(flat, middle, -held[:, 1] / np.where(flat, 1, 2 * held[:, 2]))
-    at_focus = held[:, 0] + held[:, 1] * focus + held[:, 2] * focus**2
-    held[:, 0] += np.clip(at_focus, LEAST_BLUR_PX**2, MOST_BLUR_PX**2) - at_focus
+    held[flat] = np.column_stack([held[flat] @ [1.0, middle, middle**2], np.zeros((np.count_nonzero(flat), 2))])
+    vertex = np.where(flat, middle, -held[:, 1] / np.where(flat, 1, 2 * held[:, 2]))
+    sharpest = np.clip(vertex, 0, 2 * middle)
+    least = held[:, 0] + held[:, 1] * sharpest + held[:, 2] * sharpest**2
+    held[:, 0] += np.clip(least, LEAST_BLUR_PX**2, MOST_BLUR_PX**2) - least
     return held

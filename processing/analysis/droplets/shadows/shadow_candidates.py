@@ -32,14 +32,17 @@ class Stage:
     coarse : bool
         Whether candidates enter with a size of their own, or as good as without.
     joker : bool
-        Whether a view that sees little, or knows nothing, has no say, one for each candidate; else those that see
-        black.
+        Whether a view that sees little, or knows nothing, may be without a say, one for each candidate; else all that
+        see black.
+    hidden : bool
+        Whether such candidates are looked for in this round: that takes longer.
     """
 
     smooth_px: float
     threshold: float
     coarse: bool = False
     joker: bool = False
+    hidden: bool = False
 
 
 def shadow_peaks(plan: Plan, seen: DiscImages, drawn: Sequence[Image], stage: Stage) -> FloatArray:
@@ -76,7 +79,7 @@ def _missing(seen: DiscImages, drawn: Sequence[Image], stage: Stage) -> Iterator
         shares.append(np.where(black, np.float32(0 if stage.joker else 1), share) * known)
     smoothed = [_smoothed(share, stage.smooth_px) for share in shares]
     yield smoothed
-    for view in range(len(drawn)) if stage.joker else ():
+    for view in range(len(drawn)) if stage.hidden else ():
         yield [unseen[view].astype(np.float32) if view == number else one for number, one in enumerate(smoothed)]
 
 

@@ -31,7 +31,7 @@ SHARP_PX = 0.6
 COARSE_SHARE = 0.5
 FIRST, LAST = 0.5, 0.04
 """Missing share of the light from which on a candidate is tried, at first and at last."""
-FALLING_ROUNDS, AGAIN_ROUNDS = 10, 8
+FALLING_ROUNDS, AGAIN_ROUNDS = 8, 4
 """In which it falls; after a purge."""
 LEAST_GAIN, MOST_ROUNDS = 0.003, 20
 """A fit is at rest when a round lowers the residual by less than this share, or after so many rounds."""
@@ -39,7 +39,7 @@ NOISE_SIGMAS, SIGNIFICANCE = 4.0, 5.0
 """No candidate is fainter than so many standard deviations of its shadow, and no droplet than of its squared radius."""
 COARSE_LEAST, SHARP_LEAST = 0.15, 0.5
 """Droplets with a fainter shadow are dropped: absolute, and as a share of the threshold."""
-PURGES, SETTLED = 4, 0.995
+PURGES, SETTLED = 3, 0.995
 """So often at most disputed droplets are dropped and found anew; it ends when the others become no more."""
 UNDISPUTED_SHARE, UNDISPUTED_SIGMAS = 0.75, 15.0
 """The squared radius that a view alone would give: over that of all, in the view that gives least; and over its
@@ -56,7 +56,7 @@ SMALL_VOXEL2 = 2.0
 """Squared radius below which a droplet takes over half of what was the same."""
 BEYOND_VOXEL = 1.5
 """A droplet that leaves the searched grid farther than this is dropped."""
-SWEEPS = (Sweeps(6, move=False), Sweeps(4), Sweeps(8))
+SWEEPS = (Sweeps(4, move=False), Sweeps(8))
 FINAL_SWEEPS = Sweeps(30, tolerance=3e-4)
 
 
@@ -101,7 +101,7 @@ class _Finder:
             unite = joker or number >= rounds // 2
             fit = self.round(
                 fit,
-                Stage(SHARP_PX, float(threshold), joker=joker),
+                Stage(SHARP_PX, float(threshold), joker=joker, hidden=joker and number % OPTICS_EVERY == 0),
                 estimate=number % OPTICS_EVERY == 1,
                 unite=unite,
             )
@@ -109,7 +109,7 @@ class _Finder:
         for _ in range(MOST_ROUNDS):
             if left > (1 - LEAST_GAIN) * before:
                 break
-            fit = self.round(fit, Stage(SHARP_PX, last, joker=joker), estimate=True, unite=True)
+            fit = self.round(fit, Stage(SHARP_PX, last, joker=joker, hidden=joker), estimate=True, unite=True)
             left, before = self._left(fit), left
         return fit
 

@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 
 from processing.analysis.droplets.ghost_share import matches
-from processing.analysis.droplets.shadows.disc_optics import first_disc_optics
+from processing.analysis.droplets.shadows.disc_optics import (
+    LEAST_BLUR_PX,
+    MOST_BLUR_PX,
+    first_disc_optics,
+    held_variances,
+)
 from processing.analysis.droplets.shadows.opaque_discs import Discs, DiscSupports
 from processing.analysis.droplets.shadows.shadow_finder import find_shadows, merged_discs, supporting_views, undisputed
 from processing.analysis.droplets.shadows.shadow_fit import ShadowFit, Transmissions
@@ -77,3 +82,15 @@ def said(alone: list[float], sd: float) -> DiscSupports:
 def test_views_support_and_dispute_each_alone(alone: list[float], sd: float, expected: tuple[bool, int]) -> None:
     supports = said(alone, sd)
     assert (bool(undisputed(supports)[0]), int(supporting_views(supports)[0])) == expected
+
+
+def test_blurs_stay_those_of_a_lens_and_what_is_one_is_not_touched() -> None:
+    middle = 60.0
+    z_voxel = np.linspace(0, 2 * middle, 50)
+    rng = np.random.default_rng(0)
+    proposed = np.column_stack([rng.normal(0.8, 1, 200), rng.normal(0, 0.02, 200), rng.normal(0, 1e-4, 200)])
+    proposed[:2] = [[0.5, -1e-4, 1e-12], [0.9 + middle**2 * 1e-4, -2 * middle * 1e-4, 1e-4]]
+    blurs_px = np.sqrt(held_variances(proposed, middle) @ np.stack([np.ones(50), z_voxel, z_voxel**2]))
+    assert blurs_px.min(axis=1).min() >= LEAST_BLUR_PX - 1e-9
+    assert blurs_px.min(axis=1).max() <= MOST_BLUR_PX + 1e-9
+    np.testing.assert_allclose(held_variances(proposed[:2], middle), proposed[:2])
