@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from server.cli.options import Verbs, count, positive, seed, width
 from server.cli.output import Bar, progress
 from server.cli.studies.droplets import add_droplets
+from server.cli.studies.sizes import add_sizes
 from server.cli.studies.study_command import add_study, collected, report
 
 if TYPE_CHECKING:
@@ -29,6 +30,7 @@ def add(verbs: Verbs) -> None:
     _add_calibration(studies)
     _add_sensitivity(studies)
     add_droplets(studies)
+    add_sizes(studies)
 
 
 def _add_methods(parser: ArgumentParser, default: str) -> None:

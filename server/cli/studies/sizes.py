@@ -1,0 +1,58 @@
+"""``tomoshadow study sizes``: droplets and their sizes in shadow images, where the truth is known."""
+
+from argparse import Namespace
+from dataclasses import replace
+from typing import Any
+
+from server.cli.options import Verbs, count, positive, seed, usable_processors
+from server.cli.output import progress
+from server.cli.studies.study_command import add_study, collected, report
+
+VARIED = {
+    "density": "density_per_mm3",
+    "median": "median_um",
+    "noise": "noise_percent",
+    "calibration_error": "calibration_error_px",
+}
+"""Options, and what they change of a case."""
+
+
+def add_sizes(studies: Verbs) -> None:
+    """Add the study; without options that vary a case, it tries all cases for which something is asked for."""
+    parser = add_study(studies, "sizes", sizes, "droplets found, ghosts and sizes in shadow images")
+    parser.add_argument("--seed", type=seed, default=301, help="of the first shot of a case")
+    parser.add_argument("--repeats", type=count, default=5, help="shots of a case")
+    parser.add_argument("--density", type=positive, help="droplets per mm^3")
+    parser.add_argument("--median", type=positive, metavar="UM", help="of the diameters")
+    parser.add_argument("--noise", type=positive, metavar="PERCENT", help="of the background")
+    parser.add_argument("--calibration-error", type=positive, metavar="PX", help="of every view")
+    parser.add_argument("--twins", type=seed, default=0, help="simulated twins per shot that tell ghosts")
+
+
+def sizes(options: Namespace) -> dict[str, Any]:
+    """Run the study."""
+    from processing.studies.shadows.sizes import (
+        ASKED_FOR,
+        SizeCase,
+        SizeStudy,
+        all_reached,
+        size_figure,
+        size_line,
+        size_statements,
+        size_study,
+    )
+
+    study = SizeStudy(seeds=tuple(range(options.seed, options.seed + options.repeats)), twins=options.twins)
+    stated = {field: value for name, field in VARIED.items() if (value := getattr(options, name)) is not None}
+    if stated:
+        case = SizeCase(**stated)
+        study = replace(study, cases=(next((known for known in ASKED_FOR if known.name == case.name), case),))
+    rows = collected(size_study(study, usable_processors()), size_line)
+    figure, statements = size_figure(rows, study.cases), size_statements(rows, study.cases)
+    result = report(options.out, "sizes", rows, figure, statements)
+    passed = all_reached(rows, study.cases)
+    if passed is None:
+        progress("nothing is asked for of this case")
+        return result
+    progress(f"every case reaches what is asked for: {'PASSED' if passed else 'FAILED'}")
+    return {**result, "passed": passed}
