@@ -3,8 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
 from processing.analysis.droplets.sight_lattice import SightLattice, sight_lattice
-from processing.geometry import ViewMapping
+from processing.geometry import FloatArray, ViewMapping
 from processing.reconstruction.errors import ReconstructionError
 from processing.reconstruction.planning.plan import Plan, plan_reconstruction
 from processing.volume import VoxelGrid
@@ -12,6 +16,8 @@ from processing.volume import VoxelGrid
 MARGIN_VOXEL = 20
 """Droplets that are seen, but not looked for, become ghosts: so far around the grid they are looked for too."""
 LEAST_PX_PER_VOXEL, MOST_PX_PER_VOXEL = 0.4, 1.3
+HULL_SHIFT = 4
+"""Bits of a pixel to which outlines in images are drawn."""
 CANDIDATE_PITCH_VOXEL = 1.5
 """Candidates need be no nearer to their droplet: the fit moves them."""
 
@@ -39,6 +45,30 @@ class DropletSearch:
     lattice: SightLattice
     plan: Plan
     names: tuple[str, ...]
+
+    def pixels_into_search(self) -> list[NDArray[np.bool_]]:
+        """Pixels (rows, columns) of each view that look into what is searched; what others see is not searched for."""
+        return self._pixels(0)
+
+    def pixels_into_grid(self) -> list[NDArray[np.bool_]]:
+        """Those that look into the grid: what lies just outside of what is searched does not reach them."""
+        margin_voxel = (self.searched.shape[0] - self.grid.shape[0]) / 2
+        return self._pixels(int(margin_voxel * self.lattice.pixels_per_voxel))
+
+    def _pixels(self, inset_px: int) -> list[NDArray[np.bool_]]:
+        return [
+            _hull(nodes_px.reshape(-1, 2), view.image_size_px, inset_px)
+            for nodes_px, view in zip(self.lattice.nodes_px, self.plan.views, strict=True)
+        ]
+
+
+def _hull(points_px: FloatArray, image_size_px: tuple[int, int], inset_px: int) -> NDArray[np.bool_]:
+    """Pixels within the convex hull of points (N, 2), and so far from its edge; the edge of the image is none."""
+    width_px, height_px = image_size_px
+    outline = cv2.convexHull(points_px.astype(np.float32))
+    inside = np.zeros((height_px, width_px), np.uint8)
+    cv2.fillConvexPoly(inside, np.rint(outline * 2**HULL_SHIFT).astype(np.int32), 1, shift=HULL_SHIFT)
+    return cv2.erode(inside, np.ones((2 * inset_px + 1,) * 2, np.uint8)) > 0
 
 
 def plan_droplets(

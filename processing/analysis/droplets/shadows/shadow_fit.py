@@ -40,7 +40,9 @@ class Transmissions:
 
     def noises_of(self, images: Sequence[Image]) -> FloatArray:
         """Standard deviations (K,) of the noise of typical pixels in what is left of the images, or in the images."""
-        return np.array([noise_of(image * np.sqrt(trust)) for image, trust in zip(images, self.trust, strict=True)])
+        return np.array(
+            [noise_of(image * np.sqrt(trust), trust > 0) for image, trust in zip(images, self.trust, strict=True)]
+        )
 
 
 @dataclass(frozen=True, eq=False)

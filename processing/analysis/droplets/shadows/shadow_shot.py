@@ -93,12 +93,7 @@ def measure_shadows(
     check_images(images, search)
     trusts = [np.ones(np.shape(image), np.float32) for image in images] if trust is None else trust
     check_images(trusts, search)
-    shot = Transmissions(
-        tuple(np.asarray(image, dtype=np.float32) for image in images),
-        tuple(np.ascontiguousarray(one, dtype=np.float32) for one in trusts),
-        search.lattice,
-        threads,
-    )
+    shot = _looking(images, trusts, search, threads)
     known_shadows = [(1 - image) * np.sqrt(one) for image, one in zip(shot.images, shot.trust, strict=True)]
     blind = blind_views(known_shadows, shot.noises_of(shot.images), search.names)
     if blind:
@@ -106,7 +101,8 @@ def measure_shadows(
     fit = find_shadows(shot, search)
     shadows = _recorded(shot).drawn(fit.optics, fit.discs)
     seen = seen_by(shot, fit, shadows.transmissions)
-    ratio = rms_over_noise(seen, shadows.transmissions)
+    judged_weights = tuple(map(np.multiply, seen.weights, search.pixels_into_grid()))
+    ratio = rms_over_noise(replace(seen, weights=judged_weights), shadows.transmissions)
     views = _seen(fit, search)
     beside_px = {name: float(np.hypot(view.shift_u_px, view.shift_v_px)) for name, view in views.items()}
     verdict, reasons = judged(beside_px, ratio, LIMITS)
@@ -117,6 +113,17 @@ def measure_shadows(
         return told
     rng = np.random.default_rng(seed)
     return judged_by_twins(told, pooled(_twin_ghosts(shot, fit, search, rng) for _ in range(twins)))
+
+
+def _looking(images: Sequence[Image], trusts: Sequence[Image], search: DropletSearch, threads: int) -> Transmissions:
+    """Transmissions of pixels that look into what is searched; of others nothing is known, and no shadow is there."""
+    chosen = search.pixels_into_search()
+    return Transmissions(
+        tuple(np.where(some, image, 1).astype(np.float32) for image, some in zip(images, chosen, strict=True)),
+        tuple(np.where(some, trust, 0).astype(np.float32) for trust, some in zip(trusts, chosen, strict=True)),
+        search.lattice,
+        threads,
+    )
 
 
 def _recorded(shot: Transmissions) -> DiscImages:

@@ -5,9 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from processing.analysis.droplets.droplet_search import plan_droplets
 from processing.analysis.droplets.ghost_share import matches
 from processing.analysis.droplets.measured_exposure import ShotVerdict
 from processing.analysis.droplets.shadows.shadow_shot import ShadowExposure, measure_shadows
+from processing.volume import VoxelGrid
 from tests.support.shadow_scenes import ShadowScene, search_of, shadow_scene
 
 SHAPE, IMAGE_SIZE_PX, MARGIN_VOXEL = (120, 30, 200), (280, 80), 8
@@ -70,6 +72,21 @@ def test_what_is_not_known_is_not_believed(scene: ShadowScene, shot: ShadowExpos
     assert masked.verdict is ShotVerdict.GOOD
     assert np.mean(match >= 0) > 0.97
     assert np.mean(missed >= 0) > 0.9
+
+
+def test_a_box_within_the_spray_holds_the_droplets_that_the_whole_has_there(
+    scene: ShadowScene, shot: ShadowExposure
+) -> None:
+    """Droplets above and below are seen too, by pixels that do not look into the box."""
+    nz, ny, nx = SHAPE
+    x_mm, y_mm, z_mm = scene.grid.origin_mm
+    box = VoxelGrid((nz, ny // 3, nx), (x_mm, y_mm + ny // 3 * scene.grid.pitch_mm, z_mm), scene.grid.pitch_mm)
+    part = measure_shadows(scene.images, plan_droplets(scene.cameras, box, margin_voxel=10))
+    assert part.verdict is ShotVerdict.GOOD
+    match, missed = matches(part.droplets.points_mm, shot.droplets.within(box).points_mm, 0.3 * box.pitch_mm)
+    assert len(match) > 12
+    assert np.mean(match >= 0) > 0.95
+    assert np.mean(missed >= 0) > 0.95
 
 
 def test_exchanged_views_are_refused(scene: ShadowScene) -> None:
