@@ -45,7 +45,7 @@ UNDISPUTED_SHARE, UNDISPUTED_SIGMAS = 0.75, 15.0
 """The squared radius that a view alone would give: over that of all, in the view that gives least; and over its
 standard deviation, in the view that gives the second least."""
 SUPPORTING_VIEWS, SUPPORT_SHARE, SUPPORT_SIGMAS = 3, 0.4, 5.0
-"""So many views must give a droplet such a share of its squared radius, and so surely."""
+"""So many views, or all where there are fewer, must give a droplet such a share of its squared radius, so surely."""
 OPTICS_EVERY = 2
 """Rounds from one estimate of optics and defects to the next."""
 APART_VOXEL, APART_RADII = 1.2, 0.7
@@ -117,7 +117,8 @@ class _Finder:
         """Candidates enter, all are fitted, some are dropped; then optics and defects are estimated anew."""
         fit = self._fitted(self._joined(fit, stage), stage)
         if stage.joker and len(fit.discs):
-            fit = fit.where(supporting_views(self._supports(fit)) >= SUPPORTING_VIEWS)
+            least = min(SUPPORTING_VIEWS, len(self._shot.images))
+            fit = fit.where(supporting_views(self._supports(fit)) >= least)
         if estimate and len(fit.discs):
             fit = self._estimated(fit, depths=unite, unite=unite)
         return fit

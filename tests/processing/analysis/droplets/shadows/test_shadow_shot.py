@@ -113,3 +113,13 @@ def test_bad_images_are_named(scene: ShadowScene) -> None:
         measure_shadows([scene.images[0], broken, *scene.images[2:]], search)
     with pytest.raises(ValueError, match="3 images for 4 views"):
         measure_shadows(scene.images, search, trust=scene.images[:3])
+
+
+@pytest.mark.parametrize("views", [(0, 3), (0, 1, 3)])
+def test_few_droplets_need_no_more_than_two_views(views: tuple[int, ...]) -> None:
+    sparse = shadow_scene(SHAPE, 3, IMAGE_SIZE_PX)
+    fewer = replace(sparse, images=[sparse.images[k] for k in views], cameras=[sparse.cameras[k] for k in views])
+    shot = measure_shadows(fewer.images, search_of(fewer, MARGIN_VOXEL))
+    of_found, of_truth = matches(shot.droplets.points_mm, sparse.points_mm, sparse.grid.pitch_mm)
+    assert np.mean(of_truth[sparse.diameters_mm > 0.02] >= 0) >= 0.8
+    assert np.mean(of_found < 0) <= 0.2
