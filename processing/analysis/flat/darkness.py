@@ -14,6 +14,8 @@ FITS = 6
 OFF_SIGMAS = 2.5
 LEAST_FRAME = 0.03
 """Of the light: a frame is brighter by more."""
+MOST_WHITE = 0.05
+"""Of a line within the frame."""
 _GRID = 64
 """The background is fitted to about so many pixels along each side."""
 
@@ -22,8 +24,12 @@ LEAST_LIGHT = 5.0
 Image = NDArray[np.float32]
 
 
-class DarkImageError(BadInput):
-    """An image of shadows has no light; the text says how dark it is."""
+MOST_UNEXPLAINED, UNEXPLAINED = 0.005, 0.3
+"""Share of pixels, and by how much of the light: light that is brighter than the fit is no droplet."""
+
+
+class LightError(BadInput):
+    """There is no light that droplets stand out of, or it is not known; the text says what to do."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,8 +66,9 @@ def darkness_of(image: NDArray[np.generic], polarity: Polarity, background: NDAr
 
     Raises
     ------
-    DarkImageError
-        Shadows, and the light is not much more than the noise.
+    LightError
+        Shadows, and the light is not much more than the noise; or much of the image lies on the other side of the
+        light, so that this is not known.
     """
     grey = np.asarray(image, np.float32)
     rows, columns = _without_frame(grey)
@@ -76,6 +83,7 @@ def darkness_of(image: NDArray[np.generic], polarity: Polarity, background: NDAr
     some = values[::3, ::3]
     free = some[some < np.median(some) + 0.1]
     noise = 1.4826 * float(np.median(np.abs(free - np.median(free)))) if free.size else 0.0
+    _require_known(values, noise, polarity, fitted=background is None)
     return Darkness(values.astype(np.float32), rows.start or 0, columns.start or 0, noise)
 
 
@@ -83,28 +91,47 @@ def _require_light(grey: Image) -> None:
     middle = grey[len(grey) // 3 : len(grey) - len(grey) // 3]
     light, noise = float(np.median(middle)), noise_of(middle)
     if light <= LEAST_LIGHT * noise:
-        raise DarkImageError(
+        raise LightError(
             f"the image is dark: its light is {light:.3g} at a noise of {noise:.3g}, at least {LEAST_LIGHT:g} times "
             "the noise is needed; is a lens covered, a light off, or are particles bright (--polarity bright)?"
         )
 
 
+def _require_known(values: Image, noise: float, polarity: Polarity, fitted: bool) -> None:
+    beyond = float(np.mean(values < -max(UNEXPLAINED, 6 * noise)))
+    if beyond > MOST_UNEXPLAINED:
+        brighter, other = ("brighter", "bright") if polarity == "shadow" else ("darker", "shadow")
+        cause = "do droplets cover much of it (--background IMAGE)" if fitted else "is the background of another light"
+        raise LightError(
+            f"{100 * beyond:.1f} % of the image is much {brighter} than the light that was "
+            f"{'fitted' if fitted else 'given'}: {cause}, or is the polarity another (--polarity {other})?"
+        )
+
+
 def _without_frame(grey: Image) -> tuple[slice, slice]:
-    """Rows and columns within a frame: at the edges, and brighter than half way from the middle's light to white."""
+    """Rows and columns within a frame: on all sides, and brighter than half way from the middle's light to white."""
     n_rows, n_columns = grey.shape
-    middle = grey[n_rows // 4 : n_rows - n_rows // 4, n_columns // 4 : n_columns - n_columns // 4]
-    level = float(np.median(middle))
-    limit = level + max(0.5 * (float(grey.max()) - level), LEAST_FRAME * level)
-    return _trimmed(np.median(grey[:, n_columns // 4 : -n_columns // 4], axis=1) > limit), _trimmed(
-        np.median(grey[n_rows // 4 : -n_rows // 4], axis=0) > limit
-    )
+    rows, columns = (slice(n // 4, n - n // 4) for n in grey.shape)
+    level = float(np.median(grey[rows, columns]))
+    white = grey > level + max(0.5 * (float(grey.max()) - level), LEAST_FRAME * level)
+    inner_rows, inner_columns = _trimmed(white[:, columns].mean(axis=1)), _trimmed(white[rows].mean(axis=0))
+    if inner_rows is None or inner_columns is None:
+        return slice(0, n_rows), slice(0, n_columns)
+    return inner_rows, inner_columns
 
 
-def _trimmed(is_frame: NDArray[np.bool_]) -> slice:
-    """From the first to the last line that is not of the frame; a line beside the frame may be half of it."""
-    inside = np.flatnonzero(~is_frame)
-    first, last = (int(inside[0]), int(inside[-1])) if len(inside) else (0, len(is_frame) - 1)
-    return slice(first + (first > 0), last + 1 - (last < len(is_frame) - 1))
+def _trimmed(white: NDArray[np.floating]) -> slice | None:
+    """From the first to the last line that is not of the frame, by the white share of lines; None without a frame.
+
+    A line beside the frame may be half of it. Its edge is straight, as that of light around a large droplet is not:
+    two lines further nothing is white.
+    """
+    inside = np.flatnonzero(white <= 0.5)
+    if len(inside) < 5 or inside[0] == 0 or inside[-1] == len(white) - 1:
+        return None
+    first, last = int(inside[0]) + 1, int(inside[-1])
+    straight = max(white[first + 1], white[last - 2]) <= MOST_WHITE
+    return slice(first, last) if straight else None
 
 
 def _fitted(grey: Image) -> Image:

@@ -134,7 +134,7 @@ def measure_flat(
 
     Raises
     ------
-    DarkImageError
+    LightError
         There is no light that droplets could be dark before.
     """
     how = settings or FlatSettings()

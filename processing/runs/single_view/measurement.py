@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from daq.files.run_directory import RunReader
 from processing.analysis.droplets.droplet_file import FRAME, StoredDroplets, write_columns
 from processing.analysis.droplets.size_statistics import mean_diameters
-from processing.analysis.flat.darkness import DarkImageError
+from processing.analysis.flat.darkness import LightError
 from processing.analysis.flat.flat_droplets import FlatDroplets, FlatSettings, measure_flat
 from processing.errors import BadInput
 from processing.image_file import ImageFileError, read_image
@@ -206,11 +206,11 @@ def _found(source: FlatSource, settings: FlatSettings) -> Mapping[str, FlatDropl
     return {frame: _measured(exposure, settings) for frame, exposure in exposures.items()}
 
 
-def _measured(exposure: Exposure, settings: FlatSettings) -> FlatDroplets | DarkImageError:
+def _measured(exposure: Exposure, settings: FlatSettings) -> FlatDroplets | LightError:
     image, light = exposure
     try:
         return measure_flat(image, settings, light)
-    except DarkImageError as error:
+    except LightError as error:
         return error
 
 

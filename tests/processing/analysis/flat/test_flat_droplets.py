@@ -11,8 +11,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from processing.analysis.flat.darkness import DarkImageError
+from processing.analysis.flat.darkness import LightError
 from processing.analysis.flat.flat_droplets import FlatDroplets, FlatSettings, measure_flat
+from processing.errors import BadInput
+from processing.preprocessing import Polarity
 from tests.support.flat_scenes import LIGHT, SHAPE, Disc, shadow
 
 EVERY = 4
@@ -122,8 +124,30 @@ def test_an_image_without_droplets_has_none(level: float) -> None:
 def test_an_image_without_light_is_refused() -> None:
     noise = np.random.default_rng(0).normal(0, 2, SHAPE)
     for dark in (np.zeros(SHAPE), 3 + noise):
-        with pytest.raises(DarkImageError, match="is a lens covered, a light off"):
+        with pytest.raises(LightError, match="is a lens covered, a light off"):
             measure_flat(dark)
+
+
+def test_light_around_a_large_droplet_is_no_frame() -> None:
+    found = measure_flat(shadow([(110.0, 80.0, 130.0), (20.0, 20.0, 16.0)], 1.0))
+    assert sorted(found.diameters_px) == pytest.approx([16, 130], rel=0.02)
+
+
+@pytest.mark.parametrize("polarity", ["shadow", "bright"])
+def test_an_image_of_the_other_polarity_is_refused_instead_of_empty(polarity: Polarity) -> None:
+    image = shadow([(60.0, 60.0, 18.0), (150.0, 90.0, 25.0)], 1.0, noise=0.01)
+    other = "bright" if polarity == "shadow" else "shadow"
+    with pytest.raises(BadInput, match=f"is the polarity another .--polarity {other}"):
+        measure_flat(230 - image if polarity == "shadow" else image, FlatSettings(polarity=polarity))
+
+
+def test_light_that_droplets_cover_is_refused_instead_of_empty() -> None:
+    rng = np.random.default_rng(0)
+    crowd = [(x, y, 20.0) for x, y in rng.uniform((0, 0), SHAPE[::-1], (110, 2))]
+    with pytest.raises(BadInput, match=r"do droplets cover much of it \(--background IMAGE\)"):
+        measure_flat(shadow(crowd, 1.0))
+    with pytest.raises(BadInput, match="is the background of another light"):
+        measure_flat(shadow([(60.0, 60.0, 18.0)]), background=np.full(SHAPE, LIGHT / 3))
 
 
 def annotated() -> dict[str, NDArray[np.float64]]:
