@@ -11,13 +11,13 @@ from server.cli.options import (
     add_verb,
     describe_grid,
     parse_grid,
-    seed,
     selected_shots,
+    setting,
     usable_processors,
 )
 from server.cli.output import Outcome, progress, table, tracked
 from server.cli.runs.batch import add_runs, over_runs
-from server.cli.runs.recipes import add_recipe, keep_recipe, settings_of, with_grid
+from server.cli.runs.recipes import add_recipe, keeping_recipe, settings_of, with_grid
 from server.cli.runs.single_view import IN_THE_IMAGE, add_single_view, measure_single_view, refuse
 
 if TYPE_CHECKING:
@@ -46,12 +46,18 @@ def add(verbs: Verbs) -> None:
         help="box in mm; default: the largest that all views see where they are calibrated",
     )
     parser.add_argument(
-        "--twins", type=seed, metavar="N", help="simulated twins per exposure that tell ghosts; default none"
+        "--twins", type=_twins, metavar="N", help="simulated twins per exposure that tell ghosts; default none"
     )
     parser.add_argument(
         "--export", type=_exports, default=(), metavar="csv,vtk,parquet", help="write droplets in these formats too"
     )
     add_single_view(parser)
+
+
+def _twins(text: str) -> int:
+    from processing.runs.measurement import MeasureSettings
+
+    return int(setting("twins", text, MeasureSettings))
 
 
 def _exports(text: str) -> "tuple[Export, ...]":
@@ -77,8 +83,8 @@ def measure(options: Namespace) -> Outcome:
     command = (NAME, METHOD_VERSION)
     said = settings_of(options, command, MeasureSettings, SAID, lambda: _by_options(options, calibration))
     settings = with_grid(said, calibration)
-    keep_recipe(options, command, settings)
-    return over_runs(options, lambda run_dir, out: _measure_run(options, settings, run_dir, out))
+    with keeping_recipe(options, command, settings):
+        return over_runs(options, lambda run_dir, out: _measure_run(options, settings, run_dir, out))
 
 
 def _polarity(run_dir: Path) -> "Polarity":

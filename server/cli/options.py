@@ -16,7 +16,7 @@ from server.cli.output import Outcome, progress
 
 if TYPE_CHECKING:
     from processing.calibration.calibration import Calibration
-    from processing.reconstruction.settings import ReconstructionSettings
+    from processing.reconstruction.settings import FrozenValue, ReconstructionSettings
     from processing.volume import VoxelGrid
 
 Verbs: TypeAlias = "_SubParsersAction[ArgumentParser]"
@@ -139,14 +139,14 @@ def count(text: str) -> int:
     return value
 
 
-def setting(name: str, text: str) -> Any:
-    """The value of an option, with the limits of the setting of that name."""
+def setting(name: str, text: str, kind: "type[FrozenValue] | None" = None) -> Any:
+    """The value of an option, with the limits of the setting of that name; by default of a reconstruction."""
     from pydantic import ValidationError
 
     from processing.reconstruction.settings import ReconstructionSettings
 
     try:
-        return getattr(ReconstructionSettings.model_validate({name: text}), name)
+        return getattr((kind or ReconstructionSettings).model_validate({name: text}), name)
     except ValidationError as error:
         raise ArgumentTypeError(f"{text}: {error.errors()[0]['msg']}") from error
 

@@ -21,7 +21,7 @@ from server.cli.options import (
 )
 from server.cli.output import Outcome, progress, table, tracked
 from server.cli.runs.batch import add_runs, over_runs
-from server.cli.runs.recipes import add_recipe, keep_recipe, settings_of, with_grid
+from server.cli.runs.recipes import add_recipe, keeping_recipe, settings_of, with_grid
 
 if TYPE_CHECKING:
     from processing.reconstruction.settings import ReconstructionSettings
@@ -60,8 +60,8 @@ def reconstruct(options: Namespace) -> Outcome:
     )
     settings = with_grid(said, calibration)
     share = calibrated_share(options, settings, calibration)
-    keep_recipe(options, command, settings)
-    return over_runs(options, lambda run_dir, out: _reconstruct_run(options, settings, share, run_dir, out))
+    with keeping_recipe(options, command, settings):
+        return over_runs(options, lambda run_dir, out: _reconstruct_run(options, settings, share, run_dir, out))
 
 
 def _reconstruct_run(

@@ -23,6 +23,11 @@ class Export(StrEnum):
         """Ending of its files."""
         return ".vtkhdf" if self is Export.VTK else f".{self.value}"
 
+    @property
+    def is_flat(self) -> bool:
+        """Whether it holds droplets that have no position in space."""
+        return self is not Export.VTK
+
     def require(self) -> None:
         """Refuse a format whose library is not installed, before anything is computed.
 

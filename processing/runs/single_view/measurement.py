@@ -17,6 +17,7 @@ from processing.analysis.droplets.droplet_file import FRAME, StoredDroplets, wri
 from processing.analysis.droplets.size_statistics import mean_diameters
 from processing.analysis.flat.darkness import LightError
 from processing.analysis.flat.flat_droplets import FlatDroplets, FlatSettings, measure_flat
+from processing.calibration.calibration_file import file_sha256
 from processing.errors import BadInput
 from processing.image_file import ImageFileError, read_image
 from processing.preprocessing import Intensity
@@ -84,6 +85,14 @@ def image_sources(paths: Sequence[Path], background: Path | None = None) -> list
     if twice := {name for name in names if names.count(name) > 1}:
         raise PipelineError(f"two images are called {min(twice)}: their droplets would share a file")
     return [FlatSource(path.stem, None, partial(_of_image, path, background)) for path in paths]
+
+
+def image_origin(paths: Sequence[Path], background: Path | None) -> Provenance:
+    """Where images and their light come from: only those of one folder and one light belong together."""
+    told: Provenance = {"images": ", ".join(sorted({str(path.resolve().parent) for path in paths}))}
+    if background is None:
+        return told
+    return {**told, "background": background.name, "background_sha256": file_sha256(background)}
 
 
 def shot_sources(run: RunReader, view: str | None, shots: Sequence[int]) -> list[FlatSource]:

@@ -1,7 +1,8 @@
 """A recipe instead of options, and the recipe of what options say."""
 
 from argparse import ArgumentParser, Namespace
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
@@ -70,8 +71,9 @@ def with_grid(settings: OnGrid, calibration: "Calibration") -> OnGrid:
     return settings.model_copy(update={"grid": GridSettings.of(default_grid(calibration))})
 
 
-def keep_recipe(options: Namespace, command: tuple[str, int], settings: "FrozenValue") -> None:
-    """Write the recipe, if that was asked for.
+@contextmanager
+def keeping_recipe(options: Namespace, command: tuple[str, int], settings: "FrozenValue") -> Iterator[None]:
+    """Write the recipe of what was done, if that was asked for; what fails leaves none.
 
     Raises
     ------
@@ -83,4 +85,6 @@ def keep_recipe(options: Namespace, command: tuple[str, int], settings: "FrozenV
 
     if options.write_recipe is not None:
         require_free(options.write_recipe, overwrite=options.overwrite)
+    yield
+    if options.write_recipe is not None:
         write_recipe(options.write_recipe, *command, settings)

@@ -8,7 +8,7 @@ from processing.runs.errors import PipelineError
 from server.cli.options import positive, selected_shots
 from server.cli.output import Outcome, progress, table, tracked
 from server.cli.runs.batch import over_runs
-from server.cli.runs.recipes import keep_recipe, settings_of
+from server.cli.runs.recipes import keeping_recipe, settings_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,6 +22,9 @@ IN_SPACE = ("grid", "twins")
 """Options that need a calibration."""
 IN_THE_IMAGE = ("view", "um_per_px", "background")
 """Options that mean nothing with one."""
+
+OF_RUNS = ("view", "shots")
+"""Options that mean nothing of images."""
 
 
 def add_single_view(parser: ArgumentParser) -> None:
@@ -41,9 +44,11 @@ def measure_single_view(options: Namespace) -> Outcome:
         Images and runs at once, or options that need a calibration.
     """
     from processing.analysis.flat.flat_droplets import FlatSettings
-    from processing.runs.single_view.measurement import COMMAND, METHOD_VERSION, image_sources
+    from processing.runs.single_view.measurement import COMMAND, METHOD_VERSION, image_origin, image_sources
 
     refuse(options, IN_SPACE, "needs --calibration")
+    if any(not export.is_flat for export in options.export):
+        raise PipelineError("--export vtk: needs --calibration, droplets of a single view have no place in space")
     images = [path for path in options.runs if not path.is_dir()]
     if images and len(images) < len(options.runs):
         raise PipelineError(f"{images[0]}: images and runs are not measured at once; take one after the other")
@@ -52,12 +57,13 @@ def measure_single_view(options: Namespace) -> Outcome:
         options, command, FlatSettings, ("polarity",), lambda: FlatSettings(polarity=_polarity(options, bool(images)))
     )
     if images:
+        refuse(options, OF_RUNS, "is for runs; an image is a view and a shot by itself")
         sources = image_sources(images, options.background)
-        keep_recipe(options, command, settings)
-        return _measure(options, settings, sources, options.out, {"images": str(images[0].resolve().parent)})
+        with keeping_recipe(options, command, settings):
+            return _measure(options, settings, sources, options.out, image_origin(images, options.background))
     refuse(options, ("background",), "is for images; a run has its own")
-    keep_recipe(options, command, settings)
-    return over_runs(options, lambda run_dir, out: _measure_run(options, settings, run_dir, out))
+    with keeping_recipe(options, command, settings):
+        return over_runs(options, lambda run_dir, out: _measure_run(options, settings, run_dir, out))
 
 
 def refuse(options: Namespace, names: "Sequence[str]", why: str) -> None:

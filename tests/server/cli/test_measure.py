@@ -123,6 +123,14 @@ def test_formats_that_are_not_there_are_refused_before_anything_is_measured(
     assert not (tmp_path / "out").exists()
 
 
+def test_twins_beyond_their_limit_are_refused_in_a_sentence(
+    bright: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit):
+        main([*map(str, command(bright, tmp_path / "out", "--twins", "101"))])
+    assert "--twins: 101: Input should be less than or equal to 100" in capsys.readouterr().err
+
+
 def test_the_recipe_that_was_written_measures_the_same(
     bright: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

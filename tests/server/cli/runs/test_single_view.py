@@ -68,7 +68,6 @@ def test_a_scale_turns_pixels_into_micrometres(
     head, first, *_ = (tmp_path / "out" / "first_droplets.csv").read_text().splitlines()
     assert head.startswith("image,frame,x_um,y_um,diameter_um")
     assert first.startswith("first,a,")
-    assert "no place in space" in refused(capsys, *arguments[:3], tmp_path / "vtk", "--export", "vtk")
 
 
 def write_single(run_dir: Path) -> Path:
@@ -110,6 +109,9 @@ def test_what_makes_no_sense_is_refused_before_anything_is_written(
     run_dir = write_run(tmp_path / "run")
     out = ["-o", tmp_path / "out"]
     for arguments, text in (
+        (["measure", images[0], *out, "--shots", "5:9"], "--shots: is for runs"),
+        (["measure", images[0], *out, "--view", "left"], "--view: is for runs"),
+        (["measure", images[0], *out, "--export", "csv,vtk"], "no place in space"),
         (["measure", *images, run_dir, *out], "images and runs are not measured at once"),
         (["measure", *images, *out, "--grid=0:1,0:1,0:1"], "--grid: needs --calibration"),
         (["measure", images[0], images[0], *out], "two images are called first"),
@@ -142,6 +144,29 @@ def test_a_dark_image_is_refused_by_itself(
     assert main(["measure", str(tmp_path / "dark.png"), "-o", str(tmp_path / "other"), "--json"]) == 1
     alone = json.loads(capsys.readouterr().out.splitlines()[-1])
     assert (alone["statistics"]["d32_px"], alone["statistics"]["reason"]) == (None, "no droplet was measured")
+
+
+def test_images_of_another_background_do_not_join_a_directory(
+    images: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cv2.imwrite(str(tmp_path / "light.png"), np.full(SHAPE, 180, np.uint8))
+    told(capsys, "measure", images[0], "-o", tmp_path / "out", "--background", tmp_path / "light.png")
+    error = refused(capsys, "measure", images[1], "-o", tmp_path / "out")
+    assert "holds results of another run, calibration or settings" in error
+    stored = read_droplets(tmp_path / "out" / "first_droplets.h5")
+    assert stored.provenance["background"] == "light.png"
+
+
+def test_what_is_refused_leaves_no_recipe(
+    images: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["measure", images[0], "-o", tmp_path / "out"]
+    told(capsys, *arguments)
+    recipe = tmp_path / "recipe.toml"
+    assert "first_droplets.h5: exists" in refused(capsys, *arguments, "--write-recipe", recipe)
+    assert not recipe.exists()
+    told(capsys, *arguments[:3], tmp_path / "other", "--write-recipe", recipe)
+    assert recipe.exists()
 
 
 def test_a_recipe_says_how(images: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
