@@ -1,9 +1,10 @@
 """ReconstructionSettings: how shots become volumes. The same frozen value in API, job and result."""
 
 import hashlib
+import math
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, field_validator
 
 from processing.preprocessing import Polarity, Preprocessing
 from processing.reconstruction.choices import Accuracy, ReconstructionMethod, VoxelType
@@ -14,6 +15,10 @@ METHOD_VERSION = 2
 
 2: SMART and MART count the path of each line of sight; Keys' kernel resamples images with a = -0.6, not -0.75.
 """
+
+
+MAX_VOXELS = 10**12
+"""More fill any disk: a thousand times the largest volume of the paper's rig."""
 
 
 class FrozenValue(BaseModel):
@@ -29,8 +34,17 @@ class GridSettings(FrozenValue):
         tuple[Annotated[int, Field(ge=1)], Annotated[int, Field(ge=1)], Annotated[int, Field(ge=1)]],
         Field(description="voxels along z, y, x"),
     ]
-    origin_mm: Annotated[tuple[float, float, float], Field(description="centre of voxel [0, 0, 0], x, y, z")]
-    pitch_mm: Annotated[float, Field(gt=0, description="voxel edge")]
+    origin_mm: Annotated[
+        tuple[FiniteFloat, FiniteFloat, FiniteFloat], Field(description="centre of voxel [0, 0, 0], x, y, z")
+    ]
+    pitch_mm: Annotated[FiniteFloat, Field(gt=0, description="voxel edge")]
+
+    @field_validator("shape")
+    @classmethod
+    def _fits_a_disk(cls, shape: tuple[int, int, int]) -> tuple[int, int, int]:
+        if math.prod(shape) > MAX_VOXELS:
+            raise ValueError(f"{' x '.join(map(str, shape))} voxels are too many, limit {MAX_VOXELS:.0e}")
+        return shape
 
     @classmethod
     def of(cls, grid: VoxelGrid) -> "GridSettings":

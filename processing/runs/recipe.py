@@ -127,8 +127,9 @@ def _text(path: Path) -> str:
 
 
 def _validated(path: Path, text: str, table: Key, values: Mapping[str, Any], kind: type[Settings]) -> Settings:
+    """The value that a table says; as JSON, whose strict types are those of TOML: true is no number, "1" neither."""
     try:
-        return kind.model_validate(values)
+        return kind.model_validate_json(json.dumps(values, default=str), strict=True)
     except ValidationError as error:
         first = min(error.errors(), key=lambda problem: problem["type"] != "extra_forbidden")
         known = f"; the keys here are {', '.join(_keys(kind))}" if first["type"] == "extra_forbidden" else ""

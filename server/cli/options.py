@@ -22,9 +22,6 @@ if TYPE_CHECKING:
 Verbs: TypeAlias = "_SubParsersAction[ArgumentParser]"
 Command = Callable[[Namespace], Outcome]
 
-MAX_VOXELS = 10**12
-"""More fill any disk: a thousand times the largest volume of the paper's rig."""
-
 OPTIONS = (
     "method",
     "accuracy",
@@ -190,6 +187,7 @@ def parse_grid(text: str, calibration: "Calibration") -> "VoxelGrid":
     """
     import numpy as np
 
+    from processing.reconstruction.settings import MAX_VOXELS
     from processing.runs.pipeline import default_grid
     from processing.volume import VoxelGrid
 

@@ -7,7 +7,7 @@ from typing import Annotated
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import Field, FiniteFloat
 
 from processing.analysis.flat.blurred_disc import LEVELS, flattening, unblurred
 from processing.analysis.flat.darkness import Darkness, Image, darkness_of
@@ -35,7 +35,9 @@ class FlatSettings(FrozenValue):
     least_depth: Annotated[
         float, Field(gt=0, lt=1, description="darkness, relative to the light, that a droplet stands out by")
     ] = 0.2
-    least_diameter_px: Annotated[float, Field(ge=2, description="smaller ones are dust, or cannot be sized")] = 4.0
+    least_diameter_px: Annotated[FiniteFloat, Field(ge=2, description="smaller ones are dust, or cannot be sized")] = (
+        4.0
+    )
     least_circularity: Annotated[
         float, Field(gt=0, lt=1, description="4 pi area / perimeter^2; below, it is a ligament, or several droplets")
     ] = 0.8

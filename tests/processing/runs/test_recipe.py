@@ -28,6 +28,7 @@ SETTINGS = st.builds(
     grid=st.none() | GRIDS,
     noise_floor=st.floats(0, 0.99),
 )
+BOX = "\n[settings.grid]\nshape = [9, 9, 9]\norigin_mm = [{}]\npitch_mm = {}\n"
 HEAD = 'schema = "tomoshadow/recipe"\nschema_version = 1\ncommand = "measure"\n'
 
 
@@ -66,6 +67,13 @@ def test_what_a_recipe_does_not_say_has_its_default(tmp_path: Path) -> None:
     [
         (HEAD + "[settings]\n\ntwinz = 1\n", r"recipe\.toml, line 6: settings\.twinz: there is no such key here"),
         (HEAD + "[settings]\ntwins = -1\n", r"line 5: settings\.twins: Input should be greater than or equal to 0"),
+        (HEAD + "[settings]\ntwins = true\n", r"line 5: settings\.twins: Input should be a valid integer"),
+        (HEAD + '[settings]\ntwins = "1"\n', r"line 5: settings\.twins: Input should be a valid integer"),
+        (HEAD + "[settings]\ntwins = 2020-01-01\n", r"line 5: settings\.twins: Input should be a valid integer"),
+        (HEAD + "method_version = true\n", r"line 4: method_version: Input should be a valid integer"),
+        (HEAD + BOX.format("0, 0, inf", "1"), r"line 7: settings\.grid\.origin_mm\.2: Input should be a finite number"),
+        (HEAD + BOX.format("0, 0, 0", "inf"), r"line 8: settings\.grid\.pitch_mm: Input should be a finite number"),
+        (HEAD + BOX.format("0, 0, 0", "1").replace("9", "99999"), r"line 6: settings\.grid\.shape: .* too many"),
         (HEAD + "[settings.grid]\npitch_um = 1\n", r"line 5: settings\.grid\.pitch_um: there is no such key"),
         (HEAD + "[setting]\ntwins = 1\n", r"line 4: setting: there is no such key here.*schema, schema_version"),
         (HEAD.replace("measure", "reconstruct"), r"line 3: command: a recipe for tomoshadow reconstruct, not for"),
