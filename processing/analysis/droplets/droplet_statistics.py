@@ -1,6 +1,7 @@
 """What the droplets of some shots say of a spray, as their files have them."""
 
 import json
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any
 
@@ -14,6 +15,7 @@ from processing.reconstruction.settings import GridSettings
 
 DIAMETER, REFUSED = "diameter_um", "refused"
 NO_DIAMETERS = "bright particles have no diameter: only shadows tell how large a droplet is"
+IN_PIXELS, NO_SCALE = "diameter_px", "diameters are in pixels: measure with --um-per-px"
 NOTHING_COUNTED = "no exposure could be measured"
 NO_VOLUME = "a file does not say in which volume its droplets were measured"
 
@@ -38,8 +40,9 @@ def droplet_statistics(shots: Sequence[StoredDroplets]) -> DropletStatistics:
     Raises
     ------
     DropletFileError
-        A file does not say what became of its exposures.
+        A file does not say what became of its exposures, or two are of the same shot.
     """
+    _require_once(shots)
     told = [_exposures(shot) for shot in shots]
     counted = [(shot, len(exposures)) for shot, exposures in zip(shots, told, strict=True) if exposures]
     exposures = sum(number for _, number in counted)
@@ -53,6 +56,22 @@ def droplet_statistics(shots: Sequence[StoredDroplets]) -> DropletStatistics:
         number_density_reason=reason,
         ghost_share=_ghost_share(exposure for shot in told for exposure in shot),
     )
+
+
+def _require_once(shots: Sequence[StoredDroplets]) -> None:
+    """A shot that is there twice would count twice, measured by two recipes or two calibrations too."""
+    places = Counter(place for shot in shots if (place := _place(shot)))
+    for place, times in places.items():
+        if times > 1:
+            raise DropletFileError(f"{place}: its droplets are there {times} times, and would count as often")
+
+
+def _place(shot: StoredDroplets) -> str:
+    """Of what a file is; empty where it does not say."""
+    if not {"shot", "image"} & shot.provenance.keys():
+        return ""
+    names = ("run", "view", "images", "shot", "image")
+    return ", ".join(f"{name} {shot.provenance[name]}" for name in names if name in shot.provenance)
 
 
 def _exposures(shot: StoredDroplets) -> list[Mapping[str, Any]]:
@@ -71,6 +90,8 @@ def _sizes(shots: Sequence[StoredDroplets], per_shot: float) -> SizeStatistics:
     n = sum(len(shot.columns["frame"]) for shot in shots)
     if not shots:
         return SizeStatistics(n=0, shots=0, reason=NOTHING_COUNTED)
+    if any(IN_PIXELS in shot.columns for shot in shots):
+        return SizeStatistics(n=n, shots=len(shots), reason=NO_SCALE)
     if any(DIAMETER not in shot.columns for shot in shots):
         return SizeStatistics(n=n, shots=len(shots), reason=NO_DIAMETERS)
     diameters_um = [np.asarray(shot.columns[DIAMETER], np.float64) for shot in shots]

@@ -86,7 +86,8 @@ def mean_diameters(diameters_um_by_shot: Sequence[ArrayLike], exposures_per_shot
     ValueError
         A diameter is not finite and above 0.
     """
-    shots = [array for array in map(_checked, diameters_um_by_shot) if len(array)]
+    checked = (np.sort(_checked(diameters_um)) for diameters_um in diameters_um_by_shot)
+    shots = sorted((shot for shot in checked if len(shot)), key=np.ndarray.tolist)  # draws depend on no order
     diameters_um = np.concatenate([np.empty(0), *shots])
     if len(diameters_um) < 2:
         reason = ONE_DROPLET if len(diameters_um) else NOTHING_MEASURED

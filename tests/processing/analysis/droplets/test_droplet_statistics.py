@@ -33,7 +33,7 @@ def exposure(verdict: str = "good", ghosts: tuple[int, int] | None = None) -> di
 
 def test_shots_are_pooled() -> None:
     told = {"a": exposure(ghosts=(1, 40))}, {"a": exposure("doubtful", ghosts=(2, 60))}
-    statistics = droplet_statistics([shot([20.0, 30.0], exposures=told[0]), shot([40.0], exposures=told[1])])
+    statistics = droplet_statistics([shot([20.0, 30.0], exposures=told[0]), shot([40.0], exposures=told[1], shot=4)])
     sizes = mean_diameters([[20.0, 30.0], [40.0]])
     assert (statistics.n, statistics.shots, statistics.exposures) == (3, 2, 2)
     assert {name: getattr(statistics, name) for name in type(sizes).model_fields} == dict(sizes)
@@ -53,7 +53,7 @@ def test_exposures_of_one_shot_show_the_same_droplets_twice() -> None:
 def test_refused_exposures_have_no_volume_and_empty_ones_have() -> None:
     one_of_two = {"a": exposure(), "b": exposure("refused")}
     statistics = droplet_statistics(
-        [shot([20.0, 30.0], exposures=one_of_two), shot([], exposures={"a": exposure("empty")})]
+        [shot([20.0, 30.0], exposures=one_of_two), shot([], exposures={"a": exposure("empty")}, shot=4)]
     )
     assert (statistics.exposures, statistics.number_density_per_mm3) == (2, number_density(2, 2 * VOLUME_MM3))
 
@@ -75,6 +75,19 @@ def test_files_from_before_the_grid_was_stated_have_it_in_their_settings_or_say_
     default = droplet_statistics([shot([9.0], grid="null")])
     assert default.number_density_per_mm3 is None
     assert "does not say in which volume" in (default.number_density_reason or "")
+
+
+def test_a_shot_that_is_there_twice_is_refused() -> None:
+    others: list[dict[str, Any]] = [{}, {"calibration": "other"}, {"settings": '{"twins": 1}'}]
+    for told in others:
+        with pytest.raises(DropletFileError, match="run spray, shot 3: its droplets are there 2 times"):
+            droplet_statistics([shot([20.0, 30.0]), shot([20.0, 30.0], **told)])
+    assert droplet_statistics([shot([20.0]), shot([20.0], run="other"), shot([20.0], view="left")]).n == 3
+
+
+def test_sizes_in_pixels_are_not_said_to_be_of_bright_particles() -> None:
+    flat = StoredDroplets({**shot(None, n=2).columns, "diameter_px": np.ones(2)}, shot(None, n=2).provenance)
+    assert "--um-per-px" in (droplet_statistics([flat]).reason or "")
 
 
 def test_a_file_that_says_nothing_of_its_exposures_is_named() -> None:

@@ -1,6 +1,7 @@
 """Mean diameters, quantiles and classes against analytic moments, the definition by hand, and simulated sprays."""
 
 from collections.abc import Iterator
+from random import Random
 
 import numpy as np
 import pytest
@@ -52,6 +53,13 @@ def test_three_droplets_by_hand() -> None:
     for name, value in {**by_hand, "d43_um": 980000 / 36000}.items():
         assert getattr(statistics, name).value == pytest.approx(value), name
     assert [getattr(statistics, f"dv{share}_um").value for share in (10, 50, 90)] == [20, 30, 30]
+
+
+@settings(max_examples=30)
+@given(st.lists(DIAMETERS, min_size=1, max_size=4), st.randoms())
+def test_intervals_too_depend_on_no_order(shots: list[list[float]], rng: Random) -> None:
+    other = [rng.sample(shot, len(shot)) for shot in rng.sample(shots, len(shots))]
+    assert mean_diameters(other) == mean_diameters(shots)
 
 
 @settings(max_examples=30)
