@@ -29,6 +29,11 @@ from processing.kernels import DEFAULT_THREADS
 
 LIMITS = RatioLimits(trusted=1.15, refused=2.0)
 """Of discs: overlapping shadows leave something even where all droplets are right."""
+LIGHTS = (0.5, 2.0)
+"""Of the background: where nearly nothing is in its way, the light of an exposure must be between."""
+FREE_PERCENTILE = 98
+LEAST_KNOWN = 0.1
+"""Share of the pixels of a view of which something must be known."""
 
 
 @dataclass(frozen=True)
@@ -93,6 +98,8 @@ def measure_shadows(
     check_images(images, search)
     trusts = [np.ones(np.shape(image), np.float32) for image in images] if trust is None else trust
     check_images(trusts, search)
+    if unlit := _unlit(images, trusts, search.names):
+        return MeasuredExposure(SizedDroplets.none(), {}, None, ShotVerdict.REFUSED, unlit)
     shot = _looking(images, trusts, search, threads)
     known_shadows = [(1 - image) * np.sqrt(one) for image, one in zip(shot.images, shot.trust, strict=True)]
     blind = blind_views(known_shadows, shot.noises_of(shot.images), search.names)
@@ -123,6 +130,25 @@ def _looking(images: Sequence[Image], trusts: Sequence[Image], search: DropletSe
         tuple(np.where(some, trust, 0).astype(np.float32) for trust, some in zip(trusts, chosen, strict=True)),
         search.lattice,
         threads,
+    )
+
+
+def _unlit(images: Sequence[Image], trusts: Sequence[Image], names: Sequence[str]) -> tuple[str, ...]:
+    """Why views can show no shadows, whether there are droplets or not; empty where all can."""
+    reasons = (_without_light(*view) for view in zip(names, images, trusts, strict=True))
+    return tuple(reason for reason in reasons if reason)
+
+
+def _without_light(name: str, image: Image, trust: Image) -> str:
+    known = image[trust > 0]
+    if known.size < LEAST_KNOWN * image.size:
+        return f"{name}: {known.size / image.size:.0%} of its pixels are known: is its background saturated, or dark?"
+    light = float(np.percentile(known, FREE_PERCENTILE))
+    if LIGHTS[0] <= light <= LIGHTS[1]:
+        return ""
+    return (
+        f"{name}: its light is {light:.2g} of its background's, limits {LIGHTS[0]:g} and {LIGHTS[1]:g}: is a lens "
+        "covered, a light off, or was the background taken with another light?"
     )
 
 

@@ -106,6 +106,26 @@ def test_images_without_droplets_are_empty_and_a_covered_view_is_named(scene: Sh
     assert "view 3 sees nothing while the others see droplets" in one_blind.reasons[0]
 
 
+@pytest.mark.parametrize("light", [0.0, 0.3, 3.0])
+def test_views_without_light_are_refused_and_not_empty(scene: ShadowScene, light: float) -> None:
+    rng, search = np.random.default_rng(0), search_of(scene, MARGIN_VOXEL)
+    empty = [rng.normal(1, 0.012, image.shape).astype(np.float32) for image in scene.images]
+    for unlit in ((1,), (0, 1, 2, 3)):
+        images = [image + np.float32(light - 1) * (view in unlit) for view, image in enumerate(empty)]
+        shot = measure_shadows(images, search)
+        assert shot.verdict is ShotVerdict.REFUSED
+        assert len(shot.reasons) == len(unlit)
+        assert "view 2: its light is" in "; ".join(shot.reasons)
+
+
+def test_views_of_which_nothing_is_known_are_refused_and_not_empty(scene: ShadowScene) -> None:
+    trust = [np.ones_like(image) for image in scene.images]
+    trust[2][:] = 0
+    shot = measure_shadows(scene.images, search_of(scene, MARGIN_VOXEL), trust=trust)
+    assert (shot.verdict, len(shot.droplets)) == (ShotVerdict.REFUSED, 0)
+    assert "view 3: 0% of its pixels are known" in shot.reasons[0]
+
+
 def test_bad_images_are_named(scene: ShadowScene) -> None:
     search, broken = search_of(scene, MARGIN_VOXEL), scene.images[1].copy()
     broken[3, 7] = np.nan
