@@ -30,11 +30,22 @@ def commit(part: Path, path: Path) -> None:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Yield the path of a part that replaces ``path`` at the end, or vanishes if the block raises."""
+    """Yield the path of a part that replaces ``path`` at the end, or vanishes if the block raises.
+
+    Raises
+    ------
+    OSError
+        The disk is full, say; it names the file.
+    """
     part = part_path(path)
     try:
         yield part
         sync(part)
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        if error.errno is None or error.filename is not None:
+            raise
+        raise OSError(error.errno, error.strerror, str(path)) from error
     except BaseException:
         part.unlink(missing_ok=True)
         raise

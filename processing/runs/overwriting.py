@@ -27,9 +27,11 @@ def require_free(*targets: Path, overwrite: bool, made_with: Sequence[str] = ())
     Raises
     ------
     OutputExistsError
-        A target is there.
+        A target is there, or a file is where its folder would be.
     """
     for target in targets:
+        if (place := next(folder for folder in target.absolute().parents if folder.exists())) and not place.is_dir():
+            raise OutputExistsError(f"{place}: is a file, no folder for {target.name}")
         if not target.exists() or (target.is_dir() and not any(target.iterdir())):
             continue
         if not overwrite:

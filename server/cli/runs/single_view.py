@@ -1,6 +1,6 @@
 """``tomoshadow measure`` without a calibration: images, or one view of runs, become droplets in 2-D."""
 
-from argparse import ArgumentParser, Namespace
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,14 +25,22 @@ IN_THE_IMAGE = ("view", "um_per_px", "background")
 
 OF_RUNS = ("view", "shots")
 """Options that mean nothing of images."""
+LEAST_UM_PER_PX, MOST_UM_PER_PX = 1e-3, 1e6
+"""From beyond what light resolves to a metre."""
 
 
 def add_single_view(parser: ArgumentParser) -> None:
     """Let a command be told of images without a calibration."""
     group = parser.add_argument_group("without --calibration, droplets in 2-D, of image files or one view of runs")
     group.add_argument("--view", metavar="NAME", help="of a run with several")
-    group.add_argument("--um-per-px", type=positive, metavar="X", help="width of a pixel in the spray: um for px")
+    group.add_argument("--um-per-px", type=_um_per_px, metavar="X", help="width of a pixel in the spray: um for px")
     group.add_argument("--background", type=Path, metavar="IMAGE", help="light without droplets; default: fitted")
+
+
+def _um_per_px(text: str) -> float:
+    if not LEAST_UM_PER_PX <= (value := positive(text)) <= MOST_UM_PER_PX:
+        raise ArgumentTypeError(f"{text} must be from {LEAST_UM_PER_PX:g} to {MOST_UM_PER_PX:g}")
+    return value
 
 
 def measure_single_view(options: Namespace) -> Outcome:

@@ -17,6 +17,13 @@ def write_results(folder: Path, text: str) -> None:
     (folder / "run" / "run.h5").write_text(text)
 
 
+def test_a_file_is_no_folder_for_results(tmp_path: Path) -> None:
+    (tmp_path / "spray.png").write_text("image")
+    for overwrite in (True, False):
+        with pytest.raises(OutputExistsError, match=r"spray\.png: is a file, no folder for out"):
+            require_free(tmp_path / "spray.png" / "out", overwrite=overwrite)
+
+
 def test_files_take_their_places_together(tmp_path: Path) -> None:
     (tmp_path / "mean.png").write_text("old picture")
     with replacing(tmp_path / "mean.vtkhdf") as out:

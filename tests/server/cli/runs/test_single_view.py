@@ -70,6 +70,15 @@ def test_a_scale_turns_pixels_into_micrometres(
     assert first.startswith("first,a,")
 
 
+@pytest.mark.parametrize("scale", ["0", "-1", "nan", "1e300", "1e-300"])
+def test_a_scale_that_no_camera_has_is_refused(
+    scale: str, images: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit):
+        main(["measure", str(images[0]), "-o", str(tmp_path / "out"), "--um-per-px", scale])
+    assert f"--um-per-px: {scale} must be" in capsys.readouterr().err
+
+
 def write_single(run_dir: Path) -> Path:
     """A run of one view, dark image and background known, two exposures."""
     header = RunHeader(
