@@ -27,8 +27,9 @@ from processing.analysis.droplets.shadows.shadow_fit import ShadowFit, Transmiss
 from processing.analysis.droplets.shadows.shadow_union import union_defects
 from processing.kernels import DEFAULT_THREADS
 
-LIMITS = RatioLimits(trusted=1.15, refused=2.0)
-"""Of discs: overlapping shadows leave something even where all droplets are right."""
+LIMITS = RatioLimits(trusted=1.2, refused=2.0)
+"""Of discs: overlapping shadows leave something even where all droplets are right. Of simulated shots, those from 1.15
+to 1.2 have 1 % ghosts, and one at 1.24 has 5 %."""
 LIGHTS = (0.5, 2.0)
 """Of the background: where nearly nothing is in its way, the light of an exposure must be between."""
 FREE_PERCENTILE = 98
