@@ -64,7 +64,7 @@ def read_recipe(path: Path, command: str, method_version: int, kind: type[Settin
     text = _text(path)
     recipe = _validated(path, text, (), _document(path, text), _Recipe)
     if recipe.command != command:
-        problem = f"a recipe for tomoshadow {recipe.command}, not for {command}"
+        problem = f"a recipe for {recipe.command}, not for {command}"
         raise _error(path, text, ("command",), problem)
     if recipe.method_version not in (None, method_version):
         raise _error(

@@ -23,7 +23,8 @@ class ReconstructionRequest(FrozenModel):
 
     run_id: Annotated[Identifier, Field(description="a run whose images show a spray")]
     shots: Annotated[
-        tuple[Annotated[int, Field(ge=0)], ...] | None, Field(description="indices; null: all valid shots")
+        Annotated[tuple[Annotated[int, Field(ge=0)], ...], Field(min_length=1)] | None,
+        Field(description="indices; null: all valid shots"),
     ] = None
     calibration: Annotated[Identifier | None, Field(description="null: the run's own, or the current one")] = None
     settings: Annotated[ReconstructionSettings, Field(description="how; default: by MLOS, what all views see")] = (
@@ -36,7 +37,8 @@ class MeasurementRequest(FrozenModel):
 
     run_id: Annotated[Identifier, Field(description="a run whose images show droplets")]
     shots: Annotated[
-        tuple[Annotated[int, Field(ge=0)], ...] | None, Field(description="indices; null: all valid shots")
+        Annotated[tuple[Annotated[int, Field(ge=0)], ...], Field(min_length=1)] | None,
+        Field(description="indices; null: all valid shots"),
     ] = None
     calibration: Annotated[Identifier | None, Field(description="null: the run's own, or the current one")] = None
     settings: Annotated[MeasureSettings | None, Field(description="how; null: as the run is recorded")] = None

@@ -115,6 +115,7 @@ def test_what_cannot_be_measured_is_refused_with_its_reason(measured: Serving) -
         ({"run_id": "none"}, 404, "no run 'none'"),
         ({"calibration": "none"}, 404, "none"),
         ({"shots": [0, 5]}, 422, "has 2 shots, not [5]"),
+        ({"shots": []}, 422, "at least 1 item"),
         ({"run_id": "shadows", "settings": None}, 422, "has no background, and without one nobody knows"),
         ({"run_id": "shadows"}, 422, "recorded as shadow, they are not measured as bright"),
         ({"settings": {"twinz": 1}}, 422, "twinz"),
