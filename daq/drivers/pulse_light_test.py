@@ -12,7 +12,7 @@ from typing import Protocol
 from daq.devices import GeneratorState, GeneratorStatus, PulseGenerator, TriggerSource
 from daq.drivers.pulse_probe import ProbeFailure, ProbeImpossible, expect
 from daq.drivers.pulse_protocol import HEARTBEAT_MS
-from daq.drivers.pulse_self_test import Check, Verdict
+from daq.drivers.pulse_self_test import Check, checked
 from daq.errors import DeviceError, DeviceRefused
 from daq.timing import ShotTiming
 
@@ -63,19 +63,10 @@ def light_test(generator: PulseGenerator, timing: ShotTiming, operator: Operator
     checks["silent host"] = partial(_silence, generator, timing, operator)
     try:
         for name, check in checks.items():
-            yield _run(name, check)
+            yield checked(name, check)
             generator.off()
     finally:
         generator.off()
-
-
-def _run(name: str, check: Callable[[], str]) -> Check:
-    try:
-        return Check(name, Verdict.OK, check())
-    except ProbeImpossible as reason:
-        return Check(name, Verdict.SKIPPED, str(reason))
-    except (ProbeFailure, DeviceError) as error:
-        return Check(name, Verdict.FAIL, str(error))
 
 
 def _await(operator: Operator, task: str) -> None:

@@ -71,12 +71,13 @@ def self_test(line: PulseLine, identity: Reply) -> Iterator[Check]:
     Check
         As soon as it is known.
     """
-    yield _run("identity", partial(_identity, identity))
+    yield checked("identity", partial(_identity, identity))
     for name, check in _CHECKS.items():
-        yield _run(name, partial(check, Probe(line)))
+        yield checked(name, partial(check, Probe(line)))
 
 
-def _run(name: str, check: Callable[[], str]) -> Check:
+def checked(name: str, check: Callable[[], str]) -> Check:
+    """Try one thing: what it says, why it could not be tried, or what failed."""
     try:
         return Check(name, Verdict.OK, check())
     except ProbeImpossible as reason:

@@ -5,7 +5,6 @@ import json
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated
 
@@ -19,13 +18,13 @@ from processing.analysis.droplets.ghost_share import pooled
 from processing.analysis.droplets.measured_exposure import ShotVerdict
 from processing.analysis.droplets.shadows.shadow_shot import ShadowExposure, measure_shadows
 from processing.calibration.calibration import Calibration
-from processing.calibration.calibration_file import file_sha256, load_calibration
+from processing.calibration.calibration_file import load_calibration
 from processing.kernels import DEFAULT_THREADS
 from processing.preprocessing import Polarity
 from processing.reconstruction.settings import FrozenValue, GridSettings
 from processing.runs.errors import PipelineError
 from processing.runs.measured_images import bright_images, require_backgrounds, shadow_images
-from processing.runs.pipeline import Stopped, default_grid, frame_names, require_match
+from processing.runs.pipeline import Stopped, default_grid, frame_names, provenance_of, require_match
 from processing.runs.recipe import recipe_sha256
 from processing.runs.results_file import FrameName, Provenance, claim_results
 from processing.runs.workbench import References, read_references
@@ -145,7 +144,7 @@ class RunMeasurement:
         references = read_references(run)
         if settings.polarity == "shadow":
             require_backgrounds(run, references)
-        provenance = _provenance(run, calibration, calibration_file, settings)
+        provenance = provenance_of(run, calibration, calibration_file, settings, METHOD_VERSION)
         return cls(run, calibration, settings, search, references, provenance)
 
     def measure(
@@ -203,20 +202,6 @@ class RunMeasurement:
             return measure_bright(images, self.search, twins=twins, seed=seed, threads=threads)
         images, trust = shadow_images(self.run, shot, frame, self.references)
         return measure_shadows(images, self.search, trust=trust, twins=twins, seed=seed, threads=threads)
-
-
-def _provenance(
-    run: RunReader, calibration: Calibration, calibration_file: Path, settings: MeasureSettings
-) -> Provenance:
-    return {
-        "run": run.header.run_id,
-        "calibration": calibration.id,
-        "calibration_file": calibration_file.name,
-        "calibration_sha256": file_sha256(calibration_file),
-        "settings": settings.model_dump_json(),
-        "method_version": METHOD_VERSION,
-        "tomoshadow": version("tomoshadow"),
-    }
 
 
 def droplets_path(results_dir: Path, shot: int) -> Path:

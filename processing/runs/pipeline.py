@@ -113,7 +113,7 @@ def reconstruct_shot(
     with (workbench or Workbench()).occupied() as bench, RunReader(run_dir) as run:
         recorded = run.read_shot(shot)
         require_match(run_dir.name, recorded, calibration)
-        made_by = _provenance(run, calibration, calibration_file, settings)
+        made_by = provenance_of(run, calibration, calibration_file, settings, METHOD_VERSION)
         shown, named_by = tuple(recorded.views), made_by["calibration_sha256"]
         reconstructor = bench.reconstructor(
             (named_by, settings, shown, threads), lambda: _reconstructor(calibration, settings, shown, threads)
@@ -253,16 +253,17 @@ def require_match(run_name: str, shot: Shot, calibration: Calibration) -> None:
             raise PipelineError(f"{run_name}, {name}: image of {columns} x {rows} px, calibrated for {size_px}")
 
 
-def _provenance(
-    run: RunReader, calibration: Calibration, calibration_file: Path, settings: ReconstructionSettings
+def provenance_of(
+    run: RunReader, calibration: Calibration, calibration_file: Path, settings: FrozenValue, method_version: int
 ) -> Provenance:
+    """Where results of a run come from."""
     return {
         "run": run.header.run_id,
         "calibration": calibration.id,
         "calibration_file": calibration_file.name,
         "calibration_sha256": file_sha256(calibration_file),
         "settings": settings.model_dump_json(),
-        "method_version": METHOD_VERSION,
+        "method_version": method_version,
         "tomoshadow": version("tomoshadow"),
     }
 

@@ -312,18 +312,20 @@ def test_a_line_that_only_echoes_is_named() -> None:
 
 def test_a_generator_behind_an_echo_is_heard() -> None:
     """Two wires for both directions: what is sent comes back before the answer."""
-    fields = dict.fromkeys(FIELDS[Command.ID].reply, "0") | {"protocol": str(PROTOCOL_VERSION), "state": "0"}
+    names = (*FIELDS[Command.ID].reply, *FIELDS[Command.STATUS].reply)
+    fields = dict.fromkeys(names, "0") | {"protocol": str(PROTOCOL_VERSION), "state": "0"}
 
     def answer(line: bytes) -> bytes:
         try:
             request = decode_request(line)
         except DamagedLine:
             return line
-        names = FIELDS[request.command].reply
-        return line + encode_reply(Reply(request.sequence, 1, fields={name: fields[name] for name in names}))
+        told = {name: fields[name] for name in FIELDS[request.command].reply}
+        return line + encode_reply(Reply(request.sequence, 1, fields=told))
 
     with instrument(answer) as port, SerialPulseGenerator("generator", port, CHANNELS) as generator:
         generator.off()
+        assert generator.status().state is GeneratorState.SAFE
 
 
 def test_a_reply_without_its_fields_is_named() -> None:
