@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from processing.analysis.droplets.droplet_search import DropletSearch
 from processing.analysis.droplets.droplet_table import SizedDroplets
@@ -101,6 +102,9 @@ def measure_shadows(
     check_images(trusts, search)
     if unlit := _unlit(images, trusts, search.names):
         return MeasuredExposure(SizedDroplets.none(), {}, None, ShotVerdict.REFUSED, unlit)
+    into_grid = search.pixels_into_grid()
+    if unseen := _unseen(trusts, into_grid, search.names):
+        return MeasuredExposure(SizedDroplets.none(), {}, None, ShotVerdict.REFUSED, (unseen,))
     shot = _looking(images, trusts, search, threads)
     known_shadows = [(1 - image) * np.sqrt(one) for image, one in zip(shot.images, shot.trust, strict=True)]
     blind = blind_views(known_shadows, shot.noises_of(shot.images), search.names)
@@ -109,7 +113,7 @@ def measure_shadows(
     fit = find_shadows(shot, search)
     shadows = _recorded(shot).drawn(fit.optics, fit.discs)
     seen = seen_by(shot, fit, shadows.transmissions)
-    judged_weights = tuple(map(np.multiply, seen.weights, search.pixels_into_grid()))
+    judged_weights = tuple(map(np.multiply, seen.weights, into_grid))
     ratio = rms_over_noise(replace(seen, weights=judged_weights), shadows.transmissions)
     views = _seen(fit, search)
     beside_px = {name: float(np.hypot(view.shift_u_px, view.shift_v_px)) for name, view in views.items()}
@@ -121,6 +125,15 @@ def measure_shadows(
         return told
     rng = np.random.default_rng(seed)
     return judged_by_twins(told, pooled(_twin_ghosts(shot, fit, search, rng) for _ in range(twins)))
+
+
+def _unseen(trusts: Sequence[Image], into_grid: Sequence[NDArray[np.bool_]], names: Sequence[str]) -> str:
+    """Why nothing could be judged; empty where all views look into the grid."""
+    views = zip(names, trusts, into_grid, strict=True)
+    unseen = [name for name, trust, chosen in views if not np.any(trust[chosen] > 0)]
+    if not unseen:
+        return ""
+    return f"{', '.join(unseen)}: no pixel that is known looks into the grid: is it outside of the images, or too thin?"
 
 
 def _looking(images: Sequence[Image], trusts: Sequence[Image], search: DropletSearch, threads: int) -> Transmissions:

@@ -89,6 +89,15 @@ def test_a_box_within_the_spray_holds_the_droplets_that_the_whole_has_there(
     assert np.mean(missed >= 0) > 0.95
 
 
+def test_a_grid_that_no_pixel_looks_into_is_refused_and_not_good(scene: ShadowScene) -> None:
+    x_mm, y_mm, z_mm = scene.grid.origin_mm
+    nz, _, nx = SHAPE
+    above = VoxelGrid((nz, 4, nx), (x_mm, y_mm - 3.0, z_mm), scene.grid.pitch_mm)
+    unseen = measure_shadows(scene.images, plan_droplets(scene.cameras, above, margin_voxel=4))
+    assert unseen.verdict is ShotVerdict.REFUSED
+    assert "no pixel that is known looks into the grid" in unseen.reasons[0]
+
+
 def test_exchanged_views_are_refused(scene: ShadowScene) -> None:
     images = [scene.images[k] for k in (3, 1, 2, 0)]
     other = measure_shadows(images, search_of(scene, MARGIN_VOXEL), twins=1)
