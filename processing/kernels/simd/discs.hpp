@@ -200,7 +200,7 @@ inline double next_square(double square, double step, double largest) {
 
 inline double size_of(double value) { return value < 0 ? -value : value; }
 
-// Fits one disc, all others fixed; whether it changed.
+// Fits one disc, all others fixed; whether it changed. It stays as it is where that is as good.
 inline bool fit_disc(const Discs &discs, const DiscSweeps &sweeps, SeenDisc *seen, int64_t number) {
     double *position = discs.positions + 3 * number, &square = discs.squares[number];
     DiscNormal normal;
@@ -220,16 +220,17 @@ inline bool fit_disc(const Discs &discs, const DiscSweeps &sweeps, SeenDisc *see
     const double radius = __builtin_sqrt(square), next = next_square(square, step[3], sweeps.largest);
     const double length = __builtin_sqrt(step[0] * step[0] + step[1] * step[1] + step[2] * step[2]);
     const double most = 0.3 + 0.2 * radius, share = length > most ? most / length : 1;
+    const double change = share * length, grown = size_of(__builtin_sqrt(next) - radius);
+    if (!((change > grown ? change : grown) > sweeps.tolerance)) return false;
     for (int view = 0; view < discs.n_views; ++view) add_disc(discs.views[view], seen[view], -1.0f);
     if (moved && length < 1e30)
         for (int i = 0; i < 3; ++i) position[i] += share * step[i];
-    const double change = share * length, grown = size_of(__builtin_sqrt(next) - radius);
     square = next;
     for (int view = 0; view < discs.n_views; ++view) {
         see(seen[view], discs, discs.views[view], position, square);
         add_disc(discs.views[view], seen[view], 1.0f);
     }
-    return (change > grown ? change : grown) > sweeps.tolerance;
+    return true;
 }
 
 int sweep_discs(const Discs &discs, const DiscSweeps &sweeps) {

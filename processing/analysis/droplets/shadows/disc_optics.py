@@ -37,7 +37,9 @@ def _edge_blur_px(image: Image) -> float:
     return float(np.clip(np.sqrt(max(0.1592 / slope**2 - 1 / 3, 0)), LEAST_BLUR_PX, MOST_BLUR_PX))
 
 
-def refined_disc_optics(seen: DiscImages, optics: DiscOptics, discs: Discs, *, depths: bool) -> DiscOptics:
+def refined_disc_optics(
+    seen: DiscImages, optics: DiscOptics, discs: Discs, drawn: Sequence[Image], *, depths: bool
+) -> DiscOptics:
     """One Gauss-Newton step of level, shift and blur of all views, all discs fixed.
 
     Parameters
@@ -46,11 +48,12 @@ def refined_disc_optics(seen: DiscImages, optics: DiscOptics, discs: Discs, *, d
         Images over their levels.
     optics, discs : DiscOptics, Discs
         Where to begin.
+    drawn : sequence of (rows, columns) float32 arrays
+        What these discs let through, as one product.
     depths : bool
         Whether the blur may change with depth.
     """
     middle, half = _depth_range(seen)
-    drawn = seen.drawn(optics, discs).transmissions
     powers = _powers(middle, half)[: 3 if depths else 1]
     changed = [
         seen.drawn(replace(optics, variances_px2=optics.variances_px2 + STEP_PX2 * power), discs).transmissions
@@ -62,7 +65,7 @@ def refined_disc_optics(seen: DiscImages, optics: DiscOptics, discs: Discs, *, d
         slopes = [image, -along_u, -along_v, *((other[view] - image) / STEP_PX2 for other in changed)]
         prior = np.zeros(len(slopes))
         prior[4:] = 1 / (FOCUS_PRIOR * variances[view, 0]) ** 2
-        step = _step(np.array([slope.ravel() for slope in slopes]), seen, view, image, prior)
+        step = _step(np.array(slopes), seen, view, image, prior)
         levels[view] *= 1 + np.clip(step[0], -0.05, 0.05)
         shifts[view] += np.clip(step[1:3], -MOST_SHIFT_PX, MOST_SHIFT_PX)
         most = 2 * MOST_CHANGE * optics.blurs_px(middle)[view] ** 2
@@ -73,9 +76,10 @@ def refined_disc_optics(seen: DiscImages, optics: DiscOptics, discs: Discs, *, d
 
 
 def _step(slopes: FloatArray, seen: DiscImages, view: int, drawn: Image, prior: FloatArray) -> FloatArray:
-    weighted = slopes * seen.weights[view].ravel()
-    normal = (weighted @ slopes.T).astype(np.float64) + np.diag(prior)
-    right = (weighted @ (seen.images[view] - drawn).ravel()).astype(np.float64)
+    """By slopes (N, rows, columns). Rows are summed one by one: threads of a BLAS would wait for each other."""
+    weighted = slopes * seen.weights[view]
+    normal = np.einsum("irc,jrc->rij", weighted, slopes).sum(axis=0, dtype=np.float64) + np.diag(prior)
+    right = np.einsum("irc,rc->ri", weighted, seen.images[view] - drawn).sum(axis=0, dtype=np.float64)
     return np.asarray(np.linalg.lstsq(normal, right, rcond=1e-9)[0])
 
 

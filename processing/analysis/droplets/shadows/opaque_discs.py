@@ -48,7 +48,9 @@ class Discs:
         return np.sqrt(self.squares_voxel2)
 
     def where(self, chosen: NDArray[np.bool_]) -> "Discs":
-        """The chosen ones."""
+        """The chosen ones; the very same discs where all are."""
+        if chosen.all():
+            return self
         return Discs(self.positions_voxel[chosen], self.squares_voxel2[chosen])
 
     def joined_by(self, positions_voxel: FloatArray, squares_voxel2: FloatArray) -> "Discs":

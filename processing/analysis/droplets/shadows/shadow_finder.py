@@ -5,9 +5,10 @@ size and shares the shadow with the others; those that stay insignificant are dr
 and a shift of each image are re-estimated meanwhile, and what the product of shadows gets wrong about the very discs is
 taken off the images. A view that sees black has no say.
 
-Ghosts live on shadows that the views share out among too many droplets. When a fit has come to rest, all droplets are
+Ghosts live on shadows that the views share out among too many droplets. When the threshold has fallen, all droplets are
 dropped that some view disputes, and found anew; now also such as one view cannot see beside a larger one, if three
-views support them alone. Ghosts do not come back.
+views support them alone. Ghosts do not come back; so it goes on until no more droplets are beyond dispute, and the fit
+comes to rest.
 """
 
 from dataclasses import replace
@@ -18,8 +19,16 @@ from scipy.spatial import cKDTree
 
 from processing.analysis.droplets.candidates import close_pairs, foremost
 from processing.analysis.droplets.droplet_search import CANDIDATE_PITCH_VOXEL, DropletSearch
+from processing.analysis.droplets.gaussian_blobs import Image
 from processing.analysis.droplets.shadows.disc_optics import first_disc_optics, refined_disc_optics
-from processing.analysis.droplets.shadows.opaque_discs import NO_DISC, DiscImages, Discs, DiscSupports, Sweeps
+from processing.analysis.droplets.shadows.opaque_discs import (
+    NO_DISC,
+    DiscImages,
+    DiscOptics,
+    Discs,
+    DiscSupports,
+    Sweeps,
+)
 from processing.analysis.droplets.shadows.shadow_candidates import Stage, shadow_peaks
 from processing.analysis.droplets.shadows.shadow_fit import ShadowFit, Transmissions, residuals, rms_over_noise, seen_by
 from processing.analysis.droplets.shadows.shadow_union import union_defects
@@ -29,12 +38,12 @@ COARSE_PX = (6.0, 4.0, 2.5, 1.5, 0.9)
 """Blurs with which candidates are looked for, at first."""
 SHARP_PX = 0.6
 COARSE_SHARE = 0.5
-FIRST, LAST = 0.5, 0.04
-"""Missing share of the light from which on a candidate is tried, at first and at last."""
-FALLING_ROUNDS, AGAIN_ROUNDS = 8, 4
+FIRST, AGAIN, LAST = 0.5, 0.2, 0.04
+"""Missing share of the light from which on a candidate is tried: at first, after a purge, and at last."""
+FALLING_ROUNDS, AGAIN_ROUNDS = 8, 3
 """In which it falls; after a purge."""
 LEAST_GAIN, MOST_ROUNDS = 0.003, 20
-"""A fit is at rest when a round lowers the residual by less than this share, or after so many rounds."""
+"""The fit is at rest when a round lowers the residual by less than this share, or after so many rounds."""
 NOISE_SIGMAS, SIGNIFICANCE = 4.0, 5.0
 """No candidate is fainter than so many standard deviations of its shadow, and no droplet than of its squared radius."""
 COARSE_LEAST, SHARP_LEAST = 0.15, 0.5
@@ -56,7 +65,7 @@ SMALL_VOXEL2 = 2.0
 """Squared radius below which a droplet takes over half of what was the same."""
 BEYOND_VOXEL = 1.5
 """A droplet that leaves the searched grid farther than this is dropped."""
-SWEEPS = (Sweeps(4, move=False), Sweeps(8))
+SWEEPS = (Sweeps(4, move=False, tolerance=0.01), Sweeps(8, tolerance=0.01))
 FINAL_SWEEPS = Sweeps(30, tolerance=3e-4)
 
 
@@ -74,17 +83,14 @@ def find_shadows(shot: Transmissions, search: DropletSearch) -> ShadowFit:
     finder = _Finder(shot, search)
     for number, smooth_px in enumerate(COARSE_PX):
         fit = finder.round(fit, Stage(smooth_px, COARSE_SHARE, coarse=True), estimate=number > 0)
-    fit = finder.fallen(fit, FALLING_ROUNDS, joker=False)
+    fit = finder.undisputed(finder.fallen(fit, FIRST, FALLING_ROUNDS, joker=False))
     known = 0
     for _ in range(PURGES):
-        fit = finder.undisputed(fit)
         if SETTLED * len(fit.discs) <= known:
             break
         known = len(fit.discs)
-        fit = finder.fallen(fit, AGAIN_ROUNDS, joker=True)
-    else:
-        return finder.finished(fit)
-    return finder.finished(finder.fallen(fit, AGAIN_ROUNDS, joker=True))
+        fit = finder.undisputed(finder.fallen(fit, AGAIN, AGAIN_ROUNDS, joker=True))
+    return finder.finished(finder.rested(finder.fallen(fit, AGAIN, AGAIN_ROUNDS, joker=True)))
 
 
 class _Finder:
@@ -93,11 +99,12 @@ class _Finder:
     def __init__(self, shot: Transmissions, search: DropletSearch) -> None:
         self._shot = shot
         self._search = search
+        self._last: tuple[Discs, DiscOptics, list[Image]] | None = None
 
-    def fallen(self, fit: ShadowFit, rounds: int, *, joker: bool) -> ShadowFit:
-        """Rounds with a falling threshold, and then at the last one until they explain no more."""
-        last = max(LAST, NOISE_SIGMAS * fit.amplitude_sigma)
-        for number, threshold in enumerate(np.geomspace(max(FIRST, last), last, rounds)):
+    def fallen(self, fit: ShadowFit, first: float, rounds: int, *, joker: bool) -> ShadowFit:
+        """Rounds with a falling threshold."""
+        last = _last(fit)
+        for number, threshold in enumerate(np.geomspace(max(first, last), last, rounds)):
             unite = joker or number >= rounds // 2
             fit = self.round(
                 fit,
@@ -105,11 +112,16 @@ class _Finder:
                 estimate=number % OPTICS_EVERY == 1,
                 unite=unite,
             )
+        return fit
+
+    def rested(self, fit: ShadowFit) -> ShadowFit:
+        """Rounds at the last threshold until they explain no more."""
+        stage = Stage(SHARP_PX, _last(fit), joker=True, hidden=True)
         left, before = self._left(fit), np.inf
         for _ in range(MOST_ROUNDS):
             if left > (1 - LEAST_GAIN) * before:
                 break
-            fit = self.round(fit, Stage(SHARP_PX, last, joker=joker, hidden=joker), estimate=True, unite=True)
+            fit = self.round(fit, stage, estimate=True, unite=True)
             left, before = self._left(fit), left
         return fit
 
@@ -136,7 +148,7 @@ class _Finder:
         return fit.with_discs(discs.where(_significant(discs, information)))
 
     def _joined(self, fit: ShadowFit, stage: Stage) -> ShadowFit:
-        drawn = self._recorded().drawn(fit.optics, fit.discs).transmissions
+        drawn = self._drawn(fit)
         seen = seen_by(self._shot, fit, drawn)
         peaks = shadow_peaks(self._search.plan, seen, drawn, stage)
         blur_voxel = self._blur_voxel(fit)
@@ -168,10 +180,11 @@ class _Finder:
 
     def _estimated(self, fit: ShadowFit, *, depths: bool, unite: bool) -> ShadowFit:
         seen = self._seen(fit)
-        fit = replace(fit, optics=refined_disc_optics(seen, fit.optics, fit.discs, depths=depths))
+        optics = refined_disc_optics(seen, fit.optics, fit.discs, self._drawn(fit), depths=depths)
+        fit = replace(fit, optics=optics)
         if unite:
             fit = replace(fit, defects=union_defects(seen, fit.optics, fit.discs))
-            drawn = seen.drawn(fit.optics, fit.discs).transmissions
+            drawn = self._drawn(fit)
             fit = replace(fit, noises=self._shot.noises_of(residuals(seen_by(self._shot, fit, drawn), drawn)))
         return fit
 
@@ -180,15 +193,21 @@ class _Finder:
         return DiscImages(self._shot.images, self._shot.trust, self._shot.lattice, self._shot.threads)
 
     def _seen(self, fit: ShadowFit) -> DiscImages:
-        return seen_by(self._shot, fit, self._recorded().drawn(fit.optics, fit.discs).transmissions)
+        return seen_by(self._shot, fit, self._drawn(fit))
 
     def _supports(self, fit: ShadowFit) -> DiscSupports:
         shadows = self._recorded().drawn(fit.optics, fit.discs)
         return seen_by(self._shot, fit, shadows.transmissions).supports(shadows, fit.optics, fit.discs)
 
     def _left(self, fit: ShadowFit) -> float:
-        drawn = self._recorded().drawn(fit.optics, fit.discs).transmissions
+        drawn = self._drawn(fit)
         return rms_over_noise(seen_by(self._shot, fit, drawn), drawn)
+
+    def _drawn(self, fit: ShadowFit) -> list[Image]:
+        """Transmissions of its discs; the last ones are kept, because a round asks for the same ones again."""
+        if self._last is None or self._last[0] is not fit.discs or self._last[1] is not fit.optics:
+            self._last = (fit.discs, fit.optics, self._recorded().drawn(fit.optics, fit.discs).transmissions)
+        return self._last[2]
 
     def _blur_voxel(self, fit: ShadowFit) -> float:
         lattice = self._shot.lattice
@@ -198,6 +217,11 @@ class _Finder:
     def _depths(self, fit: ShadowFit, discs: Discs) -> FloatArray:
         """Share of the light that discs take at their centres."""
         return np.asarray(1 - np.exp(-discs.squares_voxel2 / (2 * self._blur_voxel(fit) ** 2)))
+
+
+def _last(fit: ShadowFit) -> float:
+    """Threshold up to which candidates are shadows and not noise."""
+    return max(LAST, NOISE_SIGMAS * fit.amplitude_sigma)
 
 
 def _significant(discs: Discs, information: FloatArray) -> NDArray[np.bool_]:
