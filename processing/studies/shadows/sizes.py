@@ -32,6 +32,8 @@ COUNTED_UM = 20.0
 """Found droplets and ghosts are counted from this diameter on."""
 JUDGED_UM = (20.0, 60.0)
 """Diameters whose scatter is judged."""
+SIGMAS_95 = 1.96
+"""Of a normal distribution: half the width of what holds 95 %."""
 BESIDE_MM = 0.15
 """So far around the grid there are droplets, too."""
 
@@ -116,7 +118,8 @@ class SizeRow:
 
     ``bias_um`` and ``sd_um`` are median and robust standard deviation of errors of diameters from 20 to 60 um,
     ``d32_error`` is relative, of all diameters; ``z_sd`` and ``z_size`` the robust standard deviations of errors of
-    places and diameters over what their covariance says.
+    places and diameters over what their covariance says, ``held`` and ``size_held`` the shares of the errors that 95 %
+    intervals hold.
     """
 
     case: str
@@ -131,6 +134,8 @@ class SizeRow:
     d32_error: float
     z_sd: float
     z_size: float
+    held: float
+    size_held: float
     residual_over_noise: float
     verdict: str
     twin_ghosts: float | None
@@ -211,19 +216,22 @@ def _errors(droplets: SizedDroplets, truth: Spray, match: FloatArray, pitch_mm: 
     """How exact droplets are, without a common motion of all, which a wrong calibration makes."""
     real = match >= 0
     if np.count_nonzero(real) < 2:
-        return dict.fromkeys(("rms_voxel", "bias_um", "sd_um", "z_sd", "z_size"), float("nan"))
+        return dict.fromkeys(("rms_voxel", "bias_um", "sd_um", "z_sd", "z_size", "held", "size_held"), float("nan"))
     errors_mm = droplets.points_mm[real] - truth.positions_mm[match[real]]
     errors_mm = errors_mm - np.median(errors_mm, axis=0)
     true_um = 1000 * truth.diameters_mm[match[real]]
     errors_um = droplets.diameters_um[real] - true_um
     judged_um = errors_um[(true_um > JUDGED_UM[0]) & (true_um < JUDGED_UM[1])]
     scores = errors_mm / np.sqrt(np.einsum("nii->ni", droplets.covariance_mm2[real]))
+    size_scores = errors_um / droplets.diameter_sd_um[real]
     return {
         "rms_voxel": float(np.sqrt(np.mean(errors_mm**2))) / pitch_mm,
         "bias_um": float(np.median(judged_um)),
         "sd_um": _robust_sd(judged_um),
         "z_sd": float(np.median(np.abs(scores))) / 0.6745,
-        "z_size": _robust_sd(errors_um / droplets.diameter_sd_um[real]),
+        "z_size": _robust_sd(size_scores),
+        "held": float(np.mean(np.abs(scores) < SIGMAS_95)),
+        "size_held": float(np.mean(np.abs(size_scores) < SIGMAS_95)),
     }
 
 

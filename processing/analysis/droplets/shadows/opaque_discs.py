@@ -267,6 +267,16 @@ class DiscSupports:
         return 1 / np.sqrt(np.maximum(self.sums[:, :, 6], 1e-30))
 
     @property
+    def disagreement(self) -> FloatArray:
+        """How much more (N,) the views differ on the squared radii than noise lets them, 1 at least.
+
+        The ratio of Birge (Phys. Rev. 40, 207, 1932), by which measurements that disagree lose their trust.
+        """
+        deviations = (self.alone - self.squares_voxel2) / self.alone_sd
+        freedom = np.maximum(np.count_nonzero(self.sums[:, :, 6] > 0, axis=0) - 1, 1)
+        return np.asarray(np.maximum(1.0, np.sqrt(np.sum(deviations**2, axis=0) / freedom)))
+
+    @property
     def residual(self) -> FloatArray:
         """Root mean square (N,) of what is left around the discs, over the noise."""
         return np.asarray(np.sqrt(self.sums[:, :, 8].sum(axis=0) / np.maximum(self.sums[:, :, 9].sum(axis=0), 1)))

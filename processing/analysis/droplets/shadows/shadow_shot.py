@@ -188,13 +188,14 @@ def _seen(fit: ShadowFit, search: DropletSearch) -> dict[str, SeenShadows]:
 
 
 def _droplets(seen: DiscImages, shadows: Shadows, fit: ShadowFit, search: DropletSearch) -> SizedDroplets:
-    """Droplets with the covariance of the fit, each as if it stood alone."""
+    """Droplets with the covariance of the fit: each as if it stood alone, enlarged by the disagreement of its views."""
     discs = fit.discs
     if not len(discs):
         return SizedDroplets.none()
     supports = seen.supports(shadows, fit.optics, discs)
     information = supports.information(search.lattice.slopes_px(discs.positions_voxel))
-    covariance = np.asarray(np.linalg.pinv(information, hermitian=True), dtype=np.float64)
+    alone = np.linalg.pinv(information, hermitian=True)
+    covariance = np.asarray(alone * supports.disagreement[:, None, None] ** 2, dtype=np.float64)
     pitch_um = 1000 * search.searched.pitch_mm
     diameters_um = 2 * discs.radii_voxel * pitch_um
     return SizedDroplets(

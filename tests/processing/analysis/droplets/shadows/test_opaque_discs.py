@@ -117,6 +117,19 @@ def test_what_a_view_alone_would_say_of_a_size_is_its_truth() -> None:
     np.testing.assert_allclose(alone[:, 0], 1.5, rtol=0.15)
 
 
+def test_views_that_disagree_say_so_and_views_that_agree_leave_the_noise_alone() -> None:
+    true = Discs(np.array([[80.2, 20.4, 40.7]]), np.array([1.5]))
+    images = EMPTY.drawn(OPTICS, true).transmissions
+    agreed = shot_of(images)
+    assert agreed.supports(agreed.drawn(OPTICS, true), OPTICS, true).disagreement == pytest.approx(1.0)
+    other = EMPTY.drawn(OPTICS, Discs(true.positions_voxel, np.array([1.65]))).transmissions
+    disputed = shot_of([other[0], *images[1:]])
+    supports = disputed.supports(disputed.drawn(OPTICS, true), OPTICS, true)
+    expected = 0.15 / supports.alone_sd[0, 0] / np.sqrt(3)
+    assert expected > 2
+    assert supports.disagreement == pytest.approx(expected, rel=0.2)  # shadows are compared as wholes, not by their edges
+
+
 def test_the_truth_is_a_fixed_point_of_the_fit() -> None:
     some = discs(beyond=-15)
     full = shot_of(EMPTY.drawn(OPTICS, some).transmissions)
