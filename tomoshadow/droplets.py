@@ -48,8 +48,8 @@ def measure(
     -------
     MeasuredExposure
         ``droplets`` with ``points_mm``, ``covariance_mm2``, ``amplitudes`` or ``diameters_um``, and ``columns()``;
-        ``verdict``, ``reasons``, ``residual_over_noise``, ``views`` as they were found to be, and ``ghosts`` with
-        ``share`` and ``interval``.
+        ``verdict``, ``reasons``, ``residual_over_noise``, ``views`` as they were found to be, ``ghosts`` with
+        ``share`` and ``interval``, and ``hidden``: what could not be measured.
 
     Raises
     ------

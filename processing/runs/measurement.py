@@ -29,7 +29,7 @@ from processing.runs.recipe import recipe_sha256
 from processing.runs.results_file import FrameName, Provenance, claim_results
 from processing.runs.workbench import References, read_references
 
-METHOD_VERSION = 1
+METHOD_VERSION = 2
 """Of what the numbers in a file of droplets mean."""
 Exposure = BrightExposure | ShadowExposure
 
@@ -52,7 +52,7 @@ class MeasureSettings(FrozenValue):
 
 
 class ShotDroplets(FrozenValue):
-    """What became of one shot; of two exposures, the less favourable verdict and ratio."""
+    """What became of one shot; of two exposures, the less favourable verdict and ratio, and the larger hidden share."""
 
     shot: int
     droplets: int
@@ -60,6 +60,8 @@ class ShotDroplets(FrozenValue):
     ghost_interval: tuple[float, float] | None
     ghost_reason: str | None
     residual_over_noise: float | None
+    hidden_share: float
+    liquid_objects: int
     verdict: ShotVerdict
     reasons: tuple[str, ...]
     cpu_s: float
@@ -216,6 +218,7 @@ def _told(exposure: Exposure) -> Mapping[str, object]:
         "residual_over_noise": exposure.residual_over_noise,
         "views": {name: asdict(view) for name, view in exposure.views.items()},
         "ghosts": asdict(exposure.ghosts) if exposure.ghosts else None,
+        "hidden": asdict(exposure.hidden),
     }
 
 
@@ -230,6 +233,8 @@ def _summary(shot: int, exposures: tuple[Exposure, ...], cpu_s: float, file: Pat
         ghost_interval=ghosts.interval,
         ghost_reason=None if ghosts.share is not None else _why_no_share(exposures, verdict),
         residual_over_noise=max(ratios, default=None),
+        hidden_share=max(exposure.hidden.volume_share for exposure in exposures),
+        liquid_objects=sum(exposure.hidden.liquid_objects for exposure in exposures),
         verdict=verdict,
         reasons=tuple(dict.fromkeys(reason for exposure in exposures for reason in exposure.reasons)),
         cpu_s=cpu_s,

@@ -165,13 +165,14 @@ def droplets_table(result: dict[str, Any]) -> str:
             str(shot["droplets"]),
             _number(shot["residual_over_noise"], 3),
             "" if shot["ghost_share"] is None else f"{100 * shot['ghost_share']:.2f}",
+            f"{100 * shot['hidden_share']:.1f}" if shot["hidden_share"] else "",
             f"{shot['cpu_s']:.1f}",
             shot["verdict"],
             shot["file"],
         ]
         for shot in result["shots"]
     ]
-    return table(["shot", "droplets", "residual/noise", "ghosts %", "CPU-s", "verdict", "file"], rows)
+    return table(["shot", "droplets", "residual/noise", "ghosts %", "hidden %", "CPU-s", "verdict", "file"], rows)
 
 
 def _number(value: float | None, digits: int) -> str:
@@ -186,7 +187,8 @@ def _summary(result: dict[str, Any]) -> str:
     counted = f"{statistics['n']} droplets in {statistics['exposures']} exposures"
     density = _with_interval(statistics["number_density_per_mm3"])
     d32 = f", D32 {_with_interval(statistics['d32_um'])} um" if statistics["d32_um"] else ""
-    return f"{counted}, {density} per mm3{d32}, {grid}"
+    hidden = f", {100 * statistics['hidden_share']:.1f} % of the volume hidden" if statistics["hidden_share"] else ""
+    return f"{counted}, {density} per mm3{d32}{hidden}, {grid}"
 
 
 def _with_interval(estimate: dict[str, float]) -> str:

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.spatial import cKDTree
 
+from processing.analysis.droplets.droplet_search import Window
 from processing.analysis.droplets.gaussian_blobs import Image
 from processing.geometry import FloatArray
 from processing.kernels import _native
@@ -16,7 +17,14 @@ EMPTY = 0.3
 """Of the threshold: pixels below have no say, so that the kernels need not look there."""
 
 
-def candidates(plan: Plan, residuals: Sequence[Image], gains: FloatArray, threshold: float, threads: int) -> FloatArray:
+def candidates(
+    plan: Plan,
+    residuals: Sequence[Image],
+    gains: FloatArray,
+    threshold: float,
+    threads: int,
+    windows: Sequence[Window] = (),
+) -> FloatArray:
     """Peaks (N, 4): x, y, z in voxels of the plan and height, where all views have an amplitude of ``threshold`` left.
 
     Parameters
@@ -31,8 +39,12 @@ def candidates(plan: Plan, residuals: Sequence[Image], gains: FloatArray, thresh
         Above 0.
     threads : int
         The result does not depend on it.
+    windows : sequence of (rows, columns) slices
+        What the residuals are of each image, beyond which nothing is left; empty: all of it.
     """
-    seen = plan.bind(plan.resample([_lit(*view, threshold) for view in zip(residuals, gains, strict=True)], threads))
+    lit = [_lit(*view, threshold) for view in zip(residuals, gains, strict=True)]
+    whole = [_placed(*one) for one in zip(lit, windows, _shapes(plan), strict=True)] if windows else lit
+    seen = plan.bind(plan.resample(whole, threads))
     nz, ny, nx = plan.grid.shape
     found = []
     for first in range(0, ny, SLAB_ROWS):
@@ -48,6 +60,16 @@ def candidates(plan: Plan, residuals: Sequence[Image], gains: FloatArray, thresh
 def _lit(residual: Image, gain: float, threshold: float) -> Image:
     amplitudes = residual * np.float32(1 / gain)
     return np.where(amplitudes > EMPTY * threshold, amplitudes, np.float32(0))
+
+
+def _shapes(plan: Plan) -> list[tuple[int, int]]:
+    return [(view.image_size_px[1], view.image_size_px[0]) for view in plan.views]
+
+
+def _placed(part: Image, window: Window, shape: tuple[int, int]) -> Image:
+    image = np.zeros(shape, np.float32)
+    image[window] = part
+    return image
 
 
 def foremost(peaks: FloatArray, apart: float) -> FloatArray:

@@ -9,10 +9,13 @@ from numpy.typing import NDArray
 
 from processing.analysis.droplets.sight_lattice import SightLattice, sight_lattice
 from processing.geometry import FloatArray, ViewMapping
+from processing.kernels import _native
 from processing.reconstruction.errors import ReconstructionError
 from processing.reconstruction.planning.plan import Plan, plan_reconstruction
 from processing.volume import VoxelGrid
 
+Window = tuple[slice, slice]
+"""Rows and columns of an image."""
 MARGIN_VOXEL = 20
 """Droplets that are seen, but not looked for, become ghosts: so far around the grid they are looked for too."""
 LEAST_PX_PER_VOXEL, MOST_PX_PER_VOXEL = 0.4, 1.3
@@ -55,11 +58,27 @@ class DropletSearch:
         margin_voxel = (self.searched.shape[0] - self.grid.shape[0]) / 2
         return self._pixels(int(margin_voxel * self.lattice.pixels_per_voxel))
 
+    def windows(self) -> tuple[Window, ...]:
+        """Rows and columns of each view that hold the pixels into the search: of a box it is a small part."""
+        return tuple(map(_window, self.pixels_into_search()))
+
     def _pixels(self, inset_px: int) -> list[NDArray[np.bool_]]:
         return [
             _hull(nodes_px.reshape(-1, 2), view.image_size_px, inset_px)
             for nodes_px, view in zip(self.lattice.nodes_px, self.plan.views, strict=True)
         ]
+
+
+def _window(chosen: NDArray[np.bool_]) -> Window:
+    """A window around chosen pixels (rows, columns), at least as wide as a droplet can be; all where there are none."""
+    return _span(np.logical_or.reduce(chosen, axis=1)), _span(np.logical_or.reduce(chosen, axis=0))
+
+
+def _span(chosen: NDArray[np.bool_]) -> slice:
+    if not chosen.any():
+        return slice(0, len(chosen))
+    first = min(int(chosen.argmax()), len(chosen) - _native.MAX_BLOB_WINDOW_PX)
+    return slice(first, max(len(chosen) - int(chosen[::-1].argmax()), first + _native.MAX_BLOB_WINDOW_PX))
 
 
 def _hull(points_px: FloatArray, image_size_px: tuple[int, int], inset_px: int) -> NDArray[np.bool_]:

@@ -24,8 +24,13 @@ class DropletStatistics(SizeStatistics):
     """Droplets of all exposures that are not refused."""
 
     exposures: Annotated[int, Field(description="that were measured and not refused")]
-    number_density_per_mm3: Annotated[Estimate | None, Field(description="its interval by counting alone")] = None
+    number_density_per_mm3: Annotated[
+        Estimate | None, Field(description="per volume that could be measured; its interval by counting alone")
+    ] = None
     number_density_reason: Annotated[str | None, Field(description="why it is null")] = None
+    hidden_share: Annotated[
+        float, Field(description="of the volume: behind, before or in liquid that is no droplet, not measured")
+    ] = 0.0
     ghost_share: Annotated[Estimate | None, Field(description="of the twins of all exposures; null without")] = None
 
 
@@ -44,16 +49,17 @@ def droplet_statistics(shots: Sequence[StoredDroplets]) -> DropletStatistics:
     """
     _require_once(shots)
     told = [_exposures(shot) for shot in shots]
-    counted = [(shot, len(exposures)) for shot, exposures in zip(shots, told, strict=True) if exposures]
-    exposures = sum(number for _, number in counted)
-    per_shot = exposures / max(len(counted), 1)
+    counted = [(shot, exposures) for shot, exposures in zip(shots, told, strict=True) if exposures]
+    hidden = [hidden_share(exposure) for _, exposures in counted for exposure in exposures]
+    per_shot = len(hidden) / max(len(counted), 1)
     sizes = _sizes([shot for shot, _ in counted], per_shot)
     density, reason = _density(sizes.n, counted, per_shot)
     return DropletStatistics(
         **dict(sizes),
-        exposures=exposures,
+        exposures=len(hidden),
         number_density_per_mm3=density,
         number_density_reason=reason,
+        hidden_share=float(np.mean(hidden)) if hidden else 0.0,
         ghost_share=_ghost_share(exposure for shot in told for exposure in shot),
     )
 
@@ -82,6 +88,11 @@ def _exposures(shot: StoredDroplets) -> list[Mapping[str, Any]]:
     return [exposure for exposure in exposures if exposure["verdict"] != REFUSED]
 
 
+def hidden_share(exposure: Mapping[str, Any]) -> float:
+    """Share of the volume that could not be measured; older files do not know of any."""
+    return float(exposure.get("hidden", {}).get("volume_share", 0.0))
+
+
 def _named(shot: StoredDroplets) -> str:
     return f"{shot.provenance.get('run', 'a run')}, shot {shot.provenance.get('shot', '?')}"
 
@@ -99,14 +110,15 @@ def _sizes(shots: Sequence[StoredDroplets], per_shot: float) -> SizeStatistics:
 
 
 def _density(
-    n: int, counted: Sequence[tuple[StoredDroplets, int]], per_shot: float
+    n: int, counted: Sequence[tuple[StoredDroplets, Sequence[Mapping[str, Any]]]], per_shot: float
 ) -> tuple[Estimate | None, str | None]:
     if not counted:
         return None, NOTHING_COUNTED
-    volumes_mm3 = [(_volume_mm3(shot), exposures) for shot, exposures in counted]
-    if any(volume_mm3 is None for volume_mm3, _ in volumes_mm3):
-        return None, NO_VOLUME
-    total_mm3 = sum((volume_mm3 or 0.0) * exposures for volume_mm3, exposures in volumes_mm3)
+    total_mm3 = 0.0
+    for shot, exposures in counted:
+        if (volume_mm3 := _volume_mm3(shot)) is None:
+            return None, NO_VOLUME
+        total_mm3 += sum(volume_mm3 * (1 - hidden_share(exposure)) for exposure in exposures)
     return number_density(n, total_mm3, per_shot), None
 
 

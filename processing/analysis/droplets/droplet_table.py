@@ -109,6 +109,10 @@ class SizedDroplets:
     def __len__(self) -> int:
         return len(self.diameters_um)
 
+    def where(self, chosen: NDArray[np.bool_]) -> "SizedDroplets":
+        """The chosen ones."""
+        return _rows(self, chosen)
+
     def within(self, grid: VoxelGrid) -> "SizedDroplets":
         """Those in a grid, to half a voxel beyond its outermost centres, its own volume."""
         return _rows(self, _inside(self.points_mm, grid))

@@ -6,6 +6,7 @@ from enum import StrEnum
 from typing import Generic, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from processing.analysis.droplets.droplet_search import DropletSearch
 from processing.analysis.droplets.droplet_table import DropletRows
@@ -18,6 +19,8 @@ MOST_SHIFT_PX = 0.3
 """Views that lie farther beside their calibration are refused."""
 MANY_GHOSTS = 0.1
 """Share in a twin from which on a shot is doubtful: ghosts can explain images as well as the truth does."""
+MOST_HIDDEN = 0.5
+"""Share of the volume that may be hidden."""
 LIT_SIGMAS, LIT_PIXELS = 6.0, 4
 """A view that has fewer pixels above so many standard deviations of its noise sees nothing."""
 TWIN_MOVE_VOXEL = 15.0
@@ -33,6 +36,28 @@ class ShotVerdict(StrEnum):
     EMPTY = "empty"
     DOUBTFUL = "doubtful"
     REFUSED = "refused"
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """What could not be measured of an exposure.
+
+    Parameters
+    ----------
+    liquid_objects : int
+        Ligaments, sheets and other liquid that is no droplet, which is masked.
+    volume_share : float
+        Of the grid: what too few views can judge, mostly as it lies in masked liquid, before or behind it.
+    droplets : int
+        That are seen, but by too few views to be told.
+    """
+
+    liquid_objects: int = 0
+    volume_share: float = 0.0
+    droplets: int = 0
+
+
+NOTHING_HIDDEN = Hidden()
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +78,8 @@ class MeasuredExposure(Generic[Rows, Seen]):
         Why it is no better, and what to do.
     ghosts : GhostShare | None
         From twins; None where none were asked for, or where they would not tell.
+    hidden : Hidden
+        What could not be measured.
     """
 
     droplets: Rows
@@ -61,6 +88,7 @@ class MeasuredExposure(Generic[Rows, Seen]):
     verdict: ShotVerdict
     reasons: tuple[str, ...] = ()
     ghosts: GhostShare | None = None
+    hidden: Hidden = NOTHING_HIDDEN
 
 
 def check_images(images: Sequence[Image], search: DropletSearch) -> None:
@@ -144,6 +172,17 @@ def judged(beside_px: Mapping[str, float], ratio: float, limits: RatioLimits) ->
     return ShotVerdict.GOOD, ()
 
 
+def judged_by_volume(shot: "MeasuredExposure[Rows, Seen]") -> "MeasuredExposure[Rows, Seen]":
+    """A shot, doubtful where most of its volume could not be measured."""
+    if shot.hidden.volume_share <= MOST_HIDDEN:
+        return shot
+    reason = (
+        f"liquid that is no droplet hides {100 * shot.hidden.volume_share:.0f} % of the volume, limit "
+        f"{100 * MOST_HIDDEN:.0f} %: measure farther from the nozzle (--grid)"
+    )
+    return replace(shot, verdict=ShotVerdict.DOUBTFUL, reasons=(*shot.reasons, reason))
+
+
 def judged_by_twins(shot: "MeasuredExposure[Rows, Seen]", ghosts: GhostShare) -> "MeasuredExposure[Rows, Seen]":
     """A shot with the ghosts of its twins; doubtful where they are many, however well droplets explain the images."""
     if ghosts.share is None or ghosts.share <= MANY_GHOSTS:
@@ -155,10 +194,15 @@ def judged_by_twins(shot: "MeasuredExposure[Rows, Seen]", ghosts: GhostShare) ->
     return replace(shot, ghosts=ghosts, verdict=ShotVerdict.DOUBTFUL, reasons=(*shot.reasons, reason))
 
 
+def within_grid(positions_voxel: FloatArray, search: DropletSearch) -> NDArray[np.bool_]:
+    """Which positions (N, 3), in voxels of what is searched, are within the grid of a search."""
+    low, high = _box(search)
+    return np.asarray(np.all((positions_voxel >= low) & (positions_voxel < high), axis=1))
+
+
 def ghosts_within(found_voxel: FloatArray, truth_voxel: FloatArray, search: DropletSearch) -> GhostShare:
     """Ghosts among the found droplets (N, 3) within the grid of a search, in voxels of what is searched."""
-    low, high = _box(search)
-    inside = np.all((found_voxel >= low) & (found_voxel < high), axis=1)
+    inside = within_grid(found_voxel, search)
     ghost = matches(found_voxel, truth_voxel)[0] < 0
     return GhostShare(int(np.count_nonzero(ghost & inside)), int(np.count_nonzero(inside)))
 
@@ -166,7 +210,7 @@ def ghosts_within(found_voxel: FloatArray, truth_voxel: FloatArray, search: Drop
 def moved(positions_voxel: FloatArray, search: DropletSearch, rng: np.random.Generator) -> FloatArray:
     """Positions of a twin: moved at random; what was within the grid, or in its margin, is reflected back into it."""
     low, high = _box(search)
-    inside = np.all((positions_voxel >= low) & (positions_voxel < high), axis=1)[:, None]
+    inside = within_grid(positions_voxel, search)[:, None]
     least = np.where(inside, low, 0.0)
     most = np.where(inside, high, np.array(search.searched.shape[::-1]) - 1.0)
     there = positions_voxel + rng.uniform(-TWIN_MOVE_VOXEL, TWIN_MOVE_VOXEL, positions_voxel.shape)

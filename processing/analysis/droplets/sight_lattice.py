@@ -1,7 +1,7 @@
 """SightLattice: where every view sees any point of a grid, as quickly as a fit needs it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -45,6 +45,10 @@ class SightLattice:
     def pixels_per_voxel(self) -> float:
         """How wide a voxel is seen at most, mean over the views."""
         return float(np.linalg.norm(self.motion_px.reshape(-1, 2, 3), axis=1).max(axis=1).mean())
+
+    def within(self, origins_px: FloatArray) -> "SightLattice":
+        """The same in images that begin at ``origins_px`` (views, 2), column and row."""
+        return replace(self, nodes_px=np.ascontiguousarray(self.nodes_px - origins_px[:, None, None, None]))
 
     def seen_px(self, positions_voxel: FloatArray) -> FloatArray:
         """Image points (views, N, 2) of positions (N, 3) x, y, z of the grid."""

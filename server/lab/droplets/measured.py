@@ -9,7 +9,7 @@ from pydantic import Field
 
 from daq.frozen_model import FrozenModel
 from processing.analysis.droplets.droplet_file import DropletFileError, StoredDroplets, read_droplets
-from processing.analysis.droplets.droplet_statistics import DropletStatistics, droplet_statistics
+from processing.analysis.droplets.droplet_statistics import DropletStatistics, droplet_statistics, hidden_share
 from processing.analysis.droplets.measured_exposure import ShotVerdict
 from processing.runs.measurement import droplets_path
 from server.lab.errors import Damaged, NotFound
@@ -24,6 +24,9 @@ class ShotOfDroplets(FrozenModel):
     verdict: Annotated[ShotVerdict, Field(description="what they are good for")]
     reasons: Annotated[tuple[str, ...], Field(description="why it is no better, and what to do")]
     residual_over_noise: Annotated[float | None, Field(description="1 is noise; null where nothing was fitted")]
+    hidden_share: Annotated[
+        float, Field(description="of the volume: in, before or behind liquid that is no droplet, not measured")
+    ]
 
 
 class MeasuredRun(FrozenModel):
@@ -77,4 +80,5 @@ def _told(stored: StoredDroplets) -> ShotOfDroplets:
         verdict=max(verdicts, key=list(ShotVerdict).index),
         reasons=tuple(dict.fromkeys(reason for exposure in exposures for reason in exposure["reasons"])),
         residual_over_noise=max(ratios, default=None),
+        hidden_share=max(map(hidden_share, exposures), default=0.0),
     )

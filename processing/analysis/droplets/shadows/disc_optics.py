@@ -37,9 +37,7 @@ def _edge_blur_px(image: Image) -> float:
     return float(np.clip(np.sqrt(max(0.1592 / slope**2 - 1 / 3, 0)), LEAST_BLUR_PX, MOST_BLUR_PX))
 
 
-def refined_disc_optics(
-    seen: DiscImages, optics: DiscOptics, discs: Discs, drawn: Sequence[Image], *, depths: bool
-) -> DiscOptics:
+def refined_disc_optics(seen: DiscImages, optics: DiscOptics, discs: Discs, drawn: Sequence[Image]) -> DiscOptics:
     """One Gauss-Newton step of level, shift and blur of all views, all discs fixed.
 
     Parameters
@@ -50,11 +48,9 @@ def refined_disc_optics(
         Where to begin.
     drawn : sequence of (rows, columns) float32 arrays
         What these discs let through, as one product.
-    depths : bool
-        Whether the blur may change with depth.
     """
     middle, half = _depth_range(seen)
-    powers = _powers(middle, half)[: 3 if depths else 1]
+    powers = _powers(middle, half)
     changed = [
         seen.drawn(replace(optics, variances_px2=optics.variances_px2 + STEP_PX2 * power), discs).transmissions
         for power in powers

@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 
 from processing.analysis.droplets.candidates import candidates
+from processing.analysis.droplets.droplet_search import Window
 from processing.analysis.droplets.gaussian_blobs import Image
 from processing.analysis.droplets.shadows.opaque_discs import DiscImages
 from processing.geometry import FloatArray
@@ -36,6 +37,8 @@ class Stage:
         see black.
     hidden : bool
         Whether such candidates are looked for in this round: that takes longer.
+    masked : bool
+        Whether pixels of which nothing is known agree with any candidate, in all views.
     """
 
     smooth_px: float
@@ -43,9 +46,12 @@ class Stage:
     coarse: bool = False
     joker: bool = False
     hidden: bool = False
+    masked: bool = False
 
 
-def shadow_peaks(plan: Plan, seen: DiscImages, drawn: Sequence[Image], stage: Stage) -> FloatArray:
+def shadow_peaks(
+    plan: Plan, seen: DiscImages, drawn: Sequence[Image], stage: Stage, windows: Sequence[Window] = ()
+) -> FloatArray:
     """Peaks (N, 4): x, y, z in voxels of the plan, and the share of the light that all views miss there.
 
     Parameters
@@ -58,11 +64,13 @@ def shadow_peaks(plan: Plan, seen: DiscImages, drawn: Sequence[Image], stage: St
         Transmissions of the droplets that are known.
     stage : Stage
         What to look for.
+    windows : sequence of (rows, columns) slices
+        As of ``candidates``.
     """
     gains = np.ones(len(drawn))
     return np.concatenate(
         [
-            candidates(plan, views, gains, SEEN_FROM_ASIDE * stage.threshold, seen.threads)
+            candidates(plan, views, gains, SEEN_FROM_ASIDE * stage.threshold, seen.threads, windows)
             for views in _missing(seen, drawn, stage)
         ]
     )
@@ -76,7 +84,8 @@ def _missing(seen: DiscImages, drawn: Sequence[Image], stage: Stage) -> Iterator
         share = (model - image) / np.maximum(model, np.float32(most))
         black, known = model <= most, weight > 0
         unseen.append(black | ~known)
-        shares.append(np.where(black, np.float32(0 if stage.joker else 1), share) * known)
+        share = np.where(black, np.float32(0 if stage.joker else 1), share)
+        shares.append(np.where(known, share, np.float32(stage.masked)))
     smoothed = [_smoothed(share, stage.smooth_px) for share in shares]
     yield smoothed
     for view in range(len(drawn)) if stage.hidden else ():

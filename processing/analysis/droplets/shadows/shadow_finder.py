@@ -21,6 +21,8 @@ from processing.analysis.droplets.candidates import close_pairs, foremost
 from processing.analysis.droplets.droplet_search import CANDIDATE_PITCH_VOXEL, DropletSearch
 from processing.analysis.droplets.gaussian_blobs import Image
 from processing.analysis.droplets.shadows.disc_optics import first_disc_optics, refined_disc_optics
+from processing.analysis.droplets.shadows.judged_volume import judging_views, knowing_views
+from processing.analysis.droplets.shadows.masked_liquid import liquid_masks, liquid_objects
 from processing.analysis.droplets.shadows.opaque_discs import (
     NO_DISC,
     DiscImages,
@@ -53,8 +55,10 @@ PURGES, SETTLED = 3, 0.995
 UNDISPUTED_SHARE, UNDISPUTED_SIGMAS = 0.75, 15.0
 """The squared radius that a view alone would give: over that of all, in the view that gives least; and over its
 standard deviation, in the view that gives the second least."""
-SUPPORTING_VIEWS, SUPPORT_SHARE, SUPPORT_SIGMAS = 3, 0.4, 5.0
-"""So many views, or all where there are fewer, must give a droplet such a share of its squared radius, so surely."""
+SUPPORT_SHARE, SUPPORT_SIGMAS = 0.4, 5.0
+"""Views that judge a droplet must give it such a share of its squared radius, so surely."""
+MASKED_ROUNDS = 2
+"""For droplets that most views see through masks: they explain what is left, and are not told."""
 OPTICS_EVERY = 2
 """Rounds from one estimate of optics and defects to the next."""
 APART_VOXEL, APART_RADII = 1.2, 0.7
@@ -99,6 +103,7 @@ class _Finder:
     def __init__(self, shot: Transmissions, search: DropletSearch) -> None:
         self._shot = shot
         self._search = search
+        self._into_grid = shot.cut(search.pixels_into_grid())
         self._last: tuple[Discs, DiscOptics, list[Image]] | None = None
 
     def fallen(self, fit: ShadowFit, first: float, rounds: int, *, joker: bool) -> ShadowFit:
@@ -129,18 +134,31 @@ class _Finder:
         """Candidates enter, all are fitted, some are dropped; then optics and defects are estimated anew."""
         fit = self._fitted(self._joined(fit, stage), stage)
         if stage.joker and len(fit.discs):
-            least = min(SUPPORTING_VIEWS, len(self._shot.images))
+            least = np.clip(self._knowing(fit), 1, judging_views(len(self._shot.images)))
             fit = fit.where(supporting_views(self._supports(fit)) >= least)
         if estimate and len(fit.discs):
-            fit = self._estimated(fit, depths=unite, unite=unite)
+            fit = self._estimated(self._masked(fit) if unite else fit, unite=unite)
         return fit
+
+    def _masked(self, fit: ShadowFit) -> ShadowFit:
+        """Discs in a row, and those that touch what has been found to be liquid before, are no droplets."""
+        known = len(fit.liquid)
+        liquid = liquid_objects(fit.liquid.joined_by(fit.discs.positions_voxel, fit.discs.squares_voxel2))[known:] >= 0
+        if not liquid.any():
+            return fit
+        more = fit.discs.where(liquid)
+        joined = fit.liquid.joined_by(more.positions_voxel, more.squares_voxel2)
+        masks = liquid_masks(joined, self._shot.lattice, fit.optics, [image.shape for image in self._shot.images])
+        return replace(fit.where(~liquid), liquid=joined, masks=masks)
 
     def undisputed(self, fit: ShadowFit) -> ShadowFit:
         """Without the droplets that some view disputes."""
         return fit.where(undisputed(self._supports(fit)))
 
     def finished(self, fit: ShadowFit) -> ShadowFit:
-        """The droplets in place, all of them significant."""
+        """The droplets in place, all of them significant, and those that masks leave too few views for."""
+        for _ in range(MASKED_ROUNDS if fit.masks else 0):
+            fit = self.round(fit, Stage(SHARP_PX, _last(fit), joker=True, masked=True), estimate=True, unite=True)
         if not len(fit.discs):
             return fit
         seen = self._seen(fit)
@@ -150,7 +168,7 @@ class _Finder:
     def _joined(self, fit: ShadowFit, stage: Stage) -> ShadowFit:
         drawn = self._drawn(fit)
         seen = seen_by(self._shot, fit, drawn)
-        peaks = shadow_peaks(self._search.plan, seen, drawn, stage)
+        peaks = shadow_peaks(self._search.plan, seen, drawn, stage, self._shot.windows)
         blur_voxel = self._blur_voxel(fit)
         width_voxel = float(np.hypot(blur_voxel, stage.smooth_px))
         alone = foremost(peaks, max(1.0, 1.5 * width_voxel / CANDIDATE_PITCH_VOXEL))
@@ -178,14 +196,15 @@ class _Finder:
                 seen = replace(seen, weights=seen_by(self._shot, fit, shadows.transmissions).weights)
         return fit.with_discs(_inside(merged_discs(discs), self._search))
 
-    def _estimated(self, fit: ShadowFit, *, depths: bool, unite: bool) -> ShadowFit:
+    def _estimated(self, fit: ShadowFit, *, unite: bool) -> ShadowFit:
         seen = self._seen(fit)
-        optics = refined_disc_optics(seen, fit.optics, fit.discs, self._drawn(fit), depths=depths)
-        fit = replace(fit, optics=optics)
+        judging = replace(seen, weights=tuple(map(np.multiply, seen.weights, self._into_grid)))
+        fit = replace(fit, optics=refined_disc_optics(judging, fit.optics, fit.discs, self._drawn(fit)))
         if unite:
             fit = replace(fit, defects=union_defects(seen, fit.optics, fit.discs))
             drawn = self._drawn(fit)
-            fit = replace(fit, noises=self._shot.noises_of(residuals(seen_by(self._shot, fit, drawn), drawn)))
+            left = residuals(seen_by(self._shot, fit, drawn), drawn)
+            fit = replace(fit, noises=self._shot.masked(fit.masks).noises_of(left))
         return fit
 
     def _recorded(self) -> DiscImages:
@@ -198,6 +217,9 @@ class _Finder:
     def _supports(self, fit: ShadowFit) -> DiscSupports:
         shadows = self._recorded().drawn(fit.optics, fit.discs)
         return seen_by(self._shot, fit, shadows.transmissions).supports(shadows, fit.optics, fit.discs)
+
+    def _knowing(self, fit: ShadowFit) -> NDArray[np.int64]:
+        return knowing_views(self._shot, fit, fit.discs.positions_voxel)
 
     def _left(self, fit: ShadowFit) -> float:
         drawn = self._drawn(fit)

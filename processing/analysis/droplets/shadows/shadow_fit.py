@@ -2,17 +2,22 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from processing.analysis.droplets.droplet_search import Window
 from processing.analysis.droplets.gaussian_blobs import Image
 from processing.analysis.droplets.image_noise import noise_of
+from processing.analysis.droplets.shadows.masked_liquid import Mask
 from processing.analysis.droplets.shadows.opaque_discs import DiscImages, DiscOptics, Discs
 from processing.analysis.droplets.sight_lattice import SightLattice
 from processing.geometry import FloatArray
 
+AnyPixel = TypeVar("AnyPixel", bound=np.generic)
+NO_DISCS = Discs.none()
 CALIBRATION_PX = 0.03
 """What calibration and lattice leave of a position: where the model has edges, it is an error of the image."""
 
@@ -31,12 +36,28 @@ class Transmissions:
         Of the same views.
     threads : int
         Nothing depends on it.
+    windows : tuple of (rows, columns) slices
+        What these are of the recorded images; empty: all of them. The lattice is that of the windows.
     """
 
     images: tuple[Image, ...]
     trust: tuple[Image, ...]
     lattice: SightLattice
     threads: int = 1
+    windows: tuple[Window, ...] = ()
+
+    def cut(self, images: Sequence[NDArray[AnyPixel]]) -> tuple[NDArray[AnyPixel], ...]:
+        """The windows of whole images."""
+        if not self.windows:
+            return tuple(images)
+        return tuple(image[window] for image, window in zip(images, self.windows, strict=True))
+
+    def masked(self, masks: Sequence[Mask]) -> "Transmissions":
+        """The same, with nothing known of masked pixels; no masks, no change."""
+        if not masks:
+            return self
+        trust = tuple(np.where(mask, np.float32(0), one) for mask, one in zip(masks, self.trust, strict=True))
+        return replace(self, trust=trust)
 
     def noises_of(self, images: Sequence[Image]) -> FloatArray:
         """Standard deviations (K,) of the noise of typical pixels in what is left of the images, or in the images."""
@@ -59,12 +80,18 @@ class ShadowFit:
         Of typical pixels.
     defects : tuple of (rows, columns) float32 arrays
         What the union of the discs lets through beyond the product of each; empty until it is known.
+    liquid : Discs
+        Those that explain what is no droplet.
+    masks : tuple of (rows, columns) bool arrays
+        Pixels that look through it, and have no say; empty where there is none.
     """
 
     discs: Discs
     optics: DiscOptics
     noises: FloatArray
     defects: tuple[Image, ...] = ()
+    liquid: Discs = NO_DISCS
+    masks: tuple[Mask, ...] = ()
 
     def with_discs(self, discs: Discs) -> "ShadowFit":
         """The same with other droplets."""
@@ -95,7 +122,9 @@ def seen_by(shot: Transmissions, fit: ShadowFit, drawn: Sequence[Image]) -> Disc
         images = [image - defect for image, defect in zip(images, fit.defects, strict=True)]
     weights = tuple(
         _weight(trust * np.float32((level / noise) ** 2), model)
-        for trust, level, noise, model in zip(shot.trust, fit.optics.levels, fit.noises, drawn, strict=True)
+        for trust, level, noise, model in zip(
+            shot.masked(fit.masks).trust, fit.optics.levels, fit.noises, drawn, strict=True
+        )
     )
     return DiscImages(tuple(images), weights, shot.lattice, shot.threads)
 

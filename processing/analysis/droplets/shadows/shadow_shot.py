@@ -11,6 +11,7 @@ from processing.analysis.droplets.droplet_table import SizedDroplets
 from processing.analysis.droplets.gaussian_blobs import Image
 from processing.analysis.droplets.ghost_share import GhostShare, pooled
 from processing.analysis.droplets.measured_exposure import (
+    Hidden,
     MeasuredExposure,
     RatioLimits,
     ShotVerdict,
@@ -20,8 +21,12 @@ from processing.analysis.droplets.measured_exposure import (
     ghosts_within,
     judged,
     judged_by_twins,
+    judged_by_volume,
     moved,
+    within_grid,
 )
+from processing.analysis.droplets.shadows.judged_volume import judging_views, knowing_views, unjudged_share
+from processing.analysis.droplets.shadows.masked_liquid import liquid_objects, lumps
 from processing.analysis.droplets.shadows.opaque_discs import DiscImages, Discs, Shadows
 from processing.analysis.droplets.shadows.shadow_finder import find_shadows, supporting_views
 from processing.analysis.droplets.shadows.shadow_fit import ShadowFit, Transmissions, rms_over_noise, seen_by
@@ -52,6 +57,8 @@ class SeenShadows:
         Where it is largest within the grid.
     shift_u_px, shift_v_px : float
         How far the image lies beside its calibration, apart from a common motion of all.
+    masked : float
+        Share of the pixels into the grid that look through liquid that is no droplet.
     """
 
     noise: float
@@ -61,6 +68,7 @@ class SeenShadows:
     most_blur_px: float
     shift_u_px: float
     shift_v_px: float
+    masked: float
 
 
 ShadowExposure = MeasuredExposure[SizedDroplets, SeenShadows]
@@ -113,15 +121,24 @@ def measure_shadows(
     fit = find_shadows(shot, search)
     shadows = _recorded(shot).drawn(fit.optics, fit.discs)
     seen = seen_by(shot, fit, shadows.transmissions)
-    judged_weights = tuple(map(np.multiply, seen.weights, into_grid))
+    judged_weights = tuple(map(np.multiply, seen.weights, shot.cut(into_grid)))
     ratio = rms_over_noise(replace(seen, weights=judged_weights), shadows.transmissions)
-    views = _seen(fit, search)
+    views = _seen(fit, search, _masked_shares(fit, shot.cut(into_grid)))
     beside_px = {name: float(np.hypot(view.shift_u_px, view.shift_v_px)) for name, view in views.items()}
     verdict, reasons = judged(beside_px, ratio, LIMITS)
     if verdict is ShotVerdict.REFUSED:
         return MeasuredExposure(SizedDroplets.none(), views, ratio, verdict, reasons)
-    told = MeasuredExposure(_droplets(seen, shadows, fit, search).within(search.grid), views, ratio, verdict, reasons)
-    if not twins or verdict is not ShotVerdict.GOOD:
+    known = knowing_views(shot, fit, fit.discs.positions_voxel) >= judging_views(len(images))
+    droplets = _droplets(seen, shadows, fit.where(known), search)
+    lump = lumps(fit.where(known).discs, droplets.residual)
+    hidden = Hidden(
+        liquid_objects=_counted(liquid_objects(fit.liquid)) + _counted(lump),
+        volume_share=unjudged_share(shot, fit, search),
+        droplets=int(np.count_nonzero(within_grid(fit.discs.positions_voxel[~known], search))),
+    )
+    droplets = droplets.where(lump < 0).within(search.grid)
+    told = judged_by_volume(MeasuredExposure(droplets, views, ratio, verdict, reasons, hidden=hidden))
+    if not twins or told.verdict is not ShotVerdict.GOOD:
         return told
     rng = np.random.default_rng(seed)
     return judged_by_twins(told, pooled(_twin_ghosts(shot, fit, search, rng) for _ in range(twins)))
@@ -138,12 +155,16 @@ def _unseen(trusts: Sequence[Image], into_grid: Sequence[NDArray[np.bool_]], nam
 
 def _looking(images: Sequence[Image], trusts: Sequence[Image], search: DropletSearch, threads: int) -> Transmissions:
     """Transmissions of pixels that look into what is searched; of others nothing is known, and no shadow is there."""
-    chosen = search.pixels_into_search()
+    chosen, windows = search.pixels_into_search(), search.windows()
+    known = zip(images, trusts, chosen, windows, strict=True)
+    seen = [(np.where(some, image, 1)[at], np.where(some, trust, 0)[at]) for image, trust, some, at in known]
+    origins_px = np.array([(columns.start, rows.start) for rows, columns in windows], dtype=np.float64)
     return Transmissions(
-        tuple(np.where(some, image, 1).astype(np.float32) for image, some in zip(images, chosen, strict=True)),
-        tuple(np.where(some, trust, 0).astype(np.float32) for trust, some in zip(trusts, chosen, strict=True)),
-        search.lattice,
+        tuple(image.astype(np.float32) for image, _ in seen),
+        tuple(trust.astype(np.float32) for _, trust in seen),
+        search.lattice.within(origins_px),
         threads,
+        windows,
     )
 
 
@@ -170,7 +191,18 @@ def _recorded(shot: Transmissions) -> DiscImages:
     return DiscImages(shot.images, shot.trust, shot.lattice, shot.threads)
 
 
-def _seen(fit: ShadowFit, search: DropletSearch) -> dict[str, SeenShadows]:
+def _counted(numbers: NDArray[np.intp]) -> int:
+    """How many objects are numbered, from 0."""
+    return int(numbers.max(initial=-1)) + 1
+
+
+def _masked_shares(fit: ShadowFit, into_grid: Sequence[NDArray[np.bool_]]) -> list[float]:
+    if not fit.masks:
+        return [0.0] * len(into_grid)
+    return [float(np.mean(mask[chosen])) for mask, chosen in zip(fit.masks, into_grid, strict=True)]
+
+
+def _seen(fit: ShadowFit, search: DropletSearch, masked: Sequence[float]) -> dict[str, SeenShadows]:
     margin = (search.searched.shape[0] - search.grid.shape[0]) // 2
     z_voxel = margin + np.arange(search.grid.shape[0], dtype=np.float64)
     blurs_px = fit.optics.blurs_px(z_voxel)
@@ -182,6 +214,7 @@ def _seen(fit: ShadowFit, search: DropletSearch) -> dict[str, SeenShadows]:
             search.grid.z_mm[blurs_px.argmin(axis=1)],
             blurs_px.max(axis=1),
             fit.optics.shifts_px,
+            masked,
         ]
     )
     return {name: SeenShadows(*row) for name, row in zip(search.names, rows.tolist(), strict=True)}
@@ -218,5 +251,6 @@ def _twin_ghosts(shot: Transmissions, fit: ShadowFit, search: DropletSearch, rng
         (np.float32(level) * (image + defect) + rng.normal(0, noise, image.shape)).astype(np.float32)
         for image, defect, level, noise in zip(drawn, defects, fit.optics.levels, fit.noises, strict=True)
     )
-    found = find_shadows(replace(shot, images=images, trust=tuple(map(np.ones_like, images))), search).discs
+    trust = replace(shot, trust=tuple(map(np.ones_like, images))).masked(fit.masks).trust
+    found = find_shadows(replace(shot, images=images, trust=trust), search).discs
     return ghosts_within(found.positions_voxel, truth.positions_voxel, search)
