@@ -14,6 +14,7 @@ from processing.figures.colours import FRAME_COLOURS
 MARKED = {"d10_um": "D10", "d32_um": "D32", "dv50_um": "Dv0.5"}
 SMALLEST_PT2, LARGEST_PT2 = 4.0, 300.0
 """Areas of markers."""
+MOST_TICKS = 8
 
 
 def sizes_figure(shots: Sequence[StoredDroplets], title: str = "") -> Figure:
@@ -79,7 +80,10 @@ def droplets_in_space_figure(droplets: StoredDroplets, title: str = "") -> Figur
             )
     axes.set(xlabel="x [mm]", ylabel="z [mm]", zlabel="y [mm]")
     axes.invert_zaxis()
-    axes.set_box_aspect(_extents(columns["x_mm"], columns["z_mm"], columns["y_mm"]))
+    extents_mm = _extents(columns["x_mm"], columns["z_mm"], columns["y_mm"])
+    axes.set_box_aspect(extents_mm)
+    for axis, extent_mm in zip("xyz", extents_mm, strict=True):
+        axes.locator_params(axis=axis, nbins=max(2, round(MOST_TICKS * extent_mm / max(extents_mm))))
     if sizes.size:
         unit = " µm" if by == DIAMETER else ""
         axes.legend(title=f"{by.removesuffix('_um')} {sizes.min():.3g} to {sizes.max():.3g}{unit}", fontsize="small")

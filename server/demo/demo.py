@@ -1,4 +1,4 @@
-"""The demonstration: the whole chain on the simulated bench, from the target on its stage to judged volumes."""
+"""The demonstration: the whole chain on the simulated bench, from the target on its stage to volumes and droplets."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -29,6 +29,7 @@ from processing.runs.workbench import Workbench
 from processing.synthetic.spray import droplet_volume
 from processing.synthetic.truth_file import read_true_cameras, read_true_spray
 from processing.volume import VoxelGrid
+from server.demo.demo_droplets import MeasuredDroplets, measure_droplets
 from server.rig.assembly import AssembledRig, open_rig
 from server.rig.config import ConfigError, RigConfig, load_config
 from server.rig.rig_lock import hold_data_dir
@@ -69,6 +70,7 @@ class Demonstration:
     results: tuple[ShotResult, ...]
     results_dir: Path
     quality_factors: tuple[float, ...]
+    droplets: MeasuredDroplets
     shots_planned: int
     shots_recorded: int
     shots_valid: int
@@ -78,7 +80,7 @@ class Demonstration:
 def demonstrate(
     config_file: Path, out: Path, shots: int, progress: Progress, firmware: str | None = None
 ) -> Demonstration:
-    """Calibrate, record dark, background and samples, reconstruct each shot, compare with the truth.
+    """Calibrate, record dark, background and samples, reconstruct each shot, measure one, compare with the truth.
 
     ``firmware`` stands for the configuration's ``simulation.firmware``.
 
@@ -107,6 +109,11 @@ def demonstrate(
             progress(f"reconstructing shot {shot} by {settings.method.value}")
             file = calibration_path(out, calibration.id)
             results.append(reconstruct_shot(sample, shot, file, settings, results_dir, workbench=workbench))
+    with watch.step("measure"):
+        progress(f"measuring the droplets of shot {valid[0]} in a box downstream of the break-up")
+        droplets = measure_droplets(
+            sample, valid[0], calibration, calibration_path(out, calibration.id), sample / TRUTH_FILE
+        )
     with watch.step("judge"):
         progress("comparing with the truth")
         qualities = tuple(_quality(sample, results_dir, result.shot) for result in results)
@@ -117,6 +124,7 @@ def demonstrate(
         results=tuple(results),
         results_dir=results_dir,
         quality_factors=qualities,
+        droplets=droplets,
         shots_planned=shots,
         shots_recorded=recorded,
         shots_valid=len(results),

@@ -6,13 +6,16 @@ from typing import Any
 import numpy as np
 
 from daq.files.run_directory import RunReader
+from processing.figures.found_figures import found_figure
 from processing.figures.residual_figures import residuals_figure
+from processing.figures.size_figures import droplets_in_space_figure, sizes_figure
 from processing.figures.volume_figures import isosurface_figure, shadowgraph_figure, slices_figure
 from processing.preprocessing import Intensity
 from processing.reconstruction.volume_file import read_volume
 from processing.runs.results_file import volume_path
 from processing.volume import VoxelGrid
 from server.demo.demo import Demonstration
+from server.demo.demo_droplets import COUNTED_UM, MeasuredDroplets
 from server.demo.report import Picture, Section, Table, write_report
 
 DETAIL_MM = 4.0
@@ -36,8 +39,22 @@ def summary(demo: Demonstration, report: Path) -> dict[str, Any]:
             for name, view in demo.calibration.views.items()
         },
         "quality_factor": float(np.mean(demo.quality_factors)),
+        "droplets": _measured(demo.droplets),
         "seconds": demo.seconds,
         "report": str(report),
+    }
+
+
+def _measured(droplets: MeasuredDroplets) -> dict[str, Any]:
+    d32_um = droplets.statistics.d32_um
+    return {
+        **droplets.shot.model_dump(mode="json", exclude={"file"}),
+        "counted_from_um": COUNTED_UM,
+        "found_share": droplets.found_share,
+        "true_ghost_share": droplets.ghost_share,
+        "d32_um": None if d32_um is None else d32_um.model_dump(mode="json"),
+        "true_d32_um": droplets.true_d32_um,
+        "file": str(droplets.file),
     }
 
 
@@ -49,9 +66,23 @@ def readable_summary(result: dict[str, Any]) -> str:
         errors_px = "".join(f"{view[key]:12.4f}" for key in ("mean_error_px", "holdout_error_px", "true_error_px"))
         lines.append(f"{name:8}{errors_px}  {view['verdict']}")
     lines += ["", f"quality factor against the true scene: {result['quality_factor']:.3f}"]
+    lines.append(_droplets_line(result["droplets"]))
     lines.append("seconds: " + ", ".join(f"{step} {seconds:g}" for step, seconds in result["seconds"].items()))
     lines.append(f"report: {result['report']}")
     return "\n".join(lines)
+
+
+def _droplets_line(droplets: dict[str, Any]) -> str:
+    """What was measured of the droplets, or why nothing was."""
+    if droplets["d32_um"] is None:
+        return f"droplets: {droplets['verdict']}: {'; '.join(droplets['reasons'])}"
+    d32 = "D32 {value:.1f} um ({low:.1f} to {high:.1f})".format(**droplets["d32_um"])
+    return (
+        f"{droplets['droplets']} droplets, {droplets['verdict']}: {100 * droplets['found_share']:.1f} % of those from "
+        f"{droplets['counted_from_um']:g} um on found, {100 * droplets['true_ghost_share']:.1f} % ghosts, {d32}, "
+        f"true {droplets['true_d32_um']:.1f} um; {droplets['liquid_objects']} ligaments masked, "
+        f"{100 * droplets['hidden_share']:.1f} % of the volume hidden"
+    )
 
 
 def write_demo_report(demo: Demonstration, file: Path) -> None:
@@ -68,9 +99,49 @@ def write_demo_report(demo: Demonstration, file: Path) -> None:
         Section("Calibration", _CALIBRATION_TEXT, [_views(demo)], [_residuals(demo)]),
         Section("Shadowgraphs", pictures=[_shadowgraphs(demo.sample_run, first)]),
         Section("Volume", pictures=[Picture(slices_figure(volume, grid, title), "Slices and maximum projections")]),
+        _droplets_section(demo.droplets),
         Section("Detail", pictures=[_detail({name: entry[0] for name, entry in volumes.items()}, grid)]),
     ]
     write_report(file, f"tomoshadow: {demo.sample_run.name}", sections)
+
+
+_DROPLETS_TEXT = (
+    "A box downstream of the break-up, in both exposures of one shot. Nothing is given but the calibration; ligaments "
+    "are masked. Droplets that are hidden by them count as missed. The truth is that of the simulated bench."
+)
+
+
+def _droplets_section(droplets: MeasuredDroplets) -> Section:
+    """What was measured, where and how large, and beside it the truth; the reason where nothing could be."""
+    text = " ".join([_DROPLETS_TEXT, *droplets.shot.reasons])
+    if droplets.statistics.d32_um is None:
+        return Section("Droplets", text, [_droplets_table(droplets)])
+    pictures = [
+        Picture(droplets_in_space_figure(droplets.stored), "Measured droplets, larger ones larger"),
+        Picture(sizes_figure([droplets.stored]), "Distribution of their diameters, with 95 % intervals"),
+        Picture(
+            found_figure(droplets.found, droplets.missed, droplets.ghosts),
+            f"Against the truth, from {COUNTED_UM:g} µm on, both exposures",
+        ),
+    ]
+    return Section("Droplets", text, [_droplets_table(droplets)], pictures)
+
+
+def _droplets_table(droplets: MeasuredDroplets) -> Table:
+    shot, d32 = droplets.shot, droplets.statistics.d32_um
+    ratio = "" if shot.residual_over_noise is None else f"{shot.residual_over_noise:.2f}"
+    rows = [
+        ["droplets", f"{shot.droplets}"],
+        ["verdict", shot.verdict.value],
+        ["residual / noise", ratio],
+        [f"found, of those from {COUNTED_UM:g} µm on", f"{100 * droplets.found_share:.1f} %"],
+        ["ghosts among them", f"{100 * droplets.ghost_share:.1f} %"],
+        ["D32", "" if d32 is None else f"{d32.value:.1f} µm ({d32.low:.1f} to {d32.high:.1f})"],
+        ["true D32", f"{droplets.true_d32_um:.1f} µm"],
+        ["masked ligaments", f"{shot.liquid_objects}"],
+        ["volume that could not be measured", f"{100 * shot.hidden_share:.1f} %"],
+    ]
+    return Table(["", "box"], rows)
 
 
 _CALIBRATION_TEXT = (

@@ -23,9 +23,9 @@ TOUCHING = 1.25
 """Discs touch where their centres are closer than so many sums of their radii: places are known less well than that."""
 LEAST_DISCS, LEAST_LENGTH = 3, 2.4
 """So many discs that touch, over so many diameters of the largest, are no droplets."""
-PENETRATING, UNEXPLAINED = 0.7, 1.5
+CLOSE, UNEXPLAINED = 1.0, 1.5
 """Two discs closer than so many sums of their radii, around both of which the residual is so many times the noise, are
-a lump that is not round: droplets do not enter one another."""
+a lump that is not round: droplets do not touch, or become one."""
 BLUR_REACH_SIGMAS = 3.0
 """So far around a disc its shadow reaches."""
 MASK_SHIFT = 4
@@ -65,7 +65,7 @@ def lumps(discs: Discs, residual: FloatArray) -> NDArray[np.intp]:
     residual : (N,) array
         Root mean square of what is left around each, over the noise.
     """
-    pairs = touching_pairs(discs, PENETRATING)
+    pairs = touching_pairs(discs, CLOSE)
     labels = _linked(len(discs), pairs[np.all(residual[pairs] > UNEXPLAINED, axis=1)])
     lump = np.bincount(labels, minlength=1)[labels] > 1
     numbers = np.full(len(discs), -1, np.intp)

@@ -168,8 +168,8 @@ def test_objects_are_numbered() -> None:
     assert liquid_objects(Discs.none()).tolist() == []
 
 
-def test_discs_that_enter_one_another_and_explain_badly_are_a_lump() -> None:
+def test_discs_that_touch_and_explain_badly_are_a_lump() -> None:
     pair = np.array([[0, 0, 0], [1.2, 0, 0]], dtype=float)
-    discs = Discs(np.vstack([pair, pair + 30, [[60, 0, 0], [61.8, 0, 0]]]), np.ones(6))
+    discs = Discs(np.vstack([pair, pair + 30, [[60, 0, 0], [62.1, 0, 0]]]), np.ones(6))
     assert lumps(discs, np.array([2, 2, 2, 1.1, 2, 2], dtype=float)).tolist() == [0, 0, -1, -1, -1, -1]
     assert lumps(Discs.none(), np.empty(0)).tolist() == []

@@ -1,0 +1,136 @@
+"""Droplets of the demonstration: a box downstream of the break-up is measured in one shot, and judged by the truth."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from daq.files.run_directory import RunReader
+from processing.analysis.droplets.droplet_file import StoredDroplets, read_droplets
+from processing.analysis.droplets.droplet_statistics import DropletStatistics, droplet_statistics
+from processing.analysis.droplets.ghost_share import RADIUS_VOXEL, matches
+from processing.calibration.calibration import Calibration
+from processing.figures.found_figures import Placed
+from processing.reconstruction.settings import GridSettings
+from processing.runs.measurement import MeasureSettings, RunMeasurement, ShotDroplets
+from processing.runs.pipeline import default_grid
+from processing.synthetic.spray import LiquidKind, Spray
+from processing.synthetic.truth_file import read_true_spray
+from processing.volume import VoxelGrid
+
+HALF_WIDTH_MM, TOP_MM, BOTTOM_MM = 5.8, -1.1, -0.4
+"""Of the box, in x and z as wide as the cone and the droplets around it; the sheet ends 3 mm above."""
+COUNTED_UM = 30.0
+"""Droplets found and ghosts are counted from this diameter on."""
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredDroplets:
+    """What a shot says of the spray, and the truth.
+
+    Parameters
+    ----------
+    file : Path
+        Droplets of both exposures.
+    shot : ShotDroplets
+        What became of it.
+    stored : StoredDroplets
+        The droplets.
+    statistics : DropletStatistics
+        Of both exposures.
+    found, missed, ghosts : Placed
+        True droplets of both exposures that were found, true ones that were not, and found ones that are none; from
+        ``COUNTED_UM`` on. Droplets that liquid hides count as missed.
+    true_d32_um : float
+        Of all true droplets in the box.
+    """
+
+    file: Path
+    shot: ShotDroplets
+    stored: StoredDroplets
+    statistics: DropletStatistics
+    found: Placed
+    missed: Placed
+    ghosts: Placed
+    true_d32_um: float
+
+    @property
+    def found_share(self) -> float:
+        """Of the true droplets."""
+        return len(self.found) / max(len(self.found) + len(self.missed), 1)
+
+    @property
+    def ghost_share(self) -> float:
+        """Of the droplets that were found."""
+        return len(self.ghosts) / max(len(self.found) + len(self.ghosts), 1)
+
+
+def measured_box(calibration: Calibration) -> VoxelGrid:
+    """The box, one voxel per pixel."""
+    pitch_mm = default_grid(calibration).pitch_mm
+    nx, ny = (round(length_mm / pitch_mm) for length_mm in (2 * HALF_WIDTH_MM, BOTTOM_MM - TOP_MM))
+    return VoxelGrid((nx, ny, nx), (-HALF_WIDTH_MM, TOP_MM, -HALF_WIDTH_MM), pitch_mm)
+
+
+def measure_droplets(
+    run_dir: Path, shot: int, calibration: Calibration, calibration_file: Path, truth_file: Path
+) -> MeasuredDroplets:
+    """Measure the box in both exposures of a shot, and compare with the truth."""
+    grid = measured_box(calibration)
+    settings = MeasureSettings(polarity="shadow", grid=GridSettings.of(grid))
+    results_dir = run_dir / "results" / settings.results_id(calibration.id)
+    with RunReader(run_dir) as run:
+        told = RunMeasurement.of(run, shot, calibration_file, settings).measure(shot, results_dir).summary
+        sprays = _true_sprays(run, shot, truth_file)
+    stored = read_droplets(results_dir / told.file)
+    found, missed, ghosts = zip(*(_judged(stored, frame, spray, grid) for frame, spray in sprays.items()), strict=True)
+    true_mm = np.concatenate([_droplets(spray).inside(grid).diameters_mm for spray in sprays.values()])
+    return MeasuredDroplets(
+        file=results_dir / told.file,
+        shot=told,
+        stored=stored,
+        statistics=droplet_statistics([stored]),
+        found=_joined(found),
+        missed=_joined(missed),
+        ghosts=_joined(ghosts),
+        true_d32_um=1000 * float(np.sum(true_mm**3) / np.sum(true_mm**2)),
+    )
+
+
+def _true_sprays(run: RunReader, shot: int, truth_file: Path) -> Mapping[str, Spray]:
+    """The liquid of both exposures: that of A is on file, and flies on until the second pulse."""
+    fired = run.read_shot(shot).fired
+    if fired is None:
+        raise ValueError(f"shot {shot} names no firing")
+    first, second = next(iter(fired.pulses.values()))
+    spray = read_true_spray(truth_file, fired.sequence).spray
+    return {"a": spray, "b": spray.advanced(1e-9 * (second.start_ns - first.start_ns))}
+
+
+def _droplets(spray: Spray) -> Spray:
+    return spray.of_kind(LiquidKind.DROPLET)
+
+
+def _judged(stored: StoredDroplets, frame: str, spray: Spray, grid: VoxelGrid) -> tuple[Placed, Placed, Placed]:
+    """Found and missed true droplets, and ghosts."""
+    columns = {name: column[stored.columns["frame"] == frame] for name, column in stored.columns.items()}
+    told = Placed(
+        np.column_stack([columns[f"{axis}_mm"] for axis in "xyz"]), np.asarray(columns["diameter_um"], np.float64)
+    )
+    truth, within, radius_mm = _droplets(spray), _droplets(spray).inside(grid), RADIUS_VOXEL * grid.pitch_mm
+    ghost = matches(told.points_mm, truth.positions_mm, radius_mm)[0] < 0
+    missed = matches(told.points_mm, within.positions_mm, radius_mm)[1] < 0
+    true = Placed(within.positions_mm, 1000 * within.diameters_mm)
+    return _counted(true, ~missed), _counted(true, missed), _counted(told, ghost)
+
+
+def _counted(droplets: Placed, chosen: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]) -> Placed:
+    counted = chosen & (droplets.diameters_um > COUNTED_UM)
+    return Placed(droplets.points_mm[counted], droplets.diameters_um[counted])
+
+
+def _joined(parts: tuple[Placed, ...]) -> Placed:
+    return Placed(
+        np.concatenate([part.points_mm for part in parts]), np.concatenate([part.diameters_um for part in parts])
+    )

@@ -1,0 +1,18 @@
+"""Found, missed and ghosts are drawn with their numbers."""
+
+import numpy as np
+from matplotlib.patches import Rectangle
+
+from processing.figures.found_figures import Placed, found_figure
+
+
+def test_every_group_is_named_with_its_number_and_counted_by_size() -> None:
+    rng = np.random.default_rng(0)
+    groups = [Placed(rng.normal(size=(count, 3)), rng.uniform(30, 90, count)) for count in (20, 3, 0)]
+    figure = found_figure(*groups, title="shot 0")
+    above, by_size = figure.axes
+    legend = above.get_legend()
+    assert legend is not None
+    assert [text.get_text() for text in legend.get_texts()] == ["found: 20", "missed: 3", "ghosts: 0"]
+    heights = [patch.get_height() for patch in by_size.patches if isinstance(patch, Rectangle)]
+    assert sum(heights) == 23
