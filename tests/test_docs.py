@@ -198,6 +198,17 @@ def test_the_code_that_reads_runs_reads_them() -> None:
 
 
 @pytest.mark.usefixtures("workplace")
+def test_five_lines_give_a_d32_with_its_interval(capsys: pytest.CaptureFixture[str]) -> None:
+    folder = Path("demo-out/runs/demo_sample/results/droplets-0")
+    folder.mkdir(parents=True)
+    shutil.copy(next((OLD_DATA / "droplets" / "shadows").rglob("*_droplets.h5")), folder)
+    (block,) = (block for block in python_of(DOCS / "measure.md") if "demo-out" in block)
+    assert len([line for line in block.splitlines() if line]) == 5
+    exec(compile(block, "measure.md", "exec"), {})
+    assert re.fullmatch(r"D32 \d+\.\d um, 95 % between \d+\.\d and \d+\.\d", capsys.readouterr().out.strip())
+
+
+@pytest.mark.usefixtures("workplace")
 def test_the_first_hour_goes_as_written(capsys: pytest.CaptureFixture[str]) -> None:
     """What it does with images from elsewhere, on those of a small rig, whose calibration stands for the slow fit."""
     page = DOCS / "first-hour.md"

@@ -16,7 +16,7 @@ from processing.synthetic.paper_rig import TABLE_1
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "measured.md"
-STUDIES = ("density", "ghosts", "average", "residuals", "calibration", "sensitivity", "droplets")
+STUDIES = ("density", "ghosts", "average", "residuals", "calibration", "sensitivity", "droplets", "sizes")
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,23 @@ def _demonstration(said: Mapping[str, Any]) -> str:
     head = ("view", "mean error [px]", "on planes not seen [px]", "true error, largest in the volume [px]", "verdict")
     rows = [(name, *(f"{view[key]:.4f}" for key in errors), view["verdict"]) for name, view in said["views"].items()]
     quality = f"Quality factor of MLOS against the true spray: {said['quality_factor']:.2f}"
-    return f"{_markdown(head, rows)}\n{quality}; {said['shots_valid']} of {said['shots_planned']} shots valid.\n"
+    shots = f"{said['shots_valid']} of {said['shots_planned']} shots valid.\n"
+    return f"{_markdown(head, rows)}\n{quality}; {shots}\n{_measured(said['droplets'])}"
+
+
+def _measured(said: Mapping[str, Any]) -> str:
+    """A table of the droplets of the demonstration."""
+    d32 = "{value:.1f} ({low:.1f} to {high:.1f})".format(**said["d32_um"])
+    shares = (f"{100 * said[key]:.1f} %" for key in ("found_share", "true_ghost_share", "hidden_share"))
+    head = (
+        f"found, from {said['counted_from_um']:g} µm on",
+        "ghosts",
+        "volume hidden",
+        "D32 [µm]",
+        "true D32 [µm]",
+        "verdict",
+    )
+    return _markdown(head, [(*shares, d32, f"{said['true_d32_um']:.1f}", said["verdict"])])
 
 
 def _airy_disks(said: Mapping[str, Any]) -> str:

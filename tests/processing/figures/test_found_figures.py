@@ -8,8 +8,8 @@ from processing.figures.found_figures import Placed, found_figure
 
 def test_every_group_is_named_with_its_number_and_counted_by_size() -> None:
     rng = np.random.default_rng(0)
-    groups = [Placed(rng.normal(size=(count, 3)), rng.uniform(30, 90, count)) for count in (20, 3, 0)]
-    figure = found_figure(*groups, title="shot 0")
+    found, missed, ghosts = (Placed(rng.normal(size=(count, 3)), rng.uniform(30, 90, count)) for count in (20, 3, 0))
+    figure = found_figure(found, missed, ghosts, "shot 0")
     above, by_size = figure.axes
     legend = above.get_legend()
     assert legend is not None
