@@ -127,7 +127,7 @@ def test_views_that_disagree_say_so_and_views_that_agree_leave_the_noise_alone()
     supports = disputed.supports(disputed.drawn(OPTICS, true), OPTICS, true)
     expected = 0.15 / supports.alone_sd[0, 0] / np.sqrt(3)
     assert expected > 2
-    assert supports.disagreement == pytest.approx(expected, rel=0.2)  # shadows are compared as wholes, not by their edges
+    assert supports.disagreement == pytest.approx(expected, rel=0.2)  # shadows are compared as wholes, not edges
 
 
 def test_the_truth_is_a_fixed_point_of_the_fit() -> None:
