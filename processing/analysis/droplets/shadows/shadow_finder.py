@@ -50,8 +50,8 @@ NOISE_SIGMAS, SIGNIFICANCE = 4.0, 5.0
 """No candidate is fainter than so many standard deviations of its shadow, and no droplet than of its squared radius."""
 COARSE_LEAST, SHARP_LEAST = 0.15, 0.5
 """Droplets with a fainter shadow are dropped: absolute, and as a share of the threshold."""
-PURGES, SETTLED = 3, 0.995
-"""So often at most disputed droplets are dropped and found anew; it ends when the others become no more."""
+PURGES, SETTLED = 6, 0.003
+"""So often at most disputed droplets are dropped and found anew; it ends when the others stay as many, about."""
 UNDISPUTED_SHARE, UNDISPUTED_SIGMAS = 0.75, 15.0
 """The squared radius that a view alone would give: over that of all, in the view that gives least; and over its
 standard deviation, in the view that gives the second least."""
@@ -90,7 +90,7 @@ def find_shadows(shot: Transmissions, search: DropletSearch) -> ShadowFit:
     fit = finder.undisputed(finder.fallen(fit, FIRST, FALLING_ROUNDS, joker=False))
     known = 0
     for _ in range(PURGES):
-        if SETTLED * len(fit.discs) <= known:
+        if abs(len(fit.discs) - known) <= SETTLED * known:
             break
         known = len(fit.discs)
         fit = finder.undisputed(finder.fallen(fit, AGAIN, AGAIN_ROUNDS, joker=True))
