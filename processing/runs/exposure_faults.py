@@ -1,18 +1,25 @@
 """What is wrong with the images of an exposure, so that its volume may look fine and be none: told with the volume."""
 
-from collections.abc import Sequence
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
 
 from daq.files.run_directory import RunReader, Shot
 from processing.light import odd_light
 from processing.preprocessing import Frame, Intensity, is_dim
+from processing.reconstruction.volume_file import open_volume
 from processing.runs.errors import PipelineError
 from processing.runs.results_file import FrameName
 from processing.runs.workbench import References
 
+Faults = Mapping[str, tuple[str, ...] | Mapping[str, str]]
+FAULTS = ("blind_views", "dim_views", "odd_light")
+
 
 def exposure_faults(
     run: RunReader, shot: Shot, frame: FrameName, images: Sequence[Intensity], references: References
-) -> dict[str, tuple[str, ...] | dict[str, str]]:
+) -> Faults:
     """Views that see nothing, that are dim, and whose light is odd; as ``VolumeRecord`` keeps them."""
     bits = {view: run.header.views[view].bits for view in shot.views}
     return {
@@ -20,6 +27,13 @@ def exposure_faults(
         "dim_views": tuple(view for view in bits if is_dim(grey_values(shot, view, frame), bits[view])),
         "odd_light": _odd_light(run, shot, frame, references),
     }
+
+
+def stored_faults(volume_file: Path) -> Mapping[str, Any]:
+    """Shot and faults of a stored volume; empty if it tells none."""
+    with open_volume(volume_file) as volume:
+        told = {name: json.loads(str(volume.provenance[name])) for name in FAULTS if name in volume.provenance}
+        return {"shot": volume.provenance["shot"], **told} if told else {}
 
 
 def grey_values(shot: Shot, view: str, frame: FrameName) -> Frame:

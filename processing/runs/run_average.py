@@ -1,8 +1,9 @@
 """The mean volume of recorded shots, straight from their images: no volume of a single exposure is kept."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from processing.reconstruction.mean_line_of_sight import mean_line_of_sight
 from processing.reconstruction.planning.plan import plan_reconstruction
 from processing.reconstruction.reconstructor import Reconstructor
 from processing.reconstruction.settings import ReconstructionSettings
+from processing.runs.exposure_faults import exposure_faults
 from processing.runs.pipeline import default_grid, require_match, shot_intensities
 from processing.runs.results_file import FrameName
 from processing.runs.workbench import read_references
@@ -34,11 +36,14 @@ class RunAverage:
         Where it lies.
     exposures : int
         How many.
+    faults : tuple
+        Shots whose images may be wrong, and how: ``shot``, and what ``exposure_faults`` has found.
     """
 
     volume: Intensity
     grid: VoxelGrid
     exposures: int
+    faults: tuple[Mapping[str, Any], ...]
 
 
 def average_run(
@@ -83,12 +88,13 @@ def average_run(
         require_match(run_dir.name, first, calibration)
         mappings = [calibration.views[view].mapping for view in first.views]
         plan = plan_reconstruction(mappings, grid, settings.accuracy, list(first.views))
-        exposures = _exposures(run, shots, frame, calibration, settings, done, threads)
+        faults: list[Mapping[str, Any]] = []
+        exposures = _exposures(run, shots, frame, calibration, settings, done, threads, faults)
         if settings.method.iterative:
             volume = _mean_of_each(Reconstructor.of(plan, settings, threads), exposures)
         else:
             volume = mean_line_of_sight(plan, exposures, settings.method, threads=threads)
-        return RunAverage(volume, grid, len(shots))
+        return RunAverage(volume, grid, len(shots), tuple(faults))
 
 
 def _exposures(
@@ -99,12 +105,17 @@ def _exposures(
     settings: ReconstructionSettings,
     done: Callable[[int, int], None],
     threads: int,
+    faults: list[Mapping[str, Any]],
 ) -> Exposures:
+    """Images of exposure after exposure; those that may be wrong are added to ``faults``."""
     references = read_references(run)
     for count, index in enumerate(shots, start=1):
         shot = run.read_shot(index)
         require_match(run.header.run_id, shot, calibration)
-        yield shot_intensities(run, shot, frame, settings, references=references, threads=threads)
+        images = shot_intensities(run, shot, frame, settings, references=references, threads=threads)
+        if told := {name: what for name, what in exposure_faults(run, shot, frame, images, references).items() if what}:
+            faults.append({"shot": index, **told})
+        yield images
         done(count, len(shots))
 
 

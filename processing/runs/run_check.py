@@ -153,6 +153,24 @@ def _unmeasured(
     return ShotCheck(shot, {}, f"{error}: {told}" if len(names) >= MIN_VIEWS else str(error))
 
 
+def check_ends(run_dir: Path, shots: Sequence[int], calibration: Calibration) -> list[ShotCheck]:
+    """Check the first and the last of some shots: what was wrong all along, and what has gone wrong meanwhile.
+
+    Views of the calibration that the run lacks are left out.
+
+    Raises
+    ------
+    CalibrationError
+        The calibration is refused, or does not belong to the views of the run.
+    PipelineError
+        An exposure is missing.
+    """
+    with RunReader(run_dir) as run:
+        calibration.require_usable(run.header.views)
+        seen = replace(calibration, views={name: calibration.views[name] for name in run.header.views})
+    return [check_shot(run_dir, shot, seen) for shot in dict.fromkeys((shots[0], shots[-1]))]
+
+
 def run_beside(calibration_set: Path) -> Path | None:
     """The run of the import that a calibration set, or its folder, is a part of; None where there is none."""
     folder = calibration_set if (calibration_set / SET_FILE).exists() else calibration_set / CALIBRATION_FOLDER

@@ -1,5 +1,6 @@
 """``tomoshadow average``: the mean of stored volumes, or of a run whose volumes need not be stored."""
 
+import json
 from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,9 +20,13 @@ from server.cli.options import (
     selected_shots,
     usable_processors,
 )
-from server.cli.output import Bar, Outcome
+from server.cli.output import Bar, Outcome, progress
+from server.cli.runs.belonging import ask_droplets
+from server.cli.runs.faults import tell_faults
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
     from processing.runs.results_file import Provenance
     from processing.volume import VoxelGrid
 
@@ -53,11 +58,17 @@ def average(options: Namespace) -> Outcome:
     result = _average_results(options) if options.calibration is None else _average_run(options)
     grid = describe_grid(result["grid"]["shape"], result["grid"]["pitch_mm"])
     what = f"mean of {result['volumes']} volumes of exposure {options.exposure.upper()}"
-    return Outcome(result, f"{result['file']}: {what}, {grid}; slices in {result['figure']}")
+    text = f"{result['file']}: {what}, {grid}; slices in {result['figure']}"
+    for one in result["faults"]:
+        tell_faults(f"shot {one['shot']}, exposure {options.exposure}", one)
+    if result["faults"]:
+        text += f"\n{len(result['faults'])} of {result['volumes']} exposures may be wrong, and are part of the mean"
+    return Outcome(result, text)
 
 
 def _average_results(options: Namespace) -> dict[str, Any]:
     from processing.reconstruction.volume_file import VolumeFileError
+    from processing.runs.exposure_faults import stored_faults
     from processing.runs.results_file import average_volumes, volume_files
 
     files = volume_files(options.results, options.exposure)
@@ -66,7 +77,8 @@ def _average_results(options: Namespace) -> dict[str, Any]:
             f"{options.results}: there are no volumes of exposure {options.exposure.upper()} to average"
         )
     volume, grid = average_volumes(files)
-    return _written(options, volume, grid, len(files), {})
+    faults = [told for file in files if (told := stored_faults(file))]
+    return _written(options, volume, grid, len(files), faults, {})
 
 
 def _average_run(options: Namespace) -> dict[str, Any]:
@@ -93,25 +105,37 @@ def _average_run(options: Namespace) -> dict[str, Any]:
         "settings": settings.model_dump_json(),
         "method_version": METHOD_VERSION,
     }
-    written = _written(options, mean.volume, mean.grid, mean.exposures, made_by)
-    return {**written, "method": settings.method.value, "calibrated_share": share}
+    written = _written(options, mean.volume, mean.grid, mean.exposures, mean.faults, made_by)
+    belonging = ask_droplets(options.results, shots, calibration)
+    progress(belonging.text)
+    told = {"passed": belonging.passed, "belonging": belonging.record()}
+    return {**told, **written, "method": settings.method.value, "calibrated_share": share}
 
 
-def _written(options: Namespace, volume: Any, grid: "VoxelGrid", count: int, made_by: "Provenance") -> dict[str, Any]:
+def _written(
+    options: Namespace,
+    volume: Any,
+    grid: "VoxelGrid",
+    count: int,
+    faults: "Sequence[Mapping[str, Any]]",
+    made_by: "Provenance",
+) -> dict[str, Any]:
     from processing.figures.volume_figures import slices_figure
     from processing.reconstruction.settings import GridSettings
     from processing.reconstruction.volume_file import write_volume
     from processing.runs.overwriting import replacing
 
     source: Provenance = {"average_of": str(options.results), "frame": options.exposure, "volumes": count}
+    told: Provenance = {"faults": json.dumps(faults)} if faults else {}
     figure = picture_beside(options.out)
     with replacing(options.out) as out:
-        write_volume(out, volume, grid, {**source, **made_by})
+        write_volume(out, volume, grid, {**source, **told, **made_by})
         slices_figure(volume, grid, f"mean of {count} volumes").savefig(out.with_name(figure.name), dpi=120)
     return {
         "file": str(options.out),
         "figure": str(figure),
         "exposure": options.exposure,
         "volumes": count,
+        "faults": list(faults),
         "grid": GridSettings.of(grid).model_dump(),
     }

@@ -21,6 +21,8 @@ from server.cli.options import (
 )
 from server.cli.output import Outcome, progress, table, tracked
 from server.cli.runs.batch import add_runs, over_runs
+from server.cli.runs.belonging import Belonging, ask_droplets
+from server.cli.runs.faults import tell_faults
 from server.cli.runs.recipes import add_recipe, keeping_recipe, settings_of, with_grid
 
 if TYPE_CHECKING:
@@ -77,25 +79,28 @@ def _reconstruct_run(
     if options.overwrite:
         require_free(place, overwrite=True, made_with=(SETTINGS_FILE,))
         with replacing(place) as out:
-            shots = _reconstruct_shots(options, settings, run_dir, indices, out)
+            shots, belonging = _reconstruct_shots(options, settings, run_dir, indices, out)
     else:
         require_free(*volumes, overwrite=False)
-        shots = _reconstruct_shots(options, settings, run_dir, indices, place)
+        shots, belonging = _reconstruct_shots(options, settings, run_dir, indices, place)
     result = {
+        "passed": belonging.passed,
         **settings.model_dump(mode="json", include=STATED),
         "recipe_sha256": recipe_sha256(NAME, METHOD_VERSION, settings),
         "calibrated_share": share,
+        "belonging": belonging.record(),
         "views": {name: view.model_dump() for name, view in shots[0].views.items()},
         "volumes": [volume.model_dump(mode="json") for shot in shots for volume in shot.volumes],
         "cpu_s": sum(shot.cpu_s for shot in shots),
         "peak_rss_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
     }
-    return Outcome(result, f"{volumes_table(result)}\n{place}: {_summary(result)}")
+    return Outcome(result, f"{volumes_table(result)}\n{place}: {_summary(result)}\n{belonging.text}")
 
 
 def _reconstruct_shots(
     options: Namespace, settings: "ReconstructionSettings", run_dir: Path, indices: list[int], out: Path
-) -> "list[ShotResult]":
+) -> "tuple[list[ShotResult], Belonging]":
+    from processing.calibration.calibration_file import load_calibration
     from processing.runs.pipeline import reconstruct_shot
     from processing.runs.workbench import Workbench
 
@@ -107,9 +112,10 @@ def _reconstruct_shots(
         )
         if not shots:
             _tell_slow_views(shot)
+            belonging = ask_droplets(run_dir, indices, load_calibration(options.calibration))
         _tell_faults(shot)
         shots.append(shot)
-    return shots
+    return shots, belonging
 
 
 def _tell_slow_views(shot: "ShotResult") -> None:
@@ -122,14 +128,7 @@ def _tell_slow_views(shot: "ShotResult") -> None:
 def _tell_faults(shot: "ShotResult") -> None:
     for volume in shot.volumes:
         where = f"shot {volume.shot}, exposure {volume.frame}"
-        for name in volume.blind_views:
-            progress(f"{where}: {name} sees nothing; is the shot empty, or a lens covered, a light off?")
-        for name in volume.dim_views:
-            progress(
-                f"{where}: {name} uses less than 1/8 of its grey values; is light missing, or are its bits too many?"
-            )
-        for name, what in volume.odd_light.items():
-            progress(f"{where}: {name} {what}")
+        tell_faults(where, volume.model_dump())
         if volume.empty:
             progress(f"{where}: the volume is empty, no voxel is above 0")
 

@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from processing.reconstruction.volume_file import read_volume
+from server.cli.main import main
 from tests.support.command_line import GRID, refused, shown, told
+from tests.support.droplet_run import write_run
 
 
 @pytest.mark.parametrize("voxels", ["float32", "float16", "uint8"])
@@ -96,3 +98,20 @@ def test_a_mean_and_its_picture_are_replaced_only_if_asked_for(
     assert (tmp_path / "mean.png").read_text() == "a photograph"
     told(capsys, "average", run_dir, *options, "--overwrite")
     assert (tmp_path / "mean.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("straight", [False, True], ids=["of results", "of a run"])
+def test_exposures_that_may_be_wrong_are_told_with_the_mean(
+    straight: bool, calibration_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run_dir = write_run(tmp_path / "covered", shots=2, covered=("view2",))
+    options = ["--calibration", calibration_file, f"--grid={GRID}"]
+    told(capsys, "reconstruct", run_dir, *options, "-o", tmp_path / "out")
+    source = [run_dir, *options] if straight else [tmp_path / "out"]
+    assert main(["average", *map(str, source), "-o", str(tmp_path / "mean.vtkhdf"), "--json"]) == 0
+    output = capsys.readouterr()
+    assert "shot 1, exposure a: view2 sees nothing" in output.err
+    assert "2 of 2 exposures may be wrong, and are part of the mean" in output.err
+    faults = json.loads(output.out.splitlines()[-1])["faults"]
+    assert [(one["shot"], one["blind_views"]) for one in faults] == [(0, ["view2"]), (1, ["view2"])]
+    assert json.loads(str(read_volume(tmp_path / "mean.vtkhdf")[2]["faults"])) == faults

@@ -1,0 +1,69 @@
+"""Do a run and a calibration belong together? Asked of droplets before volumes that look fine are believed."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from server.cli.check import check_line
+from server.cli.output import progress
+
+if TYPE_CHECKING:
+    from processing.calibration.calibration import Calibration
+    from processing.runs.run_check import ShotCheck
+
+
+@dataclass(frozen=True)
+class Belonging:
+    """What the droplets of the first and the last shot say of the calibration.
+
+    Parameters
+    ----------
+    run : str
+        Name of the run.
+    checks : tuple of ShotCheck
+        A shot each.
+    """
+
+    run: str
+    checks: "tuple[ShotCheck, ...]"
+
+    @property
+    def verdict(self) -> str | None:
+        """The worst of those that tell; None where none does."""
+        from processing.calibration.verdict import Verdict
+
+        told = [check.verdict for check in self.checks if check.verdict]
+        return max(told, key=list(Verdict).index).value if told else None
+
+    @property
+    def passed(self) -> bool:
+        """Whether volumes are worth having, as far as the droplets tell."""
+        return self.verdict != "refuse"
+
+    def record(self) -> dict[str, Any]:
+        """What was found, for a program: JSON values."""
+        return {"verdict": self.verdict, "shots": [check.record() for check in self.checks]}
+
+    @property
+    def text(self) -> str:
+        """A line for a person."""
+        told = [check for check in self.checks if check.verdict]
+        if not told:
+            return (
+                f"NOT CHECKED whether run and calibration belong together: {check_line(self.checks[0])} "
+                "(tomoshadow check asks other shots)"
+            )
+        return "do run and calibration belong together? " + "; ".join(check_line(check) for check in told)
+
+
+def ask_droplets(run_dir: Path, shots: Sequence[int], calibration: "Calibration") -> Belonging:
+    """Check the first and the last shot; what speaks against the calibration is told at once."""
+    from processing.calibration.verdict import Verdict
+    from processing.runs.run_check import check_ends
+
+    asked = Belonging(run_dir.name, tuple(check_ends(run_dir, shots, calibration)))
+    for check in asked.checks:
+        if check.verdict in (Verdict.WARN, Verdict.REFUSE):
+            progress(f"{run_dir.name}: {check_line(check)}")
+    return asked

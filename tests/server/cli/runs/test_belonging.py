@@ -1,0 +1,43 @@
+"""reconstruct and average ask droplets whether run and calibration belong together: volumes look fine either way."""
+
+from pathlib import Path
+
+import pytest
+
+from processing.calibration.calibration_file import save_calibration
+from tests.support.command_line import told
+from tests.support.drifting_run import write_droplet_run
+from tests.support.drifting_views import calibration_of, views
+from tests.support.droplet_run import write_calibration, write_run
+
+GRID = "--grid=-1:1,-1:1,-1:1@0.1"
+
+
+@pytest.fixture
+def calibration_file(tmp_path: Path) -> Path:
+    save_calibration(calibration_of(views()), tmp_path / "calibration.json")
+    return tmp_path / "calibration.json"
+
+
+@pytest.mark.parametrize(
+    ("command", "out"), [("reconstruct", "volumes"), ("average", "mean.vtkhdf")], ids=["reconstruct", "average"]
+)
+def test_a_view_that_has_moved_does_not_pass_in_silence(
+    command: str, out: str, calibration_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run_dir = write_droplet_run(tmp_path / "run")
+    arguments = [command, run_dir, "--calibration", calibration_file, GRID, "-o", tmp_path / out]
+    answer = told(capsys, *arguments, status=1)
+    assert (tmp_path / out).exists(), "nothing that was computed is thrown away"
+    assert answer["passed"] is False
+    assert answer["belonging"]["verdict"] == "refuse"
+    assert [(shot["shot"], shot["moved"]) for shot in answer["belonging"]["shots"]] == [(0, "view2"), (1, "view2")]
+
+
+def test_what_droplets_do_not_tell_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run_dir, calibration_file = write_run(tmp_path / "run"), write_calibration(tmp_path / "calibration.json")
+    arguments = ["reconstruct", run_dir, "--calibration", calibration_file, GRID, "-o", tmp_path / "volumes"]
+    answer = told(capsys, *arguments)
+    assert "belonging" in answer
+    assert (answer["passed"], answer["belonging"]["verdict"]) == (True, None)
+    assert "too few droplets" in answer["belonging"]["shots"][0]["problem"]
