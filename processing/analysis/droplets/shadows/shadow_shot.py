@@ -39,6 +39,10 @@ per mm^3, those up to 1.25 have 0.3 to 1.7 % ghosts, those from 1.33 to 1.45 2 t
 LIGHTS = (0.5, 2.0)
 """Of the background: where nearly nothing is in its way, the light of an exposure must be between."""
 FREE_PERCENTILE = 98
+BLACK, BLACK_PIXELS = 0.2, 10
+"""Where discs let less light through than this, images are asked how much they see beyond that, at so many pixels."""
+MOST_LEFT = 0.04
+"""Share of the light that may be left there: diameters are 3 % too small then, and with twice as much ghosts come."""
 LEAST_KNOWN = 0.1
 """Share of the pixels of a view of which something must be known."""
 
@@ -126,6 +130,8 @@ def measure_shadows(
     views = _seen(fit, search, _masked_shares(fit, shot.cut(into_grid)))
     beside_px = {name: float(np.hypot(view.shift_u_px, view.shift_v_px)) for name, view in views.items()}
     verdict, reasons = judged(beside_px, ratio, LIMITS)
+    if grey := _grey(seen, shadows, judged_weights):
+        verdict, reasons = ShotVerdict.DOUBTFUL if verdict is ShotVerdict.GOOD else verdict, (*reasons, *grey)
     if verdict is ShotVerdict.REFUSED:
         return MeasuredExposure(SizedDroplets.none(), views, ratio, verdict, reasons)
     known = knowing_views(shot, fit, fit.discs.positions_voxel) >= judging_views(len(images))
@@ -184,6 +190,23 @@ def _without_light(name: str, image: Image, trust: Image) -> str:
     return (
         f"{name}: its light is {light:.2g} of its background's, limits {LIGHTS[0]:g} and {LIGHTS[1]:g}: is a lens "
         "covered, a light off, or was the background taken with another light?"
+    )
+
+
+def _grey(seen: DiscImages, shadows: Shadows, weights: Sequence[Image]) -> tuple[str, ...]:
+    """What speaks against shadows that are not dark enough; empty where they are, or none is large enough to tell."""
+    views = zip(seen.images, shadows.transmissions, weights, strict=True)
+    asked = [(image - drawn, weight, (drawn < BLACK) & (weight > 0)) for image, drawn, weight in views]
+    left = np.concatenate([beyond[black] for beyond, _, black in asked])
+    if len(left) < BLACK_PIXELS:
+        return ()
+    sd = 1 / np.sqrt(sum(float(weight[black].sum()) for _, weight, black in asked))
+    if (share := float(np.median(left))) <= MOST_LEFT + 3 * sd:
+        return ()
+    return (
+        f"{100 * share:.0f} % of the light is left where shadows should be black, limit {100 * MOST_LEFT:.0f} %: is a "
+        "dark image missing (the camera's black level), are grey values not in proportion to light (gamma), or are "
+        "droplets not opaque? Diameters are wrong then",
     )
 
 

@@ -53,6 +53,15 @@ def test_light_that_is_dimmer_than_its_background_does_not_matter(scene: ShadowS
     np.testing.assert_allclose([view.level for view in dimmed.views.values()], 0.9, atol=2e-3)
 
 
+def test_a_black_level_without_a_dark_image_is_doubted(scene: ShadowScene) -> None:
+    """Droplets look paler and smaller, and faint ones are made up; residual over noise alone would call it good."""
+    black_level = np.float32(0.17)
+    grey = [black_level + (1 - black_level) * image for image in scene.images]
+    doubted = measure_shadows(grey, search_of(scene, MARGIN_VOXEL))
+    assert doubted.verdict is ShotVerdict.DOUBTFUL, doubted.residual_over_noise
+    assert any("of the light is left where shadows should be black" in reason for reason in doubted.reasons)
+
+
 def test_the_order_of_views_does_not_matter(scene: ShadowScene, shot: ShadowExposure) -> None:
     order = [2, 0, 3, 1]
     turned = replace(scene, images=[scene.images[k] for k in order], cameras=[scene.cameras[k] for k in order])
