@@ -27,6 +27,7 @@ from processing.calibration.fit.health import (
 from processing.calibration.fit.model_choice import AUTO, fit_mapping, holdout_by_model, simplest_that_holds
 from processing.calibration.fit.not_checked import not_checked
 from processing.calibration.fit.placement_check import check_placements
+from processing.calibration.fit.plane_order import check_plane_order
 from processing.calibration.fit.ray_check import check_rays, rays_miss_px
 from processing.calibration.fit.scale_check import check_scales
 from processing.calibration.observation import CalibrationSet, PlaneObservation, ViewObservations, stacked
@@ -66,7 +67,8 @@ def calibrate(
     """
     views = _all_views(calibration_set, None if model == AUTO else Model(model), counted)
     placed = not any(view.intrinsics_only for view in views.values())
-    undirected = check_handedness(calibration_set, views) if placed else []
+    disordered = list(check_plane_order(calibration_set, views)) if placed else []
+    undirected = check_handedness(calibration_set, views) if placed and not disordered else []
     if placed:
         missed_px = rays_miss_px(calibration_set.views, {name: view.mapping for name, view in views.items()})
         views = {name: replace(view, rays_miss_px=missed_px.get(name)) for name, view in views.items()}
@@ -79,7 +81,7 @@ def calibrate(
         source=calibration_set.source,
         notes=calibration_set.notes,
         not_checked=tuple(not_checked(calibration_set, undirected)) if placed else (),
-    ).doubted(_doubts(calibration_set, views) if placed else ())
+    ).doubted(disordered or (_doubts(calibration_set, views) if placed else ()))
     return undated.with_id(content_id(undated))
 
 

@@ -41,15 +41,18 @@ def check_placements(calibration_set: CalibrationSet, mappings: Mapping[str, Vie
         undecided = same_either_way(mappings, middle_mm, turned_deg)
         texts += [f"{name}: looks the same either way; if it is turned too, say --roll for it" for name in undecided]
         texts += [f"or {question}" for question in _exchanged(mappings, middle_mm, azimuths_deg)]
-        if stretched := _stretched(calibration_set, mappings, middle_mm):
-            texts = [stretched, *(f"else: {text}" for text in texts)]
+        all_turned = len(turned_deg) + len(undecided) == len(mappings)
+        upright = _upright(calibration_set, turned_deg) if all_turned else ""
+        if likelier := upright or _stretched(calibration_set, mappings, middle_mm):
+            texts = [likelier, *(f"else: {text}" for text in texts)]
         raise CalibrationError("; ".join(texts))
     if turned_deg:
         turn_deg = next(iter(turned_deg.values()))
         yield Doubt(
             tuple(turned_deg),
             f"every view sees the target's axes turned by {turn_deg} deg about z: so do x and y of all results, unless "
-            "azimuths count the other way, or all images are mirrored",
+            "azimuths count the other way, or all images are mirrored"
+            + (f"; {upright}" if (upright := _upright(calibration_set, turned_deg)) else ""),
         )
     yield from _doubtful(calibration_set, mappings, middle_mm)
     for one, other in in_one_place(mappings, middle_mm):
@@ -87,6 +90,17 @@ def _stretched(calibration_set: CalibrationSet, mappings: Mapping[str, ViewMappi
     return (
         f"all views would stand where the rig says if x were {stretch:.3g} times as long: is "
         f"{pitch or 'the unit of x and y'} right, or z counted in other steps?"
+    )
+
+
+def _upright(calibration_set: CalibrationSet, turned_deg: Mapping[str, int]) -> str:
+    """A question where a board that is not square tells the same turn to all views; else nothing."""
+    target = calibration_set.target
+    if target is None or target.columns == target.rows or {abs(turn) for turn in turned_deg.values()} != {90}:
+        return ""
+    return (
+        f"have columns and rows of the target been exchanged (columns = {target.rows}, rows = {target.columns})? "
+        "Rows are level in the image"
     )
 
 

@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 import pytest
 
+import tomoshadow
 from processing.geometry import FloatArray, PinholeCamera, view_camera
 from server.cli.main import main
 from tests.support.command_line import told
@@ -98,6 +99,36 @@ def test_files_of_neighbours_exchanged_are_refused(tmp_path: Path, capsys: pytes
     answer = calibrated(tmp_path, capsys, lambda _rows, name: table(NEIGHBOURS[name]), AZIMUTHS)
     assert not_good(answer), answer["views"]
     assert "have cam0 and cam1 been exchanged?" in answer["error"]
+
+
+@pytest.mark.parametrize("views", [("cam1",), ALL], ids=["one view", "all"])
+@pytest.mark.parametrize("pair", [(0, 3), (-3, 0)], ids=["above", "below"])
+def test_two_planes_that_are_exchanged_are_named(
+    pair: tuple[float, float], views: tuple[str, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """They were asked as a wrong pitch, or as cameras that are turned."""
+
+    def exchange(rows: FloatArray) -> FloatArray:
+        one, other = (rows[:, 4] == z_mm for z_mm in pair)
+        rows[one, 4], rows[other, 4] = pair[::-1]
+        return rows
+
+    answer = calibrated(tmp_path, capsys, of(views, exchange), AZIMUTHS)
+    assert not_good(answer)
+    said = f"have the planes at z {pair[0]:g} and {pair[1]:g} mm been exchanged?"
+    for name in views:
+        reasons = "; ".join(answer.get("views", {}).get(name, {}).get("reasons", [answer.get("error")]))
+        assert said in reasons
+        assert "pitch" not in reasons
+
+
+def test_columns_and_rows_that_are_exchanged_are_asked_for() -> None:
+    lab = tomoshadow.example()
+    board = tomoshadow.Checkerboard(columns=7, rows=11, pitch_mm=2.0)
+    calibration = tomoshadow.calibrate(tomoshadow.find_target(lab.target, board, azimuth_deg=lab.azimuth_deg))
+    for view in calibration.views.values():
+        assert view.verdict == "warn"
+        assert "have columns and rows of the target been exchanged (columns = 11, rows = 7)?" in view.reasons[0]
 
 
 @pytest.mark.parametrize("still", [("cam1",), ALL], ids=["one view", "all"])
