@@ -17,6 +17,8 @@ DIAMETER, REFUSED = "diameter_um", "refused"
 NO_DIAMETERS = "bright particles have no diameter: only shadows tell how large a droplet is"
 IN_PIXELS, NO_SCALE = "diameter_px", "diameters are in pixels: measure with --um-per-px"
 NOTHING_COUNTED = "no exposure could be measured"
+_SAME_DROPLETS = ("grid", "margin_voxel", "twins", "seed")
+"""Settings that say where droplets are looked for, and how ghosts are counted."""
 NO_VOLUME = "a file does not say in which volume its droplets were measured"
 
 
@@ -45,9 +47,10 @@ def droplet_statistics(shots: Sequence[StoredDroplets]) -> DropletStatistics:
     Raises
     ------
     DropletFileError
-        A file does not say what became of its exposures, or two are of the same shot.
+        A file does not say what became of its exposures, or two are of the same shot, or of two recipes.
     """
     _require_once(shots)
+    _require_alike(shots)
     told = [_exposures(shot) for shot in shots]
     counted = [(shot, exposures) for shot, exposures in zip(shots, told, strict=True) if exposures]
     hidden = [hidden_share(exposure) for _, exposures in counted for exposure in exposures]
@@ -70,6 +73,26 @@ def _require_once(shots: Sequence[StoredDroplets]) -> None:
     for place, times in places.items():
         if times > 1:
             raise DropletFileError(f"{place}: its droplets are there {times} times, and would count as often")
+
+
+def _require_alike(shots: Sequence[StoredDroplets]) -> None:
+    """Numbers of two methods, or of settings that change what a droplet is, have no common mean."""
+    made_by = [(shot, _made_by(shot)) for shot in shots]
+    for shot, its in made_by[1:]:
+        first, others = made_by[0]
+        for name in {**its, **others}:
+            if its.get(name) != others.get(name):
+                raise DropletFileError(
+                    f"{_named(shot)}: measured with {name} {its.get(name)}, {_named(first)} with {others.get(name)}: "
+                    "numbers of two recipes are not comparable; take those of one"
+                )
+
+
+def _made_by(shot: StoredDroplets) -> dict[str, object]:
+    """Version and settings of a measurement, less those that leave a droplet what it is."""
+    settings = json.loads(str(shot.provenance.get("settings", "{}")))
+    version = shot.provenance.get("method_version", 1)
+    return {"method_version": version, **{name: one for name, one in settings.items() if name not in _SAME_DROPLETS}}
 
 
 def _place(shot: StoredDroplets) -> str:

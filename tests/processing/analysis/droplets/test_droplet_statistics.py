@@ -94,3 +94,13 @@ def test_a_file_that_says_nothing_of_its_exposures_is_named() -> None:
     foreign = StoredDroplets({"frame": np.full(2, "a")}, {"run": "spray", "shot": 3})
     with pytest.raises(DropletFileError, match="spray, shot 3: its file does not say what became of its exposures"):
         droplet_statistics([foreign])
+
+
+@pytest.mark.parametrize(
+    "told", [{"settings": '{"polarity": "bright"}'}, {"method_version": 2}], ids=["settings", "version"]
+)
+def test_numbers_of_two_recipes_are_not_pooled(told: dict[str, Any]) -> None:
+    with pytest.raises(DropletFileError, match=r"spray, shot 4: measured with .*: numbers of two recipes"):
+        droplet_statistics([shot([20.0, 30.0]), shot([40.0], shot=4, **told)])
+    elsewhere = shot([40.0], shot=4, settings='{"grid": {"pitch_mm": 1}, "twins": 2}')
+    assert droplet_statistics([shot([20.0, 30.0]), elsewhere]).n == 3
