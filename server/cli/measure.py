@@ -18,6 +18,7 @@ from server.cli.options import (
 from server.cli.output import Outcome, progress, table, tracked
 from server.cli.runs.batch import add_runs, over_runs
 from server.cli.runs.recipes import add_recipe, keeping_recipe, settings_of, with_grid
+from server.cli.runs.resuming import resumable
 from server.cli.runs.single_view import IN_THE_IMAGE, add_single_view, measure_single_view, refuse
 
 if TYPE_CHECKING:
@@ -118,7 +119,8 @@ def _measure_run(options: Namespace, settings: "MeasureSettings", run_dir: Path,
     else:
         files = [droplets_path(place, index) for index in indices]
         require_free(*files, *(export_path(file, kind) for file in files for kind in options.export), overwrite=False)
-        result = _measure_shots(options, settings, run_dir, indices, place)
+        with resumable(place, indices, lambda index: [droplets_path(place, index)]):
+            result = _measure_shots(options, settings, run_dir, indices, place)
     return Outcome(result, f"{droplets_table(result)}\n{place}: {_summary(result)}")
 
 

@@ -24,6 +24,7 @@ from server.cli.runs.batch import add_runs, over_runs
 from server.cli.runs.belonging import Belonging, ask_droplets
 from server.cli.runs.faults import tell_faults
 from server.cli.runs.recipes import add_recipe, keeping_recipe, settings_of, with_grid
+from server.cli.runs.resuming import resumable
 
 if TYPE_CHECKING:
     from processing.reconstruction.settings import ReconstructionSettings
@@ -69,20 +70,25 @@ def reconstruct(options: Namespace) -> Outcome:
 def _reconstruct_run(
     options: Namespace, settings: "ReconstructionSettings", share: float, run_dir: Path, place: Path
 ) -> Outcome:
+    from daq.files.run_directory import RunReader
     from processing.reconstruction.settings import METHOD_VERSION
     from processing.runs.overwriting import replacing, require_free
+    from processing.runs.pipeline import frame_names
     from processing.runs.recipe import recipe_sha256
     from processing.runs.results_file import SETTINGS_FILE, volume_path
 
     indices = selected_shots(run_dir, options.shots)
-    volumes = [volume_path(place, index, frame) for index in indices for frame in ("a", "b")]
+    with RunReader(run_dir) as run:
+        frames = frame_names(run)
+    volumes = [volume_path(place, index, frame) for index in indices for frame in frames]
     if options.overwrite:
         require_free(place, overwrite=True, made_with=(SETTINGS_FILE,))
         with replacing(place) as out:
             shots, belonging = _reconstruct_shots(options, settings, run_dir, indices, out)
     else:
         require_free(*volumes, overwrite=False)
-        shots, belonging = _reconstruct_shots(options, settings, run_dir, indices, place)
+        with resumable(place, indices, lambda index: [volume_path(place, index, frame) for frame in frames]):
+            shots, belonging = _reconstruct_shots(options, settings, run_dir, indices, place)
     result = {
         "passed": belonging.passed,
         **settings.model_dump(mode="json", include=STATED),
