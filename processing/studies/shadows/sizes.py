@@ -12,15 +12,15 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from processing.analysis.droplets.droplet_search import MARGIN_VOXEL, plan_droplets
-from processing.analysis.droplets.droplet_table import SizedDroplets
 from processing.analysis.droplets.ghost_share import RADIUS_VOXEL, matches
 from processing.analysis.droplets.shadows.shadow_shot import measure_shadows
 from processing.figures.droplet_figures import MeasuredCase, droplets_figure
-from processing.geometry import FloatArray, PinholeCamera
+from processing.geometry import PinholeCamera
 from processing.kernels import DEFAULT_THREADS
 from processing.studies.droplets import IMAGE_SIZE_PX, SLAB
 from processing.studies.report import Statement, grouped
 from processing.studies.sensitivity import misaligned
+from processing.studies.shadows.size_errors import d32_of, size_errors
 from processing.studies.simulated_droplets import study_cameras, study_grid
 from processing.synthetic.liquid.droplet_clouds import Box, LogNormal, droplet_cloud
 from processing.synthetic.paper_rig import paper_optics
@@ -30,10 +30,6 @@ from processing.volume import VoxelGrid
 
 COUNTED_UM = 20.0
 """Found droplets and ghosts are counted from this diameter on."""
-JUDGED_UM = (20.0, 60.0)
-"""Diameters whose scatter is judged."""
-SIGMAS_95 = 1.96
-"""Of a normal distribution: half the width of what holds 95 %."""
 BESIDE_MM = 0.15
 """So far around the grid there are droplets, too."""
 
@@ -191,52 +187,21 @@ def _row(study: SizeStudy, case: SizeCase, seed: int, threads: int) -> SizeRow:
     large, counted = truth.diameters_mm > COUNTED_UM / 1000, shot.droplets.diameters_um > COUNTED_UM
     match, _ = matches(shot.droplets.points_mm, scene.spray.positions_mm, RADIUS_VOXEL * grid.pitch_mm)
     _, missed = matches(shot.droplets.points_mm, truth.positions_mm, RADIUS_VOXEL * grid.pitch_mm)
-    d32_um = _d32(shot.droplets.diameters_um)
+    d32_um = d32_of(shot.droplets.diameters_um)
     return SizeRow(
         case=case.name,
         seed=seed,
         droplets=int(np.count_nonzero(large)),
         found=float(np.mean(missed[large] >= 0)),
         ghosts=float(np.mean(match[counted] < 0)) if counted.any() else 0.0,
-        **_errors(shot.droplets, scene.spray, match, grid.pitch_mm),
+        **size_errors(shot.droplets, scene.spray, match, grid.pitch_mm),
         d32_um=d32_um,
-        d32_error=d32_um / _d32(1000 * truth.diameters_mm) - 1,
+        d32_error=d32_um / d32_of(1000 * truth.diameters_mm) - 1,
         residual_over_noise=shot.residual_over_noise or 0.0,
         verdict=shot.verdict.value,
         twin_ghosts=shot.ghosts.share if shot.ghosts else None,
         cpu_ms_per_droplet=1000 * cpu_s / len(truth.diameters_mm),
     )
-
-
-def _d32(diameters: FloatArray) -> float:
-    return float(np.sum(diameters**3) / np.sum(diameters**2)) if len(diameters) else float("nan")
-
-
-def _errors(droplets: SizedDroplets, truth: Spray, match: FloatArray, pitch_mm: float) -> dict[str, float]:
-    """How exact droplets are, without a common motion of all, which a wrong calibration makes."""
-    real = match >= 0
-    if np.count_nonzero(real) < 2:
-        return dict.fromkeys(("rms_voxel", "bias_um", "sd_um", "z_sd", "z_size", "held", "size_held"), float("nan"))
-    errors_mm = droplets.points_mm[real] - truth.positions_mm[match[real]]
-    errors_mm = errors_mm - np.median(errors_mm, axis=0)
-    true_um = 1000 * truth.diameters_mm[match[real]]
-    errors_um = droplets.diameters_um[real] - true_um
-    judged_um = errors_um[(true_um > JUDGED_UM[0]) & (true_um < JUDGED_UM[1])]
-    scores = errors_mm / np.sqrt(np.einsum("nii->ni", droplets.covariance_mm2[real]))
-    size_scores = errors_um / droplets.diameter_sd_um[real]
-    return {
-        "rms_voxel": float(np.sqrt(np.mean(errors_mm**2))) / pitch_mm,
-        "bias_um": float(np.median(judged_um)),
-        "sd_um": _robust_sd(judged_um),
-        "z_sd": float(np.median(np.abs(scores))) / 0.6745,
-        "z_size": _robust_sd(size_scores),
-        "held": float(np.mean(np.abs(scores) < SIGMAS_95)),
-        "size_held": float(np.mean(np.abs(size_scores) < SIGMAS_95)),
-    }
-
-
-def _robust_sd(values: FloatArray) -> float:
-    return float(np.median(np.abs(values - np.median(values)))) / 0.6745
 
 
 def size_line(row: SizeRow) -> str:

@@ -34,8 +34,8 @@ from processing.analysis.droplets.shadows.shadow_union import union_defects
 from processing.kernels import DEFAULT_THREADS
 
 LIMITS = RatioLimits(trusted=1.25, refused=2.0)
-"""Of discs: overlapping shadows leave something even where all droplets are right. Of simulated shots of 28 to 40 droplets
-per mm^3, those up to 1.25 have 0.3 to 1.7 % ghosts, those from 1.33 to 1.45 2 to 5 %."""
+"""Of discs: overlapping shadows leave something even where all droplets are right. Simulated shots of 28 to 40 droplets
+per mm^3, up to 1.25 have 0.3 to 1.7 % ghosts, from 1.33 to 1.45 2 to 5 %."""
 LIGHTS = (0.5, 2.0)
 """Of the background: where nearly nothing is in its way, the light of an exposure must be between."""
 FREE_PERCENTILE = 98
@@ -112,29 +112,46 @@ def measure_shadows(
     check_images(images, search)
     trusts = [np.ones(np.shape(image), np.float32) for image in images] if trust is None else trust
     check_images(trusts, search)
-    if unlit := _unlit(images, trusts, search.names):
-        return MeasuredExposure(SizedDroplets.none(), {}, None, ShotVerdict.REFUSED, unlit)
-    into_grid = search.pixels_into_grid()
-    if unseen := _unseen(trusts, into_grid, search.names):
-        return MeasuredExposure(SizedDroplets.none(), {}, None, ShotVerdict.REFUSED, (unseen,))
+    if reasons := _unmeasurable(images, trusts, search):
+        return _refused(*reasons)
     shot = _looking(images, trusts, search, threads)
     known_shadows = [(1 - image) * np.sqrt(one) for image, one in zip(shot.images, shot.trust, strict=True)]
-    blind = blind_views(known_shadows, shot.noises_of(shot.images), search.names)
-    if blind:
+    if blind := blind_views(known_shadows, shot.noises_of(shot.images), search.names):
         return MeasuredExposure(SizedDroplets.none(), {}, None, *blind_verdict(blind, search.names))
     fit = find_shadows(shot, search)
-    shadows = _recorded(shot).drawn(fit.optics, fit.discs)
+    told = judged_by_volume(_told(shot, fit, search))
+    if not twins or told.verdict is not ShotVerdict.GOOD:
+        return told
+    rng = np.random.default_rng(seed)
+    return judged_by_twins(told, pooled(_twin_ghosts(shot, fit, search, rng) for _ in range(twins)))
+
+
+def _refused(*reasons: str) -> ShadowExposure:
+    return MeasuredExposure(SizedDroplets.none(), {}, None, ShotVerdict.REFUSED, reasons)
+
+
+def _unmeasurable(images: Sequence[Image], trusts: Sequence[Image], search: DropletSearch) -> tuple[str, ...]:
+    """Why views can show no shadows of the grid, whether there are droplets or not; empty where all can."""
+    if unlit := _unlit(images, trusts, search.names):
+        return unlit
+    unseen = _unseen(trusts, search.pixels_into_grid(), search.names)
+    return (unseen,) if unseen else ()
+
+
+def _told(shot: Transmissions, fit: ShadowFit, search: DropletSearch) -> ShadowExposure:
+    """What a fit tells, and whether to believe it."""
+    shadows, into_grid = _recorded(shot).drawn(fit.optics, fit.discs), shot.cut(search.pixels_into_grid())
     seen = seen_by(shot, fit, shadows.transmissions)
-    judged_weights = tuple(map(np.multiply, seen.weights, shot.cut(into_grid)))
+    judged_weights = tuple(map(np.multiply, seen.weights, into_grid))
     ratio = rms_over_noise(replace(seen, weights=judged_weights), shadows.transmissions)
-    views = _seen(fit, search, _masked_shares(fit, shot.cut(into_grid)))
+    views = _seen(fit, search, _masked_shares(fit, into_grid))
     beside_px = {name: float(np.hypot(view.shift_u_px, view.shift_v_px)) for name, view in views.items()}
     verdict, reasons = judged(beside_px, ratio, LIMITS)
     if grey := _grey(seen, shadows, judged_weights):
         verdict, reasons = ShotVerdict.DOUBTFUL if verdict is ShotVerdict.GOOD else verdict, (*reasons, *grey)
     if verdict is ShotVerdict.REFUSED:
         return MeasuredExposure(SizedDroplets.none(), views, ratio, verdict, reasons)
-    known = knowing_views(shot, fit, fit.discs.positions_voxel) >= judging_views(len(images))
+    known = knowing_views(shot, fit, fit.discs.positions_voxel) >= judging_views(len(shot.images))
     droplets = _droplets(seen, shadows, fit.where(known), search)
     lump = lumps(fit.where(known).discs, droplets.residual)
     hidden = Hidden(
@@ -142,12 +159,8 @@ def measure_shadows(
         volume_share=unjudged_share(shot, fit, search),
         droplets=int(np.count_nonzero(within_grid(fit.discs.positions_voxel[~known], search))),
     )
-    droplets = droplets.where(lump < 0).within(search.grid)
-    told = judged_by_volume(MeasuredExposure(droplets, views, ratio, verdict, reasons, hidden=hidden))
-    if not twins or told.verdict is not ShotVerdict.GOOD:
-        return told
-    rng = np.random.default_rng(seed)
-    return judged_by_twins(told, pooled(_twin_ghosts(shot, fit, search, rng) for _ in range(twins)))
+    told = droplets.where(lump < 0).within(search.grid)
+    return MeasuredExposure(told, views, ratio, verdict, reasons, hidden=hidden)
 
 
 def _unseen(trusts: Sequence[Image], into_grid: Sequence[NDArray[np.bool_]], names: Sequence[str]) -> str:
