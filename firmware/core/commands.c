@@ -5,58 +5,51 @@
 #include "safety.h"
 #include "shooting.h"
 
-typedef enum error (*action)(struct generator *generator, const uint32_t *fields, struct text *reply);
+/* Carries a command out and notes the values of its reply. */
+typedef enum error (*action)(struct generator *generator, const uint32_t *fields, uint32_t *values);
 
 struct command {
     const char *word;
     uint32_t field_count;
     action run;
+    const char *names; /* of the values of its reply */
 };
 
-void commands_identify(struct text *reply, enum cause cause, uint32_t last_sequence)
+void commands_identify(struct reply *reply, enum cause cause, uint32_t last_sequence)
 {
-    text_word(reply, " model=" MODEL " version=" VERSION " build=");
-    text_word(reply, port_build);
-    text_word(reply, " git=");
-    text_word(reply, port_git);
-    text_word(reply, " serial=");
-    text_word(reply, port_serial());
-    text_field(reply, "protocol", PROTOCOL_VERSION);
-    text_field(reply, "channels", CHANNEL_COUNT);
-    text_field(reply, "tick_ns", port_tick_ns);
-    text_field(reply, "cause", (uint32_t)cause);
-    text_field(reply, "last", last_sequence);
+    reply_word(reply, " model=" MODEL " version=" VERSION " build=");
+    reply_word(reply, port_build);
+    reply_word(reply, " git=");
+    reply_word(reply, port_git);
+    reply_word(reply, " serial=");
+    reply_word(reply, port_serial());
+    reply_field(reply, "protocol", PROTOCOL_VERSION);
+    reply_field(reply, "channels", CHANNEL_COUNT);
+    reply_field(reply, "tick_ns", port_tick_ns);
+    reply_field(reply, "cause", (uint32_t)cause);
+    reply_field(reply, "last", last_sequence);
 }
 
-static void state_field(struct text *reply, const struct generator *generator)
-{
-    text_field(reply, "state", (uint32_t)generator->state);
-}
-
-static enum error new_train(struct generator *generator, const uint32_t *fields, struct text *reply)
+static enum error new_train(struct generator *generator, const uint32_t *fields, uint32_t *values)
 {
     (void)fields;
-    (void)reply;
+    (void)values;
     return safety_new_train(generator);
 }
 
-/* In units of the tick or of 1 ns; the name says which. */
-static void channel_fields(struct text *reply, uint32_t number, const struct channel *channel, const char *unit,
-                           uint32_t unit_ns)
+/* In units of the tick or of 1 ns. */
+static void note_channel(uint32_t *values, uint32_t number, const struct channel *channel, uint32_t unit_ns)
 {
-    static const char *const names[] = {" camera", " a_start", " a_width", " b_start", " b_width"};
-    const uint32_t times_ns[] = {channel->camera_ns, channel->a_start_ns, channel->a_width_ns, channel->b_start_ns,
-                                 channel->b_width_ns};
-    text_field(reply, "channel", number);
-    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
-        text_word(reply, names[i]);
-        text_word(reply, unit);
-        text_number(reply, times_ns[i] / unit_ns);
-    }
-    text_field(reply, "current_ma", channel->current_ma);
+    values[0] = number;
+    values[1] = channel->camera_ns / unit_ns;
+    values[2] = channel->a_start_ns / unit_ns;
+    values[3] = channel->a_width_ns / unit_ns;
+    values[4] = channel->b_start_ns / unit_ns;
+    values[5] = channel->b_width_ns / unit_ns;
+    values[6] = channel->current_ma;
 }
 
-static enum error set_channel(struct generator *generator, const uint32_t *fields, struct text *reply)
+static enum error set_channel(struct generator *generator, const uint32_t *fields, uint32_t *values)
 {
     const struct channel requested = {
         .camera_ns = fields[1],
@@ -69,132 +62,136 @@ static enum error set_channel(struct generator *generator, const uint32_t *field
         .frame_b_open_ns = fields[8],
     };
     const enum error error = safety_set_channel(generator, fields[0], &requested);
-    if (error)
-        return error;
-    channel_fields(reply, fields[0], &generator->train.channels[fields[0]], "_ns=", 1);
-    return ERROR_NONE;
+    if (!error)
+        note_channel(values, fields[0], &generator->train.channels[fields[0]], 1);
+    return error;
 }
 
-static enum error limit(struct generator *generator, const uint32_t *fields, struct text *reply)
+static void note_limits(uint32_t *values, uint32_t number, struct channel_limits limits)
+{
+    values[0] = number;
+    values[1] = limits.max_current_ma;
+    values[2] = limits.max_duty_ppm;
+    values[3] = limits.max_light_ma;
+}
+
+static enum error limit(struct generator *generator, const uint32_t *fields, uint32_t *values)
 {
     const struct channel_limits asked = {fields[1], fields[2], fields[3]};
     const enum error error = safety_tighten(generator, fields[0], asked);
-    if (error)
-        return error;
-    text_field(reply, "channel", fields[0]);
-    text_field(reply, "max_current_ma", generator->limits[fields[0]].max_current_ma);
-    text_field(reply, "max_duty_ppm", generator->limits[fields[0]].max_duty_ppm);
-    text_field(reply, "max_light_ma", generator->limits[fields[0]].max_light_ma);
-    return ERROR_NONE;
+    if (!error)
+        note_limits(values, fields[0], generator->limits[fields[0]]);
+    return error;
 }
 
-static enum error load(struct generator *generator, const uint32_t *fields, struct text *reply)
+static enum error load(struct generator *generator, const uint32_t *fields, uint32_t *values)
 {
     (void)fields;
     const enum error error = safety_load(generator);
     if (error)
         return error;
-    text_field(reply, "train", generator->train_id);
-    text_field(reply, "length_ns", pulse_train_length_ns(&generator->train));
-    text_field(reply, "period_us", channel_limits_period_us(&generator->train, generator->limits));
+    values[0] = generator->train_id;
+    values[1] = pulse_train_length_ns(&generator->train);
+    values[2] = channel_limits_period_us(&generator->train, generator->limits);
     return ERROR_NONE;
 }
 
-static enum error arm(struct generator *generator, const uint32_t *fields, struct text *reply)
+static enum error arm(struct generator *generator, const uint32_t *fields, uint32_t *values)
 {
     const enum error error = shooting_arm(generator, fields[0], fields[1], fields[2]);
-    if (error)
-        return error;
-    text_field(reply, "train", generator->train_id);
-    text_field(reply, "shots_left", generator->shots_left);
-    return ERROR_NONE;
+    values[0] = generator->train_id;
+    values[1] = generator->shots_left;
+    return error;
 }
 
-static enum error fire(struct generator *generator, const uint32_t *fields, struct text *reply)
+static enum error fire(struct generator *generator, const uint32_t *fields, uint32_t *values)
 {
     (void)fields;
     const enum error error = shooting_fire(generator);
-    if (error)
-        return error;
-    text_field(reply, "fired", generator->counters.fired);
-    text_field(reply, "train", generator->train_id);
-    text_field(reply, "shots_left", generator->shots_left);
-    return ERROR_NONE;
+    values[0] = generator->counters.fired;
+    values[1] = generator->train_id;
+    values[2] = generator->shots_left;
+    return error;
 }
 
-static enum error give_light(struct generator *generator, const uint32_t *fields, struct text *reply)
+static enum error give_light(struct generator *generator, const uint32_t *fields, uint32_t *values)
 {
     const enum error error = light_start(generator, fields[0], fields + 1);
-    if (error)
-        return error;
-    state_field(reply, generator);
-    return ERROR_NONE;
+    values[0] = (uint32_t)generator->state;
+    return error;
 }
 
-static enum error shot(struct generator *generator, const uint32_t *fields, struct text *reply)
+static enum error shot(struct generator *generator, const uint32_t *fields, uint32_t *values)
 {
     if (fields[0] >= CHANNEL_COUNT)
         return ERROR_CHANNEL;
     const struct channel *fired = &generator->train.channels[fields[0]];
     if (!generator->fired || !fired->used)
         return ERROR_NO_SHOT;
-    text_field(reply, "fired", generator->counters.fired);
-    channel_fields(reply, fields[0], fired, "_ticks=", port_tick_ns);
+    values[0] = generator->counters.fired;
+    note_channel(values + 1, fields[0], fired, port_tick_ns);
     return ERROR_NONE;
 }
 
-static void counter_fields(struct text *reply, const struct counters *counters)
-{
-    static const char *const names[] = {"requested", "fired", "suppressed", "early", "cameras", "lights", "crc_errors"};
-    const uint32_t counts[] = {counters->requested, counters->fired,  counters->suppressed, counters->early,
-                               counters->cameras,   counters->lights, counters->crc_errors};
-    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
-        text_field(reply, names[i], counts[i]);
-}
-
-static enum error status(struct generator *generator, const uint32_t *fields, struct text *reply)
+static enum error status(struct generator *generator, const uint32_t *fields, uint32_t *values)
 {
     (void)fields;
-    state_field(reply, generator);
-    text_field(reply, "faults", generator->faults);
-    text_field(reply, "interlock", generator->interlock_closed);
-    text_field(reply, "estop", generator->estop_closed);
-    text_field(reply, "source", (uint32_t)generator->source);
-    text_field(reply, "shots_left", generator->shots_left);
-    counter_fields(reply, &generator->counters);
+    const struct counters *counters = &generator->counters;
+    values[0] = (uint32_t)generator->state;
+    values[1] = generator->faults;
+    values[2] = generator->interlock_closed;
+    values[3] = generator->estop_closed;
+    values[4] = (uint32_t)generator->source;
+    values[5] = generator->shots_left;
+    values[6] = counters->requested;
+    values[7] = counters->fired;
+    values[8] = counters->suppressed;
+    values[9] = counters->early;
+    values[10] = counters->cameras;
+    values[11] = counters->lights;
+    values[12] = counters->crc_errors;
     return ERROR_NONE;
 }
 
-static enum error beat(struct generator *generator, const uint32_t *fields, struct text *reply)
+static enum error beat(struct generator *generator, const uint32_t *fields, uint32_t *values)
 {
     (void)fields;
-    state_field(reply, generator);
+    values[0] = (uint32_t)generator->state;
     return ERROR_NONE;
 }
 
-static enum error off(struct generator *generator, const uint32_t *fields, struct text *reply)
+static enum error off(struct generator *generator, const uint32_t *fields, uint32_t *values)
 {
-    (void)fields;
     safety_off(generator);
-    state_field(reply, generator);
-    return ERROR_NONE;
+    return beat(generator, fields, values);
 }
 
-static enum error clear(struct generator *generator, const uint32_t *fields, struct text *reply)
+static enum error clear(struct generator *generator, const uint32_t *fields, uint32_t *values)
 {
     (void)fields;
     const enum error error = safety_clear(generator);
-    if (error)
-        return error;
-    state_field(reply, generator);
-    return ERROR_NONE;
+    values[0] = (uint32_t)generator->state;
+    return error;
 }
 
+#define EDGES(unit) \
+    "channel camera_" unit " a_start_" unit " a_width_" unit " b_start_" unit " b_width_" unit " current_ma"
+#define LIMITS "channel max_current_ma max_duty_ppm max_light_ma"
+#define COUNTERS "requested fired suppressed early cameras lights crc_errors"
+
 static const struct command COMMANDS[] = {
-    {"NEW", 0, new_train},    {"LIMIT", 4, limit}, {"CHANNEL", 9, set_channel},
-    {"LOAD", 0, load},        {"ARM", 3, arm},     {"FIRE", 0, fire},
-    {"LIGHT", 5, give_light}, {"SHOT", 1, shot},   {"STATUS", 0, status},
-    {"BEAT", 0, beat},        {"OFF", 0, off},     {"CLEAR", 0, clear},
+    {"NEW", 0, new_train, ""},
+    {"LIMIT", 4, limit, LIMITS},
+    {"CHANNEL", 9, set_channel, EDGES("ns")},
+    {"LOAD", 0, load, "train length_ns period_us"},
+    {"ARM", 3, arm, "train shots_left"},
+    {"FIRE", 0, fire, "fired train shots_left"},
+    {"LIGHT", 5, give_light, "state"},
+    {"SHOT", 1, shot, "fired " EDGES("ticks")},
+    {"STATUS", 0, status, "state faults interlock estop source shots_left " COUNTERS},
+    {"BEAT", 0, beat, "state"},
+    {"OFF", 0, off, "state"},
+    {"CLEAR", 0, clear, "state"},
 };
 
 static const struct command *find(struct span word)
@@ -205,14 +202,19 @@ static const struct command *find(struct span word)
     return NULL;
 }
 
-enum error commands_run(struct generator *generator, struct span word, struct span rest, struct text *reply)
+void commands_run(struct generator *generator, struct span word, struct span rest, struct answer *answer)
 {
     uint32_t fields[MAX_FIELDS] = {0};
     const struct command *command = find(word);
+    answer->error = command ? ERROR_NONE : ERROR_UNKNOWN_COMMAND;
     if (!command)
-        return ERROR_UNKNOWN_COMMAND;
+        return;
     for (uint32_t i = 0; i < command->field_count; i++)
         if (!span_number(span_next_word(&rest), &fields[i]))
-            return ERROR_SYNTAX;
-    return rest.length ? ERROR_SYNTAX : command->run(generator, fields, reply);
+            answer->error = ERROR_SYNTAX;
+    if (rest.length)
+        answer->error = ERROR_SYNTAX;
+    answer->names = command->names;
+    if (!answer->error)
+        answer->error = command->run(generator, fields, answer->values);
 }

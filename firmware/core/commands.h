@@ -6,18 +6,25 @@
 
 #include "error.h"
 #include "generator_state.h"
+#include "reply.h"
 #include "span.h"
-#include "text.h"
 
 #define MODEL "tomoshadow-pulse"
 #define VERSION "3.0.0"
 
-enum { PROTOCOL_VERSION = 3, MAX_FIELDS = 9 };
+enum { PROTOCOL_VERSION = 3, MAX_FIELDS = 9, MAX_VALUES = 13 };
 
-/* Carry out one command, given its word and the rest of the line; append the fields of the reply. */
-enum error commands_run(struct generator *generator, struct span word, struct span rest, struct text *reply);
+/* What a command has answered: an error, or the values of these names. */
+struct answer {
+    enum error error;
+    const char *names;
+    uint32_t values[MAX_VALUES];
+};
 
-/* Append what ID answers: the cause of the newest start and the number of the last answered line among it. */
-void commands_identify(struct text *reply, enum cause cause, uint32_t last_sequence);
+/* Carry out one command, given its word and the rest of the line. */
+void commands_run(struct generator *generator, struct span word, struct span rest, struct answer *answer);
+
+/* Write what ID answers: the cause of the newest start and the number of the last answered line among it. */
+void commands_identify(struct reply *reply, enum cause cause, uint32_t last_sequence);
 
 #endif

@@ -5,6 +5,9 @@
 #include <stddef.h>
 #include <stdint.h>
 
+enum { CRC16_START = 0xFFFF };
+
+uint16_t crc16_on(uint16_t crc, char byte); /* of one byte more */
 uint16_t crc16(const char *bytes, size_t length);
 
 #endif

@@ -1,6 +1,6 @@
 /* What the core asks of the machine it runs on. One implementation per machine, and one for the tests.
  *
- * All functions are called from one context, the main loop; none may block longer than a line takes to send.
+ * All functions are called from one context, the main loop; none may block longer than a byte takes to send.
  * A port that sees ABORT_BYTE in its receive interrupt switches its outputs off there, forgets the bytes
  * that it has not handed over yet, and then hands over ABORT_BYTE like any other byte. A port that notices that its
  * host has gone does the same with HANG_UP_BYTE. */
@@ -72,8 +72,7 @@ void port_sustain_light(void);
 /* Every light and trigger output to its safe level, set-points to zero, at once; also in mid-pulse. */
 void port_off(void);
 
-/* Send the first bytes of what is left of a reply, as many as can go at once, at least one; returns how many. Between two
- * calls the core does what is due. */
-size_t port_send(const char *bytes, size_t length);
+/* Send a byte of a reply. */
+void port_send(char byte);
 
 #endif

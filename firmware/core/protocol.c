@@ -28,38 +28,43 @@ static bool take_crc(struct span *line, uint16_t *crc)
     return true;
 }
 
-static void write_error(struct text *reply, uint32_t boot, enum error error)
+static void write_error(struct reply *reply, uint32_t boot, enum error error)
 {
-    text_word(reply, " ");
-    text_number(reply, boot);
-    text_word(reply, " ERR ");
-    text_number(reply, (uint32_t)error);
+    reply_word(reply, " ");
+    reply_number(reply, boot);
+    reply_word(reply, " ERR ");
+    reply_number(reply, (uint32_t)error);
 }
 
-static void write_ok(struct text *reply, uint32_t boot)
+static void write_ok(struct reply *reply, uint32_t boot)
 {
-    text_word(reply, " ");
-    text_number(reply, boot);
-    text_word(reply, " OK");
+    reply_word(reply, " ");
+    reply_number(reply, boot);
+    reply_word(reply, " OK");
 }
 
-static void write_unreadable(const struct protocol *protocol, struct text *reply, enum error error)
+static void write_unreadable(const struct protocol *protocol, struct reply *reply, enum error error)
 {
-    text_word(reply, "<?");
+    reply_word(reply, "<?");
     write_error(reply, protocol->boot, error);
 }
 
-static void run_command(struct protocol *protocol, struct span word, struct span rest, struct text *reply)
+static void write_kept(const struct protocol *protocol, struct reply *reply)
 {
-    const size_t after_sequence = reply->length;
-    write_ok(reply, protocol->boot);
-    const enum error error = commands_run(&protocol->generator, word, rest, reply);
-    if (error) {
-        reply->length = after_sequence;
-        write_error(reply, protocol->boot, error);
+    const struct answer *kept = &protocol->kept;
+    if (kept->error) {
+        write_error(reply, protocol->boot, kept->error);
     } else {
-        safety_heard(&protocol->generator);
+        write_ok(reply, protocol->boot);
+        reply_fields(reply, kept->names, kept->values);
     }
+}
+
+static void run_command(struct protocol *protocol, struct span word, struct span rest)
+{
+    commands_run(&protocol->generator, word, rest, &protocol->kept);
+    if (!protocol->kept.error)
+        safety_heard(&protocol->generator);
 }
 
 static bool is_newest(const struct protocol *protocol, uint32_t sequence)
@@ -67,27 +72,27 @@ static bool is_newest(const struct protocol *protocol, uint32_t sequence)
     return protocol->answered && protocol->sequence == sequence;
 }
 
-static void identify(const struct protocol *protocol, struct text *reply)
+static void identify(const struct protocol *protocol, struct reply *reply)
 {
     write_ok(reply, protocol->boot);
     commands_identify(reply, protocol->cause, protocol->sequence);
 }
 
-/* A line with a good CRC and a sequence number; the number already stands in the reply. Only a command that is carried out
+/* A line with a good CRC and a sequence number; the number has already been written. Only a command that is carried out
  * is a sign of life: what is repeated, refused or no command may come from a line that runs by itself. */
-static void answer(struct protocol *protocol, uint32_t sequence, uint16_t crc, struct span rest, struct text *reply)
+static void answer(struct protocol *protocol, uint32_t sequence, uint16_t crc, struct span rest, struct reply *reply)
 {
     const struct span word = span_next_word(&rest);
     if (span_equals(word, "ID") && !rest.length) {
         identify(protocol, reply); /* opens a session: always answered afresh, and leaves the kept reply alone */
     } else if (!is_newest(protocol, sequence)) {
-        run_command(protocol, word, rest, reply);
+        run_command(protocol, word, rest);
         protocol->answered = true;
         protocol->sequence = sequence;
         protocol->crc = crc;
-        protocol->reply = *reply;
+        write_kept(protocol, reply);
     } else if (protocol->crc == crc) {
-        *reply = protocol->reply;
+        write_kept(protocol, reply);
     } else {
         write_error(reply, protocol->boot, ERROR_SEQUENCE);
     }
@@ -99,11 +104,11 @@ static bool take_sequence(struct span *rest, uint32_t *sequence)
 }
 
 /* Of a line without mark, which is that of an older host, or of none. */
-static void answer_older(const struct protocol *protocol, struct span rest, struct text *reply)
+static void answer_older(const struct protocol *protocol, struct span rest, struct reply *reply)
 {
     uint32_t sequence = 0;
     if (take_sequence(&rest, &sequence) && span_equals(rest, "ID")) {
-        text_number(reply, sequence);
+        reply_number(reply, sequence);
         identify(protocol, reply);
     } else {
         write_unreadable(protocol, reply, ERROR_SYNTAX);
@@ -118,7 +123,7 @@ static bool take_mark(struct span *rest)
     return marked;
 }
 
-static void write_reply(struct protocol *protocol, struct text *reply)
+static void write_reply(struct protocol *protocol, struct reply *reply)
 {
     struct span rest = {protocol->line, protocol->length};
     uint16_t crc = 0;
@@ -134,31 +139,17 @@ static void write_reply(struct protocol *protocol, struct text *reply)
     } else if (!take_sequence(&rest, &sequence)) {
         write_unreadable(protocol, reply, ERROR_SYNTAX);
     } else {
-        text_word(reply, "<");
-        text_number(reply, sequence);
+        reply_word(reply, "<");
+        reply_number(reply, sequence);
         answer(protocol, sequence, crc, rest, reply);
-    }
-}
-
-/* The one place that sends. Triggers and light do not wait for a reply. */
-static void send(struct protocol *protocol, const struct text *reply)
-{
-    size_t sent = 0;
-    while (sent < reply->length) {
-        sent += port_send(reply->bytes + sent, reply->length - sent);
-        protocol_poll(protocol);
     }
 }
 
 static void answer_line(struct protocol *protocol)
 {
-    struct text reply = {.length = 0};
+    struct reply reply = reply_begin(&protocol->generator);
     write_reply(protocol, &reply);
-    const uint16_t crc = crc16(reply.bytes, reply.length);
-    text_word(&reply, "*");
-    text_hex16(&reply, crc);
-    text_word(&reply, "\n");
-    send(protocol, &reply);
+    reply_end(&reply);
 }
 
 static void end_line(struct protocol *protocol)

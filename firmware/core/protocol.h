@@ -5,7 +5,7 @@
  *               <SEQUENCE BOOT ERR NUMBER*CRC\n       SEQUENCE is ? where the request's could not be read
  *
  * Every line gets exactly one reply, sent from one place; but for one that begins like a reply: it has come back from a
- * line that echoes, and is dropped. The newest reply is kept: the same line again gets it again, without doing anything
+ * line that echoes, and is dropped. The values of the newest reply are kept: the same line again gets it again, without doing anything
  * twice. Up to protocol 2 lines began with the sequence number; ID is still answered in this form, so that an older host
  * can name what it does not understand. */
 #ifndef PROTOCOL_H
@@ -15,8 +15,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "generator_state.h"
-#include "text.h"
+#include "commands.h"
 
 enum { MAX_SEQUENCE = 65535, REQUEST_MARK = '>', REPLY_MARK = '<' };
 
@@ -30,7 +29,7 @@ struct protocol {
     bool answered; /* the next three belong to the newest numbered line */
     uint32_t sequence;
     uint16_t crc;
-    struct text reply;
+    struct answer kept;
 };
 
 void protocol_boot(struct protocol *protocol, uint32_t boot, enum cause cause);

@@ -192,20 +192,27 @@ void port_off(void)
     lit = false;
 }
 
-size_t port_send(const char *bytes, size_t length)
+static void send_line(char *line, size_t length)
 {
-    char sent[512];
     if (bench.replies_to_lose) {
         bench.replies_to_lose--;
-        return length;
+        return;
     }
-    if (length > sizeof sent)
-        length = sizeof sent;
-    memcpy(sent, bytes, length);
     if (bench.replies_to_damage) {
         bench.replies_to_damage--;
-        sent[length / 2] = (char)(sent[length / 2] ^ 1);
+        line[length / 2] = (char)(line[length / 2] ^ 1);
     }
-    bench_send(sent, length);
-    return length;
+    bench_send(line, length);
+}
+
+void port_send(char byte)
+{
+    static char line[512];
+    static size_t length;
+    if (length < sizeof line)
+        line[length++] = byte;
+    if (byte != '\n')
+        return;
+    send_line(line, length);
+    length = 0;
 }

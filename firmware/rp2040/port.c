@@ -93,9 +93,7 @@ void port_off(void)
     outputs_off();
 }
 
-size_t port_send(const char *bytes, size_t length)
+void port_send(char byte)
 {
-    (void)length;
-    serial_send(bytes, 1);
-    return 1;
+    serial_send(byte);
 }

@@ -157,13 +157,16 @@ void port_off(void)
     fake.lit_until_us = 0;
 }
 
-size_t port_send(const char *bytes, size_t length)
+void port_send(char byte)
 {
-    CHECK(length > 6 && length < TEXT_SIZE && bytes[length - 1] == '\n' && bytes[length - 6] == '*');
-    memcpy(fake.reply, bytes, length);
-    fake.reply[length] = '\0';
+    CHECK(fake.sending < sizeof fake.reply - 1);
+    fake.reply[fake.sending++] = byte;
+    if (byte != '\n')
+        return;
+    CHECK(fake.sending > 6 && fake.reply[fake.sending - 6] == '*');
+    fake.reply[fake.sending] = '\0';
+    fake.sending = 0;
     fake.replies++;
-    return length;
 }
 
 const char *exchange(struct protocol *protocol, const char *body)

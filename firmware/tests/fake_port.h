@@ -8,7 +8,10 @@
 #include "port.h"
 #include "protocol.h"
 
-enum { FIRING_US = 3 }; /* time that port_fire takes; the light may start at its end */
+enum {
+    FIRING_US = 3, /* time that port_fire takes; the light may start at its end */
+    REPLY_SIZE = 512,
+};
 
 struct fake_port {
     uint64_t now_us;
@@ -32,7 +35,8 @@ struct fake_port {
     uint64_t lit_until_us;
     unsigned fired;
     unsigned replies;
-    char reply[TEXT_SIZE]; /* newest, terminated by zero */
+    char reply[REPLY_SIZE]; /* newest, terminated by zero */
+    size_t sending;         /* bytes of the one that is on its way */
 };
 
 extern struct fake_port fake;

@@ -180,7 +180,7 @@ static const char *raw(const char *line)
 
 static const char *with_crc(const char *body)
 {
-    static char line[TEXT_SIZE];
+    static char line[REPLY_SIZE];
     snprintf(line, sizeof line, "%s*%04X\n", body, crc16(body, strlen(body)));
     return line;
 }
@@ -203,7 +203,7 @@ static void test_an_echo_ends_and_does_not_keep_it_armed(void)
         boot_armed();
         const char *said = raw(first[i]);
         for (int echoes = 0; said && echoes < 4; echoes++) {
-            char copy[TEXT_SIZE];
+            char copy[REPLY_SIZE];
             strcpy(copy, said);
             said = raw(copy);
         }
@@ -211,7 +211,7 @@ static void test_an_echo_ends_and_does_not_keep_it_armed(void)
     }
     boot_armed();
     for (int ms = 0; ms <= HEARTBEAT_MS; ms += 100) {
-        char copy[TEXT_SIZE];
+        char copy[REPLY_SIZE];
         strcpy(copy, raw(with_crc("0 ID")));
         CHECK(copy[0] == '0');
         raw(copy);
@@ -288,7 +288,7 @@ static void test_the_longest_lines_fit(void)
     protocol.generator.counters =
         (struct counters){UINT32_MAX, UINT32_MAX, UINT32_MAX, UINT32_MAX, UINT32_MAX, UINT32_MAX, UINT32_MAX};
     ASK("65535 STATUS");
-    CHECK(strlen(fake.reply) < TEXT_SIZE - 8 && strstr(fake.reply, "crc_errors=4294967295"));
+    CHECK(strlen(fake.reply) < REPLY_SIZE && strstr(fake.reply, "crc_errors=4294967295"));
     CHECK(strstr(ASK("65534 CHANNEL 4294967295 4294967295 4294967295 4294967295 4294967295 4294967295 4294967295 "
                      "4294967295 4294967295"),
                  " ERR 12"));

@@ -3,8 +3,10 @@
 
 #include "crc16.h"
 #include "fake_port.h"
+#include "reply.h"
 #include "span.h"
-#include "text.h"
+
+static struct generator generator;
 
 static struct span span(const char *text)
 {
@@ -27,23 +29,40 @@ static void test_numbers_fit_32_bits_or_are_refused(void)
         CHECK(!span_number(span(wrong[i]), &number));
 }
 
+/* Of what was sent, the CRC left out. */
+static struct span sent(struct reply *reply)
+{
+    reply_end(reply);
+    return span_next_word(&(struct span){fake.reply, strlen(fake.reply) - 6});
+}
+
 static void test_written_numbers_can_be_read(void)
 {
     const uint32_t numbers[] = {0, 9, 10, 6400, 1000000, UINT32_MAX};
     for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++) {
-        struct text text = {.length = 0};
+        struct reply reply = reply_begin(&generator);
         uint32_t back = 1;
-        text_number(&text, numbers[i]);
-        CHECK(span_number((struct span){text.bytes, text.length}, &back) && back == numbers[i]);
+        reply_number(&reply, numbers[i]);
+        CHECK(span_number(sent(&reply), &back) && back == numbers[i]);
     }
+}
+
+static void test_a_line_ends_in_its_crc(void)
+{
+    struct reply reply = reply_begin(&generator);
+    reply_word(&reply, "123456789");
+    reply_end(&reply);
+    CHECK(!strcmp(fake.reply, "123456789*29B1\n"));
+    reply = reply_begin(&generator);
+    reply_fields(&reply, "", NULL);
+    reply_fields(&reply, "one two", (const uint32_t[]){1, 2});
+    reply_field(&reply, "three", 3);
+    CHECK(sent(&reply).length == 0 && !strncmp(fake.reply, " one=1 two=2 three=3*", 21));
 }
 
 static void test_hex_is_four_upper_case_digits(void)
 {
     uint16_t number = 0;
-    struct text text = {.length = 0};
-    text_hex16(&text, 0x0AF9);
-    CHECK(text.length == 4 && !memcmp(text.bytes, "0AF9", 4));
     CHECK(span_hex16(span("0AF9"), &number) && number == 0x0AF9);
     CHECK(!span_hex16(span("0af9"), &number) && !span_hex16(span("0AF"), &number) &&
           !span_hex16(span("0AF91"), &number));
@@ -58,21 +77,14 @@ static void test_words_are_equal_only_as_a_whole(void)
     CHECK(rest.length == 0 && span_next_word(&rest).length == 0);
 }
 
-static void test_an_overlong_text_is_cut(void)
-{
-    struct text text = {.length = 0};
-    for (int i = 0; i < TEXT_SIZE; i++)
-        text_word(&text, "ab");
-    CHECK(text.length == TEXT_SIZE);
-}
-
 int main(void)
 {
+    fake_reset();
     test_crc_has_the_check_value_of_ccitt_false();
     test_numbers_fit_32_bits_or_are_refused();
     test_written_numbers_can_be_read();
+    test_a_line_ends_in_its_crc();
     test_hex_is_four_upper_case_digits();
     test_words_are_equal_only_as_a_whole();
-    test_an_overlong_text_is_cut();
     return 0;
 }

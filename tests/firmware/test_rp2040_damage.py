@@ -176,7 +176,7 @@ def test_words_that_changed_in_memory_are_not_fired(board: Board) -> None:
 def test_code_that_changes_in_memory_is_found_and_stays_a_fault(board: Board, armed: bool) -> None:
     if not armed:
         board.ask(Command.OFF)
-    unused = next(a for a in range(0x2000_0500, 0x2000_0600, 4) if board.pico.read_word(a) == vector_of_faults(board))
+    unused = next(a for a in range(0x2000_0400, 0x2000_0500, 4) if board.pico.read_word(a) == vector_of_faults(board))
     board.pico.write_word(unused, 0)
     for _ in range(TWO_ROUNDS_MS // 500):
         board.pico.run_ms(500)

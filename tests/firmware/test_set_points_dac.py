@@ -287,7 +287,7 @@ def test_a_current_that_changed_in_memory_does_not_reach_the_gain(board: Board) 
     board.pico.run_until_received()
     for _ in range(400):
         board.pico.run(board.pico.cycle + 125)
-        stack = [a for a in range(0x2000_0000, 0x2000_0500, 4) if board.pico.read_word(a) == CURRENTS_MA[1]]
+        stack = [a for a in range(0x2000_0000, 0x2000_0400, 4) if board.pico.read_word(a) == CURRENTS_MA[1]]
         for address in set(stack) - set(wanted):
             board.pico.write_word(address, 60_000)
     board.pico.run_ms(PERIOD_MS)

@@ -4,12 +4,11 @@
 #define SERIAL_H
 
 #include <stdbool.h>
-#include <stddef.h>
 
 void serial_start(void);
 bool serial_waiting(void); /* is there a byte? */
 bool serial_take(char *byte);
-void serial_send(const char *bytes, size_t length);
+void serial_send(char byte);
 
 /* For vectors.S; an image has one of them. */
 void serial_uart_isr(void);

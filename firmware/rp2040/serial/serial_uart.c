@@ -34,11 +34,9 @@ void serial_uart_isr(void)
         serial_received((char)(REG(UART0_DR) & 0xffu));
 }
 
-void serial_send(const char *bytes, size_t length)
+void serial_send(char byte)
 {
-    for (size_t i = 0; i < length; i++) {
-        while (REG(UART0_FR) & UART_FR_TX_FULL)
-            ;
-        REG(UART0_DR) = (uint8_t)bytes[i];
-    }
+    while (REG(UART0_FR) & UART_FR_TX_FULL)
+        ;
+    REG(UART0_DR) = (uint8_t)byte;
 }

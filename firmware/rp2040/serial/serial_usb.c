@@ -27,16 +27,14 @@ void serial_start(void)
     usb_endpoints_start();
 }
 
-/* Bytes come one by one; packets go when they are full or a line ends. */
-void serial_send(const char *bytes, size_t length)
+/* Packets go when they are full or a line ends. */
+void serial_send(char byte)
 {
-    bool complete = false;
-    for (size_t i = 0; i < length && head - tail < RING; i++) {
-        *place(head) = (uint8_t)bytes[i];
+    if (head - tail < RING) {
+        *place(head) = (uint8_t)byte;
         head++;
-        complete = complete || bytes[i] == '\n' || head - tail >= USB_PACKET - 1;
     }
-    if (complete)
+    if (byte == '\n' || head - tail >= USB_PACKET - 1)
         REG(USB_INTF) = USB_INT_BUFFER; /* nothing is masked for it: the interlock comes in between */
 }
 
