@@ -108,7 +108,8 @@ class GeneratorStatus:
     shots_left : int
         Shot budget that remains.
     counters : Mapping[str, int]
-        ``requested, fired, suppressed, early, cameras, lights, crc_errors``, since boot.
+        ``requested, fired, suppressed, early, cameras, lights``, and of the line ``crc_errors, framing, breaks,
+        overruns, lost``; since boot.
     estop_closed : bool
         The generator's own emergency stop.
     """

@@ -49,3 +49,19 @@ def unframed(line: bytes) -> str:
 def _crc16(body: bytes) -> int:
     """CRC-16/CCITT-FALSE."""
     return binascii.crc_hqx(body, 0xFFFF)
+
+
+def words(line: bytes, mark: str) -> list[str]:
+    """What stands between mark and CRC of a line; DamagedLine without that mark."""
+    body = unframed(line)
+    if not body.startswith(mark):
+        raise DamagedLine(f"{line!r} does not begin with {mark}")
+    return body.removeprefix(mark).split(" ")
+
+
+def named(fields: list[str]) -> dict[str, str]:
+    """Values of NAME=VALUE by name; ValueError for anything else."""
+    pairs = [field.partition("=") for field in fields]
+    if not all(name and separator and value for name, separator, value in pairs):
+        raise ValueError("a field is not NAME=VALUE")
+    return {name: value for name, _, value in pairs}

@@ -11,12 +11,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum, IntFlag, StrEnum
 
-from daq.drivers.pulse_framing import REPLY_MARK, REQUEST_MARK, DamagedLine, framed, unframed
+from daq.drivers.pulse_framing import REPLY_MARK, REQUEST_MARK, DamagedLine, framed, named, words
 
-PROTOCOL_VERSION = 3
+PROTOCOL_VERSION = 4
 CHANNEL_COUNT = 4
 MAX_SEQUENCE = 65_535
 HEARTBEAT_MS = 3000
+MAX_DUTY_PPM = 200
 UNCHANGED = 2**32 - 1  # asks for a limit without tightening it
 
 
@@ -26,6 +27,8 @@ class Command(StrEnum):
     ID = "ID"
     NEW = "NEW"
     LIMIT = "LIMIT"
+    STORE = "STORE"
+    STORED = "STORED"
     CHANNEL = "CHANNEL"
     LOAD = "LOAD"
     ARM = "ARM"
@@ -48,8 +51,10 @@ class Fields:
 
 _EDGES = ("camera_ns", "a_start_ns", "a_width_ns", "b_start_ns", "b_width_ns", "current_ma")
 _TICKS = ("camera_ticks", "a_start_ticks", "a_width_ticks", "b_start_ticks", "b_width_ticks", "current_ma")
-_LIMITS = ("max_current_ma", "max_duty_ppm", "max_light_ma")
-COUNTERS = ("requested", "fired", "suppressed", "early", "cameras", "lights", "crc_errors")
+_LIMIT_UNITS = (("max_current", "ma"), ("max_duty", "ppm"), ("max_light", "ma"))
+_LIMITS = tuple(f"{kind}_{unit}" for kind, unit in _LIMIT_UNITS)
+_SHOT_COUNTERS = ("requested", "fired", "suppressed", "early", "cameras", "lights")
+COUNTERS = (*_SHOT_COUNTERS, "crc_errors", "framing", "breaks", "overruns", "lost")
 """Counters of STATUS, since start."""
 
 FIELDS: Mapping[Command, Fields] = {
@@ -58,6 +63,10 @@ FIELDS: Mapping[Command, Fields] = {
     ),
     Command.NEW: Fields(),
     Command.LIMIT: Fields(("channel", *_LIMITS), ("channel", *_LIMITS)),
+    Command.STORE: Fields(
+        tuple(f"{kind}_{i}_{unit}" for i in range(CHANNEL_COUNT) for kind, unit in _LIMIT_UNITS), ("stored",)
+    ),
+    Command.STORED: Fields(("channel",), ("stored", "channel", *_LIMITS)),
     Command.CHANNEL: Fields(("channel", *_EDGES, "frame_a_close_ns", "frame_b_open_ns"), ("channel", *_EDGES)),
     Command.LOAD: Fields(reply=("train", "length_ns", "period_us")),
     Command.ARM: Fields(("shots", "source", "period_us"), ("train", "shots_left")),
@@ -78,6 +87,14 @@ class State(IntEnum):
     ARMED = 1
     FAULT = 2
     LIT = 3
+
+
+class Stored(IntEnum):
+    """What the board has found of the limits that it keeps over a start."""
+
+    NONE = 0
+    WHOLE = 1
+    DAMAGED = 2
 
 
 class Source(IntEnum):
@@ -109,6 +126,8 @@ class Fault(IntFlag):
     ESTOP = 16
     SETPOINT = 32
     OUTPUT = 64
+    LIMITS = 128
+    CLOCK = 256
 
 
 class ErrorNumber(IntEnum):
@@ -140,6 +159,7 @@ class ErrorNumber(IntEnum):
     PERIOD = 24
     OTHER_SOURCE = 25
     NO_SHOT = 26
+    STORE = 27
 
 
 ERROR_TEXT: Mapping[ErrorNumber, str] = {
@@ -169,6 +189,7 @@ ERROR_TEXT: Mapping[ErrorNumber, str] = {
     ErrorNumber.PERIOD: "the period is shorter than the train permits, or longer than 10000000 us",
     ErrorNumber.OTHER_SOURCE: "the generator is armed for another trigger source",
     ErrorNumber.NO_SHOT: "no shot of this train has been fired on this channel",
+    ErrorNumber.STORE: "a limit to be stored is above 30000 mA, 200 ppm or 500 mA of continuous light",
 }
 
 
@@ -234,7 +255,7 @@ def decode_request(line: bytes) -> Request:
     DamagedLine
         It is no such line.
     """
-    sequence, command, *fields = _words(line, REQUEST_MARK)
+    sequence, command, *fields = words(line, REQUEST_MARK)
     try:
         request = Request(int(sequence), Command(command), tuple(map(int, fields)))
         if encode_request(request) == line:
@@ -253,10 +274,10 @@ def decode_reply(line: bytes) -> Reply:
         CRC or form is wrong.
     """
     try:
-        sequence, boot, verdict, *rest = _words(line, REPLY_MARK)
+        sequence, boot, verdict, *rest = words(line, REPLY_MARK)
         number = None if sequence == "?" else int(sequence)
         if verdict == "OK":
-            return Reply(number, int(boot), fields=_named(rest))
+            return Reply(number, int(boot), fields=named(rest))
         if verdict == "ERR" and len(rest) == 1:
             return Reply(number, int(boot), ErrorNumber(int(rest[0])))
     except ValueError as error:
@@ -270,17 +291,3 @@ def encode_reply(reply: Reply) -> bytes:
     if reply.error is not None:
         return framed(f"{head} ERR {reply.error.value}")
     return framed(" ".join([head, "OK", *(f"{name}={value}" for name, value in reply.fields.items())]))
-
-
-def _words(line: bytes, mark: str) -> list[str]:
-    body = unframed(line)
-    if not body.startswith(mark):
-        raise DamagedLine(f"{line!r} does not begin with {mark}")
-    return body.removeprefix(mark).split(" ")
-
-
-def _named(words: list[str]) -> dict[str, str]:
-    pairs = [word.partition("=") for word in words]
-    if not all(name and separator and value for name, separator, value in pairs):
-        raise ValueError("a field is not NAME=VALUE")
-    return {name: value for name, _, value in pairs}

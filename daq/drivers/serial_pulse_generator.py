@@ -11,6 +11,7 @@ from types import TracebackType
 from typing import Self
 
 from daq.devices import DeviceIdentity, GeneratorState, GeneratorStatus, TriggerSource
+from daq.drivers.pulse_limits import check_stored_limits
 from daq.drivers.pulse_line import PulseLine
 from daq.drivers.pulse_protocol import (
     CHANNEL_COUNT,
@@ -90,6 +91,7 @@ class SerialPulseGenerator:
         self._identity = self._line.open()
         try:
             self.off()
+            check_stored_limits(self._line, self._channels, self._max_current_a, self._max_light_a)
         except DeviceError:
             self._line.close()
             raise

@@ -1,5 +1,5 @@
-/* Limits of one channel while the generator runs, for the LED that is connected to it. They start at the absolute
- * ones of limits.h and can only be tightened, until the next start. */
+/* Limits of one channel while the generator runs, for the LED that is connected to it. They start at those
+ * that the board has stored, or at the absolute ones of limits.h, and can only be tightened, until the next start. */
 #ifndef CHANNEL_LIMITS_H
 #define CHANNEL_LIMITS_H
 

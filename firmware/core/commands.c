@@ -23,11 +23,8 @@ void commands_identify(struct reply *reply, enum cause cause, uint32_t last_sequ
     reply_word(reply, port_git);
     reply_word(reply, " serial=");
     reply_word(reply, port_serial());
-    reply_field(reply, "protocol", PROTOCOL_VERSION);
-    reply_field(reply, "channels", CHANNEL_COUNT);
-    reply_field(reply, "tick_ns", port_tick_ns);
-    reply_field(reply, "cause", (uint32_t)cause);
-    reply_field(reply, "last", last_sequence);
+    const uint32_t values[] = {PROTOCOL_VERSION, CHANNEL_COUNT, port_tick_ns, (uint32_t)cause, last_sequence};
+    reply_fields(reply, "protocol channels tick_ns cause last", values);
 }
 
 static enum error new_train(struct generator *generator, const uint32_t *fields, uint32_t *values)
@@ -84,6 +81,28 @@ static enum error limit(struct generator *generator, const uint32_t *fields, uin
     return error;
 }
 
+_Static_assert(sizeof(struct channel_limits) * CHANNEL_COUNT == 12 * sizeof(uint32_t), "the fields of STORE");
+
+static enum error store(struct generator *generator, const uint32_t *fields, uint32_t *values)
+{
+    const enum error error = safety_store_limits(generator, (const struct channel_limits *)fields);
+    values[0] = (uint32_t)generator->stored;
+    return error;
+}
+
+/* Read anew from the memory of the board, which takes its time. */
+static enum error stored(struct generator *generator, const uint32_t *fields, uint32_t *values)
+{
+    struct channel_limits limits[CHANNEL_COUNT];
+    if (generator->state == STATE_ARMED || generator->state == STATE_LIT)
+        return ERROR_NOT_SAFE;
+    if (fields[0] >= CHANNEL_COUNT)
+        return ERROR_CHANNEL;
+    values[0] = (uint32_t)stored_limits_read(limits);
+    note_limits(values + 1, fields[0], limits[fields[0]]);
+    return ERROR_NONE;
+}
+
 static enum error load(struct generator *generator, const uint32_t *fields, uint32_t *values)
 {
     (void)fields;
@@ -133,23 +152,21 @@ static enum error shot(struct generator *generator, const uint32_t *fields, uint
     return ERROR_NONE;
 }
 
+_Static_assert(sizeof(struct counters) == 7 * sizeof(uint32_t) &&
+                   sizeof(struct port_line_errors) == 4 * sizeof(uint32_t),
+               "the last fields of STATUS");
+
 static enum error status(struct generator *generator, const uint32_t *fields, uint32_t *values)
 {
     (void)fields;
-    const struct counters *counters = &generator->counters;
     values[0] = (uint32_t)generator->state;
     values[1] = generator->faults;
     values[2] = generator->interlock_closed;
     values[3] = generator->estop_closed;
     values[4] = (uint32_t)generator->source;
     values[5] = generator->shots_left;
-    values[6] = counters->requested;
-    values[7] = counters->fired;
-    values[8] = counters->suppressed;
-    values[9] = counters->early;
-    values[10] = counters->cameras;
-    values[11] = counters->lights;
-    values[12] = counters->crc_errors;
+    *(struct counters *)&values[6] = generator->counters;
+    *(struct port_line_errors *)&values[13] = port_line_errors();
     return ERROR_NONE;
 }
 
@@ -177,11 +194,13 @@ static enum error clear(struct generator *generator, const uint32_t *fields, uin
 #define EDGES(unit) \
     "channel camera_" unit " a_start_" unit " a_width_" unit " b_start_" unit " b_width_" unit " current_ma"
 #define LIMITS "channel max_current_ma max_duty_ppm max_light_ma"
-#define COUNTERS "requested fired suppressed early cameras lights crc_errors"
+#define COUNTERS "requested fired suppressed early cameras lights crc_errors framing breaks overruns lost"
 
 static const struct command COMMANDS[] = {
     {"NEW", 0, new_train, ""},
     {"LIMIT", 4, limit, LIMITS},
+    {"STORE", 12, store, "stored"},
+    {"STORED", 1, stored, "stored " LIMITS},
     {"CHANNEL", 9, set_channel, EDGES("ns")},
     {"LOAD", 0, load, "train length_ns period_us"},
     {"ARM", 3, arm, "train shots_left"},

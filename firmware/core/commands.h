@@ -10,9 +10,9 @@
 #include "span.h"
 
 #define MODEL "tomoshadow-pulse"
-#define VERSION "3.0.0"
+#define VERSION "4.0.0"
 
-enum { PROTOCOL_VERSION = 3, MAX_FIELDS = 9, MAX_VALUES = 13 };
+enum { PROTOCOL_VERSION = 4, MAX_FIELDS = 12, MAX_VALUES = 17 };
 
 /* What a command has answered: an error, or the values of these names. */
 struct answer {

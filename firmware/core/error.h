@@ -30,6 +30,7 @@ enum error {
     ERROR_PERIOD = 24,
     ERROR_OTHER_SOURCE = 25,
     ERROR_NO_SHOT = 26,
+    ERROR_STORE = 27,
 };
 
 #endif

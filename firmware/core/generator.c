@@ -10,8 +10,8 @@ void generator_boot(struct generator *generator, enum cause cause)
 {
     const uint64_t now_us = port_now_us();
     *generator = (struct generator){.state = STATE_SAFE, .not_before_us = now_us + LONGEST_PERIOD_US};
-    safety_forget_limits(generator);
     safety_outputs_off(generator);
+    safety_start_limits(generator);
     (void)port_take_lights(); /* of what was before */
     if (cause == CAUSE_WATCHDOG)
         safety_trip(generator, FAULT_WATCHDOG);

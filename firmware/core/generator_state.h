@@ -20,6 +20,7 @@
 
 #include "channel_limits.h"
 #include "pulse_train.h"
+#include "stored_limits.h"
 
 enum state {
     STATE_SAFE = 0,
@@ -37,6 +38,8 @@ enum fault {
     FAULT_ESTOP = 16,
     FAULT_SETPOINT = 32,
     FAULT_OUTPUT = 64,
+    FAULT_LIMITS = 128,
+    FAULT_CLOCK = 256,
 };
 
 /* What starts the shots of an armed generator. */
@@ -72,6 +75,7 @@ struct generator {
     uint32_t faults;
     bool interlock_closed; /* as the port told it last */
     bool estop_closed;
+    enum stored stored; /* what was found in the memory of the board */
     struct channel_limits limits[CHANNEL_COUNT];
     uint32_t limits_sum;      /* of what safety.c has written there */
     struct pulse_train train; /* actual values */

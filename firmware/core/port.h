@@ -63,6 +63,26 @@ uint32_t port_take_lights(void);
  * each call. */
 bool port_intact(void);
 
+/* The newest words that were stored, in memory that outlasts a start; false where there never were any. Light is off
+ * meanwhile, and while they are stored. */
+enum { STORED_WORDS = 16 };
+bool port_read_stored(uint32_t words[STORED_WORDS]);
+
+/* Store these behind them; false where there is no room, or they do not read back. */
+bool port_store(const uint32_t words[STORED_WORDS]);
+
+/* Bytes since boot that the line has damaged or lost; each spoils the CRC of its request. */
+struct port_line_errors {
+    uint32_t framing;  /* no stop bit: another rate, or noise */
+    uint32_t breaks;   /* low for longer than a byte: a cut wire, a host that resets */
+    uint32_t overruns; /* the interrupt came too late */
+    uint32_t lost;     /* no room, while a reply was sent */
+};
+struct port_line_errors port_line_errors(void);
+
+/* False from the moment on that the clocks of this machine did not agree with each other; the outputs are off since. */
+bool port_clock_sound(void);
+
 /* Make ready for light for adjustment: set-points, read back; still dark. False as port_load. */
 bool port_prepare_light(const uint32_t *current_ma);
 

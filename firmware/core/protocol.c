@@ -60,13 +60,6 @@ static void write_kept(const struct protocol *protocol, struct reply *reply)
     }
 }
 
-static void run_command(struct protocol *protocol, struct span word, struct span rest)
-{
-    commands_run(&protocol->generator, word, rest, &protocol->kept);
-    if (!protocol->kept.error)
-        safety_heard(&protocol->generator);
-}
-
 static bool is_newest(const struct protocol *protocol, uint32_t sequence)
 {
     return protocol->answered && protocol->sequence == sequence;
@@ -78,24 +71,34 @@ static void identify(const struct protocol *protocol, struct reply *reply)
     commands_identify(reply, protocol->cause, protocol->sequence);
 }
 
-/* A line with a good CRC and a sequence number; the number has already been written. Only a command that is carried out
- * is a sign of life: what is repeated, refused or no command may come from a line that runs by itself. */
+/* Only a command that is carried out is a sign of life: what is repeated, refused or no command may come from a line that
+ * runs by itself. */
+static void run_command(struct protocol *protocol, struct span word, struct span rest)
+{
+    commands_run(&protocol->generator, word, rest, &protocol->kept);
+    if (!protocol->kept.error)
+        safety_heard(&protocol->generator);
+}
+
+/* A line with a good CRC and a sequence number. It is carried out before any of its reply is sent, which takes time. */
 static void answer(struct protocol *protocol, uint32_t sequence, uint16_t crc, struct span rest, struct reply *reply)
 {
     const struct span word = span_next_word(&rest);
-    if (span_equals(word, "ID") && !rest.length) {
-        identify(protocol, reply); /* opens a session: always answered afresh, and leaves the kept reply alone */
-    } else if (!is_newest(protocol, sequence)) {
+    const bool asks_id = span_equals(word, "ID") && !rest.length;
+    if (!asks_id && !is_newest(protocol, sequence)) {
         run_command(protocol, word, rest);
         protocol->answered = true;
         protocol->sequence = sequence;
         protocol->crc = crc;
-        write_kept(protocol, reply);
-    } else if (protocol->crc == crc) {
-        write_kept(protocol, reply);
-    } else {
-        write_error(reply, protocol->boot, ERROR_SEQUENCE);
     }
+    reply_word(reply, "<");
+    reply_number(reply, sequence);
+    if (asks_id)
+        identify(protocol, reply); /* opens a session: always answered afresh, and leaves the kept reply alone */
+    else if (protocol->crc == crc)
+        write_kept(protocol, reply);
+    else
+        write_error(reply, protocol->boot, ERROR_SEQUENCE);
 }
 
 static bool take_sequence(struct span *rest, uint32_t *sequence)
@@ -139,8 +142,6 @@ static void write_reply(struct protocol *protocol, struct reply *reply)
     } else if (!take_sequence(&rest, &sequence)) {
         write_unreadable(protocol, reply, ERROR_SYNTAX);
     } else {
-        reply_word(reply, "<");
-        reply_number(reply, sequence);
         answer(protocol, sequence, crc, rest, reply);
     }
 }

@@ -35,11 +35,6 @@ void reply_number(struct reply *reply, uint32_t number)
         put(reply, digits[--count]);
 }
 
-void reply_field(struct reply *reply, const char *name, uint32_t number)
-{
-    reply_fields(reply, name, &number);
-}
-
 void reply_fields(struct reply *reply, const char *names, const uint32_t *numbers)
 {
     while (*names) {

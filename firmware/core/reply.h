@@ -14,9 +14,8 @@ struct reply {
 struct reply reply_begin(struct generator *generator);
 void reply_word(struct reply *reply, const char *word);
 void reply_number(struct reply *reply, uint32_t number);
-void reply_field(struct reply *reply, const char *name, uint32_t number); /* " name=number" */
 
-/* The same for several numbers, whose names a space divides. */
+/* " name=number" for each of the names, which a space divides. */
 void reply_fields(struct reply *reply, const char *names, const uint32_t *numbers);
 
 /* CRC and line feed. */

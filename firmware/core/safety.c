@@ -77,12 +77,13 @@ static void forget_train(struct generator *generator)
     generator->loaded = generator->fired = false;
 }
 
-void safety_forget_limits(struct generator *generator)
+void safety_start_limits(struct generator *generator)
 {
-    for (int i = 0; i < CHANNEL_COUNT; i++)
-        generator->limits[i] = channel_limits_absolute();
+    generator->stored = stored_limits_read(generator->limits);
     generator->limits_sum = sum_of(generator->limits, sizeof generator->limits);
     forget_train(generator);
+    if (generator->stored == STORED_DAMAGED)
+        safety_trip(generator, FAULT_LIMITS);
 }
 
 enum error safety_new_train(struct generator *generator)
@@ -157,6 +158,31 @@ enum error safety_tighten(struct generator *generator, uint32_t number, struct c
     return ERROR_NONE;
 }
 
+static bool are_within_absolute(const struct channel_limits *limits)
+{
+    const struct channel_limits most = channel_limits_absolute();
+    for (int i = 0; i < CHANNEL_COUNT; i++)
+        if (limits[i].max_current_ma > most.max_current_ma || limits[i].max_duty_ppm > most.max_duty_ppm ||
+            limits[i].max_light_ma > most.max_light_ma)
+            return false;
+    return true;
+}
+
+enum error safety_store_limits(struct generator *generator, const struct channel_limits *limits)
+{
+    if (gives_light(generator))
+        return ERROR_NOT_SAFE;
+    if (!are_within_absolute(limits))
+        return ERROR_STORE;
+    if (generator->outputs_live)
+        return ERROR_EARLY;
+    if (!safety_check_memory(generator))
+        return ERROR_FAULT_LATCHED;
+    const bool written = stored_limits_write(limits);
+    safety_start_limits(generator);
+    return written ? ERROR_NONE : ERROR_HARDWARE;
+}
+
 void safety_off(struct generator *generator)
 {
     safety_outputs_off(generator);
@@ -171,7 +197,8 @@ enum error safety_clear(struct generator *generator)
     const enum error error = safety_check_stops(generator);
     if (error)
         return error;
-    if (!port_set_points_confirmed() || port_take_lights() || !port_intact() || !limits_are_sound(generator))
+    if (!port_set_points_confirmed() || port_take_lights() || !port_intact() || !port_clock_sound() ||
+        !limits_are_sound(generator) || generator->stored == STORED_DAMAGED)
         return ERROR_HARDWARE;
     if (!train_is_sound(generator))
         forget_train(generator);
@@ -210,6 +237,8 @@ void safety_watch(struct generator *generator, uint64_t now_us)
         safety_trip(generator, FAULT_SETPOINT);
     if (!port_intact() && !(generator->faults & FAULT_INTERNAL))
         safety_trip(generator, FAULT_INTERNAL);
+    if (!port_clock_sound() && !(generator->faults & FAULT_CLOCK))
+        safety_trip(generator, FAULT_CLOCK);
     if (lights && now_us - generator->heard_us > HEARTBEAT_MS * 1000u)
         safety_trip(generator, FAULT_HEARTBEAT);
 }

@@ -13,12 +13,15 @@ enum error safety_new_train(struct generator *generator);
 enum error safety_set_channel(struct generator *generator, uint32_t number, const struct channel *requested);
 enum error safety_load(struct generator *generator);
 
-/* At the start: the absolute limits, and no train. */
-void safety_forget_limits(struct generator *generator);
+/* At the start: the limits that the board has stored, and no train. Damaged ones are a fault. */
+void safety_start_limits(struct generator *generator);
 
 /* Tighten the limits of a channel; what is larger than the present limit changes nothing. The train must be loaded
  * again. Not while ARMED or LIT. */
 enum error safety_tighten(struct generator *generator, uint32_t number, struct channel_limits asked);
+
+/* Store the limits of all channels in the board, and start with them. Not while ARMED or LIT, nor under a train. */
+enum error safety_store_limits(struct generator *generator, const struct channel_limits *limits);
 
 void safety_off(struct generator *generator);
 enum error safety_clear(struct generator *generator);

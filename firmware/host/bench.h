@@ -7,6 +7,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "port.h"
+
 struct bench {
     int serial; /* file descriptor of the serial line */
     bool interlock_closed;
@@ -17,6 +19,8 @@ struct bench {
     int64_t clock_offset_us;  /* virtual time that has been skipped */
     unsigned replies_to_lose; /* line faults that are still to come */
     unsigned replies_to_damage;
+    bool any_stored; /* in memory that outlasts a reset */
+    uint32_t stored[STORED_WORDS];
 };
 
 extern struct bench bench;

@@ -1,10 +1,13 @@
 """Linked image -> UF2 for the drive of the boot ROM.
 
     image.py IMAGE.bin IMAGE.uf2
+    image.py erase-limits.uf2
 
 Puts the CRC of the second boot stage into the image (RP2040 data sheet, 2.8.1.3.1), in place, and the sums of its two
 other parts, which the firmware checks (boot/start.c); then wraps the image into UF2 blocks
 (https://github.com/microsoft/uf2). The same image gives the same bytes.
+
+The second form is for a board whose limits are to be forgotten: blank pages in the place of chip/flash_records.c.
 """
 
 import struct
@@ -14,6 +17,7 @@ from pathlib import Path
 FLASH = 0x1000_0000
 BOOT2_SIZE = 256
 PAGE = 256
+LIMITS_AT, LIMITS_SIZE = 0x1_0000, 4096
 FAMILY_RP2040 = 0xE48B_FF56
 FAMILY_PRESENT = 0x2000
 BLOCK = struct.Struct("<8I476sI")
@@ -57,7 +61,7 @@ def with_sums(image: bytes) -> bytes:
     return parts[0] + b"".join(part[:-4] + struct.pack("<I", checksum(part[:-4])) for part in parts[1:])
 
 
-def uf2(image: bytes) -> bytes:
+def uf2(image: bytes, offset: int = 0) -> bytes:
     """One block of 512 bytes per flash page; the last page is filled with zeros."""
     pages = [image[start : start + PAGE].ljust(PAGE, b"\0") for start in range(0, len(image), PAGE)]
     start_magic, second_magic, end_magic = MAGICS
@@ -66,7 +70,7 @@ def uf2(image: bytes) -> bytes:
             start_magic,
             second_magic,
             FAMILY_PRESENT,
-            FLASH + PAGE * i,
+            FLASH + offset + PAGE * i,
             PAGE,
             i,
             len(pages),
@@ -79,7 +83,11 @@ def uf2(image: bytes) -> bytes:
 
 
 def main() -> None:
-    binary, drive_file = map(Path, sys.argv[1:])
+    *binaries, drive_file = map(Path, sys.argv[1:])
+    if not binaries:
+        drive_file.write_bytes(uf2(b"\xff" * LIMITS_SIZE, LIMITS_AT))
+        return
+    binary = binaries[0]
     image = with_sums(with_boot_crc(binary.read_bytes()))
     binary.write_bytes(image)
     drive_file.write_bytes(uf2(image))

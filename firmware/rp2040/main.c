@@ -1,5 +1,7 @@
 /* The main loop. */
+#include "clock_check.h"
 #include "clocks.h"
+#include "flash.h"
 #include "generator.h"
 #include "identity.h"
 #include "image_check.h"
@@ -10,6 +12,7 @@
 #include "serial.h"
 #include "set_points.h"
 #include "state_machines.h"
+#include "supply.h"
 #include "timer.h"
 #include "watchdog.h"
 
@@ -23,6 +26,7 @@ static struct protocol protocol;
 /* The interlock before all others. */
 static void start_interrupts(void)
 {
+    REG(SCB_SHPR3) = (uint32_t)PRIORITY_LOWEST << 24;
     REG(NVIC_PRIORITY(INTERRUPT_TIMER0)) = PRIORITY_LOWEST << 8 * (INTERRUPT_TIMER0 % 4);
     REG(NVIC_PRIORITY(INTERRUPT_UART0)) = PRIORITY_LOWEST << 8 * (INTERRUPT_UART0 % 4);
     REG(NVIC_ENABLE) = 1u << INTERRUPT_TIMER0 | 1u << INTERRUPT_IO_BANK0 | 1u << INTERRUPT_UART0;
@@ -45,8 +49,10 @@ static void sleep(uint32_t time_us)
 ONCE static struct start start_chip(void)
 {
     outputs_start();
+    supply_start();
     clocks_start();
     timer_start();
+    clock_check_start();
     const struct start start = watchdog_read_start();
     watchdog_start();
     set_points_start();
@@ -59,7 +65,8 @@ int main(void)
 {
     char byte = 0;
     const struct start start = start_chip();
-    identity_read_board(); /* nothing reads from flash after it */
+    flash_take_over(); /* nothing runs from there after it */
+    identity_read_board();
     protocol_boot(&protocol, start.boot, start.cause);
     start_interrupts();
     for (;;) {

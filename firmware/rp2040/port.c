@@ -1,8 +1,10 @@
 /* The port of the core to the RP2040: everything that the core asks of its machine, and who does it. */
 #include "port.h"
 
+#include "clock_check.h"
 #include "clocks.h"
 #include "continuous_light.h"
+#include "flash_records.h"
 #include "identity.h"
 #include "image_check.h"
 #include "interlock.h"
@@ -76,6 +78,27 @@ uint32_t port_take_lights(void)
 bool port_intact(void)
 {
     return image_check_intact() && outputs_intact();
+}
+
+bool port_read_stored(uint32_t words[STORED_WORDS])
+{
+    return flash_records_read(words);
+}
+
+bool port_store(const uint32_t words[STORED_WORDS])
+{
+    return flash_records_append(words);
+}
+
+struct port_line_errors port_line_errors(void)
+{
+    return (struct port_line_errors){serial_errors.framing, serial_errors.breaks, serial_errors.overruns,
+                                     serial_errors.lost};
+}
+
+bool port_clock_sound(void)
+{
+    return clock_check_sound();
 }
 
 bool port_prepare_light(const uint32_t *current_ma)

@@ -17,7 +17,7 @@ NODE = re.compile(r'^node: { title: "([^"]+)" label: "[^"]*?(?:(\d+) bytes \((\w
 EDGE = re.compile(r'^edge: { sourcename: "([^"]+)" targetname: "([^"]+)"', re.MULTILINE)
 CONTEXTS = {
     "main loop": ("main",),
-    "lower interrupt": ("timer_isr", "serial_uart_isr", "serial_usb_isr"),
+    "lower interrupt": ("timer_isr", "clock_check_isr", "serial_uart_isr", "serial_usb_isr"),
     "higher interrupt": ("interlock_isr",),
     "fault": ("start_fault",),
 }

@@ -131,6 +131,33 @@ bool port_intact(void)
     return !fake.damaged;
 }
 
+bool port_read_stored(uint32_t words[STORED_WORDS])
+{
+    CHECK(!fake.live);
+    memcpy(words, fake.stored, sizeof fake.stored);
+    return fake.any_stored;
+}
+
+bool port_store(const uint32_t words[STORED_WORDS])
+{
+    CHECK(!fake.live);
+    if (fake.store_is_full)
+        return false;
+    memcpy(fake.stored, words, sizeof fake.stored);
+    fake.any_stored = true;
+    return !fake.store_damages || (fake.stored[5] ^= 1u, false);
+}
+
+struct port_line_errors port_line_errors(void)
+{
+    return fake.line_errors;
+}
+
+bool port_clock_sound(void)
+{
+    return !fake.clock_wrong;
+}
+
 bool port_prepare_light(const uint32_t *current_ma)
 {
     CHECK(!fake.live && !fake.permitted);
@@ -159,6 +186,8 @@ void port_off(void)
 
 void port_send(char byte)
 {
+    if (!fake.sending)
+        fake.fired_before_sending = fake.fired;
     CHECK(fake.sending < sizeof fake.reply - 1);
     fake.reply[fake.sending++] = byte;
     if (byte != '\n')

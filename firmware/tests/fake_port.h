@@ -30,13 +30,20 @@ struct fake_port {
     uint32_t lights;  /* bits of those that were high, likewise */
     uint32_t stuck_lights;
     bool damaged; /* the memory of the program */
+    bool clock_wrong;
+    uint32_t stored[STORED_WORDS];
+    bool any_stored;
+    bool store_is_full;
+    bool store_damages;
+    struct port_line_errors line_errors;
     uint32_t light_ma[CHANNEL_COUNT];
     bool prepared; /* for light */
     uint64_t lit_until_us;
     unsigned fired;
     unsigned replies;
     char reply[REPLY_SIZE]; /* newest, terminated by zero */
-    size_t sending;         /* bytes of the one that is on its way */
+    unsigned fired_before_sending;
+    size_t sending; /* bytes of the one that is on its way */
 };
 
 extern struct fake_port fake;

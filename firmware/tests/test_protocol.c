@@ -261,7 +261,7 @@ static void test_only_what_is_carried_out_is_a_sign_of_life(void)
 static void test_an_older_host_learns_the_protocol_and_nothing_else(void)
 {
     boot_armed();
-    CHECK(!strncmp(raw(with_crc("0 ID")), "0 3 OK model=tomoshadow-pulse ", 30) && strstr(fake.reply, " protocol=3 "));
+    CHECK(!strncmp(raw(with_crc("0 ID")), "0 3 OK model=tomoshadow-pulse ", 30) && strstr(fake.reply, " protocol=4 "));
     const char *lines[] = {"5 FIRE", "0 ID 1", "x ID", "65536 ID", "ID", "5 OFF"};
     for (size_t i = 0; i < sizeof lines / sizeof *lines; i++)
         CHECK(!strncmp(raw(with_crc(lines[i])), "<? 3 ERR 4*", 11));
@@ -270,14 +270,45 @@ static void test_an_older_host_learns_the_protocol_and_nothing_else(void)
     CHECK(protocol.generator.state == STATE_SAFE);
 }
 
+/* Reading the flash takes its time. */
+static void test_stored_limits_are_not_read_while_there_can_be_light(void)
+{
+    boot_armed();
+    CHECK_REPLY("5 STORED 0", "5 3 ERR 6");
+    CHECK_REPLY("6 OFF", "6 3 OK state=0");
+    fake.now_us += 100000;
+    CHECK_REPLY("7 LIGHT 1000 100 0 0 0", "7 3 OK state=3");
+    CHECK_REPLY("8 STORED 0", "8 3 ERR 6");
+}
+
+static void test_a_refused_line_is_not_done_again_either(void)
+{
+    boot_armed();
+    ASK("5 FIRE");
+    CHECK_REPLY("6 FIRE", "6 3 ERR 10");
+    CHECK_REPLY("6 FIRE", "6 3 ERR 10");
+    CHECK(protocol.generator.counters.requested == 2);
+}
+
+/* Sending takes time: the shot does not wait for it. */
+static void test_a_command_is_carried_out_before_its_reply_is_sent(void)
+{
+    boot_armed();
+    fake.fired_before_sending = 0;
+    ASK("5 FIRE");
+    CHECK(fake.fired_before_sending == 1);
+}
+
 static void test_status_tells_everything(void)
 {
     boot_armed();
     ASK("5 FIRE");
     ASK("6 FIRE");
     fake.interlock_closed = false;
-    CHECK_REPLY("7 STATUS", "7 3 OK state=2 faults=1 interlock=0 estop=1 source=0 shots_left=0 requested=2 fired=1 "
-                            "suppressed=1 early=1 cameras=1 lights=0 crc_errors=0");
+    fake.line_errors = (struct port_line_errors){.framing = 1, .breaks = 2, .overruns = 3, .lost = 4};
+    CHECK_REPLY("7 STATUS",
+                "7 3 OK state=2 faults=1 interlock=0 estop=1 source=0 shots_left=0 requested=2 fired=1 "
+                "suppressed=1 early=1 cameras=1 lights=0 crc_errors=0 framing=1 breaks=2 overruns=3 lost=4");
     CHECK_REPLY("8 CLEAR", "8 3 ERR 9");
 }
 
@@ -311,6 +342,9 @@ int main(void)
     test_an_echo_ends_and_does_not_keep_it_armed();
     test_only_what_is_carried_out_is_a_sign_of_life();
     test_an_older_host_learns_the_protocol_and_nothing_else();
+    test_stored_limits_are_not_read_while_there_can_be_light();
+    test_a_refused_line_is_not_done_again_either();
+    test_a_command_is_carried_out_before_its_reply_is_sent();
     test_status_tells_everything();
     test_the_longest_lines_fit();
     return 0;

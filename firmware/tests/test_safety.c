@@ -396,8 +396,22 @@ static void test_all_causes_at_once_are_named(void)
     CHECK(shooting_fire(&generator) == ERROR_ESTOP_OPEN && generator.faults == (FAULT_INTERLOCK | FAULT_ESTOP));
 }
 
+static void test_clocks_that_do_not_agree_trip_and_stay_a_fault(void)
+{
+    boot_armed(5);
+    fake.clock_wrong = true;
+    wait_us(1);
+    CHECK(generator.state == STATE_FAULT && generator.faults == FAULT_CLOCK && !fake.live);
+    CHECK(safety_clear(&generator) == ERROR_HARDWARE);
+    boot();
+    fake.clock_wrong = true;
+    wait_us(1);
+    CHECK(generator.faults == FAULT_CLOCK);
+}
+
 int main(void)
 {
+    test_clocks_that_do_not_agree_trip_and_stay_a_fault();
     test_arming_waits_for_the_end_of_the_last_train();
     test_a_stop_that_opens_while_arming_trips_and_latches();
     test_a_changed_train_is_not_armed_and_not_cleared_into_one();

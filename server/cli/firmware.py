@@ -26,6 +26,7 @@ def add(verbs: Verbs) -> None:
     """Add the tools."""
     tools = verbs.add_parser("firmware", help="the pulse generator").add_subparsers(required=True, metavar="TOOL")
     add_rig(add_verb(tools, "info", info, "identity, state and counters of the pulse generator"))
+    _add_limits_options(add_verb(tools, "limits", limits, "limits of the LEDs, in the board and in the rig file"))
     summary = "try everything that needs no light: protocol, refusals, limits, budget, off"
     _add_selftest_options(add_verb(tools, "selftest", selftest, summary))
     summary = "timing diagram of a pulse train as the generator loads it; nothing is fired"
@@ -34,6 +35,11 @@ def add(verbs: Verbs) -> None:
     _add_light_options(add_verb(tools, "light", light, summary))
     summary = "check a UF2 image and copy it to a board that waits for one"
     _add_flash_options(add_verb(tools, "flash", flash, summary))
+
+
+def _add_limits_options(parser: ArgumentParser) -> None:
+    add_rig(parser)
+    parser.add_argument("--store", action="store_true", help="make those of the rig file the board's")
 
 
 def _add_selftest_options(parser: ArgumentParser) -> None:
@@ -115,6 +121,44 @@ def _named(values: dict[str, Any]) -> str:
 
 def _closed(closed: bool) -> str:
     return "closed" if closed else "open"
+
+
+def limits(options: Namespace) -> Outcome:
+    """Compare the limits that the board keeps with those of the rig file; with --store, make them the board's."""
+    from daq.drivers.pulse_protocol import CHANNEL_COUNT, Command, Stored
+    from server.rig.assembly import open_pulse_line
+    from server.rig.config import load_config
+
+    config = load_config(options.config)
+    wanted = [_limits_of_rig(config, channel) for channel in range(CHANNEL_COUNT)]
+    with open_pulse_line(config) as (line, _):
+        if options.store:
+            line.ask(Command.STORE, *(value for channel in wanted for value in channel))
+        replies = [line.ask(Command.STORED, channel) for channel in range(CHANNEL_COUNT)]
+    names = ("max_current_ma", "max_duty_ppm", "max_light_ma")
+    kept = [tuple(reply.number(name) for name in names) for reply in replies]
+    stored = Stored(replies[0].number("stored")).name
+    rows = [[str(i), *map(str, (*kept[i], *wanted[i]))] for i in range(CHANNEL_COUNT)]
+    heads = ["channel", *(f"{owner}: {name}" for owner in ("board", "rig") for name in names)]
+    text = f"{_STORED_TEXT[stored]}\n{table(heads, rows)}"
+    return Outcome({"stored": stored, "board": kept, "rig": wanted}, text)
+
+
+_STORED_TEXT = {
+    "NONE": "the board keeps no limits of its own: the absolute ones count (firmware limits --store)",
+    "WHOLE": "the board keeps limits of its own",
+    "DAMAGED": "the limits in the board are damaged: no light until they are stored again (firmware limits --store)",
+}
+
+
+def _limits_of_rig(config: "RigConfig", channel: int) -> tuple[int, int, int]:
+    """A channel without a view has no LED, and gets no light."""
+    from daq.drivers.pulse_protocol import MAX_DUTY_PPM
+
+    for view in config.views.values():
+        if view.led_channel == channel:
+            return round(view.max_current_a * 1000), MAX_DUTY_PPM, round(view.max_light_a * 1000)
+    return 0, 0, 0
 
 
 def selftest(options: Namespace) -> Outcome:

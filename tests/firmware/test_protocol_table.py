@@ -77,6 +77,7 @@ def test_limits_agree() -> None:
     assert in_c == {name: int(value) for name, value, _ in table("Limits")}
     assert in_c["CHANNEL_COUNT"] == pulse_protocol.CHANNEL_COUNT
     assert in_c["HEARTBEAT_MS"] == pulse_protocol.HEARTBEAT_MS
+    assert in_c["MAX_DUTY_PPM"] == pulse_protocol.MAX_DUTY_PPM
     assert in_c["MAX_PERIOD_US"] == MAX_PERIOD_US
 
 
@@ -91,6 +92,7 @@ def test_error_texts_state_the_limits() -> None:
         ErrorNumber.SHOTS: ["MAX_SHOTS"],
         ErrorNumber.LIGHT: ["MAX_LIGHT_MA", "MAX_LIGHT_MS"],
         ErrorNumber.PERIOD: ["MAX_PERIOD_US"],
+        ErrorNumber.STORE: ["MAX_CURRENT_MA", "MAX_DUTY_PPM", "MAX_LIGHT_MA"],
     }.items():
         assert [int(number) for number in re.findall(r"\d{3,}", ERROR_TEXT[error])] == [limits[name] for name in names]
 

@@ -31,9 +31,10 @@ CUT_WITHIN_NS = 800
 NVIC_ENABLE, NVIC_PEND = 0xE000_E100, 0xE000_E200
 WATCHDOG_CTRL, WATCHDOG_LOAD, WATCHDOG_TICKS_PER_MS = 0x4005_8000, 0x4005_8004, 2000
 PSM_WDSEL, UART_LCR_H = 0x4001_0008, 0x4003_402C
+TIMER_DBGPAUSE, BROWN_OUT = 0x4005_402C, 0x4006_4004
 UNEXPECTED = 1 << 3
 """The interrupt of an alarm that nobody uses."""
-RAM, STACK_SIZE, STACK_BOUND = 0x2000_0000, 1024, 764
+RAM, STACK_SIZE, STACK_BOUND = 0x2000_0000, 896, 780
 PAINT = 0xA5A5_A5A5
 ABORT_WITHIN_NS = 600
 PIO_BLOCKS = (0x5020_0000, 0x5030_0000)
@@ -340,6 +341,36 @@ def test_the_watchdog_runs_on_under_a_debugger_and_takes_all_but_the_oscillators
     enabled, paused_by_debugger_or_jtag = control >> 30 & 1, control >> 24 & 7
     assert (enabled, paused_by_debugger_or_jtag) == (1, 0)
     assert board.pico.read_word(PSM_WDSEL) == 0x1FFFF & ~0b11
+
+
+def test_the_timer_runs_on_under_a_debugger(board: Board) -> None:
+    """Or silence of the host would not count while somebody steps through the program."""
+    assert board.pico.read_word(TIMER_DBGPAUSE) & 0b110 == 0
+
+
+def test_a_processor_that_a_debugger_halts_is_restarted_dark(board: Board) -> None:
+    """It does nothing any more, while state machines, timer and watchdog go on: one shot at most, and then a reset."""
+    board.ask(Command.OFF)
+    board.arm(5, Source.EXTERNAL)
+    board.pico.run_ms(BOOT_MS)
+    board.pico.edges.clear()
+    board.pico.hang()
+    for _ in range(10):
+        board.pico.set_trigger_pin(True)
+        board.pico.run_ms(PERIOD_MS)
+        board.pico.set_trigger_pin(False)
+        board.pico.run_ms(PERIOD_MS)
+    board.pico.run_ms(PERIOD_MS)
+    assert len([edge for edge in board.pico.edges if edge.output == "light0" and edge.high]) == 2
+    assert len(board.pico.watchdog_resets) == 1
+    board.pico.run_ms(BOOT_MS)
+    assert state_and_faults(board) == (State.FAULT, Fault.WATCHDOG)
+
+
+def test_the_chip_resets_itself_below_0_946_v(board: Board) -> None:
+    """Of its core; after power-up it would be 0.860 V."""
+    register = board.pico.read_word(BROWN_OUT)
+    assert (register & 1, register >> 4 & 15) == (1, 0b1011)
 
 
 def test_bytes_interrupt_one_by_one(board: Board) -> None:

@@ -133,7 +133,7 @@ def test_no_edge_a_little_more_than_a_period_after_another_is_lost() -> None:
         board.send(Command.STATUS)
         edge(board)
         board.pico.run_ms(PERIOD_MS + 0.2 - 0.05)
-    board.pico.run_ms(SHOTS_WHILE_BUSY * 4)
+    board.pico.run_ms(SHOTS_WHILE_BUSY * 12)
     shots = SHOTS_WHILE_BUSY
     assert board.pico.sent.count(b"OK state=") == shots + 1
     assert counted(board, before) == {"requested": shots, "fired": shots, "suppressed": 0, "early": 0, "cameras": shots}

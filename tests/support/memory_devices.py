@@ -10,6 +10,7 @@ from typing import Self
 import numpy as np
 
 from daq.devices import DeviceIdentity, GeneratorState, GeneratorStatus, TriggerSource
+from daq.drivers.pulse_protocol import COUNTERS
 from daq.errors import DeviceError, DeviceRefused, DeviceTimeout, PlanError
 from daq.files.run_directory import ViewFormat
 from daq.shot import DoubleFrame, ExposureRecord, FiredTrain, Image, LightPulse
@@ -20,7 +21,6 @@ TICK_NS = 8
 DUTY = 200e-6
 MAX_SHOTS = 1_000_000
 MAX_LIGHT_A = 0.5
-COUNTERS = ("requested", "fired", "suppressed", "early", "cameras", "lights", "crc_errors")
 
 
 class MemoryDevice:

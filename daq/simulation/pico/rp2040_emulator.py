@@ -8,11 +8,13 @@ import random
 from bisect import insort
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from rp2040py.peripherals.vreg_and_chip_reset import HAD_RUN
 
 from daq.simulation.pico.board_number import give_number
+from daq.simulation.pico.crystal import Crystal
+from daq.simulation.pico.edge import Edge
+from daq.simulation.pico.flash_chip import FlashChip
 from daq.simulation.pico.mcp4728 import Mcp4728
 from daq.simulation.pico.processor import NEVER_DUE, Processor
 from daq.simulation.pico.rp2040_chip import (
@@ -37,26 +39,9 @@ CYCLES_PER_MS = 125_000
 START_CYCLES = 2
 """From the rise of the trigger line to an output whose delay is 0; on the chip, the input synchroniser adds two."""
 
+_FLASH_BYTES = 1 << 17
+"""As much of it as this firmware uses, and more."""
 _BYTE_CYCLES = 10 * CYCLES_PER_MS * 1000 // 115_200
-
-
-@dataclass(frozen=True)
-class Edge:
-    """A change of an output.
-
-    Parameters
-    ----------
-    cycle : int
-        System clock cycles of 8 ns since construction of the emulator.
-    output : str
-        ``light0`` to ``light3``, ``camera0`` to ``camera3``, or ``trigger``, the inner line that starts a shot.
-    high : bool
-        Level after the change.
-    """
-
-    cycle: int
-    output: str
-    high: bool
 
 
 class EmulatedPico:
@@ -83,12 +68,15 @@ class EmulatedPico:
         Set-points by channel when the trigger line rose last.
     converter : Mcp4728
         On the I2C bus of the board; an image with PWM leaves it alone.
+    crystal : Crystal
+        What all of it but the ring oscillator gets its time from; sound after each power-up.
+    flash : FlashChip
+        Its contents outlast a power cut.
     usb : UsbHost
         At its USB socket; an image with a serial line leaves it alone.
     """
 
     def __init__(self, image: bytes) -> None:
-        self._image = image
         self._noise = random.Random(1)  # noqa: S311 - reproducible on purpose
         self._interlock = self._estop = True
         self._trigger = False
@@ -103,14 +91,18 @@ class EmulatedPico:
         self.watchdog_resets: list[int] = []
         self.shot_set_points_ma: tuple[int, ...] = ()
         self.converter = Mcp4728()
-        self.power_up()
+        self._start_chip(image.ljust(_FLASH_BYTES, b"\xff"))
 
     def power_up(self) -> None:
-        """Cut the power and give it back; RAM, registers and what is on the serial line are lost."""
+        """Cut the power and give it back; RAM, registers and what is on the serial line are lost, the flash is not."""
+        self._start_chip(bytes(self.flash.contents[:_FLASH_BYTES]))
+
+    def _start_chip(self, flash: bytes) -> None:
         self._received.clear()
         self._shorted: set[str] = set()
         self._restarting = False
-        self._chip = powered_chip(self._image, self._noise, self.sent.append, self._on_edge)
+        self._chip = powered_chip(flash, self._noise, self.sent.append, self._on_edge)
+        self.crystal, self.flash = Crystal(self._chip), FlashChip(self._chip)
         self._chip.watchdog.on_watchdog_trigger = self._on_watchdog
         self._processor = Processor(self._chip, CYCLE_NS, self._follow_processor)
         self.converter.power_up(self._chip, PIN_I2C_SCL)

@@ -12,6 +12,7 @@ extern uint32_t flash_sum[];
 extern uint32_t flash_copy[];
 extern uint32_t image_start[];
 extern uint32_t image_sum[];
+extern uint32_t stack_top[];
 extern uint32_t bss_start[];
 extern uint32_t bss_end[];
 
@@ -20,6 +21,12 @@ int main(void);
 /* For vectors.S. */
 _Noreturn void start_reset(void);
 _Noreturn void start_fault(void);
+
+static inline void clear(volatile uint32_t *from, const volatile uint32_t *end)
+{
+    while (from < end)
+        *from++ = 0;
+}
 
 ONCE void start_reset(void)
 {
@@ -35,8 +42,8 @@ ONCE void start_reset(void)
     if (sum != *from || checksum_words(flash_start, flash_sum) != *flash_sum)
         for (;;)
             __asm__ volatile("wfi");
-    for (volatile uint32_t *word = bss_start; word < bss_end; word++)
-        *word = 0;
+    clear(stack_top, image_start);
+    clear(bss_start, bss_end);
     REG(SCB_VTOR) = (uint32_t)(uintptr_t)image_start; /* vectors.S comes first */
     (void)main();
     start_fault();

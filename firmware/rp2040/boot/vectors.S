@@ -7,9 +7,10 @@
     .section .vectors, "a"
     .word stack_top
     .word start_reset
-    .rept 14
+    .rept 13
     .word start_fault
     .endr
+    .word clock_check_isr                             /* SysTick */
     .word timer_isr                                   /* interrupt 0 */
     .rept 4
     .word start_fault

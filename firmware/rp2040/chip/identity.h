@@ -2,7 +2,7 @@
 #ifndef IDENTITY_H
 #define IDENTITY_H
 
-/* Once, by the code that runs in RAM: while it asks the flash for its number, nobody can read from it. */
+/* Once, after flash_take_over. */
 void identity_read_board(void);
 
 /* Its number, as port_serial. */

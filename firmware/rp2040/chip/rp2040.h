@@ -39,6 +39,13 @@ enum reset_bits {
 #define CLK_PERI_CTRL 0x40008048u
 #define CLK_USB_CTRL 0x40008054u
 #define CLK_SYS_RESUS_CTRL 0x40008078u
+#define FC0_REF_KHZ 0x40008080u
+#define FC0_MIN_KHZ 0x40008084u
+#define FC0_MAX_KHZ 0x40008088u
+#define FC0_INTERVAL 0x40008090u
+#define FC0_SRC 0x40008094u
+#define FC0_STATUS 0x40008098u
+#define FC0_RESULT 0x4000809cu
 #define XOSC_CTRL 0x40024000u
 #define XOSC_STATUS 0x40024004u
 #define XOSC_STARTUP 0x4002400cu
@@ -168,6 +175,9 @@ enum uart {
     UART_LCR_8_BITS = 3 << 5,
     UART_CR_ENABLE = 1 << 0 | 1 << 8 | 1 << 9, /* UART, transmitter, receiver */
     UART_INT_RX = 1 << 4,
+    UART_DR_FRAMING = 1 << 8,
+    UART_DR_BREAK = 1 << 10,
+    UART_DR_OVERRUN = 1 << 11,
 };
 
 /* 4.3.17 */
@@ -203,6 +213,7 @@ enum i2c {
 #define TIMER_ALARM0 0x40054010u
 #define TIMER_RAWH 0x40054024u
 #define TIMER_RAWL 0x40054028u
+#define TIMER_DBGPAUSE 0x4005402cu
 #define TIMER_INTR 0x40054034u
 #define TIMER_INTE 0x40054038u
 
@@ -226,12 +237,22 @@ enum ssi {
 };
 
 /* 2.10.7 */
+#define BROWN_OUT 0x40064004u
 #define CHIP_RESET 0x40064008u
 
 /* ARMv6-M */
+#define SYSTICK_CONTROL 0xe000e010u
+#define SYSTICK_RELOAD 0xe000e014u
+#define SYSTICK_VALUE 0xe000e018u
+enum systick {
+    SYSTICK_ENABLE = 1 << 0,
+    SYSTICK_INTERRUPT = 1 << 1,
+    SYSTICK_FROM_PROCESSOR = 1 << 2,
+};
 #define NVIC_ENABLE 0xe000e100u
 #define NVIC_PRIORITY(interrupt) (0xe000e400u + ((uint32_t)(interrupt) & ~3u))
 #define SCB_VTOR 0xe000ed08u
+#define SCB_SHPR3 0xe000ed20u
 enum interrupt {
     INTERRUPT_TIMER0 = 0,
     INTERRUPT_USB = 5,

@@ -8,6 +8,7 @@ enum { ALARM0 = 1 };
 ONCE void timer_start(void)
 {
     resets_restart(RESET_TIMER);
+    REG(TIMER_DBGPAUSE) = 0; /* a processor that a debugger has halted is a silent host too */
     REG(TIMER_INTE) = ALARM0;
 }
 

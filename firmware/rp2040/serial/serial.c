@@ -3,7 +3,6 @@
 #include <stdint.h>
 
 #include "outputs.h"
-#include "port.h"
 #include "rp2040.h"
 
 _Static_assert(SERIAL_RING == UINT8_MAX + 1, "indices wrap by themselves");
@@ -11,6 +10,7 @@ _Static_assert(SERIAL_RING == UINT8_MAX + 1, "indices wrap by themselves");
 static volatile char *ring;
 static volatile uint8_t head; /* written by the interrupt */
 static volatile uint8_t tail;
+volatile struct port_line_errors serial_errors;
 
 void serial_use_ring(volatile char *place)
 {
@@ -23,10 +23,12 @@ void serial_received(char byte)
         outputs_off();
         tail = head;
     }
-    if ((uint8_t)(head + 1u) != tail) {
-        ring[head] = byte;
-        head = (uint8_t)(head + 1u);
+    if ((uint8_t)(head + 1u) == tail) {
+        serial_errors.lost++;
+        return;
     }
+    ring[head] = byte;
+    head = (uint8_t)(head + 1u);
 }
 
 bool serial_waiting(void)

@@ -5,6 +5,8 @@
 
 #include <stdbool.h>
 
+#include "port.h"
+
 void serial_start(void);
 bool serial_waiting(void); /* is there a byte? */
 bool serial_take(char *byte);
@@ -18,7 +20,10 @@ void serial_usb_isr(void);
 enum { SERIAL_RING = 256 };
 void serial_use_ring(volatile char *place);
 
-/* From the receive interrupt. A byte that finds no room is lost; the CRC of its line tells. */
+/* From the receive interrupt. A byte that finds no room is lost, and counted; the CRC of its line tells too. */
 void serial_received(char byte);
+
+/* What the line has done to bytes since boot; the UART counts its part in its interrupt. */
+extern volatile struct port_line_errors serial_errors;
 
 #endif

@@ -28,10 +28,25 @@ ONCE void serial_start(void)
     REG(IO_CTRL(PIN_UART_RX)) = FUNCTION_UART;
 }
 
+/* A break ends without a stop bit too. A line of 8N1 has no parity. What was received goes on to the core, whose CRC
+ * refuses it; an abort byte counts however it arrives. */
+static void count_errors(uint32_t received)
+{
+    if (received & UART_DR_BREAK)
+        serial_errors.breaks++;
+    else if (received & UART_DR_FRAMING)
+        serial_errors.framing++;
+    if (received & UART_DR_OVERRUN)
+        serial_errors.overruns++;
+}
+
 void serial_uart_isr(void)
 {
-    while (!(REG(UART0_FR) & UART_FR_RX_EMPTY))
-        serial_received((char)(REG(UART0_DR) & 0xffu));
+    while (!(REG(UART0_FR) & UART_FR_RX_EMPTY)) {
+        const uint32_t received = REG(UART0_DR);
+        count_errors(received);
+        serial_received((char)(received & 0xffu));
+    }
 }
 
 void serial_send(char byte)

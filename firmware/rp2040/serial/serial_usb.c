@@ -2,7 +2,6 @@
  * that it does not fetch is lost, as on a wire. */
 #include <stdint.h>
 
-#include "port.h"
 #include "rp2040.h"
 #include "serial.h"
 #include "usb_control.h"
@@ -18,12 +17,12 @@ _Static_assert((RING & (RING - 1)) == 0, "indices run on and wrap");
 /* In the memory of the USB controller, which has room: bytes on their way to a packet. */
 static volatile uint8_t *place(uint32_t index)
 {
-    return usb_endpoints_spare() + index % RING;
+    return usb_endpoints_spare() + USB_PACKET + index % RING;
 }
 
 void serial_start(void)
 {
-    serial_use_ring((volatile char *)usb_endpoints_spare() + RING);
+    serial_use_ring((volatile char *)usb_endpoints_spare() + USB_PACKET + RING);
     usb_endpoints_start();
 }
 

@@ -58,9 +58,9 @@ static const uint8_t LANGUAGES[] = {4, STRING, TWO_BYTES(0x0409)};
 /* UTF-16; lives until the next one is asked for. */
 static struct usb_bytes string(const char *text)
 {
-    static uint8_t bytes[STRING_SIZE];
+    volatile uint8_t *const bytes = usb_endpoints_spare();
     uint32_t count = 2;
-    for (; *text && count + 2 <= sizeof bytes; text++) {
+    for (; *text && count + 2 <= STRING_SIZE; text++) {
         bytes[count++] = (uint8_t)*text;
         bytes[count++] = 0;
     }

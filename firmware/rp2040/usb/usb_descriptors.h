@@ -5,7 +5,7 @@
 #include <stdint.h>
 
 struct usb_bytes {
-    const uint8_t *bytes; /* NULL: there is none */
+    const volatile uint8_t *bytes; /* NULL: there is none */
     uint32_t count;
 };
 

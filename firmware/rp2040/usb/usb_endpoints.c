@@ -45,7 +45,7 @@ void usb_endpoints_give(uint32_t endpoint, uint32_t count)
     hand_over(endpoint, USB_IN, USB_BUFFER_FULL | count);
 }
 
-void usb_endpoints_copy(uint32_t endpoint, const uint8_t *bytes, uint32_t count)
+void usb_endpoints_copy(uint32_t endpoint, const volatile uint8_t *bytes, uint32_t count)
 {
     volatile uint8_t *to = usb_endpoints_buffer(endpoint, USB_IN);
     for (uint32_t i = 0; i < count; i++)

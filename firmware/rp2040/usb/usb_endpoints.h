@@ -27,12 +27,13 @@ void usb_endpoints_set_address(uint8_t address);
 
 volatile uint8_t *usb_endpoints_buffer(uint32_t endpoint, enum usb_direction direction);
 
-/* The rest of the memory of the controller, 3 kB, which it leaves alone. */
+/* The rest of the memory of the controller, 3 kB, which it leaves alone: a packet for usb_descriptors.c, and behind it
+ * what serial_usb.c needs. */
 volatile uint8_t *usb_endpoints_spare(void);
 
 /* Give the host the packet that stands in the buffer, or one that is copied there first; expect one from it. */
 void usb_endpoints_give(uint32_t endpoint, uint32_t count);
-void usb_endpoints_copy(uint32_t endpoint, const uint8_t *bytes, uint32_t count);
+void usb_endpoints_copy(uint32_t endpoint, const volatile uint8_t *bytes, uint32_t count);
 void usb_endpoints_expect(uint32_t endpoint);
 
 /* True once, when the host has fetched or sent a packet. */

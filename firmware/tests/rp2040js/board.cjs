@@ -26,6 +26,32 @@ const FACTORY = 0x8000; // its registers after power-up: on, at 0 V
 const BYTE_BITS = 9;
 const READ = 1;
 
+/* What rp2040js lacks: a flash behind commands, here a blank one, the frequency counter, here with a sound crystal, and
+ * the brown-out detector. */
+function addPeripherals(chip) {
+  const SSI = 0x18000, SSI_STATUS = 0x28, SSI_DATA = 0x60, SSI_READY = 0xe, BLANK = 0xff;
+  const CLOCKS = 0x40008, FC0_STATUS = 0x98, FC0_RESULT = 0x9c, PASSED = 0x11, RING_KHZ = 6500;
+  const SUPPLY = 0x40064, BROWN_OUT = 0x04, AS_SET = 0xb1;
+  answerWith(chip.peripherals[SSI], { [SSI_STATUS]: SSI_READY, [SSI_DATA]: BLANK });
+  answerWith(chip.peripherals[SUPPLY], { [BROWN_OUT]: AS_SET });
+  answerWith(chip.peripherals[CLOCKS], { [FC0_STATUS]: PASSED, [FC0_RESULT]: RING_KHZ * 32 });
+}
+
+/* A write to the counter of SysTick lets it go on from its reload value; in rp2040js, from the largest. */
+function reloadTicks(block) {
+  const VALUE = 0x18;
+  const write = block.writeUint32.bind(block);
+  block.writeUint32 = (offset, value) => {
+    write(offset, value);
+    if (offset === VALUE) block.systickTimer.set(block.systickReload);
+  };
+}
+
+function answerWith(block, values) {
+  const read = block.readUint32.bind(block);
+  block.readUint32 = (offset) => values[offset] ?? read(offset);
+}
+
 /* The MCP4728 that sets the currents: fast write, multi-write and read back of its four registers. */
 class Converter {
   constructor(chip) {
@@ -75,6 +101,8 @@ class Board {
     this.chip = new RP2040();
     this.chip.logger = new ConsoleLogger(LogLevel.Error, true);
     this.chip.flash.set(image);
+    addPeripherals(this.chip);
+    reloadTicks(this.chip.ppb);
     this.chip.uart[0].onByte = (byte) => this.sent.push(byte);
     this.chip.gpio.forEach((pin, number) => pin.addListener((now, before) => this.onPin(number, now, before)));
     this.machines = this.chip.pio.flatMap((pio) => pio.machines.map((machine) => ({ machine, stalled: false })));

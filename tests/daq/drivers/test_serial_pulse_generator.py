@@ -15,6 +15,7 @@ import serial
 
 from daq.devices import GeneratorState
 from daq.drivers.pulse_framing import DamagedLine
+from daq.drivers.pulse_line import PulseLine
 from daq.drivers.pulse_protocol import (
     FIELDS,
     MAX_SEQUENCE,
@@ -285,7 +286,7 @@ def test_another_protocol_is_named() -> None:
     numbers = {"protocol": "1", "channels": "4", "tick_ns": "8", "last": "0"}
     with (
         instrument(answering(**fields, **numbers)) as port,
-        pytest.raises(ProtocolError, match="speaks protocol 1, this driver speaks 3: flash"),
+        pytest.raises(ProtocolError, match="speaks protocol 1, this driver speaks 4: flash"),
         SerialPulseGenerator("generator", port, CHANNELS),
     ):
         pass
@@ -295,7 +296,7 @@ def test_firmware_of_an_older_protocol_is_named() -> None:
     """To it, no line of this driver has a number: error 4, in its own form."""
     with (
         instrument(lambda _: b"? 1 ERR 4*%04X\n" % binascii.crc_hqx(b"? 1 ERR 4", 0xFFFF)) as port,
-        pytest.raises(ProtocolError, match="speaks protocol 2 or older, this driver speaks 3: flash"),
+        pytest.raises(ProtocolError, match="speaks protocol 2 or older, this driver speaks 4: flash"),
         SerialPulseGenerator("generator", port, CHANNELS),
     ):
         pass
@@ -357,3 +358,22 @@ def test_a_permitted_current_is_not_cut_by_its_own_limit(firmware: FirmwareProce
     with SerialPulseGenerator("generator", firmware.port, CHANNELS, dict.fromkeys(CHANNELS, 20.0)) as limited:
         train = limited.configure(shot_timing())
         assert {pulse.current_a for pulses in train.pulses.values() for pulse in pulses} == {20.0}
+
+
+@pytest.mark.parametrize("wrong", ["max_current", "max_light"])
+def test_a_rig_file_that_permits_more_than_the_board_keeps_is_refused(firmware: FirmwareProcess, wrong: str) -> None:
+    line = PulseLine("generator", firmware.port)
+    line.open()
+    line.ask(Command.STORE, *4 * (20_000, 200, 300))
+    line.close()
+    limits = {"max_current": {"left": 20.0}, "max_light": {"left": 0.3}}
+    with SerialPulseGenerator("generator", firmware.port, CHANNELS, limits["max_current"], limits["max_light"]) as fits:
+        assert fits.status().state is GeneratorState.SAFE
+    board_a = limits[wrong]["left"]
+    limits[wrong] = {"left": board_a + 0.05}
+    words = f"the rig file permits {wrong}_a {board_a + 0.05:g} A for left, the board keeps {board_a:g} A for channel 0"
+    refused = SerialPulseGenerator("generator", firmware.port, CHANNELS, limits["max_current"], limits["max_light"])
+    with pytest.raises(DeviceRefused, match=words), refused:
+        pass
+    line.open()
+    line.close()

@@ -16,10 +16,11 @@ from daq.errors import DeviceError, DeviceRefused, DeviceTimeout, DeviceUnavaila
 from daq.run_plan import PulsePair, RunPlan
 from daq.shot import FiredTrain
 from daq.simulation.pico import firmware_process
+from daq.simulation.pico.edge import Edge
 from daq.simulation.pico.emulated_firmware import measured_shot
 from daq.simulation.pico.firmware_process import FirmwareProcess
 from daq.simulation.pico.rp2040_chip import TRIGGER
-from daq.simulation.pico.rp2040_emulator import START_CYCLES, Edge
+from daq.simulation.pico.rp2040_emulator import START_CYCLES
 from daq.timing import CameraTiming, ShotTiming, plan_shot_timing
 
 pytestmark = pytest.mark.slow

@@ -26,7 +26,7 @@ def result_of(capsys: pytest.CaptureFixture[str], *arguments: str, status: int =
 
 def test_info_tells_identity_state_and_counters(capsys: pytest.CaptureFixture[str]) -> None:
     info = result_of(capsys, "info", *CONFIG)
-    assert (info["identity"]["model"], info["identity"]["protocol"]) == ("tomoshadow-pulse", "3")
+    assert (info["identity"]["model"], info["identity"]["protocol"]) == ("tomoshadow-pulse", "4")
     assert (info["state"], info["faults"], info["start_cause"]) == ("SAFE", [], "POWER")
     assert info["identity"]["git"] == Path("build/firmware/revision").read_text().strip()
     assert info["interlock_closed"]
@@ -40,6 +40,14 @@ def test_info_tells_identity_state_and_counters(capsys: pytest.CaptureFixture[st
     assert "state: SAFE, faults: none" in lines
     assert "interlock: closed, emergency stop: closed" in lines
     assert lines[-4].split() == ["0", "30000", "200", "500"]
+
+
+def test_limits_of_board_and_rig_stand_side_by_side(capsys: pytest.CaptureFixture[str]) -> None:
+    told = result_of(capsys, "limits", *CONFIG)
+    assert (told["stored"], told["board"]) == ("NONE", [[30_000, 200, 500]] * 4)
+    assert told["rig"][0] == [26_000, 200, 0]
+    stored = result_of(capsys, "limits", "--store", *CONFIG)
+    assert (stored["stored"], stored["board"]) == ("WHOLE", told["rig"])
 
 
 def test_selftest_passes_and_lists_its_checks(capsys: pytest.CaptureFixture[str]) -> None:
