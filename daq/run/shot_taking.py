@@ -13,6 +13,30 @@ from daq.shot import DoubleFrame, FiredTrain, Shot
 _LEAST_COLLECT_S = 0.05
 """What a camera gets although another one used up the deadline: its frames lie in its buffers already."""
 
+_LATE_PERIODS = 0.5
+"""A shot that is later moves those after it."""
+
+
+def next_due_s(due_s: float, fired_s: tuple[float, float], period_s: float, shortest_s: float) -> float:
+    """When the next shot is due.
+
+    A shot that is a little late does not move those after it, so that the period is exact; one that is late by more
+    than half a period does: nothing is caught up. Cameras and generator refuse, or, worse, ignore an early trigger:
+    the shortest period counts from when the last one has surely been.
+
+    Parameters
+    ----------
+    due_s : float
+        When the last shot was due.
+    fired_s : tuple[float, float]
+        When it was commanded, and when it was confirmed.
+    period_s, shortest_s : float
+        As asked for, and as the rig permits.
+    """
+    commanded_s, confirmed_s = fired_s
+    kept_s = due_s if commanded_s - due_s < _LATE_PERIODS * period_s else commanded_s
+    return max(kept_s + period_s, confirmed_s + shortest_s)
+
 
 class ShotTaker:
     """Takes the shots of one run on armed cameras.
@@ -35,6 +59,7 @@ class ShotTaker:
         self._frame_deadline_s = self._timing.shortest_period_ns / 1e9 + run.limits.frame_s
         self._refires_left = self._plan.refire_quota
         self._period_s = 1 / self._plan.rate_hz
+        self._shortest_s = self._timing.shortest_period_ns / 1e9
         self._due_s = 0.0
         self._stage_z_mm: float | None = None
 
@@ -69,16 +94,13 @@ class ShotTaker:
         return None
 
     def _fire(self, index: int) -> tuple[Shot | None, ShotFindings]:
-        """Fire and look at what came of it.
-
-        The period counts from shot to shot: catching up after a late one would break the limits of cameras
-        or generator, which refuse or, worse, ignore an early trigger.
-        """
+        """Fire and look at what came of it."""
         for camera in self._rig.cameras.values():
             camera.begin_shot()
         host_time_ns = time.time_ns()
+        sent_s = time.monotonic()
         fired = self._rig.generator.fire()
-        self._due_s = time.monotonic() + self._period_s
+        self._due_s = next_due_s(self._due_s, (sent_s, time.monotonic()), self._period_s, self._shortest_s)
         views = self._collect()
         if views is None:
             return None, ShotFindings()
