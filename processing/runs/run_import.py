@@ -135,15 +135,17 @@ def write_run(
         separation_ns=run.separation_ns,
         rate_hz=run.rate_hz,
     )
-    references = {ImageKey.DARK: _Mean(), ImageKey.BACKGROUND: _Mean()}
+    references, copies = {ImageKey.DARK: _Mean(), ImageKey.BACKGROUND: _Mean()}, _Copies()
     with RunWriter(run_dir, header) as writer:
         for index, origin in enumerate(shots):
             shot = Shot(index, origin.image_key, {camera: _frames(reader, origin, camera) for camera in header.views})
             writer.write_shot(shot)
+            if shot.image_key == ImageKey.SAMPLE:
+                copies.look_at(shot)
             if shot.image_key in references:
                 references[shot.image_key].add(shot)
             done(index + 1, len(shots))
-        notes = reader.unused_bits()
+        notes = (*reader.unused_bits(), *copies.notes())
         means = {key: reference.images() for key, reference in references.items()}
         if any(means.values()):
             writer.write_references(dark=means[ImageKey.DARK], background=means[ImageKey.BACKGROUND])
@@ -175,6 +177,33 @@ class _Mean:
     def images(self) -> dict[str, NDArray[np.float32]]:
         """(frame, row, column) means by camera; empty without shots."""
         return {camera: total / np.float32(self._count) for camera, total in self._totals.items()}
+
+
+class _Copies:
+    """Exposures that have the very pixels of another one: noise never repeats."""
+
+    def __init__(self) -> None:
+        self._first: dict[bytes, str] = {}
+        self._copies: list[str] = []
+
+    def look_at(self, shot: Shot) -> None:
+        """Compare the exposures of one more shot; those without any contrast tell nothing."""
+        for camera, exposures in shot.views.items():
+            for letter, frame in (("A", exposures.frame_a), ("B", exposures.frame_b)):
+                if frame is not None and frame.min() < frame.max():
+                    self._compare(f"{camera}, shot {shot.index}, exposure {letter}", frame)
+
+    def _compare(self, name: str, frame: NDArray[Any]) -> None:
+        first = self._first.setdefault(hashlib.sha256(frame.tobytes()).digest(), name)
+        if first != name:
+            self._copies.append(f"{name} has the very pixels of {first}")
+
+    def notes(self) -> tuple[str, ...]:
+        """What to tell of copies."""
+        if not self._copies:
+            return ()
+        others = f" (and {len(self._copies) - 1} more like it)" if len(self._copies) > 1 else ""
+        return (f"{self._copies[0]}{others}: has a file been copied, or did a camera send an image again?",)
 
 
 def _sha256(text: str) -> str:

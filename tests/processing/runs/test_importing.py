@@ -73,6 +73,15 @@ def run_import(folder: Path, text: str) -> Path:
     return folder / "out"
 
 
+def test_copied_exposures_are_told_and_flat_ones_and_references_are_not(folder: Path) -> None:
+    cv2.imwrite(str(folder / "left_3.png"), image("left", 1))
+    for flat in (2, 4):
+        cv2.imwrite(str(folder / f"right_{flat}.png"), np.full(SIZES["right"], 9000, np.uint16))
+    (folder / "manifest.toml").write_text(RUN + REFERENCES.replace("_6", "_5"))
+    (note,) = import_manifest(folder / "manifest.toml", folder / "out")["notes"]
+    assert note.startswith("left, shot 1, exposure A has the very pixels of left, shot 0, exposure A: ")
+
+
 def test_shots_come_back_as_they_were(folder: Path) -> None:
     with RunReader(run_import(folder, RUN) / "run") as run:
         assert (run.header.polarity, run.header.separation_ns, run.header.frames_per_shot) == ("shadow", 6400, 2)
