@@ -1,6 +1,14 @@
-"""Images of recorded shots as the measurement of droplets takes them: not clipped, so that noise can be judged."""
+"""Images of recorded shots as the measurement of droplets takes them: not clipped, so that noise can be judged.
+
+Rectangles of shadow images can be left unasked: a nozzle, a reflection, dirt on a window.
+"""
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 
 from daq.files.run_directory import RunReader, Shot
 from processing.preprocessing import Intensity, transmission
@@ -8,6 +16,10 @@ from processing.runs.errors import PipelineError
 from processing.runs.exposure_faults import grey_values
 from processing.runs.results_file import FrameName
 from processing.runs.workbench import References
+
+_PATTERN = r"^([^=]+)=(\d+):(\d+),(\d+):(\d+)$"
+IgnoredPixels = Annotated[str, Field(pattern=_PATTERN)]
+"""``VIEW=LEFT:RIGHT,TOP:BOTTOM``: columns and rows of a view, the first ones and those after the last."""
 
 
 def bright_images(run: RunReader, shot: Shot, frame: FrameName, references: References) -> list[Intensity]:
@@ -57,3 +69,54 @@ def _no_background(run: RunReader, view: str) -> str:
         f"{run.run_dir.name}: {view} has no background, and without one nobody knows how much light a droplet takes: "
         "record one with light and without spray, or import it ([[run.background]])"
     )
+
+
+def require_fitting(ignored: Sequence[str], sizes_px: Mapping[str, tuple[int, int]]) -> None:
+    """Refuse rectangles of no view, without pixels, or beyond an image.
+
+    Parameters
+    ----------
+    ignored : sequence of IgnoredPixels
+        What is not asked.
+    sizes_px : Mapping[str, tuple[int, int]]
+        (width, height) of the image of every view.
+
+    Raises
+    ------
+    PipelineError
+        The text names the rectangle, and what it must lie in.
+    """
+    for text in ignored:
+        view, (columns, rows) = rectangle(text)
+        if view not in sizes_px:
+            raise PipelineError(f"pixels to ignore, {text}: there is no view {view}; views are {', '.join(sizes_px)}")
+        width, height = sizes_px[view]
+        if not (columns.start < columns.stop <= width and rows.start < rows.stop <= height):
+            raise PipelineError(
+                f"pixels to ignore, {text}: VIEW=LEFT:RIGHT,TOP:BOTTOM must lie in the image, {width} x {height} px"
+            )
+
+
+def without_ignored(trust: Mapping[str, Intensity], ignored: Sequence[str]) -> dict[str, Intensity]:
+    """How sure pixels (rows, columns) of every view are, 0 where they are not asked; in arrays of their own."""
+    known = {view: np.array(image) for view, image in trust.items()}
+    for text in ignored:
+        view, (columns, rows) = rectangle(text)
+        known[view][rows, columns] = 0
+    return known
+
+
+def rectangle(text: str) -> tuple[str, tuple[slice, slice]]:
+    """View, columns and rows of pixels to ignore.
+
+    Raises
+    ------
+    PipelineError
+        It is written otherwise.
+    """
+    match = re.match(_PATTERN, text)
+    if match is None:
+        raise PipelineError(f"pixels to ignore, {text}: write VIEW=LEFT:RIGHT,TOP:BOTTOM, in pixels")
+    view, *numbers = match.groups()
+    left, right, top, bottom = map(int, numbers)
+    return view, (slice(left, right), slice(top, bottom))

@@ -23,7 +23,14 @@ from processing.kernels import DEFAULT_THREADS
 from processing.preprocessing import Polarity
 from processing.reconstruction.settings import FrozenValue, GridSettings
 from processing.runs.errors import PipelineError
-from processing.runs.measured_images import bright_images, require_backgrounds, shadow_images
+from processing.runs.measured_images import (
+    IgnoredPixels,
+    bright_images,
+    require_backgrounds,
+    require_fitting,
+    shadow_images,
+    without_ignored,
+)
 from processing.runs.pipeline import Stopped, default_grid, frame_names, provenance_of, require_match
 from processing.runs.recipe import recipe_sha256
 from processing.runs.results_file import FrameName, Provenance, claim_results
@@ -44,6 +51,12 @@ class MeasureSettings(FrozenValue):
     )
     twins: Annotated[int, Field(ge=0, le=100, description="simulated twins per exposure that tell ghosts; 0: none")] = 0
     seed: Annotated[int, Field(ge=0, description="of the twins")] = 0
+    ignored: Annotated[
+        tuple[IgnoredPixels, ...],
+        Field(
+            description="rectangles of shadow images that are not asked, VIEW=LEFT:RIGHT,TOP:BOTTOM in px"
+        ),
+    ] = ()
 
     def results_id(self, calibration: str) -> str:
         """Name of the results directory: droplets, and a hash of method, settings and the calibration's name."""
@@ -130,7 +143,8 @@ class RunMeasurement:
         Raises
         ------
         PipelineError
-            The shot is not valid, run and calibration do not belong together, or a run of shadows has no background.
+            The shot is not valid, run and calibration do not belong together, a run of shadows has no background, or
+            pixels to ignore are in no image.
         CalibrationError
             The calibration was refused.
         ReconstructionError
@@ -146,6 +160,9 @@ class RunMeasurement:
         references = read_references(run)
         if settings.polarity == "shadow":
             require_backgrounds(run, references)
+        elif settings.ignored:
+            raise PipelineError("pixels to ignore are for shadows: bright particles are measured with all pixels")
+        require_fitting(settings.ignored, {view: calibration.views[view].mapping.image_size_px for view in views})
         provenance = provenance_of(run, calibration, calibration_file, settings, METHOD_VERSION)
         return cls(run, calibration, settings, search, references, provenance)
 
@@ -203,7 +220,8 @@ class RunMeasurement:
             images = bright_images(self.run, shot, frame, self.references)
             return measure_bright(images, self.search, twins=twins, seed=seed, threads=threads)
         images, trust = shadow_images(self.run, shot, frame, self.references)
-        return measure_shadows(images, self.search, trust=trust, twins=twins, seed=seed, threads=threads)
+        known = without_ignored(dict(zip(shot.views, trust, strict=True)), self.settings.ignored)
+        return measure_shadows(images, self.search, trust=list(known.values()), twins=twins, seed=seed, threads=threads)
 
 
 def droplets_path(results_dir: Path, shot: int) -> Path:

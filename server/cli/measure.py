@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from processing.runs.measurement import MeasuredShot, MeasureSettings
 
 NAME = "measure"
-SAID = ("polarity", "grid", "twins")
+SAID = ("polarity", "grid", "twins", "ignore")
 """Options that a recipe takes the place of."""
 
 
@@ -50,6 +50,13 @@ def add(verbs: Verbs) -> None:
         "--twins", type=_twins, metavar="N", help="simulated twins per exposure that tell ghosts; default none"
     )
     parser.add_argument(
+        "--ignore",
+        action="append",
+        type=_ignored,
+        metavar="VIEW=LEFT:RIGHT,TOP:BOTTOM",
+        help="pixels of a view that are not asked, as a nozzle or a reflection; may be repeated",
+    )
+    parser.add_argument(
         "--export", type=_exports, default=(), metavar="csv,vtk,parquet", help="write droplets in these formats too"
     )
     add_single_view(parser)
@@ -59,6 +66,17 @@ def _twins(text: str) -> int:
     from processing.runs.measurement import MeasureSettings
 
     return int(setting("twins", text, MeasureSettings))
+
+
+def _ignored(text: str) -> str:
+    from processing.runs.errors import PipelineError
+    from processing.runs.measured_images import rectangle
+
+    try:
+        rectangle(text)
+    except PipelineError as error:
+        raise ArgumentTypeError(str(error)) from error
+    return text
 
 
 def _exports(text: str) -> "tuple[Export, ...]":
@@ -101,7 +119,8 @@ def _by_options(options: Namespace, calibration: "Calibration") -> "MeasureSetti
 
     grid = GridSettings.of(parse_grid(options.grid, calibration)) if options.grid else None
     polarity = options.polarity or _polarity(options.runs[0])
-    return MeasureSettings(polarity=polarity, grid=grid, twins=options.twins or 0)
+    ignored = tuple(options.ignore or ())
+    return MeasureSettings(polarity=polarity, grid=grid, twins=options.twins or 0, ignored=ignored)
 
 
 def _measure_run(options: Namespace, settings: "MeasureSettings", run_dir: Path, place: Path) -> Outcome:
