@@ -3,6 +3,7 @@
 import os
 import signal
 import threading
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,14 @@ from tests.support.command_line import told
 from tests.support.droplet_run import write_calibration, write_run
 
 SHOTS = 40
+
+
+@pytest.fixture(autouse=True)
+def interruptible() -> Iterator[None]:
+    """Jobs in the background of a shell ignore SIGINT, and their children do too."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 def interrupt_once_there(file: Path, given_up: threading.Event) -> None:
