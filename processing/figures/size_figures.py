@@ -45,7 +45,7 @@ def sizes_figure(shots: Sequence[StoredDroplets], title: str = "") -> Figure:
         _mark(axes, label, getattr(statistics, name), f"C{number + 1}")
     axes.set(xlabel="diameter [µm]", ylabel="density [1/µm]", xscale="log", ylim=(0, None))
     axes.set_title(
-        f"{statistics.n} droplets, {statistics.exposures} exposures, {statistics.shots} shots; 95 %, "
+        f"{statistics.n} droplets, exposures: {statistics.exposures}, shots: {statistics.shots}; 95 %, "
         f"diameters by drawing {statistics.intervals_over}",
         fontsize="small",
     )
