@@ -53,9 +53,7 @@ class MeasureSettings(FrozenValue):
     seed: Annotated[int, Field(ge=0, description="of the twins")] = 0
     ignored: Annotated[
         tuple[IgnoredPixels, ...],
-        Field(
-            description="rectangles of shadow images that are not asked, VIEW=LEFT:RIGHT,TOP:BOTTOM in px"
-        ),
+        Field(description="rectangles of shadow images that are not asked, VIEW=LEFT:RIGHT,TOP:BOTTOM in px"),
     ] = ()
 
     def results_id(self, calibration: str) -> str:
