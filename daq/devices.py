@@ -128,8 +128,8 @@ class PulseGenerator(Device, Protocol):
     def configure(self, timing: ShotTiming) -> FiredTrain:
         """Load a pulse train; returns the actual, quantised one (sequence 0). Refused while armed."""
 
-    def arm(self, shots: int, source: TriggerSource = TriggerSource.COMMAND, period_us: int = 0) -> None:
-        """Permit this many shots, not one more, to one source.
+    def arm(self, shots: int, source: TriggerSource = TriggerSource.COMMAND, period_us: int = 0) -> int:
+        """Permit this many shots, not one more, to one source; returns the shortest period of the loaded train, in us.
 
         The period is the timer's; for the other sources the shortest that is intended, 0 if that is not known. One that
         the loaded train does not permit is refused.

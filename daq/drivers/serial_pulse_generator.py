@@ -134,8 +134,8 @@ class SerialPulseGenerator:
         self._loaded = _LoadedTrain(loaded.number("train"), loaded.number("period_us"), _actual_train(replies))
         return self._loaded.actual
 
-    def arm(self, shots: int, source: TriggerSource = TriggerSource.COMMAND, period_us: int = 0) -> None:
-        """Permit this many shots to one source.
+    def arm(self, shots: int, source: TriggerSource = TriggerSource.COMMAND, period_us: int = 0) -> int:
+        """Permit this many shots to one source; returns the shortest period of the loaded train, in us.
 
         Raises
         ------
@@ -152,6 +152,7 @@ class SerialPulseGenerator:
         if source is not TriggerSource.TIMER:
             period_us = min(period_us, MAX_PERIOD_US)
         self._line.ask(Command.ARM, shots, Source[source.name], period_us)
+        return self._loaded.period_us if self._loaded is not None else MAX_PERIOD_US
 
     def light(self, current_a: Mapping[str, float], time_s: float) -> None:
         """Continuous light of low current, until `off` or the time is over; `status` is the heartbeat that keeps it on.

@@ -14,15 +14,15 @@ _LEAST_COLLECT_S = 0.05
 """What a camera gets although another one used up the deadline: its frames lie in its buffers already."""
 
 _LATE_PERIODS = 0.5
-"""A shot that is later moves those after it."""
+"""A shot that is later by so many periods moves those after it, and none comes closer to the one before."""
 
 
 def next_due_s(due_s: float, fired_s: tuple[float, float], period_s: float, shortest_s: float) -> float:
     """When the next shot is due.
 
     A shot that is a little late does not move those after it, so that the period is exact; one that is late by more
-    than half a period does: nothing is caught up. Cameras and generator refuse, or, worse, ignore an early trigger:
-    the shortest period counts from when the last one has surely been.
+    than half a period does: nothing is caught up, and no two shots are closer than half a period. Cameras and generator
+    refuse, or, worse, ignore an early trigger: the shortest period counts from when the last one has surely been.
 
     Parameters
     ----------
@@ -34,8 +34,8 @@ def next_due_s(due_s: float, fired_s: tuple[float, float], period_s: float, shor
         As asked for, and as the rig permits.
     """
     commanded_s, confirmed_s = fired_s
-    kept_s = due_s if commanded_s - due_s < _LATE_PERIODS * period_s else commanded_s
-    return max(kept_s + period_s, confirmed_s + shortest_s)
+    kept_s = due_s if commanded_s - due_s <= _LATE_PERIODS * period_s else commanded_s
+    return max(kept_s + period_s, confirmed_s + max(shortest_s, _LATE_PERIODS * period_s))
 
 
 class ShotTaker:
@@ -78,7 +78,8 @@ class ShotTaker:
         if deviation := train_deviation(self._timing, generator.configure(self._timing)):
             raise DeviceRefused(generator.name, f"loaded another pulse train: {deviation}")
         if not self._ending.step:
-            generator.arm(plan.shots + self._refires_left, period_us=int(1e6 * self._period_s))
+            period_us = generator.arm(plan.shots + self._refires_left, period_us=int(1e6 * self._period_s))
+            self._shortest_s = max(self._timing.shortest_period_ns / 1e9, period_us / 1e6)
 
     def take(self, index: int) -> Shot | None:
         """Take one shot when it is due; None if the run is ended."""

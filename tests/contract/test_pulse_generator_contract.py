@@ -244,6 +244,16 @@ def test_an_impossible_budget_is_refused(generator: PulseGenerator, shots: int) 
     assert generator.status().state is GeneratorState.SAFE
 
 
+@pytest.mark.parametrize(("width_ns", "shortest_us"), [(1000, 10_000), (2000, 20_000)])
+def test_the_shortest_period_that_arming_tells_is_enough(stand: Stand, width_ns: int, shortest_us: int) -> None:
+    stand.generator.configure(shot_timing(width_ns=width_ns))
+    told_us = stand.generator.arm(2)
+    assert told_us == pytest.approx(shortest_us, rel=0.01)
+    stand.generator.fire()
+    stand.around.advance(-(-told_us // 1000))
+    assert stand.generator.fire().sequence == 2
+
+
 def test_an_early_shot_is_not_fired_and_counted(stand: Stand) -> None:
     """Of a train with the longest of the shortest periods: the second one must come in time on a busy computer too."""
     stand.generator.configure(shot_timing(width_ns=2000))

@@ -187,7 +187,7 @@ class MemoryGenerator(MemoryDevice):
             raise DeviceRefused(self.name, f"continuous light is not 10 to 500 mA: {dict(current_a)}")
         self.state, self._light_a, self._dark_at_s = GeneratorState.LIT, dict(current_a), self._now_s() + time_s
 
-    def arm(self, shots: int, source: TriggerSource = TriggerSource.COMMAND, period_us: int = 0) -> None:
+    def arm(self, shots: int, source: TriggerSource = TriggerSource.COMMAND, period_us: int = 0) -> int:
         self._check_safe()
         if self._loaded is None:
             raise DeviceRefused(self.name, "there is no pulse train")
@@ -199,6 +199,7 @@ class MemoryGenerator(MemoryDevice):
             raise DeviceRefused(self.name, "the interlock is open")
         self.journal.append(f"arm {shots}")
         self.state, self._shots_left = GeneratorState.ARMED, shots
+        return round(1e6 * _shortest_s(self._loaded))
 
     def fire(self) -> FiredTrain:
         self.counters["requested"] += 1
@@ -236,8 +237,7 @@ class MemoryGenerator(MemoryDevice):
         self._shots_left -= 1
         if not self._shots_left:
             self.state = GeneratorState.SAFE
-        lit_ns = max(sum(pulse.width_ns for pulse in pulses) for pulses in loaded.pulses.values())
-        self._ready_at_s = self._now_s() + lit_ns / 1e9 / DUTY
+        self._ready_at_s = self._now_s() + _shortest_s(loaded)
         if self.fired == self.silent_at:
             raise DeviceTimeout(self.name, "fire", 0.5)
         self.journal.append(f"fire {self.fired}")
@@ -303,6 +303,11 @@ class MemoryStage(MemoryDevice):
 
     def position_mm(self) -> float:
         return self._z_mm
+
+
+def _shortest_s(loaded: FiredTrain) -> float:
+    lit_ns = max(sum(pulse.width_ns for pulse in pulses) for pulses in loaded.pulses.values())
+    return lit_ns / 1e9 / DUTY
 
 
 def _ticks(time_ns: int) -> int:

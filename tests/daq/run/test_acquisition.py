@@ -135,10 +135,11 @@ def test_runs_follow_each_other_and_never_share_a_directory(lab: Laboratory) -> 
 
 
 def test_no_shot_comes_before_its_time(lab: Laboratory) -> None:
-    """Cameras ignore an early trigger, the generator refuses it: a late shot is never caught up with."""
+    """Cameras ignore an early trigger, the generator refuses it; a late shot may shorten the time to the next one."""
     reader = lab.run(plan_of(6, rate_hz=25))
     times_s = np.array([reader.read_shot(index).host_time_ns for index in range(6)]) / 1e9
-    assert np.all(np.diff(times_s) > 1 / 25 - 0.001)
+    assert np.all(times_s - times_s[0] > np.arange(6) / 25 - 0.001)
+    assert np.all(np.diff(times_s) > 0.5 / 25 - 0.001)
     assert times_s[-1] - times_s[0] < 3
 
 
