@@ -23,7 +23,9 @@ LIMIT = {name: int(value) for name, value in re.findall(r"(\w+) = (\d+)", HEADER
 
 @pytest.fixture(scope="module")
 def shared() -> Board:
-    return Board()
+    board = Board()
+    board.pico.run_ms(2 * PERIOD_MS)  # a start waits for the period of any train
+    return board
 
 
 @pytest.fixture
