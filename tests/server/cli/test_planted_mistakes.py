@@ -101,8 +101,7 @@ def test_files_of_neighbours_exchanged_are_refused(tmp_path: Path, capsys: pytes
     assert "have cam0 and cam1 been exchanged?" in answer["error"]
 
 
-@pytest.mark.parametrize("views", [("cam1",), ALL], ids=["one view", "all"])
-@pytest.mark.parametrize("pair", [(0, 3), (-3, 0)], ids=["above", "below"])
+@pytest.mark.parametrize(("pair", "views"), [((0, 3), ALL), ((-3, 0), ("cam1",))], ids=["of all", "of one view"])
 def test_two_planes_that_are_exchanged_are_named(
     pair: tuple[float, float], views: tuple[str, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
