@@ -32,7 +32,7 @@ def test_the_bars_hold_all_droplets_and_the_lines_are_the_statistics() -> None:
     assert statistics.d10_um
     assert statistics.d32_um
     assert (drawn["D10"], drawn["D32"]) == (statistics.d10_um.value, statistics.d32_um.value)
-    assert "600 droplets, 6 exposures, 3 shots" in axes.get_title()
+    assert "600 droplets, exposures: 6, shots: 3" in axes.get_title()
 
 
 def test_without_sizes_there_is_no_figure_and_the_reason_is_told() -> None:
