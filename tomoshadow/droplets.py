@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 from processing.analysis.droplets.bright_shot import BrightExposure, measure_bright
 from processing.analysis.droplets.droplet_search import MARGIN_VOXEL, plan_droplets
+from processing.analysis.droplets.shadows.light_search import Light
 from processing.analysis.droplets.shadows.shadow_shot import ShadowExposure, measure_shadows
 from processing.calibration.calibration import Calibration
 from processing.kernels import DEFAULT_THREADS
@@ -17,6 +18,7 @@ def measure(
     grid: VoxelGrid,
     *,
     polarity: Polarity = "bright",
+    light: Light = "estimated",
     twins: int = 0,
     seed: int = 0,
     margin_voxel: int = MARGIN_VOXEL,
@@ -35,6 +37,9 @@ def measure(
         Where droplets are measured, about one voxel per pixel, see ``common_grid``.
     polarity : {"bright", "shadow"}
         Only shadows tell how large droplets are.
+    light : float or {"estimated", "incoherent"}
+        Of shadows: numerical aperture of the light over that of the lens, above 0 to 1. Such light makes droplets look
+        larger; ``diameters_um`` are corrected for it, ``diameters_raw_um`` are not.
     twins : int
         Simulated twins of the exposure that tell how many are ghosts; each costs as much as the exposure itself.
     seed : int
@@ -65,5 +70,5 @@ def measure(
     mappings = [calibration.views[name].mapping for name in names]
     search = plan_droplets(mappings, grid, names, margin_voxel=margin_voxel)
     if polarity == "shadow":
-        return measure_shadows(list(images.values()), search, twins=twins, seed=seed, threads=threads)
+        return measure_shadows(list(images.values()), search, light=light, twins=twins, seed=seed, threads=threads)
     return measure_bright(list(images.values()), search, twins=twins, seed=seed, threads=threads)

@@ -27,7 +27,6 @@ BLOB_REACH_SIGMAS: float
 DISC_ROWS: int
 DISC_NODES: int
 DISC_ROWS_PER_OCTAVE: int
-DISC_REACH: float
 SMALLEST_DISC: float
 LARGEST_DISC: float
 """Of a table of discs: rows of equal radius, its nodes along distance, and radii in units of the blur."""
@@ -171,6 +170,7 @@ def draw_discs(
     spacing: int,
     optics: NDArray[np.float64],
     profiles: NDArray[np.float32],
+    reach: float,
     positions: NDArray[np.float64],
     squares: NDArray[np.float64],
     factor: float,
@@ -184,6 +184,7 @@ def sweep_discs(
     spacing: int,
     optics: NDArray[np.float64],
     profiles: NDArray[np.float32],
+    reach: float,
     positions: NDArray[np.float64],
     squares: NDArray[np.float64],
     information: NDArray[np.float64],
@@ -201,6 +202,7 @@ def weigh_discs(
     spacing: int,
     optics: NDArray[np.float64],
     profiles: NDArray[np.float32],
+    reach: float,
     positions: NDArray[np.float64],
     squares: NDArray[np.float64],
     out: NDArray[np.float64],

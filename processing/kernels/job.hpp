@@ -240,14 +240,13 @@ struct BlobSupport {
     double product, shape, residual, pixels;
 };
 
-// Opaque discs under a Gaussian blur, in units of the blur: a table of rows of equal radius, 16 per octave, over nodes that
-// are equally apart in the square of the distance, from where the shadow begins to be whole, `disc_reach` within the edge or
-// at the centre, to `disc_reach` beyond the edge.
+// Shadows of opaque discs, in units of the blur: a table of rows of equal radius, 16 per octave, over nodes that are equally
+// apart in the square of the distance, from where the shadow begins to be whole, a reach within the edge or at the centre,
+// to as much beyond the edge. The light decides on the table and its reach.
 constexpr int disc_rows = 177, disc_nodes = 96;  // the last two nodes are beyond the disc
 constexpr int disc_rows_per_octave = 16;
-constexpr double disc_reach = 3.2;
 constexpr double least_blur_px = 0.2;
-constexpr double smallest_disc = disc_reach / 64, largest_disc = disc_reach * 32;  // radii of the first and the last row
+constexpr double smallest_disc = 0.05, largest_disc = 102.4;  // radii of the first and the last row
 
 // A row of the table: binary logarithm of the transmission; the change of the natural one with distance, over distance; and
 // with the radius squared.
@@ -271,6 +270,7 @@ struct Discs {
     int n_views;
     NodeGrid grid;
     const DiscProfile *profiles;  // (disc_rows)
+    double reach;                 // of the profiles, in blurs
     double *positions;            // (count, 3): x, y, z in voxels
     double *squares;              // (count): of the radii, in voxels^2
     int64_t count;

@@ -16,6 +16,7 @@ from processing.analysis.droplets.droplet_file import write_droplets
 from processing.analysis.droplets.droplet_search import MARGIN_VOXEL, DropletSearch, plan_droplets
 from processing.analysis.droplets.ghost_share import pooled
 from processing.analysis.droplets.measured_exposure import ShotVerdict
+from processing.analysis.droplets.shadows.light_search import Light
 from processing.analysis.droplets.shadows.shadow_shot import ShadowExposure, measure_shadows
 from processing.calibration.calibration import Calibration
 from processing.calibration.calibration_file import load_calibration
@@ -36,7 +37,7 @@ from processing.runs.recipe import recipe_sha256
 from processing.runs.results_file import FrameName, Provenance, claim_results
 from processing.runs.workbench import References, read_references
 
-METHOD_VERSION = 2
+METHOD_VERSION = 3
 """Of what the numbers in a file of droplets mean."""
 Exposure = BrightExposure | ShadowExposure
 
@@ -51,6 +52,12 @@ class MeasureSettings(FrozenValue):
     )
     twins: Annotated[int, Field(ge=0, le=100, description="simulated twins per exposure that tell ghosts; 0: none")] = 0
     seed: Annotated[int, Field(ge=0, description="of the twins")] = 0
+    light: Annotated[
+        Light,
+        Field(
+            description="of shadows: aperture of the light over that of the lens, up to 1; or incoherent; or estimated"
+        ),
+    ] = "estimated"
     ignored: Annotated[
         tuple[IgnoredPixels, ...],
         Field(description="rectangles of shadow images that are not asked, VIEW=LEFT:RIGHT,TOP:BOTTOM in px"),
@@ -219,7 +226,15 @@ class RunMeasurement:
             return measure_bright(images, self.search, twins=twins, seed=seed, threads=threads)
         images, trust = shadow_images(self.run, shot, frame, self.references)
         known = without_ignored(dict(zip(shot.views, trust, strict=True)), self.settings.ignored)
-        return measure_shadows(images, self.search, trust=list(known.values()), twins=twins, seed=seed, threads=threads)
+        return measure_shadows(
+            images,
+            self.search,
+            trust=list(known.values()),
+            light=self.settings.light,
+            twins=twins,
+            seed=seed,
+            threads=threads,
+        )
 
 
 def droplets_path(results_dir: Path, shot: int) -> Path:

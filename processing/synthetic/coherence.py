@@ -1,12 +1,7 @@
 """Partially coherent light: small opaque discs look larger than they are.
 
-A condenser whose aperture is a share of the lens's lights the spray from few directions. Each direction makes a
-coherent image, the squared modulus of a field, and they add up (Abbe):
-
-    I(x) = sum over source points s of | F^-1 [ F(disc) pupil(f + s) ] |^2
-
-Everything scales with the Airy disk d_A / M in the object, so one table of radial profiles per condenser serves all
-lenses and diameters. What it cannot do:
+A droplet's profile is Abbe's sum (``processing.coherent_light``). Everything scales with the Airy disk d_A / M in the
+object, so one table of radial profiles per condenser serves all lenses and diameters. What it cannot do:
 
 * The profile is that of a droplet in focus; defocus blurs it as if its rays were independent.
 * Neighbours interfere in truth; here each weakens what the other changes. Two discs of 0.6 Airy disks with a condenser
@@ -20,21 +15,18 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chndtr, j0, j1
+from scipy.interpolate import CubicSpline
+from scipy.special import chndtr
 
+from processing.coherent_light import blurred, circles, waves
 from processing.synthetic.stamping import Discs, FloatArray, FloatImage, stamp_discs
 from processing.synthetic.view_optics import CORE_SIGMA
 
 REACH_AIRY = 3.0
 """A profile ends so many Airy disks beyond the edge of its disc."""
-_CUT = 1.22
-"""Spatial frequency, per Airy disk, at the edge of the pupil: NA / lambda."""
-_SIZE, _PER_AIRY = 128, 6
-"""Field of one image, 21 Airy disks; squared fields hold no frequency above twice the cut."""
-_SOURCE_RINGS = 8
 _DIAMETERS_AIRY = np.geomspace(0.05, 12.0, 56)
 _BLURS_AIRY = np.array([0.0, 0.06, 0.12, 0.2, 0.3, 0.45, 0.7])
-_COLUMNS = 96
+_COLUMNS = 160
 _DARKEST = 1e-3
 
 
@@ -44,17 +36,17 @@ class CoherentProfiles:
 
     Parameters
     ----------
-    profiles : (diameters, blurs, columns) array
-        Against the distance from the middle; the last column lies ``REACH_AIRY`` beyond the edge of the disc.
+    profiles : CubicSpline
+        Of the logarithm of the diameter: (blurs, columns) against the distance from the middle; the last column lies
+        ``REACH_AIRY`` beyond the edge of the disc.
     """
 
-    profiles: FloatArray
+    profiles: CubicSpline
 
     def of(self, diameters_airy: FloatArray, blurs_airy: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Distances and transmittances (N, columns) of discs under a further Gaussian blur of their own."""
-        row, row_share = _place(np.log(diameters_airy), np.log(_DIAMETERS_AIRY))
         blur, blur_share = _place(blurs_airy, _BLURS_AIRY)
-        wide = self.profiles[row] * (1 - row_share) + self.profiles[row + 1] * row_share
+        wide = self.profiles(np.log(np.clip(diameters_airy, _DIAMETERS_AIRY[0], _DIAMETERS_AIRY[-1])))
         found = np.take_along_axis(wide, blur[:, None, None], axis=1)[:, 0] * (1 - blur_share[:, 0])
         found += np.take_along_axis(wide, blur[:, None, None] + 1, axis=1)[:, 0] * blur_share[:, 0]
         reach_airy = 0.5 * diameters_airy + REACH_AIRY
@@ -70,7 +62,7 @@ def _place(values: FloatArray, nodes: FloatArray) -> tuple[NDArray[np.intp], Flo
 
 @lru_cache(maxsize=4)
 def coherent_profiles(condenser_ratio: float) -> CoherentProfiles:
-    """Table of a condenser: a second of work, kept.
+    """Table of a condenser: two seconds of work, kept.
 
     Parameters
     ----------
@@ -79,36 +71,16 @@ def coherent_profiles(condenser_ratio: float) -> CoherentProfiles:
     """
     if not 0 < condenser_ratio <= 1:
         raise ValueError(f"condenser ratio must lie above 0 and not exceed 1, not {condenser_ratio}")
-    return CoherentProfiles(np.array([_profiles(diameter, condenser_ratio) for diameter in _DIAMETERS_AIRY]))
-
-
-def disc_image(diameter_airy: float, condenser_ratio: float) -> FloatImage:
-    """Intensity of an opaque disc in the middle of the field, (rows, columns), 1 / 6 of an Airy disk apart."""
-    frequencies = np.fft.fftfreq(_SIZE, 1 / _PER_AIRY)
-    radial = np.hypot(frequencies[:, None], frequencies)
-    radius = 0.5 * diameter_airy
-    with np.errstate(invalid="ignore"):
-        disc = np.where(radial > 0, radius * j1(2 * np.pi * radius * radial) / radial, np.pi * radius**2)
-    nodes, weights = np.polynomial.legendre.leggauss(_SOURCE_RINGS)
-    image = np.zeros((_SIZE, _SIZE))
-    # One point per ring of the source: the mean around the disc does for the others.
-    for source, weight in zip(_CUT * condenser_ratio * np.sqrt(0.5 + 0.5 * nodes), 0.5 * weights, strict=True):
-        pupil = np.hypot(frequencies[:, None], frequencies + source) <= _CUT
-        image += weight * np.abs(1 - _PER_AIRY**2 * np.fft.ifft2(disc * pupil)) ** 2
-    return np.fft.fftshift(image)
+    profiles = np.array([_profiles(diameter, condenser_ratio) for diameter in _DIAMETERS_AIRY])
+    return CoherentProfiles(CubicSpline(np.log(_DIAMETERS_AIRY), profiles))
 
 
 def _profiles(diameter_airy: float, condenser_ratio: float) -> FloatArray:
-    """Means around the disc for each blur, (blurs, columns): Bessel functions of the spectrum, summed over circles."""
-    spectrum = np.fft.fft2(np.fft.ifftshift(disc_image(diameter_airy, condenser_ratio)) - 1).real / _SIZE**2
-    steps = np.rint(_SIZE * np.fft.fftfreq(_SIZE)).astype(int)
-    squared, circles = np.unique(steps[:, None] ** 2 + steps**2, return_inverse=True)
-    frequencies = np.sqrt(squared) * _PER_AIRY / _SIZE
-    seen = frequencies <= 2 * _CUT
-    sums = np.bincount(circles.ravel(), spectrum.ravel())[seen]
+    """Means around the disc for each blur, (blurs, columns)."""
+    rings = circles()
+    spectra = rings.spectrum(diameter_airy, condenser_ratio) * blurred(rings.per_airy, _BLURS_AIRY[:, None])
     distances = (0.5 * diameter_airy + REACH_AIRY) * np.linspace(0, 1, _COLUMNS)
-    blurred = sums * np.exp(-2 * np.pi**2 * (_BLURS_AIRY[:, None] * frequencies[seen]) ** 2)
-    return np.asarray(1 + blurred @ j0(2 * np.pi * frequencies[seen, None] * distances), dtype=np.float64)
+    return np.asarray(1 + spectra @ waves(rings.per_airy, distances), dtype=np.float64)
 
 
 def with_coherence(transmittance: FloatImage, discs: Discs, airy_px: float, condenser_ratio: float) -> FloatImage:

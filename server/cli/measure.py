@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from processing.runs.measurement import MeasuredShot, MeasureSettings
 
 NAME = "measure"
-SAID = ("polarity", "grid", "twins", "ignore")
+SAID = ("polarity", "grid", "twins", "light", "ignore")
 """Options that a recipe takes the place of."""
 
 
@@ -50,6 +50,12 @@ def add(verbs: Verbs) -> None:
         "--twins", type=_twins, metavar="N", help="simulated twins per exposure that tell ghosts; default none"
     )
     parser.add_argument(
+        "--light",
+        type=_light,
+        metavar="RATIO",
+        help="of shadows: aperture of the light over that of the lens, above 0 to 1, or incoherent; default: estimated",
+    )
+    parser.add_argument(
         "--ignore",
         action="append",
         type=_ignored,
@@ -66,6 +72,13 @@ def _twins(text: str) -> int:
     from processing.runs.measurement import MeasureSettings
 
     return int(setting("twins", text, MeasureSettings))
+
+
+def _light(text: str) -> "float | str":
+    from processing.runs.measurement import MeasureSettings
+
+    light: float | str = setting("light", text, MeasureSettings)
+    return light
 
 
 def _ignored(text: str) -> str:
@@ -120,7 +133,13 @@ def _by_options(options: Namespace, calibration: "Calibration") -> "MeasureSetti
     grid = GridSettings.of(parse_grid(options.grid, calibration)) if options.grid else None
     polarity = options.polarity or _polarity(options.runs[0])
     ignored = tuple(options.ignore or ())
-    return MeasureSettings(polarity=polarity, grid=grid, twins=options.twins or 0, ignored=ignored)
+    return MeasureSettings(
+        polarity=polarity,
+        grid=grid,
+        twins=options.twins or 0,
+        light=options.light or "estimated",
+        ignored=ignored,
+    )
 
 
 def _measure_run(options: Namespace, settings: "MeasureSettings", run_dir: Path, place: Path) -> Outcome:

@@ -13,7 +13,7 @@ import pytest
 import tomoshadow
 from server.cli.main import main
 
-pytestmark = pytest.mark.network
+pytestmark = [pytest.mark.network, pytest.mark.timeout(600)]
 
 ROOT = Path(__file__).parents[2]
 SMALL = ROOT / "configs" / "simulated_small.toml"

@@ -18,7 +18,11 @@ SIZED_VERSION = 2
 """Of files whose droplets have diameters and no amplitudes."""
 SCHEMA_KEYS = ("schema", "schema_version")
 DIAMETER, RAW_DIAMETER = "diameter_um", "diameter_raw_um"
-NOT_CORRECTED = "none: no size calibration was given, diameter_um is diameter_raw_um, as fitted"
+NOT_CORRECTED = "none: light is incoherent, diameter_um is diameter_raw_um, as fitted"
+CORRECTED = (
+    "of partially coherent light, whose condenser_ratio is with the views of the exposures; diameter_raw_um is that of "
+    "the disc that would look so in incoherent light"
+)
 GROUP, PROVENANCE, FRAME = "droplets", "tomoshadow", "frame"
 UNITS = MappingProxyType({"mm": "mm", "mm2": "mm^2", "um": "um", "px": "px"})
 """By the ending of a column's name; all others are numbers, or as bright as the images."""
@@ -85,7 +89,8 @@ def write_columns(path: Path, columns: Mapping[str, NDArray[np.generic]], proven
             group["p_real"].attrs["reason"] = P_REAL_UNKNOWN
         sized = RAW_DIAMETER in columns
         if sized:
-            group[DIAMETER].attrs["correction"] = NOT_CORRECTED
+            same = np.array_equal(columns[DIAMETER], columns[RAW_DIAMETER])
+            group[DIAMETER].attrs["correction"] = NOT_CORRECTED if same else CORRECTED
         schema = {"schema": SCHEMA, "schema_version": SIZED_VERSION if sized else SCHEMA_VERSION}
         file.create_group(PROVENANCE).attrs.update({**provenance, **schema})
 

@@ -41,7 +41,8 @@ struct BoundDiscs {
     Discs discs;
 
     BoundDiscs(const Images &logs, const LatticeArray &nodes, int spacing, const OpticsArray &optics,
-               const ProfileArray &profiles, const PositionArray &positions, const NumberArray &squares) {
+               const ProfileArray &profiles, double reach, const PositionArray &positions, const NumberArray &squares) {
+        require(reach > 0 && std::isfinite(reach), "discs: a reach above 0, please");
         require(!logs.empty() && logs.size() <= max_views, "discs: one to eight views, please");
         require(nodes.shape(0) == logs.size() && optics.shape(0) == logs.size(), "discs: one lattice and optics per view");
         require(positions.shape(0) == squares.shape(0), "discs: as many positions as squares, please");
@@ -53,6 +54,7 @@ struct BoundDiscs {
                  static_cast<int>(views.size()),
                  node_grid(nodes, spacing),
                  reinterpret_cast<const DiscProfile *>(profiles.data()),
+                 reach,
                  positions.data(),
                  squares.data(),
                  static_cast<int64_t>(squares.shape(0))};
@@ -73,8 +75,8 @@ void require_same_shapes(const Images &logs, const RecordedImages &images, const
 }
 
 void draw(const Images &logs, const LatticeArray &nodes, int spacing, const OpticsArray &optics, const ProfileArray &profiles,
-          const PositionArray &positions, const NumberArray &squares, double factor, int threads) {
-    const BoundDiscs bound(logs, nodes, spacing, optics, profiles, positions, squares);
+          double reach, const PositionArray &positions, const NumberArray &squares, double factor, int threads) {
+    const BoundDiscs bound(logs, nodes, spacing, optics, profiles, reach, positions, squares);
     require_threads(threads);
     const Kernels &kernels = selected_kernels();
     nb::gil_scoped_release release;
@@ -82,9 +84,9 @@ void draw(const Images &logs, const LatticeArray &nodes, int spacing, const Opti
 }
 
 int sweep(const Images &logs, const RecordedImages &images, const RecordedImages &weights, const LatticeArray &nodes, int spacing,
-          const OpticsArray &optics, const ProfileArray &profiles, const PositionArray &positions, const NumberArray &squares,
+          const OpticsArray &optics, const ProfileArray &profiles, double reach, const PositionArray &positions, const NumberArray &squares,
           const NumberArray &information, int most, bool move, double damping, double largest, double tolerance) {
-    BoundDiscs bound(logs, nodes, spacing, optics, profiles, positions, squares);
+    BoundDiscs bound(logs, nodes, spacing, optics, profiles, reach, positions, squares);
     require_same_shapes(logs, images, weights);
     bound.see(images, weights);
     require(damping > 0 && largest > 0 && tolerance >= 0, "sweeps: damping and largest positive, tolerance not negative");
@@ -97,9 +99,9 @@ int sweep(const Images &logs, const RecordedImages &images, const RecordedImages
 }
 
 void weigh(const Images &logs, const RecordedImages &images, const RecordedImages &weights, const LatticeArray &nodes, int spacing,
-           const OpticsArray &optics, const ProfileArray &profiles, const PositionArray &positions, const NumberArray &squares,
+           const OpticsArray &optics, const ProfileArray &profiles, double reach, const PositionArray &positions, const NumberArray &squares,
            const SupportArray &out, int threads) {
-    BoundDiscs bound(logs, nodes, spacing, optics, profiles, positions, squares);
+    BoundDiscs bound(logs, nodes, spacing, optics, profiles, reach, positions, squares);
     require_same_shapes(logs, images, weights);
     bound.see(images, weights);
     require(out.shape(0) == bound.views.size() && out.shape(1) == squares.shape(0), "support: (views, discs, 10), please");
@@ -130,18 +132,17 @@ void bind_discs(nb::module_ &module) {
     module.attr("DISC_ROWS") = disc_rows;
     module.attr("DISC_NODES") = disc_nodes;
     module.attr("DISC_ROWS_PER_OCTAVE") = disc_rows_per_octave;
-    module.attr("DISC_REACH") = disc_reach;
     module.attr("LEAST_BLUR_PX") = least_blur_px;
     module.attr("SMALLEST_DISC") = smallest_disc;
     module.attr("COVERAGE_CELLS") = coverage_cells;
     module.attr("LARGEST_DISC") = largest_disc;
-    module.def("draw_discs", &draw, "log_transmissions"_a, "nodes"_a, "spacing"_a, "optics"_a, "profiles"_a, "positions"_a,
+    module.def("draw_discs", &draw, "log_transmissions"_a, "nodes"_a, "spacing"_a, "optics"_a, "profiles"_a, "reach"_a, "positions"_a,
                "squares"_a, "factor"_a, "threads"_a);
     module.def("sweep_discs", &sweep, "log_transmissions"_a, "images"_a, "weights"_a, "nodes"_a, "spacing"_a, "optics"_a,
-               "profiles"_a, "positions"_a, "squares"_a, "information"_a, "most"_a, "move"_a, "damping"_a, "largest"_a,
+               "profiles"_a, "reach"_a, "positions"_a, "squares"_a, "information"_a, "most"_a, "move"_a, "damping"_a, "largest"_a,
                "tolerance"_a);
     module.def("weigh_discs", &weigh, "log_transmissions"_a, "images"_a, "weights"_a, "nodes"_a, "spacing"_a, "optics"_a,
-               "profiles"_a, "positions"_a, "squares"_a, "out"_a, "threads"_a);
+               "profiles"_a, "reach"_a, "positions"_a, "squares"_a, "out"_a, "threads"_a);
     module.def("cover", &covered, "centres"_a, "radii"_a, "out"_a);
 }
 

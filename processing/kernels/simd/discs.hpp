@@ -1,4 +1,4 @@
-// Opaque discs under a Gaussian blur, fitted to transmissions by coordinate descent. The logarithm of the transmission of all
+// Opaque discs, fitted to transmissions by coordinate descent. The logarithm of the transmission of all
 // discs is kept up to date while discs change, so that a sweep costs a few small windows per disc and view. A disc's
 // profile is interpolated from a table once per view; pixels then only look it up.
 #pragma once
@@ -60,15 +60,15 @@ inline void interpolate(DiscProfile &profile, const DiscProfile *table, double r
 inline void see(SeenDisc &disc, const Discs &discs, const DiscView &view, const double *position, double square) {
     disc.at = seen_at(discs.grid, view.nodes, view.shift_u, view.shift_v, position);
     const double blur = blur_px(view, position[2]), scale = image_scale(disc.at), rho = __builtin_sqrt(square) * scale / blur;
-    disc.reach_px = (rho + disc_reach) * blur;
+    disc.reach_px = (rho + discs.reach) * blur;
     const double u = disc.at.u, v = disc.at.v, reach = disc.reach_px;
     disc.empty = !(square > 0 && rho <= largest_disc && u > -reach && v > -reach && u < view.columns + reach && v < view.rows + reach);
     if (disc.empty) return;
     disc.top = larger(0, ceil_of(v - reach));
     disc.bottom = smaller(view.rows, floor_of(v + reach) + 1);
     disc.empty = disc.top >= disc.bottom;
-    const double held = rho > smallest_disc ? rho : smallest_disc, inner = held > disc_reach ? held - disc_reach : 0;
-    const double outer = held + disc_reach, nodes_per_blur2 = (disc_nodes - 2) / (outer * outer - inner * inner);
+    const double held = rho > smallest_disc ? rho : smallest_disc, inner = held > discs.reach ? held - discs.reach : 0;
+    const double outer = held + discs.reach, nodes_per_blur2 = (disc_nodes - 2) / (outer * outer - inner * inner);
     disc.nodes_per_px2 = static_cast<float>(nodes_per_blur2 / (blur * blur));
     disc.inner_nodes = static_cast<float>(inner * inner * nodes_per_blur2);
     disc.pull_unit = -1 / (blur * blur);

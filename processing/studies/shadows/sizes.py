@@ -6,7 +6,7 @@ counted; noise, level, blur and shift of every view are estimated from the image
 
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -48,6 +48,8 @@ class SizeCase:
         Of the background.
     calibration_error_px : float
         By which each view lies beside its calibration, in a direction of its own.
+    condenser_ratio : float | None
+        Numerical aperture of the light over that of the lens; None: incoherent.
     least_found, most_ghosts : float | None
         Shares of the droplets from 20 um on that the mean of the shots must keep.
     most_d32_error, most_sd_um : float | None
@@ -59,6 +61,7 @@ class SizeCase:
     spread: float = 0.4
     noise_percent: float = 1.2
     calibration_error_px: float = 0.0
+    condenser_ratio: float | None = None
     least_found: float | None = None
     most_ghosts: float | None = None
     most_d32_error: float | None = None
@@ -70,6 +73,8 @@ class SizeCase:
         parts = [f"{self.density_per_mm3:g}/mm³", f"{self.median_um:g} um", f"noise {self.noise_percent:g} %"]
         if self.calibration_error_px:
             parts.append(f"calibration {self.calibration_error_px:g} px off")
+        if self.condenser_ratio:
+            parts.append(f"condenser ratio {self.condenser_ratio:g}")
         return ", ".join(parts)
 
 
@@ -169,7 +174,8 @@ def size_scene(
     case: SizeCase, grid: VoxelGrid, image_size_px: tuple[int, int], rng: np.random.Generator
 ) -> ShadowScene:
     """A shot of a case: droplets all over a grid and a little beyond, uniformly."""
-    cameras, optics = study_cameras(image_size_px), list(paper_optics().values())
+    cameras = study_cameras(image_size_px)
+    optics = [replace(view, condenser_ratio=case.condenser_ratio) for view in paper_optics().values()]
     sizes = LogNormal(case.median_um / 1000, case.spread)
     spray = droplet_cloud(Box.around(grid, BESIDE_MM), case.density_per_mm3, sizes, rng)
     images = transmission_images(cameras, optics, spray, Counting.of_noise(case.noise_percent / 100), rng)

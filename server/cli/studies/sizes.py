@@ -13,6 +13,7 @@ VARIED = {
     "median": "median_um",
     "noise": "noise_percent",
     "calibration_error": "calibration_error_px",
+    "condenser_ratio": "condenser_ratio",
 }
 """Options, and what they change of a case."""
 
@@ -26,6 +27,9 @@ def add_sizes(studies: Verbs) -> None:
     parser.add_argument("--median", type=positive, metavar="UM", help="of the diameters")
     parser.add_argument("--noise", type=positive, metavar="PERCENT", help="of the background")
     parser.add_argument("--calibration-error", type=positive, metavar="PX", help="of every view")
+    parser.add_argument(
+        "--condenser-ratio", type=positive, metavar="RATIO", help="aperture of the light over the lens's"
+    )
     parser.add_argument("--twins", type=seed, default=0, help="simulated twins per shot that tell ghosts")
 
 

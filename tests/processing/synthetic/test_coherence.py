@@ -5,13 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from processing.synthetic.coherence import coherent_profiles, disc_image, with_coherence
+from processing.coherent_light import disc_image
+from processing.synthetic.coherence import coherent_profiles, with_coherence
 from processing.synthetic.paper_rig import paper_cameras, paper_optics
 from processing.synthetic.rendering import image_scale_px_per_mm, render_transmittance
 from processing.synthetic.spray import Spray
 from processing.synthetic.stamping import Discs, FloatArray
 from processing.synthetic.union import blurred_union
 from processing.synthetic.view_optics import CORE_SIGMA
+from tests.support.abbe import PER_AIRY, SIZE, abbe
 
 AIRY_UM = 65.0
 CAMERA, OPTICS = paper_cameras()["view2"], replace(paper_optics()["view2"], condenser_ratio=0.2)
@@ -40,24 +42,6 @@ def test_rendered_droplets_look_as_much_larger(diameter_um: float, ratio: float)
     distances_um = um_per_px * np.hypot(rows - v, columns - u)
     seen_um = looks_um(distances_um, 1 - light.astype(float), um_per_px**2, diameter_um)
     assert seen_um / diameter_um == pytest.approx(ratio, abs=0.03)
-
-
-PER_AIRY, SIZE = 24, 256
-
-
-def abbe(discs_airy: list[tuple[float, float, float]], ratio: float) -> FloatArray:
-    """Image of drawn discs (row, column, radius), by points all over the source: another grid and another sum."""
-    rows = ((np.arange(SIZE) - SIZE // 2)[:, None] + (np.arange(8) - 3.5) / 8).ravel() / PER_AIRY
-    mask = np.zeros((len(rows), len(rows)), bool)
-    for row, column, radius in discs_airy:
-        mask |= (rows[:, None] - row) ** 2 + (rows - column) ** 2 < radius**2
-    field = np.fft.fft2(1 - mask.reshape(SIZE, 8, SIZE, 8).mean(axis=(1, 3)))
-    frequencies, k = np.fft.fftfreq(SIZE, 1 / PER_AIRY), np.arange(100) + 0.5
-    image = np.zeros((SIZE, SIZE))
-    for source in 1.22 * ratio * np.sqrt(k / 100) * np.exp(1j * k * np.pi * (3 - 5**0.5)):
-        pupil = np.hypot(frequencies[:, None] + source.imag, frequencies + source.real) <= 1.22
-        image += np.abs(np.fft.ifft2(field * pupil)) ** 2 / 100
-    return image
 
 
 @pytest.mark.parametrize(("diameter", "ratio"), [(0.8, 0.5), (0.3, 0.2)])

@@ -68,7 +68,12 @@ def refined_disc_optics(seen: DiscImages, optics: DiscOptics, discs: Discs, draw
         variances[view] += sum(
             np.clip(value, -most, most) * power for value, power in zip(step[3:], powers, strict=True)
         )
-    return DiscOptics(held_variances(variances, middle), without_motion(shifts, seen.lattice.motion_px), levels)
+    return replace(
+        optics,
+        variances_px2=held_variances(variances, middle),
+        shifts_px=without_motion(shifts, seen.lattice.motion_px),
+        levels=levels,
+    )
 
 
 def _step(slopes: FloatArray, seen: DiscImages, view: int, drawn: Image, prior: FloatArray) -> FloatArray:

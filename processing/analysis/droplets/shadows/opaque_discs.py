@@ -1,4 +1,4 @@
-"""Transmissions as those of opaque discs under a Gaussian blur, and the fit of discs by coordinate descent."""
+"""Transmissions as those of opaque discs that light shows blurred, and the fit of discs by coordinate descent."""
 
 from dataclasses import dataclass
 
@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from processing.analysis.droplets.gaussian_blobs import Image
 from processing.analysis.droplets.shadows.disc_profiles import disc_profiles
+from processing.analysis.droplets.shadows.disc_supports import DiscSupports
 from processing.analysis.droplets.sight_lattice import SightLattice
 from processing.geometry import FloatArray
 from processing.kernels import _native
@@ -72,11 +73,20 @@ class DiscOptics:
         How far the images lie beside the calibration, along columns and rows.
     levels : (K,) array
         Of an image without discs.
+    condenser_ratio : float, optional
+        Numerical aperture of the light over that of the lens, of all views; without it light is incoherent.
     """
 
     variances_px2: FloatArray
     shifts_px: FloatArray
     levels: FloatArray
+    condenser_ratio: float | None = None
+
+    @property
+    def profiles(self) -> tuple[NDArray[np.float32], float]:
+        """Table and reach of what discs look like, as the kernels take them."""
+        found = disc_profiles(self.condenser_ratio)
+        return found.table, found.reach
 
     @property
     def table(self) -> FloatArray:
@@ -129,7 +139,7 @@ class DiscImages:
             self.lattice.nodes_px,
             self.lattice.spacing,
             optics.table,
-            disc_profiles(),
+            *optics.profiles,
             *_copies(discs),
             factor,
             self.threads,
@@ -165,7 +175,7 @@ class DiscImages:
             self.lattice.nodes_px,
             self.lattice.spacing,
             optics.table,
-            disc_profiles(),
+            *optics.profiles,
             positions,
             squares,
             information,
@@ -177,7 +187,7 @@ class DiscImages:
         )
         return Discs(positions, squares), information
 
-    def supports(self, shadows: "Shadows", optics: DiscOptics, discs: Discs) -> "DiscSupports":
+    def supports(self, shadows: "Shadows", optics: DiscOptics, discs: Discs) -> DiscSupports:
         """What every view says of every disc, all others fixed."""
         out = np.empty((len(self.images), len(discs), 10))
         _native.weigh_discs(
@@ -187,7 +197,7 @@ class DiscImages:
             self.lattice.nodes_px,
             self.lattice.spacing,
             optics.table,
-            disc_profiles(),
+            *optics.profiles,
             *_copies(discs),
             out,
             self.threads,
@@ -234,63 +244,6 @@ class Sweeps:
     most: int
     move: bool = True
     tolerance: float = 3e-3
-
-
-@dataclass(frozen=True, eq=False)
-class DiscSupports:
-    """What K views say of N discs, each while all others stay as they are.
-
-    Parameters
-    ----------
-    squares_voxel2 : (N,) array
-        Of the discs.
-    sums : (K, N, 10) array
-        As ``job.hpp`` has them.
-    """
-
-    squares_voxel2: FloatArray
-    sums: FloatArray
-
-    @property
-    def of_size(self) -> FloatArray:
-        """Information (N,) on the squared radii from all views, positions fixed."""
-        return np.asarray(self.sums[:, :, 5].sum(axis=0))
-
-    @property
-    def alone(self) -> FloatArray:
-        """Squared radii (K, N) that each view alone would give the discs."""
-        return self.squares_voxel2 + self.sums[:, :, 7] / np.maximum(self.sums[:, :, 6], 1e-30)
-
-    @property
-    def alone_sd(self) -> FloatArray:
-        """Their standard deviations (K, N); huge where a view sees nothing."""
-        return 1 / np.sqrt(np.maximum(self.sums[:, :, 6], 1e-30))
-
-    @property
-    def disagreement(self) -> FloatArray:
-        """How much more (N,) the views differ on the squared radii than noise lets them, 1 at least.
-
-        The ratio of Birge (Phys. Rev. 40, 207, 1932), by which measurements that disagree lose their trust.
-        """
-        deviations = (self.alone - self.squares_voxel2) / self.alone_sd
-        freedom = np.maximum(np.count_nonzero(self.sums[:, :, 6] > 0, axis=0) - 1, 1)
-        return np.asarray(np.maximum(1.0, np.sqrt(np.sum(deviations**2, axis=0) / freedom)))
-
-    @property
-    def residual(self) -> FloatArray:
-        """Root mean square (N,) of what is left around the discs, over the noise."""
-        return np.asarray(np.sqrt(self.sums[:, :, 8].sum(axis=0) / np.maximum(self.sums[:, :, 9].sum(axis=0), 1)))
-
-    def information(self, slopes_px: FloatArray) -> FloatArray:
-        """Information (N, 4, 4) on x, y, z and the squared radius, by the slopes (K, N, 2, 3) of the lattice."""
-        uu, uv, vv, us, vs, ss = np.moveaxis(self.sums[:, :, :6], -1, 0)
-        places = np.stack([np.stack([uu, uv], -1), np.stack([uv, vv], -1)], -2)
-        both = np.stack([us, vs], -1)
-        out = np.empty((len(self.squares_voxel2), 4, 4))
-        out[:, :3, :3] = np.einsum("knai,knab,knbj->nij", slopes_px, places, slopes_px)
-        out[:, :3, 3] = out[:, 3, :3] = np.einsum("knai,kna->ni", slopes_px, both)
-        out[:, 3, 3] = ss.sum(axis=0)
-        return out
 
 
 def _copies(discs: Discs) -> tuple[FloatArray, FloatArray]:

@@ -17,22 +17,31 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from processing.analysis.droplets.candidates import close_pairs, foremost
+from processing.analysis.droplets.candidates import foremost
 from processing.analysis.droplets.droplet_search import CANDIDATE_PITCH_VOXEL, DropletSearch
 from processing.analysis.droplets.gaussian_blobs import Image
 from processing.analysis.droplets.shadows.disc_optics import first_disc_optics, refined_disc_optics
+from processing.analysis.droplets.shadows.disc_supports import DiscSupports, supporting_views, undisputed
 from processing.analysis.droplets.shadows.judged_volume import judging_views, knowing_views
+from processing.analysis.droplets.shadows.light_search import Light, best_light, relit
 from processing.analysis.droplets.shadows.masked_liquid import liquid_masks, liquid_objects
+from processing.analysis.droplets.shadows.merged_discs import merged_discs
 from processing.analysis.droplets.shadows.opaque_discs import (
     NO_DISC,
     DiscImages,
     DiscOptics,
     Discs,
-    DiscSupports,
     Sweeps,
 )
 from processing.analysis.droplets.shadows.shadow_candidates import Stage, shadow_peaks
-from processing.analysis.droplets.shadows.shadow_fit import ShadowFit, Transmissions, residuals, rms_over_noise, seen_by
+from processing.analysis.droplets.shadows.shadow_fit import (
+    ShadowFit,
+    Transmissions,
+    chi_squared,
+    residuals,
+    rms_over_noise,
+    seen_by,
+)
 from processing.analysis.droplets.shadows.shadow_union import union_defects
 from processing.geometry import FloatArray
 
@@ -52,28 +61,21 @@ COARSE_LEAST, SHARP_LEAST = 0.15, 0.5
 """Droplets with a fainter shadow are dropped: absolute, and as a share of the threshold."""
 PURGES, SETTLED = 6, 0.003
 """So often at most disputed droplets are dropped and found anew; it ends when the others stay as many, about."""
-UNDISPUTED_SHARE, UNDISPUTED_SIGMAS = 0.75, 15.0
-"""The squared radius that a view alone would give: over that of all, in the view that gives least; and over its
-standard deviation, in the view that gives the second least."""
-SUPPORT_SHARE, SUPPORT_SIGMAS = 0.4, 5.0
-"""Views that judge a droplet must give it such a share of its squared radius, so surely."""
+RELIT_ROUNDS = 2
+"""In which droplets, blur and level become those of another light."""
 MASKED_ROUNDS = 2
 """For droplets that most views see through masks: they explain what is left, and are not told."""
 OPTICS_EVERY = 2
 """Rounds from one estimate of optics and defects to the next."""
 APART_VOXEL, APART_RADII = 1.2, 0.7
 """A candidate keeps so far from droplets, or so many radii of theirs."""
-SAME_VOXEL, SAME_RADII = 1.0, 0.6
-"""A droplet that is closer to a larger one, or by so many radii of it, is the same."""
-SMALL_VOXEL2 = 2.0
-"""Squared radius below which a droplet takes over half of what was the same."""
 BEYOND_VOXEL = 1.5
 """A droplet that leaves the searched grid farther than this is dropped."""
 SWEEPS = (Sweeps(4, move=False, tolerance=0.01), Sweeps(8, tolerance=0.01))
 FINAL_SWEEPS = Sweeps(30, tolerance=3e-4)
 
 
-def find_shadows(shot: Transmissions, search: DropletSearch) -> ShadowFit:
+def find_shadows(shot: Transmissions, search: DropletSearch, light: Light = "estimated") -> ShadowFit:
     """Find the droplets of one exposure.
 
     Parameters
@@ -82,12 +84,18 @@ def find_shadows(shot: Transmissions, search: DropletSearch) -> ShadowFit:
         Images with the lattice of the search.
     search : DropletSearch
         Where to look: it must hold every droplet that the views show.
+    light : float | "estimated" | "incoherent"
+        Numerical aperture of the light over that of the lens; estimated once most droplets are known.
     """
-    fit = ShadowFit(Discs.none(), first_disc_optics(shot.images), shot.noises_of(shot.images))
+    optics = first_disc_optics(shot.images)
+    if not isinstance(light, str):
+        optics = replace(optics, condenser_ratio=light)
+    fit = ShadowFit(Discs.none(), optics, shot.noises_of(shot.images))
     finder = _Finder(shot, search)
     for number, smooth_px in enumerate(COARSE_PX):
         fit = finder.round(fit, Stage(smooth_px, COARSE_SHARE, coarse=True), estimate=number > 0)
-    fit = finder.undisputed(finder.fallen(fit, FIRST, FALLING_ROUNDS, joker=False))
+    fit = finder.fallen(fit, FIRST, FALLING_ROUNDS, joker=False)
+    fit = finder.undisputed(finder.lit(fit) if light == "estimated" else fit)
     known = 0
     for _ in range(PURGES):
         if abs(len(fit.discs) - known) <= SETTLED * known:
@@ -95,6 +103,16 @@ def find_shadows(shot: Transmissions, search: DropletSearch) -> ShadowFit:
         known = len(fit.discs)
         fit = finder.undisputed(finder.fallen(fit, AGAIN, AGAIN_ROUNDS, joker=True))
     return finder.finished(finder.rested(finder.fallen(fit, AGAIN, AGAIN_ROUNDS, joker=True)))
+
+
+def in_incoherent_light(shot: Transmissions, search: DropletSearch, fit: ShadowFit) -> FloatArray:
+    """Squared radii (N,) that the droplets would have, where they are, if light came from all directions."""
+    if fit.optics.condenser_ratio is None or not len(fit.discs):
+        return fit.discs.squares_voxel2
+    optics = _Finder(shot, search).relit(fit, None).optics
+    drawn = DiscImages(shot.images, shot.trust, shot.lattice, shot.threads).drawn(optics, fit.discs)
+    seen = seen_by(shot, replace(fit, optics=optics), drawn.transmissions)
+    return seen.fitted(drawn, optics, fit.discs, replace(FINAL_SWEEPS, move=False))[0].squares_voxel2
 
 
 class _Finder:
@@ -128,6 +146,19 @@ class _Finder:
                 break
             fit = self.round(fit, stage, estimate=True, unite=True)
             left, before = self._left(fit), left
+        return fit
+
+    def lit(self, fit: ShadowFit) -> ShadowFit:
+        """The same in the light that explains the images best."""
+        if not len(fit.discs):
+            return fit
+        return best_light(self.relit(fit, None), lambda ratio: self.relit(fit, ratio), self._chi_squared)
+
+    def relit(self, fit: ShadowFit, condenser_ratio: float | None) -> ShadowFit:
+        """The same in other light, fitted to it."""
+        fit = relit(fit, condenser_ratio, self._shot.lattice.pixels_per_voxel)
+        for _ in range(RELIT_ROUNDS):
+            fit = self._estimated(self._fitted(fit, Stage(SHARP_PX, _last(fit))), unite=False)
         return fit
 
     def round(self, fit: ShadowFit, stage: Stage, *, estimate: bool, unite: bool = False) -> ShadowFit:
@@ -221,6 +252,10 @@ class _Finder:
     def _knowing(self, fit: ShadowFit) -> NDArray[np.int64]:
         return knowing_views(self._shot, fit, fit.discs.positions_voxel)
 
+    def _chi_squared(self, fit: ShadowFit) -> float:
+        drawn = self._drawn(fit)
+        return chi_squared(seen_by(self._shot, fit, drawn), drawn)
+
     def _left(self, fit: ShadowFit) -> float:
         drawn = self._drawn(fit)
         return rms_over_noise(seen_by(self._shot, fit, drawn), drawn)
@@ -248,34 +283,6 @@ def _last(fit: ShadowFit) -> float:
 
 def _significant(discs: Discs, information: FloatArray) -> NDArray[np.bool_]:
     return np.asarray(discs.squares_voxel2 * np.sqrt(information) > SIGNIFICANCE)
-
-
-def undisputed(supports: DiscSupports) -> NDArray[np.bool_]:
-    """Droplets (N,) to which every view gives about what all together do, and of which two at most are unsure."""
-    share = (supports.alone / supports.squares_voxel2).min(axis=0)
-    second = np.sort(supports.alone / supports.alone_sd, axis=0)[1]
-    return np.asarray((share > UNDISPUTED_SHARE) & (second > UNDISPUTED_SIGMAS))
-
-
-def supporting_views(supports: DiscSupports) -> NDArray[np.int64]:
-    """How many views (N,) support each droplet alone."""
-    sure = supports.alone > SUPPORT_SIGMAS * supports.alone_sd
-    large = supports.alone > SUPPORT_SHARE * supports.squares_voxel2
-    return np.asarray(np.count_nonzero(sure & large, axis=0), dtype=np.int64)
-
-
-def merged_discs(discs: Discs) -> Discs:
-    """Of discs whose centres are the same, or well within a larger one, the larger alone."""
-    order = np.argsort(-discs.squares_voxel2, kind="stable")
-    positions, squares = discs.positions_voxel[order], discs.squares_voxel2[order]
-    if not len(order):
-        return discs
-    apart, kept = np.maximum(SAME_VOXEL, SAME_RADII * np.sqrt(squares)), np.ones(len(order), bool)
-    for one, other in close_pairs(positions, float(apart[0])):
-        if kept[one] and kept[other] and np.linalg.norm(positions[one] - positions[other]) < apart[one]:
-            kept[other] = False
-            squares[one] += 0.5 * squares[other] if squares[one] < SMALL_VOXEL2 else 0.0
-    return Discs(positions[kept], squares[kept])
 
 
 def _inside(discs: Discs, search: DropletSearch) -> Discs:

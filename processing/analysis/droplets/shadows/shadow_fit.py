@@ -141,10 +141,14 @@ def residuals(seen: DiscImages, drawn: Sequence[Image]) -> list[Image]:
     return [image - model for image, model in zip(seen.images, drawn, strict=True)]
 
 
+def chi_squared(seen: DiscImages, drawn: Sequence[Image]) -> float:
+    """Sum of the squares of the residuals over the noise of each pixel."""
+    return sum(
+        float(np.vdot(weight, left * left)) for left, weight in zip(residuals(seen, drawn), seen.weights, strict=True)
+    )
+
+
 def rms_over_noise(seen: DiscImages, drawn: Sequence[Image]) -> float:
     """Root mean square of the residuals over the noise of each pixel."""
-    squares = pixels = 0.0
-    for left, weight in zip(residuals(seen, drawn), seen.weights, strict=True):
-        squares += float(np.vdot(weight, left * left))
-        pixels += np.count_nonzero(weight)
-    return float(np.sqrt(squares / pixels)) if pixels else 0.0
+    pixels = sum(np.count_nonzero(weight) for weight in seen.weights)
+    return float(np.sqrt(chi_squared(seen, drawn) / pixels)) if pixels else 0.0

@@ -25,26 +25,25 @@ from processing.analysis.droplets.measured_exposure import (
     moved,
     within_grid,
 )
+from processing.analysis.droplets.shadows.disc_supports import supporting_views
 from processing.analysis.droplets.shadows.judged_volume import judging_views, knowing_views, unjudged_share
+from processing.analysis.droplets.shadows.light_search import Light
 from processing.analysis.droplets.shadows.masked_liquid import liquid_objects, lumps
 from processing.analysis.droplets.shadows.opaque_discs import DiscImages, Discs, Shadows
-from processing.analysis.droplets.shadows.shadow_finder import find_shadows, supporting_views
+from processing.analysis.droplets.shadows.shadow_finder import find_shadows, in_incoherent_light
 from processing.analysis.droplets.shadows.shadow_fit import ShadowFit, Transmissions, rms_over_noise, seen_by
+from processing.analysis.droplets.shadows.shadow_light import grey, unlit
 from processing.analysis.droplets.shadows.shadow_union import union_defects
+from processing.geometry import FloatArray
 from processing.kernels import DEFAULT_THREADS
 
 LIMITS = RatioLimits(trusted=1.25, refused=2.0)
 """Of discs: overlapping shadows leave something even where all droplets are right. Simulated shots of 28 to 40 droplets
 per mm^3, up to 1.25 have 0.3 to 1.7 % ghosts, from 1.33 to 1.45 2 to 5 %."""
-LIGHTS = (0.5, 2.0)
-"""Of the background: where nearly nothing is in its way, the light of an exposure must be between."""
-FREE_PERCENTILE = 98
-BLACK, BLACK_PIXELS = 0.2, 10
-"""Where discs let less light through than this, images are asked how much they see beyond that, at so many pixels."""
-MOST_LEFT = 0.04
-"""Share of the light that may be left there: diameters are 3 % too small then, and with twice as much ghosts come."""
-LEAST_KNOWN = 0.1
-"""Share of the pixels of a view of which something must be known."""
+
+
+COHERENT_SHARE = 0.02
+"""Of a diameter: what the correction for partially coherent light leaves, common to the droplets of a shot."""
 
 
 @dataclass(frozen=True)
@@ -63,6 +62,8 @@ class SeenShadows:
         How far the image lies beside its calibration, apart from a common motion of all.
     masked : float
         Share of the pixels into the grid that look through liquid that is no droplet.
+    condenser_ratio : float | None
+        Numerical aperture of the light over that of the lens, the same for all views; None: incoherent.
     """
 
     noise: float
@@ -73,6 +74,7 @@ class SeenShadows:
     shift_u_px: float
     shift_v_px: float
     masked: float
+    condenser_ratio: float | None = None
 
 
 ShadowExposure = MeasuredExposure[SizedDroplets, SeenShadows]
@@ -83,6 +85,7 @@ def measure_shadows(
     search: DropletSearch,
     *,
     trust: Sequence[Image] | None = None,
+    light: Light = "estimated",
     twins: int = 0,
     seed: int = 0,
     threads: int = DEFAULT_THREADS,
@@ -97,6 +100,8 @@ def measure_shadows(
         Where to look.
     trust : sequence of (rows, columns) float32 arrays, optional
         How sure pixels are: inverse variances, 1 for a typical one, 0 where nothing is known; by default all alike.
+    light : float | "estimated" | "incoherent"
+        Numerical aperture of the light over that of the lens, which makes small droplets look larger.
     twins : int
         Simulated twins of the exposure in which ghosts are counted: each costs as much as the exposure itself.
     seed : int
@@ -118,7 +123,7 @@ def measure_shadows(
     known_shadows = [(1 - image) * np.sqrt(one) for image, one in zip(shot.images, shot.trust, strict=True)]
     if blind := blind_views(known_shadows, shot.noises_of(shot.images), search.names):
         return MeasuredExposure(SizedDroplets.none(), {}, None, *blind_verdict(blind, search.names))
-    fit = find_shadows(shot, search)
+    fit = find_shadows(shot, search, light)
     told = judged_by_volume(_told(shot, fit, search))
     if not twins or told.verdict is not ShotVerdict.GOOD:
         return told
@@ -132,8 +137,8 @@ def _refused(*reasons: str) -> ShadowExposure:
 
 def _unmeasurable(images: Sequence[Image], trusts: Sequence[Image], search: DropletSearch) -> tuple[str, ...]:
     """Why views can show no shadows of the grid, whether there are droplets or not; empty where all can."""
-    if unlit := _unlit(images, trusts, search.names):
-        return unlit
+    if reasons := unlit(images, trusts, search.names):
+        return reasons
     unseen = _unseen(trusts, search.pixels_into_grid(), search.names)
     return (unseen,) if unseen else ()
 
@@ -147,12 +152,13 @@ def _told(shot: Transmissions, fit: ShadowFit, search: DropletSearch) -> ShadowE
     views = _seen(fit, search, _masked_shares(fit, into_grid))
     beside_px = {name: float(np.hypot(view.shift_u_px, view.shift_v_px)) for name, view in views.items()}
     verdict, reasons = judged(beside_px, ratio, LIMITS)
-    if grey := _grey(seen, shadows, judged_weights):
-        verdict, reasons = ShotVerdict.DOUBTFUL if verdict is ShotVerdict.GOOD else verdict, (*reasons, *grey)
+    if left := grey(seen, shadows, judged_weights):
+        verdict, reasons = ShotVerdict.DOUBTFUL if verdict is ShotVerdict.GOOD else verdict, (*reasons, *left)
     if verdict is ShotVerdict.REFUSED:
         return MeasuredExposure(SizedDroplets.none(), views, ratio, verdict, reasons)
     known = knowing_views(shot, fit, fit.discs.positions_voxel) >= judging_views(len(shot.images))
-    droplets = _droplets(seen, shadows, fit.where(known), search)
+    raw = in_incoherent_light(shot, search, fit)[known]
+    droplets = _droplets(seen, shadows, fit.where(known), raw, search)
     lump = lumps(fit.where(known).discs, droplets.residual)
     hidden = Hidden(
         liquid_objects=_counted(liquid_objects(fit.liquid)) + _counted(lump),
@@ -187,42 +193,6 @@ def _looking(images: Sequence[Image], trusts: Sequence[Image], search: DropletSe
     )
 
 
-def _unlit(images: Sequence[Image], trusts: Sequence[Image], names: Sequence[str]) -> tuple[str, ...]:
-    """Why views can show no shadows, whether there are droplets or not; empty where all can."""
-    reasons = (_without_light(*view) for view in zip(names, images, trusts, strict=True))
-    return tuple(reason for reason in reasons if reason)
-
-
-def _without_light(name: str, image: Image, trust: Image) -> str:
-    known = image[trust > 0]
-    if known.size < LEAST_KNOWN * image.size:
-        return f"{name}: {known.size / image.size:.0%} of its pixels are known: is its background saturated, or dark?"
-    light = float(np.percentile(known, FREE_PERCENTILE))
-    if LIGHTS[0] <= light <= LIGHTS[1]:
-        return ""
-    return (
-        f"{name}: its light is {light:.2g} of its background's, limits {LIGHTS[0]:g} and {LIGHTS[1]:g}: is a lens "
-        "covered, a light off, or was the background taken with another light?"
-    )
-
-
-def _grey(seen: DiscImages, shadows: Shadows, weights: Sequence[Image]) -> tuple[str, ...]:
-    """What speaks against shadows that are not dark enough; empty where they are, or none is large enough to tell."""
-    views = zip(seen.images, shadows.transmissions, weights, strict=True)
-    asked = [(image - drawn, weight, (drawn < BLACK) & (weight > 0)) for image, drawn, weight in views]
-    left = np.concatenate([beyond[black] for beyond, _, black in asked])
-    if len(left) < BLACK_PIXELS:
-        return ()
-    sd = 1 / np.sqrt(sum(float(weight[black].sum()) for _, weight, black in asked))
-    if (share := float(np.median(left))) <= MOST_LEFT + 3 * sd:
-        return ()
-    return (
-        f"{100 * share:.0f} % of the light is left where shadows should be black, limit {100 * MOST_LEFT:.0f} %: is a "
-        "dark image missing (the camera's black level), are grey values not in proportion to light (gamma), or are "
-        "droplets not opaque? Diameters are wrong then",
-    )
-
-
 def _recorded(shot: Transmissions) -> DiscImages:
     return DiscImages(shot.images, shot.trust, shot.lattice, shot.threads)
 
@@ -253,10 +223,14 @@ def _seen(fit: ShadowFit, search: DropletSearch, masked: Sequence[float]) -> dic
             masked,
         ]
     )
-    return {name: SeenShadows(*row) for name, row in zip(search.names, rows.tolist(), strict=True)}
+    ratio = fit.optics.condenser_ratio
+    seen = {name: SeenShadows(*row) for name, row in zip(search.names, rows.tolist(), strict=True)}
+    return {name: replace(view, condenser_ratio=ratio) for name, view in seen.items()}
 
 
-def _droplets(seen: DiscImages, shadows: Shadows, fit: ShadowFit, search: DropletSearch) -> SizedDroplets:
+def _droplets(
+    seen: DiscImages, shadows: Shadows, fit: ShadowFit, raw_voxel2: FloatArray, search: DropletSearch
+) -> SizedDroplets:
     """Droplets with the covariance of the fit: each as if it stood alone, enlarged by the disagreement of its views."""
     discs = fit.discs
     if not len(discs):
@@ -267,12 +241,13 @@ def _droplets(seen: DiscImages, shadows: Shadows, fit: ShadowFit, search: Drople
     covariance = np.asarray(alone * supports.disagreement[:, None, None] ** 2, dtype=np.float64)
     pitch_um = 1000 * search.searched.pitch_mm
     diameters_um = 2 * discs.radii_voxel * pitch_um
+    of_light_um = 0.0 if fit.optics.condenser_ratio is None else COHERENT_SHARE * diameters_um
     return SizedDroplets(
         points_mm=search.searched.to_mm(discs.positions_voxel[:, ::-1]),
         covariance_mm2=covariance[:, :3, :3] * search.searched.pitch_mm**2,
         diameters_um=diameters_um,
-        diameters_raw_um=diameters_um,
-        diameter_sd_um=np.sqrt(covariance[:, 3, 3]) / discs.radii_voxel * pitch_um,
+        diameters_raw_um=2 * np.sqrt(raw_voxel2) * pitch_um,
+        diameter_sd_um=np.hypot(np.sqrt(covariance[:, 3, 3]) / discs.radii_voxel * pitch_um, of_light_um),
         views=supporting_views(supports),
         residual=supports.residual,
     )
@@ -288,5 +263,6 @@ def _twin_ghosts(shot: Transmissions, fit: ShadowFit, search: DropletSearch, rng
         for image, defect, level, noise in zip(drawn, defects, fit.optics.levels, fit.noises, strict=True)
     )
     trust = replace(shot, trust=tuple(map(np.ones_like, images))).masked(fit.masks).trust
-    found = find_shadows(replace(shot, images=images, trust=trust), search).discs
+    light: Light = fit.optics.condenser_ratio or "incoherent"
+    found = find_shadows(replace(shot, images=images, trust=trust), search, light).discs
     return ghosts_within(found.positions_voxel, truth.positions_voxel, search)

@@ -15,11 +15,16 @@ BLUR_REACH_SIGMAS = 4.0
 
 
 def union_defects(seen: DiscImages, optics: DiscOptics, discs: Discs) -> tuple[Image, ...]:
-    """Transmission of the union of discs less the product of those of each, both with one blur per view."""
+    """Transmission of the union of discs less the product of those of each, both with one blur per view.
+
+    In incoherent light: where discs do not overlap there is nothing to correct, whatever the light; where they do,
+    fringes are taken to multiply.
+    """
     blurs_px = optics.blurs_px(discs.positions_voxel[:, 2].mean() if len(discs) else 0.0)
     one_blur = np.zeros_like(optics.variances_px2)
     one_blur[:, 0] = blurs_px**2
-    product = seen.drawn(replace(optics, variances_px2=one_blur), discs).transmissions
+    incoherent = replace(optics, variances_px2=one_blur, condenser_ratio=None)
+    product = seen.drawn(incoherent, discs).transmissions
     centres_px = seen.lattice.seen_px(discs.positions_voxel) + optics.shifts_px[:, None]
     radii_px = seen.lattice.scales_px(discs.positions_voxel) * discs.radii_voxel
     return tuple(

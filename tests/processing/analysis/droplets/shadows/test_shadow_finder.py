@@ -10,8 +10,10 @@ from processing.analysis.droplets.shadows.disc_optics import (
     first_disc_optics,
     held_variances,
 )
-from processing.analysis.droplets.shadows.opaque_discs import Discs, DiscSupports
-from processing.analysis.droplets.shadows.shadow_finder import find_shadows, merged_discs, supporting_views, undisputed
+from processing.analysis.droplets.shadows.disc_supports import DiscSupports, supporting_views, undisputed
+from processing.analysis.droplets.shadows.merged_discs import merged_discs
+from processing.analysis.droplets.shadows.opaque_discs import Discs
+from processing.analysis.droplets.shadows.shadow_finder import find_shadows
 from processing.analysis.droplets.shadows.shadow_fit import ShadowFit, Transmissions
 from tests.support.shadow_scenes import BLURS_PX, ShadowScene, search_of, shadow_scene
 
