@@ -15,6 +15,7 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from daq.frozen_model import FrozenModel
+from server.lab.errors import told
 from server.lab.events import EventPublisher
 
 FIRST_PAUSE_S = 1.0
@@ -80,7 +81,7 @@ class Duty:
 
     def fail(self, part: str, error: Exception) -> None:
         """Take note of an error; the same one again is no news."""
-        reason = f"{type(error).__name__}: {error}"
+        reason = told(error)
         if self._troubles.get(part) != reason:
             _LOG.error("%s, %s", self.name, part, exc_info=error)
             self._troubles[part] = reason

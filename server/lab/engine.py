@@ -21,6 +21,8 @@ from typing import Any, Protocol, Self
 import cv2
 from distributed import Client, Event, LocalCluster, Nanny, WorkerPlugin, get_worker
 
+from server.lab.errors import told
+
 Values = Mapping[str, Any]
 Task = Callable[[dict[str, Any], Callable[[], bool]], dict[str, Any]]
 OnProgress = Callable[[int], None]
@@ -163,7 +165,7 @@ def _report_to(loop: asyncio.AbstractEventLoop, on_progress: OnProgress, steps: 
 
 def _settle(error: BaseException | None, result: dict[str, Any] | None) -> dict[str, Any]:
     if error is not None:
-        raise TaskError(f"{type(error).__name__}: {error}") from error
+        raise TaskError(told(error)) from error
     if result is None:
         raise TaskAborted
     return result

@@ -1,5 +1,8 @@
 """Errors of the laboratory: what cannot be done, whoever asked for it."""
 
+from daq.errors import DaqError
+from processing.errors import BadInput
+
 
 class ServerError(Exception):
     """Base of the errors that the server itself raises on purpose."""
@@ -19,3 +22,9 @@ class Damaged(ServerError):
 
 class Unprocessable(ServerError):
     """The request is well formed and makes no sense here."""
+
+
+def told(error: BaseException) -> str:
+    """What an operator reads of an error: its text; before that of a mistake of the program, its kind."""
+    is_raised_on_purpose = isinstance(error, BadInput | DaqError | ServerError)
+    return str(error) if is_raised_on_purpose else f"{type(error).__name__}: {error}"

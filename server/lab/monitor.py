@@ -10,6 +10,7 @@ from pathlib import Path
 from daq.devices import Device, DeviceIdentity, GeneratorState, Rig
 from daq.errors import DaqError
 from server.lab.duty import Duty, Health, Lamp, pause
+from server.lab.errors import told
 
 _PERIOD_S = 1.0
 STALE_S = 5.0
@@ -98,10 +99,8 @@ def _lit(name: str, kind: str, ask: Callable[[str], tuple[Health, str]]) -> Lamp
     """Lamp of one device; an error of any kind is a red one, and hides no other device."""
     try:
         health, detail = ask(name)
-    except DaqError as error:
-        health, detail = Health.FAULT, str(error)
     except Exception as error:  # noqa: BLE001  a driver's own mistake must not freeze the lamps
-        health, detail = Health.FAULT, f"{type(error).__name__}: {error}"
+        health, detail = Health.FAULT, told(error)
     return Lamp(name=name, kind=kind, health=health, detail=detail)
 
 

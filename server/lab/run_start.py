@@ -23,3 +23,9 @@ def start_run(context: Context, plan: RunPlan) -> str:
     if plan.calibration is None and plan.kind is RunKind.SAMPLE:
         plan = plan.model_copy(update={"calibration": context.calibrations.current})
     return context.services.acquisition.start(plan)
+
+
+def choose_calibration(context: Context, calibration_id: str) -> None:
+    """Make a calibration the current one, and tell every page; see ``CalibrationStore.choose``."""
+    context.calibrations.choose(calibration_id)
+    context.services.events.publish("calibration_chosen", calibration=calibration_id)

@@ -14,7 +14,7 @@ from processing.runs.measurement import droplets_path
 from server.lab.calibrations import CalibrationStore
 from server.lab.duty import Duty, pause
 from server.lab.engine import Engine, Task, TaskAborted, TaskError
-from server.lab.errors import Conflict
+from server.lab.errors import Conflict, told
 from server.lab.events import EventPublisher
 from server.lab.jobs import Job, JobKind, JobState, JobTable
 from server.lab.watch import CalibrationWatch
@@ -148,7 +148,7 @@ class JobRunner:
             return  # aborted between being read from the table and being started
         except Exception as error:
             await pause(_REST_S)  # what is queued again at once would be tried again at once, for ever
-            await self._move(job.id, JobState.FAILED, error=f"{type(error).__name__}: {error}")
+            await self._move(job.id, JobState.FAILED, error=told(error))
             raise
 
     async def _settle(self, job: Job) -> None:

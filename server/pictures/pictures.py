@@ -1,8 +1,9 @@
 """Pictures of frames and volumes, as PNG or JPEG bytes. Pure: arrays in, bytes out.
 
 Contrast. A frame is stretched linearly from its 0.1 % to its 99.9 % quantile, so that a shadowgraph shows its full
-range whatever the light; ``FULL`` shows grey values as they are, black at 0 and white at the largest value of the bit
-depth. A volume is coloured from 0 to one limit that is the same for all its slices, so that slices can be compared.
+range; but never over less than ``DIM`` of the bit depth, so that the noise of a dark frame stays dark. ``FULL`` shows
+grey values as they are, black at 0 and white at the largest value of the bit depth. A volume is coloured from 0 to one
+limit that is the same for all its slices, so that slices can be compared.
 """
 
 from enum import StrEnum
@@ -11,6 +12,8 @@ from typing import Any
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+
+from processing.preprocessing import DIM
 
 Grey = NDArray[np.uint8]
 _QUANTILES = (0.001, 0.999)
@@ -50,8 +53,9 @@ def preview_jpeg(image: NDArray[Any], bits: int, width_px: int) -> bytes:
 
 def to_grey(image: NDArray[Any], bits: int, stretch: Stretch) -> Grey:
     """Brightness 0 to 255 of grey values."""
-    low, high = (0.0, float(2**bits - 1)) if stretch is Stretch.FULL else _limits(image)
-    scaled = (image.astype(np.float32) - low) * (255.0 / max(high - low, 1.0))
+    full = float(2**bits - 1)
+    low, high = (0.0, full) if stretch is Stretch.FULL else _limits(image, full)
+    scaled = (image.astype(np.float32) - low) * (255.0 / (high - low))
     grey: Grey = np.clip(np.rint(scaled), 0, 255).astype(np.uint8)
     return grey
 
@@ -62,10 +66,15 @@ def plane_png(plane: NDArray[Any], limit: float) -> bytes:
     return _encode(".png", np.asarray(cv2.applyColorMap(grey, cv2.COLORMAP_INFERNO)))
 
 
-def _limits(image: NDArray[Any]) -> tuple[float, float]:
+def _limits(image: NDArray[Any], full: float) -> tuple[float, float]:
+    """Grey values shown as black and white; the least range is as dark or bright as the frame is in the bit depth."""
     sample = image[::4, ::4] if image.size > 100_000 else image
-    low, high = np.quantile(sample, _QUANTILES)
-    return float(low), float(high)
+    low, high = (float(limit) for limit in np.quantile(sample, _QUANTILES))
+    missing = DIM * full - (high - low)
+    if missing > 0:
+        low -= missing * low / (full - (high - low))
+        high = low + DIM * full
+    return low, high
 
 
 def _narrowed(image: NDArray[Any], width_px: int | None) -> NDArray[Any]:

@@ -58,6 +58,7 @@ def _take_picture(page: Page, name: str) -> None:
 
 def test_an_operator_records_a_run_and_sees_its_volume(page: Page, server: Serving) -> None:
     drive_the_page(page, str(server.http.base_url), VIEWS, shots=5)
+    expect(page.locator(".q-slider").first).to_have_css("overflow-y", "visible")
     _take_picture(page, "page-dark")
     page.get_by_role("button", name="dark or light").click()
     _take_picture(page, "page-light")
@@ -107,13 +108,30 @@ def test_a_reference_that_the_operator_chose_is_not_replaced_by_a_newer_one(page
     expect(page.get_by_role("region", name="Runs").get_by_text("newer")).to_be_visible()
     expect(chosen).to_have_text(re.compile("dark: older"))
     assert (older, newer) == tuple(sorted((older, newer)))
+    for run_id in (older, newer):  # two runs may have one name
+        expect(page.get_by_role("region", name="Runs").get_by_text(run_id)).to_be_visible()
 
 
 def test_work_that_fails_has_a_red_lamp(page: Page, server: Serving) -> None:
     page.goto(str(server.http.base_url))
-    server.services.events.publish_run_event(ShotRecorded("gone", 0, valid=True))
-    lamp = page.get_by_role("status", name=re.compile("^automatic reconstruction: fault, .*no run 'gone'"))
+    server.services.events.publish_run_event(ShotRecorded('gone "far"', 0, valid=True))
+    lamp = page.get_by_role("status", name=re.compile("^automatic reconstruction: fault, .*no run 'gone \"far\"'"))
     expect(lamp).to_be_visible()
+
+
+def test_what_an_operator_chose_stays_and_what_another_page_chose_is_shown(page: Page, server: Serving) -> None:
+    page.goto(str(server.http.base_url))
+    volume = page.get_by_role("region", name="Volume").locator(".q-select")
+    expect(volume).to_contain_text("MLOS")
+    volume.click()
+    page.get_by_role("option", name=re.compile("shot 1 B.*-spray")).click()
+    server.http.put("/api/calibrations/current", json={"id": "paper"})
+    expect(page.get_by_role("log")).to_contain_text("paper is the current calibration")
+    server.run_to_its_end(plan_of(kind="dark", name="last", shots=1, pulse=PULSE))
+    expect(page.get_by_role("region", name="Runs").get_by_text("last")).to_be_visible()
+    expect(volume).to_contain_text("shot 1 B")
+    page.get_by_role("region", name="Runs").get_by_role("row", name="-spray").get_by_text("Reconstruct").click()
+    expect(page.get_by_text("nothing to do: it is done already")).to_be_visible()
 
 
 def _calibration_off_by(error_px: float) -> Calibration:

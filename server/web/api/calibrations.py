@@ -11,6 +11,7 @@ from daq.run_plan import RunKind
 from server.lab.calibrations import CalibrationSummary
 from server.lab.errors import Unprocessable
 from server.lab.jobs import Job, calibration_job
+from server.lab.run_start import choose_calibration as choose
 from server.web.api.parameters import CalibrationId, ContextOf
 from server.web.problems import responses
 
@@ -54,7 +55,7 @@ def create_calibration(request: CalibrationRequest, context: ContextOf, response
 @router.put("/current", responses=responses(404, 500))
 def choose_calibration(choice: CurrentCalibration, context: ContextOf) -> CurrentCalibration:
     """Use this one for sample runs that name none."""
-    context.calibrations.choose(choice.id)
+    choose(context, choice.id)
     return choice
 
 

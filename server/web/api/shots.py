@@ -72,7 +72,7 @@ def show_frame(
     frame: Annotated[Literal["a", "b"], Path(description="first or second exposure")],
     context: ContextOf,
     stretch: Annotated[
-        Stretch, Query(description="auto: 0.1 % to 99.9 % quantile; full: the whole bit depth")
+        Stretch, Query(description="auto: 0.1 % to 99.9 % quantile, at least 1/8 of the bit depth; full: all of it")
     ] = Stretch.AUTO,
     width_px: Annotated[int | None, Query(ge=16, le=8192, description="narrower than the frame")] = None,
 ) -> Response:

@@ -106,10 +106,10 @@ def problem_of_current(value: float | None, limit_a: float) -> str | None:
 def problem_of_positions(text: str | None) -> str | None:
     """What is wrong with a list of stage positions; None if nothing is."""
     try:
-        positions(text)
+        is_any = bool(positions(text))
     except ValueError:
-        return "numbers in mm, separated by commas"
-    return None
+        is_any = False
+    return None if is_any else "numbers in mm, separated by commas"
 
 
 def positions(text: str | None) -> tuple[float, ...]:

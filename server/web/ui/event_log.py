@@ -38,6 +38,8 @@ def line_of(event: Event) -> str | None:
             text = f"{what}: {data['state']}" + (f", {data['error']}" if data["error"] else "")
         case "calibration_alarm":
             text = data["message"] or f"calibration {data['calibration']} fits run {data['run']} again"
+        case "calibration_chosen":
+            text = f"{data['calibration']} is the current calibration"
         case "background_work":
             text = f"{data['work']}, {data['part']}: {data['error'] or 'works again'}"
         case "file_damaged":

@@ -55,7 +55,9 @@ class Header:
 
 def _show(lamp: Lamp) -> None:
     text = f"{lamp.name}: {lamp.health}, {lamp.detail}"
-    with ui.element("div").classes("lamp-chip").props(f'role=status aria-label="{text}"'):
+    chip = ui.element("div").classes("lamp-chip").props("role=status")
+    chip.props["aria-label"] = text  # whatever it says: a parser of props would stumble over quotes and lines
+    with chip:
         ui.element("span").classes(f"lamp {lamp.health}")
         ui.label(lamp.name if lamp.kind != "disk" else lamp.detail)
         ui.tooltip(text)

@@ -20,7 +20,7 @@ from server.web.ui.volume_panel import VolumePanel
 
 _REFRESH_S = 0.25
 _EVENTS_SHOWN = 100
-_LISTS_CHANGED = {"run_state", "job_changed"}
+_LISTS_CHANGED = {"run_state", "job_changed", "calibration_chosen"}
 
 
 def mount_page(app: FastAPI, config: RigConfig) -> None:

@@ -26,6 +26,8 @@ from server.web.ui.draft import (
 from server.web.ui.theme import panel
 
 _REFERENCE_KINDS = (RunKind.DARK, RunKind.BACKGROUND)
+_CALIBRATION = "Calibration (none: the current one)"
+_NO_CALIBRATION = "Calibration (none: no volumes)"
 
 
 class RunForm:
@@ -47,7 +49,7 @@ class RunForm:
         with panel("New run"):
             self._add_kind_and_name()
             with ui.grid(columns=2).classes("w-full gap-2"):
-                self._add_number("shots", "Shots", PLAN_FIELDS, whole=True)
+                self._shots = self._add_number("shots", "Shots", PLAN_FIELDS, whole=True)
                 self._add_number("rate_hz", "Rate / Hz", PLAN_FIELDS)
                 self._add_number("width_ns", "Pulse width / ns", PULSE_FIELDS, whole=True)
                 self._add_number("separation_ns", "Separation / ns", PULSE_FIELDS, whole=True)
@@ -71,6 +73,8 @@ class RunForm:
         self._show_references(references)
         known = {item.id: item.id + (" (current)" if item.current else "") for item in calibrations}
         calibration = self._draft.values["calibration"]
+        is_any_current = any(item.current for item in calibrations)
+        self._calibration.set_label(_CALIBRATION if is_any_current else _NO_CALIBRATION)
         self._calibration.set_options(known, value=calibration if calibration in known else None)
 
     def _show_references(self, references: list[RunSummary]) -> None:
@@ -102,7 +106,7 @@ class RunForm:
         )
         self._fields.append(name.props("dense outlined hide-bottom-space").classes("w-full"))
 
-    def _add_number(self, name: str, label: str, fields: dict[str, Any], *, whole: bool = False) -> None:
+    def _add_number(self, name: str, label: str, fields: dict[str, Any], *, whole: bool = False) -> ui.number:
         number = ui.number(
             label,
             value=self._draft.values[name],
@@ -111,6 +115,7 @@ class RunForm:
             precision=0 if whole else None,
         )
         self._fields.append(number.props("dense outlined hide-bottom-space"))
+        return number
 
     def _add_current(self, view: str) -> None:
         limit_a = self._context.services.config.views[view].max_current_a
@@ -141,9 +146,7 @@ class RunForm:
             .classes("w-full")
         )
         self._calibration = (
-            ui.select(
-                {}, label="Calibration (none: the current one)", clearable=True, on_change=self._changed("calibration")
-            )
+            ui.select({}, label=_CALIBRATION, clearable=True, on_change=self._changed("calibration"))
             .props("dense outlined options-dense")
             .classes("w-full")
         )
@@ -161,6 +164,7 @@ class RunForm:
             return  # while the form is being built
         kind = RunKind(self._draft.values["kind"])
         has_stage = self._context.services.rig.stage is not None
+        self._shots.set_label("Shots per position" if kind is RunKind.CALIBRATION and has_stage else "Shots")
         self._positions.set_visibility(kind is RunKind.CALIBRATION and has_stage)
         self._references.set_visibility(kind is RunKind.SAMPLE)
         self._calibration.set_visibility(kind is RunKind.SAMPLE)
@@ -197,4 +201,4 @@ class _Changed:
 
 
 def _reference_label(run: RunSummary) -> str:
-    return f"{run.kind}: {run.name}, {run.shots_valid} shots"
+    return f"{run.kind}: {run.name}, {run.shots_valid} shots, {run.run_id}"

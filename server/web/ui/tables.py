@@ -8,6 +8,7 @@ from typing import Any
 from nicegui import ui
 
 from daq.errors import DaqError
+from daq.run.state import RunOutcome
 from daq.run_plan import RunKind
 from processing.calibration.verdict import Verdict
 from processing.reconstruction.choices import Accuracy, VoxelType
@@ -17,6 +18,7 @@ from server.lab.droplets.measurement import request_measurement
 from server.lab.errors import ServerError
 from server.lab.jobs import Job, JobKind, JobState, calibration_job
 from server.lab.reconstruction import request_reconstruction
+from server.lab.run_start import choose_calibration
 from server.lab.runs import ACTIVE, DAMAGED, RunSummary
 from server.lab.services import Context
 from server.web.ui.run_panel import outcome_colour
@@ -43,7 +45,7 @@ class RunTable:
                 self._accuracy = _choice("Accuracy", {one.value: one.value for one in Accuracy}, chosen.accuracy)
                 self._voxels = _choice("Voxels", {one.value: one.value for one in VoxelType}, chosen.voxels)
             self._table = _table(
-                ("name", "Run"),
+                ("run", "Run"),
                 ("kind", "Kind"),
                 ("shots", "Valid / shots"),
                 ("outcome", "Outcome"),
@@ -58,29 +60,29 @@ class RunTable:
     async def reload(self) -> None:
         """Read the run directories again."""
         runs = await asyncio.to_thread(self._context.runs.newest, _SHOWN)
-        self._table.rows = [_run_row(run) for run in runs]
+        self._table.rows = [run_row(run) for run in runs]
         self._table.update()
 
     async def _on_act(self, event: Any) -> None:
         run_id, kind = event.args["id"], event.args["kind"]
         ask = self._calibrate if kind == RunKind.CALIBRATION else self._reconstruct
-        await _try(lambda: asyncio.to_thread(ask, run_id))
+        await _queue(lambda: ask(run_id))
 
     async def _on_measure(self, event: Any) -> None:
         run_id = event.args["id"]
-        await _try(lambda: asyncio.to_thread(request_measurement, self._context, run_id, None, None, None))
+        await _queue(lambda: request_measurement(self._context, run_id, None, None, None))
 
-    def _calibrate(self, run_id: str) -> None:
-        self._context.runner.submit(calibration_job(run_id, f"{run_id}-pinhole", "pinhole"))
+    def _calibrate(self, run_id: str) -> list[Job]:
+        return [self._context.runner.submit(calibration_job(run_id, f"{run_id}-pinhole", "pinhole"))]
 
-    def _reconstruct(self, run_id: str) -> None:
+    def _reconstruct(self, run_id: str) -> list[Job]:
         chosen = {
             "method": Method(self._method.value),
             "accuracy": Accuracy(self._accuracy.value),
             "voxels": VoxelType(self._voxels.value),
         }
         settings: ReconstructionSettings = self._context.services.settings.model_copy(update=chosen)
-        request_reconstruction(self._context, run_id, None, None, settings)
+        return request_reconstruction(self._context, run_id, None, None, settings)
 
 
 class JobPanel:
@@ -89,7 +91,7 @@ class JobPanel:
     def __init__(self, context: Context) -> None:
         self._context = context
         with panel("Processing", "flex-1"):
-            self._table = _table(("job", "Job"), ("run", "Run"), ("outcome", "State"), ("detail", ""), ("action", ""))
+            self._table = _table(("job", "Job"), ("run", "Run"), ("outcome", "State"), ("action", ""), ("detail", ""))
             self._table.add_slot("body-cell-action", _ACTION)
             self._table.on("act", self._on_act)
 
@@ -103,13 +105,36 @@ class JobPanel:
         if event.args["action"] == "Abort":
             await _try(lambda: self._context.runner.abort(event.args["id"]))
         else:
-            await _try(lambda: asyncio.to_thread(self._context.calibrations.choose, event.args["calibration"]))
-            ui.notify(f"{event.args['calibration']} is the current calibration", type="positive")
+            await _try(lambda: self._choose(event.args["calibration"]))
+
+    async def _choose(self, calibration: str) -> None:
+        await asyncio.to_thread(choose_calibration, self._context, calibration)
+        ui.notify(f"{calibration} is the current calibration", type="positive")
 
 
 def _choice(label: str, options: dict[str, str], value: str) -> ui.select:
     select = ui.select(options, value=str(value)).classes("text-xs")
     return select.props(f'dense borderless options-dense aria-label="{label}"')
+
+
+async def _queue(request: Callable[[], list[Job]]) -> None:
+    """Ask for jobs in a thread, and say what came of it."""
+
+    async def ask() -> None:
+        text, is_work = answer_of(await asyncio.to_thread(request))
+        ui.notify(text, type="positive" if is_work else "warning")
+
+    await _try(ask)
+
+
+def answer_of(jobs: list[Job]) -> tuple[str, bool]:
+    """What an operator is told of a request, and whether there is work to be done."""
+    waiting = sum(job.state in (JobState.QUEUED, JobState.RUNNING) for job in jobs)
+    if not jobs:
+        return "nothing to do: the run has no valid shot", False
+    if not waiting:
+        return "nothing to do: it is done already", False
+    return f"{waiting} {'job is' if waiting == 1 else 'jobs are'} queued, see Processing", True
 
 
 async def _try(action: Callable[[], Awaitable[Any]]) -> None:
@@ -121,22 +146,26 @@ async def _try(action: Callable[[], Awaitable[Any]]) -> None:
 
 def _table(*columns: tuple[str, str]) -> ui.table:
     described = [{"name": name, "label": label, "field": name, "align": "left"} for name, label in columns]
-    table = ui.table(columns=described, rows=[], row_key="id").classes("w-full").props("dense flat hide-bottom")
+    table = (
+        ui.table(columns=described, rows=[], row_key="id").classes("w-full").props("dense flat wrap-cells hide-bottom")
+    )
     table.props('rows-per-page-options="[0]" :pagination="{rowsPerPage: 0}"')
     table.add_slot("body-cell-outcome", _BADGE)
     return table
 
 
-def _run_row(run: RunSummary) -> dict[str, Any]:
+def run_row(run: RunSummary) -> dict[str, Any]:
+    """One run in the table; a completed one with invalid shots is not green."""
     valid = "…" if run.shots_valid is None else run.shots_valid
+    lost_shots = run.outcome == RunOutcome.COMPLETED and run.shots_valid != run.shots_recorded
     actions = {RunKind.CALIBRATION: "Calibrate", RunKind.SAMPLE: "Reconstruct"}
     return {
         "id": run.run_id,
-        "name": f"{run.name}: {run.cause}" if run.outcome == DAMAGED else run.name,
+        "run": f"{run.run_id}: {run.cause}" if run.outcome == DAMAGED else run.run_id,
         "kind": run.kind,
         "shots": f"{valid} / {run.shots_recorded}",
         "outcome": run.outcome,
-        "colour": outcome_colour(run.outcome),
+        "colour": "warning" if lost_shots else outcome_colour(run.outcome),
         "action": "" if run.outcome == ACTIVE or run.kind is None else actions.get(run.kind, ""),
         "measure": "Measure" if run.outcome != ACTIVE and run.kind is RunKind.SAMPLE else "",
     }

@@ -58,12 +58,12 @@ class VolumePanel:
 
     def __init__(self, context: Context) -> None:
         self._context = context
-        self._folder = ""
+        self._folder = self._newest = ""
         with panel("Volume", "flex-1 no-wrap"):
             with ui.row().classes("w-full items-center no-wrap gap-3"):
                 self._choice = ui.select({}, label="Volume", on_change=self._on_choice)
                 self._choice.props("dense outlined options-dense").classes("flex-1 min-w-0")
-                self._follow = ui.switch("newest", value=True).props("dense")
+                self._follow = ui.switch("newest", value=True, on_change=self._on_follow).props("dense")
                 self._download = ui.button(icon="download").props(
                     'flat dense round type=a aria-label="download volume"'
                 )
@@ -82,13 +82,21 @@ class VolumePanel:
         options = {path: label for job in jobs for path, label in _volumes_of(job)}
         if not options:
             return
-        newest = next(iter(options))
-        self._choice.set_options(options, value=newest if self._follow.value else self._choice.value)
+        self._newest, shown = next(iter(options)), self._choice.value
+        if shown and shown not in options:
+            options[shown] = self._choice.options[shown]
+        self._choice.set_options(options, value=self._newest if self._follow.value else shown)
+
+    def _on_follow(self) -> None:
+        if self._follow.value and self._newest:
+            self._choice.value = self._newest
 
     async def _on_choice(self) -> None:
         path = self._choice.value
         if not path or path == self._folder:
             return
+        if path != self._newest:
+            self._follow.value = False
         run_id, results_id, name = path.split("/")
         try:
             preview = await asyncio.to_thread(self._preview, run_id, results_id, name)
@@ -130,7 +138,7 @@ def _volumes_of(job: Job) -> list[tuple[str, str]]:
     return [
         (
             f"{job.run_id}/{job.results_id}/{Path(item['file']).stem}",
-            f"{job.run_id} · shot {job.shot} {item['frame'].upper()} · {method}",
+            f"shot {job.shot} {item['frame'].upper()} · {method} · {job.run_id}",
         )
         for item in written
     ]

@@ -2,8 +2,11 @@ import asyncio
 
 import pytest
 
+from daq.errors import RecorderOverflow
+from processing.errors import BadInput
 from server.lab import duty as module
 from server.lab.duty import Duty, Health
+from server.lab.errors import NotFound
 from server.lab.events import EventPublisher
 
 
@@ -25,6 +28,14 @@ def test_an_item_that_fails_is_told_until_the_same_part_works_again() -> None:
         pass
     assert duty.lamp is None
     assert [event.data["error"] for event in events.since(0)] == ["ValueError: no number", None]
+
+
+def test_an_error_that_was_raised_on_purpose_is_told_by_its_text_alone() -> None:
+    duty, _ = duty_of()
+    for error in (BadInput("a.json: is empty"), RecorderOverflow("a.json: is empty"), NotFound("a.json: is empty")):
+        duty.fail("first", error)
+        assert duty.lamp is not None
+        assert duty.lamp.detail == "first: a.json: is empty"
 
 
 def test_a_loop_that_ends_by_an_error_is_started_again_after_a_pause_that_grows(

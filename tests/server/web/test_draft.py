@@ -83,7 +83,12 @@ def test_the_limits_of_the_pulse_and_of_the_light_are_checked_too() -> None:
 def test_positions_are_read_from_a_list() -> None:
     assert positions(" -4, 0,2.5 ,") == (-4.0, 0.0, 2.5)
     assert problem_of_positions("1, two") is not None
-    assert problem_of_positions(None) is None
+    assert problem_of_positions("-4, 0,2.5 ,") is None
+
+
+@pytest.mark.parametrize("text", [None, "", " , "])
+def test_a_calibration_run_without_positions_could_not_be_calibrated(text: str | None) -> None:
+    assert problem_of_positions(text) == "numbers in mm, separated by commas"
 
 
 def test_a_page_does_not_undo_what_another_one_has_changed(tmp_path: Path) -> None:

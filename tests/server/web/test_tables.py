@@ -2,7 +2,12 @@
 
 from typing import Any
 
+import pytest
+
+from daq.run_plan import RunKind
 from server.lab.jobs import JobState, calibration_job
+from server.lab.runs import RunSummary
+from server.web.ui import tables
 from server.web.ui.tables import job_row
 
 
@@ -36,3 +41,32 @@ def test_results_of_before_have_no_reasons() -> None:
     old = {"views": {"cam1": {"verdict": "good", "holdout_error_px": 0.03}}}
     assert job_row(job.model_copy(update={"result": old}))["detail"] == "cam1: hold-out 0.030 px, good"
     assert job_row(job)["detail"] == ""
+
+
+@pytest.mark.parametrize(("valid", "colour"), [(6, "positive"), (1, "warning"), (0, "warning")])
+def test_a_completed_run_that_lost_shots_is_not_green(valid: int, colour: str) -> None:
+    run = RunSummary(
+        run_id="20261129T032014-spray",
+        name="spray",
+        kind=RunKind.SAMPLE,
+        created_utc="2026-11-29T03:20:14Z",
+        outcome="completed",
+        cause="",
+        views=("view1",),
+        frames_per_shot=2,
+        shots_planned=6,
+        shots_recorded=6,
+        shots_valid=valid,
+        calibration=None,
+    )
+    row = tables.run_row(run)
+    assert (row["colour"], row["run"]) == (colour, "20261129T032014-spray")
+
+
+def test_whoever_asks_for_work_is_told_what_came_of_it() -> None:
+    queued = calibration_job("run", "cal", "pinhole")
+    done = queued.model_copy(update={"state": JobState.DONE})
+    assert tables.answer_of([done, queued]) == ("1 job is queued, see Processing", True)
+    assert tables.answer_of([queued, queued]) == ("2 jobs are queued, see Processing", True)
+    assert tables.answer_of([done]) == ("nothing to do: it is done already", False)
+    assert tables.answer_of([]) == ("nothing to do: the run has no valid shot", False)
