@@ -3,7 +3,7 @@
 from argparse import Namespace
 
 from server.cli.options import Verbs, add_rig, add_verb
-from server.cli.output import Outcome
+from server.cli.output import Outcome, progress
 
 
 def add(verbs: Verbs) -> None:
@@ -23,6 +23,10 @@ def serve(options: Namespace) -> Outcome:
     config = load_config(options.config)
     server = config.server.moved(options.host, options.port)
     with listening(server.host, server.port) as port_held, hold_data_dir(server.data_dir):
+        address = f"[{server.host}]" if ":" in server.host else server.host
+        progress(
+            f"{config.name}: opening all devices; then the page is at http://{address}:{server.port}; Ctrl-C ends it"
+        )
         from server.web.serve import serve_rig
 
         serve_rig(config.model_copy(update={"server": server}), port_held)

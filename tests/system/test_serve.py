@@ -121,7 +121,10 @@ def test_a_second_server_is_refused_and_leaves_the_run_of_the_first_one_alone(tm
         assert "cannot listen there" in refused(int(client.base_url.port or 0), tmp_path / "port")
         holder = f"is held by process {process.pid}, since "
         assert f"data directory runs {holder}" in refused(free_port(), tmp_path)
-        assert holder in refused(free_port(), tmp_path / "elsewhere")
+        port = free_port()
+        late = refused(port, tmp_path / "elsewhere")
+        assert holder in late
+        assert f"http://127.0.0.1:{port}; " in late, "whoever starts a server is told where the page is"
         shots = client.get(run_url).json()["shots_recorded"]
         eventually(lambda: client.get(run_url).json()["shots_recorded"] > shots, "the run goes on")
         assert client.get(run_url).json()["outcome"] == "active"

@@ -25,8 +25,10 @@ from server.web.ui.run_panel import outcome_colour
 from server.web.ui.theme import panel
 
 _BADGE = '<q-td :props="props"><q-badge :color="props.row.colour" :label="props.value" /></q-td>'
-_ACTION = """<q-td :props="props" auto-width><q-btn v-if="props.value" dense flat no-caps size="sm" color="primary"
-:label="props.value" @click.stop="$parent.$emit('act', props.row)" /></q-td>"""
+_ACTIONS = """<q-td :props="props" auto-width><q-btn v-for="action in props.value" :key="action" :label="action"
+dense flat no-caps size="sm" color="primary" @click.stop="$parent.$emit('act', { ...props.row, action })" /></q-td>"""
+_CALIBRATE, _RECONSTRUCT, _MEASURE = "Calibrate", "Reconstruct", "Measure"
+_ACTIONS_OF = {RunKind.CALIBRATION: [_CALIBRATE], RunKind.SAMPLE: [_RECONSTRUCT, _MEASURE], None: []}
 _SHOWN = 60
 
 
@@ -49,13 +51,9 @@ class RunTable:
                 ("kind", "Kind"),
                 ("shots", "Valid / shots"),
                 ("outcome", "Outcome"),
-                ("action", ""),
-                ("measure", ""),
+                ("actions", ""),
             )
-            self._table.add_slot("body-cell-action", _ACTION)
-            self._table.add_slot("body-cell-measure", _ACTION.replace("'act'", "'measure'"))
             self._table.on("act", self._on_act)
-            self._table.on("measure", self._on_measure)
 
     async def reload(self) -> None:
         """Read the run directories again."""
@@ -64,13 +62,8 @@ class RunTable:
         self._table.update()
 
     async def _on_act(self, event: Any) -> None:
-        run_id, kind = event.args["id"], event.args["kind"]
-        ask = self._calibrate if kind == RunKind.CALIBRATION else self._reconstruct
-        await _queue(lambda: ask(run_id))
-
-    async def _on_measure(self, event: Any) -> None:
-        run_id = event.args["id"]
-        await _queue(lambda: request_measurement(self._context, run_id, None, None, None))
+        ask = {_CALIBRATE: self._calibrate, _RECONSTRUCT: self._reconstruct, _MEASURE: self._measure}
+        await _queue(lambda: ask[event.args["action"]](event.args["id"]))
 
     def _calibrate(self, run_id: str) -> list[Job]:
         return [self._context.runner.submit(calibration_job(run_id, f"{run_id}-pinhole", "pinhole"))]
@@ -84,6 +77,9 @@ class RunTable:
         settings: ReconstructionSettings = self._context.services.settings.model_copy(update=chosen)
         return request_reconstruction(self._context, run_id, None, None, settings)
 
+    def _measure(self, run_id: str) -> list[Job]:
+        return request_measurement(self._context, run_id, None, None, None)
+
 
 class JobPanel:
     """Jobs, newest first; an unfinished one can be aborted, a fitted calibration chosen."""
@@ -91,8 +87,7 @@ class JobPanel:
     def __init__(self, context: Context) -> None:
         self._context = context
         with panel("Processing", "flex-1"):
-            self._table = _table(("job", "Job"), ("run", "Run"), ("outcome", "State"), ("action", ""), ("detail", ""))
-            self._table.add_slot("body-cell-action", _ACTION)
+            self._table = _table(("job", "Job"), ("run", "Run"), ("outcome", "State"), ("actions", ""), ("detail", ""))
             self._table.on("act", self._on_act)
 
     async def reload(self) -> None:
@@ -145,12 +140,15 @@ async def _try(action: Callable[[], Awaitable[Any]]) -> None:
 
 
 def _table(*columns: tuple[str, str]) -> ui.table:
-    described = [{"name": name, "label": label, "field": name, "align": "left"} for name, label in columns]
+    described = [
+        {"name": name, "label": label, "field": name, "align": "left", "classes": name} for name, label in columns
+    ]
     table = (
         ui.table(columns=described, rows=[], row_key="id").classes("w-full").props("dense flat wrap-cells hide-bottom")
     )
     table.props('rows-per-page-options="[0]" :pagination="{rowsPerPage: 0}"')
     table.add_slot("body-cell-outcome", _BADGE)
+    table.add_slot("body-cell-actions", _ACTIONS)
     return table
 
 
@@ -158,7 +156,6 @@ def run_row(run: RunSummary) -> dict[str, Any]:
     """One run in the table; a completed one with invalid shots is not green."""
     valid = "…" if run.shots_valid is None else run.shots_valid
     lost_shots = run.outcome == RunOutcome.COMPLETED and run.shots_valid != run.shots_recorded
-    actions = {RunKind.CALIBRATION: "Calibrate", RunKind.SAMPLE: "Reconstruct"}
     return {
         "id": run.run_id,
         "run": f"{run.run_id}: {run.cause}" if run.outcome == DAMAGED else run.run_id,
@@ -166,15 +163,18 @@ def run_row(run: RunSummary) -> dict[str, Any]:
         "shots": f"{valid} / {run.shots_recorded}",
         "outcome": run.outcome,
         "colour": "warning" if lost_shots else outcome_colour(run.outcome),
-        "action": "" if run.outcome == ACTIVE or run.kind is None else actions.get(run.kind, ""),
-        "measure": "Measure" if run.outcome != ACTIVE and run.kind is RunKind.SAMPLE else "",
+        "actions": [] if run.outcome == ACTIVE else _ACTIONS_OF.get(run.kind, []),
     }
 
 
 def job_row(job: Job) -> dict[str, Any]:
     """One job in the table, what came of it included."""
     is_calibration = job.kind is JobKind.CALIBRATION
-    choices = {JobState.QUEUED: "Abort", JobState.RUNNING: "Abort", JobState.DONE: "Use" if is_calibration else ""}
+    choices = {
+        JobState.QUEUED: ["Abort"],
+        JobState.RUNNING: ["Abort"],
+        JobState.DONE: ["Use"] if is_calibration else [],
+    }
     return {
         "id": job.id,
         "job": _name(job),
@@ -182,7 +182,7 @@ def job_row(job: Job) -> dict[str, Any]:
         "outcome": job.state,
         "colour": outcome_colour(job.state),
         "detail": job.error or _DETAIL[job.kind](job),
-        "action": choices.get(job.state, ""),
+        "actions": choices.get(job.state, []),
         "calibration": job.calibration,
     }
 
