@@ -58,9 +58,10 @@ def _take_place(written: Path, place: Path) -> None:
         written.replace(place)
         return
     aside = written.with_name(f"{written.name}.replaced")
-    place.rename(aside)
     try:
+        place.rename(aside)
         written.rename(place)
-    except OSError:
-        aside.rename(place)
+    except BaseException:
+        if aside.exists() and not place.exists():
+            aside.rename(place)
         raise

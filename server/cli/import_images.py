@@ -19,8 +19,12 @@ def import_images(options: Namespace) -> Outcome:
     """Import all that a manifest names."""
     from processing.runs.importing import import_manifest
 
-    with Bar() as bar:
-        parts = import_manifest(options.manifest, options.out, overwrite=options.overwrite, done=bar.step)
+    try:
+        with Bar() as bar:
+            parts = import_manifest(options.manifest, options.out, overwrite=options.overwrite, done=bar.step)
+    except KeyboardInterrupt:
+        progress(f"{options.out}: all or nothing, so nothing was written; to go on, import again")
+        raise
     for note in parts["notes"]:
         progress(note)
     result = {"out": str(options.out), **parts}

@@ -28,7 +28,7 @@ from server.cli import (
     serve,
     study,
 )
-from server.cli.output import say, tell
+from server.cli.output import endable, say, tell
 
 COMMANDS = (
     demo,
@@ -55,7 +55,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; the exit status."""
     options = _parser().parse_args(_joined(sys.argv[1:] if arguments is None else arguments))
     try:
-        outcome = options.command(options)
+        with endable():
+            outcome = options.command(options)
     except (BadInput, PlanError, ShotFileError) as error:
         return _fail(options, error, status=2)
     except (DaqError, MemoryError, OSError) as error:

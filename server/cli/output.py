@@ -1,17 +1,25 @@
-"""What commands say: progress while they work, and at the end an object for programs and a text for people."""
+"""What commands say: progress while they work, and at the end an object for programs and a text for people.
+
+Between the steps of progress they hear who wants them to end.
+"""
 
 import json
 import os
+import signal
 import sys
+import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from shutil import get_terminal_size
 from time import monotonic
+from types import FrameType
 from typing import Any, Self, TextIO, TypeVar
 
 T = TypeVar("T")
 BAR_WIDTH = 24
 _CLEAR_LINE = "\r\x1b[K"
+_ENDED = threading.Event()
 
 
 @dataclass(frozen=True)
@@ -43,6 +51,37 @@ def tell(outcome: Outcome, as_json: bool) -> None:
         say(json.dumps(outcome.result), sys.stdout)
 
 
+@contextmanager
+def endable() -> Iterator[None]:
+    """Let SIGINT and SIGTERM end the block by a KeyboardInterrupt; a second one ends the process at once.
+
+    Python drops what a handler raises within ``__del__`` or a weakref callback: ``heed`` makes up for that.
+    """
+    main = threading.current_thread() is threading.main_thread()
+    heard = [
+        number for number in (signal.SIGINT, signal.SIGTERM) if main and signal.getsignal(number) != signal.SIG_IGN
+    ]
+    before = {number: signal.signal(number, _end) for number in heard}
+    try:
+        yield
+    finally:
+        _ENDED.clear()
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _end(number: int, _frame: FrameType | None) -> None:
+    _ENDED.set()
+    signal.signal(number, signal.SIG_DFL)
+    raise KeyboardInterrupt
+
+
+def heed() -> None:
+    """End here, between two steps, if the process was told to end and nothing came of it."""
+    if _ENDED.is_set():
+        raise KeyboardInterrupt
+
+
 def progress(text: str) -> None:
     """Tell the user what happens, on stderr; on a terminal in place of a bar, which its next step draws again."""
     say(f"{_CLEAR_LINE}{text}" if sys.stderr.isatty() else text, sys.stderr)
@@ -70,6 +109,7 @@ class Bar:
 
     def step(self, done: int, total: int, text: str = "") -> None:
         """Show that so many of so many are done; the text says of what, and is the line where there is no terminal."""
+        heed()
         if not sys.stderr.isatty():
             if text:
                 say(text, sys.stderr)

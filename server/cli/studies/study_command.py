@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from server.cli.options import Verbs, add_out, add_verb
-from server.cli.output import Outcome, progress
+from server.cli.output import Outcome, heed, progress
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -53,6 +53,7 @@ def collected(rows: Iterable[Row], line: Callable[[Row], str]) -> list[Row]:
     """All rows; each is told when it comes."""
     collected = []
     for row in rows:
+        heed()
         progress(line(row))
         collected.append(row)
     return collected
