@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.analysis.droplets.droplet_statistics import DIAMETER, droplet_statistics
-from processing.analysis.droplets.size_statistics import Estimate, SizeClass, size_classes
+from processing.analysis.droplets.size_statistics import TOO_FEW, Estimate, SizeClass, size_classes
 from processing.figures.colours import FRAME_COLOURS
 
 MARKED = {"d10_um": "D10", "d32_um": "D32", "dv50_um": "Dv0.5"}
@@ -33,7 +33,7 @@ def sizes_figure(shots: Sequence[StoredDroplets], title: str = "") -> Figure:
         There are no diameters; the text says why.
     """
     statistics = droplet_statistics(shots)
-    if statistics.reason is not None:
+    if statistics.reason not in (None, TOO_FEW):
         raise ValueError(f"no sizes to draw: {statistics.reason}")
     classes = size_classes(
         np.concatenate([shot.columns[DIAMETER] for shot in shots]), statistics.exposures / statistics.shots
@@ -42,7 +42,8 @@ def sizes_figure(shots: Sequence[StoredDroplets], title: str = "") -> Figure:
     axes = figure.add_subplot()
     _draw_classes(axes, classes)
     for number, (name, label) in enumerate(MARKED.items()):
-        _mark(axes, label, getattr(statistics, name), f"C{number + 1}")
+        if (estimate := getattr(statistics, name)) is not None:
+            _mark(axes, label, estimate, f"C{number + 1}")
     axes.set(xlabel="diameter [µm]", ylabel="density [1/µm]", xscale="log", ylim=(0, None))
     axes.set_title(
         f"{statistics.n} droplets, exposures: {statistics.exposures}, shots: {statistics.shots}; 95 %, "

@@ -226,9 +226,10 @@ def _summary(result: dict[str, Any]) -> str:
         return f"no shot could be measured, {grid}"
     counted = f"{statistics['n']} droplets in {statistics['exposures']} exposures"
     density = _with_interval(statistics["number_density_per_mm3"])
-    d32 = f", D32 {_with_interval(statistics['d32_um'])} um" if statistics["d32_um"] else ""
+    d32_um, why = statistics["d32_um"], statistics["reason"]
+    d32 = f"D32 {_with_interval(d32_um)} um" if d32_um else f"no D32: {why}"
     hidden = f", {100 * statistics['hidden_share']:.1f} % of the volume hidden" if statistics["hidden_share"] else ""
-    return f"{counted}, {density} per mm3{d32}{hidden}, {grid}"
+    return f"{counted}, {density} per mm3, {d32}{hidden}, {grid}"
 
 
 def _with_interval(estimate: dict[str, float]) -> str:

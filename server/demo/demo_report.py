@@ -52,10 +52,17 @@ def _measured(droplets: MeasuredDroplets) -> dict[str, Any]:
         "counted_from_um": COUNTED_UM,
         "found_share": droplets.found_share,
         "true_ghost_share": droplets.ghost_share,
+        "reasons": _reasons(droplets),
         "d32_um": None if d32_um is None else d32_um.model_dump(mode="json"),
         "true_d32_um": droplets.true_d32_um,
         "file": str(droplets.file),
     }
+
+
+def _reasons(droplets: MeasuredDroplets) -> list[str]:
+    """Why the shot is not good, or has no D32."""
+    statistics = droplets.statistics
+    return [*droplets.shot.reasons, *([statistics.reason] if statistics.reason and statistics.d32_um is None else [])]
 
 
 def readable_summary(result: dict[str, Any]) -> str:
@@ -113,7 +120,7 @@ _DROPLETS_TEXT = (
 
 def _droplets_section(droplets: MeasuredDroplets) -> Section:
     """What was measured, where and how large, and beside it the truth; the reason where nothing could be."""
-    text = " ".join([_DROPLETS_TEXT, *droplets.shot.reasons])
+    text = " ".join([_DROPLETS_TEXT, *_reasons(droplets)])
     if droplets.statistics.d32_um is None:
         return Section("Droplets", text, [_droplets_table(droplets)])
     pictures = [

@@ -5,6 +5,9 @@ of diameters come from a seeded bootstrap: shots are drawn with replacement wher
 there is one; the standard deviation of ``ln D`` among the draws, times ``sqrt(m / (m - 1))`` for the bias of few,
 times Student's t of ``m - 1`` degrees of freedom, with ``m`` drawn things. Droplets of one shot belong together: who
 draws droplets learns nothing of how shots differ.
+
+Nor does a bootstrap know of droplets that are larger than all that were seen, and these carry volume. A quantile by
+volume with few droplets beyond it is not told: its interval would hold the truth far less often than it says.
 """
 
 from collections.abc import Iterator, Sequence
@@ -23,11 +26,18 @@ from processing.reconstruction.settings import FrozenValue
 DRAWS, SEED = 400, 0
 DROPLETS_AT_A_TIME = 2**18
 """Of all draws that are made at once: memory."""
+SPAN = "relative_span"
 ORDERS = ((1, 0), (2, 0), (3, 0), (3, 2), (4, 3))
 QUANTILES = (0.1, 0.5, 0.9)
+BY_VOLUME = tuple(f"dv{round(100 * share)}_um" for share in QUANTILES)
 CLASSES_PER_DECADE = 20
 """Classes of diameters grow by 12 %: the preferred numbers R20 of ISO 3, geometric as ISO 9276-1 has them."""
-NOTHING_MEASURED, ONE_DROPLET = "no droplet was measured", "one droplet has no distribution"
+FEWEST = 5
+"""Droplets of a mean, and those larger than a quantile by volume, and those smaller. Of 5 to 40 droplets of lognormal
+sprays with spreads of 0.2 to 0.6, intervals of dv90 would hold the truth in 46 %, of 80 to 320 in 71 %; those that are
+told hold it in 89 %."""
+NOTHING_MEASURED = "no droplet was measured"
+TOO_FEW = f"too few droplets: means need {FEWEST}, a quantile by volume {FEWEST} larger and {FEWEST} smaller ones"
 _TAIL = (1 - CONFIDENCE) / 2
 
 
@@ -40,7 +50,7 @@ class Estimate(FrozenValue):
 
 
 class SizeStatistics(FrozenValue):
-    """Diameters of a spray; where there is none, ``reason`` says why."""
+    """Diameters of a spray; where one is missing, ``reason`` says why."""
 
     n: Annotated[int, Field(description="droplets")]
     shots: Annotated[int, Field(description="shots that they come from")]
@@ -89,18 +99,21 @@ def mean_diameters(diameters_um_by_shot: Sequence[ArrayLike], exposures_per_shot
     checked = (np.sort(_checked(diameters_um)) for diameters_um in diameters_um_by_shot)
     shots = sorted((shot for shot in checked if len(shot)), key=np.ndarray.tolist)  # draws depend on no order
     diameters_um = np.concatenate([np.empty(0), *shots])
-    if len(diameters_um) < 2:
-        reason = ONE_DROPLET if len(diameters_um) else NOTHING_MEASURED
+    if len(diameters_um) < FEWEST * exposures_per_shot:
+        reason = TOO_FEW if len(diameters_um) else NOTHING_MEASURED
         return SizeStatistics(n=len(diameters_um), shots=len(shots), reason=reason)
     several = len(shots) > 1
     units = np.repeat(np.arange(len(shots)), [len(shot) for shot in shots]) if several else np.arange(len(diameters_um))
     order = np.argsort(diameters_um, kind="stable")
     widening = 1.0 if several else np.sqrt(exposures_per_shot)
+    estimates = _estimates(diameters_um[order], units[order], float(widening))
+    known = _known(estimates, diameters_um[order], FEWEST * exposures_per_shot)
     told = {
         "n": len(diameters_um),
         "shots": len(shots),
         "intervals_over": "shots" if several else "droplets",
-        **_estimates(diameters_um[order], units[order], float(widening)),
+        "reason": None if known.keys() == estimates.keys() else TOO_FEW,
+        **known,
     }
     return SizeStatistics.model_validate(told)
 
@@ -197,12 +210,21 @@ def _estimates(diameters_um: FloatArray, units: NDArray[np.intp], widening: floa
     factors = np.exp(reach * np.std(np.log(draws[:, :-1]), axis=0))
     lows, highs = values[:-1] / factors, values[:-1] * factors
     span, half = values[-1], reach * np.std(draws[:, -1])
-    names = [*(f"d{p}{q}_um" for p, q in ORDERS), *(f"dv{round(100 * share)}_um" for share in QUANTILES)]
+    names = [*(f"d{p}{q}_um" for p, q in ORDERS), *BY_VOLUME]
     estimates = {
         name: Estimate(value=value, low=low, high=high)
         for name, value, low, high in zip(names, values.tolist(), lows.tolist(), highs.tolist(), strict=False)
     }
-    return estimates | {"relative_span": Estimate(value=span, low=max(span - half, 0.0), high=span + half)}
+    return estimates | {SPAN: Estimate(value=span, low=max(span - half, 0.0), high=span + half)}
+
+
+def _known(estimates: dict[str, Estimate], diameters_um: FloatArray, fewest: float) -> dict[str, Estimate]:
+    """Estimates less quantiles without so many of the sorted diameters on either side; a span needs all of them."""
+    quantiles_um = np.array([estimates[name].value for name in BY_VOLUME])
+    smaller = np.searchsorted(diameters_um, quantiles_um)
+    larger = len(diameters_um) - np.searchsorted(diameters_um, quantiles_um, side="right")
+    unsure = {name for name, few in zip(BY_VOLUME, np.minimum(smaller, larger) < fewest, strict=True) if few}
+    return {name: one for name, one in estimates.items() if name not in (unsure | {SPAN} if unsure else unsure)}
 
 
 def _draws(units: NDArray[np.intp]) -> Iterator[FloatArray]:
