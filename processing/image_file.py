@@ -4,17 +4,24 @@ Rows and columns are those of the file: tags that ask a viewer to turn an image 
 are calibrated by the pixels of their sensors.
 """
 
+import os
+import threading
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any
+from tempfile import TemporaryFile
+from typing import Any, TypeVar
 
 import cv2
 import numpy as np
+from isal import isal_zlib
 from numpy.typing import NDArray
 
 from processing.errors import BadInput
-from processing.tiff_pages import page_offsets, show_page
+from processing.tiff_pages import deflated_parts, page_offsets, show_page
 
 GreyImage = NDArray[np.uint8] | NDArray[np.uint16]
+T = TypeVar("T")
+_STDERR = threading.Lock()
 
 
 class ImageFileError(BadInput):
@@ -41,9 +48,12 @@ def read_image(path: Path, page: int | None = None) -> GreyImage:
     chosen = _chosen_page(path, page, len(offsets) or 1)
     if offsets:
         show_page(content, offsets[chosen])
-    image = _decoded(content)
+        _check_parts(path, deflated_parts(content, offsets[chosen]))
+    image, complaints = _heard(lambda: _decoded(content)) if _is_jpeg(content) else (_decoded(content), "")
     if image is None:
         raise ImageFileError(f"{path}: not an image that OpenCV reads")
+    if complaints:
+        raise ImageFileError(f"{path}: is damaged: {complaints}")
     if image.ndim == 3:
         image = cv2.cvtColor(image, cv2.COLOR_BGRA2GRAY if image.shape[2] == 4 else cv2.COLOR_BGR2GRAY)
     if image.dtype == np.uint8:
@@ -77,6 +87,33 @@ def _decoded(content: NDArray[np.uint8]) -> NDArray[Any] | None:
         return cv2.imdecode(content, cv2.IMREAD_UNCHANGED) if content.size else None
     except cv2.error:
         return None
+
+
+def _check_parts(path: Path, parts: Iterable[NDArray[np.uint8]]) -> None:
+    """Pixels that were compressed by zlib have a checksum; who stops at the last pixel does not read it."""
+    for part in parts:
+        try:
+            isal_zlib.decompress(part.tobytes())
+        except isal_zlib.error as error:
+            raise ImageFileError(f"{path}: is damaged: {error}") from error
+
+
+def _is_jpeg(content: NDArray[np.uint8]) -> bool:
+    return content[:2].tobytes() == b"\xff\xd8"
+
+
+def _heard(decode: Callable[[], T]) -> tuple[T, str]:
+    """What is decoded, and what libjpeg says of it on the stderr of the process: it has no other way to complain."""
+    with _STDERR, TemporaryFile() as said:
+        stderr = os.dup(2)
+        os.dup2(said.fileno(), 2)
+        try:
+            decoded = decode()
+        finally:
+            os.dup2(stderr, 2)
+            os.close(stderr)
+        said.seek(0)
+        return decoded, said.read().decode(errors="replace").strip()
 
 
 def _content(path: Path) -> NDArray[np.uint8]:

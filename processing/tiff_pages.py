@@ -14,6 +14,11 @@ from numpy.typing import NDArray
 Content = NDArray[np.uint8]
 
 ORIENTATION_TAG, SHORT, AS_STORED = 274, 3, 1
+COMPRESSION_TAG, DEFLATE = 259, (8, 32946)
+PART_TAGS = {273: 279, 324: 325}
+"""Where strips, or tiles, begin: and how many bytes they have."""
+_WIDTHS = {SHORT: 2, 4: 4, 16: 8}
+"""In bytes, of the types SHORT, LONG and LONG8."""
 
 
 @dataclass(frozen=True)
@@ -46,12 +51,38 @@ def show_page(content: Content, offset: int) -> None:
     """Change the bytes of a TIFF so that the page at an offset is the first one, and is not turned."""
     layout = _LAYOUTS[content[:4].tobytes()]
     _write(content, layout.first, layout.offset, layout, offset)
-    entries = min(_number(content, offset, layout.count, layout), content.size // layout.entry)
-    for number in range(entries):
-        entry = offset + layout.count + number * layout.entry
-        tag, kind = (_number(content, start, 2, layout) for start in (entry, entry + 2))
+    for tag, kind, entry in _entries(content, offset, layout):
         if (tag, kind) == (ORIENTATION_TAG, SHORT):
             _write(content, entry + layout.value, 2, layout, AS_STORED)
+
+
+def deflated_parts(content: Content, offset: int) -> Iterator[Content]:
+    """The strips or tiles of the page at an offset if they are zlib streams, of which libtiff reads no checksum."""
+    layout = _LAYOUTS[content[:4].tobytes()]
+    fields = {tag: (kind, entry) for tag, kind, entry in _entries(content, offset, layout)}
+    values = {tag: _values(content, *fields[tag], layout) for tag in (COMPRESSION_TAG, *PART_TAGS) if tag in fields}
+    if not {*values.get(COMPRESSION_TAG, ())} & {*DEFLATE}:
+        return
+    for begin, length in PART_TAGS.items():
+        if begin in fields and length in fields:
+            for first, size in zip(values[begin], _values(content, *fields[length], layout), strict=False):
+                yield content[first : first + size]
+
+
+def _entries(content: Content, offset: int, layout: _Layout) -> Iterator[tuple[int, int, int]]:
+    """Tag, type and place of every entry of a directory."""
+    for number in range(min(_number(content, offset, layout.count, layout), content.size // layout.entry)):
+        entry = offset + layout.count + number * layout.entry
+        yield _number(content, entry, 2, layout), _number(content, entry + 2, 2, layout), entry
+
+
+def _values(content: Content, kind: int, entry: int, layout: _Layout) -> list[int]:
+    """Unsigned numbers of an entry, which stand in it, or elsewhere if they are many."""
+    width = _WIDTHS.get(kind, layout.offset)
+    count = min(_number(content, entry + 4, layout.value - 4, layout), content.size // width)
+    inside = count * width <= layout.entry - layout.value
+    start = entry + layout.value if inside else _number(content, entry + layout.value, layout.offset, layout)
+    return [_number(content, start + number * width, width, layout) for number in range(count)]
 
 
 def _offsets(content: Content, layout: _Layout) -> Iterator[int]:

@@ -2,7 +2,7 @@
 
 import struct
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import cv2
 import numpy as np
@@ -125,6 +125,40 @@ def test_a_damaged_file_is_read_or_refused(tmp_path: Path, kind: str) -> None:
         except ImageFileError:
             refused += 1
     assert refused
+
+
+NOISY = np.random.default_rng(2).integers(90, 110, (40, 50), dtype=np.uint8)
+
+
+def flipped(file: Path, bit: int) -> None:
+    """Flip a bit of a file."""
+    content = np.fromfile(file, np.uint8)
+    content[bit // 8] ^= 1 << bit % 8
+    content.tofile(file)
+
+
+@pytest.mark.parametrize("layout", [{}, {"tile": (16, 16)}, {"bigtiff": True, "byteorder": ">"}, {"rowsperstrip": 40}])
+def test_a_flipped_bit_of_deflated_pixels_is_never_a_grey_value(tmp_path: Path, layout: dict[str, Any]) -> None:
+    """Stored blocks: every bit is one of a pixel, and only the checksum knows."""
+    tifffile.imwrite(tmp_path / "a.tif", NOISY, compression="zlib", compressionargs={"level": 0}, **layout)
+    np.testing.assert_array_equal(read_image(tmp_path / "a.tif"), NOISY)
+    whole = np.fromfile(tmp_path / "a.tif", np.uint8)
+    place = whole.tobytes().index(NOISY[0, :16].tobytes())
+    flipped(tmp_path / "a.tif", 8 * place + 3)
+    with pytest.raises(ImageFileError, match=r"a\.tif: is damaged"):
+        read_image(tmp_path / "a.tif")
+
+
+def test_what_is_wrong_with_a_jpeg_is_no_line_that_nobody_reads(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    cv2.imwrite(str(tmp_path / "a.jpg"), NOISY)
+    read_image(tmp_path / "a.jpg")
+    content = (tmp_path / "a.jpg").read_bytes()
+    (tmp_path / "a.jpg").write_bytes(content[:-200] + content[-100:])
+    with pytest.raises(ImageFileError, match=r"a\.jpg: is damaged: .*JPEG"):
+        read_image(tmp_path / "a.jpg")
+    assert capfd.readouterr().err == ""
 
 
 def test_directories_in_a_circle_end(tmp_path: Path) -> None:
