@@ -75,6 +75,7 @@ def reconstruct_shot(
     *,
     workbench: Workbench | None = None,
     threads: int = DEFAULT_THREADS,
+    told: Callable[[], Provenance] = dict,
 ) -> ShotResult:
     """Reconstruct every exposure of one shot and write its volumes.
 
@@ -96,6 +97,8 @@ def reconstruct_shot(
         For shot after shot: the volumes are the same without it, but come later.
     threads : int
         The volumes do not depend on it.
+    told : callable
+        What else is known of the shot, for its volumes; asked once there is something to write.
 
     Raises
     ------
@@ -132,8 +135,9 @@ def reconstruct_shot(
                 run, recorded, frame, settings, reconstructor.images, references=references, threads=threads
             )
             faults = exposure_faults(run, recorded, frame, images, references)
-            told = {name: json.dumps(which) for name, which in faults.items() if which} | {"recipe_sha256": recipe}
-            written = _reconstruct_frame(reconstructor, images, results_dir, shot, frame, {**provenance, **told})
+            found = {name: json.dumps(which) for name, which in faults.items() if which} | {"recipe_sha256": recipe}
+            named = {**provenance, **found, **told()}
+            written = _reconstruct_frame(reconstructor, images, results_dir, shot, frame, named)
             volumes.append(written.model_copy(update=faults))
     return ShotResult(
         shot=shot,

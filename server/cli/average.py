@@ -21,7 +21,7 @@ from server.cli.options import (
     usable_processors,
 )
 from server.cli.output import Bar, Outcome, progress
-from server.cli.runs.belonging import ask_droplets
+from server.cli.runs.belonging import STORED, ask_droplets, stored_belonging
 from server.cli.runs.faults import tell_faults
 
 if TYPE_CHECKING:
@@ -78,7 +78,12 @@ def _average_results(options: Namespace) -> dict[str, Any]:
         )
     volume, grid = average_volumes(files)
     faults = [told for file in files if (told := stored_faults(file))]
-    return _written(options, volume, grid, len(files), faults, {})
+    if (belonging := stored_belonging(files)) is None:
+        return _written(options, volume, grid, len(files), faults, {})
+    if belonging["verdict"] in ("warn", "refuse"):
+        progress(f"{options.results}: droplets speak against calibration and run: {belonging['verdict']}")
+    written = _written(options, volume, grid, len(files), faults, {STORED: json.dumps(belonging)})
+    return {"passed": belonging["verdict"] != "refuse", "belonging": belonging, **written}
 
 
 def _average_run(options: Namespace) -> dict[str, Any]:
@@ -100,13 +105,14 @@ def _average_run(options: Namespace) -> dict[str, Any]:
             frame=options.exposure,
             threads=usable_processors(),
         )
+    belonging = ask_droplets(options.results, shots, calibration)
     made_by: Provenance = {
         "calibration": calibration.id,
         "settings": settings.model_dump_json(),
         "method_version": METHOD_VERSION,
+        **belonging.provenance,
     }
     written = _written(options, mean.volume, mean.grid, mean.exposures, mean.faults, made_by)
-    belonging = ask_droplets(options.results, shots, calibration)
     progress(belonging.text)
     told = {"passed": belonging.passed, "belonging": belonging.record()}
     return {**told, **written, "method": settings.method.value, "calibrated_share": share}

@@ -2,6 +2,7 @@
 
 import resource
 from argparse import Namespace
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -110,18 +111,28 @@ def _reconstruct_shots(
     from processing.runs.pipeline import reconstruct_shot
     from processing.runs.workbench import Workbench
 
+    @cache
+    def belonging() -> Belonging:
+        return ask_droplets(run_dir, indices, load_calibration(options.calibration))
+
     shots: list[ShotResult] = []
     workbench, threads = Workbench(), usable_processors()
     for index in tracked(indices, lambda index: f"{run_dir.name}: shot {index} by {settings.method}"):
         shot = reconstruct_shot(
-            run_dir, index, options.calibration, settings, out, workbench=workbench, threads=threads
+            run_dir,
+            index,
+            options.calibration,
+            settings,
+            out,
+            workbench=workbench,
+            threads=threads,
+            told=lambda: belonging().provenance,
         )
         if not shots:
             _tell_slow_views(shot)
-            belonging = ask_droplets(run_dir, indices, load_calibration(options.calibration))
         _tell_faults(shot)
         shots.append(shot)
-    return shots, belonging
+    return shots, belonging()
 
 
 def _tell_slow_views(shot: "ShotResult") -> None:

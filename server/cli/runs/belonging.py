@@ -1,5 +1,6 @@
 """Do a run and a calibration belong together? Asked of droplets before volumes that look fine are believed."""
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +12,9 @@ from server.cli.output import progress
 if TYPE_CHECKING:
     from processing.calibration.calibration import Calibration
     from processing.runs.run_check import ShotCheck
+
+STORED = "belonging"
+"""Name of what a volume carries."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +50,11 @@ class Belonging:
         return {"verdict": self.verdict, "shots": [check.record() for check in self.checks]}
 
     @property
+    def provenance(self) -> dict[str, str]:
+        """The same for what is made of the run all the same: it says so."""
+        return {STORED: json.dumps(self.record())}
+
+    @property
     def text(self) -> str:
         """A line for a person."""
         told = [check for check in self.checks if check.verdict]
@@ -55,6 +64,19 @@ class Belonging:
                 "(tomoshadow check asks other shots)"
             )
         return "do run and calibration belong together? " + "; ".join(check_line(check) for check in told)
+
+
+def stored_belonging(files: "Sequence[Path]") -> dict[str, Any] | None:
+    """The worst record that volumes carry; None where none of them tells anything."""
+    from processing.calibration.verdict import Verdict
+    from processing.reconstruction.volume_file import open_volume
+
+    records = []
+    for file in files:
+        with open_volume(file) as volume:
+            records.append(json.loads(str(volume.provenance.get(STORED, "{}"))))
+    told = [record for record in records if record.get("verdict")]
+    return max(told, key=lambda record: list(Verdict).index(record["verdict"]), default=None)
 
 
 def ask_droplets(run_dir: Path, shots: Sequence[int], calibration: "Calibration") -> Belonging:

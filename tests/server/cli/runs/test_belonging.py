@@ -1,10 +1,12 @@
 """reconstruct and average ask droplets whether run and calibration belong together: volumes look fine either way."""
 
+import json
 from pathlib import Path
 
 import pytest
 
 from processing.calibration.calibration_file import save_calibration
+from processing.reconstruction.volume_file import read_volume
 from tests.support.command_line import told
 from tests.support.drifting_run import write_droplet_run
 from tests.support.drifting_views import calibration_of, views
@@ -32,6 +34,12 @@ def test_a_view_that_has_moved_does_not_pass_in_silence(
     assert answer["passed"] is False
     assert answer["belonging"]["verdict"] == "refuse"
     assert [(shot["shot"], shot["moved"]) for shot in answer["belonging"]["shots"]] == [(0, "view2"), (1, "view2")]
+    files = sorted(tmp_path.rglob("*.vtkhdf"))
+    for _, _, provenance in map(read_volume, files):
+        assert json.loads(str(provenance.get("belonging", "{}"))) == answer["belonging"]
+    if command == "reconstruct":
+        mean = told(capsys, "average", tmp_path / out, "-o", tmp_path / "mean.vtkhdf", status=1)
+        assert (mean["passed"], mean["belonging"]) == (False, answer["belonging"])
 
 
 def test_what_droplets_do_not_tell_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
