@@ -331,7 +331,8 @@ void fit_discs(const Kernels &kernels, int number) {
     std::vector<double> positions, squares, information(n_discs);
     for (int k = 0; k < 3 * n_discs; ++k) positions.push_back(random.uniform(-60, nodes * spacing + 60));
     for (int k = 0; k < n_discs; ++k) squares.push_back(k % 7 ? random.uniform(0, 9) : random.uniform(0, 1e4));
-    const Discs discs{views.data(), n_views, {nodes, nodes, nodes, spacing}, profiles.data(), positions.data(), squares.data(), n_discs};
+    const Discs discs{views.data(), n_views, {nodes, nodes, nodes, spacing}, profiles.data(), 3.2,
+                      positions.data(), squares.data(), n_discs};
     std::vector<uint8_t> awake(n_discs);
     std::vector<DiscSupport> support(n_discs);
     double light = 0, sizes = 0;
