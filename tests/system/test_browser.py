@@ -84,9 +84,15 @@ def test_a_drift_raises_an_alarm_and_a_larger_one_stops_reconstruction(page: Pag
     expect(alarm).to_be_hidden()
 
 
-def test_a_torn_draft_does_not_keep_the_page_from_opening(page: Page, server: Serving) -> None:
+def test_a_torn_draft_does_not_keep_the_page_from_opening_and_a_page_without_a_server_is_grey(
+    page: Page, server: Serving
+) -> None:
     page.goto(str(server.http.base_url))
     expect(page.get_by_role("button", name="Start run")).to_be_visible()
+    expect(page.get_by_role("status", name="acquisition state")).to_have_text("IDLE")
+    page.evaluate("window.socket.disconnect()")
+    for part in (".q-header", ".screen"):  # what a page shows without a server is old: no lamp stays green
+        expect(page.locator(part)).to_have_css("filter", "grayscale(1)")
     (aside,) = server.services.data_dir.glob("draft.json.damaged-*")
     assert aside.read_text() == '{"shots": 7'
 

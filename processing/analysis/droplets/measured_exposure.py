@@ -148,19 +148,23 @@ class RatioLimits:
 
 
 def judged(beside_px: Mapping[str, float], ratio: float, limits: RatioLimits) -> tuple[ShotVerdict, tuple[str, ...]]:
-    """Verdict and reasons, by how far views lie beside their calibration and by residual over noise."""
+    """Verdict and reasons, by residual over noise and by how far views lie beside their calibration.
+
+    Where droplets do not explain the images, how far these lie beside is no more than a guess, and not told.
+    """
+    if ratio >= limits.refused:
+        reason = (
+            f"droplets explain the images to {ratio:.2f} times the noise only, limit {limits.refused}: do calibration "
+            "and views belong together (tomoshadow check), is the spray too dense, or are droplets seen outside "
+            "of what was searched?"
+        )
+        return ShotVerdict.REFUSED, (reason,)
     refused = [
         f"{name} lies {shift_px:.2f} px beside its calibration, limit {MOST_SHIFT_PX} px: correct it by the droplets "
         "(tomoshadow self-calibrate) or calibrate again"
         for name, shift_px in beside_px.items()
         if shift_px > MOST_SHIFT_PX
     ]
-    if ratio >= limits.refused:
-        refused.append(
-            f"droplets explain the images to {ratio:.2f} times the noise only, limit {limits.refused}: do calibration "
-            "and views belong together (tomoshadow check), is the spray too dense, or are droplets seen outside "
-            "of what was searched?"
-        )
     if refused:
         return ShotVerdict.REFUSED, tuple(refused)
     if ratio >= limits.trusted:

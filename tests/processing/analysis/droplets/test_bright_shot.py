@@ -8,7 +8,7 @@ import pytest
 from processing.analysis.droplets.bright_shot import BrightExposure, measure_bright
 from processing.analysis.droplets.droplet_search import plan_droplets
 from processing.analysis.droplets.ghost_share import GhostShare, matches
-from processing.analysis.droplets.measured_exposure import ShotVerdict, judged_by_twins
+from processing.analysis.droplets.measured_exposure import RatioLimits, ShotVerdict, judged, judged_by_twins
 from processing.reconstruction.errors import ReconstructionError
 from processing.studies.droplets import BrightScene, DropletCase
 from processing.volume import VoxelGrid
@@ -170,3 +170,11 @@ def test_voxels_must_be_about_as_wide_as_pixels(truth: BrightScene) -> None:
     coarse = VoxelGrid((20, 12, 40), GRID.origin_mm, 4 * GRID.pitch_mm)
     with pytest.raises(ReconstructionError, match=r"px wide: droplets are looked for with 0\.4 to 1\.3 px per voxel"):
         plan_droplets(truth.believed, coarse, margin_voxel=MARGIN_VOXEL)
+
+
+def test_where_droplets_do_not_explain_the_images_nobody_is_sent_to_calibrate_again() -> None:
+    beside_px, limits = {"view1": 0.6}, RatioLimits(trusted=1.05, refused=1.5)
+    assert ["calibrate again" in reason for reason in judged(beside_px, 1.49, limits)[1]] == [True]
+    verdict, reasons = judged(beside_px, 1.5, limits)
+    assert verdict is ShotVerdict.REFUSED
+    assert ["calibrate again" in reason for reason in reasons] == [False]
