@@ -27,8 +27,9 @@ endef
 
 # A network of its own, so that no camera broadcast leaves the machine; without it where the machine forbids user namespaces.
 PRIVATE_NETWORK := $(shell unshare -rn true 2>/dev/null && echo .ci/private-network)
-# Tests run side by side, up to four at a time, where each can have such a network; the addresses of cameras are the same.
-TEST_WORKERS := $(shell n=$$(nproc); echo $$((n < 4 ? n : 4)))
+# Tests run side by side where each can have such a network, the addresses of cameras being the same: up to four at a time,
+# one more than there are processors, as some tests wait.
+TEST_WORKERS := $(shell n=$$(($$(nproc) + 1)); echo $$((n < 4 ? n : 4)))
 SIDE_BY_SIDE := $(if $(PRIVATE_NETWORK),--dist worksteal --tx "$(TEST_WORKERS)*popen//python=$(PRIVATE_NETWORK) $(PYTHON)")
 
 help: ## Show this list.

@@ -61,8 +61,8 @@ COARSE_LEAST, SHARP_LEAST = 0.15, 0.5
 """Droplets with a fainter shadow are dropped: absolute, and as a share of the threshold."""
 PURGES, SETTLED = 6, 0.003
 """So often at most disputed droplets are dropped and found anew; it ends when the others stay as many, about."""
-RELIT_ROUNDS = 2
-"""In which droplets, blur and level become those of another light."""
+RAW_ROUNDS = 3
+"""In which droplets, blur and level become those of incoherent light."""
 MASKED_ROUNDS = 2
 """For droplets that most views see through masks: they explain what is left, and are not told."""
 OPTICS_EVERY = 2
@@ -109,10 +109,12 @@ def in_incoherent_light(shot: Transmissions, search: DropletSearch, fit: ShadowF
     """Squared radii (N,) that the droplets would have, where they are, if light came from all directions."""
     if fit.optics.condenser_ratio is None or not len(fit.discs):
         return fit.discs.squares_voxel2
-    optics = _Finder(shot, search).relit(fit, None).optics
-    drawn = DiscImages(shot.images, shot.trust, shot.lattice, shot.threads).drawn(optics, fit.discs)
-    seen = seen_by(shot, replace(fit, optics=optics), drawn.transmissions)
-    return seen.fitted(drawn, optics, fit.discs, replace(FINAL_SWEEPS, move=False))[0].squares_voxel2
+    finder, raw = _Finder(shot, search), fit
+    for _ in range(RAW_ROUNDS):
+        raw = finder.relit(raw, None)
+    drawn = DiscImages(shot.images, shot.trust, shot.lattice, shot.threads).drawn(raw.optics, fit.discs)
+    seen = seen_by(shot, replace(fit, optics=raw.optics), drawn.transmissions)
+    return seen.fitted(drawn, raw.optics, fit.discs, replace(FINAL_SWEEPS, move=False))[0].squares_voxel2
 
 
 class _Finder:
@@ -157,9 +159,7 @@ class _Finder:
     def relit(self, fit: ShadowFit, condenser_ratio: float | None) -> ShadowFit:
         """The same in other light, fitted to it."""
         fit = relit(fit, condenser_ratio, self._shot.lattice.pixels_per_voxel)
-        for _ in range(RELIT_ROUNDS):
-            fit = self._estimated(self._fitted(fit, Stage(SHARP_PX, _last(fit))), unite=False)
-        return fit
+        return self._estimated(self._fitted(fit, Stage(SHARP_PX, _last(fit))), unite=False)
 
     def round(self, fit: ShadowFit, stage: Stage, *, estimate: bool, unite: bool = False) -> ShadowFit:
         """Candidates enter, all are fitted, some are dropped; then optics and defects are estimated anew."""

@@ -40,6 +40,8 @@ from processing.kernels import DEFAULT_THREADS
 LIMITS = RatioLimits(trusted=1.25, refused=2.0)
 """Of discs: overlapping shadows leave something even where all droplets are right. Simulated shots of 28 to 40 droplets
 per mm^3, up to 1.25 have 0.3 to 1.7 % ghosts, from 1.33 to 1.45 2 to 5 %."""
+COHERENT_LIMITS = RatioLimits(trusted=1.1, refused=2.0)
+"""In partially coherent light fringes look like faint droplets: 0 % ghosts at 1.06, 4 % at 1.15, 18 % at 1.25."""
 
 
 COHERENT_SHARE = 0.02
@@ -151,7 +153,8 @@ def _told(shot: Transmissions, fit: ShadowFit, search: DropletSearch) -> ShadowE
     ratio = rms_over_noise(replace(seen, weights=judged_weights), shadows.transmissions)
     views = _seen(fit, search, _masked_shares(fit, into_grid))
     beside_px = {name: float(np.hypot(view.shift_u_px, view.shift_v_px)) for name, view in views.items()}
-    verdict, reasons = judged(beside_px, ratio, LIMITS)
+    limits = LIMITS if fit.optics.condenser_ratio is None else COHERENT_LIMITS
+    verdict, reasons = judged(beside_px, ratio, limits)
     if left := grey(seen, shadows, judged_weights):
         verdict, reasons = ShotVerdict.DOUBTFUL if verdict is ShotVerdict.GOOD else verdict, (*reasons, *left)
     if verdict is ShotVerdict.REFUSED:
