@@ -189,7 +189,7 @@ class RunMeasurement:
         threads : int
             The droplets do not depend on it.
         should_stop : callable
-            Asked before each exposure.
+            Asked before each exposure and each round of the search.
 
         Raises
         ------
@@ -218,12 +218,17 @@ class RunMeasurement:
         return {"shot": shot, "grid": grid, "recipe_sha256": recipe, "exposures": json.dumps(exposures)}
 
     def _exposure(self, shot: Shot, frame: FrameName, threads: int, should_stop: Callable[[], bool]) -> Exposure:
-        if should_stop():
-            raise Stopped(f"{self.run.run_dir.name}, shot {shot.index}: stopped before exposure {frame}")
+        def before_round() -> None:
+            if should_stop():
+                raise Stopped(f"{self.run.run_dir.name}, shot {shot.index}: stopped in exposure {frame}")
+
+        before_round()
         twins, seed = self.settings.twins, self.settings.seed + shot.index
         if self.settings.polarity == "bright":
             images = bright_images(self.run, shot, frame, self.references)
-            return measure_bright(images, self.search, twins=twins, seed=seed, threads=threads)
+            return measure_bright(
+                images, self.search, twins=twins, seed=seed, threads=threads, before_round=before_round
+            )
         images, trust = shadow_images(self.run, shot, frame, self.references)
         known = without_ignored(dict(zip(shot.views, trust, strict=True)), self.settings.ignored)
         return measure_shadows(
@@ -234,6 +239,7 @@ class RunMeasurement:
             twins=twins,
             seed=seed,
             threads=threads,
+            before_round=before_round,
         )
 
 

@@ -6,7 +6,7 @@ are re-estimated meanwhile. Ghosts are mostly faint: when a fit has come to rest
 and found anew, and ghosts do not come back.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,7 +14,7 @@ from scipy.ndimage import maximum_filter
 from scipy.spatial import cKDTree
 
 from processing.analysis.droplets.candidates import candidates, close_pairs, foremost
-from processing.analysis.droplets.droplet_search import CANDIDATE_PITCH_VOXEL, DropletSearch
+from processing.analysis.droplets.droplet_search import CANDIDATE_PITCH_VOXEL, DropletSearch, keep_on
 from processing.analysis.droplets.gaussian_blobs import BlobImages, BlobOptics, Blobs, Image
 from processing.analysis.droplets.point_spread import first_optics, refined_optics
 from processing.geometry import FloatArray
@@ -84,7 +84,7 @@ class BrightFit:
         return replace(self, blobs=self.blobs.where(self.blobs.amplitudes > amplitude))
 
 
-def find_bright(shot: BlobImages, search: DropletSearch) -> BrightFit:
+def find_bright(shot: BlobImages, search: DropletSearch, before_round: Callable[[], None] = keep_on) -> BrightFit:
     """Find the droplets of one exposure.
 
     Parameters
@@ -93,11 +93,14 @@ def find_bright(shot: BlobImages, search: DropletSearch) -> BrightFit:
         Images whose noise is 1, with the lattice of the search.
     search : DropletSearch
         Where to look: it must hold every droplet that all views show.
+    before_round : callable
+        Called before each round; what it raises ends the search.
     """
     optics = first_optics(shot.images)
     fit = BrightFit(Blobs.none(), optics, _first_scale(shot.images, optics))
     number, purges, before, known = 0, PURGES, np.inf, np.inf
     for _ in range(MOST_ROUNDS):
+        before_round()
         fit, left = _round(shot, search, fit, number)
         at_rest = number >= FALLING_ROUNDS and left > (1 - LEAST_GAIN) * before
         number, before = number + 1, left

@@ -1,12 +1,12 @@
 """Bright particles of one exposure, measured: droplets, what the views look like, and whether to believe it."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from processing.analysis.droplets.bright_finder import MODEL_SHARE, BrightFit, find_bright, rms, rms_of
-from processing.analysis.droplets.droplet_search import DropletSearch
+from processing.analysis.droplets.droplet_search import DropletSearch, keep_on
 from processing.analysis.droplets.droplet_table import Droplets
 from processing.analysis.droplets.gaussian_blobs import BlobImages, BlobOptics, Blobs, Image
 from processing.analysis.droplets.ghost_share import GhostShare, pooled
@@ -58,7 +58,13 @@ BrightExposure = MeasuredExposure[Droplets, SeenView]
 
 
 def measure_bright(
-    images: Sequence[Image], search: DropletSearch, *, twins: int = 0, seed: int = 0, threads: int = DEFAULT_THREADS
+    images: Sequence[Image],
+    search: DropletSearch,
+    *,
+    twins: int = 0,
+    seed: int = 0,
+    threads: int = DEFAULT_THREADS,
+    before_round: Callable[[], None] = keep_on,
 ) -> BrightExposure:
     """Measure the bright particles of one exposure.
 
@@ -74,6 +80,8 @@ def measure_bright(
         Of the twins.
     threads : int
         The result does not depend on it.
+    before_round : callable
+        Called before each round of the search; what it raises ends it.
 
     Raises
     ------
@@ -90,7 +98,7 @@ def measure_bright(
         search.lattice,
         threads,
     )
-    fit = find_bright(shot, search)
+    fit = find_bright(shot, search, before_round)
     residuals = shot.residuals(fit.optics, fit.blobs)
     left = np.array([noise_of(residual) for residual in residuals])
     ratio = rms(residuals) / rms_of(np.maximum(left, MODEL_SHARE * fit.scale * fit.optics.gains))
@@ -104,7 +112,7 @@ def measure_bright(
     if not twins or verdict is not ShotVerdict.GOOD:
         return told
     rng = np.random.default_rng(seed)
-    return judged_by_twins(told, pooled(_twin_ghosts(shot, fit, search, left, rng) for _ in range(twins)))
+    return judged_by_twins(told, pooled(_twin_ghosts(shot, fit, search, left, rng, before_round) for _ in range(twins)))
 
 
 def _seen(optics: BlobOptics, noises: FloatArray, left: FloatArray, names: Sequence[str]) -> dict[str, SeenView]:
@@ -144,7 +152,12 @@ def _droplets(
 
 
 def _twin_ghosts(
-    shot: BlobImages, fit: BrightFit, search: DropletSearch, left: FloatArray, rng: np.random.Generator
+    shot: BlobImages,
+    fit: BrightFit,
+    search: DropletSearch,
+    left: FloatArray,
+    rng: np.random.Generator,
+    before_round: Callable[[], None],
 ) -> GhostShare:
     """Ghosts of a twin: the droplets moved, drawn, made noisy, and found again."""
     truth = Blobs(moved(fit.blobs.positions_voxel, search, rng), fit.blobs.amplitudes)
@@ -152,5 +165,5 @@ def _twin_ghosts(
         (image + np.float32(offset) + rng.normal(0, noise, image.shape)).astype(np.float32)
         for image, offset, noise in zip(shot.drawn(fit.optics, truth), fit.optics.offsets, left, strict=True)
     )
-    found = find_bright(replace(shot, images=images), search).blobs
+    found = find_bright(replace(shot, images=images), search, before_round).blobs
     return ghosts_within(found.positions_voxel, truth.positions_voxel, search)

@@ -21,6 +21,12 @@ MARGIN_VOXEL = 20
 LEAST_PX_PER_VOXEL, MOST_PX_PER_VOXEL = 0.4, 1.3
 HULL_SHIFT = 4
 """Bits of a pixel to which outlines in images are drawn."""
+
+
+def keep_on() -> None:
+    """Before a round of a search, who waits may raise what ends it; this one does not."""
+
+
 CANDIDATE_PITCH_VOXEL = 1.5
 """Candidates need be no nearer to their droplet: the fit moves them."""
 

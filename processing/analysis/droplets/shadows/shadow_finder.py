@@ -11,6 +11,7 @@ views support them alone. Ghosts do not come back; so it goes on until no more d
 comes to rest.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from processing.analysis.droplets.candidates import foremost
-from processing.analysis.droplets.droplet_search import CANDIDATE_PITCH_VOXEL, DropletSearch
+from processing.analysis.droplets.droplet_search import CANDIDATE_PITCH_VOXEL, DropletSearch, keep_on
 from processing.analysis.droplets.gaussian_blobs import Image
 from processing.analysis.droplets.shadows.disc_optics import first_disc_optics, refined_disc_optics
 from processing.analysis.droplets.shadows.disc_supports import DiscSupports, supporting_views, undisputed
@@ -75,7 +76,12 @@ SWEEPS = (Sweeps(4, move=False, tolerance=0.01), Sweeps(8, tolerance=0.01))
 FINAL_SWEEPS = Sweeps(30, tolerance=3e-4)
 
 
-def find_shadows(shot: Transmissions, search: DropletSearch, light: Light = "estimated") -> ShadowFit:
+def find_shadows(
+    shot: Transmissions,
+    search: DropletSearch,
+    light: Light = "estimated",
+    before_round: Callable[[], None] = keep_on,
+) -> ShadowFit:
     """Find the droplets of one exposure.
 
     Parameters
@@ -86,12 +92,14 @@ def find_shadows(shot: Transmissions, search: DropletSearch, light: Light = "est
         Where to look: it must hold every droplet that the views show.
     light : float | "estimated" | "incoherent"
         Numerical aperture of the light over that of the lens; estimated once most droplets are known.
+    before_round : callable
+        Called before each round; what it raises ends the search.
     """
     optics = first_disc_optics(shot.images)
     if not isinstance(light, str):
         optics = replace(optics, condenser_ratio=light)
     fit = ShadowFit(Discs.none(), optics, shot.noises_of(shot.images))
-    finder = _Finder(shot, search)
+    finder = _Finder(shot, search, before_round)
     for number, smooth_px in enumerate(COARSE_PX):
         fit = finder.round(fit, Stage(smooth_px, COARSE_SHARE, coarse=True), estimate=number > 0)
     fit = finder.fallen(fit, FIRST, FALLING_ROUNDS, joker=False)
@@ -120,8 +128,9 @@ def in_incoherent_light(shot: Transmissions, search: DropletSearch, fit: ShadowF
 class _Finder:
     """The rounds of a search, all with the same images."""
 
-    def __init__(self, shot: Transmissions, search: DropletSearch) -> None:
+    def __init__(self, shot: Transmissions, search: DropletSearch, before_round: Callable[[], None] = keep_on) -> None:
         self._shot = shot
+        self._before_round = before_round
         self._search = search
         self._into_grid = shot.cut(search.pixels_into_grid())
         self._last: tuple[Discs, DiscOptics, list[Image]] | None = None
@@ -158,11 +167,13 @@ class _Finder:
 
     def relit(self, fit: ShadowFit, condenser_ratio: float | None) -> ShadowFit:
         """The same in other light, fitted to it."""
+        self._before_round()
         fit = relit(fit, condenser_ratio, self._shot.lattice.pixels_per_voxel)
         return self._estimated(self._fitted(fit, Stage(SHARP_PX, _last(fit))), unite=False)
 
     def round(self, fit: ShadowFit, stage: Stage, *, estimate: bool, unite: bool = False) -> ShadowFit:
         """Candidates enter, all are fitted, some are dropped; then optics and defects are estimated anew."""
+        self._before_round()
         fit = self._fitted(self._joined(fit, stage), stage)
         if stage.joker and len(fit.discs):
             least = np.clip(self._knowing(fit), 1, judging_views(len(self._shot.images)))
@@ -253,12 +264,10 @@ class _Finder:
         return knowing_views(self._shot, fit, fit.discs.positions_voxel)
 
     def _chi_squared(self, fit: ShadowFit) -> float:
-        drawn = self._drawn(fit)
-        return chi_squared(seen_by(self._shot, fit, drawn), drawn)
+        return chi_squared(self._seen(fit), self._drawn(fit))
 
     def _left(self, fit: ShadowFit) -> float:
-        drawn = self._drawn(fit)
-        return rms_over_noise(seen_by(self._shot, fit, drawn), drawn)
+        return rms_over_noise(self._seen(fit), self._drawn(fit))
 
     def _drawn(self, fit: ShadowFit) -> list[Image]:
         """Transmissions of its discs; the last ones are kept, because a round asks for the same ones again."""

@@ -1,12 +1,12 @@
 """Shadows of one exposure, measured: droplets with their sizes, what the views look like, and whether to believe it."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from processing.analysis.droplets.droplet_search import DropletSearch
+from processing.analysis.droplets.droplet_search import DropletSearch, keep_on
 from processing.analysis.droplets.droplet_table import SizedDroplets
 from processing.analysis.droplets.gaussian_blobs import Image
 from processing.analysis.droplets.ghost_share import GhostShare, pooled
@@ -91,6 +91,7 @@ def measure_shadows(
     twins: int = 0,
     seed: int = 0,
     threads: int = DEFAULT_THREADS,
+    before_round: Callable[[], None] = keep_on,
 ) -> ShadowExposure:
     """Measure the droplets of one exposure of shadows.
 
@@ -110,6 +111,8 @@ def measure_shadows(
         Of the twins.
     threads : int
         The result does not depend on it.
+    before_round : callable
+        Called before each round of the search; what it raises ends it.
 
     Raises
     ------
@@ -125,12 +128,12 @@ def measure_shadows(
     known_shadows = [(1 - image) * np.sqrt(one) for image, one in zip(shot.images, shot.trust, strict=True)]
     if blind := blind_views(known_shadows, shot.noises_of(shot.images), search.names):
         return MeasuredExposure(SizedDroplets.none(), {}, None, *blind_verdict(blind, search.names))
-    fit = find_shadows(shot, search, light)
+    fit = find_shadows(shot, search, light, before_round)
     told = judged_by_volume(_told(shot, fit, search))
     if not twins or told.verdict is not ShotVerdict.GOOD:
         return told
     rng = np.random.default_rng(seed)
-    return judged_by_twins(told, pooled(_twin_ghosts(shot, fit, search, rng) for _ in range(twins)))
+    return judged_by_twins(told, pooled(_twin_ghosts(shot, fit, search, rng, before_round) for _ in range(twins)))
 
 
 def _refused(*reasons: str) -> ShadowExposure:
@@ -256,7 +259,13 @@ def _droplets(
     )
 
 
-def _twin_ghosts(shot: Transmissions, fit: ShadowFit, search: DropletSearch, rng: np.random.Generator) -> GhostShare:
+def _twin_ghosts(
+    shot: Transmissions,
+    fit: ShadowFit,
+    search: DropletSearch,
+    rng: np.random.Generator,
+    before_round: Callable[[], None],
+) -> GhostShare:
     """Ghosts of a twin: the droplets moved, united, made noisy, and found again."""
     recorded, truth = _recorded(shot), Discs(moved(fit.discs.positions_voxel, search, rng), fit.discs.squares_voxel2)
     defects = union_defects(recorded, fit.optics, truth)
@@ -267,5 +276,5 @@ def _twin_ghosts(shot: Transmissions, fit: ShadowFit, search: DropletSearch, rng
     )
     trust = replace(shot, trust=tuple(map(np.ones_like, images))).masked(fit.masks).trust
     light: Light = fit.optics.condenser_ratio or "incoherent"
-    found = find_shadows(replace(shot, images=images, trust=trust), search, light).discs
+    found = find_shadows(replace(shot, images=images, trust=trust), search, light, before_round).discs
     return ghosts_within(found.positions_voxel, truth.positions_voxel, search)

@@ -149,7 +149,8 @@ def test_the_page_tells_numbers_with_intervals_and_reasons(measured: Serving) ->
     assert told["detail"] == f"{job['result']['droplets']} droplets, good"
 
 
-def test_a_measurement_can_be_aborted_between_exposures(measured: Serving, tmp_path: Path) -> None:
+@pytest.mark.parametrize("before", [0, 3])
+def test_a_measurement_can_be_aborted_in_any_round(measured: Serving, tmp_path: Path, before: int) -> None:
     data_dir = measured.services.data_dir
     job = {
         "run_dir": str(data_dir / "bright"),
@@ -158,6 +159,7 @@ def test_a_measurement_can_be_aborted_between_exposures(measured: Serving, tmp_p
         "results_dir": str(tmp_path / "out"),
         "settings": REQUEST["settings"],
     }
-    with pytest.raises(Stopped, match="shot 0: stopped before exposure a"):
-        measure_shot(job, lambda: True)
+    asked = iter([False] * before + [True])
+    with pytest.raises(Stopped, match="shot 0: stopped in exposure a"):
+        measure_shot(job, lambda: next(asked))
     assert not list((tmp_path / "out").glob("*.h5"))
