@@ -111,7 +111,7 @@ def _act(generator: PulseGenerator, timing: ShotTiming, operator: Operator, name
 
 def _silence(generator: PulseGenerator, timing: ShotTiming, operator: Operator) -> str:
     generator.configure(timing)
-    _await(operator, "ten shots a second follow, and this program says nothing more: dark after three seconds?")
+    _await(operator, "ten shots a second follow, and this program says nothing more: they must end after three seconds")
     _arm(generator, 2 * SILENCE_S)
     time.sleep(SILENCE_S)
     faults = generator.status().faults

@@ -192,10 +192,10 @@ def _checks(config: "RigConfig", *, light: bool) -> "Iterator[Check]":
 
 
 class _Terminal:
-    """Somebody who reads and types."""
+    """Somebody who reads and types: light follows an empty line, and no other answer."""
 
     def ready(self, task: str) -> bool:
-        return not self._asked(f"{task}. Enter: ready; s: leave it out").startswith("s")
+        return not self._asked(f"{task}. Enter: ready; s: leave it out")
 
     def confirms(self, question: str) -> bool:
         return self._asked(f"{question} y or n").startswith("y")
@@ -203,7 +203,9 @@ class _Terminal:
     @staticmethod
     def _asked(question: str) -> str:
         progress(question)
-        return sys.stdin.readline().strip().lower()
+        if answer := sys.stdin.readline():
+            return answer.strip().lower()
+        raise PlanError("nobody answers, standard input has ended: light is fired only where somebody looks")
 
 
 def scope(options: Namespace) -> Outcome:
@@ -229,12 +231,9 @@ def scope(options: Namespace) -> Outcome:
     files["svg"].write_bytes(picture(figure, "svg"))
     files["png"].write_bytes(picture(figure, "png"))
     views = timing_table(requested, actual)
-    result = {
-        **{kind: str(path) for kind, path in files.items()},
-        "shortest_period_ns": requested.shortest_period_ns,
-        "views": views,
-    }
-    return Outcome(result, f"{train_table(views)}\n{result['svg']}, {result['png']}")
+    saved = {kind: str(path) for kind, path in files.items()}
+    result = {**saved, "shortest_period_ns": requested.shortest_period_ns, "views": views}
+    return Outcome(result, f"{train_table(views)}\n{saved['svg']}, {saved['png']}")
 
 
 def train_table(views: dict[str, Any]) -> str:

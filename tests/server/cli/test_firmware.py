@@ -66,6 +66,23 @@ def test_selftest_with_light_asks_before_each_flash(
     assert [check["verdict"] for check in checks] == ["ok", *7 * ["skipped"]]
 
 
+def test_selftest_fires_only_where_somebody_is_ready(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("daq.drivers.pulse_light_test.WAIT_S", 0.2)
+    monkeypatch.setattr("sys.stdin", io.StringIO("no\nq\ny\n" * 9))
+    checks = result_of(capsys, "selftest", "--light", *CONFIG)["checks"][-8:]
+    assert {check["verdict"] for check in checks} == {"skipped"}
+
+
+def test_selftest_fires_nothing_where_nobody_answers(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("daq.drivers.pulse_light_test.WAIT_S", 0.2)
+    monkeypatch.setattr("sys.stdin", io.StringIO(""))
+    assert "nobody answers" in result_of(capsys, "selftest", "--light", *CONFIG, status=2)["error"]
+
+
 def test_a_failed_selftest_shows_in_the_exit_status(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
