@@ -122,6 +122,7 @@ def _interlock() -> Iterator[Part]:
         for end, side in ((1, "FUSED"), (2, "SWITCHED"))
     )
     yield _part("K2", "contactor", ("A1", "COIL", "passive", "CONTACTOR"), ("A2", "COIL", "passive", "GND"), *poles)
+    yield _two("D1", "diode of the coil", "GND", "CONTACTOR")
     yield _two("S1", "emergency stop, second contact", "+3V3", "ESTOP_CONTACT")
     for number, (contact, net) in enumerate((("CHAIN", "INTERLOCK"), ("ESTOP_CONTACT", "ESTOP"))):
         yield _two(f"R{4 + 2 * number}", "1k", contact, net)
@@ -152,7 +153,7 @@ def _isolators() -> Iterator[Part]:
     )
     yield _part(
         "U5",
-        "ISO7710",
+        "ISO7710F",
         ("1", "VCC1", "power_in", "OUTSIDE_3V3"),
         ("2", "IN", "input", "OUTSIDE_TRIGGER"),
         ("3", "VCC1", "power_in", "OUTSIDE_3V3"),
@@ -226,6 +227,7 @@ def _channel(i: int) -> Iterator[Part]:
         ("5", "OUT", "output", f"GATE_{i}"),
     )
     yield _two(f"R{first + 2}", "10k", f"SHORTENED_{i}", "GND")
+    yield _two(f"R{first + 7}", "10k", f"GATE_{i}", f"SHUNT_{i}")
     yield _part(
         f"Q{first}",
         "MOSFET 60 V, 10 mOhm",
@@ -234,7 +236,8 @@ def _channel(i: int) -> Iterator[Part]:
         ("S", "S", "passive", f"SHUNT_{i}"),
     )
     yield _two(f"R{first + 3}", "shunt 10m", f"SHUNT_{i}", "GND")
-    yield _two(f"D{first}", "LED", f"BANK_{i}", f"CATHODE_{i}")
+    yield _two(f"R{first + 6}", "limit 0.9, pulses", f"BANK_{i}", f"ANODE_{i}")
+    yield _two(f"D{first}", "LED", f"ANODE_{i}", f"CATHODE_{i}")
     yield _two(f"F{first}", "fuse, slow", "+24V", f"FUSED_{i}")
     yield _two(f"R{first + 4}", "charge 100, 10 W", f"SWITCHED_{i}", f"BANK_{i}")
     yield _two(f"C{first + 1}", "470u", f"BANK_{i}", "GND")

@@ -175,11 +175,25 @@ def test_light_goes_through_interlock_and_one_shot_to_its_led(channel: int) -> N
     assert nets_of(one("shunt 10m", switch["S"])) == {"1": switch["S"], "2": "GND"}
     led = nets_of(one("LED", switch["D"]))
     assert led["2"] == switch["D"]
-    sources = {pin.value for pin in NETLIST[led["1"]]} - {"LED", "470u", "10u, ceramic", "bleeder 47k"}
+    assert {pin.value for pin in NETLIST[led["1"]]} == {"LED", "limit 0.9, pulses"}, "nothing else bounds its current"
+    (bank,) = set(nets_of(one("limit 0.9, pulses", led["1"])).values()) - {led["1"]}
+    sources = {pin.value for pin in NETLIST[bank]} - {"limit 0.9, pulses", "470u", "10u, ceramic", "bleeder 47k"}
     assert sources == {"charge 100, 10 W"}, "all energy comes through the resistor"
-    charge = nets_of(one("charge 100, 10 W", led["1"]))
-    (pole,) = set(charge.values()) - {led["1"]}
-    assert {pin.part for pin in NETLIST[pole]} == {"K2", one("charge 100, 10 W", led["1"])}, "behind the contactor"
+    charge = nets_of(one("charge 100, 10 W", bank))
+    (pole,) = set(charge.values()) - {bank}
+    assert {pin.part for pin in NETLIST[pole]} == {"K2", one("charge 100, 10 W", bank)}, "behind the contactor"
+
+
+@pytest.mark.parametrize("channel", range(4))
+def test_a_switch_without_its_driver_is_open(channel: int) -> None:
+    switch = one("MOSFET 60 V, 10 mOhm", f"GATE_{channel}")
+    assert nets_of(one("10k", f"GATE_{channel}"))["2"] == NET_OF[switch, "S"]
+
+
+def test_what_loses_its_supply_gives_no_edge() -> None:
+    """The isolators without F go high then, which is rest on a serial line, and a shot on the trigger line."""
+    assert NET_OF[one("ISO7710F", "TRIGGER"), "6"] == "TRIGGER"
+    assert NET_OF[one("ISO7721", "UART_RX"), "2"] == "UART_RX"
 
 
 @pytest.mark.parametrize("line", [f"{kind}_{i}" for kind in ("LIGHT", "CAMERA") for i in range(4)])
