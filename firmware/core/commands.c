@@ -64,24 +64,21 @@ static enum error set_channel(struct generator *generator, const uint32_t *field
     return error;
 }
 
-static void note_limits(uint32_t *values, uint32_t number, struct channel_limits limits)
+_Static_assert(sizeof(struct channel_limits) == 3 * sizeof(uint32_t), "fields of LIMIT, STORE and their replies");
+
+static void note_limits(uint32_t *values, uint32_t number, const struct channel_limits *limits)
 {
     values[0] = number;
-    values[1] = limits.max_current_ma;
-    values[2] = limits.max_duty_ppm;
-    values[3] = limits.max_light_ma;
+    *(struct channel_limits *)&values[1] = limits[number];
 }
 
 static enum error limit(struct generator *generator, const uint32_t *fields, uint32_t *values)
 {
-    const struct channel_limits asked = {fields[1], fields[2], fields[3]};
-    const enum error error = safety_tighten(generator, fields[0], asked);
+    const enum error error = safety_tighten(generator, fields[0], (const struct channel_limits *)&fields[1]);
     if (!error)
-        note_limits(values, fields[0], generator->limits[fields[0]]);
+        note_limits(values, fields[0], generator->limits);
     return error;
 }
-
-_Static_assert(sizeof(struct channel_limits) * CHANNEL_COUNT == 12 * sizeof(uint32_t), "the fields of STORE");
 
 static enum error store(struct generator *generator, const uint32_t *fields, uint32_t *values)
 {
@@ -90,16 +87,17 @@ static enum error store(struct generator *generator, const uint32_t *fields, uin
     return error;
 }
 
-/* Read anew from the memory of the board, which takes its time. */
+/* Read anew from the memory of the board. */
 static enum error stored(struct generator *generator, const uint32_t *fields, uint32_t *values)
 {
     struct channel_limits limits[CHANNEL_COUNT];
-    if (generator->state == STATE_ARMED || generator->state == STATE_LIT)
-        return ERROR_NOT_SAFE;
+    const enum error error = safety_check_dark(generator);
+    if (error)
+        return error;
     if (fields[0] >= CHANNEL_COUNT)
         return ERROR_CHANNEL;
     values[0] = (uint32_t)stored_limits_read(limits);
-    note_limits(values + 1, fields[0], limits[fields[0]]);
+    note_limits(values + 1, fields[0], limits);
     return ERROR_NONE;
 }
 

@@ -8,8 +8,7 @@
 
 void generator_boot(struct generator *generator, enum cause cause)
 {
-    const uint64_t now_us = port_now_us();
-    *generator = (struct generator){.state = STATE_SAFE, .not_before_us = now_us + LONGEST_PERIOD_US};
+    *generator = (struct generator){.state = STATE_SAFE};
     safety_outputs_off(generator);
     safety_start_limits(generator);
     (void)port_take_lights(); /* of what was before */

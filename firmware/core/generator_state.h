@@ -100,9 +100,6 @@ struct generator {
     uint64_t heard_us;    /* last command of the host that was carried out */
 };
 
-/* Of any train within the absolute limits: what has forgotten the light before it waits as long. */
-enum { LONGEST_PERIOD_US = 2 * MAX_WIDTH_NS * 1000 / MAX_DUTY_PPM };
-
 static inline uint64_t later_us(uint64_t a_us, uint64_t b_us)
 {
     return a_us > b_us ? a_us : b_us;

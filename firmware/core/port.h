@@ -63,13 +63,14 @@ uint32_t port_take_lights(void);
  * each call. */
 bool port_intact(void);
 
-/* The newest words that were stored, in memory that outlasts a start; false where there never were any. Light is off
- * meanwhile, and while they are stored. */
+/* The newest words that were stored, in memory that outlasts a start; false where there never were any, which a memory that
+ * does not answer cannot tell. Light is off meanwhile, and while they are stored. */
 enum { STORED_WORDS = 16 };
 bool port_read_stored(uint32_t words[STORED_WORDS]);
 
-/* Store these behind them; false where there is no room, or they do not read back. */
-bool port_store(const uint32_t words[STORED_WORDS]);
+/* Store these behind them. Where they are not, for lack of room or for another reason, the newest are still the old ones, or
+ * damaged: the core reads them back. */
+void port_store(const uint32_t words[STORED_WORDS]);
 
 /* Bytes since boot that the line has damaged or lost; each spoils the CRC of its request. */
 struct port_line_errors {

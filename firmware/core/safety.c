@@ -4,16 +4,21 @@
 #include "shot_count.h"
 #include "sum.h"
 
+static void wait_as_after_any_light(struct generator *generator)
+{
+    const uint64_t over_us = port_now_us() + channel_limits_longest_us(generator->limits);
+    generator->not_before_us = later_us(generator->not_before_us, over_us);
+}
+
 /* Dark first. Then what the trigger input had started before is counted, and the waiting times begin. */
 void safety_outputs_off(struct generator *generator)
 {
     port_off();
     shot_count_collect(generator);
-    const uint64_t now_us = port_now_us();
     if (generator->outputs_live)
-        generator->settled_us = now_us + SETTLE_MS * 1000u;
+        generator->settled_us = port_now_us() + SETTLE_MS * 1000u;
     if (generator->state == STATE_LIT)
-        generator->not_before_us = later_us(generator->not_before_us, now_us + LONGEST_PERIOD_US);
+        wait_as_after_any_light(generator);
     generator->outputs_live = false;
     generator->permitted = false;
     generator->shots_left = 0;
@@ -81,6 +86,7 @@ void safety_start_limits(struct generator *generator)
 {
     generator->stored = stored_limits_read(generator->limits);
     generator->limits_sum = sum_of(generator->limits, sizeof generator->limits);
+    wait_as_after_any_light(generator);
     forget_train(generator);
     if (generator->stored == STORED_DAMAGED)
         safety_trip(generator, FAULT_LIMITS);
@@ -107,7 +113,7 @@ enum error safety_set_channel(struct generator *generator, uint32_t number, cons
     error = pulse_train_check_channel(requested);
     if (error)
         return error;
-    if (!channel_limits_allow(requested, &generator->limits[number]))
+    if (!channel_limits_allow(requested->current_ma, &generator->limits[number]))
         return ERROR_LIMIT;
     struct channel actual = pulse_train_quantised(requested, port_tick_ns, port_current_step_ma);
     error = pulse_train_check_channel(&actual);
@@ -144,7 +150,7 @@ enum error safety_load(struct generator *generator)
     return ERROR_NONE;
 }
 
-enum error safety_tighten(struct generator *generator, uint32_t number, struct channel_limits asked)
+enum error safety_tighten(struct generator *generator, uint32_t number, const struct channel_limits *asked)
 {
     if (gives_light(generator))
         return ERROR_NOT_SAFE;
@@ -152,35 +158,31 @@ enum error safety_tighten(struct generator *generator, uint32_t number, struct c
         return ERROR_CHANNEL;
     if (!safety_check_memory(generator))
         return ERROR_FAULT_LATCHED;
-    generator->limits[number] = channel_limits_tightened(generator->limits[number], asked);
+    channel_limits_tighten(&generator->limits[number], asked);
     generator->limits_sum = sum_of(generator->limits, sizeof generator->limits);
     generator->loaded = false;
     return ERROR_NONE;
 }
 
-static bool are_within_absolute(const struct channel_limits *limits)
+enum error safety_check_dark(const struct generator *generator)
 {
-    const struct channel_limits most = channel_limits_absolute();
-    for (int i = 0; i < CHANNEL_COUNT; i++)
-        if (limits[i].max_current_ma > most.max_current_ma || limits[i].max_duty_ppm > most.max_duty_ppm ||
-            limits[i].max_light_ma > most.max_light_ma)
-            return false;
-    return true;
+    if (gives_light(generator))
+        return ERROR_NOT_SAFE;
+    return generator->outputs_live ? ERROR_EARLY : ERROR_NONE;
 }
 
 enum error safety_store_limits(struct generator *generator, const struct channel_limits *limits)
 {
-    if (gives_light(generator))
-        return ERROR_NOT_SAFE;
-    if (!are_within_absolute(limits))
+    const enum error error = safety_check_dark(generator);
+    if (error)
+        return error;
+    if (!channel_limits_are_within_absolute(limits))
         return ERROR_STORE;
-    if (generator->outputs_live)
-        return ERROR_EARLY;
     if (!safety_check_memory(generator))
         return ERROR_FAULT_LATCHED;
-    const bool written = stored_limits_write(limits);
+    stored_limits_write(limits);
     safety_start_limits(generator);
-    return written ? ERROR_NONE : ERROR_HARDWARE;
+    return generator->limits_sum == sum_of(limits, sizeof generator->limits) ? ERROR_NONE : ERROR_HARDWARE;
 }
 
 void safety_off(struct generator *generator)

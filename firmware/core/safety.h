@@ -18,9 +18,12 @@ void safety_start_limits(struct generator *generator);
 
 /* Tighten the limits of a channel; what is larger than the present limit changes nothing. The train must be loaded
  * again. Not while ARMED or LIT. */
-enum error safety_tighten(struct generator *generator, uint32_t number, struct channel_limits asked);
+enum error safety_tighten(struct generator *generator, uint32_t number, const struct channel_limits *asked);
 
-/* Store the limits of all channels in the board, and start with them. Not while ARMED or LIT, nor under a train. */
+/* Whether the memory of the board may be asked, which takes its time: not while ARMED or LIT, nor under a train. */
+enum error safety_check_dark(const struct generator *generator);
+
+/* Store the limits of all channels in the board, and start with them. Only while dark. */
 enum error safety_store_limits(struct generator *generator, const struct channel_limits *limits);
 
 void safety_off(struct generator *generator);

@@ -22,20 +22,24 @@ static uint32_t sum_of_record(const struct record *record)
 enum stored stored_limits_read(struct channel_limits *limits)
 {
     struct record record;
-    const bool any = port_read_stored((uint32_t *)&record);
-    const bool whole = any && record.mark == MARK && record.sum == sum_of_record(&record);
-    const struct channel_limits most = channel_limits_absolute();
-    const struct channel_limits none = {0};
+    enum stored found = STORED_NONE;
+    if (port_read_stored((uint32_t *)&record))
+        found = record.mark == MARK && record.sum == sum_of_record(&record) &&
+                        channel_limits_are_within_absolute(record.limits)
+                    ? STORED_WHOLE
+                    : STORED_DAMAGED;
+    if (found == STORED_DAMAGED)
+        record = (struct record){0};
     for (int i = 0; i < CHANNEL_COUNT; i++)
-        limits[i] = whole ? record.limits[i] : any ? none : most;
-    return whole ? STORED_WHOLE : any ? STORED_DAMAGED : STORED_NONE;
+        limits[i] = found == STORED_NONE ? channel_limits_absolute() : record.limits[i];
+    return found;
 }
 
-bool stored_limits_write(const struct channel_limits *limits)
+void stored_limits_write(const struct channel_limits *limits)
 {
     struct record record = {.mark = MARK};
     for (int i = 0; i < CHANNEL_COUNT; i++)
         record.limits[i] = limits[i];
     record.sum = sum_of_record(&record);
-    return port_store((const uint32_t *)&record);
+    port_store((const uint32_t *)&record);
 }

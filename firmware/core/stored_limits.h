@@ -3,8 +3,6 @@
 #ifndef STORED_LIMITS_H
 #define STORED_LIMITS_H
 
-#include <stdbool.h>
-
 #include "channel_limits.h"
 
 enum stored {
@@ -16,7 +14,7 @@ enum stored {
 /* Of all channels; for both. */
 enum stored stored_limits_read(struct channel_limits *limits);
 
-/* False where the board has no room left, or does not read back what was written. */
-bool stored_limits_write(const struct channel_limits *limits);
+/* Whether it was written, reading tells. */
+void stored_limits_write(const struct channel_limits *limits);
 
 #endif

@@ -85,9 +85,9 @@ bool port_read_stored(uint32_t words[STORED_WORDS])
     return flash_records_read(words);
 }
 
-bool port_store(const uint32_t words[STORED_WORDS])
+void port_store(const uint32_t words[STORED_WORDS])
 {
-    return flash_records_append(words);
+    flash_records_append(words);
 }
 
 struct port_line_errors port_line_errors(void)

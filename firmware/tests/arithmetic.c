@@ -13,7 +13,8 @@ enum { TICK_NS = 8 };
 
 static void report_train(struct channel actual, struct channel_limits asked)
 {
-    const struct channel_limits limits = channel_limits_tightened(channel_limits_absolute(), asked);
+    struct channel_limits limits = channel_limits_absolute();
+    channel_limits_tighten(&limits, &asked);
     struct pulse_train train = {0};
     actual.used = true;
     train.channels[1] = actual;

@@ -11,6 +11,7 @@
 enum {
     FIRING_US = 3, /* time that port_fire takes; the light may start at its end */
     REPLY_SIZE = 512,
+    LONGEST_PERIOD_US = 20000, /* 2 pulses of 2 us at 200 ppm */
 };
 
 struct fake_port {
@@ -31,6 +32,7 @@ struct fake_port {
     uint32_t stuck_lights;
     bool damaged; /* the memory of the program */
     bool clock_wrong;
+    unsigned stores; /* how often the core has stored */
     uint32_t stored[STORED_WORDS];
     bool any_stored;
     bool store_is_full;

@@ -1,6 +1,7 @@
 /* Hostile bytes, half-right lines, clock jumps, edges of the trigger input and stops that open, the same ones for the
  * same seed, across the time at which 32 bits of microseconds wrap. After every step: no light without permission, and
- * counters that add up. The judge knows what was said and what the port saw; its limits are numbers of its own.
+ * counters that add up. The judge knows what was said and what the port saw; its limits are numbers of its own, also those
+ * that the board has to keep over a start, whose memory may be full, or damage what is written, or be damaged.
  *
  *     fuzz SEED STEPS       deterministic; with -DFUZZ_INPUT LLVMFuzzerTestOneInput, for libFuzzer and replay */
 #include <string.h>
@@ -13,11 +14,16 @@ enum { WRAP_AFTER_US = 20000000 };
 static struct protocol protocol;
 static uint64_t last_shot_us;
 static uint64_t dark_until_us[CHANNEL_COUNT]; /* what the duty of each channel demands, reckoned without the core */
-static struct limits_of_led {
+static uint64_t lit_us[CHANNEL_COUNT];        /* its newest light, and how much that was */
+static uint32_t lit_ns[CHANNEL_COUNT];
+struct limits_of_led {
     uint32_t current_ma;
     uint32_t duty_ppm;
     uint32_t light_ma;
-} leds[CHANNEL_COUNT];
+};
+static struct limits_of_led leds[CHANNEL_COUNT];
+static struct limits_of_led kept[CHANNEL_COUNT]; /* over a start */
+static enum { NONE, WHOLE, DAMAGED } memory;
 static uint64_t spoken_us; /* the last command that was carried out */
 static uint64_t pulses_us; /* the last time that the set-points of pulses stood */
 static uint32_t budget;    /* shots that were permitted and not fired */
@@ -26,7 +32,9 @@ static unsigned fired_before;
 static unsigned sequence;
 static unsigned shots;
 static unsigned lights;
+static unsigned judged_stores;
 static bool was_lit;
+static bool was_asked; /* for light, when the judge looked last: it may lapse for a while and come back */
 
 #ifdef FUZZ_INPUT
 static const uint8_t *input; /* decides instead of chance, until it is used up */
@@ -86,6 +94,24 @@ static void random_light(char *line, size_t size)
              random_below(520), random_below(3) * 100);
 }
 
+/* Limits of four LEDs; now and then one of the twelve is any number. */
+static void random_store(char *line, size_t size)
+{
+    uint32_t fields[12];
+    for (uint32_t i = 0; i < 12; i += 3) {
+        fields[i] = random_below(2) ? 20000 + random_below(10001) : random_below(30001);
+        fields[i + 1] = random_below(8) ? 150 + random_below(51) : random_below(201);
+        fields[i + 2] = random_below(501);
+    }
+    if (random_below(4) == 1)
+        fields[random_below(12)] = random_below(2) ? random_below(UINT32_MAX) : 0;
+    int length = snprintf(line, size, "STORE");
+    for (int i = 0; i < 12; i++)
+        length += snprintf(line + length, size - (size_t)length, " %u", fields[i]);
+    fake.store_is_full = random_below(16) == 1;
+    fake.store_damages = random_below(16) == 1;
+}
+
 static uint32_t smaller(uint32_t a, uint32_t b)
 {
     return a < b ? a : b;
@@ -110,12 +136,74 @@ static void judge_accepted(const char *command)
     }
 }
 
+static void start_with_kept(bool is_start)
+{
+    for (int i = 0; i < CHANNEL_COUNT; i++) {
+        leds[i] = memory == WHOLE     ? kept[i]
+                  : memory == DAMAGED ? (struct limits_of_led){0, 0, 0}
+                                      : (struct limits_of_led){30000, 200, 500};
+        const uint64_t demanded_us = leds[i].duty_ppm ? lit_us[i] + lit_ns[i] * 1000ull / leds[i].duty_ppm : 0;
+        if (is_start || dark_until_us[i] < demanded_us) /* a start forgets which limits were tightened */
+            dark_until_us[i] = demanded_us;
+    }
+}
+
+/* The core has written to the memory of the board, which it may do only when it was asked to, and may be asked. */
+static void judge_store(const char *command, bool accepted)
+{
+    static const uint32_t most[3] = {30000, 200, 500};
+    uint32_t fields[12];
+    const char *rest = command;
+    CHECK(!strncmp(command, "STORE ", 6) && answered != sequence && fake.stores == judged_stores + 1);
+    for (int i = 0; i < 12; i++) {
+        rest = strchr(rest, ' ') + 1;
+        fields[i] = (uint32_t)strtoul(rest, NULL, 10);
+        CHECK(fields[i] <= most[i % 3]);
+    }
+    judged_stores = fake.stores;
+    const bool is_same = memory == WHOLE && !memcmp(kept, fields, sizeof kept);
+    CHECK(accepted == (fake.store_is_full ? is_same : !fake.store_damages));
+    if (!fake.store_is_full) {
+        memory = fake.store_damages ? DAMAGED : WHOLE;
+        memcpy(kept, fields, sizeof kept);
+    }
+    start_with_kept(false);
+}
+
+/* What the board says that it keeps. */
+static void judge_stored(const char *reply)
+{
+    unsigned said[5];
+    const char *rest = strstr(reply, "stored=");
+    CHECK(rest && sscanf(rest, "stored=%u channel=%u max_current_ma=%u max_duty_ppm=%u max_light_ma=%u", &said[0],
+                         &said[1], &said[2], &said[3], &said[4]) == 5);
+    static const struct limits_of_led most = {30000, 200, 500}, none;
+    const struct limits_of_led *led = memory == WHOLE ? &kept[said[1]] : memory == NONE ? &most : &none;
+    CHECK(said[0] == memory && said[2] == led->current_ma && said[3] == led->duty_ppm && said[4] == led->light_ma);
+}
+
+static void say(const char *command)
+{
+    char body[3 * MAX_LINE];
+    sequence += random_below(8) != 0; /* now and then the same number again */
+    snprintf(body, sizeof body, "%u %s", sequence % 65536, command);
+    const char *reply = exchange(&protocol, body);
+    const bool accepted = strstr(reply, " OK");
+    if (fake.stores != judged_stores)
+        judge_store(command, accepted);
+    else
+        CHECK(!accepted || strncmp(command, "STORE ", 6) || answered == sequence);
+    if (accepted && !strncmp(command, "STORED ", 7) && answered != sequence)
+        judge_stored(reply);
+    if (accepted)
+        judge_accepted(command);
+}
+
 static void random_command(void)
 {
     static const char *const words[] = {"NEW", "LOAD", "FIRE", "FIRE", "FIRE", "STATUS", "BEAT", "OFF", "CLEAR", "ID"};
-    char command[MAX_LINE];
-    char body[2 * MAX_LINE];
-    const uint32_t choice = random_below(19);
+    char command[2 * MAX_LINE];
+    const uint32_t choice = random_below(21);
     if (choice < 4)
         random_channel(command, sizeof command);
     else if (choice < 6)
@@ -126,13 +214,13 @@ static void random_command(void)
         random_light(command, sizeof command);
     else if (choice == 8)
         snprintf(command, sizeof command, "SHOT %u", random_below(5));
+    else if (choice == 9 && random_below(4) == 1)
+        random_store(command, sizeof command);
+    else if (choice <= 10)
+        snprintf(command, sizeof command, "STORED %u", random_below(5));
     else
-        snprintf(command, sizeof command, "%s", words[choice - 9]);
-    sequence += random_below(8) != 0; /* now and then the same number again */
-    snprintf(body, sizeof body, "%u %s", sequence % 65536, command);
-    const char *reply = exchange(&protocol, body);
-    if (strstr(reply, " OK"))
-        judge_accepted(command);
+        snprintf(command, sizeof command, "%s", words[choice - 11]);
+    say(command);
 }
 
 static void let_time_pass(void)
@@ -151,8 +239,9 @@ static void check_duty(void)
             continue;
         CHECK(fake.now_us >= dark_until_us[i] && channel->current_ma <= leds[i].current_ma);
         CHECK(channel->current_ma % 10 == 0 && leds[i].duty_ppm > 0);
-        const uint64_t lit_ns = (uint64_t)channel->a_width_ns + channel->b_width_ns;
-        dark_until_us[i] = fake.now_us + lit_ns * 1000 / leds[i].duty_ppm;
+        lit_us[i] = fake.now_us;
+        lit_ns[i] = channel->a_width_ns + channel->b_width_ns;
+        dark_until_us[i] = fake.now_us + lit_ns[i] * 1000ull / leds[i].duty_ppm;
     }
 }
 
@@ -186,32 +275,35 @@ static void check_light(void)
 {
     CHECK(protocol.generator.state == STATE_LIT && fake.prepared);
     CHECK(fake.interlock_closed && fake.estop_closed && fake.now_us - spoken_us <= 3000000);
-    CHECK(was_lit || pulses_us == 0 || fake.now_us - pulses_us >= 20000);
+    CHECK(was_asked || pulses_us == 0 || fake.now_us - pulses_us >= 20000);
     for (int i = 0; i < CHANNEL_COUNT; i++) {
         if (!fake.light_ma[i])
             continue;
         CHECK(fake.light_ma[i] <= leds[i].light_ma && fake.light_ma[i] <= leds[i].current_ma);
-        CHECK(leds[i].duty_ppm > 0 && (was_lit || fake.now_us >= dark_until_us[i]));
-        dark_until_us[i] = fake.now_us + 20000;
+        CHECK(leds[i].duty_ppm > 0 && (was_asked || fake.now_us >= dark_until_us[i]));
+        lit_us[i] = fake.now_us;
+        lit_ns[i] = 4000;
+        dark_until_us[i] = fake.now_us + lit_ns[i] * 1000ull / leds[i].duty_ppm;
     }
 }
 
-static void forget_limits(void)
+static void forget(void)
 {
-    for (int i = 0; i < CHANNEL_COUNT; i++)
-        leds[i] = (struct limits_of_led){30000, 200, 500};
+    start_with_kept(true);
     budget = 0;
     answered = UINT32_MAX; /* none */
 }
 
+/* Sometimes with a bit of its memory flipped: one of those that tell. */
 static void restart(void)
 {
-    protocol_boot(&protocol, protocol.boot + 1, CAUSE_POWER);
+    if (random_below(4) == 1 && memory == WHOLE) {
+        fake.stored[random_below(STORED_WORDS - 2)] ^= 1u << random_below(32);
+        memory = DAMAGED;
+    }
+    protocol_boot(&protocol, protocol.boot + 1, random_below(4) ? CAUSE_POWER : CAUSE_WATCHDOG);
     fake.fired = fired_before = 0;
-    for (int i = 0; i < CHANNEL_COUNT; i++) /* limits that were tightened are forgotten, the absolute ones are not */
-        if (dark_until_us[i] > fake.now_us + 20000)
-            dark_until_us[i] = fake.now_us + 20000;
-    forget_limits();
+    forget();
     CHECK(!fake.live);
 }
 
@@ -224,6 +316,7 @@ static void check_invariants(void)
     CHECK(generator->state != STATE_ARMED ||
           (fake.live && generator->shots_left > 0 && !pulse_train_check(&generator->train)));
     CHECK(generator->state != STATE_FAULT || !fake.live);
+    CHECK(memory != DAMAGED || generator->faults & FAULT_LIMITS);
     CHECK(!fake.permitted || (generator->state == STATE_ARMED && generator->source == SOURCE_EXTERNAL));
     CHECK(generator->state != STATE_LIT || (fake.live && fake.prepared));
     CHECK(fake.fired - fired_before <= 1);
@@ -233,6 +326,7 @@ static void check_invariants(void)
         check_light();
     lights += fake_lit() && !was_lit;
     was_lit = fake_lit();
+    was_asked = generator->state == STATE_LIT;
     if (fake.fired != fired_before) {
         check_shot();
         last_shot_us = fake.now_us;
@@ -244,13 +338,15 @@ static void begin(void)
 {
     fake_reset();
     fake.now_us = BEFORE_WRAP_US;
-    forget_limits();
+    memory = NONE;
+    memset(lit_us, 0, sizeof lit_us);
+    memset(lit_ns, 0, sizeof lit_ns);
+    forget();
     spoken_us = pulses_us = 0;
     protocol_boot(&protocol, 1, CAUSE_POWER);
-    fired_before = sequence = shots = lights = 0;
-    was_lit = false;
+    fired_before = sequence = shots = lights = judged_stores = 0;
+    was_lit = was_asked = false;
     last_shot_us = 0;
-    memset(dark_until_us, 0, sizeof dark_until_us);
 }
 
 /* The port's interrupt is quicker than the core. */
@@ -276,9 +372,25 @@ static void trigger_edge(void)
     protocol_poll(&protocol); /* counts it */
 }
 
+/* What leads to shots, without chance in between. */
+static void session(void)
+{
+    char command[MAX_LINE];
+    say("CLEAR");
+    say("NEW");
+    for (uint32_t count = 1 + random_below(3); count > 0; count--) {
+        random_channel(command, sizeof command);
+        say(command);
+    }
+    say("LOAD");
+    check_invariants();
+    random_arm(command, sizeof command);
+    say(command);
+}
+
 static void step(void)
 {
-    const uint32_t choice = random_below(36);
+    const uint32_t choice = random_below(38);
     if (choice == 0)
         random_bytes();
     else if (choice == 1)
@@ -287,10 +399,12 @@ static void step(void)
         let_time_pass();
     else if (choice < 12)
         trigger_edge();
+    else if (choice == 12)
+        session();
     else
         random_command();
     check_invariants();
-    if (random_below(3000) == 1) {
+    if (random_below(300) == 1) {
         shots += fake.fired;
         restart();
     }

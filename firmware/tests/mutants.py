@@ -67,7 +67,7 @@ def load_mutants() -> list[Mutant]:
     return [Mutant(**entry) for file in files for entry in tomllib.loads(file.read_text())["mutant"]]
 
 
-def killer_of(mutant: Mutant | None, sanitizers: str | None = None) -> str | None:
+def killer_of(mutant: Mutant | None, sanitizers: str | None = None, only: str = "") -> str | None:
     """First check that fails on a core with this fault, or on the healthy one; None if none does.
 
     Parameters
@@ -76,6 +76,8 @@ def killer_of(mutant: Mutant | None, sanitizers: str | None = None) -> str | Non
         The fault; None for the healthy core.
     sanitizers : str or None
         Options of the compiler in the place of the Makefile's; an empty text compiles three times as fast.
+    only : str
+        The one program that is to find a fault of the core; empty for all.
 
     Raises
     ------
@@ -89,7 +91,7 @@ def killer_of(mutant: Mutant | None, sanitizers: str | None = None) -> str | Non
             mutant.apply(copy)
             if mutant.tests:
                 return _killer_of_images(copy, [mutant.tests])
-        return _killer_of_core(copy, sanitizers)
+        return _killer_of_core(copy, sanitizers, only)
 
 
 def killer_of_healthy_images(mutants: Sequence[Mutant]) -> str | None:
@@ -101,11 +103,13 @@ def killer_of_healthy_images(mutants: Sequence[Mutant]) -> str | None:
         return _killer_of_images(copy, nodes) if nodes else None
 
 
-def _killer_of_core(firmware: Path, sanitizers: str | None) -> str | None:
+def _killer_of_core(firmware: Path, sanitizers: str | None, only: str) -> str | None:
     tests = firmware / "tests"
     vectors = (tests / "golden_vectors.txt").read_text()
     programs = [(source.stem, (), "") for source in sorted(tests.glob("test_*.c"))]
     for program, arguments, stdin in [*programs, ("run_vectors", (), vectors), ("fuzz", ("1", FUZZ_STEPS), "")]:
+        if only not in ("", program):
+            continue
         built = _build(firmware, program, sanitizers)
         if failure := _failure(built, arguments, stdin):
             return failure

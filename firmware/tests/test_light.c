@@ -62,15 +62,15 @@ static void test_current_and_time_have_bounds(void)
 static void test_the_limits_of_an_led_bind_it_too(void)
 {
     boot();
-    CHECK(!safety_tighten(&generator, 2, (struct channel_limits){UINT32_MAX, UINT32_MAX, 300}) &&
+    CHECK(!safety_tighten(&generator, 2, &(struct channel_limits){UINT32_MAX, UINT32_MAX, 300}) &&
           light_of(301) == ERROR_LIMIT);
-    CHECK(!safety_tighten(&generator, 2, (struct channel_limits){200, UINT32_MAX, UINT32_MAX}) &&
+    CHECK(!safety_tighten(&generator, 2, &(struct channel_limits){200, UINT32_MAX, UINT32_MAX}) &&
           light_of(201) == ERROR_LIMIT);
     CHECK(light_of(200) == ERROR_NONE);
-    CHECK(safety_tighten(&generator, 2, (struct channel_limits){1, 1, 1}) == ERROR_NOT_SAFE);
+    CHECK(safety_tighten(&generator, 2, &(struct channel_limits){1, 1, 1}) == ERROR_NOT_SAFE);
     safety_off(&generator);
     wait_us(LONGEST_PERIOD_US);
-    CHECK(!safety_tighten(&generator, 2, (struct channel_limits){200, 0, 200}) && light_of(1) == ERROR_LIMIT);
+    CHECK(!safety_tighten(&generator, 2, &(struct channel_limits){200, 0, 200}) && light_of(1) == ERROR_LIMIT);
 }
 
 static void test_it_ends_by_itself_when_its_time_is_over(void)
@@ -146,7 +146,7 @@ static void test_it_never_meets_the_set_points_of_pulses(void)
 static void test_it_waits_for_the_period_of_the_last_shot(void)
 {
     boot();
-    CHECK(!safety_tighten(&generator, 0, (struct channel_limits){UINT32_MAX, 10, UINT32_MAX}));
+    CHECK(!safety_tighten(&generator, 0, &(struct channel_limits){UINT32_MAX, 10, UINT32_MAX}));
     load_and_arm();
     CHECK(shooting_fire(&generator) == ERROR_NONE); /* 1 us at 10 ppm: 100 ms */
     safety_off(&generator);

@@ -279,6 +279,14 @@ static void test_stored_limits_are_not_read_while_there_can_be_light(void)
     fake.now_us += 100000;
     CHECK_REPLY("7 LIGHT 1000 100 0 0 0", "7 3 OK state=3");
     CHECK_REPLY("8 STORED 0", "8 3 ERR 6");
+    boot();
+    ASK("1 " CHANNEL_0);
+    CHECK_REPLY("2 LOAD", "2 3 OK train=1 length_ns=27400 period_us=10000");
+    CHECK_REPLY("3 ARM 1 0 0", "3 3 OK train=1 shots_left=1");
+    CHECK_REPLY("4 FIRE", "4 3 OK fired=1 train=1 shots_left=0");
+    CHECK_REPLY("5 STORED 0", "5 3 ERR 10"); /* the last train is still under way */
+    fake.now_us += MIN_PERIOD_US;
+    CHECK_REPLY("6 STORED 0", "6 3 OK stored=0 channel=0 max_current_ma=30000 max_duty_ppm=200 max_light_ma=500");
 }
 
 static void test_a_refused_line_is_not_done_again_either(void)

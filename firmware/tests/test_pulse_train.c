@@ -166,11 +166,12 @@ static void test_a_train_is_over_before_the_next_one(void)
 static void test_limits_only_become_tighter(void)
 {
     const struct channel_limits widest = {UINT32_MAX, UINT32_MAX, UINT32_MAX};
-    struct channel_limits limits = channel_limits_tightened(channel_limits_absolute(), widest);
+    struct channel_limits limits = channel_limits_absolute();
+    channel_limits_tighten(&limits, &widest);
     CHECK(limits.max_current_ma == MAX_CURRENT_MA && limits.max_duty_ppm == MAX_DUTY_PPM);
-    limits = channel_limits_tightened(limits, (struct channel_limits){12000, UINT32_MAX, UINT32_MAX});
+    channel_limits_tighten(&limits, &(struct channel_limits){12000, UINT32_MAX, UINT32_MAX});
     CHECK(limits.max_current_ma == 12000 && limits.max_duty_ppm == MAX_DUTY_PPM);
-    limits = channel_limits_tightened(limits, (struct channel_limits){12001, 50, 7});
+    channel_limits_tighten(&limits, &(struct channel_limits){12001, 50, 7});
     CHECK(limits.max_current_ma == 12000 && limits.max_duty_ppm == 50 && limits.max_light_ma == 7);
 }
 

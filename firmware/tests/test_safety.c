@@ -153,20 +153,20 @@ static void test_actual_values_must_keep_the_limits_too(void)
 static void test_a_channel_refuses_more_than_its_own_limit(void)
 {
     boot();
-    CHECK(safety_tighten(&generator, CHANNEL_COUNT, (struct channel_limits){1, 1, UINT32_MAX}) == ERROR_CHANNEL);
-    CHECK(safety_tighten(&generator, 0, (struct channel_limits){19999, MAX_DUTY_PPM, UINT32_MAX}) == ERROR_NONE);
+    CHECK(safety_tighten(&generator, CHANNEL_COUNT, &(struct channel_limits){1, 1, UINT32_MAX}) == ERROR_CHANNEL);
+    CHECK(safety_tighten(&generator, 0, &(struct channel_limits){19999, MAX_DUTY_PPM, UINT32_MAX}) == ERROR_NONE);
     CHECK(safety_set_channel(&generator, 0, &LEGAL) == ERROR_LIMIT && safety_load(&generator) == ERROR_NO_TRAIN);
     CHECK(safety_set_channel(&generator, 1, &LEGAL) == ERROR_NONE);
-    CHECK(safety_tighten(&generator, 0, (struct channel_limits){UINT32_MAX, UINT32_MAX, UINT32_MAX}) == ERROR_NONE);
+    CHECK(safety_tighten(&generator, 0, &(struct channel_limits){UINT32_MAX, UINT32_MAX, UINT32_MAX}) == ERROR_NONE);
     CHECK(safety_set_channel(&generator, 0, &LEGAL) == ERROR_LIMIT);
 }
 
 static void test_a_loaded_train_does_not_survive_a_tighter_limit(void)
 {
     boot_armed(5);
-    CHECK(safety_tighten(&generator, 0, (struct channel_limits){1, 1, UINT32_MAX}) == ERROR_NOT_SAFE);
+    CHECK(safety_tighten(&generator, 0, &(struct channel_limits){1, 1, UINT32_MAX}) == ERROR_NOT_SAFE);
     safety_off(&generator);
-    CHECK(safety_tighten(&generator, 0, (struct channel_limits){10000, MAX_DUTY_PPM, UINT32_MAX}) == ERROR_NONE);
+    CHECK(safety_tighten(&generator, 0, &(struct channel_limits){10000, MAX_DUTY_PPM, UINT32_MAX}) == ERROR_NONE);
     CHECK(arm(1) == ERROR_NO_TRAIN && safety_load(&generator) == ERROR_LIMIT);
     generator_boot(&generator, CAUSE_POWER);
     CHECK(generator.limits[0].max_current_ma == MAX_CURRENT_MA);
@@ -176,7 +176,7 @@ static void test_a_tighter_duty_lengthens_the_period(void)
 {
     boot_armed(5);
     safety_off(&generator);
-    CHECK(safety_tighten(&generator, 0, (struct channel_limits){30000, 20, UINT32_MAX}) == ERROR_NONE &&
+    CHECK(safety_tighten(&generator, 0, &(struct channel_limits){30000, 20, UINT32_MAX}) == ERROR_NONE &&
           safety_load(&generator) == ERROR_NONE);
     CHECK(arm(5) == ERROR_NONE && shooting_fire(&generator) == ERROR_NONE);
     wait_us(100000 - 1); /* 2 us of light at 20 ppm */
@@ -351,7 +351,7 @@ static void test_a_changed_limit_stays_a_fault(void)
     boot_armed(1);
     safety_off(&generator);
     generator.limits[1].max_light_ma--;
-    CHECK(safety_tighten(&generator, 0, (struct channel_limits){1, 1, 1}) == ERROR_FAULT_LATCHED);
+    CHECK(safety_tighten(&generator, 0, &(struct channel_limits){1, 1, 1}) == ERROR_FAULT_LATCHED);
     CHECK(generator.faults == FAULT_INTERNAL && safety_clear(&generator) == ERROR_HARDWARE);
     boot();
     generator.limits[1].max_duty_ppm++;
@@ -369,7 +369,7 @@ static void test_currents_are_whole_steps_and_never_above_what_was_asked(void)
         CHECK(!safety_set_channel(&generator, 0, &channel));
         CHECK(generator.train.channels[0].current_ma == actual_ma[i]);
     }
-    CHECK(!safety_tighten(&generator, 0, (struct channel_limits){19996, MAX_DUTY_PPM, 0}));
+    CHECK(!safety_tighten(&generator, 0, &(struct channel_limits){19996, MAX_DUTY_PPM, 0}));
     struct channel channel = LEGAL;
     channel.current_ma = 19996;
     CHECK(!safety_set_channel(&generator, 0, &channel) && generator.train.channels[0].current_ma == 19990);

@@ -68,7 +68,7 @@ static void test_sources_and_periods_have_bounds(void)
 static void test_a_period_that_the_duty_forbids_is_refused_when_arming(void)
 {
     boot_loaded();
-    CHECK(!safety_tighten(&generator, 2, (struct channel_limits){UINT32_MAX, 20, UINT32_MAX}) &&
+    CHECK(!safety_tighten(&generator, 2, &(struct channel_limits){UINT32_MAX, 20, UINT32_MAX}) &&
           !safety_load(&generator));
     CHECK(shooting_arm(&generator, 1, SOURCE_COMMAND, 100000 - 1) == ERROR_PERIOD);
     CHECK(shooting_arm(&generator, 1, SOURCE_COMMAND, 100000) == ERROR_NONE);

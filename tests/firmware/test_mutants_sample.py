@@ -39,6 +39,13 @@ def test_a_sample_is_found(name: str) -> None:
     assert killer_of(MUTANTS[name], sanitizers="") is not None
 
 
+@pytest.mark.parametrize("name", ["a start forgets the stored limits", "damaged limits are taken for none"])
+def test_the_fuzzer_alone_finds_a_core_that_loosens_stored_limits(name: str) -> None:
+    killer = killer_of(MUTANTS[name], sanitizers="", only="fuzz")
+    assert killer is not None
+    assert killer.startswith("fuzz.c:")
+
+
 def test_a_fault_that_does_no_harm_would_survive() -> None:
     harmless = Mutant("harmless", "limits.h", "CAMERA_PULSE_NS = 10000,", "CAMERA_PULSE_NS = 10000 + 0,")
     assert killer_of(harmless, sanitizers="") is None

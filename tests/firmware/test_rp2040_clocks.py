@@ -6,7 +6,7 @@ import pytest
 
 from daq.drivers.pulse_protocol import Command, ErrorNumber, Fault, Source, State
 from daq.simulation.pico.firmware_build import ImageKind
-from daq.simulation.pico.rp2040_emulator import EmulatedPico
+from daq.simulation.pico.rp2040_emulator import CYCLES_PER_MS, EmulatedPico
 from tests.support.rp2040_board import BOOT_MS, PAPER, PERIOD_MS, Board, image
 
 LOOK_MS = 25
@@ -43,6 +43,28 @@ def test_a_crystal_that_changes_while_armed_trips_and_stays_a_fault(board: Board
     assert board.ask(Command.CLEAR).error is ErrorNumber.HARDWARE
     board.pico.power_up()
     board.pico.run_ms(BOOT_MS)
+    assert board.ask(Command.STATUS).number("faults") == 0
+
+
+def test_a_pll_that_has_lost_its_lock_is_a_fault() -> None:
+    """Crystal and ring oscillator agree; the processor, from which all pulses have their width, agrees with neither."""
+    for factor in (0.7, 1.4):
+        board = Board()
+        board.pico.crystal.change_pll(factor)
+        board.pico.run_ms(LOOK_MS)
+        board.pico.crystal.change_pll(1)
+        assert Fault(board.ask(Command.STATUS).number("faults")) == Fault.CLOCK
+
+
+def test_32_bits_of_microseconds_wrap_without_a_fault() -> None:
+    pico = EmulatedPico(image(ImageKind.CONVERTER).read_bytes())
+    pico.crystal.start_timer_at(2**32 - 60_000)
+    board = Board.of(pico)
+    pico.run_ms(BOOT_MS)
+    board.configure([PAPER])
+    board.arm(1000, Source.TIMER, 10_000)
+    pico.run_ms(60 - pico.cycle / CYCLES_PER_MS)
+    assert lights_within(board, LOOK_MS) >= 2 * 4, "two shots of two pulses"
     assert board.ask(Command.STATUS).number("faults") == 0
 
 

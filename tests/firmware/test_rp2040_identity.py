@@ -27,6 +27,11 @@ def test_it_has_the_number_of_its_flash() -> None:
     assert Board().ask(Command.ID).fields["serial"] == BOARD_NUMBER.hex().upper()
 
 
+def test_a_flash_without_a_number_makes_an_unknown_board(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("daq.simulation.pico.rp2040_emulator.give_number", lambda chip: None)
+    assert Board().ask(Command.ID).fields["serial"] == "unknown"
+
+
 def test_every_image_says_which_one_it_is() -> None:
     builds = {kind: Board(kind).ask(Command.ID).fields["build"] for kind in (ImageKind.CONVERTER, ImageKind.PWM)}
     assert builds == {ImageKind.CONVERTER: "rp2040", ImageKind.PWM: "rp2040-pwm"}

@@ -1,15 +1,18 @@
 """What the real image says of a bad serial line: bytes that came damaged, and bytes for which there was no room."""
 
+from itertools import cycle, islice
+
 import pytest
 
 from daq.drivers.pulse_framing import ABORT_BYTE
-from daq.drivers.pulse_protocol import Command, State, decode_reply
+from daq.drivers.pulse_protocol import Command, Request, State, decode_reply, encode_request
 from tests.support.rp2040_board import PAPER, PERIOD_MS, Board
 
 LINE = ("crc_errors", "framing", "breaks", "overruns", "lost")
 FRAMING, BREAK, OVERRUN = 1 << 8, 1 << 10, 1 << 11
 """Beside a byte in the data register of the UART."""
 RING = 255
+NOISE = b"x" * 50 + b"\n"
 
 
 def counted(board: Board) -> tuple[int, ...]:
@@ -46,31 +49,48 @@ def test_an_abort_byte_counts_however_it_arrives() -> None:
     assert board.ask(Command.STATUS).number("state") == State.SAFE
 
 
-def flooded(count: int) -> Board:
-    """A host that goes on talking while it gets the longest reply there is."""
+def test_an_abort_byte_finds_room_in_a_full_ring() -> None:
     board = Board()
+    board.configure([PAPER])
+    board.pico.run_ms(2 * PERIOD_MS)
+    board.arm(1)
     board.pico.pace_serial_line()
     board.send(Command.STATUS)
     board.pico.run_until_received()
-    for _ in range(count // 5):
-        for byte in b"abcd\n":
-            board.pico.feed(byte)
-            board.pico.run_ms(0.02)
-    board.pico.run_ms(1000)
+    for byte in b"x" * (RING + 10) + ABORT_BYTE:
+        board.pico.feed(byte)
+        board.pico.run_ms(0.02)
+    board.pico.run_ms(40)
+    assert board.ask(Command.STATUS).number("state") == State.SAFE
+
+
+def flooded(count: int, start: int) -> Board:
+    """A host that goes on talking while it gets the longest reply there is, from this place of the ring on."""
+    board = Board()
+    for byte in b"\n" * (start - len(encode_request(Request(1, Command.STATUS, ())))):
+        board.pico.feed(byte)
+        board.pico.run_ms(0.02)
+    board.pico.pace_serial_line()
+    board.send(Command.STATUS)
+    board.pico.run_until_received()
+    for byte in islice(cycle(NOISE), count):
+        board.pico.feed(byte)
+        board.pico.run_ms(0.02)
+    board.pico.run_ms(200)
     return board
 
 
 def test_what_comes_while_a_long_reply_is_sent_waits_for_its_end() -> None:
-    board = flooded(RING)
+    board = flooded(RING, start=RING + 2)
     first, *others = bytes(board.pico.sent).splitlines(keepends=True)
     assert decode_reply(first).error is None
-    assert len(others) == RING // 5, "every line is answered"
-    assert counted(board) == (RING // 5, 0, 0, 0, 0)
+    assert len(others) == RING // len(NOISE), "every line is answered"
+    assert counted(board) == (RING // len(NOISE), 0, 0, 0, 0)
 
 
 def test_what_finds_no_room_is_counted_byte_by_byte() -> None:
-    board = flooded(RING + 40)
+    board = flooded(RING + 40, start=RING + 1)
     answered = board.pico.sent.count(b"\n") - 1
     crc_errors, *_, lost = counted(board)
     assert lost == 40
-    assert crc_errors == answered == RING // 5
+    assert crc_errors == answered == RING // len(NOISE)

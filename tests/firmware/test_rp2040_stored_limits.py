@@ -103,6 +103,14 @@ def test_a_power_cut_in_the_middle_of_storing_is_no_light(written: int) -> None:
     assert in_force(board) == DARK
 
 
+def test_a_record_without_its_first_word_is_damaged() -> None:
+    board = Board()
+    store(board, ABSOLUTE)
+    store(board)
+    board.pico.flash.contents[FIRST + RECORD : FIRST + RECORD + 4] = b"\xff" * 4
+    assert board.ask(Command.STORED, 0).number("stored") == Stored.DAMAGED
+
+
 def test_the_newest_count_until_the_sector_is_full() -> None:
     board = Board()
     store(board)
@@ -152,6 +160,38 @@ def test_the_interlock_acts_while_the_flash_is_busy() -> None:
     board.pico.run_ms(40)
     assert b"OK stored=1" in board.pico.sent
     assert board.pico.watchdog_resets == []
-    board.pico.flash.keep_busy_ms(10_000)
-    store(board)
     assert board.pico.watchdog_resets == []
+
+
+def test_a_flash_that_stays_busy_is_no_light_and_no_board_without_limits() -> None:
+    """It hears no other command meanwhile, and what it is asked reads as blank."""
+    board = Board()
+    store(board)
+    board.pico.flash.keep_busy_ms(250)
+    assert store(board, ABSOLUTE).error is ErrorNumber.HARDWARE
+    assert board.pico.watchdog_resets == []
+    assert in_force(board) == DARK
+    assert state_and_faults(board) == (State.FAULT, Fault.LIMITS)
+    board.pico.run_ms(250)
+    assert stored(board) == (Stored.WHOLE, ABSOLUTE), "it has taken them after all"
+    assert board.ask(Command.CLEAR).error is ErrorNumber.HARDWARE, "they are not in force yet"
+
+
+def test_a_flash_that_does_not_answer_is_no_board_without_limits() -> None:
+    board = Board()
+    store(board)
+    board.pico.flash.fall_silent()
+    assert board.ask(Command.STORED, 0).number("stored") == Stored.DAMAGED
+    assert store(board).error is ErrorNumber.HARDWARE
+    assert in_force(board) == DARK
+    assert state_and_faults(board) == (State.FAULT, Fault.LIMITS)
+
+
+def test_a_record_that_is_missed_once_is_not_taken_for_none() -> None:
+    """Whichever of the records that are read for an answer, and what a flash is asked while it is busy."""
+    board = Board()
+    store(board, ABSOLUTE)
+    store(board, DARK)
+    for first, count in (*((first, 1) for first in range(5)), (0, 2), (0, 3)):
+        board.pico.flash.fall_silent(after_bytes=first * (4 + RECORD), for_bytes=count * (4 + RECORD))
+        assert board.ask_in_bursts(Command.STORED, 0).number("max_current_ma") == 0

@@ -9,48 +9,50 @@ enum {
     READ_STATUS = 0x05,
     PROGRAM = 0x02,
     BUSY = 1 << 0,
-    FIRST = 0x10000, /* in the flash; image.ld ends before it, and image.py writes it into a file that erases */
+    BOOT_STAGE = 0,  /* in the flash; never blank */
+    FIRST = 0x10000, /* image.ld ends before it, and image.py writes it into a file that erases */
+    END = FIRST + 4096,
     RECORD_BYTES = 4 * STORED_WORDS,
-    RECORDS = 64, /* a sector of 4 kB */
     BLANK = 0xffffffff,
     LIMIT_US = 20000, /* a page takes 5 ms at most, W25Q16JV 9.6 */
 };
 
 _Static_assert(256 % RECORD_BYTES == 0, "no record crosses a page");
 
-static uint32_t address_of(uint32_t number)
-{
-    return FIRST + RECORD_BYTES * number;
-}
-
 /* False where nothing has been written there. */
-static bool read_record(uint32_t number, uint32_t words[STORED_WORDS])
+static bool read_record(uint32_t address, uint32_t words[STORED_WORDS])
 {
-    bool written = false;
-    flash_begin_at(READ, address_of(number));
+    uint32_t common = BLANK; /* of all words: their ones */
+    flash_begin_at(READ, address);
     for (uint32_t i = 0; i < STORED_WORDS; i++) {
-        words[i] = 0;
+        uint32_t word = 0;
         for (uint32_t shift = 0; shift < 32; shift += 8)
-            words[i] |= flash_exchange(0) << shift;
-        written = written || words[i] != BLANK;
+            word |= flash_exchange(0) << shift;
+        words[i] = word;
+        common &= word;
     }
     flash_end();
-    return written;
+    return common != BLANK;
 }
 
-/* The first that is blank, or RECORDS; the words are those of the last one that was read. */
+/* The first that is blank, at a second look too, or END. */
 static uint32_t find_blank(uint32_t words[STORED_WORDS])
 {
-    uint32_t number = 0;
-    while (number < RECORDS && read_record(number, words))
-        number++;
-    return number;
+    uint32_t address = FIRST;
+    while (address < END && (read_record(address, words) || read_record(address, words)))
+        address += RECORD_BYTES;
+    return address;
 }
 
+/* A flash that is gone, or still busy, leaves the line high, and everything in it seems blank: its boot stage too, which is
+ * taken for the record then. */
 bool flash_records_read(uint32_t words[STORED_WORDS])
 {
-    const uint32_t blank = find_blank(words);
-    return blank && read_record(blank - 1u, words);
+    if (!read_record(BOOT_STAGE, words))
+        return true;
+    const uint32_t newest = find_blank(words) - RECORD_BYTES;
+    (void)read_record(newest, words);
+    return newest >= FIRST;
 }
 
 static bool is_busy(void)
@@ -61,29 +63,24 @@ static bool is_busy(void)
     return busy;
 }
 
-static void program(uint32_t number, const uint32_t words[STORED_WORDS])
+static void program(uint32_t address, const uint32_t words[STORED_WORDS])
 {
     flash_begin(WRITE_ENABLE);
     flash_end();
-    flash_begin_at(PROGRAM, address_of(number));
-    for (uint32_t i = 0; i < RECORD_BYTES; i++)
-        (void)flash_exchange(words[i / 4u] >> 8u * (i % 4u) & 0xffu);
+    flash_begin_at(PROGRAM, address);
+    for (uint32_t i = 0; i < STORED_WORDS; i++)
+        for (uint32_t shift = 0; shift < 32; shift += 8)
+            (void)flash_exchange(words[i] >> shift & 0xffu);
     flash_end();
     const uint32_t start_us = REG(TIMER_RAWL);
     while (is_busy() && REG(TIMER_RAWL) - start_us < LIMIT_US)
         ;
 }
 
-bool flash_records_append(const uint32_t words[STORED_WORDS])
+void flash_records_append(const uint32_t words[STORED_WORDS])
 {
     uint32_t found[STORED_WORDS];
     const uint32_t blank = find_blank(found);
-    if (blank == RECORDS)
-        return false;
-    program(blank, words);
-    (void)read_record(blank, found);
-    for (uint32_t i = 0; i < STORED_WORDS; i++)
-        if (found[i] != words[i])
-            return false;
-    return true;
+    if (blank < END)
+        program(blank, words);
 }

@@ -10,6 +10,6 @@
 
 /* As port_read_stored and port_store, in 20 ms at most. */
 bool flash_records_read(uint32_t words[STORED_WORDS]);
-bool flash_records_append(const uint32_t words[STORED_WORDS]);
+void flash_records_append(const uint32_t words[STORED_WORDS]);
 
 #endif

@@ -7,7 +7,6 @@
 
 enum {
     READ_UNIQUE_ID = 0x4b, /* of every flash that the boot ROM can start from; four bytes later come 64 bits */
-    DUMMY_BYTES = 5,       /* the command among them */
     ID_BYTES = 8,
 };
 
@@ -21,9 +20,8 @@ void identity_read_board(void)
 {
     static const char DIGITS[] = "0123456789ABCDEF";
     bool is_number = false;
-    flash_begin(READ_UNIQUE_ID);
-    for (int i = 1; i < DUMMY_BYTES; i++)
-        (void)flash_exchange(0);
+    flash_begin_at(READ_UNIQUE_ID, 0);
+    (void)flash_exchange(0);
     for (int i = 0; i < 2 * ID_BYTES; i += 2) {
         const uint32_t byte = flash_exchange(0);
         is_number = is_number || (byte != 0x00 && byte != 0xff);

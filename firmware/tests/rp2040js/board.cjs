@@ -26,30 +26,51 @@ const FACTORY = 0x8000; // its registers after power-up: on, at 0 V
 const BYTE_BITS = 9;
 const READ = 1;
 
-/* What rp2040js lacks: a flash behind commands, here a blank one, the frequency counter, here with a sound crystal, and
- * the brown-out detector. */
+/* What rp2040js lacks: a flash behind commands, the frequency counter, here with a sound crystal, and the brown-out
+ * detector. */
 function addPeripherals(chip) {
-  const SSI = 0x18000, SSI_STATUS = 0x28, SSI_DATA = 0x60, SSI_READY = 0xe, BLANK = 0xff;
   const CLOCKS = 0x40008, FC0_STATUS = 0x98, FC0_RESULT = 0x9c, PASSED = 0x11, RING_KHZ = 6500;
   const SUPPLY = 0x40064, BROWN_OUT = 0x04, AS_SET = 0xb1;
-  answerWith(chip.peripherals[SSI], { [SSI_STATUS]: SSI_READY, [SSI_DATA]: BLANK });
-  answerWith(chip.peripherals[SUPPLY], { [BROWN_OUT]: AS_SET });
-  answerWith(chip.peripherals[CLOCKS], { [FC0_STATUS]: PASSED, [FC0_RESULT]: RING_KHZ * 32 });
+  addFlashCommands(chip);
+  answerWith(chip.peripherals[SUPPLY], { [BROWN_OUT]: () => AS_SET });
+  answerWith(chip.peripherals[CLOCKS], { [FC0_STATUS]: () => PASSED, [FC0_RESULT]: () => RING_KHZ * 32 });
+}
+
+/* Of the commands, reading alone; all others leave the line high. */
+function addFlashCommands(chip) {
+  const SSI = 0x18000, STATUS = 0x28, DATA = 0x60, READY = 0xe, HIGH = 0xff;
+  const PINS = 0x40018, SELECT = 0x0c, RELEASED = 3 << 8;
+  const READ_DATA = 0x03, HEADER_BYTES = 4;
+  let sent = [];
+  const answer = () => {
+    const [command, upper, middle, lower] = sent;
+    if (command !== READ_DATA || sent.length <= HEADER_BYTES) return HIGH;
+    return chip.flash[((upper << 16) | (middle << 8) | lower) + sent.length - HEADER_BYTES - 1] ?? HIGH;
+  };
+  answerWith(chip.peripherals[SSI], { [STATUS]: () => READY, [DATA]: answer });
+  onWrite(chip.peripherals[SSI], DATA, (value) => sent.push(value & 0xff));
+  onWrite(chip.peripherals[PINS], SELECT, (value) => {
+    if ((value & RELEASED) === RELEASED) sent = [];
+  });
 }
 
 /* A write to the counter of SysTick lets it go on from its reload value; in rp2040js, from the largest. */
 function reloadTicks(block) {
   const VALUE = 0x18;
+  onWrite(block, VALUE, () => block.systickTimer.set(block.systickReload));
+}
+
+function onWrite(block, register, then) {
   const write = block.writeUint32.bind(block);
   block.writeUint32 = (offset, value) => {
     write(offset, value);
-    if (offset === VALUE) block.systickTimer.set(block.systickReload);
+    if (offset === register) then(value);
   };
 }
 
 function answerWith(block, values) {
   const read = block.readUint32.bind(block);
-  block.readUint32 = (offset) => values[offset] ?? read(offset);
+  block.readUint32 = (offset) => values[offset]?.() ?? read(offset);
 }
 
 /* The MCP4728 that sets the currents: fast write, multi-write and read back of its four registers. */
