@@ -93,7 +93,7 @@ def _check_parts(path: Path, parts: Iterable[NDArray[np.uint8]]) -> None:
     """Pixels that were compressed by zlib have a checksum; who stops at the last pixel does not read it."""
     for part in parts:
         try:
-            zlib.decompress(part)
+            zlib.decompress(part.tobytes())
         except zlib.error as error:
             raise ImageFileError(f"{path}: is damaged: {error}") from error
 

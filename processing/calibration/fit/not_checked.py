@@ -32,6 +32,12 @@ def not_checked(calibration_set: CalibrationSet, undirected: Sequence[str]) -> I
             f"where {', '.join(unplaced)} should stand: files of two cameras may be exchanged, or a camera turned",
             f"azimuth_deg of {', '.join(unplaced)}",
         )
+    levels_mm = {plane.z_mm for view in calibration_set.views.values() for plane in view.planes}
+    if unplaced and len(levels_mm) == 2:
+        yield Unchecked(
+            "whether the two planes are as far apart as z_mm says: cameras fit any distance of two",
+            f"a third plane, or azimuth_deg of {', '.join(unplaced)}",
+        )
     if unscaled := [name for name in calibration_set.views if name not in calibration_set.scales_px_per_mm]:
         yield Unchecked(
             f"whether the scale of {', '.join(unscaled)} is right: pitch_mm, z_mm, and their unit",

@@ -1,0 +1,52 @@
+"""What a calibration cannot know is said with it."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import pytest
+
+from processing.calibration.calibrate import calibrate
+from processing.calibration.calibration import Calibration
+from processing.calibration.observation import CalibrationSet, PlaneObservation, ViewObservations
+from processing.calibration.verdict import Verdict
+from processing.geometry import view_camera
+
+AZIMUTHS_DEG = {"view1": 45.0, "view2": -45.0}
+SIZE_PX = (1200, 1000)
+
+
+def calibrated(
+    z_mm: Sequence[float], claimed_mm: Sequence[float], azimuths_deg: Mapping[str, float] | None = None
+) -> Calibration:
+    """Of planes that stand somewhere, and are said to stand somewhere else."""
+    x_mm, y_mm = np.meshgrid(np.linspace(-8, 8, 9), np.linspace(-6, 6, 7))
+    rng, views = np.random.default_rng(1), {}
+    for name, azimuth_deg in AZIMUTHS_DEG.items():
+        camera = view_camera(
+            azimuth_deg, focal_length_mm=85, magnification=0.43, scale_px_per_mm=60, image_size_px=SIZE_PX
+        )
+        planes = []
+        for true_mm, said_mm in zip(z_mm, claimed_mm, strict=True):
+            true, said = (np.column_stack([x_mm.ravel(), y_mm.ravel(), np.full(63, z)]) for z in (true_mm, said_mm))
+            seen_px = camera.project(true) + rng.normal(0, 0.03, (63, 2))
+            planes.append(PlaneObservation(f"z {said_mm}", said, seen_px, said_mm))
+        views[name] = ViewObservations(SIZE_PX, tuple(planes))
+    return calibrate(CalibrationSet("set", None, views, azimuths_deg=azimuths_deg or {}))
+
+
+def test_two_planes_at_a_wrong_distance_fit_and_that_is_said() -> None:
+    calibration = calibrated((-4, 4), (-4, 5))
+    assert {view.verdict for view in calibration.views.values()} <= {Verdict.GOOD, Verdict.USABLE}
+    told = [one.state for one in calibration.not_checked if "two planes are as far apart as z_mm says" in one.what]
+    assert told == ["a third plane, or azimuth_deg of view1, view2"]
+
+
+@pytest.mark.parametrize(
+    ("z_mm", "claimed_mm", "azimuths_deg"), [((-4, 0, 4), (-4, 0, 5), {}), ((-4, 4), (-4, 5), AZIMUTHS_DEG)]
+)
+def test_a_third_plane_or_the_azimuths_tell(
+    z_mm: tuple[float, ...], claimed_mm: tuple[float, ...], azimuths_deg: Mapping[str, float]
+) -> None:
+    calibration = calibrated(z_mm, claimed_mm, azimuths_deg)
+    assert {view.verdict for view in calibration.views.values()} <= {Verdict.WARN, Verdict.REFUSE}
+    assert not [one for one in calibration.not_checked if "two planes" in one.what]
