@@ -14,7 +14,7 @@ GAIN = 1.25
 NOISE = 0.05
 """Of the full scale: smaller differences are noise, darker backgrounds no light."""
 BRIGHTER_SHARE = 0.003
-"""So many pixels are brighter: more than glare and hot pixels."""
+"""So many pixels are brighter, or darker than nothing: more than glare and hot pixels."""
 LEAST_LIGHT = 0.8
 """Of the background, somewhere: hardly a spray covers all of a view."""
 SATURATED_SHARE = 0.01
@@ -47,6 +47,8 @@ def odd_light(
     coarse, most = np.s_[::STRIDE_PX, ::STRIDE_PX], np.float32(2**bits - 1)
     floor = np.float32(0) if dark is None else dark[coarse]
     light = (frame[coarse] - floor) / most
+    if np.mean(light < -NOISE) > BRIGHTER_SHARE:
+        return "is darker than its dark image; was that taken with light, or with another exposure?"
     if polarity == "bright":
         return _not_bright(light)
     if background is None:

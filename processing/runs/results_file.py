@@ -75,6 +75,8 @@ def average_volumes(files: list[Path]) -> tuple[Intensity, VoxelGrid]:
             if (first_file := counted.setdefault(_exposure(volume.provenance) or str(file), file)) != file:
                 raise VolumeFileError(f"{file}: the same exposure as {first_file.name}; it would count twice")
             for first_row, slab in volume.slabs():
+                if not np.isfinite(slab).all():
+                    raise VolumeFileError(f"{file}: was changed: a voxel is infinite, or not a number")
                 total[:, first_row : first_row + slab.shape[1]] += slab
     total /= np.float32(len(files))
     return total, grid

@@ -108,16 +108,24 @@ def _add_limited(parser: ArgumentParser, name: str, metavar: str, summary: str) 
     parser.add_argument(option, type=partial(setting, name), metavar=metavar, help=summary)
 
 
+def number(text: str) -> float:
+    """A number as programs write it."""
+    try:
+        return float(text)
+    except ValueError as error:
+        raise ArgumentTypeError(f"{text!r} is no number: a point stands before decimals, and no commas") from error
+
+
 def positive(text: str) -> float:
     """A finite number above 0."""
-    if not 0 < (value := float(text)) < math.inf:
+    if not 0 < (value := number(text)) < math.inf:
         raise ArgumentTypeError(f"{text} must be above 0, and finite")
     return value
 
 
 def width(text: str) -> float:
     """Width of a droplet in voxel: one that a voxel can show, and that a window of the quality factor holds."""
-    if not MIN_SIGMA_VOXEL <= (value := float(text)) <= MAX_SIGMA_VOXEL:
+    if not MIN_SIGMA_VOXEL <= (value := number(text)) <= MAX_SIGMA_VOXEL:
         raise ArgumentTypeError(f"{text} must be from {MIN_SIGMA_VOXEL:g} to {MAX_SIGMA_VOXEL:g} voxel")
     return value
 

@@ -55,7 +55,7 @@ class LensConfig(FrozenModel):
 class SensorConfig(FrozenModel):
     """Sensor of a camera."""
 
-    pixel_pitch_um: Annotated[float, Field(gt=0, le=100, description="from pixel to pixel; binned ones count as one")]
+    pixel_pitch_um: Annotated[float, Field(ge=0.5, le=100, description="from pixel to pixel; binned ones count as one")]
     width_px: Annotated[int, Field(ge=64, le=16384, description="columns of an image")]
     height_px: Annotated[int, Field(ge=64, le=16384, description="rows of one exposure")]
 

@@ -80,3 +80,9 @@ def test_half_a_view_of_liquid_is_fine() -> None:
 )
 def test_what_does_not_fit_is_told(shot: Grey, background: Grey | None, polarity: Polarity, words: str) -> None:
     assert re.search(words, told(shot, background, polarity))
+
+
+@pytest.mark.parametrize("polarity", ["shadow", "bright"])
+def test_a_dark_image_that_is_brighter_than_the_shot_is_told(polarity: Polarity) -> None:
+    shot = SHOT if polarity == "shadow" else 5 + 200 * droplets(1)
+    assert told(shot, LIGHT, polarity, dark=0 * LIGHT + 100).startswith("is darker than its dark image")

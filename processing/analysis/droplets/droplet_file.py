@@ -119,6 +119,8 @@ def read_droplets(path: str | Path) -> StoredDroplets:
             attributes = dict(file[PROVENANCE].attrs)
     except (OSError, KeyError, ValueError) as error:
         raise DropletFileError(f"{path}: not a readable file of droplets: {error}") from error
+    if len(lengths := {len(column) for column in columns.values()}) > 1:
+        raise DropletFileError(f"{path}: was changed: its columns have {min(lengths)} to {max(lengths)} rows")
     columns[FRAME] = columns[FRAME].astype("U1")
     plain = {name: value.item() if isinstance(value, np.generic) else value for name, value in attributes.items()}
     return StoredDroplets(columns, {name: value for name, value in plain.items() if name not in SCHEMA_KEYS})

@@ -129,6 +129,9 @@ def _sizes(shots: Sequence[StoredDroplets], per_shot: float) -> SizeStatistics:
     if any(DIAMETER not in shot.columns for shot in shots):
         return SizeStatistics(n=n, shots=len(shots), reason=NO_DIAMETERS)
     diameters_um = [np.asarray(shot.columns[DIAMETER], np.float64) for shot in shots]
+    for shot, its_um in zip(shots, diameters_um, strict=True):
+        if not (np.isfinite(its_um) & (its_um > 0)).all():
+            raise DropletFileError(f"{_named(shot)}: was changed: a diameter is not finite, or not above 0")
     return mean_diameters(diameters_um, per_shot)
 
 

@@ -21,6 +21,8 @@ _GRID = 64
 
 LEAST_LIGHT = 5.0
 """Over the noise."""
+FULL_SCALES, SATURATED_SHARE = tuple(2**bits - 1 for bits in range(8, 17)), 0.01
+"""Grey values where cameras of 8 to 16 bits end; so many pixels of a background there are more than glare."""
 Image = NDArray[np.float32]
 
 
@@ -73,7 +75,7 @@ def darkness_of(image: NDArray[np.generic], polarity: Polarity, background: NDAr
     grey = np.asarray(image, np.float32)
     rows, columns = _without_frame(grey)
     inner = grey[rows, columns]
-    light = _fitted(inner) if background is None else np.asarray(background, np.float32)[rows, columns]
+    light = _fitted(inner) if background is None else _given(inner, np.asarray(background, np.float32)[rows, columns])
     if polarity == "bright":
         above = inner - light
         values = above / max(float(np.quantile(above, 0.9999)), 1e-6)
@@ -85,6 +87,17 @@ def darkness_of(image: NDArray[np.generic], polarity: Polarity, background: NDAr
     noise = 1.4826 * float(np.median(np.abs(free - np.median(free)))) if free.size else 0.0
     _require_known(values, noise, polarity, fitted=background is None)
     return Darkness(values.astype(np.float32), rows.start or 0, columns.start or 0, noise)
+
+
+def _given(grey: Image, light: Image) -> Image:
+    """The light that was given, if it can be that of the image."""
+    if np.array_equal(grey, light):
+        raise LightError("is its own background, pixel by pixel: whatever there was is divided out")
+    if light.max() in FULL_SCALES and (share := np.mean(light == light.max())) > SATURATED_SHARE:
+        raise LightError(
+            f"has a background of which {100 * share:.0f} % are saturated: how dark droplets are is unknown"
+        )
+    return light
 
 
 def _require_light(grey: Image) -> None:

@@ -2,6 +2,7 @@
 
 import json
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -77,14 +78,24 @@ def image_sources(paths: Sequence[Path], background: Path | None = None) -> list
     Raises
     ------
     PipelineError
-        One of them or the background is not there, or two differ in their ending alone.
+        One of them or the background is not there, two differ in their ending alone, or one is a copy of another.
     """
     if absent := [path for path in [*paths, *([background] if background else [])] if not path.is_file()]:
         raise PipelineError(f"{absent[0]}: there is no such image or run")
     names = [path.stem for path in paths]
     if twice := {name for name in names if names.count(name) > 1}:
         raise PipelineError(f"two images are called {min(twice)}: their droplets would share a file")
+    _require_different(paths)
     return [FlatSource(path.stem, None, partial(_of_image, path, background)) for path in paths]
+
+
+def _require_different(paths: Sequence[Path]) -> None:
+    """Droplets of a copy would count twice, and make the sizes surer than they are."""
+    sizes = Counter(path.stat().st_size for path in paths)
+    first: dict[str, Path] = {}
+    for path in (path for path in paths if sizes[path.stat().st_size] > 1):
+        if (other := first.setdefault(file_sha256(path), path)) is not path:
+            raise PipelineError(f"{path}: the same image as {other.name}; its droplets would count twice")
 
 
 def image_origin(paths: Sequence[Path], background: Path | None) -> Provenance:

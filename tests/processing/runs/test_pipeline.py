@@ -5,6 +5,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -251,6 +252,15 @@ def test_the_average_is_the_mean(run_dir: Path, calibration_file: Path, voxels: 
     mean, grid = average_volumes(files)
     assert grid == GRID
     np.testing.assert_allclose(mean, (read_volume(files[0])[0] + read_volume(files[1])[0]) / 2, atol=1e-7)
+
+
+def test_a_volume_that_was_changed_to_hold_no_numbers_has_no_average(run_dir: Path, calibration_file: Path) -> None:
+    reconstructed(run_dir, calibration_file)
+    first = volume_files(run_dir / "results")[0]
+    with h5py.File(first, "r+") as file:
+        file["VTKHDF/PointData/intensity"][0, 0, 0] = np.nan
+    with pytest.raises(VolumeFileError, match=f"{first.name}: was changed: a voxel is infinite, or not a number"):
+        average_volumes([first])
 
 
 def test_volumes_of_all_types_agree_and_name_theirs(run_dir: Path, calibration_file: Path) -> None:

@@ -8,13 +8,22 @@ import h5py
 import numpy as np
 import pytest
 
+from daq.files.run_directory import DoubleFrame, ImageKey, RunHeader, RunWriter, Shot, ViewFormat
 from processing.analysis.droplets.droplet_file import read_droplets
 from processing.analysis.droplets.ghost_share import matches
 from processing.reconstruction.settings import GridSettings
 from server.cli.main import main
 from tests.support.bright_scenes import BOX, GRID, scene, write_bright_calibration, write_bright_run
 from tests.support.command_line import refused, shown, told
-from tests.support.droplet_run import write_calibration, write_run
+from tests.support.droplet_run import (
+    DROPLETS_A_MM,
+    SEEN,
+    SHAPE,
+    cameras,
+    shadowgraph,
+    write_calibration,
+    write_run,
+)
 from tests.support.shadow_scenes import ShadowScene, shadow_scene, write_shadow_calibration, write_shadow_run
 
 
@@ -207,6 +216,28 @@ def test_shadows_of_a_run_become_droplets_with_diameters(tmp_path: Path, capsys:
         assert "light is incoherent" in file["droplets"]["diameter_um"].attrs["correction"]
         assert "amplitude" not in file["droplets"]
         assert file["tomoshadow"].attrs["schema_version"] == 2
+
+
+def test_shadows_without_any_noise_are_measured(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Of a simulation, or where all light is saturated: what is left has no noise to divide by."""
+    views = cameras()
+    header = RunHeader(
+        run_id="run",
+        created_utc="2026-01-01T00:00:00+00:00",
+        views={name: ViewFormat(SHAPE, 8) for name in views},
+        frames_per_shot=1,
+        polarity="shadow",
+    )
+    images = {name: DoubleFrame(shadowgraph(camera, DROPLETS_A_MM), None, SEEN, SEEN) for name, camera in views.items()}
+    with RunWriter(tmp_path / "run", header) as writer:
+        light = np.full((1, *SHAPE), 200, np.float32)
+        writer.write_references(dict.fromkeys(views, 0 * light), dict.fromkeys(views, light))
+        writer.write_shot(Shot(0, ImageKey.SAMPLE, images))
+        writer.finish("completed")
+    calibration = write_calibration(tmp_path / "calibration.json")
+    box = "--grid=-2:2,-2:2,-2:2"
+    result = told(capsys, "measure", tmp_path / "run", "--calibration", calibration, box, "-o", tmp_path / "out")
+    assert result["shots"][0]["droplets"] == len(DROPLETS_A_MM)
 
 
 def test_shadows_without_a_background_are_refused_in_a_sentence(

@@ -43,6 +43,13 @@ def test_a_grid_of_other_words_is_named(grid: str, calibration_file: Path) -> No
         parse_grid(grid, load_calibration(calibration_file))
 
 
+@pytest.mark.parametrize("text", ["1,234.5", "4,5", "four"])
+def test_what_is_no_number_is_told_in_words(text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["measure", str(tmp_path / "a.png"), "-o", str(tmp_path / "out"), "--um-per-px", text])
+    assert f"--um-per-px: {text!r} is no number: a point stands before decimals" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("grid", "reason"),
     [

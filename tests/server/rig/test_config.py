@@ -57,6 +57,11 @@ def test_both_examples_are_the_rig_of_table_1(name: str) -> None:
             "f_number = 0",
             r"rig\.toml:8: views\.view1\.lens\.f_number: 0 .* greater than or equal to 0\.7",
         ),
+        (
+            "pixel_pitch_um = 7.4",
+            "pixel_pitch_um = 0.0074",
+            r"_pitch_um: 0\.0074 .* greater than or equal to 0\.5",
+        ),
         ("led_channel = 1", "led_channel = 4", r":16: views\.view2\.led_channel: 4 .* less than or equal to 3"),
         ("led_channel = 1", "led_channel = 0", r"led_channel \[0\] is used by two views"),
         ("127.0.1.2", "127.0.1.1", r"camera\.ip \['127\.0\.1\.1'\] is used by two views"),

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from processing.analysis.droplets.droplet_search import Window
 from processing.analysis.droplets.gaussian_blobs import Image
-from processing.analysis.droplets.image_noise import noise_of
+from processing.analysis.droplets.image_noise import LEAST_NOISE, noise_of
 from processing.analysis.droplets.shadows.masked_liquid import Mask
 from processing.analysis.droplets.shadows.opaque_discs import DiscImages, DiscOptics, Discs
 from processing.analysis.droplets.sight_lattice import SightLattice
@@ -61,9 +61,8 @@ class Transmissions:
 
     def noises_of(self, images: Sequence[Image]) -> FloatArray:
         """Standard deviations (K,) of the noise of typical pixels in what is left of the images, or in the images."""
-        return np.array(
-            [noise_of(image * np.sqrt(trust), trust > 0) for image, trust in zip(images, self.trust, strict=True)]
-        )
+        noises = [noise_of(image * np.sqrt(trust), trust > 0) for image, trust in zip(images, self.trust, strict=True)]
+        return np.maximum(noises, LEAST_NOISE)
 
 
 @dataclass(frozen=True, eq=False)

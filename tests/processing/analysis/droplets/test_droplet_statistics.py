@@ -1,12 +1,13 @@
 """What droplets of several shots say together."""
 
 import json
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from processing.analysis.droplets.droplet_file import DropletFileError, StoredDroplets
+from processing.analysis.droplets.droplet_file import DropletFileError, StoredDroplets, read_droplets, write_columns
 from processing.analysis.droplets.droplet_statistics import droplet_statistics
 from processing.analysis.droplets.size_statistics import mean_diameters, number_density
 from processing.reconstruction.settings import GridSettings
@@ -104,3 +105,18 @@ def test_numbers_of_two_recipes_are_not_pooled(told: dict[str, Any]) -> None:
         droplet_statistics([shot([20.0, 30.0]), shot([40.0], shot=4, **told)])
     elsewhere = shot([40.0], shot=4, settings='{"grid": {"pitch_mm": 1}, "twins": 2}')
     assert droplet_statistics([shot([20.0, 30.0]), elsewhere]).n == 3
+
+
+@pytest.mark.parametrize("diameter_um", [np.nan, 0.0, -20.0])
+def test_a_diameter_that_none_can_be_is_told_with_its_shot(diameter_um: float) -> None:
+    with pytest.raises(DropletFileError, match="spray, shot 3: was changed: a diameter is not finite, or not above 0"):
+        droplet_statistics([shot([20.0, diameter_um])])
+
+
+def test_columns_of_different_lengths_are_no_table(tmp_path: Path) -> None:
+    columns = {"frame": np.array([b"a", b"a"]), "diameter_um": np.array([20.0, 30.0])}
+    write_columns(tmp_path / "a.h5", columns, {"run": "spray"})
+    assert len(read_droplets(tmp_path / "a.h5").columns["diameter_um"]) == 2
+    write_columns(tmp_path / "a.h5", {**columns, "diameter_um": np.array([20.0])}, {"run": "spray"})
+    with pytest.raises(DropletFileError, match=r"a\.h5: was changed: its columns have 1 to 2 rows"):
+        read_droplets(tmp_path / "a.h5")

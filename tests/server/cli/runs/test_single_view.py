@@ -64,8 +64,10 @@ def test_a_scale_turns_pixels_into_micrometres(
     assert not [name for name in columns if name.endswith("_px")]
     with h5py.File(path) as file:
         assert file["droplets/blur_um"].attrs["units"] == "um"
-    copies = [Path(shutil.copy(images[0], tmp_path / f"copy{number}.png")) for number in range(3)]
-    more = told(capsys, "measure", *copies, "-o", tmp_path / "more", "--um-per-px", "4")["statistics"]
+    others = [tmp_path / f"other{number}.png" for number in range(3)]
+    for number, path in enumerate(others):
+        cv2.imwrite(str(path), grey(DISCS, 1 + 0.05 * number))
+    more = told(capsys, "measure", *others, "-o", tmp_path / "more", "--um-per-px", "4")["statistics"]
     assert (more["d10_um"]["value"], more["intervals_over"]) == (pytest.approx(86, rel=0.01), "shots")
     head, first, *_ = (tmp_path / "out" / "first_droplets.csv").read_text().splitlines()
     assert head.startswith("image,frame,x_um,y_um,diameter_um")
@@ -189,3 +191,25 @@ def test_a_recipe_says_how(images: list[Path], tmp_path: Path, capsys: pytest.Ca
     assert (first["statistics"]["n"], second["statistics"]["n"]) == (2, 1)
     assert second["shots"][0]["left_out"] == {"small": 1}
     assert first["recipe_sha256"] != second["recipe_sha256"]
+
+
+def test_a_copy_of_an_image_does_not_count_twice(
+    images: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    copy = shutil.copy(images[0], tmp_path / "copy.png")
+    message = refused(capsys, "measure", *images, copy, "-o", tmp_path / "out")
+    assert message == f"{copy}: the same image as first.png; its droplets would count twice"
+
+
+@pytest.mark.parametrize(
+    ("background", "reason"),
+    [(grey(DISCS), "is its own background"), (np.full(SHAPE, 255, np.uint8), "has a background of which 100 % are")],
+)
+def test_a_background_that_tells_nothing_is_refused(
+    background: Any, reason: str, images: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cv2.imwrite(str(tmp_path / "light.png"), background)
+    arguments = ["measure", images[0], "--background", tmp_path / "light.png", "-o", tmp_path / "out"]
+    (shot,) = told(capsys, *arguments, status=1)["shots"]
+    assert (shot["verdict"], shot["droplets"]) == ("refused", 0)
+    assert shot["reasons"][0].startswith(reason)
