@@ -37,6 +37,8 @@ OPTIONS = (
 MIN_SIGMA_VOXEL, MAX_SIGMA_VOXEL = 0.3, 10.0
 
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,2})?"
+LEAST_SHARE = 1e-6
+"""Of the calibrated volume: a grid that holds less is in another unit, or elsewhere."""
 
 
 def add_verb(verbs: Verbs, name: str, command: Command, summary: str) -> ArgumentParser:
@@ -182,6 +184,8 @@ def calibrated_share(options: Namespace, settings: "ReconstructionSettings", cal
             f"the largest box that all views see holds {100 * share:.0f} % of the calibrated volume "
             f"({extents} mm); --grid takes another box"
         )
+    elif share < LEAST_SHARE:
+        progress(f"the grid holds {share:.1g} of the calibrated volume: is it in mm, and where the target was?")
     return share
 
 

@@ -43,6 +43,15 @@ def test_a_grid_of_other_words_is_named(grid: str, calibration_file: Path) -> No
         parse_grid(grid, load_calibration(calibration_file))
 
 
+@pytest.mark.parametrize("grid", ["-.001:.001,-.001:.001,-.001:.001@1e-4", "-1:1,-1:1,5:6@0.1"])
+def test_a_grid_in_another_unit_or_elsewhere_is_asked_about(
+    grid: str, run_dir: Path, calibration_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["reconstruct", str(run_dir), "--calibration", str(calibration_file), "--shots", "0:1"]
+    assert main([*arguments, f"--grid={grid}", "-o", str(tmp_path / "out")]) == 0
+    assert "of the calibrated volume: is it in mm, and where the target was?" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("text", ["1,234.5", "4,5", "four"])
 def test_what_is_no_number_is_told_in_words(text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
