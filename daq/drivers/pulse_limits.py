@@ -1,10 +1,41 @@
-"""The limits that a board keeps for its LEDs, against those of a rig file."""
+"""The limits that a board keeps for its LEDs: what they are, made those of a rig file, and compared with them."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from daq.drivers.pulse_line import PulseLine
-from daq.drivers.pulse_protocol import Command, Stored
+from daq.drivers.pulse_protocol import CHANNEL_COUNT, ERROR_TEXT, Command, ErrorNumber, Stored
 from daq.errors import DeviceRefused
+
+NAMES = ("max_current_ma", "max_duty_ppm", "max_light_ma")
+Limits = tuple[int, ...]
+"""Of one LED, in the order of NAMES."""
+
+
+def kept_limits(line: PulseLine) -> tuple[Stored, list[Limits]]:
+    """Whether the board keeps any, and those of each channel."""
+    replies = [line.ask(Command.STORED, channel) for channel in range(CHANNEL_COUNT)]
+    return Stored(replies[0].number("stored")), [tuple(map(reply.number, NAMES)) for reply in replies]
+
+
+def store_limits(line: PulseLine, wanted: Sequence[Limits]) -> None:
+    """Make these the board's, unless they are already: it has room for 64 times.
+
+    Raises
+    ------
+    DeviceRefused
+        It does not take them; with what helps.
+    """
+    if kept_limits(line) == (Stored.WHOLE, list(wanted)):
+        return
+    error = line.answer(Command.STORE, *(value for channel in wanted for value in channel)).error
+    if error is ErrorNumber.HARDWARE:
+        raise DeviceRefused(
+            line.name,
+            "the board does not keep these limits: it was told others 64 times, or its flash does not answer. Hold "
+            "BOOTSEL, copy erase-limits.uf2 to the board, and store them again",
+        )
+    if error is not None:
+        raise DeviceRefused(line.name, f"{Command.STORE} refused: {ERROR_TEXT[error]} (error {error.value})")
 
 
 def check_stored_limits(

@@ -13,6 +13,8 @@ const char port_git[] = REVISION;
 const uint32_t port_tick_ns = 8; /* as the RP2040 at 125 MHz */
 const uint32_t port_current_step_ma = 10;
 
+enum { STORES = 64 };
+
 static struct pulse_train loaded;
 static uint32_t fired;
 static bool permitted;
@@ -174,6 +176,8 @@ bool port_read_stored(uint32_t words[STORED_WORDS])
 
 void port_store(const uint32_t words[STORED_WORDS])
 {
+    if (bench.stores++ >= STORES)
+        return;
     memcpy(bench.stored, words, sizeof bench.stored);
     bench.any_stored = true;
 }

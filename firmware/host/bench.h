@@ -21,6 +21,7 @@ struct bench {
     unsigned replies_to_damage;
     bool any_stored; /* in memory that outlasts a reset */
     uint32_t stored[STORED_WORDS];
+    unsigned stores; /* so often; there is room for as many as on the Pico */
 };
 
 extern struct bench bench;

@@ -125,7 +125,8 @@ def _closed(closed: bool) -> str:
 
 def limits(options: Namespace) -> Outcome:
     """Compare the limits that the board keeps with those of the rig file; with --store, make them the board's."""
-    from daq.drivers.pulse_protocol import CHANNEL_COUNT, Command, Stored
+    from daq.drivers.pulse_limits import NAMES, kept_limits, store_limits
+    from daq.drivers.pulse_protocol import CHANNEL_COUNT
     from server.rig.assembly import open_pulse_line
     from server.rig.config import load_config
 
@@ -133,15 +134,12 @@ def limits(options: Namespace) -> Outcome:
     wanted = [_limits_of_rig(config, channel) for channel in range(CHANNEL_COUNT)]
     with open_pulse_line(config) as (line, _):
         if options.store:
-            line.ask(Command.STORE, *(value for channel in wanted for value in channel))
-        replies = [line.ask(Command.STORED, channel) for channel in range(CHANNEL_COUNT)]
-    names = ("max_current_ma", "max_duty_ppm", "max_light_ma")
-    kept = [tuple(reply.number(name) for name in names) for reply in replies]
-    stored = Stored(replies[0].number("stored")).name
+            store_limits(line, wanted)
+        stored, kept = kept_limits(line)
     rows = [[str(i), *map(str, (*kept[i], *wanted[i]))] for i in range(CHANNEL_COUNT)]
-    heads = ["channel", *(f"{owner}: {name}" for owner in ("board", "rig") for name in names)]
-    text = f"{_STORED_TEXT[stored]}\n{table(heads, rows)}"
-    return Outcome({"stored": stored, "board": kept, "rig": wanted}, text)
+    heads = ["channel", *(f"{owner}: {name}" for owner in ("board", "rig") for name in NAMES)]
+    text = f"{_STORED_TEXT[stored.name]}\n{table(heads, rows)}"
+    return Outcome({"stored": stored.name, "board": kept, "rig": wanted}, text)
 
 
 _STORED_TEXT = {

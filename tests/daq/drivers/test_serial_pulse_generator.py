@@ -15,6 +15,7 @@ import serial
 
 from daq.devices import GeneratorState
 from daq.drivers.pulse_framing import DamagedLine
+from daq.drivers.pulse_limits import kept_limits, store_limits
 from daq.drivers.pulse_line import PulseLine
 from daq.drivers.pulse_protocol import (
     FIELDS,
@@ -23,6 +24,7 @@ from daq.drivers.pulse_protocol import (
     Command,
     Reply,
     Request,
+    Stored,
     decode_reply,
     decode_request,
     encode_reply,
@@ -364,7 +366,7 @@ def test_a_permitted_current_is_not_cut_by_its_own_limit(firmware: FirmwareProce
 def test_a_rig_file_that_permits_more_than_the_board_keeps_is_refused(firmware: FirmwareProcess, wrong: str) -> None:
     line = PulseLine("generator", firmware.port)
     line.open()
-    line.ask(Command.STORE, *4 * (20_000, 200, 300))
+    store_limits(line, 4 * [(20_000, 200, 300)])
     line.close()
     limits = {"max_current": {"left": 20.0}, "max_light": {"left": 0.3}}
     with SerialPulseGenerator("generator", firmware.port, CHANNELS, limits["max_current"], limits["max_light"]) as fits:
@@ -376,4 +378,20 @@ def test_a_rig_file_that_permits_more_than_the_board_keeps_is_refused(firmware: 
     with pytest.raises(DeviceRefused, match=words), refused:
         pass
     line.open()
+    line.close()
+
+
+def test_limits_that_the_board_keeps_already_cost_no_room(firmware: FirmwareProcess) -> None:
+    line = PulseLine("generator", firmware.port)
+    line.open()
+    for _ in range(70):
+        store_limits(line, 4 * [(20_000, 200, 300)])
+    for current_ma in range(63):
+        store_limits(line, 4 * [(current_ma, 200, 0)])
+    kept = kept_limits(line)
+    with pytest.raises(DeviceRefused, match=r"64 times.*erase-limits\.uf2"):
+        store_limits(line, 4 * [(20_000, 200, 300)])
+    assert kept_limits(line) == kept == (Stored.WHOLE, 4 * [(62, 200, 0)])
+    with pytest.raises(DeviceRefused, match=r"STORE refused: .* above 30000 mA"):
+        store_limits(line, 4 * [(30_001, 200, 300)])
     line.close()
