@@ -46,7 +46,7 @@ def test_every_study_explains_itself(study: str, capsys: pytest.CaptureFixture[s
         (["density", "--method", "smort"], "'smort' is none of gavlos"),
         (["density", "--sigma", "-1"], "-1 must be from 0.3 to 10 voxel"),
         (["ghosts", "--sigma", "inf"], "inf must be from 0.3 to 10 voxel"),
-        (["density", "--sigma", "wide"], "invalid width value: 'wide'"),
+        (["density", "--sigma", "wide"], "'wide' is no number"),
         (["sensitivity", "--density", "inf"], "inf must be above 0, and finite"),
         (["average", "--seed", "-1"], "-1 must be 0 or more"),
         (["ghosts", "--method", "mlos-3"], "mlos does not take 3 iterations"),
