@@ -14,66 +14,24 @@ comes to rest.
 from collections.abc import Callable
 from dataclasses import replace
 
-import numpy as np
-from numpy.typing import NDArray
-from scipy.spatial import cKDTree
-
-from processing.analysis.droplets.candidates import foremost
-from processing.analysis.droplets.droplet_search import CANDIDATE_PITCH_VOXEL, DropletSearch, keep_on
-from processing.analysis.droplets.gaussian_blobs import Image
-from processing.analysis.droplets.shadows.disc_optics import first_disc_optics, refined_disc_optics
-from processing.analysis.droplets.shadows.disc_supports import DiscSupports, supporting_views, undisputed
-from processing.analysis.droplets.shadows.judged_volume import judging_views, knowing_views
-from processing.analysis.droplets.shadows.light_search import Light, best_light, relit
-from processing.analysis.droplets.shadows.masked_liquid import liquid_masks, liquid_objects
-from processing.analysis.droplets.shadows.merged_discs import merged_discs
-from processing.analysis.droplets.shadows.opaque_discs import (
-    NO_DISC,
-    DiscImages,
-    DiscOptics,
-    Discs,
-    Sweeps,
-)
-from processing.analysis.droplets.shadows.shadow_candidates import Stage, shadow_peaks
-from processing.analysis.droplets.shadows.shadow_fit import (
-    ShadowFit,
-    Transmissions,
-    chi_squared,
-    residuals,
-    rms_over_noise,
-    seen_by,
-)
-from processing.analysis.droplets.shadows.shadow_union import union_defects
+from processing.analysis.droplets.droplet_search import DropletSearch, keep_on
+from processing.analysis.droplets.shadows.disc_optics import first_disc_optics
+from processing.analysis.droplets.shadows.light_search import Light
+from processing.analysis.droplets.shadows.opaque_discs import Discs
+from processing.analysis.droplets.shadows.shadow_candidates import Stage
+from processing.analysis.droplets.shadows.shadow_fit import ShadowFit, Transmissions
+from processing.analysis.droplets.shadows.shadow_rounds import ShadowRounds
 from processing.geometry import FloatArray
 
 COARSE_PX = (6.0, 4.0, 2.5, 1.5, 0.9)
 """Blurs with which candidates are looked for, at first."""
-SHARP_PX = 0.6
 COARSE_SHARE = 0.5
-FIRST, AGAIN, LAST = 0.5, 0.2, 0.04
-"""Missing share of the light from which on a candidate is tried: at first, after a purge, and at last."""
+FIRST, AGAIN = 0.5, 0.2
+"""Missing share of the light from which on a candidate is tried: at first, and after a purge."""
 FALLING_ROUNDS, AGAIN_ROUNDS = 8, 3
 """In which it falls; after a purge."""
-LEAST_GAIN, MOST_ROUNDS = 0.003, 20
-"""The fit is at rest when a round lowers the residual by less than this share, or after so many rounds."""
-NOISE_SIGMAS, SIGNIFICANCE = 4.0, 5.0
-"""No candidate is fainter than so many standard deviations of its shadow, and no droplet than of its squared radius."""
-COARSE_LEAST, SHARP_LEAST = 0.15, 0.5
-"""Droplets with a fainter shadow are dropped: absolute, and as a share of the threshold."""
 PURGES, SETTLED = 6, 0.003
 """So often at most disputed droplets are dropped and found anew; it ends when the others stay as many, about."""
-RAW_ROUNDS = 3
-"""In which droplets, blur and level become those of incoherent light."""
-MASKED_ROUNDS = 2
-"""For droplets that most views see through masks: they explain what is left, and are not told."""
-OPTICS_EVERY = 2
-"""Rounds from one estimate of optics and defects to the next."""
-APART_VOXEL, APART_RADII = 1.2, 0.7
-"""A candidate keeps so far from droplets, or so many radii of theirs."""
-BEYOND_VOXEL = 1.5
-"""A droplet that leaves the searched grid farther than this is dropped."""
-SWEEPS = (Sweeps(4, move=False, tolerance=0.01), Sweeps(8, tolerance=0.01))
-FINAL_SWEEPS = Sweeps(30, tolerance=3e-4)
 
 
 def find_shadows(
@@ -91,19 +49,37 @@ def find_shadows(
     search : DropletSearch
         Where to look: it must hold every droplet that the views show.
     light : float | "estimated" | "incoherent"
-        Numerical aperture of the light over that of the lens; estimated once most droplets are known.
+        Numerical aperture of the light over that of the lens; estimated from the droplets that are found in
+        incoherent light; in another they are found anew.
     before_round : callable
         Called before each round; what it raises ends the search.
     """
-    optics = first_disc_optics(shot.images)
-    if not isinstance(light, str):
-        optics = replace(optics, condenser_ratio=light)
+    if light != "estimated":
+        return _found(shot, search, None if light == "incoherent" else light, before_round)
+    fit = _found(shot, search, None, before_round)
+    seen = ShadowRounds(shot, search, before_round).light(fit)
+    if seen.condenser_ratio is not None:
+        fit = _found(shot, search, seen.condenser_ratio, before_round)
+    return replace(fit, light_share=seen.share)
+
+
+def in_incoherent_light(shot: Transmissions, search: DropletSearch, fit: ShadowFit) -> FloatArray:
+    """Squared radii (N,) that the droplets would have if light came from all directions."""
+    if fit.optics.condenser_ratio is None or not len(fit.discs):
+        return fit.discs.squares_voxel2
+    return ShadowRounds(shot, search).relit(fit, None).discs.squares_voxel2
+
+
+def _found(
+    shot: Transmissions, search: DropletSearch, condenser_ratio: float | None, before_round: Callable[[], None]
+) -> ShadowFit:
+    """The droplets in one light."""
+    optics = replace(first_disc_optics(shot.images), condenser_ratio=condenser_ratio)
     fit = ShadowFit(Discs.none(), optics, shot.noises_of(shot.images))
-    finder = _Finder(shot, search, before_round)
+    finder = ShadowRounds(shot, search, before_round)
     for number, smooth_px in enumerate(COARSE_PX):
         fit = finder.round(fit, Stage(smooth_px, COARSE_SHARE, coarse=True), estimate=number > 0)
-    fit = finder.fallen(fit, FIRST, FALLING_ROUNDS, joker=False)
-    fit = finder.undisputed(finder.lit(fit) if light == "estimated" else fit)
+    fit = finder.undisputed(finder.fallen(fit, FIRST, FALLING_ROUNDS, joker=False))
     known = 0
     for _ in range(PURGES):
         if abs(len(fit.discs) - known) <= SETTLED * known:
@@ -111,189 +87,3 @@ def find_shadows(
         known = len(fit.discs)
         fit = finder.undisputed(finder.fallen(fit, AGAIN, AGAIN_ROUNDS, joker=True))
     return finder.finished(finder.rested(finder.fallen(fit, AGAIN, AGAIN_ROUNDS, joker=True)))
-
-
-def in_incoherent_light(shot: Transmissions, search: DropletSearch, fit: ShadowFit) -> FloatArray:
-    """Squared radii (N,) that the droplets would have, where they are, if light came from all directions."""
-    if fit.optics.condenser_ratio is None or not len(fit.discs):
-        return fit.discs.squares_voxel2
-    finder, raw = _Finder(shot, search), fit
-    for _ in range(RAW_ROUNDS):
-        raw = finder.relit(raw, None)
-    drawn = DiscImages(shot.images, shot.trust, shot.lattice, shot.threads).drawn(raw.optics, fit.discs)
-    seen = seen_by(shot, replace(fit, optics=raw.optics), drawn.transmissions)
-    return seen.fitted(drawn, raw.optics, fit.discs, replace(FINAL_SWEEPS, move=False))[0].squares_voxel2
-
-
-class _Finder:
-    """The rounds of a search, all with the same images."""
-
-    def __init__(self, shot: Transmissions, search: DropletSearch, before_round: Callable[[], None] = keep_on) -> None:
-        self._shot = shot
-        self._before_round = before_round
-        self._search = search
-        self._into_grid = shot.cut(search.pixels_into_grid())
-        self._last: tuple[Discs, DiscOptics, list[Image]] | None = None
-
-    def fallen(self, fit: ShadowFit, first: float, rounds: int, *, joker: bool) -> ShadowFit:
-        """Rounds with a falling threshold."""
-        last = _last(fit)
-        for number, threshold in enumerate(np.geomspace(max(first, last), last, rounds)):
-            unite = joker or number >= rounds // 2
-            fit = self.round(
-                fit,
-                Stage(SHARP_PX, float(threshold), joker=joker, hidden=joker and number % OPTICS_EVERY == 0),
-                estimate=number % OPTICS_EVERY == 1,
-                unite=unite,
-            )
-        return fit
-
-    def rested(self, fit: ShadowFit) -> ShadowFit:
-        """Rounds at the last threshold until they explain no more."""
-        stage = Stage(SHARP_PX, _last(fit), joker=True, hidden=True)
-        left, before = self._left(fit), np.inf
-        for _ in range(MOST_ROUNDS):
-            if left > (1 - LEAST_GAIN) * before:
-                break
-            fit = self.round(fit, stage, estimate=True, unite=True)
-            left, before = self._left(fit), left
-        return fit
-
-    def lit(self, fit: ShadowFit) -> ShadowFit:
-        """The same in the light that explains the images best."""
-        if not len(fit.discs):
-            return fit
-        return best_light(self.relit(fit, None), lambda ratio: self.relit(fit, ratio), self._chi_squared)
-
-    def relit(self, fit: ShadowFit, condenser_ratio: float | None) -> ShadowFit:
-        """The same in other light, fitted to it."""
-        self._before_round()
-        fit = relit(fit, condenser_ratio, self._shot.lattice.pixels_per_voxel)
-        return self._estimated(self._fitted(fit, Stage(SHARP_PX, _last(fit))), unite=False)
-
-    def round(self, fit: ShadowFit, stage: Stage, *, estimate: bool, unite: bool = False) -> ShadowFit:
-        """Candidates enter, all are fitted, some are dropped; then optics and defects are estimated anew."""
-        self._before_round()
-        fit = self._fitted(self._joined(fit, stage), stage)
-        if stage.joker and len(fit.discs):
-            least = np.clip(self._knowing(fit), 1, judging_views(len(self._shot.images)))
-            fit = fit.where(supporting_views(self._supports(fit)) >= least)
-        if estimate and len(fit.discs):
-            fit = self._estimated(self._masked(fit) if unite else fit, unite=unite)
-        return fit
-
-    def _masked(self, fit: ShadowFit) -> ShadowFit:
-        """Discs in a row, and those that touch what has been found to be liquid before, are no droplets."""
-        known = len(fit.liquid)
-        liquid = liquid_objects(fit.liquid.joined_by(fit.discs.positions_voxel, fit.discs.squares_voxel2))[known:] >= 0
-        if not liquid.any():
-            return fit
-        more = fit.discs.where(liquid)
-        joined = fit.liquid.joined_by(more.positions_voxel, more.squares_voxel2)
-        masks = liquid_masks(joined, self._shot.lattice, fit.optics, [image.shape for image in self._shot.images])
-        return replace(fit.where(~liquid), liquid=joined, masks=masks)
-
-    def undisputed(self, fit: ShadowFit) -> ShadowFit:
-        """Without the droplets that some view disputes."""
-        return fit.where(undisputed(self._supports(fit)))
-
-    def finished(self, fit: ShadowFit) -> ShadowFit:
-        """The droplets in place, all of them significant, and those that masks leave too few views for."""
-        for _ in range(MASKED_ROUNDS if fit.masks else 0):
-            fit = self.round(fit, Stage(SHARP_PX, _last(fit), joker=True, masked=True), estimate=True, unite=True)
-        if not len(fit.discs):
-            return fit
-        seen = self._seen(fit)
-        discs, information = seen.fitted(seen.drawn(fit.optics, fit.discs), fit.optics, fit.discs, FINAL_SWEEPS)
-        return fit.with_discs(discs.where(_significant(discs, information)))
-
-    def _joined(self, fit: ShadowFit, stage: Stage) -> ShadowFit:
-        drawn = self._drawn(fit)
-        seen = seen_by(self._shot, fit, drawn)
-        peaks = shadow_peaks(self._search.plan, seen, drawn, stage, self._shot.windows)
-        blur_voxel = self._blur_voxel(fit)
-        width_voxel = float(np.hypot(blur_voxel, stage.smooth_px))
-        alone = foremost(peaks, max(1.0, 1.5 * width_voxel / CANDIDATE_PITCH_VOXEL))
-        places = CANDIDATE_PITCH_VOXEL * alone[:, :3]
-        squares = np.full(len(places), NO_DISC)
-        if stage.coarse:
-            squares = -np.log(1 - np.minimum(alone[:, 3], 0.95)) * width_voxel**2
-        if len(fit.discs) and len(places):
-            distance, near = cKDTree(fit.discs.positions_voxel).query(places)
-            free = distance > np.maximum(APART_VOXEL, APART_RADII * fit.discs.radii_voxel[near])
-            places, squares = places[free], squares[free]
-        return fit.with_discs(fit.discs.joined_by(places, squares))
-
-    def _fitted(self, fit: ShadowFit, stage: Stage) -> ShadowFit:
-        least = COARSE_LEAST if stage.coarse else SHARP_LEAST * stage.threshold
-        shadows = self._recorded().drawn(fit.optics, fit.discs)
-        seen = seen_by(self._shot, fit, shadows.transmissions)
-        discs = fit.discs
-        for sweeps in SWEEPS:
-            discs, information = seen.fitted(shadows, fit.optics, discs, sweeps)
-            kept = (self._depths(fit, discs) > least) & _significant(discs, information)
-            seen.add(shadows, fit.optics, discs.where(~kept), -1.0)
-            discs = discs.where(kept)
-            if sweeps is SWEEPS[0]:
-                seen = replace(seen, weights=seen_by(self._shot, fit, shadows.transmissions).weights)
-        return fit.with_discs(_inside(merged_discs(discs), self._search))
-
-    def _estimated(self, fit: ShadowFit, *, unite: bool) -> ShadowFit:
-        seen = self._seen(fit)
-        judging = replace(seen, weights=tuple(map(np.multiply, seen.weights, self._into_grid)))
-        fit = replace(fit, optics=refined_disc_optics(judging, fit.optics, fit.discs, self._drawn(fit)))
-        if unite:
-            fit = replace(fit, defects=union_defects(seen, fit.optics, fit.discs))
-            drawn = self._drawn(fit)
-            left = residuals(seen_by(self._shot, fit, drawn), drawn)
-            fit = replace(fit, noises=self._shot.masked(fit.masks).noises_of(left))
-        return fit
-
-    def _recorded(self) -> DiscImages:
-        """The images as they are, where weights do not matter."""
-        return DiscImages(self._shot.images, self._shot.trust, self._shot.lattice, self._shot.threads)
-
-    def _seen(self, fit: ShadowFit) -> DiscImages:
-        return seen_by(self._shot, fit, self._drawn(fit))
-
-    def _supports(self, fit: ShadowFit) -> DiscSupports:
-        shadows = self._recorded().drawn(fit.optics, fit.discs)
-        return seen_by(self._shot, fit, shadows.transmissions).supports(shadows, fit.optics, fit.discs)
-
-    def _knowing(self, fit: ShadowFit) -> NDArray[np.int64]:
-        return knowing_views(self._shot, fit, fit.discs.positions_voxel)
-
-    def _chi_squared(self, fit: ShadowFit) -> float:
-        return chi_squared(self._seen(fit), self._drawn(fit))
-
-    def _left(self, fit: ShadowFit) -> float:
-        return rms_over_noise(self._seen(fit), self._drawn(fit))
-
-    def _drawn(self, fit: ShadowFit) -> list[Image]:
-        """Transmissions of its discs; the last ones are kept, because a round asks for the same ones again."""
-        if self._last is None or self._last[0] is not fit.discs or self._last[1] is not fit.optics:
-            self._last = (fit.discs, fit.optics, self._recorded().drawn(fit.optics, fit.discs).transmissions)
-        return self._last[2]
-
-    def _blur_voxel(self, fit: ShadowFit) -> float:
-        lattice = self._shot.lattice
-        middle = 0.5 * (lattice.nodes_px.shape[1] - 1) * lattice.spacing
-        return float(fit.optics.blurs_px(middle).mean()) / lattice.pixels_per_voxel
-
-    def _depths(self, fit: ShadowFit, discs: Discs) -> FloatArray:
-        """Share of the light that discs take at their centres."""
-        return np.asarray(1 - np.exp(-discs.squares_voxel2 / (2 * self._blur_voxel(fit) ** 2)))
-
-
-def _last(fit: ShadowFit) -> float:
-    """Threshold up to which candidates are shadows and not noise."""
-    return max(LAST, NOISE_SIGMAS * fit.amplitude_sigma)
-
-
-def _significant(discs: Discs, information: FloatArray) -> NDArray[np.bool_]:
-    return np.asarray(discs.squares_voxel2 * np.sqrt(information) > SIGNIFICANCE)
-
-
-def _inside(discs: Discs, search: DropletSearch) -> Discs:
-    most = np.array(search.searched.shape[::-1]) - 1 + BEYOND_VOXEL
-    return discs.where(np.all((discs.positions_voxel > -BEYOND_VOXEL) & (discs.positions_voxel < most), axis=1))

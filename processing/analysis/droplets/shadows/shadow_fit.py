@@ -83,6 +83,8 @@ class ShadowFit:
         Those that explain what is no droplet.
     masks : tuple of (rows, columns) bool arrays
         Pixels that look through it, and have no say; empty where there is none.
+    light_share : float
+        Of the droplets, which coherent light explains better than incoherent light; 0 where that was not asked.
     """
 
     discs: Discs
@@ -91,6 +93,7 @@ class ShadowFit:
     defects: tuple[Image, ...] = ()
     liquid: Discs = NO_DISCS
     masks: tuple[Mask, ...] = ()
+    light_share: float = 0.0
 
     def with_discs(self, discs: Discs) -> "ShadowFit":
         """The same with other droplets."""
@@ -140,14 +143,10 @@ def residuals(seen: DiscImages, drawn: Sequence[Image]) -> list[Image]:
     return [image - model for image, model in zip(seen.images, drawn, strict=True)]
 
 
-def chi_squared(seen: DiscImages, drawn: Sequence[Image]) -> float:
-    """Sum of the squares of the residuals over the noise of each pixel."""
-    return sum(
-        float(np.vdot(weight, left * left)) for left, weight in zip(residuals(seen, drawn), seen.weights, strict=True)
-    )
-
-
 def rms_over_noise(seen: DiscImages, drawn: Sequence[Image]) -> float:
     """Root mean square of the residuals over the noise of each pixel."""
-    pixels = sum(np.count_nonzero(weight) for weight in seen.weights)
-    return float(np.sqrt(chi_squared(seen, drawn) / pixels)) if pixels else 0.0
+    squares = pixels = 0.0
+    for left, weight in zip(residuals(seen, drawn), seen.weights, strict=True):
+        squares += float(np.vdot(weight, left * left))
+        pixels += np.count_nonzero(weight)
+    return float(np.sqrt(squares / pixels)) if pixels else 0.0

@@ -27,7 +27,7 @@ from processing.analysis.droplets.measured_exposure import (
 )
 from processing.analysis.droplets.shadows.disc_supports import supporting_views
 from processing.analysis.droplets.shadows.judged_volume import judging_views, knowing_views, unjudged_share
-from processing.analysis.droplets.shadows.light_search import Light
+from processing.analysis.droplets.shadows.light_search import SURE, UNSURE, Light
 from processing.analysis.droplets.shadows.masked_liquid import liquid_objects, lumps
 from processing.analysis.droplets.shadows.opaque_discs import DiscImages, Discs, Shadows
 from processing.analysis.droplets.shadows.shadow_finder import find_shadows, in_incoherent_light
@@ -41,9 +41,13 @@ LIMITS = RatioLimits(trusted=1.25, refused=2.0)
 """Of discs: overlapping shadows leave something even where all droplets are right. Simulated shots of 28 to 40 droplets
 per mm^3, up to 1.25 have 0.3 to 1.7 % ghosts, from 1.33 to 1.45 2 to 5 %."""
 COHERENT_LIMITS = RatioLimits(trusted=1.1, refused=2.0)
-"""In partially coherent light fringes look like faint droplets: 0 % ghosts at 1.06, 4 % at 1.15, 18 % at 1.25."""
+"""In partially coherent light fringes look like faint droplets: 0 % ghosts at 1.06, 4 % at 1.16, 18 % at 1.24."""
 
 
+UNSURE_LIGHT = (
+    "whether light is coherent cannot be told from these droplets: if it is, diameters are up to 10 um too large; "
+    "state what is known of the rig (--light: aperture of the light over that of the lens, or incoherent)"
+)
 COHERENT_SHARE = 0.02
 """Of a diameter: what the correction for partially coherent light leaves, common to the droplets of a shot."""
 
@@ -160,6 +164,8 @@ def _told(shot: Transmissions, fit: ShadowFit, search: DropletSearch) -> ShadowE
     verdict, reasons = judged(beside_px, ratio, limits)
     if left := grey(seen, shadows, judged_weights):
         verdict, reasons = ShotVerdict.DOUBTFUL if verdict is ShotVerdict.GOOD else verdict, (*reasons, *left)
+    if UNSURE < fit.light_share < SURE:
+        verdict, reasons = ShotVerdict.DOUBTFUL if verdict is ShotVerdict.GOOD else verdict, (*reasons, UNSURE_LIGHT)
     if verdict is ShotVerdict.REFUSED:
         return MeasuredExposure(SizedDroplets.none(), views, ratio, verdict, reasons)
     known = knowing_views(shot, fit, fit.discs.positions_voxel) >= judging_views(len(shot.images))

@@ -9,10 +9,11 @@ from processing.analysis.droplets.droplet_search import plan_droplets
 from processing.analysis.droplets.ghost_share import matches
 from processing.analysis.droplets.measured_exposure import ShotVerdict
 from processing.analysis.droplets.shadows.disc_optics import first_disc_optics
-from processing.analysis.droplets.shadows.light_search import CONDENSER_RATIOS, best_light, relit
+from processing.analysis.droplets.shadows.light_search import relit, seen_light
 from processing.analysis.droplets.shadows.opaque_discs import Discs
 from processing.analysis.droplets.shadows.shadow_fit import ShadowFit
 from processing.analysis.droplets.shadows.shadow_shot import measure_shadows
+from processing.geometry import FloatArray
 from processing.studies.shadows.sizes import SizeCase, size_scene
 from processing.studies.simulated_droplets import study_grid
 
@@ -33,23 +34,44 @@ def test_partially_coherent_light_is_found_and_diameters_are_corrected_for_it() 
     assert np.median(shot.droplets.diameters_raw_um[real] - true_um) > 5
 
 
+def test_incoherent_light_is_told_from_light_that_looks_much_like_it() -> None:
+    grid = study_grid(SHAPE)
+    scene = size_scene(SizeCase(10), grid, IMAGE_SIZE_PX, np.random.default_rng(6))
+    shot = measure_shadows(scene.images, plan_droplets(scene.believed, grid, margin_voxel=8))
+    assert shot.verdict is ShotVerdict.GOOD
+    assert {view.condenser_ratio for view in shot.views.values()} == {None}
+    np.testing.assert_array_equal(shot.droplets.diameters_um, shot.droplets.diameters_raw_um)
+
+
 def test_the_ratio_that_leaves_least_is_taken_between_those_that_are_tried() -> None:
-    fits = {ratio: fit_of(ratio) for ratio in (None, *CONDENSER_RATIOS)}
+    def residuals(ratio: float | None) -> FloatArray:
+        return np.full(30, 9.0 if ratio is None else 1 + 4 * (ratio - 0.37) ** 2)
 
-    def left(fit: ShadowFit) -> float:
-        ratio = fit.optics.condenser_ratio
-        return 1000.0 if ratio is None else 500 + 4000 * (ratio - 0.37) ** 2
-
-    best = best_light(fits[None], fit_of, left)
-    assert best.optics.condenser_ratio == pytest.approx(0.37, abs=0.011)
+    assert seen_light(residuals).condenser_ratio == pytest.approx(0.37, abs=0.011)
 
 
-@pytest.mark.parametrize(("gain", "ratio"), [(20.0, None), (30.0, 1.0)])
-def test_light_is_incoherent_unless_another_explains_more(gain: float, ratio: float | None) -> None:
-    def left(fit: ShadowFit) -> float:
-        return 1000 - gain * ((fit.optics.condenser_ratio or 0.0) == 1.0)
+@pytest.mark.parametrize(("better", "droplets", "ratio"), [(15, 30, None), (24, 30, 0.8), (6, 6, None)])
+def test_most_droplets_must_say_so(better: int, droplets: int, ratio: float | None) -> None:
+    """Whatever the few that explain the images worst say, and ten droplets at least."""
 
-    assert best_light(fit_of(None), fit_of, left).optics.condenser_ratio == ratio
+    def residuals(other: float | None) -> FloatArray:
+        left = np.full(droplets, 2.0)
+        left[:better] -= (other or 0) == 0.8
+        left[better:] *= 1 if other is None else 100
+        return left
+
+    seen = seen_light(residuals)
+    assert seen.condenser_ratio == ratio
+    assert seen.share == (better / droplets if droplets > 10 else 0)
+
+
+def test_who_cannot_tell_the_light_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    grid = study_grid(SHAPE)
+    scene = size_scene(SizeCase(7), grid, IMAGE_SIZE_PX, np.random.default_rng(7))
+    monkeypatch.setattr("processing.analysis.droplets.shadows.shadow_shot.UNSURE", -0.1)
+    shot = measure_shadows(scene.images, plan_droplets(scene.believed, grid, margin_voxel=8))
+    assert shot.verdict is ShotVerdict.DOUBTFUL
+    assert "--light" in shot.reasons[-1]
 
 
 def test_there_and_back_droplets_are_as_they_were() -> None:
