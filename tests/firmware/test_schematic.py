@@ -217,6 +217,7 @@ def test_kicads_own_check_finds_no_error(tmp_path: Path) -> None:
     kicad = shutil.which("kicad-cli")
     if kicad is None:
         pytest.skip("kicad-cli is not installed (KiCad 8 or later)")
-    check = [kicad, "sch", "erc", "--severity-error", "--exit-code-violations", "-o", tmp_path / "erc.rpt", SCHEMATIC]
+    report = tmp_path / "erc.rpt"
+    check = [kicad, "sch", "erc", "--severity-error", "--exit-code-violations", "-o", str(report), str(SCHEMATIC)]
     done = subprocess.run(check, capture_output=True, text=True, timeout=100, check=False)
-    assert done.returncode == 0, (tmp_path / "erc.rpt").read_text()
+    assert done.returncode == 0, report.read_text()
