@@ -1,7 +1,7 @@
 # Each target does its own set-up on a bare Debian 12 or 13 machine, is quick when that is done, and says what it does.
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-fast test-wheel test-debian13 wheel lint serve firmware bench measured lock clean mutants flips fuzz fuzz-import
+.PHONY: help setup demo test test-fast test-wheel test-debian13 wheel lint style serve firmware bench measured lock clean mutants flips fuzz fuzz-import
 
 PYTHON := .venv/bin/python
 TOOLS := env PATH="$(CURDIR)/.venv/bin:$$PATH"
@@ -27,9 +27,8 @@ endef
 
 # A network of its own, so that no camera broadcast leaves the machine; without it where the machine forbids user namespaces.
 PRIVATE_NETWORK := $(shell unshare -rn true 2>/dev/null && echo .ci/private-network)
-# Tests run side by side where each can have such a network, the addresses of cameras being the same: up to four at a time,
-# one more than there are processors, as some tests wait.
-TEST_WORKERS := $(shell n=$$(($$(nproc) + 1)); echo $$((n < 4 ? n : 4)))
+# Tests run side by side, up to four at a time, where each can have such a network; the addresses of cameras are the same.
+TEST_WORKERS := $(shell n=$$(nproc); echo $$((n < 4 ? n : 4)))
 SIDE_BY_SIDE := $(if $(PRIVATE_NETWORK),--dist worksteal --tx "$(TEST_WORKERS)*popen//python=$(PRIVATE_NETWORK) $(PYTHON)")
 
 help: ## Show this list.
@@ -40,8 +39,11 @@ setup: .venv/.native firmware ## Install Debian packages, the Python environment
 demo: setup ## Run the whole chain on the simulated rig; writes demo-out/report.html.
 	$(PRIVATE_NETWORK) $(PYTHON) -m server.cli demo --out demo-out $(DEMO_OPTIONS)
 
-test: lint build/rp2040js/node_modules ## Run linters and all tests.
-	$(PYTHON) -m pytest $(SIDE_BY_SIDE) $(TEST_OPTIONS)
+# Types are checked beside the tests, which leave a processor idle now and then.
+test: style build/rp2040js/node_modules ## Run linters and all tests.
+	@.venv/bin/mypy >build/mypy.log 2>&1 & types=$$!; \
+	$(PYTHON) -m pytest $(SIDE_BY_SIDE) $(TEST_OPTIONS); tests=$$?; \
+	wait $$types; types=$$?; cat build/mypy.log; exit $$((tests || types))
 
 # Quick ones; calibration, reconstruction, firmware, pages and cameras need the rest.
 FAST_TESTS := $(wildcard tests/test_*.py tests/processing/test_*.py) tests/daq \
@@ -60,17 +62,19 @@ wheel: setup ## Build a wheel, for all Linux whose glibc is not older than this 
 
 test-wheel: wheel ## Install the wheel into an environment without Aravis, and use it there.
 	@/usr/bin/python3 -m venv --clear build/analysis
-	@build/analysis/bin/python -m pip install --quiet --disable-pip-version-check -c requirements.lock dist/*.whl
+	@build/analysis/bin/python -m pip install --quiet --disable-pip-version-check --no-compile -c requirements.lock dist/*.whl
 	$(PRIVATE_NETWORK) env TOMOSHADOW_PROGRAMS=$(CURDIR)/build/analysis/bin $(PYTHON) -m pytest tests/system/test_wheel.py
 
 test-debian13: ## Run TARGETS="demo test" on a Debian 13 that debootstrap lays below DEBIAN13=build/debian13; needs root.
 	@$(call install,debootstrap git)
 	@$(AS_ROOT) .ci/debian13 $(DEBIAN13) $(TARGETS)
 
-lint: setup build/.test-packages ## Run ruff, mypy, import-linter and cppcheck.
+lint: style ## Run ruff, mypy, import-linter and cppcheck.
+	.venv/bin/mypy
+
+style: setup build/.test-packages
 	.venv/bin/ruff check .
 	.venv/bin/ruff format --check .
-	.venv/bin/mypy
 	.venv/bin/lint-imports --no-cache
 	@$(MAKE) --no-print-directory -C firmware lint
 
@@ -136,7 +140,7 @@ REMOVE_CV2 := $(PYTHON) -m pip uninstall -qq --yes opencv-python-headless opencv
 	@echo "Installing Python packages into .venv"
 	@/usr/bin/python3 -m venv --system-site-packages .venv
 	@if compgen -G '.venv/lib/*/site-packages/opencv_python_headless-*' >/dev/null; then $(REMOVE_CV2); fi
-	@$(PYTHON) -m pip install --quiet --disable-pip-version-check -r requirements.lock
+	@$(PYTHON) -m pip install --quiet --disable-pip-version-check --no-compile -r requirements.lock
 	@touch $@
 
 # An editable install remembers where each module was, and finds one that has moved no more.
