@@ -14,6 +14,8 @@ from server.rig.config import RigConfig, load_config
 
 pytestmark = pytest.mark.network
 SHOTS = 3
+ATTEMPTS = 3
+"""An emulator that shares its processor with other tests may be late for a shot."""
 
 
 def emulated_config() -> RigConfig:
@@ -28,14 +30,19 @@ def test_a_run_with_the_image_of_the_pico(tmp_path: Path) -> None:
     plan = RunPlan(
         name="emulated", kind=RunKind.BACKGROUND, shots=SHOTS, rate_hz=5.0, pulse=PulsePair(current_a=current_a)
     )
-    with open_rig(config) as assembled:
-        with Acquisition(assembled.rig, tmp_path, observers=assembled.observers) as acquisition:
-            run_id = acquisition.start(plan)
-            status = acquisition.wait(60.0)
-        fired = [] if assembled.laboratory is None else assembled.laboratory.fired
+    for attempt in range(ATTEMPTS):
+        runs = tmp_path / str(attempt)
+        runs.mkdir()
+        with open_rig(config) as assembled:
+            with Acquisition(assembled.rig, runs, observers=assembled.observers) as acquisition:
+                run_id = acquisition.start(plan)
+                status = acquisition.wait(60.0)
+            fired = [] if assembled.laboratory is None else assembled.laboratory.fired
+        if status.outcome is RunOutcome.COMPLETED:
+            break
     assert (status.outcome, status.shots_valid) == (RunOutcome.COMPLETED, SHOTS)
     assert [train.sequence for train in fired] == [1, 2, 3]
-    with RunReader(tmp_path / run_id) as reader:
+    with RunReader(runs / run_id) as reader:
         assert reader.header.devices["pulse_generator"]["firmware"].endswith("rp2040")
         for index, train in enumerate(fired):
             shot = reader.read_shot(index)
