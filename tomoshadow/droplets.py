@@ -37,9 +37,9 @@ def measure(
         Where droplets are measured, about one voxel per pixel, see ``common_grid``.
     polarity : {"bright", "shadow"}
         Only shadows tell how large droplets are.
-    light : float or {"estimated", "incoherent"}
-        Of shadows: numerical aperture of the light over that of the lens, above 0 to 1. Such light makes droplets look
-        larger; ``diameters_um`` are corrected for it, ``diameters_raw_um`` are not.
+    light : float or {"estimated", "incoherent", "gaussian"}
+        Of shadows: numerical aperture of the light over that of the lens, above 0 to 8; light from all directions; or
+        whatever is behind a Gaussian blur. ``diameters_um`` are corrected for it, ``diameters_raw_um`` are not.
     twins : int
         Simulated twins of the exposure that tell how many are ghosts; each costs as much as the exposure itself.
     seed : int

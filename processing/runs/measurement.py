@@ -6,9 +6,9 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from daq.files.run_directory import RunReader, Shot
 from processing.analysis.droplets.bright_shot import BrightExposure, measure_bright
@@ -18,6 +18,7 @@ from processing.analysis.droplets.ghost_share import pooled
 from processing.analysis.droplets.measured_exposure import ShotVerdict
 from processing.analysis.droplets.shadows.light_search import Light
 from processing.analysis.droplets.shadows.shadow_shot import ShadowExposure, measure_shadows
+from processing.analysis.droplets.size_correction import SizeCorrection, SizeRows
 from processing.calibration.calibration import Calibration
 from processing.calibration.calibration_file import load_calibration
 from processing.kernels import DEFAULT_THREADS
@@ -37,7 +38,7 @@ from processing.runs.recipe import recipe_sha256
 from processing.runs.results_file import FrameName, Provenance, claim_results
 from processing.runs.workbench import References, read_references
 
-METHOD_VERSION = 3
+METHOD_VERSION = 4
 """Of what the numbers in a file of droplets mean."""
 Exposure = BrightExposure | ShadowExposure
 
@@ -55,13 +56,20 @@ class MeasureSettings(FrozenValue):
     light: Annotated[
         Light,
         Field(
-            description="of shadows: aperture of the light over that of the lens, up to 1; or incoherent; or estimated"
+            description="aperture of the light of shadows over the lens's, up to 8; incoherent, gaussian or estimated"
         ),
     ] = "estimated"
+    sizes: Annotated[SizeRows, Field(description="of the dots of a reticle, in um: found in this light, true, sd")] = ()
     ignored: Annotated[
         tuple[IgnoredPixels, ...],
         Field(description="rectangles of shadow images that are not asked, VIEW=LEFT:RIGHT,TOP:BOTTOM in px"),
     ] = ()
+
+    @model_validator(mode="after")
+    def _sizes_of_one_light(self) -> Self:
+        if self.sizes and self.light == "estimated":
+            raise ValueError("sizes were found in one light: state it, as size-calibration does")
+        return self
 
     def results_id(self, calibration: str) -> str:
         """Name of the results directory: droplets, and a hash of method, settings and the calibration's name."""
@@ -165,6 +173,8 @@ class RunMeasurement:
         references = read_references(run)
         if settings.polarity == "shadow":
             require_backgrounds(run, references)
+        elif settings.sizes:
+            raise PipelineError("sizes of a reticle are for shadows: bright particles have no diameter")
         elif settings.ignored:
             raise PipelineError("pixels to ignore are for shadows: bright particles are measured with all pixels")
         require_fitting(settings.ignored, {view: calibration.views[view].mapping.image_size_px for view in views})
@@ -236,6 +246,7 @@ class RunMeasurement:
             self.search,
             trust=list(known.values()),
             light=self.settings.light,
+            sizes=SizeCorrection.of(self.settings.sizes) if self.settings.sizes else None,
             twins=twins,
             seed=seed,
             threads=threads,

@@ -1,4 +1,4 @@
-"""Partially coherent light: small opaque discs look larger than they are.
+"""Light from more or fewer directions: in that from few, small opaque discs look larger than they are.
 
 A droplet's profile is Abbe's sum (``processing.coherent_light``). Everything scales with the Airy disk d_A / M in the
 object, so one table of radial profiles per condenser serves all lenses and diameters. What it cannot do:
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.special import chndtr
 
-from processing.coherent_light import blurred, circles, waves
+from processing.coherent_light import MOST_RATIO, blurred, circles, waves
 from processing.synthetic.stamping import Discs, FloatArray, FloatImage, stamp_discs
 from processing.synthetic.view_optics import CORE_SIGMA
 
@@ -67,10 +67,11 @@ def coherent_profiles(condenser_ratio: float) -> CoherentProfiles:
     Parameters
     ----------
     condenser_ratio : float
-        Numerical aperture of the light over that of the lens: 0.02 is almost coherent, 1 fills the lens.
+        Numerical aperture of the light over that of the lens: 0.02 is almost coherent, 1 fills the lens, 8
+        is light from all directions.
     """
-    if not 0 < condenser_ratio <= 1:
-        raise ValueError(f"condenser ratio must lie above 0 and not exceed 1, not {condenser_ratio}")
+    if not 0 < condenser_ratio <= MOST_RATIO:
+        raise ValueError(f"condenser ratio must lie above 0 and not exceed {MOST_RATIO:g}, not {condenser_ratio}")
     profiles = np.array([_profiles(diameter, condenser_ratio) for diameter in _DIAMETERS_AIRY])
     return CoherentProfiles(CubicSpline(np.log(_DIAMETERS_AIRY), profiles))
 

@@ -28,8 +28,8 @@ class ViewOptics:
     wavelength_um : float
         Wavelength of the light.
     condenser_ratio : float, optional
-        Numerical aperture of the light over that of the lens, above 0 to 1: partially coherent light, in which small
-        droplets look larger (``coherence``). Without it light is incoherent.
+        Numerical aperture of the light over that of the lens, above 0 to 8, see ``coherence``; up to 1, light is
+        partially coherent, and small droplets look larger. Without it diffraction is a Gaussian blur.
     """
 
     f_number: float

@@ -15,8 +15,6 @@ from processing.errors import BadInput
 from server.cli import (
     average,
     bench,
-    calibrate,
-    check,
     demo,
     doctor,
     firmware,
@@ -24,10 +22,10 @@ from server.cli import (
     measure,
     optics,
     reconstruct,
-    self_calibrate,
     serve,
     study,
 )
+from server.cli.calibrations import calibrate, check, self_calibrate, size_calibration
 from server.cli.output import endable, say, tell
 
 COMMANDS = (
@@ -38,6 +36,7 @@ COMMANDS = (
     calibrate,
     check,
     self_calibrate,
+    size_calibration,
     reconstruct,
     measure,
     average,

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from server.cli.options import (
     Verbs,
+    add_light,
     add_out,
     add_shots,
     add_verb,
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
     from processing.runs.measurement import MeasuredShot, MeasureSettings
 
 NAME = "measure"
-SAID = ("polarity", "grid", "twins", "light", "ignore")
+SAID = ("polarity", "grid", "twins", "light", "sizes", "ignore")
 """Options that a recipe takes the place of."""
 
 
@@ -49,11 +50,9 @@ def add(verbs: Verbs) -> None:
     parser.add_argument(
         "--twins", type=_twins, metavar="N", help="simulated twins per exposure that tell ghosts; default none"
     )
+    add_light(parser)
     parser.add_argument(
-        "--light",
-        type=_light,
-        metavar="RATIO",
-        help="of shadows: aperture of the light over that of the lens, above 0 to 1, or incoherent; default: estimated",
+        "--sizes", type=Path, metavar="FILE", help="of shadows: calibration of sizes, as size-calibration writes it"
     )
     parser.add_argument(
         "--ignore",
@@ -72,13 +71,6 @@ def _twins(text: str) -> int:
     from processing.runs.measurement import MeasureSettings
 
     return int(setting("twins", text, MeasureSettings))
-
-
-def _light(text: str) -> "float | str":
-    from processing.runs.measurement import MeasureSettings
-
-    light: float | str = setting("light", text, MeasureSettings)
-    return light
 
 
 def _ignored(text: str) -> str:
@@ -137,9 +129,24 @@ def _by_options(options: Namespace, calibration: "Calibration") -> "MeasureSetti
         polarity=polarity,
         grid=grid,
         twins=options.twins or 0,
-        light=options.light or "estimated",
         ignored=ignored,
+        **_light_and_sizes(options),
     )
+
+
+def _light_and_sizes(options: Namespace) -> dict[str, Any]:
+    """The light that is stated, or that in which a reticle was measured, with the sizes of its dots."""
+    from processing.runs.errors import PipelineError
+    from processing.runs.reticle.size_calibration import load_size_calibration
+
+    if options.sizes is None:
+        return {"light": options.light or "estimated"}
+    found = load_size_calibration(options.sizes)
+    if options.light not in (None, found.light):
+        raise PipelineError(
+            f"--light {options.light}: {options.sizes} was measured in light {found.light}; leave it out"
+        )
+    return {"light": found.light, "sizes": found.rows}
 
 
 def _measure_run(options: Namespace, settings: "MeasureSettings", run_dir: Path, place: Path) -> Outcome:

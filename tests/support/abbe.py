@@ -15,9 +15,10 @@ def abbe(discs_airy: list[tuple[float, float, float]], ratio: float) -> FloatArr
     for row, column, radius in discs_airy:
         mask |= (rows[:, None] - row) ** 2 + (rows - column) ** 2 < radius**2
     field = np.fft.fft2(1 - mask.reshape(SIZE, 8, SIZE, 8).mean(axis=(1, 3)))
-    frequencies, k = np.fft.fftfreq(SIZE, 1 / PER_AIRY), np.arange(100) + 0.5
+    points = int(100 * max(ratio, 1.0) ** 2)
+    frequencies, k = np.fft.fftfreq(SIZE, 1 / PER_AIRY), np.arange(points) + 0.5
     image = np.zeros((SIZE, SIZE))
-    for source in 1.22 * ratio * np.sqrt(k / 100) * np.exp(1j * k * np.pi * (3 - 5**0.5)):
+    for source in 1.22 * ratio * np.sqrt(k / points) * np.exp(1j * k * np.pi * (3 - 5**0.5)):
         pupil = np.hypot(frequencies[:, None] + source.imag, frequencies + source.real) <= 1.22
-        image += np.abs(np.fft.ifft2(field * pupil)) ** 2 / 100
-    return image
+        image += np.abs(np.fft.ifft2(field * pupil)) ** 2
+    return np.asarray(image / image[0, 0])

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 from scipy.ndimage import gaussian_filter
@@ -37,8 +38,10 @@ def scale_px_per_mm(camera: PinholeCamera, points_mm: FloatArray) -> FloatArray:
     return np.asarray(camera.camera_matrix[0, 0] / depths_mm)
 
 
-def united_shadow(centres_px: FloatArray, radii_px: FloatArray, blur_px: float, size_px: tuple[int, int]) -> FloatArray:
-    """What is let through by opaque discs that unite, then are blurred."""
+def united_shadow(
+    centres_px: FloatArray, radii_px: FloatArray, blur_px: float, size_px: tuple[int, int], *, sharp: bool = False
+) -> FloatArray:
+    """What is let through by opaque discs that unite, then are blurred: by a Gaussian, or as a sharp lens does."""
     width_px, height_px = size_px
     mask = np.zeros((height_px * FINE, width_px * FINE), np.float32)
     for (u, v), radius_px in zip((centres_px + 0.5) * FINE - 0.5, radii_px * FINE, strict=True):
@@ -49,8 +52,17 @@ def united_shadow(centres_px: FloatArray, radii_px: FloatArray, blur_px: float, 
         row, column = np.ogrid[rows.start : rows.start + part.shape[0], columns.start : columns.start + part.shape[1]]
         edge = np.sqrt(max(radius_px**2 - 1 / 12, 0)) + 0.5
         np.maximum(part, np.clip(edge - np.hypot(row - v, column - u), 0, 1), out=part)
-    blurred = gaussian_filter(mask, blur_px * FINE, truncate=5.0)
+    blurred = diffracted(mask, blur_px) if sharp else gaussian_filter(mask, blur_px * FINE, truncate=5.0)
     return np.asarray(1 - blurred[FINE // 2 :: FINE, FINE // 2 :: FINE], dtype=np.float64)
+
+
+def diffracted(mask: np.ndarray[tuple[int, int], np.dtype[np.float32]], core_px: float) -> FloatArray:
+    """By diffraction in light from all directions, whose core is as wide as that Gaussian, and by pixels."""
+    airy_px = core_px / (0.42 / 2.44)
+    down, along = np.fft.fftfreq(mask.shape[0])[:, None] * FINE, np.fft.rfftfreq(mask.shape[1]) * FINE
+    share = np.minimum(np.hypot(down, along) * airy_px / 2.44, 1)
+    transfer = 2 / np.pi * (np.arccos(share) - share * np.sqrt(1 - share**2)) * np.sinc(down) * np.sinc(along)
+    return np.asarray(np.fft.irfft2(np.fft.rfft2(mask) * transfer, mask.shape), dtype=np.float64)
 
 
 def shadow_scene(
@@ -62,6 +74,7 @@ def shadow_scene(
     noise: float = 0.012,
     median_mm: float = 0.04,
     blurs_px: tuple[float, ...] = BLURS_PX,
+    sharp: bool = False,
 ) -> ShadowScene:
     """Droplets of lognormal size all over a grid, seen by the paper's views."""
     rng = np.random.default_rng(seed)
@@ -72,7 +85,7 @@ def shadow_scene(
     images = []
     for camera, blur_px in zip(cameras, blurs_px, strict=True):
         radii_px = 0.5 * diameters_mm * scale_px_per_mm(camera, points_mm)
-        image = united_shadow(camera.project(points_mm), radii_px, blur_px, image_size_px)
+        image = united_shadow(camera.project(points_mm), radii_px, blur_px, image_size_px, sharp=sharp)
         images.append((image + rng.normal(0, noise, image.shape)).astype(np.float32))
     return ShadowScene(points_mm, diameters_mm, images, cameras, grid)
 
@@ -87,7 +100,19 @@ UNKNOWN = np.s_[:6]
 """Rows of every view whose background is saturated."""
 
 
-def write_shadow_run(run_dir: Path, scene: ShadowScene, *, background: bool = True) -> Path:
+class Shadows(Protocol):
+    """Images of any scene with the cameras that see it."""
+
+    @property
+    def images(self) -> list[np.ndarray[tuple[int, int], np.dtype[np.float32]]]:
+        """Light over that of the background."""
+
+    @property
+    def cameras(self) -> list[PinholeCamera]:
+        """One per image."""
+
+
+def write_shadow_run(run_dir: Path, scene: Shadows, *, background: bool = True) -> Path:
     """A shot of one exposure before a light that falls off to one side, with its references."""
     names = [f"view{number}" for number in range(1, 5)]
     rows, columns = scene.images[0].shape
@@ -117,7 +142,7 @@ def write_shadow_run(run_dir: Path, scene: ShadowScene, *, background: bool = Tr
     return run_dir
 
 
-def write_shadow_calibration(path: Path, scene: ShadowScene) -> Path:
+def write_shadow_calibration(path: Path, scene: Shadows) -> Path:
     """The scene's cameras as a calibration."""
     good = droplet_calibration(scene.cameras, np.array([3.0, 1.0, 2.0]))
     save_calibration(replace(good, id=content_id(good)), path)

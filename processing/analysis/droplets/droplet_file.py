@@ -18,10 +18,10 @@ SIZED_VERSION = 2
 """Of files whose droplets have diameters and no amplitudes."""
 SCHEMA_KEYS = ("schema", "schema_version")
 DIAMETER, RAW_DIAMETER = "diameter_um", "diameter_raw_um"
-NOT_CORRECTED = "none: light is incoherent, diameter_um is diameter_raw_um, as fitted"
+NOT_CORRECTED = "none: blur is Gaussian, diameter_um is diameter_raw_um, as fitted"
 CORRECTED = (
-    "of partially coherent light, whose condenser_ratio is with the views of the exposures; diameter_raw_um is that of "
-    "the disc that would look so in incoherent light"
+    "of diffraction in light whose condenser_ratio is with the views of the exposures; diameter_raw_um is that of the "
+    "disc that would look so behind a Gaussian blur. Where the settings have sizes, by the dots of a reticle, too"
 )
 GROUP, PROVENANCE, FRAME = "droplets", "tomoshadow", "frame"
 UNITS = MappingProxyType({"mm": "mm", "mm2": "mm^2", "um": "um", "px": "px"})

@@ -119,8 +119,8 @@ def plan_droplets(
     Raises
     ------
     ReconstructionError
-        Too few or too many views, voxels much wider or narrower than pixels, or a mapping that is too rough to be
-        sampled.
+        Too few or too many views, images that are too small, voxels much wider or narrower than pixels, or a mapping
+        that is too rough to be sampled.
     """
     searched = _widened(grid, margin_voxel)
     lattice = sight_lattice(mappings, searched)
@@ -130,6 +130,13 @@ def plan_droplets(
             f"with {LEAST_PX_PER_VOXEL} to {MOST_PX_PER_VOXEL} px per voxel"
         )
     plan = plan_reconstruction(mappings, _coarser(searched), names=names)
+    for name, mapping in zip(plan.names, mappings, strict=True):
+        if min(mapping.image_size_px) < _native.MAX_BLOB_WINDOW_PX:
+            width_px, height_px = mapping.image_size_px
+            raise ReconstructionError(
+                f"{name}: images of {width_px} x {height_px} px; droplets are measured in images of "
+                f"{_native.MAX_BLOB_WINDOW_PX} px at least on each side"
+            )
     return DropletSearch(grid, searched, lattice, plan, plan.names)
 
 

@@ -13,7 +13,6 @@ from processing.analysis.droplets.droplet_table import DropletRows
 from processing.analysis.droplets.gaussian_blobs import Image
 from processing.analysis.droplets.ghost_share import GhostShare, matches
 from processing.geometry import FloatArray
-from processing.kernels import _native
 
 MOST_SHIFT_PX = 0.3
 """Views that lie farther beside their calibration are refused."""
@@ -97,15 +96,13 @@ def check_images(images: Sequence[Image], search: DropletSearch) -> None:
     Raises
     ------
     ValueError
-        Their number or shape is another, one is too small, or a pixel is not finite.
+        Their number or shape is another, or a pixel is not finite.
     """
     if len(images) != len(search.names):
         raise ValueError(f"{len(images)} images for {len(search.names)} views")
     for name, image, view in zip(search.names, images, search.plan.views, strict=True):
         if np.shape(image) != view.image_size_px[::-1]:
             raise ValueError(f"{name}: its image has shape {np.shape(image)}, its view {view.image_size_px[::-1]}")
-        if min(image.shape) < _native.MAX_BLOB_WINDOW_PX:
-            raise ValueError(f"{name}: an image of {image.shape} px, at least {_native.MAX_BLOB_WINDOW_PX} are needed")
         if not np.isfinite(image).all():
             row, column = np.argwhere(~np.isfinite(image))[0]
             raise ValueError(f"{name}: pixel (column {column}, row {row}) is {image[row, column]}")

@@ -49,7 +49,7 @@ class SizeCase:
     calibration_error_px : float
         By which each view lies beside its calibration, in a direction of its own.
     condenser_ratio : float | None
-        Numerical aperture of the light over that of the lens; None: incoherent.
+        Numerical aperture of the light over that of the lens; None: blur is Gaussian.
     least_found, most_ghosts : float | None
         Shares of the droplets from 20 um on that the mean of the shots must keep.
     most_d32_error, most_sd_um : float | None

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from server.cli.check import check_line
+from server.cli.calibrations.check import check_line
 from server.cli.output import progress
 
 if TYPE_CHECKING:

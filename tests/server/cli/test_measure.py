@@ -213,7 +213,7 @@ def test_shadows_of_a_run_become_droplets_with_diameters(tmp_path: Path, capsys:
     assert d32_um["value"] == pytest.approx(true_d32_um, rel=0.03)
     with h5py.File(tmp_path / "out" / result["shots"][0]["file"]) as file:
         assert file["droplets"]["diameter_um"].attrs["units"] == "um"
-        assert "light is incoherent" in file["droplets"]["diameter_um"].attrs["correction"]
+        assert "blur is Gaussian" in file["droplets"]["diameter_um"].attrs["correction"]
         assert "amplitude" not in file["droplets"]
         assert file["tomoshadow"].attrs["schema_version"] == 2
 

@@ -57,6 +57,25 @@ class DiscProfiles:
         slope = (light[at] - light[at - 1]) / (distances[at] - distances[at - 1])
         return float(distances[at] - (light[at] - 0.5) / slope - radius), float(1 / (np.sqrt(2 * np.pi) * slope))
 
+    def transmission(self, radius: float, distances: FloatArray) -> FloatArray:
+        """Light (N,) that one disc lets through, in units of the blur; edges of those beyond the table look alike.
+
+        Parameters
+        ----------
+        radius : float
+            Of the disc.
+        distances : (N,) array
+            From its centre.
+        """
+        held = float(np.clip(radius, _native.SMALLEST_DISC, _native.LARGEST_DISC))
+        row = min(_native.DISC_ROWS_PER_OCTAVE * np.log2(held / _native.SMALLEST_DISC), _native.DISC_ROWS - 1.001)
+        first, share = int(row), row - int(row)
+        inner, outer = max(held - self.reach, 0), held + self.reach
+        places = np.maximum(distances - (radius - held), 0) ** 2 - inner**2
+        nodes = places / (outer**2 - inner**2) * (_native.DISC_NODES - BEYOND_NODES)
+        below, above = (np.interp(nodes, np.arange(_native.DISC_NODES), self.table[at, 0]) for at in (first, first + 1))
+        return np.asarray(np.exp2((1 - share) * below + share * above), dtype=np.float64)
+
 
 @cache
 def disc_profiles(condenser_ratio: float | None = None) -> DiscProfiles:

@@ -16,7 +16,7 @@ from dataclasses import replace
 
 from processing.analysis.droplets.droplet_search import DropletSearch, keep_on
 from processing.analysis.droplets.shadows.disc_optics import first_disc_optics
-from processing.analysis.droplets.shadows.light_search import Light
+from processing.analysis.droplets.shadows.light_search import Light, stated_ratio
 from processing.analysis.droplets.shadows.opaque_discs import Discs
 from processing.analysis.droplets.shadows.shadow_candidates import Stage
 from processing.analysis.droplets.shadows.shadow_fit import ShadowFit, Transmissions
@@ -48,23 +48,24 @@ def find_shadows(
         Images with the lattice of the search.
     search : DropletSearch
         Where to look: it must hold every droplet that the views show.
-    light : float | "estimated" | "incoherent"
-        Numerical aperture of the light over that of the lens; estimated from the droplets that are found in
-        incoherent light; in another they are found anew.
+    light : float | "estimated" | "incoherent" | "gaussian"
+        Numerical aperture of the light over that of the lens; estimated from the droplets that are found behind a
+        Gaussian blur; where another light explains them better, the search goes on in that.
     before_round : callable
         Called before each round; what it raises ends the search.
     """
     if light != "estimated":
-        return _found(shot, search, None if light == "incoherent" else light, before_round)
+        return _found(shot, search, stated_ratio(light), before_round)
     fit = _found(shot, search, None, before_round)
-    seen = ShadowRounds(shot, search, before_round).light(fit)
+    finder = ShadowRounds(shot, search, before_round)
+    seen = finder.light(fit)
     if seen.condenser_ratio is not None:
-        fit = _found(shot, search, seen.condenser_ratio, before_round)
-    return replace(fit, light_share=seen.share)
+        fit = _purged(finder, finder.relit(fit, seen.condenser_ratio))
+    return replace(fit, light_share=seen.share, light_sd_voxel=seen.radius_sd)
 
 
-def in_incoherent_light(shot: Transmissions, search: DropletSearch, fit: ShadowFit) -> FloatArray:
-    """Squared radii (N,) that the droplets would have if light came from all directions."""
+def behind_gaussian_blur(shot: Transmissions, search: DropletSearch, fit: ShadowFit) -> FloatArray:
+    """Squared radii (N,) that the droplets would have if a Gaussian blur were all that is seen of the light."""
     if fit.optics.condenser_ratio is None or not len(fit.discs):
         return fit.discs.squares_voxel2
     return ShadowRounds(shot, search).relit(fit, None).discs.squares_voxel2
@@ -73,14 +74,18 @@ def in_incoherent_light(shot: Transmissions, search: DropletSearch, fit: ShadowF
 def _found(
     shot: Transmissions, search: DropletSearch, condenser_ratio: float | None, before_round: Callable[[], None]
 ) -> ShadowFit:
-    """The droplets in one light."""
+    """The droplets in one light, from the beginning."""
     optics = replace(first_disc_optics(shot.images), condenser_ratio=condenser_ratio)
     fit = ShadowFit(Discs.none(), optics, shot.noises_of(shot.images))
     finder = ShadowRounds(shot, search, before_round)
     for number, smooth_px in enumerate(COARSE_PX):
         fit = finder.round(fit, Stage(smooth_px, COARSE_SHARE, coarse=True), estimate=number > 0)
-    fit = finder.undisputed(finder.fallen(fit, FIRST, FALLING_ROUNDS, joker=False))
-    known = 0
+    return _purged(finder, finder.fallen(fit, FIRST, FALLING_ROUNDS, joker=False))
+
+
+def _purged(finder: ShadowRounds, fit: ShadowFit) -> ShadowFit:
+    """Without disputed droplets, which are found anew, until no more droplets are beyond dispute; and at rest."""
+    fit, known = finder.undisputed(fit), 0
     for _ in range(PURGES):
         if abs(len(fit.discs) - known) <= SETTLED * known:
             break

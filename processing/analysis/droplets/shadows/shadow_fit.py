@@ -84,7 +84,9 @@ class ShadowFit:
     masks : tuple of (rows, columns) bool arrays
         Pixels that look through it, and have no say; empty where there is none.
     light_share : float
-        Of the droplets, which coherent light explains better than incoherent light; 0 where that was not asked.
+        Of the droplets, which the light explains better than a Gaussian blur; 0 where that was not asked.
+    light_sd_voxel : float
+        Standard deviation that all radii share because the light is not known better.
     """
 
     discs: Discs
@@ -94,6 +96,7 @@ class ShadowFit:
     liquid: Discs = NO_DISCS
     masks: tuple[Mask, ...] = ()
     light_share: float = 0.0
+    light_sd_voxel: float = 0.0
 
     def with_discs(self, discs: Discs) -> "ShadowFit":
         """The same with other droplets."""

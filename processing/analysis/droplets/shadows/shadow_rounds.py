@@ -13,7 +13,7 @@ from processing.analysis.droplets.gaussian_blobs import Image
 from processing.analysis.droplets.shadows.disc_optics import refined_disc_optics
 from processing.analysis.droplets.shadows.disc_supports import DiscSupports, supporting_views, undisputed
 from processing.analysis.droplets.shadows.judged_volume import judging_views, knowing_views
-from processing.analysis.droplets.shadows.light_search import SeenLight, relit, seen_light
+from processing.analysis.droplets.shadows.light_search import Relit, SeenLight, relit, seen_light
 from processing.analysis.droplets.shadows.masked_liquid import liquid_masks, liquid_objects
 from processing.analysis.droplets.shadows.merged_discs import merged_discs
 from processing.analysis.droplets.shadows.opaque_discs import (
@@ -93,7 +93,12 @@ class ShadowRounds:
 
     def light(self, fit: ShadowFit) -> SeenLight:
         """What the droplets say of the light."""
-        return seen_light(lambda ratio: self._supports(self.relit(fit, ratio)).residual ** 2)
+
+        def in_light(condenser_ratio: float | None) -> Relit:
+            other = self.relit(fit, condenser_ratio)
+            return Relit(self._supports(other).residual ** 2, other.discs.radii_voxel)
+
+        return seen_light(in_light)
 
     def relit(self, fit: ShadowFit, condenser_ratio: float | None) -> ShadowFit:
         """The very same droplets in other light, fitted to it."""

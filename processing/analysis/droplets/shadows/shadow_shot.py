@@ -27,13 +27,14 @@ from processing.analysis.droplets.measured_exposure import (
 )
 from processing.analysis.droplets.shadows.disc_supports import supporting_views
 from processing.analysis.droplets.shadows.judged_volume import judging_views, knowing_views, unjudged_share
-from processing.analysis.droplets.shadows.light_search import SURE, UNSURE, Light
+from processing.analysis.droplets.shadows.light_search import Light, light_doubts
 from processing.analysis.droplets.shadows.masked_liquid import liquid_objects, lumps
 from processing.analysis.droplets.shadows.opaque_discs import DiscImages, Discs, Shadows
-from processing.analysis.droplets.shadows.shadow_finder import find_shadows, in_incoherent_light
+from processing.analysis.droplets.shadows.shadow_finder import behind_gaussian_blur, find_shadows
 from processing.analysis.droplets.shadows.shadow_fit import ShadowFit, Transmissions, rms_over_noise, seen_by
 from processing.analysis.droplets.shadows.shadow_light import grey, unlit
 from processing.analysis.droplets.shadows.shadow_union import union_defects
+from processing.analysis.droplets.size_correction import SizeCorrection
 from processing.geometry import FloatArray
 from processing.kernels import DEFAULT_THREADS
 
@@ -42,14 +43,12 @@ LIMITS = RatioLimits(trusted=1.25, refused=2.0)
 per mm^3, up to 1.25 have 0.3 to 1.7 % ghosts, from 1.33 to 1.45 2 to 5 %."""
 COHERENT_LIMITS = RatioLimits(trusted=1.1, refused=2.0)
 """In partially coherent light fringes look like faint droplets: 0 % ghosts at 1.06, 4 % at 1.16, 18 % at 1.24."""
+FRINGELESS = 1.2
+"""Light of more than so many apertures of the lens makes no fringes."""
 
 
-UNSURE_LIGHT = (
-    "whether light is coherent cannot be told from these droplets: if it is, diameters are up to 10 um too large; "
-    "state what is known of the rig (--light: aperture of the light over that of the lens, or incoherent)"
-)
 COHERENT_SHARE = 0.02
-"""Of a diameter: what the correction for partially coherent light leaves, common to the droplets of a shot."""
+"""Of a diameter: what is wrong in any light that shows, common to the droplets of a shot."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +68,7 @@ class SeenShadows:
     masked : float
         Share of the pixels into the grid that look through liquid that is no droplet.
     condenser_ratio : float | None
-        Numerical aperture of the light over that of the lens, the same for all views; None: incoherent.
+        Numerical aperture of the light over that of the lens, the same for all views; None: blur is Gaussian.
     """
 
     noise: float
@@ -92,6 +91,7 @@ def measure_shadows(
     *,
     trust: Sequence[Image] | None = None,
     light: Light = "estimated",
+    sizes: SizeCorrection | None = None,
     twins: int = 0,
     seed: int = 0,
     threads: int = DEFAULT_THREADS,
@@ -107,8 +107,10 @@ def measure_shadows(
         Where to look.
     trust : sequence of (rows, columns) float32 arrays, optional
         How sure pixels are: inverse variances, 1 for a typical one, 0 where nothing is known; by default all alike.
-    light : float | "estimated" | "incoherent"
-        Numerical aperture of the light over that of the lens, which makes small droplets look larger.
+    light : float | "estimated" | "incoherent" | "gaussian"
+        Numerical aperture of the light over that of the lens: the smaller, the larger droplets look.
+    sizes : SizeCorrection, optional
+        What a reticle of dots says, in the same light.
     twins : int
         Simulated twins of the exposure in which ghosts are counted: each costs as much as the exposure itself.
     seed : int
@@ -133,7 +135,7 @@ def measure_shadows(
     if blind := blind_views(known_shadows, shot.noises_of(shot.images), search.names):
         return MeasuredExposure(SizedDroplets.none(), {}, None, *blind_verdict(blind, search.names))
     fit = find_shadows(shot, search, light, before_round)
-    told = judged_by_volume(_told(shot, fit, search))
+    told = judged_by_volume(_told(shot, fit, search, sizes))
     if not twins or told.verdict is not ShotVerdict.GOOD:
         return told
     rng = np.random.default_rng(seed)
@@ -152,7 +154,7 @@ def _unmeasurable(images: Sequence[Image], trusts: Sequence[Image], search: Drop
     return (unseen,) if unseen else ()
 
 
-def _told(shot: Transmissions, fit: ShadowFit, search: DropletSearch) -> ShadowExposure:
+def _told(shot: Transmissions, fit: ShadowFit, search: DropletSearch, sizes: SizeCorrection | None) -> ShadowExposure:
     """What a fit tells, and whether to believe it."""
     shadows, into_grid = _recorded(shot).drawn(fit.optics, fit.discs), shot.cut(search.pixels_into_grid())
     seen = seen_by(shot, fit, shadows.transmissions)
@@ -160,17 +162,15 @@ def _told(shot: Transmissions, fit: ShadowFit, search: DropletSearch) -> ShadowE
     ratio = rms_over_noise(replace(seen, weights=judged_weights), shadows.transmissions)
     views = _seen(fit, search, _masked_shares(fit, into_grid))
     beside_px = {name: float(np.hypot(view.shift_u_px, view.shift_v_px)) for name, view in views.items()}
-    limits = LIMITS if fit.optics.condenser_ratio is None else COHERENT_LIMITS
+    limits = COHERENT_LIMITS if (fit.optics.condenser_ratio or FRINGELESS) < FRINGELESS else LIMITS
     verdict, reasons = judged(beside_px, ratio, limits)
-    if left := grey(seen, shadows, judged_weights):
-        verdict, reasons = ShotVerdict.DOUBTFUL if verdict is ShotVerdict.GOOD else verdict, (*reasons, *left)
-    if UNSURE < fit.light_share < SURE:
-        verdict, reasons = ShotVerdict.DOUBTFUL if verdict is ShotVerdict.GOOD else verdict, (*reasons, UNSURE_LIGHT)
+    if doubts := (*grey(seen, shadows, judged_weights), *light_doubts(fit.light_share)):
+        verdict, reasons = ShotVerdict.DOUBTFUL if verdict is ShotVerdict.GOOD else verdict, (*reasons, *doubts)
     if verdict is ShotVerdict.REFUSED:
         return MeasuredExposure(SizedDroplets.none(), views, ratio, verdict, reasons)
     known = knowing_views(shot, fit, fit.discs.positions_voxel) >= judging_views(len(shot.images))
-    raw = in_incoherent_light(shot, search, fit)[known]
-    droplets = _droplets(seen, shadows, fit.where(known), raw, search)
+    raw = behind_gaussian_blur(shot, search, fit)[known]
+    droplets = _droplets(seen, shadows, fit.where(known), raw, search, sizes)
     lump = lumps(fit.where(known).discs, droplets.residual)
     hidden = Hidden(
         liquid_objects=_counted(liquid_objects(fit.liquid)) + _counted(lump),
@@ -241,7 +241,12 @@ def _seen(fit: ShadowFit, search: DropletSearch, masked: Sequence[float]) -> dic
 
 
 def _droplets(
-    seen: DiscImages, shadows: Shadows, fit: ShadowFit, raw_voxel2: FloatArray, search: DropletSearch
+    seen: DiscImages,
+    shadows: Shadows,
+    fit: ShadowFit,
+    raw_voxel2: FloatArray,
+    search: DropletSearch,
+    sizes: SizeCorrection | None,
 ) -> SizedDroplets:
     """Droplets with the covariance of the fit: each as if it stood alone, enlarged by the disagreement of its views."""
     discs = fit.discs
@@ -253,16 +258,23 @@ def _droplets(
     covariance = np.asarray(alone * supports.disagreement[:, None, None] ** 2, dtype=np.float64)
     pitch_um = 1000 * search.searched.pitch_mm
     diameters_um = 2 * discs.radii_voxel * pitch_um
-    of_light_um = 0.0 if fit.optics.condenser_ratio is None else COHERENT_SHARE * diameters_um
+    common_sd_um = _common_sd_um(fit, diameters_um, pitch_um) if sizes is None else sizes.sd(diameters_um)
     return SizedDroplets(
         points_mm=search.searched.to_mm(discs.positions_voxel[:, ::-1]),
         covariance_mm2=covariance[:, :3, :3] * search.searched.pitch_mm**2,
-        diameters_um=diameters_um,
+        diameters_um=diameters_um if sizes is None else sizes.corrected(diameters_um),
         diameters_raw_um=2 * np.sqrt(raw_voxel2) * pitch_um,
-        diameter_sd_um=np.hypot(np.sqrt(covariance[:, 3, 3]) / discs.radii_voxel * pitch_um, of_light_um),
+        diameter_sd_um=np.hypot(np.sqrt(covariance[:, 3, 3]) / discs.radii_voxel * pitch_um, common_sd_um),
         views=supporting_views(supports),
         residual=supports.residual,
     )
+
+
+def _common_sd_um(fit: ShadowFit, diameters_um: FloatArray, pitch_um: float) -> FloatArray:
+    """What all diameters share because of the light."""
+    if fit.optics.condenser_ratio is None:
+        return np.zeros(len(diameters_um))
+    return np.hypot(COHERENT_SHARE * diameters_um, 2 * fit.light_sd_voxel * pitch_um)
 
 
 def _twin_ghosts(
@@ -281,6 +293,6 @@ def _twin_ghosts(
         for image, defect, level, noise in zip(drawn, defects, fit.optics.levels, fit.noises, strict=True)
     )
     trust = replace(shot, trust=tuple(map(np.ones_like, images))).masked(fit.masks).trust
-    light: Light = fit.optics.condenser_ratio or "incoherent"
+    light: Light = fit.optics.condenser_ratio or "gaussian"
     found = find_shadows(replace(shot, images=images, trust=trust), search, light, before_round).discs
     return ghosts_within(found.positions_voxel, truth.positions_voxel, search)

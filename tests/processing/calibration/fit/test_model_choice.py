@@ -13,7 +13,7 @@ from processing.calibration.errors import CalibrationError
 from processing.calibration.fit.model_choice import holdout_by_model, simplest_that_holds
 from processing.calibration.observation import PlaneObservation
 from processing.geometry import PinholeCamera
-from server.cli.calibrate import view_errors
+from server.cli.calibrations.calibrate import view_errors
 from tests.support.calibration_cases import calibration_set, paper_camera, seen_planes, true_errors_px
 
 Z_MM = (-4.0, -2.0, 0.0, 2.0, 4.0)

@@ -1,17 +1,21 @@
-"""Discs in partially coherent light: against Abbe's sum by an oracle, and their derivatives against differences."""
+"""Discs in the light of a lens: against Abbe's sum by an oracle, and their derivatives against differences."""
 
 import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
+from scipy.special import j1
 
 from processing.analysis.droplets.shadows.coherent_discs import BLURS_PER_AIRY, CORE_SHARE, CORE_SIGMA, coherent_discs
 from processing.analysis.droplets.shadows.disc_profiles import disc_profiles
+from processing.coherent_light import circles, waves
 from tests.support.abbe import PER_AIRY, SIZE, abbe
 
 STEP = 1e-3
 
 
-@pytest.mark.parametrize(("diameter_airy", "ratio"), [(0.15, 0.7), (0.5, 1.0), (0.8, 0.5), (1.5, 0.8)])
+@pytest.mark.parametrize(
+    ("diameter_airy", "ratio"), [(0.15, 0.7), (0.5, 1.0), (0.8, 0.5), (1.5, 0.8), (0.6, 1.4), (1.2, 2.0)]
+)
 def test_a_disc_takes_the_light_that_abbes_sum_says(diameter_airy: float, ratio: float) -> None:
     pixel_and_defocus = CORE_SIGMA * np.sqrt(CORE_SHARE**-2 - 1) * PER_AIRY
     light = gaussian_filter(abbe([(0.0, 0.0, 0.5 * diameter_airy)], ratio), pixel_and_defocus)
@@ -37,7 +41,25 @@ def test_pull_and_growth_are_the_derivatives() -> None:
         np.testing.assert_allclose(change, expected, atol=5e-3 * np.abs(change).max())
 
 
-def test_the_edge_of_a_large_disc_lies_farther_out_than_in_incoherent_light() -> None:
+def test_light_from_all_directions_is_the_spread_of_a_point_added_up() -> None:
+    """Airy's pattern, ``(2 J1(x) / x)^2``, summed over the points of a disc, and what lies between is as between."""
+    radius_airy, points = 0.6, np.linspace(-2, 2, 401)
+    x, y = np.meshgrid(points, points)
+    far = np.pi * 2.44 * np.hypot(x, y) + 1e-12
+    spread = (2 * j1(far) / far) ** 2
+    spread *= np.diff(points)[0] ** 2 * (np.pi * 2.44) ** 2 / (4 * np.pi)
+    taken = [spread[np.hypot(x - at, y) < radius_airy].sum() for at in (0.0, 0.4, 0.6, 0.9)]
+    rings = circles()
+    found = [
+        -(rings.spectrum(2 * radius_airy, ratio) @ waves(rings.per_airy, np.array([0, 0.4, 0.6, 0.9])))
+        for ratio in (8.0, 4.0, 2.0)
+    ]
+    np.testing.assert_allclose(found[0], taken, atol=8e-3)
+    errors = [np.abs(row - found[0]).max() for row in found]
+    assert errors[0] < errors[1] < errors[2] < 0.06
+
+
+def test_the_edge_of_a_large_disc_lies_farther_out_than_behind_a_gaussian_blur() -> None:
     """A straight edge lets a quarter of the light through where it is, fully coherent, and half of it incoherent."""
     (shift, width), (other_shift, other_width) = (disc_profiles(ratio).edge for ratio in (None, 0.3))
     assert shift == pytest.approx(0, abs=0.04)

@@ -1,4 +1,4 @@
-"""Light that is not incoherent is found, and diameters are corrected for it; incoherent light is left alone."""
+"""Light that shows is found, and diameters are corrected for it; behind a Gaussian blur it is left alone."""
 
 from dataclasses import replace
 
@@ -9,13 +9,14 @@ from processing.analysis.droplets.droplet_search import plan_droplets
 from processing.analysis.droplets.ghost_share import matches
 from processing.analysis.droplets.measured_exposure import ShotVerdict
 from processing.analysis.droplets.shadows.disc_optics import first_disc_optics
-from processing.analysis.droplets.shadows.light_search import relit, seen_light
+from processing.analysis.droplets.shadows.light_search import Relit, SeenLight, relit, seen_light
 from processing.analysis.droplets.shadows.opaque_discs import Discs
 from processing.analysis.droplets.shadows.shadow_fit import ShadowFit
 from processing.analysis.droplets.shadows.shadow_shot import measure_shadows
 from processing.geometry import FloatArray
 from processing.studies.shadows.sizes import SizeCase, size_scene
 from processing.studies.simulated_droplets import study_grid
+from tests.support.shadow_scenes import search_of, shadow_scene
 
 SHAPE, IMAGE_SIZE_PX, RATIO = (120, 30, 200), (280, 80), 0.8
 
@@ -34,7 +35,31 @@ def test_partially_coherent_light_is_found_and_diameters_are_corrected_for_it() 
     assert np.median(shot.droplets.diameters_raw_um[real] - true_um) > 5
 
 
-def test_incoherent_light_is_told_from_light_that_looks_much_like_it() -> None:
+def test_light_from_all_directions_is_no_gaussian_blur() -> None:
+    """A sharp lens in diffuse light: by a Gaussian blur droplets would be 3 um too small, in coherent light 10 um.
+
+    Droplets alone do not tell it from light of two apertures; who states it gains what that leaves.
+    """
+    scene = shadow_scene(SHAPE, 8, IMAGE_SIZE_PX, seed=5, median_mm=0.05, blurs_px=(0.7,) * 4, sharp=True)
+    stated, estimated = (
+        measure_shadows(scene.images, search_of(scene, margin_voxel=8), light=light)
+        for light in ("incoherent", "estimated")
+    )
+    off_um, raw_off_um, sd_um = [], [], []
+    for shot in (stated, estimated):
+        assert shot.verdict is ShotVerdict.GOOD
+        match, _ = matches(shot.droplets.points_mm, scene.points_mm, scene.grid.pitch_mm)
+        assert np.all(match >= 0)
+        true_um = 1000 * scene.diameters_mm[match]
+        off_um.append(np.median(shot.droplets.diameters_um - true_um))
+        raw_off_um.append(np.median(shot.droplets.diameters_raw_um - true_um))
+        sd_um.append(np.median(shot.droplets.diameter_sd_um))
+    assert abs(off_um[0]) < 0.5
+    assert abs(off_um[1]) < 2 * sd_um[1] < 8
+    assert max(raw_off_um) < -1.5
+
+
+def test_a_gaussian_blur_is_told_from_light_that_looks_much_like_it() -> None:
     grid = study_grid(SHAPE)
     scene = size_scene(SizeCase(10), grid, IMAGE_SIZE_PX, np.random.default_rng(6))
     shot = measure_shadows(scene.images, plan_droplets(scene.believed, grid, margin_voxel=8))
@@ -44,23 +69,36 @@ def test_incoherent_light_is_told_from_light_that_looks_much_like_it() -> None:
 
 
 def test_the_ratio_that_leaves_least_is_taken_between_those_that_are_tried() -> None:
-    def residuals(ratio: float | None) -> FloatArray:
-        return np.full(30, 9.0 if ratio is None else 1 + 4 * (ratio - 0.37) ** 2)
+    def in_light(ratio: float | None) -> Relit:
+        left = 9.0 if ratio is None else np.exp(0.4 * (1 / ratio - 1 / 0.37) ** 2)
+        return Relit(np.full(30, left), np.zeros(30))
 
-    assert seen_light(residuals).condenser_ratio == pytest.approx(0.37, abs=0.011)
+    assert seen_light(in_light).condenser_ratio == pytest.approx(0.37, abs=0.011)
+
+
+def test_radii_are_as_unsure_as_the_light() -> None:
+    """Two lights in which radii differ by 2, and the same or another half of the droplets speaks for either."""
+    clear, even = np.full(40, 0.5), np.resize([0.5, 2.0], 40)
+
+    def seen(left: FloatArray) -> SeenLight:
+        others = {0.8: left, 0.7: 1 / left, 0.9: np.full(40, 4.0), None: np.full(40, 9.0)}
+        return seen_light(lambda ratio: Relit(others.get(ratio, np.full(40, 5.0)), np.full(40, 2.0 * (ratio == 0.7))))
+
+    assert seen(clear).radius_sd == 0
+    assert seen(even).radius_sd == pytest.approx(2, rel=0.3)
 
 
 @pytest.mark.parametrize(("better", "droplets", "ratio"), [(15, 30, None), (24, 30, 0.8), (6, 6, None)])
 def test_most_droplets_must_say_so(better: int, droplets: int, ratio: float | None) -> None:
     """Whatever the few that explain the images worst say, and ten droplets at least."""
 
-    def residuals(other: float | None) -> FloatArray:
+    def in_light(other: float | None) -> Relit:
         left = np.full(droplets, 2.0)
         left[:better] -= (other or 0) == 0.8
         left[better:] *= 1 if other is None else 100
-        return left
+        return Relit(left, left)
 
-    seen = seen_light(residuals)
+    seen = seen_light(in_light)
     assert seen.condenser_ratio == ratio
     assert seen.share == (better / droplets if droplets > 10 else 0)
 
@@ -68,7 +106,7 @@ def test_most_droplets_must_say_so(better: int, droplets: int, ratio: float | No
 def test_who_cannot_tell_the_light_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     grid = study_grid(SHAPE)
     scene = size_scene(SizeCase(7), grid, IMAGE_SIZE_PX, np.random.default_rng(7))
-    monkeypatch.setattr("processing.analysis.droplets.shadows.shadow_shot.UNSURE", -0.1)
+    monkeypatch.setattr("processing.analysis.droplets.shadows.light_search.UNSURE", -0.1)
     shot = measure_shadows(scene.images, plan_droplets(scene.believed, grid, margin_voxel=8))
     assert shot.verdict is ShotVerdict.DOUBTFUL
     assert "--light" in shot.reasons[-1]

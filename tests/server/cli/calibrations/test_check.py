@@ -12,7 +12,7 @@ from processing.calibration.droplets.disparity import ViewDisparity
 from processing.calibration.fit.not_checked import DROPLETS
 from processing.calibration.verdict import Verdict
 from processing.runs.run_check import ShotCheck, checked_by_run
-from server.cli.check import check_line, views_table
+from server.cli.calibrations.check import check_line, views_table
 from tests.support.command_line import told
 from tests.support.drifting_run import DRIFT_PX, write_droplet_run
 from tests.support.drifting_views import calibration_of, inside_mm, views

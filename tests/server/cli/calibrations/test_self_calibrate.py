@@ -1,6 +1,6 @@
 """``tomoshadow self-calibrate``: what it tells people; what it does is tried beside ``check``."""
 
-from server.cli.self_calibrate import views_table
+from server.cli.calibrations.self_calibrate import views_table
 
 
 def test_people_get_a_line_per_view() -> None:

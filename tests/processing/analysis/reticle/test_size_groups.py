@@ -1,0 +1,38 @@
+"""Which dot has which diameter: the order decides, dust is left out, and what does not fit is refused."""
+
+import numpy as np
+import pytest
+
+from processing.analysis.reticle.size_groups import ReticleError, size_groups
+
+TRUE_UM = (20.0, 50.0, 100.0)
+
+
+def seen(*sizes_um: float, dots: int = 4, spread_um: float = 0.3) -> "np.typing.NDArray[np.float64]":
+    rng = np.random.default_rng(3)
+    return np.concatenate([size_um + spread_um * rng.standard_normal(dots) for size_um in sizes_um])
+
+
+def test_dots_that_all_look_too_large_are_still_told_apart() -> None:
+    np.testing.assert_array_equal(size_groups(seen(108, 29, 59), TRUE_UM), [2] * 4 + [0] * 4 + [1] * 4)
+
+
+def test_dust_has_no_diameter() -> None:
+    found_um = np.concatenate([seen(20, 50, 100), [73.0, 12.0]])
+    np.testing.assert_array_equal(size_groups(found_um, TRUE_UM)[-3:], [2, -1, -1])
+
+
+@pytest.mark.parametrize("sizes_um", [(50, 100), (20, 50, 100, 200), ()])
+def test_another_number_of_sizes_is_refused_with_those_that_are_seen(sizes_um: tuple[float, ...]) -> None:
+    with pytest.raises(ReticleError, match=f"{len(sizes_um)} sizes are seen.* about {'50' if sizes_um else 'none'}|20"):
+        size_groups(seen(*sizes_um) if sizes_um else np.array([5.0, 50.0]), TRUE_UM)
+
+
+def test_radii_are_no_diameters() -> None:
+    with pytest.raises(ReticleError, match="20 um look as if they had 40 um"):
+        size_groups(seen(40, 100, 200), (20.0, 50.0, 100.0))
+
+
+def test_diameters_that_nobody_could_tell_apart_are_refused() -> None:
+    with pytest.raises(ReticleError, match=r"at least 1\.08 times"):
+        size_groups(seen(50, 100), (50.0, 52.0))
