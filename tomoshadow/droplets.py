@@ -1,6 +1,7 @@
 """Droplets of images, by the names of their views."""
 
 from collections.abc import Mapping
+from typing import get_args
 
 from processing.analysis.droplets.bright_shot import BrightExposure, measure_bright
 from processing.analysis.droplets.droplet_search import MARGIN_VOXEL, plan_droplets
@@ -37,9 +38,15 @@ def measure(
         Where droplets are measured, about one voxel per pixel, see ``common_grid``.
     polarity : {"bright", "shadow"}
         Only shadows tell how large droplets are.
+<<<<<<< HEAD
     light : float or {"estimated", "incoherent", "gaussian"}
         Of shadows: numerical aperture of the light over that of the lens, above 0 to 8; light from all directions; or
         whatever is behind a Gaussian blur. ``diameters_um`` are corrected for it, ``diameters_raw_um`` are not.
+=======
+    light : float or {"estimated", "incoherent"}
+        Of shadows alone: numerical aperture of the light over that of the lens, above 0 to 1. Such light makes droplets
+        look larger; ``diameters_um`` are corrected for it, ``diameters_raw_um`` are not.
+>>>>>>> 8d6605f (Refuse light without diameters, impossible separations, and digits of programmers)
     twins : int
         Simulated twins of the exposure that tell how many are ghosts; each costs as much as the exposure itself.
     seed : int
@@ -63,8 +70,10 @@ def measure(
     ReconstructionError
         Too few or too many views, or voxels much wider or narrower than pixels.
     ValueError
-        Images that do not fit the calibration, or a pixel that is not finite.
+        Images that do not fit the calibration, a pixel that is not finite, or options that do not exist or mean nothing
+        for the polarity.
     """
+    _require_options(polarity, light)
     names = tuple(images)
     calibration.require_usable(names)
     mappings = [calibration.views[name].mapping for name in names]
@@ -72,3 +81,12 @@ def measure(
     if polarity == "shadow":
         return measure_shadows(list(images.values()), search, light=light, twins=twins, seed=seed, threads=threads)
     return measure_bright(list(images.values()), search, twins=twins, seed=seed, threads=threads)
+
+
+def _require_options(polarity: Polarity, light: Light) -> None:
+    if polarity not in get_args(Polarity):
+        raise ValueError(f"polarity {polarity!r}: {' or '.join(get_args(Polarity))}, please")
+    if light not in ("estimated", "incoherent") and not (isinstance(light, int | float) and 0 < light <= 1):
+        raise ValueError(f"light {light!r}: estimated, incoherent, or a number above 0 up to 1, please")
+    if polarity == "bright" and light != "estimated":
+        raise ValueError(f"light {light!r} is for shadows: bright particles have no diameter that it could correct")

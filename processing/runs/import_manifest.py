@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from processing.calibration.sets.set_record import CalibrationEntry, CameraName
 from processing.errors import BadInput
@@ -20,6 +20,10 @@ _VARIABLE = re.compile(r"^\$(\w+|\{\w+\})")
 
 MAX_SHOTS = 100_000
 """Of one pattern: what is beyond is a slip of the pen."""
+
+LEAST_SEPARATION_NS, MOST_SEPARATION_NS = 40, 10_000_000_000
+"""From the shortest gap of a camera for double exposures to what is no pair any more."""
+NS_PER_S = 1_000_000_000
 
 Images = Annotated[dict[CameraName, str], Field(min_length=1, max_length=_native.MAX_VIEWS)]
 
@@ -106,7 +110,10 @@ class RunEntry(_Entry):
     bits: Annotated[
         int | None, Field(ge=8, le=16, description="of a grey value in files of 16 bit, 12 if they reach to 4095")
     ] = None
-    separation_ns: Annotated[int | None, Field(gt=0, description="from exposure A to B; kept with the run")] = None
+    separation_ns: Annotated[
+        int | None,
+        Field(description="from exposure A to B, from 40 ns to 10 s and within 1 / rate_hz; kept with the run"),
+    ] = None
     rate_hz: Annotated[float | None, Field(gt=0, description="shots per second, all alike; kept with the run")] = None
     double_height: Annotated[bool, Field(description="every image is exposure A above exposure B")] = False
     shot: Annotated[tuple[ShotEntry, ...], Field(description="the shots, in order")] = ()
@@ -120,6 +127,7 @@ class RunEntry(_Entry):
     def _shots_agree(self) -> Self:
         if not self.shot and not self.shots:
             raise ValueError("neither shot nor shots")
+        self._require_separation()
         cameras = set(self.shot[0].frame_a) if self.shot else None
         if cameras is not None and len(cameras) < 2:
             raise ValueError(f"shot: {len(cameras)} camera, a run has 2 to {_native.MAX_VIEWS}")
@@ -132,6 +140,28 @@ class RunEntry(_Entry):
                 if (entry.frame_b is None) != single:
                     raise ValueError(f"{kind} {number}: all of them have frame_b, or none")
         return self
+
+    @field_validator("separation_ns")
+    @classmethod
+    def _is_possible(cls, separation_ns: int | None) -> int | None:
+        if separation_ns is not None and not LEAST_SEPARATION_NS <= separation_ns <= MOST_SEPARATION_NS:
+            raise ValueError(
+                f"no camera takes exposures {separation_ns} ns apart, but {LEAST_SEPARATION_NS} ns to 10 s; "
+                "6400 is 6.4 us"
+            )
+        return separation_ns
+
+    def _require_separation(self) -> None:
+        separation_ns = self.separation_ns
+        if separation_ns is None:
+            return
+        if self.frames_per_shot == 1:
+            raise ValueError("separation_ns: shots have one exposure; a series in time has rate_hz")
+        if self.rate_hz is not None and separation_ns * self.rate_hz >= NS_PER_S:
+            raise ValueError(
+                f"separation_ns: {separation_ns} ns is no shorter than a shot of rate_hz = {self.rate_hz:g}, "
+                f"{NS_PER_S / self.rate_hz:.4g} ns"
+            )
 
     @property
     def frames_per_shot(self) -> Literal[1, 2]:

@@ -94,16 +94,24 @@ class ShotDroplets(FrozenValue):
     file: str
 
 
-def require_measurable(run_name: str, recorded: Polarity, polarity: Polarity) -> None:
+def require_measurable(run_name: str, recorded: Polarity, settings: MeasureSettings) -> None:
     """Refuse what cannot be measured, before anything is read.
 
     Raises
     ------
     PipelineError
-        A polarity other than the run's.
+        A polarity other than the run's, or settings of shadows for bright particles.
     """
-    if polarity != recorded:
-        raise PipelineError(f"{run_name}: its images are recorded as {recorded}, they are not measured as {polarity}")
+    if settings.polarity != recorded:
+        raise PipelineError(
+            f"{run_name}: its images are recorded as {recorded}, they are not measured as {settings.polarity}"
+        )
+    if recorded == "bright" and settings.ignored:
+        raise PipelineError("pixels to ignore are for shadows: bright particles are measured with all pixels")
+    if recorded == "bright" and settings.light != "estimated":
+        raise PipelineError(
+            f"light {settings.light} is for shadows: bright particles have no diameter that it could correct"
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,14 +164,15 @@ class RunMeasurement:
         Raises
         ------
         PipelineError
-            The shot is not valid, run and calibration do not belong together, a run of shadows has no background, or
-            pixels to ignore are in no image.
+            The shot is not valid, run and calibration do not belong together, settings are not for its polarity, a run
+            of shadows has no background, or pixels to ignore are in no image.
         CalibrationError
             The calibration was refused.
         ReconstructionError
             Its views see too little in common, or are too few.
         """
         calibration = load_calibration(calibration_file)
+        require_measurable(run.run_dir.name, run.header.polarity, settings)
         require_match(run.run_dir.name, run.read_shot(shot), calibration)
         views = tuple(run.header.views)
         grid = settings.grid.to_grid() if settings.grid else default_grid(calibration)
@@ -173,10 +182,6 @@ class RunMeasurement:
         references = read_references(run)
         if settings.polarity == "shadow":
             require_backgrounds(run, references)
-        elif settings.sizes:
-            raise PipelineError("sizes of a reticle are for shadows: bright particles have no diameter")
-        elif settings.ignored:
-            raise PipelineError("pixels to ignore are for shadows: bright particles are measured with all pixels")
         require_fitting(settings.ignored, {view: calibration.views[view].mapping.image_size_px for view in views})
         provenance = provenance_of(run, calibration, calibration_file, settings, METHOD_VERSION)
         return cls(run, calibration, settings, search, references, provenance)

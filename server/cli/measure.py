@@ -155,7 +155,7 @@ def _measure_run(options: Namespace, settings: "MeasureSettings", run_dir: Path,
     from processing.runs.overwriting import replacing, require_free
     from processing.runs.results_file import SETTINGS_FILE
 
-    require_measurable(run_dir.name, _polarity(run_dir), settings.polarity)
+    require_measurable(run_dir.name, _polarity(run_dir), settings)
     indices = selected_shots(run_dir, options.shots)
     if options.overwrite:
         require_free(place, overwrite=True, made_with=(SETTINGS_FILE,))

@@ -128,11 +128,20 @@ def _add_limited(parser: ArgumentParser, name: str, metavar: str, summary: str) 
 
 
 def number(text: str) -> float:
-    """A number as programs write it."""
+    """A number as spreadsheets write it."""
     try:
+        if "_" in text or not text.isascii():  # Python takes 1_0 for ten
+            raise ValueError(text)
         return float(text)
     except ValueError as error:
         raise ArgumentTypeError(f"{text!r} is no number: a point stands before decimals, and no commas") from error
+
+
+def whole(text: str) -> int:
+    """A whole number in digits."""
+    if not re.fullmatch(r"[-+]?\d+", text, re.ASCII):
+        raise ArgumentTypeError(f"{text!r} is no whole number")
+    return int(text)
 
 
 def positive(text: str) -> float:
@@ -151,14 +160,14 @@ def width(text: str) -> float:
 
 def seed(text: str) -> int:
     """A whole number from 0 on."""
-    if (value := int(text)) < 0:
+    if (value := whole(text)) < 0:
         raise ArgumentTypeError(f"{text} must be 0 or more")
     return value
 
 
 def count(text: str) -> int:
     """A whole number from 1 on."""
-    if not (value := int(text)) > 0:
+    if not (value := whole(text)) > 0:
         raise ArgumentTypeError(f"{text} must be 1 or more")
     return value
 
@@ -169,6 +178,8 @@ def setting(name: str, text: str, kind: "type[FrozenValue] | None" = None) -> An
 
     from processing.reconstruction.settings import ReconstructionSettings
 
+    if "_" in text:
+        raise ArgumentTypeError(f"{text!r} is no number")
     try:
         return getattr((kind or ReconstructionSettings).model_validate({name: text}), name)
     except ValidationError as error:

@@ -1,6 +1,7 @@
 """``tomoshadow.measure``: droplets of images by the names of their views."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -27,3 +28,20 @@ def test_what_cannot_be_measured_is_named(tmp_path: Path) -> None:
     calibration = ts.load_calibration(write_bright_calibration(tmp_path / "calibration.json"))
     with pytest.raises(ts.BadInput, match=r"views \['view9'\] are not in calibration"):
         ts.measure(calibration, {"view9": np.zeros((100, 240), np.float32)}, GRID)
+
+
+@pytest.mark.parametrize(
+    ("options", "problem"),
+    [
+        ({"light": 0.8}, "light 0.8 is for shadows"),
+        ({"light": "incoherent"}, "light 'incoherent' is for shadows"),
+        ({"polarity": "shadow", "light": 1.2}, "light 1.2: estimated, incoherent, or a number"),
+        ({"polarity": "shadow", "light": "coherent"}, "light 'coherent': estimated"),
+        ({"polarity": "shadows"}, "polarity 'shadows': shadow or bright"),
+    ],
+)
+def test_options_that_mean_nothing_are_refused(tmp_path: Path, options: dict[str, Any], problem: str) -> None:
+    calibration = ts.load_calibration(write_bright_calibration(tmp_path / "calibration.json"))
+    dark = dict.fromkeys(calibration.views, np.zeros((100, 240), np.float32))
+    with pytest.raises(ValueError, match=problem):
+        ts.measure(calibration, dark, GRID, margin_voxel=MARGIN_VOXEL, **options)

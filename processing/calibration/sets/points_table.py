@@ -13,6 +13,8 @@ Table = dict[str, FloatArray]
 """Values (N,) by column."""
 
 _COMMA = re.compile(r"\d,\d")
+_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?|[-+]?(nan|inf|infinity)", re.ASCII | re.IGNORECASE)
+"""As spreadsheets write it: ``float`` alone would take 1_0 for ten."""
 
 
 def read_table(path: Path, columns: Sequence[str]) -> Table:
@@ -49,10 +51,7 @@ def _lines(path: Path) -> list[str]:
 
 
 def _number(field: str) -> float | None:
-    try:
-        return float(field)
-    except ValueError:
-        return None
+    return float(field) if _NUMBER.fullmatch(field) else None
 
 
 def _problem(

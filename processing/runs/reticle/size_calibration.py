@@ -20,7 +20,7 @@ from processing.geometry import FloatArray
 from processing.preprocessing import Intensity
 from processing.reconstruction.settings import FrozenValue
 from processing.runs.measured_images import require_backgrounds, shadow_images
-from processing.runs.measurement import require_measurable
+from processing.runs.measurement import MeasureSettings, require_measurable
 from processing.runs.overwriting import replacing
 from processing.runs.pipeline import default_grid, frame_names, require_match
 from processing.runs.workbench import read_references
@@ -109,7 +109,7 @@ def calibrate_sizes(
         Run and calibration do not belong together, or the run has no background.
     """
     with RunReader(run_dir) as run:
-        require_measurable(run_dir.name, run.header.polarity, "shadow")
+        require_measurable(run_dir.name, run.header.polarity, MeasureSettings(polarity="shadow"))
         views = tuple(run.header.views)
         images, trust = _mean_transmissions(run, shots, calibration, follow)
     found = measure_reticle(

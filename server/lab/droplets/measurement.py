@@ -34,7 +34,7 @@ def request_measurement(
     run = context.runs.reader(run_id)
     chosen_settings = settings or MeasureSettings(polarity=run.header.polarity)
     try:
-        require_measurable(run_id, run.header.polarity, chosen_settings.polarity)
+        require_measurable(run_id, run.header.polarity, chosen_settings)
         if chosen_settings.polarity == "shadow":
             require_backgrounds(run, read_references(run))
     except BadInput as error:

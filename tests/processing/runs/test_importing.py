@@ -133,6 +133,16 @@ def test_root_may_come_from_the_environment(folder: Path, monkeypatch: pytest.Mo
         ("", r"manifest\.toml: neither \[calibration\] nor \[run\]"),
         ('root = "$NO_SUCH_PLACE/x"\n' + RUN, r"manifest\.toml, line 1: root: .*NO_SUCH_PLACE is not set"),
         (RUN.replace('polarity = "shadow"', 'polarity = "dark"'), r"line 2: run\.polarity: "),
+        (RUN.replace("6400", "1"), r"line 3: run\.separation_ns: no camera takes exposures 1 ns apart"),
+        (RUN.replace("6400", "64_000_000_000"), r"line 3: run\.separation_ns: no camera takes exposures 640"),
+        (
+            RUN.replace("6400", "6400\nrate_hz = 200_000"),
+            r"line 1: run: separation_ns: 6400 ns is no shorter than a shot of rate_hz = 200000, 5000 ns",
+        ),
+        (
+            RUN.replace(frames("b", 2), "").replace(frames("b", 4), ""),
+            r"line 1: run: separation_ns: shots have one exposure",
+        ),
         (RUN.replace("separation_ns", "seperation_ns"), r"line 3: run\.seperation_ns: there is no such key"),
         (RUN.replace("polarity", "polarty"), r"line 2: run\.polarty: there is no such key"),
         (RUN.replace("left_3", "left_99"), r"line 9: run\.shot\.1\.frame_a\.left: .*left_99\.png does not exist$"),

@@ -52,11 +52,20 @@ def test_a_grid_in_another_unit_or_elsewhere_is_asked_about(
     assert "of the calibrated volume: is it in mm, and where the target was?" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("text", ["1,234.5", "4,5", "four"])
+@pytest.mark.parametrize("text", ["1,234.5", "4,5", "four", "1_0", "\u0664"])
 def test_what_is_no_number_is_told_in_words(text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         main(["measure", str(tmp_path / "a.png"), "-o", str(tmp_path / "out"), "--um-per-px", text])
     assert f"--um-per-px: {text!r} is no number: a point stands before decimals" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("option", [["--twins", "1_0"], ["--light", "0.1_0"]])
+def test_digits_of_programmers_are_no_number(
+    option: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit):
+        main(["measure", str(tmp_path), "--calibration", str(tmp_path), "-o", str(tmp_path / "out"), *option])
+    assert f"{option[0]}: {option[1]!r} is no number" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -182,6 +182,8 @@ def test_measured_points_are_split_by_level(tmp_path: Path) -> None:
         ("1\0 2 3", "not a table in plain text"),
         ("1 2 3\n4 5 nan\n", "line 2: 4, 5, nan: values must be finite"),
         ("1 2 3\n-inf 5 6\n", "line 2: -inf, 5, 6: values must be finite"),
+        ("1 2 3\n1_0 5 6\n", "line 2: 1_0: not a number"),
+        ("1 2 3\n4 \u0665 6\n", "line 2: \u0665: not a number"),
         ("# nothing\n", "no points in it"),
     ],
 )

@@ -74,9 +74,12 @@ def test_what_is_not_asked_is_not_known_and_nothing_else_changes(ignored: Sequen
     assert np.argwhere(known == 0).tolist() == [[0, 1], [0, 2], [1, 1], [1, 2]]
 
 
-def test_bright_particles_are_measured_with_all_pixels(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize("option", [("--ignore", "view1=0:9,0:9"), ("--light", "0.8"), ("--light", "incoherent")])
+def test_options_of_shadows_are_refused_for_bright_particles(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], option: Sequence[str]
+) -> None:
     run_dir = write_bright_run(tmp_path / "run")
     write_bright_calibration(tmp_path / "calibration.json")
     arguments = ["measure", run_dir, "--calibration", tmp_path / "calibration.json", "-o", tmp_path / "out"]
-    assert "are for shadows" in refused(capsys, *arguments, f"--grid={BOX}", "--ignore", "view1=0:9,0:9")
+    assert "for shadows" in refused(capsys, *arguments, f"--grid={BOX}", *option)
     assert not (tmp_path / "out").exists()

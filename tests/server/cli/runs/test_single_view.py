@@ -127,6 +127,7 @@ def test_what_makes_no_sense_is_refused_before_anything_is_written(
         (["measure", images[0], *out, "--export", "csv,vtk"], "no place in space"),
         (["measure", *images, run_dir, *out], "images and runs are not measured at once"),
         (["measure", *images, *out, "--grid=0:1,0:1,0:1"], "--grid: needs --calibration"),
+        (["measure", *images, *out, "--light", "0.8"], "--light: needs --calibration"),
         (["measure", images[0], images[0], *out], "two images are called first"),
         (["measure", tmp_path / "none.png", *out], "none.png"),
         (["measure", images[0], *out, "--background", images[1].with_name("none.tif")], "none.tif"),

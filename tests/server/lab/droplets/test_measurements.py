@@ -119,6 +119,8 @@ def test_what_cannot_be_measured_is_refused_with_its_reason(measured: Serving) -
         ({"run_id": "shadows", "settings": None}, 422, "has no background, and without one nobody knows"),
         ({"run_id": "shadows"}, 422, "recorded as shadow, they are not measured as bright"),
         ({"settings": {"twinz": 1}}, 422, "twinz"),
+        ({"settings": {"light": 0.8}}, 422, "light 0.8 is for shadows"),
+        ({"settings": {"ignored": ["view1=0:9,0:9"]}}, 422, "pixels to ignore are for shadows"),
     ):
         answer = ask(measured, **changes)
         assert (answer.status_code, text in answer.text) == (status, True), answer.text
