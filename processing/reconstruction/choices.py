@@ -48,6 +48,11 @@ class VoxelType(StrEnum):
     """256 steps."""
 
     @property
+    def computed(self) -> "VoxelType":
+        """What the kernels write before it becomes bytes."""
+        return VoxelType.FLOAT16 if self is VoxelType.UINT8 else self
+
+    @property
     def unit(self) -> float:
         """Intensity of a voxel of 1, where an intensity of 1 is the largest."""
         return 1 / 255 if self is VoxelType.UINT8 else 1.0

@@ -1,16 +1,18 @@
 """Line-of-sight reconstruction: each voxel combines what the views see where it is projected to."""
 
+import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from processing.kernels import DEFAULT_THREADS, _native
-from processing.reconstruction.choices import ReconstructionMethod
+from processing.reconstruction.choices import ReconstructionMethod, VoxelType
 from processing.reconstruction.planning.fixed_point import FixedPoint
 from processing.reconstruction.planning.plan import Plan
-from processing.reconstruction.slab_volume import SLAB_ROWS, slabs_in
+from processing.reconstruction.slab_volume import SLAB_ROWS, SlabVolume, slabs_in
 
 
 def line_of_sight(
@@ -106,6 +108,49 @@ def slabs_of_sight(
     return _slabs_seen(plan.bind(seen), method, memory, ny, threads)
 
 
+def volume_of_sight(
+    plan: Plan,
+    images: Sequence[NDArray[np.float32]],
+    method: ReconstructionMethod,
+    out: NDArray[Any],
+    *,
+    resampled: Sequence[NDArray[np.int16]] | None = None,
+    threads: int = DEFAULT_THREADS,
+) -> tuple[SlabVolume, float]:
+    """The same slabs in a unit in which float16 has room for them, however dim or bright the images are.
+
+    Parameters
+    ----------
+    plan, images, method, resampled, threads
+        As ``slabs_of_sight`` takes them.
+    out : (nz, rows, nx) float32 or float16 array
+        Receives one slab after the other.
+
+    Returns
+    -------
+    SlabVolume
+        Its unit is 1 for float32, else a power of two, which leaves the bits of a voxel as they are.
+    float
+        No voxel of the slabs is brighter; above 0.
+    """
+    check_method(method)
+    seen = plan.resample(images, threads, resampled)
+    brightest = brightest_voxel(seen, method) or 1.0
+    voxels = VoxelType(out.dtype.name)
+    unit = 1.0 if voxels is VoxelType.FLOAT32 else 2.0 ** math.ceil(math.log2(brightest))
+    slabs = _slabs_seen(plan.bind(_in_unit(seen, method, unit)), method, out, plan.grid.shape[1], threads)
+    return SlabVolume(slabs, voxels, unit), brightest / unit
+
+
+def _in_unit(images: Sequence[FixedPoint], method: ReconstructionMethod, unit: float) -> list[FixedPoint]:
+    """Images whose voxels are those of the given ones over the unit; powers of two are exact."""
+    first, *others = images
+    if method is ReconstructionMethod.MINLOS:
+        return [replace(image, unit=image.unit / unit) for image in images]
+    power = len(images) if method is ReconstructionMethod.GAVLOS else 1
+    return [replace(first, unit=first.unit / unit**power), *others]
+
+
 def _slabs_seen(
     views: Sequence[_native.View], method: ReconstructionMethod, memory: NDArray[Any], grid_rows: int, threads: int
 ) -> Iterator[tuple[int, NDArray[Any]]]:
@@ -122,16 +167,22 @@ def check_method(method: ReconstructionMethod) -> None:
 
 def check_brightness(images: Sequence[FixedPoint], method: ReconstructionMethod, dtype: np.dtype[Any]) -> None:
     """Raise ValueError where a voxel could be brighter than its type has room for."""
+    most = brightest_voxel(images, method)
+    room = 1.0 if dtype == np.uint8 else float(np.finfo(dtype).max)
+    if most > room * (1 + 1e-6):
+        raise ValueError(f"voxels of {dtype} hold intensities up to {room:.3g}, these may reach {most:.3g}")
+
+
+def brightest_voxel(images: Sequence[FixedPoint], method: ReconstructionMethod) -> float:
+    """Largest intensity that a voxel could have: where the brightest pixels of all views meet."""
     brightest = [image.brightest for image in images]
     product = float(np.prod(brightest, dtype=np.float64))
-    most = {
+    most: float = {
         ReconstructionMethod.GAVLOS: product ** (1 / len(images)),
         ReconstructionMethod.MINLOS: min(brightest),
         ReconstructionMethod.MLOS: product,
     }[method]
-    room = 1.0 if dtype == np.uint8 else float(np.finfo(dtype).max)
-    if most > room * (1 + 1e-6):
-        raise ValueError(f"voxels of {dtype} hold intensities up to {room:.3g}, these may reach {most:.3g}")
+    return most
 
 
 def check_volume(volume: NDArray[Any], plan: Plan, dtypes: tuple[type, ...]) -> None:

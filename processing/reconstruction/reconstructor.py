@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from processing.kernels import DEFAULT_THREADS
 from processing.preprocessing import Intensity
-from processing.reconstruction.choices import ReconstructionMethod
-from processing.reconstruction.line_of_sight import slabs_of_sight
+from processing.reconstruction.byte_slabs import in_bytes
+from processing.reconstruction.choices import ReconstructionMethod, VoxelType
+from processing.reconstruction.line_of_sight import volume_of_sight
 from processing.reconstruction.planning.plan import Plan
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.reconstruction.slab_volume import SLAB_ROWS, Slabs, SlabVolume
@@ -57,7 +58,7 @@ class Reconstructor:
             settings,
             images=tuple(np.empty(view.image_size_px[::-1], np.float32) for view in plan.views),
             resampled=plan.empty_images(),
-            memory=np.empty((nz, min(SLAB_ROWS, ny), nx), settings.voxels.value),
+            memory=np.empty((nz, min(SLAB_ROWS, ny), nx), settings.voxels.computed.value),
             threads=threads,
         )
 
@@ -78,7 +79,9 @@ class Reconstructor:
             The residuals of SMART and MART, see ``processing.reconstruction.smart.SmartResult``.
         """
         self._exposures += 1
-        volume, residuals = self._refine(images) if self.settings.method.iterative else (self._look(images), ())
+        volume, brightest, residuals = (self._refine if self.settings.method.iterative else self._look)(images)
+        if self.settings.voxels is VoxelType.UINT8:
+            volume = in_bytes(volume, brightest)
         return replace(volume, slabs=self._while_latest(volume.slabs, self._exposures)), residuals
 
     def _while_latest(self, slabs: Slabs, exposure: int) -> Slabs:
@@ -90,14 +93,13 @@ class Reconstructor:
             yield slab
         raise RuntimeError(f"slabs of exposure {exposure} are gone: exposure {self._exposures} took their memory")
 
-    def _look(self, images: Sequence[Intensity]) -> SlabVolume:
-        method, voxels = self.settings.method, self.settings.voxels
-        slabs = slabs_of_sight(
-            self.plan, images, method, out=self.memory, resampled=self.resampled, threads=self.threads
+    def _look(self, images: Sequence[Intensity]) -> tuple[SlabVolume, float, tuple[float, ...]]:
+        volume, brightest = volume_of_sight(
+            self.plan, images, self.settings.method, self.memory, resampled=self.resampled, threads=self.threads
         )
-        return SlabVolume(slabs, voxels, voxels.unit)
+        return volume, brightest, ()
 
-    def _refine(self, images: Sequence[Intensity]) -> tuple[SlabVolume, tuple[float, ...]]:
+    def _refine(self, images: Sequence[Intensity]) -> tuple[SlabVolume, float, tuple[float, ...]]:
         solve = smart if self.settings.method is ReconstructionMethod.SMART else mart
         result = solve(
             self.plan,
@@ -109,4 +111,5 @@ class Reconstructor:
             threads=self.threads,
         )
         self._refined = result
-        return result.sparse.slabs(self.settings.voxels, self.memory, self.threads), result.residuals
+        sparse = result.sparse
+        return sparse.slabs(self.memory, self.threads), sparse.brightest(self.threads), result.residuals

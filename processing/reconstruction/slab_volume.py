@@ -16,6 +16,41 @@ SLAB_ROWS = 8 * _native.BLOCK_ROWS
 Slabs = Iterable[tuple[int, NDArray[Any]]]
 
 
+@dataclass(eq=False)
+class Losses:
+    """What voxels that were too faint for their type had, counted slab by slab.
+
+    Parameters
+    ----------
+    lost, kept : int
+        Voxels that became 0, and that did not.
+    lost_sum, total : float
+        Of the intensities of those that became 0, and of all, in a common unit.
+    """
+
+    lost: int = 0
+    lost_sum: float = 0.0
+    kept: int = 0
+    total: float = 0.0
+
+    def count(self, *, lost: int, lost_sum: float, kept: int, total: float) -> None:
+        """Add those of one more slab."""
+        self.lost += lost
+        self.lost_sum += lost_sum
+        self.kept += kept
+        self.total += total
+
+    @property
+    def voxel_share(self) -> float:
+        """Of the voxels that were not 0."""
+        return self.lost / (self.lost + self.kept) if self.lost else 0.0
+
+    @property
+    def intensity_share(self) -> float:
+        """Of the sum of all intensities."""
+        return self.lost_sum / self.total if self.lost else 0.0
+
+
 @dataclass(frozen=True, eq=False)
 class SlabVolume:
     """A volume in slabs.
@@ -29,11 +64,14 @@ class SlabVolume:
         How they are stored.
     unit : float
         Intensity of a voxel of 1.
+    losses : Losses, optional
+        Of bytes, once all slabs have come.
     """
 
     slabs: Slabs
     voxels: VoxelType
     unit: float
+    losses: Losses | None = None
 
     @classmethod
     def of(cls, volume: NDArray[Any]) -> "SlabVolume":

@@ -101,28 +101,25 @@ class SparseVolume:
         self.blocks.write(volume, threads, factor=self.unit)
         return volume
 
-    def slabs(self, voxels: VoxelType, out: NDArray[Any], threads: int = DEFAULT_THREADS) -> SlabVolume:
+    def slabs(self, out: NDArray[Any], threads: int = DEFAULT_THREADS) -> SlabVolume:
         """The volume slab by slab.
 
         Parameters
         ----------
-        voxels : VoxelType
-            Of the slabs; 255 is the brightest voxel where they are bytes.
-        out : (nz, rows, nx) array of that type
+        out : (nz, rows, nx) float32 or float16 array
             Receives one slab after the other; a multiple of ``BLOCK_ROWS`` rows y, or all.
         threads : int
             The result does not depend on it.
         """
-        brightest = self._brightest(threads) if voxels is VoxelType.UINT8 else 1.0
-        return SlabVolume(self._written(out, 1 / brightest, threads), voxels, voxels.unit * brightest * self.unit)
+        return SlabVolume(self._written(out, threads), VoxelType(out.dtype.name), self.unit)
 
-    def _written(self, out: NDArray[Any], factor: float, threads: int) -> Iterator[tuple[int, NDArray[Any]]]:
-        for first_row, slab in slabs_in(out, self.blocks.shape[1]):
-            self.blocks.write(slab, threads, first_row, factor)
-            yield first_row, slab
-
-    def _brightest(self, threads: int) -> float:
-        """Largest voxel in the blocks, or 1 where all are empty."""
+    def brightest(self, threads: int = DEFAULT_THREADS) -> float:
+        """Largest voxel of the slabs, or 1 where all are empty."""
         nz, _, nx = self.blocks.shape
         memory = np.empty((nz, SEARCH_ROWS, nx), np.float32)
-        return max(float(slab.max()) for _, slab in self._written(memory, 1.0, threads)) or 1.0
+        return max(float(slab.max()) for _, slab in self._written(memory, threads)) or 1.0
+
+    def _written(self, out: NDArray[Any], threads: int) -> Iterator[tuple[int, NDArray[Any]]]:
+        for first_row, slab in slabs_in(out, self.blocks.shape[1]):
+            self.blocks.write(slab, threads, first_row, 1.0)
+            yield first_row, slab

@@ -86,6 +86,9 @@ def write_slabs(path: Path, volume: SlabVolume, grid: VoxelGrid, provenance: Map
             dataset = _make_image_data(file.create_group("VTKHDF", track_order=True), volume, grid)
             for first_row, slab in volume.slabs:
                 _write_slab(dataset, first_row, slab, volume.unit)
+            if volume.losses:
+                dataset.attrs["lost_voxels"] = volume.losses.voxel_share
+                dataset.attrs["lost_intensity"] = volume.losses.intensity_share
             file.create_group(PROVENANCE).attrs.update({**provenance, **SCHEMA})
         _sync(part)
         part.replace(path)
@@ -122,6 +125,11 @@ class StoredVolume:
     def shape(self) -> tuple[int, int, int]:
         """Number of voxels (nz, ny, nx)."""
         return self.grid.shape
+
+    @property
+    def lost_share(self) -> float:
+        """Of the sum of all intensities, what was in voxels too faint for bytes; 0 where nobody counted."""
+        return float(self.voxels.attrs.get("lost_intensity", 0.0))
 
     def __getitem__(self, part: slice | tuple[slice, slice]) -> Intensities:
         """Some planes z, or some rows y of them; float32 intensities.

@@ -15,6 +15,8 @@ from processing.runs.workbench import References
 
 Faults = Mapping[str, tuple[str, ...] | Mapping[str, str]]
 FAULTS = ("blind_views", "dim_views", "odd_light")
+MOST_LOST = 0.01
+"""Of the sum of all intensities, in voxels that were too faint for bytes."""
 
 
 def exposure_faults(
@@ -33,6 +35,8 @@ def stored_faults(volume_file: Path) -> Mapping[str, Any]:
     """Shot and faults of a stored volume; empty if it tells none."""
     with open_volume(volume_file) as volume:
         told = {name: json.loads(str(volume.provenance[name])) for name in FAULTS if name in volume.provenance}
+        if volume.lost_share > MOST_LOST:
+            told["lost_share"] = volume.lost_share
         return {"shot": volume.provenance["shot"], **told} if told else {}
 
 

@@ -40,6 +40,7 @@ class VolumeRecord(FrozenValue):
     see nothing in this exposure, no pixel above the noise floor: a shot may be empty, or a lens be covered.
     ``dim_views`` have no grey value above 1/8 of the full scale: light is missing, or the run states too many bits.
     ``odd_light`` says of a view what does not fit its background or the polarity. ``empty``: no voxel is above 0.
+    ``lost_share`` of the sum of all intensities is in voxels that were too faint for bytes.
     """
 
     shot: int
@@ -51,6 +52,7 @@ class VolumeRecord(FrozenValue):
     dim_views: tuple[str, ...] = ()
     odd_light: Mapping[str, str] = {}
     empty: bool = False
+    lost_share: float = 0.0
 
 
 class ShotResult(FrozenValue):
@@ -238,7 +240,15 @@ def _reconstruct_frame(
     named = {**provenance, "shot": shot, "frame": frame, **convergence}
     write_slabs(file, replace(volume, slabs=slabs), reconstructor.plan.grid, named)
     seconds = round(begun_s + slabs.seconds, 4)
-    return VolumeRecord(shot=shot, frame=frame, file=file.name, seconds=seconds, residuals=residuals, empty=slabs.empty)
+    return VolumeRecord(
+        shot=shot,
+        frame=frame,
+        file=file.name,
+        seconds=seconds,
+        residuals=residuals,
+        empty=slabs.empty,
+        lost_share=volume.losses.intensity_share if volume.losses else 0.0,
+    )
 
 
 def frame_names(run: RunReader) -> tuple[FrameName, ...]:
