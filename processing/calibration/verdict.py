@@ -5,6 +5,9 @@ from enum import StrEnum
 
 from pydantic import ConfigDict, with_config
 
+BELONGING = "belonging"
+"""Under this name results keep what droplets say of their run and calibration."""
+
 
 class Verdict(StrEnum):
     """What a view is good for, by its hold-out error."""

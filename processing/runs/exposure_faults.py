@@ -40,6 +40,24 @@ def stored_faults(volume_file: Path) -> Mapping[str, Any]:
         return {"shot": volume.provenance["shot"], **told} if told else {}
 
 
+def fault_lines(faults: Mapping[str, Any]) -> list[str]:
+    """A sentence per fault of an exposure, for people: its volume looks fine."""
+    lines = [
+        f"{name} sees nothing; is the shot empty, or a lens covered, a light off?"
+        for name in faults.get("blind_views", ())
+    ]
+    lines += [
+        f"{name} uses less than 1/8 of its grey values; is light missing, or are its bits too many?"
+        for name in faults.get("dim_views", ())
+    ]
+    lines += [f"{name} {what}" for name, what in faults.get("odd_light", {}).items()]
+    if (lost := faults.get("lost_share", 0.0)) > MOST_LOST:
+        lines.append(f"{100 * lost:.2g} % of the intensity is in voxels too faint for uint8; take float16")
+    if faults.get("empty"):
+        lines.append("the volume is empty, no voxel is above 0")
+    return lines
+
+
 def grey_values(shot: Shot, view: str, frame: FrameName) -> Frame:
     """Pixels of an exposure as they were recorded; PipelineError if it is missing."""
     exposures = shot.views[view]

@@ -5,6 +5,7 @@ from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from processing.calibration.verdict import BELONGING
 from processing.reconstruction.choices import VoxelType
 from processing.runs.errors import PipelineError
 from server.cli.options import (
@@ -21,7 +22,7 @@ from server.cli.options import (
     usable_processors,
 )
 from server.cli.output import Bar, Outcome, progress
-from server.cli.runs.belonging import STORED, ask_droplets, stored_belonging
+from server.cli.runs.belonging import ask_droplets, stored_belonging
 from server.cli.runs.faults import tell_faults
 
 if TYPE_CHECKING:
@@ -82,7 +83,7 @@ def _average_results(options: Namespace) -> dict[str, Any]:
         return _written(options, volume, grid, len(files), faults, {})
     if belonging["verdict"] in ("warn", "refuse"):
         progress(f"{options.results}: droplets speak against calibration and run: {belonging['verdict']}")
-    written = _written(options, volume, grid, len(files), faults, {STORED: json.dumps(belonging)})
+    written = _written(options, volume, grid, len(files), faults, {BELONGING: json.dumps(belonging)})
     return {"passed": belonging["verdict"] != "refuse", "belonging": belonging, **written}
 
 

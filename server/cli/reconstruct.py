@@ -144,10 +144,7 @@ def _tell_slow_views(shot: "ShotResult") -> None:
 
 def _tell_faults(shot: "ShotResult") -> None:
     for volume in shot.volumes:
-        where = f"shot {volume.shot}, exposure {volume.frame}"
-        tell_faults(where, volume.model_dump())
-        if volume.empty:
-            progress(f"{where}: the volume is empty, no voxel is above 0")
+        tell_faults(f"shot {volume.shot}, exposure {volume.frame}", volume.model_dump())
 
 
 def volumes_table(result: dict[str, Any]) -> str:

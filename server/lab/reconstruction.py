@@ -41,7 +41,7 @@ def request_reconstruction(
 ) -> list[Job]:
     """Queue shots of a run; without ``shots`` all valid ones, without ``calibration`` the run's own or the current one.
 
-    The last of them is checked first: whether its droplets still agree with the calibration.
+    The last of them is checked first, and then the first: whether their droplets still agree with the calibration.
 
     Raises
     ------
@@ -61,7 +61,7 @@ def request_reconstruction(
 def requested_shots(
     context: Context, run_id: str, shots: Iterable[int] | None, calibration: str | None
 ) -> tuple[str, list[int]]:
-    """The calibration and the shots of a request, and a check of the last of them, which comes first.
+    """The calibration and the shots of a request, and a check of the last of them, which comes first, and the first.
 
     Raises
     ------
@@ -79,8 +79,8 @@ def requested_shots(
     wanted = _valid_shots(context, run_id) if shots is None else list(shots)
     if absent := [shot for shot in wanted if shot >= summary.shots_recorded]:
         raise Unprocessable(f"run {run_id} has {summary.shots_recorded} shots, not {absent}")
-    if wanted:
-        context.runner.check(run_id, chosen, wanted[-1])
+    for shot in dict.fromkeys((*wanted[-1:], *wanted[:1])):
+        context.runner.check(run_id, chosen, shot)
     return chosen, wanted
 
 

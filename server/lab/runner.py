@@ -10,6 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from processing.calibration.verdict import BELONGING
 from processing.runs.measurement import droplets_path
 from server.lab.calibrations import CalibrationStore
 from server.lab.duty import Duty, pause
@@ -155,8 +156,9 @@ class JobRunner:
         if refusal := self._watch.refusal(job):
             await self._move(job.id, JobState.FAILED, error=refusal)
             return
+        belonging = self._watch.belonging(job)
         try:
-            arguments = self._arguments(job)
+            arguments = {**self._arguments(job), BELONGING: belonging}
             result = await self._engine.submit(
                 job.id, self._tasks[job.kind], arguments, partial(self._tell_progress, job.id)
             )
@@ -165,7 +167,8 @@ class JobRunner:
         except TaskError as error:
             await self._move(job.id, JobState.FAILED, error=str(error))
         else:
-            await self._move(job.id, JobState.DONE, result=result)
+            known = {} if belonging is None else {BELONGING: belonging}
+            await self._move(job.id, JobState.DONE, result={**result, **known})
 
     def _is_lost(self, job: Job) -> bool:
         """Whether the files of a done job are gone, or some of them."""

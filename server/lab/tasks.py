@@ -1,5 +1,6 @@
 """The work functions of jobs: they run in worker processes, on paths and JSON values."""
 
+import json
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -10,6 +11,7 @@ from daq.files.run_directory import RunReader
 from processing.calibration.calibrate import calibrate
 from processing.calibration.calibration_file import load_calibration, save_calibration
 from processing.calibration.sets.calibration_set import load_calibration_set
+from processing.calibration.verdict import BELONGING
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.runs.measurement import MeasureSettings, RunMeasurement
 from processing.runs.pipeline import reconstruct_shot
@@ -35,6 +37,7 @@ def reconstruct(job: dict[str, Any], should_stop: Callable[[], bool]) -> dict[st
         results_dir,
         should_stop,
         workbench=WORKBENCH,
+        told=lambda: {BELONGING: json.dumps(job[BELONGING])} if job.get(BELONGING) else {},
     )
     for volume in result.volumes:
         write_preview(results_dir / volume.file)

@@ -6,7 +6,7 @@ newest shot that was asked for meanwhile is next. Slow runs are checked shot by 
 
 import threading
 from dataclasses import dataclass, field
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import Field
 
@@ -80,6 +80,20 @@ class _Account:
     has_ended: bool = False
     told: set[int] = field(default_factory=set)
     standing: CalibrationStanding | None = None
+    newest: dict[str, Any] | None = None
+    worst: dict[str, Any] | None = None
+
+    def note(self, job: Job) -> None:
+        """Keep what a check that has ended says: the newest, and the worst of those that tell."""
+        self.newest = job.result or {"shot": job.shot, "verdict": None, "problem": job.error or str(job.state)}
+        worst = self.worst["verdict"] if self.worst else None
+        verdict = self.newest["verdict"]
+        if verdict and (worst is None or _badness(verdict) >= _badness(worst)):
+            self.worst = self.newest
+
+
+def _badness(verdict: str) -> int:
+    return list(Verdict).index(Verdict(verdict))
 
 
 class CalibrationWatch:
@@ -119,10 +133,23 @@ class CalibrationWatch:
                 account.under_way = job.id
                 return None
             account.under_way, account.has_ended = None, True
+            account.note(job)
             before, account.standing = account.standing, self._judged(account, job)
             following = account.next_shot
         self._tell(before, account.standing)
         return None if following is None else self.next_check(job.run_id, job.calibration, following)
+
+    def belonging(self, job: Job) -> dict[str, Any] | None:
+        """What checks have said so far of run and calibration of a job that trusts them; None of every other job.
+
+        ``verdict`` is the worst of those that tell, null where none does; ``shots`` has that check, and the newest.
+        """
+        if job.kind not in _TRUSTING:
+            return None
+        with self._lock:
+            account = self._account(job.run_id, job.calibration)
+            asked = {one["shot"]: one for one in (account.worst, account.newest) if one is not None}
+            return {"verdict": account.worst["verdict"] if account.worst else None, "shots": list(asked.values())}
 
     def holds(self, job: Job) -> bool:
         """Whether a job that trusts the calibration has to wait: the first check of it on this run is under way."""

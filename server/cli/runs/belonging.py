@@ -6,15 +6,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from processing.calibration.verdict import BELONGING
 from server.cli.calibrations.check import check_line
 from server.cli.output import progress
 
 if TYPE_CHECKING:
     from processing.calibration.calibration import Calibration
     from processing.runs.run_check import ShotCheck
-
-STORED = "belonging"
-"""Name of what a volume carries."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +50,7 @@ class Belonging:
     @property
     def provenance(self) -> dict[str, str]:
         """The same for what is made of the run all the same: it says so."""
-        return {STORED: json.dumps(self.record())}
+        return {BELONGING: json.dumps(self.record())}
 
     @property
     def text(self) -> str:
@@ -74,7 +72,7 @@ def stored_belonging(files: "Sequence[Path]") -> dict[str, Any] | None:
     records = []
     for file in files:
         with open_volume(file) as volume:
-            records.append(json.loads(str(volume.provenance.get(STORED, "{}"))))
+            records.append(json.loads(str(volume.provenance.get(BELONGING, "{}"))))
     told = [record for record in records if record.get("verdict")]
     return max(told, key=lambda record: list(Verdict).index(record["verdict"]), default=None)
 

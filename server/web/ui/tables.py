@@ -10,10 +10,12 @@ from nicegui import ui
 from daq.errors import DaqError
 from daq.run.state import RunOutcome
 from daq.run_plan import RunKind
-from processing.calibration.verdict import Verdict
+from processing.analysis.droplets.measured_exposure import ShotVerdict
+from processing.calibration.verdict import BELONGING, Verdict
 from processing.reconstruction.choices import Accuracy, VoxelType
 from processing.reconstruction.choices import ReconstructionMethod as Method
 from processing.reconstruction.settings import ReconstructionSettings
+from processing.runs.exposure_faults import fault_lines
 from server.lab.droplets.measurement import request_measurement
 from server.lab.errors import ServerError
 from server.lab.jobs import Job, JobKind, JobState, calibration_job
@@ -30,6 +32,7 @@ dense flat no-caps size="sm" color="primary" @click.stop="$parent.$emit('act', {
 _CALIBRATE, _RECONSTRUCT, _MEASURE = "Calibrate", "Reconstruct", "Measure"
 _ACTIONS_OF = {RunKind.CALIBRATION: [_CALIBRATE], RunKind.SAMPLE: [_RECONSTRUCT, _MEASURE], None: []}
 _SHOWN = 60
+_TRUSTED = (Verdict.GOOD, Verdict.USABLE)
 
 
 class RunTable:
@@ -180,8 +183,8 @@ def job_row(job: Job) -> dict[str, Any]:
         "job": _name(job),
         "run": job.run_id,
         "outcome": job.state,
-        "colour": outcome_colour(job.state),
-        "detail": job.error or _DETAIL[job.kind](job),
+        "colour": "warning" if job.state is JobState.DONE and _is_doubtful(job) else outcome_colour(job.state),
+        "detail": job.error or "; ".join(told for told in (_DETAIL[job.kind](job), _belonging(job)) if told),
         "actions": choices.get(job.state, []),
         "calibration": job.calibration,
     }
@@ -225,10 +228,42 @@ def _holdout_px(view: dict[str, Any]) -> float:
     return math.inf if view["holdout_error_px"] is None else float(view["holdout_error_px"])
 
 
-def _slow_views(job: Job) -> str:
-    """The views that could not be rectified, with the reason; nothing where all were."""
-    views = (job.result or {}).get("views", {})
-    return "; ".join(f"{name} exact: {view['reason']}" for name, view in views.items() if view["reason"])
+def _volumes(job: Job) -> str:
+    """What is wrong with the images of an exposure, and the views that could not be rectified; nothing where all is."""
+    result = job.result or {}
+    views = result.get("views", {})
+    faults = [
+        f"exposure {volume['frame']}: {line}" for volume in result.get("volumes", ()) for line in fault_lines(volume)
+    ]
+    slow = [f"{name} exact: {view['reason']}" for name, view in views.items() if view["reason"]]
+    return "; ".join([*faults, *slow])
+
+
+def _belonging(job: Job) -> str:
+    """What droplets say against run and calibration, or that they say nothing; nothing where they agree."""
+    asked = (job.result or {}).get(BELONGING)
+    if asked is None or asked["verdict"] in _TRUSTED:
+        return ""
+    shots = ", ".join(str(check["shot"]) for check in asked["shots"])
+    if asked["verdict"] is None and job.kind is JobKind.MEASUREMENT:
+        return ""  # droplets have been fitted: their own verdict tells more
+    if asked["verdict"] is None:
+        return f"not checked whether run and calibration belong together (asked: shot {shots or 'none'})"
+    return f"droplets speak against run and calibration: {asked['verdict']} (shot {asked['shots'][0]['shot']})"
+
+
+def _is_doubtful(job: Job) -> bool:
+    """Whether something that is done is not to be trusted without a look: amber, not green."""
+    result = job.result or {}
+    verdicts = [result.get("verdict"), *(view.get("verdict") for view in _views(result).values())]
+    doubted = [verdict for verdict in verdicts if verdict not in (*_TRUSTED, ShotVerdict.GOOD, ShotVerdict.EMPTY, None)]
+    belonging = result.get(BELONGING, {}).get("verdict") in (Verdict.WARN, Verdict.REFUSE)
+    return bool(doubted) or belonging or any(fault_lines(volume) for volume in result.get("volumes", ()))
+
+
+def _views(result: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """Views of a calibration or a reconstruction; those of a check are figures."""
+    return {name: view for name, view in result.get("views", {}).items() if isinstance(view, dict)}
 
 
 def _found(job: Job) -> str:
@@ -241,6 +276,6 @@ def _found(job: Job) -> str:
 _DETAIL = {
     JobKind.CALIBRATION: _quality,
     JobKind.CHECK: _disparity,
-    JobKind.RECONSTRUCTION: _slow_views,
+    JobKind.RECONSTRUCTION: _volumes,
     JobKind.MEASUREMENT: _found,
 }

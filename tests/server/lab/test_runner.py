@@ -76,7 +76,8 @@ def test_jobs_are_done_in_the_order_in_which_they_were_asked_for(tmp_path: Path)
         async with at_work(tmp_path, answer) as laboratory:
             jobs = [laboratory.runner.submit(job_of(shot)) for shot in range(3)]
             done = [await laboratory.reach(job, JobState.DONE) for job in jobs]
-        assert [job.result for job in done] == [{"shot": shot, "in": "mlos-0", "with": "cal.json"} for shot in range(3)]
+        told = {"in": "mlos-0", "with": "cal.json", "belonging": {"verdict": None, "shots": []}}
+        assert [job.result for job in done] == [{"shot": shot, **told} for shot in range(3)]
         assert [job.changed_utc for job in done] == sorted(job.changed_utc for job in done)
 
     asyncio.run(go())
@@ -131,5 +132,22 @@ def test_what_was_running_when_the_server_ended_is_done_by_the_next_one(tmp_path
             await first.reach(job, JobState.RUNNING)
         async with at_work(tmp_path, answer) as second:
             assert (await second.reach(job, JobState.DONE)).result is not None
+
+    asyncio.run(go())
+
+
+def test_what_droplets_say_of_the_calibration_comes_with_every_job(tmp_path: Path) -> None:
+    check = {"shot": 0, "verdict": "warn", "moved": None, "views": {"view1": 0.5}, "uncertainty_px": {"view1": 0.1}}
+
+    def work(job: dict[str, Any], should_stop: Callable[[], bool]) -> dict[str, Any]:
+        return check if job["results_dir"] is None else {"heard": job.get("belonging")}
+
+    async def go() -> None:
+        async with at_work(tmp_path, work) as laboratory:
+            laboratory.runner.check("run", "cal", 0)
+            laboratory.runner.submit(job_of(1))
+            done = await laboratory.reach(job_of(1), JobState.DONE)
+            expected = {"verdict": "warn", "shots": [check]}
+            assert done.result == {"heard": expected, "belonging": expected}
 
     asyncio.run(go())

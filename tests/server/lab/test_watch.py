@@ -154,3 +154,19 @@ def test_checks_of_an_earlier_life_of_the_server_still_stop_a_run() -> None:
         watch.learn(job)
     assert watch.refusal(reconstruction(3)) is not None
     assert watch.next_check(RUN, CALIBRATION, 3) is None
+
+
+def test_a_job_is_told_the_worst_and_the_newest_of_what_was_found() -> None:
+    watch, _ = watch_of([0.04, 0.5, 0.1, None])
+    assert watch.belonging(reconstruction(2)) == {
+        "verdict": Verdict.WARN,
+        "shots": [ended(1, 0.5).result, ended(3, None).result],
+    }
+    assert watch.belonging(check_job(RUN, 0, CALIBRATION)) is None
+    assert watch.belonging(reconstruction(calibration="other")) == {"verdict": None, "shots": []}
+
+
+def test_droplets_that_do_not_tell_are_no_verdict() -> None:
+    watch, _ = watch_of([None])
+    told = watch.belonging(reconstruction())
+    assert told == {"verdict": None, "shots": [ended(0, None).result]}

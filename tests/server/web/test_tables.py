@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from daq.run_plan import RunKind
-from server.lab.jobs import JobState, calibration_job
+from server.lab.jobs import JobKind, JobState, calibration_job, reconstruction_job, shot_job
 from server.lab.runs import RunSummary
 from server.web.ui import tables
 from server.web.ui.tables import job_row
@@ -70,3 +70,55 @@ def test_whoever_asks_for_work_is_told_what_came_of_it() -> None:
     assert tables.answer_of([queued, queued]) == ("2 jobs are queued, see Processing", True)
     assert tables.answer_of([done]) == ("nothing to do: it is done already", False)
     assert tables.answer_of([]) == ("nothing to do: the run has no valid shot", False)
+
+
+GOOD = {"verdict": "good", "shots": [{"shot": 3, "verdict": "good"}]}
+
+
+def reconstructed(belonging: dict[str, Any] | None = None, **faults: Any) -> tuple[str, str]:
+    """Colour and text of a reconstruction that is done."""
+    volume = {"shot": 0, "frame": "a", "file": "shot_00000_a.vtkhdf", **faults}
+    result = {"views": {}, "volumes": [volume], "belonging": belonging or GOOD}
+    job = reconstruction_job("run", 0, "cal", "mlos-0", {"method": "mlos"})
+    row = job_row(job.model_copy(update={"state": JobState.DONE, "result": result}))
+    return row["colour"], row["detail"]
+
+
+def test_a_volume_whose_run_and_calibration_disagree_is_not_green() -> None:
+    assert reconstructed() == ("positive", "")
+    warned = {"verdict": "warn", "shots": [{"shot": 2, "verdict": "warn"}, {"shot": 3, "verdict": "good"}]}
+    assert reconstructed(warned) == ("warning", "droplets speak against run and calibration: warn (shot 2)")
+    silent = {"verdict": None, "shots": [{"shot": 3, "verdict": None}]}
+    assert reconstructed(silent) == (
+        "positive",
+        "not checked whether run and calibration belong together (asked: shot 3)",
+    )
+
+
+@pytest.mark.parametrize(
+    ("faults", "text"),
+    [
+        ({"blind_views": ["view2"]}, "exposure a: view2 sees nothing"),
+        ({"dim_views": ["view1"]}, "exposure a: view1 uses less than 1/8"),
+        ({"odd_light": {"view3": "is its own background"}}, "exposure a: view3 is its own background"),
+        ({"lost_share": 0.5}, "exposure a: 50 % of the intensity is in voxels too faint for uint8"),
+        ({"empty": True}, "exposure a: the volume is empty"),
+    ],
+)
+def test_a_volume_of_odd_images_is_not_green(faults: dict[str, Any], text: str) -> None:
+    colour, detail = reconstructed(None, **faults)
+    assert (colour, detail[: len(text)]) == ("warning", text)
+
+
+@pytest.mark.parametrize(("verdict", "colour"), [("good", "positive"), ("doubtful", "warning"), ("refused", "warning")])
+def test_droplets_that_are_not_to_be_trusted_are_not_green(verdict: str, colour: str) -> None:
+    job = shot_job(JobKind.MEASUREMENT, "run", 0, "cal", "droplets-0", {})
+    result = {"droplets": 0, "verdict": verdict, "reasons": [], "belonging": GOOD}
+    assert job_row(job.model_copy(update={"state": JobState.DONE, "result": result}))["colour"] == colour
+
+
+@pytest.mark.parametrize(("verdict", "colour"), [("usable", "positive"), ("warn", "warning"), ("refuse", "warning")])
+def test_a_calibration_that_is_refused_is_not_green(verdict: str, colour: str) -> None:
+    job = calibration_job("run", "cal", "pinhole")
+    result = {"views": {"cam1": view("good", 0.02), "cam2": view(verdict, 0.5)}}
+    assert job_row(job.model_copy(update={"state": JobState.DONE, "result": result}))["colour"] == colour
