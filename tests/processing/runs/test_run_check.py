@@ -5,7 +5,7 @@ import pytest
 
 from processing.calibration.droplets.disparity import ViewDisparity
 from processing.calibration.verdict import Verdict
-from processing.geometry import FloatArray
+from processing.geometry import FloatArray, PinholeCamera
 from processing.runs.run_check import ShotCheck, check_exposures
 from processing.studies.drifting_views import direction
 from tests.support.drifting_views import calibration_of, droplet_shots, inside_mm, views
@@ -121,3 +121,30 @@ def test_too_few_droplets_do_not_tell(density_per_mm3: float, drift_px: float) -
 def test_a_view_that_sees_nothing_has_not_moved() -> None:
     (seen,) = droplet_shots(1, 2.0)
     assert check_exposures(0, [[*seen[:3], np.empty((0, 2))]], CALIBRATION).verdict is None
+
+
+REFRACTIVE_INDEX = 1.52
+
+
+def behind_glass(points_mm: FloatArray, camera: PinholeCamera, thickness_mm: float) -> FloatArray:
+    """Where points seem to be behind a plate across z: Snell's law shifts each line of sight along z."""
+    towards = np.array([0.0, 0.0, np.sign(camera.centre_mm[2])])
+    seen_mm = points_mm
+    for _ in range(20):
+        sights = camera.centre_mm - seen_mm
+        cosines = np.abs(sights[:, 2]) / np.linalg.norm(sights, axis=1)
+        shifts_mm = thickness_mm * (1 - cosines / np.sqrt(REFRACTIVE_INDEX**2 - 1 + cosines**2))
+        seen_mm = points_mm + shifts_mm[:, None] * towards
+    return seen_mm
+
+
+@pytest.mark.parametrize("thickness_mm", [0.5, 1.0, 2.0, 3.0, 10.0])
+def test_a_window_that_came_after_the_calibration_is_no_good_one(thickness_mm: float) -> None:
+    cameras = [mapping for mapping in MAPPINGS if isinstance(mapping, PinholeCamera)]
+    seen = [camera.project(behind_glass(inside_mm(120), camera, thickness_mm)) for camera in cameras]
+    assert check_exposures(0, [seen], CALIBRATION).verdict in (Verdict.WARN, Verdict.REFUSE)
+
+
+@pytest.mark.parametrize("offset_px", [(4.0, 0.0), (40.0, 0.0), (16.0, 8.0)])
+def test_images_that_are_cropped_elsewhere_do_not_fit(offset_px: tuple[float, float]) -> None:
+    assert checked(dict.fromkeys(range(4), offset_px)).verdict in (Verdict.WARN, Verdict.REFUSE)
