@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from processing.errors import BadInput
-from processing.tiff_pages import deflated_parts, page_offsets, show_page
+from processing.tiff_pages import PageKind, deflated_parts, page_kind, page_offsets, show_page
 
 GreyImage = NDArray[np.uint8] | NDArray[np.uint16]
 T = TypeVar("T")
@@ -54,6 +54,8 @@ def read_image(path: Path, page: int | None = None) -> GreyImage:
         raise ImageFileError(f"{path}: not an image that OpenCV reads")
     if complaints:
         raise ImageFileError(f"{path}: is damaged: {complaints}")
+    if offsets:
+        _check_kind(path, page_kind(content, offsets[chosen]), image.dtype)
     if image.ndim == 3:
         image = cv2.cvtColor(image, cv2.COLOR_BGRA2GRAY if image.shape[2] == 4 else cv2.COLOR_BGR2GRAY)
     if image.dtype == np.uint8:
@@ -96,6 +98,16 @@ def _check_parts(path: Path, parts: Iterable[NDArray[np.uint8]]) -> None:
             zlib.decompress(part.tobytes())
         except zlib.error as error:
             raise ImageFileError(f"{path}: is damaged: {error}") from error
+
+
+def _check_kind(path: Path, kind: PageKind, decoded: np.dtype[Any]) -> None:
+    """Refuse a page that OpenCV decodes otherwise than it is meant, without a word."""
+    if kind.is_preview:
+        raise ImageFileError(f"{path}: holds a preview of an image in the sensor's own format; save it as a plain TIFF")
+    if kind.bits > 8 and decoded == np.uint8:
+        raise ImageFileError(f"{path}: has {kind.bits} bits, of which only 8 can be read; save it as a grey image")
+    if kind.white_is_zero and decoded == np.uint16:
+        raise ImageFileError(f"{path}: counts light from white, 0, to black (WhiteIsZero); save it with black as 0")
 
 
 def _is_jpeg(content: NDArray[np.uint8]) -> bool:

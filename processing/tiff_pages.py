@@ -15,6 +15,8 @@ Content = NDArray[np.uint8]
 
 ORIENTATION_TAG, SHORT, AS_STORED = 274, 3, 1
 COMPRESSION_TAG, DEFLATE = 259, (8, 32946)
+SUBFILE_TAG, PREVIEW = 254, 1
+BITS_TAG, PHOTOMETRIC_TAG, WHITE_IS_ZERO = 258, 262, 0
 PART_TAGS = {273: 279, 324: 325}
 """Where strips, or tiles, begin: and how many bytes they have."""
 _WIDTHS = {SHORT: 2, 4: 4, 16: 8}
@@ -39,6 +41,25 @@ _LAYOUTS = {
     b"II+\0": _Layout("little", first=8, offset=8, count=8, entry=20, value=12),
     b"MM\0+": _Layout("big", first=8, offset=8, count=8, entry=20, value=12),
 }
+
+
+@dataclass(frozen=True)
+class PageKind:
+    """What the fields of a page say of its pixels.
+
+    Parameters
+    ----------
+    bits : int
+        Of a sample.
+    white_is_zero : bool
+        Whether larger values are darker.
+    is_preview : bool
+        Whether it is a smaller version of an image that lies elsewhere in the file, as raw files of cameras have.
+    """
+
+    bits: int
+    white_is_zero: bool
+    is_preview: bool
 
 
 def page_offsets(content: Content) -> tuple[int, ...]:
@@ -67,6 +88,21 @@ def deflated_parts(content: Content, offset: int) -> Iterator[Content]:
         if begin in fields and length in fields:
             for first, size in zip(values[begin], _values(content, *fields[length], layout), strict=False):
                 yield content[first : first + size]
+
+
+def page_kind(content: Content, offset: int) -> PageKind:
+    """What the page at an offset says of its pixels."""
+    layout = _LAYOUTS[content[:4].tobytes()]
+    fields = {tag: (kind, entry) for tag, kind, entry in _entries(content, offset, layout)}
+
+    def first(tag: int, default: int) -> int:
+        return next(iter(_values(content, *fields[tag], layout)), default) if tag in fields else default
+
+    return PageKind(
+        bits=first(BITS_TAG, 1),
+        white_is_zero=first(PHOTOMETRIC_TAG, WHITE_IS_ZERO + 1) == WHITE_IS_ZERO,
+        is_preview=bool(first(SUBFILE_TAG, 0) & PREVIEW),
+    )
 
 
 def _entries(content: Content, offset: int, layout: _Layout) -> Iterator[tuple[int, int, int]]:

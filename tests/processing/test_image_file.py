@@ -165,3 +165,27 @@ def test_directories_in_a_circle_end(tmp_path: Path) -> None:
     circle = b"II*\0" + struct.pack("<IHHHIII", 8, 1, 256, 3, 1, 4, 8)
     (tmp_path / "a.tif").write_bytes(circle)
     assert page_count(tmp_path / "a.tif") == 1
+
+
+@pytest.mark.parametrize(
+    ("written", "complaint"),
+    [
+        ({"photometric": "miniswhite"}, "counts light from white, 0, to black"),
+        ({"subfiletype": 1}, "holds a preview of an image"),
+        ({"extrasamples": ["unspecified"]}, "has 16 bits, of which only 8 can be read"),
+    ],
+)
+def test_a_page_that_would_be_read_otherwise_than_it_is_meant_is_refused(
+    tmp_path: Path, written: dict[str, Any], complaint: str
+) -> None:
+    grey = np.arange(600, dtype=np.uint16).reshape(20, 30)
+    image = np.dstack([grey, grey]) if "extrasamples" in written else grey
+    tifffile.imwrite(tmp_path / "odd.tif", image, **{"photometric": "minisblack", **written})
+    with pytest.raises(ImageFileError, match=complaint):
+        read_image(tmp_path / "odd.tif")
+
+
+def test_white_may_be_0_where_that_is_understood(tmp_path: Path) -> None:
+    grey = np.arange(240, dtype=np.uint8).reshape(12, 20)
+    tifffile.imwrite(tmp_path / "white.tif", 255 - grey, photometric="miniswhite")
+    np.testing.assert_array_equal(read_image(tmp_path / "white.tif"), grey)
