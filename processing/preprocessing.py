@@ -6,7 +6,7 @@ bright particles on black are inverted already.
 """
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import cv2
 import numpy as np
@@ -87,6 +87,8 @@ def intensity(
     for name, reference in (("dark", dark), ("background", background), ("output", out)):
         if reference is not None and reference.shape != frame.shape:
             raise ValueError(f"{name} image {reference.shape} does not fit the frame {frame.shape}")
+    if settings.polarity not in get_args(Polarity):
+        raise ValueError(f"polarity {settings.polarity!r}: {' or '.join(get_args(Polarity))}, please")
     if frame.ndim != 2:
         raise ValueError(f"a frame is (rows, columns), not {frame.shape}: colour images must be made grey first")
     if frame.dtype not in (np.uint8, np.uint16):

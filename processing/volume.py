@@ -25,8 +25,10 @@ class VoxelGrid:
     pitch_mm: float
 
     def __post_init__(self) -> None:
-        if min(self.shape) < 1 or self.pitch_mm <= 0:
+        if min(self.shape) < 1 or not 0 < self.pitch_mm < np.inf:
             raise ValueError(f"grid needs voxels: shape {self.shape}, pitch {self.pitch_mm} mm")
+        if any(int(count) != count for count in self.shape) or not np.isfinite(self.origin_mm).all():
+            raise ValueError(f"grid has whole voxels at finite places: shape {self.shape}, origin {self.origin_mm} mm")
 
     @classmethod
     def centred(cls, shape: tuple[int, int, int], pitch_mm: float) -> "VoxelGrid":

@@ -3,6 +3,7 @@
 The kernels take images in the order of a plan (``processing.reconstruction``); here they are asked for by name.
 """
 
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from processing import preprocessing
 from processing.calibration.calibration import Calibration
 from processing.kernels import DEFAULT_THREADS
+from processing.light import odd_light
 from processing.preprocessing import Intensity, Polarity, Preprocessing
 from processing.reconstruction import smart as iterative
 from processing.reconstruction.choices import Accuracy, ReconstructionMethod
@@ -74,8 +76,12 @@ def plan(
         A view is not in the calibration or was refused, or the calibration has no common world.
     ReconstructionError
         Too few or too many views, or a mapping too rough to be sampled.
+    ValueError
+        A view is named twice.
     """
     names = tuple(calibration.views if views is None else views)
+    if twice := sorted({name for name in names if names.count(name) > 1}):
+        raise ValueError(f"views {', '.join(twice)} are named twice; each sees the volume once")
     calibration.require_usable(names)
     mappings = [calibration.views[name].mapping for name in names]
     return plan_reconstruction(mappings, grid, Accuracy(accuracy), names)
@@ -118,8 +124,13 @@ def intensity(
     Raises
     ------
     ValueError
-        A reference image has another shape than the frame or is not finite, or the frame has other grey values than
-        ``bits`` can hold.
+        A reference image has another shape than the frame or is not finite, the frame has other grey values than
+        ``bits`` can hold or pixels that are masked, or bright particles have a background.
+
+    Warns
+    -----
+    UserWarning
+        The light of the frame does not fit its background or its polarity: the result looks fine, and is not.
     """
     if not 1 <= bits <= 16 or (frame.size and int(frame.max()) >= 2**bits):
         raise ValueError(f"bits {bits} of 1 to 16 reach to {2**bits - 1}, a pixel is {frame.max(initial=0)}")
@@ -127,13 +138,17 @@ def intensity(
         if reference is not None and not np.isfinite(reference).all():
             row, column = np.argwhere(~np.isfinite(reference))[0]
             raise ValueError(f"{name}: pixel (column {column}, row {row}) is {reference[row, column]}")
-    return preprocessing.intensity(
-        frame,
-        Preprocessing(polarity, minimum_window_px, noise_floor),
-        bits=bits,
-        dark=None if dark is None else np.ascontiguousarray(dark, np.float32),
-        background=None if background is None else np.ascontiguousarray(background, np.float32),
+    if np.ma.is_masked(frame):
+        raise ValueError("the frame has masked pixels, which would count as they are: fill them with what is known")
+    if polarity == "bright" and background is not None:
+        raise ValueError("bright particles are before no light: subtract what there is without them as dark")
+    dark, background = (None if one is None else np.ascontiguousarray(one, np.float32) for one in (dark, background))
+    result = preprocessing.intensity(
+        frame, Preprocessing(polarity, minimum_window_px, noise_floor), bits=bits, dark=dark, background=background
     )
+    if odd := odd_light(frame, polarity, bits=bits, dark=dark, background=background):
+        warnings.warn(f"the image {odd}", stacklevel=2)
+    return result
 
 
 def mlos(plan: Plan, images: Images, *, out: NDArray[Any] | None = None, threads: int = DEFAULT_THREADS) -> Volume:

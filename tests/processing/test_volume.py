@@ -1,5 +1,7 @@
 """VoxelGrid: indices and millimetres are inverse to each other."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -24,3 +26,17 @@ def test_index_order_is_zyx_and_round_trips() -> None:
 def test_impossible_grid_is_refused() -> None:
     with pytest.raises(ValueError, match="pitch 0 mm"):
         VoxelGrid((1, 1, 1), (0, 0, 0), 0)
+
+
+@pytest.mark.parametrize(
+    ("shape", "origin_mm", "pitch_mm"),
+    [
+        ((3, 3, 3), (0.0, 0.0, 0.0), float("nan")),
+        ((3, 3, 3), (0.0, 0.0, 0.0), float("inf")),
+        ((3, 3, 3), (0.0, float("nan"), 0.0), 0.1),
+        ((3.5, 3, 3), (0.0, 0.0, 0.0), 0.1),
+    ],
+)
+def test_a_grid_lies_somewhere(shape: Any, origin_mm: tuple[float, float, float], pitch_mm: float) -> None:
+    with pytest.raises(ValueError, match="grid "):
+        VoxelGrid(shape, origin_mm, pitch_mm)

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -95,7 +96,7 @@ def test_a_misspelt_option_is_an_error() -> None:
 def test_intensities_of_an_array_are_those_of_the_formula() -> None:
     frame = np.array([[200, 100], [50, 0]], np.uint16)
     background, dark = np.full((2, 2), 210.0), np.full((2, 2), 10.0)
-    found = ts.intensity(frame, bits=12, background=background, dark=dark, minimum_window_px=0, noise_floor=0.0)
+    found = ts.intensity(frame, bits=8, background=background, dark=dark, minimum_window_px=0, noise_floor=0.0)
     np.testing.assert_allclose(found, [[0.05, 0.55], [0.8, 1.0]], atol=1e-6)
 
 
@@ -113,3 +114,51 @@ def test_what_is_no_grey_value_or_no_intensity_is_refused(tmp_path: Path) -> Non
     with pytest.raises(ValueError, match=r"voxel \(z 1, y 2, x 3\) is inf"):
         ts.write_volume(tmp_path / "volume.vtkhdf", volume, GRID)
     assert not list(tmp_path.iterdir())
+
+
+FRAME = np.full((40, 50), 200, np.uint8)
+FRAME[10:14, 20:24] = 60
+LIGHT = np.full((40, 50), 210, np.float32)
+
+
+@pytest.mark.parametrize(
+    ("options", "problem"),
+    [
+        ({"polarity": "Shadow"}, "polarity 'Shadow': shadow or bright"),
+        ({"polarity": None}, "polarity None: shadow or bright"),
+        ({"polarity": "bright", "background": LIGHT}, "bright particles are before no light"),
+    ],
+)
+def test_an_intensity_of_another_kind_than_was_meant_is_refused(options: dict[str, Any], problem: str) -> None:
+    with pytest.raises(ValueError, match=problem):
+        ts.intensity(FRAME, bits=8, **options)
+
+
+def test_masked_pixels_do_not_count_as_they_are() -> None:
+    masked: Any = np.ma.masked_less(FRAME, 100)
+    with pytest.raises(ValueError, match="masked pixels"):
+        ts.intensity(masked, bits=8, background=LIGHT)
+
+
+@pytest.mark.parametrize(
+    ("references", "warning"),
+    [
+        ({"background": FRAME}, "is its own background"),
+        ({"background": LIGHT / 210}, "has a background without light"),
+        ({"background": np.zeros_like(LIGHT), "dark": LIGHT}, "is darker than its dark image|without light"),
+        ({"background": LIGHT / 2}, "is brighter than its background"),
+    ],
+)
+def test_light_that_does_not_fit_is_a_warning(references: dict[str, Any], warning: str) -> None:
+    with pytest.warns(UserWarning, match=warning):
+        ts.intensity(FRAME, bits=8, **references)
+
+
+def test_a_view_sees_the_volume_once() -> None:
+    with pytest.raises(ValueError, match="views view1 are named twice"):
+        ts.plan(calibration(), GRID, views=["view1", "view1", "view2"])
+
+
+def test_a_pitch_of_nothing_is_not_the_default() -> None:
+    with pytest.raises(ValueError, match="pitch 0 mm: it must be above 0"):
+        ts.common_grid(calibration(), pitch_mm=0)

@@ -94,8 +94,10 @@ def mean_diameters(diameters_um_by_shot: Sequence[ArrayLike], exposures_per_shot
     Raises
     ------
     ValueError
-        A diameter is not finite and above 0.
+        A diameter is not finite and above 0, or there are diameters where shots should be.
     """
+    if any(np.ndim(diameters_um) != 1 for diameters_um in diameters_um_by_shot):
+        raise ValueError("diameters by shot, please: a list of arrays; of a single shot [diameters_um]")
     checked = (np.sort(_checked(diameters_um)) for diameters_um in diameters_um_by_shot)
     shots = sorted((shot for shot in checked if len(shot)), key=np.ndarray.tolist)  # draws depend on no order
     diameters_um = np.concatenate([np.empty(0), *shots])

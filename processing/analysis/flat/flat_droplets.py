@@ -138,7 +138,12 @@ def measure_flat(
     ------
     LightError
         There is no light that droplets could be dark before.
+    ValueError
+        A pixel is infinite or not a number.
     """
+    if not np.isfinite(image).all():
+        row, column = np.argwhere(~np.isfinite(image))[0]
+        raise ValueError(f"pixel (column {column}, row {row}) is {image[row, column]}")
     how = settings or FlatSettings()
     seen = darkness_of(image, how.polarity, background)
     smoothed = cv2.blur(seen.values, (3, 3)).astype(np.float32)

@@ -58,7 +58,10 @@ def common_volume(
     first, last, top, bottom, left, right = box
     lower_mm = np.array([x_mm[left], y_mm[top], z_mm[first]])
     upper_mm = np.array([x_mm[right], y_mm[bottom], z_mm[last]])
-    pitch_mm = pitch_mm or 1 / max(scale_px_per_mm(mapping, (lower_mm + upper_mm) / 2) for mapping in mappings)
+    if pitch_mm is None:
+        pitch_mm = 1 / max(scale_px_per_mm(mapping, (lower_mm + upper_mm) / 2) for mapping in mappings)
+    elif not pitch_mm > 0:
+        raise ValueError(f"pitch {pitch_mm} mm: it must be above 0")
     nx, ny, nz = (int(extent_mm / pitch_mm) + 1 for extent_mm in upper_mm - lower_mm)
     return VoxelGrid((nz, ny, nx), (float(lower_mm[0]), float(lower_mm[1]), float(lower_mm[2])), float(pitch_mm))
 

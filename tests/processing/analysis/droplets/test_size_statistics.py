@@ -189,3 +189,8 @@ def test_density_holds_the_poisson_limits_of_tables() -> None:
     assert number_density(0, 2.0).model_dump() == pytest.approx({"value": 0, "low": 0, "high": 3.6889 / 2}, rel=1e-4)
     ten = number_density(10, 1.0).model_dump()
     assert ten == pytest.approx({"value": 10, "low": 4.7954, "high": 18.3904}, rel=1e-4)
+
+
+def test_every_diameter_is_no_shot_of_its_own() -> None:
+    with pytest.raises(ValueError, match="diameters by shot, please"):
+        mean_diameters(np.arange(1.0, 30.0))  # type: ignore[arg-type]

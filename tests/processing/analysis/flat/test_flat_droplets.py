@@ -200,3 +200,10 @@ def test_annotated_droplets_of_another_laboratory_are_found_and_sized() -> None:
     is_told, blur, deep = np.array(told), np.array(blurs), np.array(depths)
     as_good = (blur <= np.nanquantile(blur[is_told], 0.95)) & (deep >= np.quantile(deep[is_told], 0.05))
     assert is_told[as_good].mean() >= 0.6, "annotated share of what is as sharp and as dark as annotated droplets"
+
+
+def test_an_image_of_no_numbers_has_not_no_droplets() -> None:
+    image = np.full((60, 80), 200.0)
+    image[5, 7] = np.nan
+    with pytest.raises(ValueError, match=r"pixel \(column 7, row 5\) is nan"):
+        measure_flat(image)
