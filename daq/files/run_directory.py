@@ -30,7 +30,9 @@ from daq.files.run_file import (
     read_header,
     read_outcome,
     read_reference,
+    read_shot_count,
     shot_path,
+    slots_of,
     write_run_file,
 )
 from daq.files.shot_file import EncodedShot, encode_shot, read_image_key, read_shot_file, write_encoded_shot
@@ -185,12 +187,11 @@ class RunReader:
 
     @property
     def shot_count(self) -> int:
-        """Number of slots up to the last committed shot; a shot lost since keeps its slot."""
+        """Number of slots up to the last committed shot; a shot lost since keeps its slot, the last ones too."""
         if not (self.run_dir / SHOTS_FOLDER).is_dir():
             reason = f"no folder {SHOTS_FOLDER}: it was packed into one file, or its shots were taken away"
             raise ShotFileError(f"{self.run_dir}: has {reason}")
-        indices = [int(path.stem) for path in (self.run_dir / SHOTS_FOLDER).glob("*.h5") if path.stem.isdecimal()]
-        return max(indices, default=-1) + 1
+        return max(slots_of(self.run_dir), read_shot_count(self.run_dir))
 
     def image_keys(self) -> NDArray[np.int64]:
         """ImageKey of every shot, (shot,); a shot that cannot be read counts as INVALID."""
@@ -198,8 +199,12 @@ class RunReader:
         return np.array([read_image_key(path) for path in paths], np.int64)
 
     def read_shot(self, index: int) -> Shot:
-        """Read one shot and check it against its checksums."""
-        return read_shot_file(shot_path(self.run_dir, index), self.header)
+        """Read one shot and check it against its checksums, and its number against the name of its file."""
+        path = shot_path(self.run_dir, index)
+        shot = read_shot_file(path, self.header)
+        if shot.index != index:
+            raise ShotFileError(f"{path}: holds shot {shot.index}, and is named otherwise: give it its name back")
+        return shot
 
     def dark(self, view: str) -> NDArray[np.float32] | None:
         """Mean image without light, (frame, row, column) in counts; None if the run has none."""

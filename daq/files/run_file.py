@@ -75,6 +75,19 @@ def add_outcome(run_dir: Path, outcome: str, cause: str) -> None:
         file["entry/outcome"] = outcome
         file["entry/cause"] = cause
         file["entry/end_time"] = datetime.now(UTC).isoformat()
+        file["entry/shot_count"] = slots_of(run_dir)
+
+
+def read_shot_count(run_dir: Path) -> int:
+    """Slots of a run when it was closed; 0 while it is open, and of runs from before this was kept."""
+    with reading(run_dir) as file:
+        return int(file["entry/shot_count"][()]) if "shot_count" in file["entry"] else 0
+
+
+def slots_of(run_dir: Path) -> int:
+    """Slots up to the last shot that is there."""
+    indices = [int(path.stem) for path in (run_dir / SHOTS_FOLDER).glob("*.h5") if path.stem.isdecimal()]
+    return max(indices, default=-1) + 1
 
 
 def read_outcome(run_dir: Path) -> tuple[str, str] | None:

@@ -273,6 +273,7 @@ def provenance_of(
     """Where results of a run come from."""
     return {
         "run": run.header.run_id,
+        "run_created_utc": run.header.created_utc,
         "calibration": calibration.id,
         "calibration_file": calibration_file.name,
         "calibration_sha256": file_sha256(calibration_file),

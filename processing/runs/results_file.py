@@ -29,6 +29,10 @@ def volume_files(results_dir: Path, frame: FrameName | None = None) -> list[Path
     return sorted(results_dir.glob(f"shot_*_{frame or '[ab]'}.vtkhdf"))
 
 
+_LATER = ("run_created_utc",)
+"""Of a provenance; results from before lack it. Two runs may have one name: imports are called as their folders."""
+
+
 def claim_results(results_dir: Path, provenance: Provenance) -> None:
     """Make the directory, or check that it holds results of the same run, calibration and settings.
 
@@ -48,7 +52,8 @@ def claim_results(results_dir: Path, provenance: Provenance) -> None:
         written = json.loads(file.read_text(encoding="utf-8"))
     except ValueError as error:
         raise VolumeFileError(f"{file}: damaged ({error}); choose another directory, or --overwrite it") from error
-    if written != json.loads(json.dumps(dict(provenance))):
+    asked = json.loads(json.dumps(dict(provenance)))
+    if {**{name: asked[name] for name in _LATER if name in asked}, **written} != asked:
         raise VolumeFileError(f"{results_dir}: holds results of another run, calibration or settings; choose another")
 
 

@@ -254,6 +254,8 @@ def selected_shots(run_dir: Path, selection: str | None) -> list[int]:
 
     first, last = _bounds(selection)
     with RunReader(run_dir) as run:
+        if told := ended(run.outcome, run.cause):
+            progress(f"{run_dir.name}: {told}")
         keys = dict(enumerate(run.image_keys().tolist()[:last]))
         wanted = {index: key for index, key in keys.items() if index >= first}
         for index in (index for index, key in wanted.items() if key == ImageKey.INVALID):
@@ -263,6 +265,13 @@ def selected_shots(run_dir: Path, selection: str | None) -> list[int]:
     if not chosen:
         raise PipelineError(f"{run_dir}: has no valid sample shots" + (f" in {selection}" if selection else ""))
     return chosen
+
+
+def ended(outcome: str | None, cause: str) -> str:
+    """How a run ended that was not completed; empty for one that was."""
+    if outcome is None:
+        return "has no outcome: it was interrupted, or is still being recorded; there may be more shots to come"
+    return "" if outcome == "completed" else f"was {outcome}, it is not complete" + (f": {cause}" if cause else "")
 
 
 def _bounds(selection: str | None) -> tuple[int, int | None]:
