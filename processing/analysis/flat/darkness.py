@@ -28,6 +28,10 @@ Image = NDArray[np.float32]
 
 MOST_UNEXPLAINED, UNEXPLAINED = 0.005, 0.3
 """Share of pixels, and by how much of the light: light that is brighter than the fit is no droplet."""
+MOST_UNEVEN = 0.1
+"""Of the light: a fit that leaves so much where no droplet is does not know it. 53 shadowgraphs of others: 0.06."""
+LEAST_SHARE = 0.5
+"""Of the light that was given, which the brightest pixels of an image have: hardly a spray covers all of a view."""
 
 
 class LightError(BadInput):
@@ -97,10 +101,19 @@ def _given(grey: Image, light: Image) -> Image:
         raise LightError(
             f"has a background of which {100 * share:.0f} % are saturated: how dark droplets are is unknown"
         )
+    if (most := float(np.quantile(grey, 0.98))) < LEAST_SHARE * (full := float(np.quantile(light, 0.98))):
+        raise LightError(
+            f"has at most {100 * most / full:.0f} % of the light of its background: is that of another exposure, or of "
+            "other bits?"
+        )
     return light
 
 
 def _require_light(grey: Image) -> None:
+    if grey.max() in FULL_SCALES and (share := np.mean(grey == grey.max())) > SATURATED_SHARE:
+        raise LightError(
+            f"{100 * share:.0f} % of the image are saturated: how dark droplets are is unknown, they would be too small"
+        )
     middle = grey[len(grey) // 3 : len(grey) - len(grey) // 3]
     light, noise = float(np.median(middle)), noise_of(middle)
     if light <= LEAST_LIGHT * noise:
@@ -118,6 +131,11 @@ def _require_known(values: Image, noise: float, polarity: Polarity, fitted: bool
         raise LightError(
             f"{100 * beyond:.1f} % of the image is much {brighter} than the light that was "
             f"{'fitted' if fitted else 'given'}: {cause}, or is the polarity another (--polarity {other})?"
+        )
+    if fitted and polarity == "shadow" and noise > MOST_UNEVEN:
+        raise LightError(
+            f"the light is not smooth: a fit leaves {100 * noise:.0f} % of it; are there steps, or several images in "
+            "one (--background IMAGE)?"
         )
 
 

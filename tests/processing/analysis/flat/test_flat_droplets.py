@@ -114,7 +114,7 @@ def test_what_is_out_of_focus_or_too_small_is_counted_and_not_sized() -> None:
     assert (len(found), found.left_out) == (0, {"small": 1})
 
 
-@pytest.mark.parametrize("level", [60.0, 180.0, 255.0])
+@pytest.mark.parametrize("level", [60.0, 180.0, 254.0])
 def test_an_image_without_droplets_has_none(level: float) -> None:
     noise = np.random.default_rng(0).normal(0, 2, SHAPE)
     assert len(measure_flat(np.full(SHAPE, level))) == 0
@@ -207,3 +207,29 @@ def test_an_image_of_no_numbers_has_not_no_droplets() -> None:
     image[5, 7] = np.nan
     with pytest.raises(ValueError, match=r"pixel \(column 7, row 5\) is nan"):
         measure_flat(image)
+
+
+def exposed(light: float, shape: tuple[int, int] = (120, 160)) -> NDArray[np.float32]:
+    """Two blurred discs and the noise of a camera of 8 bits."""
+    row, column = np.mgrid[: shape[0], : shape[1]]
+    dark = sum(1 / (1 + np.exp(np.hypot(row - v, column - u) - 9)) for u, v in ((50, 40), (110, 80)))
+    grey = light * (1 - 0.95 * dark) + np.random.default_rng(1).normal(0, 1.5, shape)
+    return np.asarray(np.clip(np.rint(grey), 0, 255), np.float32)
+
+
+def test_an_overexposed_image_is_refused() -> None:
+    """Its droplets would be too small, by a third where light is four times full scale."""
+    assert measure_flat(exposed(200)).diameters_px == pytest.approx([18, 18], rel=0.05)
+    with pytest.raises(LightError, match="% of the image are saturated"):
+        measure_flat(exposed(600))
+
+
+def test_a_background_of_other_bits_is_refused() -> None:
+    background = np.full((120, 160), 16 * 200.0)
+    with pytest.raises(LightError, match="has at most 6 % of the light of its background"):
+        measure_flat(exposed(200), background=background)
+
+
+def test_light_with_a_step_is_not_known() -> None:
+    with pytest.raises(LightError, match="the light is not smooth"):
+        measure_flat(np.hstack([exposed(200), exposed(100)]))
