@@ -64,6 +64,13 @@ class CalibrationStore:
             raise Damaged(f"{path}: is no calibration")
         return document
 
+    def content_id(self, calibration_id: str) -> str:
+        """Hash of what a calibration says, which another file of its name has not; empty where nobody can read it."""
+        try:
+            return str(self.document(calibration_id).get("id", ""))
+        except (NotFound, Damaged):
+            return ""
+
     @property
     def current(self) -> str | None:
         """Id of the calibration for runs that name none; None where none was chosen, or nobody can read which."""

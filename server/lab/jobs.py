@@ -119,16 +119,17 @@ def calibration_job(run_id: str, calibration: str, model: str) -> Job:
     )
 
 
-def check_job(run_id: str, shot: int, calibration: str) -> Job:
-    """Job that measures how well a calibration fits a shot."""
+def check_job(run_id: str, shot: int, calibration: str, content: str = "") -> Job:
+    """Job that measures how well a calibration fits a shot; another content of the same name is checked anew."""
+    named = f"{calibration}-{content}" if content else calibration
     return Job(
-        id=f"{run_id}.check-{calibration}.{shot:05d}",
+        id=f"{run_id}.check-{named}.{shot:05d}",
         kind=JobKind.CHECK,
         run_id=run_id,
         shot=shot,
         calibration=calibration,
         results_id=None,
-        settings={},
+        settings={"content": content},
     )
 
 

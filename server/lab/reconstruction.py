@@ -6,10 +6,12 @@ from collections.abc import Iterable
 from daq.run.events import ShotRecorded
 from daq.run_plan import ImageKey, RunKind
 from processing.reconstruction.settings import ReconstructionSettings
+from processing.runs.measurement import MeasureSettings
 from server.lab.duty import Duty
 from server.lab.errors import Unprocessable
 from server.lab.events import RUN_EVENTS
 from server.lab.jobs import Job, reconstruction_job
+from server.lab.results import result_calibration
 from server.lab.services import Context
 
 _SHOT_RECORDED = RUN_EVENTS[ShotRecorded]
@@ -51,11 +53,17 @@ def request_reconstruction(
         No calibration is known, or the run has no such shot.
     """
     chosen, wanted = requested_shots(context, run_id, shots, calibration)
-    described = settings.model_dump(mode="json")
-    return [
-        context.runner.submit(reconstruction_job(run_id, shot, chosen, settings.results_id(chosen), described))
-        for shot in wanted
-    ]
+    described, results_id = settings.model_dump(mode="json"), results_id_of(context, run_id, chosen, settings)
+    return [context.runner.submit(reconstruction_job(run_id, shot, chosen, results_id, described)) for shot in wanted]
+
+
+def results_id_of(
+    context: Context, run_id: str, calibration: str, settings: ReconstructionSettings | MeasureSettings
+) -> str:
+    """Where results of such settings go; those of a calibration that was replaced under its name stay by themselves."""
+    by_name, content = settings.results_id(calibration), context.calibrations.content_id(calibration)
+    made_with = result_calibration(context.runs.directory(run_id), by_name)
+    return by_name if made_with in (None, content) else settings.results_id(f"{calibration} {content}")
 
 
 def requested_shots(

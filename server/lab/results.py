@@ -60,6 +60,15 @@ def result_sets(run_dir: Path) -> list[ResultSet]:
     return [_result_set(record) for _, record in records]
 
 
+def result_calibration(run_dir: Path, results_id: str) -> str | None:
+    """Hash of the calibration that results were made with; None where there are none, or nobody can read it."""
+    try:
+        written = json.loads((run_dir / "results" / results_id / "settings.json").read_text())
+        return str(written["calibration"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
 def _dated(records: Iterator[Path]) -> Iterator[tuple[int, Path]]:
     for record in records:
         try:

@@ -79,7 +79,7 @@ class JobRunner:
 
     def check(self, run_id: str, calibration: str, shot: int) -> None:
         """Queue a check of a shot, or see to it after the one of this run that is under way; from any thread."""
-        if job := self._watch.next_check(run_id, calibration, shot):
+        if job := self._watch.next_check(run_id, calibration, shot, self._calibrations.content_id(calibration)):
             self.submit(job)
 
     async def abort(self, job_id: str) -> Job:

@@ -73,8 +73,10 @@ Pair = tuple[str, str]
 
 @dataclass
 class _Account:
-    """What is known of a run and a calibration."""
+    """What is known of a run and the content of a calibration."""
 
+    content: str
+    is_asked: bool = False
     under_way: str | None = None
     next_shot: int | None = None
     has_ended: bool = False
@@ -112,14 +114,18 @@ class CalibrationWatch:
         self.standing: CalibrationStanding | None = None
         """Of the run that was checked last."""
 
-    def next_check(self, run_id: str, calibration: str, shot: int) -> Job | None:
-        """Job that checks a shot; None while another one of this run is under way, the shot then comes after it."""
+    def next_check(self, run_id: str, calibration: str, shot: int, content: str = "") -> Job | None:
+        """Job that checks a shot; None while another one of this run is under way, the shot then comes after it.
+
+        What was known of another content of a calibration of that name is forgotten.
+        """
         with self._lock:
-            account = self._account(run_id, calibration)
+            account = self._account(run_id, calibration, content)
+            account.is_asked = True
             if account.under_way is not None:
                 account.next_shot = shot
                 return None
-            job = check_job(run_id, shot, calibration)
+            job = check_job(run_id, shot, calibration, content)
             account.under_way, account.next_shot = job.id, None
             return job
 
@@ -127,8 +133,12 @@ class CalibrationWatch:
         """Take notice of the state of a check; returns the check that follows one that has ended, if any."""
         if job.kind is not JobKind.CHECK:
             return None
+        content = str(job.settings.get("content", ""))
         with self._lock:
-            account = self._account(job.run_id, job.calibration)
+            known = self._accounts.get((job.run_id, job.calibration))
+            if known is not None and known.is_asked and known.content != content:
+                return None  # of a calibration that has been replaced meanwhile
+            account = self._account(job.run_id, job.calibration, content)
             if job.state not in ENDED:
                 account.under_way = job.id
                 return None
@@ -137,7 +147,7 @@ class CalibrationWatch:
             before, account.standing = account.standing, self._judged(account, job)
             following = account.next_shot
         self._tell(before, account.standing)
-        return None if following is None else self.next_check(job.run_id, job.calibration, following)
+        return None if following is None else self.next_check(job.run_id, job.calibration, following, content)
 
     def belonging(self, job: Job) -> dict[str, Any] | None:
         """What checks have said so far of run and calibration of a job that trusts them; None of every other job.
@@ -147,7 +157,7 @@ class CalibrationWatch:
         if job.kind not in _TRUSTING:
             return None
         with self._lock:
-            account = self._account(job.run_id, job.calibration)
+            account = self._accounts.get((job.run_id, job.calibration), _Account(""))
             asked = {one["shot"]: one for one in (account.worst, account.newest) if one is not None}
             return {"verdict": account.worst["verdict"] if account.worst else None, "shots": list(asked.values())}
 
@@ -164,8 +174,11 @@ class CalibrationWatch:
         refused = standing is not None and standing.verdict is Verdict.REFUSE
         return standing.message if standing and refused and job.kind in _TRUSTING else None
 
-    def _account(self, run_id: str, calibration: str) -> _Account:
-        return self._accounts.setdefault((run_id, calibration), _Account())
+    def _account(self, run_id: str, calibration: str, content: str) -> _Account:
+        known = self._accounts.get((run_id, calibration))
+        if known is None or known.content != content:
+            known = self._accounts[run_id, calibration] = _Account(content)
+        return known
 
     def _judged(self, account: _Account, job: Job) -> CalibrationStanding | None:
         """Standing after a check; droplets that do not tell change nothing, nor does a shot before the newest one."""

@@ -8,7 +8,7 @@ from processing.runs.measurement import MeasureSettings, require_measurable
 from processing.runs.workbench import read_references
 from server.lab.errors import Unprocessable
 from server.lab.jobs import Job, JobKind, shot_job
-from server.lab.reconstruction import requested_shots
+from server.lab.reconstruction import requested_shots, results_id_of
 from server.lab.services import Context
 
 
@@ -40,7 +40,8 @@ def request_measurement(
     except BadInput as error:
         raise Unprocessable(str(error)) from error
     chosen, wanted = requested_shots(context, run_id, shots, calibration)
-    results_id, described = chosen_settings.results_id(chosen), chosen_settings.model_dump(mode="json")
+    results_id = results_id_of(context, run_id, chosen, chosen_settings)
+    described = chosen_settings.model_dump(mode="json")
     return [
         context.runner.submit(shot_job(JobKind.MEASUREMENT, run_id, shot, chosen, results_id, described))
         for shot in wanted

@@ -170,3 +170,25 @@ def test_droplets_that_do_not_tell_are_no_verdict() -> None:
     watch, _ = watch_of([None])
     told = watch.belonging(reconstruction())
     assert told == {"verdict": None, "shots": [ended(0, None).result]}
+
+
+def test_another_content_of_the_same_name_is_checked_anew() -> None:
+    watch, _ = watch_of([0.9])
+    assert watch.refusal(reconstruction(1)) is not None
+    anew = watch.next_check(RUN, CALIBRATION, 0, content="cal-2")
+    assert anew is not None
+    assert anew.id != check_job(RUN, 0, CALIBRATION).id
+    assert (watch.refusal(reconstruction(1)), watch.holds(reconstruction(1))) == (None, True)
+    watch.learn(ended(0, 0.9))
+    assert watch.holds(reconstruction(1))  # a check of what was replaced tells nothing
+    watch.learn(anew.model_copy(update={"state": JobState.DONE, "result": ended(0, 0.1).result}))
+    told = watch.belonging(reconstruction(1))
+    assert (told or {})["verdict"] == judge(0.1)
+
+
+def test_after_a_start_the_newest_content_counts() -> None:
+    watch, _ = watch_of([])
+    for content, disparity_px in (("cal-1", 0.9), ("cal-2", 0.1)):
+        check = check_job(RUN, 0, CALIBRATION, content)
+        watch.learn(check.model_copy(update={"state": JobState.DONE, "result": ended(0, disparity_px).result}))
+    assert watch.refusal(reconstruction(1)) is None

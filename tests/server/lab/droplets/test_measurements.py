@@ -11,6 +11,8 @@ import httpx
 import pytest
 
 from processing.analysis.droplets.droplet_file import read_droplets
+from processing.calibration.calibration_file import load_calibration, save_calibration
+from processing.calibration.calibration_record import content_id
 from processing.runs.measurement import MeasureSettings
 from processing.runs.pipeline import Stopped
 from server.lab.droplets.measured import measured_run
@@ -108,6 +110,19 @@ def test_measurements_are_found_again_when_the_table_of_jobs_is_lost(measured: S
     assert {job.state for job in found.values()} == {JobState.DONE}
     for job in jobs:
         assert (found[job["id"]].kind, found[job["id"]].settings) == (JobKind.MEASUREMENT, job["settings"])
+
+
+def test_what_was_measured_with_a_calibration_that_was_replaced_is_not_done(measured: Serving) -> None:
+    file = measured.services.data_dir / "calibrations" / "cal.json"
+    before = file.read_bytes()
+    calibration = load_calibration(file)
+    anew = replace(calibration, notes=("made again",))
+    save_calibration(anew.with_id(content_id(anew)), file, overwrite=True)
+    (job,) = ask(measured, shots=[0]).json()
+    file.write_bytes(before)
+    assert job["state"] in ("queued", "running")
+    assert job["results_id"] != SETTINGS.results_id("cal")
+    wait_for_jobs(measured, 3, "measurement")
 
 
 def test_what_cannot_be_measured_is_refused_with_its_reason(measured: Serving) -> None:
