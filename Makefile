@@ -3,6 +3,9 @@ SHELL := /bin/bash
 .DEFAULT_GOAL := help
 .PHONY: help setup demo test test-fast test-wheel test-debian13 wheel lint style serve firmware bench measured lock clean mutants flips fuzz fuzz-import
 
+# Containers forbid Python to keep what it compiled; then every process of the tests compiles all that it imports.
+unexport PYTHONDONTWRITEBYTECODE
+
 PYTHON := .venv/bin/python
 TOOLS := env PATH="$(CURDIR)/.venv/bin:$$PATH"
 DEBIAN_PACKAGES := python3-venv python3-dev python3-gi gir1.2-aravis-0.8 iproute2 gcc g++ gcc-arm-none-eabi make chromium fonts-dejavu-core
