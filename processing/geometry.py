@@ -43,20 +43,19 @@ def rotation_vector_of(rotation: FloatArray) -> FloatArray:
 
     By way of the quaternion whose largest element is computed first (Shepperd 1978): exact at any angle.
     """
-    trace, diagonal = float(np.trace(rotation)), np.diagonal(rotation)
-    twist = np.array(
-        [rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1]]
-    )
-    if trace >= diagonal.max():
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = rotation.tolist()
+    trace, twist = xx + yy + zz, (zy - yz, xz - zx, yx - xy)
+    if trace >= max(xx, yy, zz):
         scalar, vector = 1 + trace, twist
+    elif xx >= max(yy, zz):
+        scalar, vector = twist[0], (1 + xx - yy - zz, xy + yx, xz + zx)
+    elif yy >= zz:
+        scalar, vector = twist[1], (xy + yx, 1 + yy - xx - zz, yz + zy)
     else:
-        largest = int(diagonal.argmax())
-        vector = rotation[largest] + rotation[:, largest]
-        vector[largest] += 1 - trace
-        scalar = float(twist[largest])
-    size = float(np.linalg.norm(vector))
+        scalar, vector = twist[2], (xz + zx, yz + zy, 1 + zz - xx - yy)
+    size = math.hypot(*vector)
     angle_rad = 2 * math.atan2(size, abs(scalar))
-    return np.asarray(vector * (math.copysign(angle_rad, scalar) / size if size else 0.0), dtype=np.float64)
+    return np.array(vector) * (math.copysign(angle_rad, scalar) / size if size else 0.0)
 
 
 def tilt_matrix(tilt_rad: FloatArray) -> FloatArray:

@@ -88,13 +88,13 @@ class Aim:
         turn = np.reshape([rotation_vector_of(one) for one in rotation.reshape(-1, 3, 3)], ray.shape)
         return np.concatenate([turn, translation_mm, focal_px, centre_px, values[..., _LENS], tilt_rad], axis=-1)
 
-    def derivatives(self, values: FloatArray) -> FloatArray:
-        """Derivatives (P, P) of the parameters by the values."""
+    def linearised(self, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The parameters (P,), and their derivatives (P, P) by the values."""
         change = np.eye(len(values))
         moved = [*range(_LENS.start), *range(_LENS.stop, len(values))]
         here, *ahead = self.parameters(values + _STEP * np.vstack([np.zeros(len(values)), change[moved]]))
         change[:, moved] = (np.array(ahead) - here).T / _STEP
-        return change
+        return here, change
 
     def with_centre(self, parameters: FloatArray, centre_px: FloatArray) -> FloatArray:
         """A camera with another principal point that shows almost the same, as its sensor is tilted instead."""

@@ -184,6 +184,7 @@ def _refine(start: FloatArray, points_mm: FloatArray, image_px: FloatArray, robu
         return _residuals_px(aim.parameters(values), points_mm, image_px)
 
     def derivatives(values: FloatArray) -> FloatArray:
-        return _project(aim.parameters(values), points_mm)[1] @ aim.derivatives(values)
+        parameters, by_values = aim.linearised(values)
+        return _project(parameters, points_mm)[1] @ by_values
 
     return aim.parameters(minimise(residuals_px, derivatives, aim.values(start), robust_px))
