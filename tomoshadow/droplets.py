@@ -38,15 +38,10 @@ def measure(
         Where droplets are measured, about one voxel per pixel, see ``common_grid``.
     polarity : {"bright", "shadow"}
         Only shadows tell how large droplets are.
-<<<<<<< HEAD
     light : float or {"estimated", "incoherent", "gaussian"}
-        Of shadows: numerical aperture of the light over that of the lens, above 0 to 8; light from all directions; or
-        whatever is behind a Gaussian blur. ``diameters_um`` are corrected for it, ``diameters_raw_um`` are not.
-=======
-    light : float or {"estimated", "incoherent"}
-        Of shadows alone: numerical aperture of the light over that of the lens, above 0 to 1. Such light makes droplets
-        look larger; ``diameters_um`` are corrected for it, ``diameters_raw_um`` are not.
->>>>>>> 8d6605f (Refuse light without diameters, impossible separations, and digits of programmers)
+        Of shadows alone: numerical aperture of the light over that of the lens, above 0 to 8; light from all
+        directions; or whatever is behind a Gaussian blur. ``diameters_um`` are corrected for it, ``diameters_raw_um``
+        are not.
     twins : int
         Simulated twins of the exposure that tell how many are ghosts; each costs as much as the exposure itself.
     seed : int

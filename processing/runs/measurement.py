@@ -53,13 +53,10 @@ class MeasureSettings(FrozenValue):
     )
     twins: Annotated[int, Field(ge=0, le=100, description="simulated twins per exposure that tell ghosts; 0: none")] = 0
     seed: Annotated[int, Field(ge=0, description="of the twins")] = 0
-    light: Annotated[
-        Light,
-        Field(
-            description="aperture of the light of shadows over the lens's, up to 8; incoherent, gaussian or estimated"
-        ),
-    ] = "estimated"
-    sizes: Annotated[SizeRows, Field(description="of the dots of a reticle, in um: found in this light, true, sd")] = ()
+    light: Annotated[Light, Field(description="of shadows: condenser ratio; incoherent, gaussian or estimated")] = (
+        "estimated"
+    )
+    sizes: Annotated[SizeRows, Field(description="of the dots of a reticle, um: found in this light, true, sd")] = ()
     ignored: Annotated[
         tuple[IgnoredPixels, ...],
         Field(description="rectangles of shadow images that are not asked, VIEW=LEFT:RIGHT,TOP:BOTTOM in px"),

@@ -4,9 +4,9 @@ from argparse import ArgumentTypeError, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from server.cli.light_option import add_light
 from server.cli.options import (
     Verbs,
-    add_light,
     add_out,
     add_shots,
     add_verb,

@@ -100,23 +100,6 @@ def add_reconstruction(parser: ArgumentParser) -> None:
     )
 
 
-def add_light(parser: ArgumentParser) -> None:
-    """Let a command be told the light of shadows."""
-    parser.add_argument(
-        "--light",
-        type=_light,
-        metavar="RATIO",
-        help="of shadows: aperture of the light over that of the lens, incoherent, or gaussian; default: estimated",
-    )
-
-
-def _light(text: str) -> "float | str":
-    from processing.runs.measurement import MeasureSettings
-
-    light: float | str = setting("light", text, MeasureSettings)
-    return light
-
-
 def add_choice(parser: ArgumentParser, name: str, kind: type[StrEnum], summary: str) -> None:
     """Let a command be told one of a kind."""
     parser.add_argument(f"--{name}", choices=[one.value for one in kind], help=summary)

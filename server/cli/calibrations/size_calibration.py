@@ -3,10 +3,10 @@
 from argparse import ArgumentTypeError, Namespace
 from typing import Any
 
+from server.cli.light_option import add_light
 from server.cli.options import (
     Verbs,
     add_calibrated_run,
-    add_light,
     add_out,
     add_shots,
     add_verb,
