@@ -28,7 +28,7 @@ Light = Annotated[float, Field(gt=0, le=MOST_RATIO)] | NamedLight
 whichever of them explains the images best."""
 CONDENSER_RATIOS = (MOST_RATIO, 3.0, 1.8, 1.3, 1.15, 1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2)
 """That are tried, from the least to the most coherent."""
-FIRST_TRIED = (MOST_RATIO, 1.3, 0.9, 0.8, 0.7)
+FIRST_TRIED = (MOST_RATIO, 0.9, 0.8, 0.7)
 """One of them is better than a Gaussian blur wherever any is: around 0.8 discs look much like larger, sharper ones."""
 UNSURE, SURE = 1 / 3, 2 / 3
 """Shares of the droplets that must be explained better, to be unsure of the light, and to be sure that it shows.
