@@ -1,6 +1,6 @@
 """Are lengths what they are said to be? A wrong pitch, or another unit, fits as well as the right one."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -26,6 +26,10 @@ LENGTHENED = 0.015
 """Shapes of pixels tell a length of z that is wrong by more."""
 SQUARE = 0.003
 """How square pixels are once it is right; a fit knows them to a thousandth."""
+NOT_SQUARE, LEAST_VIEWS = 0.006, 3
+"""From so much on a wider target, or a stage that moves askew, is looked for, where so many views tell."""
+EXPLAINED = 0.15
+"""Of what is not square, which may then be left; of what tilted sensors make, nine tenths are."""
 NEARER = 0.6
 """By this factor must azimuths then come nearer to those of the rig: a sensor's tilt looks like a longer z, and brings
 them no nearer."""
@@ -44,7 +48,9 @@ def check_scales(calibration_set: CalibrationSet, views: Mapping[str, ViewCalibr
     if not calibration_set.unit_stated and not calibration_set.scales_px_per_mm:
         yield from _unusual(calibration_set, views, scales_px_per_mm)
     yield from _stretched(views)
-    yield from _longer(calibration_set, {name: view.mapping for name, view in views.items()})
+    mappings = {name: view.mapping for name, view in views.items()}
+    yield from _longer(calibration_set, mappings)
+    yield from _askew(mappings)
 
 
 def _other_scales(found_px_per_mm: Mapping[str, float], said_px_per_mm: Mapping[str, float]) -> Iterator[Doubt]:
@@ -98,8 +104,7 @@ def _longer(calibration_set: CalibrationSet, mappings: Mapping[str, ViewMapping]
     cameras = {name: each for name, each in mappings.items() if isinstance(each, PinholeCamera) and name in said_deg}
     if sum(OBLIQUE_DEG < line_angle_deg(said_deg[name]) < 90 - OBLIQUE_DEG for name in cameras) < 2:
         return
-    longer = _longer_by(list(cameras.values()))
-    uneven = _unevenness(longer, list(cameras.values()))
+    longer, uneven = _best(_longer_z, (0.7, 1.4), list(cameras.values()))
     stands_deg = np.array([sight_azimuth_deg(camera, calibration_set.middle_mm) for camera in cameras.values()])
     beside_deg = stands_deg - np.array([said_deg[name] for name in cameras])
     then_deg = beside_deg - stands_deg + np.rad2deg(np.arctan2(np.tan(np.deg2rad(stands_deg)), longer))
@@ -114,18 +119,58 @@ def _longer(calibration_set: CalibrationSet, mappings: Mapping[str, ViewMapping]
     )
 
 
-def _longer_by(cameras: Sequence[PinholeCamera]) -> float:
-    """Factor of z with which the pixels of all cameras are as square as can be."""
-    found = minimize_scalar(_unevenness, bounds=(0.7, 1.4), args=(cameras,), method="bounded")
-    return float(found.x)
+def _askew(mappings: Mapping[str, ViewMapping]) -> Iterator[Doubt]:
+    """A target that is wider than it was said to be, or a stage that moves askew, if it makes all pixels square.
 
-
-def _unevenness(longer: float, cameras: Sequence[PinholeCamera]) -> float:
-    """Root mean square of ln(height / width) of pixels if z is so many times as long as it was said to be.
-
-    A camera ``K R`` of the lengths that were said is ``K R diag(1, 1, 1 / longer)`` of the true ones; its focal lengths
-    in pixels are ``|m1 x m3|`` and ``|m2 x m3|`` over ``|m3|^2``, with the rows of that matrix.
+    A tilted sensor looks like neither: it changes the pixels of oblique views most, and those on both sides alike.
     """
-    rows = [camera.camera_matrix @ camera.rotation / (1, 1, longer) for camera in cameras]
+    cameras = {name: each for name, each in mappings.items() if isinstance(each, PinholeCamera)}
+    if len(cameras) < LEAST_VIEWS or (before := _unevenness(np.eye(3), list(cameras.values()))) < NOT_SQUARE:
+        return
+    enough = max(SQUARE, EXPLAINED * before)
+    wider, uneven = _best(_wider, (0.7, 1.4), list(cameras.values()))
+    if uneven <= enough:
+        yield Doubt(
+            tuple(cameras),
+            f"if x were {wider:.3g} times as long, all pixels would be square: is the target as wide as it is said to "
+            "be, or was its print scaled?",
+        )
+    askew, uneven = _best(_oblique, (-0.3, 0.3), list(cameras.values()))
+    if uneven <= enough:
+        yield Doubt(
+            tuple(cameras),
+            f"if the stage moved {np.rad2deg(np.arctan(askew)):.1f} deg askew towards x, all pixels would be square: "
+            "is its travel square to the target?",
+        )
+
+
+def _wider(factor: float) -> FloatArray:
+    return np.diag([factor, 1.0, 1.0])
+
+
+def _longer_z(factor: float) -> FloatArray:
+    return np.diag([1.0, 1.0, factor])
+
+
+def _oblique(slope: float) -> FloatArray:
+    return np.array([[1.0, 0.0, slope], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+
+
+def _best(
+    true_of_said: Callable[[float], FloatArray], bounds: tuple[float, float], cameras: Sequence[PinholeCamera]
+) -> tuple[float, float]:
+    """The change of lengths with which the pixels of all cameras are as square as can be, and what is left."""
+    found = minimize_scalar(lambda change: _unevenness(true_of_said(change), cameras), bounds=bounds, method="bounded")
+    return float(found.x), float(found.fun)
+
+
+def _unevenness(true_of_said: FloatArray, cameras: Sequence[PinholeCamera]) -> float:
+    """Root mean square of ln(height / width) of pixels if lengths (3,) are truly ``true_of_said`` times those said.
+
+    A camera ``K R`` of the lengths that were said is ``K R`` times the inverse of that matrix for the true ones; its
+    focal lengths in pixels are ``|m1 x m3|`` and ``|m2 x m3|`` over ``|m3|^2``, with the rows of the product.
+    """
+    said_of_true = np.linalg.inv(true_of_said)
+    rows = [camera.camera_matrix @ camera.rotation @ said_of_true for camera in cameras]
     shapes = [np.linalg.norm(np.cross(m1, m3)) / np.linalg.norm(np.cross(m2, m3)) for m1, m2, m3 in rows]
     return float(np.sqrt(np.mean(np.log(shapes) ** 2)))

@@ -16,6 +16,7 @@ Z_MM = (-4, 0, 4)
 
 def calibrated(
     said_of_true: tuple[float, float, float] = (1, 1, 1),
+    askew: float = 0.0,
     beside_deg: tuple[float, ...] = (0, 0, 0, 0),
     tilts_deg: tuple[float, ...] = (0, 0, 0, 0),
     model: str = "pinhole",
@@ -25,7 +26,8 @@ def calibrated(
     for (name, azimuth_deg), tilt_deg in zip(AZIMUTHS_DEG.items(), tilts_deg, strict=True):
         camera = replace(paper_camera(azimuth_deg, (0, 0), (0, 0, 0, 0, 0)), tilt_rad=(0.0, np.deg2rad(tilt_deg)))
         planes = seen_planes(camera, Z_MM, seed=int(azimuth_deg) + 50, columns=11, rows=9)
-        views[name] = tuple(replace(plane, points_mm=plane.points_mm * said_of_true) for plane in planes)
+        said = np.diag(said_of_true) - askew * np.eye(3)[[2]].T * np.eye(3)[0]
+        views[name] = tuple(replace(plane, points_mm=plane.points_mm @ said) for plane in planes)
     said_deg = {name: angle + off for (name, angle), off in zip(AZIMUTHS_DEG.items(), beside_deg, strict=True)}
     return calibrate(replace(calibration_set(**views), azimuths_deg=said_deg), model)
 
@@ -48,4 +50,19 @@ def test_right_lengths_are_not_doubted_because_the_rig_knows_its_azimuths_badly(
 def test_tilted_sensors_are_no_wrong_length() -> None:
     """By Scheimpflug's rule, at a magnification of 0.45; a model without tilt sees pixels that are not square."""
     tilts_deg = tuple(np.rad2deg(np.arctan(0.45 * np.tan(np.deg2rad(angle)))) for angle in AZIMUTHS_DEG.values())
-    assert not any("if z were" in note for note in calibrated(tilts_deg=tilts_deg).notes)
+    notes = calibrated(tilts_deg=tilts_deg).notes
+    assert not any(said in note for note in notes for said in ("if z were", "if x were", "askew"))
+
+
+def test_a_target_that_is_wider_than_was_said_is_told() -> None:
+    """A print that a driver has fitted to the page; points alone cannot tell, nor can lines of sight."""
+    notes = " ".join(calibrated((1 / 1.01, 1, 1)).notes)
+    told = re.fullmatch(r"if x were ([\d.]+) times as long, all pixels would be square: .*its print scaled\?", notes)
+    assert float(told[1] if told else 0) == pytest.approx(1.01, abs=0.004)
+
+
+def test_a_stage_that_moves_askew_is_told() -> None:
+    calibration = calibrated(askew=float(np.tan(np.deg2rad(-4.0))))
+    told = re.search(r"if the stage moved (-?[\d.]+) deg askew towards x", " ".join(calibration.notes))
+    assert float(told[1] if told else 0) == pytest.approx(-4.0, abs=0.2)
+    assert {view.verdict for view in calibration.views.values()} == {"warn"}
