@@ -12,6 +12,7 @@ from processing.analysis.droplets.gaussian_blobs import BlobImages, BlobOptics, 
 from processing.analysis.droplets.ghost_share import GhostShare, pooled
 from processing.analysis.droplets.image_noise import noise_of
 from processing.analysis.droplets.measured_exposure import (
+    Hidden,
     MeasuredExposure,
     RatioLimits,
     ShotVerdict,
@@ -21,6 +22,7 @@ from processing.analysis.droplets.measured_exposure import (
     ghosts_within,
     judged,
     judged_by_twins,
+    judged_by_volume,
     moved,
 )
 from processing.geometry import FloatArray
@@ -108,11 +110,20 @@ def measure_bright(
     if verdict is ShotVerdict.REFUSED:
         return MeasuredExposure(Droplets.none(), views, ratio, verdict, reasons)
     droplets = _droplets(shot, fit, residuals, search, left, noises).within(search.grid)
-    told = MeasuredExposure(droplets, views, ratio, verdict, reasons)
-    if not twins or verdict is not ShotVerdict.GOOD:
+    hidden = Hidden(volume_share=_unseen_share(shot, search))
+    told = judged_by_volume(MeasuredExposure(droplets, views, ratio, verdict, reasons, hidden=hidden))
+    if not twins or told.verdict is not ShotVerdict.GOOD:
         return told
     rng = np.random.default_rng(seed)
     return judged_by_twins(told, pooled(_twin_ghosts(shot, fit, search, left, rng, before_round) for _ in range(twins)))
+
+
+def _unseen_share(shot: BlobImages, search: DropletSearch) -> float:
+    """Share of the grid that lies beyond the image of a view: a droplet there is not found, and not missed."""
+    sizes_px = np.array([image.shape[::-1] for image in shot.images])
+    seen_px = search.lattice.seen_px(search.places())
+    inside = np.all((seen_px >= 0) & (seen_px <= sizes_px[:, None] - 1), axis=(0, 2))
+    return float(np.mean(~inside))
 
 
 def _seen(optics: BlobOptics, noises: FloatArray, left: FloatArray, names: Sequence[str]) -> dict[str, SeenView]:

@@ -46,7 +46,8 @@ class Hidden:
     liquid_objects : int
         Ligaments, sheets and other liquid that is no droplet, which is masked.
     volume_share : float
-        Of the grid: what too few views can judge, mostly as it lies in masked liquid, before or behind it.
+        Of the grid: what too few views can judge, as it lies in masked liquid, before or behind it, or beyond their
+        images; of bright particles what not all views see.
     droplets : int
         That are seen, but by too few views to be told.
     """
@@ -177,9 +178,11 @@ def judged_by_volume(shot: "MeasuredExposure[Rows, Seen]") -> "MeasuredExposure[
     """A shot, doubtful where most of its volume could not be measured."""
     if shot.hidden.volume_share <= MOST_HIDDEN:
         return shot
+    share = f"{100 * shot.hidden.volume_share:.0f} % of the volume, limit {100 * MOST_HIDDEN:.0f} %"
     reason = (
-        f"liquid that is no droplet hides {100 * shot.hidden.volume_share:.0f} % of the volume, limit "
-        f"{100 * MOST_HIDDEN:.0f} %: measure farther from the nozzle (--grid)"
+        f"liquid that is no droplet hides {share}: measure farther from the nozzle (--grid)"
+        if shot.hidden.liquid_objects
+        else f"too few views see {share}: take a box that all of them see (--grid)"
     )
     return replace(shot, verdict=ShotVerdict.DOUBTFUL, reasons=(*shot.reasons, reason))
 

@@ -10,10 +10,6 @@ from processing.geometry import FloatArray
 
 JUDGING_VIEWS = 3
 """So many views, or all where there are fewer, must know something of a droplet."""
-ASKED_POINTS = 40_000
-"""All over the grid; a share is known to 0.1 %."""
-PLASTIC = 1.2207440846057596
-"""Its powers spread points evenly in three dimensions (Roberts's sequence)."""
 
 
 def judging_views(views: int) -> int:
@@ -38,7 +34,4 @@ def _known(trust: Image, seen_px: FloatArray) -> NDArray[np.bool_]:
 
 def unjudged_share(shot: Transmissions, fit: ShadowFit, search: DropletSearch) -> float:
     """Share of the grid of which too few views know something."""
-    evenly = np.outer(np.arange(1, ASKED_POINTS + 1), PLASTIC ** -np.arange(1.0, 4.0)) % 1
-    margin_voxel = 0.5 * (np.array(search.searched.shape) - np.array(search.grid.shape))[::-1]
-    places = margin_voxel - 0.5 + evenly * np.array(search.grid.shape[::-1])
-    return float(np.mean(knowing_views(shot, fit, places) < judging_views(len(shot.images))))
+    return float(np.mean(knowing_views(shot, fit, search.places()) < judging_views(len(shot.images))))

@@ -178,3 +178,21 @@ def test_where_droplets_do_not_explain_the_images_nobody_is_sent_to_calibrate_ag
     verdict, reasons = judged(beside_px, 1.5, limits)
     assert verdict is ShotVerdict.REFUSED
     assert ["calibrate again" in reason for reason in reasons] == [False]
+
+
+def test_what_a_view_does_not_see_is_not_empty(truth: BrightScene, shot: BrightExposure) -> None:
+    """A box four times as wide as the images: number density is of what could be measured, and the shot says so."""
+    wide = VoxelGrid.centred((*GRID.shape[:2], 4 * GRID.shape[2]), GRID.pitch_mm)
+    search = plan_droplets(truth.believed, wide, margin_voxel=MARGIN_VOXEL)
+    told = measure_bright(truth.images, search)
+    seen_mm3 = (1 - told.hidden.volume_share) * wide.volume_mm3
+    everywhere = np.stack([axis.ravel() for axis in np.meshgrid(wide.x_mm, wide.y_mm, wide.z_mm)], axis=1)
+    inside = [
+        np.all((px >= 0) & (px <= np.array(mapping.image_size_px) - 1), axis=1)
+        for mapping in truth.believed
+        for px in (mapping.project(everywhere),)
+    ]
+    assert seen_mm3 == pytest.approx(np.mean(np.all(inside, axis=0)) * wide.volume_mm3, rel=0.02)
+    assert (shot.hidden.volume_share < 0.1, shot.verdict) == (True, "good")
+    assert told.verdict == "doubtful"
+    assert "too few views see" in told.reasons[-1]
