@@ -50,14 +50,33 @@ def odd_light(
     if np.mean(light < -NOISE) > BRIGHTER_SHARE:
         return "is darker than its dark image; was that taken with light, or with another exposure?"
     if polarity == "bright":
-        return _not_bright(light)
+        return _not_bright(light) or _saturated(frame[coarse], most)
+    if black := _black_lines(frame):
+        return black
     if background is None:
-        return ""
+        return _saturated(frame[coarse], most)
     if np.array_equal(frame[coarse], background[coarse]):
         return "is its own background, pixel by pixel: whatever there was is divided out"
     if (share := np.mean(background[coarse] > FULL * most)) > SATURATED_SHARE:
         return f"has a background of which {100 * share:.0f} % are saturated: shadows are too pale there"
-    return _unlike((light, (background[coarse] - floor) / most))
+    return _unlike((light, (background[coarse] - floor) / most)) or _saturated(frame[coarse], most)
+
+
+def _saturated(frame: Frame, most: np.float32) -> str:
+    share = np.mean(frame > FULL * most)
+    return (
+        f"is saturated in {100 * share:.0f} % of its pixels: what there is is unknown"
+        if share > SATURATED_SHARE
+        else ""
+    )
+
+
+def _black_lines(frame: Frame) -> str:
+    """Whole rows or columns of shadows without a single count: no droplet is as long and as straight."""
+    for lines, axis in (("rows", 1), ("columns", 0)) if frame.any() else ():
+        if count := int(np.count_nonzero(~frame.any(axis=axis))):
+            return f"has {count} {lines} without a single count: is a part of the image missing?"
+    return ""
 
 
 def _not_bright(light: NDArray[np.float32]) -> str:

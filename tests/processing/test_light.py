@@ -86,3 +86,18 @@ def test_what_does_not_fit_is_told(shot: Grey, background: Grey | None, polarity
 def test_a_dark_image_that_is_brighter_than_the_shot_is_told(polarity: Polarity) -> None:
     shot = SHOT if polarity == "shadow" else 5 + 200 * droplets(1)
     assert told(shot, LIGHT, polarity, dark=0 * LIGHT + 100).startswith("is darker than its dark image")
+
+
+@pytest.mark.parametrize("background", [None, 0.8 * LIGHT])
+def test_an_overexposed_shot_is_odd_whatever_its_background(background: Grey | None) -> None:
+    assert re.match(r"is saturated in \d+ % of its pixels|is brighter than its background", told(2 * SHOT, background))
+
+
+def test_bright_particles_that_fill_the_camera_are_odd() -> None:
+    assert re.match(r"is saturated in \d+ % of its pixels", told(5 + 900 * droplets(1), None, "bright"))
+
+
+@pytest.mark.parametrize(("missing", "words"), [(ROWS > 70, "has 25 rows"), (COLUMNS == 5, "has 1 columns")])
+def test_a_part_of_an_image_that_is_missing_is_no_liquid(missing: NDArray[np.bool_], words: str) -> None:
+    frame = np.where(missing, 0, grey(SHOT)).astype(np.uint8)
+    assert odd_light(frame, "shadow", bits=8, background=LIGHT.astype(np.float32)).startswith(words)
