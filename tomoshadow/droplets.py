@@ -5,9 +5,10 @@ from typing import get_args
 
 from processing.analysis.droplets.bright_shot import BrightExposure, measure_bright
 from processing.analysis.droplets.droplet_search import MARGIN_VOXEL, plan_droplets
-from processing.analysis.droplets.shadows.light_search import Light
+from processing.analysis.droplets.shadows.light_search import Light, NamedLight
 from processing.analysis.droplets.shadows.shadow_shot import ShadowExposure, measure_shadows
 from processing.calibration.calibration import Calibration
+from processing.coherent_light import MOST_RATIO
 from processing.kernels import DEFAULT_THREADS
 from processing.preprocessing import Intensity, Polarity
 from processing.volume import VoxelGrid
@@ -81,7 +82,8 @@ def measure(
 def _require_options(polarity: Polarity, light: Light) -> None:
     if polarity not in get_args(Polarity):
         raise ValueError(f"polarity {polarity!r}: {' or '.join(get_args(Polarity))}, please")
-    if light not in ("estimated", "incoherent") and not (isinstance(light, int | float) and 0 < light <= 1):
-        raise ValueError(f"light {light!r}: estimated, incoherent, or a number above 0 up to 1, please")
+    named = get_args(NamedLight)
+    if light not in named and not (isinstance(light, int | float) and 0 < light <= MOST_RATIO):
+        raise ValueError(f"light {light!r}: {', '.join(named)}, or a number above 0 up to {MOST_RATIO:g}, please")
     if polarity == "bright" and light != "estimated":
         raise ValueError(f"light {light!r} is for shadows: bright particles have no diameter that it could correct")

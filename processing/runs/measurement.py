@@ -106,9 +106,7 @@ def require_measurable(run_name: str, recorded: Polarity, settings: MeasureSetti
     if recorded == "bright" and settings.ignored:
         raise PipelineError("pixels to ignore are for shadows: bright particles are measured with all pixels")
     if recorded == "bright" and settings.light != "estimated":
-        raise PipelineError(
-            f"light {settings.light} is for shadows: bright particles have no diameter that it could correct"
-        )
+        raise PipelineError(f"light {settings.light} is for shadows: bright particles have no diameter to correct")
 
 
 @dataclass(frozen=True, eq=False)

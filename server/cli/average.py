@@ -5,9 +5,9 @@ from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from processing.calibration.verdict import BELONGING
 from processing.reconstruction.choices import VoxelType
 from processing.runs.errors import PipelineError
+from server.cli.chosen_shots import selected_shots
 from server.cli.options import (
     Verbs,
     add_out,
@@ -18,7 +18,6 @@ from server.cli.options import (
     picture_beside,
     reconstruction_settings,
     run_directory,
-    selected_shots,
     usable_processors,
 )
 from server.cli.output import Bar, Outcome, progress
@@ -68,6 +67,7 @@ def average(options: Namespace) -> Outcome:
 
 
 def _average_results(options: Namespace) -> dict[str, Any]:
+    from processing.calibration.verdict import BELONGING
     from processing.reconstruction.volume_file import VolumeFileError
     from processing.runs.exposure_faults import stored_faults
     from processing.runs.results_file import average_volumes, volume_files

@@ -4,6 +4,7 @@ from argparse import ArgumentTypeError, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from server.cli.chosen_shots import selected_shots
 from server.cli.light_option import add_light
 from server.cli.options import (
     Verbs,
@@ -12,7 +13,6 @@ from server.cli.options import (
     add_verb,
     describe_grid,
     parse_grid,
-    selected_shots,
     setting,
     usable_processors,
 )

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from processing.reconstruction.choices import VoxelType
+from server.cli.chosen_shots import selected_shots
 from server.cli.options import (
     OPTIONS,
     Verbs,
@@ -17,7 +18,6 @@ from server.cli.options import (
     calibrated_share,
     describe_grid,
     reconstruction_settings,
-    selected_shots,
     usable_processors,
 )
 from server.cli.output import Outcome, progress, table, tracked

@@ -4,7 +4,8 @@ from argparse import Namespace
 from statistics import median
 from typing import TYPE_CHECKING, Any
 
-from server.cli.options import Verbs, add_calibrated_run, add_shots, add_verb, selected_shots
+from server.cli.chosen_shots import selected_shots
+from server.cli.options import Verbs, add_calibrated_run, add_shots, add_verb
 from server.cli.output import Outcome, progress, table, tracked
 
 if TYPE_CHECKING:

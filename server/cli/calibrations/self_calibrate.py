@@ -3,7 +3,8 @@
 from argparse import Namespace
 from typing import Any
 
-from server.cli.options import Verbs, add_calibrated_run, add_out, add_shots, add_verb, selected_shots
+from server.cli.chosen_shots import selected_shots
+from server.cli.options import Verbs, add_calibrated_run, add_out, add_shots, add_verb
 from server.cli.output import Outcome, progress, table, tracked
 
 

@@ -3,6 +3,7 @@
 from argparse import ArgumentTypeError, Namespace
 from typing import Any
 
+from server.cli.chosen_shots import selected_shots
 from server.cli.light_option import add_light
 from server.cli.options import (
     Verbs,
@@ -11,7 +12,6 @@ from server.cli.options import (
     add_shots,
     add_verb,
     positive,
-    selected_shots,
 )
 from server.cli.output import Outcome, table, tracked
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from processing.calibration.verdict import BELONGING
 from server.cli.calibrations.check import check_line
 from server.cli.output import progress
 
@@ -50,6 +49,8 @@ class Belonging:
     @property
     def provenance(self) -> dict[str, str]:
         """The same for what is made of the run all the same: it says so."""
+        from processing.calibration.verdict import BELONGING
+
         return {BELONGING: json.dumps(self.record())}
 
     @property
@@ -66,7 +67,7 @@ class Belonging:
 
 def stored_belonging(files: "Sequence[Path]") -> dict[str, Any] | None:
     """The worst record that volumes carry; None where none of them tells anything."""
-    from processing.calibration.verdict import Verdict
+    from processing.calibration.verdict import BELONGING, Verdict
     from processing.reconstruction.volume_file import open_volume
 
     records = []

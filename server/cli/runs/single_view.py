@@ -5,7 +5,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from processing.runs.errors import PipelineError
-from server.cli.options import positive, selected_shots
+from server.cli.chosen_shots import selected_shots
+from server.cli.options import positive
 from server.cli.output import Outcome, progress, table, tracked
 from server.cli.runs.batch import over_runs
 from server.cli.runs.recipes import keeping_recipe, settings_of
