@@ -119,14 +119,14 @@ class PinholeCamera:
 
     def _on_sensor(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Ideal image points at focal length 1, after distortion (Brown 1971) and tilt: OpenCV's model."""
-        k1, k2, p1, p2, k3 = self.distortion
-        r2 = x * x + y * y
-        radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
-        u = x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)
-        v = y * radial + 2 * p2 * x * y + p1 * (r2 + 2 * y * y)
+        k1, k2, p1, p2, k3 = self.distortion.tolist()
+        if k1 or k2 or p1 or p2 or k3:
+            r2, xy = x * x + y * y, x * y
+            radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
+            x, y = x * radial + 2 * p1 * xy + p2 * (r2 + 2 * x * x), y * radial + 2 * p2 * xy + p1 * (r2 + 2 * y * y)
         if not any(self.tilt_rad):
-            return u, v
-        tilted = tilt_matrix(np.array(self.tilt_rad)) @ np.stack([u, v, np.ones_like(u)])
+            return x, y
+        tilted = tilt_matrix(np.array(self.tilt_rad)) @ np.stack([x, y, np.ones_like(x)])
         return tilted[0] / tilted[2], tilted[1] / tilted[2]
 
     def undistort(self, image_px: FloatArray) -> FloatArray:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial import cKDTree
-from scipy.stats import beta
+from scipy.special import betaincinv
 
 from processing.geometry import FloatArray
 
@@ -38,8 +38,8 @@ class GhostShare:
         if not self.found:
             return None
         tail = (1 - CONFIDENCE) / 2
-        low = beta.ppf(tail, self.ghosts, self.found - self.ghosts + 1) if self.ghosts else 0.0
-        high = beta.isf(tail, self.ghosts + 1, self.found - self.ghosts) if self.ghosts < self.found else 1.0
+        low = betaincinv(self.ghosts, self.found - self.ghosts + 1, tail) if self.ghosts else 0.0
+        high = betaincinv(self.ghosts + 1, self.found - self.ghosts, 1 - tail) if self.ghosts < self.found else 1.0
         return float(low), float(high)
 
 

@@ -17,7 +17,7 @@ from typing import Annotated, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
-from scipy.stats import chi2, t
+from scipy.special import chdtri, stdtrit
 
 from processing.analysis.droplets.ghost_share import CONFIDENCE
 from processing.geometry import FloatArray
@@ -139,8 +139,8 @@ def number_density(n: int, volume_mm3: float, exposures_per_shot: float = 1) -> 
 
 def garwood(count: float) -> tuple[float, float]:
     """Where the mean of a Poisson distribution lies that gave this count (Garwood 1936)."""
-    low = chi2.ppf(_TAIL, 2 * count) / 2 if count else 0.0
-    return float(low), float(chi2.isf(_TAIL, 2 * count + 2) / 2)
+    low = chdtri(2 * count, 1 - _TAIL) / 2 if count else 0.0
+    return float(low), float(chdtri(2 * count + 2, _TAIL) / 2)
 
 
 def size_classes(diameters_um: ArrayLike, exposures_per_shot: float = 1) -> tuple[SizeClass, ...]:
@@ -208,7 +208,7 @@ def _estimates(diameters_um: FloatArray, units: NDArray[np.intp], widening: floa
     (values,) = _figures(diameters_um, powers, np.ones((1, len(diameters_um))))
     draws = np.concatenate([_figures(diameters_um, powers, weights) for weights in _draws(units)])
     drawn = int(units.max()) + 1
-    reach = widening * t.isf(_TAIL, drawn - 1) * np.sqrt(drawn / (drawn - 1))
+    reach = widening * stdtrit(drawn - 1, 1 - _TAIL) * np.sqrt(drawn / (drawn - 1))
     factors = np.exp(reach * np.std(np.log(draws[:, :-1]), axis=0))
     lows, highs = values[:-1] / factors, values[:-1] * factors
     span, half = values[-1], reach * np.std(draws[:, -1])

@@ -8,7 +8,7 @@ distribution: ``1 - Q1(r / s, 1 / s)`` with Marcum's Q. Its outline at half of i
 from functools import lru_cache
 
 import numpy as np
-from scipy.stats import ncx2
+from scipy.special import chndtr
 
 from processing.geometry import FloatArray
 
@@ -63,4 +63,4 @@ def _outlines(blur: float, radii: FloatArray) -> tuple[float, ...]:
 
 def _profile(distances: FloatArray, radius: float, blur: float) -> FloatArray:
     """Darkness of a blurred disc at distances from its centre."""
-    return np.asarray(ncx2.cdf((radius / blur) ** 2, 2, np.maximum(distances, 1e-9) ** 2 / blur**2))
+    return np.asarray(chndtr((radius / blur) ** 2, 2, np.maximum(distances, 1e-9) ** 2 / blur**2))
