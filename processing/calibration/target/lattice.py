@@ -1,13 +1,14 @@
 """Grid assignment: which detected point is which node of a regular target. Pure geometry, by neighbours."""
 
 import heapq
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
+from scipy.spatial import cKDTree
 
 from processing.geometry import FloatArray
 
@@ -64,7 +65,7 @@ def _everything_fits(_parent: int, _child: int) -> bool:
 class _Growth:
     points_px: FloatArray
     fits: Callable[[int, int], bool]
-    tree: KDTree
+    tree: cKDTree
     nodes: dict[Node, int] = field(default_factory=dict)
     taken: set[int] = field(default_factory=set)
     steps: dict[Node, FloatArray] = field(default_factory=dict)
@@ -85,7 +86,7 @@ class _Growth:
         here_px, step_px = self.points_px[self.nodes[node]], self.steps[node][axis]
         if behind in self.nodes:
             step_px = sign * (here_px - self.points_px[self.nodes[behind]])
-        length_px = float(np.linalg.norm(step_px))
+        length_px = math.hypot(*step_px)
         distance_px, found = self.tree.query(here_px + sign * step_px)
         index = int(found)
         if distance_px < TOLERANCE * length_px and self.fits(self.nodes[node], index):
@@ -127,7 +128,7 @@ def grow_lattice(
     Lattice
         Nodes reached; at least the start.
     """
-    growth = _Growth(points_px, fits, KDTree(points_px))
+    growth = _Growth(points_px, fits, cKDTree(points_px))
     growth.accept((0, 0), start, np.asarray(steps_px, dtype=np.float64))
     growth.run()
     return Lattice(

@@ -352,11 +352,11 @@ void fit_discs(const Kernels &kernels, int number) {
 
 int main() {
     const Kernels &kernels = selected_kernels();
-    for (int number = 0; number < 60; ++number) look(kernels, number);
+    for (int number = 0; number < 21; ++number) look(kernels, number);
     for (int number = 0; number < 14; ++number) iterate(kernels, number);
-    for (int number = 0; number < 60; ++number) resample(kernels, number);
-    for (int number = 0; number < 60; ++number) prepare(kernels, number);
-    for (int number = 0; number < 20; ++number) fit_blobs(kernels, number);
-    for (int number = 0; number < 40; ++number) stamp(number);
-    for (int number = 0; number < 20; ++number) fit_discs(kernels, number);
+    for (int number = 0; number < 30; ++number) resample(kernels, number);
+    for (int number = 0; number < 30; ++number) prepare(kernels, number);
+    for (int number = 0; number < 10; ++number) fit_blobs(kernels, number);
+    for (int number = 0; number < 20; ++number) stamp(number);
+    for (int number = 0; number < 10; ++number) fit_discs(kernels, number);
 }
