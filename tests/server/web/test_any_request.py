@@ -20,7 +20,7 @@ from tests.server.web.test_api import use_a_calibration, wait_for_jobs
 from tests.support.memory_rig import VIEWS
 from tests.support.serving import assembled, plan_of, serving
 
-EXAMPLES = 10
+EXAMPLES = 5
 NOT_IN_THE_SCHEMA: Any = [positive_data_acceptance]
 """What this rig can do, and what there is on this server, is not in the schema."""
 MISREAD = "/api/runs/{run_id}/results/{results_id}/{volume}"
