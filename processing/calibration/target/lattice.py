@@ -75,22 +75,29 @@ class _Growth:
         self.nodes[node] = index
         self.taken.add(index)
         self.steps[node] = steps_px
-        for axis, sign in _DIRECTIONS:
-            self._offer(node, axis, sign)
+        self._offer(node)
 
-    def _offer(self, node: Node, axis: int, sign: int) -> None:
-        """Queue the point that lies where the lattice continues from a node, if there is one."""
-        there, behind = _neighbour(node, axis, sign), _neighbour(node, axis, -sign)
-        if there in self.nodes:
+    def _offer(self, node: Node) -> None:
+        """Queue the points that lie where the lattice continues from a node."""
+        ahead = [direction for direction in _DIRECTIONS if _neighbour(node, *direction) not in self.nodes]
+        if not ahead:
             return
-        here_px, step_px = self.points_px[self.nodes[node]], self.steps[node][axis]
-        if behind in self.nodes:
-            step_px = sign * (here_px - self.points_px[self.nodes[behind]])
-        length_px = math.hypot(*step_px)
-        distance_px, found = self.tree.query(here_px + sign * step_px)
-        index = int(found)
-        if distance_px < TOLERANCE * length_px and self.fits(self.nodes[node], index):
-            heapq.heappush(self.queue, (float(distance_px) / length_px, there, index, sign * (axis + 1), node))
+        here = self.nodes[node]
+        steps_px = np.array([self._step_px(node, axis, sign) for axis, sign in ahead])
+        nearest = self.tree.query(self.points_px[here] + steps_px)
+        distances_px, found = (np.asarray(values).tolist() for values in nearest)
+        for (axis, sign), step_px, distance_px, index in zip(ahead, steps_px, distances_px, found, strict=True):
+            length_px = math.hypot(*step_px)
+            if distance_px < TOLERANCE * length_px and self.fits(here, index):
+                candidate = (distance_px / length_px, _neighbour(node, axis, sign), index, sign * (axis + 1), node)
+                heapq.heappush(self.queue, candidate)
+
+    def _step_px(self, node: Node, axis: int, sign: int) -> FloatArray:
+        """The step that leads on from a node: the one from the point behind, where there is one."""
+        behind = self.nodes.get(_neighbour(node, axis, -sign))
+        if behind is None:
+            return np.asarray(sign * self.steps[node][axis], dtype=np.float64)
+        return np.asarray(self.points_px[self.nodes[node]] - self.points_px[behind], dtype=np.float64)
 
     def run(self) -> None:
         """Take the best-fitting candidate until none is left."""
