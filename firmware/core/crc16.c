@@ -1,17 +1,11 @@
 #include "crc16.h"
 
-static uint16_t shifted(uint16_t crc)
-{
-    const uint16_t doubled = (uint16_t)(crc << 1);
-    return (crc & 0x8000u) ? (uint16_t)(doubled ^ 0x1021u) : doubled;
-}
-
+/* Division by x^16 + x^12 + x^5 + 1, eight bits at once: what the upper byte leaves meets itself again four bits on. */
 uint16_t crc16_on(uint16_t crc, char byte)
 {
-    crc = (uint16_t)(crc ^ (uint16_t)((uint8_t)byte << 8));
-    for (int bit = 0; bit < 8; bit++)
-        crc = shifted(crc);
-    return crc;
+    const uint32_t upper = (uint32_t)(crc >> 8) ^ (uint8_t)byte;
+    const uint32_t quotient = upper ^ upper >> 4;
+    return (uint16_t)((uint32_t)crc << 8 ^ quotient << 12 ^ quotient << 5 ^ quotient);
 }
 
 uint16_t crc16(const char *bytes, size_t length)

@@ -4,17 +4,28 @@
 #include "generator.h"
 #include "port.h"
 
+enum { POLL_EVERY_US = 50 }; /* a byte takes 87 us on a serial line, and next to none on USB */
+
+static void poll(struct reply *reply)
+{
+    const uint32_t now_us = (uint32_t)port_now_us();
+    if (now_us - reply->polled_us < POLL_EVERY_US)
+        return;
+    reply->polled_us = now_us;
+    generator_poll(reply->generator);
+}
+
 /* The one place that sends. */
 static void put(struct reply *reply, char character)
 {
     reply->crc = crc16_on(reply->crc, character);
     port_send(character);
-    generator_poll(reply->generator);
+    poll(reply);
 }
 
 struct reply reply_begin(struct generator *generator)
 {
-    return (struct reply){generator, CRC16_START};
+    return (struct reply){generator, CRC16_START, (uint32_t)port_now_us()};
 }
 
 void reply_word(struct reply *reply, const char *word)

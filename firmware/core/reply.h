@@ -9,6 +9,7 @@
 struct reply {
     struct generator *generator; /* which lives on between the bytes: triggers and light do not wait for a reply */
     uint16_t crc;
+    uint32_t polled_us;
 };
 
 struct reply reply_begin(struct generator *generator);

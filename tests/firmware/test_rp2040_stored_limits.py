@@ -8,6 +8,7 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import pytest
@@ -17,6 +18,8 @@ from tests.support.rp2040_board import BOOT_MS, PAPER, PERIOD_MS, Board
 
 FIRMWARE = Path(__file__).resolve().parents[2] / "firmware"
 FIRST, RECORD, RECORDS = 0x1_0000, 64, 64
+READ_BYTES = 4 + RECORD
+"""Of a command that reads a record."""
 KEPT = ((20_000, 100, 300), (0, 0, 0), (30_000, 200, 500), (500, 200, 0))
 DARK = ((0, 0, 0),) * 4
 ABSOLUTE = ((30_000, 200, 500),) * 4
@@ -187,11 +190,20 @@ def test_a_flash_that_does_not_answer_is_no_board_without_limits() -> None:
     assert state_and_faults(board) == (State.FAULT, Fault.LIMITS)
 
 
-def test_a_record_that_is_missed_once_is_not_taken_for_none() -> None:
-    """Whichever of the records that are read for an answer, and what a flash is asked while it is busy."""
+def test_a_flash_that_falls_silent_for_a_while_is_no_board_without_limits() -> None:
+    """Whichever of the reads for an answer it swallows: a record at both looks, and none before or after them."""
     board = Board()
     store(board, ABSOLUTE)
     store(board, DARK)
-    for first, count in (*((first, 1) for first in range(5)), (0, 2), (0, 3)):
-        board.pico.flash.fall_silent(after_bytes=first * (4 + RECORD), for_bytes=count * (4 + RECORD))
-        assert board.ask_in_bursts(Command.STORED, 0).number("max_current_ma") == 0
+    for first, count in product(range(7), range(1, 4)):
+        board.pico.flash.fall_silent(after_bytes=first * READ_BYTES, for_bytes=count * READ_BYTES)
+        assert board.ask_in_bursts(Command.STORED, 0).number("max_current_ma") == 0, (first, count)
+        board.pico.flash.answer()
+
+
+def test_nothing_is_written_into_a_flash_that_falls_silent() -> None:
+    """It would leave a gap, behind which no record is found."""
+    board = Board()
+    board.pico.flash.fall_silent(for_bytes=2 * READ_BYTES)
+    assert store(board).error is ErrorNumber.HARDWARE
+    assert set(board.pico.flash.contents[FIRST : FIRST + RECORDS * RECORD]) == {0xFF}

@@ -19,6 +19,7 @@ class FlashChip:
     def __init__(self, chip: RP2040) -> None:
         self.contents: bytearray = chip.flash
         self._ssi, self._clock = chip.ssi, chip.clock
+        self._shift = chip.ssi._shift_byte
 
     def protect(self) -> None:
         """Ignore what is written from now on."""
@@ -57,3 +58,7 @@ class FlashChip:
             return answer if count <= after_bytes or is_over else _HIGH
 
         self._ssi._shift_byte = shift_in_silence  # type: ignore[method-assign, assignment]
+
+    def answer(self) -> None:
+        """Be sound again."""
+        self._ssi._shift_byte = self._shift  # type: ignore[method-assign]

@@ -14,6 +14,7 @@ enum {
     END = FIRST + 4096,
     RECORD_BYTES = 4 * STORED_WORDS,
     BLANK = 0xffffffff,
+    LOOKS = 2,
     LIMIT_US = 20000, /* a page takes 5 ms at most, W25Q16JV 9.6 */
 };
 
@@ -35,21 +36,24 @@ static bool read_record(uint32_t address, uint32_t words[STORED_WORDS])
     return common != BLANK;
 }
 
-/* The first that is blank, at a second look too, or END. */
+/* The first that is blank, at a second look too, or END. A flash that is gone, or still busy, leaves the line high, and
+ * everything in it seems blank: its boot stage too, which is read after each look. Then nothing in it is taken for blank. */
 static uint32_t find_blank(uint32_t words[STORED_WORDS])
 {
     uint32_t address = FIRST;
-    while (address < END && (read_record(address, words) || read_record(address, words)))
-        address += RECORD_BYTES;
+    for (int looks = 0; looks < LOOKS && address < END; looks++) {
+        if (read_record(address, words)) {
+            address += RECORD_BYTES;
+            looks = -1;
+        } else if (!read_record(BOOT_STAGE, words)) {
+            return END;
+        }
+    }
     return address;
 }
 
-/* A flash that is gone, or still busy, leaves the line high, and everything in it seems blank: its boot stage too, which is
- * taken for the record then. */
 bool flash_records_read(uint32_t words[STORED_WORDS])
 {
-    if (!read_record(BOOT_STAGE, words))
-        return true;
     const uint32_t newest = find_blank(words) - RECORD_BYTES;
     (void)read_record(newest, words);
     return newest >= FIRST;
