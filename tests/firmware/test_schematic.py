@@ -11,6 +11,7 @@ import sys
 from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 
 import pytest
@@ -26,6 +27,15 @@ GPIO_OF_BOARD_PIN = {
     if pin
 }
 """Of the Raspberry Pi Pico, from its data sheet."""
+PINS_ELSEWHERE = {
+    "MCP4728": "VDD SCL SDA LDAC RDY VOUTA VOUTB VOUTC VOUTD VSS",
+    "TPS3839G33": "GND RESET VDD",
+    "74LVC1G08": "in in GND out VCC",
+    "74LVC1G123": "A B CLR GND Q CX RCX VCC",
+    "74HCT125": "OE0 A0 Y0 OE1 A1 Y1 GND Y2 A2 OE2 Y3 A3 OE3 VCC",
+}
+"""Pins 1, 2, 3... of parts, typed from the symbol library of KiCad 6.0.10, whose makers read the data sheets: MCP4728,
+TPS3839DBZ (in its other package the pins are others), 74LVC1G08, 74LVC1G123, 74LS125."""
 NETS = {
     "PIN_UART_TX": ["UART_TX"],
     "PIN_UART_RX": ["UART_RX"],
@@ -73,6 +83,7 @@ class Pin:
     part: str
     value: str
     number: str
+    name: str
     kind: str
 
 
@@ -95,8 +106,8 @@ def circuit(file: Path) -> tuple[dict[str, list[Pin]], list[Pin]]:
                 place = round(x + dx, 2), round(y - dy, 2)
                 assert place not in seen, f"two pins at {place}"
                 seen.add(place)
-                number = str(next(children(drawn, "number"))[1])
-                pin = Pin(values["Reference"], values["Value"], number, str(drawn[1]))
+                number, name = (str(next(children(drawn, each))[1]) for each in ("number", "name"))
+                pin = Pin(values["Reference"], values["Value"], number, name, str(drawn[1]))
                 if place in unconnected:
                     open_pins.append(pin)
                 else:
@@ -143,6 +154,28 @@ def test_the_pins_are_those_of_the_wiring_guide() -> None:
     for name, pins in rows:
         told |= dict(zip(re.findall(r"\d+", pins), NETS[name], strict=bool(NETS[name])))
     assert told == {number: net for number, net in nets_of("U1").items() if int(number) in GPIO_OF_BOARD_PIN}
+
+
+@pytest.mark.parametrize("value", PINS_ELSEWHERE)
+def test_the_pins_of_a_part_are_those_that_others_have_read(value: str) -> None:
+    """The two inputs of an AND gate are alike."""
+    alike = {"A": "in", "B": "in", "Y": "out"} if value == "74LVC1G08" else {}
+    drawn: dict[str, dict[int, str]] = defaultdict(dict)
+    for pin in (*chain.from_iterable(NETLIST.values()), *OPEN):
+        if pin.value == value:
+            drawn[pin.part][int(pin.number)] = alike.get(pin.name, pin.name)
+    assert drawn
+    assert all(pins == dict(enumerate(PINS_ELSEWHERE[value].split(), 1)) for pins in drawn.values())
+
+
+def test_relay_and_contactor_carry_the_numbers_of_their_terminals() -> None:
+    """As EN 50005 has them: coil A1 and A2; contacts that close .3 and .4; main poles 1-2, 3-4, 5-6, 7-8."""
+    assert set(nets_of("K1")) == {"13", "14", "23", "24"}
+    contactor = nets_of("K2")
+    assert set(contactor) == {"A1", "A2", *map(str, range(1, 9))}
+    assert [(contactor[str(2 * i + 1)], contactor[str(2 * i + 2)]) for i in range(4)] == [
+        (f"FUSED_{i}", f"SWITCHED_{i}") for i in range(4)
+    ]
 
 
 @pytest.mark.parametrize("net", sorted(NETLIST))
