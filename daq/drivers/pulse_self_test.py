@@ -98,7 +98,7 @@ def _identity(identity: Reply) -> str:
 def _starts_safe(probe: Probe) -> str:
     status = probe.done(Command.STATUS)
     faults = Fault(status.number("faults"))
-    remedy = "see to its cause, then acknowledge it on the page, or plug the board in anew"
+    remedy = "see to its cause, then acknowledge it (tomoshadow firmware clear, or the page)"
     expect(not faults, f"fault latched: {faults.name}; {remedy}")
     expect(status.number("state") == State.SAFE, f"state is {State(status.number('state')).name}")
     return "state SAFE, nothing latched"

@@ -1,4 +1,4 @@
-"""``tomoshadow firmware``: identity and limits, self-test, timing diagram, continuous light, flashing."""
+"""``tomoshadow firmware``: identity, limits, faults, self-test, timing diagram, continuous light, flashing."""
 
 import sys
 from argparse import ArgumentParser, Namespace
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from daq.errors import DeviceError, PlanError
 from server.cli.options import Verbs, add_out, add_rig, add_verb
-from server.cli.output import Outcome, progress, table
+from server.cli.output import Outcome, progress, table, train_table
 
 if TYPE_CHECKING:
     from daq.devices import GeneratorStatus, PulseGenerator
@@ -26,6 +26,7 @@ def add(verbs: Verbs) -> None:
     """Add the tools."""
     tools = verbs.add_parser("firmware", help="the pulse generator").add_subparsers(required=True, metavar="TOOL")
     add_rig(add_verb(tools, "info", info, "identity, state and counters of the pulse generator"))
+    add_rig(add_verb(tools, "clear", clear, "acknowledge the latched faults of the pulse generator; nothing is fired"))
     _add_limits_options(add_verb(tools, "limits", limits, "limits of the LEDs, in the board and in the rig file"))
     summary = "try everything that needs no light: protocol, refusals, limits, budget, off"
     _add_selftest_options(add_verb(tools, "selftest", selftest, summary))
@@ -91,6 +92,22 @@ def info(options: Namespace) -> Outcome:
             "limits": [dict(_limits(line, channel)) for channel in range(CHANNEL_COUNT)],
         }
     return Outcome(result, described(result))
+
+
+def clear(options: Namespace) -> Outcome:
+    """Acknowledge the latched faults; the generator refuses while their cause lasts, and arms nothing."""
+    from server.rig.assembly import open_generator
+    from server.rig.config import load_config
+
+    with open_generator(load_config(options.config)) as generator:
+        latched = sorted(fault.upper() for fault in generator.status().faults)
+        progress(f"latched: {', '.join(latched) or 'no fault'}")
+        if latched:
+            generator.clear()
+        status = generator.status()
+    left = sorted(fault.upper() for fault in status.faults)
+    result = {"acknowledged": latched, "state": status.state.name, "faults": left}
+    return Outcome(result, f"state: {status.state.name}, faults: {', '.join(left) or 'none'}")
 
 
 def _limits(line: "PulseLine", channel: int) -> Iterator[tuple[str, int]]:
@@ -232,29 +249,6 @@ def scope(options: Namespace) -> Outcome:
     saved = {kind: str(path) for kind, path in files.items()}
     result = {**saved, "shortest_period_ns": requested.shortest_period_ns, "views": views}
     return Outcome(result, f"{train_table(views)}\n{saved['svg']}, {saved['png']}")
-
-
-def train_table(views: dict[str, Any]) -> str:
-    """A line per view with what was loaded, for people."""
-    rows = [
-        [
-            name,
-            *("{} to {}".format(*view["actual"][key]) for key in ("pulse_a_ns", "pulse_b_ns")),
-            *(str(view["actual"][key]) for key in ("separation_ns", "guard_before_ns", "guard_after_ns")),
-            f"{view['actual']['current_a']:g}",
-        ]
-        for name, view in views.items()
-    ]
-    heads = [
-        "view",
-        "pulse A [ns]",
-        "pulse B [ns]",
-        "separation [ns]",
-        "guard before [ns]",
-        "after [ns]",
-        "current [A]",
-    ]
-    return table(heads, rows)
 
 
 def light(options: Namespace) -> Outcome:

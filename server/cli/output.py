@@ -161,3 +161,26 @@ def _is_figure(cell: str) -> bool:
     except ValueError:
         return False
     return True
+
+
+def train_table(views: dict[str, Any]) -> str:
+    """A line per view with what was loaded, for people."""
+    rows = [
+        [
+            name,
+            *("{} to {}".format(*view["actual"][key]) for key in ("pulse_a_ns", "pulse_b_ns")),
+            *(str(view["actual"][key]) for key in ("separation_ns", "guard_before_ns", "guard_after_ns")),
+            f"{view['actual']['current_a']:g}",
+        ]
+        for name, view in views.items()
+    ]
+    heads = [
+        "view",
+        "pulse A [ns]",
+        "pulse B [ns]",
+        "separation [ns]",
+        "guard before [ns]",
+        "after [ns]",
+        "current [A]",
+    ]
+    return table(heads, rows)

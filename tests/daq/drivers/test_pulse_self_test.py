@@ -83,7 +83,7 @@ def test_a_latched_fault_is_told_and_not_cleared(firmware: FirmwareProcess) -> N
     checks = results_of(firmware)
     assert checks["starts safe"] == (
         Verdict.FAIL,
-        "fault latched: WATCHDOG; see to its cause, then acknowledge it on the page, or plug the board in anew",
+        "fault latched: WATCHDOG; see to its cause, then acknowledge it (tomoshadow firmware clear, or the page)",
     )
     assert "answered by FAULT_LATCHED" in checks["off"][1]
     with opened(firmware) as line:

@@ -7,13 +7,16 @@ import shutil
 import signal
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from server.cli.firmware import described, train_table
+from daq.simulation.pico.firmware_process import FirmwareProcess
+from server.cli.firmware import described
 from server.cli.main import main
+from server.cli.output import train_table
 from tests.server.rig.test_firmware_image import bootable, mounted, saved, uf2
 
 CONFIG = ["--config", "configs/simulated_small.toml", "--json"]
@@ -40,6 +43,36 @@ def test_info_tells_identity_state_and_counters(capsys: pytest.CaptureFixture[st
     assert "state: SAFE, faults: none" in lines
     assert "interlock: closed, emergency stop: closed" in lines
     assert lines[-4].split() == ["0", "30000", "200", "500"]
+
+
+@pytest.fixture
+def generator(tmp_path: Path) -> Iterator[tuple[FirmwareProcess, list[str]]]:
+    """One that outlives a command, and the configuration of a rig that has it."""
+    config = Path(shutil.copytree("configs", tmp_path / "configs"), "spray4view.toml")
+    with FirmwareProcess({}, lambda _: None) as firmware:
+        ours = f'port = "{firmware.port}"'
+        text, found = re.subn(r'(?m)^port = "/dev/.*pulse_generator.*"$', ours, config.read_text())
+        assert found == 1
+        config.write_text(text)
+        yield firmware, ["--config", str(config), "--json"]
+
+
+def test_clear_acknowledges_what_is_over_and_nothing_else(
+    capsys: pytest.CaptureFixture[str], generator: tuple[FirmwareProcess, list[str]]
+) -> None:
+    firmware, config = generator
+    firmware.set_estop(closed=False)
+    assert main(["firmware", "clear", *config]) == 1
+    told = capsys.readouterr()
+    assert "latched: ESTOP" in told.err
+    assert "the emergency stop is open (error 22)" in told.out + told.err
+    firmware.set_estop(closed=True)
+    assert result_of(capsys, "info", *config)["faults"] == ["ESTOP"], "it stays until somebody has looked"
+    cleared = result_of(capsys, "clear", *config)
+    assert cleared == {"acknowledged": ["ESTOP"], "state": "SAFE", "faults": []}
+    assert result_of(capsys, "clear", *config) == {"acknowledged": [], "state": "SAFE", "faults": []}
+    info = result_of(capsys, "info", *config)
+    assert (info["state"], info["shots_left"], info["counters"]["requested"]) == ("SAFE", 0, 0)
 
 
 def test_limits_of_board_and_rig_stand_side_by_side(capsys: pytest.CaptureFixture[str]) -> None:
