@@ -2,6 +2,8 @@
 
 import os
 import random
+from collections import Counter
+from collections.abc import Iterator
 from enum import StrEnum
 
 import pytest
@@ -11,7 +13,8 @@ from daq.simulation.pico.rp2040_emulator import CYCLES_PER_MS, EmulatedPico
 from tests.firmware.test_rp2040_damage import LIT_AT_MOST_MS, longest_light_ms
 from tests.support.rp2040_board import PAPER, PERIOD_MS, Board, image
 
-FLIPS = int(os.environ.get("TOMOSHADOW_FLIPS", "9"))
+FLIPS_VARIABLE = "TOMOSHADOW_FLIPS"
+FLIPS = int(os.environ.get(FLIPS_VARIABLE, "9"))
 """How many; `make flips` takes 200."""
 BOOT_STAGE = 256
 RAM, RAM_BYTES = 0x2000_0000, 16 * 1024
@@ -87,9 +90,20 @@ def flip_program(chance: random.Random) -> tuple[Board, str]:
 PLACES = {"flash": flip_flash, "RAM": flip_ram, "program": flip_program}
 
 
+@pytest.fixture(scope="module")
+def tally(request: pytest.FixtureRequest) -> Iterator[Counter[str]]:
+    """What became of each place; told at the end, where somebody has asked for many."""
+    counts: Counter[str] = Counter()
+    yield counts
+    if FLIPS_VARIABLE in os.environ:
+        with request.config.pluginmanager.getplugin("capturemanager").global_and_fixture_disabled():
+            print("\n" + ", ".join(f"{name}: {count}" for name, count in sorted(counts.items())))  # noqa: T201
+
+
 @pytest.mark.parametrize("number", range(FLIPS))
-def test_a_flipped_bit_leaves_it_dark_or_right(number: int) -> None:
+def test_a_flipped_bit_leaves_it_dark_or_right(number: int, tally: Counter[str]) -> None:
     place = list(PLACES)[number % len(PLACES)]
     board, where = PLACES[place](random.Random(number))
     found = outcome(board)
+    tally[f"{place} {found or 'neither'}"] += 1
     assert found is not None, f"{where}: {board.pico.edges[-12:]}"
