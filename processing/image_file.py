@@ -22,6 +22,8 @@ from processing.tiff_pages import PageKind, deflated_parts, page_kind, page_offs
 GreyImage = NDArray[np.uint8] | NDArray[np.uint16]
 T = TypeVar("T")
 _STDERR = threading.Lock()
+_SUN_RASTER = b"\x59\xa6\x6a\x95"
+"""Of whose images OpenCV makes zeros, or other grey values."""
 
 
 class ImageFileError(BadInput):
@@ -50,8 +52,8 @@ def read_image(path: Path, page: int | None = None) -> GreyImage:
         show_page(content, offsets[chosen])
         _check_parts(path, deflated_parts(content, offsets[chosen]))
     image, complaints = _heard(lambda: _decoded(content)) if _is_jpeg(content) else (_decoded(content), "")
-    if image is None:
-        raise ImageFileError(f"{path}: not an image that OpenCV reads")
+    if image is None or content[:4].tobytes() == _SUN_RASTER:
+        raise ImageFileError(f"{path}: not an image that is read right: convert it to PNG or TIFF")
     if complaints:
         raise ImageFileError(f"{path}: is damaged: {complaints}")
     if offsets:

@@ -17,6 +17,8 @@ METHOD_VERSION = 2
 """
 
 
+MOST_RELAXATION = 2.0
+"""Beyond, SMART diverges."""
 MAX_VOXELS = 10**12
 """More fill any disk: a thousand times the largest volume of the paper's rig."""
 
@@ -70,7 +72,9 @@ class ReconstructionSettings(FrozenValue):
         Field(description="how volumes are stored: float16 keeps 11 bits in half the file of float32, uint8 256 steps"),
     ] = VoxelType.FLOAT16
     iterations: Annotated[int, Field(ge=1, le=200, description="of SMART and MART, at most")] = 20
-    relaxation: Annotated[float, Field(gt=0, le=2, description="exponent of SMART and MART; the paper's is 1")] = 1.0
+    relaxation: Annotated[
+        float, Field(gt=0, le=MOST_RELAXATION, description="exponent of SMART and MART; the paper's is 1")
+    ] = 1.0
     least_gain: Annotated[
         float,
         Field(

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from processing.kernels import DEFAULT_THREADS
 from processing.reconstruction.line_of_sight import check_volume
 from processing.reconstruction.planning.plan import Plan
+from processing.reconstruction.settings import MOST_RELAXATION
 from processing.reconstruction.smart_state import FirstGuess, SmartState
 from processing.reconstruction.sparse_volume import SparseVolume
 
@@ -193,8 +194,10 @@ def _run(
     memory: SmartResult | None,
     threads: int,
 ) -> SmartResult:
-    if not 0 < relaxation < np.inf:
-        raise ValueError(f"relaxation {relaxation} must be positive")
+    if not 0 < relaxation <= MOST_RELAXATION:
+        raise ValueError(
+            f"relaxation {relaxation} must be above 0, and at most {MOST_RELAXATION:g}: beyond, it diverges"
+        )
     if out is not None:
         check_volume(out, plan, (np.float32, np.float16))
     guess = FirstGuess(start, memory.sparse if memory else None)

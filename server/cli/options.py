@@ -37,6 +37,8 @@ OPTIONS = (
 MIN_SIGMA_VOXEL, MAX_SIGMA_VOXEL = 0.3, 10.0
 
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,2})?"
+MOST_BEYOND = 0.5
+"""Of what is calibrated along an axis: farther beyond it a grid is asked about."""
 LEAST_SHARE = 1e-6
 """Of the calibrated volume: a grid that holds less is in another unit, or elsewhere."""
 
@@ -197,6 +199,13 @@ def calibrated_share(options: Namespace, settings: "ReconstructionSettings", cal
         )
     elif share < LEAST_SHARE:
         progress(f"the grid holds {share:.1g} of the calibrated volume: is it in mm, and where the target was?")
+    for axis, (low, high), along_mm in zip("xyz", ranges_mm, (grid.x_mm, grid.y_mm, grid.z_mm), strict=True):
+        beyond_mm = max(low - along_mm[0], along_mm[-1] - high)
+        if beyond_mm > MOST_BEYOND * (high - low):
+            progress(
+                f"the grid reaches {beyond_mm:.3g} mm beyond the {axis} of the target, {low:.4g} to {high:.4g} mm: "
+                "nobody has checked the calibration there"
+            )
     return share
 
 

@@ -92,6 +92,14 @@ def test_a_stack_is_not_read_without_a_word_which_page(tmp_path: Path) -> None:
         read_image(tmp_path / "a.tif", 3)
 
 
+@pytest.mark.parametrize("depth", [8, 24])
+def test_a_sun_raster_is_not_read_as_zeros(tmp_path: Path, depth: int) -> None:
+    header = np.array([0x59A66A95, 8, 4, depth, 32 * depth // 8, 1, 0, 0], ">u4").tobytes()
+    (tmp_path / "a.ras").write_bytes(header + bytes(range(32)) * (depth // 8))
+    with pytest.raises(ImageFileError, match=r"a\.ras: not an image"):
+        read_image(tmp_path / "a.ras")
+
+
 @pytest.mark.parametrize("kind", ["gif", "png", "webp"])
 def test_an_animation_is_not_read_by_its_first_image(tmp_path: Path, kind: str) -> None:
     first, *others = (Image.fromarray(np.full((8, 9), value, np.uint8)) for value in (10, 100, 200))

@@ -23,7 +23,7 @@ CORRECTED = (
     "of diffraction in light whose condenser_ratio is with the views of the exposures; diameter_raw_um is that of the "
     "disc that would look so behind a Gaussian blur. Where the settings have sizes, by the dots of a reticle, too"
 )
-GROUP, PROVENANCE, FRAME = "droplets", "tomoshadow", "frame"
+GROUP, PROVENANCE, FRAME, ROWS = "droplets", "tomoshadow", "frame", "rows"
 UNITS = MappingProxyType({"mm": "mm", "mm2": "mm^2", "um": "um", "px": "px"})
 """By the ending of a column's name; all others are numbers, or as bright as the images."""
 Value = str | int | float
@@ -83,6 +83,7 @@ def write_columns(path: Path, columns: Mapping[str, NDArray[np.generic]], proven
     """
     with replacing(path) as part, h5py.File(part, "w") as file:
         group = file.create_group(GROUP, track_order=True)
+        group.attrs[ROWS] = len(columns[FRAME])
         for name, values in columns.items():
             group.create_dataset(name, data=values).attrs["units"] = UNITS.get(name.rpartition("_")[2], "1")
         if "p_real" in group:
@@ -116,11 +117,13 @@ def read_droplets(path: str | Path) -> StoredDroplets:
     try:
         with h5py.File(path, "r") as file:
             columns = {name: column[:] for name, column in file[GROUP].items()}
-            attributes = dict(file[PROVENANCE].attrs)
+            attributes, rows = dict(file[PROVENANCE].attrs), file[GROUP].attrs.get(ROWS)
     except (OSError, KeyError, ValueError) as error:
         raise DropletFileError(f"{path}: not a readable file of droplets: {error}") from error
     if len(lengths := {len(column) for column in columns.values()}) > 1:
         raise DropletFileError(f"{path}: was changed: its columns have {min(lengths)} to {max(lengths)} rows")
+    if rows is not None and lengths != {rows}:
+        raise DropletFileError(f"{path}: was changed: it was written with {rows} rows, and has {min(lengths)}")
     columns[FRAME] = columns[FRAME].astype("U1")
     plain = {name: value.item() if isinstance(value, np.generic) else value for name, value in attributes.items()}
     return StoredDroplets(columns, {name: value for name, value in plain.items() if name not in SCHEMA_KEYS})

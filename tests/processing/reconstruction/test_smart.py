@@ -269,10 +269,10 @@ def test_the_first_iteration_that_gains_too_little_is_the_last(
 def test_without_least_gain_it_goes_on_even_when_the_residual_rises() -> None:
     mappings = oracle.cameras(3)
     plan, images = make_plan(mappings, False), images_of(droplets(30), mappings)
-    residuals = mart(plan, images, iterations=6, relaxation=3.0).residuals
+    residuals = mart(plan, images, iterations=6, relaxation=2.0).residuals
     assert len(residuals) == 7
     assert np.diff(residuals).max() > 0
-    assert len(mart(plan, images, iterations=6, relaxation=3.0, least_gain=1e-6).residuals) < 7
+    assert len(mart(plan, images, iterations=6, relaxation=2.0, least_gain=1e-6).residuals) < 7
 
 
 def test_dark_images_give_an_empty_volume() -> None:
@@ -288,8 +288,8 @@ def test_what_cannot_be_done_is_refused() -> None:
     plan, images = make_plan(mappings, False), images_of(droplets(3), mappings)
     with pytest.raises(ValueError, match="iterations 0 must be positive"):
         smart(plan, images, iterations=0)
-    for relaxation in (0.0, np.nan, np.inf):
-        with pytest.raises(ValueError, match=f"relaxation {relaxation} must be positive"):
+    for relaxation in (0.0, 5.0, np.nan, np.inf):
+        with pytest.raises(ValueError, match=f"relaxation {relaxation} must be above 0, and at most 2"):
             smart(plan, images, relaxation=relaxation)
     with pytest.raises(TypeError, match="iteration"):
         smart(plan, images, iteration=3)  # type: ignore[call-arg]

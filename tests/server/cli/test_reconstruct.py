@@ -155,6 +155,20 @@ def test_a_grid_that_nobody_stated_says_what_it_holds(
     assert small["calibrated_share"] == pytest.approx(0.5, abs=0.02)
 
 
+def test_a_grid_beyond_the_target_is_asked_about(
+    run_dir: Path, calibration_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    common = ["reconstruct", run_dir, "--calibration", calibration_file, "--shots", "0:1"]
+    for number, (z_mm, told_mm) in enumerate(
+        (("-2:2", ""), ("-6:6", "the grid reaches 4.5 mm beyond the z of the target"))
+    ):
+        grid = f"--grid=-1:1,-0.4:0.4,{z_mm}@0.1"
+        assert main([*map(str, common), "-o", str(tmp_path / f"out{number}"), grid]) == 0
+        progress = capsys.readouterr().err
+        assert told_mm in progress
+        assert bool(told_mm) == ("beyond the z" in progress)
+
+
 def edited(calibration_file: Path, edit: Callable[[Any], None]) -> Path:
     """A calibration file that says something else, with the id that belongs to it."""
     content = json.loads(calibration_file.read_text())

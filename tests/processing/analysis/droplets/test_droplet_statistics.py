@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 
@@ -119,4 +120,16 @@ def test_columns_of_different_lengths_are_no_table(tmp_path: Path) -> None:
     assert len(read_droplets(tmp_path / "a.h5").columns["diameter_um"]) == 2
     write_columns(tmp_path / "a.h5", {**columns, "diameter_um": np.array([20.0])}, {"run": "spray"})
     with pytest.raises(DropletFileError, match=r"a\.h5: was changed: its columns have 1 to 2 rows"):
+        read_droplets(tmp_path / "a.h5")
+
+
+def test_a_table_that_was_cut_is_no_table(tmp_path: Path) -> None:
+    """All columns alike, as by a tool that copies the first rows: fewer droplets, and a lower density."""
+    columns = {"frame": np.array([b"a", b"a", b"b"]), "diameter_um": np.array([20.0, 30.0, 31.0])}
+    write_columns(tmp_path / "a.h5", columns, {"run": "spray"})
+    with h5py.File(tmp_path / "a.h5", "a") as file:
+        for name, column in columns.items():
+            del file["droplets"][name]
+            file["droplets"][name] = column[:2]
+    with pytest.raises(DropletFileError, match=r"a\.h5: was changed: it was written with 3 rows, and has 2"):
         read_droplets(tmp_path / "a.h5")
