@@ -86,14 +86,23 @@ class SeenLight:
     radius_sd: float = 0.0
 
 
-def light_doubts(share: float) -> tuple[str, ...]:
-    """What speaks against diameters of a shot, of whose droplets that share votes for a light that shows."""
-    if not UNSURE < share < SURE:
+def light_doubts(share: float, droplets: int) -> tuple[str, ...]:
+    """What speaks against diameters in an estimated light.
+
+    Parameters
+    ----------
+    share : float
+        Of the droplets, which a light that shows explains better than a Gaussian blur does.
+    droplets : int
+        How many.
+    """
+    if not droplets or share >= SURE or (droplets >= LEAST_DROPLETS and share <= UNSURE):
         return ()
+    few = f": fewer than {LEAST_DROPLETS} do not vote" if droplets < LEAST_DROPLETS else ""
     return (
-        "which light this is cannot be told from these droplets, and diameters may be up to 10 um wrong; state what is "
-        "known of the rig (--light: aperture of the light over that of the lens; incoherent; or gaussian, of a lens "
-        "that is not sharp)",
+        f"which light this is cannot be told from these droplets{few}, and diameters may be up to 10 um wrong; state "
+        "what is known of the rig (--light: aperture of the light over that of the lens; incoherent; or gaussian, of a "
+        "lens that is not sharp)",
     )
 
 

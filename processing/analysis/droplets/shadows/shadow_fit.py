@@ -84,7 +84,7 @@ class ShadowFit:
     masks : tuple of (rows, columns) bool arrays
         Pixels that look through it, and have no say; empty where there is none.
     light_share : float
-        Of the droplets, which the light explains better than a Gaussian blur; 0 where that was not asked.
+        Of the droplets, which the light explains better than a Gaussian blur; 1 where it was stated.
     light_sd_voxel : float
         Standard deviation that all radii share because the light is not known better.
     """
@@ -95,7 +95,7 @@ class ShadowFit:
     defects: tuple[Image, ...] = ()
     liquid: Discs = NO_DISCS
     masks: tuple[Mask, ...] = ()
-    light_share: float = 0.0
+    light_share: float = 1.0
     light_sd_voxel: float = 0.0
 
     def with_discs(self, discs: Discs) -> "ShadowFit":

@@ -164,7 +164,7 @@ def _told(shot: Transmissions, fit: ShadowFit, search: DropletSearch, sizes: Siz
     beside_px = {name: float(np.hypot(view.shift_u_px, view.shift_v_px)) for name, view in views.items()}
     limits = COHERENT_LIMITS if (fit.optics.condenser_ratio or FRINGELESS) < FRINGELESS else LIMITS
     verdict, reasons = judged(beside_px, ratio, limits)
-    if doubts := (*grey(seen, shadows, judged_weights), *light_doubts(fit.light_share)):
+    if doubts := (*grey(seen, shadows, judged_weights), *light_doubts(fit.light_share, len(fit.discs))):
         verdict, reasons = ShotVerdict.DOUBTFUL if verdict is ShotVerdict.GOOD else verdict, (*reasons, *doubts)
     if verdict is ShotVerdict.REFUSED:
         return MeasuredExposure(SizedDroplets.none(), views, ratio, verdict, reasons)

@@ -112,6 +112,19 @@ def test_who_cannot_tell_the_light_says_so(monkeypatch: pytest.MonkeyPatch) -> N
     assert "--light" in shot.reasons[-1]
 
 
+def test_few_droplets_do_not_tell_the_light_and_say_so() -> None:
+    """Behind a sharp lens they would be 10 um too large without a word."""
+    scene = shadow_scene((30, 14, 60), 8, (130, 70))
+    stated, estimated = (
+        measure_shadows(scene.images, search_of(scene, margin_voxel=8), light=light)
+        for light in ("gaussian", "estimated")
+    )
+    assert 0 < len(stated.droplets) < 10
+    assert stated.verdict is ShotVerdict.GOOD
+    assert estimated.verdict is ShotVerdict.DOUBTFUL
+    assert "fewer than 10 do not vote" in estimated.reasons[-1]
+
+
 def test_there_and_back_droplets_are_as_they_were() -> None:
     fit = fit_of(None)
     back = relit(relit(fit, 0.7, 1.0), None, 1.0)
