@@ -11,6 +11,8 @@ from processing.geometry import FloatArray
 BEYOND_SHARE = 0.5
 """Of the correction of the last dots: how unsure it is for smaller and larger droplets than any dot."""
 
+LEAST_SHARE = 0.5
+"""Of a diameter, that is left of it."""
 
 SizeRow = tuple[float, float, float]
 """Found, true, and standard deviation of their difference, in um."""
@@ -51,9 +53,12 @@ class SizeCorrection:
         return cls(*np.array(rows, dtype=np.float64).T)
 
     def corrected(self, diameters_um: FloatArray) -> FloatArray:
-        """True diameters (N,): between two dots by their differences, beyond them by that of the last one."""
-        differences = self.true_um - self.found_um
-        return np.asarray(diameters_um + np.interp(diameters_um, self.found_um, differences), dtype=np.float64)
+        """True diameters (N,): between two dots by their differences, beyond them by that of the last one.
+
+        None becomes less than half as large, as droplets that are much smaller than any dot might else.
+        """
+        differences = np.interp(diameters_um, self.found_um, self.true_um - self.found_um)
+        return np.asarray(np.maximum(diameters_um + differences, LEAST_SHARE * diameters_um), dtype=np.float64)
 
     def sd(self, diameters_um: FloatArray) -> FloatArray:
         """Standard deviation (N,) of the correction; beyond the dots half of it is added."""
