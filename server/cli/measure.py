@@ -130,11 +130,11 @@ def _by_options(options: Namespace, calibration: "Calibration") -> "MeasureSetti
         grid=grid,
         twins=options.twins or 0,
         ignored=ignored,
-        **_light_and_sizes(options),
+        **_light_and_sizes(options, calibration),
     )
 
 
-def _light_and_sizes(options: Namespace) -> dict[str, Any]:
+def _light_and_sizes(options: Namespace, calibration: "Calibration") -> dict[str, Any]:
     """The light that is stated, or that in which a reticle was measured, with the sizes of its dots."""
     from processing.runs.errors import PipelineError
     from processing.runs.reticle.size_calibration import load_size_calibration
@@ -145,6 +145,11 @@ def _light_and_sizes(options: Namespace) -> dict[str, Any]:
     if options.light not in (None, found.light):
         raise PipelineError(
             f"--light {options.light}: {options.sizes} was measured in light {found.light}; leave it out"
+        )
+    if found.calibration != calibration.id:
+        progress(
+            f"{options.sizes}: its reticle was measured by {found.calibration}, these runs are by {calibration.id}: "
+            "sizes hold for the same lenses, focus and light"
         )
     return {"light": found.light, "sizes": found.rows}
 

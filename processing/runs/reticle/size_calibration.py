@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field, ValidationError
 
 from daq.files.run_directory import RunReader
-from processing.analysis.droplets.shadows.light_search import Light
+from processing.analysis.droplets.shadows.light_search import Light, light_doubts
 from processing.analysis.droplets.size_correction import SizeRow
 from processing.analysis.reticle.reticle_sizes import ReticleSizes, measure_reticle
 from processing.analysis.reticle.size_groups import ReticleError
@@ -37,7 +37,7 @@ class DotSizes(FrozenValue):
 
     true_um: float
     found_um: float
-    sd_um: float
+    sd_um: Annotated[float, Field(ge=0)]
     dots: int
     views_um: dict[str, float]
 
@@ -56,13 +56,23 @@ class SizeCalibration(FrozenValue):
     residual: float
     middle_mm: tuple[float, float, float]
     normal: tuple[float, float, float]
-    tolerance_um: float
-    sizes: tuple[DotSizes, ...]
+    tolerance_um: Annotated[float, Field(gt=0)]
+    sizes: Annotated[tuple[DotSizes, ...], Field(min_length=1)]
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """What speaks against it."""
+        if self.residual <= MOST_LEFT:
+            return light_doubts(self.light_share, sum(size.dots for size in self.sizes))
+        return (
+            f"{100 * self.residual:.1f} % of the light is left around the dots, limit {100 * MOST_LEFT:g} %: is the "
+            "reticle in focus, did it move, and are its dots round and opaque?",
+        )
 
     @property
     def passed(self) -> bool:
-        """Whether dots look as opaque dots do."""
-        return self.residual <= MOST_LEFT
+        """Whether dots look as opaque dots do, in a light that they tell."""
+        return not self.reasons
 
     @property
     def rows(self) -> tuple[SizeRow, ...]:
@@ -191,14 +201,18 @@ def load_size_calibration(path: Path) -> SizeCalibration:
     Raises
     ------
     ReticleError
-        There is no such file, or it holds something else.
+        There is no such file, it holds something else, or its reticle failed.
     """
     try:
-        return SizeCalibration.model_validate_json(path.read_text(encoding="utf-8"))
+        found = SizeCalibration.model_validate_json(path.read_text(encoding="utf-8"))
+        MeasureSettings(polarity="shadow", light=found.light, sizes=found.rows)
     except OSError as error:
         raise ReticleError(f"{path}: {error.strerror}") from error
     except (ValidationError, UnicodeDecodeError) as error:
         problem = error.errors()[0] if isinstance(error, ValidationError) else None
-        where = ".".join(map(str, problem["loc"])) if problem else "text"
+        where = ".".join(map(str, problem["loc"])) or "light and sizes" if problem else "text"
         told = f"{where}: {problem['msg']}" if problem else "not UTF-8"
         raise ReticleError(f"{path}: no size calibration: {told}") from error
+    if not found.passed:
+        raise ReticleError(f"{path}: this size calibration failed: {found.reasons[0]}")
+    return found

@@ -47,7 +47,6 @@ def size_calibration(options: Namespace) -> Outcome:
     from processing.calibration.calibration_file import load_calibration
     from processing.runs.overwriting import require_free
     from processing.runs.reticle.size_calibration import (
-        MOST_LEFT,
         TOLERANCE_UM,
         calibrate_sizes,
         save_size_calibration,
@@ -66,12 +65,9 @@ def size_calibration(options: Namespace) -> Outcome:
     save_size_calibration(found, options.out)
     result = {**found.model_dump(mode="json", by_alias=True), "file": str(options.out), "passed": found.passed}
     if found.passed:
-        return Outcome(result, sizes_table(result))
-    result["reason"] = (
-        f"{100 * found.residual:.1f} % of the light is left around the dots, limit {100 * MOST_LEFT:g} %: is the "
-        "reticle in focus, did it move, and are its dots round and opaque?"
-    )
-    return Outcome(result, f"{sizes_table(result)}\n{result['reason']}")
+        return Outcome(result, f"{sizes_table(result)}; measure --sizes {options.out}")
+    result["reason"] = found.reasons[0]
+    return Outcome(result, f"{sizes_table(result)}\n{options.out} failed: {result['reason']}")
 
 
 def sizes_table(result: dict[str, Any]) -> str:
@@ -90,4 +86,4 @@ def sizes_table(result: dict[str, Any]) -> str:
     ]
     heads = ["true [um]", "found [um]", "sd", "difference", "dots", *views]
     light = result["light"] if isinstance(result["light"], str) else f"{result['light']:g} apertures of the lens"
-    return f"{table(heads, rows)}\nlight: {light}; measure --sizes {result['file']}"
+    return f"{table(heads, rows)}\nlight: {light}"

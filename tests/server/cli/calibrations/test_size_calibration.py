@@ -127,3 +127,25 @@ def test_sizes_are_those_of_one_light(
     other.write_text(sizes.read_text().replace('"true_um"', '"truth_um"'))
     assert "other.json: no size calibration: sizes.0.true_um" in refused(capsys, *measure, "--sizes", other)
     assert "nowhere.json" in refused(capsys, *measure, "--sizes", tmp_path / "nowhere.json")
+
+
+def test_sizes_are_for_droplets_in_space(
+    folder: Path, sizes: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    measure = ("measure", folder / "run", "--view", "view2", "-o", tmp_path / "out", "--sizes", sizes)
+    assert refused(capsys, *measure) == "--sizes: needs --calibration"
+
+
+def test_sizes_by_another_calibration_are_told(
+    folder: Path, sizes: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Self-calibration makes another one of the same views, so they are no reason to refuse."""
+    other = tmp_path / "other.json"
+    other.write_text(sizes.read_text().replace('"calibration": "cal-', '"calibration": "cal-of-another-'))
+    measure = ["measure", folder / "run", "--calibration", folder / "calibration.json", "-o", tmp_path / "out"]
+    told_of = {}
+    for file in (sizes, other):
+        assert main([*map(str, measure), "--shots", "7:8", "--sizes", str(file)]) == 2
+        told_of[file] = capsys.readouterr().err
+    assert "its reticle was measured by cal-of-another-" in told_of[other]
+    assert "its reticle" not in told_of[sizes]
