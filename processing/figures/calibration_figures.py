@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from processing.calibration.calibration import Calibration
 from processing.calibration.observation import CalibrationSet, PlaneObservation
 from processing.figures.colours import VIEW_COLOURS
+from processing.figures.spacing import Room, spaced_panels
 from processing.geometry import FloatArray
 
 SECTION_STEPS = 2.6
@@ -40,8 +41,9 @@ def grid_figure(
     """
     columns = min(MAX_COLUMNS, len(images))
     rows = -(-len(images) // columns)
-    figure = Figure(figsize=(5.6 * columns, 5.9 * rows), layout="constrained")
-    panels = figure.subplots(rows, columns, squeeze=False)
+    figure = Figure(figsize=(5.6 * columns, 5.9 * rows))
+    room = Room(left=0.75, right=0.15, bottom=0.55, top=0.7 if title else 0.4, across=0.8, down=0.85)
+    panels = spaced_panels(figure, rows, columns, room)
     for axes, (name, image) in zip(panels.flat, images.items(), strict=False):
         _section(axes, image, planes[name])
         z_mm = planes[name].z_mm
@@ -69,8 +71,9 @@ def error_vectors_figure(calibration_set: CalibrationSet, calibration: Calibrati
     lengths_px = np.concatenate([np.linalg.norm(error, axis=1) for view in errors.values() for error in view])
     typical_px = float(np.quantile(lengths_px, _QUANTILE)) or 1.0
     columns = max(map(len, chosen.values()))
-    figure = Figure(figsize=(3.3 * columns + 0.6, 2.9 * len(chosen) + 0.5), layout="constrained")
-    panels = figure.subplots(len(chosen), columns, squeeze=False)
+    figure = Figure(figsize=(3.3 * columns + 0.6, 2.9 * len(chosen) + 0.5))
+    room = Room(left=0.7, right=0.2, bottom=0.5, top=0.95, across=0.6, down=0.75)
+    panels = spaced_panels(figure, len(chosen), columns, room)
     for row, ((name, planes), colour) in enumerate(zip(chosen.items(), VIEW_COLOURS, strict=False)):
         size_px = calibration_set.views[name].image_size_px
         for column, axes in enumerate(panels[row]):
@@ -80,7 +83,8 @@ def error_vectors_figure(calibration_set: CalibrationSet, calibration: Calibrati
             _arrows(axes, planes[column], errors[name][column], typical_px, size_px, colour)
             axes.set_title(_panel_title(name, planes[column], errors[name][column]), fontsize="medium")
             axes.set(ylabel="row [px]" if column == 0 else "", xlabel="column [px]" if row == len(chosen) - 1 else "")
-    figure.suptitle(f"back-projection errors, mean and largest; the bar at the lower left is {typical_px:.2g} px")
+    told = f"back-projection errors, mean and largest;\nthe bar at the lower left is {typical_px:.2g} px"
+    figure.suptitle(told, fontsize="medium")
     return figure
 
 

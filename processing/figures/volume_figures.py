@@ -1,6 +1,6 @@
 """Figures of volumes and of the images they come from: slices and projections, iso-surfaces (Fig. 4), shadowgraphs."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from skimage.measure import marching_cubes
 
 from processing.figures.colours import FRAME_COLOURS
+from processing.figures.spacing import Room, spaced_panels
 from processing.volume import VoxelGrid
 
 Volume = NDArray[np.float32]
@@ -36,8 +37,9 @@ def slices_figure(volume: Volume, grid: VoxelGrid, title: str = "") -> Figure:
     Figure
         Of matplotlib: ``figure.savefig("slices.png")``.
     """
-    figure = Figure(figsize=(11, 5.8), layout="constrained")
-    panels = figure.subplots(2, 3)
+    figure = Figure(figsize=(11, 5.8))
+    room = Room(left=0.8, right=1.45, bottom=0.5, top=_top_in(title), across=0.85, down=0.75)
+    panels = spaced_panels(figure, 2, 3, room)
     scale = PowerNorm(0.5, vmin=0, vmax=float(np.quantile(volume.max(axis=0), 0.999)) or 1.0)
     for column, axis in enumerate((0, 1, 2)):
         fullest = int(volume.sum(axis=tuple({0, 1, 2} - {axis})).argmax())
@@ -48,7 +50,7 @@ def slices_figure(volume: Volume, grid: VoxelGrid, title: str = "") -> Figure:
         panels[0, column].set_title(f"slice at {label}", fontsize="medium")
         _show(panels[1, column], volume.max(axis=axis), grid, axis, scale)
         panels[1, column].set_title(f"maximum along {'zyx'[axis]}", fontsize="medium")
-    figure.colorbar(picture, ax=panels, label="reconstructed intensity [-]", shrink=0.6)
+    figure.colorbar(picture, cax=figure.add_axes((0.905, 0.2, 0.016, 0.6)), label="reconstructed intensity [-]")
     if title:
         figure.suptitle(title)
     return figure
@@ -96,8 +98,9 @@ def shadowgraph_figure(images: Mapping[str, NDArray[np.generic]], title: str = "
     title : str
         Title of the figure.
     """
-    figure = Figure(figsize=(3.4 * len(images), 2.9), layout="constrained")
-    panels: Sequence[Axes] = np.atleast_1d(figure.subplots(1, len(images))).tolist()
+    figure = Figure(figsize=(3.4 * len(images), 2.9))
+    room = Room(left=0.65, right=0.1, bottom=0.45, top=_top_in(title), across=0.45)
+    (panels,) = spaced_panels(figure, 1, len(images), room)
     for axes, (name, image) in zip(panels, images.items(), strict=True):
         axes.imshow(image, cmap="gray", vmin=0)
         axes.set(title=name, xlabel="column [px]", ylabel="row [px]" if axes is panels[0] else "")
@@ -107,13 +110,20 @@ def shadowgraph_figure(images: Mapping[str, NDArray[np.generic]], title: str = "
     return figure
 
 
+def _top_in(title: str) -> float:
+    """Room in inches for the titles of panels, and of the figure if it has one."""
+    return 0.55 if title else 0.3
+
+
 def _show(axes: Axes, image: NDArray[np.float32], grid: VoxelGrid, axis: int, scale: PowerNorm) -> AxesImage:
     names = [name for name in "zyx" if name != "zyx"[axis]]
     across_mm, down_mm = ({"x": grid.x_mm, "y": grid.y_mm, "z": grid.z_mm}[name] for name in reversed(names))
     half_mm = grid.pitch_mm / 2
     extent = (across_mm[0] - half_mm, across_mm[-1] + half_mm, down_mm[-1] + half_mm, down_mm[0] - half_mm)
     axes.set(xlabel=f"{names[1]} [mm]", ylabel=f"{names[0]} [mm]")
-    return axes.imshow(image, cmap="magma", norm=scale, extent=extent, interpolation="antialiased")
+    picture = axes.imshow(image, cmap="magma", norm=scale, extent=extent, interpolation="antialiased")
+    axes.ticklabel_format(useOffset=False)
+    return picture
 
 
 def _surface(volume: Volume, grid: VoxelGrid, level: float) -> tuple[NDArray[np.float64], NDArray[np.intp]] | None:

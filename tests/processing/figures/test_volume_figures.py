@@ -1,10 +1,11 @@
 """Figures show what they are given, with units on their axes."""
 
 import numpy as np
+import pytest
 
 from processing.figures.volume_figures import isosurface_figure, shadowgraph_figure, slices_figure
 from processing.volume import VoxelGrid
-from tests.support.drawing import drawn
+from tests.support.drawing import collisions, drawn
 
 GRID = VoxelGrid.centred((20, 30, 40), 0.1)
 
@@ -24,6 +25,12 @@ def test_slices_have_the_extent_of_the_grid() -> None:
     assert drawn(figure) > 1000
 
 
+@pytest.mark.parametrize("shape", [(8, 8, 60), (30, 30, 30)])
+def test_slices_stand_apart_whatever_the_volume(shape: tuple[int, int, int]) -> None:
+    volume = 1e-5 * np.random.default_rng(1).random(shape, np.float32)
+    assert collisions(slices_figure(volume, VoxelGrid(shape, (-112.5, 900.0, -130.0), 0.1), "mean")) == []
+
+
 def test_isosurface_of_a_ball_has_its_radius() -> None:
     figure = isosurface_figure({"A": ball(), "B": ball(0.5)}, GRID, level=float(np.exp(-1)))
     surfaces = figure.axes[0].collections
@@ -36,7 +43,10 @@ def test_isosurface_of_an_empty_volume_is_empty() -> None:
     assert len(figure.axes[0].collections) == 0
 
 
-def test_shadowgraphs_of_all_views() -> None:
-    figure = shadowgraph_figure({"view1": np.ones((30, 40)), "view2": np.zeros((30, 40))}, "shot 1")
-    assert [axes.get_title() for axes in figure.axes] == ["view1", "view2"]
-    assert drawn(figure) > 1000
+@pytest.mark.parametrize(("views", "title"), [(1, ""), (4, "shot 1")])
+def test_shadowgraphs_of_all_views(views: int, title: str) -> None:
+    names = [f"view{number}" for number in range(views)]
+    figure = shadowgraph_figure({name: np.ones((1200, 1600), np.uint8) for name in names}, title)
+    assert [axes.get_title() for axes in figure.axes] == names
+    assert figure.axes[-1].get_xlabel() == "column [px]"
+    assert collisions(figure) == []
