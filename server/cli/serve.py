@@ -15,9 +15,9 @@ def add(verbs: Verbs) -> None:
 
 
 def serve(options: Namespace) -> Outcome:
-    """Serve until interrupted; another server that has the port or the data directory is told before all else."""
+    """Serve until interrupted; whoever else has the port, the data directory or the rig is named before all else."""
     from server.rig.config import load_config
-    from server.rig.rig_lock import hold_data_dir
+    from server.rig.rig_lock import hold_data_dir, hold_rig
     from server.web.port import listening
 
     config = load_config(options.config)
@@ -27,7 +27,8 @@ def serve(options: Namespace) -> Outcome:
         progress(
             f"{config.name}: opening all devices; then the page is at http://{address}:{server.port}; Ctrl-C ends it"
         )
-        from server.web.serve import serve_rig
+        with hold_rig(config):  # is asked before the server is loaded, which takes seconds
+            from server.web.serve import serve_rig
 
         serve_rig(config.model_copy(update={"server": server}), port_held)
     return Outcome({})
