@@ -16,10 +16,9 @@ _FIRMNESS = 1e-12
 
 def linearise(mapping: ViewMapping, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Image points (N, 2) of world points (N, 3), and their derivatives (N, 2, 3) in px/mm."""
-    image_px = mapping.project(points_mm)
     step_mm = _STEP_MM
     for _ in range(_ITERATIONS):
-        slopes = _differences(mapping, points_mm, image_px, step_mm)
+        image_px, slopes = _differences(mapping, points_mm, step_mm)
         shown_px = step_mm * float(np.median(np.linalg.norm(slopes, axis=(1, 2)))) if len(slopes) else _STEP_PX
         if not shown_px or _STEP_RANGE_PX[0] < shown_px < _STEP_RANGE_PX[1]:
             break
@@ -27,9 +26,11 @@ def linearise(mapping: ViewMapping, points_mm: FloatArray) -> tuple[FloatArray, 
     return image_px, slopes
 
 
-def _differences(mapping: ViewMapping, points_mm: FloatArray, image_px: FloatArray, step_mm: float) -> FloatArray:
-    ahead_px = [mapping.project(points_mm + step) for step in step_mm * np.eye(3)]
-    return np.stack([(there_px - image_px) / step_mm for there_px in ahead_px], axis=-1)
+def _differences(mapping: ViewMapping, points_mm: FloatArray, step_mm: float) -> tuple[FloatArray, FloatArray]:
+    """Image points and difference quotients, all projected at once: most are asked of a few points only."""
+    steps_mm = step_mm * np.vstack([np.zeros(3), np.eye(3)])
+    here_px, *ahead_px = mapping.project((points_mm + steps_mm[:, None]).reshape(-1, 3)).reshape(4, -1, 2)
+    return here_px, np.stack([(there_px - here_px) / step_mm for there_px in ahead_px], axis=-1)
 
 
 def back_project(
