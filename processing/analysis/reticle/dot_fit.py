@@ -7,6 +7,7 @@ import numpy as np
 
 from processing.analysis.droplets.gaussian_blobs import Image
 from processing.analysis.droplets.shadows.disc_profiles import DiscProfiles
+from processing.analysis.droplets.shadows.shadow_light import BLACK
 from processing.analysis.reticle.elliptic_dots import Ellipse, elliptic_dot
 from processing.geometry import FloatArray
 
@@ -62,11 +63,14 @@ class FittedDots:
         Standard deviation of the blur.
     squares : (N,) array
         Mean squared residual of each dot, relative to its light.
+    greys : (M,) array
+        Share of the light that is left at pixels where dots should be black.
     """
 
     dots: tuple[Dot, ...]
     blur_px: float
     squares: FloatArray
+    greys: FloatArray
 
 
 def fit_dots(image: Image, dots: Sequence[Dot], blur_px: float, profiles: DiscProfiles) -> FittedDots:
@@ -85,7 +89,7 @@ def fit_dots(image: Image, dots: Sequence[Dot], blur_px: float, profiles: DiscPr
     """
     reach_px = profiles.reach * blur_px + AROUND_PX
     places = [_Place.of(image, dot, reach_px, _neighbours(dots, number, reach_px)) for number, dot in enumerate(dots)]
-    found = FittedDots(tuple(dots), blur_px, np.zeros(len(dots)))
+    found = FittedDots(tuple(dots), blur_px, np.zeros(len(dots)), np.zeros(0))
     for _ in range(STEPS):
         before = np.array([dot.ellipse.major_px for dot in found.dots])
         found = _improved(found, places, profiles)
@@ -130,7 +134,8 @@ def _improved(found: FittedDots, places: Sequence[_Place], profiles: DiscProfile
     step = float(np.clip(pull / bend if bend > 0 else 0, -MOST_CHANGE, MOST_CHANGE))
     blur_px = float(np.clip(found.blur_px * (1 + step), LEAST_BLUR_PX, MOST_BLUR_PX))
     dots = tuple(dot.moved(fit.step(step)) for dot, fit in zip(found.dots, fits, strict=True))
-    return replace(found, dots=dots, blur_px=blur_px, squares=np.array([fit.square for fit in fits]))
+    squares, greys = np.array([fit.square for fit in fits]), np.concatenate([fit.greys for fit in fits])
+    return FittedDots(dots, blur_px, squares, greys)
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,6 +147,7 @@ class _Linear:
     bend: float
     pull: float
     square: float
+    greys: FloatArray
 
     @classmethod
     def of(cls, number: int, found: FittedDots, place: _Place, profiles: DiscProfiles) -> "_Linear":
@@ -161,10 +167,9 @@ class _Linear:
         slopes, left = (np.column_stack(changed) - drawn[:, None]) / STEP, place.light - drawn
         own, blurring = slopes[:, :4], slopes[:, 4]
         alone, by_blur = np.linalg.lstsq(own, np.column_stack([left, -blurring]), rcond=None)[0].T
-        beyond = blurring + own @ by_blur
-        return cls(
-            alone, by_blur, float(beyond @ beyond), float(beyond @ left), float(np.mean((left / dot.level) ** 2))
-        )
+        beyond, shares = blurring + own @ by_blur, left / dot.level
+        greys = shares[drawn < BLACK * dot.level]
+        return cls(alone, by_blur, float(beyond @ beyond), float(beyond @ left), float(np.mean(shares**2)), greys)
 
     def step(self, blur_step: float) -> FloatArray:
         """Of radius, column, row and level, with that change of the blur."""

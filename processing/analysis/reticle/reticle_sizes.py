@@ -17,6 +17,7 @@ from processing.analysis.droplets.shadows.light_search import (
     seen_light,
     stated_ratio,
 )
+from processing.analysis.droplets.shadows.shadow_light import BLACK_PIXELS, MOST_LEFT
 from processing.analysis.reticle.dot_fit import Dot, FittedDots, fit_dots
 from processing.analysis.reticle.dots_in_space import PlaneDots, SeenDots, dots_on_plane, ellipses, seen_dots
 from processing.analysis.reticle.size_groups import ReticleError, size_groups
@@ -112,6 +113,7 @@ def measure_reticle(
     reticle = _Reticle(images, mappings, seen, dots_on_plane(mappings, seen, box))
     seen_in = reticle.light() if light == "estimated" else SeenLight(stated_ratio(light), 1.0)
     views = reticle.fitted(seen_in.condenser_ratio)
+    _require_black(np.concatenate([view.greys for view in views]))
     found_um = reticle.diameters_um(views)
     numbers = size_groups(found_um.mean(axis=1), diameters_um)
     groups = tuple(
@@ -127,6 +129,15 @@ def measure_reticle(
         reticle.dots.points_mm.mean(axis=0),
         reticle.dots.normal,
     )
+
+
+def _require_black(greys: FloatArray) -> None:
+    if len(greys) >= BLACK_PIXELS and (share := float(np.median(greys))) > MOST_LEFT:
+        raise ReticleError(
+            f"{100 * share:.0f} % of the light is left where dots should be black, limit {100 * MOST_LEFT:.0f} %: is a "
+            "dark image missing (the camera's black level), are grey values not in proportion to light (gamma), are "
+            "the dots not opaque, or is the light that was stated another one? Diameters are wrong then"
+        )
 
 
 def _group(true_um: float, found_um: FloatArray) -> DotGroup:

@@ -59,7 +59,12 @@ def size_groups(found_um: FloatArray, diameters_um: Sequence[float]) -> NDArray[
 
 
 def _require_stated(seen_um: FloatArray, diameters_um: Sequence[float]) -> None:
-    seen = ", ".join(f"{one:.0f}" for one in seen_um) or "none"
+    if not len(seen_um):
+        raise ReticleError(
+            f"no {LEAST_DOTS} dots of one size are seen in all views: is this the run of a reticle, is it wholly in "
+            "every view, and is the calibration that of these views?"
+        )
+    seen = ", ".join(f"{one:.0f}" for one in seen_um)
     if len(seen_um) != len(diameters_um):
         raise ReticleError(
             f"{len(diameters_um)} diameters are stated, and dots of {len(seen_um)} sizes are seen, {LEAST_DOTS} of "

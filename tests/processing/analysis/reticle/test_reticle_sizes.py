@@ -44,3 +44,11 @@ def test_dots_that_views_do_not_share_are_refused() -> None:
     scene = reticle_scene(0.8, diameters_um=DIAMETERS_UM, columns=4)
     with pytest.raises(ReticleError, match="dots lie on one plane in all views, which see 8, 8, 8, 0"):
         measure_reticle([*scene.images[:3], np.ones_like(scene.images[3])], scene.cameras, BOX, DIAMETERS_UM)
+
+
+def test_dots_that_are_not_black_are_refused() -> None:
+    """Without its dark image, or of dots that let a tenth through, diameters would be 6 um too small."""
+    scene = reticle_scene(0.8, diameters_um=DIAMETERS_UM, columns=4)
+    images = [np.float32(0.9) * image + np.float32(0.1) for image in scene.images]
+    with pytest.raises(ReticleError, match="7 % of the light is left where dots should be black, limit 4 %"):
+        measure_reticle(images, scene.cameras, BOX, DIAMETERS_UM, light=0.8)
