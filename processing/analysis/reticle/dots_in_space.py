@@ -18,6 +18,7 @@ from processing.geometry import FloatArray, ViewMapping
 LEAST_DEPTH, NOISES = 0.08, 8.0
 """A dot is darker by so much of the light, and by so many standard deviations of the noise of a pixel."""
 PAD_PX = 3
+LEAST_VIEWS = 2
 TOLERANCE_PX = 1.5
 """A dot of one view may lie so far beside those of the others."""
 FLAT_PX = 3.0
@@ -124,8 +125,10 @@ def dots_on_plane(mappings: Sequence[ViewMapping], seen: Sequence[SeenDots], box
     Raises
     ------
     ReticleError
-        Too few dots of all views lie on one plane.
+        Too few dots of all views lie on one plane, or there is one view alone.
     """
+    if len(seen) < LEAST_VIEWS:
+        raise ReticleError(f"a reticle is measured by {LEAST_VIEWS} views at least: they tell its plane; here is one")
     matches = match_droplets(mappings, [dots.middles_px for dots in seen], box, TOLERANCE_PX)
     if len(matches) < LEAST_DOTS:
         raise ReticleError(_too_few(seen, len(matches)))

@@ -52,3 +52,9 @@ def test_dots_that_are_not_black_are_refused() -> None:
     images = [np.float32(0.9) * image + np.float32(0.1) for image in scene.images]
     with pytest.raises(ReticleError, match="7 % of the light is left where dots should be black, limit 4 %"):
         measure_reticle(images, scene.cameras, BOX, DIAMETERS_UM, light=0.8)
+
+
+def test_one_view_tells_no_plane() -> None:
+    scene = reticle_scene(0.8, diameters_um=DIAMETERS_UM, columns=4)
+    with pytest.raises(ReticleError, match="2 views at least"):
+        measure_reticle(scene.images[:1], scene.cameras[:1], BOX, DIAMETERS_UM, light=0.8)
