@@ -41,7 +41,7 @@ static bool read_record(uint32_t address, uint32_t words[STORED_WORDS])
 static uint32_t find_blank(uint32_t words[STORED_WORDS])
 {
     uint32_t address = FIRST;
-    for (int looks = 0; looks < LOOKS && address < END; looks++) {
+    for (int looks = 0; looks < (int)LOOKS && address < END; looks++) {
         if (read_record(address, words)) {
             address += RECORD_BYTES;
             looks = -1;
