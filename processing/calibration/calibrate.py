@@ -32,9 +32,11 @@ from processing.calibration.fit.ray_check import check_rays, rays_miss_px
 from processing.calibration.fit.scale_check import check_scales
 from processing.calibration.observation import CalibrationSet, PlaneObservation, ViewObservations, stacked
 from processing.calibration.verdict import Doubt
-from processing.geometry import FloatArray, ViewMapping
+from processing.geometry import FloatArray, PinholeCamera, ViewMapping
 from processing.progress import Counted, in_silence
 
+MOST_HOLDOUT_PX, MOST_STRETCH = 5.0, 4.0
+"""Points that a camera misses by more, while its pixels are so far from square, are those of no camera."""
 PLACEHOLDERS = 3
 """So many wrong points on one spot of the image stand for points that were not seen."""
 
@@ -119,6 +121,14 @@ def _placed_view(name: str, seen: ViewObservations, wanted: Model | None) -> Vie
     return replace(chosen, candidates_holdout_error_px=errors_by_model_px)
 
 
+def _is_no_camera(view: ViewCalibration) -> bool:
+    """Whether points fit so badly, by so strange a camera, that they are those of another target."""
+    if not isinstance(view.mapping, PinholeCamera) or view.holdout_error_px < MOST_HOLDOUT_PX:
+        return False
+    height_to_width = float(view.mapping.camera_matrix[0, 0] / view.mapping.camera_matrix[1, 1])
+    return not 1 / MOST_STRETCH < height_to_width < MOST_STRETCH
+
+
 def _fitted_view(seen: ViewObservations, model: Model) -> ViewCalibration:
     mapping, used = fit_mapping(seen.planes, seen.image_size_px, model)
     masks = [_counted(mask) for mask in _by_plane(seen.planes, used)]
@@ -129,6 +139,8 @@ def _fitted_view(seen: ViewObservations, model: Model) -> ViewCalibration:
     errors = [errors_px(mapping, plane) for plane in planes]
     n_rejected = len(used) - sum(len(plane) for plane in planes)
     summary = _summary(mapping, model, planes, errors, holdout_px, n_rejected, extent_mm=outline_mm(planes))
+    if _is_no_camera(summary):
+        raise CalibrationError(UNFIT)
     return replace(
         summary,
         covariance=parameter_covariance(mapping, points_mm, image_px, model),
