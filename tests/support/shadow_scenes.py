@@ -112,8 +112,8 @@ class Shadows(Protocol):
         """One per image."""
 
 
-def write_shadow_run(run_dir: Path, scene: Shadows, *, background: bool = True) -> Path:
-    """A shot of one exposure before a light that falls off to one side, with its references."""
+def write_shadow_run(run_dir: Path, scene: Shadows, *further: Shadows, background: bool = True) -> Path:
+    """Shots of one exposure before a light that falls off to one side, with its references."""
     names = [f"view{number}" for number in range(1, 5)]
     rows, columns = scene.images[0].shape
     light = np.repeat(np.linspace(LIGHT, 0.7 * LIGHT, columns)[None], rows, axis=0)
@@ -126,18 +126,22 @@ def write_shadow_run(run_dir: Path, scene: Shadows, *, background: bool = True) 
         frames_per_shot=1,
         polarity="shadow",
     )
-    views = {}
-    for name, image in zip(names, scene.images, strict=True):
-        grey = np.clip(np.rint(DARK + light * image), 0, full_scale).astype(np.uint16)
-        grey[UNKNOWN] = full_scale
-        views[name] = DoubleFrame(grey, None, recorded, recorded)
+
+    def views(seen: Shadows) -> dict[str, DoubleFrame]:
+        greys = [np.clip(np.rint(DARK + light * image), 0, full_scale).astype(np.uint16) for image in seen.images]
+        for grey in greys:
+            grey[UNKNOWN] = full_scale
+        frames = (DoubleFrame(grey, None, recorded, recorded) for grey in greys)
+        return dict(zip(names, frames, strict=True))
+
     lit = (DARK + light).astype(np.float32)[None]
     lit[:, UNKNOWN] = full_scale
     with RunWriter(run_dir, header) as writer:
         if background:
             dark = np.full((1, rows, columns), DARK, np.float32)
             writer.write_references(dict.fromkeys(names, dark), dict.fromkeys(names, lit))
-        writer.write_shot(Shot(0, ImageKey.SAMPLE, views))
+        for number, seen in enumerate((scene, *further)):
+            writer.write_shot(Shot(number, ImageKey.SAMPLE, views(seen)))
         writer.finish("completed")
     return run_dir
 

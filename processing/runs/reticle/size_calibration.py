@@ -14,6 +14,7 @@ from processing.analysis.droplets.shadows.light_search import Light, light_doubt
 from processing.analysis.droplets.size_correction import SizeRow
 from processing.analysis.reticle.reticle_sizes import ReticleSizes, measure_reticle
 from processing.analysis.reticle.size_groups import ReticleError
+from processing.analysis.reticle.stillness import require_still
 from processing.calibration.calibration import Calibration
 from processing.calibration.droplets.droplet_matching import Box
 from processing.geometry import FloatArray
@@ -148,9 +149,10 @@ def calibrate_sizes(
 def _mean_transmissions(
     run: RunReader, shots: Sequence[int], calibration: Calibration, follow: Callable[[Sequence[int]], Iterable[int]]
 ) -> tuple[list[Intensity], list[Intensity]]:
-    """Of all exposures; what is unknown in one is unknown."""
+    """Of all exposures, which must show the same; what is unknown in one is unknown."""
     references = read_references(run)
     require_backgrounds(run, references)
+    first: list[Intensity] = []
     sums: list[Intensity] = []
     trusts: list[Intensity] = []
     number = 0
@@ -159,6 +161,9 @@ def _mean_transmissions(
         require_match(run.run_dir.name, shot, calibration)
         for frame in frame_names(run):
             images, trust = shadow_images(run, shot, frame, references)
+            first = first or images
+            for view, before, image, known in zip(run.header.views, first, images, trust, strict=True):
+                require_still(before, image, known > 0, f"{run.run_dir.name}, shot {index}, {view}")
             sums = [a + b for a, b in zip(sums, images, strict=True)] if sums else images
             trusts = [np.minimum(a, b) for a, b in zip(trusts, trust, strict=True)] if trusts else trust
             number += 1

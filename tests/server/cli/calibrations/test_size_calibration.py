@@ -1,6 +1,7 @@
 """``tomoshadow size-calibration`` and ``measure --sizes``: from the run of a reticle to corrected diameters."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -149,3 +150,16 @@ def test_sizes_by_another_calibration_are_told(
         told_of[file] = capsys.readouterr().err
     assert "its reticle was measured by cal-of-another-" in told_of[other]
     assert "its reticle" not in told_of[sizes]
+
+
+def test_a_reticle_that_moved_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """In the mean of both shots its dots are 5 um too small, and little light is left around them."""
+    scene = reticle_scene(0.8, diameters_um=DIAMETERS_UM, columns=4)
+    moved = replace(scene, images=[np.roll(image, 2, axis=1) for image in scene.images])
+    write_shadow_run(tmp_path / "run", scene, moved)
+    write_shadow_calibration(tmp_path / "calibration.json", scene)
+    out = tmp_path / "sizes.json"
+    complaint = refused(capsys, *command(tmp_path, out, "--light", 0.8))
+    assert complaint.startswith("run, shot 1, view1: its image lies about 1.")
+    assert "--shots" in complaint
+    assert not out.exists()
