@@ -20,7 +20,7 @@ from processing.analysis.droplets.shadows.light_search import (
 from processing.analysis.droplets.shadows.shadow_light import BLACK_PIXELS, MOST_LEFT
 from processing.analysis.reticle.dot_fit import Dot, FittedDots, fit_dots
 from processing.analysis.reticle.dots_in_space import PlaneDots, SeenDots, dots_on_plane, ellipses, seen_dots
-from processing.analysis.reticle.size_groups import ReticleError, size_groups
+from processing.analysis.reticle.size_groups import IN_ANY_LIGHT, IN_ITS_LIGHT, ReticleError, size_groups
 from processing.calibration.droplets.droplet_matching import Box
 from processing.geometry import FloatArray, ViewMapping
 
@@ -115,7 +115,8 @@ def measure_reticle(
     views = reticle.fitted(seen_in.condenser_ratio)
     _require_black(np.concatenate([view.greys for view in views]))
     found_um = reticle.diameters_um(views)
-    numbers = size_groups(found_um.mean(axis=1), diameters_um)
+    most = IN_ANY_LIGHT if seen_in.condenser_ratio is None else IN_ITS_LIGHT
+    numbers = size_groups(found_um.mean(axis=1), diameters_um, most)
     groups = tuple(
         _group(true_um, found_um[numbers == number]) for number, true_um in enumerate(map(float, diameters_um))
     )

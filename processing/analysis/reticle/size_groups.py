@@ -14,15 +14,18 @@ LEAST_RATIO = 1.08
 """Of two diameters: dots of closer ones could not be told apart."""
 GAP_SHARE = 0.4
 """Of the least step between two diameters, as logarithms: a wider gap parts two sizes."""
-MOST_SHARE, MOST_UM = 0.2, 12.0
-"""What a correction may be, of a diameter and beside it; more, and the diameters are those of another reticle."""
+IN_ANY_LIGHT, IN_ITS_LIGHT = (12.0, 0.2), (4.0, 0.03)
+"""What a correction may be, in um and beside it of a diameter, behind a Gaussian blur and in a light that shows; more,
+and the diameters are those of another reticle."""
 
 
 class ReticleError(BadInput):
     """Images do not show the reticle that was described; the text says what they show."""
 
 
-def size_groups(found_um: FloatArray, diameters_um: Sequence[float]) -> NDArray[np.intp]:
+def size_groups(
+    found_um: FloatArray, diameters_um: Sequence[float], most: tuple[float, float] = IN_ANY_LIGHT
+) -> NDArray[np.intp]:
     """Number of the stated diameter (N,) of every dot, -1 of dust.
 
     Dots are sorted by size. As many sizes must be seen as are stated: which of them is missing would be a guess.
@@ -33,6 +36,8 @@ def size_groups(found_um: FloatArray, diameters_um: Sequence[float]) -> NDArray[
         Diameters as they are seen, which may all be too large.
     diameters_um : sequence of float
         As the maker states them, increasing.
+    most : float, float
+        What a correction may be, in um and of a diameter.
 
     Raises
     ------
@@ -51,14 +56,14 @@ def size_groups(found_um: FloatArray, diameters_um: Sequence[float]) -> NDArray[
     sizes, counts = np.unique(cluster, return_counts=True)
     kept = sizes[counts >= LEAST_DOTS]
     medians_um = np.array([np.median(found_um[order][cluster == size]) for size in kept])
-    _require_stated(medians_um, diameters_um)
+    _require_stated(medians_um, diameters_um, most)
     groups = np.full(len(found_um), -1, np.intp)
     for number, size in enumerate(kept):
         groups[order[cluster == size]] = number
     return groups
 
 
-def _require_stated(seen_um: FloatArray, diameters_um: Sequence[float]) -> None:
+def _require_stated(seen_um: FloatArray, diameters_um: Sequence[float], most: tuple[float, float]) -> None:
     if not len(seen_um):
         raise ReticleError(
             f"no {LEAST_DOTS} dots of one size are seen in all views: is this the run of a reticle, is it wholly in "
@@ -72,7 +77,7 @@ def _require_stated(seen_um: FloatArray, diameters_um: Sequence[float]) -> None:
             "--diameters"
         )
     for found_um, true_um in zip(seen_um.tolist(), diameters_um, strict=True):
-        if abs(found_um - true_um) > MOST_UM + MOST_SHARE * true_um:
+        if abs(found_um - true_um) > most[0] + most[1] * true_um:
             raise ReticleError(
                 f"dots of {true_um:g} um look as if they had {found_um:.0f} um: are these the diameters of this "
                 f"reticle (sizes that are seen: about {seen} um), and is its calibration that of these views?"

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from processing.analysis.reticle.size_groups import ReticleError, size_groups
+from processing.analysis.reticle.size_groups import IN_ITS_LIGHT, ReticleError, size_groups
 
 TRUE_UM = (20.0, 50.0, 100.0)
 
@@ -31,6 +31,13 @@ def test_another_number_of_sizes_is_refused_with_those_that_are_seen(sizes_um: t
 def test_radii_are_no_diameters() -> None:
     with pytest.raises(ReticleError, match="20 um look as if they had 40 um"):
         size_groups(seen(40, 100, 200), (20.0, 50.0, 100.0))
+
+
+def test_in_its_own_light_a_dot_looks_as_large_as_it_is() -> None:
+    """Diameters that differ by 5 um are those of another reticle, unless the light is unknown."""
+    with pytest.raises(ReticleError, match="25 um look as if they had 30 um"):
+        size_groups(seen(30, 110), (25.0, 110.0), IN_ITS_LIGHT)
+    assert set(size_groups(seen(30, 110), (25.0, 110.0))) == {0, 1}
 
 
 def test_diameters_that_nobody_could_tell_apart_are_refused() -> None:
