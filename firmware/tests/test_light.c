@@ -143,6 +143,18 @@ static void test_it_never_meets_the_set_points_of_pulses(void)
     CHECK(light_of(100) == ERROR_NONE);
 }
 
+static void test_it_waits_anew_after_every_train(void)
+{
+    boot();
+    for (int train = 0; train < 3; train++) {
+        load_and_arm();
+        safety_off(&generator);
+        CHECK(light_of(100) == ERROR_EARLY);
+        wait_us(SETTLE_MS * 1000u);
+    }
+    CHECK(light_of(100) == ERROR_NONE);
+}
+
 static void test_it_waits_for_the_period_of_the_last_shot(void)
 {
     boot();
@@ -214,6 +226,7 @@ int main(void)
     test_every_stop_ends_it();
     test_it_needs_closed_stops_and_a_safe_generator();
     test_it_never_meets_the_set_points_of_pulses();
+    test_it_waits_anew_after_every_train();
     test_it_waits_for_the_period_of_the_last_shot();
     test_a_train_that_is_not_over_is_not_cut_off();
     test_a_shot_after_it_waits_as_after_a_start();

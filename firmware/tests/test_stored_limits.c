@@ -132,6 +132,19 @@ static void test_a_start_waits_as_long_as_the_stored_duty_demands(void)
     CHECK(generator.not_before_us == fake.now_us + 40000);
 }
 
+static void test_a_store_does_not_shorten_the_wait_after_a_shot(void)
+{
+    store();
+    fake.now_us += 2 * LONGEST_PERIOD_US;
+    CHECK(!safety_tighten(&generator, 0, &(struct channel_limits){UINT32_MAX, 1, UINT32_MAX}));
+    arm();
+    CHECK(!shooting_fire(&generator));
+    safety_off(&generator);
+    const uint64_t not_before_us = generator.not_before_us;
+    CHECK(!safety_store_limits(&generator, KEPT));
+    CHECK(generator.not_before_us == not_before_us);
+}
+
 /* The sum of such a record is right: that of a firmware with other limits. */
 static void test_limits_beyond_the_absolute_ones_are_damaged(void)
 {
@@ -237,6 +250,7 @@ int main(void)
     test_nothing_is_stored_while_there_can_be_light();
     test_a_loaded_train_does_not_survive_other_limits();
     test_a_start_waits_as_long_as_the_stored_duty_demands();
+    test_a_store_does_not_shorten_the_wait_after_a_shot();
     test_limits_beyond_the_absolute_ones_are_damaged();
     test_limits_that_are_stored_already_need_no_room();
     test_a_flipped_bit_is_no_light_until_others_are_stored();

@@ -38,6 +38,7 @@ def test_a_crystal_that_changes_while_armed_trips_and_stays_a_fault(board: Board
     assert lights_within(board, 100) == 0
     assert board.pico.set_points_ma() == (0, 0, 0, 0)
     board.pico.crystal.change_speed(1)
+    board.pico.run_ms(2 * LOOK_MS)
     status = board.ask(Command.STATUS)
     assert (State(status.number("state")), Fault(status.number("faults"))) == (State.FAULT, Fault.CLOCK)
     assert board.ask(Command.CLEAR).error is ErrorNumber.HARDWARE

@@ -69,7 +69,8 @@ def write_spray(job: dict[str, Any], should_stop: Callable[[], bool]) -> dict[st
     z, y, x = np.meshgrid(grid.z_mm, grid.y_mm, grid.x_mm, indexing="ij")
     radius = np.hypot(x, z)
     volume = np.exp(-((radius - 0.35 * (y + 6)) ** 2) / 0.3) * (0.6 + 0.4 * np.sin(9 * np.arctan2(z, x) + 2 * y))
-    calibration = {"calibration": "cal", "calibration_file": Path(job["calibration_file"]).name}
+    file = Path(job["calibration_file"])
+    calibration = {"calibration": json.loads(file.read_text())["id"], "calibration_file": file.name}
     record = {"run": "x", **calibration, "settings": json.dumps(job["settings"])}
     (results_dir / "settings.json").write_text(json.dumps(record))
     files = []
