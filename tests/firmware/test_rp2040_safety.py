@@ -213,7 +213,8 @@ def test_an_interlock_that_opens_at_any_moment_of_arming_leaves_the_outputs_cut(
 def test_an_interlock_that_opens_just_before_interrupts_are_masked_cuts_the_outputs(board: Board) -> None:
     """Whether the outputs are still wanted is asked with interrupts masked; in no cycle before can it be too late."""
     given = cycles_until_live(board)
-    before_live = range(given - 6 * LOADING_CYCLES, given - LOADING_CYCLES)
+    live = while_arming(board, range(given - LOADING_CYCLES, given + 1), ARMING_CYCLES, can_light)[0]
+    before_live = range(live - 6 * LOADING_CYCLES, live)
     masked = while_arming(board, before_live, ARMING_CYCLES, lambda board: not board.pico.interrupts_masked)[-1]
     for moment in range(masked - 16, masked + 2):
         watched = range(given - LOADING_CYCLES, given + 2 * LOADING_CYCLES, LOOK_CYCLES)
