@@ -23,6 +23,8 @@ from scipy.special import j0, j1
 FloatArray = NDArray[np.float64]
 CUT_PER_AIRY = 1.22
 """Spatial frequency, per Airy disk, at the edge of the pupil: NA / lambda."""
+CORE_SIGMA = 0.42 / 2.44
+"""Sigma of the Gaussian with the core of the Airy pattern, in Airy disks."""
 SIZE, PER_AIRY = 128, 6
 """Field of one image, 21 Airy disks; squared fields hold no frequency above twice the cut."""
 SOURCE_RINGS = 8

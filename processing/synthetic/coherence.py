@@ -18,9 +18,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.special import chndtr
 
-from processing.coherent_light import MOST_RATIO, blurred, circles, waves
+from processing.coherent_light import CORE_SIGMA, MOST_RATIO, blurred, circles, waves
 from processing.synthetic.stamping import Discs, FloatArray, FloatImage, stamp_discs
-from processing.synthetic.view_optics import CORE_SIGMA
 
 REACH_AIRY = 3.0
 """A profile ends so many Airy disks beyond the edge of its disc."""

@@ -4,11 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from processing.coherent_light import CORE_SIGMA
 from processing.optics import GREEN_UM, airy_diameter_um
 from processing.synthetic.stamping import FloatArray
 
-CORE_SIGMA = 0.42 / 2.44
-"""Sigma of the Gaussian with the core of the Airy pattern, relative to d_A."""
 PIXEL_VARIANCE_PX2 = 1 / 12
 """Variance of a pixel of full fill factor."""
 

@@ -5,14 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from processing.coherent_light import disc_image
+from processing.coherent_light import CORE_SIGMA, disc_image
 from processing.synthetic.coherence import coherent_profiles, with_coherence
 from processing.synthetic.paper_rig import paper_cameras, paper_optics
 from processing.synthetic.rendering import image_scale_px_per_mm, render_transmittance
 from processing.synthetic.spray import Spray
 from processing.synthetic.stamping import Discs, FloatArray
 from processing.synthetic.union import blurred_union
-from processing.synthetic.view_optics import CORE_SIGMA
 from tests.support.abbe import PER_AIRY, SIZE, abbe
 
 AIRY_UM = 65.0

@@ -9,11 +9,9 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.special import j1
 
-from processing.coherent_light import blurred, circles, waves
+from processing.coherent_light import CORE_SIGMA, blurred, circles, waves
 from processing.geometry import FloatArray
 
-CORE_SIGMA = 0.42 / 2.44
-"""Sigma of the Gaussian with the core of the Airy pattern, in Airy disks."""
 CORE_SHARE = 0.94
 """Of the blur that is diffraction: of lenses whose Airy disk is four to five pixels."""
 BLURS_PER_AIRY = CORE_SHARE / CORE_SIGMA

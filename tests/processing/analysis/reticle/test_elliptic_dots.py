@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from processing.analysis.droplets.shadows.coherent_discs import BLURS_PER_AIRY, CORE_SHARE, CORE_SIGMA
+from processing.analysis.droplets.shadows.coherent_discs import BLURS_PER_AIRY
 from processing.analysis.droplets.shadows.disc_profiles import disc_profiles
 from processing.analysis.reticle.elliptic_dots import Ellipse, elliptic_dot
+from processing.coherent_light import CORE_SIGMA
 from tests.support.reticle_scenes import AIRY_PX, PER_AIRY, SIZE, ellipse_image
 
 PLACES = (np.arange(SIZE) - SIZE // 2) / PER_AIRY
@@ -45,5 +46,5 @@ def test_a_dot_at_45_degrees_is_as_large_as_it_is(ratio: float, diameter_airy: f
 
     major, width, level = least_squares(left, [0.9 * radius, blur, 1.0]).x
     assert major == pytest.approx(radius, rel=0.02)
-    assert width == pytest.approx(np.hypot(CORE_SIGMA * CORE_SHARE / CORE_SHARE, 0.29 / AIRY_PX), rel=0.08)
+    assert width == pytest.approx(np.hypot(CORE_SIGMA, 0.29 / AIRY_PX), rel=0.08)
     assert level == pytest.approx(1, abs=0.02)

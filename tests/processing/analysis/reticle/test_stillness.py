@@ -6,7 +6,7 @@ from scipy.ndimage import gaussian_filter, shift
 
 from processing.analysis.droplets.gaussian_blobs import Image
 from processing.analysis.reticle.size_groups import ReticleError
-from processing.analysis.reticle.stillness import require_still
+from processing.analysis.reticle.stillness import require_still, shift_px
 
 
 def exposure(moved_px: tuple[float, float], seed: int) -> Image:
@@ -24,7 +24,9 @@ KNOWN = np.broadcast_to(np.arange(90)[:, None] >= 6, (90, 120))
 
 @pytest.mark.parametrize("moved_px", [(0, 0), (0.3, 0), (0.1, -0.3)])
 def test_noise_is_no_motion(moved_px: tuple[float, float]) -> None:
-    require_still(exposure((0, 0), 0), exposure(moved_px, 1), KNOWN, "shot 1, view1")
+    first, image = exposure((0, 0), 0), exposure(moved_px, 1)
+    np.testing.assert_allclose(shift_px(first, image, KNOWN), moved_px, atol=0.1)
+    require_still(first, image, KNOWN, "shot 1, view1")
 
 
 @pytest.mark.parametrize("moved_px", [(0.7, 0), (0, -1), (2, 1), (0, 5)])

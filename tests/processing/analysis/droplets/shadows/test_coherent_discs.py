@@ -5,9 +5,9 @@ import pytest
 from scipy.ndimage import gaussian_filter
 from scipy.special import j1
 
-from processing.analysis.droplets.shadows.coherent_discs import BLURS_PER_AIRY, CORE_SHARE, CORE_SIGMA, coherent_discs
+from processing.analysis.droplets.shadows.coherent_discs import BLURS_PER_AIRY, CORE_SHARE, coherent_discs
 from processing.analysis.droplets.shadows.disc_profiles import disc_profiles
-from processing.coherent_light import circles, waves
+from processing.coherent_light import CORE_SIGMA, circles, waves
 from tests.support.abbe import PER_AIRY, SIZE, abbe
 
 STEP = 1e-3
