@@ -1,6 +1,6 @@
 """``tomoshadow study sizes``: droplets and their sizes in shadow images, where the truth is known."""
 
-from argparse import Namespace
+from argparse import ArgumentTypeError, Namespace
 from dataclasses import replace
 from typing import Any
 
@@ -27,10 +27,17 @@ def add_sizes(studies: Verbs) -> None:
     parser.add_argument("--median", type=positive, metavar="UM", help="of the diameters")
     parser.add_argument("--noise", type=positive, metavar="PERCENT", help="of the background")
     parser.add_argument("--calibration-error", type=positive, metavar="PX", help="of every view")
-    parser.add_argument(
-        "--condenser-ratio", type=positive, metavar="RATIO", help="aperture of the light over the lens's"
-    )
+    parser.add_argument("--condenser-ratio", type=_ratio, metavar="RATIO", help="aperture of the light over the lens's")
     parser.add_argument("--twins", type=seed, default=0, help="simulated twins per shot that tell ghosts")
+
+
+def _ratio(text: str) -> float:
+    """A light that can be simulated."""
+    from processing.coherent_light import MOST_RATIO
+
+    if (ratio := positive(text)) > MOST_RATIO:
+        raise ArgumentTypeError(f"{text} must be at most {MOST_RATIO:g}, which is light from all directions")
+    return ratio
 
 
 def sizes(options: Namespace) -> dict[str, Any]:

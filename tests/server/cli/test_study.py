@@ -119,3 +119,9 @@ def test_help_states_the_papers_iterations(capsys: pytest.CaptureFixture[str]) -
     with pytest.raises(SystemExit):
         main(["study", "density", "--help"])
     assert f"of smart and mart without -N, {PAPER_ITERATIONS} by default" in capsys.readouterr().out
+
+
+def test_light_that_cannot_be_simulated_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        main(["study", "sizes", "--condenser-ratio", "9", "-o", "nowhere"])
+    assert "9 must be at most 8, which is light from all directions" in capsys.readouterr().err
