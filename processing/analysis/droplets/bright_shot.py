@@ -103,10 +103,11 @@ def measure_bright(
     fit = find_bright(shot, search, before_round)
     residuals = shot.residuals(fit.optics, fit.blobs)
     left = np.array([noise_of(residual) for residual in residuals])
-    ratio = rms(residuals) / rms_of(np.maximum(left, MODEL_SHARE * fit.scale * fit.optics.gains))
+    unit = rms_of(np.maximum(left, MODEL_SHARE * fit.scale * fit.optics.gains))
+    ratio, bare = rms(residuals) / unit, rms(shot.residuals(fit.optics, Blobs.none())) / unit
     views = _seen(fit.optics, noises, left, search.names)
     beside_px = {name: float(np.hypot(view.shift_u_px, view.shift_v_px)) for name, view in views.items()}
-    verdict, reasons = judged(beside_px, ratio, LIMITS)
+    verdict, reasons = judged(beside_px, ratio, bare, LIMITS)
     if verdict is ShotVerdict.REFUSED:
         return MeasuredExposure(Droplets.none(), views, ratio, verdict, reasons)
     droplets = _droplets(shot, fit, residuals, search, left, noises).within(search.grid)

@@ -20,6 +20,8 @@ MANY_GHOSTS = 0.1
 """Share in a twin from which on a shot is doubtful: ghosts can explain images as well as the truth does."""
 MOST_HIDDEN = 0.5
 """Share of the volume that may be hidden."""
+EVEN, MOSTLY = 1.05, 0.9
+"""Where more than so many times the noise is left, so large a share of what views see must be explained by droplets."""
 LIT_SIGMAS, LIT_PIXELS = 6.0, 4
 """A view that has fewer pixels above so many standard deviations of its noise sees nothing."""
 TWIN_MOVE_VOXEL = 15.0
@@ -145,10 +147,21 @@ class RatioLimits:
     refused: float
 
 
-def judged(beside_px: Mapping[str, float], ratio: float, limits: RatioLimits) -> tuple[ShotVerdict, tuple[str, ...]]:
+def judged(
+    beside_px: Mapping[str, float], ratio: float, bare: float, limits: RatioLimits
+) -> tuple[ShotVerdict, tuple[str, ...]]:
     """Verdict and reasons, by residual over noise and by how far views lie beside their calibration.
 
     Where droplets do not explain the images, how far these lie beside is no more than a guess, and not told.
+
+    Parameters
+    ----------
+    beside_px : dict of name to float
+        How far views lie beside their calibration.
+    ratio, bare : float
+        Residual over noise, with all droplets and without any.
+    limits : RatioLimits
+        Of the ratio.
     """
     if ratio >= limits.refused:
         reason = (
@@ -169,6 +182,13 @@ def judged(beside_px: Mapping[str, float], ratio: float, limits: RatioLimits) ->
         reason = (
             f"droplets explain the images to {ratio:.2f} times the noise, more than {limits.trusted}: how many are "
             "ghosts cannot be told"
+        )
+        return ShotVerdict.DOUBTFUL, (reason,)
+    if ratio >= EVEN and (share := (bare**2 - ratio**2) / (bare**2 - 1)) < MOSTLY:
+        reason = (
+            f"droplets explain {100 * max(0.0, share):.0f} % of what views see beyond their noise, limit "
+            f"{100 * MOSTLY:.0f} %: the rest is too small or too faint to be told as droplets, and missing in number "
+            "density and mean sizes"
         )
         return ShotVerdict.DOUBTFUL, (reason,)
     return ShotVerdict.GOOD, ()

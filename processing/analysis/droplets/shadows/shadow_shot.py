@@ -159,11 +159,13 @@ def _told(shot: Transmissions, fit: ShadowFit, search: DropletSearch, sizes: Siz
     shadows, into_grid = _recorded(shot).drawn(fit.optics, fit.discs), shot.cut(search.pixels_into_grid())
     seen = seen_by(shot, fit, shadows.transmissions)
     judged_weights = tuple(map(np.multiply, seen.weights, into_grid))
-    ratio = rms_over_noise(replace(seen, weights=judged_weights), shadows.transmissions)
+    asked = replace(seen, weights=judged_weights)
+    ratio = rms_over_noise(asked, shadows.transmissions)
+    bare = rms_over_noise(asked, [np.ones_like(image) for image in seen.images])
     views = _seen(fit, search, _masked_shares(fit, into_grid))
     beside_px = {name: float(np.hypot(view.shift_u_px, view.shift_v_px)) for name, view in views.items()}
     limits = COHERENT_LIMITS if (fit.optics.condenser_ratio or FRINGELESS) < FRINGELESS else LIMITS
-    verdict, reasons = judged(beside_px, ratio, limits)
+    verdict, reasons = judged(beside_px, ratio, bare, limits)
     if doubts := (*grey(seen, shadows, judged_weights), *light_doubts(fit.light_share, len(fit.discs))):
         verdict, reasons = ShotVerdict.DOUBTFUL if verdict is ShotVerdict.GOOD else verdict, (*reasons, *doubts)
     if verdict is ShotVerdict.REFUSED:

@@ -174,8 +174,8 @@ def test_voxels_must_be_about_as_wide_as_pixels(truth: BrightScene) -> None:
 
 def test_where_droplets_do_not_explain_the_images_nobody_is_sent_to_calibrate_again() -> None:
     beside_px, limits = {"view1": 0.6}, RatioLimits(trusted=1.05, refused=1.5)
-    assert ["calibrate again" in reason for reason in judged(beside_px, 1.49, limits)[1]] == [True]
-    verdict, reasons = judged(beside_px, 1.5, limits)
+    assert ["calibrate again" in reason for reason in judged(beside_px, 1.49, 9.0, limits)[1]] == [True]
+    verdict, reasons = judged(beside_px, 1.5, 9.0, limits)
     assert verdict is ShotVerdict.REFUSED
     assert ["calibrate again" in reason for reason in reasons] == [False]
 

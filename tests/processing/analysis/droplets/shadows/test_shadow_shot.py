@@ -161,3 +161,12 @@ def test_few_droplets_need_no_more_than_two_views(views: tuple[int, ...]) -> Non
     of_found, of_truth = matches(shot.droplets.points_mm, sparse.points_mm, sparse.grid.pitch_mm)
     assert np.mean(of_truth[sparse.diameters_mm > 0.02] >= 0) >= 0.8
     assert np.mean(of_found < 0) <= 0.2
+
+
+def test_droplets_too_small_to_be_told_are_no_sparse_spray() -> None:
+    """Eleven droplets of 12 um; what views see beyond noise is theirs, and next to none of them is found."""
+    tiny = shadow_scene((80, 30, 120), 8, (180, 80), seed=5, median_mm=0.012, blurs_px=(0.7,) * 4, sharp=True)
+    told = measure_shadows(tiny.images, search_of(tiny, 10), light=2.0)
+    assert told.verdict is ShotVerdict.DOUBTFUL
+    assert len(told.droplets) < 0.5 * len(tiny.points_mm)
+    assert ["of what views see beyond their noise" in reason for reason in told.reasons] == [True]
