@@ -19,6 +19,12 @@ LEAST_LIGHT = 0.8
 """Of the background, somewhere: hardly a spray covers all of a view."""
 SATURATED_SHARE = 0.01
 """So many pixels of a background at full scale: more light than the camera can tell."""
+OPAQUE = 0.6
+"""From so much missing light on a shadow is dense; of bright particles, so much of the height of the brightest."""
+FEW = 10
+"""Pixels tell nothing."""
+MOST_HOLLOW = 0.25
+"""Share of them that may be missing in intensities: noise floor and edges take a tenth."""
 SHADOWS_ABOVE = 0.6
 """Of the span of grey values: if half of the pixels are above, dark spots lie on bright ground."""
 
@@ -60,6 +66,53 @@ def odd_light(
     if (share := np.mean(background[coarse] > FULL * most)) > SATURATED_SHARE:
         return f"has a background of which {100 * share:.0f} % are saturated: shadows are too pale there"
     return _unlike((light, (background[coarse] - floor) / most)) or _saturated(frame[coarse], most)
+
+
+def hollowed(
+    frame: Frame,
+    image: Intensity,
+    polarity: Polarity,
+    *,
+    bits: int,
+    dark: Intensity | None = None,
+    background: Intensity | None = None,
+) -> str:
+    """Whether structures are wider than the window of the sliding minimum, which takes away their middle.
+
+    Parameters
+    ----------
+    frame, polarity, bits, dark, background
+        As for ``odd_light``.
+    image : (rows, columns) float32 array
+        Its intensities.
+
+    Returns
+    -------
+    str
+        What is lost; empty where little is, or where shadows have no background to tell by.
+    """
+    coarse, most = np.s_[::STRIDE_PX, ::STRIDE_PX], np.float32(2**bits - 1)
+    floor = np.float32(0) if dark is None else dark[coarse]
+    light = (frame[coarse] - floor) / most
+    if polarity == "bright":
+        seen = light - np.median(light)
+        dense = seen > OPAQUE * np.percentile(seen, 99.9)
+    elif background is not None:
+        full = (background[coarse] - floor) / most
+        seen = np.where(full > NOISE, 1 - light / np.maximum(full, NOISE), np.float32(0))
+        dense = seen > OPAQUE
+    else:
+        return ""
+    return _lost(seen[dense], image[coarse][dense])
+
+
+def _lost(seen: NDArray[np.float32], kept: Intensity) -> str:
+    if seen.size < FEW or (lost := 1 - float(kept.sum() / seen.sum())) <= MOST_HOLLOW:
+        return ""
+    return (
+        f"loses {100 * lost:.0f} % of what is dense to the sliding minimum, which is narrower than that: volumes are "
+        "hollow there; take a wider one (minimum_window_px), or none (0)"
+    )
 
 
 def _saturated(frame: Frame, most: np.float32) -> str:

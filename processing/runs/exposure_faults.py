@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from daq.files.run_directory import RunReader, Shot
-from processing.light import odd_light
+from processing.light import hollowed, odd_light
 from processing.preprocessing import Frame, Intensity, is_dim
 from processing.reconstruction.volume_file import open_volume
 from processing.runs.errors import PipelineError
@@ -27,7 +27,7 @@ def exposure_faults(
     return {
         "blind_views": tuple(view for view, image in zip(shot.views, images, strict=True) if not image.any()),
         "dim_views": tuple(view for view in bits if is_dim(grey_values(shot, view, frame), bits[view])),
-        "odd_light": _odd_light(run, shot, frame, references),
+        "odd_light": _odd_light(run, shot, frame, images, references),
     }
 
 
@@ -67,15 +67,13 @@ def grey_values(shot: Shot, view: str, frame: FrameName) -> Frame:
     return pixels
 
 
-def _odd_light(run: RunReader, shot: Shot, frame: FrameName, references: References) -> dict[str, str]:
+def _odd_light(
+    run: RunReader, shot: Shot, frame: FrameName, images: Sequence[Intensity], references: References
+) -> dict[str, str]:
     said = {}
-    for view in shot.views:
+    for view, image in zip(shot.views, images, strict=True):
         dark, background = (None if one is None else one["ab".index(frame)] for one in references[view])
-        said[view] = odd_light(
-            grey_values(shot, view, frame),
-            run.header.polarity,
-            bits=run.header.views[view].bits,
-            dark=dark,
-            background=background,
-        )
+        grey, polarity, bits = grey_values(shot, view, frame), run.header.polarity, run.header.views[view].bits
+        odd = odd_light(grey, polarity, bits=bits, dark=dark, background=background)
+        said[view] = odd or hollowed(grey, image, polarity, bits=bits, dark=dark, background=background)
     return {view: what for view, what in said.items() if what}

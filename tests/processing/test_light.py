@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from processing.light import odd_light
-from processing.preprocessing import Polarity
+from processing.light import hollowed, odd_light
+from processing.preprocessing import Polarity, Preprocessing, intensity
 
 Grey = NDArray[np.float64]
 ROWS, COLUMNS = np.mgrid[:96, :128]
@@ -101,3 +101,21 @@ def test_bright_particles_that_fill_the_camera_are_odd() -> None:
 def test_a_part_of_an_image_that_is_missing_is_no_liquid(missing: NDArray[np.bool_], words: str) -> None:
     frame = np.where(missing, 0, grey(SHOT)).astype(np.uint8)
     assert odd_light(frame, "shadow", bits=8, background=LIGHT.astype(np.float32)).startswith(words)
+
+
+@pytest.mark.parametrize(("window_px", "hollow"), [(3, True), (9, True), (41, False), (0, False)])
+def test_a_window_that_is_narrower_than_what_is_dense_is_told(window_px: int, hollow: bool) -> None:
+    """A black disc of 24 px: the least value around its middle is black, too."""
+    disc = 0.95 * (np.hypot(ROWS - 40, COLUMNS - 70) < 12)
+    frame, background = grey(LIGHT * (1 - disc)), grey(LIGHT).astype(np.float32)
+    image = intensity(frame, Preprocessing("shadow", window_px), bits=8, background=background)
+    told_of_it = hollowed(frame, image, "shadow", bits=8, background=background)
+    assert told_of_it.startswith("loses ") == hollow
+    assert bool(told_of_it) == hollow
+
+
+@pytest.mark.parametrize(("window_px", "hollow"), [(3, True), (41, False)])
+def test_bright_particles_can_be_hollow_too(window_px: int, hollow: bool) -> None:
+    frame = grey(12 + 200.0 * (np.hypot(ROWS - 40, COLUMNS - 70) < 12))
+    image = intensity(frame, Preprocessing("bright", window_px), bits=8)
+    assert bool(hollowed(frame, image, "bright", bits=8)) == hollow
