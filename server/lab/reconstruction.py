@@ -93,5 +93,5 @@ def requested_shots(
 
 
 def _valid_shots(context: Context, run_id: str) -> list[int]:
-    keys = context.runs.reader(run_id).image_keys()
+    keys = context.runs.image_keys(run_id)
     return [index for index, key in enumerate(keys.tolist()) if key == ImageKey.SAMPLE]

@@ -18,7 +18,7 @@ from server.lab.jobs import JobKind, JobTable
 from server.lab.live import LiveFeed
 from server.lab.monitor import RigMonitor
 from server.lab.runner import JobRunner
-from server.lab.runs import RunStore
+from server.lab.runs.run_store import RunStore
 from server.lab.watch import CalibrationStanding, CalibrationWatch
 from server.rig.config import RigConfig
 

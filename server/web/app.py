@@ -5,7 +5,7 @@ import contextlib
 import signal
 import socket
 from collections.abc import AsyncIterator, Coroutine
-from contextlib import AsyncExitStack, asynccontextmanager
+from contextlib import AsyncExitStack, asynccontextmanager, closing
 from functools import partial
 from importlib.metadata import version
 from typing import Any
@@ -24,7 +24,8 @@ from server.lab.live import LiveFeed
 from server.lab.monitor import RigMonitor
 from server.lab.reconstruction import follow_acquisition
 from server.lab.runner import JobRunner
-from server.lab.runs import RunStore
+from server.lab.runs.run_index import INDEX_FILE, RunIndex
+from server.lab.runs.run_store import RunStore
 from server.lab.services import Context, Services
 from server.lab.watch import CalibrationWatch
 from server.web import problems
@@ -106,7 +107,8 @@ async def _life(app: FastAPI, services: Services) -> AsyncIterator[None]:
         stack.callback(services.events.detach)
         jobs_table = stack.enter_context(opened_table(services.data_dir, services.events))
         await stack.enter_async_context(services.engine)
-        context = app.state.context = _context(services, jobs_table)
+        index = stack.enter_context(closing(RunIndex(services.data_dir / INDEX_FILE)))
+        context = app.state.context = _context(services, jobs_table, index)
         await context.monitor.ask()
         follow = partial(follow_acquisition, context)
         works: tuple[Work, ...] = (context.runner.run, follow, context.monitor.run, context.live.run)
@@ -115,12 +117,12 @@ async def _life(app: FastAPI, services: Services) -> AsyncIterator[None]:
         yield
 
 
-def _context(services: Services, table: JobTable) -> Context:
+def _context(services: Services, table: JobTable, index: RunIndex) -> Context:
     store = CalibrationStore(services.data_dir / "calibrations")
     watch = CalibrationWatch(services.events)
     return Context(
         services=services,
-        runs=RunStore(services.data_dir, services.acquisition.status),
+        runs=RunStore(services.data_dir, services.acquisition.status, index),
         calibrations=store,
         jobs=table,
         runner=JobRunner(services.engine, table, services.tasks, services.events, services.data_dir, store, watch),

@@ -29,7 +29,7 @@ from processing.synthetic.truth_file import read_true_cameras, read_true_spray
 from server.lab.calibrations import CalibrationStore
 from server.lab.jobs import JobTable
 from server.lab.results import result_sets
-from server.lab.runs import RunStore
+from server.lab.runs.run_store import RunStore
 from server.pictures.previews import load_preview
 
 EXPECTED = "expected.json"

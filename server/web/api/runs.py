@@ -1,6 +1,6 @@
 """/api/runs: past runs, and the one that is active."""
 
-from typing import Annotated
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Response
 
@@ -8,7 +8,7 @@ from daq.files.run_directory import RunHeader
 from daq.run_plan import RunPlan
 from server.lab.errors import Conflict
 from server.lab.run_start import start_run
-from server.lab.runs import RunSummary
+from server.lab.runs.run_summary import RunSummary
 from server.web.api.parameters import ContextOf, RunId
 from server.web.api.rig import AcquisitionView, view_of_acquisition
 from server.web.problems import responses
@@ -16,12 +16,22 @@ from server.web.problems import responses
 router = APIRouter(prefix="/api/runs", tags=["runs"])
 
 
-@router.get("")
+_COUNT = "X-Total-Count"
+_COUNTED: dict[int | str, dict[str, Any]] = {
+    200: {"headers": {_COUNT: {"description": "number of all runs", "schema": {"type": "integer"}}}}
+}
+
+
+@router.get("", responses=_COUNTED)
 def list_runs(
-    context: ContextOf, limit: Annotated[int, Query(ge=1, le=1000, description="at most so many")] = 100
+    context: ContextOf,
+    response: Response,
+    limit: Annotated[int, Query(ge=1, le=1000, description="at most so many")] = 100,
+    offset: Annotated[int, Query(ge=0, le=10_000_000, description="leave out so many of the newest ones")] = 0,
 ) -> list[RunSummary]:
     """Runs, newest first."""
-    return context.runs.newest(limit)
+    response.headers[_COUNT] = str(context.runs.count())
+    return context.runs.newest(limit, offset)
 
 
 @router.post("", status_code=201, responses=responses(409, 423, 503, 504))

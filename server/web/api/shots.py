@@ -10,7 +10,7 @@ from daq.frozen_model import FrozenModel
 from daq.names import ViewName
 from daq.run_plan import ImageKey
 from server.lab.errors import NotFound
-from server.lab.runs import RunStore
+from server.lab.runs.run_store import RunStore
 from server.pictures.pictures import Stretch, frame_png
 from server.web.api.parameters import ContextOf, RunId, ShotIndex
 from server.web.problems import responses
@@ -40,10 +40,15 @@ class ShotDetail(FrozenModel):
 
 
 @router.get("", responses=responses(404, 500))
-def list_shots(run_id: RunId, context: ContextOf) -> list[ShotView]:
-    """All shots of a run."""
-    keys = context.runs.reader(run_id).image_keys().tolist()
-    return [ShotView(index=index, image_key=ImageKey(key).name.lower()) for index, key in enumerate(keys)]
+def list_shots(
+    run_id: RunId,
+    context: ContextOf,
+    limit: Annotated[int, Query(ge=1, le=100_000, description="at most so many")] = 100_000,
+    offset: Annotated[int, Query(ge=0, le=100_000, description="leave out so many of the first ones")] = 0,
+) -> list[ShotView]:
+    """All shots of a run, or some of them."""
+    keys = context.runs.image_keys(run_id).tolist()[offset : offset + limit]
+    return [ShotView(index=index, image_key=ImageKey(key).name.lower()) for index, key in enumerate(keys, start=offset)]
 
 
 @router.get("/{shot}", responses=responses(404, 500))

@@ -21,7 +21,7 @@ from server.lab.errors import ServerError
 from server.lab.jobs import Job, JobKind, JobState, calibration_job
 from server.lab.reconstruction import request_reconstruction
 from server.lab.run_start import choose_calibration
-from server.lab.runs import ACTIVE, DAMAGED, RunSummary
+from server.lab.runs.run_summary import ACTIVE, DAMAGED, RunSummary
 from server.lab.services import Context
 from server.web.ui.run_panel import outcome_colour
 from server.web.ui.theme import panel

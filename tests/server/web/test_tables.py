@@ -6,7 +6,7 @@ import pytest
 
 from daq.run_plan import RunKind
 from server.lab.jobs import JobKind, JobState, calibration_job, reconstruction_job, shot_job
-from server.lab.runs import RunSummary
+from server.lab.runs.run_summary import RunSummary
 from server.web.ui import tables
 from server.web.ui.tables import job_row
 

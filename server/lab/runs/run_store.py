@@ -1,0 +1,206 @@
+"""RunStore: what lies in the run directories, for lists and pages. The directories are the truth."""
+
+import re
+import threading
+from collections import Counter
+from collections.abc import Callable
+from datetime import UTC, datetime
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq.errors import ShotFileError
+from daq.files.run_directory import RunReader, list_runs
+from daq.files.run_file import RUN_FILE, SHOTS_FOLDER, shot_path
+from daq.files.shot_file import read_image_key
+from daq.names import is_identifier
+from daq.run.events import RunStatus
+from server.lab.errors import NotFound
+from server.lab.runs.run_index import IndexedRun, RunIndex
+from server.lab.runs.run_summary import (
+    ACTIVE,
+    DAMAGED,
+    RunSummary,
+    summary_of,
+    summary_of_beginning,
+    summary_of_damaged,
+)
+
+_TIME = "%Y%m%dT%H%M%S"
+_TIME_IN_ID = re.compile(r"\d{8}T\d{6}(?=-)")
+
+
+class RunStore:
+    """Run directories in one folder.
+
+    Parameters
+    ----------
+    data_dir : Path
+        Folder of the run directories.
+    status : Callable[[], RunStatus]
+        Asked which run is active: any other one without an outcome was interrupted.
+    index : RunIndex, optional
+        Remembers what was read; by default for as long as the store lives.
+    """
+
+    def __init__(self, data_dir: Path, status: Callable[[], RunStatus], index: RunIndex | None = None) -> None:
+        self._data_dir = data_dir
+        self._status = status
+        self._index = index or RunIndex()
+        self._shots = _ShotKeys()
+
+    def directory(self, run_id: str) -> Path:
+        """Directory of a run; NotFound if there is none."""
+        path = self._data_dir / run_id
+        if not is_identifier(run_id) or not (path / RUN_FILE).is_file():
+            raise NotFound(f"there is no run {run_id!r}")
+        return path
+
+    def reader(self, run_id: str) -> RunReader:
+        """Reader of a run; NotFound if there is none."""
+        return RunReader(self.directory(run_id))
+
+    def summary(self, run_id: str) -> RunSummary:
+        """What a run is and how it went, from the moment it was accepted; NotFound if there is none."""
+        status = self._status()
+        if status.run_id == run_id and status.plan and not (self._data_dir / run_id / RUN_FILE).is_file():
+            return summary_of_beginning(run_id, status, status.plan)
+        return self._summary_of(self.directory(run_id))
+
+    def require_sound(self, summary: RunSummary) -> None:
+        """Raise ShotFileError if a run is damaged."""
+        if summary.outcome == DAMAGED:
+            raise ShotFileError(summary.cause)
+
+    def image_keys(self, run_id: str) -> NDArray[np.int64]:
+        """ImageKey of every shot of a run, (shot,); INVALID where one cannot be read.
+
+        Raises
+        ------
+        NotFound
+            There is no such run.
+        ShotFileError
+            The run is damaged.
+        """
+        run_dir = self.directory(run_id)
+        if self._is_active(run_dir):
+            return self._shots.so_far(RunReader(run_dir))
+        return self._indexed(run_dir).image_keys
+
+    def newest(self, limit: int = 100, offset: int = 0) -> list[RunSummary]:
+        """Runs, newest first by their own time, whatever has been done to their directories since.
+
+        Ids tell it to the second, so that a long list need not be read; headers tell two of the same second apart.
+        """
+        directories = list_runs(self._data_dir)
+        seconds = {path: self._second(path) for path in directories}
+        crowd = Counter(seconds.values())
+
+        def age(path: Path) -> tuple[str, str]:
+            second = seconds[path]
+            return second, self._created(path).isoformat() if crowd[second] > 1 else ""
+
+        page = sorted(directories, key=age, reverse=True)[offset : offset + limit]
+        return [self._summary_of(path) for path in page]
+
+    def count(self) -> int:
+        """Number of runs."""
+        return len(list_runs(self._data_dir))
+
+    def _is_active(self, run_dir: Path) -> bool:
+        status = self._status()
+        return status.active and status.run_id == run_dir.name
+
+    def _summary_of(self, run_dir: Path) -> RunSummary:
+        try:
+            if not self._is_active(run_dir):
+                return self._indexed(run_dir).summary
+            recorded = self._status().shots_recorded
+            begun = _begun(run_dir, _changed_ns(run_dir / RUN_FILE))
+            return begun.model_copy(update={"outcome": ACTIVE, "shots_recorded": recorded, "shots_valid": None})
+        except ShotFileError as error:
+            return summary_of_damaged(run_dir, self._started(run_dir), str(error))
+
+    def _indexed(self, run_dir: Path) -> IndexedRun:
+        """What is known of a run that is not active: read again where its files have changed."""
+        stamp = _stamp(run_dir)
+        if known := self._index.find(run_dir.name, stamp):
+            return known
+        run = RunReader(run_dir)
+        keys = self._shots.all(run)
+        read = IndexedRun(summary_of(run, keys), keys)
+        self._index.keep(run_dir.name, stamp, read)
+        return read
+
+    def _second(self, run_dir: Path) -> str:
+        """When a run was started. Its id says so, as its header does; imported runs have no time in their ids."""
+        written = _TIME_IN_ID.match(run_dir.name)
+        return written[0] if written else f"{self._created(run_dir):{_TIME}}"
+
+    def _started(self, run_dir: Path) -> datetime:
+        """As far as a run tells that cannot be read."""
+        try:
+            return datetime.strptime(self._second(run_dir), _TIME).replace(tzinfo=UTC)
+        except ValueError:  # digits, but no time
+            return self._created(run_dir)
+
+    def _created(self, run_dir: Path) -> datetime:
+        known = self._index.find(run_dir.name, _stamp(run_dir))
+        written = known.summary.created_utc if known else None
+        return _created(run_dir, _changed_ns(run_dir / RUN_FILE), written)
+
+
+class _ShotKeys:
+    """ImageKeys of the run that was asked for last: while it grows each shot is read once."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._run_dir = Path()
+        self._shots_ns = 0
+        self._keys: list[int] = []
+
+    def so_far(self, run: RunReader) -> NDArray[np.int64]:
+        """ImageKey of every shot of a run that grows, (shot,); INVALID where one cannot be read."""
+        with self._lock:
+            if run.run_dir != self._run_dir:
+                self._run_dir, self._keys = run.run_dir, []
+            self._shots_ns = _changed_ns(run.run_dir / SHOTS_FOLDER)
+            paths = (shot_path(run.run_dir, index) for index in range(len(self._keys), run.shot_count))
+            self._keys += [int(read_image_key(path)) for path in paths]
+            return np.array(self._keys, np.int64)
+
+    def all(self, run: RunReader) -> NDArray[np.int64]:
+        """ImageKey of every shot of a run that grows no more: shots may have been lost or repaired."""
+        with self._lock:
+            is_same = (run.run_dir, _changed_ns(run.run_dir / SHOTS_FOLDER)) == (self._run_dir, self._shots_ns)
+            return np.array(self._keys, np.int64) if is_same else run.image_keys()
+
+
+def _stamp(run_dir: Path) -> str:
+    return f"{_changed_ns(run_dir / RUN_FILE)} {_changed_ns(run_dir / SHOTS_FOLDER)}"
+
+
+def _changed_ns(path: Path) -> int:
+    """When a file or folder was changed; 0 if it is gone."""
+    try:
+        return path.stat().st_mtime_ns
+    except OSError:
+        return 0
+
+
+@lru_cache(maxsize=2)
+def _begun(run_dir: Path, _changed_ns: int) -> RunSummary:
+    """An active run, without its shots; read once."""
+    return summary_of(RunReader(run_dir), np.empty(0, np.int64))
+
+
+@lru_cache(maxsize=4096)
+def _created(run_dir: Path, changed_ns: int, written: str | None) -> datetime:
+    """What the header says; if nobody can read it, when its file was changed."""
+    try:
+        created = datetime.fromisoformat(written or RunReader(run_dir).header.created_utc)
+    except (ShotFileError, ValueError):
+        return datetime.fromtimestamp(changed_ns / 1e9, UTC)
+    return created if created.tzinfo else created.replace(tzinfo=UTC)
