@@ -1,4 +1,4 @@
-"""RunHeader: everything a run says of itself before its first shot."""
+"""RunHeader: everything a run says of itself before its first shot; RunClosing: what is said after its last one."""
 
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
@@ -32,7 +32,7 @@ class ViewFormat:
 
 
 class RunHeader(FrozenModel):
-    """What a run is, written before its first shot and never changed."""
+    """What a run is, written before its first shot and never changed; devices are added when they have answered."""
 
     run_id: Annotated[str, Field(min_length=1, description="name of the run directory")]
     created_utc: Annotated[str, Field(description="ISO 8601, UTC")]
@@ -63,3 +63,22 @@ class RunHeader(FrozenModel):
     def shot_bytes(self) -> int:
         """Size of one uncompressed shot."""
         return self.frames_per_shot * sum(view.frame_bytes for view in self.views.values())
+
+
+@dataclass(frozen=True)
+class RunClosing:
+    """How a run ended.
+
+    Parameters
+    ----------
+    outcome : str
+        A value of ``daq.run.state.RunOutcome``.
+    cause : str
+        Why; empty if it was completed.
+    ended_utc : str
+        ISO 8601, UTC.
+    """
+
+    outcome: str
+    cause: str
+    ended_utc: str

@@ -8,6 +8,8 @@
 Any HDF5 reader sees the whole run through ``run.h5``: ``h5py.File("run.h5")["/cameras/view1/frames"][3]``.
 """
 
+from collections.abc import Mapping
+from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
 from types import TracebackType
@@ -18,7 +20,7 @@ from numpy.typing import NDArray
 
 from daq.errors import RecorderError, ShotFileError
 from daq.files.atomic_file import commit, part_path, sync
-from daq.files.header import RunHeader, ViewFormat
+from daq.files.header import RunClosing, RunHeader, ViewFormat
 from daq.files.packed_file import pack_run, require_free
 from daq.files.run_file import (
     RUN_FILE,
@@ -27,10 +29,11 @@ from daq.files.run_file import (
     ReferenceImages,
     add_outcome,
     add_references,
+    read_closing,
     read_header,
-    read_outcome,
     read_reference,
     read_shot_count,
+    set_devices,
     shot_path,
     slots_of,
     write_run_file,
@@ -90,8 +93,12 @@ class RunWriter:
             (self.run_dir / SHOTS_FOLDER).mkdir(parents=True)
         except FileExistsError as error:
             raise RecorderError(f"{self.run_dir}: exists already, a run is never overwritten") from error
-        write_run_file(self.run_dir, self.header)
-        sync(self.run_dir.parent)
+        try:
+            write_run_file(self.run_dir, self.header)
+            sync(self.run_dir.parent)
+        except OSError:
+            self._forget_directory()
+            raise
         return self
 
     def __exit__(
@@ -127,6 +134,10 @@ class RunWriter:
         self.stage(shot.index, self.encode(shot))
         self.commit(shot.index)
 
+    def write_devices(self, devices: Mapping[str, Mapping[str, str]]) -> None:
+        """Store what the devices of the rig say they are, by device name."""
+        set_devices(self.run_dir, devices)
+
     def write_references(self, dark: ReferenceImages, background: ReferenceImages) -> None:
         """Store the mean dark and background images of each view, (frame, row, column) float32 in counts."""
         add_references(self.run_dir, self.header, {"dark": dark, "background": background})
@@ -134,6 +145,12 @@ class RunWriter:
     def finish(self, outcome: str, cause: str = "") -> None:
         """Write how the run ended, once."""
         add_outcome(self.run_dir, outcome, cause)
+
+    def _forget_directory(self) -> None:
+        """A run that could not even begin leaves nothing."""
+        for folder in (self.run_dir / SHOTS_FOLDER, self.run_dir):
+            with suppress(OSError):
+                folder.rmdir()
 
     def _free_path(self, index: int) -> Path:
         path = shot_path(self.run_dir, index)
@@ -176,14 +193,25 @@ class RunReader:
     @property
     def outcome(self) -> str | None:
         """How the run ended; None while it is open, and for ever if its process was killed."""
-        closed = read_outcome(self.run_dir)
-        return closed[0] if closed else None
+        closing = self.closing
+        return closing.outcome if closing else None
 
     @property
     def cause(self) -> str:
         """Why the run ended; empty if it is open or was completed."""
-        closed = read_outcome(self.run_dir)
-        return closed[1] if closed else ""
+        closing = self.closing
+        return closing.cause if closing else ""
+
+    @property
+    def ended_utc(self) -> str:
+        """When the run ended, ISO 8601; empty if it is open."""
+        closing = self.closing
+        return closing.ended_utc if closing else ""
+
+    @property
+    def closing(self) -> RunClosing | None:
+        """How, why and when the run ended; None while it is open, and for ever if its process was killed."""
+        return read_closing(self.run_dir)
 
     @property
     def shot_count(self) -> int:

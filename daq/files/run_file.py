@@ -21,7 +21,7 @@ from daq.errors import RecorderError, ShotFileError
 from daq.files.atomic_file import replacing
 from daq.files.columns import columns_of, frames_path, view_path
 from daq.files.encoding import encode_frame
-from daq.files.header import RunHeader
+from daq.files.header import RunClosing, RunHeader
 from daq.files.shot_file import LIBRARY_VERSIONS, SCHEMA_VERSION, create_groups
 
 RUN_FILE = "run.h5"
@@ -61,6 +61,13 @@ def read_header(run_dir: Path) -> RunHeader:
         return RunHeader.model_validate({name: json.loads(entry[name].asstr()[()]) for name in written})
 
 
+def set_devices(run_dir: Path, devices: Mapping[str, Mapping[str, str]]) -> None:
+    """Write down what the devices say they are: they are asked when the run exists already."""
+    with _amending(run_dir) as file:
+        del file["entry/devices"]
+        file["entry/devices"] = json.dumps(devices, indent=1)
+
+
 def add_outcome(run_dir: Path, outcome: str, cause: str) -> None:
     """Close the run: how it ended, why, and when.
 
@@ -90,11 +97,14 @@ def slots_of(run_dir: Path) -> int:
     return max(indices, default=-1) + 1
 
 
-def read_outcome(run_dir: Path) -> tuple[str, str] | None:
-    """Outcome and cause; None while the run is open, and for ever if its process was killed."""
+def read_closing(run_dir: Path) -> RunClosing | None:
+    """How, why and when the run ended; None while it is open, and for ever if its process was killed."""
     with reading(run_dir) as file:
         entry = file["entry"]
-        return (entry["outcome"].asstr()[()], entry["cause"].asstr()[()]) if "outcome" in entry else None
+        if "outcome" not in entry:
+            return None
+        outcome, cause, ended_utc = (entry[name].asstr()[()] for name in ("outcome", "cause", "end_time"))
+        return RunClosing(outcome, cause, ended_utc)
 
 
 def add_references(run_dir: Path, header: RunHeader, references: Mapping[Reference, ReferenceImages]) -> None:

@@ -1,5 +1,6 @@
 """Acquisition: one run at a time, on a thread of its own."""
 
+import signal
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -8,7 +9,7 @@ from typing import Any, Self
 
 from daq.devices import Rig
 from daq.errors import BusyError, PlanError
-from daq.files.run_directory import open_runs
+from daq.files.run_directory import RunWriter, open_runs
 from daq.run import light
 from daq.run.active_run import ActiveRun, RunObserver
 from daq.run.ending import RunEnding
@@ -72,6 +73,7 @@ class Acquisition:
         self._limits = limits or AcquisitionLimits()
         self._observers = tuple(observers)
         self._starting = threading.Lock()
+        self._left = ""
         self._progress = RunProgress(publish)
         self._ending = RunEnding()
 
@@ -83,9 +85,8 @@ class Acquisition:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self.status().active:
-            self.abort()
-            self.wait(self._limits.light_off_s + self._limits.disarm_s + self._limits.drain_s)
+        self.leave(_why_it_ends(error))
+        self.wait(self._limits.light_off_s + self._limits.disarm_s + self._limits.drain_s)
 
     def status(self) -> RunStatus:
         """Snapshot; never waits for a device."""
@@ -102,7 +103,7 @@ class Acquisition:
         Raises
         ------
         BusyError
-            A run is active or just starting, or a fault waits to be acknowledged.
+            A run is active or just starting, a fault waits to be acknowledged, or the program is ending.
         PlanError
             The plan cannot run on this rig, or the disk does not hold it; the text names value and limit.
         InterlockOpen
@@ -114,11 +115,13 @@ class Acquisition:
             raise BusyError("another run is being started")
         try:
             next_state(self.status().state, RunStep.START)
+            if self._left:
+                raise BusyError(f"no run starts any more: {self._left}")
             ending = self._ending = RunEnding()
-            prepared = self._prepare(plan)
+            prepared, writer = self._prepare(plan)
             self._progress.begin(prepared.header.run_id, plan)
             run = ActiveRun(self._rig, prepared, self._progress, self._limits, self._observers, ending)
-            threading.Thread(target=self._work, args=(run,), name="acquisition", daemon=True).start()
+            threading.Thread(target=self._work, args=(run, writer), name="acquisition", daemon=True).start()
             return prepared.header.run_id
         finally:
             self._starting.release()
@@ -137,6 +140,13 @@ class Acquisition:
         """
         self._ending.end(RunStep.ABORT, "aborted by the operator")
         light.switch_off(self._rig)
+
+    def leave(self, cause: str) -> None:
+        """The program ends: abort what runs for this cause, and let no run start any more. The first cause stays."""
+        self._left = self._left or cause
+        if self.status().active:
+            self._ending.end(RunStep.ABORT, self._left)
+            light.try_to_switch_off(self._rig)
 
     def acknowledge(self) -> None:
         """Clear the generator's latched faults, and leave FAULT if the light is off.
@@ -159,19 +169,27 @@ class Acquisition:
         """Wait until no run is active; returns the status then, or the one at the deadline."""
         return self._progress.wait(deadline_s)
 
-    def _prepare(self, plan: RunPlan) -> PreparedRun:
+    def _prepare(self, plan: RunPlan) -> tuple[PreparedRun, RunWriter]:
+        """Check the plan, and make the directory of the run: a run that is accepted always has one."""
         try:
             self._data_dir.mkdir(parents=True, exist_ok=True)
-            return prepare_run(self._rig, self._data_dir, plan, self._configuration, self._hash_calibration)
+            prepared = prepare_run(self._rig, self._data_dir, plan, self._configuration, self._hash_calibration)
+            return prepared, RunWriter(prepared.run_dir, prepared.header).__enter__()
         except OSError as error:
             raise PlanError(f"the run cannot be stored, or its calibration not be read: {error}") from error
 
-    def _work(self, run: ActiveRun) -> None:
+    def _work(self, run: ActiveRun, writer: RunWriter) -> None:
         """Thread: one run from ARMING until it rests."""
-        session, ending, progress = RunSession(run), run.ending, run.progress
+        session, ending, progress = RunSession(run, writer), run.ending, run.progress
         session.acquire()
         progress.move(ending.step or RunStep.ERROR, message=ending.cause)
         light_reason = session.disarm()
         session.close()
         step = RunStep.LIGHT_UNKNOWN if light_reason else RunStep.LIGHT_OFF
         progress.move(step, outcome=ending.outcome, message=ending.cause or progress.status().summary)
+
+
+def _why_it_ends(error: BaseException | None) -> str:
+    if isinstance(error, KeyboardInterrupt):
+        return f"the program was ended by {str(error) or signal.SIGINT.name}"
+    return "the program ended before the run did" + (f": {error!r}" if error else "")

@@ -19,7 +19,7 @@ class RunObserver(Protocol):
     """
 
     def before_run(self, plan: RunPlan) -> None:
-        """Before the directory of the run exists and cameras are armed."""
+        """Before any device is asked for anything."""
 
     def after_run(self, run_dir: Path) -> None:
         """After the last shot is on the disk, before the outcome is."""

@@ -23,7 +23,7 @@ class RunStatus:
     message : str
         What happened last; the cause if the run failed.
     plan : RunPlan | None
-        What the run named by ``run_id`` was asked to do; known before its directory exists.
+        What the run named by ``run_id`` was asked to do; known although its directory may be gone.
     """
 
     state: RunState = RunState.IDLE

@@ -2,7 +2,7 @@
 
 import shutil
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -30,7 +30,7 @@ class PreparedRun:
     Parameters
     ----------
     run_dir : Path
-        Where it will be stored; does not exist yet.
+        Where it will be stored.
     plan : RunPlan
         As the operator wrote it.
     header : RunHeader
@@ -46,11 +46,6 @@ class PreparedRun:
     header: RunHeader
     timing: ShotTiming
     references: Mapping[RunKind, tuple[Path, ...]]
-
-    def header_of(self, rig: Rig) -> RunHeader:
-        """Header with what the devices of a rig answer when they are asked who they are."""
-        devices = {device.name: asdict(device.identity()) for device in rig.devices}
-        return self.header.model_copy(update={"devices": devices})
 
 
 def prepare_run(

@@ -2,9 +2,10 @@
 
 from collections.abc import Callable
 from contextlib import ExitStack
+from dataclasses import asdict
 from functools import partial
 
-from daq.errors import DaqError
+from daq.errors import DaqError, DeviceError
 from daq.files.run_directory import RunWriter
 from daq.run import light
 from daq.run.active_run import ActiveRun
@@ -25,13 +26,18 @@ class RunSession:
     ----------
     run : ActiveRun
         What to do, on which devices, and who is told.
+    writer : RunWriter
+        The open run.
     """
 
-    def __init__(self, run: ActiveRun) -> None:
+    def __init__(self, run: ActiveRun, writer: RunWriter) -> None:
         self._run = run
         self._rig = run.rig
         self._ending = run.ending
+        self._writer = writer
         self._storage = ExitStack()
+        self._storage.push(writer)
+        self._storage.callback(self._finish)
 
     def acquire(self) -> None:
         """Arm, and take all shots; returns when the last one is handed to the recorder, or the run is ended."""
@@ -58,9 +64,9 @@ class RunSession:
         plan = self._run.prepared.plan
         for observer in self._run.observers:
             observer.before_run(plan)
-        writer = self._open_directory()
-        taker = ShotTaker(self._run, self._copy_references(writer))
-        recorder = self._start_recorder(writer)
+        self._write_devices()
+        taker = ShotTaker(self._run, self._copy_references())
+        recorder = self._start_recorder()
         self._arm(taker)
         for index in range(plan.total_shots):
             shot = taker.take(index)
@@ -77,24 +83,31 @@ class RunSession:
         if not self._ending.step:
             self._run.progress.move(RunStep.ARMED)
 
-    def _open_directory(self) -> RunWriter:
-        """Open the run directory; what is opened from here on is closed in the opposite order by ``close``."""
-        prepared = self._run.prepared
-        writer = self._storage.enter_context(RunWriter(prepared.run_dir, prepared.header_of(self._rig)))
-        self._storage.callback(self._finish, writer)
-        return writer
+    def _write_devices(self) -> None:
+        """Ask every device who it is; one that does not answer ends the run, and those that do are named in it."""
+        devices, silent = {}, list[DeviceError]()
+        for device in self._rig.devices:
+            try:
+                devices[device.name] = asdict(device.identity())
+            except DeviceError as error:
+                devices[device.name] = {"not answered": error.reason}
+                silent.append(error)
+        self._writer.write_devices(devices)
+        if silent:
+            raise silent[0]
 
-    def _copy_references(self, writer: RunWriter) -> Thresholds:
+    def _copy_references(self) -> Thresholds:
         """Let dark and background images travel with the run; returns the levels above which an exposure is lit."""
         prepared = self._run.prepared
         dark, background = (mean_images(prepared.references[kind]) for kind in (RunKind.DARK, RunKind.BACKGROUND))
         if dark or background:
-            writer.write_references(dark, background)
+            self._writer.write_references(dark, background)
         bits = {view: view_format.bits for view, view_format in prepared.header.views.items()}
         return light_thresholds(bits, dark, background)
 
-    def _start_recorder(self, writer: RunWriter) -> Recorder:
-        limits = self._run.limits
+    def _start_recorder(self) -> Recorder:
+        """Start what ``close`` ends, in the opposite order."""
+        limits, writer = self._run.limits, self._writer
         for observer in self._run.observers:
             self._storage.callback(self._attempt, partial(observer.after_run, writer.run_dir))
         recorder = Recorder(writer, limits.recorder_depth, limits.recorder_threads, self._run.progress.count)
@@ -102,8 +115,8 @@ class RunSession:
         self._storage.callback(self._attempt, partial(recorder.close, limits.drain_s))
         return recorder
 
-    def _finish(self, writer: RunWriter) -> None:
-        writer.finish(self._ending.outcome.value, self._ending.cause)
+    def _finish(self) -> None:
+        self._writer.finish(self._ending.outcome.value, self._ending.cause)
 
     def _attempt(self, action: Callable[[], None]) -> None:
         """The top of the acquisition thread: whatever goes wrong, the light goes off before anything else."""

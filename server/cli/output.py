@@ -73,7 +73,7 @@ def endable() -> Iterator[None]:
 def _end(number: int, _frame: FrameType | None) -> None:
     _ENDED.set()
     signal.signal(number, signal.SIG_DFL)
-    raise KeyboardInterrupt
+    raise KeyboardInterrupt(signal.Signals(number).name)
 
 
 def heed() -> None:

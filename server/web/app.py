@@ -4,10 +4,11 @@ import asyncio
 import contextlib
 import signal
 import socket
-from collections.abc import AsyncIterator, Coroutine
+from collections.abc import AsyncIterator, Callable, Coroutine
 from contextlib import AsyncExitStack, asynccontextmanager, closing
 from functools import partial
 from importlib.metadata import version
+from types import FrameType
 from typing import Any
 
 import uvicorn
@@ -76,17 +77,42 @@ def create_api(services: Services) -> FastAPI:
     return app
 
 
-def serve(app: FastAPI, listener: socket.socket) -> None:
+class _Server(uvicorn.Server):
+    """Tells by which signal it ends before it waits for anything: a run makes light until then."""
+
+    def __init__(self, config: uvicorn.Config, leave: Callable[[str], None]) -> None:
+        super().__init__(config)
+        self._leave = leave
+        self._ended_by = ""
+
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        self._ended_by = self._ended_by or f" by {signal.Signals(sig).name}"
+        super().handle_exit(sig, frame)
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        await asyncio.to_thread(self._leave, f"the server was ended{self._ended_by}")
+        await super().shutdown(sockets)
+
+
+def serve(app: FastAPI, listener: socket.socket, leave: Callable[[str], None]) -> None:
     """Serve until SIGINT or SIGTERM, then return. One process: acquisition, jobs and pages share its state.
+
+    Parameters
+    ----------
+    app : FastAPI
+        What to serve.
+    listener : socket
+        Where; listens already.
+    leave : Callable[[str], None]
+        Gets the cause within a tenth of a second of the signal, before clients and jobs are waited for.
 
     Raises
     ------
     DaqError
         The application did not start; the log says why.
     """
-    server = uvicorn.Server(
-        uvicorn.Config(app, timeout_graceful_shutdown=_SHUTDOWN_S, access_log=False, log_level="warning")
-    )
+    config = uvicorn.Config(app, timeout_graceful_shutdown=_SHUTDOWN_S, access_log=False, log_level="warning")
+    server = _Server(config, leave)
     # The server passes a signal on once it has ended. By default SIGTERM would then kill the process before the caller
     # has switched off the light and closed the devices.
     previous = signal.signal(signal.SIGTERM, signal.default_int_handler)

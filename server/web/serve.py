@@ -43,7 +43,7 @@ def serve_rig(config: RigConfig, port_held: socket.socket) -> None:
                 tasks=TASKS,
                 laboratory=assembled.laboratory,
             )
-            serve(create_app(services), port_held)
+            serve(create_app(services), port_held, acquisition.leave)
 
 
 def _acquisition(config: RigConfig, assembled: AssembledRig, events: EventPublisher) -> Acquisition:

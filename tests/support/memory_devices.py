@@ -24,11 +24,15 @@ MAX_LIGHT_A = 0.5
 
 
 class MemoryDevice:
-    """Name, identity, and a life without meaning; ``journal`` is shared by all devices of a rig."""
+    """Name, identity, and a life without meaning; ``journal`` is shared by all devices of a rig.
+
+    ``mute`` lets it give no answer when it is asked who it is.
+    """
 
     def __init__(self, name: str, journal: list[str]) -> None:
         self.name = name
         self.journal = journal
+        self.mute = False
 
     def __enter__(self) -> Self:
         return self
@@ -39,6 +43,8 @@ class MemoryDevice:
         """Nothing is held."""
 
     def identity(self) -> DeviceIdentity:
+        if self.mute:
+            raise DeviceTimeout(self.name, "identity", 0.5)
         return DeviceIdentity("tomoshadow", "memory", self.name, "1")
 
 

@@ -17,6 +17,7 @@ from daq.files.run_file import RUN_FILE, SHOTS_FOLDER, shot_path
 from daq.files.shot_file import read_image_key
 from daq.names import is_identifier
 from daq.run.events import RunStatus
+from daq.run.state import RunOutcome
 from server.lab.errors import NotFound
 from server.lab.runs.run_index import IndexedRun, RunIndex
 from server.lab.runs.run_summary import (
@@ -24,7 +25,7 @@ from server.lab.runs.run_summary import (
     DAMAGED,
     RunSummary,
     summary_of,
-    summary_of_beginning,
+    summary_of_absent,
     summary_of_damaged,
 )
 
@@ -63,10 +64,10 @@ class RunStore:
         return RunReader(self.directory(run_id))
 
     def summary(self, run_id: str) -> RunSummary:
-        """What a run is and how it went, from the moment it was accepted; NotFound if there is none."""
+        """What a run is and how it went, although its directory may be gone now; NotFound if there is none."""
         status = self._status()
         if status.run_id == run_id and status.plan and not (self._data_dir / run_id / RUN_FILE).is_file():
-            return summary_of_beginning(run_id, status, status.plan)
+            return summary_of_absent(run_id, status, status.plan)
         return self._summary_of(self.directory(run_id))
 
     def require_sound(self, summary: RunSummary) -> None:
@@ -116,7 +117,7 @@ class RunStore:
     def _summary_of(self, run_dir: Path) -> RunSummary:
         try:
             if not self._is_active(run_dir):
-                return self._indexed(run_dir).summary
+                return _closed(self._indexed(run_dir).summary, self._status())
             recorded = self._status().shots_recorded
             begun = _begun(run_dir, _changed_ns(run_dir / RUN_FILE))
             return begun.model_copy(update={"outcome": ACTIVE, "shots_recorded": recorded, "shots_valid": None})
@@ -176,6 +177,13 @@ class _ShotKeys:
         with self._lock:
             is_same = (run.run_dir, _changed_ns(run.run_dir / SHOTS_FOLDER)) == (self._run_dir, self._shots_ns)
             return np.array(self._keys, np.int64) if is_same else run.image_keys()
+
+
+def _closed(read: RunSummary, status: RunStatus) -> RunSummary:
+    """A run that is not active: acquisition knows how its last one ended, although no file may say it."""
+    if status.run_id != read.run_id or read.outcome != RunOutcome.INTERRUPTED:
+        return read
+    return read.model_copy(update={"outcome": status.outcome or RunOutcome.FAILED, "cause": status.message})
 
 
 def _stamp(run_dir: Path) -> str:

@@ -58,8 +58,8 @@ def summary_of(run: RunReader, image_keys: NDArray[np.int64]) -> RunSummary:
     )
 
 
-def summary_of_beginning(run_id: str, status: RunStatus, plan: RunPlan) -> RunSummary:
-    """A run that was accepted and has no directory yet, or failed before it could have one."""
+def summary_of_absent(run_id: str, status: RunStatus, plan: RunPlan) -> RunSummary:
+    """The last run, whose directory was taken away."""
     return RunSummary(
         run_id=run_id,
         name=plan.name,

@@ -1,16 +1,28 @@
 """Runs on a rig in memory: how they end, what is on the disk then, and when the light goes off."""
 
+import re
 import threading
 import time
 from collections.abc import Iterator
+from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from daq.devices import GeneratorState, GeneratorStatus, Rig
-from daq.errors import BusyError, DaqError, DeviceError, DeviceOvertaken, DeviceRefused, InterlockOpen, PlanError
+from daq.devices import DeviceIdentity, GeneratorState, GeneratorStatus, Rig
+from daq.errors import (
+    BusyError,
+    DaqError,
+    DeviceError,
+    DeviceOvertaken,
+    DeviceRefused,
+    DeviceTimeout,
+    InterlockOpen,
+    PlanError,
+)
 from daq.files.run_directory import ImageKey, PulsePair, RunKind, RunPlan, RunReader, RunWriter
 from daq.run.acquisition import Acquisition
 from daq.run.events import RunEvent, RunMessage, ShotRecorded, StateChanged
@@ -229,6 +241,27 @@ def test_a_dead_camera_fails_the_run_and_keeps_its_shots(lab: Laboratory) -> Non
     lab.memory.cameras["view2"].broken_at = 3
     assert_failed(lab, lab.run(plan_of(9)), "view2: control lost", 2)
     assert lab.memory.generator.fired == 3
+
+
+def test_a_run_whose_camera_does_not_say_who_it_is_has_a_directory_with_the_reason(lab: Laboratory) -> None:
+    lab.memory.cameras["view2"].mute = True
+    reader = lab.run(plan_of())
+    assert_failed(lab, reader, "view2: no answer to 'identity' within 0.5 s", 0)
+    devices = reader.header.devices
+    assert devices["view2"] == {"not answered": "no answer to 'identity' within 0.5 s"}
+    assert devices["view1"]["vendor"] == devices["generator"]["vendor"] == "tomoshadow"
+    assert reader.ended_utc > reader.header.created_utc
+
+
+def test_an_accepted_run_has_a_directory_before_any_device_is_asked(lab: Laboratory) -> None:
+    found: list[str] = []
+
+    def look(_: str) -> DeviceIdentity:
+        found.extend(path.parent.name for path in lab.data_dir.glob("*/run.h5"))
+        raise DeviceTimeout("view1", "identity", 0.5)
+
+    lab.memory.cameras["view1"].identity = partial(look, "")  # type: ignore[method-assign]
+    assert lab.run(plan_of()).run_dir.name in found
 
 
 def test_a_failed_fire_is_no_lost_frame(lab: Laboratory) -> None:
@@ -501,10 +534,9 @@ def test_a_bug_in_the_scene_is_a_failed_run_and_not_a_dead_thread(lab: Laborator
     assert (status.state, status.outcome) == (RunState.IDLE, RunOutcome.FAILED)
     assert "ZeroDivisionError('no nozzle')" in status.message
     assert "off" in lab.memory.journal
-    assert run_dir.exists() == (when == "after")
-    if when == "after":
-        reader = RunReader(run_dir)
-        assert (reader.shot_count, reader.outcome, reader.cause) == (2, "failed", status.message)
+    reader = RunReader(run_dir)
+    shots = 2 if when == "after" else 0
+    assert (reader.shot_count, reader.outcome, reader.cause) == (shots, "failed", status.message)
 
 
 def test_observers_have_the_first_and_the_last_word(lab: Laboratory) -> None:
@@ -524,9 +556,22 @@ def test_runs_without_an_outcome_are_reported_as_interrupted(lab: Laboratory, tm
     assert events == [RunMessage("20260101T000000-killed", "interrupted: its process ended before the run did")]
 
 
-def test_leaving_ends_the_run_in_the_dark(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("error", "cause"),
+    [
+        (None, "the program ended before the run did"),
+        (KeyboardInterrupt("SIGTERM"), "the program was ended by SIGTERM"),
+        (KeyboardInterrupt(), "the program was ended by SIGINT"),
+        (ZeroDivisionError("no nozzle"), "the program ended before the run did: ZeroDivisionError('no nozzle')"),
+    ],
+)
+def test_leaving_ends_the_run_in_the_dark_and_says_why(tmp_path: Path, error: BaseException | None, cause: str) -> None:
     lab = Laboratory(tmp_path)
-    with lab.acquisition:
+    with suppress(KeyboardInterrupt, ZeroDivisionError), lab.acquisition:
         reader = lab.start_and_await_shot(plan_of(**SLOW), 0)
-    assert reader.outcome == "aborted"
+        if error:
+            raise error
+    assert (reader.outcome, reader.cause) == ("aborted", cause)
     assert lab.memory.generator.state is GeneratorState.SAFE
+    with pytest.raises(BusyError, match=f"no run starts any more: {re.escape(cause)}"):
+        lab.acquisition.start(plan_of())

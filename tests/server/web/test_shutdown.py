@@ -2,12 +2,15 @@ import os
 import signal
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import httpx
 import pytest
 
-from tests.support.serving import DEADLINE_S
+from daq.files.run_directory import RunReader
+from tests.support.serving import DEADLINE_S, plan_of
 
 SCRIPT = """
 import sys
@@ -26,7 +29,7 @@ def talkative_serve(services):
         print(server.servers[0].sockets[0].getsockname()[1], flush=True)
     uvicorn.Server.startup = startup
     with listening("127.0.0.1", 0) as listener:
-        serve(app, listener)
+        serve(app, listener, services.acquisition.leave)
     print("served", flush=True)
 
 with serving.assembled(Path(sys.argv[1])) as services:
@@ -37,9 +40,7 @@ print("closed", flush=True)
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_a_signal_ends_the_server_and_its_caller_can_close_the_devices(tmp_path: Path, number: signal.Signals) -> None:
-    command = [sys.executable, "-c", SCRIPT, str(tmp_path / "runs")]
-    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[3])}
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as process:
+    with _server(tmp_path) as process:
         assert process.stdout is not None
         port = int(process.stdout.readline())
         url = f"http://127.0.0.1:{port}/api/events"
@@ -48,3 +49,25 @@ def test_a_signal_ends_the_server_and_its_caller_can_close_the_devices(tmp_path:
             process.send_signal(number)
             assert process.stdout.read().split() == ["served", "closed"]
         assert process.wait(DEADLINE_S) == 0
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_ends_the_run_by_its_name(tmp_path: Path, number: signal.Signals) -> None:
+    with _server(tmp_path) as process:
+        assert process.stdout is not None
+        port = int(process.stdout.readline())
+        plan = plan_of(shots=1000, rate_hz=5)
+        answer = httpx.post(f"http://127.0.0.1:{port}/api/runs", json=plan, timeout=DEADLINE_S)
+        run_dir = tmp_path / "runs" / answer.json()["run_id"]
+        process.send_signal(number)
+        assert process.wait(DEADLINE_S) == 0
+    reader = RunReader(run_dir)
+    assert (reader.outcome, reader.cause) == ("aborted", f"the server was ended by {number.name}")
+
+
+@contextmanager
+def _server(folder: Path) -> Iterator[subprocess.Popen[str]]:
+    command = [sys.executable, "-c", SCRIPT, str(folder / "runs")]
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[3])}
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as process:
+        yield process
