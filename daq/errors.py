@@ -14,7 +14,12 @@
     │   └── ProtocolError       it answered something that makes no sense
     ├── InterlockOpen         the light must not be switched on
     ├── RecorderError         a shot could not be stored
-    │   └── RecorderOverflow    the disk does not keep up
+    │   ├── RecorderOverflow    the disk does not keep up
+    │   └── StorageError        the disk refuses; the text says what to do
+    │       ├── DiskFull          it is full, or its margin is reached
+    │       ├── DiskReadOnly      it takes nothing any more
+    │       ├── DiskForbidden     the permission to write is missing
+    │       └── DiskGone          the folder was moved or deleted, or its disk is not mounted
     └── ShotFileError         a run directory or a shot file cannot be read
 """
 
@@ -97,6 +102,26 @@ class RecorderError(DaqError):
 
 class RecorderOverflow(RecorderError):
     """The recorder's queue is full: the disk does not keep up with the cameras."""
+
+
+class StorageError(RecorderError):
+    """The disk refuses; the text names the path and says what to do."""
+
+
+class DiskFull(StorageError):
+    """The disk is full, or has no more room than what a run leaves free."""
+
+
+class DiskReadOnly(StorageError):
+    """The disk is mounted for reading only."""
+
+
+class DiskForbidden(StorageError):
+    """The permission to write there is missing."""
+
+
+class DiskGone(StorageError):
+    """The folder was moved or deleted, or its disk is not mounted any more."""
 
 
 class ShotFileError(DaqError):

@@ -1,16 +1,36 @@
-"""Files that appear complete or not at all: write beside, fsync, rename, fsync the folder."""
+"""Files that appear complete or not at all: write beside, fsync, rename, fsync the folder.
+
+A file that must be changed on a full disk has a reserve beside it: blocks that its changed copy is written into.
+"""
 
 import os
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 PART_SUFFIX = ".part"
+RESERVE_SUFFIX = ".reserve"
 
 
 def part_path(path: Path) -> Path:
     """Where a file is written before it is committed; readers ignore such files."""
     return path.with_name(path.name + PART_SUFFIX)
+
+
+def reserve_path(path: Path) -> Path:
+    """Where room for a changed copy of a file is kept."""
+    return path.with_name(path.name + RESERVE_SUFFIX)
+
+
+def reserve(path: Path, more_bytes: int) -> None:
+    """Take room on the disk for a copy of a file that is longer by some bytes."""
+    descriptor = os.open(reserve_path(path), os.O_RDWR | os.O_CREAT, 0o666)
+    try:
+        os.posix_fallocate(descriptor, 0, path.stat().st_size + more_bytes)
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 def sync(path: Path) -> None:
@@ -50,3 +70,22 @@ def replacing(path: Path) -> Iterator[Path]:
         part.unlink(missing_ok=True)
         raise
     commit(part, path)
+
+
+@contextmanager
+def amending(path: Path) -> Iterator[Path]:
+    """Yield the path of a copy that replaces ``path`` at the end; it lies in the reserve if there is one.
+
+    A reserve outlives a block that raises, so that the same change can be tried again.
+    """
+    copy = reserve_path(path)
+    if not copy.exists():
+        with replacing(path) as part:
+            shutil.copyfile(path, part)
+            yield part
+        return
+    with copy.open("r+b") as reserved:  # never truncated: a full disk would not give its blocks back
+        reserved.write(path.read_bytes())
+    yield copy
+    sync(copy)
+    commit(copy, path)

@@ -8,8 +8,6 @@
 Any HDF5 reader sees the whole run through ``run.h5``: ``h5py.File("run.h5")["/cameras/view1/frames"][3]``.
 """
 
-from collections.abc import Mapping
-from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
 from types import TracebackType
@@ -19,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.errors import RecorderError, ShotFileError
-from daq.files.atomic_file import commit, part_path, sync
 from daq.files.header import RunClosing, RunHeader, ViewFormat
 from daq.files.packed_file import pack_run, require_free
 from daq.files.run_file import (
@@ -27,18 +24,15 @@ from daq.files.run_file import (
     SHOTS_FOLDER,
     Reference,
     ReferenceImages,
-    add_outcome,
-    add_references,
     read_closing,
     read_header,
     read_reference,
     read_shot_count,
-    set_devices,
     shot_path,
     slots_of,
-    write_run_file,
 )
-from daq.files.shot_file import EncodedShot, encode_shot, read_image_key, read_shot_file, write_encoded_shot
+from daq.files.run_writer import RunWriter
+from daq.files.shot_file import read_image_key, read_shot_file
 from daq.run_plan import ImageKey, PulsePair, RunKind, RunPlan
 from daq.shot import DoubleFrame, ExposureRecord, FiredTrain, Image, LightPulse, Shot
 
@@ -64,99 +58,6 @@ __all__ = [
     "open_runs",
     "pack",
 ]
-
-
-class RunWriter:
-    """Writes one run. ``with RunWriter(run_dir, header) as writer`` creates the directory.
-
-    Parameters
-    ----------
-    run_dir : Path
-        Must not exist: a run is never overwritten.
-    header : RunHeader
-        What the run is.
-
-    Raises
-    ------
-    RecorderError
-        The directory exists, or a shot does not have the format of the run.
-    OSError
-        The disk refuses.
-    """
-
-    def __init__(self, run_dir: Path, header: RunHeader) -> None:
-        self.run_dir = run_dir
-        self.header = header
-
-    def __enter__(self) -> Self:
-        try:
-            (self.run_dir / SHOTS_FOLDER).mkdir(parents=True)
-        except FileExistsError as error:
-            raise RecorderError(f"{self.run_dir}: exists already, a run is never overwritten") from error
-        try:
-            write_run_file(self.run_dir, self.header)
-            sync(self.run_dir.parent)
-        except OSError:
-            self._forget_directory()
-            raise
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Leave the run as it is: one without an outcome was interrupted."""
-
-    def encode(self, shot: Shot) -> EncodedShot:
-        """Compress a shot; several threads may do so at the same time."""
-        return encode_shot(shot, self.header)
-
-    def stage(self, index: int, encoded: EncodedShot) -> None:
-        """Write a shot to its part and wait until that is on the disk."""
-        part = part_path(self._free_path(index))
-        try:
-            write_encoded_shot(part, encoded, self.header)
-            sync(part)
-        except OSError:
-            self.discard(index)
-            raise
-
-    def discard(self, index: int) -> None:
-        """Remove a shot that was staged and shall not be committed."""
-        part_path(shot_path(self.run_dir, index)).unlink(missing_ok=True)
-
-    def commit(self, index: int) -> None:
-        """Make a staged shot part of the run; call in the order of indices, a gap would hide later shots."""
-        path = self._free_path(index)
-        commit(part_path(path), path)
-
-    def write_shot(self, shot: Shot) -> None:
-        """Encode, stage and commit one shot."""
-        self.stage(shot.index, self.encode(shot))
-        self.commit(shot.index)
-
-    def write_devices(self, devices: Mapping[str, Mapping[str, str]]) -> None:
-        """Store what the devices of the rig say they are, by device name."""
-        set_devices(self.run_dir, devices)
-
-    def write_references(self, dark: ReferenceImages, background: ReferenceImages) -> None:
-        """Store the mean dark and background images of each view, (frame, row, column) float32 in counts."""
-        add_references(self.run_dir, self.header, {"dark": dark, "background": background})
-
-    def finish(self, outcome: str, cause: str = "") -> None:
-        """Write how the run ended, once."""
-        add_outcome(self.run_dir, outcome, cause)
-
-    def _forget_directory(self) -> None:
-        """A run that could not even begin leaves nothing."""
-        for folder in (self.run_dir / SHOTS_FOLDER, self.run_dir):
-            with suppress(OSError):
-                folder.rmdir()
-
-    def _free_path(self, index: int) -> Path:
-        path = shot_path(self.run_dir, index)
-        if path.exists():
-            raise RecorderError(f"{path}: exists already, a shot is never overwritten")
-        return path
 
 
 class RunReader:

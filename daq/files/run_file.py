@@ -5,10 +5,8 @@ outcome are added to a copy that replaces the file, so that a complete ``run.h5`
 """
 
 import json
-import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Literal
 
@@ -18,7 +16,7 @@ from h5py import h5d, h5p, h5s, h5t
 from numpy.typing import NDArray
 
 from daq.errors import RecorderError, ShotFileError
-from daq.files.atomic_file import replacing
+from daq.files.atomic_file import amending, replacing, reserve
 from daq.files.columns import columns_of, frames_path, view_path
 from daq.files.encoding import encode_frame
 from daq.files.header import RunClosing, RunHeader
@@ -28,6 +26,8 @@ RUN_FILE = "run.h5"
 _LATER_FIELDS = ("rate_hz",)
 """Of the header; runs from before have their defaults."""
 SHOTS_FOLDER = "shots"
+_CLOSING_BYTES = 256 * 2**10
+"""What the end of a run adds to its file at most: outcome, causes, numbers of the shots that were not stored."""
 RUN_SCHEMA = "tomoshadow-run"
 Reference = Literal["dark", "background"]
 ReferenceImages = Mapping[str, NDArray[np.float32]]
@@ -45,6 +45,11 @@ def write_run_file(run_dir: Path, header: RunHeader) -> None:
         create_groups(file, header)
         _write_entry(file.create_group("entry"), header)
         _write_view(file, header)
+
+
+def reserve_closing(run_dir: Path) -> None:
+    """Keep room for the outcome, whatever fills the disk in the meantime; again after every change of the file."""
+    reserve(run_dir / RUN_FILE, _CLOSING_BYTES)
 
 
 def read_header(run_dir: Path) -> RunHeader:
@@ -68,7 +73,7 @@ def set_devices(run_dir: Path, devices: Mapping[str, Mapping[str, str]]) -> None
         file["entry/devices"] = json.dumps(devices, indent=1)
 
 
-def add_outcome(run_dir: Path, outcome: str, cause: str) -> None:
+def add_closing(run_dir: Path, closing: RunClosing) -> None:
     """Close the run: how it ended, why, and when.
 
     Raises
@@ -79,9 +84,9 @@ def add_outcome(run_dir: Path, outcome: str, cause: str) -> None:
     with _amending(run_dir) as file:
         if "outcome" in file["entry"]:
             raise RecorderError(f"{run_dir}: has an outcome already, {file['entry/outcome'].asstr()[()]}")
-        file["entry/outcome"] = outcome
-        file["entry/cause"] = cause
-        file["entry/end_time"] = datetime.now(UTC).isoformat()
+        file["entry/outcome"] = closing.outcome
+        file["entry/cause"] = closing.cause
+        file["entry/end_time"] = closing.ended_utc
         file["entry/shot_count"] = slots_of(run_dir)
 
 
@@ -152,11 +157,8 @@ def reading(run_dir: Path) -> Iterator[h5py.File]:
 
 @contextmanager
 def _amending(run_dir: Path) -> Iterator[h5py.File]:
-    path = run_dir / RUN_FILE
-    with replacing(path) as part:
-        shutil.copyfile(path, part)
-        with h5py.File(part, "r+", libver=LIBRARY_VERSIONS) as file:
-            yield file
+    with amending(run_dir / RUN_FILE) as copy, h5py.File(copy, "r+", libver=LIBRARY_VERSIONS) as file:
+        yield file
 
 
 def _write_entry(entry: h5py.Group, header: RunHeader) -> None:

@@ -31,6 +31,11 @@ class EncodedShot:
     frames: Mapping[str, list[EncodedFrame]]
     columns: Mapping[str, NDArray[Any]]
 
+    @property
+    def size_bytes(self) -> int:
+        """Size of its frames, which is all but some kilobytes."""
+        return sum(len(frame.chunk) for frames in self.frames.values() for frame in frames)
+
 
 def encode_shot(shot: Shot, header: RunHeader) -> EncodedShot:
     """Compress the frames of a shot; releases the GIL for most of the time.

@@ -8,7 +8,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from daq.devices import Rig
-from daq.errors import BusyError, PlanError
+from daq.errors import BusyError, PlanError, StorageError
 from daq.files.run_directory import RunWriter, open_runs
 from daq.run import light
 from daq.run.active_run import ActiveRun, RunObserver
@@ -74,6 +74,8 @@ class Acquisition:
         self._observers = tuple(observers)
         self._starting = threading.Lock()
         self._left = ""
+        self._leaving = threading.Event()
+        self._threads: list[threading.Thread] = []
         self._progress = RunProgress(publish)
         self._ending = RunEnding()
 
@@ -87,6 +89,9 @@ class Acquisition:
     ) -> None:
         self.leave(_why_it_ends(error))
         self.wait(self._limits.light_off_s + self._limits.disarm_s + self._limits.drain_s)
+        self._leaving.set()
+        for thread in self._threads:
+            thread.join(self._limits.light_off_s)
 
     def status(self) -> RunStatus:
         """Snapshot; never waits for a device."""
@@ -121,7 +126,9 @@ class Acquisition:
             prepared, writer = self._prepare(plan)
             self._progress.begin(prepared.header.run_id, plan)
             run = ActiveRun(self._rig, prepared, self._progress, self._limits, self._observers, ending)
-            threading.Thread(target=self._work, args=(run, writer), name="acquisition", daemon=True).start()
+            thread = threading.Thread(target=self._work, args=(run, writer), name="acquisition", daemon=True)
+            self._threads = [*(one for one in self._threads if one.is_alive()), thread]
+            thread.start()
             return prepared.header.run_id
         finally:
             self._starting.release()
@@ -173,13 +180,18 @@ class Acquisition:
         """Check the plan, and make the directory of the run: a run that is accepted always has one."""
         try:
             self._data_dir.mkdir(parents=True, exist_ok=True)
-            prepared = prepare_run(self._rig, self._data_dir, plan, self._configuration, self._hash_calibration)
-            return prepared, RunWriter(prepared.run_dir, prepared.header).__enter__()
+            margin_bytes = self._limits.disk_margin_bytes
+            prepared = prepare_run(
+                self._rig, self._data_dir, plan, self._configuration, self._hash_calibration, margin_bytes
+            )
+            return prepared, RunWriter(prepared.run_dir, prepared.header, margin_bytes).open()
+        except StorageError as error:
+            raise PlanError(f"the run cannot be stored: {error}") from error
         except OSError as error:
             raise PlanError(f"the run cannot be stored, or its calibration not be read: {error}") from error
 
     def _work(self, run: ActiveRun, writer: RunWriter) -> None:
-        """Thread: one run from ARMING until it rests."""
+        """Thread: one run from ARMING until it rests, and longer only if the disk does not take its outcome."""
         session, ending, progress = RunSession(run, writer), run.ending, run.progress
         session.acquire()
         progress.move(ending.step or RunStep.ERROR, message=ending.cause)
@@ -187,6 +199,7 @@ class Acquisition:
         session.close()
         step = RunStep.LIGHT_UNKNOWN if light_reason else RunStep.LIGHT_OFF
         progress.move(step, outcome=ending.outcome, message=ending.cause or progress.status().summary)
+        session.insist(self._leaving)
 
 
 def _why_it_ends(error: BaseException | None) -> str:

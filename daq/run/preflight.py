@@ -16,8 +16,6 @@ from daq.run.references import find_references
 from daq.run_plan import RunKind, RunPlan
 from daq.timing import ShotTiming, plan_shot_timing
 
-DISK_MARGIN_BYTES = 256 * 2**20
-"""What a run leaves free; room for its header, references and the operating system."""
 _FRAMES_PER_SHOT = 2
 _REFERENCE_ITEM_BYTES = 4
 _SOFTWARE = ("tomoshadow", "numpy", "h5py", "isal", "pydantic")
@@ -54,6 +52,7 @@ def prepare_run(
     plan: RunPlan,
     configuration: Mapping[str, Any],
     hash_calibration: Callable[[str], str | None],
+    disk_margin_bytes: int,
 ) -> PreparedRun:
     """Check a plan against rig, references, disk, generator and interlock, and describe the run.
 
@@ -69,6 +68,8 @@ def prepare_run(
         The resolved configuration of the rig (JSON).
     hash_calibration : Callable[[str], str | None]
         SHA-256 of a calibration by its id.
+    disk_margin_bytes : int
+        What the run leaves free on the disk.
 
     Raises
     ------
@@ -86,7 +87,7 @@ def prepare_run(
     _check_stage(rig, plan)
     views = {view: ViewFormat(camera.image_shape, camera.bits) for view, camera in rig.cameras.items()}
     references = find_references(data_dir, plan, views)
-    _check_disk(data_dir, plan, views)
+    _check_disk(data_dir, plan, views, disk_margin_bytes)
     light.check_permitted(rig)
     calibration_sha256 = hash_calibration(plan.calibration) if plan.calibration else None
     header = _header(data_dir, plan, views, configuration, calibration_sha256)
@@ -140,12 +141,12 @@ def _check_stage(rig: Rig, plan: RunPlan) -> None:
             raise PlanError(f"stage_z_mm: {z_mm:g} mm is outside of {lowest_mm:g} to {highest_mm:g} mm")
 
 
-def _check_disk(data_dir: Path, plan: RunPlan, views: Mapping[str, ViewFormat]) -> None:
+def _check_disk(data_dir: Path, plan: RunPlan, views: Mapping[str, ViewFormat], margin_bytes: int) -> None:
     """Compare with the uncompressed size: how well a spray compresses is not known before."""
     shot_bytes = _FRAMES_PER_SHOT * sum(view.frame_bytes for view in views.values())
     pixels = sum(view.shape[0] * view.shape[1] for view in views.values())
     reference_bytes = 2 * _FRAMES_PER_SHOT * pixels * _REFERENCE_ITEM_BYTES if plan.references else 0
-    needed = plan.total_shots * shot_bytes + reference_bytes + DISK_MARGIN_BYTES
+    needed = plan.total_shots * shot_bytes + reference_bytes + margin_bytes
     free = shutil.disk_usage(data_dir).free
     if needed > free:
         raise PlanError(

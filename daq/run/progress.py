@@ -62,4 +62,9 @@ class RunProgress:
         """Something is worth a line."""
         with self._changed:
             self._status = replace(self._status, message=text)
-            self._publish(RunMessage(self._status.run_id or "", text))
+            self.tell(self._status.run_id or "", text)
+
+    def tell(self, run_id: str, text: str) -> None:
+        """Something is worth a line of a run that is over."""
+        with self._changed:
+            self._publish(RunMessage(run_id, text))

@@ -7,12 +7,12 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Self
 
-from daq.errors import RecorderError, RecorderOverflow
+from daq.errors import RecorderError, RecorderOverflow, StorageError
 from daq.files.run_directory import RunWriter
 from daq.shot import Shot
 
 
-def _nobody_listens(_: Shot) -> None:
+def _nobody_listens(_: Shot | RecorderError) -> None:
     """Not every recorder has a listener."""
 
 
@@ -33,6 +33,8 @@ class Recorder:
         Writer threads.
     on_commit : Callable[[Shot], None]
         Called by a writer thread after a shot has reached the disk, in the order of indices.
+    on_failure : Callable[[RecorderError], None]
+        Called by a writer thread as soon as a shot cannot be stored: the light is still on then.
     """
 
     def __init__(
@@ -41,10 +43,12 @@ class Recorder:
         depth: int = 8,
         threads: int = 2,
         on_commit: Callable[[Shot], None] = _nobody_listens,
+        on_failure: Callable[[RecorderError], None] = _nobody_listens,
     ) -> None:
         self._writer = writer
         self._depth = depth
         self._on_commit = on_commit
+        self._on_failure = on_failure
         self._threads = [threading.Thread(target=self._work, name=f"recorder-{n}", daemon=True) for n in range(threads)]
         self._changed = threading.Condition()
         self._waiting: deque[Shot] = deque()
@@ -117,8 +121,7 @@ class Recorder:
 
     def _raise_failure(self) -> None:
         if self._failure is not None:
-            index, cause = self._failure
-            raise RecorderError(f"shot {index} cannot be stored: {cause}") from cause
+            raise _told(*self._failure) from self._failure[1]
 
     def _work(self) -> None:
         """Thread: take a shot, compress and stage it, commit it when its turn comes."""
@@ -155,3 +158,10 @@ class Recorder:
             if self._failure is None or index < self._failure[0]:
                 self._failure = (index, error)
             self._changed.notify_all()
+        self._on_failure(_told(index, error))
+
+
+def _told(index: int, cause: Exception) -> RecorderError:
+    """Whatever kept a shot from the disk, with its number; what the disk refused keeps its kind."""
+    kind = type(cause) if isinstance(cause, StorageError) else RecorderError
+    return kind(f"shot {index} cannot be stored: {cause}")

@@ -1,11 +1,15 @@
 """RunSession: one run on devices and disk, worked by the acquisition thread: acquire, disarm, close."""
 
+import threading
 from collections.abc import Callable
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import asdict
+from datetime import UTC, datetime
 from functools import partial
 
 from daq.errors import DaqError, DeviceError
+from daq.files.header import RunClosing
+from daq.files.outcome_note import write_note
 from daq.files.run_directory import RunWriter
 from daq.run import light
 from daq.run.active_run import ActiveRun
@@ -17,6 +21,8 @@ from daq.run.shot_check import Thresholds, light_thresholds
 from daq.run.shot_taking import ShotTaker
 from daq.run.state import RunStep
 from daq.run_plan import RunKind
+
+_RETRY_S = 1.0
 
 
 class RunSession:
@@ -36,8 +42,8 @@ class RunSession:
         self._ending = run.ending
         self._writer = writer
         self._storage = ExitStack()
-        self._storage.push(writer)
-        self._storage.callback(self._finish)
+        self._closed = False
+        self._ended_utc = ""
 
     def acquire(self) -> None:
         """Arm, and take all shots; returns when the last one is handed to the recorder, or the run is ended."""
@@ -59,6 +65,20 @@ class RunSession:
     def close(self) -> None:
         """Wait until every shot is on the disk, then write the outcome."""
         self._attempt(self._storage.close)
+        self._ended_utc = datetime.now(UTC).isoformat()
+        self._attempt(self._finish)
+
+    def insist(self, leaving: threading.Event) -> None:
+        """Write an outcome that the disk did not take as soon as it does; when the program ends, leave a note of it."""
+        run_id, tell = self._writer.header.run_id, self._run.progress.tell
+        if not self._closed:
+            tell(run_id, "its outcome could not be written: that is tried again until the disk takes it")
+        while not self._closed and not leaving.wait(_RETRY_S):
+            with suppress(DaqError, OSError):
+                self._finish()
+                tell(run_id, f"its outcome is in its file now: {self._ending.outcome}")
+        if not self._closed:
+            write_note(self._writer.run_dir, self._closing())
 
     def _acquire(self) -> None:
         plan = self._run.prepared.plan
@@ -110,13 +130,19 @@ class RunSession:
         limits, writer = self._run.limits, self._writer
         for observer in self._run.observers:
             self._storage.callback(self._attempt, partial(observer.after_run, writer.run_dir))
-        recorder = Recorder(writer, limits.recorder_depth, limits.recorder_threads, self._run.progress.count)
+        count, fail = self._run.progress.count, self._fail_by
+        recorder = Recorder(writer, limits.recorder_depth, limits.recorder_threads, count, fail)
         self._storage.enter_context(recorder)
         self._storage.callback(self._attempt, partial(recorder.close, limits.drain_s))
         return recorder
 
     def _finish(self) -> None:
-        self._writer.finish(self._ending.outcome.value, self._ending.cause)
+        self._writer.write_closing(self._closing())
+        self._writer.close()
+        self._closed = True
+
+    def _closing(self) -> RunClosing:
+        return RunClosing(self._ending.outcome.value, self._ending.cause, self._ended_utc)
 
     def _attempt(self, action: Callable[[], None]) -> None:
         """The top of the acquisition thread: whatever goes wrong, the light goes off before anything else."""
@@ -127,7 +153,10 @@ class RunSession:
         except Exception as error:  # noqa: BLE001  the top of a thread: a bug must not leave the light on
             self._fail(f"internal error: {error!r}")
 
+    def _fail_by(self, error: Exception) -> None:
+        self._fail(str(error))
+
     def _fail(self, cause: str) -> None:
         light.try_to_switch_off(self._rig)
-        if not self._ending.end(RunStep.ERROR, cause):
+        if not self._ending.end(RunStep.ERROR, cause) and cause != self._ending.cause:
             self._run.progress.say(cause)

@@ -1,0 +1,86 @@
+"""What becomes of a run whose disk fails: real, small file systems, see ``tests.support.storage_trials``."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.support.storage_trials import DISK_BYTES, MARGIN_BYTES
+
+ROOT = Path(__file__).parents[3]
+NAMESPACE = ("unshare", "-rm", "setpriv", "--bounding-set", "-dac_override,-dac_read_search")
+
+
+def namespace_works() -> bool:
+    return subprocess.run([*NAMESPACE, "true"], capture_output=True, check=False).returncode == 0
+
+
+pytestmark = pytest.mark.skipif(not namespace_works(), reason="this machine forbids user namespaces")
+
+
+@pytest.fixture(scope="module")
+def trials(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]:
+    """What was found in every trial, by its name."""
+    folder = tmp_path_factory.mktemp("trials")
+    process = subprocess.run(
+        [*NAMESPACE, sys.executable, "-m", "tests.support.storage_trials", str(folder)],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=200,
+        cwd=ROOT,
+        env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1"},
+    )
+    assert process.returncode == 0, process.stderr
+    found = [json.loads(line) for line in process.stdout.splitlines()]
+    return {one["trial"]: one for one in found}
+
+
+CAUSES = {
+    "filled_by_the_run": "the disk of {run_dir} has ",
+    "filled_by_others": "the disk of {run_dir} is full (0 bytes are free): delete or move away what is not needed",
+    "moved": "{run_dir} is gone (moved, deleted, or its disk is not mounted): bring it back",
+    "unmounted": "{run_dir} is gone (moved, deleted, or its disk is not mounted): bring it back",
+    "read_only_for_a_while": "the disk of {run_dir} is read-only, as after a fault of it: look at it, mount it",
+    "forbidden_for_a_while": "{run_dir} may not be written by this server (user 0): give the permission back",
+}
+
+
+@pytest.mark.parametrize("name", CAUSES)
+def test_light_goes_off_first_and_outcome_and_cause_are_stored(trials: dict[str, dict[str, Any]], name: str) -> None:
+    found = trials[name]
+    assert found["light_first"]
+    cause = found["closing"]["cause"]
+    assert found["closing"]["outcome"] == found["status"]["outcome"] == "failed"
+    assert cause == found["status"]["message"]
+    assert cause.startswith(
+        f"shot {found['acknowledged']} cannot be stored: {CAUSES[name].format(run_dir=found['run_dir'])}"
+    )
+    assert cause.endswith("then start again")
+    assert "rrno" not in cause, "numbers of the system help no operator"
+    assert found["readable"] == found["acknowledged"] >= 3
+    assert found["parts"] == [] or name in ("moved", "unmounted"), "out of reach, the next start sets it aside"
+
+
+def test_a_run_ends_at_the_margin_and_not_at_the_last_byte(trials: dict[str, dict[str, Any]]) -> None:
+    found = trials["filled_by_the_run"]
+    assert MARGIN_BYTES / 2 < found["free"] < DISK_BYTES / 2
+    assert f"a run leaves {MARGIN_BYTES} bytes free" in found["closing"]["cause"]
+
+
+@pytest.mark.parametrize("name", ["read_only_for_a_while", "forbidden_for_a_while"])
+def test_an_outcome_that_cannot_be_written_is_kept_until_it_can(trials: dict[str, dict[str, Any]], name: str) -> None:
+    found = trials[name]
+    assert found["before"] is None
+    assert "its outcome could not be written: that is tried again until the disk takes it" in found["messages"]
+    assert found["messages"][-1] == "its outcome is in its file now: failed"
+
+
+def test_an_outcome_that_was_never_written_lies_beside_the_run(trials: dict[str, dict[str, Any]]) -> None:
+    found = trials["forbidden_until_the_end"]
+    assert found["closing"] is None
+    assert (found["note"]["outcome"], found["note"]["cause"]) == ("failed", found["status"]["message"])

@@ -1,0 +1,31 @@
+"""What the list says of a run whose file does not say how it ended."""
+
+from pathlib import Path
+
+import pytest
+
+from daq.files.run_directory import RunHeader, RunWriter, ViewFormat
+from daq.run.events import RunStatus
+from daq.run.state import RunOutcome, RunState
+from server.lab.runs.run_store import RunStore
+
+RUN_ID = "20260101T000000-run"
+HEADER = RunHeader(run_id=RUN_ID, created_utc="2026-01-01T00:00:00+00:00", views={"view1": ViewFormat((4, 4), 8)})
+
+
+@pytest.mark.parametrize(
+    ("status", "told"),
+    [
+        (RunStatus(), ("interrupted", "")),
+        (RunStatus(RunState.ACQUIRING, run_id=RUN_ID, message="shot 3"), ("active", "")),
+        (RunStatus(outcome=RunOutcome.FAILED, run_id=RUN_ID, message="disk full"), ("failed", "disk full")),
+        (RunStatus(outcome=RunOutcome.FAILED, run_id="another", message="disk full"), ("interrupted", "")),
+    ],
+)
+def test_a_run_without_an_outcome_is_what_acquisition_knows_of_it(
+    tmp_path: Path, status: RunStatus, told: tuple[str, str]
+) -> None:
+    with RunWriter(tmp_path / RUN_ID, HEADER):
+        pass
+    summary = RunStore(tmp_path, lambda: status).summary(RUN_ID)
+    assert (summary.outcome, summary.cause) == told
