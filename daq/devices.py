@@ -10,6 +10,7 @@ from enum import StrEnum
 from types import TracebackType
 from typing import Protocol, Self
 
+from daq.network import Network
 from daq.shot import DoubleFrame, FiredTrain, Image
 from daq.timing import CameraTiming, ShotTiming
 
@@ -189,6 +190,8 @@ class Rig:
         Carries the calibration target, where there is one.
     max_current_a : Mapping[str, float]
         Limit of each view's LED; a view that is not named has only the limit of the generator.
+    network : Network
+        The wires between cameras and computer.
     """
 
     cameras: Mapping[str, Camera]
@@ -196,6 +199,7 @@ class Rig:
     interlock: Interlock
     stage: TranslationStage | None = None
     max_current_a: Mapping[str, float] = field(default_factory=dict)
+    network: Network = field(default_factory=Network)
 
     @property
     def devices(self) -> tuple[Device, ...]:

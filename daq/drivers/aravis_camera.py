@@ -10,6 +10,7 @@ from daq.drivers.camera_profile import CameraProfile, FeatureWrite
 from daq.drivers.exposure_pairing import ExposureFormat, double_frame
 from daq.drivers.frame_receiver import FrameReceiver, StreamCounters
 from daq.errors import DeviceError, DeviceRefused, DeviceUnavailable
+from daq.network import Network
 from daq.shot import DoubleFrame, Image
 from daq.timing import CameraTiming
 
@@ -21,6 +22,8 @@ _log = logging.getLogger(__name__)
 ARAVIS_REMEDY = "apt install python3-gi gir1.2-aravis-0.8, and a virtual environment with --system-site-packages"
 """No package index has them, so Debian's must be seen."""
 _RELEASE_LIMIT_S = 2.0
+JUMBO = Network(packet_bytes=9000)
+"""The loopback interface carries it."""
 
 
 def load_aravis(name: str) -> "type[AravisDevice]":
@@ -55,8 +58,8 @@ class AravisCamera:
         What it is told before each run, and its timing.
     shape : tuple[int, int]
         (rows, columns) of one exposure.
-    packet_bytes : int
-        Size of a stream packet: 9000 where the network carries jumbo frames, else 1500.
+    network : Network
+        How its images are sent, and what may wait for them.
     """
 
     def __init__(
@@ -65,12 +68,12 @@ class AravisCamera:
         ip: str,
         profile: CameraProfile,
         shape: tuple[int, int] = (1200, 1600),
-        packet_bytes: int = 9000,
+        network: Network = JUMBO,
     ) -> None:
         self._name = name
         self._ip = ip
         self._profile = profile
-        self._packet_bytes = packet_bytes
+        self._network = network
         self._form = ExposureFormat(shape, profile.bits, profile.frames_per_trigger, profile.pair, profile.stacked)
         self._is_open = False
         self._device: AravisDevice | None = None
@@ -142,8 +145,8 @@ class AravisCamera:
         settings = self._settings(device)
         for setting in settings:
             device.write(setting)
-        device.set_packet_bytes(self._packet_bytes)
-        receiver = FrameReceiver(self._name, device.open_stream(self._form))
+        device.set_packets(self._network.packet_bytes, self._network.packet_delay_ns)
+        receiver = FrameReceiver(self._name, device.open_stream(self._form, self._network.socket_buffer_bytes))
         receiver.start()
         self._receiver = receiver
         self._last_id = 0

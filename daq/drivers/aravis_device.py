@@ -27,7 +27,6 @@ _CONTROL_LIMIT_S = 6.0  # control of a client that was killed expires 3 s after 
 _CONTROL_RETRY_S = 0.25
 _BUFFERS = 8
 _POLL_US = 50_000
-_SOCKET_BUFFER_BYTES = 4 << 20
 # Shots come one by one: rather late than incomplete. Aravis would give up after 0.1 s, or a tenth of the packets.
 _FRAME_RETENTION_US = 500_000
 _RESEND_RATIO = 1.0
@@ -36,6 +35,7 @@ _RESEND_RATIO = 1.0
 _TICK_FREQUENCY_HIGH, _TICK_FREQUENCY_LOW = 0x093C, 0x0940
 _TIMESTAMP_CONTROL, _TIMESTAMP_HIGH, _TIMESTAMP_LOW = 0x0944, 0x0948, 0x094C
 _LATCH = 2
+_PACKET_DELAY = 0x0D08  # of the first stream channel, in ticks
 
 
 class AravisDevice:
@@ -115,17 +115,33 @@ class AravisDevice:
         if not setting.is_met_by(actual):
             raise DeviceRefused(self._name, f"{setting.feature} reads {actual!r} after writing {setting.value!r}")
 
-    def set_packet_bytes(self, packet_bytes: int) -> None:
-        """Fix the size of stream packets; the automatic choice of Aravis is not dependable."""
+    def set_packets(self, packet_bytes: int, packet_delay_ns: int) -> None:
+        """Fix size and distance of stream packets, and read them back; the automatic size of Aravis is not dependable.
+
+        Raises
+        ------
+        DeviceRefused
+            The camera does not take the size, or no pause as long as that.
+        """
         with self._typed_errors(f"packet size {packet_bytes}"):
             self._camera.gv_set_packet_size_adjustment(Aravis.GvPacketSizeAdjustment.NEVER)
             self._camera.gv_set_packet_size(packet_bytes)
+            taken_bytes = self._camera.gv_get_packet_size()
+        if taken_bytes != packet_bytes:
+            raise DeviceRefused(self._name, f"sends packets of {taken_bytes} bytes, not {packet_bytes}")
+        delay_ticks = -(-packet_delay_ns * self._tick_hz // 1_000_000_000)
+        with self._typed_errors(f"packet delay {packet_delay_ns} ns"):
+            self._device.write_register(_PACKET_DELAY, delay_ticks)
+            taken_ticks = self._device.read_register(_PACKET_DELAY)
+        if taken_ticks != delay_ticks:
+            pauses_ns = 1e9 * taken_ticks / self._tick_hz
+            raise DeviceRefused(self._name, f"pauses {pauses_ns:g} ns between packets, not {packet_delay_ns}")
 
-    def open_stream(self, form: ExposureFormat) -> "AravisStream":
+    def open_stream(self, form: ExposureFormat, socket_buffer_bytes: int) -> "AravisStream":
         """A fresh stream, so that no frame of an earlier acquisition is in it."""
         with self._typed_errors("stream"):
             stream = self._camera.create_stream(None, None)
-            return AravisStream(stream, self._camera.get_payload(), form)
+            return AravisStream(stream, self._camera.get_payload(), form, socket_buffer_bytes)
 
     def start(self) -> None:
         """Start acquisition."""
@@ -208,15 +224,17 @@ class AravisStream:
         Size of one image on the wire.
     form : ExposureFormat
         What a frame must look like.
+    socket_buffer_bytes : int
+        What may wait in the socket.
     """
 
-    def __init__(self, stream: Any, payload_bytes: int, form: ExposureFormat) -> None:
+    def __init__(self, stream: Any, payload_bytes: int, form: ExposureFormat, socket_buffer_bytes: int) -> None:
         self._stream = stream
         self._form = form
         self._missing_packets = 0
         self._resent_packets = 0
         stream.set_property("socket-buffer", Aravis.GvStreamSocketBuffer.FIXED)
-        stream.set_property("socket-buffer-size", _SOCKET_BUFFER_BYTES)
+        stream.set_property("socket-buffer-size", socket_buffer_bytes)
         stream.set_property("frame-retention", _FRAME_RETENTION_US)
         stream.set_property("packet-request-ratio", _RESEND_RATIO)
         self._memory: dict[Any, NDArray[np.uint8]] = {}

@@ -88,6 +88,7 @@ def prepare_run(
     views = {view: ViewFormat(camera.image_shape, camera.bits) for view, camera in rig.cameras.items()}
     references = find_references(data_dir, plan, views)
     _check_disk(data_dir, plan, views, disk_margin_bytes)
+    _check_network(rig, plan, views)
     light.check_permitted(rig)
     calibration_sha256 = hash_calibration(plan.calibration) if plan.calibration else None
     header = _header(data_dir, plan, views, configuration, calibration_sha256)
@@ -139,6 +140,18 @@ def _check_stage(rig: Rig, plan: RunPlan) -> None:
     for z_mm in plan.stage_z_mm:
         if not lowest_mm <= z_mm <= highest_mm:
             raise PlanError(f"stage_z_mm: {z_mm:g} mm is outside of {lowest_mm:g} to {highest_mm:g} mm")
+
+
+def _check_network(rig: Rig, plan: RunPlan, views: Mapping[str, ViewFormat]) -> None:
+    """Images that come faster than the wires carry them are lost, or pile up in the cameras."""
+    shot_s = rig.network.shot_s({view: _FRAMES_PER_SHOT * one.frame_bytes for view, one in views.items()})
+    if shot_s > 1 / plan.rate_hz:
+        shared = rig.network.shared_gbit_s
+        wires = f"the {shared:g} Gbit/s that the cameras share" if shared else f"{rig.network.camera_gbit_s:g} Gbit/s"
+        raise PlanError(
+            f"rate_hz: {plan.rate_hz:g} shots per second do not pass through {wires}: a shot takes {1e3 * shot_s:.0f} "
+            f"ms, so at most {1 / shot_s:.1f} per second ([network] in the rig file)"
+        )
 
 
 def _check_disk(data_dir: Path, plan: RunPlan, views: Mapping[str, ViewFormat], margin_bytes: int) -> None:

@@ -137,13 +137,19 @@ def _simulated_generator(config: RigConfig, on_fired: Callable[[FiredTrain], Non
 
 
 def _rig(config: RigConfig, profiles: Profiles, interlock: Interlock, clock_s: Clock = time.monotonic) -> Rig:
-    stage = None if config.stage is None else _stage(config.stage)
+    stage, network = None if config.stage is None else _stage(config.stage), config.network.to_network()
     cameras = {
-        name: AravisCamera(name, view.camera.ip, profiles[name], (view.sensor.height_px, view.sensor.width_px))
+        name: AravisCamera(
+            name,
+            view.camera.ip,
+            profiles[name],
+            (view.sensor.height_px, view.sensor.width_px),
+            network,
+        )
         for name, view in config.views.items()
     }
     generator = _pulse_generator(config, clock_s)
-    return Rig(cameras, generator, interlock, stage, max_current_a=_current_limits_a(config))
+    return Rig(cameras, generator, interlock, stage, max_current_a=_current_limits_a(config), network=network)
 
 
 def _pulse_generator(config: RigConfig, clock_s: Clock) -> SerialPulseGenerator:

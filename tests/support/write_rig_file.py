@@ -27,6 +27,7 @@ UNITS = {
     "px": "px",
     "deg": "°",
     "a": "A",
+    "bytes": "bytes",
 }
 NAMES = {"string": "text", "integer": "integer", "number": "number", "boolean": "true or false"}
 FORMATS = {"path": "path"}
@@ -164,8 +165,9 @@ def _plural(described: Schema, defs: Schema) -> str:
 
 
 def _unit(key: str, described: Schema) -> str:
-    if key.endswith("_px_per_mm"):
-        return "px/mm"
+    for ending, unit in (("_px_per_mm", "px/mm"), ("_gbit_s", "Gbit/s")):
+        if key.endswith(ending):
+            return unit
     suffix = key.rpartition("_")[2]
     return UNITS[suffix] if suffix in UNITS and suffix != key and "string" not in str(described) else ""
 

@@ -23,6 +23,7 @@ from daq.simulation.camera.gige_faults import CameraFaults, ShotFault
 from daq.simulation.camera.gige_registers import (
     LATCH_TIMESTAMP,
     STREAM_PACKET_SIZE_MASK,
+    TICK_FREQUENCY_HZ,
     Register,
     RegisterBank,
     TriggerSource,
@@ -272,7 +273,8 @@ class SimulatedCamera:
         address = self._bank[Register.STREAM_ADDRESS].to_bytes(4)
         port = self._bank[Register.STREAM_PORT] & 0xFFFF
         if firing.acquisition == self._acquisition and port and not self.faults.frozen:
-            self._stream.send(delivery.block, (socket.inet_ntoa(address), port))
+            delay_s = self._bank[Register.STREAM_PACKET_DELAY] / TICK_FREQUENCY_HZ
+            self._stream.send(delivery.block, (socket.inet_ntoa(address), port), delay_s)
 
 
 def _stacked(images: Sequence[Image]) -> Image:

@@ -109,13 +109,13 @@ class StreamChannel:
         self._kept: OrderedDict[int, tuple[Block, Peer]] = OrderedDict()
         self._lock = Lock()
 
-    def send(self, block: Block, client: Peer) -> None:
-        """Send a whole block and keep it for resend requests."""
+    def send(self, block: Block, client: Peer, packet_delay_s: float = 0.0) -> None:
+        """Send a whole block, with a pause between packets, and keep it for resend requests."""
         with self._lock:
             self._kept[block.block_id] = (block, client)
             while len(self._kept) > _BLOCKS_KEPT:
                 self._kept.popitem(last=False)
-        packet_s = (block.packet_bytes + _ETHERNET_BYTES) * 8 / self._link_bits_per_s
+        packet_s = (block.packet_bytes + _ETHERNET_BYTES) * 8 / self._link_bits_per_s + packet_delay_s
         started_s = perf_counter()
         for index in range(block.packet_count):
             self._send(block.packet(index), client)

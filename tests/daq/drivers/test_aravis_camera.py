@@ -2,6 +2,7 @@
 
 import socket
 import struct
+import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -17,6 +18,7 @@ from daq.drivers.aravis_camera import AravisCamera
 from daq.drivers.camera_profile import FeatureWrite, PairSpacing, load_camera_profile
 from daq.drivers.frame_receiver import FrameReceiver, StreamCounters
 from daq.errors import DeviceError, DeviceRefused, DeviceTimeout, DeviceUnavailable
+from daq.network import Network
 from daq.shot import DoubleFrame, FiredTrain, Image, LightPulse
 from daq.simulation.camera.gige_camera import SimulatedCamera
 from daq.simulation.camera.gige_control import GVCP_PORT, Command
@@ -96,7 +98,7 @@ def test_lost_packets_are_asked_for_again(percent: int) -> None:
     shape = (600, 800)
     with (
         SimulatedCamera("view", IP, "SN32", TIMING, noise, shape) as simulated,
-        AravisCamera("view", IP, PROFILE, shape, packet_bytes=1500) as camera,
+        AravisCamera("view", IP, PROFILE, shape, Network(packet_bytes=1500)) as camera,
     ):
         camera.arm()
         simulated.faults.packet_loss = percent / 100
@@ -105,6 +107,18 @@ def test_lost_packets_are_asked_for_again(percent: int) -> None:
             wire.assert_good_shot()
         assert camera.counters.resent_packets > 5 * percent
         assert camera.counters.missing_packets == 0
+
+
+def test_a_camera_pauses_between_packets_where_a_switch_needs_it() -> None:
+    shape, network = (300, 400), Network(packet_bytes=1500, packet_delay_ns=1_000_000)
+    with (
+        SimulatedCamera("view", IP, "SN32", TIMING, noise, shape) as simulated,
+        AravisCamera("view", IP, PROFILE, shape, network) as camera,
+    ):
+        camera.arm()
+        begun_s = time.monotonic()
+        Wire(simulated, camera).assert_good_shot()
+        assert time.monotonic() - begun_s > 2 * 80 * 1e-3
 
 
 def test_a_frame_that_stays_incomplete_is_flagged_and_black(wire: Wire) -> None:

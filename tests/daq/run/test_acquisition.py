@@ -5,6 +5,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,7 @@ from daq.errors import (
     PlanError,
 )
 from daq.files.run_directory import ImageKey, PulsePair, RunKind, RunPlan, RunReader, RunWriter
+from daq.network import Network
 from daq.run.acquisition import Acquisition
 from daq.run.events import RunEvent, RunMessage, ShotRecorded, StateChanged
 from daq.run.limits import AcquisitionLimits
@@ -417,6 +419,19 @@ def test_a_run_that_the_disk_does_not_hold_is_refused_with_both_numbers(lab: Lab
         PlanError, match=r"100000 shots of \d+ bytes need \d+ bytes on the disk of .*, \d+ bytes are free"
     ):
         lab.acquisition.start(plan_of(100_000))
+
+
+def test_images_that_come_faster_than_the_wires_carry_them_are_refused(lab: Laboratory) -> None:
+    """A shot has 2 x (768 + 2 x 640) bytes and four packets with 74 bytes around each: 35 kbit."""
+    shared = replace(lab.memory.rig, network=Network(camera_gbit_s=1e-3, shared_gbit_s=1e-3))
+    acquisition = Acquisition(shared, lab.data_dir)
+    with pytest.raises(
+        PlanError, match=r"rate_hz: 50 shots .* pass through the 0\.001 Gbit/s .* at most 28\.5 per second"
+    ):
+        acquisition.start(plan_of(1, rate_hz=50))
+    assert not lab.memory.journal
+    acquisition.start(plan_of(1, rate_hz=25))
+    assert acquisition.wait(DEADLINE_S).outcome is RunOutcome.COMPLETED
 
 
 def test_a_calibration_that_does_not_exist_refuses_the_plan(lab: Laboratory) -> None:

@@ -87,6 +87,16 @@ def test_an_open_door_is_a_warning() -> None:
 def test_an_address_that_no_interface_leads_to_fails() -> None:
     if len(Path("/proc/net/route").read_text().splitlines()) > 1:
         pytest.skip("this machine is on a network, which leads everywhere")
-    check = check_network("network of view1", "192.168.10.11")
+    check = check_network("network of view1", "192.168.10.11", 1500)
     assert check.status is Status.FAIL
     assert "192.168.10.11" in check.detail
+
+
+@pytest.mark.parametrize(
+    ("packet_bytes", "status"), [(9000, Status.OK), (1500, Status.WARN), (70000, Status.FAIL)], ids=str
+)
+def test_packets_must_pass_the_interface(packet_bytes: int, status: Status) -> None:
+    """The loopback interface carries packets of 65536 bytes."""
+    check = check_network("network of view1", "127.0.0.31", packet_bytes)
+    assert check.status is status
+    assert ("packet_bytes = " in check.remedy) == (status is not Status.OK)
