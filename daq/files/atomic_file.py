@@ -24,10 +24,11 @@ def reserve_path(path: Path) -> Path:
 
 
 def reserve(path: Path, more_bytes: int) -> None:
-    """Take room on the disk for a copy of a file that is longer by some bytes."""
+    """Take room on the disk for a copy of a file, which need not be there yet, that is longer by some bytes."""
+    size_bytes = path.stat().st_size if path.exists() else 0
     descriptor = os.open(reserve_path(path), os.O_RDWR | os.O_CREAT, 0o666)
     try:
-        os.posix_fallocate(descriptor, 0, path.stat().st_size + more_bytes)
+        os.posix_fallocate(descriptor, 0, size_bytes + more_bytes)
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
@@ -74,14 +75,21 @@ def replacing(path: Path) -> Iterator[Path]:
 
 @contextmanager
 def amending(path: Path) -> Iterator[Path]:
-    """Yield the path of a copy that replaces ``path`` at the end; it lies in the reserve if there is one.
+    """Yield the path of a copy of a file that replaces it at the end."""
+    with replacing(path) as part:
+        shutil.copyfile(path, part)
+        yield part
+
+
+@contextmanager
+def spending_reserve(path: Path) -> Iterator[Path]:
+    """Like ``amending``, but the copy lies in the reserve, if there is one: it needs no room on the disk.
 
     A reserve outlives a block that raises, so that the same change can be tried again.
     """
     copy = reserve_path(path)
     if not copy.exists():
-        with replacing(path) as part:
-            shutil.copyfile(path, part)
+        with amending(path) as part:
             yield part
         return
     with copy.open("r+b") as reserved:  # never truncated: a full disk would not give its blocks back

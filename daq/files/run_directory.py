@@ -55,7 +55,6 @@ __all__ = [
     "ShotFileError",
     "ViewFormat",
     "list_runs",
-    "open_runs",
     "pack",
 ]
 
@@ -159,15 +158,3 @@ def pack(run_dir: Path, out: Path) -> None:
     require_free(out)
     reader = RunReader(run_dir)
     pack_run(run_dir, reader.header, reader.shot_count, out)
-
-
-def open_runs(data_dir: Path) -> tuple[str, ...]:
-    """Ids of the runs without an outcome: active ones, and those whose process was killed."""
-    found = []
-    for run_dir in list_runs(data_dir):
-        try:
-            if RunReader(run_dir).outcome is None:
-                found.append(run_dir.name)
-        except ShotFileError:
-            continue
-    return tuple(found)

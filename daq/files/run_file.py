@@ -6,7 +6,7 @@ outcome are added to a copy that replaces the file, so that a complete ``run.h5`
 
 import json
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any, Literal
 
@@ -16,7 +16,7 @@ from h5py import h5d, h5p, h5s, h5t
 from numpy.typing import NDArray
 
 from daq.errors import RecorderError, ShotFileError
-from daq.files.atomic_file import amending, replacing, reserve
+from daq.files.atomic_file import amending, replacing, reserve, spending_reserve
 from daq.files.columns import columns_of, frames_path, view_path
 from daq.files.encoding import encode_frame
 from daq.files.header import RunClosing, RunHeader
@@ -68,7 +68,7 @@ def read_header(run_dir: Path) -> RunHeader:
 
 def set_devices(run_dir: Path, devices: Mapping[str, Mapping[str, str]]) -> None:
     """Write down what the devices say they are: they are asked when the run exists already."""
-    with _amending(run_dir) as file:
+    with _changing(amending(run_dir / RUN_FILE)) as file:
         del file["entry/devices"]
         file["entry/devices"] = json.dumps(devices, indent=1)
 
@@ -81,7 +81,7 @@ def add_closing(run_dir: Path, closing: RunClosing) -> None:
     RecorderError
         The run has an outcome already.
     """
-    with _amending(run_dir) as file:
+    with _changing(spending_reserve(run_dir / RUN_FILE)) as file:
         if "outcome" in file["entry"]:
             raise RecorderError(f"{run_dir}: has an outcome already, {file['entry/outcome'].asstr()[()]}")
         file["entry/outcome"] = closing.outcome
@@ -123,7 +123,7 @@ def add_references(run_dir: Path, header: RunHeader, references: Mapping[Referen
     for name, images in references.items():
         for view, stack in images.items():
             _check_reference(run_dir, header, f"{name} of {view}", view, stack)
-    with _amending(run_dir) as file:
+    with _changing(amending(run_dir / RUN_FILE)) as file:
         for name, images in references.items():
             for view, stack in images.items():
                 if view_path(view, name) in file:
@@ -156,8 +156,8 @@ def reading(run_dir: Path) -> Iterator[h5py.File]:
 
 
 @contextmanager
-def _amending(run_dir: Path) -> Iterator[h5py.File]:
-    with amending(run_dir / RUN_FILE) as copy, h5py.File(copy, "r+", libver=LIBRARY_VERSIONS) as file:
+def _changing(copied: AbstractContextManager[Path]) -> Iterator[h5py.File]:
+    with copied as copy, h5py.File(copy, "r+", libver=LIBRARY_VERSIONS) as file:
         yield file
 
 

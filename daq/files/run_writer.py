@@ -139,6 +139,7 @@ class RunWriter:
 
     def _begin(self) -> None:
         self._held_dir = self._held.enter_context(hold_folder(self.run_dir))
+        reserve_closing(self.run_dir)  # first: whoever finds it without an outcome knows that the run is not over
         write_run_file(self.run_dir, self.header)
         reserve_closing(self.run_dir)
         sync(self.run_dir.parent)

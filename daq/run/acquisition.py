@@ -1,5 +1,6 @@
 """Acquisition: one run at a time, on a thread of its own."""
 
+import logging
 import signal
 import threading
 from collections.abc import Callable, Mapping, Sequence
@@ -9,7 +10,8 @@ from typing import Any, Self
 
 from daq.devices import Rig
 from daq.errors import BusyError, PlanError, StorageError
-from daq.files.run_directory import RunWriter, open_runs
+from daq.files.recovery import recover
+from daq.files.run_directory import RunWriter
 from daq.run import light
 from daq.run.active_run import ActiveRun, RunObserver
 from daq.run.ending import RunEnding
@@ -20,6 +22,8 @@ from daq.run.progress import RunProgress
 from daq.run.session import RunSession
 from daq.run.state import RunState, RunStep, next_state
 from daq.run_plan import RunPlan
+
+_LOG = logging.getLogger(__name__)
 
 
 def _nobody_listens(_: RunEvent) -> None:
@@ -80,8 +84,6 @@ class Acquisition:
         self._ending = RunEnding()
 
     def __enter__(self) -> Self:
-        for run_id in self.interrupted_runs():
-            self._publish(RunMessage(run_id, "interrupted: its process ended before the run did"))
         return self
 
     def __exit__(
@@ -97,10 +99,11 @@ class Acquisition:
         """Snapshot; never waits for a device."""
         return self._progress.status()
 
-    def interrupted_runs(self) -> tuple[str, ...]:
-        """Runs without an outcome whose process is gone: their outcome is INTERRUPTED, their shots are sound."""
-        active = self.status().run_id
-        return tuple(run_id for run_id in open_runs(self._data_dir) if run_id != active)
+    def recover(self) -> None:
+        """Close runs whose process is gone as INTERRUPTED, and tell; the caller holds the data directory."""
+        for found in recover(self._data_dir):
+            _LOG.warning("run %s: %s", found.run_id, found.text)
+            self._publish(RunMessage(found.run_id, found.text))
 
     def start(self, plan: RunPlan) -> str:
         """Check the plan and start the run; returns its id.

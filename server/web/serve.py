@@ -34,6 +34,7 @@ def serve_rig(config: RigConfig, port_held: socket.socket) -> None:
     with open_rig(config) as assembled:
         events = EventPublisher()
         with _acquisition(config, assembled, events) as acquisition:
+            acquisition.recover()
             services = Services(
                 config=config,
                 rig=assembled.rig,

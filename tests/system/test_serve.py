@@ -113,7 +113,10 @@ def refused(port: int, work_dir: Path) -> str:
 
 
 def test_a_second_server_is_refused_and_leaves_the_run_of_the_first_one_alone(tmp_path: Path) -> None:
+    torn = "20200101T000000-torn"
+    (tmp_path / "runs" / torn).mkdir(parents=True)
     with served(tmp_path) as (client, process):
+        assert (tmp_path / "runs" / "set-aside" / torn).is_dir(), "a start looks after what a crash has left"
         plan = {"name": "long", "kind": "dark", "shots": 600, "rate_hz": 1, "pulse": {"current_a": CURRENT_A}}
         run_url = client.post("/api/runs", json=plan).headers["location"]
         eventually(lambda: client.get(run_url).json()["shots_recorded"] > 0, "there is a shot")

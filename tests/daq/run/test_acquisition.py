@@ -24,6 +24,7 @@ from daq.errors import (
     InterlockOpen,
     PlanError,
 )
+from daq.files.recovery import INTERRUPTED_CAUSE
 from daq.files.run_directory import ImageKey, PulsePair, RunKind, RunPlan, RunReader, RunWriter
 from daq.network import Network
 from daq.run.acquisition import Acquisition
@@ -560,15 +561,20 @@ def test_observers_have_the_first_and_the_last_word(lab: Laboratory) -> None:
     assert lab.memory.journal[-1] == "after, 2 shots, None"
 
 
-def test_runs_without_an_outcome_are_reported_as_interrupted(lab: Laboratory, tmp_path: Path) -> None:
+def test_runs_without_an_outcome_are_closed_as_interrupted_and_told(
+    lab: Laboratory, caplog: pytest.LogCaptureFixture
+) -> None:
     done = lab.run(plan_of(1))
     header = done.header.model_copy(update={"run_id": "20260101T000000-killed"})
     with RunWriter(lab.data_dir / header.run_id, header):
         pass
-    events: list[RunEvent] = []
-    with Acquisition(lab.memory.rig, lab.data_dir, events.append) as restarted:
-        assert restarted.interrupted_runs() == ("20260101T000000-killed",)
-    assert events == [RunMessage("20260101T000000-killed", "interrupted: its process ended before the run did")]
+    lab.events.clear()
+    lab.acquisition.recover()
+    reader = RunReader(lab.data_dir / header.run_id)
+    assert (reader.outcome, reader.cause) == (RunOutcome.INTERRUPTED, INTERRUPTED_CAUSE)
+    told = f"interrupted at {reader.ended_utc}: {INTERRUPTED_CAUSE}"
+    assert lab.events == [RunMessage(header.run_id, told)]
+    assert f"{header.run_id}: {told}" in caplog.text
 
 
 @pytest.mark.parametrize(

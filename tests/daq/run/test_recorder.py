@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from daq.errors import RecorderError, RecorderOverflow
+from daq.files.recovery import INTERRUPTED_CAUSE, recover
 from daq.files.run_directory import (
     DoubleFrame,
     ExposureRecord,
@@ -150,6 +151,7 @@ def test_every_committed_shot_survives_a_kill(tmp_path: Path, shots_before: int)
         assert process.stdout is not None
         for _ in range(shots_before):
             last = int(process.stdout.readline())
+        assert recover(tmp_path) == [], "it is alive"
         process.kill()
     reader = RunReader(run_dir)
     assert reader.outcome is None
@@ -158,6 +160,10 @@ def test_every_committed_shot_survives_a_kill(tmp_path: Path, shots_before: int)
         assert_stored(run_dir, index)
     with h5py.File(run_dir / "run.h5") as file:
         assert file["/cameras/view2/frames"].shape[0] == reader.shot_count
+    recover(tmp_path)
+    closed = RunReader(run_dir)
+    assert (closed.outcome, closed.cause) == ("interrupted", INTERRUPTED_CAUSE)
+    assert not list((run_dir / "shots").glob("*.part"))
 
 
 def unshare_works() -> bool:
