@@ -1,4 +1,4 @@
-"""Faults of the simulated laboratory: what can go wrong, when, and to whom."""
+"""Faults of the simulated laboratory: what can go wrong, when, to whom, and for how long."""
 
 from enum import StrEnum
 from typing import Annotated, Self
@@ -12,7 +12,7 @@ class FaultKind(StrEnum):
     """What can go wrong; ``amount`` of a fault counts the shots it hits unless stated here."""
 
     PACKET_LOSS = "packet_loss"
-    """``amount`` percent of the stream packets never arrive, from now on."""
+    """``amount`` percent of the stream packets never arrive."""
     MISSED_TRIGGER = "missed_trigger"
     DROPPED_A = "dropped_a"
     DROPPED_B = "dropped_b"
@@ -23,29 +23,70 @@ class FaultKind(StrEnum):
     TIMESTAMP_JUMP = "timestamp_jump"
     """The clock of the camera jumps by ``amount`` seconds."""
     FROZEN = "frozen"
-    """The camera neither answers nor streams any more."""
+    """The camera neither answers nor streams, as with its cable out; it keeps its settings."""
     KILLED = "killed"
-    """The address answers no more."""
+    """The camera has no power; with power again it has factory settings, its clock and its frame ids start anew."""
+    POWER_CYCLED = "power_cycled"
+    """The camera has no power for ``amount`` seconds."""
     CONTROL_TAKEN = "control_taken"
-    """Another client takes control of the camera, and keeps it."""
+    """Another client takes control of the camera; when it gives the camera back, nobody has control."""
     PULSE_B_LOST = "pulse_b_lost"
     """The LED does not answer the second pulse."""
     PULSE_B_LATE = "pulse_b_late"
     """In one shot the second light pulse comes ``amount`` microseconds late."""
     GENERATOR_RESET = "generator_reset"
     """The microcontroller restarts."""
+    GENERATOR_HANG = "generator_hang"
+    """The microcontroller stands still."""
+    GENERATOR_UNPLUGGED = "generator_unplugged"
+    """The pulse generator has neither cable nor power; plugged in again, it boots anew at the same path."""
+    REPLIES_LOST = "replies_lost"
+    """The next ``amount`` replies of the pulse generator vanish."""
+    REPLIES_DAMAGED = "replies_damaged"
+    """In each of the next ``amount`` replies of the pulse generator a bit flips."""
     SERIAL_GARBAGE = "serial_garbage"
     """``amount`` bytes of noise arrive on the line of the pulse generator."""
     INTERLOCK_OPEN = "interlock_open"
     """Somebody opens the door."""
+    ESTOP_PRESSED = "estop_pressed"
+    """Somebody presses the emergency stop of the pulse generator."""
     STAGE_STALL = "stage_stall"
     """The carriage of the stage is blocked."""
+    STAGE_UNPLUGGED = "stage_unplugged"
+    """The cable of the stage is out; plugged in again, the stage is where it was, at the same path."""
 
 
 LABORATORY_FAULTS = frozenset(
-    {FaultKind.GENERATOR_RESET, FaultKind.SERIAL_GARBAGE, FaultKind.INTERLOCK_OPEN, FaultKind.STAGE_STALL}
+    {
+        FaultKind.GENERATOR_RESET,
+        FaultKind.GENERATOR_HANG,
+        FaultKind.GENERATOR_UNPLUGGED,
+        FaultKind.REPLIES_LOST,
+        FaultKind.REPLIES_DAMAGED,
+        FaultKind.SERIAL_GARBAGE,
+        FaultKind.INTERLOCK_OPEN,
+        FaultKind.ESTOP_PRESSED,
+        FaultKind.STAGE_STALL,
+        FaultKind.STAGE_UNPLUGGED,
+    }
 )
 """Faults that happen to no view."""
+
+LASTING_FAULTS = frozenset(
+    {
+        FaultKind.PACKET_LOSS,
+        FaultKind.FROZEN,
+        FaultKind.KILLED,
+        FaultKind.CONTROL_TAKEN,
+        FaultKind.GENERATOR_HANG,
+        FaultKind.GENERATOR_UNPLUGGED,
+        FaultKind.INTERLOCK_OPEN,
+        FaultKind.ESTOP_PRESSED,
+        FaultKind.STAGE_STALL,
+        FaultKind.STAGE_UNPLUGGED,
+    }
+)
+"""Faults that last until their ``duration_s`` is over; all others end by themselves."""
 
 
 class Fault(FrozenModel):
@@ -54,11 +95,21 @@ class Fault(FrozenModel):
     kind: Annotated[FaultKind, Field(description="what goes wrong")]
     view: Annotated[str | None, Field(description="whose camera or light; none for the faults of the bench")] = None
     amount: Annotated[float, Field(ge=0, description="how much; see the kind")] = 1.0
+    duration_s: Annotated[
+        float | None,
+        Field(ge=0, description="of a fault that lasts: its end; 0 ends one that has begun; none: it stays"),
+    ] = None
 
     @model_validator(mode="after")
     def _happens_to_somebody(self) -> Self:
         if (self.view is None) != (self.kind in LABORATORY_FAULTS):
             raise ValueError(f"{self.kind}: {'needs a view' if self.view is None else 'happens to no view'}")
+        return self
+
+    @model_validator(mode="after")
+    def _has_an_end_to_choose(self) -> Self:
+        if self.duration_s is not None and self.kind not in LASTING_FAULTS:
+            raise ValueError(f"{self.kind}: ends by itself and takes no duration_s")
         return self
 
 

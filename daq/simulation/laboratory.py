@@ -1,42 +1,19 @@
 """SimulatedLaboratory: what lies around the simulated devices; light reaches the cameras here, and faults happen."""
 
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import partial
 from types import TracebackType
 from typing import Self
 
 from daq.faults import LABORATORY_FAULTS, Fault, FaultKind, ScriptedFault
 from daq.shot import FiredTrain
-from daq.simulation.camera.gige_camera import SimulatedCamera
-from daq.simulation.interlock import DoorSwitch
-from daq.simulation.pico.firmware_process import FirmwareProcess
-from daq.simulation.stage import SimulatedStage
+from daq.simulation.fault_ends import FaultEnds
+from daq.simulation.mishaps import BEGINNINGS, ENDINGS, SimulatedDevices
 
-_CAMERA_FAULTS: Mapping[FaultKind, Callable[[float], Mapping[str, float | bool]]] = {
-    FaultKind.PACKET_LOSS: lambda percent: {"packet_loss": percent / 100},
-    FaultKind.MISSED_TRIGGER: lambda shots: {"missed_triggers": int(shots)},
-    FaultKind.DROPPED_A: lambda shots: {"dropped_a": int(shots)},
-    FaultKind.DROPPED_B: lambda shots: {"dropped_b": int(shots)},
-    FaultKind.SWAPPED: lambda shots: {"swapped": int(shots)},
-    FaultKind.WRONG_SIZE: lambda shots: {"wrong_size": int(shots)},
-    FaultKind.LATE: lambda seconds: {"late_s": seconds, "late": 1},
-    FaultKind.TIMESTAMP_JUMP: lambda seconds: {"timestamp_jump_ns": round(seconds * 1e9)},
-    FaultKind.FROZEN: lambda _: {"frozen": True},
-    FaultKind.CONTROL_TAKEN: lambda _: {"held_by_another": True},
-}
-"""Fields of ``CameraFaults`` that a fault sets, from its amount."""
-
-
-@dataclass(frozen=True)
-class SimulatedDevices:
-    """The simulated devices: everything that a fault can happen to."""
-
-    cameras: Mapping[str, SimulatedCamera]
-    generator: FirmwareProcess
-    switch: DoorSwitch
-    stage: SimulatedStage
+_PULSE_FAULTS = frozenset({FaultKind.PULSE_B_LOST, FaultKind.PULSE_B_LATE})
 
 
 class SimulatedLaboratory:
@@ -54,6 +31,7 @@ class SimulatedLaboratory:
         self._pulse_faults: list[Fault] = []
         self._fired: list[FiredTrain] = []
         self._firing = threading.Lock()
+        self._ends = FaultEnds()
         # The generator calls from the thread that also reads its answers: what asks it needs another one.
         self._visitor = ThreadPoolExecutor(1, thread_name_prefix="laboratory visitor")
 
@@ -63,7 +41,7 @@ class SimulatedLaboratory:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._visitor.shutdown()
+        self.disconnect()
 
     @property
     def devices(self) -> SimulatedDevices:
@@ -77,15 +55,18 @@ class SimulatedLaboratory:
         self._connected = devices
         self.close_door()
 
+    def disconnect(self) -> None:
+        """Nothing happens to the devices any more; before they are closed."""
+        self._ends.close()
+        self._visitor.shutdown()
+
     def close_door(self) -> None:
         """Allow light."""
-        self.devices.generator.set_interlock(True)
-        self.devices.switch.close_door()
+        self.devices.close_door()
 
     def open_door(self) -> None:
-        """Open the interlock; it reaches the pulse generator and the computer on wires of their own."""
-        self.devices.generator.set_interlock(False)
-        self.devices.switch.open_door()
+        """Open the interlock."""
+        self.devices.open_door()
 
     @property
     def fired(self) -> tuple[FiredTrain, ...]:
@@ -99,7 +80,7 @@ class SimulatedLaboratory:
             self._fired = []
 
     def inject(self, fault: Fault) -> None:
-        """Let something go wrong, from now on or at the next shot; see ``FaultKind``.
+        """Let something go wrong, from now on or at the next shot, or mend it; see ``FaultKind``.
 
         Raises
         ------
@@ -108,16 +89,26 @@ class SimulatedLaboratory:
         """
         if fault.view is not None and fault.view not in self.devices.cameras:
             raise ValueError(f"there is no view {fault.view}; the bench has {sorted(self.devices.cameras)}")
-        if fault.kind in LABORATORY_FAULTS:
-            self._spoil_laboratory(fault)
-        elif fault.kind in (FaultKind.PULSE_B_LOST, FaultKind.PULSE_B_LATE):
+        if fault.kind in _PULSE_FAULTS:
             with self._firing:
                 self._pulse_faults.append(fault)
-        elif fault.kind is FaultKind.KILLED:
-            self.devices.cameras[str(fault.view)].kill()
         else:
-            for field, value in _CAMERA_FAULTS[fault.kind](fault.amount).items():
-                setattr(self.devices.cameras[str(fault.view)].faults, field, value)
+            self._begin(fault)
+
+    def _begin(self, fault: Fault) -> None:
+        """Begin a fault and see to its end; of the same fault, what was said last holds."""
+        cycled = fault.kind is FaultKind.POWER_CYCLED
+        kind, duration_s = (FaultKind.KILLED, fault.amount) if cycled else (fault.kind, fault.duration_s)
+        self._ends.cancel((kind, fault.view))
+        if fault.duration_s == 0:
+            ENDINGS[kind](self.devices, fault)
+            return
+        BEGINNINGS[kind](self.devices, fault)
+        if duration_s is not None:
+            self._ends.put((kind, fault.view), duration_s, partial(self._end, kind, fault))
+
+    def _end(self, kind: FaultKind, fault: Fault) -> None:
+        self._visitor.submit(ENDINGS[kind], self.devices, fault)
 
     def on_fired(self, train: FiredTrain) -> None:
         """Carry light and triggers to the cameras; called by the pulse generator for every shot."""
@@ -134,20 +125,9 @@ class SimulatedLaboratory:
 
     def _happen(self, fault: Fault) -> None:
         if fault.kind in LABORATORY_FAULTS:
-            self._visitor.submit(self._spoil_laboratory, fault)
+            self._visitor.submit(self.inject, fault)
         else:
             self.inject(fault)
-
-    def _spoil_laboratory(self, fault: Fault) -> None:
-        match fault.kind:
-            case FaultKind.GENERATOR_RESET:
-                self.devices.generator.reset()
-            case FaultKind.SERIAL_GARBAGE:
-                self.devices.generator.garbage(bytes(number % 256 for number in range(int(fault.amount))))
-            case FaultKind.INTERLOCK_OPEN:
-                self.open_door()
-            case FaultKind.STAGE_STALL:
-                self.devices.stage.stall()
 
 
 def _spoiled(train: FiredTrain, fault: Fault) -> FiredTrain:

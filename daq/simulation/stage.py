@@ -13,6 +13,7 @@ from typing import Self
 import numpy as np
 
 from daq.drivers.zaber_protocol import Command, MessageError, Reply, encode_reply, parse_command
+from daq.simulation.port_link import PortLink
 
 SETTINGS = {"device.id": "50419", "system.serial": "100042", "version": "7.38"}
 """Answers of an X-LSM stage to questions about itself."""
@@ -53,6 +54,7 @@ class SimulatedStage:
         self._from_mm, self._to_mm, self._started_s = 0.3 * travel_mm, 0.3 * travel_mm, 0.0
         self._warning, self._stalled, self._garbled = "WR", False, 0
         self._thread: threading.Thread | None = None
+        self._link = PortLink("stage")
         self._actions: dict[str, Callable[[str], str]] = {
             "": lambda _: "0",
             "get": self._get,
@@ -64,23 +66,19 @@ class SimulatedStage:
         }
 
     def __enter__(self) -> Self:
-        self._master, slave = os.openpty()
-        tty.setraw(slave)
-        self._port, self._slave = os.ttyname(slave), slave
-        self._end_read, self._end_write = os.pipe()
-        self._thread = threading.Thread(target=self._serve, name="simulated stage", daemon=True)
-        self._thread.start()
+        self.plug_in()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.unplug()
+        self._link.remove()
 
     @property
     def port(self) -> str:
-        """Path of the serial port to open."""
-        return self._port
+        """Path of the serial port to open; the same whenever it is plugged in."""
+        return self._link.path
 
     @property
     def position_mm(self) -> float:
@@ -90,6 +88,11 @@ class SimulatedStage:
         if self._stalled:
             return self._from_mm
         return self._to_mm if driven_mm >= abs(path_mm) else self._from_mm + np.sign(path_mm) * driven_mm
+
+    @property
+    def is_stalled(self) -> bool:
+        """The carriage is blocked."""
+        return self._stalled
 
     def stall(self, stalled: bool = True) -> None:
         """Block the carriage: this movement, or else the next one, ends at once with a fault flag."""
@@ -104,10 +107,22 @@ class SimulatedStage:
         with self._state:
             self._garbled = replies
 
+    def plug_in(self) -> None:
+        """Plug the cable in: a new device at the same path. The stage itself has always had power."""
+        if self._thread is not None:
+            return
+        self._master, self._slave = os.openpty()
+        tty.setraw(self._slave)
+        self._end_read, self._end_write = os.pipe()
+        self._thread = threading.Thread(target=self._serve, name="simulated stage", daemon=True)
+        self._thread.start()
+        self._link.lead_to(os.ttyname(self._slave))
+
     def unplug(self) -> None:
         """Pull the cable; the other end sees a hang-up."""
         if self._thread is None:
             return
+        self._link.lead_nowhere()
         os.write(self._end_write, b"x")
         self._thread.join()
         self._thread = None

@@ -19,7 +19,8 @@ from daq.shot import FiredTrain
 from daq.simulation.camera.gige_camera import SimulatedCamera
 from daq.simulation.gpio_chip import CHIP_PATH, ChipUnsupported, SimulatedSwitchLine, free_line
 from daq.simulation.interlock import DoorSwitch, MemoryInterlock
-from daq.simulation.laboratory import SimulatedDevices, SimulatedLaboratory
+from daq.simulation.laboratory import SimulatedLaboratory
+from daq.simulation.mishaps import SimulatedDevices
 from daq.simulation.pico.firmware_process import FirmwareProcess
 from daq.simulation.stage import SimulatedStage
 from server.rig.config import (
@@ -200,6 +201,7 @@ def _simulation(
     }
     generator = far_ends.enter_context(_simulated_generator(config, laboratory.on_fired))
     laboratory.connect(SimulatedDevices(cameras, generator, switch, stage))
+    far_ends.callback(laboratory.disconnect)
     wired = config.model_copy(
         update={
             "pulse_generator": PulseGeneratorConfig(port=generator.port),

@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from threading import Condition, Event, Thread
+from threading import Condition, Event, Lock, Thread
 from time import monotonic, monotonic_ns
 from types import TracebackType
 from typing import Any, Literal, Self
@@ -108,11 +108,40 @@ class SimulatedCamera:
         self._block_id = 0
         self._lost_triggers = 0
         self._stopping = Event()
+        self._switching = Lock()
         self._threads: tuple[Thread, ...] = ()
 
     def __enter__(self) -> Self:
+        self.power_on()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.kill()
+
+    @property
+    def lost_triggers(self) -> int:
+        """Trigger edges that came while the camera was busy or not armed."""
+        return self._lost_triggers
+
+    def power_on(self) -> None:
+        """Give it power: factory settings, a clock that starts anew, and nobody who controls it."""
+        with self._switching:
+            if not self._threads:
+                self._boot()
+
+    def kill(self) -> None:
+        """Pull the plug: the address answers no more."""
+        with self._switching:
+            if self._threads:
+                self._die()
+
+    def _boot(self) -> None:
         self._stopping.clear()
         self._pending.clear()
+        self._busy_until_ns = 0
+        self.faults.forget_what_power_ends()
         self._bank = self._factory_settings()
         self._power_on_ns = monotonic_ns() - _POWER_ON_NS
         self._control_socket = self._bind(GVCP_PORT)
@@ -128,22 +157,8 @@ class SimulatedCamera:
         )
         for thread in self._threads:
             thread.start()
-        return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.kill()
-
-    @property
-    def lost_triggers(self) -> int:
-        """Trigger edges that came while the camera was busy or not armed."""
-        return self._lost_triggers
-
-    def kill(self) -> None:
-        """Pull the plug: the address answers no more."""
-        if not self._threads:
-            return
+    def _die(self) -> None:
         self._stopping.set()
         with self._changed:
             self._changed.notify_all()
@@ -192,7 +207,7 @@ class SimulatedCamera:
             if self.faults.frozen:
                 continue
             now_s = monotonic()
-            self._control.held_by_another = self.faults.held_by_another
+            self._control.hand_over(self.faults.held_by_another)
             self._control.expire(now_s)
             answer = self._control.answer(request, peer, now_s)
             if answer is not None:

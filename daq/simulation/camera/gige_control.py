@@ -75,7 +75,7 @@ class ControlChannel:
         self._on_resend = on_resend
         self._holder: Peer | None = None
         self._heard_s = 0.0
-        self.held_by_another = False
+        self._held_by_another = False
 
     def answer(self, request: bytes, peer: Peer, now_s: float) -> bytes | None:
         """Acknowledge of one request; None where none is due."""
@@ -96,6 +96,12 @@ class ControlChannel:
         except struct.error:
             status = Status.INVALID_PARAMETER
         return _ACKNOWLEDGE.pack(status, command + 1, len(reply), request_id) + reply
+
+    def hand_over(self, to_another: bool) -> None:
+        """Let another client have the camera, or let it give the camera back: then nobody holds it."""
+        if self._held_by_another and not to_another:
+            self._release()
+        self._held_by_another = to_another
 
     def expire(self, now_s: float) -> None:
         """Free the camera if its client's heartbeat has stopped; that stops the acquisition too."""
@@ -124,7 +130,7 @@ class ControlChannel:
         return content
 
     def _write(self, address: int, value: int, peer: Peer, now_s: float) -> None:
-        if self.held_by_another or self._holder not in (None, peer):
+        if self._held_by_another or self._holder not in (None, peer):
             raise _Refusal(Status.ACCESS_DENIED)
         if self._holder is None and address != Register.CONTROL_PRIVILEGE:
             raise _Refusal(Status.ACCESS_DENIED)

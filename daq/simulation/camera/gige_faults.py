@@ -48,6 +48,10 @@ class CameraFaults:
     held_by_another: bool = False
     _lock: Lock = field(default_factory=Lock, repr=False, compare=False)
 
+    def forget_what_power_ends(self) -> None:
+        """What a camera that gets power again knows nothing of."""
+        self.timestamp_jump_ns, self.frozen, self.held_by_another = 0, False, False
+
     def take(self, fault: ShotFault) -> bool:
         """True if the fault hits this shot; uses up one of its shots."""
         with self._lock:

@@ -22,6 +22,7 @@ from typing import IO, Self
 from daq.errors import DeviceTimeout, DeviceUnavailable
 from daq.shot import FiredTrain, LightPulse
 from daq.simulation.pico.firmware_build import build_firmware, build_image
+from daq.simulation.port_link import PortLink
 
 _DEVICE = "simulated pulse generator"
 _ANSWER_LIMIT_S = 20.0
@@ -54,13 +55,16 @@ class FirmwareProcess:
         self._answers: queue.Queue[str] = queue.Queue()
         self._instructing = threading.Lock()
         self._reader: threading.Thread | None = None
-        self._port = ""
+        self._link = PortLink("pulse_generator")
+        self._plugging = threading.RLock()
+        self._hangs = False
+        self._inputs: dict[str, bool] = {}
         self._light_a: Mapping[str, float] = {}
 
     @property
     def port(self) -> str:
-        """Path of the serial port."""
-        return self._port
+        """Path of the serial port; the same whenever the generator is plugged in."""
+        return self._link.path
 
     @property
     def pid(self) -> int:
@@ -68,25 +72,61 @@ class FirmwareProcess:
         return self._running().pid
 
     def __enter__(self) -> Self:
-        self._process = self._start_emulator() if self._emulated else _start(_host_command())
-        self._reader = threading.Thread(target=self._read_events, args=(self._process,), name=_DEVICE, daemon=True)
-        self._reader.start()
-        try:
-            self._port = self._answer("start").removeprefix("port ")
-        except DeviceTimeout:
-            self._end()
-            raise
+        self.plug_in()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._end()
+        self.unplug()
+        self._link.remove()
+        if self._clock is not None:
+            self._clock.close()
+
+    def plug_in(self) -> None:
+        """Give it cable and power: it boots, and its inputs are as the laboratory has left them."""
+        with self._plugging:
+            if self._process is not None:
+                return
+            self._answers = queue.Queue()
+            self._process = process = self._start_emulator() if self._emulated else _start(_host_command())
+            self._reader = threading.Thread(target=self._read_events, args=(process,), name=_DEVICE, daemon=True)
+            self._reader.start()
+            try:
+                self._link.lead_to(self._answer("start").removeprefix("port "))
+            except DeviceTimeout:
+                self._end(process)
+                raise
+            self._apply_inputs()
+
+    def unplug(self) -> None:
+        """Pull the cable, and with it the power."""
+        with self._plugging:
+            if self._process is not None:
+                self._link.lead_nowhere()
+                self._end(self._process)
+
+    def hang(self) -> None:
+        """Let the microcontroller stand still."""
+        with self._plugging:
+            if self._process is not None:
+                self._process.send_signal(signal.SIGSTOP)
+                self._hangs = True
+
+    def go_on(self) -> None:
+        """Let it go on."""
+        with self._plugging:
+            if self._process is not None and self._hangs:
+                self._process.send_signal(signal.SIGCONT)
+                self._hangs = False
+                self._apply_inputs()
 
     def _start_emulator(self) -> subprocess.Popen[str]:
         if importlib.util.find_spec("rp2040py") is None:
             missing = "rp2040py, which emulates the Pico, is missing (pip install rp2040py==0.3.6)"
             raise DeviceUnavailable(_DEVICE, missing)
+        if self._clock is not None:
+            self._clock.close()
         self._clock = tempfile.TemporaryFile()  # noqa: SIM115 - open as long as the process
         clock = self._clock.fileno()
         program = [sys.executable, "-m", "daq.simulation.pico.emulated_firmware", str(build_image()), str(clock)]
@@ -107,8 +147,7 @@ class FirmwareProcess:
         (now_s,) = struct.unpack("d", os.pread(self._clock.fileno(), 8, 0))
         return float(now_s)
 
-    def _end(self) -> None:
-        process = self._running()
+    def _end(self, process: subprocess.Popen[str]) -> None:
         process.kill()
         process.wait(_ANSWER_LIMIT_S)
         if self._reader is not None:
@@ -117,16 +156,26 @@ class FirmwareProcess:
             if pipe is not None:
                 with suppress(BrokenPipeError):  # an instruction to a generator that had died before
                     pipe.close()
-        if self._clock is not None:
-            self._clock.close()
+        self._process, self._hangs, self._light_a = None, False, {}
 
     def set_interlock(self, closed: bool) -> None:
         """Open or close the generator's interlock input."""
-        self._instruct(f"interlock {int(closed)}")
+        self._set_input("interlock", closed)
 
     def set_estop(self, closed: bool) -> None:
         """Open or close the input of the generator's emergency stop."""
-        self._instruct(f"estop {int(closed)}")
+        self._set_input("estop", closed)
+
+    def _set_input(self, name: str, closed: bool) -> None:
+        """What is wired to an input has its state whether or not somebody looks at it."""
+        with self._plugging:
+            self._inputs[name] = closed
+            if self._process is not None and not self._hangs:
+                self._instruct(f"{name} {int(closed)}")
+
+    def _apply_inputs(self) -> None:
+        for name, closed in self._inputs.items():
+            self._instruct(f"{name} {int(closed)}")
 
     def set_converter(self, working: bool) -> None:
         """Let the set-points of the currents be confirmed as zero, or not."""
@@ -173,7 +222,7 @@ class FirmwareProcess:
 
     def _running(self) -> subprocess.Popen[str]:
         if self._process is None:
-            raise DeviceUnavailable(_DEVICE, "has not been started")
+            raise DeviceUnavailable(_DEVICE, "is not plugged in")
         return self._process
 
     def _instruct(self, line: str) -> None:

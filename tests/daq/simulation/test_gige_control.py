@@ -73,7 +73,7 @@ def test_a_silent_client_loses_control_after_the_heartbeat_timeout(client: Clien
 
 
 def test_a_foreign_holder_shuts_everybody_out(client: Client) -> None:
-    client.channel.held_by_another = True
+    client.channel.hand_over(True)
     assert client.write(Register.CONTROL_PRIVILEGE, CONTROL) is Status.ACCESS_DENIED
 
 

@@ -15,6 +15,7 @@ from daq.drivers.serial_pulse_generator import SerialPulseGenerator
 from daq.errors import DeviceTimeout, DeviceUnavailable
 from daq.run_plan import PulsePair, RunPlan
 from daq.shot import FiredTrain
+from daq.simulation.pico import firmware_process
 from daq.simulation.pico.firmware_build import build_firmware
 from daq.simulation.pico.firmware_process import FirmwareProcess
 from daq.timing import CameraTiming, plan_shot_timing
@@ -134,9 +135,16 @@ def test_a_failed_build_shows_the_compiler_s_words(monkeypatch: pytest.MonkeyPat
 def test_one_that_never_answers_is_ended_and_leaves_nothing_open(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("daq.simulation.pico.firmware_process._ANSWER_LIMIT_S", 0.2)
     monkeypatch.setattr("daq.simulation.pico.firmware_process._host_command", lambda: ["sleep", "60"])
+    started, start = list[subprocess.Popen[str]](), firmware_process._start
+
+    def remember(command: list[str], *files: int) -> subprocess.Popen[str]:
+        started.append(start(command, *files))
+        return started[-1]
+
+    monkeypatch.setattr(firmware_process, "_start", remember)
     silent = FirmwareProcess({}, lambda train: None)
     with pytest.raises(DeviceTimeout, match=r"simulated pulse generator: no answer to 'start' within 0\.2 s"), silent:
         pass
     with pytest.raises(ProcessLookupError):
-        os.kill(silent.pid, 0)
+        os.kill(started[0].pid, 0)
     gc.collect()  # an open pipe is an error of the test
