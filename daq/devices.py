@@ -61,6 +61,12 @@ class Camera(Device, Protocol):
     def is_lost(self) -> bool:
         """The camera no longer answers, as far as is known; asking costs nothing and may come from any thread."""
 
+    def ask(self) -> None:
+        """A sign of life within a second, from any thread and also in a run; DeviceError if there is none."""
+
+    def recover(self) -> None:
+        """Open the camera anew if it was lost; for between runs. DeviceError if that is not possible yet."""
+
     def arm(self) -> None:
         """Write the profile, read every value back, drain the stream, start acquisition."""
 
@@ -151,6 +157,12 @@ class PulseGenerator(Device, Protocol):
     def clear(self) -> None:
         """Acknowledge latched faults; the generator stays SAFE."""
 
+    def recover(self) -> None:
+        """Open the port again if it hung up, as at first: light off, limits checked; DeviceError if that fails.
+
+        Another board than before is refused. What was armed is not armed again.
+        """
+
 
 class Interlock(Device, Protocol):
     """The laboratory's door and enclosure switches."""
@@ -174,6 +186,9 @@ class TranslationStage(Device, Protocol):
 
     def position_mm(self) -> float:
         """Actual position."""
+
+    def recover(self) -> None:
+        """Open the port again if it hung up; DeviceError if that fails, or another stage is there."""
 
 
 @dataclass(frozen=True)

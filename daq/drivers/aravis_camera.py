@@ -9,6 +9,7 @@ from daq.devices import DeviceIdentity
 from daq.drivers.camera_profile import CameraProfile, FeatureWrite
 from daq.drivers.exposure_pairing import ExposureFormat, double_frame
 from daq.drivers.frame_receiver import FrameReceiver, StreamCounters
+from daq.drivers.gige_question import is_controlled
 from daq.errors import DeviceError, DeviceRefused, DeviceUnavailable
 from daq.network import Network
 from daq.shot import DoubleFrame, Image
@@ -45,7 +46,8 @@ class AravisCamera:
     """Implements ``daq.devices.Camera``.
 
     Every call ends within seconds: Aravis gives up on a register after 2.5 s, ``collect`` has its own deadline,
-    and ``disarm`` takes 2 s at most. A camera that was lost is opened anew by the next ``arm``.
+    ``ask`` takes 1 s and ``disarm`` 2 s at most. A camera that was lost is opened anew by ``recover``, or the next
+    ``arm``.
     Any thread may ask for counters and pictures, and disarm, while another one arms and collects.
 
     Parameters
@@ -81,6 +83,7 @@ class AravisCamera:
         self._last_id: int | None = None
         self._latest: Image | None = None
         self._letting_go = Lock()
+        self._opening = Lock()
 
     def __enter__(self) -> Self:
         self._device = self._open()
@@ -116,7 +119,7 @@ class AravisCamera:
 
     @property
     def is_lost(self) -> bool:
-        """The camera has stopped answering, for up to 6 s unnoticed; it is opened anew by the next ``arm``."""
+        """The camera does not answer us any more, as far as ``ask``, Aravis or a command has found out."""
         device = self._device
         return self._is_open and (device is None or device.is_lost)
 
@@ -125,6 +128,34 @@ class AravisCamera:
         """What the stream has done since the camera was armed."""
         receiver = self._receiver
         return StreamCounters() if receiver is None else receiver.counters
+
+    def ask(self) -> None:
+        """A sign of life, within 1 s; also while another thread works with the camera.
+
+        Raises
+        ------
+        DeviceUnavailable
+            There is none, or the camera has let go of us, as one does that was without power or cable for a while.
+        """
+        self._look()
+        if self.is_lost:
+            raise DeviceUnavailable(self._name, f"the camera at {self._ip} was lost; it is opened again between runs")
+
+    def _look(self) -> None:
+        device = self._device
+        if not is_controlled(self._name, self._ip) and device is not None:
+            device.lose()
+
+    def recover(self) -> None:
+        """Open a camera anew that was lost and answers again; takes long if another client holds it.
+
+        Raises
+        ------
+        DeviceUnavailable
+            It does not answer, or is held by another client.
+        """
+        if self._receiver is None and self.is_lost:
+            self._connected()
 
     def identity(self) -> DeviceIdentity:
         """Vendor, model, serial number and firmware version, as the device answers."""
@@ -141,6 +172,8 @@ class AravisCamera:
             A feature is unknown, out of range, or reads back differently; the camera is disarmed again.
         """
         self.disarm()
+        if self._device is not None:
+            self._look()
         device = self._connected()
         settings = self._settings(device)
         for setting in settings:
@@ -211,13 +244,19 @@ class AravisCamera:
     def _connected(self) -> "AravisDevice":
         if not self._is_open:
             raise DeviceRefused(self._name, "the camera is not open")
-        device = self._device
-        if device is None:
-            device = self._device = self._open()
-        return device
+        with self._opening:
+            device = self._device
+            if device is None or (device.is_lost and self._receiver is None):
+                device = self._device = self._open(device)
+            return device
 
-    def _open(self) -> "AravisDevice":
-        return load_aravis(self._name)(self._name, self._ip)
+    def _open(self, lost: "AravisDevice | None" = None) -> "AravisDevice":
+        """Let go of the lost one first: its heartbeat may still hold the camera."""
+        aravis = load_aravis(self._name)
+        is_controlled(self._name, self._ip)  # Aravis takes 2.5 s to find out that nobody is there
+        if lost is not None:
+            lost.close()
+        return aravis(self._name, self._ip)
 
     def _armed(self) -> FrameReceiver:
         receiver = self._receiver

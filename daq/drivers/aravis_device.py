@@ -76,6 +76,10 @@ class AravisDevice:
         """The camera has stopped answering, or has been taken by another client."""
         return self._lost.is_set()
 
+    def lose(self) -> None:
+        """Take note that the camera has let go of us; nothing is asked of it any more."""
+        self._lost.set()
+
     def require_answer(self) -> None:
         """Raise DeviceUnavailable if the camera is lost."""
         if self.is_lost:

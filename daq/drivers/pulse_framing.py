@@ -2,11 +2,21 @@
 
 import binascii
 import re
+from enum import Enum, auto
 
 ABORT_BYTE = b"\x18"
 REQUEST_MARK, REPLY_MARK = ">", "<"
 
 _OLDER_REPLY = re.compile(r"(\?|\d+) \d+ (OK|ERR)\b")
+
+
+class Heard(Enum):
+    """What came instead of the reply that was waited for."""
+
+    NOTHING = auto()
+    DAMAGED = auto()
+    ECHO = auto()
+    OLDER = auto()
 
 
 class DamagedLine(ValueError):

@@ -3,8 +3,8 @@
 from collections.abc import Mapping, Sequence
 
 from daq.drivers.pulse_line import PulseLine
-from daq.drivers.pulse_protocol import CHANNEL_COUNT, ERROR_TEXT, Command, ErrorNumber, Stored
-from daq.errors import DeviceRefused
+from daq.drivers.pulse_protocol import CHANNEL_COUNT, ERROR_TEXT, UNCHANGED, Command, ErrorNumber, Stored
+from daq.errors import DeviceRefused, ProtocolError
 
 NAMES = ("max_current_ma", "max_duty_ppm", "max_light_ma")
 Limits = tuple[int, ...]
@@ -61,3 +61,19 @@ def check_stored_limits(
                     f"channel {channels[view]}: correct the rig file, or, if this LED takes it, store its limits in "
                     "the board (tomoshadow firmware limits --store)",
                 )
+
+
+def tighten_limits(
+    line: PulseLine, channels: Mapping[str, int], max_current_a: Mapping[str, float], max_light_a: Mapping[str, float]
+) -> None:
+    """Before every train: a generator that was reset has forgotten its limits, and every train with them."""
+    for view in sorted(max_current_a.keys() | max_light_a.keys()):
+        pulse_ma, light_ma = _limit_ma(max_current_a, view), _limit_ma(max_light_a, view)
+        reply = line.ask(Command.LIMIT, channels[view], pulse_ma, UNCHANGED, light_ma)
+        for name, limit_ma in (("max_current_ma", pulse_ma), ("max_light_ma", light_ma)):
+            if reply.number(name) > limit_ma:
+                raise ProtocolError(line.name, f"keeps {reply.number(name)} mA as {name} of {view}")
+
+
+def _limit_ma(limits_a: Mapping[str, float], view: str) -> int:
+    return round(limits_a[view] * 1000) if view in limits_a else UNCHANGED

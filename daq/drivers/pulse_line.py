@@ -5,11 +5,10 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from enum import Enum, auto
 
 import serial
 
-from daq.drivers.pulse_framing import ABORT_BYTE, DamagedLine, is_echo, is_older_reply
+from daq.drivers.pulse_framing import ABORT_BYTE, DamagedLine, Heard, is_echo, is_older_reply
 from daq.drivers.pulse_protocol import (
     ERROR_TEXT,
     FIELDS,
@@ -40,13 +39,6 @@ _BAUD = 115_200
 _LONGEST_LINE = 512
 
 
-class _Heard(Enum):
-    NOTHING = auto()
-    DAMAGED = auto()
-    ECHO = auto()
-    OLDER = auto()
-
-
 def _other_protocol(spoken: str) -> str:
     return (
         f"speaks protocol {spoken}, this driver speaks {PROTOCOL_VERSION}: "
@@ -72,6 +64,7 @@ class PulseLine:
         self._path = port
         self._clock_s = clock_s
         self._port: serial.Serial | None = None
+        self._hung_up = False
         self._asking = threading.Lock()
         self._counting = threading.Lock()
         self._offs = 0
@@ -87,12 +80,24 @@ class PulseLine:
             self._port = serial.Serial(
                 self._path, _BAUD, timeout=_SLICE_S, write_timeout=_WRITE_LIMIT_S, exclusive=True
             )
+        self._hung_up = False
         try:
             self._write(ABORT_BYTE + b"\n", Command.ID, OPENING_LIMIT_S)
             return self._open_session()
         except DeviceError:
             self.close()
             raise
+
+    def reopen(self) -> Reply:
+        """Open the port anew: there may be another device at its path. Waits for whoever still asks."""
+        with self._alone("open"):
+            self.close()
+            return self.open()
+
+    @property
+    def is_lost(self) -> bool:
+        """The port hung up, or is closed."""
+        return self._hung_up or self._port is None
 
     def _open_session(self) -> Reply:
         identity = self._converse(Request(0, Command.ID), OPENING_LIMIT_S, offs=None)
@@ -192,7 +197,7 @@ class PulseLine:
     def _converse(self, request: Request, limit_s: float, offs: int | None) -> Reply:
         """Send until answered: the generator carries out a repeated line only once."""
         deadline_s = self._clock_s() + limit_s
-        heard: Counter[_Heard] = Counter()
+        heard: Counter[Heard] = Counter()
         while self._clock_s() < deadline_s:
             self._check_not_overtaken(request.command, offs)
             self._write(encode_request(request), request.command, limit_s)
@@ -203,38 +208,38 @@ class PulseLine:
                 if isinstance(reply, Reply):
                     return reply
                 heard[reply] += 1
-                if reply is _Heard.DAMAGED:
+                if reply is Heard.DAMAGED:
                     repeat_s = min(repeat_s, self._clock_s() + _REPEAT_DAMAGED_S)
         self._explain_silence(request.command, heard)
         raise DeviceTimeout(self._name, request.command.value, limit_s)
 
-    def _explain_silence(self, command: Command, heard: Mapping[_Heard, int]) -> None:
-        if heard[_Heard.OLDER]:
+    def _explain_silence(self, command: Command, heard: Mapping[Heard, int]) -> None:
+        if heard[Heard.OLDER]:
             raise ProtocolError(self._name, _other_protocol("2 or older"))
-        if heard[_Heard.DAMAGED]:
-            raise ProtocolError(self._name, f"only damaged lines ({heard[_Heard.DAMAGED]}) in answer to {command}")
-        if heard[_Heard.ECHO]:
+        if heard[Heard.DAMAGED]:
+            raise ProtocolError(self._name, f"only damaged lines ({heard[Heard.DAMAGED]}) in answer to {command}")
+        if heard[Heard.ECHO]:
             raise ProtocolError(
                 self._name, f"{self._path} gives back what is sent, {command} among it, and nobody answers: an echo"
             )
 
-    def _next_reply(self, request: Request) -> Reply | _Heard:
+    def _next_reply(self, request: Request) -> Reply | Heard:
         """Reply to this request; one to another is NOTHING, one that cannot be read, here or there, is DAMAGED."""
         line = self._next_line()
         if line is None:
-            return _Heard.NOTHING
+            return Heard.NOTHING
         if is_echo(line):
-            return _Heard.ECHO
+            return Heard.ECHO
         if is_older_reply(line):
-            return _Heard.OLDER
+            return Heard.OLDER
         try:
             reply = decode_reply(line)
         except DamagedLine:
-            return _Heard.DAMAGED
+            return Heard.DAMAGED
         if reply.sequence is None:
-            return _Heard.DAMAGED
+            return Heard.DAMAGED
         if reply.sequence != request.sequence:
-            return _Heard.NOTHING
+            return Heard.NOTHING
         if request.command is not Command.ID:  # another protocol may answer it with other fields
             self._check_fields(request.command, reply)
         return reply
@@ -277,6 +282,7 @@ class PulseLine:
         except serial.SerialTimeoutException:
             raise
         except OSError as error:
+            self._hung_up = True
             raise DeviceUnavailable(self._name, f"{self._path}: {error}") from error
 
     def _check_not_overtaken(self, command: Command, offs: int | None) -> None:

@@ -1,8 +1,4 @@
-"""The pulse generator on a serial port: ``daq.devices.PulseGenerator`` in terms of its protocol.
-
-``ShotTiming`` counts from the start of pulse A, so camera triggers can be negative; the generator counts from
-the trigger of the shot, where nothing can be. All edges are shifted by the same whole number of ticks.
-"""
+"""The pulse generator on a serial port: ``daq.devices.PulseGenerator`` in terms of its protocol."""
 
 import time
 from collections.abc import Callable, Iterable, Mapping
@@ -11,20 +7,20 @@ from types import TracebackType
 from typing import Self
 
 from daq.devices import DeviceIdentity, GeneratorState, GeneratorStatus, TriggerSource
-from daq.drivers.pulse_limits import check_stored_limits
+from daq.drivers.pulse_limits import check_stored_limits, tighten_limits
 from daq.drivers.pulse_line import PulseLine
 from daq.drivers.pulse_protocol import (
     CHANNEL_COUNT,
     COUNTERS,
-    UNCHANGED,
     Command,
     Fault,
     Reply,
     Source,
     State,
 )
-from daq.errors import DeviceError, PlanError, ProtocolError
-from daq.shot import FiredTrain, LightPulse
+from daq.drivers.pulse_train import actual_train, pulses_of, shift_ns
+from daq.errors import DeviceError, DeviceRefused, PlanError, ProtocolError
+from daq.shot import FiredTrain
 from daq.timing import ShotTiming, ViewTiming
 
 MAX_PERIOD_US = 10_000_000
@@ -80,6 +76,7 @@ class SerialPulseGenerator:
         self._max_light_a = dict(max_light_a or {})
         self._line = PulseLine(name, port, clock_s)
         self._identity: Reply | None = None
+        self._is_open = False
         self._loaded: _LoadedTrain | None = None
 
     @property
@@ -89,17 +86,14 @@ class SerialPulseGenerator:
 
     def __enter__(self) -> Self:
         self._identity = self._line.open()
-        try:
-            self.off()
-            check_stored_limits(self._line, self._channels, self._max_current_a, self._max_light_a)
-        except DeviceError:
-            self._line.close()
-            raise
+        self._make_safe()
+        self._is_open = True
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        self._is_open = False
         try:
             self.off()
         except DeviceError as not_off:
@@ -108,6 +102,39 @@ class SerialPulseGenerator:
             error.add_note(f"light not confirmed off: {not_off}")
         finally:
             self._line.close()
+
+    def recover(self) -> None:
+        """Open the port again if it hung up: light off, limits checked, nothing loaded, nothing armed.
+
+        Raises
+        ------
+        DeviceUnavailable, DeviceTimeout
+            Nothing is plugged in there yet, or it does not answer.
+        DeviceRefused
+            Another board is, or the board keeps other limits than the rig file.
+        """
+        if not (self._is_open and self._line.is_lost):
+            return
+        known, self._loaded = self._opened_identity(), None
+        found = self._line.reopen()
+        serial, expected = found.fields["serial"], known.fields["serial"]
+        if serial != expected:
+            self._line.close()
+            raise DeviceRefused(
+                self._name,
+                f"another board is plugged in, {serial} instead of {expected}: plug the right one in, or start the "
+                "server again to work with this one",
+            )
+        self._make_safe()
+        self._identity = found
+
+    def _make_safe(self) -> None:
+        try:
+            self.off()
+            check_stored_limits(self._line, self._channels, self._max_current_a, self._max_light_a)
+        except DeviceError:
+            self._line.close()
+            raise
 
     def identity(self) -> DeviceIdentity:
         """Model, serial number and firmware version, as the generator answered when it was opened."""
@@ -126,12 +153,12 @@ class SerialPulseGenerator:
         """
         self._check_views(timing.views)
         self._loaded = None
-        shift_ns = _shift_ns(timing, self._opened_identity().number("tick_ns"))
-        self._tighten_limits()
+        shift = shift_ns(timing, self._opened_identity().number("tick_ns"))
+        tighten_limits(self._line, self._channels, self._max_current_a, self._max_light_a)
         self._line.ask(Command.NEW)
-        replies = {view: self._set_channel(view, edges, shift_ns) for view, edges in timing.views.items()}
+        replies = {view: self._set_channel(view, edges, shift) for view, edges in timing.views.items()}
         loaded = self._line.ask(Command.LOAD)
-        self._loaded = _LoadedTrain(loaded.number("train"), loaded.number("period_us"), _actual_train(replies))
+        self._loaded = _LoadedTrain(loaded.number("train"), loaded.number("period_us"), actual_train(replies))
         return self._loaded.actual
 
     def arm(self, shots: int, source: TriggerSource = TriggerSource.COMMAND, period_us: int = 0) -> int:
@@ -168,7 +195,7 @@ class SerialPulseGenerator:
         currents_ma = [0] * CHANNEL_COUNT
         for view, limit in current_a.items():
             currents_ma[self._channels[view]] = round(limit * 1000)
-        self._tighten_limits()
+        tighten_limits(self._line, self._channels, self._max_current_a, self._max_light_a)
         self._line.ask(Command.LIGHT, round(time_s * 1000), *currents_ma)
 
     def fire(self) -> FiredTrain:
@@ -197,7 +224,7 @@ class SerialPulseGenerator:
         return FiredTrain(
             sequence=max(reply.number("fired") for reply in replies.values()),
             camera_trigger_ns={view: tick_ns * reply.number("camera_ticks") for view, reply in replies.items()},
-            pulses={view: _pulses(reply, "ticks", tick_ns) for view, reply in replies.items()},
+            pulses={view: pulses_of(reply, "ticks", tick_ns) for view, reply in replies.items()},
         )
 
     def status(self) -> GeneratorStatus:
@@ -239,15 +266,6 @@ class SerialPulseGenerator:
         if strangers:
             raise PlanError(f"{self._name}: views {strangers} have no channel; there are {sorted(self._channels)}")
 
-    def _tighten_limits(self) -> None:
-        """Before every train: a generator that was reset has forgotten its limits, and every train with them."""
-        for view in sorted(self._max_current_a.keys() | self._max_light_a.keys()):
-            pulse_ma, light_ma = _limit_ma(self._max_current_a, view), _limit_ma(self._max_light_a, view)
-            reply = self._line.ask(Command.LIMIT, self._channels[view], pulse_ma, UNCHANGED, light_ma)
-            for name, limit_ma in (("max_current_ma", pulse_ma), ("max_light_ma", light_ma)):
-                if reply.number(name) > limit_ma:
-                    raise ProtocolError(self._name, f"keeps {reply.number(name)} mA as {name} of {view}")
-
     def _set_channel(self, view: str, edges: ViewTiming, shift_ns: int) -> Reply:
         pulse_b = edges.pulse_b
         single = pulse_b.open_ns == pulse_b.close_ns
@@ -263,30 +281,3 @@ class SerialPulseGenerator:
             edges.frame_a.close_ns - edges.camera_trigger_ns,
             edges.frame_b.open_ns - edges.camera_trigger_ns,
         )
-
-
-def _limit_ma(limits_a: Mapping[str, float], view: str) -> int:
-    return round(limits_a[view] * 1000) if view in limits_a else UNCHANGED
-
-
-def _shift_ns(timing: ShotTiming, tick_ns: int) -> int:
-    """Start of pulse A after the trigger of the shot: whole ticks, so that it is quantised without error."""
-    earliest_ns = min(min(view.camera_trigger_ns, view.pulse_a.open_ns) for view in timing.views.values())
-    return -(min(0, earliest_ns) // tick_ns) * tick_ns
-
-
-def _actual_train(replies: Mapping[str, Reply]) -> FiredTrain:
-    return FiredTrain(
-        sequence=0,
-        camera_trigger_ns={view: reply.number("camera_ns") for view, reply in replies.items()},
-        pulses={view: _pulses(reply, "ns", 1) for view, reply in replies.items()},
-    )
-
-
-def _pulses(reply: Reply, unit: str, unit_ns: int) -> tuple[LightPulse, ...]:
-    """Pulses of a channel that has current; one of no width is none."""
-    current_a = reply.number("current_ma") / 1000
-    edges = ((reply.number(f"{pulse}_start_{unit}"), reply.number(f"{pulse}_width_{unit}")) for pulse in "ab")
-    return tuple(
-        LightPulse(start * unit_ns, width * unit_ns, current_a) for start, width in edges if current_a and width
-    )

@@ -83,6 +83,7 @@ class SerialStage:
         self._device, self._axis = device, axis
         self._reply_limit_s, self._move_limit_s, self._poll_s = reply_limit_s, move_limit_s, poll_s
         self._line: serial.Serial | None = None
+        self._identity = DeviceIdentity("Zaber", "", "", "")
         self._talking, self._closing = threading.Lock(), threading.Event()
         self._message_id = 0
 
@@ -97,6 +98,10 @@ class SerialStage:
         return self._range_mm
 
     def __enter__(self) -> Self:
+        self._identity = self._open()
+        return self
+
+    def _open(self) -> DeviceIdentity:
         try:
             self._line = serial.Serial(self._port, 115200, timeout=self._reply_limit_s, exclusive=True)
         except (serial.SerialException, OSError) as error:
@@ -105,18 +110,42 @@ class SerialStage:
         try:
             # The reply may still come without checksum; then the repetition brings one.
             self._ask("set comm.checksum 1")
+            return self.identity()
         except BaseException:
-            self._line.close()
+            self._close()
             raise
-        return self
+
+    def _close(self) -> None:
+        line, self._line = self._line, None
+        if line is not None:
+            line.close()
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._closing.set()
-        if self._line is not None:
-            self._line.close()
-            self._line = None
+        self._close()
+
+    def recover(self) -> None:
+        """Open the port again if it hung up; the same stage must be there.
+
+        Raises
+        ------
+        DeviceUnavailable, DeviceTimeout
+            Nothing is plugged in there yet, or it does not answer.
+        DeviceRefused
+            It is another stage.
+        """
+        if self._line is not None or self._closing.is_set():
+            return
+        found = self._open()
+        if found.serial != self._identity.serial:
+            self._close()
+            raise DeviceRefused(
+                self._name,
+                f"another stage is plugged in, {found.serial} instead of {self._identity.serial}: plug the right one "
+                "in, or start the server again to work with this one",
+            )
 
     def identity(self) -> DeviceIdentity:
         """Device id, serial number and firmware version, as the stage answers."""
@@ -191,6 +220,7 @@ class SerialStage:
             return self._reply_to(command, self._line)
         except (serial.SerialException, OSError, termios.error, TypeError) as error:
             # pyserial reads from None, a TypeError, when another thread closes the port.
+            self._close()
             raise DeviceUnavailable(self._name, f"port {self._port}: {error}") from error
 
     def _reply_to(self, command: Command, line: serial.Serial) -> Reply | None:

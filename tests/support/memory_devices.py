@@ -11,7 +11,7 @@ import numpy as np
 
 from daq.devices import DeviceIdentity, GeneratorState, GeneratorStatus, TriggerSource
 from daq.drivers.pulse_protocol import COUNTERS
-from daq.errors import DeviceError, DeviceRefused, DeviceTimeout, PlanError
+from daq.errors import DeviceError, DeviceRefused, DeviceTimeout, DeviceUnavailable, PlanError
 from daq.files.run_directory import ViewFormat
 from daq.shot import DoubleFrame, ExposureRecord, FiredTrain, Image, LightPulse
 from daq.simulation.camera.light import Exposure, FrameSource, exposures_of
@@ -24,7 +24,7 @@ MAX_LIGHT_A = 0.5
 
 
 class MemoryDevice:
-    """Name, identity, and a life without meaning; ``journal`` is shared by all devices of a rig.
+    """Name, identity, and a life without meaning; ``journal`` is shared by all devices of a rig. It is never lost.
 
     ``mute`` lets it give no answer when it is asked who it is.
     """
@@ -46,6 +46,9 @@ class MemoryDevice:
         if self.mute:
             raise DeviceTimeout(self.name, "identity", 0.5)
         return DeviceIdentity("tomoshadow", "memory", self.name, "1")
+
+    def recover(self) -> None:
+        """Nothing was lost."""
 
 
 class MemoryCamera(MemoryDevice):
@@ -72,6 +75,13 @@ class MemoryCamera(MemoryDevice):
         self._train: FiredTrain | None = None
         self._triggered = threading.Event()
         self._latest: Image | None = None
+
+    def ask(self) -> None:
+        if self.is_lost or self.frozen:
+            raise DeviceUnavailable(self.name, "does not answer")
+
+    def recover(self) -> None:
+        self.ask()
 
     def arm(self) -> None:
         self.journal.append(f"{self.name} arm")

@@ -4,7 +4,7 @@ import socket
 import struct
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
 from itertools import count
 from pathlib import Path
@@ -245,6 +245,96 @@ def test_a_camera_that_dies_between_runs_is_noticed_by_its_heartbeat(wire: Wire)
     deadline_s = monotonic() + HEARTBEAT_LIMIT_S
     while not wire.camera.is_lost and monotonic() < deadline_s:
         sleep(0.1)
+    assert wire.camera.is_lost
+
+
+def lose(wire: Wire) -> None:
+    """Wait until the driver has found out, by asking once in a while."""
+    deadline_s = monotonic() + HEARTBEAT_LIMIT_S
+    while not wire.camera.is_lost:
+        assert monotonic() < deadline_s
+        with suppress(DeviceUnavailable):
+            wire.camera.ask()
+        sleep(0.05)
+
+
+def test_a_question_finds_a_silent_camera_within_a_second(wire: Wire) -> None:
+    wire.camera.ask()
+    wire.simulated.faults.frozen = True
+    began_s = monotonic()
+    with pytest.raises(DeviceUnavailable, match=f"view: no camera answers at {IP} within 1 s"):
+        wire.camera.ask()
+    assert monotonic() - began_s < 1.5
+    wire.simulated.faults.frozen = False
+    wire.camera.ask()
+    wire.assert_good_shot()
+
+
+def test_a_question_comes_between_no_two_commands(wire: Wire) -> None:
+    for _ in range(3):
+        wire.camera.begin_shot()
+        wire.camera.ask()
+        wire.assert_good_shot()
+
+
+def test_a_camera_that_was_without_power_for_a_moment_is_opened_again(wire: Wire) -> None:
+    wire.camera.disarm()
+    wire.simulated.kill()
+    with pytest.raises(DeviceUnavailable, match=f"view: no camera answers at {IP}"):
+        wire.camera.ask()
+    wire.simulated.power_on()
+    lose(wire)
+    with pytest.raises(DeviceUnavailable, match="was lost"):
+        wire.camera.ask()
+    wire.camera.recover()
+    wire.camera.ask()
+    wire.camera.arm()
+    wire.assert_good_shot()
+
+
+def test_a_lost_camera_that_is_still_away_is_named_at_once(wire: Wire) -> None:
+    wire.camera.disarm()
+    wire.simulated.kill()
+    wire.simulated.power_on()
+    lose(wire)
+    wire.simulated.kill()
+    began_s = monotonic()
+    for attempt in (wire.camera.recover, wire.camera.arm):
+        with pytest.raises(DeviceUnavailable, match=f"view: no camera answers at {IP}"):
+            attempt()
+    assert monotonic() - began_s < 2.4
+    wire.simulated.power_on()
+    wire.camera.arm()
+    wire.assert_good_shot()
+
+
+def test_a_camera_whose_cable_was_out_is_opened_again(wire: Wire) -> None:
+    wire.camera.disarm()
+    wire.simulated.faults.frozen = True
+    sleep(3.2)  # the heartbeat of the camera is 3 s
+    wire.simulated.faults.frozen = False
+    lose(wire)
+    wire.camera.recover()
+    wire.camera.arm()
+    wire.assert_good_shot()
+
+
+def test_a_camera_that_another_client_gave_back_is_opened_again(wire: Wire) -> None:
+    wire.camera.disarm()
+    wire.simulated.faults.held_by_another = True
+    sleep(0.3)
+    wire.simulated.faults.held_by_another = False
+    lose(wire)
+    wire.camera.recover()
+    wire.camera.arm()
+    wire.assert_good_shot()
+
+
+def test_an_armed_camera_is_not_opened_again(wire: Wire) -> None:
+    wire.simulated.kill()
+    wire.simulated.power_on()
+    lose(wire)
+    wire.camera.recover()
     assert wire.camera.is_lost
 
 

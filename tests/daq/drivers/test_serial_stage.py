@@ -20,7 +20,7 @@ from daq.drivers.zaber_protocol import (
     parse_reply,
 )
 from daq.errors import DeviceRefused, DeviceTimeout, DeviceUnavailable, ProtocolError
-from daq.simulation.stage import SimulatedStage
+from daq.simulation.stage import SETTINGS, SimulatedStage
 
 texts = st.text(st.characters(min_codepoint=33, max_codepoint=126), max_size=12)
 
@@ -139,3 +139,40 @@ def test_a_silent_port_is_a_timeout() -> None:
     finally:
         os.close(master)
         os.close(slave)
+
+
+def test_a_stage_that_is_plugged_in_again_is_opened_again(instrument: SimulatedStage) -> None:
+    with driver(instrument) as stage:
+        stage.move_to(10.0)
+        instrument.unplug()
+        with pytest.raises(DeviceUnavailable):
+            stage.position_mm()
+        with pytest.raises(DeviceUnavailable, match=instrument.port):
+            stage.recover()
+        instrument.plug_in()
+        stage.recover()
+        assert stage.position_mm() == pytest.approx(10.0, abs=0.0025)
+        stage.recover()
+        assert stage.move_to(20.0) == pytest.approx(20.0, abs=0.0025)
+
+
+def test_another_stage_in_its_place_is_refused(instrument: SimulatedStage, monkeypatch: pytest.MonkeyPatch) -> None:
+    with driver(instrument) as stage:
+        instrument.unplug()
+        with pytest.raises(DeviceUnavailable):
+            stage.position_mm()
+        monkeypatch.setitem(SETTINGS, "system.serial", "100043")
+        instrument.plug_in()
+        for _ in range(2):
+            with pytest.raises(DeviceRefused, match="another stage is plugged in, 100043 instead of 100042"):
+                stage.recover()
+        with pytest.raises(DeviceUnavailable):
+            stage.position_mm()
+
+
+def test_a_stage_that_is_closed_is_not_opened_again(instrument: SimulatedStage) -> None:
+    with driver(instrument) as stage:
+        pass
+    stage.recover()
+    with pytest.raises(DeviceUnavailable, match="is not open"):
+        stage.position_mm()
