@@ -47,6 +47,11 @@ class DoubleFrame:
         """Both exposures (or the only one) are complete."""
         return self.record_a.valid and (self.frame_b is None or self.record_b.valid)
 
+    @property
+    def silent(self) -> bool:
+        """Nothing of the firing arrived whole."""
+        return not (self.record_a.valid or self.record_b.valid)
+
 
 @dataclass(frozen=True)
 class LightPulse:

@@ -13,12 +13,12 @@ from daq.files.outcome_note import write_note
 from daq.files.run_directory import RunWriter
 from daq.run import light
 from daq.run.active_run import ActiveRun
-from daq.run.disarming import disarm_cameras
 from daq.run.guard import RunGuard
 from daq.run.recorder import Recorder
 from daq.run.references import mean_images
 from daq.run.shot_check import Thresholds, light_thresholds
 from daq.run.shot_taking import ShotTaker
+from daq.run.side_by_side import disarm_cameras
 from daq.run.state import RunStep
 from daq.run_plan import RunKind
 

@@ -1,17 +1,26 @@
-"""ShotTaker: pace, fire, collect, check; and fire again where a frame is proven to be missing."""
+"""ShotTaker: pace, fire, collect, check; and fire again where a frame is proven to be missing.
+
+The acquisition thread controls the light, so it waits for no register of a camera while the generator is armed: a
+camera of which nothing comes in time costs the light first, then it is asked, and then the generator is armed again.
+"""
 
 import time
 
+from daq.devices import Camera
 from daq.errors import DeviceRefused
 from daq.run import light
 from daq.run.active_run import ActiveRun
 from daq.run.shot_check import ShotFindings, Thresholds, check_exposures
+from daq.run.side_by_side import SideBySide
 from daq.run.train_check import train_deviation
 from daq.run_plan import ImageKey
 from daq.shot import DoubleFrame, FiredTrain, Shot
 
 _LEAST_COLLECT_S = 0.05
 """What a camera gets although another one used up the deadline: its frames lie in its buffers already."""
+
+_PATIENCE_S = 0.2
+"""For cameras that re-base, before the light is switched off; they need milliseconds."""
 
 _LATE_PERIODS = 0.5
 """A shot that is later by so many periods moves those after it, and none comes closer to the one before."""
@@ -61,6 +70,7 @@ class ShotTaker:
         self._period_s = 1 / self._plan.rate_hz
         self._shortest_s = self._timing.shortest_period_ns / 1e9
         self._due_s = 0.0
+        self._armed = False
         self._stage_z_mm: float | None = None
 
     def load_position(self, position: int) -> None:
@@ -71,15 +81,10 @@ class ShotTaker:
         DeviceRefused
             The generator did not load what it was asked to.
         """
-        generator, plan = self._rig.generator, self._plan
-        if plan.stage_z_mm and self._rig.stage:
-            light.switch_off(self._rig)
-            self._stage_z_mm = self._rig.stage.move_to(plan.stage_z_mm[position])
-        if deviation := train_deviation(self._timing, generator.configure(self._timing)):
-            raise DeviceRefused(generator.name, f"loaded another pulse train: {deviation}")
-        if not self._ending.step:
-            period_us = generator.arm(plan.shots + self._refires_left, period_us=int(1e6 * self._period_s))
-            self._shortest_s = max(self._timing.shortest_period_ns / 1e9, period_us / 1e6)
+        if self._plan.stage_z_mm and self._rig.stage:
+            self._darken()
+            self._stage_z_mm = self._rig.stage.move_to(self._plan.stage_z_mm[position])
+        self._arm(self._plan.shots)
 
     def take(self, index: int) -> Shot | None:
         """Take one shot when it is due; None if the run is ended."""
@@ -87,6 +92,9 @@ class ShotTaker:
         if position and not number:
             self.load_position(position)
         while self._ending.wait_until(self._due_s):
+            self._rebase()
+            if not self._armed and not self._arm(self._plan.shots - number):
+                return None
             shot, findings = self._fire(index)
             if shot is None or not findings.missing or not self._refires_left:
                 return shot
@@ -94,10 +102,32 @@ class ShotTaker:
             self._say(f"shot {index} is fired again, {self._refires_left} more permitted")
         return None
 
+    def _arm(self, shots: int) -> bool:
+        """Load the train, verify its echo, arm for these shots and the refires; False if the run is ended."""
+        generator = self._rig.generator
+        if deviation := train_deviation(self._timing, generator.configure(self._timing)):
+            raise DeviceRefused(generator.name, f"loaded another pulse train: {deviation}")
+        if self._ending.step:
+            return False
+        period_us = generator.arm(shots + self._refires_left, period_us=int(1e6 * self._period_s))
+        self._shortest_s = max(self._timing.shortest_period_ns / 1e9, period_us / 1e6)
+        self._armed = True
+        return True
+
+    def _darken(self) -> None:
+        """Light off, confirmed; the generator is armed again before the next shot."""
+        self._armed = False
+        light.switch_off(self._rig)
+
+    def _rebase(self) -> None:
+        """Let the cameras tell the next firing from the last one; they read their clocks."""
+        rebasing = SideBySide("begin shot", _begin_shot, self._rig.cameras)
+        if not rebasing.wait(_PATIENCE_S):
+            self._darken()
+        _raise_first(rebasing.errors(self._frame_deadline_s))
+
     def _fire(self, index: int) -> tuple[Shot | None, ShotFindings]:
         """Fire and look at what came of it."""
-        for camera in self._rig.cameras.values():
-            camera.begin_shot()
         host_time_ns = time.time_ns()
         sent_s = time.monotonic()
         fired = self._rig.generator.fire()
@@ -105,6 +135,7 @@ class ShotTaker:
         views = self._collect()
         if views is None:
             return None, ShotFindings()
+        self._ask_silent(index, views)
         findings = self._check(index, fired, views)
         key = self._plan.kind.image_key if findings.good else ImageKey.INVALID
         return Shot(index, key, views, fired, host_time_ns, self._stage_z_mm), findings
@@ -115,9 +146,18 @@ class ShotTaker:
         views = {}
         for view, camera in self._rig.cameras.items():
             views[view] = camera.collect(max(_LEAST_COLLECT_S, deadline_s - time.monotonic()))
+            if views[view].silent and self._armed:
+                self._darken()
             if self._ending.at_once:
                 return None
         return views
+
+    def _ask_silent(self, index: int, views: dict[str, DoubleFrame]) -> None:
+        """Whether cameras of which nothing came are there at all; it is dark."""
+        silent = {view: self._rig.cameras[view] for view, frames in views.items() if frames.silent}
+        if silent:
+            self._say(f"shot {index}: nothing came from {', '.join(silent)}; light off")
+            _raise_first(SideBySide("a question", _ask, silent).errors(self._frame_deadline_s))
 
     def _check(self, index: int, fired: FiredTrain, views: dict[str, DoubleFrame]) -> ShotFindings:
         lit = {view: one.current_a > 0 for view, one in self._timing.views.items()}
@@ -126,3 +166,16 @@ class ShotTaker:
         if not findings.good:
             self._say(f"shot {index}: {findings}")
         return findings
+
+
+def _begin_shot(camera: Camera) -> None:
+    camera.begin_shot()
+
+
+def _ask(camera: Camera) -> None:
+    camera.ask()
+
+
+def _raise_first(errors: dict[str, Exception]) -> None:
+    for error in errors.values():
+        raise error

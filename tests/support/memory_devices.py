@@ -55,7 +55,8 @@ class MemoryCamera(MemoryDevice):
     """Sees its scene by the light that falls into its exposures.
 
     ``lost`` names the firings, from 1, of which exposure B is lost; ``broken_at`` the firing at which it dies;
-    ``frozen`` lets collect and disarm hang until the event is set.
+    ``frozen`` lets collect and disarm hang until the event is set, ``clock`` begin_shot. ``silent_at`` names
+    firings of which nothing comes; from ``dead_from`` on nothing comes, and it does not answer.
     """
 
     def __init__(
@@ -69,6 +70,9 @@ class MemoryCamera(MemoryDevice):
         self.lost: set[int] = set()
         self.broken_at: int | None = None
         self.frozen: threading.Event | None = None
+        self.silent_at: set[int] = set()
+        self.dead_from: int | None = None
+        self.clock: threading.Event | None = None
         self._scene = scene
         self._frames = 0
         self._armed = False
@@ -77,11 +81,13 @@ class MemoryCamera(MemoryDevice):
         self._latest: Image | None = None
 
     def ask(self) -> None:
-        if self.is_lost or self.frozen:
+        self.journal.append(f"{self.name} ask")
+        if self.is_lost or self.frozen or self._is_dead:
             raise DeviceUnavailable(self.name, "does not answer")
 
     def recover(self) -> None:
-        self.ask()
+        if self.is_lost:
+            self.ask()
 
     def arm(self) -> None:
         self.journal.append(f"{self.name} arm")
@@ -90,6 +96,8 @@ class MemoryCamera(MemoryDevice):
 
     def begin_shot(self) -> None:
         self._check_armed()
+        if self.clock:
+            self.clock.wait(5)
         self._train = None
         self._triggered.clear()
 
@@ -102,7 +110,7 @@ class MemoryCamera(MemoryDevice):
         if self.frozen:
             self.frozen.wait(deadline_s)
             return self._double_frame(None, None)
-        if not self._triggered.wait(deadline_s) or self._train is None:
+        if not self._triggered.wait(deadline_s) or self._train is None or self._is_silent:
             return self._double_frame(None, None)
         if self._train.sequence == self.broken_at:
             raise DeviceError(self.name, "control lost")
@@ -117,6 +125,14 @@ class MemoryCamera(MemoryDevice):
 
     def latest(self) -> Image | None:
         return self._latest
+
+    @property
+    def _is_dead(self) -> bool:
+        return self.dead_from is not None and self._train is not None and self._train.sequence >= self.dead_from
+
+    @property
+    def _is_silent(self) -> bool:
+        return self._is_dead or (self._train is not None and self._train.sequence in self.silent_at)
 
     def _check_armed(self) -> None:
         if not self._armed:

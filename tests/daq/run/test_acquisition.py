@@ -267,6 +267,63 @@ def test_an_accepted_run_has_a_directory_before_any_device_is_asked(lab: Laborat
     assert lab.run(plan_of()).run_dir.name in found
 
 
+@pytest.mark.parametrize("sequence", [1, 3, 4])
+@pytest.mark.parametrize("quota", [0, 3])
+def test_a_silent_camera_costs_the_light_before_it_is_asked(lab: Laboratory, sequence: int, quota: int) -> None:
+    lab.memory.cameras["view2"].dead_from = sequence
+    assert_failed(lab, lab.run(plan_of(4, refire_quota=quota)), "view2: does not answer", sequence - 1)
+    journal = lab.memory.journal
+    fired = journal.index(f"fire {sequence}")
+    assert journal[fired + 1 : fired + 3] == ["off", "view2 ask"]
+
+
+def test_a_camera_that_missed_a_trigger_goes_on_with_the_light_armed_again(lab: Laboratory) -> None:
+    lab.memory.cameras["view2"].silent_at = {2}
+    reader = lab.run(plan_of(4, refire_quota=3))
+    assert (reader.outcome, reader.shot_count) == ("completed", 4)
+    journal = lab.memory.journal
+    assert journal[journal.index("fire 2") :][:5] == ["fire 2", "off", "view2 ask", "arm 5", "fire 3"]
+    assert "shot 1: nothing came from view2; light off" in lab.messages()
+
+
+def test_a_camera_that_misses_the_last_trigger_arms_nothing_again(lab: Laboratory) -> None:
+    lab.memory.cameras["view2"].silent_at = {2}
+    reader = lab.run(plan_of(2, refire_quota=0))
+    assert reader.shot_count == 2
+    assert [entry for entry in lab.memory.journal if entry.startswith("arm")] == ["arm 2"]
+
+
+def test_the_light_does_not_wait_for_the_clock_of_a_camera(lab: Laboratory) -> None:
+    run_id = lab.acquisition.start(plan_of(3, rate_hz=5))
+    lab.await_in_journal("fire 1")
+    lab.memory.cameras["view1"].clock = clock = threading.Event()
+    lab.await_in_journal("off")
+    assert lab.memory.generator.state is GeneratorState.SAFE
+    assert lab.acquisition.status().active
+    clock.set()
+    assert lab.acquisition.wait(DEADLINE_S).outcome is RunOutcome.COMPLETED
+    assert RunReader(lab.data_dir / run_id).shot_count == 3
+
+
+def test_a_camera_whose_clock_stands_still_is_named(lab: Laboratory) -> None:
+    reader = lab.start_and_await_shot(plan_of(9, rate_hz=5), 0)
+    lab.memory.cameras["view1"].clock = clock = threading.Event()
+    assert not lab.acquisition.wait(DEADLINE_S).active
+    clock.set()
+    assert "view1: no answer to 'begin shot' within" in reader.cause
+    assert reader.outcome == "failed"
+
+
+def test_a_stop_while_it_is_dark_is_a_stop(lab: Laboratory) -> None:
+    reader = lab.start_and_await_shot(plan_of(3, rate_hz=5), 0)
+    lab.memory.cameras["view1"].clock = clock = threading.Event()
+    lab.await_in_journal("off")
+    lab.acquisition.stop()
+    clock.set()
+    assert lab.acquisition.wait(DEADLINE_S).outcome is RunOutcome.STOPPED
+    assert reader.shot_count < 3
+
+
 def test_a_failed_fire_is_no_lost_frame(lab: Laboratory) -> None:
     lab.memory.generator.silent_at = 2
     assert_failed(lab, lab.run(plan_of(9)), "generator: no answer to 'fire' within 0.5 s", 1)
@@ -343,7 +400,7 @@ def test_a_frozen_camera_is_left_alone_after_its_deadline(lab: Laboratory) -> No
     status = lab.acquisition.wait(2.0)
     thaw.set()
     assert status.outcome is RunOutcome.STOPPED
-    assert "view2: not disarmed within 0.3 s" in lab.messages()
+    assert "view2: no answer to 'disarm' within 0.3 s" in lab.messages()
     assert reader.outcome == "stopped"
 
 
