@@ -30,7 +30,9 @@ uint64_t port_now_us(void);
 bool port_interlock_closed(void);
 bool port_estop_closed(void);
 
-/* False while the set-points shall be zero and the hardware does not confirm that they are; the port goes on trying. */
+/* False while the set-points shall be zero and the hardware does not confirm that they are; the port goes on trying. To be
+ * asked all the time, also while a reply is sent: each call takes the next step of a look at them, or zeroes them, which
+ * takes some ms and happens in the dark. */
 bool port_set_points_confirmed(void);
 
 /* Make ready for shots: set-points, read back, and edges. False where this machine cannot produce the train, or a

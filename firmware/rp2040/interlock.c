@@ -30,10 +30,11 @@ ONCE void interlock_start(void)
 void interlock_isr(void)
 {
     const uint32_t pending = REG(IO_INTS(PIN_INTERLOCK));
-    if (pending & OPENED)
+    if (pending & OPENED) {
         outputs_off();
+        opened |= pending & OPENED;
+    }
     REG(IO_INTR(PIN_INTERLOCK)) = pending;
-    opened |= pending & OPENED;
     if (pending & RISEN) {
         edges.rises++;
         edges.fired |= outputs_take_start();

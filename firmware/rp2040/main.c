@@ -71,9 +71,8 @@ int main(void)
     start_interrupts();
     for (;;) {
         watchdog_feed();
-        while (serial_take(&byte))
+        if (serial_take(&byte)) /* one in a turn: what comes as fast as it is taken must not keep all else waiting */
             protocol_receive(&protocol, byte);
-        set_points_poll();
         state_machines_poll();
         image_check_poll();
         protocol_poll(&protocol);

@@ -41,6 +41,7 @@ bool port_estop_closed(void)
 
 bool port_set_points_confirmed(void)
 {
+    set_points_poll(); /* a reply keeps the main loop for longer than a look may take */
     return set_points_confirmed();
 }
 

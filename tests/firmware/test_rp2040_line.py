@@ -12,6 +12,7 @@ LINE = ("crc_errors", "framing", "breaks", "overruns", "lost")
 FRAMING, BREAK, OVERRUN = 1 << 8, 1 << 10, 1 << 11
 """Beside a byte in the data register of the UART."""
 RING = 255
+BURST, LONGEST_REPLY_MS = 14, 30
 NOISE = b"x" * 50 + b"\n"
 
 
@@ -94,3 +95,19 @@ def test_what_finds_no_room_is_counted_byte_by_byte() -> None:
     crc_errors, *_, lost = counted(board)
     assert lost == 40
     assert crc_errors == answered == RING // len(NOISE)
+
+
+def test_a_burst_of_requests_neither_restarts_nor_trips_an_armed_board() -> None:
+    """Their replies take longer than the watchdog waits and than a look at the converter may take."""
+    board = Board()
+    board.configure([PAPER] * 4)
+    board.pico.run_ms(2 * PERIOD_MS)
+    board.arm(5)
+    board.pico.pace_serial_line()
+    board.pico.sent.clear()
+    board.pico.receive(b"".join(encode_request(Request(100 + i, Command.STATUS, ())) for i in range(BURST)))
+    board.pico.run_ms(BURST * LONGEST_REPLY_MS)
+    assert board.pico.watchdog_resets == []
+    replies = [decode_reply(line) for line in bytes(board.pico.sent).splitlines(keepends=True)]
+    assert [reply.sequence for reply in replies] == list(range(100, 100 + BURST))
+    assert {(reply.number("state"), reply.number("faults")) for reply in replies} == {(State.ARMED, 0)}

@@ -244,7 +244,7 @@ def test_an_abort_between_the_words_and_the_start_is_no_shot(board: Board) -> No
         asked = ask_to_fire(board)
         board.pico.run(asked + fires_after - early_cycles)
         board.pico.feed(ABORT_BYTE[0])
-        board.pico.run_ms(1)
+        board.pico.run_ms(3)  # the reply waits until the converter confirms its zeros
         shot = counted(board, before)
         assert shot["fired"] == len(rises(board, "trigger"))
         assert shot["cameras"] == len(rises(board, "camera0")) <= shot["fired"]

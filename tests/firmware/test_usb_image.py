@@ -19,6 +19,9 @@ REPLY_LIMIT_MS = 5
 WATCHDOG_MS = 200
 HEARTBEAT_MS = 3000
 KEPT_BYTES = 512 + PACKET
+FLOOD_MS = 10
+FASTEST_PACKET_NS = 1_000_000 // 19
+"""Of 64 bytes: 19 of them fit a millisecond of the bus."""
 PACKET_NS = 10_000
 """The emulated bus takes so long for any packet."""
 ABORT_WITHIN_NS = 1200
@@ -238,6 +241,29 @@ def test_a_program_that_opens_the_port_gets_nothing_that_was_meant_for_another(b
     line = encode_request(Request(2201, Command.STATUS, ()))
     board.say(line)
     assert decode_reply(board.say(line)).sequence == 2201
+
+
+@pytest.mark.parametrize("line", [b"x", b"<\n", b"x\n"])
+def test_a_host_that_floods_the_line_keeps_no_fault_from_being_seen(line: bytes) -> None:
+    """As fast as the bus permits: bytes come as quickly as they are taken."""
+    board = UsbBoard()
+    board.configure([PAPER] * 4)
+    board.pico.run_ms(2 * PERIOD_MS)
+    board.arm(5)
+    start = board.pico.cycle
+
+    def flood() -> None:
+        board.usb.send(line * (PACKET // len(line)))
+        if board.pico.cycle < start + FLOOD_MS * CYCLES_PER_MS:
+            board.pico.at(board.pico.cycle + FASTEST_PACKET_NS // CYCLE_NS, flood)
+
+    flood()
+    board.pico.run_ms(FLOOD_MS / 2)
+    board.pico.short("light0")  # until its power is cut
+    board.pico.run_ms(2)
+    assert board.pico.set_points_ma() == (0, 0, 0, 0)
+    board.pico.run_ms(FLOOD_MS)
+    assert board.pico.watchdog_resets == []
 
 
 def test_a_restart_by_the_watchdog_comes_back_to_the_bus() -> None:

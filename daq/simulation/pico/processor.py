@@ -59,6 +59,12 @@ class Processor:
             self._run_loop(limit_cycles)
         return self._cycles()
 
+    def falls_asleep(self) -> bool:
+        """Whether it waits for an interrupt now; rp2040py's does so too where a masked one is pending already."""
+        if self._core.pending_interrupts & self._core.enabled_interrupts:
+            self._core.waiting = False
+        return self._core.waiting
+
     def sleep(self, limit_cycles: int) -> int:
         """Cycles to the next alarm, or to the limit."""
         if not self.clock.has_scheduled_alarm:

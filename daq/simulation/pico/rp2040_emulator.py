@@ -238,7 +238,7 @@ class EmulatedPico:
                 asleep = core.waiting
                 self._advance_machines(self._processor.sleep(end - start) if asleep else core.execute_instruction())
                 tick(float((self.cycle - start) * CYCLE_NS))
-            if core.waiting:
+            if self._processor.falls_asleep():
                 return
 
     def _run_processor(self, end: int) -> None:

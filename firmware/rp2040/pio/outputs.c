@@ -33,7 +33,7 @@ static struct words *const camera = words_of[CAMERA];
 static uint32_t words_sum;
 static bool words_changed;
 static volatile uint32_t off_count;
-static volatile bool permitted; /* until the shot has started */
+static volatile uint32_t permitted; /* until the shot has started: the register that tells; else 0 */
 
 void outputs_off(void)
 {
@@ -158,7 +158,7 @@ uint32_t outputs_switch_off(void)
 {
     const uint32_t before = interrupts_mask();
     outputs_off();
-    permitted = false;
+    permitted = 0;
     const uint32_t count = off_count;
     interrupts_restore(before);
     return count;
@@ -236,6 +236,15 @@ bool outputs_fire(void)
     return start;
 }
 
+/* The machines run in step: where the first camera stands tells of all. */
+static uint32_t address_register(void)
+{
+    uint32_t machine = 0;
+    while (machine < CHANNEL_COUNT - 1 && !camera[machine].used)
+        machine++;
+    return PIO_ADDR(CAMERA, machine);
+}
+
 /* All machines have to see the same edge. So the line is held high while they get their words, one after the other:
  * they stand and wait for it to fall. Then one write hands it to the pin. If that is low they all go on to wait for its
  * rise; if it is high they all wait for it to fall first. */
@@ -244,29 +253,24 @@ void outputs_permit(void)
     const uint32_t off_before = off_count;
     REG(IO_CTRL(PIN_TRIGGER)) = FUNCTION_NONE | INPUT_HIGH;
     const bool ready = push_shot(PIO_TRIGGER_LOW_ADDRESS);
+    const uint32_t address = address_register();
     uint32_t before = 0;
     if (outputs_mask_unless_off(off_before, &before) && ready) {
-        permitted = true;
+        permitted = address;
         REG(IO_CTRL(PIN_TRIGGER)) = FUNCTION_NONE;
     }
     interrupts_restore(before);
 }
 
-/* They run in step: the first camera tells of all. */
-static bool has_started(void)
-{
-    uint32_t machine = 0;
-    while (machine < CHANNEL_COUNT - 1 && !camera[machine].used)
-        machine++;
-    const uint32_t address = REG(PIO_ADDR(CAMERA, machine));
-    return address != PIO_TRIGGER_LOW_ADDRESS && address != PIO_TRIGGER_ADDRESS;
-}
-
+/* In few steps: the interlock waits for it. */
 bool outputs_take_start(void)
 {
-    const bool started = permitted && has_started();
+    if (!permitted)
+        return false;
+    const uint32_t address = REG(permitted);
+    const bool started = address != PIO_TRIGGER_LOW_ADDRESS && address != PIO_TRIGGER_ADDRESS;
     if (started)
-        permitted = false;
+        permitted = 0;
     return started;
 }
 

@@ -21,8 +21,8 @@ bool set_points_set(const uint32_t current_ma[CHANNEL_COUNT]);
 /* To zero, from any context, without waiting. */
 void set_points_zero(void);
 
-/* From the main loop, all the time: goes on until the zero that was asked for reads back, and looks from time to time
- * whether what was set still does. */
+/* From the main loop, all the time, also while it sends a reply: goes on until the zero that was asked for reads back, and
+ * looks from time to time whether what was set still does. */
 void set_points_poll(void);
 
 /* False from set-points that do not read back to the first ones that do. */
