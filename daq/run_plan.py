@@ -7,6 +7,7 @@ from pydantic import Field
 
 from daq.frozen_model import FrozenModel
 from daq.names import RunName
+from daq.run_notes import RunNotes, Spray
 
 
 class ImageKey(IntEnum):
@@ -74,6 +75,8 @@ class RunPlan(FrozenModel):
         int, Field(ge=0, le=1000, description="how many shots with a proven frame miss may be fired again")
     ] = 3
     calibration: Annotated[str | None, Field(description="id of the calibration that reconstructs this run")] = None
+    notes: Annotated[RunNotes, Field(description="conditions that no device knows")] = RunNotes()
+    spray: Annotated[Spray | None, Field(description="where nozzle and axis are; null where nobody stated it")] = None
 
     @property
     def total_shots(self) -> int:

@@ -8,6 +8,7 @@ from pydantic import Field
 
 from daq.frozen_model import FrozenModel
 from daq.names import ViewName
+from daq.run_notes import RunNotes, Spray
 from daq.run_plan import RunPlan
 
 
@@ -58,6 +59,8 @@ class RunHeader(FrozenModel):
         int | None, Field(description="time between exposures A and B; null for single exposures")
     ] = None
     rate_hz: Annotated[float | None, Field(description="of shots at even times; null where nobody stated it")] = None
+    notes: Annotated[RunNotes, Field(description="conditions that no device knows")] = RunNotes()
+    spray: Annotated[Spray | None, Field(description="where nozzle and axis are; null where nobody stated it")] = None
 
     @property
     def shot_bytes(self) -> int:

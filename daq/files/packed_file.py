@@ -43,7 +43,7 @@ def _replace_view(packed: h5py.File, header: RunHeader, shot_count: int) -> None
     for path, column in columns_of(header).items():
         del packed[path]
         dataset = packed.create_dataset(path, (shot_count, *column.shape), np.dtype(column.dtype))
-        dataset.attrs.update(units=column.units, axes=column.axes)
+        dataset.attrs.update(units=column.units, dimensions=column.axes)
 
 
 def _copy_shot(path: Path, header: RunHeader, index: int, packed: h5py.File) -> None:

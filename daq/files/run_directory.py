@@ -33,6 +33,7 @@ from daq.files.run_file import (
 )
 from daq.files.run_writer import RunWriter
 from daq.files.shot_file import read_image_key, read_shot_file
+from daq.run_notes import RunNotes, Spray
 from daq.run_plan import ImageKey, PulsePair, RunKind, RunPlan
 from daq.shot import DoubleFrame, ExposureRecord, FiredTrain, Image, LightPulse, Shot
 
@@ -48,11 +49,13 @@ __all__ = [
     "ReferenceImages",
     "RunHeader",
     "RunKind",
+    "RunNotes",
     "RunPlan",
     "RunReader",
     "RunWriter",
     "Shot",
     "ShotFileError",
+    "Spray",
     "ViewFormat",
     "list_runs",
     "pack",

@@ -21,9 +21,10 @@ from daq.files.columns import columns_of, frames_path, view_path
 from daq.files.encoding import encode_frame
 from daq.files.header import RunClosing, RunHeader
 from daq.files.shot_file import LIBRARY_VERSIONS, SCHEMA_VERSION, create_groups
+from daq.run_notes import RunNotes
 
 RUN_FILE = "run.h5"
-_LATER_FIELDS = ("rate_hz",)
+_LATER_FIELDS = ("rate_hz", "notes", "spray")
 """Of the header; runs from before have their defaults."""
 SHOTS_FOLDER = "shots"
 _CLOSING_BYTES = 256 * 2**10
@@ -166,10 +167,18 @@ def _write_entry(entry: h5py.Group, header: RunHeader) -> None:
     entry.attrs["NX_class"] = "NXentry"
     for name, value in header.model_dump(mode="json").items():
         entry[name] = json.dumps(value, indent=1)
+    entry["title"] = header.plan.name if header.plan else header.run_id
+    entry["definition"] = RUN_SCHEMA
+    entry["definition"].attrs["version"] = str(SCHEMA_VERSION)
+    _write_conditions(entry, header.notes)
     entry["entry_identifier"] = header.run_id
     entry["start_time"] = header.created_utc
-    entry["instrument"] = h5py.SoftLink("/cameras")
+    instrument = entry.create_group("instrument")
+    instrument.attrs["NX_class"] = "NXinstrument"
     for view in header.views:
+        detector = instrument.create_group(view)
+        detector.attrs["NX_class"] = "NXdetector"
+        detector["data"] = h5py.SoftLink(frames_path(view))
         data = entry.create_group(f"data_{view}")
         data.attrs.update(NX_class="NXdata", signal="frames", axes=["index", ".", ".", "."])
         data["frames"] = h5py.SoftLink(frames_path(view))
@@ -177,15 +186,27 @@ def _write_entry(entry: h5py.Group, header: RunHeader) -> None:
     entry.attrs["default"] = f"data_{next(iter(header.views))}"
 
 
+def _write_conditions(entry: h5py.Group, notes: RunNotes) -> None:
+    """What the notes say, where NeXus readers look for it."""
+    user, sample = entry.create_group("user"), entry.create_group("sample")
+    user.attrs["NX_class"], sample.attrs["NX_class"] = "NXuser", "NXsample"
+    user["name"] = notes.operator
+    sample["name"] = notes.fluid
+    sample["description"] = "; ".join(part for part in (notes.nozzle, notes.remark) if part)
+    if notes.pressure_bar is not None:
+        sample["pressure"] = notes.pressure_bar
+        sample["pressure"].attrs["units"] = "bar"
+
+
 def _write_view(file: h5py.File, header: RunHeader) -> None:
     for view, view_format in header.views.items():
         frames = _create_virtual(
             file, frames_path(view), view_format.dtype, (header.frames_per_shot, *view_format.shape)
         )
-        frames.attrs.update(units="counts", axes="shot,frame,row,column", significant_bits=view_format.bits)
+        frames.attrs.update(units="counts", dimensions="shot,frame,row,column", significant_bits=view_format.bits)
     for path, column in columns_of(header).items():
         dataset = _create_virtual(file, path, np.dtype(column.dtype), column.shape)
-        dataset.attrs.update(units=column.units, axes=column.axes)
+        dataset.attrs.update(units=column.units, dimensions=column.axes)
 
 
 def _create_virtual(file: h5py.File, path: str, dtype: np.dtype[Any], shape: tuple[int, ...]) -> h5py.Dataset:
@@ -210,6 +231,6 @@ def _create_reference(file: h5py.File, path: str, stack: NDArray[np.float32]) ->
     dataset = file.create_dataset(
         path, stack.shape, stack.dtype, chunks=(1, *stack.shape[1:]), compression="gzip", shuffle=True
     )
-    dataset.attrs.update(units="counts", axes="frame,row,column")
+    dataset.attrs.update(units="counts", dimensions="frame,row,column")
     for number, image in enumerate(stack):
         dataset.id.write_direct_chunk((number, 0, 0), encode_frame(image).chunk)

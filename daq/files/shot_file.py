@@ -132,7 +132,7 @@ def create_frames(file: h5py.File, view: str, view_format: ViewFormat, leading: 
         compression_opts=1,
         shuffle=is_shuffled(view_format.dtype),
     )
-    dataset.attrs.update(units="counts", axes="shot,frame,row,column", significant_bits=view_format.bits)
+    dataset.attrs.update(units="counts", dimensions="shot,frame,row,column", significant_bits=view_format.bits)
     return dataset
 
 
@@ -158,7 +158,7 @@ def _create_column(file: h5py.File, name: str, column: Column, values: NDArray[A
     kind = h5t.py_create(values.dtype, logical=True)
     stored = h5d.create(file.id, name.encode(), kind, space, layout)
     stored.write(h5s.ALL, h5s.ALL, np.ascontiguousarray(values[np.newaxis]))
-    h5py.Dataset(stored).attrs.update(units=column.units, axes=column.axes)
+    h5py.Dataset(stored).attrs.update(units=column.units, dimensions=column.axes)
 
 
 def _read_frames(file: h5py.File, view: str, view_format: ViewFormat, crc32: NDArray[Any]) -> list[Image]:

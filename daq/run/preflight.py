@@ -113,6 +113,8 @@ def _header(
         calibration_id=plan.calibration,
         calibration_sha256=calibration_sha256,
         separation_ns=plan.pulse.separation_ns,
+        notes=plan.notes,
+        spray=plan.spray,
     )
 
 

@@ -10,6 +10,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
+from daq.files.run_directory import RunNotes, Spray
 from processing.calibration.sets.set_record import CalibrationEntry, CameraName
 from processing.errors import BadInput
 from processing.kernels import _native
@@ -116,6 +117,7 @@ class RunEntry(_Entry):
     ] = None
     rate_hz: Annotated[float | None, Field(gt=0, description="shots per second, all alike; kept with the run")] = None
     double_height: Annotated[bool, Field(description="every image is exposure A above exposure B")] = False
+    notes: Annotated[RunNotes, Field(description="conditions of the run; kept with it")] = RunNotes()
     shot: Annotated[tuple[ShotEntry, ...], Field(description="the shots, in order")] = ()
     shots: Annotated[tuple[ShotsEntry, ...], Field(description="more of them, by patterns of file names")] = ()
     background: Annotated[tuple[ShotEntry, ...], Field(description="light without spray; their mean is used")] = ()
@@ -179,6 +181,7 @@ class Manifest(_Entry):
     ] = None
     calibration: CalibrationEntry | None = None
     run: RunEntry | None = None
+    spray: Annotated[Spray | None, Field(description="where nozzle and axis are; kept with the run")] = None
 
     @model_validator(mode="after")
     def _has_something(self) -> Self:

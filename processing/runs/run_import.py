@@ -134,6 +134,8 @@ def write_run(
         polarity=run.polarity,
         separation_ns=run.separation_ns,
         rate_hz=run.rate_hz,
+        notes=run.notes,
+        spray=source.manifest.spray,
     )
     references, copies = {ImageKey.DARK: _Mean(), ImageKey.BACKGROUND: _Mean()}, _Copies()
     with RunWriter(run_dir, header) as writer:

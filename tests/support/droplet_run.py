@@ -57,8 +57,9 @@ def write_run(
     covered: tuple[str, ...] = (),
     bits: int = 8,
     polarity: Polarity = "shadow",
+    **told: Any,
 ) -> Path:
-    """Record shots; in the invalid ones exposure B of view2 is missing; covered views are dark."""
+    """Record shots; in the invalid ones exposure B of view2 is missing; covered views are dark; more of the header."""
     views = {name: ViewFormat(SHAPE, bits) for name in cameras()}
     header = RunHeader(
         run_id=run_dir.name,
@@ -66,6 +67,7 @@ def write_run(
         views=views,
         polarity=polarity,
         separation_ns=6400,
+        **told,
     )
     with RunWriter(run_dir, header) as writer:
         for index in range(shots):

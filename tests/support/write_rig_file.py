@@ -161,6 +161,8 @@ def _plural(described: Schema, defs: Schema) -> str:
         return "words: " + _kind(described, defs)
     if "prefixItems" in target:
         return "pairs of " + _plural(target["prefixItems"][0], defs)
+    if "anyOf" in target:
+        return " or ".join(_plural(one, defs) for one in target["anyOf"])
     return "tables" if "properties" in target else {"string": "texts"}.get(target["type"], NAMES[target["type"]] + "s")
 
 
@@ -175,8 +177,8 @@ def _unit(key: str, described: Schema) -> str:
 def _default(required: bool, described: Schema) -> str:
     if required:
         return ""
-    default = described["default"]
-    if default is None or default in ({}, []):
+    default = described.get("default")
+    if default is None or default in ({}, [], ""):
         return "none"
     if isinstance(default, dict):
         return "as below"

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from daq.files.run_directory import ImageKey, RunReader
+from daq.files.run_directory import ImageKey, RunReader, Spray
 from processing.calibration.calibrate import calibrate
 from processing.calibration.errors import CalibrationError
 from processing.calibration.sets.calibration_set import load_calibration_set
@@ -96,6 +96,19 @@ def test_shots_come_back_as_they_were(folder: Path) -> None:
             np.testing.assert_array_equal(frame_b, image(camera, 4))
         assert {camera: run.header.views[camera].bits for camera in SIZES} == {"left": 8, "right": 16}
         assert run.dark("left") is None
+
+
+def test_conditions_and_nozzle_are_kept(folder: Path) -> None:
+    notes = 'notes = { fluid = "water", pressure_bar = 6.0, more = { flow_l_min = 1.2 } }'
+    out = run_import(folder, RUN.replace("6400", f"6400\n{notes}") + "\n[spray]\nnozzle_mm = [0, -5, 0.5]\n")
+    with RunReader(out / "run") as run:
+        assert (run.header.notes.fluid, run.header.notes.more) == ("water", {"flow_l_min": 1.2})
+        assert run.header.spray == Spray(nozzle_mm=(0, -5, 0.5), axis=(0, 1, 0))
+
+
+def test_a_nozzle_without_direction_names_its_line(folder: Path) -> None:
+    with pytest.raises(ManifestError, match=r"manifest\.toml, line \d+: spray: axis: 0, 0, 0 is no direction"):
+        run_import(folder, RUN + "\n[spray]\nnozzle_mm = [0, 0, 0]\naxis = [0, 0, 0]\n")
 
 
 def test_references_are_kept_and_averaged_a_and_b_apart(folder: Path) -> None:
