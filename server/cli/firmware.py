@@ -99,7 +99,13 @@ def clear(options: Namespace) -> Outcome:
     from server.rig.assembly import open_generator
     from server.rig.config import load_config
 
-    with open_generator(load_config(options.config)) as generator:
+    config = load_config(options.config)
+    if config.simulation is not None:
+        raise PlanError(
+            f"{options.config}: the rig is simulated, and this command would get a generator of its own: "
+            "acknowledge them on the page of the server that shows them"
+        )
+    with open_generator(config) as generator:
         latched = sorted(fault.upper() for fault in generator.status().faults)
         progress(f"latched: {', '.join(latched) or 'no fault'}")
         if latched:

@@ -75,6 +75,14 @@ def test_clear_acknowledges_what_is_over_and_nothing_else(
     assert (info["state"], info["shots_left"], info["counters"]["requested"]) == ("SAFE", 0, 0)
 
 
+def test_clear_does_not_pretend_to_reach_the_generator_of_a_simulated_server(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["firmware", "clear", *CONFIG]) == 2
+    told = capsys.readouterr()
+    assert "on the page of the server that shows them" in told.out + told.err
+
+
 def test_limits_of_board_and_rig_stand_side_by_side(capsys: pytest.CaptureFixture[str]) -> None:
     told = result_of(capsys, "limits", *CONFIG)
     assert (told["stored"], told["board"]) == ("NONE", [[30_000, 200, 500]] * 4)
