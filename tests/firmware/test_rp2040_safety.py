@@ -37,8 +37,8 @@ UNEXPECTED = 1 << 3
 RAM, STACK_SIZE, STACK_BOUND = 0x2000_0000, 896, 780
 PAINT = 0xA5A5_A5A5
 ABORT_WITHIN_NS = 800
-MASKED_NS = 200
-"""While the main loop takes a byte."""
+MASKED_NS = 350
+"""For 42 cycles at most, on the way to sleep."""
 PIO_BLOCKS = (0x5020_0000, 0x5030_0000)
 FIRST_FIFO = 0x10
 OUTPUT_CTRL = [0x4001_4004 + 8 * pin for pin in range(PIN_LIGHT, PIN_LIGHT + 8)]
