@@ -226,6 +226,19 @@ def test_a_converter_that_changes_while_armed_trips(board: Board, what: str) -> 
     assert is_off(board)
 
 
+def test_a_converter_that_changes_while_replies_are_sent_trips_as_soon() -> None:
+    board = Board()
+    board.pico.run_ms(2 * PERIOD_MS)
+    board.configure([PAPER] * 4)
+    assert arm(board).error is None
+    board.pico.pace_serial_line()
+    board.pico.receive(b"".join(encode_request(Request(100 + i, Command.STATUS, ())) for i in range(3)))
+    board.pico.run_ms(PERIOD_MS)
+    change(converter(board), 2, double=True)
+    board.pico.run_ms(NOTICED_WITHIN_MS)
+    assert board.pico.set_points_ma() == (0, 0, 0, 0)
+
+
 def test_a_converter_that_changes_while_safe_is_a_fault_too(board: Board) -> None:
     change(converter(board), 1, power_down=0, steps=3000)
     board.pico.run_ms(2 * TRIED_AGAIN_MS)
