@@ -13,6 +13,7 @@
     │   ├── DeviceOvertaken     it was switched off while it was asked
     │   └── ProtocolError       it answered something that makes no sense
     ├── InterlockOpen         the light must not be switched on
+    ├── InvalidShots          too many shots are invalid
     ├── RecorderError         a shot could not be stored
     │   ├── RecorderOverflow    the disk does not keep up
     │   └── StorageError        the disk refuses; the text says what to do
@@ -94,6 +95,10 @@ class ProtocolError(DeviceError):
 
 class InterlockOpen(DaqError):
     """The interlock is open: the light must not be switched on."""
+
+
+class InvalidShots(DaqError):
+    """Too many shots in a row are invalid, or all of a run; the text says what the last one lacks."""
 
 
 class RecorderError(DaqError):

@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field
 
+from daq.causes import Cause
 from daq.frozen_model import FrozenModel
 from daq.names import ViewName
 from daq.run_notes import RunNotes, Spray
@@ -80,8 +81,11 @@ class RunClosing:
         Why; empty if it was completed.
     ended_utc : str
         ISO 8601, UTC.
+    causes : tuple[Cause, ...]
+        All reasons with their codes, the first one first; empty where none was kept, as in runs from before.
     """
 
     outcome: str
     cause: str
     ended_utc: str
+    causes: tuple[Cause, ...] = ()

@@ -3,10 +3,10 @@
 The next start of the server writes it into ``run.h5`` and removes the note.
 """
 
-import json
 import logging
-from dataclasses import asdict
 from pathlib import Path
+
+from pydantic import TypeAdapter
 
 from daq.errors import StorageError
 from daq.files.atomic_file import replacing
@@ -14,6 +14,7 @@ from daq.files.header import RunClosing
 from daq.files.storage import storing
 
 _SUFFIX = ".outcome.json"
+_CLOSING = TypeAdapter(RunClosing)
 _LOG = logging.getLogger(__name__)
 
 
@@ -26,7 +27,7 @@ def write_note(run_dir: Path, closing: RunClosing) -> None:
     """Keep an outcome beside the run; if that is impossible too, the log is the last place for it."""
     try:
         with storing(run_dir.parent), replacing(note_path(run_dir)) as part:
-            part.write_text(json.dumps(asdict(closing), indent=1))
+            part.write_bytes(_CLOSING.dump_json(closing, indent=1))
     except StorageError as error:
         _LOG.error("run %s ended: %s; that is written nowhere: %s", run_dir.name, closing, error)
 
@@ -34,6 +35,6 @@ def write_note(run_dir: Path, closing: RunClosing) -> None:
 def read_note(run_dir: Path) -> RunClosing | None:
     """Outcome that was kept beside a run; None if there is no such note, or nobody can read it."""
     try:
-        return RunClosing(**json.loads(note_path(run_dir).read_text()))
-    except (OSError, ValueError, TypeError):
+        return _CLOSING.validate_json(note_path(run_dir).read_bytes())
+    except (OSError, ValueError):
         return None

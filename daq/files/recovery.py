@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
+from daq.causes import Cause, CauseCode
 from daq.errors import AlreadyHeld, DaqError
 from daq.files.atomic_file import PART_SUFFIX, RESERVE_SUFFIX
 from daq.files.header import RunClosing
@@ -49,10 +50,15 @@ def close_run(run_dir: Path) -> Iterator[str]:
         if part.parent.name != ASIDE_FOLDER:
             yield f"{part.name} was not committed, it is set aside as {set_aside(part, run_dir)}"
     if read_closing(run_dir) is None:
-        closing = read_note(run_dir) or RunClosing(INTERRUPTED, INTERRUPTED_CAUSE, lived_until_utc)
+        closing = read_note(run_dir) or _interrupted(lived_until_utc)
         add_closing(run_dir, closing)
         note_path(run_dir).unlink(missing_ok=True)
         yield f"{closing.outcome} at {closing.ended_utc}: {closing.cause}"
+
+
+def _interrupted(ended_utc: str) -> RunClosing:
+    cause = Cause(CauseCode.PROCESS_DIED, INTERRUPTED_CAUSE, ended_utc)
+    return RunClosing(INTERRUPTED, INTERRUPTED_CAUSE, ended_utc, (cause,))
 
 
 def _recovered(run_dir: Path, work: Callable[[Path], Iterator[str]]) -> Iterator[Recovered]:

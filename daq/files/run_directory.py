@@ -16,6 +16,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from daq.causes import Cause
 from daq.errors import RecorderError, ShotFileError
 from daq.files.header import RunClosing, RunHeader, ViewFormat
 from daq.files.packed_file import pack_run, require_free
@@ -110,6 +111,12 @@ class RunReader:
         """When the run ended, ISO 8601; empty if it is open."""
         closing = self.closing
         return closing.ended_utc if closing else ""
+
+    @property
+    def causes(self) -> tuple[Cause, ...]:
+        """Every reason why the run ended, the first one first; empty in runs from before they were kept."""
+        closing = self.closing
+        return closing.causes if closing else ()
 
     @property
     def closing(self) -> RunClosing | None:

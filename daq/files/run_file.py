@@ -14,7 +14,9 @@ import h5py
 import numpy as np
 from h5py import h5d, h5p, h5s, h5t
 from numpy.typing import NDArray
+from pydantic import TypeAdapter
 
+from daq.causes import Cause
 from daq.errors import RecorderError, ShotFileError
 from daq.files.atomic_file import amending, replacing, reserve, spending_reserve
 from daq.files.columns import columns_of, frames_path, view_path
@@ -26,6 +28,7 @@ from daq.run_notes import RunNotes
 RUN_FILE = "run.h5"
 _LATER_FIELDS = ("rate_hz", "notes", "spray")
 """Of the header; runs from before have their defaults."""
+_CAUSES = TypeAdapter(tuple[Cause, ...])
 SHOTS_FOLDER = "shots"
 _CLOSING_BYTES = 256 * 2**10
 """What the end of a run adds to its file at most: outcome, causes, numbers of the shots that were not stored."""
@@ -88,6 +91,7 @@ def add_closing(run_dir: Path, closing: RunClosing) -> None:
         file["entry/outcome"] = closing.outcome
         file["entry/cause"] = closing.cause
         file["entry/end_time"] = closing.ended_utc
+        file["entry/causes"] = _CAUSES.dump_json(closing.causes, indent=1).decode()
         file["entry/shot_count"] = slots_of(run_dir)
 
 
@@ -110,7 +114,8 @@ def read_closing(run_dir: Path) -> RunClosing | None:
         if "outcome" not in entry:
             return None
         outcome, cause, ended_utc = (entry[name].asstr()[()] for name in ("outcome", "cause", "end_time"))
-        return RunClosing(outcome, cause, ended_utc)
+        causes = entry["causes"].asstr()[()] if "causes" in entry else "[]"  # runs from before have none
+        return RunClosing(outcome, cause, ended_utc, _CAUSES.validate_json(causes))
 
 
 def add_references(run_dir: Path, header: RunHeader, references: Mapping[Reference, ReferenceImages]) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+from daq.causes import CauseCode
 from daq.devices import Rig
 from daq.errors import BusyError, PlanError, StorageError
 from daq.files.recovery import recover
@@ -155,7 +156,7 @@ class Acquisition:
         """The program ends: abort what runs for this cause, and let no run start any more. The first cause stays."""
         self._left = self._left or cause
         if self.status().active:
-            self._ending.end(RunStep.ABORT, self._left)
+            self._ending.end(RunStep.ABORT, self._left, CauseCode.PROGRAM_ENDED)
             light.try_to_switch_off(self._rig)
 
     def acknowledge(self) -> None:

@@ -13,7 +13,7 @@ from typing import Self
 from daq.errors import DaqError, DeviceOvertaken
 from daq.run import light
 from daq.run.active_run import ActiveRun
-from daq.run.state import RunStep
+from daq.run.ending import code_of
 
 
 class RunGuard:
@@ -52,4 +52,4 @@ class RunGuard:
                 self._rig.interlock.wait_for_change(self._period_s)
         except DaqError as error:
             light.try_to_switch_off(self._rig)
-            self._ending.end(RunStep.ERROR, str(error))
+            self._ending.fail(error, code_of(error, self._rig))

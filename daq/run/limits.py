@@ -19,6 +19,8 @@ class AcquisitionLimits:
         Until shots that wait must be on the disk.
     heartbeat_s : float
         Period of the status requests to the generator.
+    invalid_in_a_row : int
+        Invalid shots, one after the other, that end a run.
     disk_margin_bytes : int
         What a run leaves free on the disk: without it no run starts, and one under way ends.
     recorder_depth, recorder_threads : int
@@ -30,6 +32,7 @@ class AcquisitionLimits:
     disarm_s: float = 5.0
     drain_s: float = 60.0
     heartbeat_s: float = 0.2
+    invalid_in_a_row: int = 5
     disk_margin_bytes: int = 256 * 2**20
     recorder_depth: int = 8
     recorder_threads: int = 2

@@ -7,20 +7,24 @@ from dataclasses import asdict
 from datetime import UTC, datetime
 from functools import partial
 
-from daq.errors import DaqError, DeviceError
+from daq.causes import CauseCode
+from daq.errors import DaqError, DeviceError, DeviceOvertaken, DeviceRefused, InterlockOpen
 from daq.files.header import RunClosing
 from daq.files.outcome_note import write_note
 from daq.files.run_directory import RunWriter
 from daq.run import light
 from daq.run.active_run import ActiveRun
+from daq.run.ending import code_of
 from daq.run.guard import RunGuard
 from daq.run.recorder import Recorder
 from daq.run.references import mean_images
-from daq.run.shot_check import Thresholds, light_thresholds
+from daq.run.shot_check import InvalidStreak, ShotFindings, Thresholds, check_exposures, light_thresholds
 from daq.run.shot_taking import ShotTaker
 from daq.run.side_by_side import disarm_cameras
 from daq.run.state import RunStep
+from daq.run.train_check import train_deviation
 from daq.run_plan import RunKind
+from daq.shot import Shot
 
 _RETRY_S = 1.0
 
@@ -54,10 +58,11 @@ class RunSession:
 
     def disarm(self) -> str | None:
         """Light off, then cameras; returns why the light could not be confirmed off."""
+        self._look_for_more_causes()
         limits = self._run.limits
         reason = light.confirm_off(self._rig, limits.light_off_s)
         if reason:
-            self._ending.end(RunStep.ERROR, f"light not confirmed off: {reason}")
+            self._ending.fail(DaqError(f"light not confirmed off: {reason}"), CauseCode.LIGHT_NOT_OFF)
         for problem in disarm_cameras(self._rig.cameras, limits.disarm_s).values():
             self._run.progress.say(problem)
         return reason
@@ -85,7 +90,9 @@ class RunSession:
         for observer in self._run.observers:
             observer.before_run(plan)
         self._write_devices()
-        taker = ShotTaker(self._run, self._copy_references())
+        thresholds = self._copy_references()
+        taker = ShotTaker(self._run, thresholds)
+        streak = InvalidStreak(self._run.limits.invalid_in_a_row, partial(self._findings, thresholds))
         recorder = self._start_recorder()
         self._arm(taker)
         for index in range(plan.total_shots):
@@ -93,6 +100,14 @@ class RunSession:
             if shot is None:
                 return
             recorder.put(shot)
+            streak.count(shot)
+        streak.require_a_valid_one()
+
+    def _findings(self, thresholds: Thresholds, shot: Shot) -> ShotFindings:
+        timing = self._run.prepared.timing
+        lit = {view: one.current_a > 0 for view, one in timing.views.items()}
+        misfired = train_deviation(timing, shot.fired) if shot.fired else None
+        return check_exposures(shot.views, lit, thresholds, misfired or "")
 
     def _arm(self, taker: ShotTaker) -> None:
         for camera in self._rig.cameras.values():
@@ -130,8 +145,8 @@ class RunSession:
         limits, writer = self._run.limits, self._writer
         for observer in self._run.observers:
             self._storage.callback(self._attempt, partial(observer.after_run, writer.run_dir))
-        count, fail = self._run.progress.count, self._fail_by
-        recorder = Recorder(writer, limits.recorder_depth, limits.recorder_threads, count, fail)
+        count = self._run.progress.count
+        recorder = Recorder(writer, limits.recorder_depth, limits.recorder_threads, count, self._fail)
         self._storage.enter_context(recorder)
         self._storage.callback(self._attempt, partial(recorder.close, limits.drain_s))
         return recorder
@@ -142,21 +157,44 @@ class RunSession:
         self._closed = True
 
     def _closing(self) -> RunClosing:
-        return RunClosing(self._ending.outcome.value, self._ending.cause, self._ended_utc)
+        ending = self._ending
+        return RunClosing(ending.outcome.value, ending.cause, self._ended_utc, ending.causes)
 
     def _attempt(self, action: Callable[[], None]) -> None:
         """The top of the acquisition thread: whatever goes wrong, the light goes off before anything else."""
         try:
             action()
         except (DaqError, OSError) as error:
-            self._fail(str(error))
+            self._fail(error)
         except Exception as error:  # noqa: BLE001  the top of a thread: a bug must not leave the light on
-            self._fail(f"internal error: {error!r}")
+            self._fail(DaqError(f"internal error: {error!r}"))
 
-    def _fail_by(self, error: Exception) -> None:
-        self._fail(str(error))
-
-    def _fail(self, cause: str) -> None:
+    def _fail(self, error: Exception) -> None:
         light.try_to_switch_off(self._rig)
-        if not self._ending.end(RunStep.ERROR, cause) and cause != self._ending.cause:
-            self._run.progress.say(cause)
+        if isinstance(error, DeviceOvertaken):
+            self._ending.wait_for_reason(self._run.limits.light_off_s)
+        error = self._reason_of(error)
+        is_first = self._ending.fail(error, code_of(error, self._rig))
+        if not is_first and not isinstance(error, DeviceOvertaken) and str(error) != self._ending.cause:
+            self._run.progress.say(str(error))
+
+    def _reason_of(self, error: Exception) -> Exception:
+        """Why the generator refuses: it went off by itself when a door was opened, and may be the first to say so."""
+        if isinstance(error, DeviceRefused) and error.device == self._rig.generator.name:
+            try:
+                light.check_permitted(self._rig)
+            except (DeviceRefused, InterlockOpen) as reason:
+                return reason
+            except DeviceError:
+                return error
+        return error
+
+    def _look_for_more_causes(self) -> None:
+        """A run that has failed may have had two reasons: an open door hides that the generator was reset."""
+        if not self._ending.at_once:
+            return
+        for look in (self._rig.generator.status, partial(light.check_permitted, self._rig)):
+            try:
+                look()
+            except DaqError as error:
+                self._ending.fail(error, code_of(error, self._rig))

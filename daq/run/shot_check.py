@@ -5,13 +5,14 @@ more than half of the image for darkness. If A is bright and B dark, the second 
 that is a fault of the light, not a lost frame, and firing again would not prove anything.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from daq.errors import InvalidShots
 from daq.files.run_directory import ReferenceImages
-from daq.shot import DoubleFrame, Image
+from daq.shot import DoubleFrame, Image, Shot
 
 LIT_FRACTION_OF_SCALE = 0.06
 """Without references: a lit shadowgraph lies far above this part of full scale, the dark level of a sensor below."""
@@ -51,6 +52,39 @@ class ShotFindings:
     def __str__(self) -> str:
         texts = [f"no exposure {name}" for name in self.missing] + [f"no light in {name}" for name in self.unlit]
         return ", ".join(texts + ([f"fired otherwise: {self.misfired}"] if self.misfired else []))
+
+
+class InvalidStreak:
+    """Counts invalid shots: a run whose shots are all invalid measures nothing, and its light is switched off.
+
+    Parameters
+    ----------
+    limit : int
+        So many in a row end the run.
+    look : Callable[[Shot], ShotFindings]
+        Says what is wrong with an invalid shot.
+    """
+
+    def __init__(self, limit: int, look: Callable[[Shot], ShotFindings]) -> None:
+        self._limit = limit
+        self._look = look
+        self._in_a_row = 0
+        self._valid = 0
+        self._last = ""
+
+    def count(self, shot: Shot) -> None:
+        """Count one more shot; InvalidShots if it is one invalid shot too many."""
+        self._valid += shot.valid
+        self._in_a_row = 0 if shot.valid else self._in_a_row + 1
+        if not shot.valid:
+            self._last = f"shot {shot.index}: {self._look(shot)}"
+        if self._in_a_row >= self._limit:
+            raise InvalidShots(f"{self._in_a_row} shots in a row are invalid; {self._last}")
+
+    def require_a_valid_one(self) -> None:
+        """Raise InvalidShots if not one shot was valid."""
+        if not self._valid:
+            raise InvalidShots(f"none of {self._in_a_row} shots is valid; {self._last}")
 
 
 def light_thresholds(bits: Mapping[str, int], dark: ReferenceImages, background: ReferenceImages) -> Thresholds:

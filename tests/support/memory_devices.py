@@ -155,7 +155,8 @@ class MemoryGenerator(MemoryDevice):
     """Fires what it has loaded while it is armed, and no shot before its duty permits it.
 
     ``unlit`` names the firings without their second pulse, ``silent_at`` the one that it does not answer;
-    ``stuck`` lets it ignore ``off``; ``wrong_echo_ns`` shifts the second pulse of what it loads.
+    ``stuck`` lets it ignore ``off``; ``wrong_echo_ns`` shifts the second pulse of what it loads; ``restarted`` lets the
+    next status say that it was reset.
     """
 
     def __init__(
@@ -166,6 +167,7 @@ class MemoryGenerator(MemoryDevice):
         self.unlit: set[int] = set()
         self.silent_at: int | None = None
         self.stuck = False
+        self.restarted = False
         self.wrong_echo_ns = 0
         self.counters = dict.fromkeys(COUNTERS, 0)
         self._views = tuple(views)
@@ -245,6 +247,9 @@ class MemoryGenerator(MemoryDevice):
         return self._fire(self._loaded)
 
     def status(self) -> GeneratorStatus:
+        if self.restarted:
+            self.restarted = False
+            raise DeviceError(self.name, "the microcontroller was reset")
         self._end_light()
         return GeneratorStatus(self.state, self._faults, self._interlock_closed, self._shots_left, dict(self.counters))
 

@@ -60,6 +60,7 @@ class Trial:
         return {
             "status": {"outcome": status.outcome, "message": status.message},
             "closing": reader.closing and asdict(reader.closing),
+            "codes": [cause.code for cause in reader.causes],
             "acknowledged": self.recorded,
             "readable": sum(reader.read_shot(index).valid for index in range(reader.shot_count)),
             "parts": [path.name for path in (run_dir or self.run_dir).rglob("*.part")],

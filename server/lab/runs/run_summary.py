@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from daq.causes import EXPLANATIONS, Cause, CauseCode
 from daq.files.run_directory import RunReader
 from daq.frozen_model import FrozenModel
 from daq.run.events import RunStatus
@@ -18,6 +19,15 @@ ACTIVE = "active"
 """Stands in the place of the outcome while a run is being recorded."""
 DAMAGED = "damaged"
 """Stands in the place of the outcome of a run that cannot be read; the cause says why."""
+
+
+class RunCause(FrozenModel):
+    """One reason why a run ended."""
+
+    code: Annotated[CauseCode, Field(description="for programs; docs/operate.md lists them")]
+    text: Annotated[str, Field(description="names device, value and limit")]
+    remedy: Annotated[str, Field(description="what to do")]
+    at_utc: Annotated[str, Field(description="when it was noticed, ISO 8601")]
 
 
 class RunSummary(FrozenModel):
@@ -31,6 +41,11 @@ class RunSummary(FrozenModel):
         str, Field(description="completed, stopped, aborted, failed, interrupted; active; damaged: it cannot be read")
     ]
     cause: Annotated[str, Field(description="why it ended, or why it cannot be read; empty if it was completed")]
+    causes: Annotated[
+        tuple[RunCause, ...],
+        Field(description="every reason, the first one first; empty while it is active, and in runs from before"),
+    ] = ()
+    ended_utc: Annotated[str, Field(description="when it ended, ISO 8601; empty while it is open")] = ""
     views: Annotated[tuple[str, ...], Field(description="names of the lines of sight")]
     frames_per_shot: Annotated[int, Field(description="2: exposures A and B; 1: single ones; 0: nobody knows")]
     shots_planned: Annotated[int | None, Field(description="null for imported images")]
@@ -49,12 +64,21 @@ def summary_of(run: RunReader, image_keys: NDArray[np.int64]) -> RunSummary:
         created_utc=run.header.created_utc,
         outcome=outcome or RunOutcome.INTERRUPTED,
         cause=run.cause,
+        causes=_explained(run.causes),
+        ended_utc=run.ended_utc,
         views=tuple(run.header.views),
         frames_per_shot=run.header.frames_per_shot,
         shots_planned=plan.total_shots if plan else None,
         shots_recorded=len(image_keys),
         shots_valid=int(np.count_nonzero(image_keys != ImageKey.INVALID)) if outcome else None,
         calibration=(plan.calibration if plan else None) or run.header.calibration_id,
+    )
+
+
+def _explained(causes: tuple[Cause, ...]) -> tuple[RunCause, ...]:
+    return tuple(
+        RunCause(code=one.code, text=one.text, remedy=EXPLANATIONS[one.code].remedy, at_utc=one.at_utc)
+        for one in causes
     )
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from daq.causes import CauseCode
 from daq.files.recovery import INTERRUPTED_CAUSE, recover
 from daq.files.run_directory import RunReader, RunWriter
 from tests.daq.files.test_run_directory import header_of, shot_of
@@ -37,6 +38,7 @@ def test_a_killed_run_is_closed_once_with_cause_and_last_sign_of_life(killed: Pa
     reader = RunReader(killed)
     assert (reader.outcome, reader.cause, reader.shot_count) == ("interrupted", INTERRUPTED_CAUSE, 2)
     assert abs(datetime.fromisoformat(reader.ended_utc).timestamp() - last_s) < 0.05
+    assert [(one.code, one.at_utc) for one in reader.causes] == [(CauseCode.PROCESS_DIED, reader.ended_utc)]
     assert outcome == f"{RUN_ID}: interrupted at {reader.ended_utc}: {INTERRUPTED_CAUSE}"
     assert aside.stat().st_size > 0
     assert all(reader.read_shot(index).valid for index in range(2))

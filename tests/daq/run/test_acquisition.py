@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from daq.causes import CauseCode
 from daq.devices import DeviceIdentity, GeneratorState, GeneratorStatus, Rig
 from daq.errors import (
     BusyError,
@@ -31,6 +32,7 @@ from daq.run.acquisition import Acquisition
 from daq.run.events import RunEvent, RunMessage, ShotRecorded, StateChanged
 from daq.run.limits import AcquisitionLimits
 from daq.run.state import RunOutcome, RunState
+from daq.shot import FiredTrain
 from daq.timing import CameraTiming
 from tests.support.memory_rig import DARK_COUNTS, LIT_COUNTS, MemoryRig
 
@@ -214,6 +216,36 @@ def test_a_lost_pulse_is_flagged_and_not_taken_for_a_lost_frame(lab: Laboratory)
     assert reader.image_keys().tolist() == [0, ImageKey.INVALID, 0]
     assert lab.memory.generator.fired == 3
     assert "shot 1: no light in B of view1, no light in B of view2" in lab.messages()
+
+
+@pytest.mark.parametrize("lost", ["light", "frames"])
+def test_five_invalid_shots_in_a_row_end_the_run_and_are_kept(lab: Laboratory, lost: str) -> None:
+    fired = set(range(3, 100))
+    if lost == "light":
+        lab.memory.generator.unlit = fired
+    else:
+        lab.memory.cameras["view2"].lost = fired
+    reader = lab.run(plan_of(20, refire_quota=0))
+    what = "no light in B of view1, no light in B of view2" if lost == "light" else "no exposure B of view2"
+    cause = f"5 shots in a row are invalid; shot 6: {what}"
+    assert (reader.outcome, reader.cause) == ("failed", cause)
+    assert [cause.code for cause in reader.causes] == [CauseCode.INVALID_SHOTS]
+    assert reader.image_keys().tolist() == [0, 0] + 5 * [ImageKey.INVALID]
+    assert lab.memory.generator.fired == 7
+    assert lab.memory.journal.index("off") < lab.memory.journal.index("view1 disarm")
+
+
+def test_a_valid_shot_ends_the_row_of_invalid_ones(lab: Laboratory) -> None:
+    lab.memory.generator.unlit = {1, 2, 3, 4, 6, 7, 8, 9}
+    assert lab.run(plan_of(10)).outcome == "completed"
+
+
+def test_a_run_without_a_valid_shot_is_never_completed(lab: Laboratory) -> None:
+    lab.memory.cameras["view2"].lost = {1, 2, 3}
+    reader = lab.run(plan_of(3, refire_quota=0))
+    assert (reader.outcome, reader.cause) == ("failed", "none of 3 shots is valid; shot 2: no exposure B of view2")
+    assert lab.acquisition.status().outcome is RunOutcome.FAILED
+    assert reader.shot_count == 3
 
 
 def test_a_view_without_current_may_be_dark(lab: Laboratory) -> None:
@@ -582,6 +614,55 @@ def test_the_guard_asks_again_when_the_light_goes_off_under_its_question(
     with lab.run(plan_of(2)) as run:
         assert run.outcome == RunOutcome.COMPLETED
     assert overtaken.is_set()
+
+
+@pytest.mark.parametrize("generator_says", ["overtaken", "refused"])
+def test_the_cause_is_the_door_and_never_what_the_generator_says_of_it(
+    lab: Laboratory, monkeypatch: pytest.MonkeyPatch, generator_says: str
+) -> None:
+    """Light off comes before the reason: a shot that is being asked for fails first, and knows nothing."""
+    generator, fire = lab.memory.generator, lab.memory.generator.fire
+
+    def fire_behind_an_open_door() -> FiredTrain:
+        lab.memory.open_door()
+        if generator_says == "overtaken":
+            raise DeviceOvertaken(generator.name, "FIRE was overtaken by off")
+        return fire()
+
+    monkeypatch.setattr(generator, "fire", fire_behind_an_open_door)
+    reader = lab.run(plan_of())
+    assert (reader.outcome, reader.cause) == ("failed", "door: the interlock is open")
+    assert [cause.code for cause in reader.causes] == [CauseCode.INTERLOCK_OPEN]
+    assert "overtaken" not in lab.messages()
+
+
+def test_a_second_cause_of_its_own_is_kept_beside_the_first(lab: Laboratory) -> None:
+    reader = lab.start_and_await_shot(plan_of(**SLOW), 0)
+    lab.memory.generator.restarted = True
+    lab.memory.open_door()
+    lab.acquisition.wait(DEADLINE_S)
+    causes = {cause.code: cause.text for cause in reader.causes}
+    assert causes == {
+        CauseCode.INTERLOCK_OPEN: "door: the interlock is open",
+        CauseCode.GENERATOR_FAILED: "generator: the microcontroller was reset",
+    }
+    assert reader.cause == reader.causes[0].text
+    assert all(reader.header.created_utc < cause.at_utc <= reader.ended_utc for cause in reader.causes)
+
+
+@pytest.mark.parametrize(
+    ("step", "outcome", "code"),
+    [("stop", "stopped", CauseCode.STOPPED), ("abort", "aborted", CauseCode.ABORTED), ("", "completed", None)],
+)
+def test_what_an_operator_ended_says_so_in_its_file(
+    lab: Laboratory, step: str, outcome: str, code: CauseCode | None
+) -> None:
+    reader = lab.start_and_await_shot(plan_of(**(SLOW if step else {"shots": 1})), 0)
+    if step:
+        getattr(lab.acquisition, step)()
+    lab.acquisition.wait(DEADLINE_S)
+    assert reader.outcome == outcome
+    assert [cause.code for cause in reader.causes] == ([code] if code else [])
 
 
 class Clumsy:

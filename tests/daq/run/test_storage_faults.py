@@ -49,12 +49,22 @@ CAUSES = {
     "forbidden_for_a_while": "{run_dir} may not be written by this server (user 0): give the permission back",
 }
 
+CODES = {
+    "filled_by_the_run": "disk_full",
+    "filled_by_others": "disk_full",
+    "moved": "disk_gone",
+    "unmounted": "disk_gone",
+    "read_only_for_a_while": "disk_read_only",
+    "forbidden_for_a_while": "disk_forbidden",
+}
+
 
 @pytest.mark.parametrize("name", CAUSES)
 def test_light_goes_off_first_and_outcome_and_cause_are_stored(trials: dict[str, dict[str, Any]], name: str) -> None:
     found = trials[name]
     assert found["light_first"]
-    cause = found["closing"]["cause"]
+    cause, code = found["closing"]["cause"], CODES[name]
+    assert found["codes"] == [code]
     assert found["closing"]["outcome"] == found["status"]["outcome"] == "failed"
     assert cause == found["status"]["message"]
     assert cause.startswith(

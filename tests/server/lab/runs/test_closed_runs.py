@@ -4,6 +4,8 @@ from pathlib import Path
 
 import pytest
 
+from daq.causes import EXPLANATIONS, Cause, CauseCode
+from daq.files.header import RunClosing
 from daq.files.run_directory import RunHeader, RunWriter, ViewFormat
 from daq.run.events import RunStatus
 from daq.run.state import RunOutcome, RunState
@@ -29,3 +31,19 @@ def test_a_run_without_an_outcome_is_what_acquisition_knows_of_it(
         pass
     summary = RunStore(tmp_path, lambda: status).summary(RUN_ID)
     assert (summary.outcome, summary.cause) == told
+
+
+def test_the_causes_of_a_run_come_with_a_remedy_each(tmp_path: Path) -> None:
+    cause = Cause(CauseCode.CAMERA_FAILED, "view2: control lost", "2026-01-01T00:01:00+00:00")
+    with RunWriter(tmp_path / RUN_ID, HEADER) as writer:
+        writer.write_closing(RunClosing("failed", cause.text, "2026-01-01T00:01:01+00:00", (cause,)))
+    summary = RunStore(tmp_path, RunStatus).summary(RUN_ID)
+    assert summary.ended_utc == "2026-01-01T00:01:01+00:00"
+    assert [one.model_dump(mode="json") for one in summary.causes] == [
+        {
+            "code": "camera_failed",
+            "text": "view2: control lost",
+            "remedy": EXPLANATIONS[CauseCode.CAMERA_FAILED].remedy,
+            "at_utc": "2026-01-01T00:01:00+00:00",
+        }
+    ]
