@@ -22,6 +22,9 @@
     │       ├── DiskForbidden     the permission to write is missing
     │       └── DiskGone          the folder was moved or deleted, or its disk is not mounted
     └── ShotFileError         a run directory or a shot file cannot be read
+        ├── ForeignFile         it belongs to another run, or is no shot
+        ├── RenamedFile         it is another shot of this run
+        └── DamagedFrame        the bytes of an exposure are not those that were written
 """
 
 
@@ -131,3 +134,15 @@ class DiskGone(StorageError):
 
 class ShotFileError(DaqError):
     """A run directory or a shot file cannot be read; the text names the file."""
+
+
+class ForeignFile(ShotFileError):
+    """The file belongs to another run, or is no shot at all."""
+
+
+class RenamedFile(ShotFileError):
+    """The file holds another shot than its name says."""
+
+
+class DamagedFrame(ShotFileError):
+    """The bytes of an exposure are not those that were written; the text names view and exposure."""

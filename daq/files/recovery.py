@@ -45,10 +45,9 @@ def recover(data_dir: Path) -> list[Recovered]:
 
 def close_run(run_dir: Path) -> Iterator[str]:
     """Set torn parts aside, and write how the run ended, if that is not known; says what was done."""
-    lived_until_utc = last_sign_of_life_utc(run_dir)
-    for part in sorted(run_dir.rglob(f"*{PART_SUFFIX}")):
-        if part.parent.name != ASIDE_FOLDER:
-            yield f"{part.name} was not committed, it is set aside as {set_aside(part, run_dir)}"
+    lived_until_utc = last_sign_of_life_utc(run_dir / RUN_FILE, run_dir / SHOTS_FOLDER)
+    for part in sorted(part for folder in (run_dir, run_dir / SHOTS_FOLDER) for part in folder.glob(f"*{PART_SUFFIX}")):
+        yield f"{part.name} was not committed, it is set aside as {set_aside(part, run_dir)}"
     if read_closing(run_dir) is None:
         closing = read_note(run_dir) or _interrupted(lived_until_utc)
         add_closing(run_dir, closing)
@@ -91,8 +90,8 @@ def set_aside(path: Path, keeper: Path) -> Path:
     return path.rename(target)
 
 
-def last_sign_of_life_utc(run_dir: Path) -> str:
-    """When anything of a run was written last, ISO 8601; results that were made since do not count."""
-    written = [run_dir / RUN_FILE, run_dir / SHOTS_FOLDER, *(run_dir / SHOTS_FOLDER).iterdir()]
+def last_sign_of_life_utc(*paths: Path) -> str:
+    """When some files, or folders with what lies in them, were written last, ISO 8601."""
+    written = [path for one in paths if one.exists() for path in (one, *one.glob("*"))]
     newest_s = max(path.stat().st_mtime for path in written)
     return datetime.fromtimestamp(newest_s, UTC).isoformat()

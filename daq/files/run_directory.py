@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.causes import Cause
-from daq.errors import RecorderError, ShotFileError
+from daq.errors import RecorderError, RenamedFile, ShotFileError
 from daq.files.header import RunClosing, RunHeader, ViewFormat
 from daq.files.packed_file import pack_run, require_free
 from daq.files.run_file import (
@@ -141,7 +141,7 @@ class RunReader:
         path = shot_path(self.run_dir, index)
         shot = read_shot_file(path, self.header)
         if shot.index != index:
-            raise ShotFileError(f"{path}: holds shot {shot.index}, and is named otherwise: give it its name back")
+            raise RenamedFile(f"{path}: holds shot {shot.index}, and is named otherwise: give it its name back")
         return shot
 
     def dark(self, view: str) -> NDArray[np.float32] | None:

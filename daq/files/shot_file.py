@@ -11,7 +11,7 @@ import numpy as np
 from h5py import h5d, h5p, h5s, h5t
 from numpy.typing import NDArray
 
-from daq.errors import RecorderError, ShotFileError
+from daq.errors import DamagedFrame, ForeignFile, RecorderError, ShotFileError
 from daq.files.columns import Column, columns_of, crc32_path, frames_path, shot_from_columns, shot_to_columns, view_path
 from daq.files.encoding import EncodedFrame, decode_frame, encode_frame, is_shuffled
 from daq.files.header import RunHeader, ViewFormat
@@ -79,7 +79,7 @@ def reading_shot(path: Path, header: RunHeader) -> Iterator[h5py.File]:
     try:
         with h5py.File(path, "r") as file:
             if file.attrs["schema"] != SHOT_SCHEMA or file.attrs["run_id"] != header.run_id:
-                raise ShotFileError(f"{path}: not a shot of run {header.run_id}")
+                raise ForeignFile(f"{path}: not a shot of run {header.run_id}")
             yield file
     except (OSError, KeyError, ValueError, IndexError, TypeError, AttributeError, RuntimeError) as error:
         raise ShotFileError(f"{path}: cannot be read: {error}") from error
@@ -96,7 +96,7 @@ def read_shot_file(path: Path, header: RunHeader) -> Shot:
     with reading_shot(path, header) as file:
         columns = {name: file[name][0] for name in columns_of(header)}
         frames = {
-            view: _read_frames(file, view, view_format, columns[crc32_path(view)])
+            view: _read_frames(path, file, view, view_format, columns[crc32_path(view)])
             for view, view_format in header.views.items()
         }
         return shot_from_columns(columns, frames)
@@ -161,10 +161,33 @@ def _create_column(file: h5py.File, name: str, column: Column, values: NDArray[A
     h5py.Dataset(stored).attrs.update(units=column.units, dimensions=column.axes)
 
 
-def _read_frames(file: h5py.File, view: str, view_format: ViewFormat, crc32: NDArray[Any]) -> list[Image]:
-    dataset = file[frames_path(view)]
-    chunks = [dataset.id.read_direct_chunk((0, number, 0, 0))[1] for number in range(len(crc32))]
-    return [
-        decode_frame(EncodedFrame(chunk, int(check)), view_format.shape, view_format.dtype)
-        for chunk, check in zip(chunks, crc32, strict=True)
-    ]
+def _read_frames(path: Path, file: h5py.File, view: str, view_format: ViewFormat, crc32: NDArray[Any]) -> list[Image]:
+    chunks = [file[frames_path(view)].id.read_direct_chunk((0, number, 0, 0))[1] for number in range(len(crc32))]
+    frames = []
+    for name, chunk, check in zip("AB", chunks, crc32, strict=False):
+        try:
+            frames.append(decode_frame(EncodedFrame(chunk, int(check)), view_format.shape, view_format.dtype))
+        except ValueError as error:
+            raise DamagedFrame(f"{path}: exposure {name} of {view}: {error}") from error
+    return frames
+
+
+def read_formats(path: Path) -> tuple[str, dict[str, ViewFormat], int]:
+    """Run id, views and exposures per view, as a shot tells them without the header of its run.
+
+    Raises
+    ------
+    ShotFileError
+        It cannot be read, or is no shot.
+    """
+    try:
+        with h5py.File(path, "r") as file:
+            if file.attrs["schema"] != SHOT_SCHEMA:
+                raise ForeignFile(f"{path}: not a shot")
+            frames = {view: group["frames"] for view, group in file["cameras"].items()}
+            views = {
+                view: ViewFormat(one.shape[2:], int(one.attrs["significant_bits"])) for view, one in frames.items()
+            }
+            return file.attrs["run_id"], views, max(one.shape[1] for one in frames.values())
+    except (OSError, KeyError, ValueError, IndexError, TypeError, AttributeError, RuntimeError) as error:
+        raise ShotFileError(f"{path}: cannot be read: {error}") from error

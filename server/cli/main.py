@@ -26,6 +26,7 @@ from server.cli import (
     study,
 )
 from server.cli.calibrations import calibrate, check, self_calibrate, size_calibration
+from server.cli.keeping import pack, repair, verify
 from server.cli.output import endable, say, tell
 
 COMMANDS = (
@@ -44,6 +45,9 @@ COMMANDS = (
     optics,
     bench,
     firmware,
+    verify,
+    repair,
+    pack,
 )
 """In the order of the help. Each adds its own parser; what is heavy is imported when it runs, so that help is quick."""
 

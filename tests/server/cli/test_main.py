@@ -18,7 +18,7 @@ STUDIES = ("density", "ghosts", "average", "residuals", "calibration", "sensitiv
 TOOLS = ("info", "selftest", "scope", "light", "flash")
 WORDS = [
     [],
-    *([command] for command in (*CHAIN, "study", "optics", "bench", "firmware")),
+    *([command] for command in (*CHAIN, "study", "optics", "bench", "firmware", "verify", "repair", "pack")),
     *(["study", study] for study in STUDIES),
     *(["firmware", tool] for tool in TOOLS),
 ]

@@ -1,0 +1,154 @@
+"""Is a run whole? Every frame is read and its CRC compared; what is wrong is named, file by file."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+
+from daq.errors import AlreadyHeld, DamagedFrame, ForeignFile, RenamedFile, ShotFileError
+from daq.files.atomic_file import PART_SUFFIX
+from daq.files.lock_file import hold_folder
+from daq.files.run_directory import RunReader
+from daq.files.run_file import RUN_FILE, SHOTS_FOLDER, shot_path
+
+Done = Callable[[int, int], None]
+_EOF_ADDRESS = slice(28, 36)
+"""Where the superblock of HDF5, version 2 and 3, says how long its file is (HDF5 File Format Specification, II.A)."""
+_SIGNATURE = b"\x89HDF\r\n\x1a\n"
+
+
+class FlawKind(StrEnum):
+    """What can be wrong with a file of a run."""
+
+    MISSING = "missing"
+    TRUNCATED = "truncated"
+    DAMAGED = "damaged"
+    FOREIGN = "foreign"
+    RENAMED = "renamed"
+    UNREADABLE = "unreadable"
+    NOT_COMMITTED = "not_committed"
+    NO_OUTCOME = "no_outcome"
+    BEING_WRITTEN = "being_written"
+
+
+@dataclass(frozen=True)
+class Flaw:
+    """One thing that is wrong.
+
+    Parameters
+    ----------
+    kind : FlawKind
+        What.
+    file : str
+        Relative to the run.
+    text : str
+        For people.
+    """
+
+    kind: FlawKind
+    file: str
+    text: str
+
+
+@dataclass(frozen=True)
+class Verification:
+    """What a run was found to be.
+
+    Parameters
+    ----------
+    outcome : str | None
+        How it ended; None if it does not say.
+    shots, sound_shots : int
+        Slots, and those that hold what was written.
+    frames : int
+        Exposures whose CRC was found right.
+    flaws : tuple[Flaw, ...]
+        All that is wrong; none if the run is sound.
+    """
+
+    outcome: str | None
+    shots: int
+    sound_shots: int
+    frames: int
+    flaws: tuple[Flaw, ...]
+
+    @property
+    def sound(self) -> bool:
+        """Nothing is wrong."""
+        return not self.flaws
+
+
+def verify(run_dir: Path, done: Done = lambda _done, _total: None) -> Verification:
+    """Look at every file of a run.
+
+    Parameters
+    ----------
+    run_dir : Path
+        The run directory.
+    done : Callable[[int, int], None]
+        Told after each shot how many of how many are looked at.
+    """
+    reader = RunReader(run_dir)
+    strangers = tuple(_strangers(run_dir))
+    try:
+        header, closing, shots = reader.header, reader.closing, reader.shot_count
+    except ShotFileError as error:
+        there = (run_dir / RUN_FILE).exists()
+        flaw = Flaw(FlawKind.UNREADABLE if there else FlawKind.MISSING, RUN_FILE, str(error))
+        return Verification(None, 0, 0, 0, (flaw, *strangers))
+    flaws = [] if closing else [_open_flaw(run_dir)]
+    bad: list[Flaw] = []
+    for index in range(shots):
+        bad += _flaws_of_shot(reader, index)
+        done(index + 1, shots)
+    sound = shots - len(bad)
+    frames = sound * header.frames_per_shot * len(header.views)
+    return Verification(closing.outcome if closing else None, shots, sound, frames, (*flaws, *bad, *strangers))
+
+
+def _flaws_of_shot(reader: RunReader, index: int) -> list[Flaw]:
+    path = shot_path(reader.run_dir, index)
+    try:
+        reader.read_shot(index)
+    except ShotFileError as error:
+        return [Flaw(_kind_of(path, error), f"{SHOTS_FOLDER}/{path.name}", str(error))]
+    return []
+
+
+def _kind_of(path: Path, error: ShotFileError) -> FlawKind:
+    if not path.exists():
+        return FlawKind.MISSING
+    if _is_truncated(path):
+        return FlawKind.TRUNCATED
+    kinds = {ForeignFile: FlawKind.FOREIGN, RenamedFile: FlawKind.RENAMED, DamagedFrame: FlawKind.DAMAGED}
+    return kinds.get(type(error), FlawKind.UNREADABLE)
+
+
+def _is_truncated(path: Path) -> bool:
+    """Whether a file is shorter than it says; one that does not begin as HDF5 is something else."""
+    with path.open("rb") as file:
+        head = file.read(_EOF_ADDRESS.stop)
+    size = path.stat().st_size
+    if len(head) < _EOF_ADDRESS.stop:
+        return _SIGNATURE.startswith(head[: len(_SIGNATURE)])
+    return head.startswith(_SIGNATURE) and size < int.from_bytes(head[_EOF_ADDRESS], "little")
+
+
+def _strangers(run_dir: Path) -> list[Flaw]:
+    """Files that are no shots, among the shots; parts that were never committed, there and above."""
+    found = []
+    for path in sorted([*run_dir.glob(f"*{PART_SUFFIX}"), *(run_dir / SHOTS_FOLDER).glob("*")]):
+        name = str(path.relative_to(run_dir))
+        if path.suffix == PART_SUFFIX:
+            found.append(Flaw(FlawKind.NOT_COMMITTED, name, f"{path}: was being written when its process ended"))
+        elif not (path.suffix == ".h5" and path.stem.isdecimal()):
+            found.append(Flaw(FlawKind.FOREIGN, name, f"{path}: no shot of this run has such a name"))
+    return found
+
+
+def _open_flaw(run_dir: Path) -> Flaw:
+    try:
+        with hold_folder(run_dir):
+            return Flaw(FlawKind.NO_OUTCOME, RUN_FILE, f"{run_dir}: has no outcome, its process ended before it did")
+    except AlreadyHeld as error:
+        return Flaw(FlawKind.BEING_WRITTEN, RUN_FILE, str(error))

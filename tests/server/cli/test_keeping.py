@@ -1,0 +1,188 @@
+"""verify, repair and pack: what they find in a run, what they mend, and what they leave alone."""
+
+import os
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+from daq.files.run_directory import RunReader, RunWriter
+from tests.daq.files.test_run_directory import assert_same, header_of, shot_of
+from tests.support.command_line import refused, told
+
+HEADER = header_of()
+
+
+@pytest.fixture
+def run_dir(tmp_path: Path) -> Path:
+    """A sound run of three shots."""
+    with RunWriter(tmp_path / HEADER.run_id, HEADER) as writer:
+        for index in range(3):
+            writer.write_shot(shot_of(HEADER, index))
+        writer.finish("completed")
+    return tmp_path / HEADER.run_id
+
+
+def shot(run_dir: Path, index: int) -> Path:
+    return run_dir / "shots" / f"{index}.h5"
+
+
+def missing(run_dir: Path) -> None:
+    shot(run_dir, 1).unlink()
+
+
+def truncated(run_dir: Path) -> None:
+    os.truncate(shot(run_dir, 1), shot(run_dir, 1).stat().st_size // 2)
+
+
+def empty(run_dir: Path) -> None:
+    shot(run_dir, 1).write_bytes(b"")
+
+
+def damaged(run_dir: Path) -> None:
+    with h5py.File(shot(run_dir, 1)) as file:
+        chunk = file["/cameras/view2/frames"].id.get_chunk_info(1)
+    content = bytearray(shot(run_dir, 1).read_bytes())
+    content[chunk.byte_offset + chunk.size // 2] ^= 0x10
+    shot(run_dir, 1).write_bytes(content)
+
+
+def of_another_run(run_dir: Path) -> None:
+    other = HEADER.model_copy(update={"run_id": "other"})
+    with RunWriter(run_dir.parent / "other", other) as writer:
+        writer.write_shot(shot_of(other, 0))
+    shutil.copy(run_dir.parent / "other" / "shots" / "0.h5", shot(run_dir, 1))
+
+
+def renamed(run_dir: Path) -> None:
+    shutil.copy(shot(run_dir, 2), shot(run_dir, 1))
+
+
+def nonsense(run_dir: Path) -> None:
+    shot(run_dir, 1).write_bytes(b"nonsense" * 100)
+
+
+def a_part(run_dir: Path) -> None:
+    (run_dir / "shots" / "1.h5.part").write_bytes(b"torn")
+
+
+def a_picture(run_dir: Path) -> None:
+    (run_dir / "shots" / "1.png").write_bytes(b"picture")
+
+
+def open_for_ever(run_dir: Path) -> None:
+    shutil.rmtree(run_dir)
+    with RunWriter(run_dir, HEADER) as writer:
+        for index in range(3):
+            writer.write_shot(shot_of(HEADER, index))
+
+
+FLAWS: list[tuple[Callable[[Path], None], str, str, bool]] = [
+    (missing, "missing", "shots/1.h5", False),
+    (truncated, "truncated", "shots/1.h5", False),
+    (empty, "truncated", "shots/1.h5", False),
+    (damaged, "damaged", "shots/1.h5", False),
+    (nonsense, "unreadable", "shots/1.h5", False),
+    (of_another_run, "foreign", "shots/1.h5", False),
+    (renamed, "renamed", "shots/1.h5", False),
+    (a_part, "not_committed", "shots/1.h5.part", True),
+    (a_picture, "foreign", "shots/1.png", True),
+    (open_for_ever, "no_outcome", "run.h5", True),
+]
+"""Harm, what verify calls it, the file, and whether repair makes the run sound again."""
+
+
+def test_a_sound_run_is_told_with_all_its_frames(run_dir: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (found,) = told(capsys, "verify", run_dir)["runs"]
+    counts = {"sound": True, "outcome": "completed", "shots": 3, "sound_shots": 3, "frames": 12, "flaws": []}
+    assert found == {"run": str(run_dir), **counts}
+
+
+@pytest.mark.parametrize(("harm", "kind", "file", "mended"), FLAWS, ids=[harm.__name__ for harm, *_ in FLAWS])
+def test_a_flaw_is_named_and_mended_or_left_alone(
+    run_dir: Path,
+    capsys: pytest.CaptureFixture[str],
+    harm: Callable[[Path], None],
+    kind: str,
+    file: str,
+    mended: bool,
+) -> None:
+    harm(run_dir)
+    before = {path.name: path.read_bytes() for path in (run_dir / "shots").iterdir()}
+    found = told(capsys, "verify", run_dir, status=1)
+    assert not found["passed"]
+    assert [(flaw["kind"], flaw["file"]) for flaw in found["runs"][0]["flaws"]] == [(kind, file)]
+    after = told(capsys, "repair", run_dir, status=0 if mended else 1)
+    assert after["sound"] == mended
+    kept = {path.name: path.read_bytes() for folder in ("shots", "set-aside") for path in (run_dir / folder).glob("*")}
+    assert kept == before, "nothing is changed, nothing is deleted"
+    assert told(capsys, "repair", run_dir, status=0 if mended else 1)["done"] == []
+
+
+def test_a_lost_header_is_written_anew_from_the_shots_and_what_is_lost_is_named(
+    run_dir: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (run_dir / "run.h5").write_bytes(b"nonsense")
+    for path in (*(run_dir / "shots").iterdir(), run_dir / "shots"):
+        os.utime(path, (1.8e9, 1.8e9))
+    assert told(capsys, "verify", run_dir, status=1)["runs"][0]["flaws"][0]["kind"] == "unreadable"
+    done = told(capsys, "repair", run_dir)["done"]
+    assert done[0] == f"run.h5 is set aside as {run_dir / 'set-aside' / 'run.h5'}"
+    assert "plan, configuration" in done[1]
+    reader = RunReader(run_dir)
+    lost: dict[str, Any] = {"plan": None, "configuration": {}, "devices": {}, "software": {}}
+    lost |= {"calibration_id": None, "calibration_sha256": None, "created_utc": reader.header.created_utc}
+    assert reader.header == HEADER.model_copy(update=lost)
+    assert (reader.outcome, reader.cause) == ("interrupted", "its run.h5 was lost, and with it how the run ended")
+    assert reader.ended_utc == "2027-01-15T08:00:00+00:00"
+    assert_same(reader.read_shot(2), shot_of(HEADER, 2))
+    with h5py.File(run_dir / "run.h5") as file:
+        np.testing.assert_array_equal(file["/shots/sequence"], [40, 41, 42])
+
+
+def test_without_a_shot_a_lost_header_stays_lost(run_dir: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (run_dir / "run.h5").unlink()
+    for path in (run_dir / "shots").iterdir():
+        path.unlink()
+    assert "no shot is left that tells what it was" in refused(capsys, "repair", run_dir)
+
+
+def test_a_run_that_is_being_recorded_is_not_repaired(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with RunWriter(tmp_path / "run", HEADER) as writer:
+        writer.write_shot(shot_of(HEADER, 0))
+        assert told(capsys, "verify", tmp_path / "run", status=1)["runs"][0]["flaws"][0]["kind"] == "being_written"
+        error = told(capsys, "repair", tmp_path / "run", status=1)["error"]
+        assert "is being written by a living process" in error
+        writer.finish("completed")
+    assert RunReader(tmp_path / "run").outcome == "completed"
+
+
+@pytest.mark.parametrize("command", ["verify", "repair"])
+def test_what_is_no_run_is_bad_input(tmp_path: Path, capsys: pytest.CaptureFixture[str], command: str) -> None:
+    assert "no run, it has neither run.h5 nor shots" in refused(capsys, command, tmp_path)
+    assert "no run" in refused(capsys, command, tmp_path / "nowhere")
+
+
+def test_several_runs_are_verified_at_once_and_one_flaw_is_enough(
+    run_dir: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copytree(run_dir, run_dir.parent / "copy")
+    truncated(run_dir.parent / "copy")
+    found = told(capsys, "verify", run_dir, run_dir.parent / "copy", status=1)
+    assert [one["sound"] for one in found["runs"]] == [True, False]
+
+
+def test_a_run_is_packed_into_one_file(run_dir: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = run_dir.parent / "packed.h5"
+    assert told(capsys, "pack", run_dir, "-o", out)["shots"] == 3
+    with h5py.File(out) as packed:
+        np.testing.assert_array_equal(packed["/shots/sequence"], [40, 41, 42])
+    assert "only --overwrite replaces it" in refused(capsys, "pack", run_dir, "-o", out)
+    truncated(run_dir)
+    assert "1.h5: cannot be read" in refused(capsys, "pack", run_dir, "-o", out, "--overwrite")
+    with h5py.File(out) as packed:
+        assert packed["/shots/index"].shape == (3,)
