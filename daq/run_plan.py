@@ -1,4 +1,4 @@
-"""RunPlan: what a run shall do. The same frozen value in configuration, API and file."""
+"""RunPlan: what a run shall do; LivePlan: what a live view shows. The same in configuration, API and file."""
 
 from enum import IntEnum, StrEnum
 from typing import Annotated
@@ -82,3 +82,16 @@ class RunPlan(FrozenModel):
     def total_shots(self) -> int:
         """Number of shots of the whole run: ``shots`` at each stage position."""
         return self.shots * max(1, len(self.stage_z_mm))
+
+
+class LivePlan(FrozenModel):
+    """What a live view shows."""
+
+    rate_hz: Annotated[float, Field(ge=0.1, le=10, description="shots per second")] = 2.0
+    pulse: Annotated[
+        PulsePair | None, Field(description="the light of every shot; null: none, the cameras see what light there is")
+    ] = None
+
+    def __str__(self) -> str:
+        """For people."""
+        return f"live view at {self.rate_hz:g} Hz, {'pulsed' if self.pulse else 'ambient'} light"

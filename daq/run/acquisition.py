@@ -1,9 +1,10 @@
-"""Acquisition: one run at a time, on a thread of its own."""
+"""Acquisition: one run or one live view at a time, on a thread of its own."""
 
 import logging
 import signal
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -18,11 +19,17 @@ from daq.run.active_run import ActiveRun, RunObserver
 from daq.run.ending import RunEnding
 from daq.run.events import RunEvent, RunMessage, RunStatus
 from daq.run.limits import AcquisitionLimits
+from daq.run.live.active_live import ActiveLive, Audience, checked_plan
+from daq.run.live.live_session import LiveSession
 from daq.run.preflight import PreparedRun, prepare_run
 from daq.run.progress import RunProgress
 from daq.run.session import RunSession
 from daq.run.state import RunState, RunStep, next_state
-from daq.run_plan import RunPlan
+from daq.run_plan import LivePlan, RunPlan
+from daq.shot import Shot
+
+_ARMING_S = 10.0
+"""What a live view may be busy with when it is asked to end: cameras that are being armed, one of them silent."""
 
 _LOG = logging.getLogger(__name__)
 
@@ -37,9 +44,9 @@ def _no_calibration_store(_: str) -> str | None:
 
 
 class Acquisition:
-    """Runs plans on a rig. The rig is open; the light is off unless a run is active.
+    """Runs plans on a rig, and shows it live. The rig is open; the light is off unless a run or a live view is active.
 
-    Every method may be called from any thread; none but ``start`` and ``wait`` takes longer than a
+    Every method may be called from any thread; none but ``start``, ``start_live`` and ``wait`` takes longer than a
     command to the pulse generator.
 
     Parameters
@@ -83,6 +90,8 @@ class Acquisition:
         self._threads: list[threading.Thread] = []
         self._progress = RunProgress(publish)
         self._ending = RunEnding()
+        self._live_ending = RunEnding()
+        self._audience = Audience()
 
     def __enter__(self) -> Self:
         return self
@@ -100,6 +109,11 @@ class Acquisition:
         """Snapshot; never waits for a device."""
         return self._progress.status()
 
+    @property
+    def newest_shot(self) -> Shot | None:
+        """What the rig saw last, in a run or a live view; None before the first shot."""
+        return self._progress.newest_shot
+
     def recover(self) -> None:
         """Close runs whose process is gone as INTERRUPTED, and tell; the caller holds the data directory."""
         for found in recover(self._data_dir):
@@ -107,7 +121,7 @@ class Acquisition:
             self._publish(RunMessage(found.run_id, found.text))
 
     def start(self, plan: RunPlan) -> str:
-        """Check the plan and start the run; returns its id.
+        """Check the plan and start the run; returns its id. A live view ends first, its light confirmed off.
 
         Raises
         ------
@@ -120,26 +134,46 @@ class Acquisition:
         DeviceError
             The generator has a latched fault or does not answer.
         """
-        if not self._starting.acquire(blocking=False):
-            raise BusyError("another run is being started")
-        try:
-            next_state(self.status().state, RunStep.START)
-            if self._left:
-                raise BusyError(f"no run starts any more: {self._left}")
+        with self._starting_alone(RunStep.START):
             ending = self._ending = RunEnding()
             prepared, writer = self._prepare(plan)
             self._progress.begin(prepared.header.run_id, plan)
             run = ActiveRun(self._rig, prepared, self._progress, self._limits, self._observers, ending)
-            thread = threading.Thread(target=self._work, args=(run, writer), name="acquisition", daemon=True)
-            self._threads = [*(one for one in self._threads if one.is_alive()), thread]
-            thread.start()
+            self._start_thread(threading.Thread(target=self._work, args=(run, writer), name="acquisition", daemon=True))
             return prepared.header.run_id
-        finally:
-            self._starting.release()
+
+    def start_live(self, plan: LivePlan) -> None:
+        """Check the plan and show the rig live. A live view of another plan ends first.
+
+        Raises
+        ------
+        BusyError, PlanError, InterlockOpen, DeviceError
+            As for a run.
+        """
+        with self._starting_alone(RunStep.LIVE):
+            ending = self._ending = RunEnding()
+            shots, timing = checked_plan(self._rig, plan)
+            self._end_live_before(RunStep.LIVE, "another live view starts")
+            self._live_ending = ending
+            self._audience.look()
+            live = ActiveLive(
+                self._rig, shots, timing, self._progress, self._limits, self._observers, self._audience, ending
+            )
+            self._progress.begin_live(plan)
+            self._start_thread(threading.Thread(target=LiveSession(live).work, name="live", daemon=True))
+
+    def keep_live(self) -> None:
+        """Somebody looks: a live view that nobody looks at ends after a while."""
+        self._audience.look()
+
+    def end_live(self) -> None:
+        """End the live view after the shot under way; without one there is nothing to do."""
+        self._live_ending.end(RunStep.STOP, "ended by the operator")
 
     def stop(self) -> None:
-        """End the run after the shot under way; without a run there is nothing to do."""
+        """End the run after the shot under way, or the live view; without either there is nothing to do."""
         self._ending.end(RunStep.STOP, "stopped by the operator")
+        self.end_live()
 
     def abort(self) -> None:
         """Light off now, from this thread, whatever acquisition waits for; the shot under way is lost.
@@ -149,14 +183,14 @@ class Acquisition:
         DeviceError
             The generator did not take the command; acquisition goes on trying.
         """
-        self._ending.end(RunStep.ABORT, "aborted by the operator")
+        self._end_at_once("aborted by the operator", CauseCode.ABORTED)
         light.switch_off(self._rig)
 
     def leave(self, cause: str) -> None:
         """The program ends: abort what runs for this cause, and let no run start any more. The first cause stays."""
         self._left = self._left or cause
-        if self.status().active:
-            self._ending.end(RunStep.ABORT, self._left, CauseCode.PROGRAM_ENDED)
+        if not self.status().resting:
+            self._end_at_once(self._left, CauseCode.PROGRAM_ENDED)
             light.try_to_switch_off(self._rig)
 
     def acknowledge(self) -> None:
@@ -177,8 +211,37 @@ class Acquisition:
             self._progress.move(RunStep.ACKNOWLEDGE)
 
     def wait(self, deadline_s: float) -> RunStatus:
-        """Wait until no run is active; returns the status then, or the one at the deadline."""
+        """Wait until no run and no live view is under way; returns the status then, or the one at the deadline."""
         return self._progress.wait(deadline_s)
+
+    @contextmanager
+    def _starting_alone(self, step: RunStep) -> Iterator[None]:
+        """Nothing else starts meanwhile; BusyError where this cannot start, not even after a live view."""
+        if not self._starting.acquire(blocking=False):
+            raise BusyError("another run or live view is being started")
+        try:
+            state = self.status().state
+            next_state(RunState.IDLE if state is RunState.LIVE else state, step)
+            if self._left:
+                raise BusyError(f"no run starts any more: {self._left}")
+            yield
+        finally:
+            self._starting.release()
+
+    def _start_thread(self, thread: threading.Thread) -> None:
+        self._threads = [*(one for one in self._threads if one.is_alive()), thread]
+        thread.start()
+
+    def _end_live_before(self, step: RunStep, cause: str) -> None:
+        """Wait until a live view has ended; BusyError if it does not, or leaves a fault."""
+        self._live_ending.end(RunStep.STOP, cause)
+        limits = self._limits
+        status = self._progress.wait(_ARMING_S + limits.frame_s + limits.light_off_s + limits.disarm_s)
+        next_state(status.state, step)
+
+    def _end_at_once(self, cause: str, code: CauseCode) -> None:
+        for ending in (self._ending, self._live_ending):
+            ending.end(RunStep.ABORT, cause, code)
 
     def _prepare(self, plan: RunPlan) -> tuple[PreparedRun, RunWriter]:
         """Check the plan, and make the directory of the run: a run that is accepted always has one."""
@@ -188,6 +251,7 @@ class Acquisition:
             prepared = prepare_run(
                 self._rig, self._data_dir, plan, self._configuration, self._hash_calibration, margin_bytes
             )
+            self._end_live_before(RunStep.START, "a run starts")
             return prepared, RunWriter(prepared.run_dir, prepared.header, margin_bytes).open()
         except StorageError as error:
             raise PlanError(f"the run cannot be stored: {error}") from error

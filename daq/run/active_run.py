@@ -10,6 +10,7 @@ from daq.run.limits import AcquisitionLimits
 from daq.run.preflight import PreparedRun
 from daq.run.progress import RunProgress
 from daq.run_plan import RunPlan
+from daq.timing import ShotTiming
 
 
 class RunObserver(Protocol):
@@ -23,6 +24,24 @@ class RunObserver(Protocol):
 
     def after_run(self, run_dir: Path) -> None:
         """After the last shot is on the disk, before the outcome is."""
+
+
+class Shooting(Protocol):
+    """What it takes to fire shots: a run under way is that, and so is a live view."""
+
+    @property
+    def rig(self) -> Rig: ...  # noqa: D102
+    @property
+    def plan(self) -> RunPlan: ...  # noqa: D102
+    @property
+    def timing(self) -> ShotTiming: ...  # noqa: D102
+    @property
+    def limits(self) -> AcquisitionLimits: ...  # noqa: D102
+    @property
+    def ending(self) -> RunEnding: ...  # noqa: D102
+
+    def say(self, text: str) -> None:
+        """Something is worth a line."""
 
 
 @dataclass(frozen=True)
@@ -51,3 +70,17 @@ class ActiveRun:
     limits: AcquisitionLimits
     observers: tuple[RunObserver, ...] = ()
     ending: RunEnding = field(default_factory=RunEnding)
+
+    @property
+    def plan(self) -> RunPlan:
+        """As the operator wrote it."""
+        return self.prepared.plan
+
+    @property
+    def timing(self) -> ShotTiming:
+        """Edges of every shot."""
+        return self.prepared.timing
+
+    def say(self, text: str) -> None:
+        """Something is worth a line."""
+        self.progress.say(text)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from daq.run.state import RunOutcome, RunState
-from daq.run_plan import RunPlan
+from daq.run_plan import LivePlan, RunPlan
 
 
 @dataclass(frozen=True)
@@ -24,6 +24,8 @@ class RunStatus:
         What happened last; the cause if the run failed.
     plan : RunPlan | None
         What the run named by ``run_id`` was asked to do; known although its directory may be gone.
+    live : LivePlan | None
+        What the live view shows; None in every other state.
     """
 
     state: RunState = RunState.IDLE
@@ -34,11 +36,17 @@ class RunStatus:
     shots_valid: int = 0
     message: str = ""
     plan: RunPlan | None = None
+    live: LivePlan | None = None
 
     @property
     def active(self) -> bool:
         """A run is under way."""
-        return self.state not in (RunState.IDLE, RunState.FAULT)
+        return not self.resting and self.state is not RunState.LIVE
+
+    @property
+    def resting(self) -> bool:
+        """Neither a run nor a live view is under way."""
+        return self.state in (RunState.IDLE, RunState.FAULT)
 
     @property
     def summary(self) -> str:
@@ -48,7 +56,7 @@ class RunStatus:
 
 @dataclass(frozen=True)
 class StateChanged:
-    """Acquisition moved to another state."""
+    """Acquisition moved to another state; ``run_id`` is empty where a live view begins or ends."""
 
     run_id: str
     state: RunState

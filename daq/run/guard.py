@@ -1,4 +1,4 @@
-"""RunGuard: watches interlock and generator during a run, and is the generator's heartbeat.
+"""RunGuard: watches interlock and generator during a run or a live view, and is the generator's heartbeat.
 
 It has a thread of its own, because the acquisition thread waits for cameras, a stage and files: the light
 goes off when the interlock opens, whatever acquisition waits for. Firing stays with the acquisition thread,
@@ -12,7 +12,7 @@ from typing import Self
 
 from daq.errors import DaqError, DeviceOvertaken
 from daq.run import light
-from daq.run.active_run import ActiveRun
+from daq.run.active_run import Shooting
 from daq.run.ending import code_of
 
 
@@ -21,12 +21,12 @@ class RunGuard:
 
     Parameters
     ----------
-    run : ActiveRun
+    run : Shooting
         Its interlock is watched, its generator gets a status request at the period of its limits, which is well below
         what the generator permits. Its ending is told about the error, after the light is off.
     """
 
-    def __init__(self, run: ActiveRun) -> None:
+    def __init__(self, run: Shooting) -> None:
         self._rig = run.rig
         self._ending = run.ending
         self._period_s = run.limits.heartbeat_s

@@ -23,6 +23,8 @@ class AcquisitionLimits:
         Invalid shots, one after the other, that end a run.
     disk_margin_bytes : int
         What a run leaves free on the disk: without it no run starts, and one under way ends.
+    live_unwatched_s : float
+        Until a live view that nobody looks at is over.
     recorder_depth, recorder_threads : int
         Shots that may wait for the disk, and threads that compress them.
     """
@@ -33,6 +35,7 @@ class AcquisitionLimits:
     drain_s: float = 60.0
     heartbeat_s: float = 0.2
     invalid_in_a_row: int = 5
+    live_unwatched_s: float = 600.0
     disk_margin_bytes: int = 256 * 2**20
     recorder_depth: int = 8
     recorder_threads: int = 2

@@ -82,8 +82,7 @@ def prepare_run(
     OSError
         The disk or the calibration cannot be read.
     """
-    timing = _timing(rig, plan)
-    _check_currents(rig, plan)
+    timing = permitted_timing(rig, plan)
     _check_stage(rig, plan)
     views = {view: ViewFormat(camera.image_shape, camera.bits) for view, camera in rig.cameras.items()}
     references = find_references(data_dir, plan, views)
@@ -93,6 +92,12 @@ def prepare_run(
     calibration_sha256 = hash_calibration(plan.calibration) if plan.calibration else None
     header = _header(data_dir, plan, views, configuration, calibration_sha256)
     return PreparedRun(data_dir / header.run_id, plan, header, timing, references)
+
+
+def permitted_timing(rig: Rig, plan: RunPlan) -> ShotTiming:
+    """Edges of every shot of a plan; PlanError if a camera does not permit them, or an LED its current."""
+    _check_currents(rig, plan)
+    return _timing(rig, plan)
 
 
 def _header(

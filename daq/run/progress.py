@@ -6,8 +6,8 @@ from dataclasses import replace
 from typing import Any
 
 from daq.run.events import RunEvent, RunMessage, RunStatus, ShotRecorded, StateChanged
-from daq.run.state import RunStep, next_state
-from daq.run_plan import RunPlan
+from daq.run.state import RunState, RunStep, next_state
+from daq.run_plan import LivePlan, RunPlan
 from daq.shot import Shot
 
 
@@ -26,6 +26,7 @@ class RunProgress:
         self._publish = publish
         self._changed = threading.Condition()
         self._status = RunStatus()
+        self._newest: Shot | None = None
 
     def status(self) -> RunStatus:
         """Snapshot."""
@@ -33,22 +34,37 @@ class RunProgress:
             return self._status
 
     def wait(self, deadline_s: float) -> RunStatus:
-        """Wait until no run is active; returns the status then, or the one at the deadline."""
+        """Wait until no run and no live view is under way; returns the status then, or the one at the deadline."""
         with self._changed:
-            self._changed.wait_for(lambda: not self._status.active, deadline_s)
+            self._changed.wait_for(lambda: self._status.resting, deadline_s)
             return self._status
 
     def begin(self, run_id: str, plan: RunPlan) -> None:
         """A run starts, with all counts at zero; BusyError if it cannot."""
         self.move(RunStep.START, **vars(RunStatus(run_id=run_id, shots_planned=plan.total_shots, plan=plan)))
 
+    def begin_live(self, plan: LivePlan) -> None:
+        """A live view starts; BusyError if it cannot. What is known of the last run stays."""
+        self.move(RunStep.LIVE, live=plan, message=str(plan))
+
     def move(self, step: RunStep, **changes: Any) -> None:
         """Go to the state after a step, and change other fields of the status; BusyError if it is not permitted."""
         with self._changed:
-            state = next_state(self._status.state, step)
+            before, state = self._status.state, next_state(self._status.state, step)
             status = self._status = replace(self._status, **{**changes, "state": state})
-            self._publish(StateChanged(status.run_id or "", state, status.outcome, status.message))
+            is_of_run = RunState.LIVE not in (before, state)
+            run_id, outcome = (status.run_id or "", status.outcome) if is_of_run else ("", None)
+            self._publish(StateChanged(run_id, state, outcome, status.message))
             self._changed.notify_all()
+
+    @property
+    def newest_shot(self) -> Shot | None:
+        """What the rig saw last, in a run or a live view."""
+        return self._newest
+
+    def show(self, shot: Shot) -> None:
+        """A shot has been taken."""
+        self._newest = shot
 
     def count(self, shot: Shot) -> None:
         """A shot has reached the disk."""
@@ -62,7 +78,7 @@ class RunProgress:
         """Something is worth a line."""
         with self._changed:
             self._status = replace(self._status, message=text)
-            self.tell(self._status.run_id or "", text)
+            self.tell("" if self._status.live else self._status.run_id or "", text)
 
     def tell(self, run_id: str, text: str) -> None:
         """Something is worth a line of a run that is over."""

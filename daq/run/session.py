@@ -99,6 +99,7 @@ class RunSession:
             shot = taker.take(index)
             if shot is None:
                 return
+            self._run.progress.show(shot)
             recorder.put(shot)
             streak.count(shot)
         streak.require_a_valid_one()

@@ -9,7 +9,7 @@ import time
 from daq.devices import Camera
 from daq.errors import DeviceRefused
 from daq.run import light
-from daq.run.active_run import ActiveRun
+from daq.run.active_run import Shooting
 from daq.run.shot_check import ShotFindings, Thresholds, check_exposures
 from daq.run.side_by_side import SideBySide
 from daq.run.train_check import train_deviation
@@ -48,22 +48,22 @@ def next_due_s(due_s: float, fired_s: tuple[float, float], period_s: float, shor
 
 
 class ShotTaker:
-    """Takes the shots of one run on armed cameras.
+    """Takes the shots of one run, or of a live view, on armed cameras.
 
     Parameters
     ----------
-    run : ActiveRun
+    run : Shooting
         What to do; its ending is looked at before every shot, while waiting for its time, and between cameras.
     thresholds : Mapping[str, tuple[float, float]]
         Bright levels above which an exposure is lit.
     """
 
-    def __init__(self, run: ActiveRun, thresholds: Thresholds) -> None:
+    def __init__(self, run: Shooting, thresholds: Thresholds) -> None:
         self._rig = run.rig
-        self._plan = run.prepared.plan
-        self._timing = run.prepared.timing
+        self._plan = run.plan
+        self._timing = run.timing
         self._ending = run.ending
-        self._say = run.progress.say
+        self._say = run.say
         self._thresholds = thresholds
         self._frame_deadline_s = self._timing.shortest_period_ns / 1e9 + run.limits.frame_s
         self._refires_left = self._plan.refire_quota

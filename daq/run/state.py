@@ -10,6 +10,7 @@ class RunState(StrEnum):
     """Where acquisition stands."""
 
     IDLE = "idle"
+    LIVE = "live"
     ARMING = "arming"
     ACQUIRING = "acquiring"
     DISARMING = "disarming"
@@ -30,6 +31,7 @@ class RunStep(StrEnum):
     """What moves a run from one state to the next."""
 
     START = "start"
+    LIVE = "live view"
     ARMED = "armed"
     LAST_SHOT = "last shot recorded"
     STOP = "stop"
@@ -44,6 +46,9 @@ _ENDINGS = (RunStep.STOP, RunStep.ABORT, RunStep.ERROR)
 
 TRANSITIONS = MappingProxyType(
     {
+        (RunState.IDLE, RunStep.LIVE): RunState.LIVE,
+        (RunState.LIVE, RunStep.LIGHT_OFF): RunState.IDLE,
+        (RunState.LIVE, RunStep.LIGHT_UNKNOWN): RunState.FAULT,
         (RunState.IDLE, RunStep.START): RunState.ARMING,
         (RunState.ARMING, RunStep.ARMED): RunState.ACQUIRING,
         (RunState.ACQUIRING, RunStep.LAST_SHOT): RunState.DISARMING,
@@ -54,7 +59,11 @@ TRANSITIONS = MappingProxyType(
         (RunState.FAULT, RunStep.ACKNOWLEDGE): RunState.IDLE,
     }
 )
-"""Every permitted transition. Light can be on in ARMING and ACQUIRING only, and both lead to DISARMING."""
+"""Every permitted transition.
+
+Light can be on in ARMING and ACQUIRING, which lead to DISARMING, and in LIVE. Nothing leads out of DISARMING and LIVE
+but the answer whether it is off.
+"""
 
 OUTCOMES = MappingProxyType(
     {

@@ -180,6 +180,9 @@ class AcquisitionConfig(FrozenModel):
         float,
         Field(gt=0, le=60, description="time for the network, after the cameras' cycle, until a frame is missing"),
     ] = AcquisitionLimits.frame_s
+    live_unwatched_s: Annotated[
+        float, Field(ge=1, le=86_400, description="a live view that nobody looks at for so long ends")
+    ] = AcquisitionLimits.live_unwatched_s
     recorder_depth: Annotated[int, Field(ge=1, le=1000, description="shots that may wait for the disk")] = (
         AcquisitionLimits.recorder_depth
     )
@@ -191,6 +194,7 @@ class AcquisitionConfig(FrozenModel):
         """The same as limits of acquisition."""
         return AcquisitionLimits(
             frame_s=self.frame_deadline_s,
+            live_unwatched_s=self.live_unwatched_s,
             recorder_depth=self.recorder_depth,
             recorder_threads=self.recorder_threads,
         )

@@ -9,7 +9,9 @@ from hypothesis import strategies as st
 from daq.errors import BusyError
 from daq.run.state import OUTCOMES, TRANSITIONS, RunOutcome, RunState, RunStep, next_state
 
-LIGHT_MAY_BE_ON = {RunState.ARMING, RunState.ACQUIRING}
+LIGHT_MAY_BE_ON = {RunState.ARMING, RunState.ACQUIRING, RunState.LIVE}
+IN_A_RUN = {RunState.ARMING, RunState.ACQUIRING}
+CONFIRMATIONS = {RunStep.LIGHT_OFF, RunStep.LIGHT_UNKNOWN}
 RESTING = {RunState.IDLE, RunState.FAULT}
 
 
@@ -31,11 +33,22 @@ paths = st.lists(st.sampled_from(RunStep), max_size=60).map(walk)
 @given(paths)
 def test_light_is_accounted_for_before_a_run_is_over(path: list[tuple[RunStep, RunState]]) -> None:
     for (_, before), (step, after) in itertools.pairwise(path):
-        if before in LIGHT_MAY_BE_ON:
-            assert after in LIGHT_MAY_BE_ON | {RunState.DISARMING}
+        if before in IN_A_RUN:
+            assert after in IN_A_RUN | {RunState.DISARMING}
+        if before is RunState.LIVE:
+            assert step in CONFIRMATIONS
         if after in RESTING and before not in RESTING:
-            assert before is RunState.DISARMING
-            assert step in {RunStep.LIGHT_OFF, RunStep.LIGHT_UNKNOWN}
+            assert before in {RunState.DISARMING, RunState.LIVE}
+            assert step in CONFIRMATIONS
+
+
+@given(paths)
+def test_nothing_but_a_start_from_rest_brings_light(path: list[tuple[RunStep, RunState]]) -> None:
+    for (_, before), (step, after) in itertools.pairwise(path):
+        if after in LIGHT_MAY_BE_ON and before not in LIGHT_MAY_BE_ON:
+            assert (before, step) in {(RunState.IDLE, RunStep.START), (RunState.IDLE, RunStep.LIVE)}
+        if after is not before and after in LIGHT_MAY_BE_ON:
+            assert RunState.LIVE not in (before, after) or before is RunState.IDLE
 
 
 @given(paths)
@@ -48,13 +61,17 @@ def test_only_an_operator_leaves_a_fault(path: list[tuple[RunStep, RunState]]) -
 @given(paths)
 def test_every_run_gets_exactly_one_outcome_before_it_rests(path: list[tuple[RunStep, RunState]]) -> None:
     outcomes: list[RunOutcome] = []
+    before = RunState.IDLE
     for step, state in path:
         if step is RunStep.START:
             outcomes = []
         if state is RunState.DISARMING:
             outcomes.append(OUTCOMES[step])
-        if state in RESTING and step is not RunStep.ACKNOWLEDGE:
+        if step is RunStep.LIVE:
+            outcomes = []
+        if state in RESTING and step is not RunStep.ACKNOWLEDGE and before is not RunState.LIVE:
             assert len(outcomes) == 1
+        before = state
 
 
 def test_every_state_is_reached_and_can_rest_again() -> None:
@@ -69,7 +86,7 @@ def test_every_state_is_reached_and_can_rest_again() -> None:
 
 
 @pytest.mark.parametrize("step", [RunStep.STOP, RunStep.ABORT, RunStep.ERROR])
-@pytest.mark.parametrize("state", sorted(LIGHT_MAY_BE_ON))
+@pytest.mark.parametrize("state", sorted(IN_A_RUN))
 def test_whatever_ends_a_run_disarms(state: RunState, step: RunStep) -> None:
     assert next_state(state, step) is RunState.DISARMING
 
