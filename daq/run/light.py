@@ -24,12 +24,12 @@ def check_permitted(rig: Rig) -> None:
     if not rig.interlock.is_closed():
         raise InterlockOpen(f"{rig.interlock.name}: the interlock is open")
     status = rig.generator.status()
-    if status.state is GeneratorState.FAULT:
-        raise DeviceRefused(rig.generator.name, f"fault: {', '.join(status.faults)}; acknowledge it first")
     if not status.interlock_closed:
         raise InterlockOpen(f"{rig.generator.name}: the interlock input of the pulse generator is open")
     if not status.estop_closed:
         raise InterlockOpen(f"{rig.generator.name}: the emergency stop of the pulse generator is open")
+    if status.state is GeneratorState.FAULT:  # last: an open door is why, and the generator may know of it first
+        raise DeviceRefused(rig.generator.name, f"fault: {', '.join(status.faults)}; acknowledge it first")
 
 
 def switch_off(rig: Rig) -> None:

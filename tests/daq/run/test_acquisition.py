@@ -636,6 +636,14 @@ def test_the_cause_is_the_door_and_never_what_the_generator_says_of_it(
     assert "overtaken" not in lab.messages()
 
 
+def test_a_door_that_the_generator_sees_first_is_a_door_and_no_fault_of_the_generator(lab: Laboratory) -> None:
+    reader = lab.start_and_await_shot(plan_of(**SLOW), 0)
+    lab.memory.generator.set_interlock(False)
+    lab.acquisition.wait(DEADLINE_S)
+    assert reader.cause == "generator: the interlock input of the pulse generator is open"
+    assert [cause.code for cause in reader.causes] == [CauseCode.INTERLOCK_OPEN]
+
+
 def test_a_second_cause_of_its_own_is_kept_beside_the_first(lab: Laboratory) -> None:
     reader = lab.start_and_await_shot(plan_of(**SLOW), 0)
     lab.memory.generator.restarted = True
