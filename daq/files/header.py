@@ -83,9 +83,12 @@ class RunClosing:
         ISO 8601, UTC.
     causes : tuple[Cause, ...]
         All reasons with their codes, the first one first; empty where none was kept, as in runs from before.
+    unstored : tuple[int, ...]
+        Shots that were fired and are not on the disk.
     """
 
     outcome: str
     cause: str
     ended_utc: str
     causes: tuple[Cause, ...] = ()
+    unstored: tuple[int, ...] = ()

@@ -119,6 +119,12 @@ class RunReader:
         return closing.causes if closing else ()
 
     @property
+    def unstored(self) -> tuple[int, ...]:
+        """Shots that were fired and never reached the disk."""
+        closing = self.closing
+        return closing.unstored if closing else ()
+
+    @property
     def closing(self) -> RunClosing | None:
         """How, why and when the run ended; None while it is open, and for ever if its process was killed."""
         return read_closing(self.run_dir)

@@ -91,6 +91,7 @@ def add_closing(run_dir: Path, closing: RunClosing) -> None:
         file["entry/outcome"] = closing.outcome
         file["entry/cause"] = closing.cause
         file["entry/end_time"] = closing.ended_utc
+        file["entry/unstored"] = json.dumps(closing.unstored)
         file["entry/causes"] = _CAUSES.dump_json(closing.causes, indent=1).decode()
         file["entry/shot_count"] = slots_of(run_dir)
 
@@ -114,8 +115,9 @@ def read_closing(run_dir: Path) -> RunClosing | None:
         if "outcome" not in entry:
             return None
         outcome, cause, ended_utc = (entry[name].asstr()[()] for name in ("outcome", "cause", "end_time"))
-        causes = entry["causes"].asstr()[()] if "causes" in entry else "[]"  # runs from before have none
-        return RunClosing(outcome, cause, ended_utc, _CAUSES.validate_json(causes))
+        later = {name: entry[name].asstr()[()] for name in ("causes", "unstored") if name in entry}  # not in old runs
+        causes, unstored = _CAUSES.validate_json(later.get("causes", "[]")), json.loads(later.get("unstored", "[]"))
+        return RunClosing(outcome, cause, ended_utc, causes, tuple(unstored))
 
 
 def add_references(run_dir: Path, header: RunHeader, references: Mapping[Reference, ReferenceImages]) -> None:

@@ -55,6 +55,7 @@ class Recorder:
         self._accepted = 0
         self._committed = 0
         self._closing = False
+        self._given_up = False
         self._failure: tuple[int, Exception] | None = None
 
     def __enter__(self) -> Self:
@@ -73,6 +74,12 @@ class Recorder:
         """Shots that are on the disk."""
         with self._changed:
             return self._committed
+
+    @property
+    def accepted(self) -> int:
+        """Shots that were handed over: on the disk, waiting, or lost with an error."""
+        with self._changed:
+            return self._accepted
 
     def put(self, shot: Shot) -> None:
         """Hand over the next shot; never waits.
@@ -104,8 +111,10 @@ class Recorder:
 
         Raises
         ------
+        RecorderOverflow
+            The deadline passed before all were stored; none is stored later: a run that is closed stays as it is.
         RecorderError
-            A shot could not be stored, or the deadline passed before all were.
+            A shot could not be stored.
         """
         deadline = time.monotonic() + deadline_s
         with self._changed:
@@ -116,8 +125,9 @@ class Recorder:
         with self._changed:
             self._raise_failure()
             if self._committed < self._accepted:
+                self._given_up = True
                 left = self._accepted - self._committed
-                raise RecorderError(f"{left} of {self._accepted} shots are not stored after {deadline_s:g} s")
+                raise RecorderOverflow(f"{left} of {self._accepted} shots are not stored after {deadline_s:g} s")
 
     def _raise_failure(self) -> None:
         if self._failure is not None:
@@ -135,12 +145,12 @@ class Recorder:
     def _take(self) -> Shot | None:
         with self._changed:
             self._changed.wait_for(lambda: self._waiting or self._closing or self._failure)
-            return self._waiting.popleft() if self._waiting and not self._failure else None
+            return self._waiting.popleft() if self._waiting and not (self._failure or self._given_up) else None
 
     def _commit_in_turn(self, shot: Shot) -> None:
         with self._changed:
-            self._changed.wait_for(lambda: self._committed == shot.index or self._failed_before(shot.index))
-            if self._committed != shot.index:
+            self._changed.wait_for(lambda: self._committed == shot.index or self._is_hopeless(shot.index))
+            if self._committed != shot.index or self._given_up:
                 self._writer.discard(shot.index)
                 return
         self._writer.commit(shot.index)
@@ -149,8 +159,8 @@ class Recorder:
             self._committed += 1
             self._changed.notify_all()
 
-    def _failed_before(self, index: int) -> bool:
-        return self._failure is not None and self._failure[0] < index
+    def _is_hopeless(self, index: int) -> bool:
+        return self._given_up or (self._failure is not None and self._failure[0] < index)
 
     def _fail(self, index: int, error: Exception) -> None:
         """Keep the failure of the lowest index: whatever is staged before it is still committed."""

@@ -46,6 +46,8 @@ class RunSession:
         self._ending = run.ending
         self._writer = writer
         self._storage = ExitStack()
+        self._taker: ShotTaker | None = None
+        self._recorder: Recorder | None = None
         self._closed = False
         self._ended_utc = ""
 
@@ -71,6 +73,8 @@ class RunSession:
         """Wait until every shot is on the disk, then write the outcome."""
         self._attempt(self._storage.close)
         self._ended_utc = datetime.now(UTC).isoformat()
+        if unstored := self._unstored():
+            self._run.progress.say(f"fired and not stored: shots {', '.join(map(str, unstored))}")
         self._attempt(self._finish)
 
     def insist(self, leaving: threading.Event) -> None:
@@ -91,9 +95,9 @@ class RunSession:
             observer.before_run(plan)
         self._write_devices()
         thresholds = self._copy_references()
-        taker = ShotTaker(self._run, thresholds)
+        taker = self._taker = ShotTaker(self._run, thresholds)
         streak = InvalidStreak(self._run.limits.invalid_in_a_row, partial(self._findings, thresholds))
-        recorder = self._start_recorder()
+        recorder = self._recorder = self._start_recorder()
         self._arm(taker)
         for index in range(plan.total_shots):
             shot = taker.take(index)
@@ -159,7 +163,15 @@ class RunSession:
 
     def _closing(self) -> RunClosing:
         ending = self._ending
-        return RunClosing(ending.outcome.value, ending.cause, self._ended_utc, ending.causes)
+        return RunClosing(ending.outcome.value, ending.cause, self._ended_utc, ending.causes, self._unstored())
+
+    def _unstored(self) -> tuple[int, ...]:
+        """Shots that were fired and are not on the disk: those that waited for it, and the one under way."""
+        if self._recorder is None or self._taker is None:
+            return ()
+        accepted, last = self._recorder.accepted, self._taker.last_fired
+        under_way = () if last is None or last < accepted else (last,)
+        return (*range(self._recorder.committed, accepted), *under_way)
 
     def _attempt(self, action: Callable[[], None]) -> None:
         """The top of the acquisition thread: whatever goes wrong, the light goes off before anything else."""

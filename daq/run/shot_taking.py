@@ -72,6 +72,8 @@ class ShotTaker:
         self._due_s = 0.0
         self._armed = False
         self._stage_z_mm: float | None = None
+        self.last_fired: int | None = None
+        """Index of the shot that was fired last, whatever became of it."""
 
     def load_position(self, position: int) -> None:
         """Move the stage in the dark, load the pulse train, verify its echo, arm the generator for these shots.
@@ -131,6 +133,7 @@ class ShotTaker:
         host_time_ns = time.time_ns()
         sent_s = time.monotonic()
         fired = self._rig.generator.fire()
+        self.last_fired = index
         self._due_s = next_due_s(self._due_s, (sent_s, time.monotonic()), self._period_s, self._shortest_s)
         views = self._collect()
         if views is None:

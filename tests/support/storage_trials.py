@@ -62,6 +62,8 @@ class Trial:
             "closing": reader.closing and asdict(reader.closing),
             "codes": [cause.code for cause in reader.causes],
             "acknowledged": self.recorded,
+            "unstored": reader.unstored,
+            "fired": self.memory.generator.fired,
             "readable": sum(reader.read_shot(index).valid for index in range(reader.shot_count)),
             "parts": [path.name for path in (run_dir or self.run_dir).rglob("*.part")],
             "light_first": journal.index("off") < journal.index("view1 disarm"),

@@ -51,6 +51,9 @@ class RunSummary(FrozenModel):
     shots_planned: Annotated[int | None, Field(description="null for imported images")]
     shots_recorded: Annotated[int, Field(description="shots on the disk")]
     shots_valid: Annotated[int | None, Field(description="null before the run has ended")]
+    shots_unstored: Annotated[
+        tuple[int, ...], Field(description="that were fired and never reached the disk, by number")
+    ] = ()
     calibration: Annotated[str | None, Field(description="that reconstructs it, where the run names one")]
 
 
@@ -70,6 +73,7 @@ def summary_of(run: RunReader, image_keys: NDArray[np.int64]) -> RunSummary:
         frames_per_shot=run.header.frames_per_shot,
         shots_planned=plan.total_shots if plan else None,
         shots_recorded=len(image_keys),
+        shots_unstored=run.unstored,
         shots_valid=int(np.count_nonzero(image_keys != ImageKey.INVALID)) if outcome else None,
         calibration=(plan.calibration if plan else None) or run.header.calibration_id,
     )

@@ -422,7 +422,8 @@ def test_light_off_never_waits_for_a_frozen_camera(lab: Laboratory, frozen: thre
     frozen.set()
     status = lab.acquisition.wait(DEADLINE_S)
     assert status.outcome is (RunOutcome.ABORTED if reason == "abort" else RunOutcome.FAILED)
-    assert RunReader(lab.data_dir / run_id).outcome == status.outcome
+    reader = RunReader(lab.data_dir / run_id)
+    assert (reader.outcome, reader.unstored) == (status.outcome, (0,)), "the shot under way was fired, and is lost"
 
 
 def test_a_frozen_camera_is_left_alone_after_its_deadline(lab: Laboratory) -> None:

@@ -73,6 +73,7 @@ def test_light_goes_off_first_and_outcome_and_cause_are_stored(trials: dict[str,
     assert cause.endswith("then start again")
     assert "rrno" not in cause, "numbers of the system help no operator"
     assert found["readable"] == found["acknowledged"] >= 3
+    assert [*range(found["acknowledged"]), *found["unstored"]] == list(range(found["fired"]))
     assert found["parts"] == [] or name in ("moved", "unmounted"), "out of reach, the next start sets it aside"
 
 
