@@ -81,6 +81,7 @@ class AravisCamera:
         self._device: AravisDevice | None = None
         self._receiver: FrameReceiver | None = None
         self._last_id: int | None = None
+        self._late_frames = 0
         self._latest: Image | None = None
         self._letting_go = Lock()
         self._opening = Lock()
@@ -182,7 +183,7 @@ class AravisCamera:
         receiver = FrameReceiver(self._name, device.open_stream(self._form, self._network.socket_buffer_bytes))
         receiver.start()
         self._receiver = receiver
-        self._last_id = 0
+        self._last_id = self._late_frames = 0
         try:
             device.start()
             for setting in settings:
@@ -209,8 +210,11 @@ class AravisCamera:
         DeviceUnavailable
             An exposure is missing and the camera no longer answers.
         """
-        arrivals = self._armed().take(self._form.arrivals, deadline_s)
+        receiver = self._armed()
+        arrivals = receiver.take(self._form.arrivals, deadline_s)
         shot = double_frame(arrivals, self._last_id, self._form)
+        late_frames, self._late_frames = self._late_frames, receiver.counters.stale_frames
+        shot = replace(shot, late_frames=self._late_frames - late_frames)
         self._last_id = arrivals[-1].frame_id if shot.valid else None
         if not shot.valid:
             self._connected().require_answer()

@@ -96,7 +96,7 @@ class RunSession:
         self._write_devices()
         thresholds = self._copy_references()
         taker = self._taker = ShotTaker(self._run, thresholds)
-        streak = InvalidStreak(self._run.limits.invalid_in_a_row, partial(self._findings, thresholds))
+        streak = InvalidStreak(self._run.limits.invalid_in_a_row, self._findings)
         recorder = self._recorder = self._start_recorder()
         self._arm(taker)
         for index in range(plan.total_shots):
@@ -108,11 +108,9 @@ class RunSession:
             streak.count(shot)
         streak.require_a_valid_one()
 
-    def _findings(self, thresholds: Thresholds, shot: Shot) -> ShotFindings:
-        timing = self._run.prepared.timing
-        lit = {view: one.current_a > 0 for view, one in timing.views.items()}
-        misfired = train_deviation(timing, shot.fired) if shot.fired else None
-        return check_exposures(shot.views, lit, thresholds, misfired or "")
+    def _findings(self, shot: Shot) -> ShotFindings:
+        misfired = train_deviation(self._run.timing, shot.fired) if shot.fired else None
+        return check_exposures(shot.views, misfired or "")
 
     def _arm(self, taker: ShotTaker) -> None:
         for camera in self._rig.cameras.values():

@@ -5,14 +5,15 @@ more than half of the image for darkness. If A is bright and B dark, the second 
 that is a fault of the light, not a lost frame, and firing again would not prove anything.
 """
 
+from collections import defaultdict
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from daq.errors import InvalidShots
 from daq.files.run_directory import ReferenceImages
-from daq.shot import DoubleFrame, Image, Shot
+from daq.shot import DoubleFrame, ExposureRecord, Flaw, Image, Shot
 
 LIT_FRACTION_OF_SCALE = 0.06
 """Without references: a lit shadowgraph lies far above this part of full scale, the dark level of a sensor below."""
@@ -22,8 +23,36 @@ _BRIGHT_PERCENT = 90
 _STRIDE_PX = 8
 """A percentile needs no more than every eighth row and column: 30 000 pixels of a 2 MP frame, 0.4 ms."""
 
-Thresholds = Mapping[str, tuple[float, float]]
-"""Counts per view, for frames A and B, above which a bright level means light."""
+DOUBLE_FRACTION_OF_BACKGROUND = 1.6
+"""So far above dark, in spans from dark to background, it is the light of two pulses; a spray only takes some away."""
+_FULL = 0.98
+"""Of full scale: brighter ones cannot be told."""
+
+
+@dataclass(frozen=True)
+class LightLevels:
+    """Grey values of one exposure of a view.
+
+    Parameters
+    ----------
+    lit : float
+        A bright level above this means light.
+    doubly_lit : float
+        Above this it is the light of two pulses; infinite where no background tells.
+    """
+
+    lit: float
+    doubly_lit: float = np.inf
+
+
+_HOW = defaultdict(str) | {
+    Flaw.INCOMPLETE: " (incomplete)",
+    Flaw.WRONG_SIZE: " (of wrong size)",
+    Flaw.UNPROVEN: " (frames came that are not proven to be it)",
+}
+
+Thresholds = Mapping[str, tuple[LightLevels, LightLevels]]
+"""Per view, for frames A and B."""
 
 
 @dataclass(frozen=True)
@@ -34,23 +63,25 @@ class ShotFindings:
     ----------
     missing : tuple[str, ...]
         Exposures that did not arrive.
-    unlit : tuple[str, ...]
-        Exposures that arrived without light although their view should be lit.
+    unlit, doubly_lit : tuple[str, ...]
+        Exposures that arrived without light although their view should be lit, and with the light of two pulses.
     misfired : str
         How the fired pulse train differs from the one asked for.
     """
 
     missing: tuple[str, ...] = ()
     unlit: tuple[str, ...] = ()
+    doubly_lit: tuple[str, ...] = ()
     misfired: str = ""
 
     @property
     def good(self) -> bool:
         """Nothing is wrong."""
-        return not (self.missing or self.unlit or self.misfired)
+        return not (self.missing or self.unlit or self.doubly_lit or self.misfired)
 
     def __str__(self) -> str:
         texts = [f"no exposure {name}" for name in self.missing] + [f"no light in {name}" for name in self.unlit]
+        texts += [f"the light of two pulses in {name}" for name in self.doubly_lit]
         return ", ".join(texts + ([f"fired otherwise: {self.misfired}"] if self.misfired else []))
 
 
@@ -91,35 +122,59 @@ def light_thresholds(bits: Mapping[str, int], dark: ReferenceImages, background:
     """Thresholds from the mean dark and background images, or from full scale where a view has no background."""
     thresholds = {}
     for view, depth in bits.items():
+        most = 2**depth - 1
         low = [bright_level(image) for image in dark[view]] if view in dark else [0.0, 0.0]
         if view in background:
             high = [bright_level(image) for image in background[view]]
-            levels = [a + LIT_FRACTION_OF_BACKGROUND * (b - a) for a, b in zip(low, high, strict=True)]
+            levels = [_levels(a, b, most) for a, b in zip(low, high, strict=True)]
         else:
-            levels = [LIT_FRACTION_OF_SCALE * (2**depth - 1)] * 2
+            levels = [LightLevels(LIT_FRACTION_OF_SCALE * most)] * 2
         thresholds[view] = (levels[0], levels[1])
     return thresholds
 
 
-def check_exposures(
-    views: Mapping[str, DoubleFrame], lit: Mapping[str, bool], thresholds: Thresholds, misfired: str = ""
-) -> ShotFindings:
-    """Look for exposures that are missing, and for dark ones of the views that should be lit."""
-    missing: list[str] = []
-    unlit: list[str] = []
-    for view, double_frame in views.items():
-        exposures = (
-            ("A", double_frame.frame_a, double_frame.record_a),
-            ("B", double_frame.frame_b, double_frame.record_b),
-        )
-        for (name, image, record), threshold in zip(exposures, thresholds[view], strict=True):
-            if image is None:
-                continue
-            if not record.valid:
-                missing.append(f"{name} of {view}")
-            elif lit[view] and bright_level(image) < threshold:
-                unlit.append(f"{name} of {view}")
-    return ShotFindings(tuple(missing), tuple(unlit), misfired)
+def _levels(dark: float, background: float, most: int) -> LightLevels:
+    double = dark + DOUBLE_FRACTION_OF_BACKGROUND * (background - dark)
+    lit = dark + LIT_FRACTION_OF_BACKGROUND * (background - dark)
+    return LightLevels(lit, double if dark < background and double < _FULL * most else np.inf)
+
+
+def marked(views: Mapping[str, DoubleFrame], lit: Mapping[str, bool], thresholds: Thresholds) -> dict[str, DoubleFrame]:
+    """The same views, with a flaw on each exposure that is dark although it should be lit, or doubly lit."""
+    return {view: _marked(frames, lit[view], thresholds[view]) for view, frames in views.items()}
+
+
+def _marked(frames: DoubleFrame, lit: bool, levels: tuple[LightLevels, LightLevels]) -> DoubleFrame:
+    return replace(
+        frames,
+        record_a=_judged(frames.frame_a, frames.record_a, lit, levels[0]),
+        record_b=_judged(frames.frame_b, frames.record_b, lit, levels[1]),
+    )
+
+
+def _judged(image: Image | None, record: ExposureRecord, lit: bool, levels: LightLevels) -> ExposureRecord:
+    if image is None or not record.valid:
+        return record
+    level = bright_level(image)
+    if lit and level < levels.lit:
+        return replace(record, flaw=Flaw.DARK)
+    return replace(record, flaw=Flaw.DOUBLY_LIT) if level > levels.doubly_lit else record
+
+
+def check_exposures(views: Mapping[str, DoubleFrame], misfired: str = "") -> ShotFindings:
+    """What is wrong with the exposures of a shot, by their flaws."""
+    exposures = [
+        (f"{name} of {view}", record)
+        for view, frames in views.items()
+        for name, image, record in (("A", frames.frame_a, frames.record_a), ("B", frames.frame_b, frames.record_b))
+        if image is not None
+    ]
+    return ShotFindings(
+        missing=tuple(f"{name}{_HOW[record.flaw]}" for name, record in exposures if not record.valid),
+        unlit=tuple(name for name, record in exposures if record.flaw is Flaw.DARK),
+        doubly_lit=tuple(name for name, record in exposures if record.flaw is Flaw.DOUBLY_LIT),
+        misfired=misfired,
+    )
 
 
 def bright_level(image: Image | np.ndarray) -> float:

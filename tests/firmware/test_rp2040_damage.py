@@ -95,9 +95,13 @@ def test_a_program_that_changes_while_armed_gives_light_for_a_millisecond_at_mos
 
 
 def test_a_program_that_changes_between_shots_is_written_anew_for_the_next(board: Board) -> None:
-    for address in range(1, 12):
-        board.pico.write_word(PIO_BLOCKS[0] + INSTRUCTIONS + 4 * address, 0x0000)
-        assert board.shoot() == sorted(edge for i in range(4) for edge in PAPER.edges(i)), address
+    """As late as can be: the main loop, too, writes the programs anew, an instruction in a turn."""
+
+    def spoil() -> None:
+        for address in range(1, 12):
+            board.pico.write_word(PIO_BLOCKS[0] + INSTRUCTIONS + 4 * address, 0x0000)
+
+    assert board.fire_after(spoil) == sorted(edge for i in range(4) for edge in PAPER.edges(i))
 
 
 def test_a_program_that_changes_while_a_trigger_is_awaited_is_mended(board: Board) -> None:

@@ -134,6 +134,19 @@ class Board:
     def arm(self, shots: int, source: Source = Source.COMMAND, period_us: int = 0) -> None:
         assert self.ask(Command.ARM, shots, source, period_us).error is None
 
+    def fire_after(self, change: Callable[[], None]) -> Waveform:
+        """Fire as ``shoot`` does; something changes just before the last byte of the request."""
+        line = self._line(Command.FIRE)
+        self.pico.receive(line[:-1])
+        self.pico.run_ms(1)
+        self.pico.edges.clear()
+        self.pico.sent.clear()
+        change()
+        self.pico.feed(line[-1])
+        self._await_reply()
+        self.pico.run_ms(PERIOD_MS)
+        return self.waveform()
+
     def shoot(self, time_ms: float = PERIOD_MS) -> Waveform:
         """Fire, let the period pass, and measure what the outputs did."""
         self.pico.edges.clear()
