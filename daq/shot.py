@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from enum import IntEnum
 from typing import Annotated
 
 import numpy as np
@@ -13,6 +14,24 @@ from daq.run_plan import ImageKey
 Image = NDArray[np.uint8] | NDArray[np.uint16]
 
 
+class Flaw(IntEnum):
+    """What is wrong with an exposure. The first four did not arrive as they should, the others have the wrong light."""
+
+    NONE = 0
+    LOST = 1
+    """Nothing came before the deadline; what comes later is counted as ``late_frames`` of a later shot."""
+    INCOMPLETE = 2
+    """Packets of it never came."""
+    WRONG_SIZE = 3
+    """It came with other rows or columns than the camera was told."""
+    UNPROVEN = 4
+    """It came, but nothing proves that it is this exposure of this shot: swapped, a neighbour lost, too many frames."""
+    DARK = 5
+    """It shows no light although its view was lit."""
+    DOUBLY_LIT = 6
+    """It shows far more light than its background."""
+
+
 @dataclass(frozen=True)
 class ExposureRecord:
     """What the camera said of one exposure."""
@@ -22,6 +41,13 @@ class ExposureRecord:
     device_timestamp_ns: Annotated[int, Field(description="camera clock at the exposure; 0 where missing")] = 0
     missing_packets: Annotated[int, Field(description="network packets that never came")] = 0
     resent_packets: Annotated[int, Field(description="network packets that came on the second request")] = 0
+    flaw: Annotated[
+        Flaw,
+        Field(
+            description="0: none; 1: lost; 2: incomplete; 3: of wrong size; 4: not proven to be this one; 5: dark; 6: "
+            "doubly lit"
+        ),
+    ] = Flaw.NONE
 
 
 @dataclass(frozen=True)
@@ -35,12 +61,15 @@ class DoubleFrame:
         exposure keeps its slot. ``frame_b`` is None in runs with single exposures.
     record_a, record_b : ExposureRecord
         What the camera said of each.
+    late_frames : int
+        Frames of earlier shots that came since the one before this.
     """
 
     frame_a: Image
     frame_b: Image | None
     record_a: ExposureRecord
     record_b: ExposureRecord
+    late_frames: int = 0
 
     @property
     def valid(self) -> bool:
@@ -93,6 +122,12 @@ class Shot:
         Unix time of the firing; 0 for imported images.
     stage_z_mm : float | None
         Position of the calibration target, where there is one.
+    refires : int
+        How often it was fired before, with an exposure missing each time; their sequence numbers were given up.
+    period_ns : int
+        Time since the firing before, of whatever shot, by a clock that nobody sets; 0 for the first one.
+    clock_step_ns : int
+        By how much the host's clock was set since then, against that clock.
     """
 
     index: int
@@ -101,6 +136,9 @@ class Shot:
     fired: FiredTrain | None = None
     host_time_ns: int = 0
     stage_z_mm: float | None = None
+    refires: int = 0
+    period_ns: int = 0
+    clock_step_ns: int = 0
 
     @property
     def valid(self) -> bool:

@@ -1,6 +1,7 @@
 """GigE Vision double-frame camera: arms it by its profile, and proves that two frames are exposures A and B."""
 
 import logging
+from dataclasses import replace
 from threading import Lock, Thread
 from types import TracebackType
 from typing import TYPE_CHECKING, Self

@@ -263,13 +263,15 @@ class AravisStream:
 
     def _arrival(self, buffer: Any) -> Arrival:
         missing, resent = self._count("n_missing_packets"), self._count("n_resent_packets")
-        whole = buffer.get_status() == Aravis.BufferStatus.SUCCESS and self._fits(buffer)
+        arrived = buffer.get_status() == Aravis.BufferStatus.SUCCESS
+        whole = arrived and self._fits(buffer)
         arrival = Arrival(
             frame_id=int(buffer.get_frame_id()),
             device_timestamp_ns=int(buffer.get_timestamp()) if whole else 0,
             image=self._form.image_of(self._memory[buffer]) if whole else None,
             missing_packets=missing - self._missing_packets,
             resent_packets=resent - self._resent_packets,
+            wrong_size=arrived and not whole,
         )
         self._missing_packets, self._resent_packets = missing, resent
         return arrival

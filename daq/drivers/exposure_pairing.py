@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.drivers.camera_profile import PairSpacing
-from daq.shot import DoubleFrame, ExposureRecord, Image
+from daq.shot import DoubleFrame, ExposureRecord, Flaw, Image
 
 _FRAME_IDS = 65535
 
@@ -32,6 +32,8 @@ class Arrival:
         Grey values, (row, column); None where packets are missing or the size is wrong.
     missing_packets, resent_packets : int
         What the stream counted since the frame before.
+    wrong_size : bool
+        It is whole, but has other rows or columns than it should.
     """
 
     frame_id: int
@@ -39,10 +41,12 @@ class Arrival:
     image: Image | None
     missing_packets: int = 0
     resent_packets: int = 0
+    wrong_size: bool = False
 
-    def record(self, *, valid: bool) -> ExposureRecord:
+    def record(self, flaw: Flaw = Flaw.NONE) -> ExposureRecord:
         """What the shot file keeps of it."""
-        return ExposureRecord(valid, self.frame_id, self.device_timestamp_ns, self.missing_packets, self.resent_packets)
+        counted = (self.frame_id, self.device_timestamp_ns, self.missing_packets, self.resent_packets)
+        return ExposureRecord(flaw is Flaw.NONE, *counted, flaw=flaw)
 
 
 @dataclass(frozen=True)
@@ -136,7 +140,8 @@ def double_frame(arrivals: Sequence[Arrival], last_id: int | None, form: Exposur
     if form.stacked:
         placed = [_half(placed[0], index, form) for index in range(form.frames)]
     trusted = _is_one_pair(placed, form.pair)
-    images, records = zip(*(_exposure(arrival, trusted, form) for arrival in placed), strict=True)
+    unplaced = bool(arrivals) and not any(placed)
+    images, records = zip(*(_exposure(arrival, trusted, form, unplaced) for arrival in placed), strict=True)
     if form.frames == 1:
         return DoubleFrame(images[0], None, records[0], ExposureRecord(valid=False))
     return DoubleFrame(images[0], images[1], records[0], records[1])
@@ -158,9 +163,13 @@ def _is_one_pair(placed: Sequence[Arrival | None], pair: PairSpacing | None) -> 
     return abs(spacing_ns - pair.spacing_ns) <= pair.tolerance_ns
 
 
-def _exposure(arrival: Arrival | None, trusted: bool, form: ExposureFormat) -> tuple[Image, ExposureRecord]:
+def _exposure(
+    arrival: Arrival | None, trusted: bool, form: ExposureFormat, unplaced: bool
+) -> tuple[Image, ExposureRecord]:
     if arrival is None:
-        return form.blank(), ExposureRecord(valid=False)
-    if arrival.image is None or not trusted:
-        return form.blank(), arrival.record(valid=False)
-    return arrival.image, arrival.record(valid=True)
+        return form.blank(), ExposureRecord(valid=False, flaw=Flaw.UNPROVEN if unplaced else Flaw.LOST)
+    if arrival.image is None:
+        return form.blank(), arrival.record(Flaw.WRONG_SIZE if arrival.wrong_size else Flaw.INCOMPLETE)
+    if not trusted:
+        return form.blank(), arrival.record(Flaw.UNPROVEN)
+    return arrival.image, arrival.record()

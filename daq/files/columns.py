@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from daq.files.header import RunHeader
 from daq.run_plan import ImageKey
-from daq.shot import DoubleFrame, ExposureRecord, FiredTrain, Image, LightPulse, Shot
+from daq.shot import DoubleFrame, ExposureRecord, FiredTrain, Flaw, Image, LightPulse, Shot
 
 Columns = Mapping[str, NDArray[Any]]
 
@@ -27,12 +27,13 @@ NO_EDGE_NS = -(2**63)
 
 @dataclass(frozen=True)
 class Column:
-    """Number type, unit, and axes after the shot axis."""
+    """Number type, unit, and axes after the shot axis; one that came later is missing in older files, and 0 there."""
 
     dtype: str
     units: str
     shape: tuple[int, ...] = ()
     axes: str = "shot"
+    later: bool = False
 
 
 _SHOT_COLUMNS = {
@@ -41,6 +42,9 @@ _SHOT_COLUMNS = {
     "sequence": Column("i8", "1"),
     "host_time_ns": Column("i8", "ns"),
     "stage_z_mm": Column("f8", "mm"),
+    "refires": Column("i8", "1", later=True),
+    "period_ns": Column("i8", "ns", later=True),
+    "clock_step_ns": Column("i8", "ns", later=True),
 }
 _EXPOSURE_COLUMNS = {
     "valid": ("?", "1"),
@@ -48,7 +52,9 @@ _EXPOSURE_COLUMNS = {
     "device_timestamp_ns": ("i8", "ns"),
     "missing_packets": ("i8", "1"),
     "resent_packets": ("i8", "1"),
+    "flaw": ("u1", "1"),
 }
+_LATER_OF_EXPOSURES = ("flaw",)
 _PULSE_COLUMNS = {"start_ns": ("i8", "ns"), "width_ns": ("i8", "ns"), "current_a": ("f8", "A")}
 
 
@@ -75,7 +81,9 @@ def columns_of(header: RunHeader) -> dict[str, Column]:
         columns[crc32_path(view)] = Column("u4", "1", frames, "shot,frame")
         columns[view_path(view, "camera_trigger_ns")] = Column("i8", "ns")
         for name, (dtype, units) in _EXPOSURE_COLUMNS.items():
-            columns[view_path(view, name)] = Column(dtype, units, frames, "shot,frame")
+            later = name in _LATER_OF_EXPOSURES
+            columns[view_path(view, name)] = Column(dtype, units, frames, "shot,frame", later)
+        columns[view_path(view, "late_frames")] = Column("i8", "1", later=True)
         for name, (dtype, units) in _PULSE_COLUMNS.items():
             columns[view_path(view, f"pulse_{name}")] = Column(dtype, units, (PULSE_SLOTS,), "shot,pulse")
     return columns
@@ -95,11 +103,15 @@ def shot_to_columns(shot: Shot, header: RunHeader) -> dict[str, NDArray[Any]]:
         "/shots/sequence": shot.fired.sequence if shot.fired else NO_SEQUENCE,
         "/shots/host_time_ns": shot.host_time_ns,
         "/shots/stage_z_mm": np.nan if shot.stage_z_mm is None else shot.stage_z_mm,
+        "/shots/refires": shot.refires,
+        "/shots/period_ns": shot.period_ns,
+        "/shots/clock_step_ns": shot.clock_step_ns,
     }
     fired = shot.fired or FiredTrain(NO_SEQUENCE)
     for view in header.views:
         double_frame = shot.views[view]
         records = (double_frame.record_a, double_frame.record_b)[: header.frames_per_shot]
+        values[view_path(view, "late_frames")] = double_frame.late_frames
         values[view_path(view, "camera_trigger_ns")] = fired.camera_trigger_ns.get(view, NO_EDGE_NS)
         for name in _EXPOSURE_COLUMNS:
             values[view_path(view, name)] = [getattr(record, name) for record in records]
@@ -120,6 +132,9 @@ def shot_from_columns(columns: Columns, frames: Mapping[str, list[Image]]) -> Sh
         fired=None if sequence == NO_SEQUENCE else _fired_train(columns, sequence, frames),
         host_time_ns=int(columns["/shots/host_time_ns"]),
         stage_z_mm=None if np.isnan(stage_z_mm) else stage_z_mm,
+        refires=int(columns["/shots/refires"]),
+        period_ns=int(columns["/shots/period_ns"]),
+        clock_step_ns=int(columns["/shots/clock_step_ns"]),
     )
 
 
@@ -132,10 +147,12 @@ def _pulse_slots(view: str, pulses: tuple[LightPulse, ...]) -> dict[str, list[fl
 
 def _double_frame(columns: Columns, view: str, images: list[Image]) -> DoubleFrame:
     fields = [columns[view_path(view, name)].tolist() for name in _EXPOSURE_COLUMNS]
-    records = [ExposureRecord(*values) for values in zip(*fields, strict=True)]
+    exposures = [dict(zip(_EXPOSURE_COLUMNS, values, strict=True)) for values in zip(*fields, strict=True)]
+    records = [ExposureRecord(**{**exposure, "flaw": Flaw(exposure["flaw"])}) for exposure in exposures]
+    late_frames = int(columns[view_path(view, "late_frames")])
     if len(images) == 1:
-        return DoubleFrame(images[0], None, records[0], ExposureRecord(valid=False))
-    return DoubleFrame(images[0], images[1], records[0], records[1])
+        return DoubleFrame(images[0], None, records[0], ExposureRecord(valid=False), late_frames)
+    return DoubleFrame(images[0], images[1], records[0], records[1], late_frames)
 
 
 def _fired_train(columns: Columns, sequence: int, views: Iterable[str]) -> FiredTrain:

@@ -11,7 +11,7 @@ from daq.files.atomic_file import replacing
 from daq.files.columns import columns_of, frames_path
 from daq.files.header import RunHeader
 from daq.files.run_file import RUN_FILE, shot_path
-from daq.files.shot_file import LIBRARY_VERSIONS, create_frames, reading_shot
+from daq.files.shot_file import LIBRARY_VERSIONS, create_frames, is_missing, reading_shot
 
 
 def pack_run(run_dir: Path, header: RunHeader, shot_count: int, out: Path) -> None:
@@ -41,15 +41,17 @@ def _replace_view(packed: h5py.File, header: RunHeader, shot_count: int) -> None
         del packed[frames_path(view)]
         create_frames(packed, view, view_format, (shot_count, header.frames_per_shot))
     for path, column in columns_of(header).items():
-        del packed[path]
+        if path in packed:
+            del packed[path]
         dataset = packed.create_dataset(path, (shot_count, *column.shape), np.dtype(column.dtype))
         dataset.attrs.update(units=column.units, dimensions=column.axes)
 
 
 def _copy_shot(path: Path, header: RunHeader, index: int, packed: h5py.File) -> None:
     with reading_shot(path, header) as shot:
-        for name in columns_of(header):
-            packed[name][index] = shot[name][0]
+        for name, column in columns_of(header).items():
+            if not is_missing(shot, column):
+                packed[name][index] = shot[name][0]
         for view in header.views:
             source, target = shot[frames_path(view)].id, packed[frames_path(view)].id
             for number in range(header.frames_per_shot):

@@ -1,6 +1,6 @@
 """RUN/shots/N.h5: one shot. Written to a part, fsynced, committed by rename; never written again."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +22,8 @@ LIBRARY_VERSIONS = ("v110", "v110")
 """Format of every file: newer formats cannot be opened by the HDF5 1.10 tools of current distributions."""
 SHOT_SCHEMA = "tomoshadow-shot"
 SCHEMA_VERSION = 1
+SHOT_VERSION = 2
+"""Of shot files: in those of version 1 the later columns are missing."""
 
 
 @dataclass(frozen=True)
@@ -63,10 +65,10 @@ def write_encoded_shot(path: Path, encoded: EncodedShot, header: RunHeader) -> N
     """Write one file; the caller syncs and commits it."""
     described = columns_of(header)
     with h5py.File(path, "w", libver=LIBRARY_VERSIONS) as file:
-        file.attrs.update(schema=SHOT_SCHEMA, schema_version=SCHEMA_VERSION, run_id=header.run_id)
-        create_groups(file, header)
+        file.attrs.update(_fixed(schema=SHOT_SCHEMA, schema_version=SHOT_VERSION, run_id=header.run_id))
+        create_groups(file, header, _fixed)
         for view, view_format in header.views.items():
-            frames = create_frames(file, view, view_format, (1, header.frames_per_shot))
+            frames = create_frames(file, view, view_format, (1, header.frames_per_shot), _fixed)
             for number, frame in enumerate(encoded.frames[view]):
                 frames.id.write_direct_chunk((0, number, 0, 0), frame.chunk)
         for name, values in encoded.columns.items():
@@ -78,7 +80,7 @@ def reading_shot(path: Path, header: RunHeader) -> Iterator[h5py.File]:
     """Open a shot of this run and turn what can go wrong into ShotFileError."""
     try:
         with h5py.File(path, "r") as file:
-            if file.attrs["schema"] != SHOT_SCHEMA or file.attrs["run_id"] != header.run_id:
+            if (_text(file.attrs["schema"]), _text(file.attrs["run_id"])) != (SHOT_SCHEMA, header.run_id):
                 raise ForeignFile(f"{path}: not a shot of run {header.run_id}")
             yield file
     except (OSError, KeyError, ValueError, IndexError, TypeError, AttributeError, RuntimeError) as error:
@@ -94,7 +96,7 @@ def read_shot_file(path: Path, header: RunHeader) -> Shot:
         The file is missing, torn, damaged, or belongs to another run; the text names it.
     """
     with reading_shot(path, header) as file:
-        columns = {name: file[name][0] for name in columns_of(header)}
+        columns = {name: _read_column(file, name, column) for name, column in columns_of(header).items()}
         frames = {
             view: _read_frames(path, file, view, view_format, columns[crc32_path(view)])
             for view, view_format in header.views.items()
@@ -111,16 +113,25 @@ def read_image_key(path: Path) -> ImageKey:
         return ImageKey.INVALID
 
 
-def create_groups(file: h5py.File, header: RunHeader) -> None:
-    """Create the groups that shot files and ``run.h5`` have in common."""
-    file.attrs["NX_class"] = "NXroot"
-    file.create_group("shots").attrs["NX_class"] = "NXcollection"
-    file.create_group("cameras").attrs["NX_class"] = "NXinstrument"
+Attributes = Mapping[str, Any]
+
+
+def create_groups(file: h5py.File, header: RunHeader, stored: Callable[..., Attributes] = dict) -> None:
+    """Create the groups that shot files and ``run.h5`` have in common; ``stored`` says how texts are kept."""
+    file.attrs.update(stored(NX_class="NXroot"))
+    file.create_group("shots").attrs.update(stored(NX_class="NXcollection"))
+    file.create_group("cameras").attrs.update(stored(NX_class="NXinstrument"))
     for view in header.views:
-        file.create_group(view_path(view, "")).attrs["NX_class"] = "NXdetector"
+        file.create_group(view_path(view, "")).attrs.update(stored(NX_class="NXdetector"))
 
 
-def create_frames(file: h5py.File, view: str, view_format: ViewFormat, leading: tuple[int, int]) -> h5py.Dataset:
+def create_frames(
+    file: h5py.File,
+    view: str,
+    view_format: ViewFormat,
+    leading: tuple[int, int],
+    stored: Callable[..., Attributes] = dict,
+) -> h5py.Dataset:
     """Create the dataset for the frames of one view, (shot, frame, row, column), one chunk per frame."""
     dataset = file.create_dataset(
         frames_path(view),
@@ -132,7 +143,7 @@ def create_frames(file: h5py.File, view: str, view_format: ViewFormat, leading: 
         compression_opts=1,
         shuffle=is_shuffled(view_format.dtype),
     )
-    dataset.attrs.update(units="counts", dimensions="shot,frame,row,column", significant_bits=view_format.bits)
+    dataset.attrs.update(stored(units="counts", dimensions="shot,frame,row,column", significant_bits=view_format.bits))
     return dataset
 
 
@@ -158,7 +169,28 @@ def _create_column(file: h5py.File, name: str, column: Column, values: NDArray[A
     kind = h5t.py_create(values.dtype, logical=True)
     stored = h5d.create(file.id, name.encode(), kind, space, layout)
     stored.write(h5s.ALL, h5s.ALL, np.ascontiguousarray(values[np.newaxis]))
-    h5py.Dataset(stored).attrs.update(units=column.units, dimensions=column.axes)
+    h5py.Dataset(stored).attrs.update(_fixed(units=column.units, dimensions=column.axes))
+
+
+def _fixed(**attributes: Any) -> Attributes:
+    """Texts of fixed length lie in the object header, whose checksum finds damage.
+
+    Others would lie in a heap without a checksum, and HDF5 reads a damaged heap for ever.
+    """
+    return {name: np.bytes_(value.encode()) if isinstance(value, str) else value for name, value in attributes.items()}
+
+
+def _text(attribute: str | bytes) -> str:
+    return attribute.decode() if isinstance(attribute, bytes) else attribute
+
+
+def is_missing(shot: h5py.File, column: Column) -> bool:
+    """Whether a shot file is from before a column, by its version: h5py says that a damaged name is not there."""
+    return bool(column.later and shot.attrs["schema_version"] < SHOT_VERSION)
+
+
+def _read_column(file: h5py.File, name: str, column: Column) -> Any:
+    return np.zeros(column.shape, column.dtype) if is_missing(file, column) else file[name][0]
 
 
 def _read_frames(path: Path, file: h5py.File, view: str, view_format: ViewFormat, crc32: NDArray[Any]) -> list[Image]:

@@ -10,7 +10,8 @@ from daq.devices import Camera
 from daq.errors import DeviceRefused
 from daq.run import light
 from daq.run.active_run import Shooting
-from daq.run.shot_check import ShotFindings, Thresholds, check_exposures
+from daq.run.firing_clock import FiringClock
+from daq.run.shot_check import ShotFindings, Thresholds, check_exposures, marked
 from daq.run.side_by_side import SideBySide
 from daq.run.train_check import train_deviation
 from daq.run_plan import ImageKey
@@ -71,6 +72,7 @@ class ShotTaker:
         self._shortest_s = self._timing.shortest_period_ns / 1e9
         self._due_s = 0.0
         self._armed = False
+        self._clock = FiringClock()
         self._stage_z_mm: float | None = None
         self.last_fired: int | None = None
         """Index of the shot that was fired last, whatever became of it."""
@@ -93,14 +95,16 @@ class ShotTaker:
         position, number = divmod(index, self._plan.shots)
         if position and not number:
             self.load_position(position)
+        refires = 0
         while self._ending.wait_until(self._due_s):
             self._rebase()
             if not self._armed and not self._arm(self._plan.shots - number):
                 return None
-            shot, findings = self._fire(index)
+            shot, findings = self._fire(index, refires)
             if shot is None or not findings.missing or not self._refires_left:
                 return shot
             self._refires_left -= 1
+            refires += 1
             self._say(f"shot {index} is fired again, {self._refires_left} more permitted")
         return None
 
@@ -128,20 +132,23 @@ class ShotTaker:
             self._darken()
         _raise_first(rebasing.errors(self._frame_deadline_s))
 
-    def _fire(self, index: int) -> tuple[Shot | None, ShotFindings]:
+    def _fire(self, index: int, refires: int) -> tuple[Shot | None, ShotFindings]:
         """Fire and look at what came of it."""
-        host_time_ns = time.time_ns()
-        sent_s = time.monotonic()
+        at = self._clock.now()
         fired = self._rig.generator.fire()
         self.last_fired = index
-        self._due_s = next_due_s(self._due_s, (sent_s, time.monotonic()), self._period_s, self._shortest_s)
-        views = self._collect()
-        if views is None:
+        commanded_s = at.steady_ns / 1e9
+        self._due_s = next_due_s(self._due_s, (commanded_s, time.monotonic()), self._period_s, self._shortest_s)
+        collected = self._collect()
+        if collected is None:
             return None, ShotFindings()
-        self._ask_silent(index, views)
+        self._ask_silent(index, collected)
+        lit = {view: one.current_a > 0 for view, one in self._timing.views.items()}
+        views = marked(collected, lit, self._thresholds)
         findings = self._check(index, fired, views)
         key = self._plan.kind.image_key if findings.good else ImageKey.INVALID
-        return Shot(index, key, views, fired, host_time_ns, self._stage_z_mm), findings
+        when = (at.host_time_ns, self._stage_z_mm, refires, at.period_ns, at.clock_step_ns)
+        return Shot(index, key, views, fired, *when), findings
 
     def _collect(self) -> dict[str, DoubleFrame] | None:
         """Collect the exposures of all views before one common deadline; None if the run ends at once."""
@@ -163,9 +170,7 @@ class ShotTaker:
             _raise_first(SideBySide("a question", _ask, silent).errors(self._frame_deadline_s))
 
     def _check(self, index: int, fired: FiredTrain, views: dict[str, DoubleFrame]) -> ShotFindings:
-        lit = {view: one.current_a > 0 for view, one in self._timing.views.items()}
-        misfired = train_deviation(self._timing, fired) or ""
-        findings = check_exposures(views, lit, self._thresholds, misfired)
+        findings = check_exposures(views, train_deviation(self._timing, fired) or "")
         if not findings.good:
             self._say(f"shot {index}: {findings}")
         return findings

@@ -151,10 +151,10 @@ def test_every_number_has_a_unit_and_nexus_finds_its_way(tmp_path: Path) -> None
         if (group and "NX_class" not in found.attrs) or (number and "units" not in found.attrs):
             lacking.append(name)
 
-    for name in ("run.h5", "shots/0.h5"):
+    for name, version in (("run.h5", 1), ("shots/0.h5", 2)):
         with h5py.File(tmp_path / "run" / name) as file:
             file.visititems(visit)
-            assert file.attrs["schema_version"] == 1
+            assert file.attrs["schema_version"] == version
     assert not lacking
     with h5py.File(tmp_path / "run" / "run.h5") as file:
         data = file[file.attrs["default"]][file["entry"].attrs["default"]]

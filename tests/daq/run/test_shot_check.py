@@ -5,11 +5,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from daq.run.shot_check import ShotFindings, check_exposures, light_thresholds
-from daq.shot import DoubleFrame, ExposureRecord
+from daq.run.shot_check import LightLevels, ShotFindings, Thresholds, check_exposures, light_thresholds, marked
+from daq.shot import DoubleFrame, ExposureRecord, Flaw
 
 SHAPE = (200, 48)
-THRESHOLDS = {"view1": (20.0, 20.0)}
+THRESHOLDS = {"view1": (LightLevels(20.0), LightLevels(20.0))}
+
+
+def findings_of(shot: DoubleFrame, thresholds: Thresholds, *, lit: bool = True) -> ShotFindings:
+    return check_exposures(marked({"view1": shot}, {"view1": lit}, thresholds))
 
 
 def double_frame(level_a: float, level_b: float, valid_a: bool = True, valid_b: bool = True) -> DoubleFrame:
@@ -29,16 +33,29 @@ def double_frame(level_a: float, level_b: float, valid_a: bool = True, valid_b: 
     ],
 )
 def test_each_fault_has_its_name(levels: tuple[int, int], valid: tuple[bool, bool], expected: ShotFindings) -> None:
-    findings = check_exposures({"view1": double_frame(*levels, *valid)}, {"view1": True}, THRESHOLDS)
+    findings = findings_of(double_frame(*levels, *valid), THRESHOLDS)
     assert findings == expected
     assert findings.good == (expected == ShotFindings())
 
 
 def test_a_view_that_is_not_lit_may_be_dark_but_not_missing() -> None:
-    dark = {"view1": double_frame(4, 4)}
-    assert check_exposures(dark, {"view1": False}, THRESHOLDS).good
-    lost = {"view1": double_frame(4, 0, valid_b=False)}
-    assert check_exposures(lost, {"view1": False}, THRESHOLDS).missing == ("B of view1",)
+    assert findings_of(double_frame(4, 4), THRESHOLDS, lit=False).good
+    assert findings_of(double_frame(4, 0, valid_b=False), THRESHOLDS, lit=False).missing == ("B of view1",)
+
+
+@pytest.mark.parametrize(
+    ("flaw", "text"),
+    [
+        (Flaw.LOST, "no exposure B of view1"),
+        (Flaw.INCOMPLETE, "no exposure B of view1 (incomplete)"),
+        (Flaw.WRONG_SIZE, "no exposure B of view1 (of wrong size)"),
+        (Flaw.UNPROVEN, "no exposure B of view1 (frames came that are not proven to be it)"),
+    ],
+)
+def test_it_is_told_how_an_exposure_is_missing(flaw: Flaw, text: str) -> None:
+    image = np.full(SHAPE, 120, np.uint8)
+    shot = DoubleFrame(image, image, ExposureRecord(True), ExposureRecord(False, flaw=flaw))
+    assert str(findings_of(shot, THRESHOLDS)) == text
 
 
 @given(
@@ -53,19 +70,31 @@ def test_references_tell_light_from_dark_at_any_exposure(dark: int, light: int, 
     thresholds = light_thresholds({"view1": bits}, {"view1": unlit}, {"view1": lit})
     spray = lit.copy()
     spray[:, : int(covered * SHAPE[0])] = unlit[:, : int(covered * SHAPE[0])]
-    for stack, expected in ((spray, ()), (unlit, ("A of view1", "B of view1"))):
+    both = ("A of view1", "B of view1")
+    for stack, dark_ones, bright_ones in ((spray, (), ()), (unlit, both, ()), (lit + light * scale, (), both)):
         images = stack.astype(np.uint16)
         shot = DoubleFrame(images[0], images[1], ExposureRecord(True), ExposureRecord(True))
-        assert check_exposures({"view1": shot}, {"view1": True}, thresholds).unlit == expected
+        findings = findings_of(shot, thresholds)
+        assert findings.unlit == dark_ones
+        if dark + 3 + 2 * light <= 245:
+            assert findings.doubly_lit == bright_ones
+
+
+def test_a_background_near_full_scale_tells_no_double_light() -> None:
+    background = np.full((2, *SHAPE), 230.0, np.float32)
+    thresholds = light_thresholds({"view1": 8}, {}, {"view1": background})
+    assert findings_of(double_frame(255, 255), thresholds).good
 
 
 def test_a_single_exposure_has_no_frame_b_to_miss() -> None:
     single = DoubleFrame(np.full(SHAPE, 120, np.uint8), None, ExposureRecord(True), ExposureRecord(False))
-    assert check_exposures({"view1": single}, {"view1": True}, THRESHOLDS).good
+    assert findings_of(single, THRESHOLDS).good
 
 
 def test_findings_read_as_a_sentence() -> None:
-    findings = ShotFindings(("A of view1",), ("B of view2",), "start of pulse 1 of view2 is missing")
+    misfired = "start of pulse 1 of view2 is missing"
+    findings = ShotFindings(("A of view1",), ("B of view2",), ("A of view3",), misfired)
     assert str(findings) == (
-        "no exposure A of view1, no light in B of view2, fired otherwise: start of pulse 1 of view2 is missing"
+        "no exposure A of view1, no light in B of view2, the light of two pulses in A of view3, "
+        "fired otherwise: start of pulse 1 of view2 is missing"
     )
