@@ -53,6 +53,14 @@ def require_room(path: Path, needed_bytes: int, margin_bytes: int) -> None:
         )
 
 
+def disk_of(path: Path) -> int | None:
+    """Number of the disk that a folder lies on; None if there is no such folder."""
+    try:
+        return path.stat().st_dev
+    except OSError:
+        return None
+
+
 def _errno_of(error: OSError | RuntimeError) -> int | None:
     """Number of the system's error; HDF5 hides it in its text where it fails to close a file."""
     if isinstance(error, OSError) and error.errno is not None:

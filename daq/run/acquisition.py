@@ -14,6 +14,7 @@ from daq.devices import Rig
 from daq.errors import BusyError, PlanError, StorageError
 from daq.files.recovery import recover
 from daq.files.run_directory import RunWriter
+from daq.files.storage import disk_of
 from daq.run import light
 from daq.run.active_run import ActiveRun, RunObserver
 from daq.run.ending import RunEnding
@@ -92,8 +93,11 @@ class Acquisition:
         self._ending = RunEnding()
         self._live_ending = RunEnding()
         self._audience = Audience()
+        self._disk: int | None = None
 
     def __enter__(self) -> Self:
+        self._data_dir.mkdir(parents=True, exist_ok=True)
+        self._disk = disk_of(self._data_dir)
         return self
 
     def __exit__(
@@ -245,6 +249,11 @@ class Acquisition:
 
     def _prepare(self, plan: RunPlan) -> tuple[PreparedRun, RunWriter]:
         """Check the plan, and make the directory of the run: a run that is accepted always has one."""
+        if self._disk is not None and disk_of(self._data_dir) != self._disk:
+            raise PlanError(
+                f"{self._data_dir} is gone, or on another disk than when the server was started: "
+                "mount or bring back the right one, or start the server again"
+            )
         try:
             self._data_dir.mkdir(parents=True, exist_ok=True)
             margin_bytes = self._limits.disk_margin_bytes

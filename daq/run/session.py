@@ -48,6 +48,7 @@ class RunSession:
         self._storage = ExitStack()
         self._taker: ShotTaker | None = None
         self._recorder: Recorder | None = None
+        self._finishing = threading.Thread(target=self._attempt, args=(self._finish,), name="outcome", daemon=True)
         self._closed = False
         self._ended_utc = ""
 
@@ -70,23 +71,27 @@ class RunSession:
         return reason
 
     def close(self) -> None:
-        """Wait until every shot is on the disk, then write the outcome."""
+        """Wait until every shot is on the disk, and the outcome too; a disk that hangs is left alone."""
         self._attempt(self._storage.close)
         self._ended_utc = datetime.now(UTC).isoformat()
         if unstored := self._unstored():
             self._run.progress.say(f"fired and not stored: shots {', '.join(map(str, unstored))}")
-        self._attempt(self._finish)
+        self._finishing.start()
+        self._finishing.join(self._run.limits.drain_s)
 
     def insist(self, leaving: threading.Event) -> None:
         """Write an outcome that the disk did not take as soon as it does; when the program ends, leave a note of it."""
+        if self._closed:
+            return
         run_id, tell = self._writer.header.run_id, self._run.progress.tell
-        if not self._closed:
-            tell(run_id, "its outcome could not be written: that is tried again until the disk takes it")
+        tell(run_id, "its outcome could not be written: that is tried again until the disk takes it")
         while not self._closed and not leaving.wait(_RETRY_S):
-            with suppress(DaqError, OSError):
-                self._finish()
-                tell(run_id, f"its outcome is in its file now: {self._ending.outcome}")
-        if not self._closed:
+            if not self._finishing.is_alive():
+                with suppress(DaqError, OSError):
+                    self._finish()
+        if self._closed:
+            tell(run_id, f"its outcome is in its file now: {self._ending.outcome}")
+        else:
             write_note(self._writer.run_dir, self._closing())
 
     def _acquire(self) -> None:

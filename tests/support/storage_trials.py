@@ -14,6 +14,7 @@ from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 
+from daq.errors import PlanError
 from daq.files.run_directory import PulsePair, RunPlan, RunReader
 from daq.run.acquisition import Acquisition
 from daq.run.events import RunEvent, RunMessage, ShotRecorded
@@ -36,7 +37,7 @@ class Trial:
         self.memory = MemoryRig()
         self.events: list[RunEvent] = []
         self._told = threading.Condition()
-        self.acquisition = Acquisition(self.memory.rig, self.disk / "runs", self._publish, limits=limits)
+        self.acquisition = Acquisition(self.memory.rig, self.disk / "runs", self._publish, limits=limits).__enter__()
         self.run_dir = self.disk / "runs" / self.acquisition.start(PLAN)
         self.until(lambda: self.recorded > 2)
 
@@ -100,7 +101,12 @@ def unmounted(folder: Path) -> dict[str, object]:
     second.mkdir()
     _mount("--bind", trial.disk, second)
     subprocess.run(["umount", "--lazy", trial.disk], check=True)
-    return {**trial.end(second / "runs" / trial.run_dir.name), "run_dir": str(trial.run_dir)}
+    found = trial.end(second / "runs" / trial.run_dir.name)
+    try:
+        refused = trial.acquisition.start(PLAN)
+    except PlanError as error:
+        refused = str(error)
+    return {**found, "run_dir": str(trial.run_dir), "refused": refused, "left_behind": os.listdir(trial.disk)}
 
 
 def read_only_for_a_while(folder: Path) -> dict[str, object]:

@@ -29,15 +29,15 @@ ENDINGS: dict[str, tuple[Callable[[Acquisition], None], RunOutcome, str]] = {
 
 
 class Disk:
-    """A disk that holds every shot back until it is let go; other files are not its concern."""
+    """A disk that holds every shot back until it is let go, or what ``holds_back`` says."""
 
     def __init__(self) -> None:
         self.moving = threading.Event()
+        self.holds_back: Callable[[Path], bool] = lambda path: path.suffix == ".part" and path.parent.name == "shots"
         self._fsync = os.fsync
 
     def fsync(self, descriptor: int) -> None:
-        path = Path(os.readlink(f"/proc/self/fd/{descriptor}"))
-        if path.suffix == ".part" and path.parent.name == "shots":
+        if self.holds_back(Path(os.readlink(f"/proc/self/fd/{descriptor}"))):
             assert self.moving.wait(DEADLINE_S)
         self._fsync(descriptor)
 
@@ -127,3 +127,22 @@ def test_a_full_queue_ends_the_run_and_lists_what_it_did_not_take(tmp_path: Path
     assert [cause.code for cause in trial.reader.causes] == [CauseCode.DISK_SLOW]
     assert trial.committed == trial.acknowledged == list(range(8))
     assert trial.reader.unstored == (8,)
+
+
+def test_a_disk_that_hangs_at_the_outcome_ends_the_run_all_the_same(tmp_path: Path, disk: Disk) -> None:
+    def is_last_copy(path: Path) -> bool:
+        return path.name == "run.h5.reserve" and (path.parent / "shots" / "4.h5").exists()
+
+    disk.holds_back = is_last_copy
+    trial = Trial(tmp_path, drain_s=1.0)
+    trial.acquisition.stop()
+    assert trial.acquisition.wait(DEADLINE_S).outcome is RunOutcome.STOPPED
+    assert trial.reader.outcome is None
+    disk.moving.set()
+    pause = threading.Event()
+    while "its outcome is in its file now: stopped" not in trial.messages:
+        pause.wait(0.01)
+    closing = trial.reader.closing
+    assert closing is not None
+    assert (closing.outcome, closing.cause) == ("stopped", "stopped by the operator")
+    assert "its outcome could not be written: that is tried again until the disk takes it" in trial.messages

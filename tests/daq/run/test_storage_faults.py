@@ -67,14 +67,21 @@ def test_light_goes_off_first_and_outcome_and_cause_are_stored(trials: dict[str,
     assert found["codes"] == [code]
     assert found["closing"]["outcome"] == found["status"]["outcome"] == "failed"
     assert cause == found["status"]["message"]
-    assert cause.startswith(
-        f"shot {found['acknowledged']} cannot be stored: {CAUSES[name].format(run_dir=found['run_dir'])}"
-    )
+    shot, reason = cause.split(" cannot be stored: ")
+    assert int(shot.removeprefix("shot ")) in found["unstored"]
+    assert reason.startswith(CAUSES[name].format(run_dir=found["run_dir"]))
     assert cause.endswith("then start again")
     assert "rrno" not in cause, "numbers of the system help no operator"
     assert found["readable"] == found["acknowledged"] >= 3
     assert [*range(found["acknowledged"]), *found["unstored"]] == list(range(found["fired"]))
     assert found["parts"] == [] or name in ("moved", "unmounted"), "out of reach, the next start sets it aside"
+
+
+def test_no_run_starts_on_the_disk_that_lies_below_one_that_is_gone(trials: dict[str, dict[str, Any]]) -> None:
+    found = trials["unmounted"]
+    data_dir = Path(found["run_dir"]).parent
+    assert found["refused"].startswith(f"{data_dir} is gone, or on another disk than when the server was started")
+    assert found["left_behind"] == []
 
 
 def test_a_run_ends_at_the_margin_and_not_at_the_last_byte(trials: dict[str, dict[str, Any]]) -> None:
