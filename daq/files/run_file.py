@@ -22,7 +22,7 @@ from daq.files.atomic_file import amending, replacing, reserve, spending_reserve
 from daq.files.columns import columns_of, frames_path, view_path
 from daq.files.encoding import encode_frame
 from daq.files.header import RunClosing, RunHeader
-from daq.files.shot_file import LIBRARY_VERSIONS, SCHEMA_VERSION, create_groups
+from daq.files.shot_file import LIBRARY_VERSIONS, SCHEMA_VERSION, create_groups, unreadable
 from daq.run_notes import RunNotes
 
 RUN_FILE = "run.h5"
@@ -160,7 +160,7 @@ def reading(run_dir: Path) -> Iterator[h5py.File]:
                 raise ShotFileError(f"{path}: {schema} {version}, this program reads {RUN_SCHEMA} {SCHEMA_VERSION}")
             yield file
     except (OSError, KeyError, ValueError, TypeError, AttributeError, RuntimeError) as error:
-        raise ShotFileError(f"{path}: cannot be read: {error}") from error
+        raise unreadable(path, error) from error
 
 
 @contextmanager

@@ -84,7 +84,7 @@ def reading_shot(path: Path, header: RunHeader) -> Iterator[h5py.File]:
                 raise ForeignFile(f"{path}: not a shot of run {header.run_id}")
             yield file
     except (OSError, KeyError, ValueError, IndexError, TypeError, AttributeError, RuntimeError) as error:
-        raise ShotFileError(f"{path}: cannot be read: {error}") from error
+        raise unreadable(path, error) from error
 
 
 def read_shot_file(path: Path, header: RunHeader) -> Shot:
@@ -204,6 +204,18 @@ def _read_frames(path: Path, file: h5py.File, view: str, view_format: ViewFormat
     return frames
 
 
+def unreadable(path: Path, error: Exception) -> ShotFileError:
+    """Why a file of a run cannot be read, and what to do; the words of HDF5 help no operator and stay in the chain."""
+    told = str(error)
+    if isinstance(error, FileNotFoundError):
+        told = "it is missing: copy it back from a backup"
+    elif isinstance(error, PermissionError):
+        told = "the permission to read it is missing"
+    elif isinstance(error, OSError | RuntimeError):
+        told = "it is torn or damaged: copy it back from a backup"
+    return ShotFileError(f"{path}: cannot be read: {told}")
+
+
 def read_formats(path: Path) -> tuple[str, dict[str, ViewFormat], int]:
     """Run id, views and exposures per view, as a shot tells them without the header of its run.
 
@@ -222,4 +234,4 @@ def read_formats(path: Path) -> tuple[str, dict[str, ViewFormat], int]:
             }
             return file.attrs["run_id"], views, max(one.shape[1] for one in frames.values())
     except (OSError, KeyError, ValueError, IndexError, TypeError, AttributeError, RuntimeError) as error:
-        raise ShotFileError(f"{path}: cannot be read: {error}") from error
+        raise unreadable(path, error) from error

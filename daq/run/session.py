@@ -12,6 +12,7 @@ from daq.errors import DaqError, DeviceError, DeviceOvertaken, DeviceRefused, In
 from daq.files.header import RunClosing
 from daq.files.outcome_note import write_note
 from daq.files.run_directory import RunWriter
+from daq.files.storage import storing
 from daq.run import light
 from daq.run.active_run import ActiveRun
 from daq.run.ending import code_of
@@ -179,7 +180,8 @@ class RunSession:
     def _attempt(self, action: Callable[[], None]) -> None:
         """The top of the acquisition thread: whatever goes wrong, the light goes off before anything else."""
         try:
-            action()
+            with storing(self._writer.run_dir):
+                action()
         except (DaqError, OSError) as error:
             self._fail(error)
         except Exception as error:  # noqa: BLE001  the top of a thread: a bug must not leave the light on

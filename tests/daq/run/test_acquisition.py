@@ -1,5 +1,6 @@
 """Runs on a rig in memory: how they end, what is on the disk then, and when the light goes off."""
 
+import errno
 import re
 import threading
 import time
@@ -700,6 +701,18 @@ def test_a_bug_in_the_scene_is_a_failed_run_and_not_a_dead_thread(lab: Laborator
     reader = RunReader(run_dir)
     shots = 2 if when == "after" else 0
     assert (reader.shot_count, reader.outcome, reader.cause) == (shots, "failed", status.message)
+
+
+def test_what_the_disk_refuses_an_observer_is_told_in_words(lab: Laboratory) -> None:
+    class Writer(Clumsy):
+        def after_run(self, run_dir: Path) -> None:
+            raise OSError(errno.ENOSPC, "raw text")
+
+    acquisition = Acquisition(lab.memory.rig, lab.data_dir, limits=LIMITS, observers=[Writer("")])
+    reader = RunReader(lab.data_dir / acquisition.start(plan_of(2)))
+    acquisition.wait(DEADLINE_S)
+    assert [cause.code for cause in reader.causes] == [CauseCode.DISK_FULL]
+    assert f"the disk of {reader.run_dir} is full" in reader.cause
 
 
 def test_observers_have_the_first_and_the_last_word(lab: Laboratory) -> None:
