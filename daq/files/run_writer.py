@@ -8,7 +8,7 @@ from types import TracebackType
 from typing import Self
 
 from daq.errors import RecorderError
-from daq.files.atomic_file import commit, part_path, reserve_path, sync
+from daq.files.atomic_file import PART_SUFFIX, commit, part_path, reserve_path, sync
 from daq.files.header import RunClosing, RunHeader
 from daq.files.lock_file import hold_folder
 from daq.files.run_file import (
@@ -136,6 +136,8 @@ class RunWriter:
                 add_closing(self.run_dir, closing)
             except FileNotFoundError:
                 add_closing(self._held_dir, closing)
+            for part in (self._held_dir / SHOTS_FOLDER).glob(f"*{PART_SUFFIX}"):
+                part.unlink(missing_ok=True)  # of a shot that is not stored: the disk did not let go of it before
 
     def _begin(self) -> None:
         self._held_dir = self._held.enter_context(hold_folder(self.run_dir))

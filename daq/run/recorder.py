@@ -34,7 +34,7 @@ class Recorder:
     on_commit : Callable[[Shot], None]
         Called by a writer thread after a shot has reached the disk, in the order of indices.
     on_failure : Callable[[RecorderError], None]
-        Called by a writer thread as soon as a shot cannot be stored: the light is still on then.
+        Called by a writer thread as soon as a shot cannot be stored while others are taken: there is light.
     """
 
     def __init__(
@@ -167,8 +167,10 @@ class Recorder:
         with self._changed:
             if self._failure is None or index < self._failure[0]:
                 self._failure = (index, error)
+            is_late = self._closing  # the light of this run is off, and there may be that of another one
             self._changed.notify_all()
-        self._on_failure(_told(index, error))
+        if not is_late:
+            self._on_failure(_told(index, error))
 
 
 def _told(index: int, cause: Exception) -> RecorderError:

@@ -2,13 +2,21 @@
 
 import threading
 from collections.abc import Callable
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 from dataclasses import asdict
 from datetime import UTC, datetime
 from functools import partial
 
 from daq.causes import CauseCode
-from daq.errors import DaqError, DeviceError, DeviceOvertaken, DeviceRefused, InterlockOpen
+from daq.errors import (
+    DaqError,
+    DeviceError,
+    DeviceOvertaken,
+    DeviceRefused,
+    InterlockOpen,
+    RecorderError,
+    StorageError,
+)
 from daq.files.header import RunClosing
 from daq.files.outcome_note import write_note
 from daq.files.run_directory import RunWriter
@@ -88,8 +96,7 @@ class RunSession:
         tell(run_id, "its outcome could not be written: that is tried again until the disk takes it")
         while not self._closed and not leaving.wait(_RETRY_S):
             if not self._finishing.is_alive():
-                with suppress(DaqError, OSError):
-                    self._finish()
+                self._finish_again()
         if self._closed:
             tell(run_id, f"its outcome is in its file now: {self._ending.outcome}")
         else:
@@ -164,6 +171,14 @@ class RunSession:
         self._writer.write_closing(self._closing())
         self._writer.close()
         self._closed = True
+
+    def _finish_again(self) -> None:
+        try:
+            self._finish()
+        except (StorageError, OSError):
+            return  # not yet
+        except RecorderError:
+            self._closed = True  # it has an outcome already: all that was refused was to sync its folder
 
     def _closing(self) -> RunClosing:
         ending = self._ending

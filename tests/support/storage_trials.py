@@ -111,8 +111,10 @@ def unmounted(folder: Path) -> dict[str, object]:
 
 def read_only_for_a_while(folder: Path) -> dict[str, object]:
     trial = Trial(folder)
-    while subprocess.run(["mount", "-o", "remount,ro", trial.disk], capture_output=True, check=False).returncode:
-        pass  # busy while a shot is being written
+    remount = ["mount", "-o", "remount,ro", str(trial.disk)]
+    for _ in range(500):  # busy while a shot is being written
+        if not subprocess.run(remount, capture_output=True, check=False).returncode:
+            break
     return _mended(trial, lambda: _mount("-o", "remount,rw", trial.disk))
 
 

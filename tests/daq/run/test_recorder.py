@@ -22,6 +22,7 @@ from daq.files.run_directory import (
     Shot,
     ViewFormat,
 )
+from daq.files.shot_file import EncodedShot
 from daq.run.recorder import Recorder
 
 SHAPE = (120, 160)
@@ -60,6 +61,14 @@ class GatedWriter(RunWriter):
         super().commit(index)
 
 
+class LateWriter(GatedWriter):
+    """A disk that says only when it moves that it takes nothing."""
+
+    def stage(self, index: int, encoded: EncodedShot) -> None:
+        assert self.gate.wait(DEADLINE_S)
+        raise RecorderError(f"shot {index} came to nothing")
+
+
 def test_shots_are_committed_in_order_by_any_number_of_threads(tmp_path: Path) -> None:
     seen: list[int] = []
     with (
@@ -92,6 +101,33 @@ def test_a_disk_that_hangs_is_an_error_within_the_deadline(tmp_path: Path) -> No
         with pytest.raises(RecorderError, match=r"1 of 1 shots are not stored after 0\.05 s"):
             recorder.close(0.05)
         writer.gate.set()
+
+
+def test_a_failure_is_told_at_once_while_shots_are_taken_and_never_after(tmp_path: Path) -> None:
+    told: list[RecorderError] = []
+    heard = threading.Event()
+
+    def listen(error: RecorderError) -> None:
+        told.append(error)
+        heard.set()
+
+    with RunWriter(tmp_path / "run", HEADER) as writer, Recorder(writer, on_failure=listen) as recorder:
+        (tmp_path / "run" / "shots" / "0.h5").write_bytes(b"in the way")
+        recorder.put(shot_of(0))
+        assert heard.wait(DEADLINE_S)
+        assert "shot 0 cannot be stored" in str(told[0])
+        with pytest.raises(RecorderError, match="shot 0 cannot be stored"):
+            recorder.close(DEADLINE_S)
+    told.clear()
+    with LateWriter(tmp_path / "late", HEADER) as late, Recorder(late, on_failure=listen) as recorder:
+        recorder.put(shot_of(0))
+        with pytest.raises(RecorderError, match="not stored after"):
+            recorder.close(0.05)
+        late.gate.set()
+        for thread in threading.enumerate():
+            if thread.name.startswith("recorder"):
+                thread.join(DEADLINE_S)
+    assert told == [], "the light of the next run may be on"
 
 
 def test_an_index_out_of_order_is_refused(tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 """A run that is ended while shots wait for a slow disk: what was acknowledged is stored, what is not is listed."""
 
+import errno
 import os
 import threading
 from collections.abc import Callable, Iterator
@@ -29,15 +30,19 @@ ENDINGS: dict[str, tuple[Callable[[Acquisition], None], RunOutcome, str]] = {
 
 
 class Disk:
-    """A disk that holds every shot back until it is let go, or what ``holds_back`` says."""
+    """A disk that holds every shot back until it is let go, or what ``holds_back`` says; it may refuse something."""
 
     def __init__(self) -> None:
         self.moving = threading.Event()
+        self.refuses: Callable[[Path], bool] = lambda _: False
         self.holds_back: Callable[[Path], bool] = lambda path: path.suffix == ".part" and path.parent.name == "shots"
         self._fsync = os.fsync
 
     def fsync(self, descriptor: int) -> None:
-        if self.holds_back(Path(os.readlink(f"/proc/self/fd/{descriptor}"))):
+        path = Path(os.readlink(f"/proc/self/fd/{descriptor}"))
+        if self.refuses(path):
+            raise OSError(errno.EIO, "raw text")
+        if self.holds_back(path):
             assert self.moving.wait(DEADLINE_S)
         self._fsync(descriptor)
 
@@ -146,3 +151,20 @@ def test_a_disk_that_hangs_at_the_outcome_ends_the_run_all_the_same(tmp_path: Pa
     assert closing is not None
     assert (closing.outcome, closing.cause) == ("stopped", "stopped by the operator")
     assert "its outcome could not be written: that is tried again until the disk takes it" in trial.messages
+
+
+def test_an_outcome_that_was_written_although_the_disk_complained_is_not_written_again(
+    tmp_path: Path, disk: Disk
+) -> None:
+    def is_folder_of_closed_run(path: Path) -> bool:
+        return (path / "run.h5").exists() and not (path / "run.h5.reserve").exists()
+
+    disk.moving.set()
+    disk.refuses = is_folder_of_closed_run
+    trial = Trial(tmp_path, drain_s=DEADLINE_S)
+    trial.acquisition.stop()
+    trial.acquisition.wait(DEADLINE_S)
+    pause = threading.Event()
+    while not any("its outcome is in its file now" in text for text in trial.messages):
+        pause.wait(0.01)
+    assert trial.reader.outcome == "stopped"
