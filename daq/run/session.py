@@ -57,7 +57,8 @@ class RunSession:
         self._storage = ExitStack()
         self._taker: ShotTaker | None = None
         self._recorder: Recorder | None = None
-        self._finishing = threading.Thread(target=self._attempt, args=(self._finish,), name="outcome", daemon=True)
+        self._finishing = threading.Thread(target=self._try_to_finish, name="outcome", daemon=True)
+        self._trouble = "the disk does not answer"
         self._closed = False
         self._ended_utc = ""
 
@@ -93,10 +94,10 @@ class RunSession:
         if self._closed:
             return
         run_id, tell = self._writer.header.run_id, self._run.progress.tell
-        tell(run_id, "its outcome could not be written: that is tried again until the disk takes it")
+        tell(run_id, f"its outcome could not be written, that is tried until the disk takes it: {self._trouble}")
         while not self._closed and not leaving.wait(_RETRY_S):
             if not self._finishing.is_alive():
-                self._finish_again()
+                self._try_to_finish()
         if self._closed:
             tell(run_id, f"its outcome is in its file now: {self._ending.outcome}")
         else:
@@ -167,18 +168,17 @@ class RunSession:
         self._storage.callback(self._attempt, partial(recorder.close, limits.drain_s))
         return recorder
 
-    def _finish(self) -> None:
-        self._writer.write_closing(self._closing())
+    def _try_to_finish(self) -> None:
+        """Write the outcome; that the disk refuses it is no part of it, and nobody's light goes off for it."""
+        try:
+            self._writer.write_closing(self._closing())
+        except (StorageError, OSError) as error:
+            self._trouble = str(error)
+            return
+        except RecorderError:
+            pass  # it has an outcome already: all that was refused was to sync its folder
         self._writer.close()
         self._closed = True
-
-    def _finish_again(self) -> None:
-        try:
-            self._finish()
-        except (StorageError, OSError):
-            return  # not yet
-        except RecorderError:
-            self._closed = True  # it has an outcome already: all that was refused was to sync its folder
 
     def _closing(self) -> RunClosing:
         ending = self._ending

@@ -150,7 +150,8 @@ def test_a_disk_that_hangs_at_the_outcome_ends_the_run_all_the_same(tmp_path: Pa
     closing = trial.reader.closing
     assert closing is not None
     assert (closing.outcome, closing.cause) == ("stopped", "stopped by the operator")
-    assert "its outcome could not be written: that is tried again until the disk takes it" in trial.messages
+    refused = "its outcome could not be written, that is tried until the disk takes it: the disk does not answer"
+    assert refused in trial.messages
 
 
 def test_an_outcome_that_was_written_although_the_disk_complained_is_not_written_again(
