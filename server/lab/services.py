@@ -8,7 +8,8 @@ from typing import Protocol
 from daq.devices import Rig
 from daq.faults import Fault
 from daq.run.events import RunStatus
-from daq.run_plan import RunPlan
+from daq.run_plan import LivePlan, RunPlan
+from daq.shot import Shot
 from processing.reconstruction.settings import ReconstructionSettings
 from server.lab.calibrations import CalibrationStore
 from server.lab.duty import Duty, Lamp
@@ -24,13 +25,18 @@ from server.rig.config import RigConfig
 
 
 class RunControl(Protocol):
-    """What the server asks of ``daq.run.acquisition.Acquisition``; every method but ``start`` returns at once."""
+    """What the server asks of ``daq.run.acquisition.Acquisition``; only what starts something takes its time."""
 
     def start(self, plan: RunPlan) -> str: ...  # noqa: D102
+    def start_live(self, plan: LivePlan) -> None: ...  # noqa: D102
+    def keep_live(self) -> None: ...  # noqa: D102
+    def end_live(self) -> None: ...  # noqa: D102
     def stop(self) -> None: ...  # noqa: D102
     def abort(self) -> None: ...  # noqa: D102
     def acknowledge(self) -> None: ...  # noqa: D102
     def status(self) -> RunStatus: ...  # noqa: D102
+    @property
+    def newest_shot(self) -> Shot | None: ...  # noqa: D102
 
 
 class Laboratory(Protocol):

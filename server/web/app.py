@@ -30,12 +30,26 @@ from server.lab.runs.run_store import RunStore
 from server.lab.services import Context, Services
 from server.lab.watch import CalibrationWatch
 from server.web import problems
-from server.web.api import bench, calibrations, droplets, events, jobs, live, results, rig, runs, shots, sign_in, timing
+from server.web.api import (
+    bench,
+    calibrations,
+    droplets,
+    events,
+    jobs,
+    live,
+    live_view,
+    results,
+    rig,
+    runs,
+    shots,
+    sign_in,
+    timing,
+)
 from server.web.api.parameters import forbid_unknown_query
 from server.web.guard import Guard
 from server.web.ui.page import mount_page
 
-_RESOURCES = (rig, runs, shots, droplets, results, calibrations, jobs, events, bench, timing)
+_RESOURCES = (rig, live_view, runs, shots, droplets, results, calibrations, jobs, events, bench, timing)
 _METHODS = ["GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"]
 _SHUTDOWN_S = 3
 _DUTIES = ("processing", "automatic reconstruction", "lamps", "live view")
@@ -146,6 +160,7 @@ async def _life(app: FastAPI, services: Services) -> AsyncIterator[None]:
 def _context(services: Services, table: JobTable, index: RunIndex) -> Context:
     store = CalibrationStore(services.data_dir / "calibrations")
     watch = CalibrationWatch(services.events)
+    acquisition = services.acquisition
     return Context(
         services=services,
         runs=RunStore(services.data_dir, services.acquisition.status, index),
@@ -154,7 +169,7 @@ def _context(services: Services, table: JobTable, index: RunIndex) -> Context:
         runner=JobRunner(services.engine, table, services.tasks, services.events, services.data_dir, store, watch),
         watch=watch,
         monitor=RigMonitor(services.rig, services.data_dir),
-        live=LiveFeed(services.rig.cameras),
+        live=LiveFeed(services.rig.cameras, lambda: acquisition.newest_shot, acquisition.keep_live),
         duties=tuple(Duty(name, services.events) for name in _DUTIES),
     )
 

@@ -66,6 +66,27 @@ def test_an_operator_records_a_run_and_sees_its_volume(page: Page, server: Servi
     _take_picture(page, "page-narrow")
 
 
+def test_an_operator_looks_at_the_rig_live(page: Page, server: Serving) -> None:
+    page.goto(str(server.http.base_url))
+    live, state = page.get_by_role("region", name="Live"), page.get_by_role("status", name="acquisition state")
+    live.get_by_label("Live rate / Hz").fill("50")
+    live.get_by_role("button", name="Live", exact=True).click()
+    expect(page.get_by_text("less than or equal to 10")).to_be_visible()
+    live.get_by_label("Live rate / Hz").fill("10")
+    live.get_by_role("button", name="Live", exact=True).click()
+    expect(state).to_have_text("LIVE")
+    caption = live.get_by_role("status", name="view1 newest shot")
+    expect(caption).to_have_text(re.compile(r"shot \d+ · \d+\.\d s old · A \d+ % · B \d+ %"))
+    _take_picture(page, "page-live")
+    live.get_by_role("switch", name="Pulsed light").click()
+    live.get_by_role("button", name="Apply").click()
+    expect(caption).to_have_text(re.compile("A 0 % · B 0 %"))
+    live.get_by_role("button", name="End live").click()
+    expect(state).to_have_text("IDLE")
+    expect(page.get_by_role("log")).to_contain_text("live, live view at 10 Hz, ambient light")
+    expect(page.get_by_role("log")).to_contain_text("idle, ended by the operator")
+
+
 def test_a_drift_raises_an_alarm_and_a_larger_one_stops_reconstruction(page: Page, server: Serving) -> None:
     write_droplet_run(server.services.data_dir / DRIFTED)
     page.goto(str(server.http.base_url))

@@ -117,6 +117,11 @@ def positions(text: str | None) -> tuple[float, ...]:
     return tuple(float(part) for part in (text or "").split(",") if part.strip())
 
 
+def pulse_of(values: dict[str, Any]) -> PulsePair:
+    """The light that a draft describes; ValueError if it describes none."""
+    return PulsePair(width_ns=values["width_ns"], separation_ns=values["separation_ns"], current_a=values["current_a"])
+
+
 def plan_of(values: dict[str, Any]) -> RunPlan:
     """The plan that a draft describes.
 
@@ -131,9 +136,7 @@ def plan_of(values: dict[str, Any]) -> RunPlan:
         kind=kind,
         shots=values["shots"],
         rate_hz=values["rate_hz"],
-        pulse=PulsePair(
-            width_ns=values["width_ns"], separation_ns=values["separation_ns"], current_a=values["current_a"]
-        ),
+        pulse=pulse_of(values),
         stage_z_mm=positions(values["stage_z_mm"]) if kind is RunKind.CALIBRATION else (),
         references=tuple(values["references"]) if kind is RunKind.SAMPLE else (),
         calibration=values["calibration"] if kind is RunKind.SAMPLE else None,

@@ -28,7 +28,8 @@ def line_of(event: Event) -> str | None:
     data = event.data
     match event.name:
         case "run_state":
-            text = f"{data['run_id']}: {data['state']}" + (f", {data['message']}" if data["message"] else "")
+            whose = f"{data['run_id']}: " if data["run_id"] else ""
+            text = whose + data["state"] + (f", {data['message']}" if data["message"] else "")
         case "shot_recorded":
             text = f"shot {data['index']} recorded" + ("" if data["valid"] else ", INVALID")
         case "run_message":

@@ -8,6 +8,7 @@ from server.lab.services import Context
 
 _STATE_COLOURS = {
     RunState.IDLE: "positive",
+    RunState.LIVE: "primary",
     RunState.ARMING: "warning",
     RunState.ACQUIRING: "primary",
     RunState.DISARMING: "warning",

@@ -11,11 +11,10 @@ from server.web.ui.draft import DraftStore
 from server.web.ui.droplet_panel import DropletPanel
 from server.web.ui.event_log import EventLog
 from server.web.ui.header import Header
-from server.web.ui.live_tiles import LiveTiles
+from server.web.ui.live_panel import LivePanel
 from server.web.ui.run_form import RunForm
 from server.web.ui.run_panel import RunPanel
 from server.web.ui.tables import JobPanel, RunTable
-from server.web.ui.theme import panel
 from server.web.ui.volume_panel import VolumePanel
 
 _REFRESH_S = 0.25
@@ -46,8 +45,7 @@ class Page:
         self._alarm = AlarmBanner(context)
         with ui.element("div").classes("screen"):
             with ui.element("div").classes("column"):
-                with panel("Live"):
-                    LiveTiles(list(context.services.config.views))
+                self._live = LivePanel(context, draft)
                 self._runs, self._jobs = RunTable(context), JobPanel(context)
             with ui.element("div").classes("column wide"):
                 self._volume = VolumePanel(context)
@@ -59,7 +57,7 @@ class Page:
     async def _refresh(self) -> None:
         events = self._events.since(self._seen)
         self._log.add(events)
-        for part in (self._header, self._alarm, self._run, self._form):
+        for part in (self._header, self._alarm, self._live, self._run, self._form):
             part.refresh()
         if events:
             self._seen = events[-1].id

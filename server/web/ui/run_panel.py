@@ -66,7 +66,7 @@ async def _notify_failure(command: Callable[[], None]) -> None:
 def waits_for_acknowledgement(status: RunStatus, lamps: Sequence[Lamp]) -> bool:
     """True where an operator must clear a fault: of acquisition, or latched by a generator that is at rest."""
     latched = any(lamp.kind == "generator" and lamp.health is Health.FAULT for lamp in lamps)
-    return status.state is RunState.FAULT or (latched and not status.active)
+    return status.state is RunState.FAULT or (latched and status.resting)
 
 
 def counts_text(status: RunStatus) -> str:

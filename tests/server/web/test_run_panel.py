@@ -16,6 +16,7 @@ def generator_lamp(health: Health) -> Lamp:
         (RunState.IDLE, Health.OK, False),
         (RunState.IDLE, Health.FAULT, True),
         (RunState.ACQUIRING, Health.FAULT, False),
+        (RunState.LIVE, Health.FAULT, False),
         (RunState.FAULT, Health.OK, True),
     ],
 )

@@ -1,0 +1,74 @@
+"""LivePanel: the pictures of all cameras, and the buttons of the live view. Its light is that of the run form."""
+
+import asyncio
+from collections.abc import Callable
+
+from nicegui import ui
+
+from daq.errors import DaqError
+from daq.run.state import RunState
+from daq.run_plan import LivePlan
+from server.lab.errors import ServerError
+from server.lab.services import Context
+from server.web.ui.draft import DraftStore, problem_of, pulse_of
+from server.web.ui.live_tiles import LiveTiles
+from server.web.ui.theme import panel
+
+_FIELDS = LivePlan.model_fields
+
+
+class LivePanel:
+    """Built once per page, refreshed by its timer.
+
+    Parameters
+    ----------
+    context : Context
+        The application.
+    draft : DraftStore
+        Knows pulses and currents.
+    """
+
+    def __init__(self, context: Context, draft: DraftStore) -> None:
+        self._acquisition = context.services.acquisition
+        self._draft = draft
+        with panel("Live"):
+            LiveTiles(list(context.services.config.views))
+            with ui.row().classes("w-full gap-2 items-center no-wrap"):
+                self._start = ui.button("Live", icon="videocam", on_click=self._on_start).props("outline dense no-caps")
+                self._end = ui.button("End live", icon="videocam_off", on_click=self._acquisition.end_live)
+                self._end.props("outline dense no-caps")
+                self._rate = ui.number(
+                    "Live rate / Hz",
+                    value=_FIELDS["rate_hz"].default,
+                    validation=lambda value: problem_of(_FIELDS, "rate_hz", value),
+                )
+                self._rate.props("dense outlined hide-bottom-space")
+                self._lit = ui.switch("Pulsed light", value=True)
+                self._lit.tooltip("Pulses and currents of the form of a new run; off: no light but that of the room")
+            self._refusal = ui.label("").classes("refusal").props('role=alert aria-label="live refusal"')
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Follow the state of acquisition."""
+        status = self._acquisition.status()
+        is_live = status.state is RunState.LIVE
+        self._start.set_enabled(status.resting or is_live)
+        self._start.set_text("Apply" if is_live else "Live")
+        self._end.set_enabled(is_live)
+
+    async def _on_start(self) -> None:
+        if self._rate.validate():
+            await self._try(self._show)
+
+    def _show(self) -> None:
+        pulse = pulse_of(self._draft.values) if self._lit.value else None
+        self._acquisition.start_live(LivePlan(rate_hz=self._rate.value, pulse=pulse))
+
+    async def _try(self, action: Callable[[], object]) -> None:
+        """Do what takes its time outside of the event loop, and say why it was refused."""
+        try:
+            await asyncio.to_thread(action)
+        except (DaqError, ServerError, ValueError) as error:
+            self._refusal.set_text(str(error))
+        else:
+            self._refusal.set_text("")
