@@ -232,6 +232,11 @@ class JobTable:
                 self._insert(job)
         return len(new)
 
+    def forget(self, run_id: str) -> None:
+        """Drop the jobs of a run that has been removed."""
+        with self._lock, self._database:
+            self._database.execute("DELETE FROM job WHERE run_id = ?", (run_id,))
+
     def set_strangers_aside(self) -> list[str]:
         """Take rows that are no jobs of this version out of queue and lists; their ids. They stay in the file."""
         with self._lock, self._database:

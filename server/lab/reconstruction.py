@@ -27,7 +27,9 @@ async def follow_acquisition(context: Context, duty: Duty) -> None:
 
 
 def reconstruct_by_itself(context: Context, run_id: str, shot: int) -> None:
-    """Queue a recorded shot, if it shows a spray and a calibration is known."""
+    """Queue a recorded shot, if it shows a spray, a calibration is known, and it is not a single shot."""
+    if context.unkept_runs.has(run_id):
+        return
     summary = context.runs.summary(run_id)
     calibration = summary.calibration or context.calibrations.current
     if summary.kind is RunKind.SAMPLE and calibration is not None:

@@ -1,6 +1,12 @@
-"""Starting a run: the one way for API and page."""
+"""Starting a run, or a single shot: the one way for API and page."""
 
-from daq.run_plan import RunKind, RunPlan
+from typing import Annotated
+
+from pydantic import Field
+
+from daq.frozen_model import FrozenModel
+from daq.names import Identifier
+from daq.run_plan import PulsePair, RunKind, RunPlan
 from server.lab.errors import Unprocessable
 from server.lab.services import Context
 
@@ -23,6 +29,24 @@ def start_run(context: Context, plan: RunPlan) -> str:
     if plan.calibration is None and plan.kind is RunKind.SAMPLE:
         plan = plan.model_copy(update={"calibration": context.calibrations.current})
     return context.services.acquisition.start(plan)
+
+
+class SingleShot(FrozenModel):
+    """One shot that is kept on request only."""
+
+    pulse: Annotated[PulsePair, Field(description="its light")]
+    references: Annotated[
+        tuple[str, ...], Field(description="run ids of the dark and background runs that belong to it")
+    ] = ()
+    calibration: Annotated[Identifier | None, Field(description="for its volumes; null: the current one")] = None
+
+
+def shoot(context: Context, shot: SingleShot) -> str:
+    """Start a run of one shot, which the next one removes; the run id. Raises what ``start_run`` raises."""
+    plan = RunPlan(
+        name="single-shot", shots=1, pulse=shot.pulse, references=shot.references, calibration=shot.calibration
+    )
+    return context.unkept_runs.add(lambda: start_run(context, plan))
 
 
 def choose_calibration(context: Context, calibration_id: str) -> None:

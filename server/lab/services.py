@@ -20,6 +20,7 @@ from server.lab.live import LiveFeed
 from server.lab.monitor import RigMonitor
 from server.lab.runner import JobRunner
 from server.lab.runs.run_store import RunStore
+from server.lab.runs.unkept_runs import UnkeptRuns
 from server.lab.watch import CalibrationStanding, CalibrationWatch
 from server.rig.config import RigConfig
 
@@ -100,6 +101,7 @@ class Context:
 
     services: Services
     runs: RunStore
+    unkept_runs: UnkeptRuns
     calibrations: CalibrationStore
     jobs: JobTable
     runner: JobRunner

@@ -27,6 +27,7 @@ from server.lab.reconstruction import follow_acquisition
 from server.lab.runner import JobRunner
 from server.lab.runs.run_index import INDEX_FILE, RunIndex
 from server.lab.runs.run_store import RunStore
+from server.lab.runs.unkept_runs import UnkeptRuns
 from server.lab.services import Context, Services
 from server.lab.watch import CalibrationWatch
 from server.web import problems
@@ -43,13 +44,14 @@ from server.web.api import (
     runs,
     shots,
     sign_in,
+    single_shot,
     timing,
 )
 from server.web.api.parameters import forbid_unknown_query
 from server.web.guard import Guard
 from server.web.ui.page import mount_page
 
-_RESOURCES = (rig, live_view, runs, shots, droplets, results, calibrations, jobs, events, bench, timing)
+_RESOURCES = (rig, live_view, single_shot, runs, shots, droplets, results, calibrations, jobs, events, bench, timing)
 _METHODS = ["GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"]
 _SHUTDOWN_S = 3
 _DUTIES = ("processing", "automatic reconstruction", "lamps", "live view")
@@ -164,6 +166,7 @@ def _context(services: Services, table: JobTable, index: RunIndex) -> Context:
     return Context(
         services=services,
         runs=RunStore(services.data_dir, services.acquisition.status, index),
+        unkept_runs=UnkeptRuns(services.data_dir, table),
         calibrations=store,
         jobs=table,
         runner=JobRunner(services.engine, table, services.tasks, services.events, services.data_dir, store, watch),

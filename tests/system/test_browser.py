@@ -69,10 +69,10 @@ def test_an_operator_records_a_run_and_sees_its_volume(page: Page, server: Servi
 def test_an_operator_looks_at_the_rig_live(page: Page, server: Serving) -> None:
     page.goto(str(server.http.base_url))
     live, state = page.get_by_role("region", name="Live"), page.get_by_role("status", name="acquisition state")
-    live.get_by_label("Live rate / Hz").fill("50")
+    live.get_by_label("Live / Hz").fill("50")
     live.get_by_role("button", name="Live", exact=True).click()
     expect(page.get_by_text("less than or equal to 10")).to_be_visible()
-    live.get_by_label("Live rate / Hz").fill("10")
+    live.get_by_label("Live / Hz").fill("10")
     live.get_by_role("button", name="Live", exact=True).click()
     expect(state).to_have_text("LIVE")
     caption = live.get_by_role("status", name="view1 newest shot")
@@ -85,6 +85,18 @@ def test_an_operator_looks_at_the_rig_live(page: Page, server: Serving) -> None:
     expect(state).to_have_text("IDLE")
     expect(page.get_by_role("log")).to_contain_text("live, live view at 10 Hz, ambient light")
     expect(page.get_by_role("log")).to_contain_text("idle, ended by the operator")
+
+
+def test_an_operator_takes_a_single_shot_and_keeps_it(page: Page, server: Serving) -> None:
+    page.goto(str(server.http.base_url))
+    live, runs = page.get_by_role("region", name="Live"), page.get_by_role("region", name="Runs")
+    live.get_by_role("button", name="Shoot one").click()
+    expect(page.get_by_label("run outcome")).to_have_text("completed")
+    expect(live.get_by_role("status", name="view1 newest shot")).to_have_text(re.compile("^shot 0 · "))
+    expect(runs.get_by_text("single-shot")).to_have_count(1)
+    live.get_by_role("button", name="Keep shot").click()
+    expect(live.get_by_role("button", name="Keep shot")).to_be_hidden()
+    assert server.http.get("/api/rig/shot").json() == {"run_ids": []}
 
 
 def test_a_drift_raises_an_alarm_and_a_larger_one_stops_reconstruction(page: Page, server: Serving) -> None:

@@ -9,6 +9,7 @@ from daq.errors import DaqError
 from daq.run.state import RunState
 from daq.run_plan import LivePlan
 from server.lab.errors import ServerError
+from server.lab.run_start import SingleShot, shoot
 from server.lab.services import Context
 from server.web.ui.draft import DraftStore, problem_of, pulse_of
 from server.web.ui.live_tiles import LiveTiles
@@ -29,6 +30,7 @@ class LivePanel:
     """
 
     def __init__(self, context: Context, draft: DraftStore) -> None:
+        self._context = context
         self._acquisition = context.services.acquisition
         self._draft = draft
         with panel("Live"):
@@ -38,13 +40,17 @@ class LivePanel:
                 self._end = ui.button("End live", icon="videocam_off", on_click=self._acquisition.end_live)
                 self._end.props("outline dense no-caps")
                 self._rate = ui.number(
-                    "Live rate / Hz",
+                    "Live / Hz",
                     value=_FIELDS["rate_hz"].default,
                     validation=lambda value: problem_of(_FIELDS, "rate_hz", value),
                 )
                 self._rate.props("dense outlined hide-bottom-space")
                 self._lit = ui.switch("Pulsed light", value=True)
                 self._lit.tooltip("Pulses and currents of the form of a new run; off: no light but that of the room")
+                self._shoot = ui.button("Shoot one", icon="photo_camera", on_click=self._on_shoot)
+                self._shoot.props("outline dense no-caps")
+                self._shoot.tooltip("One shot with the light of the form of a new run; the next one takes its place")
+                self._keep = ui.button("Keep shot", icon="save", on_click=self._on_keep).props("outline dense no-caps")
             self._refusal = ui.label("").classes("refusal").props('role=alert aria-label="live refusal"')
         self.refresh()
 
@@ -55,6 +61,8 @@ class LivePanel:
         self._start.set_enabled(status.resting or is_live)
         self._start.set_text("Apply" if is_live else "Live")
         self._end.set_enabled(is_live)
+        self._shoot.set_enabled(status.resting or is_live)
+        self._keep.set_visibility(bool(self._context.unkept_runs.ids) and status.resting)
 
     async def _on_start(self) -> None:
         if self._rate.validate():
@@ -63,6 +71,17 @@ class LivePanel:
     def _show(self) -> None:
         pulse = pulse_of(self._draft.values) if self._lit.value else None
         self._acquisition.start_live(LivePlan(rate_hz=self._rate.value, pulse=pulse))
+
+    async def _on_shoot(self) -> None:
+        await self._try(self._take)
+
+    def _take(self) -> None:
+        values = self._draft.values
+        references, calibration = tuple(values["references"]), values["calibration"]
+        shoot(self._context, SingleShot(pulse=pulse_of(values), references=references, calibration=calibration))
+
+    async def _on_keep(self) -> None:
+        await self._try(lambda: self._context.unkept_runs.keep(self._context.unkept_runs.ids[-1]))
 
     async def _try(self, action: Callable[[], object]) -> None:
         """Do what takes its time outside of the event loop, and say why it was refused."""
