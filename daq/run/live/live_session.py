@@ -1,4 +1,8 @@
-"""LiveSession: one live view, worked by a thread of its own: shoot until something ends it, then darkness."""
+"""LiveSession: one live view, worked by a thread of its own: shoot until something ends it, then darkness.
+
+This thread fires every shot, not the timer of the generator: with it, a thread that hangs would go on flashing for as
+long as the guard sends the heartbeat.
+"""
 
 from itertools import count
 

@@ -44,7 +44,7 @@ class LivePanel:
                     value=_FIELDS["rate_hz"].default,
                     validation=lambda value: problem_of(_FIELDS, "rate_hz", value),
                 )
-                self._rate.props("dense outlined hide-bottom-space")
+                self._rate.props("dense outlined hide-bottom-space").classes("w-20")
                 self._lit = ui.switch("Pulsed light", value=True)
                 self._lit.tooltip("Pulses and currents of the form of a new run; off: no light but that of the room")
                 self._shoot = ui.button("Shoot one", icon="photo_camera", on_click=self._on_shoot)

@@ -227,6 +227,27 @@ def test_light_off_never_waits_for_a_frozen_camera(lab: Laboratory, reason: str)
     assert status.message == {"abort": "aborted by the operator", "door": "door: the interlock is open"}[reason]
 
 
+def test_an_abort_while_a_run_waits_for_its_end_is_for_the_run_too(lab: Laboratory) -> None:
+    thaw = threading.Event()
+    lab.memory.cameras["view1"].timing = CameraTiming(1000, 20_000, 2000, 3_000_000_000, 0)
+    lab.memory.cameras["view1"].frozen = thaw
+    try:
+        lab.acquisition.start_live(SLOW)
+        await_true(lambda: "fire 1" in lab.memory.journal)
+        starting = threading.Thread(target=lab.acquisition.start, args=(RUN.model_copy(update={"rate_hz": 0.1}),))
+        starting.start()
+        await_true(lambda: lab.acquisition._live_ending.step is not None)
+        with pytest.raises(BusyError, match="another run or live view is being started"):
+            lab.acquisition.start_live(LIT)
+        lab.acquisition.abort()
+    finally:
+        thaw.set()
+    starting.join(DEADLINE_S)
+    status = lab.rest()
+    assert (status.outcome, status.shots_recorded) == (RunOutcome.ABORTED, 0)
+    assert lab.memory.generator.fired == 1
+
+
 def test_a_dead_camera_ends_it_and_is_named(lab: Laboratory) -> None:
     lab.memory.cameras["view2"].broken_at = 2
     lab.show(LIT)
