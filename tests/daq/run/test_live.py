@@ -146,6 +146,8 @@ def test_light_that_a_run_may_not_have_is_refused_and_what_is_shown_goes_on(
     with pytest.raises(PlanError, match=reason):
         lab.acquisition.start_live(plan)
     assert lab.acquisition.status().live == SLOW
+    lab.acquisition.abort()
+    assert lab.rest().message == "aborted by the operator"
 
 
 def test_another_plan_takes_the_place_of_the_first(lab: Laboratory) -> None:
@@ -290,6 +292,7 @@ def test_light_that_does_not_go_off_is_a_fault(lab: Laboratory) -> None:
 def test_it_ends_when_nobody_looks_and_not_before(tmp_path: Path) -> None:
     lab = Laboratory(tmp_path / "runs", AcquisitionLimits(frame_s=0.1, heartbeat_s=0.05, live_unwatched_s=0.5))
     with lab.acquisition:
+        threading.Event().wait(0.6)  # nobody need have looked before it starts
         first = lab.show(LIT)
         began = time.monotonic()
         while time.monotonic() < began + 1.0:
