@@ -7,29 +7,20 @@ from dataclasses import asdict
 from datetime import UTC, datetime
 from functools import partial
 
-from daq.causes import CauseCode
-from daq.errors import (
-    DaqError,
-    DeviceError,
-    DeviceOvertaken,
-    DeviceRefused,
-    InterlockOpen,
-    RecorderError,
-    StorageError,
-)
+from daq.errors import DaqError, DeviceError, RecorderError, StorageError
 from daq.files.header import RunClosing
 from daq.files.outcome_note import write_note
 from daq.files.run_directory import RunWriter
 from daq.files.storage import storing
 from daq.run import light
 from daq.run.active_run import ActiveRun
+from daq.run.darkness import attempt, darken, fail
 from daq.run.ending import code_of
 from daq.run.guard import RunGuard
 from daq.run.recorder import Recorder
 from daq.run.references import mean_images
 from daq.run.shot_check import InvalidStreak, ShotFindings, Thresholds, check_exposures, light_thresholds
 from daq.run.shot_taking import ShotTaker
-from daq.run.side_by_side import disarm_cameras
 from daq.run.state import RunStep
 from daq.run.train_check import train_deviation
 from daq.run_plan import RunKind
@@ -72,13 +63,7 @@ class RunSession:
     def disarm(self) -> str | None:
         """Light off, then cameras; returns why the light could not be confirmed off."""
         self._look_for_more_causes()
-        limits = self._run.limits
-        reason = light.confirm_off(self._rig, limits.light_off_s)
-        if reason:
-            self._ending.fail(DaqError(f"light not confirmed off: {reason}"), CauseCode.LIGHT_NOT_OFF)
-        for problem in disarm_cameras(self._rig.cameras, limits.disarm_s).values():
-            self._run.progress.say(problem)
-        return reason
+        return darken(self._run)
 
     def close(self) -> None:
         """Wait until every shot is on the disk, and the outcome too; a disk that hangs is left alone."""
@@ -163,7 +148,7 @@ class RunSession:
         for observer in self._run.observers:
             self._storage.callback(self._attempt, partial(observer.after_run, writer.run_dir))
         count = self._run.progress.count
-        recorder = Recorder(writer, limits.recorder_depth, limits.recorder_threads, count, self._fail)
+        recorder = Recorder(writer, limits.recorder_depth, limits.recorder_threads, count, partial(fail, self._run))
         self._storage.enter_context(recorder)
         self._storage.callback(self._attempt, partial(recorder.close, limits.drain_s))
         return recorder
@@ -193,34 +178,13 @@ class RunSession:
         return (*range(self._recorder.committed, accepted), *under_way)
 
     def _attempt(self, action: Callable[[], None]) -> None:
-        """The top of the acquisition thread: whatever goes wrong, the light goes off before anything else."""
-        try:
+        """The top of the acquisition thread, with words for what a disk does."""
+
+        def in_words() -> None:
             with storing(self._writer.run_dir):
                 action()
-        except (DaqError, OSError) as error:
-            self._fail(error)
-        except Exception as error:  # noqa: BLE001  the top of a thread: a bug must not leave the light on
-            self._fail(DaqError(f"internal error: {error!r}"))
 
-    def _fail(self, error: Exception) -> None:
-        light.try_to_switch_off(self._rig)
-        if isinstance(error, DeviceOvertaken):
-            self._ending.wait_for_reason(self._run.limits.light_off_s)
-        error = self._reason_of(error)
-        is_first = self._ending.fail(error, code_of(error, self._rig))
-        if not is_first and not isinstance(error, DeviceOvertaken) and str(error) != self._ending.cause:
-            self._run.progress.say(str(error))
-
-    def _reason_of(self, error: Exception) -> Exception:
-        """Why the generator refuses: it went off by itself when a door was opened, and may be the first to say so."""
-        if isinstance(error, DeviceRefused) and error.device == self._rig.generator.name:
-            try:
-                light.check_permitted(self._rig)
-            except (DeviceRefused, InterlockOpen) as reason:
-                return reason
-            except DeviceError:
-                return error
-        return error
+        attempt(self._run, in_words)
 
     def _look_for_more_causes(self) -> None:
         """A run that has failed may have had two reasons: an open door hides that the generator was reset."""

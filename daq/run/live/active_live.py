@@ -56,6 +56,8 @@ class ActiveLive:
         Who looks.
     ending : RunEnding
         Ends it, and says why.
+    quiet : bool
+        Nothing is worth a line.
     """
 
     rig: Rig
@@ -66,9 +68,12 @@ class ActiveLive:
     observers: tuple[RunObserver, ...] = ()
     audience: Audience = field(default_factory=Audience)
     ending: RunEnding = field(default_factory=RunEnding)
+    quiet: bool = False
 
     def say(self, text: str) -> None:
-        """Say nothing: what is wrong with a shot is shown with it, and twice a second is no line of a log."""
+        """Something is worth a line."""
+        if not self.quiet:
+            self.progress.say(text)
 
 
 def checked_plan(rig: Rig, live: LivePlan) -> tuple[RunPlan, ShotTiming]:

@@ -11,7 +11,7 @@ import pytest
 from daq.devices import GeneratorState
 from daq.errors import BusyError, DeviceRefused, InterlockOpen, PlanError
 from daq.run.acquisition import Acquisition
-from daq.run.events import RunEvent, RunStatus, StateChanged
+from daq.run.events import RunEvent, RunMessage, RunStatus, StateChanged
 from daq.run.limits import AcquisitionLimits
 from daq.run.live import active_live
 from daq.run.state import RunOutcome, RunState
@@ -258,12 +258,24 @@ def test_a_dead_camera_ends_it_and_is_named(lab: Laboratory) -> None:
     assert lab.memory.generator.fired == 2
 
 
+def test_a_camera_that_is_not_disarmed_is_told(lab: Laboratory) -> None:
+    lab.show(SLOW)
+    thaw = lab.memory.cameras["view2"].frozen = threading.Event()
+    lab.acquisition.end_live()
+    status = lab.rest()
+    thaw.set()
+    assert status.message == "ended by the operator"
+    (told,) = (event for event in lab.told if isinstance(event, RunMessage))
+    assert (told.run_id, told.text) == ("", "view2: no answer to 'disarm' within 0.3 s")
+
+
 def test_a_missing_exposure_is_shown_as_missing_and_ends_nothing(lab: Laboratory) -> None:
     lab.memory.cameras["view2"].lost = {1}
     shot = lab.show(SLOW)
     assert (shot.image_key, shot.views["view2"].record_b.valid) == (ImageKey.INVALID, False)
     assert lab.acquisition.status().state is RunState.LIVE
     assert lab.acquisition.status().message == "live view at 0.1 Hz, pulsed light"
+    assert not [event for event in lab.told if isinstance(event, RunMessage)]
 
 
 def test_a_generator_fault_ends_it_and_waits_to_be_acknowledged(lab: Laboratory) -> None:
@@ -274,6 +286,17 @@ def test_a_generator_fault_ends_it_and_waits_to_be_acknowledged(lab: Laboratory)
         lab.acquisition.start_live(LIT)
     lab.acquisition.acknowledge()
     lab.show(LIT)
+
+
+def test_a_refusal_to_fire_is_told_by_its_reason(tmp_path: Path) -> None:
+    """The guard has not looked yet: the shot is the first to meet a generator that went off by itself."""
+    lab = Laboratory(tmp_path / "runs", AcquisitionLimits(frame_s=0.1, heartbeat_s=5.0))
+    with lab.acquisition:
+        lab.show(LIT)
+        lab.memory.generator.trip("interlock")
+        await_true(lambda: lab.acquisition._live_ending.step is not None)
+        lab.memory.interlock.open_door()  # ends the wait of the guard
+        assert lab.rest().message == "generator: fault: interlock; acknowledge it first"
 
 
 def test_light_that_does_not_go_off_is_a_fault(lab: Laboratory) -> None:

@@ -1,0 +1,53 @@
+"""Darkness: whatever goes wrong in a run or a live view, the light goes off first, and then the reason is found."""
+
+from collections.abc import Callable
+
+from daq.causes import CauseCode
+from daq.errors import DaqError, DeviceError, DeviceOvertaken, DeviceRefused, InterlockOpen
+from daq.run import light
+from daq.run.active_run import Shooting
+from daq.run.ending import code_of
+from daq.run.side_by_side import disarm_cameras
+
+
+def attempt(run: Shooting, action: Callable[[], None]) -> None:
+    """Do something at the top of a thread: an error of any kind ends the run, the light goes off before all else."""
+    try:
+        action()
+    except (DaqError, OSError) as error:
+        fail(run, error)
+    except Exception as error:  # noqa: BLE001  the top of a thread: a bug must not leave the light on
+        fail(run, DaqError(f"internal error: {error!r}"))
+
+
+def fail(run: Shooting, error: Exception) -> None:
+    """Light off, then end the run by the reason of an error."""
+    light.try_to_switch_off(run.rig)
+    if isinstance(error, DeviceOvertaken):
+        run.ending.wait_for_reason(run.limits.light_off_s)
+    error = _reason_of(run, error)
+    is_first = run.ending.fail(error, code_of(error, run.rig))
+    if not is_first and not isinstance(error, DeviceOvertaken) and str(error) != run.ending.cause:
+        run.say(str(error))
+
+
+def darken(run: Shooting) -> str | None:
+    """Light off, then cameras; returns why the light could not be confirmed off."""
+    reason = light.confirm_off(run.rig, run.limits.light_off_s)
+    if reason:
+        run.ending.fail(DaqError(f"light not confirmed off: {reason}"), CauseCode.LIGHT_NOT_OFF)
+    for problem in disarm_cameras(run.rig.cameras, run.limits.disarm_s).values():
+        run.say(problem)
+    return reason
+
+
+def _reason_of(run: Shooting, error: Exception) -> Exception:
+    """Why the generator refuses: it went off by itself when a door was opened, and may be the first to say so."""
+    if isinstance(error, DeviceRefused) and error.device == run.rig.generator.name:
+        try:
+            light.check_permitted(run.rig)
+        except (DeviceRefused, InterlockOpen) as reason:
+            return reason
+        except DeviceError:
+            return error
+    return error
