@@ -11,7 +11,7 @@ from types import TracebackType
 from typing import Protocol, Self
 
 from daq.network import Network
-from daq.shot import DoubleFrame, FiredTrain, Image
+from daq.shot import DoubleFrame, FiredTrain
 from daq.timing import CameraTiming, ShotTiming
 
 
@@ -78,9 +78,6 @@ class Camera(Device, Protocol):
 
     def disarm(self) -> None:
         """Stop acquisition; safe to call in any state."""
-
-    def latest(self) -> Image | None:
-        """Newest exposure seen, for the live view; None before the first."""
 
 
 class GeneratorState(StrEnum):

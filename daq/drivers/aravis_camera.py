@@ -13,7 +13,7 @@ from daq.drivers.frame_receiver import FrameReceiver, StreamCounters
 from daq.drivers.gige_question import is_controlled
 from daq.errors import DeviceError, DeviceRefused, DeviceUnavailable
 from daq.network import Network
-from daq.shot import DoubleFrame, Image
+from daq.shot import DoubleFrame
 from daq.timing import CameraTiming
 
 if TYPE_CHECKING:
@@ -83,7 +83,6 @@ class AravisCamera:
         self._receiver: FrameReceiver | None = None
         self._last_id: int | None = None
         self._late_frames = 0
-        self._latest: Image | None = None
         self._letting_go = Lock()
         self._opening = Lock()
 
@@ -225,14 +224,7 @@ class AravisCamera:
         """Stop acquisition, within 2 s; a camera that does not answer is let go, and ``arm`` opens it anew."""
         receiver = self._receiver
         if receiver is not None:
-            self._latest = receiver.latest
             self._release(keep=True)
-
-    def latest(self) -> Image | None:
-        """Newest exposure seen, for the live view; None before the first."""
-        receiver = self._receiver
-        frame = self._latest if receiver is None else receiver.latest
-        return None if frame is None else self._form.exposure_of(frame, -1)
 
     def _settings(self, device: "AravisDevice") -> list[FeatureWrite]:
         rows, columns = self._form.shape

@@ -91,7 +91,7 @@ class ExposureFormat:
         return memory.view(np.uint16).reshape(self.arrival_shape).copy()
 
     def exposure_of(self, image: Image, index: int) -> Image:
-        """Exposure A (0) or B (1, -1) of a frame; the frame itself, unless it holds both."""
+        """Exposure A (0) or B (1) of a frame; the frame itself, unless it holds both."""
         return image.reshape(-1, *self.shape)[index] if self.stacked else image
 
     def blank(self) -> Image:

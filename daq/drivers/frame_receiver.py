@@ -6,7 +6,6 @@ from threading import Condition, Event, Thread
 from typing import Protocol
 
 from daq.drivers.exposure_pairing import Arrival, frame_id_distance
-from daq.shot import Image
 
 
 @dataclass(frozen=True)
@@ -59,7 +58,6 @@ class FrameReceiver:
         self._arrivals: list[Arrival] = []
         self._opened_ns = 0
         self._last_id: int | None = None
-        self._latest: Image | None = None
         self._counters = StreamCounters()
         self._stopping = Event()
         self._thread = Thread(target=self._poll, name=f"{name} frames", daemon=True)
@@ -87,11 +85,6 @@ class FrameReceiver:
             return arrivals
 
     @property
-    def latest(self) -> Image | None:
-        """Newest complete image."""
-        return self._latest
-
-    @property
     def counters(self) -> StreamCounters:
         """Counters since arming."""
         return self._counters
@@ -107,7 +100,6 @@ class FrameReceiver:
         with self._changed:
             stale = arrival.image is not None and arrival.device_timestamp_ns < self._opened_ns
             self._count(arrival, stale)
-            self._latest = self._latest if arrival.image is None else arrival.image
             if stale:
                 self._arrivals.clear()  # frames come in order: whatever came before a stale one is older still
             else:

@@ -177,16 +177,6 @@ def test_collects_until_the_deadline_and_no_longer(stand: CameraStand) -> None:
     assert not shot.record_b.valid
 
 
-@pytest.mark.parametrize("stand", [*WITH_TWO_IMAGES, stacked], indirect=True)
-def test_shows_the_newest_exposure(stand: CameraStand) -> None:
-    assert stand.camera.latest() is None
-    stand.camera.arm()
-    sequence, _ = stand.shoot()
-    newest = stand.camera.latest()
-    assert newest is not None
-    assert newest[0, :2].tolist() == [sequence, 2]
-
-
 def test_disarms_in_any_state_and_arms_again(stand: CameraStand) -> None:
     stand.camera.disarm()
     for _ in range(2):

@@ -78,7 +78,6 @@ class MemoryCamera(MemoryDevice):
         self._armed = False
         self._train: FiredTrain | None = None
         self._triggered = threading.Event()
-        self._latest: Image | None = None
 
     def ask(self) -> None:
         self.journal.append(f"{self.name} ask")
@@ -123,9 +122,6 @@ class MemoryCamera(MemoryDevice):
         if self.frozen:
             self.frozen.wait(5)
 
-    def latest(self) -> Image | None:
-        return self._latest
-
     @property
     def _is_dead(self) -> bool:
         return self.dead_from is not None and self._train is not None and self._train.sequence >= self.dead_from
@@ -147,8 +143,7 @@ class MemoryCamera(MemoryDevice):
             nothing = np.zeros(self.image_shape, np.uint16)
             return nothing.astype(np.uint8) if self.bits == 8 else nothing, ExposureRecord(valid=False)
         self._frames += 1
-        self._latest = image = self._scene(exposure)
-        return image, ExposureRecord(True, self._frames, 1000 * self._frames)
+        return self._scene(exposure), ExposureRecord(True, self._frames, 1000 * self._frames)
 
 
 class MemoryGenerator(MemoryDevice):

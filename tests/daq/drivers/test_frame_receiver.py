@@ -78,15 +78,6 @@ def test_an_incomplete_frame_is_as_old_as_its_successor(frames: Frames, receiver
     assert ids(receiver, 3, 0.1) == [3, 4]
 
 
-def test_the_newest_image_is_the_last_complete_one(frames: Frames, receiver: FrameReceiver) -> None:
-    assert receiver.latest is None
-    for arrival in (whole(1, 1), whole(2, 2), incomplete(3, 1)):
-        frames.queue.put(arrival)
-    receiver.take(3, 1.0)
-    assert receiver.latest is not None
-    assert receiver.latest[0, 0] == 2
-
-
 def test_counts_gaps_in_the_frame_ids_across_the_wrap(frames: Frames, receiver: FrameReceiver) -> None:
     for arrival in (whole(65533, 1), whole(65534, 2), incomplete(2, 7)):
         frames.queue.put(arrival)
