@@ -173,8 +173,6 @@ class AravisCamera:
             A feature is unknown, out of range, or reads back differently; the camera is disarmed again.
         """
         self.disarm()
-        if self._device is not None:
-            self._look()
         device = self._connected()
         settings = self._settings(device)
         for setting in settings:
@@ -242,6 +240,8 @@ class AravisCamera:
         if not self._is_open:
             raise DeviceRefused(self._name, "the camera is not open")
         with self._opening:
+            if self._receiver is None and self._device is not None:
+                self._look()  # Aravis asks a silent camera for 2.5 s, and one that was without power refuses everything
             device = self._device
             if device is None or (device.is_lost and self._receiver is None):
                 device = self._device = self._open(device)

@@ -38,7 +38,10 @@ class Lamp(FrozenModel):
     name: Annotated[str, Field(description="of the device, or of the work")]
     kind: Annotated[str, Field(description="camera, generator, interlock, stage, disk or work")]
     health: Annotated[Health, Field(description="ok: green; warn: amber, it works or nobody knows; fault: red")]
-    detail: Annotated[str, Field(description="what was found; how old it is, where it is old")]
+    detail: Annotated[str, Field(description="what was found, or why nothing was")]
+    age_s: Annotated[float | None, Field(description="since the device last answered; null: never, or no device")] = (
+        None
+    )
 
 
 class Duty:

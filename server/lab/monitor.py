@@ -1,21 +1,34 @@
-"""RigMonitor: the lamps. Asks every device once a second, outside the event loop, and remembers the answers."""
+"""RigMonitor: the lamps. Asks every device once a second, and opens again what was lost, outside the event loop.
+
+Each device has a thread of its own: one that is slow makes no other lamp old.
+"""
 
 import asyncio
 import contextlib
 import shutil
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 
-from daq.devices import Device, DeviceIdentity, GeneratorState, Rig
+from daq.devices import Camera, Device, GeneratorState, Rig, TranslationStage
 from daq.errors import DaqError
 from server.lab.duty import Duty, Health, Lamp, pause
 from server.lab.errors import told
 
 _PERIOD_S = 1.0
-STALE_S = 5.0
-"""Answers older than this are told with their age: devices give up on each question sooner."""
+STALE_S = 2.5
+"""No lamp is green whose answer is older; devices are asked once a second, and have a second to answer."""
 _LOW_DISK_BYTES = 20e9
+
+Look = Callable[[], tuple[Health, str]]
+"""Asks a device; health and detail of its lamp, or an error if it does not answer."""
+Clock = Callable[[], float]
+
+
+def _always() -> bool:
+    return True
 
 
 class RigMonitor:
@@ -27,83 +40,130 @@ class RigMonitor:
         Opened devices.
     data_dir : Path
         Its file system must have room for runs.
+    resting : Callable[[], bool]
+        No run is under way: what was lost may be opened again.
     now_s : Callable[[], float]
         A clock that never goes back.
     """
 
-    def __init__(self, rig: Rig, data_dir: Path, now_s: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self, rig: Rig, data_dir: Path, resting: Callable[[], bool] = _always, now_s: Clock = time.monotonic
+    ) -> None:
         self._rig = rig
         self._data_dir = data_dir
-        self._now_s = now_s
-        self._identities: dict[str, DeviceIdentity] = {}
-        self._answers: tuple[Lamp, ...] = ()
-        self._answered_s = now_s()
+        self._resting = resting
+        self._who: dict[str, str] = {}
+        self._watched = tuple(_Watched(name, kind, look, now_s) for name, kind, look in self._looks())
+        self._threads = ThreadPoolExecutor(len(self._watched), thread_name_prefix="lamp")
 
     @property
     def lamps(self) -> tuple[Lamp, ...]:
-        """What every device last answered; never green where that is long ago."""
-        age_s = self._now_s() - self._answered_s
-        return self._answers if age_s < STALE_S else tuple(_aged(lamp, age_s) for lamp in self._answers)
+        """What every device answers; never green where that is long ago."""
+        return tuple(watched.lamp for watched in self._watched)
 
     async def run(self, duty: Duty) -> None:
         """Ask until cancelled."""
-        while True:
-            with duty.item("devices"):
-                await self.ask()
-            await pause(_PERIOD_S)
+        async with asyncio.TaskGroup() as group:
+            for watched in self._watched:
+                group.create_task(self._keep_asking(watched, duty))
 
     async def ask(self) -> None:
         """Ask every device once."""
-        self._answers = await asyncio.to_thread(self._asked)
-        self._answered_s = self._now_s()
+        await asyncio.gather(*map(self._ask, self._watched))
 
-    def _asked(self) -> tuple[Lamp, ...]:
-        stage = self._rig.stage
-        return (
-            *(_lit(view, "camera", self._camera) for view in self._rig.cameras),
-            _lit("pulse generator", "generator", self._generator),
-            _lit("interlock", "interlock", self._interlock),
-            *(() if stage is None else (_lit("stage", "stage", lambda name: self._identity(name, stage)),)),
-            _lit("disk", "disk", self._disk),
-        )
+    async def _keep_asking(self, watched: "_Watched", duty: Duty) -> None:
+        while True:
+            with duty.item(watched.name):
+                await self._ask(watched)
+            await pause(_PERIOD_S)
 
-    def _camera(self, view: str) -> tuple[Health, str]:
-        camera = self._rig.cameras[view]
-        return (Health.FAULT, "has stopped answering") if camera.is_lost else self._identity(view, camera)
+    async def _ask(self, watched: "_Watched") -> None:
+        await asyncio.get_running_loop().run_in_executor(self._threads, watched.ask)
 
-    def _identity(self, name: str, device: Device) -> tuple[Health, str]:
-        """A camera is asked who it is once: later questions would come between the commands of a run."""
-        with contextlib.suppress(DaqError):
-            if name not in self._identities:
-                self._identities[name] = device.identity()
-        known = self._identities.get(name)
-        if known is None:
-            return Health.FAULT, "does not answer"
-        return Health.OK, f"{known.vendor} {known.model}, {known.serial}"
+    def _looks(self) -> Iterator[tuple[str, str, Look]]:
+        for view, camera in self._rig.cameras.items():
+            yield view, "camera", partial(self._camera, view, camera)
+        yield "pulse generator", "generator", self._generator
+        yield "interlock", "interlock", self._interlock
+        if self._rig.stage is not None:
+            yield "stage", "stage", partial(self._stage, self._rig.stage)
+        yield "disk", "disk", self._disk
 
-    def _generator(self, _: str) -> tuple[Health, str]:
+    def _camera(self, view: str, camera: Camera) -> tuple[Health, str]:
+        with self._known(view, camera):
+            if self._resting():
+                camera.recover()
+            camera.ask()
+        return Health.OK, self._who[view]
+
+    def _stage(self, stage: TranslationStage) -> tuple[Health, str]:
+        with self._known("stage", stage):
+            if self._resting():
+                stage.recover()
+            stage.position_mm()
+        return Health.OK, self._who["stage"]
+
+    @contextlib.contextmanager
+    def _known(self, name: str, device: Device) -> Iterator[None]:
+        """A device is asked who it is once, between runs: in a run the question would come between its commands."""
+        try:
+            yield
+        except DaqError:
+            self._who.pop(name, None)  # whoever answers next may be another one
+            raise
+        if name not in self._who and self._resting():
+            known = device.identity()
+            self._who[name] = f"{known.vendor} {known.model}, {known.serial}"
+        self._who.setdefault(name, "")
+
+    def _generator(self) -> tuple[Health, str]:
+        if self._resting():
+            self._rig.generator.recover()
         status = self._rig.generator.status()
         health = Health.FAULT if status.state is GeneratorState.FAULT else Health.OK
         return health, ", ".join([status.state.value, *status.faults])
 
-    def _interlock(self, _: str) -> tuple[Health, str]:
+    def _interlock(self) -> tuple[Health, str]:
         closed = self._rig.interlock.is_closed()
         return (Health.OK, "closed") if closed else (Health.FAULT, "open: the light is locked")
 
-    def _disk(self, _: str) -> tuple[Health, str]:
+    def _disk(self) -> tuple[Health, str]:
         free = shutil.disk_usage(self._data_dir).free
         return Health.WARN if free < _LOW_DISK_BYTES else Health.OK, f"{free / 1e9:.0f} GB free"
 
 
-def _lit(name: str, kind: str, ask: Callable[[str], tuple[Health, str]]) -> Lamp:
-    """Lamp of one device; an error of any kind is a red one, and hides no other device."""
-    try:
-        health, detail = ask(name)
-    except Exception as error:  # noqa: BLE001  a driver's own mistake must not freeze the lamps
-        health, detail = Health.FAULT, told(error)
-    return Lamp(name=name, kind=kind, health=health, detail=detail)
+class _Watched:
+    """One device, and what came of asking it."""
 
+    def __init__(self, name: str, kind: str, look: Look, now_s: Clock) -> None:
+        self.name = name
+        self._kind = kind
+        self._look = look
+        self._now_s = now_s
+        self._answer = (Health.WARN, "not asked yet")
+        self._answered_s: float | None = None
+        self._silence = ""
 
-def _aged(lamp: Lamp, age_s: float) -> Lamp:
-    health = Health.WARN if lamp.health is Health.OK else lamp.health
-    return lamp.model_copy(update={"health": health, "detail": f"no answer for {age_s:.0f} s; before: {lamp.detail}"})
+    def ask(self) -> None:
+        """Ask once; an error of any kind is a red lamp, and hides no other device."""
+        try:
+            answer = self._look()
+        except Exception as error:  # noqa: BLE001  a driver's own mistake must not freeze the lamp
+            self._silence = told(error)
+        else:
+            self._answer, self._answered_s, self._silence = answer, self._now_s(), ""
+
+    @property
+    def lamp(self) -> Lamp:
+        """The lamp at present."""
+        age_s = None if self._answered_s is None else round(self._now_s() - self._answered_s, 1)
+        health, detail = self._state(age_s or 0.0)
+        return Lamp(name=self.name, kind=self._kind, health=health, detail=detail, age_s=age_s)
+
+    def _state(self, age_s: float) -> tuple[Health, str]:
+        if silence := self._silence:
+            return Health.FAULT, f"{silence}; last answer {age_s:.0f} s ago" if age_s else silence
+        health, detail = self._answer
+        if age_s < STALE_S:
+            return health, detail
+        return Health.WARN if health is Health.OK else health, f"no answer for {age_s:.0f} s"

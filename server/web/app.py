@@ -171,7 +171,7 @@ def _context(services: Services, table: JobTable, index: RunIndex) -> Context:
         jobs=table,
         runner=JobRunner(services.engine, table, services.tasks, services.events, services.data_dir, store, watch),
         watch=watch,
-        monitor=RigMonitor(services.rig, services.data_dir),
+        monitor=RigMonitor(services.rig, services.data_dir, lambda: acquisition.status().resting),
         live=LiveFeed(services.rig.cameras, lambda: acquisition.newest_shot, acquisition.keep_live),
         duties=tuple(Duty(name, services.events) for name in _DUTIES),
     )

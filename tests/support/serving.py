@@ -131,14 +131,15 @@ def serving(
     """Serve a rig in memory until the block ends."""
     with (
         assembled(data_dir, engine=engine, views=views, token=token) as services,
-        _listening(build(services)) as port,
+        listening(build(services)) as port,
         httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=DEADLINE_S) as http,
     ):
         yield Serving(http, port, services)
 
 
 @contextmanager
-def _listening(app: FastAPI) -> Iterator[int]:
+def listening(app: FastAPI) -> Iterator[int]:
+    """Serve an application at a free port of the loopback interface."""
     started = threading.Event()
     server = _Server(uvicorn.Config(app, port=0, log_level="error", timeout_graceful_shutdown=1), started)
     thread = threading.Thread(target=server.run)

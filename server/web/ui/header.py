@@ -21,7 +21,7 @@ class Header:
 
     def __init__(self, context: Context, dark: ui.dark_mode) -> None:
         self._context = context
-        self._shown: tuple[Lamp, ...] = ()
+        self._shown: tuple[str, ...] = ()
         config = context.services.config
         with (
             ui.header(elevated=False)
@@ -46,16 +46,16 @@ class Header:
         self._state.set_text(state.upper())
         self._state.props(f"color={_STATE_COLOURS[state]}")
         lamps = self._context.lamps
-        if lamps != self._shown:
-            self._shown = lamps
+        texts = tuple(f"{lamp.name}: {lamp.health}, {lamp.detail}" for lamp in lamps)
+        if texts != self._shown:
+            self._shown = texts
             self._lamps.clear()
             with self._lamps:
-                for lamp in self._shown:
-                    _show(lamp)
+                for lamp, text in zip(lamps, texts, strict=True):
+                    _show(lamp, text)
 
 
-def _show(lamp: Lamp) -> None:
-    text = f"{lamp.name}: {lamp.health}, {lamp.detail}"
+def _show(lamp: Lamp, text: str) -> None:
     chip = ui.element("div").classes("lamp-chip").props("role=status")
     chip.props["aria-label"] = text  # whatever it says: a parser of props would stumble over quotes and lines
     with chip:
