@@ -75,3 +75,11 @@ def named(fields: list[str]) -> dict[str, str]:
     if not all(name and separator and value for name, separator, value in pairs):
         raise ValueError("a field is not NAME=VALUE")
     return {name: value for name, _, value in pairs}
+
+
+def other_protocol(spoken: str, ours: int) -> str:
+    """What is wrong with firmware of another protocol, and what to do."""
+    return (
+        f"speaks protocol {spoken}, this driver speaks {ours}: "
+        "flash the firmware of this release (tomoshadow firmware flash)"
+    )

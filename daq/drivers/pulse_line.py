@@ -8,7 +8,7 @@ from contextlib import contextmanager
 
 import serial
 
-from daq.drivers.pulse_framing import ABORT_BYTE, DamagedLine, Heard, is_echo, is_older_reply
+from daq.drivers.pulse_framing import ABORT_BYTE, DamagedLine, Heard, is_echo, is_older_reply, other_protocol
 from daq.drivers.pulse_protocol import (
     ERROR_TEXT,
     FIELDS,
@@ -39,13 +39,6 @@ _BAUD = 115_200
 _LONGEST_LINE = 512
 
 
-def _other_protocol(spoken: str) -> str:
-    return (
-        f"speaks protocol {spoken}, this driver speaks {PROTOCOL_VERSION}: "
-        "flash the firmware of this release (tomoshadow firmware flash)"
-    )
-
-
 class PulseLine:
     """Asks one generator, one question at a time; ``off`` overtakes every question that was asked before it.
 
@@ -70,6 +63,7 @@ class PulseLine:
         self._offs = 0
         self._sequence = 0
         self._boot = 0
+        self.restarts = 0  # of the microcontroller, or of its port, as far as they were found out
         self._received = b""
 
     def open(self) -> Reply:
@@ -92,6 +86,7 @@ class PulseLine:
         """Open the port anew: there may be another device at its path. Waits for whoever still asks."""
         with self._alone("open"):
             self.close()
+            self.restarts += 1
             return self.open()
 
     @property
@@ -103,7 +98,7 @@ class PulseLine:
         identity = self._converse(Request(0, Command.ID), OPENING_LIMIT_S, offs=None)
         spoken = identity.fields.get("protocol")
         if spoken is not None and spoken != str(PROTOCOL_VERSION):
-            raise ProtocolError(self._name, _other_protocol(spoken))
+            raise ProtocolError(self._name, other_protocol(spoken, PROTOCOL_VERSION))
         self._check_fields(Command.ID, identity)
         self._sequence = identity.number("last")
         self._boot = identity.boot
@@ -177,7 +172,9 @@ class PulseLine:
             self._offs += 1
         self._write(ABORT_BYTE, Command.OFF, _WRITE_LIMIT_S)
         with self._alone(Command.OFF):
-            return self._converse(self._numbered(Command.OFF, ()), LIMIT_S, offs=None)
+            reply = self._converse(self._numbered(Command.OFF, ()), LIMIT_S, offs=None)
+            self._has_restarted(reply)
+        return reply
 
     @contextmanager
     def _alone(self, command: str) -> Iterator[None]:
@@ -215,7 +212,7 @@ class PulseLine:
 
     def _explain_silence(self, command: Command, heard: Mapping[Heard, int]) -> None:
         if heard[Heard.OLDER]:
-            raise ProtocolError(self._name, _other_protocol("2 or older"))
+            raise ProtocolError(self._name, other_protocol("2 or older", PROTOCOL_VERSION))
         if heard[Heard.DAMAGED]:
             raise ProtocolError(self._name, f"only damaged lines ({heard[Heard.DAMAGED]}) in answer to {command}")
         if heard[Heard.ECHO]:
@@ -290,9 +287,14 @@ class PulseLine:
             raise DeviceOvertaken(self._name, f"{command} was overtaken by off")
 
     def _check_boot(self, reply: Reply) -> None:
-        before, self._boot = self._boot, reply.boot
-        if reply.boot != before:
+        before = self._boot
+        if self._has_restarted(reply):
             raise DeviceError(
                 self._name,
                 f"the microcontroller was reset (start {reply.boot}, was {before}); light is off, nothing is loaded",
             )
+
+    def _has_restarted(self, reply: Reply) -> bool:
+        before, self._boot = self._boot, reply.boot
+        self.restarts += reply.boot != before
+        return reply.boot != before

@@ -5,10 +5,20 @@ the trigger of the shot, where nothing can be. All edges are shifted by the same
 """
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 from daq.drivers.pulse_protocol import Reply
 from daq.shot import FiredTrain, LightPulse
 from daq.timing import ShotTiming
+
+
+@dataclass(frozen=True)
+class LoadedTrain:
+    """The train that the generator holds: its number there, its shortest period, and its actual edges."""
+
+    number: int
+    period_us: int
+    actual: FiredTrain
 
 
 def shift_ns(timing: ShotTiming, tick_ns: int) -> int:

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import TracebackType
 from typing import Self
 
@@ -18,21 +18,14 @@ from daq.drivers.pulse_protocol import (
     Source,
     State,
 )
-from daq.drivers.pulse_train import actual_train, pulses_of, shift_ns
+from daq.drivers.pulse_train import LoadedTrain, actual_train, pulses_of, shift_ns
 from daq.errors import DeviceError, DeviceRefused, PlanError, ProtocolError
 from daq.shot import FiredTrain
 from daq.timing import ShotTiming, ViewTiming
 
 MAX_PERIOD_US = 10_000_000
-
-
-@dataclass(frozen=True)
-class _LoadedTrain:
-    """The train that the generator holds: its number there, its shortest period, and its actual edges."""
-
-    number: int
-    period_us: int
-    actual: FiredTrain
+RESTARTED = "restarted"
+"""Fault of a generator that started anew while it was armed; the driver latches it, the board knows nothing of it."""
 
 
 class SerialPulseGenerator:
@@ -77,7 +70,8 @@ class SerialPulseGenerator:
         self._line = PulseLine(name, port, clock_s)
         self._identity: Reply | None = None
         self._is_open = False
-        self._loaded: _LoadedTrain | None = None
+        self._loaded: LoadedTrain | None = None
+        self._restarts_when_armed: int | None = None
 
     @property
     def name(self) -> str:
@@ -117,8 +111,7 @@ class SerialPulseGenerator:
             return
         known, self._loaded = self._opened_identity(), None
         found = self._line.reopen()
-        serial, expected = found.fields["serial"], known.fields["serial"]
-        if serial != expected:
+        if (serial := found.fields["serial"]) != (expected := known.fields["serial"]):
             self._line.close()
             raise DeviceRefused(
                 self._name,
@@ -158,7 +151,7 @@ class SerialPulseGenerator:
         self._line.ask(Command.NEW)
         replies = {view: self._set_channel(view, edges, shift) for view, edges in timing.views.items()}
         loaded = self._line.ask(Command.LOAD)
-        self._loaded = _LoadedTrain(loaded.number("train"), loaded.number("period_us"), actual_train(replies))
+        self._loaded = LoadedTrain(loaded.number("train"), loaded.number("period_us"), actual_train(replies))
         return self._loaded.actual
 
     def arm(self, shots: int, source: TriggerSource = TriggerSource.COMMAND, period_us: int = 0) -> int:
@@ -169,8 +162,10 @@ class SerialPulseGenerator:
         PlanError
             The shots are to follow each other faster than the loaded train permits.
         DeviceRefused
-            Without a train, while armed, with an open interlock or emergency stop.
+            Without a train, while armed, with an open interlock or emergency stop, with a latched fault.
         """
+        if self._has_restarted:
+            raise DeviceRefused(self._name, f"{Command.ARM} refused: a fault is latched; clear it first: {RESTARTED}")
         if self._loaded is not None and 0 < period_us < self._loaded.period_us:
             raise PlanError(
                 f"{self._name}: a shot every {period_us} us is too fast for this pulse train, which its duty limit "
@@ -178,7 +173,8 @@ class SerialPulseGenerator:
             )
         if source is not TriggerSource.TIMER:
             period_us = min(period_us, MAX_PERIOD_US)
-        self._line.ask(Command.ARM, shots, Source[source.name], period_us)
+        self._done(Command.ARM, shots, Source[source.name], period_us)
+        self._restarts_when_armed = self._line.restarts
         return self._loaded.period_us if self._loaded is not None else MAX_PERIOD_US
 
     def light(self, current_a: Mapping[str, float], time_s: float) -> None:
@@ -206,7 +202,7 @@ class SerialPulseGenerator:
         DeviceRefused
             Not armed, too early, interlock open; nothing was fired.
         """
-        reply = self._line.ask(Command.FIRE)
+        reply = self._done(Command.FIRE)
         if self._loaded is None or reply.number("train") != self._loaded.number:
             raise ProtocolError(self._name, f"fired train {reply.number('train')}, which this driver did not load")
         return replace(self._loaded.actual, sequence=reply.number("fired"))
@@ -230,9 +226,13 @@ class SerialPulseGenerator:
     def status(self) -> GeneratorStatus:
         """State, faults and counters; also the heartbeat that keeps the generator armed."""
         reply = self._line.ask(Command.STATUS)
+        faults = tuple(fault.name.lower() for fault in Fault if fault & reply.number("faults") and fault.name)
+        state = GeneratorState[State(reply.number("state")).name]
+        if self._has_restarted and state is GeneratorState.SAFE:
+            state = GeneratorState.FAULT
         return GeneratorStatus(
-            state=GeneratorState[State(reply.number("state")).name],
-            faults=tuple(fault.name.lower() for fault in Fault if fault & reply.number("faults") and fault.name),
+            state=state,
+            faults=(*faults, RESTARTED) if self._has_restarted else faults,
             interlock_closed=reply.number("interlock") == 1,
             shots_left=reply.number("shots_left"),
             counters={name: reply.number(name) for name in COUNTERS},
@@ -251,10 +251,27 @@ class SerialPulseGenerator:
         state = State(reply.number("state"))
         if state in (State.ARMED, State.LIT):
             raise ProtocolError(self._name, f"is still {state.name.lower()} after off")
+        if not self._has_restarted:
+            self._restarts_when_armed = None
 
     def clear(self) -> None:
         """Acknowledge latched faults; refused while its cause lasts."""
         self._line.ask(Command.CLEAR)
+        self._restarts_when_armed = None
+
+    @property
+    def _has_restarted(self) -> bool:
+        return self._restarts_when_armed is not None and self._restarts_when_armed < self._line.restarts
+
+    def _done(self, command: Command, *fields: int) -> Reply:
+        """Reply of a command that makes light; a refusal names the faults behind it."""
+        try:
+            return self._line.ask(command, *fields)
+        except DeviceRefused as refused:
+            faults = self.status().faults
+            if not faults:
+                raise
+            raise DeviceRefused(self._name, f"{refused.reason}: {', '.join(faults)}") from refused
 
     def _opened_identity(self) -> Reply:
         if self._identity is None:

@@ -55,9 +55,22 @@ def confirm_off(rig: Rig, deadline_s: float) -> str | None:
 
 
 def acknowledge_faults(rig: Rig) -> None:
-    """Clear the generator's latched faults in the dark; DeviceError if it refuses, or the light is not off."""
+    """Clear the generator's latched faults in the dark.
+
+    Raises
+    ------
+    InterlockOpen
+        It refuses, as the interlock is still open.
+    DeviceError
+        It refuses, or the light is not off.
+    """
     switch_off(rig)
-    rig.generator.clear()
+    try:
+        rig.generator.clear()
+    except DeviceRefused as refused:
+        if rig.interlock.is_closed():
+            raise
+        raise InterlockOpen(f"{rig.interlock.name}: the interlock is open; close it, then acknowledge") from refused
     _check_off(rig)
 
 

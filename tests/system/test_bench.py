@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from daq.devices import GeneratorState
-from daq.errors import InterlockOpen, PlanError
+from daq.errors import DeviceRefused, InterlockOpen, PlanError
 from daq.faults import Fault, FaultKind
 from daq.files.run_directory import RunReader
 from daq.run.acquisition import Acquisition
@@ -192,6 +192,10 @@ def test_a_generator_that_restarts_in_a_run_ends_it(assembled: AssembledRig, tmp
     status = fail_in_mid_run(assembled, tmp_path, lambda: laboratory.inject(Fault(kind=FaultKind.GENERATOR_RESET)))
     assert status.outcome is RunOutcome.FAILED
     assert "pulse_generator: the microcontroller was reset" in status.message
+    with Acquisition(assembled.rig, tmp_path) as acquisition:
+        with pytest.raises(DeviceRefused, match="fault: restarted; acknowledge it first"):
+            acquisition.start(plan(RunKind.BACKGROUND, 1))
+        acquisition.acknowledge()
     assert record(assembled, tmp_path, plan(RunKind.BACKGROUND, 1))[0].outcome is RunOutcome.COMPLETED
 
 

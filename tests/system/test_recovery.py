@@ -6,7 +6,7 @@ import pytest
 
 from daq.devices import GeneratorState
 from daq.run.state import RunOutcome
-from tests.support.simulated_serving import BenchServing, serving_bench, tiny_config
+from tests.support.simulated_serving import BenchServing, eventually, serving_bench, tiny_config
 
 pytestmark = pytest.mark.network
 
@@ -82,9 +82,9 @@ def test_a_generator_that_is_unplugged_in_a_run_is_a_fault_until_it_is_acknowled
     with bench.during("generator_unplugged"):
         assert bench.end().outcome is RunOutcome.FAILED
         assert bench.http.get("/api/rig").json()["acquisition"]["state"] == "fault"
-    bench.await_lamp("pulse generator", "ok")
-    assert bench.rig.generator.status().state is GeneratorState.SAFE
+    eventually(lambda: "restarted" in bench.lamp("pulse generator")["detail"], lambda: bench.lamp("pulse generator"))
     assert bench.http.post("/api/rig/acknowledge").status_code == 202
+    assert bench.rig.generator.status().state is GeneratorState.SAFE
     bench.assert_next_run_is_sound()
 
 

@@ -70,7 +70,7 @@ def abort_everything(context: ContextOf) -> AcquisitionView:
     return view_of_acquisition(context)
 
 
-@router.post("/acknowledge", status_code=202, responses=responses(409))
+@router.post("/acknowledge", status_code=202, responses=responses(409, 423, 503, 504))
 def acknowledge_fault(context: ContextOf) -> AcquisitionView:
     """Leave the FAULT state: the operator has seen to the light."""
     context.services.acquisition.acknowledge()

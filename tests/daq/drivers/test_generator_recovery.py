@@ -47,10 +47,12 @@ def test_a_generator_that_is_plugged_in_again_is_opened_again_and_dark(
     with pytest.raises(DeviceUnavailable):
         generator.fire()
     generator.recover()
-    assert generator.status().state is GeneratorState.SAFE
+    assert (generator.status().state, generator.status().faults) == (GeneratorState.FAULT, ("restarted",))
     with pytest.raises(DeviceRefused):
         generator.fire()
     assert FIRED == []
+    generator.clear()
+    assert generator.status().state is GeneratorState.SAFE
     generator.configure(shot_timing())
     generator.arm(1)
     assert generator.fire().sequence == 1
@@ -132,3 +134,62 @@ def test_a_closed_generator_is_not_opened_again(firmware: FirmwareProcess) -> No
     generator.recover()
     with pytest.raises(DeviceUnavailable, match="is not open"):
         generator.status()
+
+
+def test_a_restart_while_armed_is_a_fault_until_it_is_acknowledged(
+    firmware: FirmwareProcess, generator: SerialPulseGenerator
+) -> None:
+    generator.configure(shot_timing())
+    generator.arm(100)
+    firmware.reset()
+    generator.off()  # the first to hear of it, and it must not fail
+    for _ in range(2):
+        status = generator.status()
+        assert (status.state, status.faults) == (GeneratorState.FAULT, ("restarted",))
+        generator.off()
+    generator.clear()
+    assert (generator.status().state, generator.status().faults) == (GeneratorState.SAFE, ())
+
+
+def test_a_restart_stands_beside_what_came_after_it(firmware: FirmwareProcess, generator: SerialPulseGenerator) -> None:
+    generator.configure(shot_timing())
+    generator.arm(100)
+    firmware.reset(by_watchdog=True)
+    with pytest.raises(DeviceError, match="was reset"):
+        generator.status()
+    assert generator.status().faults == ("watchdog", "restarted")
+
+
+def test_a_refused_shot_names_the_fault_behind_it(firmware: FirmwareProcess, generator: SerialPulseGenerator) -> None:
+    generator.configure(shot_timing())
+    generator.arm(100)
+    firmware.set_estop(False)
+    with pytest.raises(DeviceRefused, match=r"FIRE refused: a fault is latched.*: estop"):
+        generator.fire()
+
+
+def test_a_restart_of_one_that_is_not_armed_is_no_fault(
+    firmware: FirmwareProcess, generator: SerialPulseGenerator
+) -> None:
+    generator.configure(shot_timing())
+    generator.arm(100)
+    generator.off()
+    firmware.reset()
+    with pytest.raises(DeviceError, match="was reset"):
+        generator.status()
+    assert generator.status().faults == ()
+
+
+def test_a_cable_that_was_out_while_armed_is_a_fault(
+    firmware: FirmwareProcess, generator: SerialPulseGenerator
+) -> None:
+    generator.configure(shot_timing())
+    generator.arm(100)
+    firmware.unplug()
+    with pytest.raises(DeviceUnavailable):
+        generator.off()
+    firmware.plug_in()
+    generator.recover()
+    assert generator.status().faults == ("restarted",)
+    generator.clear()
+    assert generator.status().state is GeneratorState.SAFE

@@ -170,7 +170,10 @@ def test_a_reset_is_an_error_and_leaves_no_light(firmware: FirmwareProcess, gene
     with pytest.raises(DeviceError, match="was reset"):
         generator.fire()
     status = generator.status()
-    assert (status.state, status.counters["fired"]) == (GeneratorState.SAFE, 0)
+    assert (status.state, status.faults, status.counters["fired"]) == (GeneratorState.FAULT, ("restarted",), 0)
+    with pytest.raises(DeviceRefused, match="clear it first: restarted"):
+        generator.arm(1)
+    generator.clear()
     with pytest.raises(DeviceRefused, match="no pulse train"):
         generator.arm(1)
     generator.configure(shot_timing())
@@ -182,7 +185,7 @@ def test_a_watchdog_reset_is_a_fault(firmware: FirmwareProcess, generator: Seria
     firmware.reset(by_watchdog=True)
     with pytest.raises(DeviceError, match="was reset"):
         generator.status()
-    assert generator.status().faults == ("watchdog",)
+    assert generator.status().faults == ("watchdog", "restarted")
 
 
 def send(firmware: FirmwareProcess, request: Request) -> Reply:

@@ -5,7 +5,7 @@ import threading
 import pytest
 
 from daq.devices import GeneratorState
-from daq.errors import DeviceError, DeviceTimeout
+from daq.errors import DeviceError, DeviceTimeout, InterlockOpen
 from daq.run import light
 from daq.run_plan import PulsePair, RunPlan
 from daq.timing import plan_shot_timing
@@ -56,3 +56,12 @@ def test_a_generator_that_does_not_answer_is_not_known_to_be_off(
     assert light.confirm_off(memory.rig, 0.0) == "generator: no answer to 'off' within 1 s"
     with pytest.raises(DeviceTimeout):
         light.switch_off(memory.rig)
+
+
+def test_an_interlock_that_is_still_open_is_the_reason_why_nothing_can_be_acknowledged(memory: MemoryRig) -> None:
+    memory.open_door()
+    with pytest.raises(InterlockOpen, match="door: the interlock is open; close it, then acknowledge"):
+        light.acknowledge_faults(memory.rig)
+    memory.close_door()
+    light.acknowledge_faults(memory.rig)
+    assert memory.generator.state is GeneratorState.SAFE
