@@ -71,6 +71,14 @@ class CalibrationStore:
         except (NotFound, Damaged):
             return ""
 
+    def image_sizes_px(self, calibration_id: str) -> dict[str, tuple[int, int]]:
+        """(width, height) of the images of each view that a calibration is made for; those that can be read."""
+        try:
+            views = self.document(calibration_id).get("views", {})
+            return {view: tuple(one["mapping"]["image_size_px"]) for view, one in views.items()}
+        except (NotFound, Damaged, AttributeError, KeyError, TypeError):
+            return {}
+
     @property
     def current(self) -> str | None:
         """Id of the calibration for runs that name none; None where none was chosen, or nobody can read which."""

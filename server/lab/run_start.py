@@ -20,7 +20,7 @@ def start_run(context: Context, plan: RunPlan) -> str:
     Raises
     ------
     Unprocessable
-        The plan names a calibration that does not exist.
+        The plan names a calibration that does not exist, or one of images of another size.
     DaqError
         Acquisition refuses, see ``daq.errors``.
     """
@@ -28,6 +28,8 @@ def start_run(context: Context, plan: RunPlan) -> str:
         raise Unprocessable(f"calibration: there is no calibration {plan.calibration!r}")
     if plan.calibration is None and plan.kind is RunKind.SAMPLE:
         plan = plan.model_copy(update={"calibration": context.calibrations.current})
+    if plan.calibration is not None:
+        _check_image_sizes(context, plan.calibration)
     return context.services.acquisition.start(plan)
 
 
@@ -47,6 +49,19 @@ def shoot(context: Context, shot: SingleShot) -> str:
         name="single-shot", shots=1, pulse=shot.pulse, references=shot.references, calibration=shot.calibration
     )
     return context.unkept_runs.add(lambda: start_run(context, plan))
+
+
+def _check_image_sizes(context: Context, calibration: str) -> None:
+    """A camera that is binned, or another one, needs another calibration; later nothing could be reconstructed."""
+    sizes_px = context.calibrations.image_sizes_px(calibration)
+    for view, camera in context.services.rig.cameras.items():
+        rows, columns = camera.image_shape
+        made_for = sizes_px.get(view, (columns, rows))
+        if made_for != (columns, rows):
+            raise Unprocessable(
+                f"calibration: {calibration!r} is made for images of {made_for[0]} x {made_for[1]} px of {view}, its "
+                f"camera delivers {columns} x {rows} px: choose another calibration, or calibrate again"
+            )
 
 
 def choose_calibration(context: Context, calibration_id: str) -> None:
