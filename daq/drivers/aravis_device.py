@@ -214,7 +214,10 @@ class AravisDevice:
             if error.matches(Aravis.device_error_quark(), Aravis.DeviceError.TIMEOUT):
                 self._lost.set()
                 raise DeviceTimeout(self._name, command, _REGISTER_LIMIT_S) from error
-            raise DeviceRefused(self._name, f"{command}: {error.message}") from error
+            denied = "; another client has control, or the camera was without power" * (
+                "access-denied" in error.message
+            )
+            raise DeviceRefused(self._name, f"{command}: {error.message}{denied}") from error
 
 
 class AravisStream:

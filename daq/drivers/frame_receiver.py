@@ -7,6 +7,9 @@ from typing import Protocol
 
 from daq.drivers.exposure_pairing import Arrival, frame_id_distance
 
+_FARTHEST = 32767
+"""Ids wrap: what seems farther ahead than half of them lies behind."""
+
 
 @dataclass(frozen=True)
 class StreamCounters:
@@ -107,8 +110,10 @@ class FrameReceiver:
                 self._changed.notify_all()
 
     def _count(self, arrival: Arrival, stale: bool) -> None:
-        gap = 0 if self._last_id is None else frame_id_distance(self._last_id, arrival.frame_id) - 1
-        self._last_id = arrival.frame_id
+        distance = 1 if self._last_id is None else frame_id_distance(self._last_id, arrival.frame_id)
+        overtaken = distance > _FARTHEST  # a frame that stayed incomplete is given up after later ones have come
+        gap = 0 if overtaken else distance - 1
+        self._last_id = self._last_id if overtaken else arrival.frame_id
         self._counters = replace(
             self._counters,
             frames=self._counters.frames + 1,

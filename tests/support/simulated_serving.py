@@ -17,6 +17,7 @@ from daq.run.acquisition import Acquisition
 from daq.run.events import RunStatus
 from daq.run.limits import AcquisitionLimits
 from daq.run.state import RunOutcome
+from daq.simulation.laboratory import SimulatedLaboratory
 from server.lab.engine import InlineEngine
 from server.lab.events import EventPublisher
 from server.lab.services import Services
@@ -51,6 +52,7 @@ class BenchServing:
 
     http: httpx.Client
     rig: Rig
+    laboratory: SimulatedLaboratory
     acquisition: Acquisition
     data_dir: Path
 
@@ -146,7 +148,8 @@ def serving_bench(config: RigConfig, frame_s: float = 2.0) -> Iterator[BenchServ
         ) as port,
         httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=DEADLINE_S) as http,
     ):
-        yield BenchServing(http, assembled.rig, acquisition, data_dir)
+        assert assembled.laboratory is not None
+        yield BenchServing(http, assembled.rig, assembled.laboratory, acquisition, data_dir)
 
 
 def _services(config: RigConfig, assembled: AssembledRig, acquisition: Acquisition, events: EventPublisher) -> Services:

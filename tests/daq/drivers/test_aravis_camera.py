@@ -131,6 +131,20 @@ def test_a_frame_that_stays_incomplete_is_flagged_and_black(wire: Wire) -> None:
     wire.assert_good_shot()
 
 
+@pytest.mark.parametrize("loss", [0.9, 1.0])
+def test_twenty_shots_of_lost_packets_leave_the_stream_alive(wire: Wire, loss: float) -> None:
+    wire.assert_good_shot()
+    wire.simulated.faults.packet_loss = loss
+    for _ in range(20):
+        assert not wire.shoot(0.05)[1].valid
+    wire.simulated.faults.packet_loss = 0.0
+    deadline_s = monotonic() + 5.0
+    while not wire.shoot(0.7)[1].valid:  # what is still incomplete holds its buffer for 0.5 s
+        assert monotonic() < deadline_s
+    for _ in range(10):
+        wire.assert_good_shot()
+
+
 @pytest.mark.parametrize(("fault", "lost"), [("dropped_a", "A"), ("dropped_b", "B"), ("swapped", "A")])
 def test_a_lost_exposure_is_flagged_in_its_slot(wire: Wire, fault: str, lost: str) -> None:
     wire.assert_good_shot()

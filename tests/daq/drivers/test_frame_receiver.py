@@ -83,3 +83,10 @@ def test_counts_gaps_in_the_frame_ids_across_the_wrap(frames: Frames, receiver: 
         frames.queue.put(arrival)
     receiver.take(3, 1.0)
     assert receiver.counters == StreamCounters(frames=3, missing_frames=2, missing_packets=7)
+
+
+def test_a_frame_that_was_overtaken_is_no_gap(frames: Frames, receiver: FrameReceiver) -> None:
+    for arrival in (whole(65534, 1), whole(1, 3), incomplete(65535, 7), whole(2, 4)):
+        frames.queue.put(arrival)
+    receiver.take(4, 1.0)
+    assert receiver.counters == StreamCounters(frames=4, missing_frames=1, missing_packets=7)
