@@ -199,3 +199,23 @@ def test_is_deaf_while_disarmed(stand: CameraStand) -> None:
 def test_refuses_shots_while_disarmed(stand: CameraStand, call: Callable[[Camera], object]) -> None:
     with pytest.raises(DeviceError, match=f"{VIEW}: the camera is not armed"):
         call(stand.camera)
+
+
+def test_gives_a_sign_of_life_whatever_it_is_doing(stand: CameraStand) -> None:
+    stand.camera.ask()
+    stand.camera.arm()
+    stand.camera.begin_shot()
+    stand.camera.ask()
+    stand.fire()
+    stand.camera.ask()
+    assert stand.camera.collect(2.0).valid
+    stand.camera.disarm()
+    stand.camera.ask()
+    assert not stand.camera.is_lost
+
+
+def test_one_that_was_not_lost_is_not_opened_again(stand: CameraStand) -> None:
+    stand.camera.recover()
+    stand.camera.arm()
+    stand.camera.recover()
+    assert stand.shoot()[1].valid

@@ -557,3 +557,10 @@ def test_the_generator_keeps_the_limit_of_an_led_for_continuous_light() -> None:
                 generator.light({view: current_a}, 1.0)
         generator.light({"left": 0.2}, 1.0)
         assert generator.status().state is GeneratorState.LIT
+
+
+def test_one_that_was_not_lost_stays_armed(stand: Stand) -> None:
+    stand.generator.configure(shot_timing())
+    stand.generator.arm(2)
+    stand.generator.recover()
+    assert stand.generator.status().state is GeneratorState.ARMED

@@ -49,3 +49,9 @@ def test_repeated_positions_scatter_by_two_micrometres_at_most(stage: Translatio
     reached_mm = [stage.move_to(z_mm) for z_mm in (1.0, 2.0) * 8]
     errors_um = [1000 * abs(z_mm - round(z_mm)) for z_mm in reached_mm]
     assert 0.2 < max(errors_um) < 2.05
+
+
+def test_one_that_was_not_lost_stays_where_it_is(stage: TranslationStage) -> None:
+    reached_mm = stage.move_to(1.0)
+    stage.recover()
+    assert stage.position_mm() == reached_mm
