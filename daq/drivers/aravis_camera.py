@@ -95,7 +95,8 @@ class AravisCamera:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.disarm()
-        self._is_open = False
+        with self._opening:
+            self._is_open = False
         self._release(keep=False)
 
     @property
@@ -237,9 +238,9 @@ class AravisCamera:
         return [*ours, *self._profile.features]
 
     def _connected(self) -> "AravisDevice":
-        if not self._is_open:
-            raise DeviceRefused(self._name, "the camera is not open")
         with self._opening:
+            if not self._is_open:
+                raise DeviceRefused(self._name, "the camera is not open")
             if self._receiver is None and self._device is not None:
                 self._look()  # Aravis asks a silent camera for 2.5 s, and one that was without power refuses everything
             device = self._device

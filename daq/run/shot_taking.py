@@ -23,6 +23,9 @@ _LEAST_COLLECT_S = 0.05
 _PATIENCE_S = 0.2
 """For cameras that re-base, before the light is switched off; they need milliseconds."""
 
+_ANSWER_LIMIT_S = 2.0
+"""For cameras of which nothing came, in the dark; each gives up on the answer itself before."""
+
 _LATE_PERIODS = 0.5
 """A shot that is later by so many periods moves those after it, and none comes closer to the one before."""
 
@@ -66,7 +69,7 @@ class ShotTaker:
         self._ending = run.ending
         self._say = run.say
         self._thresholds = thresholds
-        self._frame_deadline_s = self._timing.shortest_period_ns / 1e9 + run.limits.frame_s
+        self._frame_deadline_s = round(self._timing.shortest_period_ns / 1e9 + run.limits.frame_s, 2)
         self._refires_left = self._plan.refire_quota
         self._period_s = 1 / self._plan.rate_hz
         self._shortest_s = self._timing.shortest_period_ns / 1e9
@@ -167,7 +170,7 @@ class ShotTaker:
         silent = {view: self._rig.cameras[view] for view, frames in views.items() if frames.silent}
         if silent:
             self._say(f"shot {index}: nothing came from {', '.join(silent)}; light off")
-            _raise_first(SideBySide("a question", _ask, silent).errors(self._frame_deadline_s))
+            _raise_first(SideBySide("a question", _ask, silent).errors(_ANSWER_LIMIT_S))
 
     def _check(self, index: int, fired: FiredTrain, views: dict[str, DoubleFrame]) -> ShotFindings:
         findings = check_exposures(views, train_deviation(self._timing, fired) or "")
