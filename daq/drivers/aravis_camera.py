@@ -10,7 +10,7 @@ from daq.devices import DeviceIdentity
 from daq.drivers.camera_profile import CameraProfile, FeatureWrite
 from daq.drivers.exposure_pairing import ExposureFormat, double_frame
 from daq.drivers.frame_receiver import FrameReceiver, StreamCounters
-from daq.drivers.gige_question import is_controlled
+from daq.drivers.gige_question import Controller, controller_of
 from daq.errors import DeviceError, DeviceRefused, DeviceUnavailable
 from daq.network import Network
 from daq.shot import DoubleFrame
@@ -81,6 +81,7 @@ class AravisCamera:
         self._is_open = False
         self._device: AravisDevice | None = None
         self._receiver: FrameReceiver | None = None
+        self._controller: Controller | None = None
         self._last_id: int | None = None
         self._late_frames = 0
         self._letting_go = Lock()
@@ -144,9 +145,14 @@ class AravisCamera:
             raise DeviceUnavailable(self._name, f"the camera at {self._ip} was lost; it is opened again between runs")
 
     def _look(self) -> None:
-        device = self._device
-        if not is_controlled(self._name, self._ip) and device is not None:
-            device.lose()
+        """Find out whether the camera still knows us: it tells who controls it, and that was us when it was opened."""
+        device, ours = self._device, self._controller
+        controller = controller_of(self._name, self._ip)
+        if device is None or controller == ours:
+            return
+        device.lose()
+        if controller is not None:
+            raise DeviceUnavailable(self._name, f"the camera at {self._ip} was taken over by {controller}")
 
     def recover(self) -> None:
         """Open a camera anew that was lost and answers again; takes long if another client holds it.
@@ -251,10 +257,12 @@ class AravisCamera:
     def _open(self, lost: "AravisDevice | None" = None) -> "AravisDevice":
         """Let go of the lost one first: its heartbeat may still hold the camera."""
         aravis = load_aravis(self._name)
-        is_controlled(self._name, self._ip)  # Aravis takes 2.5 s to find out that nobody is there
+        controller_of(self._name, self._ip)  # Aravis takes 2.5 s to find out that nobody is there
         if lost is not None:
             lost.close()
-        return aravis(self._name, self._ip)
+        device = aravis(self._name, self._ip)
+        self._controller = controller_of(self._name, self._ip)
+        return device
 
     def _armed(self) -> FrameReceiver:
         receiver = self._receiver

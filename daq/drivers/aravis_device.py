@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from daq.devices import DeviceIdentity
 from daq.drivers.camera_profile import FeatureValue, FeatureWrite
 from daq.drivers.exposure_pairing import Arrival, ExposureFormat
+from daq.drivers.gige_question import controller_of
 from daq.errors import DeviceRefused, DeviceTimeout, DeviceUnavailable
 
 gi.require_version("Aravis", "0.8")
@@ -178,7 +179,8 @@ class AravisDevice:
         deadline_s = monotonic() + _CONTROL_LIMIT_S
         while not self._device.is_controller() and not self._try_to_take_control():
             if monotonic() > deadline_s:
-                reason = f"the camera at {self._ip} is held by another client, still after {_CONTROL_LIMIT_S:g} s"
+                holder = controller_of(self._name, self._ip) or "another client"
+                reason = f"the camera at {self._ip} is held by {holder}, still after {_CONTROL_LIMIT_S:g} s"
                 raise DeviceUnavailable(self._name, reason)
             self._lost.wait(_CONTROL_RETRY_S)
         self._lost.clear()

@@ -6,6 +6,8 @@ thread each. A register may be read by anybody, so this asks by a socket of its 
 
 import socket
 import struct
+from dataclasses import dataclass
+from itertools import count
 from time import monotonic
 
 from daq.errors import DeviceUnavailable
@@ -17,13 +19,31 @@ _REPEAT_S = 0.25
 _PORT = 3956
 _KEY, _ACKNOWLEDGE = 0x42, 0x01
 _READ_REGISTER = 0x0080
-_CONTROL_PRIVILEGE = 0x0A00
-_QUESTION = struct.Struct(">BBHHHI")
-_ANSWER = struct.Struct(">HHHHI")
+_PRIVILEGE, _PRIMARY_PORT, _PRIMARY_IP = 0x0A00, 0x0A04, 0x0A14
+_HEADER = struct.Struct(">BBHHH")
 
 
-def is_controlled(name: str, ip: str, limit_s: float = ASK_LIMIT_S) -> bool:
-    """Whether any client has control of the camera, as it answers itself.
+@dataclass(frozen=True)
+class Controller:
+    """Who controls a camera, as the camera says it.
+
+    Parameters
+    ----------
+    ip : str
+        Address; ``0.0.0.0`` where the camera does not tell.
+    port : int
+        Its UDP port; 0 where the camera does not tell.
+    """
+
+    ip: str = "0.0.0.0"  # noqa: S104  nobody listens there
+    port: int = 0
+
+    def __str__(self) -> str:
+        return f"{self.ip}:{self.port}" if self.port else "another client"
+
+
+def controller_of(name: str, ip: str, limit_s: float = ASK_LIMIT_S) -> Controller | None:
+    """Who controls the camera, as it answers itself; None if nobody does.
 
     Parameters
     ----------
@@ -39,30 +59,38 @@ def is_controlled(name: str, ip: str, limit_s: float = ASK_LIMIT_S) -> bool:
     DeviceUnavailable
         Nothing answers there.
     """
+    deadline_s = monotonic() + limit_s
     try:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
             sock.connect((ip, _PORT))
-            deadline_s = monotonic() + limit_s
-            number = 0
-            while (left_s := deadline_s - monotonic()) > 0:
-                number += 1
-                sock.settimeout(min(_REPEAT_S, left_s))
-                sock.send(_QUESTION.pack(_KEY, _ACKNOWLEDGE, _READ_REGISTER, 4, number, _CONTROL_PRIVILEGE))
-                privilege = _answer(sock, number)
-                if privilege is not None:
-                    return privilege != 0
+            sock.settimeout(_REPEAT_S)
+            numbers = count(1)
+            while monotonic() < deadline_s:
+                # Not every camera tells more than its privilege, or answers a question for several registers.
+                for registers in ((_PRIVILEGE, _PRIMARY_PORT, _PRIMARY_IP), (_PRIVILEGE,)):
+                    if told := _read(sock, next(numbers), *registers):
+                        privilege, *client = told
+                        return _client(client) if privilege else None
     except OSError as error:
         raise DeviceUnavailable(name, f"no camera answers at {ip} ({error.strerror})") from error
     raise DeviceUnavailable(name, f"no camera answers at {ip} within {limit_s:g} s")
 
 
-def _answer(sock: socket.socket, number: int) -> int | None:
-    """Value of the register; None if no answer to this question came in time."""
+def _read(sock: socket.socket, number: int, *registers: int) -> tuple[int, ...]:
+    """Values of registers; none if the camera refuses, or no answer to this question comes in time."""
+    body = struct.Struct(f">{len(registers)}I")
+    sock.send(_HEADER.pack(_KEY, _ACKNOWLEDGE, _READ_REGISTER, body.size, number) + body.pack(*registers))
     try:
-        answer = sock.recv(64)
+        while True:
+            answer = sock.recv(64)
+            if answer[2:4] + answer[6:8] == struct.pack(">HH", _READ_REGISTER + 1, number):
+                return body.unpack_from(answer, 8) if len(answer) == 8 + body.size and answer[:2] == b"\0\0" else ()
     except TimeoutError:
-        return None
-    if len(answer) != _ANSWER.size:
-        return None
-    status, command, _, answered, privilege = _ANSWER.unpack(answer)
-    return int(privilege) if (status, command, answered) == (0, _READ_REGISTER + 1, number) else None
+        return ()
+
+
+def _client(told: list[int]) -> Controller:
+    if not told:
+        return Controller()
+    port, address = told
+    return Controller(socket.inet_ntoa(address.to_bytes(4)), port & 0xFFFF)

@@ -42,9 +42,10 @@ def test_what_was_away_between_runs_is_back_for_the_next_one(
 
 def test_control_that_was_given_back_is_taken_again(bench: BenchServing) -> None:
     with bench.during("control_taken", view="view1"):
+        assert "taken over by 10.99.99.99:50000" in bench.await_lamp("view1", "fault")["detail"]
         status = bench.run()
     assert status.outcome is RunOutcome.FAILED
-    assert "view1" in status.message
+    assert "view1: the camera at 127.0.6.1 was taken over by 10.99.99.99:50000" in status.message
     bench.await_lamp("view1", "ok")
     bench.assert_next_run_is_sound()
 

@@ -3,6 +3,7 @@
 Bytes in, bytes out; the socket belongs to the camera.
 """
 
+import socket
 import struct
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -12,6 +13,8 @@ from daq.simulation.camera.gige_registers import Register, RegisterBank
 
 GVCP_PORT = 3956
 Peer = tuple[str, int]
+ANOTHER_CLIENT: Peer = ("10.99.99.99", 50000)
+"""Who takes control away in a fault."""
 
 _KEY = 0x42
 _HEADER = struct.Struct(">BBHHH")
@@ -99,14 +102,18 @@ class ControlChannel:
 
     def hand_over(self, to_another: bool) -> None:
         """Let another client have the camera, or let it give the camera back: then nobody holds it."""
-        if self._held_by_another and not to_another:
-            self._release()
+        if to_another == self._held_by_another:
+            return
         self._held_by_another = to_another
+        if to_another:
+            self._hold(ANOTHER_CLIENT)
+        else:
+            self._release()
 
     def expire(self, now_s: float) -> None:
         """Free the camera if its client's heartbeat has stopped; that stops the acquisition too."""
         limit_s = self._bank[Register.HEARTBEAT_TIMEOUT_MS] / 1e3
-        if self._holder is not None and now_s - self._heard_s > limit_s:
+        if not self._held_by_another and self._holder is not None and now_s - self._heard_s > limit_s:
             self._release()
 
     def _execute(self, command: int, body: bytes, peer: Peer, now_s: float) -> bytes:
@@ -145,12 +152,20 @@ class ControlChannel:
 
     def _grant(self, value: int, peer: Peer, now_s: float) -> None:
         if value:
-            self._holder, self._heard_s = peer, now_s
+            self._heard_s = now_s
+            self._hold(peer)
         else:
             self._release()
 
+    def _hold(self, client: Peer) -> None:
+        self._holder = client
+        ip, port = client
+        self._bank[Register.PRIMARY_APPLICATION_IP] = int.from_bytes(socket.inet_aton(ip))
+        self._bank[Register.PRIMARY_APPLICATION_PORT] = port
+
     def _release(self) -> None:
         self._holder = None
+        self._bank[Register.PRIMARY_APPLICATION_IP] = self._bank[Register.PRIMARY_APPLICATION_PORT] = 0
         self._bank[Register.CONTROL_PRIVILEGE] = 0
         self._bank[Register.ACQUISITION] = 0
         self._on_write(Register.ACQUISITION, 0)

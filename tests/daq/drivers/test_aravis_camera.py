@@ -344,6 +344,15 @@ def test_a_camera_that_another_client_gave_back_is_opened_again(wire: Wire) -> N
     wire.assert_good_shot()
 
 
+def test_who_has_taken_a_camera_is_named(wire: Wire) -> None:
+    wire.camera.disarm()
+    wire.simulated.faults.held_by_another = True
+    lose(wire)
+    for attempt in (wire.camera.ask, wire.camera.recover, wire.camera.arm):
+        with pytest.raises(DeviceUnavailable, match=rf"view: the camera at {IP} was taken over by 10\.99"):
+            attempt()
+
+
 def test_an_armed_camera_is_not_opened_again(wire: Wire) -> None:
     wire.simulated.kill()
     wire.simulated.power_on()
@@ -361,7 +370,7 @@ def test_a_camera_that_another_client_holds_is_waited_for_and_named(
     wire: Wire, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(aravis_device, "_CONTROL_LIMIT_S", 1.0)
-    with pytest.raises(DeviceUnavailable, match=f"second: the camera at {IP} is held by another client"):
+    with pytest.raises(DeviceUnavailable, match=f"second: the camera at {IP} is held by 127"):
         AravisCamera("second", IP, PROFILE, SHAPE).__enter__()
     wire.assert_good_shot()
 

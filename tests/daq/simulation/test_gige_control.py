@@ -75,6 +75,11 @@ def test_a_silent_client_loses_control_after_the_heartbeat_timeout(client: Clien
 def test_a_foreign_holder_shuts_everybody_out(client: Client) -> None:
     client.channel.hand_over(True)
     assert client.write(Register.CONTROL_PRIVILEGE, CONTROL) is Status.ACCESS_DENIED
+    client.channel.expire(60.0)
+    assert client.read(Register.PRIMARY_APPLICATION_PORT) == 50000
+    client.channel.hand_over(False)
+    assert client.read(Register.CONTROL_PRIVILEGE) == client.read(Register.PRIMARY_APPLICATION_PORT) == 0
+    assert client.write(Register.CONTROL_PRIVILEGE, CONTROL) is Status.SUCCESS
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from daq.drivers.aravis_camera import AravisCamera
 from daq.drivers.camera_profile import load_camera_profile
-from daq.drivers.gige_question import is_controlled
+from daq.drivers.gige_question import controller_of
 from daq.drivers.serial_pulse_generator import SerialPulseGenerator
 from daq.errors import DeviceError, DeviceUnavailable
 from daq.faults import LASTING_FAULTS, Fault, FaultKind, ScriptedFault
@@ -56,7 +56,7 @@ def fault(kind: FaultKind, duration_s: float | None = None, amount: float = 1.0)
 
 def answers(_: SimulatedLaboratory) -> bool:
     try:
-        is_controlled(VIEW, IP, 0.3)
+        controller_of(VIEW, IP, 0.3)
     except DeviceUnavailable:
         return False
     return True
@@ -143,7 +143,7 @@ def test_a_camera_with_power_again_has_factory_settings_and_another_clock(labora
         assert becomes_well(laboratory, FaultKind.KILLED)
         bank = laboratory.devices.cameras[VIEW]._bank
         assert (bank.frames_per_trigger, bank[0x8020], bank[0x0D04]) == (1, 0, 1500)
-        assert not is_controlled(VIEW, IP)
+        assert not controller_of(VIEW, IP)
         camera.disarm()
         camera.arm()
         assert camera._connected().clock_ns() < before_ns
