@@ -18,6 +18,7 @@ from server.web.app import create_api
 from tests.server.web.test_api import use_a_calibration, wait_for_jobs
 from tests.support.drifting_run import DRIFT_PX, write_droplet_run
 from tests.support.drifting_views import calibration_of, views
+from tests.support.memory_rig import SHAPE
 from tests.support.serving import DEADLINE_S, Serving, plan_of, serving, write_spray
 
 RUN = "drifted"
@@ -93,7 +94,8 @@ def test_recorded_shots_are_checked_one_at_a_time_and_the_last_one_always(tmp_pa
 
 def test_a_check_that_cannot_be_made_says_why_and_stops_nothing(tmp_path: Path) -> None:
     with serving(tmp_path / "runs", build=checking) as server:
-        save_calibration(calibration_of(views()), server.services.data_dir / "calibrations" / "cal.json")
+        of_the_rig = [replace(camera, image_size_px=SHAPE[::-1]) for camera in views()]
+        save_calibration(calibration_of(of_the_rig), server.services.data_dir / "calibrations" / "cal.json")
         server.http.put("/api/calibrations/current", json={"id": "cal"})
         server.run_to_its_end(plan_of(shots=1))
         assert [job["state"] for job in wait_for_jobs(server, 1)] == ["done"]
