@@ -123,7 +123,7 @@ def eventually(condition: Callable[[], bool], otherwise: Callable[[], object]) -
     deadline_s = time.monotonic() + DEADLINE_S
     while not condition():
         assert time.monotonic() < deadline_s, otherwise()
-        threading.Event().wait(0.05)
+        threading.Event().wait(0.1)
 
 
 @contextmanager

@@ -61,9 +61,7 @@ def test_what_cannot_be_acknowledged_yet_says_why(bench: BenchServing) -> None:
     ("lamp", "kind", "fields"),
     [
         ("pulse generator", "generator_hang", {}),
-        ("pulse generator", "generator_unplugged", {}),
         ("view1", "frozen", {"view": "view1"}),
-        ("stage", "stage_unplugged", {}),
     ],
 )
 def test_a_lamp_of_a_silent_device_does_not_show_its_last_value(
