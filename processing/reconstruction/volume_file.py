@@ -8,6 +8,7 @@ several times faster to write.
 
 import os
 from collections.abc import Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,12 +17,13 @@ from typing import Any
 
 import h5py
 import numpy as np
-from isal import isal_zlib
 from numpy.typing import NDArray
 
 from processing.errors import BadInput
+from processing.kernels import DEFAULT_THREADS
 from processing.reconstruction.choices import VoxelType
 from processing.reconstruction.slab_volume import SLAB_ROWS, SlabVolume
+from processing.reconstruction.voxel_chunks import chunks_of
 from processing.volume import VoxelGrid
 
 FORMAT_VERSION = (2, 0)
@@ -66,7 +68,14 @@ def write_volume(
     write_slabs(Path(path), SlabVolume.of(volume), grid, provenance)
 
 
-def write_slabs(path: Path, volume: SlabVolume, grid: VoxelGrid, provenance: Mapping[str, Value]) -> None:
+def write_slabs(
+    path: Path,
+    volume: SlabVolume,
+    grid: VoxelGrid,
+    provenance: Mapping[str, Value],
+    *,
+    threads: int = DEFAULT_THREADS,
+) -> None:
     """Write a volume as its slabs come; the file appears complete or not at all.
 
     Parameters
@@ -79,13 +88,14 @@ def write_slabs(path: Path, volume: SlabVolume, grid: VoxelGrid, provenance: Map
         Where its voxels lie; VTK sees the same x, y, z in mm.
     provenance : Mapping[str, str | int | float]
         Where it comes from: kept as attributes of the group ``/tomoshadow``.
+    threads : int
+        Deflate side by side; the file does not depend on it.
     """
     part = path.with_name(path.name + ".part")
     try:
         with h5py.File(part, "w", libver=("v110", "v110")) as file:
             dataset = _make_image_data(file.create_group("VTKHDF", track_order=True), volume, grid)
-            for first_row, slab in volume.slabs:
-                _write_slab(dataset, first_row, slab, volume.unit)
+            _write_voxels(dataset, volume, threads)
             if volume.losses:
                 dataset.attrs["lost_voxels"] = volume.losses.voxel_share
                 dataset.attrs["lost_intensity"] = volume.losses.intensity_share
@@ -233,25 +243,17 @@ def _make_image_data(group: h5py.Group, volume: SlabVolume, grid: VoxelGrid) -> 
     return dataset
 
 
-def _write_slab(dataset: h5py.Dataset, first_row: int, slab: NDArray[Any], unit: float) -> None:
-    """Write chunks of whole size, as HDF5 wants them; beyond the volume they are zero."""
-    chunk = np.zeros(dataset.chunks[1:], dataset.dtype)
-    for z, rows in enumerate(slab):
-        chunk[: len(rows)] = rows
-        if chunk.dtype == np.float32 and unit != 1:
-            chunk *= np.float32(unit)
-        dataset.id.write_direct_chunk((z, first_row, 0), _deflated(chunk))
+def _write_voxels(dataset: h5py.Dataset, volume: SlabVolume, threads: int) -> None:
+    """Write chunks of whole size, as HDF5 wants them."""
+    with ThreadPoolExecutor(threads) as pool:
+        for first_row, slab in volume.slabs:
+            for z, chunk in enumerate(chunks_of(slab, dataset.chunks[1:], dataset.dtype, volume.unit, pool)):
+                dataset.id.write_direct_chunk((z, first_row, 0), chunk)
 
 
 def _write_name(target: h5py.Group | h5py.Dataset, attribute: str, name: str) -> None:
     """A string of fixed length: VTK reads no others."""
     target.attrs.create(attribute, name.encode(), dtype=h5py.string_dtype("ascii", len(name)))
-
-
-def _deflated(chunk: NDArray[Any]) -> bytes:
-    """Shuffle and deflate, the bytes that HDF5's own filters would make."""
-    bytes_by_significance = chunk.reshape(-1, 1).view(np.uint8).T
-    return isal_zlib.compress(np.ascontiguousarray(bytes_by_significance), 1)
 
 
 def _read_grid(attributes: Mapping[str, Any], shape: tuple[int, ...]) -> VoxelGrid:

@@ -19,6 +19,7 @@ from processing.reconstruction.volume_file import (
     write_slabs,
     write_volume,
 )
+from processing.reconstruction.voxel_chunks import PLANES_AT_ONCE
 from processing.volume import VoxelGrid
 
 GRID = VoxelGrid((5, 7, 11), (-1.0, 2.0, -3.5), 1 / 60)
@@ -90,6 +91,24 @@ def test_slabs_may_come_in_the_same_memory_and_in_a_unit(tmp_path: Path, voxels:
 
     write_slabs(tmp_path / "one.vtkhdf", SlabVolume(slabs(), voxels, 0.3), TALL, {})
     np.testing.assert_array_equal(read_volume(tmp_path / "one.vtkhdf")[0], volume.astype(np.float32) * np.float32(0.3))
+
+
+def test_every_number_of_half_precision_is_stored_as_it_is(tmp_path: Path) -> None:
+    grid = VoxelGrid((3, SLAB_ROWS + 1, 200), (0.0, 0.0, 0.0), 0.1)
+    count = int(np.prod(grid.shape))
+    half = (np.arange(count, dtype=np.uint16) % 0x7C00).view(np.float16).reshape(grid.shape)  # all that are finite
+    assert np.unique(half).size == 0x7C00
+    write_volume(tmp_path / "one.vtkhdf", half, grid, {})
+    np.testing.assert_array_equal(read_volume(tmp_path / "one.vtkhdf")[0], half.astype(np.float32))
+
+
+@pytest.mark.parametrize("voxels", VoxelType)
+def test_a_file_is_the_same_however_many_threads_deflate(tmp_path: Path, voxels: VoxelType) -> None:
+    grid = VoxelGrid((2 * PLANES_AT_ONCE + 3, SLAB_ROWS + 9, 5), (0.0, 0.0, 0.0), 0.1)
+    volume = (some_volume(grid) * 200).astype(voxels.value)
+    for threads in (1, 3):
+        write_slabs(tmp_path / f"{threads}.vtkhdf", SlabVolume.of(volume), grid, {}, threads=threads)
+    assert (tmp_path / "1.vtkhdf").read_bytes() == (tmp_path / "3.vtkhdf").read_bytes()
 
 
 def test_parts_are_read_by_planes_and_by_slabs(tmp_path: Path) -> None:

@@ -1,0 +1,64 @@
+"""Slabs as the chunks of a volume file: the bytes that HDF5's own shuffle and gzip filters would make of them."""
+
+from collections.abc import Iterator
+from concurrent.futures import Executor
+from functools import partial
+from typing import Any
+
+import cv2
+import numpy as np
+from isal import isal_zlib
+from numpy.typing import NDArray
+
+PLANES_AT_ONCE = 32
+"""One thread turns so many planes into chunks at a time."""
+_LEVEL = 1
+
+
+def chunks_of(
+    slab: NDArray[Any], chunk_shape: tuple[int, int], dtype: np.dtype[Any], unit: float, pool: Executor
+) -> Iterator[bytes]:
+    """One chunk per plane z, in order; beyond the slab it is zero.
+
+    Parameters
+    ----------
+    slab : (nz, rows, nx) float32, float16 or uint8 array
+        Its memory is read until the last chunk has come.
+    chunk_shape : tuple[int, int]
+        (rows, nx), rows as many as the slab has, or more.
+    dtype : dtype
+        float32, or uint8 where the slab has it.
+    unit : float
+        Voxels of float32 are multiplied by it.
+    pool : Executor
+        Threads that work side by side.
+    """
+    parts = [slab[z : z + PLANES_AT_ONCE] for z in range(0, len(slab), PLANES_AT_ONCE)]
+    for chunks in pool.map(partial(_chunks, chunk_shape, dtype, unit), parts):
+        yield from chunks
+
+
+def _chunks(chunk_shape: tuple[int, int], dtype: np.dtype[Any], unit: float, planes: NDArray[Any]) -> list[bytes]:
+    chunk = np.zeros(chunk_shape, dtype)
+    chunks = []
+    for rows in planes:
+        _copy(rows, chunk[: len(rows)])
+        if dtype == np.float32 and unit != 1:
+            chunk *= np.float32(unit)
+        chunks.append(_deflated(chunk))
+    return chunks
+
+
+def _copy(rows: NDArray[Any], to: NDArray[Any]) -> None:
+    """OpenCV makes float32 of float16 seven times faster than numpy does."""
+    if rows.dtype == np.float16 and to.dtype == np.float32:
+        cv2.convertFp16(rows.view(np.int16), to)
+    else:
+        to[:] = rows
+
+
+def _deflated(chunk: NDArray[Any]) -> bytes:
+    if chunk.itemsize == 1:
+        return isal_zlib.compress(chunk, _LEVEL)
+    bytes_by_significance = cv2.split(chunk.view(np.uint8).reshape(*chunk.shape, chunk.itemsize))
+    return isal_zlib.compress(np.stack(bytes_by_significance), _LEVEL)
