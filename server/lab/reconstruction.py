@@ -1,7 +1,7 @@
 """What is reconstructed, and when: every valid shot of a sample run by itself, and what an operator asks for."""
 
 import asyncio
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from daq.run.events import ShotRecorded
 from daq.run_plan import ImageKey, RunKind
@@ -56,7 +56,8 @@ def request_reconstruction(
     """
     chosen, wanted = requested_shots(context, run_id, shots, calibration)
     described, results_id = settings.model_dump(mode="json"), results_id_of(context, run_id, chosen, settings)
-    return [context.runner.submit(reconstruction_job(run_id, shot, chosen, results_id, described)) for shot in wanted]
+    jobs = [reconstruction_job(run_id, shot, chosen, results_id, described) for shot in wanted]
+    return context.runner.submit_checked(jobs, run_id, chosen, ends_of(wanted))
 
 
 def results_id_of(
@@ -71,7 +72,7 @@ def results_id_of(
 def requested_shots(
     context: Context, run_id: str, shots: Iterable[int] | None, calibration: str | None
 ) -> tuple[str, list[int]]:
-    """The calibration and the shots of a request, and a check of the last of them, which comes first, and the first.
+    """The calibration and the shots of a request.
 
     Raises
     ------
@@ -89,9 +90,12 @@ def requested_shots(
     wanted = _valid_shots(context, run_id) if shots is None else list(shots)
     if absent := [shot for shot in wanted if shot >= summary.shots_recorded]:
         raise Unprocessable(f"run {run_id} has {summary.shots_recorded} shots, not {absent}")
-    for shot in dict.fromkeys((*wanted[-1:], *wanted[:1])):
-        context.runner.check(run_id, chosen, shot)
     return chosen, wanted
+
+
+def ends_of(shots: Sequence[int]) -> list[int]:
+    """The shots of a request that are checked: the last, which comes first, and the first."""
+    return list(dict.fromkeys((*shots[-1:], *shots[:1])))
 
 
 def _valid_shots(context: Context, run_id: str) -> list[int]:

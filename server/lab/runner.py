@@ -5,7 +5,7 @@ The table is the queue. Whatever is asked for while the server is down, or was r
 
 import asyncio
 import contextlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -77,10 +77,19 @@ class JobRunner:
             self.submit(following)
         return queued
 
-    def check(self, run_id: str, calibration: str, shot: int) -> None:
-        """Queue a check of a shot, or see to it after the one of this run that is under way; from any thread."""
-        if job := self._watch.next_check(run_id, calibration, shot, self._calibrations.content_id(calibration)):
-            self.submit(job)
+    def submit_checked(self, jobs: Sequence[Job], run_id: str, calibration: str, shots: Iterable[int]) -> list[Job]:
+        """Queue jobs that trust a calibration, and checks of some shots of their run; from any thread.
+
+        The watch knows of the checks before the first job is queued, and so holds back those that have to wait. A
+        check of a run whose check is under way comes after that.
+        """
+        content = self._calibrations.content_id(calibration)
+        checks = [self._watch.next_check(run_id, calibration, shot, content) for shot in shots]
+        try:
+            return [self.submit(job) for job in jobs]
+        finally:
+            for check in filter(None, checks):
+                self.submit(check)
 
     async def abort(self, job_id: str) -> Job:
         """Abort a job: a waiting one at once, a running one at its next step.
@@ -122,11 +131,15 @@ class JobRunner:
             self._watch.learn(job)
 
     def _waiting(self, running: frozenset[str]) -> list[Job]:
-        """Who may be next: checks and all else take turns, so that neither keeps the other waiting."""
+        """Who may be next: checks and all else take turns, so that neither keeps the other waiting.
+
+        The first check of a run comes after the first volumes.
+        """
         self._table.requeue_interrupted(running)
         checks = self._table.oldest(JobState.QUEUED, self._engine.workers, [JobKind.CHECK])
         others = self._table.oldest(JobState.QUEUED, self._engine.workers, set(JobKind) - {JobKind.CHECK})
-        return [*others, *checks] if self._checked_last else [*checks, *others]
+        others_first = self._checked_last or any(self._watch.goes_ahead(job) for job in others)
+        return [*others, *checks] if others_first else [*checks, *others]
 
     def _may_start(self, job: Job) -> bool:
         has_room = len(self._running) < self._engine.workers

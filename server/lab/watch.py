@@ -1,7 +1,8 @@
 """CalibrationWatch: does the calibration of a run still fit its shots? Check jobs tell, reconstructions ask.
 
 A check takes seconds and shots may come faster. So one check of a run is under way at a time; when it has ended, the
-newest shot that was asked for meanwhile is next. Slow runs are checked shot by shot, fast ones by a sample.
+newest shot that was asked for meanwhile is next. Slow runs are checked shot by shot, fast ones by a sample. The volumes
+of the shot that is checked first do not wait, and say that they are not checked yet; those of all others do.
 """
 
 import threading
@@ -77,7 +78,7 @@ class _Account:
 
     content: str
     is_asked: bool = False
-    under_way: str | None = None
+    under_way: int | None = None
     next_shot: int | None = None
     has_ended: bool = False
     told: set[int] = field(default_factory=set)
@@ -126,7 +127,7 @@ class CalibrationWatch:
                 account.next_shot = shot
                 return None
             job = check_job(run_id, shot, calibration, content)
-            account.under_way, account.next_shot = job.id, None
+            account.under_way, account.next_shot = shot, None
             return job
 
     def learn(self, job: Job) -> Job | None:
@@ -140,7 +141,7 @@ class CalibrationWatch:
                 return None  # of a calibration that has been replaced meanwhile
             account = self._account(job.run_id, job.calibration, content)
             if job.state not in ENDED:
-                account.under_way = job.id
+                account.under_way = job.shot
                 return None
             account.under_way, account.has_ended = None, True
             account.note(job)
@@ -163,9 +164,18 @@ class CalibrationWatch:
 
     def holds(self, job: Job) -> bool:
         """Whether a job that trusts the calibration has to wait: the first check of it on this run is under way."""
+        checked = self._first_checked(job)
+        return checked is not None and checked != job.shot
+
+    def goes_ahead(self, job: Job) -> bool:
+        """Whether a job comes before that first check, as it is of the same shot: nobody shall wait for its volumes."""
+        checked = self._first_checked(job)
+        return checked is not None and checked == job.shot
+
+    def _first_checked(self, job: Job) -> int | None:
+        """The shot whose check is under way and tells a job, as the first one, whether to trust the calibration."""
         account = self._accounts.get((job.run_id, job.calibration))
-        waits = account is not None and account.under_way is not None and not account.has_ended
-        return waits and job.kind in _TRUSTING
+        return None if account is None or account.has_ended or job.kind not in _TRUSTING else account.under_way
 
     def refusal(self, job: Job) -> str | None:
         """Why a job that trusts the calibration must not be done; None if it may."""

@@ -8,7 +8,7 @@ from processing.runs.measurement import MeasureSettings, require_measurable
 from processing.runs.workbench import read_references
 from server.lab.errors import Unprocessable
 from server.lab.jobs import Job, JobKind, shot_job
-from server.lab.reconstruction import requested_shots, results_id_of
+from server.lab.reconstruction import ends_of, requested_shots, results_id_of
 from server.lab.services import Context
 
 
@@ -42,7 +42,5 @@ def request_measurement(
     chosen, wanted = requested_shots(context, run_id, shots, calibration)
     results_id = results_id_of(context, run_id, chosen, chosen_settings)
     described = chosen_settings.model_dump(mode="json")
-    return [
-        context.runner.submit(shot_job(JobKind.MEASUREMENT, run_id, shot, chosen, results_id, described))
-        for shot in wanted
-    ]
+    jobs = [shot_job(JobKind.MEASUREMENT, run_id, shot, chosen, results_id, described) for shot in wanted]
+    return context.runner.submit_checked(jobs, run_id, chosen, ends_of(wanted))

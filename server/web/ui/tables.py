@@ -247,8 +247,10 @@ def _belonging(job: Job) -> str:
     shots = ", ".join(str(check["shot"]) for check in asked["shots"])
     if asked["verdict"] is None and job.kind is JobKind.MEASUREMENT:
         return ""  # droplets have been fitted: their own verdict tells more
+    if not asked["shots"]:
+        return "not checked yet whether run and calibration belong together"
     if asked["verdict"] is None:
-        return f"not checked whether run and calibration belong together (asked: shot {shots or 'none'})"
+        return f"not checked whether run and calibration belong together (asked: shot {shots})"
     return f"droplets speak against run and calibration: {asked['verdict']} (shot {asked['shots'][0]['shot']})"
 
 

@@ -101,6 +101,26 @@ def test_checks_and_reconstructions_take_turns_beginning_with_a_check(tmp_path: 
     assert order == [(kind, shot) for shot in range(3) for kind in ("check", "reconstruction")]
 
 
+def test_the_first_volumes_come_before_the_first_check_and_all_others_after_it(tmp_path: Path) -> None:
+    order: list[tuple[str, int]] = []
+
+    def note(job: dict[str, Any], should_stop: Callable[[], bool]) -> dict[str, Any]:
+        order.append(("reconstruction" if job["results_dir"] else "check", job["shot"]))
+        return {"shot": job["shot"], "verdict": "good", "moved": None, "views": {}, "uncertainty_px": {}}
+
+    async def go() -> None:
+        async with at_work(tmp_path, note) as laboratory:
+            jobs = laboratory.runner.submit_checked([job_of(0), job_of(1)], "run", "cal", [0])
+            first, second = [await laboratory.reach(job, JobState.DONE) for job in jobs]
+        assert first.result is not None
+        assert first.result["belonging"] == {"verdict": None, "shots": []}
+        assert second.result is not None
+        assert second.result["belonging"]["verdict"] == "good"
+
+    asyncio.run(go())
+    assert order == [("reconstruction", 0), ("check", 0), ("reconstruction", 1)]
+
+
 def test_a_job_that_fails_says_why_and_stops_no_other(tmp_path: Path) -> None:
     async def go() -> None:
         async with at_work(tmp_path, fail) as laboratory:
@@ -144,8 +164,7 @@ def test_what_droplets_say_of_the_calibration_comes_with_every_job(tmp_path: Pat
 
     async def go() -> None:
         async with at_work(tmp_path, work) as laboratory:
-            laboratory.runner.check("run", "cal", 0)
-            laboratory.runner.submit(job_of(1))
+            laboratory.runner.submit_checked([job_of(1)], "run", "cal", [0])
             done = await laboratory.reach(job_of(1), JobState.DONE)
             expected = {"verdict": "warn", "shots": [check]}
             assert done.result == {"heard": expected, "belonging": expected}

@@ -132,13 +132,26 @@ def test_reconstructions_wait_for_the_first_check_however_it_ends(state: JobStat
     watch = CalibrationWatch(EventPublisher())
     assert not watch.holds(reconstruction())
     watch.next_check(RUN, CALIBRATION, 0)
-    assert watch.holds(reconstruction())
+    assert watch.holds(reconstruction(1))
     assert not watch.holds(check_job(RUN, 0, CALIBRATION))
-    assert not watch.holds(reconstruction(calibration="another"))
+    assert not watch.holds(reconstruction(1, calibration="another"))
     watch.learn(ended(0, None, state))
-    assert not watch.holds(reconstruction())
+    assert not watch.holds(reconstruction(1))
     watch.next_check(RUN, CALIBRATION, 1)
-    assert not watch.holds(reconstruction())
+    assert not watch.holds(reconstruction(0))
+
+
+def test_the_shot_that_is_checked_first_goes_ahead_and_is_not_checked_yet() -> None:
+    watch = CalibrationWatch(EventPublisher())
+    assert not watch.goes_ahead(reconstruction(3))
+    watch.next_check(RUN, CALIBRATION, 3)
+    assert (watch.holds(reconstruction(3)), watch.goes_ahead(reconstruction(3))) == (False, True)
+    assert (watch.holds(reconstruction(0)), watch.goes_ahead(reconstruction(0))) == (True, False)
+    assert watch.belonging(reconstruction(3)) == {"verdict": None, "shots": []}
+    assert not watch.goes_ahead(check_job(RUN, 3, CALIBRATION))
+    watch.learn(ended(3, 0.9))
+    assert not watch.goes_ahead(reconstruction(3))
+    assert watch.refusal(reconstruction(3)) is not None
 
 
 def test_a_failed_check_says_nothing() -> None:
