@@ -6,7 +6,7 @@ from typing import Literal
 from daq.files.run_directory import RunReader
 from processing.preprocessing import Intensity, Preprocessing
 from processing.reconstruction.settings import ReconstructionSettings
-from processing.runs import pipeline
+from processing.runs.shots import shot_images
 
 
 def read_run(path: str | Path) -> RunReader:
@@ -67,5 +67,5 @@ def shot_intensities(
     """
     recorded = run.read_shot(shot)
     settings = ReconstructionSettings(minimum_window_px=minimum_window_px, noise_floor=noise_floor)
-    images = pipeline.shot_intensities(run, recorded, frame, settings)
+    images = shot_images.shot_intensities(run, recorded, frame, settings)
     return dict(zip(recorded.views, images, strict=True))

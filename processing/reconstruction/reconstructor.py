@@ -30,8 +30,8 @@ class Reconstructor:
         Geometry of views and grid.
     settings : ReconstructionSettings
         Method, options and type of voxels.
-    images : tuple of (rows, columns) float32 arrays
-        For preprocessed images, one per view.
+    images : tuple of tuples of (rows, columns) float32 arrays
+        For preprocessed images of two exposures, one per view: those of the next one come while one is reconstructed.
     resampled : tuple of (rows, columns) int16 arrays
         For what the kernels sample, one per view.
     memory : (nz, rows, nx) array
@@ -42,7 +42,7 @@ class Reconstructor:
 
     plan: Plan
     settings: ReconstructionSettings
-    images: tuple[Intensity, ...]
+    images: tuple[tuple[Intensity, ...], ...]
     resampled: tuple[NDArray[np.int16], ...]
     memory: NDArray[Any]
     threads: int = DEFAULT_THREADS
@@ -56,7 +56,9 @@ class Reconstructor:
         return cls(
             plan,
             settings,
-            images=tuple(np.empty(view.image_size_px[::-1], np.float32) for view in plan.views),
+            images=tuple(
+                tuple(np.empty(view.image_size_px[::-1], np.float32) for view in plan.views) for _ in range(2)
+            ),
             resampled=plan.empty_images(),
             memory=np.empty((nz, min(SLAB_ROWS, ny), nx), settings.voxels.computed.value),
             threads=threads,

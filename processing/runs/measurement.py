@@ -33,9 +33,10 @@ from processing.runs.measured_images import (
     shadow_images,
     without_ignored,
 )
-from processing.runs.pipeline import Stopped, default_grid, frame_names, provenance_of, require_match
+from processing.runs.pipeline import Stopped, default_grid, provenance_of
 from processing.runs.recipe import recipe_sha256
 from processing.runs.results_file import FrameName, Provenance, claim_results
+from processing.runs.shots.shot_images import frame_names, require_match
 from processing.runs.workbench import References, read_references
 
 METHOD_VERSION = 4

@@ -16,8 +16,9 @@ from processing.reconstruction.planning.plan import plan_reconstruction
 from processing.reconstruction.reconstructor import Reconstructor
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.runs.exposure_faults import exposure_faults
-from processing.runs.pipeline import default_grid, require_match, shot_intensities
+from processing.runs.pipeline import default_grid
 from processing.runs.results_file import FrameName
+from processing.runs.shots.shot_images import require_match, shot_intensities
 from processing.runs.workbench import read_references
 from processing.volume import VoxelGrid
 

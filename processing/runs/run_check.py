@@ -27,8 +27,8 @@ from processing.progress import Counted, in_silence
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.runs.errors import PipelineError
 from processing.runs.importing import CALIBRATION_FOLDER, RUN_FOLDER
-from processing.runs.pipeline import shot_intensities
 from processing.runs.results_file import FrameName
+from processing.runs.shots.shot_images import shot_intensities
 from processing.runs.workbench import read_references
 
 CHECKED_SHOTS = 3

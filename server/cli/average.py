@@ -75,7 +75,8 @@ def _average_results(options: Namespace) -> dict[str, Any]:
     files = volume_files(options.results, options.exposure)
     if not files:
         raise VolumeFileError(
-            f"{options.results}: there are no volumes of exposure {options.exposure.upper()} to average"
+            f"{options.results}: there are no volumes of exposure {options.exposure.upper()} to average; the server "
+            "keeps previews: name the run and its --calibration"
         )
     volume, grid = average_volumes(files)
     faults = [told for file in files if (told := stored_faults(file))]

@@ -29,7 +29,7 @@ from server.cli.runs.resuming import resumable
 
 if TYPE_CHECKING:
     from processing.reconstruction.settings import ReconstructionSettings
-    from processing.runs.pipeline import ShotResult
+    from processing.runs.shots.shot_result import ShotResult
 
 NAME = "reconstruct"
 STATED = {"method", "accuracy", "voxels", "grid", "minimum_window_px", "noise_floor"}
@@ -74,9 +74,9 @@ def _reconstruct_run(
     from daq.files.run_directory import RunReader
     from processing.reconstruction.settings import METHOD_VERSION
     from processing.runs.overwriting import replacing, require_free
-    from processing.runs.pipeline import frame_names
     from processing.runs.recipe import recipe_sha256
     from processing.runs.results_file import SETTINGS_FILE, volume_path
+    from processing.runs.shots.shot_images import frame_names
 
     indices = selected_shots(run_dir, options.shots)
     with RunReader(run_dir) as run:
@@ -108,26 +108,24 @@ def _reconstruct_shots(
     options: Namespace, settings: "ReconstructionSettings", run_dir: Path, indices: list[int], out: Path
 ) -> "tuple[list[ShotResult], Belonging]":
     from processing.calibration.calibration_file import load_calibration
-    from processing.runs.pipeline import reconstruct_shot
-    from processing.runs.workbench import Workbench
+    from processing.runs.pipeline import reconstruct_shots
 
     @cache
     def belonging() -> Belonging:
         return ask_droplets(run_dir, indices, load_calibration(options.calibration))
 
     shots: list[ShotResult] = []
-    workbench, threads = Workbench(), usable_processors()
-    for index in tracked(indices, lambda index: f"{run_dir.name}: shot {index} by {settings.method}"):
-        shot = reconstruct_shot(
-            run_dir,
-            index,
-            options.calibration,
-            settings,
-            out,
-            workbench=workbench,
-            threads=threads,
-            told=lambda: belonging().provenance,
-        )
+    coming = reconstruct_shots(
+        run_dir,
+        indices,
+        options.calibration,
+        settings,
+        out,
+        threads=usable_processors(),
+        told=lambda: belonging().provenance,
+    )
+    for _ in tracked(indices, lambda index: f"{run_dir.name}: shot {index} by {settings.method}"):
+        shot = next(coming)
         if not shots:
             _tell_slow_views(shot)
         _tell_faults(shot)

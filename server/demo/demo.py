@@ -23,8 +23,9 @@ from processing.calibration.sets.calibration_set import load_calibration_set
 from processing.geometry import FloatArray
 from processing.reconstruction.settings import GridSettings, ReconstructionSettings
 from processing.reconstruction.volume_file import read_volume
-from processing.runs.pipeline import ShotResult, default_grid, reconstruct_shot
+from processing.runs.pipeline import default_grid, reconstruct_shot
 from processing.runs.results_file import volume_path
+from processing.runs.shots.shot_result import ShotResult
 from processing.runs.workbench import Workbench
 from processing.synthetic.spray import droplet_volume
 from processing.synthetic.truth_file import read_true_cameras, read_true_spray

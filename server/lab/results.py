@@ -5,6 +5,7 @@ import re
 import threading
 import zipfile
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any
@@ -12,10 +13,23 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from daq.frozen_model import FrozenModel
-from processing.reconstruction.volume_file import VolumeFileError, open_volume
-from processing.runs.results_file import volume_files
+from processing.calibration.verdict import BELONGING
+from processing.reconstruction.slab_volume import SlabVolume
+from processing.reconstruction.volume_file import VolumeFileError, open_volume, write_slabs
+from processing.runs.results_file import Provenance, volume_files
+from processing.volume import VoxelGrid
 from server.lab.errors import Damaged, NotFound
-from server.pictures.previews import VolumePreview, load_preview, make_preview, preview_path, save_preview
+from server.pictures.previews import (
+    GrowingPreview,
+    VolumePreview,
+    load_preview,
+    load_provenance,
+    preview_files,
+    preview_of_slabs,
+    preview_path,
+    save_preview,
+    volume_of,
+)
 from server.pictures.surfaces import surface_glb
 
 VOLUME_NAME = re.compile(r"shot_(?P<shot>[0-9]{5,7})_(?P<frame>[ab])")
@@ -31,7 +45,7 @@ class VolumeSummary(FrozenModel):
     name: Annotated[str, Field(description="of its file, without the ending")]
     shot: Annotated[int, Field(description="position in the run, from 0")]
     frame: Annotated[str, Field(description="exposure, a or b")]
-    size_bytes: Annotated[int, Field(description="of its file")]
+    size_bytes: Annotated[int, Field(description="of its file; 0 while only its preview is kept")]
 
 
 class DropletsSummary(FrozenModel):
@@ -78,9 +92,9 @@ def _dated(records: Iterator[Path]) -> Iterator[tuple[int, Path]]:
 
 
 def volume_file(run_dir: Path, results_id: str, name: str) -> Path:
-    """File of a volume; NotFound if there is none."""
+    """File of a volume, which is made when somebody asks for it; NotFound if there is not even a preview."""
     path = run_dir / "results" / results_id / f"{name}.vtkhdf"
-    if not path.is_file():
+    if not is_kept(path):
         raise NotFound(f"run {run_dir.name} has no volume {results_id}/{name}")
     return path
 
@@ -96,7 +110,7 @@ def preview_of(volume: Path) -> VolumePreview:
     stored = preview_path(volume)
     try:
         with _MAKING:
-            if not stored.is_file() or stored.stat().st_mtime_ns < volume.stat().st_mtime_ns:
+            if volume.is_file() and (not stored.is_file() or stored.stat().st_mtime_ns < volume.stat().st_mtime_ns):
                 write_preview(volume)
             try:
                 return _load(stored, stored.stat().st_mtime_ns)
@@ -110,7 +124,48 @@ def preview_of(volume: Path) -> VolumePreview:
 def write_preview(volume: Path) -> None:
     """Read a volume and leave its preview beside it."""
     with open_volume(volume) as stored:
-        save_preview(preview_path(volume), make_preview(stored, stored.grid))
+        preview = preview_of_slabs(stored.slabs(), stored.grid)
+        save_preview(preview_path(volume), preview, stored.provenance)
+
+
+def keep_preview(file: Path, volume: SlabVolume, grid: VoxelGrid, provenance: Provenance) -> None:
+    """Keep of a volume what is looked at, and what it takes to make it again."""
+    save_preview(preview_path(file), preview_of_slabs(volume.slabs, grid, volume.unit), provenance)
+
+
+def keep_volume(file: Path, volume: SlabVolume, grid: VoxelGrid, provenance: Provenance) -> None:
+    """Keep the whole volume, and its preview."""
+    growing = GrowingPreview(grid, volume.unit)
+    write_slabs(file, replace(volume, slabs=growing.watching(volume.slabs)), grid, provenance)
+    save_preview(preview_path(file), growing.preview(), provenance)
+
+
+def is_kept(volume: Path) -> bool:
+    """Whether a volume is there, or its preview."""
+    return volume.is_file() or preview_path(volume).is_file()
+
+
+def remaking(volume: Path) -> dict[str, Any]:
+    """Arguments of a task that makes a volume again of which a preview is kept, but for its calibration's file.
+
+    Raises
+    ------
+    Damaged
+        Nobody can read any more how it was made.
+    """
+    try:
+        made_by = load_provenance(preview_path(volume))
+        return {
+            "run_dir": str(volume.parents[2]),
+            "shot": int(made_by["shot"]),
+            "calibration_file": str(made_by["calibration_file"]),
+            "results_dir": str(volume.parent),
+            "settings": json.loads(made_by["settings"]),
+            BELONGING: json.loads(made_by.get(BELONGING, "null")),
+            "keep": "volume",
+        }
+    except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
+        raise Damaged(f"{volume.name} cannot be made again: its preview does not say how ({error})") from error
 
 
 @lru_cache(maxsize=16)
@@ -142,7 +197,8 @@ def droplet_summaries(results_dir: Path) -> Iterator[DropletsSummary]:
 
 def volume_summaries(results_dir: Path) -> Iterator[VolumeSummary]:
     """Volumes in a result set, by shot and exposure."""
-    for path in volume_files(results_dir):
-        if (name := VOLUME_NAME.fullmatch(path.stem)) and path.is_file():
-            shot, frame, size_bytes = int(name["shot"]), name["frame"], path.stat().st_size
-            yield VolumeSummary(name=path.stem, shot=shot, frame=frame, size_bytes=size_bytes)
+    previewed = map(volume_of, preview_files(results_dir))
+    for path in sorted({*volume_files(results_dir), *previewed}):
+        if name := VOLUME_NAME.fullmatch(path.stem):
+            size_bytes = path.stat().st_size if path.is_file() else 0
+            yield VolumeSummary(name=path.stem, shot=int(name["shot"]), frame=name["frame"], size_bytes=size_bytes)

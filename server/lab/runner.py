@@ -18,11 +18,13 @@ from server.lab.engine import Engine, Task, TaskAborted, TaskError
 from server.lab.errors import Conflict, told
 from server.lab.events import EventPublisher
 from server.lab.jobs import Job, JobKind, JobState, JobTable
+from server.lab.results import is_kept, remaking
 from server.lab.watch import CalibrationWatch
 
 _CHECKS_REMEMBERED = 1000
 _LOOK_AGAIN_S = 5.0
 _REST_S = 1.0
+_STORE_S = 600.0
 
 
 class JobRunner:
@@ -65,6 +67,7 @@ class JobRunner:
         self._watch = watch
         self._loop = asyncio.get_running_loop()
         self._changed = asyncio.Event()
+        self._storing = asyncio.Lock()
         self._running: set[str] = set()
         self._checked_last = False
 
@@ -105,6 +108,33 @@ class JobRunner:
             await self._engine.abort(job_id)
             return await asyncio.to_thread(self._table.get, job_id)
         return await self._move(job_id, JobState.ABORTED)
+
+    async def store(self, volume: Path) -> None:
+        """Make the file of a volume of which a preview is kept, as soon as a worker is free.
+
+        Raises
+        ------
+        Conflict
+            It cannot be made any more, or not in time; the text says why.
+        Damaged
+            Nobody can read any more how it was made.
+        """
+        async with self._storing:  # who asks for the same meanwhile finds it there
+            if await asyncio.to_thread(volume.is_file):
+                return
+            made = await asyncio.to_thread(remaking, volume)
+            arguments = {**made, "calibration_file": str(self._calibrations.path(Path(made["calibration_file"]).stem))}
+            name = f"store {volume.parent.name}/{volume.stem}"
+            try:
+                async with asyncio.timeout(_STORE_S):
+                    task = self._tasks[JobKind.RECONSTRUCTION]
+                    await self._engine.submit(name, task, arguments, lambda _steps: None)
+            except TaskError as error:
+                raise Conflict(f"{volume.name} cannot be made again: {error}") from error
+            except TimeoutError as error:
+                raise Conflict(
+                    f"{volume.name} took more than {_STORE_S:g} s: others are before it, ask later"
+                ) from error
 
     async def run(self, duty: Duty) -> None:
         """Work until cancelled; jobs that are then unfinished are taken up by the next start."""
@@ -193,7 +223,7 @@ class JobRunner:
         if job.kind is JobKind.MEASUREMENT:
             return not droplets_path(results_dir, job.shot).is_file()
         written = (job.result or {}).get("volumes") or [{"file": f"shot_{job.shot:05d}_a.vtkhdf"}]
-        return not all((results_dir / volume["file"]).is_file() for volume in written)
+        return not all(is_kept(results_dir / volume["file"]) for volume in written)
 
     def _arguments(self, job: Job) -> dict[str, Any]:
         run_dir = self._data_dir / job.run_id

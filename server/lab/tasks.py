@@ -19,28 +19,25 @@ from processing.runs.run_check import check_shot
 from processing.runs.workbench import Workbench
 from server.lab.engine import Task
 from server.lab.jobs import JobKind
-from server.lab.results import write_preview
+from server.lab.results import keep_preview, keep_volume
 
 WORKBENCH = Workbench()
 """Of this worker process, which does one job at a time."""
 
 
 def reconstruct(job: dict[str, Any], should_stop: Callable[[], bool]) -> dict[str, Any]:
-    """Reconstruct one shot and leave a preview beside each volume."""
-    results_dir = Path(job["results_dir"])
-    settings = ReconstructionSettings.model_validate(job["settings"])
+    """Reconstruct one shot; a preview is kept of each volume, or all of it where the job says so."""
     result = reconstruct_shot(
         Path(job["run_dir"]),
         job["shot"],
         Path(job["calibration_file"]),
-        settings,
-        results_dir,
+        ReconstructionSettings.model_validate(job["settings"]),
+        Path(job["results_dir"]),
         should_stop,
         workbench=WORKBENCH,
         told=lambda: {BELONGING: json.dumps(job[BELONGING])} if job.get(BELONGING) else {},
+        keep=keep_volume if job.get("keep") == "volume" else keep_preview,
     )
-    for volume in result.volumes:
-        write_preview(results_dir / volume.file)
     return result.model_dump(mode="json")
 
 

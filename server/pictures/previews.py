@@ -1,22 +1,28 @@
 """Previews of volumes: at most 192 voxels along each axis, 8 bits, small enough to keep in memory and to draw.
 
 A full volume has 600 million voxels; reading one to show a slice would cost seconds and gigabytes. So the task that
-reconstructs a shot leaves a preview beside each volume: every preview voxel is the maximum of a block of voxels, so
-that no droplet disappears. A small volume is its own preview.
+reconstructs a shot makes a preview of each volume while its slabs come: every preview voxel is the maximum of a block
+of voxels, so that no droplet disappears. A small volume is its own preview.
 """
 
+import json
 import math
+import zipfile
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from processing.reconstruction.slab_volume import Slabs, slabs_of
 from processing.volume import VoxelGrid
 
 LONGEST_AXIS = 192
 AXES = "zyx"
+_ENDING = ".preview.npz"
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,45 +64,102 @@ class VolumePreview:
         return np.asarray(self.voxels.max(axis=AXES.index(axis)), np.uint8)
 
 
-class Planes(Protocol):
-    """A volume (z, y, x) that gives away some planes: an array, or an open file."""
+class GrowingPreview:
+    """The preview of a volume of non-negative values, slab after slab.
 
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """Number of voxels (nz, ny, nx)."""
+    Parameters
+    ----------
+    grid : VoxelGrid
+        Of the volume.
+    unit : float
+        Intensity of a voxel of 1.
+    longest_axis : int
+        Most voxels of the preview along an axis.
+    """
 
-    def __getitem__(self, planes: slice, /) -> NDArray[Any]:
-        """Planes z."""
+    def __init__(self, grid: VoxelGrid, unit: float = 1.0, longest_axis: int = LONGEST_AXIS) -> None:
+        self._grid, self._unit = grid, unit
+        self._factor = math.ceil(max(grid.shape) / longest_axis)
+        self._shape = tuple(math.ceil(n / self._factor) for n in grid.shape)
+        self._maxima: NDArray[Any] = np.zeros(self._shape, np.uint8)
+
+    def add(self, first_row: int, slab: NDArray[Any]) -> None:
+        """Take in the rows y from ``first_row`` on."""
+        if self._maxima.dtype != slab.dtype:
+            self._maxima = self._maxima.astype(slab.dtype)
+        layers = _maxima_along(_ordered(slab), 0, self._factor)
+        blocks = _maxima_in_rows(_maxima_along(layers, 1, self._factor, first_row), self._factor)
+        first = first_row // self._factor
+        to = _ordered(self._maxima)[:, first : first + blocks.shape[1]]
+        np.maximum(to, blocks, out=to)
+
+    def watching(self, slabs: Slabs) -> Slabs:
+        """The same slabs, taken in as they pass."""
+        for first_row, slab in slabs:
+            self.add(first_row, slab)
+            yield first_row, slab
+
+    def preview(self) -> VolumePreview:
+        """What has been taken in."""
+        reduced = self._maxima.astype(np.float32)
+        if self._unit != 1:
+            reduced *= np.float32(self._unit)
+        limit = float(reduced.max())
+        voxels = np.rint(reduced * (255.0 / limit if limit > 0 else 0.0)).astype(np.uint8)
+        return VolumePreview(voxels, _coarser(self._grid, self._factor, voxels.shape), limit, self._grid.shape)
 
 
-def make_preview(volume: Planes, grid: VoxelGrid, longest_axis: int = LONGEST_AXIS) -> VolumePreview:
-    """Reduce a volume (z, y, x) of non-negative values to block maxima; one layer of blocks in memory at a time."""
-    factor = math.ceil(max(volume.shape) / longest_axis)
-    starts = range(0, volume.shape[0], factor)
-    reduced = np.concatenate([_block_maxima(volume[z : z + factor], factor) for z in starts]).astype(np.float32)
-    limit = float(reduced.max())
-    voxels = np.clip(np.rint(reduced * (255.0 / limit if limit > 0 else 0.0)), 0, 255).astype(np.uint8)
-    return VolumePreview(voxels, _coarser(grid, factor, voxels.shape), limit, grid.shape)
+def preview_of_slabs(slabs: Slabs, grid: VoxelGrid, unit: float = 1.0, longest: int = LONGEST_AXIS) -> VolumePreview:
+    """Reduce the slabs of a volume to block maxima."""
+    growing = GrowingPreview(grid, unit, longest)
+    for first_row, slab in slabs:
+        growing.add(first_row, slab)
+    return growing.preview()
+
+
+def make_preview(volume: NDArray[Any], grid: VoxelGrid, longest_axis: int = LONGEST_AXIS) -> VolumePreview:
+    """Reduce a volume (z, y, x) of non-negative values to block maxima."""
+    return preview_of_slabs(slabs_of(volume), grid, longest=longest_axis)
 
 
 def preview_path(volume_file: Path) -> Path:
     """Where the preview of a volume lies."""
-    return volume_file.with_suffix(".preview.npz")
+    return volume_file.with_suffix(_ENDING)
 
 
-def save_preview(path: Path, preview: VolumePreview) -> None:
-    """Write a preview; it replaces an older one at once."""
+def volume_of(preview_file: Path) -> Path:
+    """Where the volume of a preview lies, if it is kept."""
+    return preview_file.with_name(preview_file.name.removesuffix(_ENDING) + ".vtkhdf")
+
+
+def preview_files(folder: Path) -> list[Path]:
+    """Previews in a folder."""
+    return sorted(folder.glob(f"*{_ENDING}"))
+
+
+def save_preview(path: Path, preview: VolumePreview, provenance: Mapping[str, Any] | None = None) -> None:
+    """Write a preview and what its volume is made of; it replaces an older one at once."""
     part = path.with_suffix(".part")
-    with part.open("wb") as file:
-        np.savez_compressed(
-            file,
-            voxels=preview.voxels,
-            origin_mm=preview.grid.origin_mm,
-            pitch_mm=preview.grid.pitch_mm,
-            limit=preview.limit,
-            full_shape=preview.full_shape,
-        )
+    arrays = {
+        "voxels": preview.voxels,
+        "origin_mm": preview.grid.origin_mm,
+        "pitch_mm": preview.grid.pitch_mm,
+        "limit": preview.limit,
+        "full_shape": preview.full_shape,
+        "provenance": json.dumps(dict(provenance or {})),
+    }
+    with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as file:  # numpy's own takes 6, far slower
+        for name, values in arrays.items():
+            with file.open(f"{name}.npy", "w") as entry:
+                np.lib.format.write_array(entry, np.asanyarray(values), allow_pickle=False)
     part.replace(path)
+
+
+def load_provenance(path: Path) -> dict[str, Any]:
+    """What the volume of a preview is made of; empty where the preview does not say."""
+    with np.load(path, allow_pickle=False) as stored:
+        told: dict[str, Any] = json.loads(str(stored["provenance"])) if "provenance" in stored else {}
+    return told
 
 
 def load_preview(path: Path) -> VolumePreview:
@@ -110,12 +173,25 @@ def load_preview(path: Path) -> VolumePreview:
         return VolumePreview(voxels, grid, float(stored["limit"]), (full_z, full_y, full_x))
 
 
-def _block_maxima(volume: NDArray[Any], factor: int) -> NDArray[Any]:
-    """Maximum of blocks of factor^3 voxels; the last block of an axis may be smaller."""
-    for axis in range(3):
-        starts = np.arange(0, volume.shape[axis], factor)
-        volume = np.maximum.reduceat(volume, starts, axis=axis) if factor > 1 else volume
-    return volume
+def _ordered(values: NDArray[Any]) -> NDArray[Any]:
+    """The same memory as numbers of the same order: those of float16 that are not negative, as whole numbers."""
+    return values.view(np.uint16) if values.dtype == np.float16 else values
+
+
+def _maxima_along(values: NDArray[Any], axis: int, factor: int, first: int = 0) -> NDArray[Any]:
+    """Maxima of blocks along an axis that begins at the number ``first`` of its grid; blocks begin at multiples."""
+    if factor == 1:
+        return values
+    starts = [0, *range(factor - first % factor, values.shape[axis], factor)]
+    ends = [*starts[1:], values.shape[axis]]
+    blocks = (values[:, a:b] if axis else values[a:b] for a, b in zip(starts, ends, strict=True))
+    return np.stack([block.max(axis=axis) for block in blocks], axis=axis)
+
+
+def _maxima_in_rows(values: NDArray[Any], factor: int) -> NDArray[Any]:
+    """Maxima of blocks along x: as columns, far apart in memory, neighbours are compared several times faster."""
+    columns = cv2.transpose(values.reshape(-1, values.shape[2]))
+    return _maxima_along(columns, 0, factor).T.reshape(*values.shape[:2], -1)
 
 
 def _coarser(grid: VoxelGrid, factor: int, shape: tuple[int, ...]) -> VoxelGrid:

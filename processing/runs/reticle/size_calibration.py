@@ -23,7 +23,8 @@ from processing.reconstruction.settings import FrozenValue
 from processing.runs.measured_images import require_backgrounds, shadow_images
 from processing.runs.measurement import MeasureSettings, require_measurable
 from processing.runs.overwriting import replacing
-from processing.runs.pipeline import default_grid, frame_names, require_match
+from processing.runs.pipeline import default_grid
+from processing.runs.shots.shot_images import frame_names, require_match
 from processing.runs.workbench import read_references
 
 SCHEMA: Literal["tomoshadow/sizes"] = "tomoshadow/sizes"

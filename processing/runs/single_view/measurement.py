@@ -25,9 +25,9 @@ from processing.preprocessing import Intensity
 from processing.reconstruction.settings import FrozenValue
 from processing.runs.errors import PipelineError
 from processing.runs.exposure_faults import grey_values
-from processing.runs.pipeline import frame_names
 from processing.runs.recipe import recipe_sha256
 from processing.runs.results_file import Provenance, claim_results
+from processing.runs.shots.shot_images import frame_names
 from processing.runs.workbench import read_references
 
 COMMAND, METHOD_VERSION = "measure-single-view", 1

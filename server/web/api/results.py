@@ -4,6 +4,8 @@ Pictures have y pointing down, as camera images do: slices across z show x to th
 right; slices across y show x to the right and z down.
 """
 
+from asyncio import to_thread
+from pathlib import Path as FilePath
 from typing import Annotated, Literal
 
 import numpy as np
@@ -15,6 +17,7 @@ from pydantic import Field
 from daq.frozen_model import FrozenModel
 from server.lab.errors import NotFound
 from server.lab.results import ResultSet, preview_of, result_sets, surface_of, volume_file
+from server.lab.services import Context
 from server.pictures.pictures import plane_png
 from server.pictures.previews import VolumePreview
 from server.web.api.parameters import ContextOf, ResultsId, RunId
@@ -58,10 +61,12 @@ def show_preview(run_id: RunId, results_id: ResultsId, volume: VolumeName, conte
     )
 
 
-@router.get("/{results_id}/{volume}/volume.vtkhdf", response_class=FileResponse, responses=responses(404))
-def download_volume(run_id: RunId, results_id: ResultsId, volume: VolumeName, context: ContextOf) -> FileResponse:
-    """The volume itself, VTKHDF ImageData; ParaView opens it."""
-    path = volume_file(context.runs.directory(run_id), results_id, volume)
+@router.get("/{results_id}/{volume}/volume.vtkhdf", response_class=FileResponse, responses=responses(404, 409, 500))
+async def download_volume(run_id: RunId, results_id: ResultsId, volume: VolumeName, context: ContextOf) -> FileResponse:
+    """The volume itself, VTKHDF ImageData; ParaView opens it. Only a preview is kept until somebody asks for it."""
+    path = await to_thread(_volume, context, run_id, results_id, volume)
+    if not await to_thread(path.is_file):
+        await context.runner.store(path)
     return FileResponse(path, media_type="application/x-hdf5", filename=f"{run_id}_{path.name}")
 
 
@@ -103,6 +108,10 @@ def show_surface(
     """Iso-surface in mm; axes (x, -y, -z) of the world, so that viewers show the spray upright."""
     mesh = surface_of(volume_file(context.runs.directory(run_id), results_id, volume), round(level, 3))
     return Response(mesh, media_type="model/gltf-binary", headers=_SHORTLY)
+
+
+def _volume(context: Context, run_id: str, results_id: str, volume: str) -> FilePath:
+    return volume_file(context.runs.directory(run_id), results_id, volume)
 
 
 def _plane(preview: VolumePreview, axis: Axis, index: int) -> NDArray[np.uint8]:

@@ -23,8 +23,10 @@ from processing.reconstruction.reconstructor import Reconstructor
 from processing.reconstruction.settings import GridSettings, ReconstructionSettings
 from processing.reconstruction.volume_file import VolumeFileError, open_volume, read_volume
 from processing.runs.errors import PipelineError
-from processing.runs.pipeline import ShotResult, Stopped, default_grid, reconstruct_shot, shot_intensities
+from processing.runs.pipeline import Stopped, default_grid, reconstruct_shot
 from processing.runs.results_file import average_volumes, claim_results, volume_files, volume_path
+from processing.runs.shots.shot_images import shot_intensities
+from processing.runs.shots.shot_result import ShotResult
 from processing.runs.workbench import Workbench
 from processing.volume import VoxelGrid
 from tests.support.droplet_run import DROPLETS_A_MM, MOTION_MM, SHAPE, cameras, write_calibration, write_run

@@ -85,7 +85,7 @@ def test_impossible_grids(
 
 
 @pytest.mark.parametrize(
-    ("command", "work"), [("reconstruct", "pipeline.reconstruct_shot"), ("average", "run_average.average_run")]
+    ("command", "work"), [("reconstruct", "pipeline.reconstruct_shots"), ("average", "run_average.average_run")]
 )
 def test_a_command_takes_the_processors_that_it_may_use(
     command: str,

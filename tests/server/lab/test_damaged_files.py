@@ -185,7 +185,10 @@ def test_a_deleted_volume_is_made_again_although_its_job_is_done(server: Serving
     (job,) = wait_for_jobs(server, 1)
     volume = server.services.data_dir / run_id / "results" / job["results_id"] / "shot_00000_b.vtkhdf"
     volume.unlink()
-    assert server.http.get(f"/api/runs/{run_id}/results/{job['results_id']}/shot_00000_b").status_code == 404
+    shown = f"/api/runs/{run_id}/results/{job['results_id']}/shot_00000_b"
+    assert server.http.get(shown).status_code == 200
+    volume.with_suffix(".preview.npz").unlink()
+    assert server.http.get(shown).status_code == 404
     (again,) = server.http.post("/api/jobs", json={"run_id": run_id}).json()
     assert (again["id"], again["state"]) == (job["id"], "queued")
     wait_for_jobs(server, 1)

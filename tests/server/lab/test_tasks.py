@@ -1,6 +1,78 @@
-"""What a worker loads to do the work of jobs."""
+"""What a worker loads to do the work of jobs, and what it leaves of a volume."""
 
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from processing.reconstruction.choices import VoxelType
+from processing.reconstruction.settings import GridSettings, ReconstructionSettings
+from processing.reconstruction.volume_file import read_volume
+from processing.runs.pipeline import reconstruct_shot
+from processing.volume import VoxelGrid
+from server.lab.errors import Damaged
+from server.lab.results import preview_of, remaking, volume_summaries
+from server.lab.tasks import reconstruct
+from server.pictures.previews import load_provenance, preview_files, preview_path, save_preview
+from tests.support.droplet_run import write_calibration, write_run
 from tests.support.fresh_interpreter import modules_after, packages_of
+
+GRID = VoxelGrid.centred((61, 81, 201), 0.05)
+"""A preview of it is coarser than the volume."""
+
+
+def job_of(tmp_path: Path, settings: ReconstructionSettings) -> dict[str, Any]:
+    return {
+        "run_dir": str(write_run(tmp_path / "run")),
+        "shot": 0,
+        "calibration_file": str(write_calibration(tmp_path / "calibration.json")),
+        "results_dir": str(tmp_path / "run" / "results" / "one"),
+        "settings": settings.model_dump(mode="json"),
+        "belonging": {"verdict": None, "shots": []},
+    }
+
+
+@pytest.mark.parametrize("voxels", VoxelType)
+def test_of_a_volume_a_preview_is_kept_from_which_all_of_it_can_be_made(tmp_path: Path, voxels: VoxelType) -> None:
+    settings = ReconstructionSettings(grid=GridSettings.of(GRID), minimum_window_px=0, voxels=voxels)
+    job = job_of(tmp_path, settings)
+    results_dir, calibration = Path(job["results_dir"]), Path(job["calibration_file"])
+    told = reconstruct(job, lambda: False)
+    assert [volume["file"] for volume in told["volumes"]] == ["shot_00000_a.vtkhdf", "shot_00000_b.vtkhdf"]
+    assert [(one.name, one.size_bytes) for one in volume_summaries(results_dir)] == [
+        ("shot_00000_a", 0),
+        ("shot_00000_b", 0),
+    ]
+    volume = results_dir / "shot_00000_b.vtkhdf"
+    at_once = preview_of(volume)
+    assert at_once.voxels.max() == 255
+    assert at_once.grid.pitch_mm > GRID.pitch_mm
+
+    again = {**remaking(volume), "calibration_file": str(calibration)}
+    assert again["belonging"] == job["belonging"]
+    reconstruct(again, lambda: False)
+    reconstruct_shot(tmp_path / "run", 0, calibration, settings, tmp_path / "by_command")
+    for name in ("shot_00000_a.vtkhdf", "shot_00000_b.vtkhdf"):
+        made, expected = (read_volume(place / name) for place in (results_dir, tmp_path / "by_command"))
+        np.testing.assert_array_equal(made[0], expected[0])
+        assert {**expected[2], "belonging": json.dumps(job["belonging"])} == made[2]
+    preview_path(volume).unlink()
+    later = preview_of(volume)
+    assert (later.grid, later.limit, later.full_shape) == (at_once.grid, at_once.limit, at_once.full_shape)
+    np.testing.assert_array_equal(later.voxels, at_once.voxels)
+
+
+def test_a_preview_that_does_not_say_how_it_was_made_is_named(tmp_path: Path) -> None:
+    volume = tmp_path / "shot_00000_a.vtkhdf"
+    settings = ReconstructionSettings(grid=GridSettings.of(GRID), minimum_window_px=0)
+    reconstruct(job := job_of(tmp_path, settings), lambda: False)
+    first, _ = preview_files(Path(job["results_dir"]))
+    assert load_provenance(first)["run"] == "run"
+    save_preview(preview_path(volume), preview_of(Path(job["results_dir"]) / volume.name))
+    with pytest.raises(Damaged, match="cannot be made again: its preview does not say how"):
+        remaking(volume)
 
 
 def test_a_worker_loads_neither_web_nor_commands() -> None:

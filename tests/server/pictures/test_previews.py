@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from processing.reconstruction.volume_file import open_volume, write_volume
 from processing.volume import VoxelGrid
-from server.pictures.previews import load_preview, make_preview, save_preview
+from server.pictures.previews import load_preview, make_preview, preview_of_slabs, save_preview
 
 SHAPES = st.tuples(st.integers(1, 30), st.integers(1, 30), st.integers(1, 30))
 
@@ -45,7 +45,7 @@ def test_a_file_has_the_preview_of_its_volume(tmp_path: Path) -> None:
     grid = VoxelGrid.centred(volume.shape, 0.1)
     write_volume(tmp_path / "v.vtkhdf", volume, grid, {})
     with open_volume(tmp_path / "v.vtkhdf") as stored:
-        by_layers = make_preview(stored, stored.grid, 30)
+        by_layers = preview_of_slabs(stored.slabs(), stored.grid, longest=30)
     whole = make_preview(volume, grid, 30)
     assert (by_layers.grid, by_layers.limit, by_layers.full_shape) == (whole.grid, whole.limit, whole.full_shape)
     np.testing.assert_array_equal(by_layers.voxels, whole.voxels)

@@ -10,6 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from processing.reconstruction.settings import ReconstructionSettings
+from server.pictures.previews import load_preview, preview_path, save_preview
 from tests.support.serving import DEADLINE_S, Serving, plan_of
 
 
@@ -166,6 +167,25 @@ def test_volumes_are_listed_sliced_projected_meshed_and_downloaded(server: Servi
     mesh = server.http.get(f"{volume}/surface.glb", params={"level": 0.4}).content
     assert struct.unpack("<4sII", mesh[:12]) == (b"glTF", 2, len(mesh))
     assert server.http.get(f"{volume}/volume.vtkhdf").content == b"volume"
+
+
+def test_a_volume_of_which_only_a_preview_is_kept_is_made_when_it_is_asked_for(server: Serving) -> None:
+    use_a_calibration(server)
+    run_id, _ = server.run_to_its_end(plan_of(shots=1))
+    (job,) = wait_for_jobs(server, 1)
+    results_dir = server.services.data_dir / run_id / "results" / job["results_id"]
+    made_by = json.loads((results_dir / "settings.json").read_text()) | {"shot": 0}
+    for name in ("shot_00000_a", "shot_00000_b"):
+        (results_dir / f"{name}.vtkhdf").unlink()
+        kept = preview_path(results_dir / f"{name}.vtkhdf")
+        save_preview(kept, load_preview(kept), made_by if name.endswith("a") else {})
+    (result_set,) = server.http.get(f"/api/runs/{run_id}/results").json()
+    assert [volume["size_bytes"] for volume in result_set["volumes"]] == [0, 0]
+    volumes = f"/api/runs/{run_id}/results/{job['results_id']}"
+    unknown = server.http.get(f"{volumes}/shot_00000_b/volume.vtkhdf")
+    assert (unknown.status_code, unknown.json()["type"]) == (500, "urn:tomoshadow:Damaged")
+    assert server.http.get(f"{volumes}/shot_00000_a/volume.vtkhdf").content == b"volume"
+    assert server.http.get(f"{volumes}/shot_00001_a/volume.vtkhdf").status_code == 404
 
 
 def test_a_calibration_is_made_from_a_run_and_chosen(server: Serving) -> None:
