@@ -40,7 +40,7 @@ def serve_rig(config: RigConfig, port_held: socket.socket) -> None:
                 rig=assembled.rig,
                 acquisition=acquisition,
                 events=events,
-                engine=DaskEngine(),
+                engine=DaskEngine(modules=sorted({task.__module__ for task in TASKS.values()})),
                 tasks=TASKS,
                 laboratory=assembled.laboratory,
             )

@@ -1,7 +1,9 @@
 import asyncio
 import os
 import signal
+import sys
 import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,6 +13,14 @@ import pytest
 from server.lab.engine import DaskEngine, Engine, InlineEngine, TaskAborted, TaskError
 
 ENGINES = pytest.mark.parametrize("make", [InlineEngine, DaskEngine])
+
+
+def wait_for_module(job: dict[str, Any], should_stop: Callable[[], bool]) -> dict[str, Any]:
+    deadline_s = time.monotonic() + 30
+    while job["module"] not in sys.modules and time.monotonic() < deadline_s:
+        time.sleep(0.02)
+    names = ("MALLOC_MMAP_THRESHOLD_", "OMP_NUM_THREADS")
+    return {"loaded": job["module"] in sys.modules, **{name: os.environ.get(name) for name in names}}
 
 
 def double(job: dict[str, Any], should_stop: Callable[[], bool]) -> dict[str, Any]:
@@ -80,3 +90,14 @@ def test_an_engine_returns_results_reports_errors_obeys_aborts_and_outlives_its_
 def test_an_engine_that_was_not_started_says_so() -> None:
     with pytest.raises(TaskError, match="not running"):
         asyncio.run(DaskEngine().abort("x"))
+
+
+def test_workers_load_what_they_are_told_to_before_a_task_needs_it_and_keep_their_memory() -> None:
+    module = "colorsys"  # nothing else loads it
+
+    async def go() -> dict[str, Any]:
+        async with DaskEngine(modules=[module]) as engine:
+            return await engine.submit("a", wait_for_module, {"module": module}, _ignore)
+
+    expected = {"loaded": True, "MALLOC_MMAP_THRESHOLD_": str(32 << 20), "OMP_NUM_THREADS": "1"}
+    assert asyncio.run(go()) == expected
