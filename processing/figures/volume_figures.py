@@ -13,6 +13,8 @@ from skimage.measure import marching_cubes
 
 from processing.figures.colours import FRAME_COLOURS
 from processing.figures.spacing import Room, spaced_panels
+from processing.figures.volume_look import GrowingLook, VolumeLook
+from processing.reconstruction.slab_volume import slabs_of
 from processing.volume import VoxelGrid
 
 Volume = NDArray[np.float32]
@@ -37,18 +39,24 @@ def slices_figure(volume: Volume, grid: VoxelGrid, title: str = "") -> Figure:
     Figure
         Of matplotlib: ``figure.savefig("slices.png")``.
     """
+    look = GrowingLook(grid.shape)
+    for _ in look.watching(slabs_of(volume)):
+        pass
+    return look_figure(look.look(slabs_of(volume)), grid, title)
+
+
+def look_figure(look: VolumeLook, grid: VoxelGrid, title: str = "") -> Figure:
+    """The same of a volume that has been looked at, and need not be there any more."""
     figure = Figure(figsize=(11, 5.8))
     room = Room(left=0.8, right=1.45, bottom=0.5, top=_top_in(title), across=0.85, down=0.75)
     panels = spaced_panels(figure, 2, 3, room)
-    scale = PowerNorm(0.5, vmin=0, vmax=float(np.quantile(volume.max(axis=0), 0.999)) or 1.0)
+    scale = PowerNorm(0.5, vmin=0, vmax=float(np.quantile(look.projections[0], 0.999)) or 1.0)
     for column, axis in enumerate((0, 1, 2)):
-        fullest = int(volume.sum(axis=tuple({0, 1, 2} - {axis})).argmax())
-        depth_mm = (grid.z_mm, grid.y_mm, grid.x_mm)[axis][fullest]
+        depth_mm = (grid.z_mm, grid.y_mm, grid.x_mm)[axis][look.fullest[axis]]
         label = f"{'zyx'[axis]} = {depth_mm:.2f} mm"
-        plane = np.take(volume, fullest, axis=axis)
-        picture = _show(panels[0, column], plane, grid, axis, scale)
+        picture = _show(panels[0, column], look.slices[axis], grid, axis, scale)
         panels[0, column].set_title(f"slice at {label}", fontsize="medium")
-        _show(panels[1, column], volume.max(axis=axis), grid, axis, scale)
+        _show(panels[1, column], look.projections[axis], grid, axis, scale)
         panels[1, column].set_title(f"maximum along {'zyx'[axis]}", fontsize="medium")
     figure.colorbar(picture, cax=figure.add_axes((0.905, 0.2, 0.016, 0.6)), label="reconstructed intensity [-]")
     if title:

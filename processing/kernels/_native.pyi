@@ -75,7 +75,12 @@ def line_of_sight(
     grid_rows: int = 0,
 ) -> None: ...
 def sum_of_sight(
-    exposures: Sequence[Sequence[View]], method: str, volume: NDArray[np.float32], threads: int
+    exposures: Sequence[Sequence[View]],
+    method: str,
+    volume: NDArray[np.float32],
+    threads: int,
+    first_row: int = 0,
+    grid_rows: int = 0,
 ) -> None: ...
 
 @final

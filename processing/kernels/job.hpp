@@ -97,7 +97,8 @@ struct LineOfSight {
 struct SumOfSight {
     const View *views;
     int n_views, n_exposures;
-    Shape shape;
+    Shape shape;    // of the volume, which may begin at a later row of the grid
+    int first_row;  // of the grid: the volume's row 0
     Method method;
     float *volume;  // is added to
 };

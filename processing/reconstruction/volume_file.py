@@ -89,7 +89,7 @@ def write_slabs(
     provenance : Mapping[str, str | int | float]
         Where it comes from: kept as attributes of the group ``/tomoshadow``.
     threads : int
-        Deflate side by side; the file does not depend on it.
+        Deflate side by side; what is read does not depend on it.
     """
     part = path.with_name(path.name + ".part")
     try:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,10 +12,11 @@ from daq.files.run_directory import RunReader
 from processing.calibration.calibration import Calibration
 from processing.kernels import DEFAULT_THREADS
 from processing.preprocessing import Intensity
-from processing.reconstruction.mean_line_of_sight import mean_line_of_sight
+from processing.reconstruction.mean_line_of_sight import mean_slabs
 from processing.reconstruction.planning.plan import plan_reconstruction
 from processing.reconstruction.reconstructor import Reconstructor
 from processing.reconstruction.settings import ReconstructionSettings
+from processing.reconstruction.slab_volume import Slabs, slabs_of
 from processing.runs.exposure_faults import exposure_faults
 from processing.runs.pipeline import default_grid
 from processing.runs.results_file import FrameName
@@ -31,8 +33,8 @@ class RunAverage:
 
     Parameters
     ----------
-    volume : (z, y, x) float32 array
-        The mean.
+    slabs : callable
+        Returns the slabs of the mean, float32, as often as it is called; a slab is in the memory of the one before.
     grid : VoxelGrid
         Where it lies.
     exposures : int
@@ -41,7 +43,7 @@ class RunAverage:
         Shots whose images may be wrong, and how: ``shot``, and what ``exposure_faults`` has found.
     """
 
-    volume: Intensity
+    slabs: Callable[[], Slabs]
     grid: VoxelGrid
     exposures: int
     faults: tuple[Mapping[str, Any], ...]
@@ -92,10 +94,12 @@ def average_run(
         faults: list[Mapping[str, Any]] = []
         exposures = _exposures(run, shots, frame, calibration, settings, done, threads, faults)
         if settings.method.iterative:
-            volume = _mean_of_each(Reconstructor.of(plan, settings, threads), exposures)
+            slabs: Callable[[], Slabs] = partial(
+                slabs_of, _mean_of_each(Reconstructor.of(plan, settings, threads), exposures)
+            )
         else:
-            volume = mean_line_of_sight(plan, exposures, settings.method, threads=threads)
-        return RunAverage(volume, grid, len(shots), tuple(faults))
+            slabs = mean_slabs(plan, exposures, settings.method, threads=threads)
+        return RunAverage(slabs, grid, len(shots), tuple(faults))
 
 
 def _exposures(

@@ -168,7 +168,9 @@ def check_ends(run_dir: Path, shots: Sequence[int], calibration: Calibration) ->
     with RunReader(run_dir) as run:
         calibration.require_usable(run.header.views)
         seen = replace(calibration, views={name: calibration.views[name] for name in run.header.views})
-    return [check_shot(run_dir, shot, seen) for shot in dict.fromkeys((shots[0], shots[-1]))]
+    ends = list(dict.fromkeys((shots[0], shots[-1])))
+    found = _droplets(run_dir, ends, seen)
+    return [check_exposures(shot, exposures, seen) for shot, exposures in zip(ends, found, strict=True)]
 
 
 def run_beside(calibration_set: Path) -> Path | None:

@@ -2,6 +2,7 @@
 
 import json
 from argparse import Namespace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,8 +26,9 @@ from server.cli.runs.belonging import ask_droplets, stored_belonging
 from server.cli.runs.faults import tell_faults
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
+    from processing.reconstruction.slab_volume import Slabs
     from processing.runs.results_file import Provenance
     from processing.volume import VoxelGrid
 
@@ -68,6 +70,7 @@ def average(options: Namespace) -> Outcome:
 
 def _average_results(options: Namespace) -> dict[str, Any]:
     from processing.calibration.verdict import BELONGING
+    from processing.reconstruction.slab_volume import slabs_of
     from processing.reconstruction.volume_file import VolumeFileError
     from processing.runs.exposure_faults import stored_faults
     from processing.runs.results_file import average_volumes, volume_files
@@ -79,12 +82,13 @@ def _average_results(options: Namespace) -> dict[str, Any]:
             "keeps previews: name the run and its --calibration"
         )
     volume, grid = average_volumes(files)
+    slabs = partial(slabs_of, volume)
     faults = [told for file in files if (told := stored_faults(file))]
     if (belonging := stored_belonging(files)) is None:
-        return _written(options, volume, grid, len(files), faults, {})
+        return _written(options, slabs, grid, len(files), faults, {})
     if belonging["verdict"] in ("warn", "refuse"):
         progress(f"{options.results}: droplets speak against calibration and run: {belonging['verdict']}")
-    written = _written(options, volume, grid, len(files), faults, {BELONGING: json.dumps(belonging)})
+    written = _written(options, slabs, grid, len(files), faults, {BELONGING: json.dumps(belonging)})
     return {"passed": belonging["verdict"] != "refuse", "belonging": belonging, **written}
 
 
@@ -114,7 +118,7 @@ def _average_run(options: Namespace) -> dict[str, Any]:
         "method_version": METHOD_VERSION,
         **belonging.provenance,
     }
-    written = _written(options, mean.volume, mean.grid, mean.exposures, mean.faults, made_by)
+    written = _written(options, mean.slabs, mean.grid, mean.exposures, mean.faults, made_by)
     progress(belonging.text)
     told = {"passed": belonging.passed, "belonging": belonging.record()}
     return {**told, **written, "method": settings.method.value, "calibrated_share": share}
@@ -122,23 +126,28 @@ def _average_run(options: Namespace) -> dict[str, Any]:
 
 def _written(
     options: Namespace,
-    volume: Any,
+    slabs: "Callable[[], Slabs]",
     grid: "VoxelGrid",
     count: int,
     faults: "Sequence[Mapping[str, Any]]",
     made_by: "Provenance",
 ) -> dict[str, Any]:
-    from processing.figures.volume_figures import slices_figure
+    from processing.figures.volume_figures import look_figure
+    from processing.figures.volume_look import GrowingLook
     from processing.reconstruction.settings import GridSettings
-    from processing.reconstruction.volume_file import write_volume
+    from processing.reconstruction.slab_volume import SlabVolume
+    from processing.reconstruction.volume_file import write_slabs
     from processing.runs.overwriting import replacing
 
     source: Provenance = {"average_of": str(options.results), "frame": options.exposure, "volumes": count}
     told: Provenance = {"faults": json.dumps(faults)} if faults else {}
     figure = picture_beside(options.out)
     with replacing(options.out) as out:
-        write_volume(out, volume, grid, {**source, **told, **made_by})
-        slices_figure(volume, grid, f"mean of {count} volumes").savefig(out.with_name(figure.name), dpi=120)
+        look = GrowingLook(grid.shape)
+        volume = SlabVolume(look.watching(slabs()), VoxelType.FLOAT32, 1.0)
+        write_slabs(out, volume, grid, {**source, **told, **made_by}, threads=usable_processors())
+        drawn = look_figure(look.look(slabs()), grid, f"mean of {count} volumes")
+        drawn.savefig(out.with_name(figure.name), dpi=120)
     return {
         "file": str(options.out),
         "figure": str(figure),

@@ -31,13 +31,18 @@ bool same_geometry(const View &a, const View &b) {
            a.shift_v == b.shift_v && a.nodes == b.nodes && a.spacing == b.spacing;
 }
 
+// The grid of which a volume has the rows from first_row on; without a number of rows the volume is all of it.
+Shape grid_of(const Shape &shape, int first_row, int grid_rows) {
+    if (!grid_rows) grid_rows = shape.ny;
+    require(first_row >= 0 && first_row <= grid_rows - shape.ny, "volume: more rows than the grid");
+    return {shape.nz, grid_rows, shape.nx};
+}
+
 void line_of_sight(const std::vector<const BoundView *> &bound, const std::string &method, const AnyVolume &volume, int threads,
                    int first_row, int grid_rows) {
     const Shape shape = shape_of(volume);
-    if (!grid_rows) grid_rows = shape.ny;
-    require(first_row >= 0 && first_row <= grid_rows - shape.ny, "volume: more rows than the grid");
     require_threads(threads);
-    const auto views = views_on(bound, {shape.nz, grid_rows, shape.nx});
+    const auto views = views_on(bound, grid_of(shape, first_row, grid_rows));
     const LineOfSight job{views.data(), static_cast<int>(views.size()), shape, first_row, method_of(method),
                           format_of(volume), volume.data()};
     const Kernels &kernels = selected_kernels();
@@ -46,21 +51,22 @@ void line_of_sight(const std::vector<const BoundView *> &bound, const std::strin
 }
 
 void sum_of_sight(const std::vector<std::vector<const BoundView *>> &exposures, const std::string &method,
-                  const FloatVolume &volume, int threads) {
-    const Shape shape = shape_of(volume);
+                  const FloatVolume &volume, int threads, int first_row, int grid_rows) {
+    const Shape shape = shape_of(volume), grid = grid_of(shape, first_row, grid_rows);
     require(!exposures.empty(), "one exposure or more, please");
     require_threads(threads);
     std::vector<View> views;
     for (const auto &bound : exposures) {
         require(bound.size() == exposures[0].size(), "exposures differ in their number of views");
-        for (const View &view : views_on(bound, shape)) {
+        for (const View &view : views_on(bound, grid)) {
             require(same_geometry(view, views.size() < bound.size() ? view : views[views.size() % bound.size()]),
                     "exposures must be of the same views");
             views.push_back(view);
         }
     }
     const SumOfSight job{views.data(), static_cast<int>(exposures[0].size()), static_cast<int>(exposures.size()),
-                         shape,        method_of(method),                      volume.data()};
+                         shape,        first_row,                              method_of(method),
+                         volume.data()};
     const Kernels &kernels = selected_kernels();
     nb::gil_scoped_release release;
     run_sum_of_sight(kernels, job, threads);
@@ -78,7 +84,8 @@ void bind_line_of_sight(nb::module_ &module) {
         .def_static("mapped", &BoundView::mapped, "pixels"_a, "unit"_a, "nodes"_a, "spacing"_a, "cull"_a = true);
     module.def("line_of_sight", &line_of_sight, "views"_a, "method"_a, "volume"_a, "threads"_a, "first_row"_a = 0,
                "grid_rows"_a = 0);
-    module.def("sum_of_sight", &sum_of_sight, "exposures"_a, "method"_a, "volume"_a, "threads"_a);
+    module.def("sum_of_sight", &sum_of_sight, "exposures"_a, "method"_a, "volume"_a, "threads"_a, "first_row"_a = 0,
+               "grid_rows"_a = 0);
 }
 
 }  // namespace tomoshadow

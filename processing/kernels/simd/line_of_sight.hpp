@@ -89,9 +89,9 @@ void line_of_sight(const LineOfSight &job, int number) {
     finish_streams();
 }
 
-inline void add_to_volume(const SumOfSight &job, const Tile &tile, const Block &sum) {
+inline void add_to_volume(const SumOfSight &job, int y0, const Tile &tile, const Block &sum) {
     for (int row = 0; row < tile.rows; ++row) {
-        float *voxels = job.volume + (static_cast<int64_t>(tile.z) * job.shape.ny + tile.y0 + row) * job.shape.nx + tile.x0;
+        float *voxels = job.volume + (static_cast<int64_t>(tile.z) * job.shape.ny + y0 + row) * job.shape.nx + tile.x0;
         for (int k = 0; k < smaller(block_columns, job.shape.nx - tile.x0); ++k) voxels[k] += sum.rows[row][k];
     }
 }
@@ -117,7 +117,7 @@ inline void add_exposures(const SumOfSight &job, const SlabSight &slab, const St
 void sum_of_sight(const SumOfSight &job, int number) {
     constexpr int columns_at_once = 16 * block_columns;
     const FlushSubnormals flush;
-    SlabSight slab(job.views, job.n_views, job.shape, 0, number);
+    SlabSight slab(job.views, job.n_views, job.shape, job.first_row, number);
     const int64_t bytes = static_cast<int64_t>(sizeof(Block)) * slab.depth() * (columns_at_once / block_columns);
     const Memory sums(bytes);
     slab.for_stacks([&](const Stack &stack) {
@@ -126,7 +126,7 @@ void sum_of_sight(const SumOfSight &job, int number) {
             std::memset(sums.as<void>(), 0, static_cast<size_t>(bytes));
             add_exposures(job, slab, part, sums.as<Block>());
             const Block *sum = sums.as<Block>();
-            part.for_tiles([&](int, const Tile &tile) { add_to_volume(job, tile, *sum++); });
+            part.for_tiles([&](int, const Tile &tile) { add_to_volume(job, slab.y0, tile, *sum++); });
         }
     });
 }

@@ -8,9 +8,10 @@ from processing.kernels import _native
 from processing.reconstruction import mean_line_of_sight as module
 from processing.reconstruction.choices import ReconstructionMethod
 from processing.reconstruction.line_of_sight import line_of_sight
-from processing.reconstruction.mean_line_of_sight import mean_line_of_sight
+from processing.reconstruction.mean_line_of_sight import mean_line_of_sight, mean_slabs
 from processing.reconstruction.planning.node_view import sample_mapping
 from processing.reconstruction.planning.plan import Plan, plan_reconstruction
+from processing.reconstruction.slab_volume import SLAB_ROWS
 from processing.volume import VoxelGrid
 from tests.support import oracle
 
@@ -41,8 +42,29 @@ def test_it_is_the_mean_of_the_volumes(
     np.testing.assert_allclose(out, expected, rtol=1e-5, atol=1e-7)
 
 
+TALL = VoxelGrid.centred((7, 2 * SLAB_ROWS + 9, 40), 1 / 60)
+
+
+@pytest.mark.parametrize("fitting", [3, 5, 8])
+def test_slabs_are_those_of_the_whole_mean_as_often_as_they_are_made(
+    monkeypatch: pytest.MonkeyPatch, fitting: int
+) -> None:
+    plan, shots = plan_reconstruction(oracle.cameras(3), TALL), exposures(5)
+    monkeypatch.setattr(module, "BATCH_EXPOSURES", fitting)
+    whole = mean_line_of_sight(plan, shots)
+    assert whole.any()
+    slabs = mean_slabs(plan, iter(shots), ReconstructionMethod.MLOS)
+    for _ in range(2):
+        found = np.full(TALL.shape, np.nan, np.float32)
+        for first_row, slab in slabs():
+            found[:, first_row : first_row + slab.shape[1]] = slab
+        np.testing.assert_array_equal(found, whole)
+
+
 def test_what_has_no_mean_is_refused() -> None:
     plan = plan_reconstruction(oracle.cameras(3), GRID)
+    with pytest.raises(ValueError, match="a mean needs one exposure or more"):
+        mean_slabs(plan, [], ReconstructionMethod.MLOS)
     with pytest.raises(ValueError, match="a mean needs one exposure or more"):
         mean_line_of_sight(plan, [])
     other = plan_reconstruction(oracle.cameras(3), GRID)

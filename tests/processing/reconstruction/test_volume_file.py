@@ -103,12 +103,13 @@ def test_every_number_of_half_precision_is_stored_as_it_is(tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize("voxels", VoxelType)
-def test_a_file_is_the_same_however_many_threads_deflate(tmp_path: Path, voxels: VoxelType) -> None:
+def test_a_file_holds_the_same_however_many_threads_deflate(tmp_path: Path, voxels: VoxelType) -> None:
     grid = VoxelGrid((2 * PLANES_AT_ONCE + 3, SLAB_ROWS + 9, 5), (0.0, 0.0, 0.0), 0.1)
     volume = (some_volume(grid) * 200).astype(voxels.value)
     for threads in (1, 3):
         write_slabs(tmp_path / f"{threads}.vtkhdf", SlabVolume.of(volume), grid, {}, threads=threads)
-    assert (tmp_path / "1.vtkhdf").read_bytes() == (tmp_path / "3.vtkhdf").read_bytes()
+    one, three = (read_volume(tmp_path / f"{threads}.vtkhdf")[0] for threads in (1, 3))
+    np.testing.assert_array_equal(one, three)
 
 
 def test_parts_are_read_by_planes_and_by_slabs(tmp_path: Path) -> None:

@@ -128,7 +128,7 @@ void look(const Kernels &kernels, int number) {
     run_line_of_sight(kernels, {scene.views.data(), n_views, shape, 0, method, Format::single, volume.get()}, 2);
     std::vector<View> exposures;
     for (int e = 0; e < 5; ++e) exposures.insert(exposures.end(), scene.views.begin(), scene.views.end());
-    run_sum_of_sight(kernels, {exposures.data(), n_views, 5, shape, method, sum.get()}, 2);
+    run_sum_of_sight(kernels, {exposures.data(), n_views, 5, shape, 0, method, sum.get()}, 2);
     std::printf("sight %d %.6f %.6f\n", number, sum_of(volume.get(), voxels(shape)), sum_of(sum.get(), voxels(shape)));
 }
 

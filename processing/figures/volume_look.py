@@ -1,0 +1,69 @@
+"""VolumeLook: what the figure of a volume shows, gathered slab by slab, so that no volume has to lie in memory."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from processing.reconstruction.slab_volume import Slabs
+
+Plane = NDArray[np.float32]
+
+
+@dataclass(frozen=True, eq=False)
+class VolumeLook:
+    """Slices and projections of a volume, each along z, y, x.
+
+    Parameters
+    ----------
+    fullest : tuple of int
+        The planes with the largest sum.
+    slices, projections : tuple of (rows, columns) float32 arrays
+        Those planes, and the maxima across all planes.
+    """
+
+    fullest: tuple[int, int, int]
+    slices: tuple[Plane, Plane, Plane]
+    projections: tuple[Plane, Plane, Plane]
+
+
+class GrowingLook:
+    """The look of a volume (nz, ny, nx) of values from 0 on, of which one slab is seen after the other."""
+
+    def __init__(self, shape: tuple[int, int, int]) -> None:
+        nz, ny, nx = self._shape = shape
+        self._projections = (_zeros(ny, nx), _zeros(nz, nx), _zeros(nz, ny))
+        self._sums, self._sum_along_z = np.zeros(nz), _zeros(ny, nx)
+
+    def watching(self, slabs: Slabs) -> Iterator[tuple[int, Plane]]:
+        """The same slabs, seen as they pass."""
+        for first_row, slab in slabs:
+            self._see(slice(first_row, first_row + slab.shape[1]), slab)
+            yield first_row, slab
+
+    def _see(self, rows: slice, slab: Plane) -> None:
+        along_z, along_y, along_x = self._projections
+        for z, plane in enumerate(slab):  # one by one: a plane of a slab fits into the cache
+            np.maximum(along_z[rows], plane, out=along_z[rows])
+            np.maximum(along_y[z], plane.max(axis=0), out=along_y[z])
+            along_x[z, rows] = plane.max(axis=1)
+            self._sum_along_z[rows] += plane
+            self._sums[z] += plane.sum()
+
+    def look(self, slabs: Slabs) -> VolumeLook:
+        """What has been seen, and the slices that show most of it, from the same slabs once more."""
+        sums = (self._sums, self._sum_along_z.sum(axis=1), self._sum_along_z.sum(axis=0))
+        z, y, x = (int(one.argmax()) for one in sums)
+        nz, ny, nx = self._shape
+        across_z, across_y, across_x = _zeros(ny, nx), _zeros(nz, nx), _zeros(nz, ny)
+        for first_row, slab in slabs:
+            rows = slice(first_row, first_row + slab.shape[1])
+            across_z[rows], across_x[:, rows] = slab[z], slab[:, :, x]
+            if rows.start <= y < rows.stop:
+                across_y[:] = slab[:, y - first_row]
+        return VolumeLook((z, y, x), (across_z, across_y, across_x), self._projections)
+
+
+def _zeros(rows: int, columns: int) -> Plane:
+    return np.zeros((rows, columns), np.float32)
