@@ -4,7 +4,7 @@ import os
 import tempfile
 import time
 from argparse import Namespace
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +21,7 @@ MISTUNED = ("OPENBLAS_CORETYPE", "OPENBLAS_L2_SIZE")
 TABLE_BEGIN, TABLE_END = "<!-- bench -->", "<!-- /bench -->"
 RECORDED_SHOTS = 24
 RECORDER_DEADLINE_S = 120.0
+QUICK_SHOTS = 3
 
 
 class BenchError(BadInput):
@@ -40,6 +41,7 @@ def bench(options: Namespace) -> Outcome:
     from processing.benchmarks.scene import QUICK, SpeedStudy
     from processing.benchmarks.speed import speed_study
     from processing.benchmarks.targets import markdown_table
+    from server.cli.benchmarks.chain_on_disk import SHOTS, chain_on_disk
 
     around_table = split_at_table(options.table) if options.table else None
     for name in MISTUNED:
@@ -49,6 +51,9 @@ def bench(options: Namespace) -> Outcome:
     speed = speed_study(study, progress)
     progress("recorder")
     recorder = recorder_speed(options.directory, study.image_size_px, speed.views)
+    progress("run on disk")
+    on_disk = tuple(chain_on_disk(study, options.directory, QUICK_SHOTS if options.quick else SHOTS))
+    speed = replace(speed, targets=(*speed.targets, *on_disk))
     targets = markdown_table(speed.targets)
     if around_table:
         options.table.write_text(f"\n{targets}\n\n".join(around_table))

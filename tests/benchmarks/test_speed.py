@@ -61,7 +61,7 @@ def assert_every_target(measured: list[dict[str, object]]) -> None:
         assert isinstance(value, float)
         assert value > 0
         assert one["reached"] == target.verdict(value)
-        if target.unit in ("s", "ms"):
+        if target.unit in ("s", "ms") and target is not speed_targets.JOB:  # of which the work does not count
             assert value == pytest.approx(one["wall_s"] if target.unit == "s" else 1e3 * float(str(one["wall_s"])))
 
 
