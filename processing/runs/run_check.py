@@ -29,7 +29,7 @@ from processing.runs.errors import PipelineError
 from processing.runs.importing import CALIBRATION_FOLDER, RUN_FOLDER
 from processing.runs.results_file import FrameName
 from processing.runs.shots.shot_images import shot_intensities
-from processing.runs.workbench import read_references
+from processing.runs.workbench import Workbench
 
 CHECKED_SHOTS = 3
 """Shots of a run that a calibration is checked by; the watch over a run checks more of them."""
@@ -106,8 +106,8 @@ class ShotCheck:
         return max(view.certain_px for view in self.views.values())
 
 
-def check_shot(run_dir: Path, shot: int, calibration: Calibration) -> ShotCheck:
-    """Measure the disparity of every view in one recorded shot.
+def check_shot(run_dir: Path, shot: int, calibration: Calibration, workbench: Workbench | None = None) -> ShotCheck:
+    """Measure the disparity of every view in one recorded shot; a workbench has the references of the run ready.
 
     Raises
     ------
@@ -116,7 +116,7 @@ def check_shot(run_dir: Path, shot: int, calibration: Calibration) -> ShotCheck:
     PipelineError
         An exposure is missing.
     """
-    (exposures,) = _droplets(run_dir, [shot], calibration)
+    (exposures,) = _droplets(run_dir, [shot], calibration, workbench=workbench)
     return check_exposures(shot, exposures, calibration)
 
 
@@ -238,14 +238,18 @@ def self_calibrate_run(
 
 
 def _droplets(
-    run_dir: Path, shots: Sequence[int], calibration: Calibration, counted: Counted = in_silence
+    run_dir: Path,
+    shots: Sequence[int],
+    calibration: Calibration,
+    counted: Counted = in_silence,
+    workbench: Workbench | None = None,
 ) -> list[list[Exposure]]:
     """Droplets by shot, exposure and view, in the order of the views of the calibration."""
     calibration.require_world()
     settings = ReconstructionSettings()
-    with RunReader(run_dir) as run:
+    with (workbench or Workbench()).occupied() as bench, RunReader(run_dir) as run:
         _check_views(run, calibration)
-        found, references = [], read_references(run)
+        found, references = [], bench.references(run)
         for index in counted(shots, lambda index: f"droplets of shot {index}"):
             shot = run.read_shot(index)
             if not shot.valid:

@@ -76,7 +76,7 @@ def check_run(job: dict[str, Any], should_stop: Callable[[], bool]) -> dict[str,
     """Measure how well the calibration still fits one shot."""
     calibration = load_calibration(Path(job["calibration_file"]))
     should_stop()
-    return check_shot(Path(job["run_dir"]), job["shot"], calibration).record()
+    return check_shot(Path(job["run_dir"]), job["shot"], calibration, WORKBENCH).record()
 
 
 TASKS: Mapping[JobKind, Task] = MappingProxyType(

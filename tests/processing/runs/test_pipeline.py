@@ -23,7 +23,7 @@ from processing.reconstruction.reconstructor import Reconstructor
 from processing.reconstruction.settings import GridSettings, ReconstructionSettings
 from processing.reconstruction.volume_file import VolumeFileError, open_volume, read_volume
 from processing.runs.errors import PipelineError
-from processing.runs.pipeline import Stopped, default_grid, reconstruct_shot
+from processing.runs.pipeline import Stopped, default_grid, reconstruct_shot, reconstruct_shots
 from processing.runs.results_file import average_volumes, claim_results, volume_files, volume_path
 from processing.runs.shots.shot_images import shot_intensities
 from processing.runs.shots.shot_result import ShotResult
@@ -160,6 +160,21 @@ def test_a_workbench_keeps_what_is_asked_for_again_and_no_more(
         reconstruct_shot(run_dir, 0, calibration_file, one, tmp_path / f"fresh{number}")
         for file in volume_files(out):
             np.testing.assert_array_equal(read_volume(file)[0], read_volume(tmp_path / f"fresh{number}" / file.name)[0])
+
+
+def test_shots_of_a_series_are_those_that_come_alone_until_one_is_not_valid(
+    calibration_file: Path, tmp_path: Path
+) -> None:
+    run_dir = write_run(tmp_path / "run", shots=4, invalid=(2,))
+    coming = reconstruct_shots(run_dir, [1, 0, 2, 3], calibration_file, SETTINGS, tmp_path / "series")
+    assert [next(coming).shot, next(coming).shot] == [1, 0]
+    with pytest.raises(PipelineError, match="shot 2: exposures are missing"):
+        next(coming)
+    assert len(volume_files(tmp_path / "series")) == 4
+    for shot in (0, 1):
+        reconstruct_shot(run_dir, shot, calibration_file, SETTINGS, tmp_path / "alone")
+    for file in volume_files(tmp_path / "series"):
+        np.testing.assert_array_equal(read_volume(file)[0], read_volume(tmp_path / "alone" / file.name)[0])
 
 
 def test_what_is_wrong_with_the_light_is_told_with_the_volume(calibration_file: Path, tmp_path: Path) -> None:

@@ -7,14 +7,16 @@ from typing import Any
 import numpy as np
 import pytest
 
+from daq.files.run_directory import RunReader
 from processing.reconstruction.choices import VoxelType
 from processing.reconstruction.settings import GridSettings, ReconstructionSettings
 from processing.reconstruction.volume_file import read_volume
 from processing.runs.pipeline import reconstruct_shot
+from processing.runs.workbench import References, read_references
 from processing.volume import VoxelGrid
 from server.lab.errors import Damaged
 from server.lab.results import preview_of, remaking, volume_summaries
-from server.lab.tasks import reconstruct
+from server.lab.tasks import check_run, reconstruct
 from server.pictures.previews import load_provenance, preview_files, preview_path, save_preview
 from tests.support.droplet_run import write_calibration, write_run
 from tests.support.fresh_interpreter import modules_after, packages_of
@@ -80,3 +82,18 @@ def test_a_worker_loads_neither_web_nor_commands() -> None:
     assert "processing.runs.pipeline" in modules
     assert not {module for module in modules if module.startswith(("server.cli", "server.web"))}
     assert not packages_of(modules) & {"fastapi", "starlette", "nicegui", "uvicorn"}
+
+
+def test_jobs_of_a_run_read_its_references_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    read: list[str] = []
+
+    def counted(run: RunReader) -> References:
+        read.append(run.header.run_id)
+        return read_references(run)
+
+    monkeypatch.setattr("processing.runs.workbench.read_references", counted)
+    job = job_of(tmp_path, ReconstructionSettings(grid=GridSettings.of(GRID), minimum_window_px=0))
+    reconstruct(job, lambda: False)
+    check_run(job, lambda: False)
+    reconstruct(job, lambda: False)
+    assert read == ["run"]
