@@ -19,10 +19,10 @@ from daq.run.ending import code_of
 from daq.run.guard import RunGuard
 from daq.run.recorder import Recorder
 from daq.run.references import mean_images
-from daq.run.shot_check import InvalidStreak, ShotFindings, Thresholds, check_exposures, light_thresholds
-from daq.run.shot_taking import ShotTaker
+from daq.run.shots.shot_check import InvalidStreak, ShotFindings, Thresholds, check_exposures, light_thresholds
+from daq.run.shots.shot_taking import ShotTaker
+from daq.run.shots.train_check import train_deviation
 from daq.run.state import RunStep
-from daq.run.train_check import train_deviation
 from daq.run_plan import RunKind
 from daq.shot import Shot
 

@@ -5,7 +5,7 @@ from typing import Annotated
 from pydantic import Field
 
 from daq.frozen_model import FrozenModel
-from daq.run.shot_check import bright_level
+from daq.run.shots.shot_check import bright_level
 from daq.shot import Image
 
 

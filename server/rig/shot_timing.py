@@ -9,7 +9,7 @@ from pydantic import ValidationError
 
 from daq.drivers.camera_profile import load_camera_profile
 from daq.errors import PlanError
-from daq.run.train_check import lit_pulses
+from daq.run.shots.train_check import lit_pulses
 from daq.run_plan import PulsePair, RunPlan
 from daq.shot import FiredTrain, LightPulse
 from daq.timing import CameraTiming, ShotTiming, ViewTiming, Window

@@ -11,8 +11,8 @@ from daq.run import light
 from daq.run.darkness import attempt, darken
 from daq.run.guard import RunGuard
 from daq.run.live.active_live import ActiveLive
-from daq.run.shot_check import light_thresholds
-from daq.run.shot_taking import ShotTaker
+from daq.run.shots.shot_check import light_thresholds
+from daq.run.shots.shot_taking import ShotTaker
 from daq.run.state import RunStep
 
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from daq.run.train_check import TOLERANCE_NS, train_deviation
+from daq.run.shots.train_check import TOLERANCE_NS, train_deviation
 from daq.run_plan import PulsePair, RunPlan
 from daq.shot import FiredTrain, LightPulse
 from daq.timing import CameraTiming, ShotTiming, plan_shot_timing

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from daq.run.shot_taking import next_due_s
+from daq.run.shots.shot_taking import next_due_s
 
 PERIOD_S, SHORTEST_S = 0.05, 0.012
 

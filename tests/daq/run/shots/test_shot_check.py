@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from daq.run.shot_check import LightLevels, ShotFindings, Thresholds, check_exposures, light_thresholds, marked
+from daq.run.shots.shot_check import LightLevels, ShotFindings, Thresholds, check_exposures, light_thresholds, marked
 from daq.shot import DoubleFrame, ExposureRecord, Flaw
 
 SHAPE = (200, 48)

@@ -10,10 +10,10 @@ from daq.devices import Camera
 from daq.errors import DeviceRefused
 from daq.run import light
 from daq.run.active_run import Shooting
-from daq.run.firing_clock import FiringClock
-from daq.run.shot_check import ShotFindings, Thresholds, check_exposures, marked
+from daq.run.shots.firing_clock import FiringClock
+from daq.run.shots.shot_check import ShotFindings, Thresholds, check_exposures, marked
+from daq.run.shots.train_check import train_deviation
 from daq.run.side_by_side import SideBySide
-from daq.run.train_check import train_deviation
 from daq.run_plan import ImageKey
 from daq.shot import DoubleFrame, FiredTrain, Shot
 

@@ -1,6 +1,6 @@
 """Periods of shots do not depend on a clock that somebody sets."""
 
-from daq.run.firing_clock import FiringClock
+from daq.run.shots.firing_clock import FiringClock
 
 
 def test_a_clock_that_is_set_back_changes_no_period_and_is_told() -> None:
