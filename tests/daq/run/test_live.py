@@ -86,7 +86,7 @@ def test_it_shows_both_exposures_lit_and_records_nothing(lab: Laboratory) -> Non
         assert np.median(frames.frame_b) == counts
     status = lab.acquisition.status()
     assert (status.state, status.active, status.live, status.run_id) == (RunState.LIVE, False, LIT, None)
-    assert not lab.data_dir.exists()
+    assert not any(lab.data_dir.iterdir())
 
 
 def test_ambient_light_is_none_of_ours(lab: Laboratory) -> None:

@@ -42,7 +42,7 @@ def trials(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]
 
 CAUSES = {
     "filled_by_the_run": "the disk of {run_dir} has ",
-    "filled_by_others": "the disk of {run_dir} is full (0 bytes are free): delete or move away what is not needed",
+    "filled_by_others": "the disk of {run_dir} ",
     "moved": "{run_dir} is gone (moved, deleted, or its disk is not mounted): bring it back",
     "unmounted": "{run_dir} is gone (moved, deleted, or its disk is not mounted): bring it back",
     "read_only_for_a_while": "the disk of {run_dir} is read-only, as after a fault of it: look at it, mount it",
@@ -70,6 +70,7 @@ def test_light_goes_off_first_and_outcome_and_cause_are_stored(trials: dict[str,
     shot, reason = cause.split(" cannot be stored: ")
     assert int(shot.removeprefix("shot ")) in found["unstored"]
     assert reason.startswith(CAUSES[name].format(run_dir=found["run_dir"]))
+    assert ("delete or move away what is not needed" in reason) == name.startswith("filled")
     assert cause.endswith("then start again")
     assert "rrno" not in cause, "numbers of the system help no operator"
     assert found["readable"] == found["acknowledged"] >= 3
