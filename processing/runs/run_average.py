@@ -21,7 +21,7 @@ from processing.runs.exposure_faults import exposure_faults
 from processing.runs.pipeline import default_grid
 from processing.runs.results_file import FrameName
 from processing.runs.shots.shot_images import require_match, shot_intensities
-from processing.runs.workbench import read_references
+from processing.runs.workbench import References, Workbench
 from processing.volume import VoxelGrid
 
 Exposures = Iterator[list[Intensity]]
@@ -58,6 +58,7 @@ def average_run(
     *,
     frame: FrameName = "a",
     threads: int = DEFAULT_THREADS,
+    workbench: Workbench | None = None,
 ) -> RunAverage:
     """Mean of what ``reconstruct_shot`` makes of one exposure of some shots.
 
@@ -77,6 +78,8 @@ def average_run(
         Which exposure: A and B are different times.
     threads : int
         The mean does not depend on it.
+    workbench : Workbench, optional
+        Keeps the references of the run for what comes next.
 
     Raises
     ------
@@ -86,13 +89,14 @@ def average_run(
         The calibration was refused.
     """
     grid = settings.grid.to_grid() if settings.grid else default_grid(calibration)
-    with RunReader(run_dir) as run:
+    with (workbench or Workbench()).occupied() as bench, RunReader(run_dir) as run:
         first = run.read_shot(shots[0])
         require_match(run_dir.name, first, calibration)
         mappings = [calibration.views[view].mapping for view in first.views]
         plan = plan_reconstruction(mappings, grid, settings.accuracy, list(first.views))
         faults: list[Mapping[str, Any]] = []
-        exposures = _exposures(run, shots, frame, calibration, settings, done, threads, faults)
+        references = bench.references(run)
+        exposures = _exposures(run, shots, frame, calibration, settings, references, done, threads, faults)
         if settings.method.iterative:
             slabs: Callable[[], Slabs] = partial(
                 slabs_of, _mean_of_each(Reconstructor.of(plan, settings, threads), exposures)
@@ -108,12 +112,12 @@ def _exposures(
     frame: FrameName,
     calibration: Calibration,
     settings: ReconstructionSettings,
+    references: References,
     done: Callable[[int, int], None],
     threads: int,
     faults: list[Mapping[str, Any]],
 ) -> Exposures:
     """Images of exposure after exposure; those that may be wrong are added to ``faults``."""
-    references = read_references(run)
     for count, index in enumerate(shots, start=1):
         shot = run.read_shot(index)
         require_match(run.header.run_id, shot, calibration)

@@ -153,7 +153,9 @@ def _unmeasured(
     return ShotCheck(shot, {}, f"{error}: {told}" if len(names) >= MIN_VIEWS else str(error))
 
 
-def check_ends(run_dir: Path, shots: Sequence[int], calibration: Calibration) -> list[ShotCheck]:
+def check_ends(
+    run_dir: Path, shots: Sequence[int], calibration: Calibration, workbench: Workbench | None = None
+) -> list[ShotCheck]:
     """Check the first and the last of some shots: what was wrong all along, and what has gone wrong meanwhile.
 
     Views of the calibration that the run lacks are left out.
@@ -169,7 +171,7 @@ def check_ends(run_dir: Path, shots: Sequence[int], calibration: Calibration) ->
         calibration.require_usable(run.header.views)
         seen = replace(calibration, views={name: calibration.views[name] for name in run.header.views})
     ends = list(dict.fromkeys((shots[0], shots[-1])))
-    found = _droplets(run_dir, ends, seen)
+    found = _droplets(run_dir, ends, seen, workbench=workbench)
     return [check_exposures(shot, exposures, seen) for shot, exposures in zip(ends, found, strict=True)]
 
 

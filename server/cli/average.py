@@ -96,11 +96,12 @@ def _average_run(options: Namespace) -> dict[str, Any]:
     from processing.calibration.calibration_file import load_calibration
     from processing.reconstruction.settings import METHOD_VERSION
     from processing.runs.run_average import average_run
+    from processing.runs.workbench import Workbench
 
     calibration = load_calibration(options.calibration)
     settings = reconstruction_settings(options, calibration)
     shots = selected_shots(options.results, options.shots)
-    share = calibrated_share(options, settings, calibration)
+    share, workbench = calibrated_share(options, settings, calibration), Workbench()
     with Bar() as bar:
         mean = average_run(
             options.results,
@@ -110,8 +111,9 @@ def _average_run(options: Namespace) -> dict[str, Any]:
             lambda done, of: bar.step(done, of, f"{options.results.name}: {done} exposures"),
             frame=options.exposure,
             threads=usable_processors(),
+            workbench=workbench,
         )
-    belonging = ask_droplets(options.results, shots, calibration)
+    belonging = ask_droplets(options.results, shots, calibration, workbench)
     made_by: Provenance = {
         "calibration": calibration.id,
         "settings": settings.model_dump_json(),

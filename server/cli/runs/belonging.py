@@ -12,6 +12,7 @@ from server.cli.output import progress
 if TYPE_CHECKING:
     from processing.calibration.calibration import Calibration
     from processing.runs.run_check import ShotCheck
+    from processing.runs.workbench import Workbench
 
 
 @dataclass(frozen=True)
@@ -78,12 +79,14 @@ def stored_belonging(files: "Sequence[Path]") -> dict[str, Any] | None:
     return max(told, key=lambda record: list(Verdict).index(record["verdict"]), default=None)
 
 
-def ask_droplets(run_dir: Path, shots: Sequence[int], calibration: "Calibration") -> Belonging:
+def ask_droplets(
+    run_dir: Path, shots: Sequence[int], calibration: "Calibration", workbench: "Workbench | None" = None
+) -> Belonging:
     """Check the first and the last shot; what speaks against the calibration is told at once."""
     from processing.calibration.verdict import Verdict
     from processing.runs.run_check import check_ends
 
-    asked = Belonging(run_dir.name, tuple(check_ends(run_dir, shots, calibration)))
+    asked = Belonging(run_dir.name, tuple(check_ends(run_dir, shots, calibration, workbench)))
     for check in asked.checks:
         if check.verdict in (Verdict.WARN, Verdict.REFUSE):
             progress(f"{run_dir.name}: {check_line(check)}")
