@@ -67,7 +67,7 @@ def test_what_cannot_be_acknowledged_yet_says_why(bench: BenchServing) -> None:
 def test_a_lamp_of_a_silent_device_does_not_show_its_last_value(
     bench: BenchServing, lamp: str, kind: str, fields: dict[str, str]
 ) -> None:
-    bench.await_lamp(lamp, "ok")
+    eventually(lambda: detail(bench, "pulse generator") == "safe", lambda: detail(bench, "pulse generator"))
     last = detail(bench, lamp)
     with bench.during(kind, **fields):
         shown = bench.await_lamp(lamp, "fault")["detail"]
