@@ -76,7 +76,7 @@ class ShadowFit:
     optics : DiscOptics
         How the views see them.
     noises : (K,) array
-        Of typical pixels.
+        Of typical pixels, of the images as they were recorded.
     defects : tuple of (rows, columns) float32 arrays
         What the union of the discs lets through beyond the product of each; empty until it is known.
     liquid : Discs
@@ -109,7 +109,8 @@ class ShadowFit:
     @property
     def amplitude_sigma(self) -> float:
         """Standard deviation of the depth of a faint shadow that stands alone."""
-        return float(1 / np.sqrt(np.pi * np.sum(self.optics.variances_px2[:, 0] / self.noises**2)))
+        clearness = self.optics.levels / self.noises
+        return float(1 / np.sqrt(np.pi * np.sum(self.optics.variances_px2[:, 0] * clearness**2)))
 
 
 def seen_by(shot: Transmissions, fit: ShadowFit, drawn: Sequence[Image]) -> DiscImages:

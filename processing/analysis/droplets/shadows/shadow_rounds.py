@@ -188,7 +188,7 @@ class ShadowRounds:
             fit = replace(fit, defects=union_defects(seen, fit.optics, fit.discs))
             drawn = self._drawn(fit)
             left = residuals(seen_by(self._shot, fit, drawn), drawn)
-            fit = replace(fit, noises=self._shot.masked(fit.masks).noises_of(left))
+            fit = replace(fit, noises=fit.optics.levels * self._shot.masked(fit.masks).noises_of(left))
         return fit
 
     def _recorded(self) -> DiscImages:

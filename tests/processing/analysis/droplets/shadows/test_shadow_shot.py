@@ -51,6 +51,7 @@ def test_light_that_is_dimmer_than_its_background_does_not_matter(scene: ShadowS
         dimmed.droplets.diameters_um[match >= 0], shot.droplets.diameters_um[match[match >= 0]], atol=0.3
     )
     np.testing.assert_allclose([view.level for view in dimmed.views.values()], 0.9, atol=2e-3)
+    assert dimmed.residual_over_noise == pytest.approx(shot.residual_over_noise, abs=0.01)
 
 
 def test_a_black_level_without_a_dark_image_is_doubted(scene: ShadowScene) -> None:
