@@ -35,6 +35,8 @@ UNSURE, SURE = 1 / 3, 2 / 3
 
 Of simulated shots 0 to 20 % were behind a Gaussian blur, 73 to 100 % in light that shows.
 """
+LEAST_BLUR_PX = 0.6
+"""Of views in the mean: pixels that are wider leave edges by which a Gaussian blur looks like light."""
 LEAST_DROPLETS = 10
 """That vote; blur is taken as Gaussian where there are fewer."""
 LEAST_SIZE, MOST_SIZE = 0.75, 1.33
@@ -106,20 +108,22 @@ def light_doubts(share: float, droplets: int) -> tuple[str, ...]:
     )
 
 
-def seen_light(relit: Callable[[float | None], Relit]) -> SeenLight:
+def seen_light(relit: Callable[[float | None], Relit], *, resolved: bool = True) -> SeenLight:
     """The light that explains most droplets best.
 
     Parameters
     ----------
     relit : callable
         Of a condenser ratio, or None for a Gaussian blur: the droplets in that light.
+    resolved : bool
+        Whether pixels are fine enough to tell; else droplets can only be unsure of the light.
     """
     blurred = relit(None).squares
     if len(blurred) < LEAST_DROPLETS:
         return SeenLight()
     tried = {ratio: relit(ratio) for ratio in FIRST_TRIED}
-    if (share := float(np.mean(tried[_best(tried)].squares < blurred))) < SURE:
-        return SeenLight(None, share)
+    if (share := float(np.mean(tried[_best(tried)].squares < blurred))) < SURE or not resolved:
+        return SeenLight(None, min(share, 0.5 * (UNSURE + SURE)) if not resolved else share)
     while unknown := [ratio for ratio in _next_ratios(tried) if ratio not in tried]:
         tried |= {ratio: relit(ratio) for ratio in unknown}
     ratio, radius_sd = _middle(tried)

@@ -13,7 +13,7 @@ from processing.analysis.droplets.gaussian_blobs import Image
 from processing.analysis.droplets.shadows.disc_optics import refined_disc_optics
 from processing.analysis.droplets.shadows.disc_supports import DiscSupports, supporting_views, undisputed
 from processing.analysis.droplets.shadows.judged_volume import judging_views, knowing_views
-from processing.analysis.droplets.shadows.light_search import Relit, SeenLight, relit, seen_light
+from processing.analysis.droplets.shadows.light_search import LEAST_BLUR_PX, Relit, SeenLight, relit, seen_light
 from processing.analysis.droplets.shadows.masked_liquid import liquid_masks, liquid_objects
 from processing.analysis.droplets.shadows.merged_discs import merged_discs
 from processing.analysis.droplets.shadows.opaque_discs import (
@@ -98,7 +98,7 @@ class ShadowRounds:
             other = self.relit(fit, condenser_ratio)
             return Relit(self._supports(other).residual ** 2, other.discs.radii_voxel)
 
-        return seen_light(in_light)
+        return seen_light(in_light, resolved=self._blur_px(fit) >= LEAST_BLUR_PX)
 
     def relit(self, fit: ShadowFit, condenser_ratio: float | None) -> ShadowFit:
         """The very same droplets in other light, fitted to it."""
@@ -214,10 +214,12 @@ class ShadowRounds:
             self._last = (fit.discs, fit.optics, self._recorded().drawn(fit.optics, fit.discs).transmissions)
         return self._last[2]
 
-    def _blur_voxel(self, fit: ShadowFit) -> float:
+    def _blur_px(self, fit: ShadowFit) -> float:
         lattice = self._shot.lattice
-        middle = 0.5 * (lattice.nodes_px.shape[1] - 1) * lattice.spacing
-        return float(fit.optics.blurs_px(middle).mean()) / lattice.pixels_per_voxel
+        return float(fit.optics.blurs_px(0.5 * (lattice.nodes_px.shape[1] - 1) * lattice.spacing).mean())
+
+    def _blur_voxel(self, fit: ShadowFit) -> float:
+        return self._blur_px(fit) / self._shot.lattice.pixels_per_voxel
 
     def _depths(self, fit: ShadowFit, discs: Discs) -> FloatArray:
         """Share of the light that discs take at their centres."""

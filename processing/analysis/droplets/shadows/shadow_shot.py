@@ -32,7 +32,7 @@ from processing.analysis.droplets.shadows.masked_liquid import liquid_objects, l
 from processing.analysis.droplets.shadows.opaque_discs import DiscImages, Discs, Shadows
 from processing.analysis.droplets.shadows.shadow_finder import behind_gaussian_blur, find_shadows
 from processing.analysis.droplets.shadows.shadow_fit import ShadowFit, Transmissions, rms_over_noise, seen_by
-from processing.analysis.droplets.shadows.shadow_light import grey, unlit
+from processing.analysis.droplets.shadows.shadow_light import grey, judged_by_shape, unlit
 from processing.analysis.droplets.shadows.shadow_union import union_defects
 from processing.analysis.droplets.size_correction import SizeCorrection
 from processing.geometry import FloatArray
@@ -135,7 +135,7 @@ def measure_shadows(
     if blind := blind_views(known_shadows, shot.noises_of(shot.images), search.names):
         return MeasuredExposure(SizedDroplets.none(), {}, None, *blind_verdict(blind, search.names))
     fit = find_shadows(shot, search, light, before_round)
-    told = judged_by_volume(_told(shot, fit, search, sizes))
+    told = judged_by_volume(judged_by_shape(_told(shot, fit, search, sizes)))
     if not twins or told.verdict is not ShotVerdict.GOOD:
         return told
     rng = np.random.default_rng(seed)

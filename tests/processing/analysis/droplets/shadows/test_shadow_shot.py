@@ -1,9 +1,11 @@
 """Shadows against truth that shares no code with the finder, and what must not matter."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from processing.analysis.droplets.droplet_search import plan_droplets
 from processing.analysis.droplets.ghost_share import matches
@@ -12,6 +14,7 @@ from processing.analysis.droplets.shadows.shadow_shot import ShadowExposure, mea
 from processing.volume import VoxelGrid
 from tests.support.shadow_scenes import ShadowScene, search_of, shadow_scene
 
+Grey = NDArray[np.float32]
 SHAPE, IMAGE_SIZE_PX, MARGIN_VOXEL = (120, 30, 200), (280, 80), 8
 
 
@@ -61,6 +64,34 @@ def test_a_black_level_without_a_dark_image_is_doubted(scene: ShadowScene) -> No
     doubted = measure_shadows(grey, search_of(scene, MARGIN_VOXEL))
     assert doubted.verdict is ShotVerdict.DOUBTFUL, doubted.residual_over_noise
     assert any("of the light is left where shadows should be black" in reason for reason in doubted.reasons)
+
+
+def moved_px(image: Grey, rows: int) -> Grey:
+    """Droplets that fall by so many rows while the light is on."""
+    return np.asarray(np.mean([np.roll(image, row, axis=0) for row in range(rows)], axis=0), dtype=np.float32)
+
+
+def seen_twice(image: Grey, rows: int) -> Grey:
+    """Two pulses of light within one exposure."""
+    return np.asarray(0.5 * (image + np.roll(image, rows, axis=0)), dtype=np.float32)
+
+
+@pytest.mark.parametrize(("spoil", "rows"), [(moved_px, 3), (moved_px, 6), (seen_twice, 6)])
+def test_droplets_that_are_no_round_discs_are_doubted(spoil: Callable[[Grey, int], Grey], rows: int) -> None:
+    """Small discs in a row explain each of them to about the noise of the whole image: too many, and too small."""
+    rng, clear = np.random.default_rng(1), shadow_scene(SHAPE, 14, IMAGE_SIZE_PX, seed=2, noise=0.0)
+    images = [(spoil(image, rows) + rng.normal(0, 0.012, image.shape)).astype(np.float32) for image in clear.images]
+    told = measure_shadows(images, search_of(clear, MARGIN_VOXEL), light="gaussian")
+    assert told.verdict is ShotVerdict.DOUBTFUL, told.residual_over_noise
+    assert any("do not look like round opaque discs" in reason for reason in told.reasons)
+
+
+def test_pixels_too_coarse_to_tell_the_light_do_not_tell_it() -> None:
+    """Edges sharper than a pixel look like light of 0.8 apertures, in which diameters would be 6 um too small."""
+    coarse = shadow_scene(SHAPE, 14, IMAGE_SIZE_PX, seed=2, blurs_px=(0.3,) * 4)
+    told = measure_shadows(coarse.images, search_of(coarse, MARGIN_VOXEL))
+    assert {view.condenser_ratio for view in told.views.values()} == {None}
+    assert "which light this is cannot be told" in "; ".join(told.reasons)
 
 
 def test_the_order_of_views_does_not_matter(scene: ShadowScene, shot: ShadowExposure) -> None:
