@@ -17,7 +17,6 @@ from processing.analysis.droplets.measured_exposure import (
     RatioLimits,
     ShotVerdict,
     blind_verdict,
-    blind_views,
     check_images,
     ghosts_within,
     judged,
@@ -92,9 +91,8 @@ def measure_bright(
     """
     check_images(images, search)
     noises = np.array([noise_of(image) for image in images])
-    blind = blind_views(images, noises, search.names)
-    if blind:
-        return MeasuredExposure(Droplets.none(), {}, None, *blind_verdict(blind, search.names))
+    if blind := blind_verdict(images, noises, search.names):
+        return MeasuredExposure(Droplets.none(), {}, None, *blind)
     shot = BlobImages(
         tuple(np.asarray(image / np.float32(noise)) for image, noise in zip(images, noises, strict=True)),
         search.lattice,

@@ -120,13 +120,31 @@ def blind_views(bright: Sequence[Image], noises: FloatArray, names: Sequence[str
     )
 
 
-def blind_verdict(blind: Sequence[str], names: Sequence[str]) -> tuple[ShotVerdict, tuple[str, ...]]:
-    """Verdict and reasons where some views see nothing, or all."""
+def blind_verdict(
+    bright: Sequence[Image], noises: FloatArray, names: Sequence[str]
+) -> tuple[ShotVerdict, tuple[str, ...]] | None:
+    """Verdict and reasons where some views see nothing, or all, from images in which droplets are bright; else None."""
+    blind = blind_views(bright, noises, names)
+    if not blind:
+        return None
     if len(blind) == len(names):
-        return ShotVerdict.EMPTY, ("no view sees a droplet",)
+        return _without_droplets([-image for image in bright], noises, names)
     reason = (
         f"{', '.join(blind)} sees nothing while the others see droplets: is a lens covered, or a light off? "
         "Measure without the view, by a calibration that has only the others"
+    )
+    return ShotVerdict.REFUSED, (reason,)
+
+
+def _without_droplets(
+    dark: Sequence[Image], noises: FloatArray, names: Sequence[str]
+) -> tuple[ShotVerdict, tuple[str, ...]]:
+    """Nothing is as droplets are; if all views see spots in images that are turned over, something was mistaken."""
+    if blind_views(dark, noises, names):
+        return ShotVerdict.EMPTY, ("no view sees a droplet",)
+    reason = (
+        "all views see spots, and none is as droplets are: is the polarity another (shadow, bright), or are there "
+        "droplets in the dark image or the background?"
     )
     return ShotVerdict.REFUSED, (reason,)
 

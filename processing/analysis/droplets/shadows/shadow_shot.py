@@ -16,7 +16,6 @@ from processing.analysis.droplets.measured_exposure import (
     RatioLimits,
     ShotVerdict,
     blind_verdict,
-    blind_views,
     check_images,
     ghosts_within,
     judged,
@@ -132,8 +131,8 @@ def measure_shadows(
         return _refused(*reasons)
     shot = _looking(images, trusts, search, threads)
     known_shadows = [(1 - image) * np.sqrt(one) for image, one in zip(shot.images, shot.trust, strict=True)]
-    if blind := blind_views(known_shadows, shot.noises_of(shot.images), search.names):
-        return MeasuredExposure(SizedDroplets.none(), {}, None, *blind_verdict(blind, search.names))
+    if blind := blind_verdict(known_shadows, shot.noises_of(shot.images), search.names):
+        return MeasuredExposure(SizedDroplets.none(), {}, None, *blind)
     fit = find_shadows(shot, search, light, before_round)
     told = judged_by_volume(judged_by_shape(_told(shot, fit, search, sizes)))
     if not twins or told.verdict is not ShotVerdict.GOOD:

@@ -122,6 +122,13 @@ def test_images_without_droplets_are_empty(truth: BrightScene, level: float) -> 
     assert dark.verdict is ShotVerdict.EMPTY
 
 
+def test_droplets_of_the_other_polarity_are_refused_and_not_empty(truth: BrightScene) -> None:
+    shadows = [(1 - 0.5 * image).astype(np.float32) for image in truth.images]
+    told = measure_bright(shadows, search_of(truth))
+    assert told.verdict is ShotVerdict.REFUSED
+    assert "is the polarity another" in told.reasons[0]
+
+
 def test_a_black_view_is_named_and_nothing_is_told(truth: BrightScene) -> None:
     images = [*truth.images[:2], np.zeros_like(truth.images[2]), truth.images[3]]
     shot = measure_bright(images, search_of(truth))

@@ -156,6 +156,12 @@ def test_images_without_droplets_are_empty_and_a_covered_view_is_named(scene: Sh
     assert "view 3 sees nothing while the others see droplets" in one_blind.reasons[0]
 
 
+def test_droplets_in_the_background_alone_are_refused_and_not_empty(scene: ShadowScene) -> None:
+    told = measure_shadows([2 - image for image in scene.images], search_of(scene, MARGIN_VOXEL))
+    assert told.verdict is ShotVerdict.REFUSED
+    assert "droplets in the dark image or the background" in told.reasons[0]
+
+
 @pytest.mark.parametrize("light", [0.0, 0.3, 3.0])
 def test_views_without_light_are_refused_and_not_empty(scene: ShadowScene, light: float) -> None:
     rng, search = np.random.default_rng(0), search_of(scene, MARGIN_VOXEL)
