@@ -2,6 +2,7 @@
 
 import glob
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -48,15 +49,43 @@ class ImagePattern:
         """Name of the file of one shot."""
         return self.text.format(view=view, shot=shot)
 
-    def found(self, root: Path) -> dict[str, list[int]]:
-        """Views that have files below a folder, in the order of their names, with the numbers of their shots."""
-        numbers: dict[str, set[int]] = {}
-        for name in glob.iglob(self._wildcards, root_dir=root):
-            match = self._expression.fullmatch(name)
-            shot = int(match["shot"]) if match and self.counts_shots else 0
-            if match and self.file(match["view"], shot) == name:
-                numbers.setdefault(match["view"], set()).add(shot)
-        return {view: sorted(numbers[view]) for view in sorted(numbers)}
+    def found(self, root: Path, views: Sequence[str] | None = None) -> dict[str, list[int]]:
+        """Views that have files below a folder, in the order of their names, with the numbers of their shots.
+
+        Parameters
+        ----------
+        root : Path
+            The folder.
+        views : sequence of str, optional
+            Which ones; by default all names that there are.
+
+        Raises
+        ------
+        ValueError
+            A file has its number padded otherwise than the pattern, or it is not clear where a name ends.
+        """
+        if views is None and self._touching:
+            raise ValueError(f"{self.text}: {{view}} and {{shot}} touch, so name the cameras: views = [...]")
+        names = list(glob.iglob(self._wildcards, root_dir=root))
+        found = {view: sorted(self._numbers(names, view)) for view in views or self._views(names)}
+        return {view: found[view] for view in sorted(found) if found[view]}
+
+    def _views(self, names: Sequence[str]) -> set[str]:
+        expression = self._expression()
+        return {match["view"] for name in names if (match := expression.fullmatch(name))}
+
+    def _numbers(self, names: Sequence[str], view: str) -> set[int]:
+        """Of the shots of a view."""
+        numbers, expression = set[int](), self._expression(view)
+        for match in filter(None, map(expression.fullmatch, names)):
+            written = {int(text) for name, text in match.groupdict().items() if name != "view"}
+            if len(written) > 1:  # a number that comes twice says two things
+                continue
+            shot = min(written, default=0)
+            if (called := self.file(view, shot)) != match[0]:
+                raise ValueError(f"{match[0]} is there, and is {called} by {self.text}: pad {{shot}} as files are")
+            numbers.add(shot)
+        return numbers
 
     @cached_property
     def _parts(self) -> list[tuple[str, str | None, str | None, str | None]]:
@@ -67,12 +96,18 @@ class ImagePattern:
         return "".join(glob.escape(literal) + ("*" if name else "") for literal, name, _, _ in self._parts)
 
     @cached_property
-    def _expression(self) -> re.Pattern[str]:
-        """With groups ``view`` and ``shot``; that a field which comes again says the same is for the caller to see."""
-        text, named = "", set()
-        for literal, name, _, _ in self._parts:
+    def _touching(self) -> bool:
+        """Whether a name and a number follow one another with nothing between them that could tell them apart."""
+        return any(not literal and number > 0 for number, (literal, name, _, _) in enumerate(self._parts) if name)
+
+    def _expression(self, view: str | None = None) -> re.Pattern[str]:
+        """With groups ``view``, which says the same where it comes again, and ``shot0``, ``shot3``, ... for numbers."""
+        fields = _FIELDS if view is None else {**_FIELDS, "view": re.escape(view)}
+        text, named = "", False
+        for number, (literal, name, _, _) in enumerate(self._parts):
             text += re.escape(literal)
-            if name:
-                text += f"(?:{_FIELDS[name]})" if name in named else f"(?P<{name}>{_FIELDS[name]})"
-                named.add(name)
+            if name == "view":
+                text, named = text + ("(?P=view)" if named else f"(?P<view>{fields[name]})"), True
+            elif name:
+                text += f"(?P<shot{number}>{fields[name]})"
         return re.compile(text)

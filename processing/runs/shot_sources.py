@@ -78,8 +78,12 @@ def _pages(entry: ShotEntry | ShotsEntry) -> tuple[int | None, int | None]:
 
 def _by_pattern(source: ManifestFile, key: Key, entry: ShotsEntry) -> Iterator[tuple[dict[str, ImageSource], ...]]:
     first, pattern = next(iter(entry.patterns.items()))
-    found = pattern.found(source.root)
-    views = entry.views or _other_views(source.manifest) or tuple(found)
+    views = entry.views or _other_views(source.manifest)
+    try:
+        found = {} if views and entry.shots else pattern.found(source.root, views or None)
+    except ValueError as error:
+        raise source.error((*key, first), str(error)) from error
+    views = views or tuple(found)
     if entry.counts_shots:
         shots, starts, step = _numbers(source, key, entry, views, found), _pages(entry), 0
     else:

@@ -25,11 +25,26 @@ def test_what_is_written_is_found(tmp_path: Path, text: str) -> None:
     assert pattern.found(tmp_path) == written
 
 
-def test_numbers_that_are_padded_otherwise_are_other_files(tmp_path: Path) -> None:
-    for name in ("a_001.tif", "a_2.tif", "a_x.tif", "a_0003.tif", "b_2.tiff"):
-        (tmp_path / name).touch()
-    assert ImagePattern("{view}_{shot:03d}.tif").found(tmp_path) == {"a": [1]}
-    assert ImagePattern("{view}_{shot}.tif").found(tmp_path) == {"a": [2]}
+@pytest.mark.parametrize(("text", "name"), [("{view}_{shot:03d}.tif", "a_2.tif"), ("{view}_{shot}.tif", "a_001.tif")])
+def test_numbers_that_are_padded_otherwise_are_told_and_not_left_out(tmp_path: Path, text: str, name: str) -> None:
+    """Of im01 to im14, a number without zeros in front would mean the last five alone."""
+    for there in (name, "a_123.tif", "a_x.tif", "b_2.tiff", "b_123.tif"):
+        (tmp_path / there).touch()
+    with pytest.raises(ValueError, match=f"{name} is there, and is a_"):
+        ImagePattern(text).found(tmp_path)
+    assert ImagePattern(text).found(tmp_path, ["b"]) == {"b": [123]}
+
+
+@pytest.mark.parametrize("text", ["{view}{shot}.png", "{view}{shot:02d}.png", "{shot:02d}{view}.png"])
+def test_a_name_and_a_number_that_touch_are_told_apart_by_names_that_are_known(tmp_path: Path, text: str) -> None:
+    """Else left12 is shot 2 of left1."""
+    pattern, written = ImagePattern(text), {"left": [1, 2, 12], "2right": [2, 34]}
+    for view, shots in written.items():
+        for shot in shots:
+            (tmp_path / pattern.file(view, shot)).touch()
+    assert pattern.found(tmp_path, list(written)) == dict(sorted(written.items()))
+    with pytest.raises(ValueError, match="touch, so name the cameras"):
+        pattern.found(tmp_path)
 
 
 def test_without_a_number_a_view_has_one_file(tmp_path: Path) -> None:
