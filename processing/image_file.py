@@ -5,6 +5,7 @@ are calibrated by the pixels of their sensors.
 """
 
 import os
+import re
 import threading
 import zlib
 from collections.abc import Callable, Iterable
@@ -22,6 +23,8 @@ from processing.tiff_pages import PageKind, deflated_parts, page_kind, page_offs
 GreyImage = NDArray[np.uint8] | NDArray[np.uint16]
 T = TypeVar("T")
 _STDERR = threading.Lock()
+_BLANK = rb"(?:\s|#[^\n]*\n)+"
+_NETPBM = re.compile(rb"P([56])" + 3 * (_BLANK + rb"(\d+)") + rb"\s")
 _SUN_RASTER = b"\x59\xa6\x6a\x95"
 """Of whose images OpenCV makes zeros, or other grey values."""
 
@@ -58,6 +61,8 @@ def read_image(path: Path, page: int | None = None) -> GreyImage:
         raise ImageFileError(f"{path}: is damaged: {complaints}")
     if offsets:
         _check_kind(path, page_kind(content, offsets[chosen]), image.dtype)
+    if image.ndim == 3 and image.shape[2] < 3:
+        raise ImageFileError(f"{path}: {image.shape[2]} values a pixel, grey or colour is needed")
     if image.ndim == 3:
         image = cv2.cvtColor(image, cv2.COLOR_BGRA2GRAY if image.shape[2] == 4 else cv2.COLOR_BGR2GRAY)
     if image.dtype == np.uint8:
@@ -80,10 +85,28 @@ def page_count(path: Path) -> int:
 
 def _pages(path: Path, content: NDArray[np.uint8]) -> tuple[int, ...]:
     """Where the pages of a TIFF begin; empty for every other image, of which OpenCV reads the first one alone."""
-    offsets = page_offsets(content)
+    try:
+        offsets = page_offsets(content)
+    except ValueError as error:
+        raise ImageFileError(f"{path}: {error}") from error
+    if offsets and (described := page_kind(content, offsets[0]).described) > len(offsets):
+        raise ImageFileError(f"{path}: holds {described} images, and lists {len(offsets)}; save them one by one")
+    if _is_netpbm_stack(content):
+        raise ImageFileError(f"{path}: holds several images, one after the other; of all formats only TIFF may do so")
     if not offsets and (count := cv2.imcount(str(path), cv2.IMREAD_UNCHANGED)) > 1:
         raise ImageFileError(f"{path}: is an animation of {count} images; of all formats only TIFF may hold several")
     return offsets
+
+
+def _is_netpbm_stack(content: NDArray[np.uint8]) -> bool:
+    """Whether another image begins where a PGM or PPM ends, which OpenCV does not count."""
+    header = _NETPBM.match(content[:1024].tobytes())
+    if header is None:
+        return False
+    columns, rows, brightest = map(int, header.groups()[1:])
+    pixel = (3 if header[1] == b"6" else 1) * (2 if brightest > np.iinfo(np.uint8).max else 1)
+    after = header.end() + columns * rows * pixel
+    return bool(_NETPBM.match(content[after : after + 1024].tobytes()))
 
 
 def _decoded(content: NDArray[np.uint8]) -> NDArray[Any] | None:
@@ -108,6 +131,8 @@ def _check_kind(path: Path, kind: PageKind, decoded: np.dtype[Any]) -> None:
         raise ImageFileError(f"{path}: holds a preview of an image in the sensor's own format; save it as a plain TIFF")
     if kind.bits > 8 and decoded == np.uint8:
         raise ImageFileError(f"{path}: has {kind.bits} bits, of which only 8 can be read; save it as a grey image")
+    if kind.has_planes and decoded == np.uint16:
+        raise ImageFileError(f"{path}: holds colours of 16 bits in separate planes; save it as a grey image")
     if kind.white_is_zero and decoded == np.uint16:
         raise ImageFileError(f"{path}: counts light from white, 0, to black (WhiteIsZero); save it with black as 0")
 

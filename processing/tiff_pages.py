@@ -4,6 +4,7 @@ OpenCV decodes the first page, and turns it as its orientation tag says. So the 
 and the tag is set to 1: no turn. TIFF 6.0, section 2; BigTIFF (libtiff.gitlab.io, BigTIFF design) has wider fields.
 """
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
@@ -17,6 +18,10 @@ ORIENTATION_TAG, SHORT, AS_STORED = 274, 3, 1
 COMPRESSION_TAG, DEFLATE = 259, (8, 32946)
 SUBFILE_TAG, PREVIEW = 254, 1
 BITS_TAG, PHOTOMETRIC_TAG, WHITE_IS_ZERO = 258, 262, 0
+PLANES_TAG, SEPARATE = 284, 2
+DESCRIPTION_TAG, DEPTH_TAG = 270, 32997
+_IMAGEJ = re.compile(rb"ImageJ=.*?\bimages=(\d+)", re.DOTALL)
+"""As ImageJ describes a stack, of which it lists only the first image where the file is larger than 4 GB."""
 PART_TAGS = {273: 279, 324: 325}
 """Where strips, or tiles, begin: and how many bytes they have."""
 _WIDTHS = {SHORT: 2, 4: 4, 16: 8}
@@ -55,15 +60,27 @@ class PageKind:
         Whether larger values are darker.
     is_preview : bool
         Whether it is a smaller version of an image that lies elsewhere in the file, as raw files of cameras have.
+    has_planes : bool
+        Whether red, green and blue lie apart.
+    described : int
+        How many images it says the file holds, or the page itself in its depth; 1 where it says nothing.
     """
 
     bits: int
     white_is_zero: bool
     is_preview: bool
+    has_planes: bool
+    described: int
 
 
 def page_offsets(content: Content) -> tuple[int, ...]:
-    """Where the directory of every page begins; empty where the bytes are no TIFF."""
+    """Where the directory of every page begins; empty where the bytes are no TIFF.
+
+    Raises
+    ------
+    ValueError
+        There are more pages, beyond the end of the file.
+    """
     layout = _LAYOUTS.get(content[:4].tobytes())
     return tuple(_offsets(content, layout)) if layout else ()
 
@@ -102,7 +119,20 @@ def page_kind(content: Content, offset: int) -> PageKind:
         bits=first(BITS_TAG, 1),
         white_is_zero=first(PHOTOMETRIC_TAG, WHITE_IS_ZERO + 1) == WHITE_IS_ZERO,
         is_preview=bool(first(SUBFILE_TAG, 0) & PREVIEW),
+        has_planes=first(PLANES_TAG, 1) == SEPARATE,
+        described=max(first(DEPTH_TAG, 1), _described(content, fields.get(DESCRIPTION_TAG), layout)),
     )
+
+
+def _described(content: Content, field: tuple[int, int] | None, layout: _Layout) -> int:
+    """How many images a description by ImageJ speaks of; 1 of any other."""
+    if field is None:
+        return 1
+    _, entry = field
+    start = _number(content, entry + layout.value, layout.offset, layout)
+    text = content[start : start + _number(content, entry + 4, layout.value - 4, layout)].tobytes()
+    match = _IMAGEJ.match(text)
+    return int(match[1]) if match else 1
 
 
 def _entries(content: Content, offset: int, layout: _Layout) -> Iterator[tuple[int, int, int]]:
@@ -122,13 +152,19 @@ def _values(content: Content, kind: int, entry: int, layout: _Layout) -> list[in
 
 
 def _offsets(content: Content, layout: _Layout) -> Iterator[int]:
-    """Follow the chain of directories, to its end, to that of a torn file, or until it runs in a circle."""
+    """Follow the chain of directories, to its end, or until it runs in a circle."""
     seen: set[int] = set()
     offset = _number(content, layout.first, layout.offset, layout)
-    while offset and offset not in seen and (entries := _number(content, offset, layout.count, layout)):
+    while offset and offset not in seen:
+        entries = _number(content, offset, layout.count, layout)
+        end = offset + layout.count + entries * layout.entry
+        if seen and (not entries or end + layout.offset > content.size):
+            raise ValueError(f"holds more than {len(seen)} images, which lie beyond its end: was it cut?")
+        if not entries:
+            return
         seen.add(offset)
         yield offset
-        offset = _number(content, offset + layout.count + entries * layout.entry, layout.offset, layout)
+        offset = _number(content, end, layout.offset, layout)
 
 
 def _number(content: Content, start: int, width: int, layout: _Layout) -> int:

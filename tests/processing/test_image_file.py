@@ -169,6 +169,29 @@ def test_what_is_wrong_with_a_jpeg_is_no_line_that_nobody_reads(
     assert capfd.readouterr().err == ""
 
 
+def test_a_stack_that_was_cut_is_not_a_shorter_one(tmp_path: Path) -> None:
+    """libtiff writes the directory of a page after its pixels, so the pages before are whole."""
+    cv2.imwritemulti(str(tmp_path / "whole.tif"), list(STACK), [cv2.IMWRITE_TIFF_COMPRESSION, 1])
+    whole = (tmp_path / "whole.tif").read_bytes()
+    for length in range(len(whole) // 3 + 20, len(whole) - 20, 20):
+        (tmp_path / "cut.tif").write_bytes(whole[:length])
+        for read in (read_image, page_count):
+            with pytest.raises(ImageFileError, match=r"cut\.tif: holds more than [12] images"):
+                read(tmp_path / "cut.tif")
+
+
+def test_images_that_a_file_does_not_list_are_not_left_out(tmp_path: Path) -> None:
+    tifffile.imwrite(tmp_path / "imagej.tif", STACK, imagej=True, truncate=True)
+    deep = np.zeros((4, 16, 16), np.uint16)
+    tifffile.imwrite(tmp_path / "deep.tif", deep, volumetric=True, tile=(4, 16, 16), photometric="minisblack")
+    header = b"P5 # by the frame grabber\n8 4\n255\n"
+    (tmp_path / "two.pgm").write_bytes(2 * (header + bytes(range(32))))
+    for file, holds in (("imagej.tif", "3 images"), ("deep.tif", "4 images"), ("two.pgm", "several images")):
+        for read in (read_image, page_count):
+            with pytest.raises(ImageFileError, match=f"{file}: holds {holds}"):
+                read(tmp_path / file)
+
+
 def test_directories_in_a_circle_end(tmp_path: Path) -> None:
     circle = b"II*\0" + struct.pack("<IHHHIII", 8, 1, 256, 3, 1, 4, 8)
     (tmp_path / "a.tif").write_bytes(circle)
@@ -181,6 +204,7 @@ def test_directories_in_a_circle_end(tmp_path: Path) -> None:
         ({"photometric": "miniswhite"}, "counts light from white, 0, to black"),
         ({"subfiletype": 1}, "holds a preview of an image"),
         ({"extrasamples": ["unspecified"]}, "has 16 bits, of which only 8 can be read"),
+        ({"photometric": "rgb", "planarconfig": "separate"}, "colours of 16 bits in separate planes"),
     ],
 )
 def test_a_page_that_would_be_read_otherwise_than_it_is_meant_is_refused(
@@ -188,6 +212,7 @@ def test_a_page_that_would_be_read_otherwise_than_it_is_meant_is_refused(
 ) -> None:
     grey = np.arange(600, dtype=np.uint16).reshape(20, 30)
     image = np.dstack([grey, grey]) if "extrasamples" in written else grey
+    image = np.stack([grey, grey, grey]) if "planarconfig" in written else image
     tifffile.imwrite(tmp_path / "odd.tif", image, **{"photometric": "minisblack", **written})
     with pytest.raises(ImageFileError, match=complaint):
         read_image(tmp_path / "odd.tif")
