@@ -10,6 +10,7 @@ from processing.analysis.droplets.shadows.shadow_shot import ShadowExposure, mea
 from processing.calibration.calibration import Calibration
 from processing.coherent_light import MOST_RATIO
 from processing.kernels import DEFAULT_THREADS
+from processing.masked import require_unmasked
 from processing.preprocessing import Intensity, Polarity
 from processing.volume import VoxelGrid
 
@@ -70,6 +71,8 @@ def measure(
         for the polarity.
     """
     _require_options(polarity, light)
+    for name, image in images.items():
+        require_unmasked(name, image)
     names = tuple(images)
     calibration.require_usable(names)
     mappings = [calibration.views[name].mapping for name in names]

@@ -14,6 +14,7 @@ from processing import preprocessing
 from processing.calibration.calibration import Calibration
 from processing.kernels import DEFAULT_THREADS
 from processing.light import odd_light
+from processing.masked import require_unmasked
 from processing.preprocessing import Intensity, Polarity, Preprocessing
 from processing.reconstruction import smart as iterative
 from processing.reconstruction.choices import Accuracy, ReconstructionMethod
@@ -134,12 +135,12 @@ def intensity(
     """
     if not 1 <= bits <= 16 or (frame.size and int(frame.max()) >= 2**bits):
         raise ValueError(f"bits {bits} of 1 to 16 reach to {2**bits - 1}, a pixel is {frame.max(initial=0)}")
+    for name, array in (("frame", frame), ("background", background), ("dark", dark)):
+        require_unmasked(name, array)
     for name, reference in (("background", background), ("dark", dark)):
         if reference is not None and not np.isfinite(reference).all():
             row, column = np.argwhere(~np.isfinite(reference))[0]
             raise ValueError(f"{name}: pixel (column {column}, row {row}) is {reference[row, column]}")
-    if np.ma.is_masked(frame):
-        raise ValueError("the frame has masked pixels, which would count as they are: fill them with what is known")
     if polarity == "bright" and background is not None:
         raise ValueError("bright particles are before no light: subtract what there is without them as dark")
     dark, background = (None if one is None else np.ascontiguousarray(one, np.float32) for one in (dark, background))
@@ -277,4 +278,8 @@ def _in_order(plan: Plan, images: Images) -> list[Intensity]:
     """The images of the views in the order of the plan."""
     if set(images) != set(plan.names):
         raise ValueError(f"images of {sorted(images)}, the plan has views {sorted(plan.names)}")
+    for name, image in images.items():
+        require_unmasked(name, image)
+        if not np.issubdtype(np.asarray(image).dtype, np.floating):
+            raise ValueError(f"{name}: its image is of {np.asarray(image).dtype}; make grey values intensities first")
     return [images[name] for name in plan.names]

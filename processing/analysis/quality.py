@@ -4,6 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter
 
+from processing.masked import require_unmasked
+
 Volume = NDArray[np.floating]
 Sums = NDArray[np.float64]
 
@@ -32,13 +34,18 @@ def quality_factor(
     Raises
     ------
     ValueError
-        Shapes differ, no window fits in, ``window`` is no multiple of ``step``, or no window has a say.
+        Shapes differ, a voxel is masked or not finite, no window fits in, ``window`` is no multiple of ``step``, or no
+        window has a say.
     """
     if truth.shape != volume.shape:
         raise ValueError(f"truth has shape {truth.shape}, volume {volume.shape}")
     if step < 1 or window % step or window < step or min(truth.shape) < window:
         raise ValueError(f"windows of {window} voxels at steps of {step} do not fit shape {truth.shape}")
+    require_unmasked("truth", truth)
+    require_unmasked("volume", volume)
     first, second, products = _window_sums(truth, volume, window, step)
+    if not np.isfinite(products).all():
+        raise ValueError("a voxel of truth or volume is infinite or not a number")
     covariance, first_power, second_power = products
     if mean_subtracted:
         count = float(window) ** 3

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from processing.errors import BadInput
 from processing.kernels import DEFAULT_THREADS
+from processing.masked import require_unmasked
 from processing.reconstruction.choices import VoxelType
 from processing.reconstruction.slab_volume import SLAB_ROWS, SlabVolume
 from processing.reconstruction.voxel_chunks import chunks_of
@@ -62,6 +63,7 @@ def write_volume(
     """
     if volume.shape != grid.shape:
         raise ValueError(f"{path}: volume has shape {volume.shape}, its grid {grid.shape}")
+    require_unmasked(str(path), volume)
     if not np.isfinite(volume).all():
         z, y, x = np.argwhere(~np.isfinite(volume))[0]
         raise ValueError(f"{path}: voxel (z {z}, y {y}, x {x}) is {volume[z, y, x]}")

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError, field_validator, model_validator
 
 from daq.files.run_directory import RunNotes, Spray
 from processing.calibration.sets.set_record import CalibrationEntry, CameraName
@@ -115,7 +115,9 @@ class RunEntry(_Entry):
         int | None,
         Field(description="from exposure A to B, from 40 ns to 10 s and within 1 / rate_hz; kept with the run"),
     ] = None
-    rate_hz: Annotated[float | None, Field(gt=0, description="shots per second, all alike; kept with the run")] = None
+    rate_hz: Annotated[
+        FiniteFloat | None, Field(gt=0, description="shots per second, all alike; kept with the run")
+    ] = None
     double_height: Annotated[bool, Field(description="every image is exposure A above exposure B")] = False
     notes: Annotated[RunNotes, Field(description="conditions of the run; kept with it")] = RunNotes()
     shot: Annotated[tuple[ShotEntry, ...], Field(description="the shots, in order")] = ()

@@ -136,7 +136,7 @@ def test_an_intensity_of_another_kind_than_was_meant_is_refused(options: dict[st
 
 def test_masked_pixels_do_not_count_as_they_are() -> None:
     masked: Any = np.ma.masked_less(FRAME, 100)
-    with pytest.raises(ValueError, match="masked pixels"):
+    with pytest.raises(ValueError, match="masked values"):
         ts.intensity(masked, bits=8, background=LIGHT)
 
 

@@ -21,6 +21,7 @@ from scipy.special import chdtri, stdtrit
 
 from processing.analysis.droplets.ghost_share import CONFIDENCE
 from processing.geometry import FloatArray
+from processing.masked import require_unmasked
 from processing.reconstruction.settings import FrozenValue
 
 DRAWS, SEED = 400, 0
@@ -171,6 +172,7 @@ def size_classes(diameters_um: ArrayLike, exposures_per_shot: float = 1) -> tupl
 
 
 def _checked(diameters_um: ArrayLike) -> FloatArray:
+    require_unmasked("diameters", diameters_um)
     array = np.asarray(diameters_um, dtype=np.float64).ravel()
     if not (good := np.isfinite(array) & (array > 0)).all():
         raise ValueError(f"diameter {array[~good][0]} um: diameters must be finite, and above 0")

@@ -15,6 +15,7 @@ from processing.analysis.flat.discs_in_outline import Disc, discs_in
 from processing.analysis.flat.outline import Outline, outline_around
 from processing.analysis.flat.spots import Spot, find_spots
 from processing.geometry import FloatArray
+from processing.masked import require_unmasked
 from processing.preprocessing import Polarity
 from processing.reconstruction.settings import FrozenValue
 
@@ -141,6 +142,8 @@ def measure_flat(
     ValueError
         A pixel is infinite or not a number.
     """
+    require_unmasked("image", image)
+    require_unmasked("background", background)
     if not np.isfinite(image).all():
         row, column = np.argwhere(~np.isfinite(image))[0]
         raise ValueError(f"pixel (column {column}, row {row}) is {image[row, column]}")

@@ -1,15 +1,17 @@
 """A calibration set from images that are in memory: of every view, the target at known positions."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from functools import partial
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from processing.calibration.observation import CalibrationSet
 from processing.calibration.sets.plane_detection import PlaneImage, detect_planes
 from processing.calibration.target.targets import Target
 from processing.kernels import _native
+from processing.masked import require_unmasked
 
 
 def find_target(
@@ -45,11 +47,16 @@ def find_target(
     CalibrationError
         A view never sees the target, or its images differ in size; names the view.
     ValueError
-        Too many views.
+        Too many views, something is stated of another view or is not finite, or an image has masked pixels.
     """
     if not 1 <= len(images) <= _native.MAX_VIEWS:
         raise ValueError(f"{len(images)} views, a calibration takes 1 to {_native.MAX_VIEWS}")
+    for stated in (origin_px, azimuth_deg, roll_deg):
+        _require_stated(stated or {}, images)
     origins_px, rolls_deg = dict(origin_px or {}), dict(roll_deg or {})
+    for view, by_z in images.items():
+        for z_mm, image in by_z.items():
+            require_unmasked(f"{view}, z = {_named(z_mm)} mm", image)
     planes = [
         PlaneImage(view, _named(z_mm), f"z = {_named(z_mm)} mm", z_mm, partial(_kept, image), origins_px.get(view))
         for view, by_z in images.items()
@@ -57,6 +64,14 @@ def find_target(
     ]
     found = detect_planes("images", planes, target, rolls_deg)
     return CalibrationSet("images", target, found.views, found.notes, dict(azimuth_deg or {}), rolls_deg)
+
+
+def _require_stated(stated: Mapping[str, float | tuple[float, float]], views: Collection[str]) -> None:
+    for name, value in stated.items():
+        if name not in views:
+            raise ValueError(f"{name}: something is stated of it, and images are of {', '.join(views)}")
+        if not np.isfinite(value).all():
+            raise ValueError(f"{name}: {value} is stated of it, which is not finite")
 
 
 def _named(z_mm: float) -> str:

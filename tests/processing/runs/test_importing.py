@@ -148,6 +148,7 @@ def test_root_may_come_from_the_environment(folder: Path, monkeypatch: pytest.Mo
         (RUN.replace('polarity = "shadow"', 'polarity = "dark"'), r"line 2: run\.polarity: "),
         (RUN.replace("6400", "1"), r"line 3: run\.separation_ns: no camera takes exposures 1 ns apart"),
         (RUN.replace("6400", "64_000_000_000"), r"line 3: run\.separation_ns: no camera takes exposures 640"),
+        (RUN.replace("6400", "6400\nrate_hz = inf"), r"run.rate_hz: Input should be a finite number"),
         (
             RUN.replace("6400", "6400\nrate_hz = 200_000"),
             r"line 1: run: separation_ns: 6400 ns is no shorter than a shot of rate_hz = 200000, 5000 ns",
