@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from processing.analysis.droplets.bright_finder import MODEL_SHARE, BrightFit, find_bright, rms, rms_of
+from processing.analysis.droplets.companions import judged_by_company
 from processing.analysis.droplets.droplet_search import DropletSearch, keep_on
 from processing.analysis.droplets.droplet_table import Droplets
 from processing.analysis.droplets.gaussian_blobs import BlobImages, BlobOptics, Blobs, Image
@@ -110,7 +111,8 @@ def measure_bright(
         return MeasuredExposure(Droplets.none(), views, ratio, verdict, reasons)
     droplets = _droplets(shot, fit, residuals, search, left, noises).within(search.grid)
     hidden = Hidden(volume_share=_unseen_share(shot, search))
-    told = judged_by_volume(MeasuredExposure(droplets, views, ratio, verdict, reasons, hidden=hidden))
+    found = MeasuredExposure(droplets, views, ratio, verdict, reasons, hidden=hidden)
+    told = judged_by_volume(judged_by_company(found, search.grid))
     if not twins or told.verdict is not ShotVerdict.GOOD:
         return told
     rng = np.random.default_rng(seed)

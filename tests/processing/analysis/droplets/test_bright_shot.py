@@ -1,5 +1,6 @@
 """Bright particles against truth that shares no code with the finder, and what must not matter."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 
 from processing.analysis.droplets.bright_shot import BrightExposure, measure_bright
 from processing.analysis.droplets.droplet_search import plan_droplets
+from processing.analysis.droplets.gaussian_blobs import Image
 from processing.analysis.droplets.ghost_share import GhostShare, matches
 from processing.analysis.droplets.measured_exposure import RatioLimits, ShotVerdict, judged, judged_by_twins
 from processing.reconstruction.errors import ReconstructionError
@@ -120,6 +122,26 @@ def test_images_without_droplets_are_empty(truth: BrightScene, level: float) -> 
     assert (shot.verdict, len(shot.droplets), shot.reasons) == (ShotVerdict.EMPTY, 0, ("no view sees a droplet",))
     dark = measure_bright([np.full_like(image, level) for image in truth.images], search_of(truth))
     assert dark.verdict is ShotVerdict.EMPTY
+
+
+def streaks(image: Image) -> Image:
+    """Of droplets that move by five pixels, askew, while the light is on."""
+    return np.asarray(np.mean([np.roll(image, (step, step), (0, 1)) for step in range(-2, 3)], axis=0), np.float32)
+
+
+def saturated(image: Image) -> Image:
+    """At half of the height of a droplet."""
+    return np.minimum(image, np.float32(0.5))
+
+
+@pytest.mark.parametrize("spoil", [streaks, saturated])
+def test_what_only_several_droplets_explain_is_doubted(truth: BrightScene, spoil: Callable[[Image], Image]) -> None:
+    """They explain it to the noise: residual over noise is that of a good shot."""
+    rng = np.random.default_rng(2)
+    images = [(spoil(image) + rng.normal(0, 0.03, image.shape)).astype(np.float32) for image in truth.images]
+    told = measure_bright(images, search_of(truth))
+    assert told.verdict is ShotVerdict.DOUBTFUL
+    assert "beyond chance" in told.reasons[-1]
 
 
 def test_droplets_of_the_other_polarity_are_refused_and_not_empty(truth: BrightScene) -> None:
