@@ -39,7 +39,7 @@ from processing.runs.results_file import FrameName, Provenance, claim_results
 from processing.runs.shots.shot_images import frame_names, require_match
 from processing.runs.workbench import References, read_references
 
-METHOD_VERSION = 4
+METHOD_VERSION = 5
 """Of what the numbers in a file of droplets mean."""
 Exposure = BrightExposure | ShadowExposure
 
