@@ -66,8 +66,8 @@ class ImagePattern:
         """
         if views is None and self._touching:
             raise ValueError(f"{self.text}: {{view}} and {{shot}} touch, so name the cameras: views = [...]")
-        names = list(glob.iglob(self._wildcards, root_dir=root))
-        found = {view: sorted(self._numbers(names, view)) for view in views or self._views(names)}
+        names = sorted(glob.iglob(self._wildcards, root_dir=root))
+        found = {view: sorted(self._numbers(names, view)) for view in views or sorted(self._views(names))}
         return {view: found[view] for view in sorted(found) if found[view]}
 
     def _views(self, names: Sequence[str]) -> set[str]:

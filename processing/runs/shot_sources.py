@@ -8,6 +8,7 @@ import numpy as np
 from daq.files.run_directory import ImageKey
 from processing.image_file import ImageFileError, page_count
 from processing.kernels import _native
+from processing.runs.image_pattern import ImagePattern
 from processing.runs.import_manifest import Manifest, ManifestFile, RunEntry, ShotEntry, ShotsEntry
 from processing.runs.toml_lines import Key
 
@@ -79,10 +80,7 @@ def _pages(entry: ShotEntry | ShotsEntry) -> tuple[int | None, int | None]:
 def _by_pattern(source: ManifestFile, key: Key, entry: ShotsEntry) -> Iterator[tuple[dict[str, ImageSource], ...]]:
     first, pattern = next(iter(entry.patterns.items()))
     views = entry.views or _other_views(source.manifest)
-    try:
-        found = {} if views and entry.shots else pattern.found(source.root, views or None)
-    except ValueError as error:
-        raise source.error((*key, first), str(error)) from error
+    found = {} if views and entry.shots else _found(source, (*key, first), pattern, views)
     views = views or tuple(found)
     if entry.counts_shots:
         shots, starts, step = _numbers(source, key, entry, views, found), _pages(entry), 0
@@ -103,6 +101,14 @@ def _by_pattern(source: ManifestFile, key: Key, entry: ShotsEntry) -> Iterator[t
         )
 
 
+def _found(source: ManifestFile, key: Key, pattern: ImagePattern, views: Sequence[str]) -> Mapping[str, Sequence[int]]:
+    """Numbers of the shots of views, or of all that there are."""
+    try:
+        return pattern.found(source.root, views or None)
+    except ValueError as error:
+        raise source.error(key, str(error)) from error
+
+
 def _other_views(manifest: Manifest) -> tuple[str, ...]:
     """Cameras that the manifest names elsewhere: in a shot, else in its calibration."""
     if manifest.run is not None and manifest.run.shot:
@@ -116,7 +122,8 @@ def _numbers(
     """Numbers of the shots that are stated, or that are there, the same for all views."""
     if entry.shots is not None:
         return range(entry.shots[0], entry.shots[1] + 1)
-    every = sorted({shot for view in views for shot in found.get(view, ())})
+    of_b = [_found(source, (*key, name), pattern, views) for name, pattern in list(entry.patterns.items())[1:]]
+    every = sorted({shot for one in (found, *of_b) for view in views for shot in one.get(view, ())})
     for view in views:
         numbers = found.get(view, ())
         if missing := sorted(set(every).difference(numbers)):

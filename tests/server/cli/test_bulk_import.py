@@ -104,8 +104,8 @@ def test_shots_that_all_views_have_lost_are_told(folder: Path, capsys: Capture) 
 
 def test_every_second_number_is_no_loss(folder: Path, capsys: Capture) -> None:
     for view in VIEWS:
-        for shot in (4, 6):
-            (folder / view / f"im{shot:04d}_a.png").unlink()
+        for name in ("im0004_a", "im0004_b", "im0006_a", "im0006_b"):
+            (folder / view / f"{name}.png").unlink()
     told(capsys, "import", write_manifest(folder, PAIRS), "-o", folder / "out")
     assert_pairs(folder / "out" / "run", [3, 5, 7])
 
@@ -121,6 +121,14 @@ def test_backgrounds_and_darks_have_patterns_too(folder: Path, capsys: Capture) 
     assert dark is not None
     np.testing.assert_array_equal(background[1], (image("right", 5, "b") + image("right", 6, "b").astype(float)) / 2)
     np.testing.assert_array_equal(dark[0], image("left", 7, "a"))
+
+
+def test_a_last_shot_of_which_all_cameras_lack_exposure_a_is_not_left_out(folder: Path, capsys: Capture) -> None:
+    for view in VIEWS:
+        (folder / view / "im0007_a.png").unlink()
+    message = refused(capsys, "import", write_manifest(folder, PAIRS), "-o", folder / "out")
+    assert "run.shots.0.frame_a: left has 4 images" in message
+    assert "shot 7 of left is missing" in message
 
 
 @pytest.mark.parametrize(
