@@ -91,7 +91,7 @@ class RunSession:
     def _acquire(self) -> None:
         plan = self._run.prepared.plan
         for observer in self._run.observers:
-            observer.before_run(plan)
+            observer.before_run(plan, self._writer.run_dir)
         self._write_devices()
         thresholds = self._copy_references()
         taker = self._taker = ShotTaker(self._run, thresholds)

@@ -1,7 +1,7 @@
 """SimulatedLaboratory: what lies around the simulated devices; light reaches the cameras here, and faults happen."""
 
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
@@ -23,13 +23,18 @@ class SimulatedLaboratory:
     ----------
     script : sequence of ScriptedFault
         Faults by the sequence number of the firing at which they happen.
+
+    Attributes
+    ----------
+    witnesses : list of Callable[[FiredTrain], None]
+        Each is told of every firing, in the thread that reads the generator, and must not block.
     """
 
     def __init__(self, script: Sequence[ScriptedFault] = ()) -> None:
         self._script = tuple(script)
+        self.witnesses: list[Callable[[FiredTrain], None]] = []
         self._connected: SimulatedDevices | None = None
         self._pulse_faults: list[Fault] = []
-        self._fired: list[FiredTrain] = []
         self._firing = threading.Lock()
         self._ends = FaultEnds()
         # The generator calls from the thread that also reads its answers: what asks it needs another one.
@@ -68,17 +73,6 @@ class SimulatedLaboratory:
         """Open the interlock."""
         self.devices.open_door()
 
-    @property
-    def fired(self) -> tuple[FiredTrain, ...]:
-        """What was fired since ``forget_fired``."""
-        with self._firing:
-            return tuple(self._fired)
-
-    def forget_fired(self) -> None:
-        """Start a new record of what is fired."""
-        with self._firing:
-            self._fired = []
-
     def inject(self, fault: Fault) -> None:
         """Let something go wrong, from now on or at the next shot, or mend it; see ``FaultKind``.
 
@@ -116,8 +110,9 @@ class SimulatedLaboratory:
             if scripted.sequence == train.sequence:
                 self._happen(scripted)
         with self._firing:
-            self._fired.append(train)
             spoiling, self._pulse_faults = self._pulse_faults, []
+        for witness in self.witnesses:
+            witness(train)
         for fault in spoiling:
             train = _spoiled(train, fault)
         for camera in self.devices.cameras.values():

@@ -208,7 +208,8 @@ def _simulation(
             "stage": config.stage and config.stage.model_copy(update={"port": stage.port}),
         }
     )
-    operator = SimulatedOperator(scene, laboratory)
+    operator = SimulatedOperator(scene)
+    laboratory.witnesses.append(operator.on_fired)
     return AssembledRig(_rig(wired, profiles, interlock, generator.clock_s), laboratory, (operator,))
 
 

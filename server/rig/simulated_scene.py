@@ -1,8 +1,7 @@
 """The scene of a simulated rig: the views of its configuration, as imperfect as real ones, and the truth of them."""
 
 import threading
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -14,7 +13,7 @@ from processing.optics import image_scale_px_per_mm
 from processing.synthetic.liquid.nozzles import flat_fan_spray, hollow_cone_spray
 from processing.synthetic.scene import Scene
 from processing.synthetic.target import Checkerboard, DotTarget
-from processing.synthetic.truth_file import FiredSpray, write_truth
+from processing.synthetic.truth_file import FiredSpray
 from processing.synthetic.view_optics import ViewOptics
 from server.rig.config import RigConfig, TargetConfig, ViewConfig
 
@@ -51,12 +50,10 @@ class SimulatedScene:
             target=_target(config.target),
             stage_z_mm=stage_z_mm,
         )
-        self._kind = RunKind.BACKGROUND
         self._rendering = threading.BoundedSemaphore(RENDERING_THREADS)
 
     def prepare(self, kind: RunKind) -> None:
         """Play the operator before a run: spray on or off, target in."""
-        self._kind = kind
         self._scene.prepare(kind.value)
 
     def expose(self, exposure: Exposure) -> Image:
@@ -67,14 +64,15 @@ class SimulatedScene:
                 exposure.view, exposure.sequence, exposure.frame, pulses, exposure.shape, exposure.bits
             )
 
-    def write_truth(self, path: Path, fired: Sequence[FiredTrain]) -> None:
-        """Keep camera models and, if there is spray, the liquid at the middle of the first light pulse of firings."""
-        with_spray = fired if self._kind is RunKind.SAMPLE else ()
-        times_ns = {train.sequence: _first_light_ns(train) for train in with_spray}
-        sprays = {
-            number: FiredSpray(time_ns, self._scene.truth(number, time_ns)) for number, time_ns in times_ns.items()
-        }
-        write_truth(path, self._scene.cameras, sprays)
+    @property
+    def cameras(self) -> Mapping[str, PinholeCamera]:
+        """True cameras by view."""
+        return self._scene.cameras
+
+    def liquid(self, train: FiredTrain) -> FiredSpray:
+        """What the nozzle gives, where it is open, at the middle of the first light pulse of a firing."""
+        time_ns = _first_light_ns(train)
+        return FiredSpray(time_ns, self._scene.truth(train.sequence, time_ns))
 
 
 def true_cameras(config: RigConfig, seed: int) -> dict[str, PinholeCamera]:

@@ -9,6 +9,7 @@ from daq.files.run_directory import RunReader
 from daq.run.acquisition import Acquisition
 from daq.run.state import RunOutcome
 from daq.run_plan import PulsePair, RunKind, RunPlan
+from daq.shot import FiredTrain
 from server.rig.assembly import open_rig
 from server.rig.config import RigConfig, load_config
 
@@ -28,11 +29,13 @@ def test_a_run_with_the_image_of_the_pico(tmp_path: Path) -> None:
     plan = RunPlan(
         name="emulated", kind=RunKind.BACKGROUND, shots=SHOTS, rate_hz=5.0, pulse=PulsePair(current_a=current_a)
     )
+    fired: list[FiredTrain] = []
     with open_rig(config) as assembled:
+        assert assembled.laboratory is not None
+        assembled.laboratory.witnesses.append(fired.append)
         with Acquisition(assembled.rig, tmp_path, observers=assembled.observers) as acquisition:
             run_id = acquisition.start(plan)
             status = acquisition.wait(60.0)
-        fired = [] if assembled.laboratory is None else assembled.laboratory.fired
     assert (status.outcome, status.shots_valid) == (RunOutcome.COMPLETED, SHOTS), status.message
     assert [train.sequence for train in fired] == [1, 2, 3]
     with RunReader(tmp_path / run_id) as reader:

@@ -7,7 +7,7 @@ import numpy as np
 from processing.synthetic.liquid.nozzles import hollow_cone_spray
 from processing.synthetic.spray import LiquidKind, Spray
 from processing.synthetic.true_droplets import true_droplets
-from processing.synthetic.truth_file import FiredSpray, read_true_spray, write_truth
+from processing.synthetic.truth_file import FiredSpray, read_true_spray, write_true_spray
 
 
 def test_rows_are_the_same_droplets_in_both_exposures() -> None:
@@ -48,9 +48,11 @@ def test_a_spray_without_droplets_has_none() -> None:
 
 def test_the_file_of_a_run_tells_all_that_measuring_is_judged_by(tmp_path: Path) -> None:
     spray = hollow_cone_spray(1)
-    write_truth(tmp_path / "truth.h5", {}, {4: FiredSpray(5_000, spray)})
+    write_true_spray(tmp_path / "truth.h5", 4, FiredSpray(5_000, spray))
     found = true_droplets(read_true_spray(tmp_path / "truth.h5", 4), 11_400)
     expected = true_droplets(FiredSpray(5_000, spray), 11_400)
-    for name in ("positions_mm", "diameters_mm", "velocities_mm_per_s", "free"):
-        np.testing.assert_array_equal(getattr(found, name), getattr(expected, name))
+    for name in ("positions_mm", "diameters_mm"):
+        np.testing.assert_allclose(getattr(found, name), getattr(expected, name), atol=1e-6, err_msg=name)
+    np.testing.assert_allclose(found.velocities_mm_per_s, expected.velocities_mm_per_s, rtol=1e-6, atol=1e-2)
+    np.testing.assert_array_equal(found.free, expected.free)
     assert 0.5 < np.mean(found.free) < 1

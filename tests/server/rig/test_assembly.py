@@ -46,7 +46,11 @@ def plan(assembled: AssembledRig, kind: RunKind = RunKind.BACKGROUND) -> RunPlan
 
 
 def shoot(
-    assembled: AssembledRig, *faults: Fault, shots: int = 1, kind: RunKind = RunKind.BACKGROUND
+    assembled: AssembledRig,
+    *faults: Fault,
+    shots: int = 1,
+    kind: RunKind = RunKind.BACKGROUND,
+    run_dir: Path | None = None,
 ) -> list[Mapping[str, DoubleFrame]]:
     """Arm everything, fire, collect, disarm; faults happen before the first shot."""
     rig, laboratory = assembled.rig, assembled.laboratory
@@ -55,8 +59,9 @@ def shoot(
     rig.generator.configure(
         plan_shot_timing(plan(assembled), {name: camera.timing for name, camera in rig.cameras.items()})
     )
-    (operator,) = assembled.observers
-    operator.before_run(plan(assembled, kind))
+    if run_dir is not None:
+        (operator,) = assembled.observers
+        operator.before_run(plan(assembled, kind), run_dir)
     for camera in rig.cameras.values():
         camera.arm()
     for fault in faults:
@@ -144,7 +149,7 @@ def test_the_door_reaches_computer_and_generator(assembled: AssembledRig) -> Non
 
 def test_the_truth_of_fired_sprays_is_kept(assembled: AssembledRig, tmp_path: Path) -> None:
     before = assembled.rig.generator.status().counters["fired"]
-    shoot(assembled, shots=2, kind=RunKind.SAMPLE)
+    shoot(assembled, shots=2, kind=RunKind.SAMPLE, run_dir=tmp_path)
     (operator,) = assembled.observers
     operator.after_run(tmp_path)
     path = tmp_path / "truth" / "truth.h5"

@@ -1,16 +1,19 @@
 """The views of a simulated rig are imperfect in a known way, and the truth of them is kept."""
 
+import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from daq.run_plan import RunKind
+from daq.errors import DeviceError
+from daq.run_plan import PulsePair, RunKind, RunPlan
 from daq.shot import FiredTrain, LightPulse
 from daq.simulation.camera.light import CollectedPulse, Exposure
 from daq.timing import Window
 from processing.synthetic.truth_file import TruthFileError, read_true_cameras, read_true_spray
 from server.rig.config import RigConfig, load_config
+from server.rig.simulated_operator import TRUTH_FILE, SimulatedOperator
 from server.rig.simulated_scene import SimulatedScene, true_cameras
 
 
@@ -74,24 +77,62 @@ def test_without_light_it_is_dark_and_twice_the_light_is_twice_as_bright(small: 
     assert two - none == pytest.approx(2 * (one - none), rel=0.1) or two == 255
 
 
+def plan(small: RigConfig, kind: RunKind) -> RunPlan:
+    current_a = {name: view.nominal_current_a for name, view in small.views.items()}
+    return RunPlan(name="test", kind=kind, shots=1, pulse=PulsePair(current_a=current_a))
+
+
 def test_the_truth_is_the_liquid_at_the_middle_of_the_first_pulse(small: RigConfig, tmp_path: Path) -> None:
-    scene = SimulatedScene(small, lambda: 0.0)
-    scene.prepare(RunKind.SAMPLE)
+    operator = SimulatedOperator(SimulatedScene(small, lambda: 0.0))
+    operator.before_run(plan(small, RunKind.SAMPLE), tmp_path)
     light = {"view1": (LightPulse(5552, 1000, 25.0), LightPulse(11952, 1000, 25.0)), "view2": ()}
-    scene.write_truth(tmp_path / "truth.h5", [FiredTrain(7, {}, light), FiredTrain(8, {}, {})])
-    fired, unlit = (read_true_spray(tmp_path / "truth.h5", sequence) for sequence in (7, 8))
+    for train in (FiredTrain(7, {}, light), FiredTrain(8, {}, {})):
+        operator.on_fired(train)
+    operator.after_run(tmp_path)
+    fired, unlit = (read_true_spray(tmp_path / TRUTH_FILE, sequence) for sequence in (7, 8))
     assert (fired.time_ns, unlit.time_ns) == (6052, 0)
     assert len(fired.spray) > 1000
-    assert set(read_true_cameras(tmp_path / "truth.h5")) == set(small.views)
+    assert set(read_true_cameras(tmp_path / TRUTH_FILE)) == set(small.views)
+
+
+def test_the_truth_is_there_while_the_run_goes_on(small: RigConfig, tmp_path: Path) -> None:
+    operator = SimulatedOperator(SimulatedScene(small, lambda: 0.0))
+    operator.before_run(plan(small, RunKind.SAMPLE), tmp_path)
+    operator.on_fired(FiredTrain(7))
+    end_s = time.monotonic() + 20
+    while not list(tmp_path.glob("truth/sprays/7.h5")):
+        assert time.monotonic() < end_s
+        time.sleep(0.01)
+    assert len(read_true_spray(tmp_path / TRUTH_FILE, 7).spray) > 1000
 
 
 def test_runs_without_spray_keep_their_cameras_only(small: RigConfig, tmp_path: Path) -> None:
-    scene = SimulatedScene(small, lambda: 0.0)
-    scene.prepare(RunKind.CALIBRATION)
-    scene.write_truth(tmp_path / "truth.h5", [FiredTrain(7)])
-    assert len(read_true_cameras(tmp_path / "truth.h5")) == 4
+    operator = SimulatedOperator(SimulatedScene(small, lambda: 0.0))
+    operator.before_run(plan(small, RunKind.CALIBRATION), tmp_path)
+    operator.on_fired(FiredTrain(7))
+    operator.after_run(tmp_path)
+    assert len(read_true_cameras(tmp_path / TRUTH_FILE)) == 4
     with pytest.raises(TruthFileError, match="no spray of firing 7"):
-        read_true_spray(tmp_path / "truth.h5", 7)
+        read_true_spray(tmp_path / TRUTH_FILE, 7)
+
+
+def test_a_truth_that_cannot_be_written_is_named(small: RigConfig, tmp_path: Path) -> None:
+    operator = SimulatedOperator(SimulatedScene(small, lambda: 0.0))
+    operator.before_run(plan(small, RunKind.SAMPLE), tmp_path)
+    (tmp_path / "truth" / "sprays").write_text("no folder")
+    operator.on_fired(FiredTrain(7))
+    with pytest.raises(DeviceError, match=r"truth\.h5: the truth is not complete: .*sprays"):
+        operator.after_run(tmp_path)
+
+
+def test_a_run_that_nobody_has_ended_is_over_when_the_next_one_begins(small: RigConfig, tmp_path: Path) -> None:
+    operator = SimulatedOperator(SimulatedScene(small, lambda: 0.0))
+    for name in ("lost", "next"):
+        operator.before_run(plan(small, RunKind.SAMPLE), tmp_path / name)
+    operator.on_fired(FiredTrain(9))
+    operator.after_run(tmp_path / "lost")
+    operator.after_run(tmp_path / "next")
+    assert len(read_true_spray(tmp_path / "next" / TRUTH_FILE, 9).spray) > 1000
 
 
 def test_a_real_rig_has_no_scene() -> None:
