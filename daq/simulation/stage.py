@@ -7,6 +7,7 @@ import threading
 import time
 import tty
 from collections.abc import Callable
+from pathlib import Path
 from types import TracebackType
 from typing import Self
 
@@ -36,6 +37,8 @@ class SimulatedStage:
         Length of one count.
     seed : int
         Of the scatter.
+    port : Path | None
+        Where its serial port shall be; else in a folder of its own.
     """
 
     def __init__(
@@ -46,6 +49,7 @@ class SimulatedStage:
         scatter_um: float = 2.0,
         microstep_um: float = 0.047625,
         seed: int = 0,
+        port: Path | None = None,
     ) -> None:
         self._travel_mm, self._speed_mm_s = travel_mm, speed_mm_s
         self._scatter_um, self._microstep_um = scatter_um, microstep_um
@@ -54,7 +58,7 @@ class SimulatedStage:
         self._from_mm, self._to_mm, self._started_s = 0.3 * travel_mm, 0.3 * travel_mm, 0.0
         self._warning, self._stalled, self._garbled = "WR", False, 0
         self._thread: threading.Thread | None = None
-        self._link = PortLink("stage")
+        self._link = PortLink("stage", port)
         self._actions: dict[str, Callable[[str], str]] = {
             "": lambda _: "0",
             "get": self._get,

@@ -23,6 +23,7 @@ from server.cli import (
     optics,
     reconstruct,
     serve,
+    simulate,
     study,
 )
 from server.cli.calibrations import calibrate, check, self_calibrate, size_calibration
@@ -32,6 +33,7 @@ from server.cli.output import endable, say, tell
 COMMANDS = (
     demo,
     serve,
+    simulate,
     doctor,
     import_images,
     calibrate,

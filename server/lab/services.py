@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Protocol
 
 from daq.devices import Rig
-from daq.faults import Fault
 from daq.run.events import RunStatus
 from daq.run_plan import LivePlan, RunPlan
 from daq.shot import Shot
@@ -23,6 +22,7 @@ from server.lab.runs.run_store import RunStore
 from server.lab.runs.unkept_runs import UnkeptRuns
 from server.lab.watch import CalibrationStanding, CalibrationWatch
 from server.rig.config import RigConfig
+from server.rig.laboratory import Laboratory
 
 
 class RunControl(Protocol):
@@ -38,19 +38,6 @@ class RunControl(Protocol):
     def status(self) -> RunStatus: ...  # noqa: D102
     @property
     def newest_shot(self) -> Shot | None: ...  # noqa: D102
-
-
-class Laboratory(Protocol):
-    """What the server asks of the laboratory of a simulated rig."""
-
-    def inject(self, fault: Fault) -> None:
-        """Let something go wrong; ValueError if the laboratory has no such view."""
-
-    def open_door(self) -> None:
-        """Open the interlock."""
-
-    def close_door(self) -> None:
-        """Allow light."""
 
 
 @dataclass(frozen=True)

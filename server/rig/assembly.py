@@ -1,4 +1,4 @@
-"""Assembly: the only module that names concrete devices. Drivers are the same on a real and on a simulated rig."""
+"""Assembly: the only module that names concrete drivers. They are the same on a real and on a simulated rig."""
 
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -15,30 +15,24 @@ from daq.drivers.serial_pulse_generator import SerialPulseGenerator
 from daq.drivers.serial_stage import SerialStage, StageScale
 from daq.errors import DeviceUnavailable
 from daq.run.active_run import RunObserver
-from daq.shot import FiredTrain
-from daq.simulation.camera.gige_camera import SimulatedCamera
 from daq.simulation.gpio_chip import CHIP_PATH, ChipUnsupported, SimulatedSwitchLine, free_line
 from daq.simulation.interlock import DoorSwitch, MemoryInterlock
-from daq.simulation.laboratory import SimulatedLaboratory
-from daq.simulation.mishaps import SimulatedDevices
-from daq.simulation.pico.firmware_process import FirmwareProcess
-from daq.simulation.stage import SimulatedStage
 from server.rig.config import (
     PulseGeneratorConfig,
     RigConfig,
     SimulationConfig,
     StageConfig,
-    ViewConfig,
 )
-from server.rig.rig_lock import hold_generator, hold_rig
-from server.rig.simulated_operator import SimulatedOperator
-from server.rig.simulated_scene import SimulatedScene
+from server.rig.far_end_guest import FarEndGuest
+from server.rig.far_end_line import somebody_listens
+from server.rig.far_ends import run_far_ends, simulated_generator
+from server.rig.laboratory import Laboratory
+from server.rig.rig_lock import far_end_address, hold_far_ends, hold_generator, hold_rig
 
 Profiles = Mapping[str, CameraProfile]
 Clock = Callable[[], float]
 
 _GENERATOR = "pulse_generator"
-_STAGE_SPEED_MM_S = 100.0
 
 
 @dataclass(frozen=True)
@@ -49,15 +43,27 @@ class AssembledRig:
     ----------
     rig : Rig
         Its devices.
-    laboratory : SimulatedLaboratory | None
+    laboratory : Laboratory | None
         Doors to open and faults to inject, where the rig is simulated.
     observers : tuple[RunObserver, ...]
         Who takes part in its runs: nobody, or the operator of a simulated rig.
     """
 
     rig: Rig
-    laboratory: SimulatedLaboratory | None = None
+    laboratory: Laboratory | None = None
     observers: tuple[RunObserver, ...] = ()
+
+
+@dataclass(frozen=True)
+class _Wires:
+    """What the drivers of a simulated rig are wired to."""
+
+    laboratory: Laboratory
+    operator: RunObserver
+    interlock: Interlock
+    generator_port: str
+    stage_port: str
+    clock_s: Clock
 
 
 @contextmanager
@@ -81,7 +87,9 @@ def open_rig(config: RigConfig) -> Iterator[AssembledRig]:
 
 @contextmanager
 def wire_rig(config: RigConfig) -> Iterator[AssembledRig]:
-    """All devices of a rig, not yet opened; of a simulated one, the far ends run until the block ends.
+    """All devices of a rig, not yet opened. The far ends of a simulated one run until the block ends, or go on to run.
+
+    They go on where they run in a process of their own, see ``server.rig.far_end_host``.
 
     Raises
     ------
@@ -126,15 +134,16 @@ def _generator_wired(config: RigConfig) -> Iterator[tuple[RigConfig, Clock]]:
     if config.simulation is None:
         with hold_generator(config):
             yield config, time.monotonic
-        return
-    with _simulated_generator(config, lambda _: None) as firmware:
-        port = PulseGeneratorConfig(port=firmware.port)
-        yield config.model_copy(update={"pulse_generator": port}), firmware.clock_s
+    elif somebody_listens(far_end_address(config)):
+        with hold_rig(config), FarEndGuest(config, MemoryInterlock("nobody's")) as guest:
+            yield _with_port(config, guest.generator_port), _clock_of(config, guest.clock_s)
+    else:
+        with simulated_generator(config, lambda _: None) as firmware:
+            yield _with_port(config, firmware.port), firmware.clock_s
 
 
-def _simulated_generator(config: RigConfig, on_fired: Callable[[FiredTrain], None]) -> FirmwareProcess:
-    emulated = config.simulation is not None and config.simulation.firmware == "emulated"
-    return FirmwareProcess(channels_of(config), on_fired, emulated=emulated)
+def _with_port(config: RigConfig, port: str) -> RigConfig:
+    return config.model_copy(update={"pulse_generator": PulseGeneratorConfig(port=port)})
 
 
 def _rig(config: RigConfig, profiles: Profiles, interlock: Interlock, clock_s: Clock = time.monotonic) -> Rig:
@@ -156,7 +165,7 @@ def _rig(config: RigConfig, profiles: Profiles, interlock: Interlock, clock_s: C
 def _pulse_generator(config: RigConfig, clock_s: Clock) -> SerialPulseGenerator:
     max_light_a = {name: view.max_light_a for name, view in config.views.items()}
     return SerialPulseGenerator(
-        _GENERATOR, _port_of(config), channels_of(config), _current_limits_a(config), max_light_a, clock_s
+        _GENERATOR, _port_of(config), config.channels, _current_limits_a(config), max_light_a, clock_s
     )
 
 
@@ -181,39 +190,33 @@ def _stage(stage: StageConfig) -> SerialStage:
     return SerialStage("stage", stage.port, stage.range_mm, scale=StageScale(stage.microstep_um, stage.zero_mm))
 
 
-def channels_of(config: RigConfig) -> dict[str, int]:
-    """Channel of the pulse generator by view."""
-    return {name: view.led_channel for name, view in config.views.items()}
-
-
-def _simulation(
-    config: RigConfig, simulation: SimulationConfig, profiles: Profiles, far_ends: ExitStack
-) -> AssembledRig:
-    """Simulated devices at the far ends of all wires, then the drivers of a real rig at the near ones."""
-    laboratory = far_ends.enter_context(SimulatedLaboratory(simulation.faults))
+def _wires(config: RigConfig, simulation: SimulationConfig, stack: ExitStack) -> _Wires:
+    """Join the far ends that run in another process, or run them in this one."""
     interlock, switch = _interlock_and_switch(simulation)
-    stage = far_ends.enter_context(_simulated_stage(config, simulation))
-    zero_mm = 0.0 if config.stage is None else config.stage.zero_mm
-    scene = SimulatedScene(config, lambda: stage.position_mm - zero_mm)
-    cameras = {
-        name: far_ends.enter_context(_simulated_camera(name, view, profiles[name], scene))
-        for name, view in config.views.items()
-    }
-    generator = far_ends.enter_context(_simulated_generator(config, laboratory.on_fired))
-    laboratory.connect(SimulatedDevices(cameras, generator, switch, stage))
-    far_ends.callback(laboratory.disconnect)
-    wired = config.model_copy(
-        update={
-            "pulse_generator": PulseGeneratorConfig(port=generator.port),
-            "stage": config.stage and config.stage.model_copy(update={"port": stage.port}),
-        }
-    )
-    operator = SimulatedOperator(scene)
-    laboratory.witnesses.append(operator.on_fired)
-    return AssembledRig(_rig(wired, profiles, interlock, generator.clock_s), laboratory, (operator,))
+    if somebody_listens(far_end_address(config)):
+        guest = stack.enter_context(FarEndGuest(config, switch))
+        return _Wires(guest, guest, interlock, guest.generator_port, guest.stage_port, _clock_of(config, guest.clock_s))
+    stack.enter_context(hold_far_ends(config))
+    ends = stack.enter_context(run_far_ends(config, switch))
+    generator, stage = ends.devices.generator, ends.devices.stage
+    return _Wires(ends.laboratory, ends.operator, interlock, generator.port, stage.port, generator.clock_s)
+
+
+def _simulation(config: RigConfig, simulation: SimulationConfig, profiles: Profiles, stack: ExitStack) -> AssembledRig:
+    """Far ends of all wires, then the drivers of a real rig at the near ones."""
+    wires = _wires(config, simulation, stack)
+    stage = config.stage and config.stage.model_copy(update={"port": wires.stage_port})
+    wired = _with_port(config, wires.generator_port).model_copy(update={"stage": stage})
+    return AssembledRig(_rig(wired, profiles, wires.interlock, wires.clock_s), wires.laboratory, (wires.operator,))
+
+
+def _clock_of(config: RigConfig, clock_s: Clock) -> Clock:
+    """An emulated generator is slower than the clock on the wall; any other one needs not be asked."""
+    return clock_s if config.simulation is not None and config.simulation.firmware == "emulated" else time.monotonic
 
 
 def _interlock_and_switch(simulation: SimulationConfig) -> tuple[Interlock, DoorSwitch]:
+    """The simulated chip exists in one process only: that of the interlock, which moves its line as the door does."""
     if simulation.gpio != "memory":
         try:
             line = free_line()
@@ -223,26 +226,3 @@ def _interlock_and_switch(simulation: SimulationConfig) -> tuple[Interlock, Door
                 raise DeviceUnavailable("interlock", f"simulation.gpio is 'chip', but {reason}") from reason
     memory = MemoryInterlock("interlock")
     return memory, memory
-
-
-def _simulated_stage(config: RigConfig, simulation: SimulationConfig) -> SimulatedStage:
-    stage = config.stage
-    if stage is None:
-        return SimulatedStage(seed=simulation.seed)
-    return SimulatedStage(
-        travel_mm=2 * max(stage.zero_mm + stage.range_mm[1], 1.0),
-        speed_mm_s=_STAGE_SPEED_MM_S,
-        microstep_um=stage.microstep_um,
-        seed=simulation.seed,
-    )
-
-
-def _simulated_camera(name: str, view: ViewConfig, profile: CameraProfile, scene: SimulatedScene) -> SimulatedCamera:
-    return SimulatedCamera(
-        name,
-        view.camera.ip,
-        f"sim-{name}"[:15],
-        profile.camera_timing,
-        scene.expose,
-        (view.sensor.height_px, view.sensor.width_px),
-    )

@@ -233,6 +233,11 @@ class RigConfig(FrozenModel):
     server: ServerConfig = ServerConfig()
     simulation: SimulationConfig | None = None
 
+    @property
+    def channels(self) -> dict[str, int]:
+        """Channel of the pulse generator by view."""
+        return {name: view.led_channel for name, view in self.views.items()}
+
     @model_validator(mode="after")
     def _wires_are_not_shared(self) -> Self:
         wires: dict[str, list[int | str]] = {

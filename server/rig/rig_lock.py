@@ -34,6 +34,31 @@ def hold_generator(config: RigConfig) -> Iterator[None]:
 
 
 @contextmanager
+def hold_far_ends(config: RigConfig) -> Iterator[None]:
+    """Hold the far ends of a simulated rig, whoever works with its drivers; AlreadyHeld names their process."""
+    with _hold(config.name, (f"far end of {address}" for address in _cameras(config))):
+        yield
+
+
+def far_end_address(config: RigConfig) -> str:
+    """Where the far ends of a simulated rig answer: a local socket of the network that its cameras are in.
+
+    Its name is abstract: it vanishes with its process, however that ends.
+    """
+    return "\0" + _far_end_name(config, "laboratory")
+
+
+def far_end_port(config: RigConfig, device: str) -> Path:
+    """Where a serial port of the far ends is, in whatever process they run."""
+    return _folder() / _far_end_name(config, device)
+
+
+def _far_end_name(config: RigConfig, what: str) -> str:
+    first = min(view.camera.ip for view in config.views.values())
+    return f"tomoshadow-{what}-of-{first}-of-network-{_NETWORK.stat().st_ino}"
+
+
+@contextmanager
 def hold_data_dir(data_dir: Path) -> Iterator[None]:
     """Hold a folder of runs, made if need be; AlreadyHeld names its holder."""
     data_dir.mkdir(parents=True, exist_ok=True)

@@ -10,6 +10,7 @@ from daq.run.acquisition import Acquisition
 from daq.run.state import RunOutcome
 from daq.run_plan import PulsePair, RunKind, RunPlan
 from daq.shot import FiredTrain
+from daq.simulation.laboratory import SimulatedLaboratory
 from server.rig.assembly import open_rig
 from server.rig.config import RigConfig, load_config
 
@@ -31,7 +32,7 @@ def test_a_run_with_the_image_of_the_pico(tmp_path: Path) -> None:
     )
     fired: list[FiredTrain] = []
     with open_rig(config) as assembled:
-        assert assembled.laboratory is not None
+        assert isinstance(assembled.laboratory, SimulatedLaboratory)
         assembled.laboratory.witnesses.append(fired.append)
         with Acquisition(assembled.rig, tmp_path, observers=assembled.observers) as acquisition:
             run_id = acquisition.start(plan)

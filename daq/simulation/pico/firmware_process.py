@@ -14,14 +14,16 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
+from pathlib import Path
 from types import TracebackType
 from typing import IO, Self
 
 from daq.errors import DeviceTimeout, DeviceUnavailable
 from daq.shot import FiredTrain, LightPulse
 from daq.simulation.pico.firmware_build import build_firmware, build_image
+from daq.simulation.pico.piped_process import lines_of, start_piped
 from daq.simulation.port_link import PortLink
 
 _DEVICE = "simulated pulse generator"
@@ -42,10 +44,17 @@ class FirmwareProcess:
         Called from the reading thread for every shot. If it raises, the generator dies with it.
     emulated : bool
         Run the image of the Raspberry Pi Pico in an emulator, instead of the core built for this computer.
+    port : Path | None
+        Where its serial port shall be; else in a folder of its own.
     """
 
     def __init__(
-        self, channels: Mapping[str, int], on_fired: Callable[[FiredTrain], None], *, emulated: bool = False
+        self,
+        channels: Mapping[str, int],
+        on_fired: Callable[[FiredTrain], None],
+        *,
+        emulated: bool = False,
+        port: Path | None = None,
     ) -> None:
         self._emulated = emulated
         self._clock: IO[bytes] | None = None
@@ -55,7 +64,7 @@ class FirmwareProcess:
         self._answers: queue.Queue[str] = queue.Queue()
         self._instructing = threading.Lock()
         self._reader: threading.Thread | None = None
-        self._link = PortLink("pulse_generator")
+        self._link = PortLink("pulse_generator", port)
         self._plugging = threading.RLock()
         self._hangs = False
         self._inputs: dict[str, bool] = {}
@@ -70,6 +79,11 @@ class FirmwareProcess:
     def pid(self) -> int:
         """Process id, for tests that stop it."""
         return self._running().pid
+
+    @property
+    def has_died(self) -> bool:
+        """It is plugged in, and has ended all the same."""
+        return self._process is not None and self._process.poll() is not None
 
     def __enter__(self) -> Self:
         self.plug_in()
@@ -89,7 +103,7 @@ class FirmwareProcess:
             if self._process is not None:
                 return
             self._answers = queue.Queue()
-            self._process = process = self._start_emulator() if self._emulated else _start(_host_command())
+            self._process = process = self._start_emulator() if self._emulated else start_piped([str(build_firmware())])
             self._reader = threading.Thread(target=self._read_events, args=(process,), name=_DEVICE, daemon=True)
             self._reader.start()
             try:
@@ -130,7 +144,7 @@ class FirmwareProcess:
         self._clock = tempfile.TemporaryFile()  # noqa: SIM115 - open as long as the process
         clock = self._clock.fileno()
         program = [sys.executable, "-m", "daq.simulation.pico.emulated_firmware", str(build_image()), str(clock)]
-        return _start(program, clock)
+        return start_piped(program, clock)
 
     def clock_s(self) -> float:
         """The generator's own time, which does not go on while an emulated one is not given a processor.
@@ -246,7 +260,7 @@ class FirmwareProcess:
 
     def _read_events(self, process: subprocess.Popen[str]) -> None:
         try:
-            for line in _lines(process):
+            for line in lines_of(process):
                 if line.startswith("fired "):
                     self._on_fired(self._fired_train(line))
                 elif line == "dark" or line.startswith("lit "):
@@ -280,17 +294,3 @@ def _light(edges: list[int]) -> tuple[LightPulse, ...]:
         return ()
     pulses = ((a_start_ns, a_width_ns), (b_start_ns, b_width_ns))
     return tuple(LightPulse(start_ns, width_ns, current_ma / 1000) for start_ns, width_ns in pulses if width_ns)
-
-
-def _host_command() -> list[str]:
-    return [str(build_firmware())]
-
-
-def _start(command: list[str], *files: int) -> subprocess.Popen[str]:
-    return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, pass_fds=files)
-
-
-def _lines(process: subprocess.Popen[str]) -> Iterator[str]:
-    if process.stdout is not None:
-        for line in process.stdout:
-            yield line.rstrip("\n")

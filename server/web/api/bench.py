@@ -8,7 +8,7 @@ from pydantic import Field
 from daq.faults import Fault
 from daq.frozen_model import FrozenModel
 from server.lab.errors import NotFound, Unprocessable
-from server.lab.services import Laboratory
+from server.rig.laboratory import Laboratory
 from server.web.api.parameters import ContextOf
 from server.web.problems import responses
 

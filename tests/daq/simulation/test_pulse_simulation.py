@@ -15,9 +15,9 @@ from daq.drivers.serial_pulse_generator import SerialPulseGenerator
 from daq.errors import DeviceTimeout, DeviceUnavailable
 from daq.run_plan import PulsePair, RunPlan
 from daq.shot import FiredTrain
-from daq.simulation.pico import firmware_process
 from daq.simulation.pico.firmware_build import build_firmware
 from daq.simulation.pico.firmware_process import FirmwareProcess
+from daq.simulation.pico.piped_process import start_piped
 from daq.timing import CameraTiming, plan_shot_timing
 
 CAMERA = CameraTiming(1_000, 20_000, 500, 30_000_000, 1_000_000)
@@ -134,14 +134,13 @@ def test_a_failed_build_shows_the_compiler_s_words(monkeypatch: pytest.MonkeyPat
 
 def test_one_that_never_answers_is_ended_and_leaves_nothing_open(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("daq.simulation.pico.firmware_process._ANSWER_LIMIT_S", 0.2)
-    monkeypatch.setattr("daq.simulation.pico.firmware_process._host_command", lambda: ["sleep", "60"])
-    started, start = list[subprocess.Popen[str]](), firmware_process._start
+    started = list[subprocess.Popen[str]]()
 
-    def remember(command: list[str], *files: int) -> subprocess.Popen[str]:
-        started.append(start(command, *files))
+    def sleep(_: list[str]) -> subprocess.Popen[str]:
+        started.append(start_piped(["sleep", "60"]))
         return started[-1]
 
-    monkeypatch.setattr(firmware_process, "_start", remember)
+    monkeypatch.setattr("daq.simulation.pico.firmware_process.start_piped", sleep)
     silent = FirmwareProcess({}, lambda train: None)
     with pytest.raises(DeviceTimeout, match=r"simulated pulse generator: no answer to 'start' within 0\.2 s"), silent:
         pass

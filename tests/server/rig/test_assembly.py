@@ -12,6 +12,7 @@ from daq.faults import Fault, FaultKind, ScriptedFault
 from daq.run_plan import PulsePair, RunKind, RunPlan
 from daq.shot import DoubleFrame
 from daq.simulation.gpio_chip import ChipUnsupported, SimulatedSwitchLine
+from daq.simulation.laboratory import SimulatedLaboratory
 from daq.timing import plan_shot_timing
 from processing.synthetic.truth_file import read_true_spray
 from server.rig.assembly import AssembledRig, open_rig
@@ -175,7 +176,7 @@ def test_scripted_faults_happen_at_their_firing_and_the_light_ends_with_the_rig(
         assert [name for name, frames in second.items() if not frames.valid] == ["view4"]
         opened.rig.interlock.wait_for_change(2.0)
         assert not opened.rig.interlock.is_closed()
-        assert opened.laboratory is not None
+        assert isinstance(opened.laboratory, SimulatedLaboratory)
         generator = opened.laboratory.devices.generator.pid
     assert not Path(f"/proc/{generator}").exists()
 
