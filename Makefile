@@ -1,7 +1,7 @@
 # Each target does its own set-up on a bare Debian 12 or 13 machine, is quick when that is done, and says what it does.
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-fast test-wheel test-debian13 wheel lint style serve firmware bench measured lock clean mutants flips fuzz fuzz-import
+.PHONY: help setup demo test test-fast test-wheel test-debian13 wheel lint style serve firmware bench measured lock clean mutants flips fuzz fuzz-import soak
 
 # Containers forbid Python to keep what it compiled; then every process of the tests compiles all that it imports.
 unexport PYTHONDONTWRITEBYTECODE
@@ -101,6 +101,10 @@ mutants: setup build/rp2040js/node_modules ## Shoot a long series and many plans
 
 fuzz-import: setup ## Damage manifests, tables and images in FUZZ_IMPORTS=2000 ways: each is imported or refused in a sentence.
 	@$(PYTHON) -m tests.support.fuzz_import $(FUZZ_IMPORTS) 2>/dev/null
+
+KILLS := 100
+soak: setup ## Kill the server KILLS=100 times while it records on a simulated rig, and count what is lost; goes on where it was interrupted.
+	@$(PRIVATE_NETWORK) $(PYTHON) -m tests.support.soak_$(or $(PART),kill) $(KILLS)
 
 flips: setup ## Flip 200 bits in flash, RAM and the state machines of an armed board, one at a time; six minutes of CPU time.
 	@TOMOSHADOW_FLIPS=200 $(PYTHON) -m pytest -q tests/firmware/test_rp2040_bit_flips.py

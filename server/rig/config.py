@@ -214,6 +214,9 @@ class SimulationConfig(FrozenModel):
     gpio: Annotated[
         Literal["auto", "chip", "memory"], Field(description="simulated GPIO chip, interlock in memory, or what works")
     ] = "auto"
+    numbered: Annotated[
+        bool, Field(description="the first pixels of every image tell firing, view and exposure: proof of a recording")
+    ] = False
     faults: Annotated[tuple[ScriptedFault, ...], Field(description="what goes wrong, and at which shot")] = ()
 
 

@@ -11,6 +11,7 @@ from daq.simulation.camera.light import Exposure
 from processing.geometry import PinholeCamera, view_camera
 from processing.optics import image_scale_px_per_mm
 from processing.synthetic.liquid.nozzles import flat_fan_spray, hollow_cone_spray
+from processing.synthetic.numbered import ImageNumber, numbered
 from processing.synthetic.scene import Scene
 from processing.synthetic.target import Checkerboard, DotTarget
 from processing.synthetic.truth_file import FiredSpray
@@ -50,6 +51,7 @@ class SimulatedScene:
             target=_target(config.target),
             stage_z_mm=stage_z_mm,
         )
+        self._numbered, self._views = simulation.numbered, list(config.views)
         self._rendering = threading.BoundedSemaphore(RENDERING_THREADS)
 
     def prepare(self, kind: RunKind) -> None:
@@ -60,9 +62,13 @@ class SimulatedScene:
         """Image of one exposure: the frame source of every camera."""
         pulses = [(pulse.start_ns, pulse.collected_ns, pulse.current_a) for pulse in exposure.pulses]
         with self._rendering:
-            return self._scene.render(
+            image = self._scene.render(
                 exposure.view, exposure.sequence, exposure.frame, pulses, exposure.shape, exposure.bits
             )
+        if not self._numbered:
+            return image
+        number = ImageNumber(exposure.sequence, self._views.index(exposure.view), exposure.frame)
+        return numbered(image, number, exposure.bits)
 
     @property
     def cameras(self) -> Mapping[str, PinholeCamera]:

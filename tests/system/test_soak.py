@@ -1,0 +1,59 @@
+"""The soak of ``make soak PART=kill`` at reduced length, and what it would find."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from daq.files.run_directory import DoubleFrame, ExposureRecord, FiredTrain, ImageKey, Shot
+from processing.synthetic.numbered import ImageNumber, numbered
+from tests.support.soak_kill import Killed, kill_servers, mispaired_exposures, summary
+
+VIEWS = ("view1", "view2")
+
+
+@pytest.mark.network
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+def test_no_acknowledged_shot_is_lost_when_the_server_is_killed(tmp_path: Path) -> None:
+    kills: list[Killed] = []
+    kill_servers(2, tmp_path, "here", kills.append)
+    for kill in kills:
+        assert 0 < kill.acknowledged <= kill.on_disk, kills
+        assert (kill.lost, kill.mispaired) == (0, 0), kills
+    assert [kill.outcome for kill in kills] == ["interrupted", ""]
+    assert kills[0].first_shot_s is None
+    assert kills[1].first_shot_s is not None
+
+
+def shot() -> Shot:
+    views = {}
+    for number, view in enumerate(VIEWS):
+        a, b = (numbered(np.zeros((24, 32), np.uint8), ImageNumber(7, number, frame), 8) for frame in ("A", "B"))
+        views[view] = DoubleFrame(a, b, ExposureRecord(True, 1), ExposureRecord(True, 2))
+    return Shot(0, ImageKey.BACKGROUND, views, FiredTrain(7))
+
+
+def test_exposures_of_another_view_firing_or_pulse_are_found() -> None:
+    right = shot()
+    assert mispaired_exposures(right, VIEWS) == 0
+    assert mispaired_exposures(replace(right, fired=FiredTrain(8)), VIEWS) == 4
+    assert mispaired_exposures(replace(right, fired=None), VIEWS) == 4
+    one, other = right.views.values()
+    assert mispaired_exposures(replace(right, views={"view1": other, "view2": one}), VIEWS) == 4
+    assert one.frame_b is not None
+    swapped = replace(one, frame_a=one.frame_b, frame_b=one.frame_a)
+    assert mispaired_exposures(replace(right, views={"view1": swapped, "view2": other}), VIEWS) == 2
+    damaged = replace(one, frame_a=255 - one.frame_a)
+    assert mispaired_exposures(replace(right, views={"view1": damaged, "view2": other}), VIEWS) == 1
+    flagged = replace(damaged, record_a=ExposureRecord(False))
+    assert mispaired_exposures(replace(right, views={"view1": flagged, "view2": other}), VIEWS) == 0
+
+
+def test_the_table_counts_all_kills() -> None:
+    kills = [Killed("abc", 10, 11, 1, 2, None, "interrupted", 1.0), Killed("abc", 5, 5, 0, 0, 3.25, "", 2.0)]
+    heads, row, origin = summary(kills).splitlines()
+    assert heads.split()[0] == "kills"
+    assert row.split() == ["2", "15", "1", "2", "0", "3.2", "3.2", "1", "to", "2"]
+    assert origin.startswith("commit abc; ")
