@@ -23,33 +23,36 @@ _LOST_AFTER = 2
 
 
 class FarEndGuest:
-    """Laboratory and observer of runs at the other end of a line; a context manager, which moves the door meanwhile.
+    """Laboratory and observer of runs at the other end of a line; a context manager, which follows the door meanwhile.
 
     Parameters
     ----------
     config : RigConfig
-        A rig whose far ends run, see ``found``.
+        A rig whose far ends run, as ``far_end_line.somebody_listens`` tells.
     switch : DoorSwitch
         The interlock of this process, which moves as the door does. A door that nobody can tell about is open.
-
-    Raises
-    ------
-    AlreadyHeld
-        They run, but were started with another rig file.
-    DeviceUnavailable
-        They do not answer.
     """
 
     def __init__(self, config: RigConfig, switch: DoorSwitch) -> None:
         self._config = config
         self._address = far_end_address(config)
         self._switch = switch
-        self._known = self._meet()
+        self._known: dict[str, Any] = {}
         self._leaving = threading.Event()
         self._first_word = threading.Event()
         self._thread = threading.Thread(target=self._follow_door, name="laboratory door", daemon=True)
 
     def __enter__(self) -> Self:
+        """Join them.
+
+        Raises
+        ------
+        AlreadyHeld
+            They run, but were started with another rig file.
+        DeviceUnavailable
+            They do not answer.
+        """
+        self._known = self._meet()
         self._thread.start()
         if not self._first_word.wait(ANSWER_LIMIT_S):
             raise DeviceTimeout("far ends", "follow_door", ANSWER_LIMIT_S)
@@ -126,7 +129,7 @@ class FarEndGuest:
                     _LOG.warning("the far ends of rig %r are back", self._config.name)
                 failures = 0
                 self._stay()
-            except (OSError, DaqError) as error:
+            except (OSError, DaqError, LookupError, ValueError) as error:
                 failures += 1
                 if failures == _LOST_AFTER:
                     self._switch.break_wire()

@@ -3,7 +3,7 @@
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
-from daq.errors import DeviceError
+from daq.errors import DeviceError, DeviceTimeout
 from daq.run_plan import RunKind, RunPlan
 from daq.shot import FiredTrain
 from processing.synthetic.truth_file import write_true_cameras, write_true_spray
@@ -69,10 +69,12 @@ class _TruthWriter:
 
     def finish(self) -> None:
         self._thread.shutdown(wait=False)
-        if self._newest is not None:
-            self._newest.exception(_DRAIN_S)
-        if self._problem is not None:
-            raise DeviceError("simulated rig", f"{self.path}: the truth is not complete: {self._problem}")
+        try:
+            newest = self._newest and self._newest.exception(_DRAIN_S)
+        except TimeoutError as error:
+            raise DeviceTimeout("simulated rig", f"write {self.path}", _DRAIN_S) from error
+        if problem := self._problem or newest:
+            raise DeviceError("simulated rig", f"{self.path}: the truth is not complete: {problem}")
 
     def _write(self, train: FiredTrain) -> None:
         write_true_spray(self.path, train.sequence, self._scene.liquid(train))
