@@ -23,6 +23,9 @@ from daq.errors import DeviceRefused, DeviceTimeout, DeviceUnavailable
 gi.require_version("Aravis", "0.8")
 from gi.repository import Aravis, GLib  # noqa: E402  the version must be required first
 
+# PyGObject fills an enumeration when it is first asked for; a thread that asks meanwhile finds it empty. So ask now.
+_WHOLE, _NO_ANSWER = Aravis.BufferStatus.SUCCESS, Aravis.DeviceError.TIMEOUT
+
 _REGISTER_LIMIT_S = 2.5  # Aravis asks five times, half a second each
 _CONTROL_LIMIT_S = 6.0  # control of a client that was killed expires 3 s after its last heartbeat
 _CONTROL_RETRY_S = 0.25
@@ -213,7 +216,7 @@ class AravisDevice:
         try:
             yield
         except GLib.Error as error:
-            if error.matches(Aravis.device_error_quark(), Aravis.DeviceError.TIMEOUT):
+            if error.matches(Aravis.device_error_quark(), _NO_ANSWER):
                 self._lost.set()
                 raise DeviceTimeout(self._name, command, _REGISTER_LIMIT_S) from error
             denied = "; another client has control, or the camera was without power" * (
@@ -268,7 +271,7 @@ class AravisStream:
 
     def _arrival(self, buffer: Any) -> Arrival:
         missing, resent = self._count("n_missing_packets"), self._count("n_resent_packets")
-        arrived = buffer.get_status() == Aravis.BufferStatus.SUCCESS
+        arrived = buffer.get_status() == _WHOLE
         whole = arrived and self._fits(buffer)
         arrival = Arrival(
             frame_id=int(buffer.get_frame_id()),

@@ -3,6 +3,8 @@
 It has no pairs, no hardware trigger and no clock that runs: what it can show is that the driver speaks GigE Vision.
 """
 
+import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from typing import Any
@@ -111,6 +113,14 @@ def next_frame(stream: Any) -> Arrival:
 def test_what_it_cannot_do_is_refused_in_words(device: Any, setting: FeatureWrite, reason: str) -> None:
     with pytest.raises(DeviceRefused, match=f"fake: {reason}"):
         device.write(setting)
+
+
+def test_threads_find_all_that_they_compare_with() -> None:
+    """What PyGObject loads at its first use may be half there for a second thread: it is loaded with the driver."""
+    pytest.importorskip("gi")
+    code = "import daq.drivers.aravis_device as driver; print(*vars(driver.Aravis))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
+    assert {"BufferStatus", "DeviceError"} <= set(done.stdout.split())
 
 
 def test_nobody_answers_at_another_address(fake_camera: None) -> None:
