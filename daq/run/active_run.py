@@ -19,8 +19,8 @@ class RunObserver(Protocol):
     An error of an observer fails the run.
     """
 
-    def before_run(self, plan: RunPlan, run_dir: Path) -> None:
-        """Before any device is asked for anything; the run has its directory."""
+    def before_run(self, plan: RunPlan, run_dir: Path | None) -> None:
+        """Before any device is asked for anything; the run has its directory, a live view has none."""
 
     def after_run(self, run_dir: Path) -> None:
         """After the last shot is on the disk, before the outcome is."""

@@ -86,9 +86,10 @@ class FarEndGuest:
         """Allow light."""
         self._ask("close_door")
 
-    def before_run(self, plan: RunPlan, run_dir: Path) -> None:
+    def before_run(self, plan: RunPlan, run_dir: Path | None) -> None:
         """Spray on or off, target in; the truth begins."""
-        self._ask("before_run", plan=plan.model_dump(mode="json"), run_dir=str(run_dir.resolve()))
+        folder = str(run_dir.resolve()) if run_dir else None
+        self._ask("before_run", plan=plan.model_dump(mode="json"), run_dir=folder)
 
     def after_run(self, run_dir: Path) -> None:
         """See that the truth of this run is complete."""

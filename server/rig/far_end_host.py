@@ -82,7 +82,8 @@ class FarEndHost:
         }
 
     def _before_run(self, asked: Asked) -> None:
-        self._ends.operator.before_run(RunPlan.model_validate(asked["plan"]), Path(asked["run_dir"]))
+        run_dir = Path(asked["run_dir"]) if asked["run_dir"] else None
+        self._ends.operator.before_run(RunPlan.model_validate(asked["plan"]), run_dir)
 
     def _reply(self, asked: Asked) -> dict[str, Any]:
         try:

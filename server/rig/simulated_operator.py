@@ -27,10 +27,11 @@ class SimulatedOperator:
         self._scene = scene
         self._truth: _TruthWriter | None = None
 
-    def before_run(self, plan: RunPlan, run_dir: Path) -> None:
+    def before_run(self, plan: RunPlan, run_dir: Path | None) -> None:
         """Spray on or off, target in; the truth begins. A run before that nobody has ended is over."""
         self._scene.prepare(plan.kind)
-        self._truth = _TruthWriter(run_dir / TRUTH_FILE, self._scene, has_spray=plan.kind is RunKind.SAMPLE)
+        has_spray = plan.kind is RunKind.SAMPLE
+        self._truth = _TruthWriter(run_dir / TRUTH_FILE, self._scene, has_spray=has_spray) if run_dir else None
 
     def on_fired(self, train: FiredTrain) -> None:
         """Keep the truth of one firing; returns at once."""

@@ -87,7 +87,7 @@ class MemoryRig:
         assert fault.kind is FaultKind.DROPPED_B
         self.cameras[fault.view].lost.add(self.generator.fired + 1)
 
-    def before_run(self, plan: RunPlan, run_dir: Path) -> None:
+    def before_run(self, plan: RunPlan, run_dir: Path | None) -> None:
         self.journal.append(f"before {plan.kind}")
 
     def after_run(self, run_dir: Path) -> None:

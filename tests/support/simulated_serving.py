@@ -148,7 +148,7 @@ def serving_bench(config: RigConfig, frame_s: float = 2.0) -> Iterator[BenchServ
         ) as port,
         httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=DEADLINE_S) as http,
     ):
-        assert assembled.laboratory is not None
+        assert isinstance(assembled.laboratory, SimulatedLaboratory)
         yield BenchServing(http, assembled.rig, assembled.laboratory, acquisition, data_dir)
 
 

@@ -41,7 +41,7 @@ class LiveSession:
     def _show(self) -> None:
         live = self._live
         for observer in live.observers:
-            observer.before_run(live.plan)
+            observer.before_run(live.plan, None)
         # What is wrong with a shot is shown with it, and is no line of a log twice a second.
         bits = {view: camera.bits for view, camera in self._rig.cameras.items()}
         taker = ShotTaker(replace(live, quiet=True), light_thresholds(bits, {}, {}))

@@ -681,7 +681,7 @@ class Clumsy:
     def __init__(self, when: str) -> None:
         self._when = when
 
-    def before_run(self, plan: RunPlan, run_dir: Path) -> None:
+    def before_run(self, plan: RunPlan, run_dir: Path | None) -> None:
         if self._when == "before":
             raise ZeroDivisionError("no nozzle")
 
