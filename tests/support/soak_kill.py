@@ -25,7 +25,7 @@ import httpx
 from daq.errors import ShotFileError
 from daq.files.run_directory import RunReader, Shot
 from processing.synthetic.numbered import ImageNumber, number_of
-from server.cli.output import table
+from server.cli.output import endable, table
 from server.rig.config import RigConfig, load_config
 from tests.support.server_process import ENVIRONMENT, ServerProcess, eventually, stopped_at_end
 
@@ -77,12 +77,14 @@ def kill_servers(kills: int, work_dir: Path, commit: str, tell: Callable[[Killed
         before: _Recording | None = None
         for _ in range(kills):
             recording = _Recording(work_dir, config)
-            if before is None:
-                recording.first_shot_s = None
-            else:
-                tell(before.judged(commit, recording.outcome_of(before.run_id)))
-            time.sleep(random.uniform(*WAIT_S))
-            recording.kill()
+            try:
+                if before is None:
+                    recording.first_shot_s = None
+                else:
+                    tell(before.judged(commit, recording.outcome_of(before.run_id)))
+                time.sleep(random.uniform(*WAIT_S))
+            finally:
+                recording.kill()
             before = recording
         if before is not None:
             tell(before.judged(commit, ""))
@@ -214,8 +216,9 @@ def main() -> int:
             file.write(json.dumps(asdict(kill)) + "\n")
         sys.stderr.write(f"{len(kills)} of {wanted}: {kill}\n")
 
-    kill_servers(max(0, wanted - len(kills)), work_dir, commit.stdout.strip(), keep)
-    sys.stdout.write(summary(kills) + "\n")
+    with suppress(KeyboardInterrupt), endable():
+        kill_servers(max(0, wanted - len(kills)), work_dir, commit.stdout.strip(), keep)
+    sys.stdout.write(summary(kills) + "\n" if kills else "nothing was killed\n")
     return int(any(kill.lost or kill.mispaired for kill in kills))
 
 
