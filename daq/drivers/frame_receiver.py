@@ -6,6 +6,7 @@ from threading import Condition, Event, Thread
 from typing import Protocol
 
 from daq.drivers.exposure_pairing import Arrival, frame_id_distance
+from daq.errors import DeviceError
 
 _FARTHEST = 32767
 """Ids wrap: what seems farther ahead than half of them lies behind."""
@@ -56,12 +57,14 @@ class FrameReceiver:
     """
 
     def __init__(self, name: str, stream: FrameStream) -> None:
+        self._name = name
         self._stream = stream
         self._changed = Condition()
         self._arrivals: list[Arrival] = []
         self._opened_ns = 0
         self._last_id: int | None = None
         self._counters = StreamCounters()
+        self._failure: Exception | None = None
         self._stopping = Event()
         self._thread = Thread(target=self._poll, name=f"{name} frames", daemon=True)
 
@@ -81,9 +84,18 @@ class FrameReceiver:
             self._opened_ns = opened_ns
 
     def take(self, frames: int, deadline_s: float) -> Sequence[Arrival]:
-        """Frames of the firing: as soon as so many are there, at the deadline otherwise. They are handed out once."""
+        """Frames of the firing: as soon as so many are there, at the deadline otherwise. They are handed out once.
+
+        Raises
+        ------
+        DeviceError
+            The thread that polls has died.
+        """
         with self._changed:
-            self._changed.wait_for(lambda: len(self._arrivals) >= frames, deadline_s)
+            self._changed.wait_for(lambda: len(self._arrivals) >= frames or self._failure, deadline_s)
+            if self._failure is not None:
+                reason = f"its frames are received no more: {self._failure!r}"
+                raise DeviceError(self._name, reason) from self._failure
             arrivals, self._arrivals = self._arrivals, []
             return arrivals
 
@@ -93,11 +105,18 @@ class FrameReceiver:
         return self._counters
 
     def _poll(self) -> None:
-        while not self._stopping.is_set():
-            arrival = self._stream.pop()
-            if arrival is not None:
-                self._take(arrival)
-        self._stream.close()
+        """Thread; what ends it is told by the next ``take``."""
+        try:
+            while not self._stopping.is_set():
+                arrival = self._stream.pop()
+                if arrival is not None:
+                    self._take(arrival)
+        except Exception as error:  # noqa: BLE001  the top of a thread
+            with self._changed:
+                self._failure = error
+                self._changed.notify_all()
+        finally:
+            self._stream.close()
 
     def _take(self, arrival: Arrival) -> None:
         with self._changed:

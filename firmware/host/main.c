@@ -15,6 +15,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <termios.h>
+#include <time.h>
 #include <unistd.h>
 
 #include "bench.h"
@@ -22,7 +23,7 @@
 #include "generator.h"
 #include "protocol.h"
 
-enum { POLL_MS = 10 };
+enum { RESTING_US = 10000 };
 
 static void fail(const char *what)
 {
@@ -89,8 +90,9 @@ static void run(struct protocol *protocol)
     struct pollfd waiting[2] = {{bench.serial, POLLIN, 0}, {STDIN_FILENO, POLLIN, 0}};
     bool open = true;
     while (open) {
-        poll(waiting, 2,
-             protocol->generator.state == STATE_ARMED ? (int)generator_idle_us(&protocol->generator) / 1000 : POLL_MS);
+        const bool armed = protocol->generator.state == STATE_ARMED;
+        const uint32_t idle_us = armed ? generator_idle_us(&protocol->generator) : RESTING_US;
+        ppoll(waiting, 2, &(struct timespec){.tv_nsec = (long)idle_us * 1000}, NULL);
         if (waiting[1].revents)
             open = read_control(protocol);
         if (open && waiting[0].revents)

@@ -6,6 +6,7 @@ import pytest
 
 from daq.drivers.exposure_pairing import Arrival
 from daq.drivers.frame_receiver import FrameReceiver, StreamCounters
+from daq.errors import DeviceError
 
 
 class Frames:
@@ -49,6 +50,28 @@ def receiver(frames: Frames) -> Iterator[FrameReceiver]:
 
 def ids(receiver: FrameReceiver, frames: int, deadline_s: float = 1.0) -> list[int]:
     return [arrival.frame_id for arrival in receiver.take(frames, deadline_s)]
+
+
+class Broken(Frames):
+    """A stream whose second frame cannot be taken out."""
+
+    def pop(self) -> Arrival | None:
+        arrival = super().pop()
+        if arrival is not None and arrival.frame_id == 2:
+            raise AttributeError("BufferStatus has no attribute SUCCESS")
+        return arrival
+
+
+def test_a_thread_that_dies_is_told_at_once_and_its_stream_is_closed() -> None:
+    frames = Broken()
+    receiver = FrameReceiver("view2", frames)
+    receiver.start()
+    for frame_id in (1, 2):
+        frames.queue.put(whole(frame_id, 100))
+    with pytest.raises(DeviceError, match=r"view2: its frames are received no more: AttributeError\('BufferStatus"):
+        receiver.take(2, 30.0)
+    receiver.stop()
+    assert frames.closed
 
 
 def test_hands_frames_out_once_and_in_order(frames: Frames, receiver: FrameReceiver) -> None:
