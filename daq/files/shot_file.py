@@ -226,12 +226,12 @@ def read_formats(path: Path) -> tuple[str, dict[str, ViewFormat], int]:
     """
     try:
         with h5py.File(path, "r") as file:
-            if file.attrs["schema"] != SHOT_SCHEMA:
+            if _text(file.attrs["schema"]) != SHOT_SCHEMA:
                 raise ForeignFile(f"{path}: not a shot")
             frames = {view: group["frames"] for view, group in file["cameras"].items()}
             views = {
                 view: ViewFormat(one.shape[2:], int(one.attrs["significant_bits"])) for view, one in frames.items()
             }
-            return file.attrs["run_id"], views, max(one.shape[1] for one in frames.values())
+            return _text(file.attrs["run_id"]), views, max(one.shape[1] for one in frames.values())
     except (OSError, KeyError, ValueError, IndexError, TypeError, AttributeError, RuntimeError) as error:
         raise unreadable(path, error) from error

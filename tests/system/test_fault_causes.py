@@ -36,6 +36,9 @@ AMOUNTS = {
     FaultKind.PULSE_B_LATE: 40_000.0,
     FaultKind.SERIAL_GARBAGE: 300.0,
 }
+DURATIONS_S = {FaultKind.GENERATOR_HANG: 1.5, FaultKind.GENERATOR_UNPLUGGED: 1.0}
+"""They end, so that the light is known to be off when the bench is taken down."""
+MOVING = (FaultKind.STAGE_STALL, FaultKind.STAGE_UNPLUGGED)
 LIMITS = AcquisitionLimits(frame_s=2.0)
 DEADLINE_S = 60.0
 
@@ -104,7 +107,7 @@ def small_config() -> RigConfig:
 
 def plan_of(config: RigConfig, cell: Cell) -> RunPlan:
     """Three shots; where the stage is at fault each at another position, so that it has to move."""
-    moves = cell.kind is FaultKind.STAGE_STALL
+    moves = cell.kind in MOVING
     return RunPlan(
         name=str(cell),
         kind=RunKind.CALIBRATION if moves else RunKind.BACKGROUND,
@@ -120,7 +123,7 @@ def plan_of(config: RigConfig, cell: Cell) -> RunPlan:
 def test_a_fault_ends_a_run_as_the_page_says(cell: Cell, tmp_path: Path) -> None:
     config = small_config()
     view = None if cell.kind in LABORATORY_FAULTS else "view2"
-    fault = Fault(kind=cell.kind, view=view, amount=AMOUNTS.get(cell.kind, 1.0))
+    fault = Fault(kind=cell.kind, view=view, amount=AMOUNTS.get(cell.kind, 1.0), duration_s=DURATIONS_S.get(cell.kind))
     with open_rig(config) as bench:
         assert bench.laboratory is not None
         generator = FaultyFire(bench.rig.generator, PLACES[cell.place], partial(bench.laboratory.inject, fault))
@@ -128,6 +131,7 @@ def test_a_fault_ends_a_run_as_the_page_says(cell: Cell, tmp_path: Path) -> None
         with Acquisition(rig, tmp_path, limits=LIMITS, observers=bench.observers) as acquisition:
             run_id = acquisition.start(plan_of(config, cell))
             assert not acquisition.wait(DEADLINE_S).active
+            bench.rig.generator.recover()
     reader, told = RunReader(tmp_path / run_id), promised(cell)
     codes = [cause.code for cause in reader.causes]
     if reader.outcome == "completed":
