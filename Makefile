@@ -102,9 +102,8 @@ mutants: setup build/rp2040js/node_modules ## Shoot a long series and many plans
 fuzz-import: setup ## Damage manifests, tables and images in FUZZ_IMPORTS=2000 ways: each is imported or refused in a sentence.
 	@$(PYTHON) -m tests.support.fuzz_import $(FUZZ_IMPORTS) 2>/dev/null
 
-KILLS := 100
-soak: setup ## Kill the server KILLS=100 times while it records on a simulated rig, and count what is lost; goes on where it was interrupted.
-	@$(PRIVATE_NETWORK) $(PYTHON) -m tests.support.soak_$(or $(PART),kill) $(KILLS)
+soak: setup ## PART=kill: kill the server TIMES=100 times while it records, and count what is lost; goes on where it was interrupted. PART=faults: lose each device TIMES=10 times, and time the next run.
+	@$(PRIVATE_NETWORK) $(PYTHON) -m tests.support.soak_$(or $(PART),kill) $(TIMES)
 
 flips: setup ## Flip 200 bits in flash, RAM and the state machines of an armed board, one at a time; six minutes of CPU time.
 	@TOMOSHADOW_FLIPS=200 $(PYTHON) -m pytest -q tests/firmware/test_rp2040_bit_flips.py

@@ -1,4 +1,4 @@
-"""The soak of ``make soak PART=kill`` at reduced length, and what it would find."""
+"""The soaks of ``make soak`` at reduced length, and what they would find."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -8,6 +8,8 @@ import pytest
 
 from daq.files.run_directory import DoubleFrame, ExposureRecord, FiredTrain, ImageKey, Shot
 from processing.synthetic.numbered import ImageNumber, numbered
+from tests.support import soak_faults
+from tests.support.simulated_serving import serving_bench, tiny_config
 from tests.support.soak_kill import Killed, kill_servers, mispaired_exposures, summary
 
 VIEWS = ("view1", "view2")
@@ -57,3 +59,25 @@ def test_the_table_counts_all_kills() -> None:
     assert heads.split()[0] == "kills"
     assert row.split() == ["2", "15", "1", "2", "0", "3.2", "3.2", "1", "to", "2"]
     assert origin.startswith("commit abc; ")
+
+
+@pytest.mark.network
+@pytest.mark.slow
+def test_after_a_camera_was_without_power_the_next_run_is_completed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(soak_faults, "FAULTS", {"killed": {"view": "view2"}})
+    with serving_bench(tiny_config(tmp_path / "runs", subnet=9)) as bench:
+        sound, returned = soak_faults.lose_devices(bench, 1)
+    assert (sound.fault, sound.refused, sound.failed) == ("", 0, 0)
+    assert returned.fault == "killed"
+    assert returned.next_run_s > 0
+
+
+def test_the_table_of_faults_counts_what_was_refused() -> None:
+    found = [soak_faults.Returned(name, 2.0, 1, 2, 0.5) for name in ("", *soak_faults.FAULTS)]
+    heads, *rows, origin = soak_faults.summary([*found, soak_faults.Returned("", 4.0, 0, 0, 1.5)]).splitlines()
+    assert heads.startswith("lost between runs")
+    assert rows[0].split() == ["(none)", "2", "3.0", "4.0", "1", "2"]
+    assert [row.split()[0] for row in rows[1:]] == list(soak_faults.FAULTS)
+    assert origin.endswith("load 0.5 to 1.5")
