@@ -121,14 +121,15 @@ class RunSession:
             self._run.progress.move(RunStep.ARMED)
 
     def _write_devices(self) -> None:
-        """Ask every device who it is; one that does not answer ends the run, and those that do are named in it."""
+        """Ask every device who it is, and name it in the run; one that is needed and does not answer ends it."""
         devices, silent = {}, list[DeviceError]()
         for device in self._rig.devices:
             try:
                 devices[device.name] = asdict(device.identity())
             except DeviceError as error:
                 devices[device.name] = {"not answered": error.reason}
-                silent.append(error)
+                if device is not self._rig.stage or self._run.plan.stage_z_mm:
+                    silent.append(error)
         self._writer.write_devices(devices)
         if silent:
             raise silent[0]

@@ -20,6 +20,8 @@ from tests.support.simulated_serving import CURRENT_A, BenchServing, eventually,
 
 AWAY_S = 3.0
 """So long a device is away: longer than its lamp takes to notice."""
+AGAIN_S = 0.5
+"""After a refusal an operator reads it before the next try."""
 FAULTS: Mapping[str, Mapping[str, Any]] = {
     "frozen": {"view": "view2"},
     "killed": {"view": "view2"},
@@ -61,6 +63,8 @@ def next_run(bench: BenchServing, fault: str) -> Returned:
     def completed() -> bool:
         bench.http.post("/api/rig/acknowledge")
         answers[0] += 1
+        if answers[0] > 1:
+            time.sleep(AGAIN_S)
         if bench.http.post("/api/runs", json=PLAN).status_code != 201:
             return False
         status = bench.end()

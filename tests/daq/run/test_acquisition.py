@@ -262,6 +262,15 @@ def test_a_target_is_taken_at_each_position_and_light_waits_for_the_stage(lab: L
     assert acted == ["move -3", "arm 5", "move 0", "arm 5", "move 3", "arm 5"]
 
 
+def test_a_stage_that_is_silent_ends_only_the_runs_that_move_it(lab: Laboratory) -> None:
+    lab.memory.stage.mute = True
+    reader = lab.run(plan_of(2))
+    assert (reader.outcome, reader.shot_count) == ("completed", 2)
+    assert "not answered" in reader.header.devices["stage"]
+    moved = lab.run(plan_of(1, kind=RunKind.CALIBRATION, stage_z_mm=(1.0,)))
+    assert (moved.outcome, moved.cause) == ("failed", "stage: no answer to 'identity' within 0.5 s")
+
+
 def assert_failed(lab: Laboratory, reader: RunReader, cause: str, readable: int) -> None:
     status = lab.acquisition.wait(DEADLINE_S)
     assert (status.state, status.outcome) == (RunState.IDLE, RunOutcome.FAILED)
