@@ -93,5 +93,5 @@ def set_aside(path: Path, keeper: Path) -> Path:
 def last_sign_of_life_utc(*paths: Path) -> str:
     """When some files, or folders with what lies in them, were written last, ISO 8601."""
     written = [path for one in paths if one.exists() for path in (one, *one.glob("*"))]
-    newest_s = max(path.stat().st_mtime for path in written)
+    newest_s = max(path.lstat().st_mtime for path in written)
     return datetime.fromtimestamp(newest_s, UTC).isoformat()

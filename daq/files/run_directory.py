@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from daq.causes import Cause
 from daq.errors import RecorderError, RenamedFile, ShotFileError
 from daq.files.header import RunClosing, RunHeader, ViewFormat
+from daq.files.lock_file import hold_folder
 from daq.files.packed_file import pack_run, require_free
 from daq.files.run_file import (
     RUN_FILE,
@@ -170,7 +171,16 @@ def list_runs(data_dir: Path) -> tuple[Path, ...]:
 
 
 def pack(run_dir: Path, out: Path) -> None:
-    """Copy a run into one plain HDF5 file that needs no other file; ``out`` must not exist."""
+    """Copy a run into one plain HDF5 file that needs no other file; ``out`` must not exist.
+
+    Raises
+    ------
+    AlreadyHeld
+        A living process writes the run: the file would hold the half of it.
+    """
     require_free(out)
     reader = RunReader(run_dir)
+    if reader.closing is None:
+        with hold_folder(run_dir):
+            pass
     pack_run(run_dir, reader.header, reader.shot_count, out)

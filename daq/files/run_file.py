@@ -5,8 +5,10 @@ outcome are added to a copy that replaces the file, so that a complete ``run.h5`
 """
 
 import json
+import os
+import re
 from collections.abc import Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from typing import Any, Literal
 
@@ -30,6 +32,8 @@ _LATER_FIELDS = ("rate_hz", "notes", "spray")
 """Of the header; runs from before have their defaults."""
 _CAUSES = TypeAdapter(tuple[Cause, ...])
 SHOTS_FOLDER = "shots"
+_SHOT_NAME = re.compile(r"(0|[1-9][0-9]{0,6})\.h5")
+"""Up to ten million, which no plan reaches: a stray number of more digits would be a slot for every number below it."""
 _CLOSING_BYTES = 256 * 2**10
 """What the end of a run adds to its file at most: outcome, causes, numbers of the shots that were not stored."""
 RUN_SCHEMA = "tomoshadow-run"
@@ -104,8 +108,14 @@ def read_shot_count(run_dir: Path) -> int:
 
 def slots_of(run_dir: Path) -> int:
     """Slots up to the last shot that is there."""
-    indices = [int(path.stem) for path in (run_dir / SHOTS_FOLDER).glob("*.h5") if path.stem.isdecimal()]
-    return max(indices, default=-1) + 1
+    with suppress(FileNotFoundError, NotADirectoryError, PermissionError), os.scandir(run_dir / SHOTS_FOLDER) as found:
+        return max((int(entry.name.removesuffix(".h5")) for entry in found if is_shot(entry)), default=-1) + 1
+    return 0
+
+
+def is_shot(entry: Path | os.DirEntry[str]) -> bool:
+    """Whether something among the shots is a file named as ``shot_path`` names one."""
+    return bool(_SHOT_NAME.fullmatch(entry.name)) and entry.is_file()
 
 
 def read_closing(run_dir: Path) -> RunClosing | None:

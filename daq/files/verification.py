@@ -9,7 +9,7 @@ from daq.errors import AlreadyHeld, DamagedFrame, ForeignFile, RenamedFile, Shot
 from daq.files.atomic_file import PART_SUFFIX
 from daq.files.lock_file import hold_folder
 from daq.files.run_directory import RunReader
-from daq.files.run_file import RUN_FILE, SHOTS_FOLDER, shot_path
+from daq.files.run_file import RUN_FILE, SHOTS_FOLDER, is_shot, shot_path
 
 Done = Callable[[int, int], None]
 _EOF_ADDRESS = slice(28, 36)
@@ -116,7 +116,7 @@ def _flaws_of_shot(reader: RunReader, index: int) -> list[Flaw]:
 
 
 def _kind_of(path: Path, error: ShotFileError) -> FlawKind:
-    if not path.exists():
+    if not path.is_file():
         return FlawKind.MISSING
     if _is_truncated(path):
         return FlawKind.TRUNCATED
@@ -141,8 +141,8 @@ def _strangers(run_dir: Path) -> list[Flaw]:
         name = str(path.relative_to(run_dir))
         if path.suffix == PART_SUFFIX:
             found.append(Flaw(FlawKind.NOT_COMMITTED, name, f"{path}: was being written when its process ended"))
-        elif not (path.suffix == ".h5" and path.stem.isdecimal()):
-            found.append(Flaw(FlawKind.FOREIGN, name, f"{path}: no shot of this run has such a name"))
+        elif not is_shot(path):
+            found.append(Flaw(FlawKind.FOREIGN, name, f"{path}: no file that is named by the number of a shot"))
     return found
 
 

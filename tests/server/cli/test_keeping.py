@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from daq.files.run_directory import RunReader, RunWriter
+from server.cli.main import main
 from tests.daq.files.test_run_directory import assert_same, header_of, shot_of
 from tests.support.command_line import refused, told
 
@@ -186,3 +187,47 @@ def test_a_run_is_packed_into_one_file(run_dir: Path, capsys: pytest.CaptureFixt
     assert "1.h5: cannot be read" in refused(capsys, "pack", run_dir, "-o", out, "--overwrite")
     with h5py.File(out) as packed:
         assert packed["/shots/index"].shape == (3,)
+
+
+@pytest.mark.parametrize("name", ["007.h5", "٣.h5", "99999999999.h5"])
+def test_a_copy_whose_name_is_no_number_of_a_shot_opens_no_slots(
+    run_dir: Path, capsys: pytest.CaptureFixture[str], name: str
+) -> None:
+    shutil.copy(shot(run_dir, 1), run_dir / "shots" / name)
+    assert RunReader(run_dir).shot_count == 3
+    (found,) = told(capsys, "verify", run_dir, status=1)["runs"]
+    assert [(flaw["kind"], flaw["file"]) for flaw in found["flaws"]] == [("foreign", f"shots/{name}")]
+    assert told(capsys, "repair", run_dir)["sound"]
+
+
+def a_folder(path: Path) -> None:
+    (path / "kept").mkdir(parents=True)
+
+
+def a_dead_link(path: Path) -> None:
+    path.symlink_to("nowhere")
+
+
+@pytest.mark.parametrize("put", [a_folder, a_dead_link])
+@pytest.mark.parametrize(("name", "lost"), [("1.h5", ["missing"]), ("3.h5", [])])
+def test_what_stands_in_the_place_of_a_shot_and_is_no_file_is_set_aside(
+    run_dir: Path, capsys: pytest.CaptureFixture[str], put: Callable[[Path], None], name: str, lost: list[str]
+) -> None:
+    path = run_dir / "shots" / name
+    path.unlink(missing_ok=True)
+    put(path)
+    (found,) = told(capsys, "verify", run_dir, status=1).get("runs", [{"flaws": []}])
+    assert [flaw["kind"] for flaw in found["flaws"] if flaw["file"] == f"shots/{name}"] == [*lost, "foreign"]
+    after = told(capsys, "repair", run_dir, status=1 if lost else 0)
+    assert [flaw["kind"] for flaw in after["flaws"]] == lost
+    assert (run_dir / "set-aside" / name).lstat()
+
+
+def test_a_run_that_is_being_recorded_is_not_packed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "half.h5"
+    with RunWriter(tmp_path / HEADER.run_id, HEADER) as writer:
+        writer.write_shot(shot_of(HEADER, 0))
+        main(["pack", str(tmp_path / HEADER.run_id), "-o", str(out)])
+        assert "is being written by a living process" in capsys.readouterr().err
+    assert not out.exists()
+    told(capsys, "pack", tmp_path / HEADER.run_id, "-o", out)
