@@ -2,11 +2,19 @@
 
 from typing import Annotated, Self
 
-from pydantic import Field, StringConstraints, model_validator
+from pydantic import AfterValidator, Field, StringConstraints, model_validator
 
 from daq.frozen_model import FrozenModel
 
-_Line = Annotated[str, StringConstraints(max_length=200)]
+
+def _storable(text: str) -> str:
+    if "\0" in text:
+        raise ValueError("holds the character NUL, which ends a text in HDF5: leave it out")
+    return text
+
+
+_Text = Annotated[str, AfterValidator(_storable)]
+_Line = Annotated[_Text, StringConstraints(max_length=200)]
 _Key = Annotated[str, StringConstraints(pattern=r"^[A-Za-z][A-Za-z0-9_]{0,63}$")]
 _Millimetres = Annotated[float, Field(ge=-10_000, le=10_000)]
 _Share = Annotated[float, Field(ge=-1e6, le=1e6)]
@@ -19,7 +27,7 @@ class RunNotes(FrozenModel):
     fluid: Annotated[_Line, Field(description="what is sprayed")] = ""
     nozzle: Annotated[_Line, Field(description="which nozzle, its maker and number")] = ""
     pressure_bar: Annotated[float | None, Field(ge=0, le=10_000, description="of the fluid, above ambient")] = None
-    remark: Annotated[str, StringConstraints(max_length=4000), Field(description="whatever else matters")] = ""
+    remark: Annotated[_Text, StringConstraints(max_length=4000), Field(description="whatever else matters")] = ""
     more: Annotated[
         dict[_Key, float | _Line],
         Field(max_length=64, description="fields of your own; a unit ends the name of a quantity"),

@@ -70,11 +70,10 @@ class RunWriter:
                 (self.run_dir / SHOTS_FOLDER).mkdir(parents=True)
             except FileExistsError as error:
                 raise RecorderError(f"{self.run_dir}: exists already, a run is never overwritten") from error
-            try:
+            with ExitStack() as undo:
+                undo.callback(self._forget_directory)
                 self._begin()
-            except (OSError, RuntimeError):
-                self._forget_directory()
-                raise
+                undo.pop_all()
         return self
 
     def close(self) -> None:

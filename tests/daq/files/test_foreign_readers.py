@@ -75,3 +75,9 @@ def test_xarray_reads_a_run(run_dir: Path) -> None:
     view = xarray.open_dataset(run_dir / "run.h5", group="/cameras/view1", engine="h5netcdf", phony_dims="sort")
     np.testing.assert_array_equal(view.frames[0, 0], RunReader(run_dir).read_shot(0).views["view1"].frame_a)
     assert view.device_timestamp_ns.attrs["units"] == "ns"
+
+
+@pytest.mark.parametrize("notes", [{"operator": "A\0"}, {"remark": "\0"}, {"more": {"batch": "7\0"}}], ids=str)
+def test_a_text_that_no_file_takes_is_refused(notes: dict[str, Any]) -> None:
+    with pytest.raises(ValueError, match="NUL, which ends a text in HDF5"):
+        RunNotes.model_validate(notes)

@@ -378,3 +378,10 @@ def test_an_unreadable_run_is_named(tmp_path: Path, damage: str) -> None:
             file.attrs.update({"schema_version": 2} if damage == "newer" else {"schema": "something"})
     with pytest.raises(ShotFileError, match=r"run\.h5"), RunReader(tmp_path / "run"):
         pass
+
+
+def test_a_run_that_cannot_begin_leaves_nothing_whatever_the_reason(tmp_path: Path) -> None:
+    """HDF5 takes no NUL, and says so by a ValueError."""
+    with pytest.raises(ValueError, match="NULL"):
+        RunWriter(tmp_path / "run", header_of().model_copy(update={"created_utc": "\0"})).open()
+    assert not (tmp_path / "run").exists()
