@@ -56,7 +56,7 @@ class RunStatus:
 
 @dataclass(frozen=True)
 class StateChanged:
-    """Acquisition moved to another state; ``run_id`` is empty where a live view begins or ends."""
+    """Acquisition moved to another state; ``run_id`` is empty at the ends of a live view, and of a fault."""
 
     run_id: str
     state: RunState

@@ -52,7 +52,7 @@ class RunProgress:
         with self._changed:
             before, state = self._status.state, next_state(self._status.state, step)
             status = self._status = replace(self._status, **{**changes, "state": state})
-            is_of_run = RunState.LIVE not in (before, state)
+            is_of_run = RunState.LIVE not in (before, state) and step is not RunStep.ACKNOWLEDGE
             run_id, outcome = (status.run_id or "", status.outcome) if is_of_run else ("", None)
             self._publish(StateChanged(run_id, state, outcome, status.message))
             self._changed.notify_all()

@@ -312,6 +312,20 @@ def test_light_that_does_not_go_off_is_a_fault(lab: Laboratory) -> None:
     lab.show(LIT)
 
 
+def test_a_fault_of_the_live_view_is_no_matter_of_the_run_before_it(lab: Laboratory) -> None:
+    lab.acquisition.start(RUN)
+    lab.rest()
+    lab.show(SLOW)
+    lab.memory.generator.stuck = True
+    lab.acquisition.end_live()
+    lab.rest()
+    lab.memory.generator.stuck = False
+    lab.acquisition.acknowledge()
+    told = lab.told[-1]
+    assert isinstance(told, StateChanged)
+    assert (told.run_id, told.state, told.outcome) == ("", RunState.IDLE, None)
+
+
 def test_it_ends_when_nobody_looks_and_not_before(tmp_path: Path) -> None:
     lab = Laboratory(tmp_path / "runs", AcquisitionLimits(frame_s=0.1, heartbeat_s=0.05, live_unwatched_s=0.5))
     with lab.acquisition:
