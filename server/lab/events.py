@@ -58,10 +58,11 @@ class EventPublisher:
             self._loop = asyncio.get_running_loop()
 
     def detach(self) -> None:
-        """Readers end; events are still kept."""
+        """Readers get what they have not seen, and end; events are still kept. From any thread."""
         with self._lock:
-            self._loop = None
-        self._wake()
+            loop, self._loop = self._loop, None
+            if loop is not None:
+                loop.call_soon_threadsafe(self._wake)
 
     @property
     def newest(self) -> int:
@@ -91,12 +92,14 @@ class EventPublisher:
 
     async def follow(self, last_id: int) -> AsyncIterator[Event | None]:
         """Events after ``last_id`` as they happen, until ``detach``; None every 15 s without one."""
-        while self._loop is not None:
-            changed = self._changed
+        while True:
+            changed, over = self._changed, self._loop is None
             events = self.since(last_id)
             for event in events:
                 yield event
                 last_id = event.id
+            if over:
+                return
             if not events and not await _waited(changed):
                 yield None
 

@@ -1,6 +1,7 @@
 """Open a rig and serve it: what ``tomoshadow serve`` does."""
 
 import socket
+from functools import partial
 
 from daq.run.acquisition import Acquisition
 from processing.calibration.calibration_file import file_sha256
@@ -12,6 +13,9 @@ from server.lab.tasks import TASKS
 from server.rig.assembly import AssembledRig, open_rig
 from server.rig.config import RigConfig
 from server.web.app import create_app, serve
+
+_LAST_EVENTS_S = 3.0
+"""A disk that does not keep up holds the end of a run back for longer; then its last event is in the log alone."""
 
 
 def serve_rig(config: RigConfig, port_held: socket.socket) -> None:
@@ -44,7 +48,14 @@ def serve_rig(config: RigConfig, port_held: socket.socket) -> None:
                 tasks=TASKS,
                 laboratory=assembled.laboratory,
             )
-            serve(create_app(services), port_held, acquisition.leave)
+            serve(create_app(services), port_held, partial(leave, acquisition, events))
+
+
+def leave(acquisition: Acquisition, events: EventPublisher, cause: str) -> None:
+    """End what runs, and then the readers of events: they have seen how it ended, and hold up the server no longer."""
+    acquisition.leave(cause)
+    acquisition.wait(_LAST_EVENTS_S)
+    events.detach()
 
 
 def _acquisition(config: RigConfig, assembled: AssembledRig, events: EventPublisher) -> Acquisition:

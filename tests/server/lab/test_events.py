@@ -48,14 +48,15 @@ def test_events_of_many_threads_reach_every_reader_in_one_order() -> None:
 def test_readers_end_when_the_server_does() -> None:
     events = EventPublisher()
 
-    async def go() -> list[object]:
+    async def go() -> None:
         events.attach()
         reader = asyncio.create_task(_all(events))
         await asyncio.sleep(0)
+        last = events.publish("last")
         events.detach()
-        return await asyncio.wait_for(reader, 5)
+        assert await asyncio.wait_for(reader, 5) == [last]
 
-    assert asyncio.run(go()) == []
+    asyncio.run(go())
 
 
 def test_what_acquisition_says_becomes_an_event() -> None:

@@ -3,7 +3,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import httpx
@@ -15,10 +15,12 @@ from tests.support.serving import DEADLINE_S, plan_of
 SCRIPT = """
 import sys
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 import uvicorn
 from server.web.app import create_app, serve
 from server.web.port import listening
+from server.web.serve import leave
 from tests.support import serving
 
 def talkative_serve(services):
@@ -29,7 +31,7 @@ def talkative_serve(services):
         print(server.servers[0].sockets[0].getsockname()[1], flush=True)
     uvicorn.Server.startup = startup
     with listening("127.0.0.1", 0) as listener:
-        serve(app, listener, services.acquisition.leave)
+        serve(app, listener, partial(leave, services.acquisition, services.events))
     print("served", flush=True)
 
 with serving.assembled(Path(sys.argv[1])) as services:
@@ -65,9 +67,26 @@ def test_a_signal_ends_the_run_by_its_name(tmp_path: Path, number: signal.Signal
     assert (reader.outcome, reader.cause) == ("aborted", f"the server was ended by {number.name}")
 
 
+def test_a_reader_of_events_sees_how_it_ended_and_holds_up_nothing(tmp_path: Path) -> None:
+    with _server(tmp_path) as process:
+        assert process.stdout is not None
+        url = f"http://127.0.0.1:{int(process.stdout.readline())}/api"
+        with httpx.stream("GET", f"{url}/events", timeout=DEADLINE_S) as stream:
+            httpx.post(f"{url}/runs", json=plan_of(shots=1000, rate_hz=5), timeout=DEADLINE_S)
+            process.send_signal(signal.SIGTERM)
+            seen: list[str] = []
+            with suppress(httpx.RemoteProtocolError):  # the stream was cut off
+                seen += stream.iter_lines()
+        _, said = process.communicate(timeout=DEADLINE_S)
+        assert "Traceback" not in said
+        assert any('"outcome": "aborted"' in line for line in seen)
+
+
 @contextmanager
 def _server(folder: Path) -> Iterator[subprocess.Popen[str]]:
     command = [sys.executable, "-c", SCRIPT, str(folder / "runs")]
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[3])}
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as process:
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment
+    ) as process:
         yield process
