@@ -89,21 +89,31 @@ LASTING_FAULTS = frozenset(
 """Faults that last until their ``duration_s`` is over; all others end by themselves."""
 
 
+_MOST = 100_000
+"""A day and some, and as many bytes of noise as a line carries while somebody waits."""
+
+
 class Fault(FrozenModel):
     """One thing that goes wrong."""
 
     kind: Annotated[FaultKind, Field(description="what goes wrong")]
     view: Annotated[str | None, Field(description="whose camera or light; none for the faults of the bench")] = None
-    amount: Annotated[float, Field(ge=0, description="how much; see the kind")] = 1.0
+    amount: Annotated[float, Field(ge=0, le=_MOST, description="how much; see the kind")] = 1.0
     duration_s: Annotated[
         float | None,
-        Field(ge=0, description="of a fault that lasts: its end; 0 ends one that has begun; none: it stays"),
+        Field(ge=0, le=_MOST, description="of a fault that lasts: its end; 0 ends one that has begun; none: it stays"),
     ] = None
 
     @model_validator(mode="after")
     def _happens_to_somebody(self) -> Self:
         if (self.view is None) != (self.kind in LABORATORY_FAULTS):
             raise ValueError(f"{self.kind}: {'needs a view' if self.view is None else 'happens to no view'}")
+        return self
+
+    @model_validator(mode="after")
+    def _is_a_share(self) -> Self:
+        if self.kind is FaultKind.PACKET_LOSS and self.amount > 100:
+            raise ValueError(f"packet_loss: {self.amount:g} % is more than all")
         return self
 
     @model_validator(mode="after")

@@ -37,7 +37,8 @@ def recover(data_dir: Path) -> list[Recovered]:
 
     Runs from before room for the outcome was reserved are not looked for: thousands would have to be opened.
     """
-    unfinished = sorted(path.parent for path in data_dir.glob(f"*/{RUN_FILE}{RESERVE_SUFFIX}"))
+    reserved = sorted(path.parent for path in data_dir.glob(f"*/{RUN_FILE}{RESERVE_SUFFIX}"))
+    unfinished = [run_dir for run_dir in reserved if not _is_headless(run_dir)]
     found = [told for run_dir in unfinished for told in _recovered(run_dir, close_run)]
     headless = sorted(path for path in data_dir.iterdir() if _OWN_NAME.match(path.name) and _is_headless(path))
     return found + [told for run_dir in headless for told in _recovered(run_dir, _set_run_aside)]

@@ -81,6 +81,7 @@ def test_a_note_that_nobody_can_read_changes_nothing(killed: Path) -> None:
 
 def test_a_directory_without_run_file_is_set_aside_and_named(tmp_path: Path) -> None:
     (tmp_path / RUN_ID / "shots").mkdir(parents=True)
+    (tmp_path / RUN_ID / "run.h5.reserve").write_bytes(b"made first")
     (tmp_path / "calibrations").mkdir()
     aside = tmp_path / "set-aside" / RUN_ID
     assert told(tmp_path) == [f"{RUN_ID}: it has no run.h5 and is no run, it is set aside as {aside}"]

@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -132,6 +133,21 @@ def test_a_fault_that_ends_by_itself_takes_no_duration(kind: FaultKind) -> None:
     for view in (VIEW, None):
         with pytest.raises(ValidationError):
             Fault(kind=kind, view=view, duration_s=1.0)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"kind": "interlock_open", "duration_s": 1e300},
+        {"kind": "serial_garbage", "amount": 1e9},
+        {"kind": "serial_garbage", "amount": float("nan")},
+        {"kind": "packet_loss", "view": VIEW, "amount": 200},
+    ],
+    ids=str,
+)
+def test_a_fault_beyond_all_measure_is_refused(wrong: dict[str, Any]) -> None:
+    with pytest.raises(ValidationError, match=r"less than or equal to 100000|200 % is more than all"):
+        Fault.model_validate(wrong)
 
 
 def test_a_camera_with_power_again_has_factory_settings_and_another_clock(laboratory: SimulatedLaboratory) -> None:
