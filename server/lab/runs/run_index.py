@@ -5,7 +5,7 @@ It is a cache. The directories are the truth; an index that is lost or damaged i
 
 import sqlite3
 import threading
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -58,19 +58,19 @@ class RunIndex:
     def find(self, run_id: str, stamp: str) -> IndexedRun | None:
         """What is known of a run whose files have this stamp; None if they have changed, or nothing is known."""
         query = "SELECT summary, image_keys FROM run WHERE run_id = ? AND stamp = ?"
-        with self._lock:
-            row = self._database.execute(query, (run_id, stamp)).fetchone()
         try:
+            with self._lock:
+                row = self._database.execute(query, (run_id, stamp)).fetchone()
             return row and IndexedRun(
                 RunSummary.model_validate_json(row[0]), np.frombuffer(row[1], np.int8).astype(np.int64)
             )
-        except ValidationError:
-            return None  # of an older program: read again
+        except (sqlite3.Error, ValidationError):
+            return None  # damaged, or of an older program: read again
 
     def keep(self, run_id: str, stamp: str, run: IndexedRun) -> None:
-        """Remember a run; what was known of it is replaced."""
+        """Remember a run, if the disk takes it; what was known of it is replaced."""
         row = (run_id, stamp, run.summary.model_dump_json(), run.image_keys.astype(np.int8).tobytes())
-        with self._lock, self._database:
+        with suppress(sqlite3.Error), self._lock, self._database:
             self._database.execute("INSERT OR REPLACE INTO run VALUES (?, ?, ?, ?)", row)
 
 

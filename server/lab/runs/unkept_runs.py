@@ -10,9 +10,10 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
-from daq.errors import ShotFileError
+from daq.errors import ShotFileError, StorageError
 from daq.files.atomic_file import replacing
 from daq.files.run_directory import RunReader
+from daq.files.storage import storing
 from daq.names import is_identifier
 from server.lab.jobs import JobState, JobTable
 
@@ -51,13 +52,13 @@ class UnkeptRuns:
         """Start a run that may be removed, and remove those before it; returns its id. Those stay if it is refused."""
         with self._changing:
             run_id, before = start(), self._ids
-            with suppress(OSError):  # a disk that does not take the note: then the shot is kept
+            with suppress(StorageError):  # a disk that does not take the note: then the shot is kept
                 self._store((*before, run_id))
                 self._store((*(old for old in before if not self._remove(old)), run_id))
             return run_id
 
     def keep(self, run_id: str) -> None:
-        """Let a run stay; one that stays anyway is left as it is."""
+        """Let a run stay; one that stays anyway is left as it is. StorageError if the disk does not take the note."""
         with self._changing:
             if run_id in self._ids:
                 self._store(tuple(one for one in self._ids if one != run_id))
@@ -79,7 +80,7 @@ class UnkeptRuns:
             return ()
 
     def _store(self, ids: tuple[str, ...]) -> None:
-        with replacing(self._file) as part:
+        with storing(self._data_dir), replacing(self._file) as part:
             part.write_text("".join(f"{run_id}\n" for run_id in ids))
         self._ids = ids
 

@@ -41,7 +41,7 @@ def take_shot(shot: SingleShot, context: ContextOf, response: Response) -> Acqui
     return view_of_acquisition(context)
 
 
-@router.post("/keep", responses=responses(404, 500))
+@router.post("/keep", responses=responses(404, 500, 507))
 def keep_shot(shot: ShotToKeep, context: ContextOf) -> UnkeptView:
     """Keep a single shot: no later one removes its run."""
     context.runs.summary(shot.run_id)

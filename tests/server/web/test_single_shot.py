@@ -66,6 +66,16 @@ def test_a_shot_that_is_refused_leaves_the_last_one_alone(server: Serving) -> No
     assert server.http.get(f"/api/runs/{first}").status_code == 200
 
 
+def test_a_shot_is_not_kept_where_the_disk_takes_no_note_and_says_so(server: Serving, tmp_path: Path) -> None:
+    run_id = shoot(server)
+    (blocked,) = (path.with_name(f"{UNKEPT_FILE}.part") for path in tmp_path.rglob(UNKEPT_FILE))
+    blocked.mkdir()
+    answer = server.http.post("/api/rig/shot/keep", json={"run_id": run_id})
+    assert (answer.status_code, answer.json().get("type")) == (507, "urn:tomoshadow:StorageError")
+    assert "takes no data" in answer.json()["detail"]
+    assert unkept(server) == [run_id]
+
+
 def test_it_is_taken_out_of_a_live_view_too(server: Serving) -> None:
     server.http.put("/api/rig/live", json={"rate_hz": 10, **SHOT})
     assert server.http.get(f"/api/runs/{shoot(server)}").json()["shots_valid"] == 1

@@ -1,6 +1,8 @@
 """Lists of many runs: what is told, and that no file is opened that has not changed."""
 
 import os
+import sqlite3
+from contextlib import suppress
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -91,6 +93,16 @@ def test_an_index_that_is_damaged_is_made_anew(run_dir: Path, tmp_path: Path, da
     index.close()
     file.write_bytes(damage)
     assert RunStore(run_dir.parent, RunStatus, RunIndex(file)).newest() == told
+
+
+def test_runs_are_listed_where_the_disk_takes_no_index(run_dir: Path, tmp_path: Path) -> None:
+    """Full or read-only: then somebody looks for what to delete."""
+    index = RunIndex(tmp_path / "runs.sqlite")
+    index._database.execute("PRAGMA query_only = 1")
+    seen = []
+    with suppress(sqlite3.Error):
+        seen = RunStore(run_dir.parent, RunStatus, index).newest()
+    assert [run.run_id for run in seen] == [run_dir.name]
 
 
 def test_an_index_cut_in_its_middle_is_made_anew(tmp_path: Path) -> None:
