@@ -2,16 +2,18 @@
 
 import shutil
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
 
-from daq.errors import RecorderError
+from daq.errors import DiskFull, RecorderError
 from daq.files.atomic_file import replacing
 from daq.files.columns import columns_of, frames_path
 from daq.files.header import RunHeader
 from daq.files.run_file import RUN_FILE, shot_path
 from daq.files.shot_file import LIBRARY_VERSIONS, create_frames, is_missing, reading_shot
+from daq.files.storage import storing
 
 
 def pack_run(run_dir: Path, header: RunHeader, shot_count: int, out: Path) -> None:
@@ -21,8 +23,11 @@ def pack_run(run_dir: Path, header: RunHeader, shot_count: int, out: Path) -> No
     ------
     ShotFileError
         A shot cannot be read: a packed run is complete or not there.
+    StorageError
+        The disk of ``out`` refuses, or has no room for the run.
     """
-    with replacing(out) as part:
+    _require_room(run_dir, shot_count, out.parent)
+    with storing(out.parent), replacing(out) as part:
         shutil.copyfile(run_dir / RUN_FILE, part)
         with h5py.File(part, "r+", libver=LIBRARY_VERSIONS) as packed:
             _replace_view(packed, header, shot_count)
@@ -34,6 +39,18 @@ def require_free(out: Path) -> None:
     """Raise RecorderError if ``out`` exists."""
     if out.exists():
         raise RecorderError(f"{out}: exists already, it is not overwritten")
+
+
+def _require_room(run_dir: Path, shot_count: int, folder: Path) -> None:
+    """Before anything is written: HDF5 may crash where the disk is full when a file is closed."""
+    files = [run_dir / RUN_FILE, *(shot_path(run_dir, index) for index in range(shot_count))]
+    needed = sum(file.stat().st_size for file in files if file.exists())
+    free = shutil.disk_usage(folder).free
+    if free < needed:
+        raise DiskFull(
+            f"the disk of {folder} has {free} bytes left, and the packed run takes up to {needed} bytes: "
+            "delete or move away what is not needed, or name a file on another disk"
+        )
 
 
 def _replace_view(packed: h5py.File, header: RunHeader, shot_count: int) -> None:
@@ -48,11 +65,21 @@ def _replace_view(packed: h5py.File, header: RunHeader, shot_count: int) -> None
 
 
 def _copy_shot(path: Path, header: RunHeader, index: int, packed: h5py.File) -> None:
+    columns, chunks = _read_as_it_is(path, header)
+    for name, value in columns.items():
+        packed[name][index] = value
+    for (view, number), chunk in chunks.items():
+        packed[frames_path(view)].id.write_direct_chunk((index, number, 0, 0), chunk)
+
+
+def _read_as_it_is(path: Path, header: RunHeader) -> tuple[dict[str, Any], dict[tuple[str, int], bytes]]:
+    """Columns by name, compressed frames by view and number; all of it before anything is written.
+
+    So a disk that takes nothing is not taken for a shot that cannot be read.
+    """
+    numbers = range(header.frames_per_shot)
     with reading_shot(path, header) as shot:
-        for name, column in columns_of(header).items():
-            if not is_missing(shot, column):
-                packed[name][index] = shot[name][0]
-        for view in header.views:
-            source, target = shot[frames_path(view)].id, packed[frames_path(view)].id
-            for number in range(header.frames_per_shot):
-                target.write_direct_chunk((index, number, 0, 0), source.read_direct_chunk((0, number, 0, 0))[1])
+        columns = {name: shot[name][0] for name, column in columns_of(header).items() if not is_missing(shot, column)}
+        frames = {view: shot[frames_path(view)].id for view in header.views}
+        chunks = {(view, n): frames[view].read_direct_chunk((0, n, 0, 0))[1] for view in header.views for n in numbers}
+    return columns, chunks

@@ -2,6 +2,8 @@
 
 import os
 import shutil
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,6 +15,7 @@ import pytest
 from daq.files.run_directory import RunReader, RunWriter
 from server.cli.main import main
 from tests.daq.files.test_run_directory import assert_same, header_of, shot_of
+from tests.daq.run.test_recorder import unshare_works
 from tests.support.command_line import refused, told
 
 HEADER = header_of()
@@ -231,3 +234,19 @@ def test_a_run_that_is_being_recorded_is_not_packed(tmp_path: Path, capsys: pyte
         assert "is being written by a living process" in capsys.readouterr().err
     assert not out.exists()
     told(capsys, "pack", tmp_path / HEADER.run_id, "-o", out)
+
+
+@pytest.mark.skipif(not unshare_works(), reason="this machine forbids user namespaces")
+def test_a_full_disk_is_not_taken_for_a_torn_shot_when_a_run_is_packed(run_dir: Path, tmp_path: Path) -> None:
+    (tmp_path / "disk").mkdir()
+    mount = 'mount -t tmpfs -o size=48k tomoshadow "$1/disk" &&'
+    command = f'{mount} exec "$2" -m server.cli pack "$3" -o "$1/disk/x.h5"'
+    process = subprocess.run(
+        ["unshare", "-rm", "sh", "-c", command, "sh", str(tmp_path), sys.executable, str(run_dir)],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+        cwd=Path(__file__).parents[3],
+    )
+    assert "bytes left, and the packed run takes up to" in process.stderr
