@@ -13,7 +13,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 from daq.files.lock_file import hold
-from server.rig.config import RigConfig
+from server.rig.config import ConfigError, RigConfig
 
 _SHARED_BY_ALL_USERS = Path("/run/lock")
 _NETWORK = Path("/proc/self/ns/net")
@@ -60,8 +60,12 @@ def _far_end_name(config: RigConfig, what: str) -> str:
 
 @contextmanager
 def hold_data_dir(data_dir: Path) -> Iterator[None]:
-    """Hold a folder of runs, made if need be; AlreadyHeld names its holder."""
-    data_dir.mkdir(parents=True, exist_ok=True)
+    """Hold a folder of runs, made if need be; AlreadyHeld names its holder, ConfigError says why it cannot be made."""
+    try:
+        data_dir.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise ConfigError(f"data directory {data_dir}: cannot be made ({reason}): name another folder") from error
     with hold(data_dir / ".lock", f"data directory {data_dir}"):
         yield
 

@@ -11,7 +11,7 @@ from server.cli.main import main
 from server.doctor.checkup import Status
 from server.doctor.doctor_rig import check_rig
 from server.rig.assembly import open_generator, open_rig, wire_rig
-from server.rig.config import RigConfig, load_config
+from server.rig.config import ConfigError, RigConfig, load_config
 from server.rig.rig_lock import hold_data_dir, hold_rig
 
 SMALL = Path("configs/simulated_small.toml")
@@ -66,6 +66,14 @@ def test_a_data_directory_is_held_by_one_process(tmp_path: Path) -> None:
     held = pytest.raises(AlreadyHeld, match=f"{tmp_path}/runs is held by process")
     with hold_data_dir(tmp_path / "runs"), held, hold_data_dir(tmp_path / "runs"):
         pass
+
+
+def test_a_data_directory_that_cannot_be_made_is_named_with_the_reason(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises((ConfigError, OSError)) as refused, hold_data_dir(tmp_path / "file" / "runs"):
+        pass
+    reason = "cannot be made (not a directory): name another folder"
+    assert str(refused.value) == f"data directory {tmp_path}/file/runs: {reason}"
 
 
 def test_the_demonstration_does_not_record_into_a_folder_that_is_in_use(
