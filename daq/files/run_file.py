@@ -7,6 +7,7 @@ outcome are added to a copy that replaces the file, so that a complete ``run.h5`
 import json
 import os
 import re
+import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
@@ -25,6 +26,7 @@ from daq.files.columns import columns_of, frames_path, view_path
 from daq.files.encoding import encode_frame
 from daq.files.header import RunClosing, RunHeader
 from daq.files.shot_file import LIBRARY_VERSIONS, SCHEMA_VERSION, create_groups, unreadable
+from daq.files.text_heap import has_whole_heaps
 from daq.run_notes import RunNotes
 
 RUN_FILE = "run.h5"
@@ -71,14 +73,14 @@ def read_header(run_dir: Path) -> RunHeader:
     with reading(run_dir) as file:
         entry = file["entry"]
         written = [name for name in RunHeader.model_fields if name in entry or name not in _LATER_FIELDS]
-        return RunHeader.model_validate({name: json.loads(entry[name].asstr()[()]) for name in written})
+        return RunHeader.model_validate({name: json.loads(_read_text(entry, name)) for name in written})
 
 
 def set_devices(run_dir: Path, devices: Mapping[str, Mapping[str, str]]) -> None:
     """Write down what the devices say they are: they are asked when the run exists already."""
     with _changing(amending(run_dir / RUN_FILE)) as file:
         del file["entry/devices"]
-        file["entry/devices"] = json.dumps(devices, indent=1)
+        _write_text(file["entry"], "devices", json.dumps(devices, indent=1))
 
 
 def add_closing(run_dir: Path, closing: RunClosing) -> None:
@@ -92,11 +94,11 @@ def add_closing(run_dir: Path, closing: RunClosing) -> None:
     with _changing(spending_reserve(run_dir / RUN_FILE)) as file:
         if "outcome" in file["entry"]:
             raise RecorderError(f"{run_dir}: has an outcome already, {file['entry/outcome'].asstr()[()]}")
-        file["entry/outcome"] = closing.outcome
-        file["entry/cause"] = closing.cause
-        file["entry/end_time"] = closing.ended_utc
-        file["entry/unstored"] = json.dumps(closing.unstored)
-        file["entry/causes"] = _CAUSES.dump_json(closing.causes, indent=1).decode()
+        _write_text(file["entry"], "outcome", closing.outcome)
+        _write_text(file["entry"], "cause", closing.cause)
+        _write_text(file["entry"], "end_time", closing.ended_utc)
+        _write_text(file["entry"], "unstored", json.dumps(closing.unstored))
+        _write_text(file["entry"], "causes", _CAUSES.dump_json(closing.causes, indent=1).decode())
         file["entry/shot_count"] = slots_of(run_dir)
 
 
@@ -124,8 +126,8 @@ def read_closing(run_dir: Path) -> RunClosing | None:
         entry = file["entry"]
         if "outcome" not in entry:
             return None
-        outcome, cause, ended_utc = (entry[name].asstr()[()] for name in ("outcome", "cause", "end_time"))
-        later = {name: entry[name].asstr()[()] for name in ("causes", "unstored") if name in entry}  # not in old runs
+        outcome, cause, ended_utc = (_read_text(entry, name) for name in ("outcome", "cause", "end_time"))
+        later = {name: _read_text(entry, name) for name in ("causes", "unstored") if name in entry}  # not in old runs
         causes, unstored = _CAUSES.validate_json(later.get("causes", "[]")), json.loads(later.get("unstored", "[]"))
         return RunClosing(outcome, cause, ended_utc, causes, tuple(unstored))
 
@@ -164,6 +166,8 @@ def reading(run_dir: Path) -> Iterator[h5py.File]:
         missing = f"no run, it has no {RUN_FILE}" if run_dir.is_dir() else "there is no such directory"
         raise ShotFileError(f"{run_dir}: {missing}")
     try:
+        if not has_whole_heaps(path):
+            raise ShotFileError(f"{path}: is damaged, its texts cannot be read: copy it back from a backup")
         with h5py.File(path, "r") as file:
             schema, version = file.attrs["schema"], file.attrs["schema_version"]
             if schema != RUN_SCHEMA or version > SCHEMA_VERSION:
@@ -183,7 +187,7 @@ def _write_entry(entry: h5py.Group, header: RunHeader) -> None:
     """Every field of the header as JSON, and what NeXus readers look for."""
     entry.attrs["NX_class"] = "NXentry"
     for name, value in header.model_dump(mode="json").items():
-        entry[name] = json.dumps(value, indent=1)
+        _write_text(entry, name, json.dumps(value, indent=1))
     entry["title"] = header.plan.name if header.plan else header.run_id
     entry["definition"] = RUN_SCHEMA
     entry["definition"].attrs["version"] = str(SCHEMA_VERSION)
@@ -201,6 +205,20 @@ def _write_entry(entry: h5py.Group, header: RunHeader) -> None:
         data["frames"] = h5py.SoftLink(frames_path(view))
         data["index"] = h5py.SoftLink("/shots/index")
     entry.attrs["default"] = f"data_{next(iter(header.views))}"
+
+
+def _write_text(entry: h5py.Group, name: str, text: str) -> None:
+    entry[name] = text
+    entry[name].attrs["crc32"] = np.uint32(zlib.crc32(text.encode()))
+
+
+def _read_text(entry: h5py.Group, name: str) -> str:
+    """A text that is as it was written; in runs from before nothing tells."""
+    text: str = entry[name].asstr()[()]
+    check = entry[name].attrs.get("crc32")
+    if check is not None and int(check) != zlib.crc32(text.encode()):
+        raise ShotFileError(f"{entry.file.filename}: its {name} is not what was written: copy it back from a backup")
+    return text
 
 
 def _write_conditions(entry: h5py.Group, notes: RunNotes) -> None:
