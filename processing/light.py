@@ -51,8 +51,7 @@ def odd_light(
         As for ``processing.preprocessing.intensity``.
     """
     coarse, most = np.s_[::STRIDE_PX, ::STRIDE_PX], np.float32(2**bits - 1)
-    floor = np.float32(0) if dark is None else dark[coarse]
-    light = (frame[coarse] - floor) / most
+    light = _above_dark(frame, dark) / most
     if np.mean(light < -NOISE) > BRIGHTER_SHARE:
         return "is darker than its dark image; was that taken with light, or with another exposure?"
     if polarity == "bright":
@@ -65,7 +64,7 @@ def odd_light(
         return "is its own background, pixel by pixel: whatever there was is divided out"
     if (share := np.mean(background[coarse] > FULL * most)) > SATURATED_SHARE:
         return f"has a background of which {100 * share:.0f} % are saturated: shadows are too pale there"
-    return _unlike((light, (background[coarse] - floor) / most)) or _saturated(frame[coarse], most)
+    return _unlike((light, _above_dark(background, dark) / most)) or _saturated(frame[coarse], most)
 
 
 def hollowed(
@@ -92,18 +91,23 @@ def hollowed(
         What is lost; empty where little is, or where shadows have no background to tell by.
     """
     coarse, most = np.s_[::STRIDE_PX, ::STRIDE_PX], np.float32(2**bits - 1)
-    floor = np.float32(0) if dark is None else dark[coarse]
-    light = (frame[coarse] - floor) / most
+    light = _above_dark(frame, dark) / most
     if polarity == "bright":
         seen = light - np.median(light)
         dense = seen > OPAQUE * np.percentile(seen, 99.9)
     elif background is not None:
-        full = (background[coarse] - floor) / most
+        full = _above_dark(background, dark) / most
         seen = np.where(full > NOISE, 1 - light / np.maximum(full, NOISE), np.float32(0))
         dense = seen > OPAQUE
     else:
         return ""
     return _lost(seen[dense], image[coarse][dense])
+
+
+def _above_dark(image: Frame | Intensity, dark: Intensity | None) -> NDArray[np.float32]:
+    """Grey values of the pixels that are asked, above those of the dark image."""
+    coarse = np.s_[::STRIDE_PX, ::STRIDE_PX]
+    return np.asarray(image[coarse] - (np.float32(0) if dark is None else dark[coarse]), np.float32)
 
 
 def _lost(seen: NDArray[np.float32], kept: Intensity) -> str:

@@ -4,7 +4,6 @@ A heap begins with its signature, version and size; then come its objects, each 
 last, with number 0, the free space (HDF5 File Format Specification, III.E, "Global Heap").
 """
 
-import mmap
 from functools import lru_cache
 from pathlib import Path
 
@@ -20,19 +19,17 @@ def has_whole_heaps(path: Path) -> bool:
 
 
 @lru_cache(maxsize=256)
-def _has_whole_heaps(path: Path, _mtime_ns: int, size: int, _inode: int) -> bool:
-    if not size:
-        return True
-    with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
-        start = content.find(_BEGIN)
-        while start >= 0:
-            if not _is_whole(content, start):
-                return False
-            start = content.find(_BEGIN, start + _HEAD)
+def _has_whole_heaps(path: Path, _mtime_ns: int, _size: int, _inode: int) -> bool:
+    content = path.read_bytes()  # not mapped: a disk that fails would end the process instead of raising
+    start = content.find(_BEGIN)
+    while start >= 0:
+        if not _is_whole(content, start):
+            return False
+        start = content.find(_BEGIN, start + _HEAD)
     return True
 
 
-def _is_whole(content: mmap.mmap, start: int) -> bool:
+def _is_whole(content: bytes, start: int) -> bool:
     """Whether the objects of a heap fill it."""
     end, at = start + _number(content, start + 8, 8), start + _HEAD
     if not at <= end <= len(content):
@@ -45,5 +42,5 @@ def _is_whole(content: mmap.mmap, start: int) -> bool:
     return at <= end
 
 
-def _number(content: mmap.mmap, at: int, size: int) -> int:
+def _number(content: bytes, at: int, size: int) -> int:
     return int.from_bytes(content[at : at + size], "little")

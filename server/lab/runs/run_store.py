@@ -91,7 +91,11 @@ class RunStore:
         return self._indexed(run_dir).image_keys
 
     def newest(self, limit: int = 100, offset: int = 0) -> list[RunSummary]:
-        """Runs, newest first by their own time, whatever has been done to their directories since.
+        """Runs, newest first by their own time, whatever has been done to their directories since."""
+        return self.page(limit, offset)[0]
+
+    def page(self, limit: int, offset: int) -> tuple[list[RunSummary], int]:
+        """Some runs, as ``newest`` has them, and how many there are in all.
 
         Ids tell it to the second, so that a long list need not be read; headers tell two of the same second apart.
         """
@@ -104,11 +108,7 @@ class RunStore:
             return second, self._created(path).isoformat() if crowd[second] > 1 else ""
 
         page = sorted(directories, key=age, reverse=True)[offset : offset + limit]
-        return [self._summary_of(path) for path in page]
-
-    def count(self) -> int:
-        """Number of runs."""
-        return len(list_runs(self._data_dir))
+        return [self._summary_of(path) for path in page], len(directories)
 
     def _is_active(self, run_dir: Path) -> bool:
         status = self._status()

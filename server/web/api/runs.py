@@ -30,8 +30,9 @@ def list_runs(
     offset: Annotated[int, Query(ge=0, le=10_000_000, description="leave out so many of the newest ones")] = 0,
 ) -> list[RunSummary]:
     """Runs, newest first."""
-    response.headers[_COUNT] = str(context.runs.count())
-    return context.runs.newest(limit, offset)
+    runs, count = context.runs.page(limit, offset)
+    response.headers[_COUNT] = str(count)
+    return runs
 
 
 @router.post("", status_code=201, responses=responses(409, 423, 503, 504))
