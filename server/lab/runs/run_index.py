@@ -5,6 +5,7 @@ It is a cache. The directories are the truth; an index that is lost or damaged i
 
 import sqlite3
 import threading
+import weakref
 from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -49,6 +50,7 @@ class RunIndex:
     def __init__(self, path: Path | None = None) -> None:
         self._lock = threading.Lock()
         self._database = _opened(path) if path else _with_table(_IN_MEMORY)
+        weakref.finalize(self, self._database.close)  # Python 3.13 complains of one that is merely forgotten
 
     def close(self) -> None:
         """Close the file."""
