@@ -1,9 +1,14 @@
 """What all tests share: property tests try the same examples in every run, and however slow the machine is.
 
-``TEST_OPTIONS=--hypothesis-profile=others`` tries others.
+``TEST_OPTIONS=--hypothesis-profile=others`` tries others. Ctrl-C is heard even where a shell runs the tests in its
+background, which has them, and so the programs that they start, ignore it.
 """
 
+import signal
+
 from hypothesis import settings
+
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.register_profile("others", deadline=None)

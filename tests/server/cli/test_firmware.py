@@ -226,7 +226,6 @@ def test_no_led_gives_continuous_light_unless_its_limit_is_stated(capsys: pytest
 def test_ctrl_c_ends_the_light(permissive: list[str]) -> None:
     """What would not be confirmed off is added to the error."""
     command = [sys.executable, "-m", "server.cli", "firmware", "light", *permissive, "--current-a", "0.1"]
-    signal.signal(signal.SIGINT, signal.default_int_handler)  # background jobs of a shell ignore it
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as tool:
         assert tool.stderr is not None
         assert "lit for 60 s at most" in tool.stderr.readline()

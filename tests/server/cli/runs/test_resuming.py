@@ -19,11 +19,10 @@ SHOTS = 5
 
 @pytest.fixture(autouse=True)
 def heard() -> Iterator[None]:
-    """Jobs in the background of a shell ignore SIGINT, and so do their children; SIGTERM would end the tests."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler), signal.signal(signal.SIGTERM, lambda *_: None)
+    """SIGTERM would end the tests."""
+    before = signal.signal(signal.SIGTERM, lambda *_: None)
     yield
-    signal.signal(signal.SIGINT, before[0])
-    signal.signal(signal.SIGTERM, before[1])
+    signal.signal(signal.SIGTERM, before)
 
 
 class Interrupting(io.StringIO):
