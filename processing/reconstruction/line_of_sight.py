@@ -14,6 +14,9 @@ from processing.reconstruction.planning.fixed_point import FixedPoint
 from processing.reconstruction.planning.plan import Plan
 from processing.reconstruction.slab_volume import SLAB_ROWS, SlabVolume, slabs_in
 
+ROWS_TOGETHER = 2 * _native.BLOCK_ROWS
+"""Rows y that the kernels see as one block; parts of a volume begin at multiples of them."""
+
 
 def line_of_sight(
     plan: Plan,
@@ -105,7 +108,7 @@ def slabs_of_sight(
         raise ValueError(f"slabs of shape {memory.shape}, they need ({nz}, one or more, {nx})")
     seen = plan.resample(images, threads, resampled)
     check_brightness(seen, method, memory.dtype)
-    return _slabs_seen(plan.bind(seen), method, memory, ny, threads)
+    return _slabs_seen(plan.bind(seen), method, memory, range(ny), ny, threads)
 
 
 def volume_of_sight(
@@ -133,12 +136,36 @@ def volume_of_sight(
     float
         No voxel of the slabs is brighter; above 0.
     """
+    return volume_seen(plan, plan.resample(images, threads, resampled), method, out, threads=threads)
+
+
+def volume_seen(
+    plan: Plan,
+    seen: Sequence[FixedPoint],
+    method: ReconstructionMethod,
+    out: NDArray[Any],
+    *,
+    rows: range | None = None,
+    threads: int = DEFAULT_THREADS,
+) -> tuple[SlabVolume, float]:
+    """The same slabs, or some rows y of them, of images that are resampled already.
+
+    Parameters
+    ----------
+    plan, method, out, threads
+        As ``volume_of_sight`` takes them.
+    seen : sequence of FixedPoint
+        The images of all views, as ``Plan.resample`` returns them; they stay as they are.
+    rows : range, optional
+        From a multiple of ``ROWS_TOGETHER`` on; by default all.
+    """
     check_method(method)
-    seen = plan.resample(images, threads, resampled)
+    ny = plan.grid.shape[1]
     brightest = brightest_voxel(seen, method) or 1.0
     voxels = VoxelType(out.dtype.name)
     unit = 1.0 if voxels is VoxelType.FLOAT32 else 2.0 ** math.ceil(math.log2(brightest))
-    slabs = _slabs_seen(plan.bind(_in_unit(seen, method, unit)), method, out, plan.grid.shape[1], threads)
+    views = plan.bind(_in_unit(seen, method, unit))
+    slabs = _slabs_seen(views, method, out, rows or range(ny), ny, threads)
     return SlabVolume(slabs, voxels, unit), brightest / unit
 
 
@@ -152,9 +179,14 @@ def _in_unit(images: Sequence[FixedPoint], method: ReconstructionMethod, unit: f
 
 
 def _slabs_seen(
-    views: Sequence[_native.View], method: ReconstructionMethod, memory: NDArray[Any], grid_rows: int, threads: int
+    views: Sequence[_native.View],
+    method: ReconstructionMethod,
+    memory: NDArray[Any],
+    rows: range,
+    grid_rows: int,
+    threads: int,
 ) -> Iterator[tuple[int, NDArray[Any]]]:
-    for first_row, slab in slabs_in(memory, grid_rows):
+    for first_row, slab in slabs_in(memory, rows):
         _native.line_of_sight(views, method, slab, threads, first_row, grid_rows)
         yield first_row, slab
 

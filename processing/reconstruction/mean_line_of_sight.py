@@ -87,7 +87,7 @@ def mean_slabs(
 
 def _slabs(batch: Batch, method: ReconstructionMethod, shape: tuple[int, int, int], threads: int) -> Slabs:
     nz, ny, nx = shape
-    for first_row, slab in slabs_in(np.empty((nz, min(SLAB_ROWS, ny), nx), np.float32), ny):
+    for first_row, slab in slabs_in(np.empty((nz, min(SLAB_ROWS, ny), nx), np.float32), range(ny)):
         slab.fill(0)
         _native.sum_of_sight(batch, method, slab, threads, first_row, ny)
         slab /= np.float32(len(batch))

@@ -85,11 +85,11 @@ class SlabVolume:
             yield first_row, np.multiply(slab, np.float32(self.unit), dtype=np.float32)
 
 
-def slabs_in(memory: NDArray[Any], grid_rows: int) -> Iterator[tuple[int, NDArray[Any]]]:
-    """First row and memory of each slab of a grid with so many rows y, all in the same memory (nz, rows, nx)."""
+def slabs_in(memory: NDArray[Any], grid_rows: range) -> Iterator[tuple[int, NDArray[Any]]]:
+    """First row and memory of each slab of these rows y of a grid, all in the same memory (nz, rows, nx)."""
     nz, rows, nx = memory.shape
-    for first_row in range(0, grid_rows, rows):
-        here = min(rows, grid_rows - first_row)
+    for first_row in grid_rows[::rows]:
+        here = min(rows, grid_rows.stop - first_row)
         yield first_row, memory.reshape(-1)[: nz * here * nx].reshape(nz, here, nx)
 
 

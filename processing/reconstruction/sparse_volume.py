@@ -120,6 +120,6 @@ class SparseVolume:
         return max(float(slab.max()) for _, slab in self._written(memory, threads)) or 1.0
 
     def _written(self, out: NDArray[Any], threads: int) -> Iterator[tuple[int, NDArray[Any]]]:
-        for first_row, slab in slabs_in(out, self.blocks.shape[1]):
+        for first_row, slab in slabs_in(out, range(self.blocks.shape[1])):
             self.blocks.write(slab, threads, first_row, 1.0)
             yield first_row, slab

@@ -4,7 +4,7 @@ Any smooth mapping will do: polynomials, refracting windows, any roll, mirrors.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -56,6 +56,12 @@ class NodeView:
         """(rows, columns) of the averaged image with its frame."""
         width, height = (n // self.binning + FRAME_BEFORE_PX + FRAME_AFTER_PX for n in self.image_size_px)
         return height, width
+
+    def between(self, planes: range) -> "NodeView":
+        """The same view of some planes z, of which the first one has nodes; ValueError if it has none."""
+        if planes.start % self.spacing:
+            raise ValueError(f"planes from {planes.start} on, nodes are at every {self.spacing}th")
+        return replace(self, nodes=np.ascontiguousarray(self.nodes[:, planes.start // self.spacing :]))
 
     def resample(self, image: NDArray[np.float32], out: NDArray[np.int16], threads: int) -> FixedPoint:
         """The image, averaged and framed with zeros, in ``out``.

@@ -6,7 +6,7 @@ through the full camera model with all its distortion; from there on no camera m
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -73,6 +73,12 @@ class RectifiedView:
     foot: tuple[float, float, float]
     image_size_px: tuple[int, int]
     deviation_px: float
+
+    def between(self, planes: range) -> "RectifiedView":
+        """The same view of some planes z."""
+        some = slice(planes.start, planes.stop)
+        shifts = {"shift_u_px": self.shift_u_px[some], "shift_v_px": self.shift_v_px[some]}
+        return replace(self, scale=self.scale[some], **shifts)
 
     def resample(self, image: NDArray[np.float32], out: NDArray[np.int16], threads: int) -> FixedPoint:
         """The image on the plane z_ref, in ``out``: cubic, zero outside of the recorded image, limited to its range.
