@@ -3,7 +3,8 @@
 A plan of a smaller grid would resample the images in another way, and be off by some 1e-4.
 """
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Self
 
@@ -14,6 +15,7 @@ from processing.kernels import DEFAULT_THREADS
 from processing.preprocessing import Intensity
 from processing.reconstruction.byte_slabs import in_bytes
 from processing.reconstruction.choices import ReconstructionMethod, VoxelType
+from processing.reconstruction.errors import ReconstructionError
 from processing.reconstruction.line_of_sight import ROWS_TOGETHER, volume_seen
 from processing.reconstruction.planning.fixed_point import FixedPoint
 from processing.reconstruction.planning.plan import PLANES_TOGETHER, Plan
@@ -21,6 +23,15 @@ from processing.volume import VoxelGrid
 
 _ROWS_AT_ONCE = 2 * ROWS_TOGETHER
 """A block for each of two threads; of the paper's volume 37 MB."""
+
+MOST_VOXELS = 1 << 24
+"""Of a part: 256 along each axis, 67 MB of float32."""
+RangesMm = Mapping[str, tuple[float, float] | None]
+"""From and to along x, y, z; None stands for all of the axis."""
+
+
+class PartError(ReconstructionError):
+    """There is no such part of a volume, or it is too large; the text names the limit."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +58,29 @@ class Part:
         first = np.array([self.z.start, self.y.start, self.x.start], dtype=np.float64)
         x_mm, y_mm, z_mm = whole.to_mm(first).tolist()
         return VoxelGrid(self.shape, (x_mm, y_mm, z_mm), whole.pitch_mm)
+
+
+def part_within(grid: VoxelGrid, ranges_mm: RangesMm) -> Part:
+    """The voxels whose centres lie in some ranges; where a range is one place, the plane that is nearest to it."""
+    part = Part(**{axis: _within(axis, getattr(grid, f"{axis}_mm"), ranges_mm.get(axis)) for axis in "zyx"})
+    if (count := math.prod(part.shape)) > MOST_VOXELS:
+        size = " x ".join(map(str, part.shape))
+        raise PartError(f"{size} = {count} voxels, limit {MOST_VOXELS}: ask for parts, or download volume.vtkhdf")
+    return part
+
+
+def _within(axis: str, centres_mm: NDArray[np.float64], span_mm: tuple[float, float] | None) -> range:
+    if span_mm is None:
+        return range(len(centres_mm))
+    low_mm, high_mm = span_mm
+    if low_mm == high_mm:
+        low_mm = high_mm = float(centres_mm[np.abs(centres_mm - low_mm).argmin()])
+    begin, end = np.searchsorted(centres_mm, [low_mm, np.nextafter(high_mm, np.inf)]).tolist()
+    first_mm, last_mm = float(centres_mm[0]), float(centres_mm[-1])
+    if begin >= end or not first_mm <= span_mm[1] or not span_mm[0] <= last_mm:
+        asked = f"{axis} from {span_mm[0]:g} to {span_mm[1]:g} mm"
+        raise PartError(f"{asked}: no voxel there, the volume has {axis} from {first_mm:g} to {last_mm:g} mm")
+    return range(begin, end)
 
 
 @dataclass(frozen=True, eq=False)

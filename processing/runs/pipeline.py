@@ -16,7 +16,7 @@ from processing.calibration.calibration_file import file_sha256, load_calibratio
 from processing.kernels import DEFAULT_THREADS
 from processing.preprocessing import Intensity
 from processing.reconstruction.planning.common_volume import common_volume
-from processing.reconstruction.planning.plan import plan_reconstruction
+from processing.reconstruction.planning.plan import Plan, plan_reconstruction
 from processing.reconstruction.planning.planned_view import PlannedView
 from processing.reconstruction.reconstructor import Reconstructor
 from processing.reconstruction.settings import METHOD_VERSION, FrozenValue, GridSettings, ReconstructionSettings
@@ -251,9 +251,13 @@ def provenance_of(
 def _reconstructor(
     calibration: Calibration, settings: ReconstructionSettings, views: Sequence[str], threads: int
 ) -> Reconstructor:
+    return Reconstructor.of(plan_of(calibration, settings, views), settings, threads)
+
+
+def plan_of(calibration: Calibration, settings: ReconstructionSettings, views: Sequence[str]) -> Plan:
+    """Where these views see the grid of the settings, or the default one."""
     grid = settings.grid.to_grid() if settings.grid else default_grid(calibration)
-    plan = plan_reconstruction([calibration.views[view].mapping for view in views], grid, settings.accuracy, views)
-    return Reconstructor.of(plan, settings, threads)
+    return plan_reconstruction([calibration.views[view].mapping for view in views], grid, settings.accuracy, views)
 
 
 def _widened(span_mm: tuple[float, float]) -> tuple[float, float]:

@@ -22,17 +22,27 @@ def read_references(run: RunReader) -> References:
     return {view: (run.dark(view), run.background(view)) for view in run.header.views}
 
 
-class _Latest(Generic[Made]):
-    """What was made last, for as long as the same is asked for."""
+class Latest(Generic[Made]):
+    """What was asked for last: so many things, of which the one that nobody asks for any more makes room.
 
-    def __init__(self) -> None:
-        self._made: tuple[Hashable, Made] | None = None
+    Parameters
+    ----------
+    most : int
+        As many are kept.
+    """
+
+    def __init__(self, most: int = 1) -> None:
+        self._most = most
+        self._made: dict[Hashable, Made] = {}
 
     def of(self, key: Hashable, make: Callable[[], Made]) -> Made:
-        if self._made is None or self._made[0] != key:
-            self._made = None  # so that its memory is free before the next one is made
-            self._made = (key, make())
-        return self._made[1]
+        """What stands for the key, made now if it is not there."""
+        if key not in self._made:
+            while len(self._made) >= self._most:  # first, so that its memory is free
+                del self._made[next(iter(self._made))]
+        made = self._made.pop(key) if key in self._made else make()
+        self._made[key] = made
+        return made
 
 
 class Workbench:
@@ -43,8 +53,8 @@ class Workbench:
 
     def __init__(self) -> None:
         self._lock = Lock()
-        self._references: _Latest[References] = _Latest()
-        self._reconstructor: _Latest[Reconstructor] = _Latest()
+        self._references: Latest[References] = Latest()
+        self._reconstructor: Latest[Reconstructor] = Latest()
 
     @contextmanager
     def occupied(self) -> Iterator["Workbench"]:

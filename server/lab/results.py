@@ -14,11 +14,17 @@ from pydantic import Field
 
 from daq.frozen_model import FrozenModel
 from processing.calibration.verdict import BELONGING
+from processing.errors import BadInput
+from processing.reconstruction.choices import ReconstructionMethod
+from processing.reconstruction.settings import ReconstructionSettings
 from processing.reconstruction.slab_volume import SlabVolume
 from processing.reconstruction.volume_file import VolumeFileError, open_volume, write_slabs
+from processing.reconstruction.volume_part import PartError, RangesMm
 from processing.runs.results_file import Provenance, volume_files
+from processing.runs.volume_parts import Recipe, VolumePart, VolumeParts, stored_part
 from processing.volume import VoxelGrid
-from server.lab.errors import Damaged, NotFound
+from server.lab.calibrations import CalibrationStore
+from server.lab.errors import Conflict, Damaged, NotFound, Unprocessable
 from server.pictures.previews import (
     GrowingPreview,
     VolumePreview,
@@ -166,6 +172,55 @@ def remaking(volume: Path) -> dict[str, Any]:
         }
     except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
         raise Damaged(f"{volume.name} cannot be made again: its preview does not say how ({error})") from error
+
+
+def part_of(
+    parts: VolumeParts,
+    volume: Path,
+    calibrations: CalibrationStore,
+    ranges_mm: RangesMm,
+    method: ReconstructionMethod | None = None,
+) -> VolumePart:
+    """A slice or a region of a volume at full resolution, by its own method or by another line-of-sight method.
+
+    Raises
+    ------
+    Damaged
+        Nobody can read any more how the volume was made.
+    Conflict
+        It cannot be made from the images: of an iterative method, before the whole volume is stored; or where run or
+        calibration are not the same any more.
+    Unprocessable
+        There is no such part, or it is too large.
+    """
+    recipe = _recipe(volume, calibrations)
+    chosen = method or recipe.settings.method
+    try:
+        if not chosen.iterative:
+            return parts.seen(recipe, ranges_mm, chosen)
+        if chosen is recipe.settings.method and volume.is_file():
+            return stored_part(volume, ranges_mm, chosen)
+    except PartError as error:
+        raise Unprocessable(str(error)) from error
+    except (BadInput, FileNotFoundError) as error:
+        raise Conflict(f"{volume.name}: {error}") from error
+    raise Conflict(
+        f"{volume.name}: {chosen.value} computes the whole volume, no part of it alone; download volume.vtkhdf of a "
+        "result by this method, then its parts can be seen; or ask for one by method=mlos"
+    )
+
+
+def _recipe(volume: Path, calibrations: CalibrationStore) -> Recipe:
+    preview_of(volume)  # made of a volume that other hands have written, with what that says of itself
+    again = remaking(volume)
+    return Recipe(
+        run_dir=Path(again["run_dir"]),
+        shot=again["shot"],
+        frame="a" if volume.stem.endswith("_a") else "b",
+        calibration_file=calibrations.path(Path(again["calibration_file"]).stem),
+        settings=ReconstructionSettings.model_validate(again["settings"]),
+        made_by=load_provenance(preview_path(volume)),
+    )
 
 
 @lru_cache(maxsize=16)

@@ -10,6 +10,7 @@ from daq.run.events import RunStatus
 from daq.run_plan import LivePlan, RunPlan
 from daq.shot import Shot
 from processing.reconstruction.settings import ReconstructionSettings
+from processing.runs.volume_parts import VolumeParts
 from server.lab.calibrations import CalibrationStore
 from server.lab.duty import Duty, Lamp
 from server.lab.engine import Engine, Task
@@ -95,6 +96,7 @@ class Context:
     watch: CalibrationWatch
     monitor: RigMonitor
     live: LiveFeed
+    parts: VolumeParts
     duties: tuple[Duty, ...]
 
     @property

@@ -17,6 +17,7 @@ from starlette.exceptions import HTTPException
 from starlette.routing import Match
 
 from daq.errors import DaqError
+from processing.runs.volume_parts import VolumeParts
 from server.lab.calibrations import CalibrationStore
 from server.lab.duty import Duty, Work
 from server.lab.job_recovery import opened_table
@@ -46,12 +47,27 @@ from server.web.api import (
     sign_in,
     single_shot,
     timing,
+    volume_parts,
 )
 from server.web.api.parameters import forbid_unknown_query
 from server.web.guard import Guard
 from server.web.ui.page import mount_page
 
-_RESOURCES = (rig, live_view, single_shot, runs, shots, droplets, results, calibrations, jobs, events, bench, timing)
+_RESOURCES = (
+    rig,
+    live_view,
+    single_shot,
+    runs,
+    shots,
+    droplets,
+    results,
+    volume_parts,
+    calibrations,
+    jobs,
+    events,
+    bench,
+    timing,
+)
 _METHODS = ["GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"]
 _SHUTDOWN_S = 3
 _DUTIES = ("processing", "automatic reconstruction", "lamps", "live view")
@@ -173,6 +189,7 @@ def _context(services: Services, table: JobTable, index: RunIndex) -> Context:
         watch=watch,
         monitor=RigMonitor(services.rig, services.data_dir, lambda: acquisition.status().resting),
         live=LiveFeed(services.rig.cameras, lambda: acquisition.newest_shot, acquisition.keep_live),
+        parts=VolumeParts(),
         duties=tuple(Duty(name, services.events) for name in _DUTIES),
     )
 

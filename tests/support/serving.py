@@ -79,7 +79,7 @@ def write_spray(job: dict[str, Any], should_stop: Callable[[], bool]) -> dict[st
             return {}
         path = results_dir / f"shot_{job['shot']:05d}_{frame}.vtkhdf"
         path.write_bytes(b"volume")
-        save_preview(preview_path(path), make_preview(volume.astype(np.float32), grid))
+        save_preview(preview_path(path), make_preview(volume.astype(np.float32), grid), {**record, "shot": job["shot"]})
         files.append({"shot": job["shot"], "frame": frame, "file": path.name, "seconds": 0.1})
     return {"shot": job["shot"], "volumes": files}
 

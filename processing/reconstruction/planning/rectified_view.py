@@ -77,8 +77,7 @@ class RectifiedView:
     def between(self, planes: range) -> "RectifiedView":
         """The same view of some planes z."""
         some = slice(planes.start, planes.stop)
-        shifts = {"shift_u_px": self.shift_u_px[some], "shift_v_px": self.shift_v_px[some]}
-        return replace(self, scale=self.scale[some], **shifts)
+        return replace(self, scale=self.scale[some], shift_u_px=self.shift_u_px[some], shift_v_px=self.shift_v_px[some])
 
     def resample(self, image: NDArray[np.float32], out: NDArray[np.int16], threads: int) -> FixedPoint:
         """The image on the plane z_ref, in ``out``: cubic, zero outside of the recorded image, limited to its range.

@@ -1,0 +1,107 @@
+"""/api/runs/{run_id}/results/{results_id}/{volume}: slices and regions at full resolution, made when asked for.
+
+A slice across z or y takes some milliseconds of CPU once its exposure has been looked at, one across x as long as the
+whole volume does. Every value is, bit by bit, that of the whole volume.
+"""
+
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, Query, Response
+
+from processing.reconstruction.choices import ReconstructionMethod
+from processing.runs.volume_parts import VolumePart
+from server.lab.results import part_of, preview_of, volume_file
+from server.lab.services import Context
+from server.pictures.pictures import plane_png
+from server.web.api.parameters import ContextOf, ResultsId, RunId
+from server.web.api.results import VolumeName
+from server.web.problems import responses
+
+router = APIRouter(prefix="/api/runs/{run_id}/results/{results_id}/{volume}", tags=["results"])
+
+_NUMBER = r"-?[0-9]{1,6}(\.[0-9]{1,9})?"
+_RANGE = rf"^{_NUMBER}(:{_NUMBER})?$"
+_PROBLEMS = responses(404, 409, 500)
+_SHORTLY = {"Cache-Control": "private, max-age=60"}
+LineOfSight = Annotated[
+    ReconstructionMethod | None,
+    Query(description="by another line-of-sight method than the volume was made by; smart and mart have no parts"),
+]
+Range = Annotated[
+    str | None, Query(pattern=_RANGE, description="from:to in mm, or one place for the nearest plane; default: all")
+]
+
+
+@router.get("/slice.png", response_class=Response, responses={**_PROBLEMS, 200: {"content": {"image/png": {}}}})
+def show_full_slice(
+    run_id: RunId,
+    results_id: ResultsId,
+    volume: VolumeName,
+    context: ContextOf,
+    axis: Annotated[Literal["x", "y", "z"], Query(description="of the world, across which the slice lies")],
+    at_mm: Annotated[float, Query(ge=-1e6, le=1e6, description="where; the nearest plane is shown")],
+    method: LineOfSight = None,
+) -> Response:
+    """A slice of the volume, coloured as its preview; by another method, up to the brightest voxel of the slice."""
+    part = _part(context, run_id, results_id, volume, {axis: (at_mm, at_mm)}, method)
+    plane = part.voxels.squeeze("zyx".index(axis))
+    file = volume_file(context.runs.directory(run_id), results_id, volume)
+    limit = preview_of(file).limit if method is None else float(plane.max())
+    png = plane_png(plane.T if axis == "x" else plane, limit)
+    return Response(png, media_type="image/png", headers={**_SHORTLY, **_place(part)})
+
+
+@router.get(
+    "/region.f32",
+    response_class=Response,
+    responses={**_PROBLEMS, 200: {"content": {"application/octet-stream": {}}}},
+)
+def show_region(
+    run_id: RunId,
+    results_id: ResultsId,
+    volume: VolumeName,
+    context: ContextOf,
+    x_mm: Range = None,
+    y_mm: Range = None,
+    z_mm: Range = None,
+    method: LineOfSight = None,
+) -> Response:
+    """Intensities, float32 little-endian, z slowest and x fastest; headers say shape, place and method.
+
+    ``Tomoshadow-Shape`` are the voxels along z, y, x; ``Tomoshadow-Origin-Mm`` is x, y, z of the first one's centre,
+    ``Tomoshadow-Pitch-Mm`` the edge of each. One place instead of a range makes a slice.
+    """
+    ranges_mm = {"x": _span(x_mm), "y": _span(y_mm), "z": _span(z_mm)}
+    part = _part(context, run_id, results_id, volume, ranges_mm, method)
+    return Response(
+        part.voxels.astype("<f4", copy=False).tobytes(), media_type="application/octet-stream", headers=_place(part)
+    )
+
+
+def _part(
+    context: Context,
+    run_id: str,
+    results_id: str,
+    volume: str,
+    ranges_mm: dict[str, tuple[float, float] | None],
+    method: ReconstructionMethod | None,
+) -> VolumePart:
+    file = volume_file(context.runs.directory(run_id), results_id, volume)
+    return part_of(context.parts, file, context.calibrations, ranges_mm, method)
+
+
+def _span(text: str | None) -> tuple[float, float] | None:
+    if text is None:
+        return None
+    low, _, high = text.partition(":")
+    return float(low), float(high or low)
+
+
+def _place(part: VolumePart) -> dict[str, str]:
+    grid = part.grid
+    return {
+        "Tomoshadow-Shape": ",".join(map(str, grid.shape)),
+        "Tomoshadow-Origin-Mm": ",".join(map(repr, grid.origin_mm)),
+        "Tomoshadow-Pitch-Mm": repr(grid.pitch_mm),
+        "Tomoshadow-Method": part.method.value,
+    }
