@@ -16,18 +16,19 @@ from daq.files.recovery import recover
 from daq.files.run_directory import RunWriter
 from daq.files.storage import disk_of
 from daq.run import light
-from daq.run.active_run import ActiveRun, RunObserver
 from daq.run.ending import RunEnding
 from daq.run.events import RunEvent, RunMessage, RunStatus
 from daq.run.limits import AcquisitionLimits
-from daq.run.live.active_live import ActiveLive, Audience, checked_plan
 from daq.run.live.live_session import LiveSession
+from daq.run.live.live_start import Audience, checked_plan
 from daq.run.preflight import PreparedRun, prepare_run
 from daq.run.progress import RunProgress
 from daq.run.session import RunSession
+from daq.run.shooting import RunObserver, Shooting
 from daq.run.state import RunState, RunStep, next_state
 from daq.run_plan import LivePlan, RunPlan
 from daq.shot import Shot
+from daq.timing import ShotTiming
 
 _ARMING_S = 10.0
 """What a live view may be busy with when it is asked to end: cameras that are being armed, one of them silent."""
@@ -142,8 +143,10 @@ class Acquisition:
             ending = self._ending = RunEnding()
             prepared, writer = self._prepare(plan)
             self._progress.begin(prepared.header.run_id, plan)
-            run = ActiveRun(self._rig, prepared, self._progress, self._limits, self._observers, ending)
-            self._start_thread(threading.Thread(target=self._work, args=(run, writer), name="acquisition", daemon=True))
+            session = RunSession(self._shooting(plan, prepared.timing, ending), prepared.references, writer)
+            self._start_thread(
+                threading.Thread(target=self._work, args=(session, ending), name="acquisition", daemon=True)
+            )
             return prepared.header.run_id
 
     def start_live(self, plan: LivePlan) -> None:
@@ -160,11 +163,9 @@ class Acquisition:
             self._end_live_before(RunStep.LIVE, "another live view starts")
             self._live_ending = ending
             self._audience.look()
-            live = ActiveLive(
-                self._rig, shots, timing, self._progress, self._limits, self._observers, self._audience, ending
-            )
+            session = LiveSession(self._shooting(shots, timing, ending), self._audience)
             self._progress.begin_live(plan)
-            self._start_thread(threading.Thread(target=LiveSession(live).work, name="live", daemon=True))
+            self._start_thread(threading.Thread(target=session.work, name="live", daemon=True))
 
     def keep_live(self) -> None:
         """Somebody looks: a live view that nobody looks at ends after a while."""
@@ -232,6 +233,9 @@ class Acquisition:
         finally:
             self._starting.release()
 
+    def _shooting(self, plan: RunPlan, timing: ShotTiming, ending: RunEnding) -> Shooting:
+        return Shooting(self._rig, plan, timing, self._progress, self._limits, self._observers, ending)
+
     def _start_thread(self, thread: threading.Thread) -> None:
         self._threads = [*(one for one in self._threads if one.is_alive()), thread]
         thread.start()
@@ -267,9 +271,9 @@ class Acquisition:
         except OSError as error:
             raise PlanError(f"the run cannot be stored, or its calibration not be read: {error}") from error
 
-    def _work(self, run: ActiveRun, writer: RunWriter) -> None:
+    def _work(self, session: RunSession, ending: RunEnding) -> None:
         """Thread: one run from ARMING until it rests, and longer only if the disk does not take its outcome."""
-        session, ending, progress = RunSession(run, writer), run.ending, run.progress
+        progress = self._progress
         session.acquire()
         progress.move(ending.step or RunStep.ERROR, message=ending.cause)
         light_reason = session.disarm()

@@ -5,8 +5,8 @@ from collections.abc import Callable
 from daq.causes import CauseCode
 from daq.errors import DaqError, DeviceError, DeviceOvertaken, DeviceRefused, InterlockOpen
 from daq.run import light
-from daq.run.active_run import Shooting
 from daq.run.ending import code_of
+from daq.run.shooting import Shooting
 from daq.run.side_by_side import disarm_cameras
 
 

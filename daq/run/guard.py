@@ -12,8 +12,8 @@ from typing import Self
 
 from daq.errors import DaqError, DeviceOvertaken
 from daq.run import light
-from daq.run.active_run import Shooting
 from daq.run.ending import code_of
+from daq.run.shooting import Shooting
 
 
 class RunGuard:

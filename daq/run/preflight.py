@@ -29,8 +29,6 @@ class PreparedRun:
     ----------
     run_dir : Path
         Where it will be stored.
-    plan : RunPlan
-        As the operator wrote it.
     header : RunHeader
         What the run is, but for its devices.
     timing : ShotTiming
@@ -40,7 +38,6 @@ class PreparedRun:
     """
 
     run_dir: Path
-    plan: RunPlan
     header: RunHeader
     timing: ShotTiming
     references: Mapping[RunKind, tuple[Path, ...]]
@@ -91,7 +88,7 @@ def prepare_run(
     light.check_permitted(rig)
     calibration_sha256 = hash_calibration(plan.calibration) if plan.calibration else None
     header = _header(data_dir, plan, views, configuration, calibration_sha256)
-    return PreparedRun(data_dir / header.run_id, plan, header, timing, references)
+    return PreparedRun(data_dir / header.run_id, header, timing, references)
 
 
 def permitted_timing(rig: Rig, plan: RunPlan) -> ShotTiming:

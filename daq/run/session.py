@@ -1,11 +1,12 @@
 """RunSession: one run on devices and disk, worked by the acquisition thread: acquire, disarm, close."""
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import asdict
 from datetime import UTC, datetime
 from functools import partial
+from pathlib import Path
 
 from daq.errors import DaqError, DeviceError, RecorderError, StorageError
 from daq.files.header import RunClosing
@@ -13,12 +14,12 @@ from daq.files.outcome_note import write_note
 from daq.files.run_directory import RunWriter
 from daq.files.storage import storing
 from daq.run import light
-from daq.run.active_run import ActiveRun
 from daq.run.darkness import attempt, darken, fail
 from daq.run.ending import code_of
 from daq.run.guard import RunGuard
 from daq.run.recorder import Recorder
 from daq.run.references import mean_images
+from daq.run.shooting import Shooting
 from daq.run.shots.shot_check import InvalidStreak, ShotFindings, Thresholds, check_exposures, light_thresholds
 from daq.run.shots.shot_taking import ShotTaker
 from daq.run.shots.train_check import train_deviation
@@ -34,14 +35,17 @@ class RunSession:
 
     Parameters
     ----------
-    run : ActiveRun
-        What to do, on which devices, and who is told.
+    run : Shooting
+        What to shoot, on which devices, and who is told.
+    references : Mapping[RunKind, tuple[Path, ...]]
+        Dark and background runs that belong to it.
     writer : RunWriter
         The open run.
     """
 
-    def __init__(self, run: ActiveRun, writer: RunWriter) -> None:
+    def __init__(self, run: Shooting, references: Mapping[RunKind, tuple[Path, ...]], writer: RunWriter) -> None:
         self._run = run
+        self._references = references
         self._rig = run.rig
         self._ending = run.ending
         self._writer = writer
@@ -89,7 +93,7 @@ class RunSession:
             write_note(self._writer.run_dir, self._closing())
 
     def _acquire(self) -> None:
-        plan = self._run.prepared.plan
+        plan = self._run.plan
         for observer in self._run.observers:
             observer.before_run(plan, self._writer.run_dir)
         self._write_devices()
@@ -136,11 +140,10 @@ class RunSession:
 
     def _copy_references(self) -> Thresholds:
         """Let dark and background images travel with the run; returns the levels above which an exposure is lit."""
-        prepared = self._run.prepared
-        dark, background = (mean_images(prepared.references[kind]) for kind in (RunKind.DARK, RunKind.BACKGROUND))
+        dark, background = (mean_images(self._references[kind]) for kind in (RunKind.DARK, RunKind.BACKGROUND))
         if dark or background:
             self._writer.write_references(dark, background)
-        bits = {view: view_format.bits for view, view_format in prepared.header.views.items()}
+        bits = {view: view_format.bits for view, view_format in self._writer.header.views.items()}
         return light_thresholds(bits, dark, background)
 
     def _start_recorder(self) -> Recorder:

@@ -14,7 +14,7 @@ from daq.drivers.pulse_protocol import Reply
 from daq.drivers.serial_pulse_generator import SerialPulseGenerator
 from daq.drivers.serial_stage import SerialStage, StageScale
 from daq.errors import DeviceUnavailable
-from daq.run.active_run import RunObserver
+from daq.run.shooting import RunObserver
 from daq.simulation.gpio_chip import CHIP_PATH, ChipUnsupported, SimulatedSwitchLine, free_line
 from daq.simulation.interlock import DoorSwitch, MemoryInterlock
 from server.rig.config import (

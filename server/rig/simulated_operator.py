@@ -15,7 +15,7 @@ _DRAIN_S = 20.0
 
 
 class SimulatedOperator:
-    """Observes the runs of a simulated rig, see ``daq.run.active_run.RunObserver``.
+    """Observes the runs of a simulated rig, see ``daq.run.shooting.RunObserver``.
 
     Parameters
     ----------

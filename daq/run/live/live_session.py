@@ -10,7 +10,8 @@ from itertools import count
 from daq.run import light
 from daq.run.darkness import attempt, darken
 from daq.run.guard import RunGuard
-from daq.run.live.active_live import ActiveLive
+from daq.run.live.live_start import Audience
+from daq.run.shooting import Shooting
 from daq.run.shots.shot_check import light_thresholds
 from daq.run.shots.shot_taking import ShotTaker
 from daq.run.state import RunStep
@@ -21,12 +22,15 @@ class LiveSession:
 
     Parameters
     ----------
-    live : ActiveLive
+    live : Shooting
         What to show, with which devices, and who is told.
+    audience : Audience
+        Who looks.
     """
 
-    def __init__(self, live: ActiveLive) -> None:
+    def __init__(self, live: Shooting, audience: Audience) -> None:
         self._live = live
+        self._audience = audience
         self._rig = live.rig
         self._ending = live.ending
 
@@ -62,5 +66,5 @@ class LiveSession:
 
     def _look_around(self) -> None:
         limit_s = self._live.limits.live_unwatched_s
-        if self._live.audience.absent_s > limit_s:
+        if self._audience.absent_s > limit_s:
             self._ending.end(RunStep.STOP, f"nobody has looked at the live view for {limit_s:g} s")

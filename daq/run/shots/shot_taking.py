@@ -9,7 +9,7 @@ import time
 from daq.devices import Camera
 from daq.errors import DeviceRefused
 from daq.run import light
-from daq.run.active_run import Shooting
+from daq.run.shooting import Shooting
 from daq.run.shots.firing_clock import FiringClock
 from daq.run.shots.shot_check import ShotFindings, Thresholds, check_exposures, marked
 from daq.run.shots.train_check import train_deviation

@@ -13,7 +13,7 @@ from daq.errors import BusyError, DeviceRefused, InterlockOpen, PlanError
 from daq.run.acquisition import Acquisition
 from daq.run.events import RunEvent, RunMessage, RunStatus, StateChanged
 from daq.run.limits import AcquisitionLimits
-from daq.run.live import active_live
+from daq.run.live import live_start
 from daq.run.state import RunOutcome, RunState
 from daq.run_plan import ImageKey, LivePlan, PulsePair, RunPlan
 from daq.shot import Shot
@@ -342,7 +342,7 @@ def test_it_ends_when_nobody_looks_and_not_before(tmp_path: Path) -> None:
 
 
 def test_the_generator_is_armed_again_for_the_next_shots(lab: Laboratory, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(active_live, "SHOTS_PER_ARMING", 2)
+    monkeypatch.setattr(live_start, "SHOTS_PER_ARMING", 2)
     lab.show(LIT)
     await_true(lambda: lab.memory.generator.fired == 5)
     assert [entry for entry in lab.memory.journal if entry.startswith("arm")] == ["arm 2"] * 3

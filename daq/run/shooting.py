@@ -1,4 +1,4 @@
-"""ActiveRun: what all parts of one run share while it is under way."""
+"""Shooting: what all parts of one run, or of one live view, share while it is under way."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -7,7 +7,6 @@ from typing import Protocol
 from daq.devices import Rig
 from daq.run.ending import RunEnding
 from daq.run.limits import AcquisitionLimits
-from daq.run.preflight import PreparedRun
 from daq.run.progress import RunProgress
 from daq.run_plan import RunPlan
 from daq.timing import ShotTiming
@@ -26,34 +25,18 @@ class RunObserver(Protocol):
         """After the last shot is on the disk, before the outcome is."""
 
 
-class Shooting(Protocol):
-    """What it takes to fire shots: a run under way is that, and so is a live view."""
-
-    @property
-    def rig(self) -> Rig: ...  # noqa: D102
-    @property
-    def plan(self) -> RunPlan: ...  # noqa: D102
-    @property
-    def timing(self) -> ShotTiming: ...  # noqa: D102
-    @property
-    def limits(self) -> AcquisitionLimits: ...  # noqa: D102
-    @property
-    def ending(self) -> RunEnding: ...  # noqa: D102
-
-    def say(self, text: str) -> None:
-        """Something is worth a line."""
-
-
 @dataclass(frozen=True)
-class ActiveRun:
-    """One run under way.
+class Shooting:
+    """A run or a live view under way.
 
     Parameters
     ----------
     rig : Rig
         Open devices.
-    prepared : PreparedRun
-        What to do.
+    plan : RunPlan
+        What to shoot.
+    timing : ShotTiming
+        Edges of every shot.
     progress : RunProgress
         Told of everything that happens.
     limits : AcquisitionLimits
@@ -61,26 +44,21 @@ class ActiveRun:
     observers : tuple[RunObserver, ...]
         Who else takes part.
     ending : RunEnding
-        Ends the run early, and says how it ended.
+        Ends it, and says why.
+    quiet : bool
+        Nothing is worth a line.
     """
 
     rig: Rig
-    prepared: PreparedRun
+    plan: RunPlan
+    timing: ShotTiming
     progress: RunProgress
     limits: AcquisitionLimits
     observers: tuple[RunObserver, ...] = ()
     ending: RunEnding = field(default_factory=RunEnding)
-
-    @property
-    def plan(self) -> RunPlan:
-        """As the operator wrote it."""
-        return self.prepared.plan
-
-    @property
-    def timing(self) -> ShotTiming:
-        """Edges of every shot."""
-        return self.prepared.timing
+    quiet: bool = False
 
     def say(self, text: str) -> None:
         """Something is worth a line."""
-        self.progress.say(text)
+        if not self.quiet:
+            self.progress.say(text)

@@ -1,16 +1,11 @@
-"""ActiveLive: what all parts of one live view share while it is under way."""
+"""What a live view starts from: a plan that the rig permits, and somebody who looks."""
 
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 
 from daq.devices import Rig
 from daq.run import light
-from daq.run.active_run import RunObserver
-from daq.run.ending import RunEnding
-from daq.run.limits import AcquisitionLimits
 from daq.run.preflight import permitted_timing
-from daq.run.progress import RunProgress
 from daq.run_plan import LivePlan, PulsePair, RunKind, RunPlan
 from daq.timing import CameraTiming, ShotTiming
 
@@ -32,48 +27,6 @@ class Audience:
     def absent_s(self) -> float:
         """Time since."""
         return time.monotonic() - self._looked_s
-
-
-@dataclass(frozen=True)
-class ActiveLive:
-    """One live view under way; a ``daq.run.active_run.Shooting``.
-
-    Parameters
-    ----------
-    rig : Rig
-        Open devices.
-    plan : RunPlan
-        The same as a run: of samples, or dark where the light is that of the room.
-    timing : ShotTiming
-        Edges of every shot.
-    progress : RunProgress
-        Gets every shot.
-    limits : AcquisitionLimits
-        Deadlines.
-    observers : tuple[RunObserver, ...]
-        Who prepares the rig before anything is shot.
-    audience : Audience
-        Who looks.
-    ending : RunEnding
-        Ends it, and says why.
-    quiet : bool
-        Nothing is worth a line.
-    """
-
-    rig: Rig
-    plan: RunPlan
-    timing: ShotTiming
-    progress: RunProgress
-    limits: AcquisitionLimits
-    observers: tuple[RunObserver, ...] = ()
-    audience: Audience = field(default_factory=Audience)
-    ending: RunEnding = field(default_factory=RunEnding)
-    quiet: bool = False
-
-    def say(self, text: str) -> None:
-        """Something is worth a line."""
-        if not self.quiet:
-            self.progress.say(text)
 
 
 def checked_plan(rig: Rig, live: LivePlan) -> tuple[RunPlan, ShotTiming]:
