@@ -102,3 +102,17 @@ class Cause:
     at_utc: Annotated[str, Field(description="when it was noticed, ISO 8601")] = field(
         default_factory=lambda: datetime.now(UTC).isoformat()
     )
+
+    @property
+    def remedy(self) -> str:
+        """What to do."""
+        return EXPLANATIONS[self.code].remedy
+
+
+_NEEDS_NO_WORD = frozenset({CauseCode.STOPPED, CauseCode.ABORTED, CauseCode.PROGRAM_ENDED, CauseCode.LIGHT_NOT_OFF})
+"""What the operator did himself, and what the state FAULT stands for."""
+
+
+def to_acknowledge(causes: tuple[Cause, ...]) -> tuple[Cause, ...]:
+    """What an operator has to acknowledge one by one, so that no cause hides another; a single one hides none."""
+    return tuple(cause for cause in causes if cause.code not in _NEEDS_NO_WORD) if len(causes) > 1 else ()

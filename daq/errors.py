@@ -13,6 +13,7 @@
     │   ├── DeviceOvertaken     it was switched off while it was asked
     │   └── ProtocolError       it answered something that makes no sense
     ├── InterlockOpen         the light must not be switched on
+    ├── NotAcknowledged       a cause of the last run waits to be acknowledged
     ├── InvalidShots          too many shots are invalid
     ├── RecorderError         a shot could not be stored
     │   ├── RecorderOverflow    the disk does not keep up
@@ -98,6 +99,10 @@ class ProtocolError(DeviceError):
 
 class InterlockOpen(DaqError):
     """The interlock is open: the light must not be switched on."""
+
+
+class NotAcknowledged(DaqError):
+    """A run ended for several reasons, and some of them are still to be acknowledged; the text names them."""
 
 
 class InvalidShots(DaqError):

@@ -5,13 +5,14 @@ import signal
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
 from daq.causes import CauseCode
 from daq.devices import Rig
-from daq.errors import BusyError, PlanError, StorageError
+from daq.errors import BusyError, NotAcknowledged, PlanError, StorageError
 from daq.files.recovery import recover
 from daq.files.run_directory import RunWriter
 from daq.files.storage import disk_of
@@ -40,9 +41,8 @@ def _nobody_listens(_: RunEvent) -> None:
     """Events are for who wants them."""
 
 
-def _no_calibration_store(_: str) -> str | None:
+def _no_calibration_store(_: str) -> None:
     """Without a store of calibrations a run names its calibration, but not its hash."""
-    return None
 
 
 class Acquisition:
@@ -132,6 +132,8 @@ class Acquisition:
         ------
         BusyError
             A run is active or just starting, a fault waits to be acknowledged, or the program is ending.
+        NotAcknowledged
+            What ended last had several causes, and not all of them are acknowledged.
         PlanError
             The plan cannot run on this rig, or the disk does not hold it; the text names value and limit.
         InterlockOpen
@@ -144,17 +146,16 @@ class Acquisition:
             prepared, writer = self._prepare(plan)
             self._progress.begin(prepared.header.run_id, plan)
             session = RunSession(self._shooting(plan, prepared.timing, ending), prepared.references, writer)
-            self._start_thread(
-                threading.Thread(target=self._work, args=(session, ending), name="acquisition", daemon=True)
-            )
-            return prepared.header.run_id
+            work = partial(self._work, session, ending)
+            self._start_thread(threading.Thread(target=work, name="acquisition", daemon=True))
+        return prepared.header.run_id
 
     def start_live(self, plan: LivePlan) -> None:
         """Check the plan and show the rig live. A live view of another plan ends first.
 
         Raises
         ------
-        BusyError, PlanError, InterlockOpen, DeviceError
+        BusyError, NotAcknowledged, PlanError, InterlockOpen, DeviceError
             As for a run.
         """
         with self._starting_alone(RunStep.LIVE):
@@ -199,21 +200,24 @@ class Acquisition:
             light.try_to_switch_off(self._rig)
 
     def acknowledge(self) -> None:
-        """Clear the generator's latched faults, and leave FAULT if the light is off.
+        """Clear the generator's latched faults, and acknowledge the first cause that waits; the last one ends FAULT.
 
         Raises
         ------
         BusyError
             A run is active.
+        InterlockOpen
+            The interlock is the cause, and still open.
         DeviceError
             The generator does not answer, refuses, or is still armed.
         """
-        state = self.status().state
-        if state is not RunState.IDLE:
-            next_state(state, RunStep.ACKNOWLEDGE)
+        status = self.status()
+        if status.state is not RunState.IDLE:
+            next_state(status.state, RunStep.ACKNOWLEDGE)
+        if any(cause.code is CauseCode.INTERLOCK_OPEN for cause in status.to_acknowledge[:1]):
+            light.check_closed(self._rig)
         light.acknowledge_faults(self._rig)
-        if state is RunState.FAULT:
-            self._progress.move(RunStep.ACKNOWLEDGE)
+        self._progress.acknowledge()
 
     def wait(self, deadline_s: float) -> RunStatus:
         """Wait until no run and no live view is under way; returns the status then, or the one at the deadline."""
@@ -229,6 +233,7 @@ class Acquisition:
             next_state(RunState.IDLE if state is RunState.LIVE else state, step)
             if self._left:
                 raise BusyError(f"no run starts any more: {self._left}")
+            self._check_acknowledged()
             yield
         finally:
             self._starting.release()
@@ -246,6 +251,12 @@ class Acquisition:
         limits = self._limits
         status = self._progress.wait(_ARMING_S + limits.frame_s + limits.light_off_s + limits.disarm_s)
         next_state(status.state, step)
+        self._check_acknowledged()
+
+    def _check_acknowledged(self) -> None:
+        if waiting := self.status().to_acknowledge:
+            texts = "; ".join(cause.text for cause in waiting)
+            raise NotAcknowledged(f"what ended last had more than one cause; to be acknowledged one by one: {texts}")
 
     def _end_at_once(self, cause: str, code: CauseCode) -> None:
         for ending in (self._ending, self._live_ending):
@@ -273,13 +284,13 @@ class Acquisition:
 
     def _work(self, session: RunSession, ending: RunEnding) -> None:
         """Thread: one run from ARMING until it rests, and longer only if the disk does not take its outcome."""
-        progress = self._progress
         session.acquire()
-        progress.move(ending.step or RunStep.ERROR, message=ending.cause)
+        self._progress.move(ending.step or RunStep.ERROR, message=ending.cause)
         light_reason = session.disarm()
         session.close()
         step = RunStep.LIGHT_UNKNOWN if light_reason else RunStep.LIGHT_OFF
-        progress.move(step, outcome=ending.outcome, message=ending.cause or progress.status().summary)
+        message = ending.cause or self.status().summary
+        self._progress.end(step, ending, outcome=ending.outcome, message=message)
         session.insist(self._leaving)
 
 

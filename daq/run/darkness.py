@@ -33,12 +33,24 @@ def fail(run: Shooting, error: Exception) -> None:
 
 def darken(run: Shooting) -> str | None:
     """Light off, then cameras; returns why the light could not be confirmed off."""
+    _look_for_more_causes(run)
     reason = light.confirm_off(run.rig, run.limits.light_off_s)
     if reason:
         run.ending.fail(DaqError(f"light not confirmed off: {reason}"), CauseCode.LIGHT_NOT_OFF)
     for problem in disarm_cameras(run.rig.cameras, run.limits.disarm_s).values():
         run.say(problem)
     return reason
+
+
+def _look_for_more_causes(run: Shooting) -> None:
+    """What has failed may have had two reasons: an open door hides that the generator was reset."""
+    if not run.ending.at_once:
+        return
+    for look in (light.check_generator, light.check_permitted):
+        try:
+            look(run.rig)
+        except DaqError as error:
+            run.ending.fail(error, code_of(error, run.rig))
 
 
 def _reason_of(run: Shooting, error: Exception) -> Exception:

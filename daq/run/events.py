@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from daq.causes import Cause
 from daq.run.state import RunOutcome, RunState
 from daq.run_plan import LivePlan, RunPlan
 
@@ -26,6 +27,8 @@ class RunStatus:
         What the run named by ``run_id`` was asked to do; known although its directory may be gone.
     live : LivePlan | None
         What the live view shows; None in every other state.
+    to_acknowledge : tuple[Cause, ...]
+        Where there was more than one cause: those that wait to be acknowledged, one by one. Nothing starts before.
     """
 
     state: RunState = RunState.IDLE
@@ -37,6 +40,7 @@ class RunStatus:
     message: str = ""
     plan: RunPlan | None = None
     live: LivePlan | None = None
+    to_acknowledge: tuple[Cause, ...] = ()
 
     @property
     def active(self) -> bool:

@@ -8,6 +8,7 @@ from daq.devices import GeneratorState, Rig
 from daq.errors import DeviceError, DeviceRefused, InterlockOpen
 
 _RETRY_S = 0.05
+_OPEN_STOPS = frozenset({"interlock", "estop"})
 _LIGHT_STATES = frozenset({GeneratorState.ARMED, GeneratorState.LIT})
 
 
@@ -30,6 +31,19 @@ def check_permitted(rig: Rig) -> None:
         raise InterlockOpen(f"{rig.generator.name}: the emergency stop of the pulse generator is open")
     if status.state is GeneratorState.FAULT:  # last: an open door is why, and the generator may know of it first
         raise DeviceRefused(rig.generator.name, f"fault: {', '.join(status.faults)}; acknowledge it first")
+
+
+def check_generator(rig: Rig) -> None:
+    """DeviceError if the generator does not answer, or has a fault that an open interlock does not explain."""
+    own = [fault for fault in rig.generator.status().faults if fault not in _OPEN_STOPS]
+    if own:
+        raise DeviceError(rig.generator.name, f"fault: {', '.join(own)}")
+
+
+def check_closed(rig: Rig) -> None:
+    """Refuse to go on while the interlock is open; InterlockOpen says so."""
+    if not rig.interlock.is_closed():
+        raise InterlockOpen(f"{rig.interlock.name}: the interlock is open; close it, then acknowledge")
 
 
 def switch_off(rig: Rig) -> None:
@@ -67,10 +81,9 @@ def acknowledge_faults(rig: Rig) -> None:
     switch_off(rig)
     try:
         rig.generator.clear()
-    except DeviceRefused as refused:
-        if rig.interlock.is_closed():
-            raise
-        raise InterlockOpen(f"{rig.interlock.name}: the interlock is open; close it, then acknowledge") from refused
+    except DeviceRefused:
+        check_closed(rig)
+        raise
     _check_off(rig)
 
 

@@ -5,6 +5,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+from daq.causes import to_acknowledge
+from daq.run.ending import RunEnding
 from daq.run.events import RunEvent, RunMessage, RunStatus, ShotRecorded, StateChanged
 from daq.run.state import RunState, RunStep, next_state
 from daq.run_plan import LivePlan, RunPlan
@@ -57,6 +59,24 @@ class RunProgress:
             self._publish(StateChanged(run_id, state, outcome, status.message))
             self._changed.notify_all()
 
+    def end(self, step: RunStep, ending: RunEnding, **changes: Any) -> None:
+        """A run or a live view is over; if it had several causes, each is to be acknowledged by itself."""
+        with self._changed:
+            waiting = to_acknowledge(ending.causes)
+            for cause in waiting[1:]:
+                self.tell(self._run_id, f"a second cause, to be acknowledged by itself: {cause.text}")
+            self.move(step, to_acknowledge=waiting, **changes)
+
+    def acknowledge(self) -> None:
+        """The operator has seen to the first cause that waits; the last one ends FAULT."""
+        with self._changed:
+            waiting = self._status.to_acknowledge
+            if waiting:
+                self._status = replace(self._status, to_acknowledge=waiting[1:])
+                self.tell(self._run_id, f"acknowledged: {waiting[0].text}")
+            if self._status.state is RunState.FAULT and not waiting[1:]:
+                self.move(RunStep.ACKNOWLEDGE)
+
     @property
     def newest_shot(self) -> Shot | None:
         """What the rig saw last, in a run or a live view."""
@@ -78,7 +98,11 @@ class RunProgress:
         """Something is worth a line."""
         with self._changed:
             self._status = replace(self._status, message=text)
-            self.tell("" if self._status.live else self._status.run_id or "", text)
+            self.tell(self._run_id, text)
+
+    @property
+    def _run_id(self) -> str:
+        return "" if self._status.live else self._status.run_id or ""
 
     def tell(self, run_id: str, text: str) -> None:
         """Something is worth a line of a run that is over."""

@@ -8,14 +8,13 @@ from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 
-from daq.errors import DaqError, DeviceError, RecorderError, StorageError
+from daq.errors import DeviceError, RecorderError, StorageError
 from daq.files.header import RunClosing
 from daq.files.outcome_note import write_note
 from daq.files.run_directory import RunWriter
 from daq.files.storage import storing
 from daq.run import light
 from daq.run.darkness import attempt, darken, fail
-from daq.run.ending import code_of
 from daq.run.guard import RunGuard
 from daq.run.recorder import Recorder
 from daq.run.references import mean_images
@@ -66,7 +65,6 @@ class RunSession:
 
     def disarm(self) -> str | None:
         """Light off, then cameras; returns why the light could not be confirmed off."""
-        self._look_for_more_causes()
         return darken(self._run)
 
     def close(self) -> None:
@@ -189,13 +187,3 @@ class RunSession:
                 action()
 
         attempt(self._run, in_words)
-
-    def _look_for_more_causes(self) -> None:
-        """A run that has failed may have had two reasons: an open door hides that the generator was reset."""
-        if not self._ending.at_once:
-            return
-        for look in (self._rig.generator.status, partial(light.check_permitted, self._rig)):
-            try:
-                look()
-            except DaqError as error:
-                self._ending.fail(error, code_of(error, self._rig))

@@ -40,7 +40,7 @@ class LiveSession:
             attempt(self._live, self._show)
             light.try_to_switch_off(self._rig)
         step = RunStep.LIGHT_UNKNOWN if darken(self._live) else RunStep.LIGHT_OFF
-        self._live.progress.move(step, live=None, message=self._ending.cause)
+        self._live.progress.end(step, self._ending, live=None, message=self._ending.cause)
 
     def _show(self) -> None:
         live = self._live

@@ -6,9 +6,9 @@ from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import ConfigDict, Field
 
-from daq.causes import EXPLANATIONS, Cause, CauseCode
+from daq.causes import CauseCode
 from daq.files.run_directory import RunReader
 from daq.frozen_model import FrozenModel
 from daq.run.events import RunStatus
@@ -23,6 +23,8 @@ DAMAGED = "damaged"
 
 class RunCause(FrozenModel):
     """One reason why a run ended."""
+
+    model_config = ConfigDict(from_attributes=True)
 
     code: Annotated[CauseCode, Field(description="for programs; docs/operate.md lists them")]
     text: Annotated[str, Field(description="names device, value and limit")]
@@ -67,7 +69,7 @@ def summary_of(run: RunReader, image_keys: NDArray[np.int64]) -> RunSummary:
         created_utc=run.header.created_utc,
         outcome=outcome or RunOutcome.INTERRUPTED,
         cause=run.cause,
-        causes=_explained(run.causes),
+        causes=tuple(map(RunCause.model_validate, run.causes)),
         ended_utc=run.ended_utc,
         views=tuple(run.header.views),
         frames_per_shot=run.header.frames_per_shot,
@@ -76,13 +78,6 @@ def summary_of(run: RunReader, image_keys: NDArray[np.int64]) -> RunSummary:
         shots_unstored=run.unstored,
         shots_valid=int(np.count_nonzero(image_keys != ImageKey.INVALID)) if outcome else None,
         calibration=(plan.calibration if plan else None) or run.header.calibration_id,
-    )
-
-
-def _explained(causes: tuple[Cause, ...]) -> tuple[RunCause, ...]:
-    return tuple(
-        RunCause(code=one.code, text=one.text, remedy=EXPLANATIONS[one.code].remedy, at_utc=one.at_utc)
-        for one in causes
     )
 
 

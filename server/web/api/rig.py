@@ -8,6 +8,7 @@ from pydantic import ConfigDict, Field
 from daq.frozen_model import FrozenModel
 from daq.run.state import RunOutcome, RunState
 from server.lab.duty import Lamp
+from server.lab.runs.run_summary import RunCause
 from server.lab.watch import CalibrationStanding
 from server.web.api.parameters import ContextOf
 from server.web.problems import responses
@@ -27,6 +28,12 @@ class AcquisitionView(FrozenModel):
     shots_recorded: Annotated[int, Field(description="shots on the disk")]
     shots_valid: Annotated[int, Field(description="shots with every exposure, and light where it belongs")]
     message: Annotated[str, Field(description="what happened last; the cause where a run has failed")]
+    to_acknowledge: Annotated[
+        tuple[RunCause, ...],
+        Field(
+            description="several causes of what ended last, each to be acknowledged by itself before anything starts"
+        ),
+    ]
 
 
 class RigView(FrozenModel):
@@ -72,7 +79,7 @@ def abort_everything(context: ContextOf) -> AcquisitionView:
 
 @router.post("/acknowledge", status_code=202, responses=responses(409, 423, 503, 504))
 def acknowledge_fault(context: ContextOf) -> AcquisitionView:
-    """Leave the FAULT state: the operator has seen to the light."""
+    """The operator has seen to a fault, or to the first of several causes; the last one ends the state FAULT."""
     context.services.acquisition.acknowledge()
     return view_of_acquisition(context)
 

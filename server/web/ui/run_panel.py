@@ -33,7 +33,7 @@ class RunPanel:
                 self._stop.tooltip("Ends the run after the present shot")
                 ui.button("ABORT", icon="front_hand", on_click=self._on_abort, color="negative").classes("flex-1")
             self._acknowledge = ui.button("Acknowledge fault", icon="verified_user", on_click=self._on_acknowledge)
-            self._acknowledge.props("outline color=negative").classes("w-full")
+            self._acknowledge.props("outline no-caps color=negative").classes("w-full")
 
     def refresh(self) -> None:
         """Show the present state."""
@@ -46,6 +46,7 @@ class RunPanel:
         self._outcome.props(f"color={outcome_colour(status.outcome)}")
         self._outcome.set_visibility(bool(self._outcome.text))
         self._stop.set_enabled(status.active)
+        self._acknowledge.set_text(acknowledge_text(status))
         self._acknowledge.set_visibility(waits_for_acknowledgement(status, self._monitor.lamps))
 
     async def _on_abort(self) -> None:
@@ -66,7 +67,13 @@ async def _notify_failure(command: Callable[[], None]) -> None:
 def waits_for_acknowledgement(status: RunStatus, lamps: Sequence[Lamp]) -> bool:
     """True where an operator must clear a fault: of acquisition, or latched by a generator that is at rest."""
     latched = any(lamp.kind == "generator" and lamp.health is Health.FAULT for lamp in lamps)
-    return status.state is RunState.FAULT or (latched and status.resting)
+    return status.state is RunState.FAULT or bool(status.to_acknowledge) or (latched and status.resting)
+
+
+def acknowledge_text(status: RunStatus) -> str:
+    """What the button says: of several causes the one that comes next, so that none hides another."""
+    waiting = status.to_acknowledge
+    return f"Acknowledge 1 of {len(waiting)}: {waiting[0].text}" if waiting else "Acknowledge fault"
 
 
 def counts_text(status: RunStatus) -> str:

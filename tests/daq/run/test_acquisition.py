@@ -24,6 +24,7 @@ from daq.errors import (
     DeviceRefused,
     DeviceTimeout,
     InterlockOpen,
+    NotAcknowledged,
     PlanError,
 )
 from daq.files.recovery import INTERRUPTED_CAUSE
@@ -33,6 +34,7 @@ from daq.run.acquisition import Acquisition
 from daq.run.events import RunEvent, RunMessage, ShotRecorded, StateChanged
 from daq.run.limits import AcquisitionLimits
 from daq.run.state import RunOutcome, RunState
+from daq.run_plan import LivePlan
 from daq.shot import FiredTrain
 from daq.timing import CameraTiming
 from tests.support.memory_rig import DARK_COUNTS, LIT_COUNTS, MemoryRig
@@ -667,6 +669,42 @@ def test_a_second_cause_of_its_own_is_kept_beside_the_first(lab: Laboratory) -> 
     }
     assert reader.cause == reader.causes[0].text
     assert all(reader.header.created_utc < cause.at_utc <= reader.ended_utc for cause in reader.causes)
+
+
+def test_each_of_two_causes_is_acknowledged_by_itself(lab: Laboratory) -> None:
+    lab.start_and_await_shot(plan_of(**SLOW), 0)
+    lab.memory.generator.restarted = True
+    lab.memory.open_door()
+    causes = lab.acquisition.wait(DEADLINE_S).to_acknowledge
+    door, reset = "door: the interlock is open", "generator: the microcontroller was reset"
+    assert {cause.text for cause in causes} == {door, reset}
+    assert f"a second cause, to be acknowledged by itself: {causes[1].text}" in lab.messages()
+    with pytest.raises(InterlockOpen):
+        lab.acquisition.acknowledge()
+    lab.memory.close_door()
+    for left in (causes, causes[1:]):
+        assert lab.acquisition.status().to_acknowledge == left
+        with pytest.raises(NotAcknowledged, match=left[-1].text):
+            lab.acquisition.start(plan_of(1))
+        with pytest.raises(NotAcknowledged):
+            lab.acquisition.start_live(LivePlan(pulse=None))
+        lab.acquisition.acknowledge()
+        assert f"acknowledged: {left[0].text}" in lab.messages()
+    assert lab.run(plan_of(1)).outcome == "completed"
+
+
+def test_a_fault_is_left_with_the_last_cause(lab: Laboratory) -> None:
+    lab.start_and_await_shot(plan_of(**SLOW), 0)
+    lab.memory.generator.stuck = lab.memory.generator.restarted = True
+    lab.memory.interlock.open_door()
+    causes = lab.acquisition.wait(DEADLINE_S).to_acknowledge
+    assert {cause.code for cause in causes} == {CauseCode.INTERLOCK_OPEN, CauseCode.GENERATOR_FAILED}
+    lab.memory.generator.stuck = False
+    lab.memory.close_door()
+    lab.acquisition.acknowledge()
+    assert lab.acquisition.status().state is RunState.FAULT
+    lab.acquisition.acknowledge()
+    assert lab.acquisition.status().state is RunState.IDLE
 
 
 @pytest.mark.parametrize(

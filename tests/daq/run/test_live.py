@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from daq.devices import GeneratorState
-from daq.errors import BusyError, DeviceRefused, InterlockOpen, PlanError
+from daq.errors import BusyError, DeviceRefused, InterlockOpen, NotAcknowledged, PlanError
 from daq.run.acquisition import Acquisition
 from daq.run.events import RunEvent, RunMessage, RunStatus, StateChanged
 from daq.run.limits import AcquisitionLimits
@@ -285,6 +285,20 @@ def test_a_generator_fault_ends_it_and_waits_to_be_acknowledged(lab: Laboratory)
     with pytest.raises(DeviceRefused, match="heartbeat"):
         lab.acquisition.start_live(LIT)
     lab.acquisition.acknowledge()
+    lab.show(LIT)
+
+
+def test_two_causes_of_its_end_are_acknowledged_one_by_one(lab: Laboratory) -> None:
+    lab.show(SLOW)
+    lab.memory.generator.restarted = True
+    lab.memory.open_door()
+    assert len(lab.rest().to_acknowledge) == 2
+    lab.memory.close_door()
+    lab.acquisition.acknowledge()
+    with pytest.raises(NotAcknowledged):
+        lab.acquisition.start(RUN)
+    lab.acquisition.acknowledge()
+    lab.memory.generator.advance(1000)
     lab.show(LIT)
 
 

@@ -1,9 +1,10 @@
 import pytest
 
+from daq.causes import Cause, CauseCode
 from daq.run.events import RunStatus
 from daq.run.state import RunState
 from server.lab.duty import Health, Lamp
-from server.web.ui.run_panel import counts_text, waits_for_acknowledgement
+from server.web.ui.run_panel import acknowledge_text, counts_text, waits_for_acknowledgement
 
 
 def generator_lamp(health: Health) -> Lamp:
@@ -23,6 +24,14 @@ def generator_lamp(health: Health) -> Lamp:
 def test_a_fault_can_be_acknowledged_wherever_it_is_latched(state: RunState, generator: Health, waits: bool) -> None:
     door = Lamp(name="interlock", kind="interlock", health=Health.FAULT, detail="open")
     assert waits_for_acknowledgement(RunStatus(state=state), (door, generator_lamp(generator))) is waits
+
+
+def test_of_two_causes_the_button_names_the_first_and_how_many_wait() -> None:
+    causes = tuple(Cause(CauseCode.INTERLOCK_OPEN, text) for text in ("the door is open", "the generator was reset"))
+    status = RunStatus(to_acknowledge=causes)
+    assert waits_for_acknowledgement(status, ())
+    assert acknowledge_text(status) == "Acknowledge 1 of 2: the door is open"
+    assert acknowledge_text(RunStatus()) == "Acknowledge fault"
 
 
 def test_invalid_shots_are_never_left_out() -> None:
