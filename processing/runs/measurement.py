@@ -3,21 +3,19 @@
 import hashlib
 import json
 import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
 from daq.files.run_directory import RunReader, Shot
-from processing.analysis.droplets.bright_shot import BrightExposure, measure_bright
+from processing.analysis.droplets.bright_shot import measure_bright
 from processing.analysis.droplets.droplet_file import write_droplets
 from processing.analysis.droplets.droplet_search import MARGIN_VOXEL, DropletSearch, plan_droplets
-from processing.analysis.droplets.ghost_share import pooled
-from processing.analysis.droplets.measured_exposure import ShotVerdict
 from processing.analysis.droplets.shadows.light_search import Light
-from processing.analysis.droplets.shadows.shadow_shot import ShadowExposure, measure_shadows
+from processing.analysis.droplets.shadows.shadow_shot import measure_shadows
 from processing.analysis.droplets.size_correction import SizeCorrection, SizeRows
 from processing.calibration.calibration import Calibration
 from processing.calibration.calibration_file import load_calibration
@@ -33,15 +31,24 @@ from processing.runs.measured_images import (
     shadow_images,
     without_ignored,
 )
+from processing.runs.measured_shot import (
+    Exposure,
+    MeasuredShot,
+    ShotVelocity,
+    droplets_path,
+    shot_summary,
+    shot_velocities,
+    told_exposure,
+)
 from processing.runs.pipeline import Stopped, default_grid, provenance_of
 from processing.runs.recipe import recipe_sha256
 from processing.runs.results_file import FrameName, Provenance, claim_results
+from processing.runs.shots.separation import separation_of
 from processing.runs.shots.shot_images import frame_names, require_match
 from processing.runs.workbench import References, read_references
 
-METHOD_VERSION = 5
+METHOD_VERSION = 6
 """Of what the numbers in a file of droplets mean."""
-Exposure = BrightExposure | ShadowExposure
 
 
 class MeasureSettings(FrozenValue):
@@ -75,23 +82,6 @@ class MeasureSettings(FrozenValue):
         return f"droplets-{digest[:8]}"
 
 
-class ShotDroplets(FrozenValue):
-    """What became of one shot; of two exposures, the less favourable verdict and ratio, and the larger hidden share."""
-
-    shot: int
-    droplets: int
-    ghost_share: float | None
-    ghost_interval: tuple[float, float] | None
-    ghost_reason: str | None
-    residual_over_noise: float | None
-    hidden_share: float
-    liquid_objects: int
-    verdict: ShotVerdict
-    reasons: tuple[str, ...]
-    cpu_s: float
-    file: str
-
-
 def require_measurable(run_name: str, recorded: Polarity, settings: MeasureSettings) -> None:
     """Refuse what cannot be measured, before anything is read.
 
@@ -108,22 +98,6 @@ def require_measurable(run_name: str, recorded: Polarity, settings: MeasureSetti
         raise PipelineError("pixels to ignore are for shadows: bright particles are measured with all pixels")
     if recorded == "bright" and settings.light != "estimated":
         raise PipelineError(f"light {settings.light} is for shadows: bright particles have no diameter to correct")
-
-
-@dataclass(frozen=True, eq=False)
-class MeasuredShot:
-    """A shot that was measured.
-
-    Parameters
-    ----------
-    summary : ShotDroplets
-        What became of it.
-    exposures : tuple of MeasuredExposure
-        All that was measured.
-    """
-
-    summary: ShotDroplets
-    exposures: tuple[Exposure, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,16 +191,28 @@ class RunMeasurement:
         claim_results(results_dir, self.provenance)
         frames = frame_names(self.run)
         exposures = tuple(self._exposure(recorded, frame, threads, should_stop) for frame in frames)
-        told = {frame: _told(exposure) for frame, exposure in zip(frames, exposures, strict=True)}
-        droplets = {str(frame): exposure.droplets for frame, exposure in zip(frames, exposures, strict=True)}
+        velocities, velocity = shot_velocities(exposures, self.search.grid, separation_of(self.run, recorded))
         file = droplets_path(results_dir, shot)
-        write_droplets(file, droplets, {**self.provenance, **self._told_of(shot, told)})
-        return MeasuredShot(_summary(shot, exposures, time.process_time() - started_cpu_s, file), exposures)
+        by_frame = {str(frame): exposure for frame, exposure in zip(frames, exposures, strict=True)}
+        write_droplets(
+            file,
+            {frame: exposure.droplets for frame, exposure in by_frame.items()},
+            {**self.provenance, **self._told_of(shot, by_frame, velocity)},
+            velocities.columns() if velocities else None,
+        )
+        summary = shot_summary(shot, exposures, velocity, time.process_time() - started_cpu_s, file)
+        return MeasuredShot(summary, exposures, velocities)
 
-    def _told_of(self, shot: int, exposures: Mapping[FrameName, Mapping[str, object]]) -> Provenance:
-        grid = GridSettings.of(self.search.grid).model_dump_json()
-        recipe = recipe_sha256("measure", METHOD_VERSION, self.settings)
-        return {"shot": shot, "grid": grid, "recipe_sha256": recipe, "exposures": json.dumps(exposures)}
+    def _told_of(self, shot: int, exposures: Mapping[str, Exposure], velocity: ShotVelocity | str) -> Provenance:
+        told = {frame: told_exposure(exposure) for frame, exposure in exposures.items()}
+        reason = {"reason": velocity} if isinstance(velocity, str) else velocity.model_dump(mode="json")
+        return {
+            "shot": shot,
+            "grid": GridSettings.of(self.search.grid).model_dump_json(),
+            "recipe_sha256": recipe_sha256("measure", METHOD_VERSION, self.settings),
+            "exposures": json.dumps(told),
+            "velocity": json.dumps(reason),
+        }
 
     def _exposure(self, shot: Shot, frame: FrameName, threads: int, should_stop: Callable[[], bool]) -> Exposure:
         def before_round() -> None:
@@ -253,45 +239,3 @@ class RunMeasurement:
             threads=threads,
             before_round=before_round,
         )
-
-
-def droplets_path(results_dir: Path, shot: int) -> Path:
-    """Where the droplets of one shot lie."""
-    return results_dir / f"shot_{shot:05d}_droplets.h5"
-
-
-def _told(exposure: Exposure) -> Mapping[str, object]:
-    return {
-        "verdict": exposure.verdict.value,
-        "reasons": exposure.reasons,
-        "residual_over_noise": exposure.residual_over_noise,
-        "views": {name: asdict(view) for name, view in exposure.views.items()},
-        "ghosts": asdict(exposure.ghosts) if exposure.ghosts else None,
-        "hidden": asdict(exposure.hidden),
-    }
-
-
-def _summary(shot: int, exposures: tuple[Exposure, ...], cpu_s: float, file: Path) -> ShotDroplets:
-    ghosts = pooled(exposure.ghosts for exposure in exposures if exposure.ghosts)
-    ratios = [exposure.residual_over_noise for exposure in exposures if exposure.residual_over_noise is not None]
-    verdict = max((exposure.verdict for exposure in exposures), key=list(ShotVerdict).index)
-    return ShotDroplets(
-        shot=shot,
-        droplets=sum(len(exposure.droplets) for exposure in exposures),
-        ghost_share=ghosts.share,
-        ghost_interval=ghosts.interval,
-        ghost_reason=None if ghosts.share is not None else _why_no_share(exposures, verdict),
-        residual_over_noise=max(ratios, default=None),
-        hidden_share=max(exposure.hidden.volume_share for exposure in exposures),
-        liquid_objects=sum(exposure.hidden.liquid_objects for exposure in exposures),
-        verdict=verdict,
-        reasons=tuple(dict.fromkeys(reason for exposure in exposures for reason in exposure.reasons)),
-        cpu_s=cpu_s,
-        file=file.name,
-    )
-
-
-def _why_no_share(exposures: Sequence[Exposure], verdict: ShotVerdict) -> str:
-    if verdict is not ShotVerdict.GOOD:
-        return "; ".join(reason for exposure in exposures for reason in exposure.reasons)
-    return "no twins were asked for (--twins)"

@@ -26,7 +26,8 @@ if TYPE_CHECKING:
     from processing.analysis.exports.export import Export
     from processing.calibration.calibration import Calibration
     from processing.preprocessing import Polarity
-    from processing.runs.measurement import MeasuredShot, MeasureSettings
+    from processing.runs.measured_shot import MeasuredShot
+    from processing.runs.measurement import MeasureSettings
 
 NAME = "measure"
 SAID = ("polarity", "grid", "twins", "light", "sizes", "ignore")
@@ -156,7 +157,8 @@ def _light_and_sizes(options: Namespace, calibration: "Calibration") -> dict[str
 
 def _measure_run(options: Namespace, settings: "MeasureSettings", run_dir: Path, place: Path) -> Outcome:
     from processing.analysis.exports.export import export_path
-    from processing.runs.measurement import droplets_path, require_measurable
+    from processing.runs.measured_shot import droplets_path
+    from processing.runs.measurement import require_measurable
     from processing.runs.overwriting import replacing, require_free
     from processing.runs.results_file import SETTINGS_FILE
 
@@ -181,6 +183,7 @@ def _measure_shots(
     from processing.analysis.droplets.droplet_file import read_droplets
     from processing.analysis.droplets.droplet_statistics import droplet_statistics
     from processing.analysis.exports.export import export_droplets
+    from processing.analysis.velocity.velocity_statistics import velocity_statistics
     from processing.reconstruction.settings import GridSettings
     from processing.runs.measurement import METHOD_VERSION, RunMeasurement
     from processing.runs.recipe import recipe_sha256
@@ -193,13 +196,14 @@ def _measure_shots(
             for export in options.export:
                 export_droplets(out / shots[-1].summary.file, export)
             _tell_faults(shots[-1])
-    statistics = droplet_statistics([read_droplets(out / shot.summary.file) for shot in shots])
+    stored = [read_droplets(out / shot.summary.file) for shot in shots]
     return {
         "polarity": settings.polarity,
         "recipe_sha256": recipe_sha256(NAME, METHOD_VERSION, settings),
         "grid": GridSettings.of(measurement.search.grid).model_dump(mode="json"),
         "shots": [shot.summary.model_dump(mode="json") for shot in shots],
-        "statistics": statistics.model_dump(mode="json"),
+        "statistics": droplet_statistics(stored).model_dump(mode="json"),
+        "velocity": velocity_statistics(stored).model_dump(mode="json"),
         "passed": any(shot.summary.verdict != "refused" for shot in shots),
     }
 
@@ -207,6 +211,9 @@ def _measure_shots(
 def _tell_faults(shot: "MeasuredShot") -> None:
     for reason in shot.summary.reasons:
         progress(f"shot {shot.summary.shot}: {shot.summary.verdict}: {reason}")
+    if velocity := shot.summary.velocity:
+        for reason in velocity.reasons:
+            progress(f"shot {shot.summary.shot}: velocities {velocity.verdict}: {reason}")
 
 
 def droplets_table(result: dict[str, Any]) -> str:
@@ -218,13 +225,19 @@ def droplets_table(result: dict[str, Any]) -> str:
             _number(shot["residual_over_noise"], 3),
             "" if shot["ghost_share"] is None else f"{100 * shot['ghost_share']:.2f}",
             f"{100 * shot['hidden_share']:.1f}" if shot["hidden_share"] else "",
+            _paired(shot["velocity"]),
             f"{shot['cpu_s']:.1f}",
             shot["verdict"],
             shot["file"],
         ]
         for shot in result["shots"]
     ]
-    return table(["shot", "droplets", "residual/noise", "ghosts %", "hidden %", "CPU-s", "verdict", "file"], rows)
+    head = ["shot", "droplets", "residual/noise", "ghosts %", "hidden %", "paired %", "CPU-s", "verdict", "file"]
+    return table(head, rows)
+
+
+def _paired(velocity: dict[str, Any] | None) -> str:
+    return f"{100 * velocity['share_paired']:.1f}" if velocity and velocity["pairs"] else ""
 
 
 def _number(value: float | None, digits: int) -> str:
@@ -241,7 +254,14 @@ def _summary(result: dict[str, Any]) -> str:
     d32_um, why = statistics["d32_um"], statistics["reason"]
     d32 = f"D32 {_with_interval(d32_um)} um" if d32_um else f"no D32: {why}"
     hidden = f", {100 * statistics['hidden_share']:.1f} % of the volume hidden" if statistics["hidden_share"] else ""
-    return f"{counted}, {density} per mm3, {d32}{hidden}, {grid}"
+    return f"{counted}, {density} per mm3, {d32}{hidden}, {_mean_velocity(result['velocity'])}, {grid}"
+
+
+def _mean_velocity(velocity: dict[str, Any]) -> str:
+    if velocity["mean_m_s"] is None:
+        return f"no velocity: {velocity['reason']}"
+    components = (f"{name} {_with_interval(estimate)}" for name, estimate in velocity["mean_m_s"].items())
+    return f"{velocity['pairs']} pairs, {', '.join(components)} m/s"
 
 
 def _with_interval(estimate: dict[str, float]) -> str:

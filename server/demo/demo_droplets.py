@@ -13,7 +13,8 @@ from processing.analysis.droplets.ghost_share import RADIUS_VOXEL, matches
 from processing.calibration.calibration import Calibration
 from processing.figures.found_figures import Placed
 from processing.reconstruction.settings import GridSettings
-from processing.runs.measurement import MeasureSettings, RunMeasurement, ShotDroplets
+from processing.runs.measured_shot import ShotDroplets
+from processing.runs.measurement import MeasureSettings, RunMeasurement
 from processing.runs.pipeline import default_grid
 from processing.synthetic.spray import LiquidKind, Spray
 from processing.synthetic.truth_file import read_true_spray

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from processing.calibration.verdict import BELONGING
-from processing.runs.measurement import droplets_path
+from processing.runs.measured_shot import droplets_path
 from server.lab.calibrations import CalibrationStore
 from server.lab.duty import Duty, pause
 from server.lab.engine import Engine, Task, TaskAborted, TaskError

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.files.atomic_file import replacing
-from processing.analysis.droplets.droplet_table import P_REAL_UNKNOWN, DropletRows
+from processing.analysis.droplets.droplet_table import P_REAL_UNKNOWN, Columns, DropletRows
 from processing.errors import BadInput
 
-SCHEMA, SCHEMA_VERSION = "tomoshadow/droplets", 1
-SIZED_VERSION = 2
-"""Of files whose droplets have diameters and no amplitudes."""
+SCHEMA, SCHEMA_VERSION = "tomoshadow/droplets", 3
+"""1: bright particles, which have amplitudes; 2: shadows, which have diameters; 3: either, with velocities where there
+are two exposures and the time between them is known."""
 SCHEMA_KEYS = ("schema", "schema_version")
 DIAMETER, RAW_DIAMETER = "diameter_um", "diameter_raw_um"
 NOT_CORRECTED = "none: blur is Gaussian, diameter_um is diameter_raw_um, as fitted"
@@ -24,7 +24,7 @@ CORRECTED = (
     "disc that would look so behind a Gaussian blur. Where the settings have sizes, by the dots of a reticle, too"
 )
 GROUP, PROVENANCE, FRAME, ROWS = "droplets", "tomoshadow", "frame", "rows"
-UNITS = MappingProxyType({"mm": "mm", "mm2": "mm^2", "um": "um", "px": "px"})
+UNITS = MappingProxyType({"_mm": "mm", "_mm2": "mm^2", "_um": "um", "_px": "px", "_m_s": "m/s", "_m2_s2": "m^2/s^2"})
 """By the ending of a column's name; all others are numbers, or as bright as the images."""
 Value = str | int | float
 
@@ -49,7 +49,12 @@ class StoredDroplets:
     provenance: dict[str, Value]
 
 
-def write_droplets(path: Path, exposures: Mapping[str, DropletRows], provenance: Mapping[str, Value]) -> None:
+def write_droplets(
+    path: Path,
+    exposures: Mapping[str, DropletRows],
+    provenance: Mapping[str, Value],
+    velocities: Mapping[str, Columns] | None = None,
+) -> None:
     """Write the droplets of all exposures of a shot; the file appears whole or not at all, an old one is replaced.
 
     Parameters
@@ -60,13 +65,21 @@ def write_droplets(path: Path, exposures: Mapping[str, DropletRows], provenance:
         ``a``, and ``b`` where there is one.
     provenance : Mapping[str, str | int | float]
         Where they come from: kept as attributes of the group ``/tomoshadow``.
+    velocities : mapping of frame name to columns, optional
+        More columns of the same rows, where velocities are measured.
     """
-    tables = [exposure.columns() for exposure in exposures.values()]
+    more = velocities or {}
+    tables = [{**exposure.columns(), **more.get(frame, {})} for frame, exposure in exposures.items()]
     frames = [np.full(len(exposure), frame, "S1") for frame, exposure in exposures.items()]
     columns = {FRAME: np.concatenate(frames)} | {
         name: np.concatenate([table[name] for table in tables]) for name in tables[0]
     }
     write_columns(path, columns, provenance)
+
+
+def unit_of(column: str) -> str:
+    """Unit of a column by the ending of its name; 1 for a number, or one as bright as the images."""
+    return next((unit for ending, unit in UNITS.items() if column.endswith(ending)), "1")
 
 
 def write_columns(path: Path, columns: Mapping[str, NDArray[np.generic]], provenance: Mapping[str, Value]) -> None:
@@ -85,14 +98,13 @@ def write_columns(path: Path, columns: Mapping[str, NDArray[np.generic]], proven
         group = file.create_group(GROUP, track_order=True)
         group.attrs[ROWS] = len(columns[FRAME])
         for name, values in columns.items():
-            group.create_dataset(name, data=values).attrs["units"] = UNITS.get(name.rpartition("_")[2], "1")
+            group.create_dataset(name, data=values).attrs["units"] = unit_of(name)
         if "p_real" in group:
             group["p_real"].attrs["reason"] = P_REAL_UNKNOWN
-        sized = RAW_DIAMETER in columns
-        if sized:
+        if RAW_DIAMETER in columns:
             same = np.array_equal(columns[DIAMETER], columns[RAW_DIAMETER])
             group[DIAMETER].attrs["correction"] = NOT_CORRECTED if same else CORRECTED
-        schema = {"schema": SCHEMA, "schema_version": SIZED_VERSION if sized else SCHEMA_VERSION}
+        schema = {"schema": SCHEMA, "schema_version": SCHEMA_VERSION}
         file.create_group(PROVENANCE).attrs.update({**provenance, **schema})
 
 

@@ -35,12 +35,15 @@ class GhostShare:
     @property
     def interval(self) -> tuple[float, float] | None:
         """Where the share lies with 95 % confidence, by counting alone (Clopper and Pearson)."""
-        if not self.found:
-            return None
-        tail = (1 - CONFIDENCE) / 2
-        low = betaincinv(self.ghosts, self.found - self.ghosts + 1, tail) if self.ghosts else 0.0
-        high = betaincinv(self.ghosts + 1, self.found - self.ghosts, 1 - tail) if self.ghosts < self.found else 1.0
-        return float(low), float(high)
+        return share_interval(self.ghosts, self.found) if self.found else None
+
+
+def share_interval(chosen: int, of: int) -> tuple[float, float]:
+    """Where a share lies with 95 % confidence, by counting alone (Clopper and Pearson)."""
+    tail = (1 - CONFIDENCE) / 2
+    low = betaincinv(chosen, of - chosen + 1, tail) if chosen else 0.0
+    high = betaincinv(chosen + 1, of - chosen, 1 - tail) if chosen < of else 1.0
+    return float(low), float(high)
 
 
 def pooled(shares: Iterable[GhostShare]) -> GhostShare:

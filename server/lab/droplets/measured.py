@@ -11,7 +11,7 @@ from daq.frozen_model import FrozenModel
 from processing.analysis.droplets.droplet_file import DropletFileError, StoredDroplets, read_droplets
 from processing.analysis.droplets.droplet_statistics import DropletStatistics, droplet_statistics, hidden_share
 from processing.analysis.droplets.measured_exposure import ShotVerdict
-from processing.runs.measurement import droplets_path
+from processing.runs.measured_shot import droplets_path
 from server.lab.errors import Damaged, NotFound
 from server.lab.results import droplet_summaries
 

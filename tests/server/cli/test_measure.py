@@ -85,7 +85,7 @@ def test_a_file_says_where_it_comes_from_and_what_each_column_is(
         assert "ghost_share" in columns["p_real"].attrs["reason"]
         assert np.isnan(columns["p_real"][:]).all()
         attributes = dict(file["tomoshadow"].attrs)
-    assert (attributes["schema"], attributes["schema_version"]) == ("tomoshadow/droplets", 1)
+    assert (attributes["schema"], attributes["schema_version"]) == ("tomoshadow/droplets", 3)
     assert (attributes["run"], attributes["shot"]) == ("run", 1)
     exposures = json.loads(attributes["exposures"])
     assert list(exposures) == ["a", "b"]
@@ -215,7 +215,7 @@ def test_shadows_of_a_run_become_droplets_with_diameters(tmp_path: Path, capsys:
         assert file["droplets"]["diameter_um"].attrs["units"] == "um"
         assert "blur is Gaussian" in file["droplets"]["diameter_um"].attrs["correction"]
         assert "amplitude" not in file["droplets"]
-        assert file["tomoshadow"].attrs["schema_version"] == 2
+        assert file["tomoshadow"].attrs["schema_version"] == 3
 
 
 def test_shadows_without_any_noise_are_measured(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,0 +1,130 @@
+"""How fast the droplets of a double exposure fly, how sure that is, and whether to believe it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+
+from processing.analysis.droplets.droplet_table import Columns, Droplets, SizedDroplets
+from processing.analysis.droplets.measured_exposure import MeasuredExposure, ShotVerdict
+from processing.analysis.velocity.moving_droplets import MovingDroplets
+from processing.analysis.velocity.pairing import Pairing, pair
+from processing.analysis.velocity.velocity_table import MM_PER_NS, Velocities
+from processing.analysis.velocity.velocity_verdict import judged
+from processing.volume import VoxelGrid
+
+Rows = Droplets | SizedDroplets
+Seen = TypeVar("Seen", covariant=True)
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredVelocities:
+    """Velocities of a double exposure.
+
+    Parameters
+    ----------
+    first, second : Velocities
+        Of the droplets of A, and of B; the two of a pair have the same.
+    separation_ns : float
+        Time from A to B.
+    stayed : int
+        Droplets of A that should be in the grid in B, too, by the motion of their neighbours.
+    verdict : ShotVerdict
+        What velocities are good for; where they are refused, no droplet has one.
+    reasons : tuple of str
+        Why it is no better, and what to do.
+    """
+
+    first: Velocities
+    second: Velocities
+    separation_ns: float
+    stayed: int
+    verdict: ShotVerdict
+    reasons: tuple[str, ...]
+
+    @property
+    def pairs(self) -> int:
+        """Droplets of A with a partner."""
+        return int(np.count_nonzero(self.first.paired))
+
+    @property
+    def share_paired(self) -> float | None:
+        """Of the droplets of A that should be in the grid in B, too; None where there is none."""
+        return min(1.0, self.pairs / self.stayed) if self.stayed else None
+
+    @property
+    def wrong_share(self) -> float | None:
+        """Of the pairs, as their own probabilities have it; None without pairs."""
+        return float(np.mean(1 - self.first.partners.p_pair[self.first.paired])) if self.pairs else None
+
+    @property
+    def mean_m_s(self) -> tuple[float, float, float] | None:
+        """Mean (u, v, w) of all pairs; None without."""
+        if not self.pairs:
+            return None
+        u, v, w = self.first.velocities_m_s[self.first.paired].mean(axis=0).tolist()
+        return u, v, w
+
+    def columns(self) -> Mapping[str, Columns]:
+        """Columns of both exposures, for a table in which A comes before B."""
+        return {"a": self.first.columns(len(self.first)), "b": self.second.columns(0)}
+
+
+def measured_velocities(
+    first: MeasuredExposure[Rows, Seen], second: MeasuredExposure[Rows, Seen], grid: VoxelGrid, separation_ns: float
+) -> MeasuredVelocities:
+    """Find for every droplet of exposure A the one of B that it is, and its velocity.
+
+    No motion need be known: displacements may be as large as 25 voxels. Errors of the calibration are the same in both
+    exposures, and cancel; so the covariance is that of the two places by noise.
+
+    Parameters
+    ----------
+    first, second : MeasuredExposure
+        A and B, as ``measure`` gives them.
+    grid : VoxelGrid
+        In which they were measured.
+    separation_ns : float
+        Time from A to B in nanoseconds, from the middle of one light pulse to that of the other.
+
+    Returns
+    -------
+    MeasuredVelocities
+        ``first`` and ``second`` with ``velocities_m_s``, ``covariance_m2_s2`` and ``partners``, a row per droplet;
+        ``verdict``, ``reasons``, ``pairs``, ``share_paired`` and ``mean_m_s``.
+
+    Raises
+    ------
+    ValueError
+        The separation is not above 0.
+    """
+    if not 0 < separation_ns < np.inf:
+        raise ValueError(f"separation {separation_ns} ns: must be above 0")
+    before, after = MovingDroplets.of(first.droplets, grid), MovingDroplets.of(second.droplets, grid)
+    pairing = pair(before, after)
+    stayed = _stayed(before, pairing, grid)
+    verdict, reasons = judged((first, second), (before, after), pairing, stayed)
+    if verdict is ShotVerdict.REFUSED:
+        pairing = pairing.disbelieved()
+    of_first, of_second = _velocities(first.droplets, second.droplets, pairing, separation_ns)
+    return MeasuredVelocities(of_first, of_second, separation_ns, stayed, verdict, reasons)
+
+
+def _stayed(before: MovingDroplets, pairing: Pairing, grid: VoxelGrid) -> int:
+    if pairing.shifts is None:
+        return 0
+    there = before.places + pairing.shifts
+    inside = np.all((there >= -0.5) & (there < np.array(grid.shape[::-1]) - 0.5), axis=1)
+    return int(np.count_nonzero(inside))
+
+
+def _velocities(before: Rows, after: Rows, pairing: Pairing, separation_ns: float) -> tuple[Velocities, Velocities]:
+    own, other = pairing.pairs
+    m_s_per_mm = MM_PER_NS / separation_ns
+    velocities_m_s = m_s_per_mm * (after.points_mm[other] - before.points_mm[own])
+    covariance_m2_s2 = m_s_per_mm**2 * (before.covariance_mm2[own] + after.covariance_mm2[other])
+    return (
+        Velocities.of_pairs(pairing.first, own, velocities_m_s, covariance_m2_s2),
+        Velocities.of_pairs(pairing.second, other, velocities_m_s, covariance_m2_s2),
+    )

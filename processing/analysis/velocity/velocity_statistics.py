@@ -1,0 +1,98 @@
+"""What the velocities of some shots say of a spray, as their files have them."""
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import Field
+from scipy.special import stdtrit
+
+from processing.analysis.droplets.droplet_file import StoredDroplets
+from processing.analysis.droplets.ghost_share import CONFIDENCE, share_interval
+from processing.analysis.droplets.size_statistics import Estimate
+from processing.geometry import FloatArray
+from processing.reconstruction.settings import FrozenValue
+
+COMPONENTS = ("u_m_s", "v_m_s", "w_m_s")
+NOTHING = "no shot was measured"
+OLD = "a file does not tell velocities: it is from before they were measured"
+
+
+class MeanVelocity(FrozenValue):
+    """Mean of the velocities of all pairs, each pair counting once: a spatial mean."""
+
+    u: Annotated[Estimate, Field(description="along x")]
+    v: Annotated[Estimate, Field(description="along y")]
+    w: Annotated[Estimate, Field(description="along z")]
+
+
+class VelocityStatistics(FrozenValue):
+    """Velocities of a spray; where one is missing, ``reason`` says why."""
+
+    shots: Annotated[int, Field(description="whose velocities are not refused")]
+    pairs: Annotated[int, Field(description="of droplets of exposures A and B")]
+    share_paired: Annotated[
+        Estimate | None,
+        Field(description="of the droplets of A that should be in B, too; its interval by counting alone"),
+    ] = None
+    mean_m_s: Annotated[MeanVelocity | None, Field(description="of all pairs")] = None
+    intervals_over: Annotated[
+        Literal["shots", "pairs"] | None, Field(description="what the interval of the mean knows to differ")
+    ] = None
+    reason: Annotated[str | None, Field(description="why there is no mean; null where there is one")] = None
+
+
+def velocity_statistics(shots: Sequence[StoredDroplets]) -> VelocityStatistics:
+    """Pairs, share of paired droplets and mean velocity of all shots whose velocities are not refused.
+
+    Parameters
+    ----------
+    shots : sequence of StoredDroplets
+        A shot each, as ``read_droplets`` gives it.
+    """
+    told = [(shot, _told(shot)) for shot in shots]
+    believed = [(shot, its) for shot, its in told if its.get("pairs")]
+    if not believed:
+        return VelocityStatistics(shots=0, pairs=0, reason=_why(its for _, its in told))
+    velocities_m_s = [_of_pairs(shot) for shot, _ in believed]
+    pairs, stayed = sum(map(len, velocities_m_s)), sum(its["stayed"] for _, its in believed)
+    several = len(believed) > 1
+    low, high = share_interval(min(pairs, stayed), stayed)
+    return VelocityStatistics(
+        shots=len(believed),
+        pairs=pairs,
+        share_paired=Estimate(value=min(1.0, pairs / stayed), low=low, high=high),
+        mean_m_s=_mean(velocities_m_s if several else list(velocities_m_s[0][:, None])),
+        intervals_over="shots" if several else "pairs",
+    )
+
+
+def _told(shot: StoredDroplets) -> Mapping[str, Any]:
+    told: Mapping[str, Any] = json.loads(str(shot.provenance.get("velocity", json.dumps({"reason": OLD}))))
+    return told
+
+
+def _why(told: Iterable[Mapping[str, Any]]) -> str:
+    reasons = [reason for its in told for reason in ([its["reason"]] if "reason" in its else its["reasons"])]
+    return "; ".join(dict.fromkeys(reasons)) or NOTHING
+
+
+def _of_pairs(shot: StoredDroplets) -> FloatArray:
+    """Velocities (N, 3) of the droplets of A that have a partner."""
+    paired = (shot.columns["frame"] == "a") & np.isfinite(np.asarray(shot.columns[COMPONENTS[0]], np.float64))
+    return np.column_stack([np.asarray(shot.columns[name], np.float64)[paired] for name in COMPONENTS])
+
+
+def _mean(units: Sequence[FloatArray]) -> MeanVelocity:
+    """Mean of rows (N, 3) that come in units, which differ from each other (ratio of sums)."""
+    rows = np.concatenate(units)
+    mean = rows.mean(axis=0)
+    apart = np.array([np.sum(unit - mean, axis=0) for unit in units]) / len(rows)
+    variance = np.sum(apart**2, axis=0) * len(units) / (len(units) - 1)
+    reach = stdtrit(len(units) - 1, (1 + CONFIDENCE) / 2) * np.sqrt(variance)
+    u, v, w = (
+        Estimate(value=value, low=value - half, high=value + half)
+        for value, half in zip(mean.tolist(), reach.tolist(), strict=True)
+    )
+    return MeanVelocity(u=u, v=v, w=w)

@@ -1,0 +1,165 @@
+"""What became of a shot that was measured: its droplets, its velocities, and whether to believe them."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Literal
+
+from processing.analysis.droplets.bright_shot import BrightExposure
+from processing.analysis.droplets.ghost_share import pooled
+from processing.analysis.droplets.measured_exposure import ShotVerdict
+from processing.analysis.droplets.shadows.shadow_shot import ShadowExposure
+from processing.analysis.velocity.measured_velocities import MeasuredVelocities, measured_velocities
+from processing.reconstruction.settings import FrozenValue
+from processing.runs.shots.separation import Separation
+from processing.volume import VoxelGrid
+
+Exposure = BrightExposure | ShadowExposure
+MOST_SPREAD = 0.01
+"""Of the separation: views that differ by more see droplets at different times."""
+
+
+class ShotVelocity(FrozenValue):
+    """What became of the velocities of a double exposure."""
+
+    verdict: ShotVerdict
+    reasons: tuple[str, ...]
+    pairs: int
+    stayed: int
+    share_paired: float | None
+    wrong_share: float | None
+    mean_m_s: tuple[float, float, float] | None
+    separation_ns: float
+    separation_source: Literal["fired", "stated"]
+
+
+class ShotDroplets(FrozenValue):
+    """What became of one shot; of two exposures, the less favourable verdict and ratio, and the larger hidden share."""
+
+    shot: int
+    droplets: int
+    ghost_share: float | None
+    ghost_interval: tuple[float, float] | None
+    ghost_reason: str | None
+    residual_over_noise: float | None
+    hidden_share: float
+    liquid_objects: int
+    verdict: ShotVerdict
+    reasons: tuple[str, ...]
+    cpu_s: float
+    file: str
+    velocity: ShotVelocity | None = None
+    velocity_reason: str | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredShot:
+    """A shot that was measured.
+
+    Parameters
+    ----------
+    summary : ShotDroplets
+        What became of it.
+    exposures : tuple of MeasuredExposure
+        All that was measured.
+    velocities : MeasuredVelocities | None
+        Of the droplets; None where there is one exposure, or nobody knows the separation.
+    """
+
+    summary: ShotDroplets
+    exposures: tuple[Exposure, ...]
+    velocities: MeasuredVelocities | None = None
+
+
+def droplets_path(results_dir: Path, shot: int) -> Path:
+    """Where the droplets of one shot lie."""
+    return results_dir / f"shot_{shot:05d}_droplets.h5"
+
+
+def shot_velocities(
+    exposures: Sequence[Exposure], grid: VoxelGrid, separation: Separation | str
+) -> tuple[MeasuredVelocities | None, ShotVelocity | str]:
+    """Velocities of a shot and what to tell of them, or why there are none."""
+    if isinstance(separation, str):
+        return None, separation
+    first, second = exposures
+    velocities = measured_velocities(first, second, grid, separation.mean_ns)
+    return velocities, _told_velocity(velocities, separation)
+
+
+def _told_velocity(velocities: MeasuredVelocities, separation: Separation) -> ShotVelocity:
+    verdict, reasons = velocities.verdict, velocities.reasons
+    if verdict is ShotVerdict.GOOD and separation.spread_ns > MOST_SPREAD * separation.mean_ns:
+        reason = (
+            f"separations of the views differ by {separation.spread_ns:g} ns, limit {100 * MOST_SPREAD:g} % of "
+            f"{separation.mean_ns:g} ns: they see droplets at different times"
+        )
+        verdict, reasons = ShotVerdict.DOUBTFUL, (reason,)
+    return ShotVelocity(
+        verdict=verdict,
+        reasons=reasons,
+        pairs=velocities.pairs,
+        stayed=velocities.stayed,
+        share_paired=velocities.share_paired,
+        wrong_share=velocities.wrong_share,
+        mean_m_s=velocities.mean_m_s,
+        separation_ns=separation.mean_ns,
+        separation_source=separation.source,
+    )
+
+
+def told_exposure(exposure: Exposure) -> Mapping[str, object]:
+    """What a file says of an exposure."""
+    return {
+        "verdict": exposure.verdict.value,
+        "reasons": exposure.reasons,
+        "residual_over_noise": exposure.residual_over_noise,
+        "views": {name: asdict(view) for name, view in exposure.views.items()},
+        "ghosts": asdict(exposure.ghosts) if exposure.ghosts else None,
+        "hidden": asdict(exposure.hidden),
+    }
+
+
+def shot_summary(
+    shot: int, exposures: tuple[Exposure, ...], velocity: ShotVelocity | str, cpu_s: float, file: Path
+) -> ShotDroplets:
+    """What became of a shot.
+
+    Parameters
+    ----------
+    shot : int
+        Index of the shot.
+    exposures : tuple of MeasuredExposure
+        All that was measured.
+    velocity : ShotVelocity | str
+        What to tell of the velocities, or why there are none.
+    cpu_s : float
+        CPU time.
+    file : Path
+        Of the droplets.
+    """
+    ghosts = pooled(exposure.ghosts for exposure in exposures if exposure.ghosts)
+    ratios = [exposure.residual_over_noise for exposure in exposures if exposure.residual_over_noise is not None]
+    verdict = max((exposure.verdict for exposure in exposures), key=list(ShotVerdict).index)
+    return ShotDroplets(
+        shot=shot,
+        droplets=sum(len(exposure.droplets) for exposure in exposures),
+        ghost_share=ghosts.share,
+        ghost_interval=ghosts.interval,
+        ghost_reason=None if ghosts.share is not None else _why_no_share(exposures, verdict),
+        residual_over_noise=max(ratios, default=None),
+        hidden_share=max(exposure.hidden.volume_share for exposure in exposures),
+        liquid_objects=sum(exposure.hidden.liquid_objects for exposure in exposures),
+        verdict=verdict,
+        reasons=tuple(dict.fromkeys(reason for exposure in exposures for reason in exposure.reasons)),
+        cpu_s=cpu_s,
+        file=file.name,
+        velocity=None if isinstance(velocity, str) else velocity,
+        velocity_reason=velocity if isinstance(velocity, str) else None,
+    )
+
+
+def _why_no_share(exposures: Sequence[Exposure], verdict: ShotVerdict) -> str:
+    if verdict is not ShotVerdict.GOOD:
+        return "; ".join(reason for exposure in exposures for reason in exposure.reasons)
+    return "no twins were asked for (--twins)"

@@ -1,0 +1,54 @@
+"""Time from exposure A to B of a shot: as the pulses were fired, else as the run states it."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from daq.files.run_directory import LightPulse, RunReader, Shot
+
+NOT_DOUBLE = "shots have one exposure: a velocity needs two"
+UNKNOWN = (
+    "nobody knows the time from exposure A to B: the run has neither fired pulses nor a separation (separation_ns of "
+    "the manifest)"
+)
+
+
+@dataclass(frozen=True)
+class Separation:
+    """Time from A to B.
+
+    Parameters
+    ----------
+    mean_ns : float
+        From the middle of a pulse to that of the next, mean of the views.
+    spread_ns : float
+        Between the view with the longest and that with the shortest.
+    source : str
+        ``fired``: the pulses as they were fired; ``stated``: the run's header, the same for all shots.
+    """
+
+    mean_ns: float
+    spread_ns: float
+    source: Literal["fired", "stated"]
+
+
+def separation_of(run: RunReader, shot: Shot) -> Separation | str:
+    """Separation of a shot, or why there is none.
+
+    Every view has its own light, so each has its own pulses; views that were not lit have no say.
+    """
+    if run.header.frames_per_shot == 1:
+        return NOT_DOUBLE
+    trains = [pulses for pulses in shot.fired.pulses.values() if pulses] if shot.fired else []
+    if not trains:
+        stated_ns = run.header.separation_ns
+        return Separation(float(stated_ns), 0.0, "stated") if stated_ns else UNKNOWN
+    if odd := {len(pulses) for pulses in trains if len(pulses) != 2}:
+        return f"views were lit {', '.join(map(str, sorted(odd)))} times: which pulse is in which exposure is not known"
+    fired_ns = [_middle_ns(second) - _middle_ns(first) for first, second in trains]
+    return Separation(float(np.mean(fired_ns)), float(np.ptp(fired_ns)), "fired")
+
+
+def _middle_ns(pulse: LightPulse) -> float:
+    return pulse.start_ns + pulse.width_ns / 2
