@@ -8,7 +8,8 @@ from matplotlib.figure import Figure
 
 from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.analysis.droplets.droplet_statistics import DIAMETER, droplet_statistics
-from processing.analysis.droplets.size_statistics import TOO_FEW, Estimate, SizeClass, size_classes
+from processing.analysis.droplets.size_statistics import TOO_FEW, SizeClass, size_classes
+from processing.analysis.estimates import Estimate
 from processing.figures.colours import FRAME_COLOURS
 
 MARKED = {"d10_um": "D10", "d32_um": "D32", "dv50_um": "Dv0.5"}

@@ -10,8 +10,10 @@ from pydantic import Field
 
 from processing.analysis.droplets.droplet_file import DropletFileError, StoredDroplets
 from processing.analysis.droplets.ghost_share import GhostShare, pooled
-from processing.analysis.droplets.size_statistics import Estimate, SizeStatistics, mean_diameters, number_density
+from processing.analysis.droplets.size_statistics import SizeStatistics, mean_diameters, shots_density
+from processing.analysis.estimates import Estimate
 from processing.reconstruction.settings import GridSettings
+from processing.volume import VoxelGrid
 
 DIAMETER, REFUSED = "diameter_um", "refused"
 NO_DIAMETERS = "bright particles have no diameter: only shadows tell how large a droplet is"
@@ -27,7 +29,8 @@ class DropletStatistics(SizeStatistics):
 
     exposures: Annotated[int, Field(description="that were measured and not refused")]
     number_density_per_mm3: Annotated[
-        Estimate | None, Field(description="per volume that could be measured; its interval by counting alone")
+        Estimate | None,
+        Field(description="per volume that could be measured; its interval over shots, of one by counting"),
     ] = None
     number_density_reason: Annotated[str | None, Field(description="why it is null")] = None
     hidden_share: Annotated[
@@ -49,14 +52,13 @@ def droplet_statistics(shots: Sequence[StoredDroplets]) -> DropletStatistics:
     DropletFileError
         A file does not say what became of its exposures, or two are of the same shot, or of two recipes.
     """
-    _require_once(shots)
-    _require_alike(shots)
-    told = [_exposures(shot) for shot in shots]
+    require_poolable(shots)
+    told = [told_exposures(shot) for shot in shots]
     counted = [(shot, exposures) for shot, exposures in zip(shots, told, strict=True) if exposures]
     hidden = [hidden_share(exposure) for _, exposures in counted for exposure in exposures]
     per_shot = len(hidden) / max(len(counted), 1)
     sizes = _sizes([shot for shot, _ in counted], per_shot)
-    density, reason = _density(sizes.n, counted, per_shot)
+    density, reason = _density(counted, per_shot)
     return DropletStatistics(
         **dict(sizes),
         exposures=len(hidden),
@@ -65,6 +67,18 @@ def droplet_statistics(shots: Sequence[StoredDroplets]) -> DropletStatistics:
         hidden_share=float(np.mean(hidden)) if hidden else 0.0,
         ghost_share=_ghost_share(exposure for shot in told for exposure in shot),
     )
+
+
+def require_poolable(shots: Sequence[StoredDroplets]) -> None:
+    """Refuse shots whose droplets have no common mean: one that is there twice, or two recipes.
+
+    Raises
+    ------
+    DropletFileError
+        The text names both, and what differs.
+    """
+    _require_once(shots)
+    _require_alike(shots)
 
 
 def _require_once(shots: Sequence[StoredDroplets]) -> None:
@@ -103,7 +117,7 @@ def _place(shot: StoredDroplets) -> str:
     return ", ".join(f"{name} {shot.provenance[name]}" for name in names if name in shot.provenance)
 
 
-def _exposures(shot: StoredDroplets) -> list[Mapping[str, Any]]:
+def told_exposures(shot: StoredDroplets) -> list[Mapping[str, Any]]:
     """What was told of the exposures that are not refused."""
     if "exposures" not in shot.provenance:
         raise DropletFileError(f"{_named(shot)}: its file does not say what became of its exposures")
@@ -136,24 +150,29 @@ def _sizes(shots: Sequence[StoredDroplets], per_shot: float) -> SizeStatistics:
 
 
 def _density(
-    n: int, counted: Sequence[tuple[StoredDroplets, Sequence[Mapping[str, Any]]]], per_shot: float
+    counted: Sequence[tuple[StoredDroplets, Sequence[Mapping[str, Any]]]], per_shot: float
 ) -> tuple[Estimate | None, str | None]:
     if not counted:
         return None, NOTHING_COUNTED
-    total_mm3 = 0.0
-    for shot, exposures in counted:
-        if (volume_mm3 := _volume_mm3(shot)) is None:
-            return None, NO_VOLUME
-        total_mm3 += sum(volume_mm3 * (1 - hidden_share(exposure)) for exposure in exposures)
-    return number_density(n, total_mm3, per_shot), None
+    volumes_mm3 = [measured_mm3(shot, exposures) for shot, exposures in counted]
+    if None in volumes_mm3:
+        return None, NO_VOLUME
+    counts = [len(shot.columns["frame"]) for shot, _ in counted]
+    return shots_density(counts, np.array(volumes_mm3, np.float64), per_shot), None
 
 
-def _volume_mm3(shot: StoredDroplets) -> float | None:
-    """Volume of the grid; files that do not state it have it in their settings, if the user named a grid."""
+def measured_mm3(shot: StoredDroplets, exposures: Sequence[Mapping[str, Any]]) -> float | None:
+    """Volume that could be measured, of all these exposures together; None where the file does not say."""
+    grid = measured_grid(shot)
+    return None if grid is None else grid.volume_mm3 * sum(1 - hidden_share(exposure) for exposure in exposures)
+
+
+def measured_grid(shot: StoredDroplets) -> VoxelGrid | None:
+    """Where droplets are told; files that do not state it have it in their settings, if the user named a grid."""
     grid = json.loads(str(shot.provenance.get("grid", "null"))) or json.loads(str(shot.provenance["settings"])).get(
         "grid"
     )
-    return GridSettings.model_validate(grid).to_grid().volume_mm3 if grid else None
+    return GridSettings.model_validate(grid).to_grid() if grid else None
 
 
 def _ghost_share(exposures: Iterator[Mapping[str, Any]]) -> Estimate | None:

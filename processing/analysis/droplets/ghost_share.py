@@ -7,9 +7,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.special import betaincinv
 
+from processing.analysis.estimates import CONFIDENCE
 from processing.geometry import FloatArray
 
-CONFIDENCE = 0.95
 RADIUS_VOXEL = 1.0
 """How far a droplet may be found from where it is."""
 

@@ -1,32 +1,28 @@
 """Sizes of many droplets: mean diameters, quantiles by volume, classes, number density, each with its interval.
 
 Mean diameters after ISO 9276-2 and ASTM E799: ``D_pq = (sum d^p / sum d^q)^(1 / (p - q))``. Intervals hold 95 %. Those
-of diameters come from a seeded bootstrap: shots are drawn with replacement where there are several, droplets where
-there is one; the standard deviation of ``ln D`` among the draws, times ``sqrt(m / (m - 1))`` for the bias of few,
-times Student's t of ``m - 1`` degrees of freedom, with ``m`` drawn things. Droplets of one shot belong together: who
-draws droplets learns nothing of how shots differ.
+of diameters come from ``processing.analysis.estimates``: shots are drawn with replacement where there are several,
+droplets where there is one. Droplets of one shot belong together: who draws droplets learns nothing of how shots
+differ.
 
 Nor does a bootstrap know of droplets that are larger than all that were seen, and these carry volume. A quantile by
 volume with few droplets beyond it is not told: its interval would hold the truth far less often than it says.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
-from scipy.special import chdtri, stdtrit
+from scipy.special import chdtri
 
-from processing.analysis.droplets.ghost_share import CONFIDENCE
+from processing.analysis.estimates import CONFIDENCE, Estimate, estimated
 from processing.geometry import FloatArray
 from processing.masked import require_unmasked
 from processing.reconstruction.settings import FrozenValue
 
-DRAWS, SEED = 400, 0
-DROPLETS_AT_A_TIME = 2**18
-"""Of all draws that are made at once: memory."""
 SPAN = "relative_span"
 ORDERS = ((1, 0), (2, 0), (3, 0), (3, 2), (4, 3))
 QUANTILES = (0.1, 0.5, 0.9)
@@ -40,14 +36,6 @@ told hold it in 89 %."""
 NOTHING_MEASURED = "no droplet was measured"
 TOO_FEW = f"too few droplets: means need {FEWEST}, a quantile by volume {FEWEST} larger and {FEWEST} smaller ones"
 _TAIL = (1 - CONFIDENCE) / 2
-
-
-class Estimate(FrozenValue):
-    """A number, and where it lies with 95 % confidence."""
-
-    value: Annotated[float, Field(description="the number")]
-    low: Annotated[float, Field(description="it is not below this, with 97.5 %")]
-    high: Annotated[float, Field(description="it is not above this, with 97.5 %")]
 
 
 class SizeStatistics(FrozenValue):
@@ -77,12 +65,16 @@ class SizeClass(FrozenValue):
     high_um: Annotated[float, Field(description="largest diameter, which belongs to the next class")]
     n: Annotated[int, Field(description="droplets")]
     q0_per_um: Annotated[Estimate, Field(description="density by number; its interval by counting alone")]
+    q2_per_um: Annotated[float, Field(description="density by area")]
     q3_per_um: Annotated[float, Field(description="density by volume")]
     cumulative_q0: Annotated[float, Field(description="share by number of droplets below high_um")]
+    cumulative_q2: Annotated[float, Field(description="share by area of droplets below high_um")]
     cumulative_q3: Annotated[float, Field(description="share by volume of droplets below high_um")]
 
 
-def mean_diameters(diameters_um_by_shot: Sequence[ArrayLike], exposures_per_shot: float = 1) -> SizeStatistics:
+def mean_diameters(
+    diameters_um_by_shot: Sequence[ArrayLike], exposures_per_shot: float = 1, confidence: float = CONFIDENCE
+) -> SizeStatistics:
     """Mean diameters, quantiles by volume and relative span, with intervals.
 
     Parameters
@@ -91,6 +83,8 @@ def mean_diameters(diameters_um_by_shot: Sequence[ArrayLike], exposures_per_shot
         Diameters of the droplets of every shot.
     exposures_per_shot : float
         2 where exposures A and B, which show the same droplets, are both in the array of a shot.
+    confidence : float
+        Of the intervals.
 
     Raises
     ------
@@ -109,7 +103,7 @@ def mean_diameters(diameters_um_by_shot: Sequence[ArrayLike], exposures_per_shot
     units = np.repeat(np.arange(len(shots)), [len(shot) for shot in shots]) if several else np.arange(len(diameters_um))
     order = np.argsort(diameters_um, kind="stable")
     widening = 1.0 if several else np.sqrt(exposures_per_shot)
-    estimates = _estimates(diameters_um[order], units[order], float(widening))
+    estimates = _estimates(diameters_um[order], units[order], float(widening), confidence)
     known = _known(estimates, diameters_um[order], FEWEST * exposures_per_shot)
     told = {
         "n": len(diameters_um),
@@ -119,6 +113,30 @@ def mean_diameters(diameters_um_by_shot: Sequence[ArrayLike], exposures_per_shot
         **known,
     }
     return SizeStatistics.model_validate(told)
+
+
+def shots_density(counts: ArrayLike, volumes_mm3: ArrayLike, exposures_per_shot: float = 1) -> Estimate:
+    """Droplets per mm3, with an interval over shots, which is nowhere narrower than that by counting alone.
+
+    Parameters
+    ----------
+    counts, volumes_mm3 : (S,) arrays
+        Droplets of each shot, in all its exposures, and the volume of all its exposures together.
+    exposures_per_shot : float
+        As of ``number_density``.
+    """
+    droplets, measured_mm3 = np.asarray(counts, np.float64), np.asarray(volumes_mm3, np.float64)
+    counted = number_density(int(droplets.sum()), float(measured_mm3.sum()), exposures_per_shot)
+
+    def density(taken: FloatArray) -> FloatArray:
+        return (taken @ droplets / (taken @ measured_mm3))[:, None]
+
+    (over_shots,) = estimated(density, len(droplets), 1, signed=True)
+    if over_shots is None:
+        return counted
+    return Estimate(
+        value=counted.value, low=max(min(counted.low, over_shots.low), 0.0), high=max(counted.high, over_shots.high)
+    )
 
 
 def number_density(n: int, volume_mm3: float, exposures_per_shot: float = 1) -> Estimate:
@@ -164,9 +182,9 @@ def size_classes(diameters_um: ArrayLike, exposures_per_shot: float = 1) -> tupl
         return ()
     edges_um = _edges_um(diameters[0], diameters[-1])
     bounds = np.searchsorted(diameters, edges_um)
-    volumes = np.concatenate([[0.0], np.cumsum(diameters**3)]) / np.sum(diameters**3)
+    shares = [np.concatenate([[0.0], np.cumsum(diameters**p)]) / np.sum(diameters**p) for p in (2, 3)]
     return tuple(
-        _size_class((low_um, high_um), (first, last), volumes, exposures_per_shot)
+        _size_class((low_um, high_um), (first, last), shares, exposures_per_shot)
         for (low_um, high_um), (first, last) in zip(pairwise(edges_um.tolist()), pairwise(bounds.tolist()), strict=True)
     )
 
@@ -188,9 +206,10 @@ def _edges_um(least_um: float, most_um: float) -> FloatArray:
 
 
 def _size_class(
-    span_um: tuple[float, float], droplets: tuple[int, int], volumes: FloatArray, exposures_per_shot: float
+    span_um: tuple[float, float], droplets: tuple[int, int], shares: Sequence[FloatArray], exposures_per_shot: float
 ) -> SizeClass:
-    (low_um, high_um), (first, last), total = span_um, droplets, len(volumes) - 1
+    (low_um, high_um), (first, last), (areas, volumes) = span_um, droplets, shares
+    total = len(volumes) - 1
     unit = 1 / (total * (high_um - low_um))
     low, high = (exposures_per_shot * end * unit for end in garwood((last - first) / exposures_per_shot))
     return SizeClass(
@@ -198,28 +217,32 @@ def _size_class(
         high_um=high_um,
         n=last - first,
         q0_per_um=Estimate(value=(last - first) * unit, low=low, high=high),
+        q2_per_um=float(areas[last] - areas[first]) / (high_um - low_um),
         q3_per_um=float(volumes[last] - volumes[first]) / (high_um - low_um),
         cumulative_q0=last / total,
+        cumulative_q2=float(areas[last]),
         cumulative_q3=float(volumes[last]),
     )
 
 
-def _estimates(diameters_um: FloatArray, units: NDArray[np.intp], widening: float) -> dict[str, Estimate]:
+def _estimates(
+    diameters_um: FloatArray, units: NDArray[np.intp], widening: float, confidence: float
+) -> dict[str, Estimate]:
     """Figures of sorted diameters, with intervals; diameters by their logarithm, so that no limit is below 0."""
     powers = diameters_um ** np.arange(5)[:, None]
-    (values,) = _figures(diameters_um, powers, np.ones((1, len(diameters_um))))
-    draws = np.concatenate([_figures(diameters_um, powers, weights) for weights in _draws(units)])
-    drawn = int(units.max()) + 1
-    reach = widening * stdtrit(drawn - 1, 1 - _TAIL) * np.sqrt(drawn / (drawn - 1))
-    factors = np.exp(reach * np.std(np.log(draws[:, :-1]), axis=0))
-    lows, highs = values[:-1] / factors, values[:-1] * factors
-    span, half = values[-1], reach * np.std(draws[:, -1])
-    names = [*(f"d{p}{q}_um" for p, q in ORDERS), *BY_VOLUME]
-    estimates = {
-        name: Estimate(value=value, low=low, high=high)
-        for name, value, low, high in zip(names, values.tolist(), lows.tolist(), highs.tolist(), strict=False)
-    }
-    return estimates | {SPAN: Estimate(value=span, low=max(span - half, 0.0), high=span + half)}
+    names = [*(f"d{p}{q}_um" for p, q in ORDERS), *BY_VOLUME, SPAN]
+    told = estimated(
+        lambda counts: _figures(diameters_um, powers, counts[:, units]),
+        int(units.max()) + 1,
+        len(diameters_um),
+        widening=widening,
+        signed=np.array([name == SPAN for name in names]),
+        confidence=confidence,
+    )
+    known = {name: estimate for name, estimate in zip(names, told, strict=True) if estimate}
+    if SPAN in known:
+        known[SPAN] = known[SPAN].model_copy(update={"low": max(known[SPAN].low, 0.0)})
+    return known
 
 
 def _known(estimates: dict[str, Estimate], diameters_um: FloatArray, fewest: float) -> dict[str, Estimate]:
@@ -229,17 +252,6 @@ def _known(estimates: dict[str, Estimate], diameters_um: FloatArray, fewest: flo
     larger = len(diameters_um) - np.searchsorted(diameters_um, quantiles_um, side="right")
     unsure = {name for name, few in zip(BY_VOLUME, np.minimum(smaller, larger) < fewest, strict=True) if few}
     return {name: one for name, one in estimates.items() if name not in (unsure | {SPAN} if unsure else unsure)}
-
-
-def _draws(units: NDArray[np.intp]) -> Iterator[FloatArray]:
-    """How often each droplet is taken when its units are drawn with replacement; some draws at a time, a row each."""
-    rng, drawn = np.random.default_rng(SEED), int(units.max()) + 1
-    rows = max(1, DROPLETS_AT_A_TIME // len(units))
-    for first in range(0, DRAWS, rows):
-        taken = rng.integers(0, drawn, (min(rows, DRAWS - first), drawn))
-        places = taken + drawn * np.arange(len(taken))[:, None]
-        counts = np.bincount(places.ravel(), minlength=taken.size).reshape(taken.shape)
-        yield counts[:, units].astype(np.float64)
 
 
 def _figures(diameters_um: FloatArray, powers: FloatArray, weights: FloatArray) -> FloatArray:

@@ -6,7 +6,7 @@ from typing import Any
 
 from nicegui import ui
 
-from processing.analysis.droplets.size_statistics import Estimate
+from processing.analysis.estimates import Estimate
 from server.lab.droplets.measured import MeasuredRun, measured_run
 from server.lab.errors import ServerError
 from server.lab.jobs import JobKind, JobState

@@ -10,7 +10,7 @@ import pytest
 
 from processing.analysis.droplets.droplet_file import DropletFileError, StoredDroplets, read_droplets, write_columns
 from processing.analysis.droplets.droplet_statistics import droplet_statistics
-from processing.analysis.droplets.size_statistics import mean_diameters, number_density
+from processing.analysis.droplets.size_statistics import mean_diameters, number_density, shots_density
 from processing.reconstruction.settings import GridSettings
 
 GRID = GridSettings(shape=(2, 4, 6), origin_mm=(0, 0, 0), pitch_mm=0.5)
@@ -39,7 +39,7 @@ def test_shots_are_pooled() -> None:
     sizes = mean_diameters([[20.0, 30.0], [40.0]])
     assert (statistics.n, statistics.shots, statistics.exposures) == (3, 2, 2)
     assert {name: getattr(statistics, name) for name in type(sizes).model_fields} == dict(sizes)
-    assert statistics.number_density_per_mm3 == number_density(3, 2 * VOLUME_MM3)
+    assert statistics.number_density_per_mm3 == shots_density([2, 1], [VOLUME_MM3] * 2)
     assert statistics.ghost_share
     assert statistics.ghost_share.value == pytest.approx(0.03)
 
@@ -57,7 +57,7 @@ def test_refused_exposures_have_no_volume_and_empty_ones_have() -> None:
     statistics = droplet_statistics(
         [shot([20.0, 30.0], exposures=one_of_two), shot([], exposures={"a": exposure("empty")}, shot=4)]
     )
-    assert (statistics.exposures, statistics.number_density_per_mm3) == (2, number_density(2, 2 * VOLUME_MM3))
+    assert (statistics.exposures, statistics.number_density_per_mm3) == (2, shots_density([2, 0], [VOLUME_MM3] * 2))
 
 
 def test_where_a_number_is_missing_a_reason_is_told() -> None:

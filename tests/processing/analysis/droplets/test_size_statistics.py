@@ -15,12 +15,13 @@ from processing.analysis.droplets.size_statistics import (
     NOTHING_MEASURED,
     SPAN,
     TOO_FEW,
-    Estimate,
     SizeStatistics,
     mean_diameters,
     number_density,
+    shots_density,
     size_classes,
 )
+from processing.analysis.estimates import Estimate
 
 MEDIAN_UM, SPREAD = 40.0, 0.4
 MEANS = {"d10_um": 1, "d20_um": 2, "d30_um": 3, "d32_um": 5, "d43_um": 7}
@@ -168,12 +169,14 @@ def test_classes_hold_every_droplet_once_and_their_densities_are_whole(diameters
     assert sum(one.n for one in classes) == len(diameters)
     widths = np.array([one.high_um - one.low_um for one in classes])
     assert widths @ [one.q0_per_um.value for one in classes] == pytest.approx(1)
+    assert widths @ [one.q2_per_um for one in classes] == pytest.approx(1)
     assert widths @ [one.q3_per_um for one in classes] == pytest.approx(1)
     for one in classes:
         assert one.n == sum(one.low_um <= diameter < one.high_um for diameter in diameters)
         assert one.q0_per_um.low <= one.q0_per_um.value <= one.q0_per_um.high
         below = [diameter for diameter in diameters if diameter < one.high_um]
         assert one.cumulative_q0 == pytest.approx(len(below) / len(diameters))
+        assert one.cumulative_q2 == pytest.approx(np.sum(np.power(below, 2)) / np.sum(np.power(diameters, 2)))
         assert one.cumulative_q3 == pytest.approx(np.sum(np.power(below, 3)) / np.sum(np.power(diameters, 3)))
 
 
@@ -189,6 +192,15 @@ def test_density_holds_the_poisson_limits_of_tables() -> None:
     assert number_density(0, 2.0).model_dump() == pytest.approx({"value": 0, "low": 0, "high": 3.6889 / 2}, rel=1e-4)
     ten = number_density(10, 1.0).model_dump()
     assert ten == pytest.approx({"value": 10, "low": 4.7954, "high": 18.3904}, rel=1e-4)
+
+
+def test_shots_that_differ_make_a_density_less_sure_and_those_that_do_not_make_it_no_surer_than_counting() -> None:
+    alike, unlike = shots_density([50] * 4, [2.0] * 4), shots_density([10, 90, 30, 70], [2.0] * 4)
+    assert alike == number_density(200, 8.0)
+    assert unlike.value == alike.value
+    assert unlike.low < alike.low < alike.high < unlike.high
+    assert shots_density([50], [2.0]) == number_density(50, 2.0)
+    assert shots_density([0, 3], [2.0] * 2).low == 0
 
 
 def test_every_diameter_is_no_shot_of_its_own() -> None:
