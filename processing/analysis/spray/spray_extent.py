@@ -1,0 +1,96 @@
+"""SprayExtent: cone angle and penetration, by shares of the liquid, so that nobody has to choose a threshold.
+
+* *Cone angle*: twice the angle from the axis, seen from the nozzle, within which a share of the liquid of the box is:
+  90 %, and 50 %, which in a hollow cone is where the cone is. Spatial: by what is there, not by what flows.
+* *Penetration*: the distance from the nozzle along the axis beyond which 1 % of the liquid of the box is. It is known
+  where the box holds the tip: where its last tenth has less than a tenth of the mean of the rest. Of a spray that goes
+  on beyond the box there is none.
+"""
+
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from processing.analysis.estimates import Estimate
+from processing.analysis.spray.spray_axis import SprayAxis, cell_volumes_mm3
+from processing.analysis.spray.spray_sample import SpraySample, weighted_quantiles
+from processing.geometry import FloatArray
+from processing.reconstruction.settings import FrozenValue
+
+SHARES = (0.5, 0.9)
+TIP_SHARE = 0.99
+LEAST_COVERED = 0.9
+"""Of the ring around the cone's edge, which the box must hold."""
+EDGE = 0.1
+"""Of the angle, to both sides: so wide is that ring; of the box's length: its last part."""
+FEWEST = 20
+TOO_NARROW = "the box does not reach around the cone: it cuts off what flies farther out; measure a wider box"
+GOES_ON = "the spray goes on beyond the box: measure a longer box, or earlier after the start of injection"
+TOO_FEW = f"fewer than {FEWEST} droplets beyond the nozzle"
+NO_BOX = "shots were measured in several boxes, or no file says in which: measure all of them in one"
+
+
+class SprayExtent(FrozenValue):
+    """How wide and how far a spray goes."""
+
+    cone_angle_deg: Annotated[Estimate | None, Field(description="whole angle that holds 90 % of the liquid")] = None
+    cone_angle_half_deg: Annotated[Estimate | None, Field(description="whole angle that holds 50 % of the liquid")] = (
+        None
+    )
+    cone_reason: Annotated[str | None, Field(description="why there is no angle")] = None
+    penetration_mm: Annotated[
+        Estimate | None, Field(description="distance along the axis beyond which 1 % of the liquid of the box is")
+    ] = None
+    penetration_reason: Annotated[str | None, Field(description="why there is no penetration")] = None
+
+
+def spray_extent(sample: SpraySample, axis: SprayAxis) -> SprayExtent:
+    """Cone angle and penetration of a sample.
+
+    Parameters
+    ----------
+    sample : SpraySample
+        The droplets.
+    axis : SprayAxis
+        Of the spray.
+    """
+    along_mm, radius_mm, _ = axis.coordinates(sample.points_mm)
+    chosen = sample.chosen(along_mm > 0)
+    missing = NO_BOX if sample.box_mm is None else TOO_FEW if len(chosen) < FEWEST else None
+    if sample.box_mm is None or missing:
+        return SprayExtent(cone_reason=missing, penetration_reason=missing)
+    angles_deg = np.degrees(np.arctan2(radius_mm, along_mm))[along_mm > 0]
+    half, most = _quantiles(chosen, 2 * angles_deg, SHARES)
+    wide_enough = most is None or _covered(axis, sample.box_mm, most.value / 2) >= LEAST_COVERED
+    (tip,) = _quantiles(chosen, along_mm[along_mm > 0], (TIP_SHARE,))
+    ends = _ends(chosen.cubes_um3, along_mm[along_mm > 0], axis.reach_mm(sample.box_mm))
+    return SprayExtent(
+        cone_angle_deg=most if wide_enough else None,
+        cone_angle_half_deg=half if wide_enough else None,
+        cone_reason=None if wide_enough else TOO_NARROW,
+        penetration_mm=tip if ends else None,
+        penetration_reason=None if ends else GOES_ON,
+    )
+
+
+def _quantiles(sample: SpraySample, values: FloatArray, shares: tuple[float, ...]) -> list[Estimate | None]:
+    order = np.argsort(values, kind="stable")
+    sorted_values, units, cubes = values[order], sample.units[order], sample.cubes_um3[order]
+    return sample.estimated(lambda counts: weighted_quantiles(sorted_values, counts[:, units] * cubes, shares))
+
+
+def _covered(axis: SprayAxis, box_mm: FloatArray, angle_deg: float) -> float:
+    """Which part of the ring around an angle from the axis lies in the box, within the reach of its middle."""
+    near_mm, far_mm = axis.reach_mm(box_mm)
+    middle_mm, length_mm = (near_mm + far_mm) / 2, 0.5 * (far_mm - near_mm)
+    tangents = np.tan(np.radians(np.minimum(angle_deg * np.array([1 - EDGE, 1 + EDGE]), 89)))
+    edges_mm = (middle_mm + length_mm * np.array([-0.5, 0.5]), middle_mm * tangents, np.array([0, 360.0]))
+    (((inside_mm3,),),) = cell_volumes_mm3(axis, box_mm, edges_mm)
+    return float(inside_mm3 / (np.pi * np.diff(edges_mm[1] ** 2)[0] * length_mm))
+
+
+def _ends(cubes_um3: FloatArray, along_mm: FloatArray, reach_mm: tuple[float, float]) -> bool:
+    """Whether the last part of the box has next to no liquid."""
+    last = along_mm > reach_mm[1] - EDGE * (reach_mm[1] - reach_mm[0])
+    return bool(cubes_um3[last].sum() < EDGE * EDGE / (1 - EDGE) * cubes_um3[~last].sum())

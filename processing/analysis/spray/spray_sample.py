@@ -1,0 +1,178 @@
+"""SpraySample: the droplets of some shots together, and what is drawn to say how sure their figures are."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from processing.analysis.droplets.droplet_file import StoredDroplets
+from processing.analysis.droplets.droplet_statistics import DIAMETER, measured_grid, measured_mm3, told_exposures
+from processing.analysis.estimates import CONFIDENCE, Estimate, Figures, drawn_figures, estimated
+from processing.geometry import FloatArray
+
+VELOCITY = ("u_m_s", "v_m_s", "w_m_s")
+
+
+@dataclass(frozen=True, eq=False)
+class SpraySample:
+    """Droplets of some shots.
+
+    Parameters
+    ----------
+    diameters_um : (N,) array
+        Of all droplets in all exposures.
+    points_mm : (N, 3) array
+        x, y, z.
+    velocities_m_s : (N, 3) array
+        u, v, w; not a number where a droplet has none.
+    shot : (N,) array of int
+        Of which shot a droplet is.
+    volumes_mm3 : (S,) array
+        That could be measured in each shot, of all its exposures together.
+    exposures_per_shot : float
+        2 where A and B, which show the same droplets, are both there.
+    box_mm : (2, 3) array | None
+        Lower and upper corner of what was measured in every shot; None where shots differ in it.
+    """
+
+    diameters_um: FloatArray
+    points_mm: FloatArray
+    velocities_m_s: FloatArray
+    shot: NDArray[np.intp]
+    volumes_mm3: FloatArray
+    exposures_per_shot: float = 1.0
+    box_mm: FloatArray | None = None
+
+    def __len__(self) -> int:
+        return len(self.diameters_um)
+
+    @property
+    def several(self) -> bool:
+        """Whether there are shots to draw; of a single one droplets are drawn."""
+        return len(self.volumes_mm3) > 1
+
+    @property
+    def paired(self) -> NDArray[np.bool_]:
+        """Which droplets have a velocity, (N,)."""
+        return np.asarray(np.isfinite(self.velocities_m_s).all(axis=1), np.bool_)
+
+    @property
+    def cubes_um3(self) -> FloatArray:
+        """Diameters to the third: volumes, but for pi / 6; (N,)."""
+        return self.diameters_um**3
+
+    @property
+    def n_units(self) -> int:
+        """How many things there are to draw."""
+        return len(self.volumes_mm3) if self.several else len(self)
+
+    @cached_property
+    def units(self) -> NDArray[np.intp]:
+        """Of which of the drawn things a droplet is, (N,)."""
+        return self.shot if self.several else np.arange(len(self))
+
+    def chosen(self, which: NDArray[np.bool_]) -> "SpraySample":
+        """The same shots with some of their droplets."""
+        return replace(
+            self,
+            diameters_um=self.diameters_um[which],
+            points_mm=self.points_mm[which],
+            velocities_m_s=self.velocities_m_s[which],
+            shot=self.shot[which],
+        )
+
+    def sums(self, counts: FloatArray, values: FloatArray) -> FloatArray:
+        """Sums of values of the droplets, (N, k), when units are taken so often, (rows, units): (rows, k)."""
+        per_unit = np.zeros((self.n_units, values.shape[1]))
+        np.add.at(per_unit, self.units, values)
+        return counts @ per_unit
+
+    def measured_mm3(self, counts: FloatArray) -> FloatArray:
+        """Volumes that belong to so many shots, (rows, 1)."""
+        if self.several:
+            return counts @ self.volumes_mm3[:, None]
+        return np.full((len(counts), 1), self.volumes_mm3.sum())
+
+    def estimated(
+        self, figures: Figures, signed: bool | NDArray[np.bool_] = False, confidence: float = CONFIDENCE
+    ) -> list[Estimate | None]:
+        """Figures with intervals over shots; of a single shot over its droplets, whose number is left to chance."""
+        widening = 1.0 if self.several else float(np.sqrt(self.exposures_per_shot))
+        return estimated(
+            figures,
+            self.n_units,
+            len(self),
+            counting=not self.several,
+            widening=widening,
+            signed=signed,
+            confidence=confidence,
+        )
+
+    def drawn(self, figures: Figures) -> tuple[FloatArray, FloatArray]:
+        """Figures as measured, and of every draw."""
+        return drawn_figures(figures, self.n_units, len(self), counting=not self.several)
+
+
+def spray_sample(shots: Sequence[StoredDroplets]) -> SpraySample:
+    """Droplets of shots as their files have them; shots of which every exposure was refused do not count.
+
+    Parameters
+    ----------
+    shots : sequence of StoredDroplets
+        With diameters in micrometres, of one recipe.
+    """
+    told = [(shot, told_exposures(shot)) for shot in shots]
+    counted = [(shot, exposures) for shot, exposures in told if exposures]
+    return SpraySample(
+        diameters_um=_joined([np.asarray(shot.columns[DIAMETER], np.float64) for shot, _ in counted]),
+        points_mm=_joined([_columns(shot, ("x_mm", "y_mm", "z_mm")) for shot, _ in counted], 3),
+        velocities_m_s=_joined([_columns(shot, VELOCITY) for shot, _ in counted], 3),
+        shot=np.repeat(np.arange(len(counted)), [len(shot.columns["frame"]) for shot, _ in counted]),
+        volumes_mm3=np.array([measured_mm3(shot, exposures) or np.nan for shot, exposures in counted], np.float64),
+        exposures_per_shot=sum(len(exposures) for _, exposures in counted) / max(len(counted), 1),
+        box_mm=_common_box([shot for shot, _ in counted]),
+    )
+
+
+def _joined(columns: Sequence[FloatArray], width: int = 0) -> FloatArray:
+    return np.concatenate([np.empty((0, width) if width else 0), *columns])
+
+
+def _columns(shot: StoredDroplets, names: Sequence[str]) -> FloatArray:
+    """Columns side by side; not a number where a file has them not."""
+    nothing = np.full(len(shot.columns["frame"]), np.nan)
+    return np.column_stack([np.asarray(shot.columns.get(name, nothing), np.float64) for name in names])
+
+
+def _common_box(shots: Sequence[StoredDroplets]) -> FloatArray | None:
+    grids = {measured_grid(shot) for shot in shots}
+    if len(grids) != 1 or (grid := grids.pop()) is None:
+        return None
+    first, last = np.array([[axis[0], axis[-1]] for axis in (grid.x_mm, grid.y_mm, grid.z_mm)]).T
+    return np.array([first - grid.pitch_mm / 2, last + grid.pitch_mm / 2])
+
+
+def weighted_quantiles(values: FloatArray, weights: FloatArray, shares: Sequence[float]) -> FloatArray:
+    """Values below which so much of the weight lies.
+
+    Parameters
+    ----------
+    values : (N,) array
+        Sorted.
+    weights : (rows, N) array
+        Of each value, row by row.
+    shares : sequence of k float
+        0 to 1.
+
+    Returns
+    -------
+    (rows, k) array
+        Not a number where a row has no weight.
+    """
+    summed = np.cumsum(weights, axis=1)
+    total = summed[:, -1:]
+    below = [np.count_nonzero(summed < share * total, axis=1) for share in shares]
+    found = np.column_stack([values[np.minimum(index, len(values) - 1)] for index in below])
+    return np.where(total > 0, found, np.nan)

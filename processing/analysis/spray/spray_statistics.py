@@ -1,0 +1,159 @@
+"""SprayStatistics: all that the droplets of some shots say of a spray, each figure with its interval or a reason."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field
+
+from processing.analysis.droplets.droplet_file import StoredDroplets
+from processing.analysis.droplets.droplet_statistics import (
+    DIAMETER,
+    NO_VOLUME,
+    DropletStatistics,
+    droplet_statistics,
+)
+from processing.analysis.droplets.size_statistics import SizeClass, size_classes
+from processing.analysis.estimates import Estimate
+from processing.analysis.spray.patternation import Patternation, patternation
+from processing.analysis.spray.sample_size import SampleVerdict, sample_verdict
+from processing.analysis.spray.size_fits import SizeFit, size_fits
+from processing.analysis.spray.spray_axis import SprayAxis
+from processing.analysis.spray.spray_extent import SprayExtent, spray_extent
+from processing.analysis.spray.spray_motion import (
+    MM3_PER_UM3,
+    NO_AXIS,
+    NO_VELOCITIES,
+    SprayMotion,
+    spray_motion,
+)
+from processing.analysis.spray.spray_sample import SpraySample, spray_sample
+from processing.geometry import FloatArray
+from processing.reconstruction.settings import FrozenValue
+
+SLICE = 0.25
+"""Of the box's reach along the axis: length of the slice of a patternation."""
+CORRECTIONS = (
+    "densities are per volume that could be measured: what liquid hides is taken off",
+    "diameters are corrected as the files say (diameter_um; diameter_raw_um is not)",
+    "not corrected: droplets that are too small or too faint to be found, and ghosts; their shares are in the studies",
+)
+
+
+@dataclass(frozen=True)
+class AskedFor:
+    """What the user knows of a spray, and wants to know.
+
+    Parameters
+    ----------
+    axis : SprayAxis | None
+        Nozzle and direction.
+    at_mm : tuple of float
+        Distances of patternations along the axis; none stands for the middle of the box.
+    liquid_kg_m3 : float | None
+        Density of the liquid.
+    """
+
+    axis: SprayAxis | None = None
+    at_mm: tuple[float, ...] = ()
+    liquid_kg_m3: float | None = None
+
+
+class SprayStatistics(FrozenValue):
+    """A spray, as its droplets say."""
+
+    sampling: Annotated[
+        Literal["spatial"],
+        Field(description="droplets in a volume at an instant, not those that pass an area: ASTM E799"),
+    ] = "spatial"
+    droplets: Annotated[DropletStatistics, Field(description="number, density, mean diameters and quantiles by volume")]
+    smallest_um: Annotated[float | None, Field(description="diameter of the smallest droplet")] = None
+    liquid_ppm: Annotated[Estimate | None, Field(description="volume of liquid in droplets per volume, 1e-6")] = None
+    sample: Annotated[SampleVerdict | None, Field(description="is it large enough; null without diameters")] = None
+    classes: Annotated[tuple[SizeClass, ...], Field(description="by number, area, volume: ISO 9276-1, R20")] = ()
+    fits: Annotated[tuple[SizeFit, ...], Field(description="lognormal and Rosin-Rammler, the better one first")] = ()
+    motion: Annotated[SprayMotion | None, Field(description="velocities and flux")] = None
+    extent: Annotated[SprayExtent | None, Field(description="cone angle and penetration")] = None
+    patternations: Annotated[tuple[Patternation, ...], Field(description="liquid by sectors and rings")] = ()
+    corrections: Annotated[tuple[str, ...], Field(description="what is corrected, and what is not")] = CORRECTIONS
+    reasons: Annotated[
+        dict[str, str], Field(description="why a part is null or empty, and what to do about it, by its name")
+    ] = Field(default_factory=dict)
+
+
+def spray_statistics(shots: Sequence[StoredDroplets], asked: AskedFor | None = None) -> SprayStatistics:
+    """All figures of a spray.
+
+    Parameters
+    ----------
+    shots : sequence of StoredDroplets
+        A shot each, as ``read_droplets`` gives it; of one run or several.
+    asked : AskedFor | None
+        Nozzle and axis, density of the liquid.
+
+    Raises
+    ------
+    DropletFileError
+        As of ``droplet_statistics``.
+    """
+    asked = asked or AskedFor()
+    pooled = droplet_statistics(shots)
+    if not pooled.n or any(DIAMETER not in shot.columns for shot in shots):
+        why = pooled.reason or "no droplet was measured"
+        return SprayStatistics(droplets=pooled, reasons=dict.fromkeys(("sample", "fits", "motion", "extent"), why))
+    return _of_sample(spray_sample(shots), pooled, asked)
+
+
+def _of_sample(sample: SpraySample, pooled: DropletStatistics, asked: AskedFor) -> SprayStatistics:
+    extent, patternations = _in_space(sample, asked)
+    fits, motion = size_fits(sample), spray_motion(sample, asked.axis, asked.liquid_kg_m3)
+    return SprayStatistics(
+        droplets=pooled,
+        smallest_um=float(sample.diameters_um.min()),
+        liquid_ppm=_liquid_ppm(sample),
+        sample=sample_verdict(sample, pooled),
+        classes=size_classes(sample.diameters_um, sample.exposures_per_shot),
+        fits=fits,
+        motion=motion,
+        extent=extent,
+        patternations=patternations,
+        reasons=_reasons(sample, asked, bool(fits), motion is not None, bool(patternations)),
+    )
+
+
+def _in_space(sample: SpraySample, asked: AskedFor) -> tuple[SprayExtent | None, tuple[Patternation, ...]]:
+    axis = asked.axis
+    if axis is None:
+        return None, ()
+    if sample.box_mm is None:
+        return spray_extent(sample, axis), ()
+    near_mm, far_mm = axis.reach_mm(sample.box_mm)
+    places_mm = asked.at_mm or ((near_mm + far_mm) / 2,)
+    slices = (patternation(sample, axis, at_mm, SLICE * (far_mm - near_mm)) for at_mm in places_mm)
+    return spray_extent(sample, axis), tuple(one for one in slices if one)
+
+
+def _liquid_ppm(sample: SpraySample) -> Estimate | None:
+    volumes_mm3 = MM3_PER_UM3 * np.pi / 6 * sample.cubes_um3[:, None]
+
+    def ppm(counts: FloatArray) -> FloatArray:
+        return np.asarray(1e6 * sample.sums(counts, volumes_mm3) / sample.measured_mm3(counts))
+
+    (one,) = sample.estimated(ppm)
+    return one
+
+
+def _reasons(sample: SpraySample, asked: AskedFor, fits: bool, motion: bool, patternations: bool) -> dict[str, str]:
+    reasons = {}
+    if not fits:
+        reasons["fits"] = "fewer than 20 different diameters: measure more shots"
+    if not motion:
+        reasons["motion"] = NO_VELOCITIES
+    if asked.axis is None:
+        reasons |= {"extent": NO_AXIS, "patternations": NO_AXIS}
+    elif not patternations:
+        reasons["patternations"] = "fewer than 20 droplets in the slice across the axis, or no common box"
+    if not np.isfinite(sample.volumes_mm3).all():
+        reasons["liquid_ppm"] = NO_VOLUME
+    return reasons

@@ -1,0 +1,91 @@
+"""Fits against the distributions that they are of: moments by gamma functions, quantiles by scipy."""
+
+import numpy as np
+import pytest
+from scipy.special import gamma
+from scipy.stats import lognorm, weibull_min
+
+from processing.analysis.droplets.size_statistics import mean_diameters
+from processing.analysis.spray.sample_size import MOST_EXTREME, sample_verdict
+from processing.analysis.spray.size_fits import SizeFit, size_fits
+from processing.analysis.spray.spray_sample import SpraySample, spray_sample
+from tests.support.sampled_sprays import stored_shot
+
+N = 4000
+SHARES = (np.arange(N) + 0.5) / N
+
+
+def rosin_rammler_um(scale_um: float = 80.0, q: float = 4.0) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+    """Diameters whose volumes follow Rosin and Rammler: q above 3, so that their number is finite.
+
+    By number their density is ``d^(q - 4) exp(-(d / X)^q)``: ``(d / X)^q`` is gamma distributed, of order (q - 3) / q.
+    """
+    rng = np.random.default_rng(5)
+    return np.asarray(scale_um * rng.gamma((q - 3) / q, 1, 20 * N) ** (1 / q))
+
+
+def sample_of(diameters_um: np.ndarray[tuple[int, ...], np.dtype[np.float64]], shots: int = 10) -> SpraySample:
+    return spray_sample([stored_shot(diameters_um[shot::shots], shot=shot) for shot in range(shots)])
+
+
+def by_name(sample: SpraySample) -> dict[str, SizeFit]:
+    return {fit.name: fit for fit in size_fits(sample)}
+
+
+def test_a_lognormal_spray_is_found_and_the_other_one_does_not_fit() -> None:
+    sample = sample_of(lognorm.ppf(SHARES, 0.35, scale=40))
+    fits = by_name(sample)
+    assert next(iter(fits)) == "lognormal"
+    fit = fits["lognormal"]
+    assert fit.shape == pytest.approx(0.35, rel=0.03)
+    assert fit.scale_um == pytest.approx(40 * np.exp(3 * 0.35**2), rel=0.01)
+    assert fit.d32_um == pytest.approx(40 * np.exp(2.5 * 0.35**2), rel=0.01)
+    assert (fit.fits, fits["rosin-rammler"].fits) == (True, False)
+    d_um = np.array([20.0, 60.0, 90.0])
+    by_volume = lognorm(fit.shape, scale=fit.scale_um)
+    np.testing.assert_allclose(fit.cumulative(d_um), by_volume.cdf(d_um))
+    np.testing.assert_allclose(fit.density_per_um(d_um), by_volume.pdf(d_um))
+
+
+def test_a_spray_of_rosin_and_rammler_has_their_exponent_and_moments_by_gamma_functions() -> None:
+    d_um = rosin_rammler_um()
+    fits = by_name(sample_of(d_um))
+    assert next(iter(fits)) == "rosin-rammler"
+    fit = fits["rosin-rammler"]
+    assert (fit.scale_um, fit.shape) == pytest.approx((80, 4), rel=0.02)
+    assert fit.d32_um == pytest.approx(80 / gamma(1 - 1 / 4), rel=0.02)
+    assert fit.d32_um == pytest.approx(np.sum(d_um**3) / np.sum(d_um**2), rel=0.01)
+    assert fit.dv50_um == pytest.approx(weibull_min(4, scale=80).median(), rel=0.02)
+    assert (fit.fits, fits["lognormal"].fits) == (True, False)
+    by_volume = weibull_min(fit.shape, scale=fit.scale_um)
+    np.testing.assert_allclose(fit.cumulative(np.array([30.0, 90.0])), by_volume.cdf([30.0, 90.0]))
+    np.testing.assert_allclose(fit.density_per_um(np.array([30.0, 90.0])), by_volume.pdf([30.0, 90.0]))
+
+
+def test_fewer_than_20_diameters_are_not_fitted() -> None:
+    assert size_fits(sample_of(np.linspace(10, 20, 19), shots=2)) == ()
+
+
+def test_a_large_sample_is_adequate_and_one_with_an_extreme_droplet_is_not() -> None:
+    d_um = lognorm.ppf(SHARES, 0.3, scale=40)
+    adequate = _verdict(np.random.default_rng(0).permutation(d_um))
+    assert (adequate.verdict, adequate.reasons) == ("adequate", ())
+    assert adequate.extreme_share
+    assert adequate.extreme_share < MOST_EXTREME
+    extreme = _verdict(np.append(d_um, 400.0))
+    assert extreme.verdict == "low sample"
+    assert "the largest droplet has" in " ".join(extreme.reasons)
+    assert extreme.extreme_um == 400
+    assert extreme.d32_without_extreme_um == pytest.approx(np.sum(d_um**3) / np.sum(d_um**2))
+
+
+def test_a_few_shots_say_how_many_it_would_take() -> None:
+    few = _verdict(np.random.default_rng(0).permutation(lognorm.ppf(SHARES[::40], 0.3, scale=40)), shots=4)
+    assert few.verdict == "low sample"
+    assert few.shots_for_5_percent
+    assert few.shots_for_5_percent > 4
+    assert f"about {few.shots_for_5_percent} shots would do" in few.reasons[-1]
+
+
+def _verdict(d_um: np.ndarray[tuple[int, ...], np.dtype[np.float64]], shots: int = 10):  # type: ignore[no-untyped-def]
+    return sample_verdict(sample_of(d_um, shots), mean_diameters([d_um[shot::shots] for shot in range(shots)]))

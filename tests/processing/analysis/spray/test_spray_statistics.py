@@ -1,0 +1,233 @@
+"""The spray as a whole, against formulas and by what must not change."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from processing.analysis.droplets.droplet_file import StoredDroplets
+from processing.analysis.estimates import Estimate
+from processing.analysis.spray.spray_axis import SprayAxis
+from processing.analysis.spray.spray_motion import NO_AXIS, NO_DENSITY, NO_VELOCITIES
+from processing.analysis.spray.spray_statistics import AskedFor, SprayStatistics, spray_statistics
+from processing.volume import VoxelGrid
+from tests.support.sampled_sprays import BOX, cone_shots, stored_shot
+
+DOWN = SprayAxis((0, 0, 0), (0, 2, 0))
+ASKED = AskedFor(DOWN, liquid_kg_m3=1000.0)
+DIAMETERS = ("d10_um", "d20_um", "d30_um", "d32_um", "d43_um", "dv10_um", "dv50_um", "dv90_um", "relative_span")
+
+
+def value(estimate: Estimate | None) -> float:
+    assert estimate
+    return estimate.value
+
+
+def figures(told: SprayStatistics) -> dict[str, float]:
+    """Figures that a spray has, without intervals."""
+    assert told.motion
+    assert told.extent
+    (pattern,) = told.patternations
+    of_droplets = {name: value(getattr(told.droplets, name)) for name in DIAMETERS}
+    return of_droplets | {
+        "density": value(told.droplets.number_density_per_mm3),
+        "ppm": value(told.liquid_ppm),
+        "flux": value(told.motion.volume_flux_mm_s),
+        "flux d32": value(told.motion.flux_d32_um),
+        "speed": value(told.motion.speed_m_s),
+        "axial": value(told.motion.axial_m_s),
+        "correlation": value(told.motion.size_speed_correlation),
+        "cone": value(told.extent.cone_angle_deg),
+        "asymmetry": pattern.asymmetry or 0.0,
+    }
+
+
+@pytest.fixture(scope="module")
+def cone() -> list[StoredDroplets]:
+    return cone_shots()
+
+
+@pytest.fixture(scope="module")
+def told(cone: list[StoredDroplets]) -> SprayStatistics:
+    return spray_statistics(cone, ASKED)
+
+
+def test_sampling_is_stated_and_what_is_not_corrected(told: SprayStatistics) -> None:
+    assert told.sampling == "spatial"
+    assert any("not corrected" in line for line in told.corrections)
+    assert told.reasons == {}
+
+
+def test_flux_and_density_are_what_the_droplets_carry(cone: list[StoredDroplets], told: SprayStatistics) -> None:
+    """By hand: mean of 8 shots of 400 mm3 each."""
+    assert told.motion
+    d_mm = np.concatenate([shot.columns["diameter_um"] for shot in cone]).astype(float) / 1000
+    down_mm_s = 1000 * np.concatenate([shot.columns["v_m_s"] for shot in cone]).astype(float)
+    liquid_mm3 = np.pi / 6 * d_mm**3
+    assert value(told.droplets.number_density_per_mm3) == pytest.approx(len(d_mm) / 3200)
+    assert value(told.liquid_ppm) == pytest.approx(1e6 * liquid_mm3.sum() / 3200)
+    assert value(told.motion.volume_flux_mm_s) == pytest.approx(liquid_mm3 @ down_mm_s / 3200)
+    assert value(told.motion.mass_flux_kg_m2_s) == pytest.approx(liquid_mm3 @ down_mm_s / 3200)  # 1000 kg/m3, mm/s
+    weights = down_mm_s * d_mm**2
+    assert value(told.motion.flux_d32_um) == pytest.approx(1000 * weights @ d_mm / weights.sum())
+    assert value(told.motion.flux_d32_um) > value(told.droplets.d32_um), "large ones fly faster"
+
+
+def test_speeds_follow_the_sizes(told: SprayStatistics) -> None:
+    assert told.motion
+    assert value(told.motion.size_speed_correlation) == pytest.approx(1)
+    assert told.motion.paired_share == 1
+    for row in (row for row in told.motion.by_size if row.speed_m_s):
+        assert 5 + row.low / 10 <= value(row.speed_m_s) <= 5 + row.high / 10
+        assert value(row.radial_m_s) / value(row.axial_m_s) == pytest.approx(np.tan(np.radians(20)), rel=0.05)
+
+
+def test_a_known_cone_has_its_angle(told: SprayStatistics) -> None:
+    assert told.extent
+    half, most = told.extent.cone_angle_half_deg, told.extent.cone_angle_deg
+    assert value(half) == pytest.approx(40, abs=0.5)
+    assert value(most) == pytest.approx(43.2, abs=0.4), "nine tenths of 18 to 22 degrees, twice"
+    assert half
+    assert half.low < 40 < half.high
+
+
+def test_an_even_cone_is_no_more_uneven_than_chance_and_a_half_one_is(cone: list[StoredDroplets]) -> None:
+    (even,) = spray_statistics(cone, ASKED).patternations
+    assert even.asymmetry
+    assert even.asymmetry_by_chance
+    assert even.asymmetry < even.asymmetry_by_chance
+    assert sum(value(share) for share in even.sector_shares) == pytest.approx(1)
+    (half,) = spray_statistics([rows(shot, numbers(shot, "x_mm") > 0) for shot in cone], ASKED).patternations
+    assert half.asymmetry == pytest.approx(0.5, abs=0.05)
+    assert half.asymmetry_by_chance
+    assert half.asymmetry_by_chance < 0.4 < half.asymmetry
+
+
+def rows(shot: StoredDroplets, which: NDArray[np.generic]) -> StoredDroplets:
+    return StoredDroplets({name: column[which] for name, column in shot.columns.items()}, shot.provenance)
+
+
+def numbers(shot: StoredDroplets, name: str) -> NDArray[np.float64]:
+    return shot.columns[name].astype(np.float64)
+
+
+def scaled(shot: StoredDroplets, scale: float) -> StoredDroplets:
+    columns = {**shot.columns, "diameter_um": scale * numbers(shot, "diameter_um")}
+    return StoredDroplets(columns, shot.provenance)
+
+
+def renumbered(shots: Sequence[StoredDroplets]) -> list[StoredDroplets]:
+    return [StoredDroplets(one.columns, {**one.provenance, "shot": number}) for number, one in enumerate(shots)]
+
+
+def test_diameters_scale(cone: list[StoredDroplets], told: SprayStatistics) -> None:
+    other = figures(spray_statistics([scaled(shot, 2.0) for shot in cone], ASKED))
+    powers = {"ppm": 3, "flux": 3, "flux d32": 1} | {name: 1 for name in DIAMETERS if name != "relative_span"}
+    for name, one in figures(told).items():
+        assert other[name] == pytest.approx(one * 2.0 ** powers.get(name, 0), rel=1e-9), name
+
+
+def test_the_order_of_droplets_and_shots_means_nothing(cone: list[StoredDroplets], told: SprayStatistics) -> None:
+    rng = np.random.default_rng(1)
+    mixed = [rows(cone[shot], rng.permutation(len(cone[shot].columns["frame"]))) for shot in rng.permutation(len(cone))]
+    assert figures(spray_statistics(mixed, ASKED)) == pytest.approx(figures(told), rel=1e-9)
+
+
+def test_all_shots_twice_change_no_figure(cone: list[StoredDroplets], told: SprayStatistics) -> None:
+    twice = spray_statistics(renumbered([*cone, *cone]), ASKED)
+    assert figures(twice) == pytest.approx(figures(told), rel=1e-9)
+    assert twice.droplets.d32_um
+    assert told.droplets.d32_um
+    assert twice.droplets.d32_um.high < told.droplets.d32_um.high
+
+
+def test_an_empty_shot_changes_densities_and_no_diameter(cone: list[StoredDroplets], told: SprayStatistics) -> None:
+    """Nine shots of which one is empty have 8 / 9 of the droplets per volume."""
+    empty = stored_shot(np.empty(0), np.empty((0, 3)), np.empty((0, 3)), shot=99)
+    other = figures(spray_statistics([*cone, empty], ASKED))
+    for name, one in figures(told).items():
+        factor = 8 / 9 if name in ("density", "ppm", "flux") else 1
+        assert other[name] == pytest.approx(factor * one, rel=1e-9), name
+
+
+def test_a_spray_that_is_turned_with_its_axis_is_the_same(cone: list[StoredDroplets], told: SprayStatistics) -> None:
+    """x, y, z become z, x, y: the box turns with it."""
+    columns = {"x_mm": "z_mm", "y_mm": "x_mm", "z_mm": "y_mm", "u_m_s": "w_m_s", "v_m_s": "u_m_s", "w_m_s": "v_m_s"}
+    box = VoxelGrid((40, 100, 100), (-4.95, -4.95, 8.05), 0.1)
+    turned = []
+    for number, shot in enumerate(cone):
+        moved = {name: shot.columns[columns.get(name, name)] for name in shot.columns}
+        points_mm = np.column_stack([moved[f"{axis}_mm"] for axis in "xyz"])
+        velocities = np.column_stack([moved[name] for name in ("u_m_s", "v_m_s", "w_m_s")])
+        turned.append(stored_shot(moved["diameter_um"], points_mm, velocities, number, box))  # type: ignore[arg-type]
+    other = figures(spray_statistics(turned, replace(ASKED, axis=SprayAxis((0, 0, 0), (0, 0, 1)))))
+    one = figures(told)
+    assert {**other, "asymmetry": 0} == pytest.approx({**one, "asymmetry": 0}, rel=1e-9)
+
+
+def test_what_cannot_be_known_is_null_with_a_reason_and_a_remedy(cone: list[StoredDroplets]) -> None:
+    blind = spray_statistics(cone)
+    assert (blind.extent, blind.patternations) == (None, ())
+    assert blind.reasons["extent"] == blind.reasons["patternations"] == NO_AXIS
+    assert "--nozzle" in NO_AXIS
+    assert blind.motion
+    assert (blind.motion.volume_flux_mm_s, blind.motion.reason) == (None, NO_AXIS)
+    weightless = spray_statistics(cone, AskedFor(DOWN)).motion
+    assert weightless
+    assert (weightless.mass_flux_kg_m2_s, weightless.reason) == (None, NO_DENSITY)
+    still = [rows(shot, np.arange(len(shot.columns["frame"]))) for shot in cone]
+    for shot in still:
+        for name in ("u_m_s", "v_m_s", "w_m_s"):
+            del shot.columns[name]
+    assert spray_statistics(still, ASKED).reasons["motion"] == NO_VELOCITIES
+    assert spray_statistics([]).reasons["fits"]
+
+
+def test_a_box_that_cuts_the_cone_tells_no_angle_and_a_spray_that_goes_on_no_penetration() -> None:
+    wide = spray_statistics(cone_shots(half_angle_deg=35.0), ASKED).extent
+    assert wide
+    assert wide.cone_angle_deg is None
+    assert "wider box" in (wide.cone_reason or "")
+    assert wide.penetration_mm is None
+    assert "longer box" in (wide.penetration_reason or "")
+
+
+def test_a_spray_that_ends_in_the_box_has_a_penetration() -> None:
+    shots = cone_shots()
+    short = [rows(shot, numbers(shot, "y_mm") < 11) for shot in shots]
+    extent = spray_statistics(short, ASKED).extent
+    assert extent
+    assert value(extent.penetration_mm) == pytest.approx(10.97, abs=0.04)
+
+
+def test_droplets_without_partner_take_the_mean_velocity_of_the_others(cone: list[StoredDroplets]) -> None:
+    """Lost at random, a third of the velocities changes the flux by chance only."""
+    rng = np.random.default_rng(2)
+    full, lost = spray_statistics(cone, ASKED).motion, []
+    for shot in cone:
+        gone = rng.random(len(shot.columns["frame"])) < 1 / 3
+        unpaired = {name: np.where(gone, np.nan, shot.columns[name]) for name in ("u_m_s", "v_m_s", "w_m_s")}
+        lost.append(StoredDroplets({**shot.columns, **unpaired}, shot.provenance))
+    partly = spray_statistics(lost, ASKED).motion
+    assert full
+    assert partly
+    assert partly.paired_share == pytest.approx(2 / 3, abs=0.03)
+    assert value(partly.volume_flux_mm_s) == pytest.approx(value(full.volume_flux_mm_s), rel=0.02)
+
+
+def test_one_shot_draws_its_droplets_and_says_that_its_sample_is_low(cone: list[StoredDroplets]) -> None:
+    one = spray_statistics(cone[:1], ASKED)
+    assert one.droplets.intervals_over == "droplets"
+    assert one.sample
+    assert one.sample.verdict == "low sample"
+    assert "how shots differ" in one.sample.reasons[0]
+    assert one.motion
+    assert one.motion.volume_flux_mm_s
+
+
+def test_nothing_is_not_a_number_in_json(told: SprayStatistics) -> None:
+    assert "NaN" not in told.model_dump_json()
+    assert SprayStatistics.model_validate_json(told.model_dump_json()) == told
+    assert BOX.volume_mm3 == pytest.approx(400)
