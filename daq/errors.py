@@ -30,7 +30,9 @@
 
 
 class DaqError(Exception):
-    """Base of every error that daq raises on purpose."""
+    """Base of every error that daq raises on purpose; ``code`` is one of ``daq.run.refusals``, if it is a refusal."""
+
+    code: str = ""
 
 
 class PlanError(DaqError):

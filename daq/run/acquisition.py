@@ -1,29 +1,30 @@
 """Acquisition: one run or one live view at a time, on a thread of its own."""
 
 import logging
-import signal
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
 from daq.causes import CauseCode
 from daq.devices import Rig
-from daq.errors import BusyError, NotAcknowledged, PlanError, StorageError
+from daq.errors import BusyError, DaqError, PlanError, StorageError
 from daq.files.recovery import recover
 from daq.files.run_directory import RunWriter
 from daq.files.storage import disk_of
 from daq.run import light
-from daq.run.ending import RunEnding
+from daq.run.ending import RunEnding, why_it_ends
 from daq.run.events import RunEvent, RunMessage, RunStatus
 from daq.run.limits import AcquisitionLimits
 from daq.run.live.live_session import LiveSession
 from daq.run.live.live_start import Audience, checked_plan
-from daq.run.preflight import PreparedRun, prepare_run
+from daq.run.preflight import Preflight, PreparedRun
 from daq.run.progress import RunProgress
+from daq.run.refusals import RefusalCode, coded, impossible, not_acknowledged, raise_first, starts_already
 from daq.run.session import RunSession
 from daq.run.shooting import RunObserver, Shooting
 from daq.run.state import RunState, RunStep, next_state
@@ -104,7 +105,7 @@ class Acquisition:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self.leave(_why_it_ends(error))
+        self.leave(why_it_ends(error))
         self.wait(self._limits.light_off_s + self._limits.disarm_s + self._limits.drain_s)
         self._leaving.set()
         for thread in self._threads:
@@ -124,6 +125,19 @@ class Acquisition:
         for found in recover(self._data_dir):
             _LOG.warning("run %s: %s", found.run_id, found.text)
             self._publish(RunMessage(found.run_id, found.text))
+
+    def refusals(self, plan: RunPlan | None = None) -> Iterator[DaqError]:
+        """Why a run, or this one, does not start now, in the order in which ``start`` looks; none if it does.
+
+        While a run is under way no device is asked: the light may be on.
+        """
+        if self._starting.locked():
+            yield starts_already()
+        yield from self._refusals_of_state(RunStep.START)
+        if not self.status().active:
+            yield from self._preflight().refusals_of_rig()
+        if plan is not None:
+            yield from self._preflight().refusals_of_plan(plan)
 
     def start(self, plan: RunPlan) -> str:
         """Check the plan and start the run; returns its id. A live view ends first, its light confirmed off.
@@ -153,10 +167,7 @@ class Acquisition:
     def start_live(self, plan: LivePlan) -> None:
         """Check the plan and show the rig live. A live view of another plan ends first.
 
-        Raises
-        ------
-        BusyError, NotAcknowledged, PlanError, InterlockOpen, DeviceError
-            As for a run.
+        Raises what ``start`` raises.
         """
         with self._starting_alone(RunStep.LIVE):
             ending = self._ending = RunEnding()
@@ -227,16 +238,22 @@ class Acquisition:
     def _starting_alone(self, step: RunStep) -> Iterator[None]:
         """Nothing else starts meanwhile; BusyError where this cannot start, not even after a live view."""
         if not self._starting.acquire(blocking=False):
-            raise BusyError("another run or live view is being started")
+            raise starts_already()
         try:
-            state = self.status().state
-            next_state(RunState.IDLE if state is RunState.LIVE else state, step)
-            if self._left:
-                raise BusyError(f"no run starts any more: {self._left}")
-            self._check_acknowledged()
+            raise_first(self._refusals_of_state(step))
             yield
         finally:
             self._starting.release()
+
+    def _refusals_of_state(self, step: RunStep) -> Iterator[DaqError]:
+        status = self.status()
+        yield from impossible(step, RunState.IDLE if status.state is RunState.LIVE else status.state)
+        if self._left:
+            yield coded(BusyError(f"no run starts any more: {self._left}"), RefusalCode.PROGRAM_ENDING)
+        yield from not_acknowledged(status)
+
+    def _preflight(self) -> Preflight:
+        return Preflight(self._rig, self._data_dir, self._hash_calibration, self._limits.disk_margin_bytes, self._disk)
 
     def _shooting(self, plan: RunPlan, timing: ShotTiming, ending: RunEnding) -> Shooting:
         return Shooting(self._rig, plan, timing, self._progress, self._limits, self._observers, ending)
@@ -250,13 +267,7 @@ class Acquisition:
         self._live_ending.end(RunStep.STOP, cause)
         limits = self._limits
         status = self._progress.wait(_ARMING_S + limits.frame_s + limits.light_off_s + limits.disarm_s)
-        next_state(status.state, step)
-        self._check_acknowledged()
-
-    def _check_acknowledged(self) -> None:
-        if waiting := self.status().to_acknowledge:
-            texts = "; ".join(cause.text for cause in waiting)
-            raise NotAcknowledged(f"what ended last had more than one cause; to be acknowledged one by one: {texts}")
+        raise_first(chain(impossible(step, status.state), not_acknowledged(self.status())))
 
     def _end_at_once(self, cause: str, code: CauseCode) -> None:
         for ending in (self._ending, self._live_ending):
@@ -264,23 +275,12 @@ class Acquisition:
 
     def _prepare(self, plan: RunPlan) -> tuple[PreparedRun, RunWriter]:
         """Check the plan, and make the directory of the run: a run that is accepted always has one."""
-        if self._disk is not None and disk_of(self._data_dir) != self._disk:
-            raise PlanError(
-                f"{self._data_dir} is gone, or on another disk than when the server was started: "
-                "mount or bring back the right one, or start the server again"
-            )
         try:
-            self._data_dir.mkdir(parents=True, exist_ok=True)
-            margin_bytes = self._limits.disk_margin_bytes
-            prepared = prepare_run(
-                self._rig, self._data_dir, plan, self._configuration, self._hash_calibration, margin_bytes
-            )
+            prepared = self._preflight().prepare(plan, self._configuration)
             self._end_live_before(RunStep.START, "a run starts")
-            return prepared, RunWriter(prepared.run_dir, prepared.header, margin_bytes).open()
-        except StorageError as error:
-            raise PlanError(f"the run cannot be stored: {error}") from error
-        except OSError as error:
-            raise PlanError(f"the run cannot be stored, or its calibration not be read: {error}") from error
+            return prepared, RunWriter(prepared.run_dir, prepared.header, self._limits.disk_margin_bytes).open()
+        except (StorageError, OSError) as error:
+            raise coded(PlanError(f"the run cannot be stored: {error}"), RefusalCode.STORAGE) from error
 
     def _work(self, session: RunSession, ending: RunEnding) -> None:
         """Thread: one run from ARMING until it rests, and longer only if the disk does not take its outcome."""
@@ -292,9 +292,3 @@ class Acquisition:
         message = ending.cause or self.status().summary
         self._progress.end(step, ending, outcome=ending.outcome, message=message)
         session.insist(self._leaving)
-
-
-def _why_it_ends(error: BaseException | None) -> str:
-    if isinstance(error, KeyboardInterrupt):
-        return f"the program was ended by {str(error) or signal.SIGINT.name}"
-    return "the program ended before the run did" + (f": {error!r}" if error else "")

@@ -1,5 +1,6 @@
 """RunEnding: what ends a run and why, said by any thread, obeyed by the acquisition thread."""
 
+import signal
 import threading
 import time
 
@@ -130,3 +131,10 @@ class RunEnding:
         """Wait until somebody says why the light went off, but no longer than that."""
         with self._changed:
             self._changed.wait_for(lambda: self.at_once, deadline_s)
+
+
+def why_it_ends(error: BaseException | None) -> str:
+    """Cause of an end together with the program, by the error that ends it."""
+    if isinstance(error, KeyboardInterrupt):
+        return f"the program was ended by {str(error) or signal.SIGINT.name}"
+    return "the program ended before the run did" + (f": {error!r}" if error else "")

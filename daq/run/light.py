@@ -2,10 +2,12 @@
 
 import threading
 import time
+from collections.abc import Iterator
 from contextlib import suppress
 
-from daq.devices import GeneratorState, Rig
-from daq.errors import DeviceError, DeviceRefused, InterlockOpen
+from daq.devices import GeneratorState, GeneratorStatus, Rig
+from daq.errors import DaqError, DeviceError, DeviceRefused, InterlockOpen
+from daq.run.refusals import RefusalCode, coded, raise_first
 
 _RETRY_S = 0.05
 _OPEN_STOPS = frozenset({"interlock", "estop"})
@@ -22,15 +24,34 @@ def check_permitted(rig: Rig) -> None:
     InterlockOpen
         The light must not be switched on.
     """
-    if not rig.interlock.is_closed():
-        raise InterlockOpen(f"{rig.interlock.name}: the interlock is open")
-    status = rig.generator.status()
+    raise_first(obstacles(rig))
+
+
+def obstacles(rig: Rig) -> Iterator[DaqError]:
+    """Whatever forbids light at present, the first reason first; the generator is asked once."""
+    try:
+        if not rig.interlock.is_closed():
+            yield coded(InterlockOpen(f"{rig.interlock.name}: the interlock is open"), RefusalCode.INTERLOCK_OPEN)
+    except DeviceError as error:
+        yield coded(error, RefusalCode.INTERLOCK_SILENT)
+    try:
+        status = rig.generator.status()
+    except DeviceError as error:
+        yield coded(error, RefusalCode.GENERATOR_SILENT)
+    else:
+        yield from _obstacles_of(rig.generator.name, status)
+
+
+def _obstacles_of(name: str, status: GeneratorStatus) -> Iterator[DaqError]:
+    """An open door is told before the fault that it causes: the generator may know of it first."""
     if not status.interlock_closed:
-        raise InterlockOpen(f"{rig.generator.name}: the interlock input of the pulse generator is open")
+        reason = f"{name}: the interlock input of the pulse generator is open"
+        yield coded(InterlockOpen(reason), RefusalCode.INTERLOCK_OPEN)
     if not status.estop_closed:
-        raise InterlockOpen(f"{rig.generator.name}: the emergency stop of the pulse generator is open")
-    if status.state is GeneratorState.FAULT:  # last: an open door is why, and the generator may know of it first
-        raise DeviceRefused(rig.generator.name, f"fault: {', '.join(status.faults)}; acknowledge it first")
+        yield coded(InterlockOpen(f"{name}: the emergency stop of the pulse generator is open"), RefusalCode.ESTOP_OPEN)
+    if status.state is GeneratorState.FAULT:
+        reason = f"fault: {', '.join(status.faults)}; acknowledge it first"
+        yield coded(DeviceRefused(name, reason), RefusalCode.GENERATOR_FAULT)
 
 
 def check_generator(rig: Rig) -> None:

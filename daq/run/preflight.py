@@ -1,7 +1,8 @@
 """What is checked and written down before a run starts, so that it is refused with a reason instead of failing."""
 
+import os
 import shutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
@@ -9,10 +10,12 @@ from pathlib import Path
 from typing import Any
 
 from daq.devices import Rig
-from daq.errors import PlanError
+from daq.errors import DaqError, PlanError
 from daq.files.run_directory import RunHeader, ViewFormat
+from daq.files.storage import disk_of
 from daq.run import light
 from daq.run.references import find_references
+from daq.run.refusals import RefusalCode, raise_first, refused
 from daq.run_plan import RunKind, RunPlan
 from daq.timing import ShotTiming, plan_shot_timing
 
@@ -43,15 +46,9 @@ class PreparedRun:
     references: Mapping[RunKind, tuple[Path, ...]]
 
 
-def prepare_run(
-    rig: Rig,
-    data_dir: Path,
-    plan: RunPlan,
-    configuration: Mapping[str, Any],
-    hash_calibration: Callable[[str], str | None],
-    disk_margin_bytes: int,
-) -> PreparedRun:
-    """Check a plan against rig, references, disk, generator and interlock, and describe the run.
+@dataclass(frozen=True)
+class Preflight:
+    """What decides whether a run may start.
 
     Parameters
     ----------
@@ -59,42 +56,71 @@ def prepare_run(
         Open devices.
     data_dir : Path
         Where run directories are made.
-    plan : RunPlan
-        What the operator wants.
-    configuration : Mapping[str, Any]
-        The resolved configuration of the rig (JSON).
     hash_calibration : Callable[[str], str | None]
         SHA-256 of a calibration by its id.
     disk_margin_bytes : int
-        What the run leaves free on the disk.
-
-    Raises
-    ------
-    PlanError
-        The plan cannot run on this rig, a reference is missing, or the disk does not hold the run.
-    DeviceRefused
-        The pulse generator has a latched fault.
-    InterlockOpen
-        The light must not be switched on.
-    OSError
-        The disk or the calibration cannot be read.
+        What a run leaves free on the disk.
+    disk : int | None
+        On which the folder was when the program started; None if that does not matter.
     """
-    timing = permitted_timing(rig, plan)
-    _check_stage(rig, plan)
-    views = {view: ViewFormat(camera.image_shape, camera.bits) for view, camera in rig.cameras.items()}
-    references = find_references(data_dir, plan, views)
-    _check_disk(data_dir, plan, views, disk_margin_bytes)
-    _check_network(rig, plan, views)
-    light.check_permitted(rig)
-    calibration_sha256 = hash_calibration(plan.calibration) if plan.calibration else None
-    header = _header(data_dir, plan, views, configuration, calibration_sha256)
-    return PreparedRun(data_dir / header.run_id, header, timing, references)
+
+    rig: Rig
+    data_dir: Path
+    hash_calibration: Callable[[str], str | None]
+    disk_margin_bytes: int
+    disk: int | None = None
+
+    def refusals_of_rig(self) -> Iterator[DaqError]:
+        """Why no run at all can start."""
+        yield from refused(RefusalCode.FOLDER_GONE, _check_disk_is_ours, self.data_dir, self.disk)
+        yield from refused(RefusalCode.STORAGE, _check_folder, self.data_dir)
+        yield from refused(RefusalCode.DISK_FULL, _check_margin, self.data_dir, self.disk_margin_bytes)
+        yield from light.obstacles(self.rig)
+
+    def refusals_of_plan(self, plan: RunPlan) -> Iterator[DaqError]:
+        """Why this plan cannot run on this rig; no device is asked."""
+        views = self.views
+        yield from refusals_of_light(self.rig, plan)
+        yield from refused(RefusalCode.STAGE, _check_stage, self.rig, plan)
+        yield from refused(RefusalCode.REFERENCES, find_references, self.data_dir, plan, views)
+        yield from refused(RefusalCode.DISK_FULL, _check_disk, self.data_dir, plan, views, self.disk_margin_bytes)
+        yield from refused(RefusalCode.NETWORK, _check_network, self.rig, plan, views)
+        yield from refused(RefusalCode.STORAGE, self.calibration_sha256, plan)
+
+    def prepare(self, plan: RunPlan, configuration: Mapping[str, Any]) -> PreparedRun:
+        """Describe a run that nothing speaks against.
+
+        Raises
+        ------
+        DaqError
+            The first refusal; see ``daq.run.refusals``.
+        """
+        raise_first(self.refusals_of_rig())
+        raise_first(self.refusals_of_plan(plan))
+        header = _header(self.data_dir, plan, self.views, configuration, self.calibration_sha256(plan))
+        references = find_references(self.data_dir, plan, self.views)
+        return PreparedRun(self.data_dir / header.run_id, header, _timing(self.rig, plan), references)
+
+    @property
+    def views(self) -> dict[str, ViewFormat]:
+        """Frames of every view."""
+        return {view: ViewFormat(camera.image_shape, camera.bits) for view, camera in self.rig.cameras.items()}
+
+    def calibration_sha256(self, plan: RunPlan) -> str | None:
+        """Hash of the calibration that a plan names; None if it names none."""
+        return self.hash_calibration(plan.calibration) if plan.calibration else None
 
 
 def permitted_timing(rig: Rig, plan: RunPlan) -> ShotTiming:
     """Edges of every shot of a plan; PlanError if a camera does not permit them, or an LED its current."""
-    _check_currents(rig, plan)
+    raise_first(refusals_of_light(rig, plan))
     return _timing(rig, plan)
+
+
+def refusals_of_light(rig: Rig, plan: RunPlan) -> Iterator[DaqError]:
+    """Why the light of a plan is none for this rig."""
+    yield from refused(RefusalCode.CURRENT, _check_currents, rig, plan)
+    yield from refused(RefusalCode.TIMING, _timing, rig, plan)
 
 
 def _header(
@@ -133,6 +159,29 @@ def _check_currents(rig: Rig, plan: RunPlan) -> None:
         limit_a = rig.max_current_a.get(view, current_a)
         if current_a > limit_a:
             raise PlanError(f"pulse.current_a: {current_a:g} A is above {limit_a:g} A, the limit of the LED of {view}")
+
+
+def _check_disk_is_ours(data_dir: Path, disk: int | None) -> None:
+    if disk is not None and disk_of(data_dir) != disk:
+        raise PlanError(
+            f"{data_dir} is gone, or on another disk than when the server was started: "
+            "mount or bring back the right one, or start the server again"
+        )
+
+
+def _check_folder(data_dir: Path) -> None:
+    data_dir.mkdir(parents=True, exist_ok=True)
+    if not os.access(data_dir, os.W_OK | os.X_OK):
+        raise PlanError(f"the run cannot be stored: {data_dir} may not be written by this program")
+
+
+def _check_margin(data_dir: Path, margin_bytes: int) -> None:
+    free = shutil.disk_usage(data_dir).free
+    if free < margin_bytes:
+        raise PlanError(
+            f"the disk of {data_dir} has {free} bytes left, and a run leaves {margin_bytes} bytes free: "
+            "delete or move away what is not needed"
+        )
 
 
 def _check_stage(rig: Rig, plan: RunPlan) -> None:

@@ -5,7 +5,19 @@ from processing.errors import BadInput
 
 
 class ServerError(Exception):
-    """Base of the errors that the server itself raises on purpose."""
+    """Base of the errors that the server itself raises on purpose.
+
+    Parameters
+    ----------
+    reason : str
+        For the operator.
+    code : str
+        For programs; empty where the kind of the error says enough.
+    """
+
+    def __init__(self, reason: str, code: str = "") -> None:
+        super().__init__(reason)
+        self.code = code
 
 
 class NotFound(ServerError):

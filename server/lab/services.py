@@ -1,17 +1,19 @@
 """Services: everything the web application is given, and everything it builds from that at start-up."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
 
 from daq.devices import Rig
+from daq.errors import DaqError
 from daq.run.events import RunStatus
 from daq.run_plan import LivePlan, RunPlan
 from daq.shot import Shot
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.runs.volume_parts import VolumeParts
 from server.lab.calibrations import CalibrationStore
+from server.lab.desk.desk_watch import DeskWatch
 from server.lab.duty import Duty, Lamp
 from server.lab.engine import Engine, Task
 from server.lab.events import EventPublisher
@@ -29,6 +31,7 @@ from server.rig.laboratory import Laboratory
 class RunControl(Protocol):
     """What the server asks of ``daq.run.acquisition.Acquisition``; only what starts something takes its time."""
 
+    def refusals(self, plan: RunPlan | None = None) -> Iterator[DaqError]: ...  # noqa: D102
     def start(self, plan: RunPlan) -> str: ...  # noqa: D102
     def start_live(self, plan: LivePlan) -> None: ...  # noqa: D102
     def keep_live(self) -> None: ...  # noqa: D102
@@ -95,6 +98,7 @@ class Context:
     runner: JobRunner
     watch: CalibrationWatch
     monitor: RigMonitor
+    desk: DeskWatch
     live: LiveFeed
     parts: VolumeParts
     duties: tuple[Duty, ...]

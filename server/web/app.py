@@ -19,6 +19,7 @@ from starlette.routing import Match
 from daq.errors import DaqError
 from processing.runs.volume_parts import VolumeParts
 from server.lab.calibrations import CalibrationStore
+from server.lab.desk.desk_watch import DeskWatch
 from server.lab.duty import Duty, Work
 from server.lab.job_recovery import opened_table
 from server.lab.jobs import JobTable
@@ -30,6 +31,7 @@ from server.lab.runs.run_index import INDEX_FILE, RunIndex
 from server.lab.runs.run_store import RunStore
 from server.lab.runs.unkept_runs import UnkeptRuns
 from server.lab.services import Context, Services
+from server.lab.starting.readiness import reasons_against
 from server.lab.watch import CalibrationWatch
 from server.web import problems
 from server.web.api import (
@@ -40,6 +42,7 @@ from server.web.api import (
     jobs,
     live,
     live_view,
+    readiness,
     results,
     rig,
     runs,
@@ -55,6 +58,7 @@ from server.web.ui.page import mount_page
 
 _RESOURCES = (
     rig,
+    readiness,
     live_view,
     single_shot,
     runs,
@@ -70,7 +74,7 @@ _RESOURCES = (
 )
 _METHODS = ["GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"]
 _SHUTDOWN_S = 3
-_DUTIES = ("processing", "automatic reconstruction", "lamps", "live view")
+_DUTIES = ("processing", "automatic reconstruction", "lamps", "state of the rig", "live view")
 
 
 def create_app(services: Services) -> FastAPI:
@@ -169,7 +173,13 @@ async def _life(app: FastAPI, services: Services) -> AsyncIterator[None]:
         context = app.state.context = _context(services, jobs_table, index)
         await context.monitor.ask()
         follow = partial(follow_acquisition, context)
-        works: tuple[Work, ...] = (context.runner.run, follow, context.monitor.run, context.live.run)
+        works: tuple[Work, ...] = (
+            context.runner.run,
+            follow,
+            context.monitor.run,
+            context.desk.run,
+            context.live.run,
+        )
         for duty, work in zip(context.duties, works, strict=True):
             await stack.enter_async_context(_in_background(duty.keep(work)))
         yield
@@ -179,7 +189,7 @@ def _context(services: Services, table: JobTable, index: RunIndex) -> Context:
     store = CalibrationStore(services.data_dir / "calibrations")
     watch = CalibrationWatch(services.events)
     acquisition = services.acquisition
-    return Context(
+    context = Context(
         services=services,
         runs=RunStore(services.data_dir, services.acquisition.status, index),
         unkept_runs=UnkeptRuns(services.data_dir, table),
@@ -188,10 +198,12 @@ def _context(services: Services, table: JobTable, index: RunIndex) -> Context:
         runner=JobRunner(services.engine, table, services.tasks, services.events, services.data_dir, store, watch),
         watch=watch,
         monitor=RigMonitor(services.rig, services.data_dir, lambda: acquisition.status().resting),
+        desk=DeskWatch(acquisition.status, lambda: reasons_against(context)),
         live=LiveFeed(services.rig.cameras, lambda: acquisition.newest_shot, acquisition.keep_live),
         parts=VolumeParts(),
         duties=tuple(Duty(name, services.events) for name in _DUTIES),
     )
+    return context
 
 
 @asynccontextmanager

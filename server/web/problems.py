@@ -21,6 +21,7 @@ from daq.errors import (
     RecorderError,
     ShotFileError,
 )
+from daq.run.refusals import REMEDIES, RefusalCode
 from server.lab.errors import Conflict, Damaged, NotFound, ServerError, Unprocessable
 
 MEDIA_TYPE = "application/problem+json"
@@ -37,6 +38,8 @@ class Problem(BaseModel):
     status: int = Field(description="HTTP status")
     detail: str | None = Field(None, description="what is wrong, for the operator")
     instance: str | None = Field(None, description="path of the request")
+    code: str | None = Field(None, description="for programs: why a start was refused, as in the readiness of the rig")
+    remedy: str | None = Field(None, description="what to do about it, for the operator")
 
 
 STATUS_OF: dict[type[Exception], HTTPStatus] = {
@@ -112,6 +115,8 @@ def describe(app: FastAPI) -> None:
 
 async def _on_known_error(request: Request, error: Exception) -> JSONResponse:
     more = {"device": error.device} if isinstance(error, DeviceError) else {}
+    if isinstance(error, DaqError | ServerError) and error.code in tuple(RefusalCode):
+        more |= {"code": error.code, "remedy": REMEDIES[RefusalCode(error.code)]}
     return problem(request, status_of(error), str(error), f"urn:tomoshadow:{type(error).__name__}", **more)
 
 

@@ -9,8 +9,8 @@ from pydantic import Field
 from scipy.special import stdtrit
 
 from processing.analysis.droplets.droplet_file import StoredDroplets
-from processing.analysis.droplets.ghost_share import CONFIDENCE, share_interval
-from processing.analysis.droplets.size_statistics import Estimate
+from processing.analysis.droplets.ghost_share import share_interval
+from processing.analysis.estimates import CONFIDENCE, Estimate
 from processing.geometry import FloatArray
 from processing.reconstruction.settings import FrozenValue
 

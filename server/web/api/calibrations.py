@@ -11,7 +11,7 @@ from daq.run_plan import RunKind
 from server.lab.calibrations import CalibrationSummary
 from server.lab.errors import Unprocessable
 from server.lab.jobs import Job, calibration_job
-from server.lab.run_start import choose_calibration as choose
+from server.lab.starting.run_start import choose_calibration as choose
 from server.web.api.parameters import CalibrationId, ContextOf
 from server.web.problems import responses
 

@@ -7,8 +7,8 @@ from fastapi import APIRouter, Query, Response
 from daq.files.run_directory import RunHeader
 from daq.run_plan import RunPlan
 from server.lab.errors import Conflict
-from server.lab.run_start import start_run
 from server.lab.runs.run_summary import RunSummary
+from server.lab.starting.run_start import start_run
 from server.web.api.parameters import ContextOf, RunId
 from server.web.api.rig import AcquisitionView, view_of_acquisition
 from server.web.problems import responses

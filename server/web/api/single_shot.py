@@ -7,7 +7,7 @@ from pydantic import Field
 
 from daq.frozen_model import FrozenModel
 from daq.names import Identifier
-from server.lab.run_start import SingleShot, shoot
+from server.lab.starting.run_start import SingleShot, shoot
 from server.web.api.parameters import ContextOf
 from server.web.api.rig import AcquisitionView, view_of_acquisition
 from server.web.problems import responses

@@ -9,8 +9,8 @@ from daq.errors import DaqError
 from daq.run.state import RunState
 from daq.run_plan import LivePlan
 from server.lab.errors import ServerError
-from server.lab.run_start import SingleShot, shoot
 from server.lab.services import Context
+from server.lab.starting.run_start import SingleShot, shoot
 from server.web.ui.draft import DraftStore, problem_of, pulse_of
 from server.web.ui.live_tiles import LiveTiles
 from server.web.ui.theme import panel

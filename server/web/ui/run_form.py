@@ -11,9 +11,9 @@ from daq.run.state import RunOutcome
 from daq.run_plan import RunKind
 from daq.timing import plan_shot_timing
 from server.lab.errors import ServerError
-from server.lab.run_start import start_run
 from server.lab.runs.run_summary import RunSummary
 from server.lab.services import Context
+from server.lab.starting.run_start import start_run
 from server.web.ui.draft import (
     PLAN_FIELDS,
     PULSE_FIELDS,

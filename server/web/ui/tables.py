@@ -20,9 +20,9 @@ from server.lab.droplets.measurement import request_measurement
 from server.lab.errors import ServerError
 from server.lab.jobs import Job, JobKind, JobState, calibration_job
 from server.lab.reconstruction import request_reconstruction
-from server.lab.run_start import choose_calibration
 from server.lab.runs.run_summary import ACTIVE, DAMAGED, RunSummary
 from server.lab.services import Context
+from server.lab.starting.run_start import choose_calibration
 from server.web.ui.run_panel import outcome_colour
 from server.web.ui.theme import panel
 

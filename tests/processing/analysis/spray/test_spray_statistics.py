@@ -95,13 +95,14 @@ def test_a_known_cone_has_its_angle(told: SprayStatistics) -> None:
 
 def test_an_even_cone_is_no_more_uneven_than_chance_and_a_half_one_is(cone: list[StoredDroplets]) -> None:
     (even,) = spray_statistics(cone, ASKED).patternations
-    assert even.asymmetry
-    assert even.asymmetry_by_chance
+    assert even.asymmetry is not None
+    assert even.asymmetry_by_chance is not None
     assert even.asymmetry < even.asymmetry_by_chance
     assert sum(value(share) for share in even.sector_shares) == pytest.approx(1)
     (half,) = spray_statistics([rows(shot, numbers(shot, "x_mm") > 0) for shot in cone], ASKED).patternations
     assert half.asymmetry == pytest.approx(0.5, abs=0.05)
-    assert half.asymmetry_by_chance
+    assert half.asymmetry_by_chance is not None
+    assert half.asymmetry is not None
     assert half.asymmetry_by_chance < 0.4 < half.asymmetry
 
 

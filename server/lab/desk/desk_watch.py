@@ -1,0 +1,62 @@
+"""DeskWatch: the state of the rig, looked at twice a second, so that no page has to ask a device."""
+
+import asyncio
+import time
+from collections.abc import Callable
+
+from daq.run.events import RunStatus
+from server.lab.desk.pace import Pace
+from server.lab.desk.reason import Reason
+from server.lab.desk.rig_state import RigState, rig_state
+from server.lab.duty import Duty, pause
+
+_PERIOD_S = 0.5
+_STALE_S = 3.0
+"""A rig that nobody has looked at for so long is not ready; a silent generator takes a second."""
+
+Look = Callable[[], tuple[Reason, ...]]
+"""Finds everything that speaks against a start; blocks."""
+
+
+class DeskWatch:
+    """Keeps what was found last.
+
+    Parameters
+    ----------
+    status : Callable[[], RunStatus]
+        What acquisition does; asked whenever somebody wants to know the state.
+    look : Look
+        Asked twice a second, outside of the event loop.
+    now_s : Callable[[], float]
+        A clock that never goes back.
+    """
+
+    def __init__(
+        self, status: Callable[[], RunStatus], look: Look, now_s: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._status = status
+        self._look = look
+        self._now_s = now_s
+        self._pace = Pace(now_s)
+        self._found: tuple[Reason, ...] = ()
+        self._found_s: float | None = None
+
+    async def run(self, duty: Duty) -> None:
+        """Look until cancelled."""
+        while True:
+            with duty.item("readiness"):
+                await asyncio.to_thread(self.look)
+            await pause(_PERIOD_S)
+
+    def look(self) -> RigState:
+        """Look now; blocks."""
+        self._found = self._look()
+        self._found_s = self._now_s()
+        return self.state
+
+    @property
+    def state(self) -> RigState:
+        """What acquisition does now, and what was found at the last look; not ready where that is long ago."""
+        status = self._status()
+        is_known = self._found_s is not None and self._now_s() - self._found_s < _STALE_S
+        return rig_state(status, self._found if is_known else None, self._pace.eta_s(status))

@@ -1,0 +1,27 @@
+"""Reason: one thing that speaks against a start, for people and programs."""
+
+from typing import Annotated
+
+from pydantic import Field
+
+from daq.errors import DaqError
+from daq.frozen_model import FrozenModel
+from daq.run.refusals import REMEDIES, RefusalCode
+from server.lab.errors import ServerError
+
+Refusal = DaqError | ServerError
+"""An error with a ``code``."""
+
+
+class Reason(FrozenModel):
+    """One thing that speaks against a start."""
+
+    code: Annotated[RefusalCode, Field(description="for programs; a start is refused with the same one")]
+    text: Annotated[str, Field(description="names device, value and limit")]
+    remedy: Annotated[str, Field(description="what to do about it")]
+
+
+def reason_of(refusal: Refusal) -> Reason:
+    """What a refusal says."""
+    code = RefusalCode(refusal.code)
+    return Reason(code=code, text=str(refusal), remedy=REMEDIES[code])

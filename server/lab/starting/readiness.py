@@ -1,0 +1,63 @@
+"""Readiness: what speaks against a start. ``run_start`` raises the first refusal, the desk shows all of them."""
+
+from collections.abc import Iterator
+from itertools import chain
+
+from daq.errors import DaqError, DeviceUnavailable
+from daq.run.refusals import RefusalCode, coded
+from daq.run_plan import RunKind, RunPlan
+from server.lab.desk.reason import Reason, Refusal, reason_of
+from server.lab.duty import Health
+from server.lab.errors import ServerError, Unprocessable
+from server.lab.services import Context
+
+
+def reasons_against(context: Context, plan: RunPlan | None = None) -> tuple[Reason, ...]:
+    """Everything that speaks against starting a run, or this one, now; the first is the one that a start would name.
+
+    Devices are asked, so that it may take a second where one is silent; the light stays as it is.
+    """
+    if plan is not None:
+        plan = with_calibration(context, plan)
+    refusals = chain(refusals_of_lab(context, plan), context.services.acquisition.refusals(plan))
+    return tuple(map(reason_of, refusals))
+
+
+def refusals_of_lab(context: Context, plan: RunPlan | None) -> Iterator[Refusal]:
+    """What the laboratory has against a start; acquisition is asked after it."""
+    if not context.services.acquisition.status().active:
+        yield from _silent_cameras(context)
+    if plan is not None and plan.calibration is not None:
+        yield from _against_calibration(context, plan.calibration)
+
+
+def with_calibration(context: Context, plan: RunPlan) -> RunPlan:
+    """A sample run that names no calibration gets the current one, so that it travels with the run."""
+    if plan.calibration is not None or plan.kind is not RunKind.SAMPLE:
+        return plan
+    return plan.model_copy(update={"calibration": context.calibrations.current})
+
+
+def _silent_cameras(context: Context) -> Iterator[DaqError]:
+    """A run without one of its cameras would fail at once."""
+    for lamp in context.monitor.lamps:
+        if lamp.kind == "camera" and lamp.health is Health.FAULT:
+            reason = lamp.detail.removeprefix(f"{lamp.name}: ")
+            yield coded(DeviceUnavailable(lamp.name, reason), RefusalCode.CAMERA_SILENT)
+
+
+def _against_calibration(context: Context, calibration: str) -> Iterator[ServerError]:
+    """A camera that is binned, or another one, needs another calibration; later nothing could be reconstructed."""
+    if not context.calibrations.has(calibration):
+        reason = f"calibration: there is no calibration {calibration!r}"
+        yield Unprocessable(reason, RefusalCode.CALIBRATION_UNKNOWN)
+    sizes_px = context.calibrations.image_sizes_px(calibration)
+    for view, camera in context.services.rig.cameras.items():
+        rows, columns = camera.image_shape
+        made_for = sizes_px.get(view, (columns, rows))
+        if made_for != (columns, rows):
+            reason = (
+                f"calibration: {calibration!r} is made for images of {made_for[0]} x {made_for[1]} px of {view}, its "
+                f"camera delivers {columns} x {rows} px: choose another calibration, or calibrate again"
+            )
+            yield Unprocessable(reason, RefusalCode.CALIBRATION_SIZE)

@@ -1,0 +1,57 @@
+"""The state of the rig in one word, and how long a run still takes."""
+
+import pytest
+
+from daq.run.events import RunStatus
+from daq.run.refusals import RefusalCode
+from daq.run.state import RunState
+from daq.run_plan import PulsePair, RunPlan
+from server.lab.desk.desk_watch import DeskWatch
+from server.lab.desk.pace import Pace
+from server.lab.desk.reason import Reason
+from server.lab.desk.rig_state import RigWord, rig_state
+
+DOOR = Reason(code=RefusalCode.INTERLOCK_OPEN, text="door: the interlock is open", remedy="close the door")
+PLAN = RunPlan(name="spray", shots=266, rate_hz=2.0, pulse=PulsePair(current_a={"view1": 5.0}))
+
+
+def acquiring(recorded: int) -> RunStatus:
+    return RunStatus(
+        state=RunState.ACQUIRING, run_id="one", shots_planned=PLAN.shots, shots_recorded=recorded, plan=PLAN
+    )
+
+
+@pytest.mark.parametrize("state", RunState)
+def test_only_a_rig_at_rest_without_a_reason_is_ready(state: RunState) -> None:
+    for reasons in ((), (DOOR,), None):
+        word = rig_state(RunStatus(state=state), reasons).state
+        assert (word is RigWord.READY) == (state is RunState.IDLE and reasons == ())
+        assert word.value == state.value or state is RunState.IDLE
+
+
+def test_the_text_says_what_belongs_to_the_state() -> None:
+    assert rig_state(RunStatus(), (DOOR,)).text == "NOT READY: door: the interlock is open"
+    assert rig_state(RunStatus(), None).text == "NOT READY: nobody has looked at the rig for seconds"
+    assert rig_state(acquiring(12), (), 127.4).text == "ACQUIRING 12/266, 2:07 left"
+    assert rig_state(acquiring(12), (), 3600.0 + 61).text == "ACQUIRING 12/266, 1:01:01 left"
+
+
+def test_a_run_takes_as_long_as_its_shots_do_and_before_the_first_one_as_planned() -> None:
+    now_s = [100.0]
+    pace = Pace(lambda: now_s[0])
+    assert pace.eta_s(RunStatus()) is None
+    assert pace.eta_s(acquiring(0)) == 133.0
+    now_s[0] += 10
+    assert pace.eta_s(acquiring(10)) == 256.0
+    now_s[0] += 0.5
+    assert pace.eta_s(acquiring(10)) == 255.5
+    assert pace.eta_s(RunStatus(state=RunState.DISARMING)) is None
+
+
+def test_a_rig_that_nobody_has_looked_at_for_seconds_is_not_ready() -> None:
+    now_s = [0.0]
+    watch = DeskWatch(RunStatus, tuple, lambda: now_s[0])
+    assert watch.state.state is RigWord.NOT_READY
+    assert watch.look().state is RigWord.READY
+    now_s[0] = 3.1
+    assert watch.state.state is RigWord.NOT_READY

@@ -1,0 +1,288 @@
+"""The rig is never ready where a start would be refused: every reason there is, on the rig and in the plan."""
+
+import itertools
+import json
+import shutil
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from daq.devices import Rig
+from daq.errors import DeviceError, DeviceTimeout
+from daq.network import Network
+from daq.run.refusals import REMEDIES, RefusalCode
+from tests.server.web.test_api import use_a_calibration
+from tests.support.memory_rig import MemoryRig
+from tests.support.server_process import eventually
+from tests.support.serving import Serving, plan_of
+
+PULSE = {"current_a": {"view1": 5, "view2": 5}}
+Situation = Callable[[Serving, pytest.MonkeyPatch], Any]
+
+
+def laboratory(server: Serving) -> MemoryRig:
+    assert isinstance(server.services.laboratory, MemoryRig)
+    return server.services.laboratory
+
+
+def acquisition(server: Serving) -> Any:
+    return server.services.acquisition
+
+
+@contextmanager
+def starting(server: Serving, patch: pytest.MonkeyPatch) -> Iterator[None]:
+    with acquisition(server)._starting:
+        yield
+
+
+@contextmanager
+def busy(server: Serving, patch: pytest.MonkeyPatch) -> Iterator[None]:
+    assert server.http.post("/api/runs", json=plan_of(shots=1000, rate_hz=5.0)).status_code == 201
+    yield
+    server.http.post("/api/rig/abort")
+    server.wait()
+
+
+@contextmanager
+def light_not_off(server: Serving, patch: pytest.MonkeyPatch) -> Iterator[None]:
+    laboratory(server).generator.stuck = True
+    acquisition(server)._limits = replace(acquisition(server)._limits, light_off_s=0.1)
+    server.http.post("/api/runs", json=plan_of(shots=1000, rate_hz=5.0))
+    eventually(lambda: acquisition(server).status().shots_recorded > 0, "the generator is armed")
+    server.http.post("/api/rig/abort")
+    assert server.wait().state == "fault"
+    yield
+    laboratory(server).generator.stuck = False
+
+
+@contextmanager
+def ending(server: Serving, patch: pytest.MonkeyPatch) -> Iterator[None]:
+    acquisition(server).leave("the server is being ended")
+    yield
+
+
+@contextmanager
+def not_acknowledged(server: Serving, patch: pytest.MonkeyPatch) -> Iterator[None]:
+    server.http.post("/api/runs", json=plan_of(shots=1000, rate_hz=5.0))
+    eventually(lambda: acquisition(server).status().shots_recorded > 0, "shots are recorded")
+    laboratory(server).generator.restarted = True
+    laboratory(server).open_door()
+    server.wait()
+    laboratory(server).close_door()
+    assert len(acquisition(server).status().to_acknowledge) == 2
+    yield
+
+
+@contextmanager
+def folder_gone(server: Serving, patch: pytest.MonkeyPatch) -> Iterator[None]:
+    patch.setattr(acquisition(server), "_disk", -1)
+    yield
+
+
+@contextmanager
+def no_folder(server: Serving, patch: pytest.MonkeyPatch) -> Iterator[None]:
+    folder = server.services.data_dir
+    aside = folder.rename(folder.with_name("aside"))
+    folder.touch()
+    yield
+    folder.unlink()
+    aside.rename(folder)
+
+
+@contextmanager
+def disk_full(server: Serving, patch: pytest.MonkeyPatch) -> Iterator[None]:
+    usage = shutil.disk_usage(server.services.data_dir)._replace(free=2**20)
+    patch.setattr("daq.run.preflight.shutil.disk_usage", lambda _: usage)
+    yield
+
+
+@contextmanager
+def door_open(server: Serving, patch: pytest.MonkeyPatch) -> Iterator[None]:
+    laboratory(server).open_door()
+    yield
+    laboratory(server).close_door()
+
+
+def raising(error: Exception) -> Callable[[], Any]:
+    def ask() -> Any:
+        raise error
+
+    return ask
+
+
+@contextmanager
+def interlock_silent(server: Serving, patch: pytest.MonkeyPatch) -> Iterator[None]:
+    error = DeviceError("door", "no such line")
+    patch.setattr(laboratory(server).interlock, "is_closed", raising(error))
+    yield
+
+
+@contextmanager
+def estop(server: Serving, patch: pytest.MonkeyPatch) -> Iterator[None]:
+    generator = laboratory(server).generator
+    said = replace(generator.status(), estop_closed=False)
+    patch.setattr(generator, "status", lambda: said)
+    yield
+
+
+@contextmanager
+def generator_fault(server: Serving, patch: pytest.MonkeyPatch) -> Iterator[None]:
+    laboratory(server).generator.trip("overcurrent")
+    yield
+
+
+@contextmanager
+def generator_silent(server: Serving, patch: pytest.MonkeyPatch) -> Iterator[None]:
+    patch.setattr(laboratory(server).generator, "status", raising(DeviceTimeout("generator", "STATUS", 1.0)))
+    yield
+
+
+@contextmanager
+def camera_silent(server: Serving, patch: pytest.MonkeyPatch) -> Iterator[None]:
+    laboratory(server).cameras["view2"].is_lost = True
+
+    def health() -> list[str]:
+        return [lamp["health"] for lamp in server.http.get("/api/rig").json()["lamps"] if lamp["name"] == "view2"]
+
+    eventually(lambda: health() == ["fault"], "its lamp is red")
+    yield
+
+
+@contextmanager
+def thin_wire(server: Serving, patch: pytest.MonkeyPatch) -> Iterator[None]:
+    rig: Rig = server.services.rig
+    object.__setattr__(rig, "network", Network(camera_gbit_s=1e-4))
+    yield
+
+
+@contextmanager
+def other_size(server: Serving, patch: pytest.MonkeyPatch) -> Iterator[None]:
+    views = {"view1": {"mapping": {"image_size_px": [64, 48]}}}
+    (server.services.data_dir / "calibrations" / "small.json").write_text(json.dumps({"id": "small", "views": views}))
+    yield
+
+
+OF_THE_RIG: dict[RefusalCode, Situation] = {
+    RefusalCode.STARTING: starting,
+    RefusalCode.BUSY: busy,
+    RefusalCode.LIGHT_NOT_OFF: light_not_off,
+    RefusalCode.PROGRAM_ENDING: ending,
+    RefusalCode.NOT_ACKNOWLEDGED: not_acknowledged,
+    RefusalCode.FOLDER_GONE: folder_gone,
+    RefusalCode.STORAGE: no_folder,
+    RefusalCode.DISK_FULL: disk_full,
+    RefusalCode.INTERLOCK_OPEN: door_open,
+    RefusalCode.INTERLOCK_SILENT: interlock_silent,
+    RefusalCode.ESTOP_OPEN: estop,
+    RefusalCode.GENERATOR_FAULT: generator_fault,
+    RefusalCode.GENERATOR_SILENT: generator_silent,
+    RefusalCode.CAMERA_SILENT: camera_silent,
+}
+OF_THE_PLAN: dict[RefusalCode, tuple[Situation | None, dict[str, Any]]] = {
+    RefusalCode.CURRENT: (None, {"pulse": {"current_a": {"view1": 5, "view2": 28}}}),
+    RefusalCode.TIMING: (None, {"pulse": {**PULSE, "separation_ns": 2500}}),
+    RefusalCode.NETWORK: (thin_wire, {}),
+    RefusalCode.STAGE: (None, {"kind": "calibration", "stage_z_mm": [0.0]}),
+    RefusalCode.REFERENCES: (None, {"references": ["nothing"]}),
+    RefusalCode.CALIBRATION_UNKNOWN: (None, {"calibration": "nothing"}),
+    RefusalCode.CALIBRATION_SIZE: (other_size, {"calibration": "small"}),
+}
+
+
+def start(server: Serving, **changes: Any) -> dict[str, Any]:
+    """The problem that a start is answered with."""
+    answer = server.http.post("/api/runs", json=plan_of(**changes))
+    assert answer.status_code >= 400, answer.text
+    return dict(answer.json())
+
+
+def judge(server: Serving, **changes: Any) -> dict[str, Any]:
+    answer = server.http.post("/api/rig/readiness", json=plan_of(**changes))
+    assert answer.status_code == 200, answer.text
+    return dict(answer.json())
+
+
+def test_every_reason_of_the_catalogue_is_tried_here_and_has_a_remedy() -> None:
+    assert {*OF_THE_RIG, *OF_THE_PLAN} == set(RefusalCode) == set(REMEDIES)
+
+
+@pytest.mark.parametrize("code", OF_THE_RIG)
+def test_a_start_is_refused_for_the_reason_that_the_rig_is_not_ready(
+    server: Serving, monkeypatch: pytest.MonkeyPatch, code: RefusalCode
+) -> None:
+    with OF_THE_RIG[code](server, monkeypatch):
+        shown, refusal, judged = server.http.get("/api/rig/readiness").json(), start(server), judge(server)
+    assert shown["state"] != "ready"
+    assert code in [reason["code"] for reason in shown["reasons"]]
+    first = shown["reasons"][0]
+    assert (refusal["code"], refusal["remedy"]) == (first["code"], first["remedy"])
+    assert refusal["detail"] == first["text"]
+    assert (judged["ready"], judged["reasons"][0]["code"]) == (False, first["code"])
+
+
+@pytest.mark.parametrize("code", OF_THE_PLAN)
+def test_a_start_is_refused_for_the_reason_that_is_told_of_its_plan(
+    server: Serving, monkeypatch: pytest.MonkeyPatch, code: RefusalCode
+) -> None:
+    situation, changes = OF_THE_PLAN[code]
+    with ExitStack() as stack:
+        if situation is not None:
+            stack.enter_context(situation(server, monkeypatch))
+        assert server.http.get("/api/rig/readiness").json()["state"] == "ready"
+        judged, refusal = judge(server, **changes), start(server, **changes)
+    assert [reason["code"] for reason in judged["reasons"]] == [code]
+    assert (refusal["code"], refusal["detail"]) == (code, judged["reasons"][0]["text"])
+
+
+def test_of_several_reasons_a_start_names_the_one_that_is_told_first(
+    server: Serving, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Every two reasons of the rig that can be there together, and one of the plan."""
+    together = (
+        RefusalCode.DISK_FULL,
+        RefusalCode.INTERLOCK_OPEN,
+        RefusalCode.GENERATOR_FAULT,
+        RefusalCode.INTERLOCK_SILENT,
+        RefusalCode.FOLDER_GONE,
+    )
+    for pair in itertools.combinations(together, 2):
+        with monkeypatch.context() as patch, ExitStack() as stack:
+            for code in pair:
+                stack.enter_context(OF_THE_RIG[code](server, patch))
+            judged, refusal = judge(server, references=["nothing"]), start(server, references=["nothing"])
+        codes = [reason["code"] for reason in judged["reasons"]]
+        assert refusal["code"] == codes[0]
+        assert {RefusalCode.REFERENCES} < set(codes), f"{pair}: {codes}"
+        laboratory(server).generator.clear()
+
+
+def test_a_rig_that_is_ready_starts(server: Serving) -> None:
+    use_a_calibration(server)
+    assert server.http.get("/api/rig/readiness").json() == {
+        "state": "ready",
+        "text": "READY",
+        "reasons": [],
+        "eta_s": None,
+    }
+    assert judge(server) == {"ready": True, "reasons": []}
+    _, status = server.run_to_its_end(plan_of())
+    assert status.outcome == "completed"
+
+
+def test_while_a_run_is_under_way_its_progress_is_told_and_no_device_is_asked(
+    server: Serving, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    server.http.post("/api/runs", json=plan_of(shots=1000, rate_hz=10.0))
+    eventually(lambda: acquisition(server).status().shots_recorded > 3, "shots are recorded")
+    monkeypatch.setattr(laboratory(server).interlock, "is_closed", raising(AssertionError("asked")))
+    state = server.http.get("/api/rig/readiness").json()
+    monkeypatch.undo()
+    assert state["state"] == "acquiring"
+    assert state["text"].startswith("ACQUIRING ")
+    assert [reason["code"] for reason in state["reasons"]] == ["busy"]
+    assert state["eta_s"] > 10
+    server.http.post("/api/rig/abort")
+    server.wait()
