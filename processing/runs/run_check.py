@@ -26,7 +26,7 @@ from processing.geometry import FloatArray
 from processing.progress import Counted, in_silence
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.runs.errors import PipelineError
-from processing.runs.importing import CALIBRATION_FOLDER, RUN_FOLDER
+from processing.runs.manifest.importing import CALIBRATION_FOLDER, RUN_FOLDER
 from processing.runs.results_file import FrameName
 from processing.runs.shots.shot_images import shot_intensities
 from processing.runs.workbench import Workbench

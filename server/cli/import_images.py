@@ -17,7 +17,7 @@ def add(verbs: Verbs) -> None:
 
 def import_images(options: Namespace) -> Outcome:
     """Import all that a manifest names."""
-    from processing.runs.importing import import_manifest
+    from processing.runs.manifest.importing import import_manifest
 
     try:
         with Bar() as bar:

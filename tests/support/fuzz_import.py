@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from processing.calibration.calibrate import calibrate
 from processing.calibration.sets.calibration_set import load_calibration_set
 from processing.errors import BadInput
-from processing.runs.importing import import_manifest
+from processing.runs.manifest.importing import import_manifest
 
 VALID = Path(__file__).parents[1] / "fixtures" / "v0.1.0" / "import"
 LEAST_IMPORTED = 0.2

@@ -12,7 +12,7 @@ from pydantic import BaseModel
 
 from daq.drivers.camera_profile import CameraProfile
 from daq.faults import FaultKind
-from processing.runs.import_manifest import Manifest
+from processing.runs.manifest.import_manifest import Manifest
 from server.rig.config import RigConfig
 
 Schema = Mapping[str, Any]

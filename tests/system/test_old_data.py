@@ -14,7 +14,7 @@ from daq.drivers.camera_profile import load_camera_profile
 from daq.files.run_directory import RunReader, list_runs
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.reconstruction.volume_file import read_volume
-from processing.runs.importing import import_manifest
+from processing.runs.manifest.importing import import_manifest
 from processing.runs.pipeline import reconstruct_shot
 from processing.runs.results_file import volume_path
 from processing.runs.shots.shot_result import ShotResult

@@ -12,8 +12,8 @@ from daq.files.run_directory import ImageKey, RunReader, Spray
 from processing.calibration.calibrate import calibrate
 from processing.calibration.errors import CalibrationError
 from processing.calibration.sets.calibration_set import load_calibration_set
-from processing.runs.import_manifest import ManifestError
-from processing.runs.importing import import_manifest
+from processing.runs.manifest.import_manifest import ManifestError
+from processing.runs.manifest.importing import import_manifest
 from processing.runs.overwriting import OutputExistsError
 from processing.synthetic.paper_rig import paper_cameras, paper_optics
 from processing.synthetic.target import Checkerboard, render_target

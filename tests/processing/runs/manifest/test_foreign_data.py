@@ -15,12 +15,12 @@ from processing.calibration.observation import CalibrationSet, PlaneObservation,
 from processing.calibration.sets.calibration_set import load_calibration_set
 from processing.calibration.target.targets import Target, detect_target
 from processing.image_file import read_image
-from processing.runs.importing import import_manifest
+from processing.runs.manifest.importing import import_manifest
 
 pytestmark = pytest.mark.skipif(
     "TOMOSHADOW_DATA" not in os.environ, reason="TOMOSHADOW_DATA does not name a folder of foreign data sets"
 )
-MANIFESTS = Path(__file__).parents[2] / "manifests"
+MANIFESTS = Path(__file__).parents[3] / "manifests"
 
 
 def imported(name: str, tmp_path: Path) -> Path:

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from daq.files.run_directory import DoubleFrame, ExposureRecord, ImageKey, RunHeader, RunWriter, Shot, ViewFormat
 from processing.image_file import GreyImage, ImageFileError, read_image
-from processing.runs.import_manifest import ManifestFile, RunEntry
-from processing.runs.shot_sources import ImageSource, ShotSource
+from processing.runs.manifest.import_manifest import ManifestFile, RunEntry
+from processing.runs.manifest.shot_sources import ImageSource, ShotSource
 
 CAMERA_BITS = (8, 10, 12, 14)
 """What cameras have whose images are kept in files of 16 bit; images that need no more must be said to."""

@@ -14,7 +14,7 @@ from daq.files.run_directory import RunNotes, Spray
 from processing.calibration.sets.set_record import CalibrationEntry, CameraName
 from processing.errors import BadInput
 from processing.kernels import _native
-from processing.runs.image_pattern import ImagePattern
+from processing.runs.manifest.image_pattern import ImagePattern
 from processing.runs.toml_lines import Key, line_of
 
 _VARIABLE = re.compile(r"^\$(\w+|\{\w+\})")
@@ -239,7 +239,7 @@ def read_manifest(path: Path) -> ManifestFile:
 
 
 def named_files(manifest: Manifest) -> Iterator[tuple[Key, str]]:
-    """Key and name of every file of a calibration; for those of a run see ``processing.runs.shot_sources``."""
+    """Key and name of every file of a calibration; for those of a run see ``processing.runs.manifest.shot_sources``."""
     if manifest.calibration is not None:
         for number, plane in enumerate(manifest.calibration.plane):
             for camera, file in plane.images.items():

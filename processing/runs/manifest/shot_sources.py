@@ -8,8 +8,8 @@ import numpy as np
 from daq.files.run_directory import ImageKey
 from processing.image_file import ImageFileError, page_count
 from processing.kernels import _native
-from processing.runs.image_pattern import ImagePattern
-from processing.runs.import_manifest import Manifest, ManifestFile, RunEntry, ShotEntry, ShotsEntry
+from processing.runs.manifest.image_pattern import ImagePattern
+from processing.runs.manifest.import_manifest import Manifest, ManifestFile, RunEntry, ShotEntry, ShotsEntry
 from processing.runs.toml_lines import Key
 
 _KINDS = (

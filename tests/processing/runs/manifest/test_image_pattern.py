@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from processing.runs.image_pattern import ImagePattern
+from processing.runs.manifest.image_pattern import ImagePattern
 
 
 @pytest.mark.parametrize(

@@ -13,10 +13,10 @@ from processing.calibration.sets.calibration_set import SET_FILE, write_set_file
 from processing.calibration.sets.points_table import read_table
 from processing.calibration.sets.set_record import CalibrationEntry, PlaneEntry, PointsEntry
 from processing.image_file import GreyImage
-from processing.runs.import_manifest import ManifestFile, named_files, read_manifest
+from processing.runs.manifest.import_manifest import ManifestFile, named_files, read_manifest
+from processing.runs.manifest.run_import import Done, ExposureReader, read_source, write_run
+from processing.runs.manifest.shot_sources import ImageSource, ShotSource, shot_sources
 from processing.runs.overwriting import replacing, require_free
-from processing.runs.run_import import Done, ExposureReader, read_source, write_run
-from processing.runs.shot_sources import ImageSource, ShotSource, shot_sources
 from processing.runs.toml_lines import Key
 
 CALIBRATION_FOLDER, RUN_FOLDER = "calibration", "run"
@@ -42,7 +42,7 @@ def import_manifest(
     Parameters
     ----------
     manifest_path : Path
-        TOML, see ``processing.runs.import_manifest``.
+        TOML, see ``processing.runs.manifest.import_manifest``.
     out_dir : Path
         Receives ``calibration/`` (a calibration set) and ``run/`` (a run).
     overwrite : bool
