@@ -4,6 +4,7 @@ A file that must be changed on a full disk has a reserve beside it: blocks that 
 """
 
 import os
+import secrets
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -16,6 +17,11 @@ RESERVE_SUFFIX = ".reserve"
 def part_path(path: Path) -> Path:
     """Where a file is written before it is committed; readers ignore such files."""
     return path.with_name(path.name + PART_SUFFIX)
+
+
+def own_part_path(path: Path) -> Path:
+    """A part that nobody else writes, where several may write one file at a time, on this computer or another."""
+    return part_path(path.with_name(f"{path.name}.{secrets.token_hex(4)}"))
 
 
 def reserve_path(path: Path) -> Path:
@@ -50,15 +56,22 @@ def commit(part: Path, path: Path) -> None:
 
 
 @contextmanager
-def replacing(path: Path) -> Iterator[Path]:
+def replacing(path: Path, part: Path | None = None) -> Iterator[Path]:
     """Yield the path of a part that replaces ``path`` at the end, or vanishes if the block raises.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    part : Path | None
+        By default ``part_path``.
 
     Raises
     ------
     OSError
         The disk is full, say; it names the file.
     """
-    part = part_path(path)
+    part = part or part_path(path)
     try:
         yield part
         sync(part)

@@ -19,6 +19,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from daq.files.atomic_file import own_part_path
 from processing.errors import BadInput
 from processing.kernels import DEFAULT_THREADS
 from processing.masked import require_unmasked
@@ -93,7 +94,7 @@ def write_slabs(
     threads : int
         Deflate side by side; what is read does not depend on it.
     """
-    part = path.with_name(path.name + ".part")
+    part = own_part_path(path)
     try:
         with h5py.File(part, "w", libver=("v110", "v110")) as file:
             dataset = _make_image_data(file.create_group("VTKHDF", track_order=True), volume, grid)

@@ -1,15 +1,13 @@
 """A results directory: ``settings.json`` and one volume per exposure, ``shot_00012_a.vtkhdf``."""
 
 import json
-import os
-import threading
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
-from daq.files.atomic_file import commit, part_path, sync
+from daq.files.atomic_file import commit, own_part_path, sync
 from processing.preprocessing import Intensity
 from processing.reconstruction.volume_file import VolumeFileError, open_volume
 from processing.volume import VoxelGrid
@@ -44,7 +42,7 @@ def claim_results(results_dir: Path, provenance: Provenance) -> None:
     results_dir.mkdir(parents=True, exist_ok=True)
     file = results_dir / SETTINGS_FILE
     if not file.exists():
-        part = part_path(file.with_suffix(f".{os.getpid()}-{threading.get_ident()}"))  # others may claim it just now
+        part = own_part_path(file)  # others may claim it just now
         part.write_text(json.dumps(dict(provenance), indent=2) + "\n", encoding="utf-8")
         sync(part)
         commit(part, file)

@@ -17,6 +17,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from daq.files.atomic_file import own_part_path
 from processing.reconstruction.slab_volume import Slabs, slabs_of
 from processing.volume import VoxelGrid
 
@@ -139,7 +140,7 @@ def preview_files(folder: Path) -> list[Path]:
 
 def save_preview(path: Path, preview: VolumePreview, provenance: Mapping[str, Any] | None = None) -> None:
     """Write a preview and what its volume is made of; it replaces an older one at once."""
-    part = path.with_suffix(".part")
+    part = own_part_path(path)
     arrays = {
         "voxels": preview.voxels,
         "origin_mm": preview.grid.origin_mm,

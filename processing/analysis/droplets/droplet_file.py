@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from daq.files.atomic_file import replacing
+from daq.files.atomic_file import own_part_path, replacing
 from processing.analysis.droplets.droplet_table import P_REAL_UNKNOWN, Columns, DropletRows
 from processing.errors import BadInput
 
@@ -94,7 +94,7 @@ def write_columns(path: Path, columns: Mapping[str, NDArray[np.generic]], proven
     provenance : Mapping[str, str | int | float]
         As of ``write_droplets``.
     """
-    with replacing(path) as part, h5py.File(part, "w") as file:
+    with replacing(path, own_part_path(path)) as part, h5py.File(part, "w") as file:
         group = file.create_group(GROUP, track_order=True)
         group.attrs[ROWS] = len(columns[FRAME])
         for name, values in columns.items():
