@@ -13,6 +13,14 @@ class FaultKind(StrEnum):
 
     PACKET_LOSS = "packet_loss"
     """``amount`` percent of the stream packets never arrive."""
+    PACKETS_DOUBLED = "packets_doubled"
+    """``amount`` percent of the stream packets arrive twice."""
+    PACKETS_SWAPPED = "packets_swapped"
+    """``amount`` percent of the stream packets are overtaken by the one behind them."""
+    BLOCK_DOUBLED = "block_doubled"
+    """Every exposure of a shot is sent twice."""
+    IDS_WRAP = "ids_wrap"
+    """The camera starts to stream so that its 16-bit block ids wrap to 1 after ``amount`` blocks, again and again."""
     MISSED_TRIGGER = "missed_trigger"
     DROPPED_A = "dropped_a"
     DROPPED_B = "dropped_b"
@@ -22,6 +30,8 @@ class FaultKind(StrEnum):
     """One shot is sent ``amount`` seconds late."""
     TIMESTAMP_JUMP = "timestamp_jump"
     """The clock of the camera jumps by ``amount`` seconds."""
+    CLOCK_BACK = "clock_back"
+    """The clock of the camera goes back by ``amount`` seconds, at most to zero."""
     FROZEN = "frozen"
     """The camera neither answers nor streams, as with its cable out; it keeps its settings."""
     KILLED = "killed"
@@ -36,6 +46,10 @@ class FaultKind(StrEnum):
     """In one shot the second light pulse comes ``amount`` microseconds late."""
     GENERATOR_RESET = "generator_reset"
     """The microcontroller restarts."""
+    GENERATOR_WATCHDOG = "generator_watchdog"
+    """The microcontroller is restarted by its watchdog, as its program has hung."""
+    SET_POINT = "set_point"
+    """A current set-point of the pulse generator is another one than was asked for."""
     GENERATOR_HANG = "generator_hang"
     """The microcontroller stands still."""
     GENERATOR_UNPLUGGED = "generator_unplugged"
@@ -59,6 +73,8 @@ class FaultKind(StrEnum):
 LABORATORY_FAULTS = frozenset(
     {
         FaultKind.GENERATOR_RESET,
+        FaultKind.GENERATOR_WATCHDOG,
+        FaultKind.SET_POINT,
         FaultKind.GENERATOR_HANG,
         FaultKind.GENERATOR_UNPLUGGED,
         FaultKind.REPLIES_LOST,
@@ -72,12 +88,17 @@ LABORATORY_FAULTS = frozenset(
 )
 """Faults that happen to no view."""
 
+PACKET_SHARES = frozenset({FaultKind.PACKET_LOSS, FaultKind.PACKETS_DOUBLED, FaultKind.PACKETS_SWAPPED})
+"""Faults whose ``amount`` is a percentage."""
+
 LASTING_FAULTS = frozenset(
     {
-        FaultKind.PACKET_LOSS,
+        *PACKET_SHARES,
+        FaultKind.IDS_WRAP,
         FaultKind.FROZEN,
         FaultKind.KILLED,
         FaultKind.CONTROL_TAKEN,
+        FaultKind.SET_POINT,
         FaultKind.GENERATOR_HANG,
         FaultKind.GENERATOR_UNPLUGGED,
         FaultKind.INTERLOCK_OPEN,
@@ -112,8 +133,8 @@ class Fault(FrozenModel):
 
     @model_validator(mode="after")
     def _is_a_share(self) -> Self:
-        if self.kind is FaultKind.PACKET_LOSS and self.amount > 100:
-            raise ValueError(f"packet_loss: {self.amount:g} % is more than all")
+        if self.kind in PACKET_SHARES and self.amount > 100:
+            raise ValueError(f"{self.kind}: {self.amount:g} % is more than all")
         return self
 
     @model_validator(mode="after")

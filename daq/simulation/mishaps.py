@@ -47,19 +47,35 @@ def _spoil(spoiled: Callable[[float], Mapping[str, float | bool]]) -> Act:
     return act
 
 
+def _jump(direction: int) -> Act:
+    """Let the clock of the camera jump, from where it is."""
+
+    def act(devices: SimulatedDevices, fault: Fault) -> None:
+        devices.camera_of(fault).faults.timestamp_jump_ns += direction * round(fault.amount * 1e9)
+
+    return act
+
+
 BEGINNINGS: Mapping[FaultKind, Act] = {
     FaultKind.PACKET_LOSS: _spoil(lambda percent: {"packet_loss": percent / 100}),
+    FaultKind.PACKETS_DOUBLED: _spoil(lambda percent: {"packets_doubled": percent / 100}),
+    FaultKind.PACKETS_SWAPPED: _spoil(lambda percent: {"packets_swapped": percent / 100}),
+    FaultKind.BLOCK_DOUBLED: _spoil(lambda shots: {"doubled": int(shots)}),
+    FaultKind.IDS_WRAP: _spoil(lambda blocks: {"blocks_before_wrap": int(blocks)}),
     FaultKind.MISSED_TRIGGER: _spoil(lambda shots: {"missed_triggers": int(shots)}),
     FaultKind.DROPPED_A: _spoil(lambda shots: {"dropped_a": int(shots)}),
     FaultKind.DROPPED_B: _spoil(lambda shots: {"dropped_b": int(shots)}),
     FaultKind.SWAPPED: _spoil(lambda shots: {"swapped": int(shots)}),
     FaultKind.WRONG_SIZE: _spoil(lambda shots: {"wrong_size": int(shots)}),
     FaultKind.LATE: _spoil(lambda seconds: {"late_s": seconds, "late": 1}),
-    FaultKind.TIMESTAMP_JUMP: _spoil(lambda seconds: {"timestamp_jump_ns": round(seconds * 1e9)}),
+    FaultKind.TIMESTAMP_JUMP: _jump(+1),
+    FaultKind.CLOCK_BACK: _jump(-1),
     FaultKind.FROZEN: _spoil(lambda _: {"frozen": True}),
     FaultKind.KILLED: lambda devices, fault: devices.camera_of(fault).kill(),
     FaultKind.CONTROL_TAKEN: _spoil(lambda _: {"held_by_another": True}),
     FaultKind.GENERATOR_RESET: lambda devices, _: devices.generator.reset(),
+    FaultKind.GENERATOR_WATCHDOG: lambda devices, _: devices.generator.reset(by_watchdog=True),
+    FaultKind.SET_POINT: lambda devices, _: devices.generator.set_converter(False),
     FaultKind.GENERATOR_HANG: lambda devices, _: devices.generator.hang(),
     FaultKind.GENERATOR_UNPLUGGED: lambda devices, _: devices.generator.unplug(),
     FaultKind.REPLIES_LOST: lambda devices, fault: devices.generator.lose_replies(int(fault.amount)),
@@ -76,9 +92,13 @@ BEGINNINGS: Mapping[FaultKind, Act] = {
 
 ENDINGS: Mapping[FaultKind, Act] = {
     FaultKind.PACKET_LOSS: _spoil(lambda _: {"packet_loss": 0.0}),
+    FaultKind.PACKETS_DOUBLED: _spoil(lambda _: {"packets_doubled": 0.0}),
+    FaultKind.PACKETS_SWAPPED: _spoil(lambda _: {"packets_swapped": 0.0}),
+    FaultKind.IDS_WRAP: _spoil(lambda _: {"blocks_before_wrap": 0}),
     FaultKind.FROZEN: _spoil(lambda _: {"frozen": False}),
     FaultKind.KILLED: lambda devices, fault: devices.camera_of(fault).power_on(),
     FaultKind.CONTROL_TAKEN: _spoil(lambda _: {"held_by_another": False}),
+    FaultKind.SET_POINT: lambda devices, _: devices.generator.set_converter(True),
     FaultKind.GENERATOR_HANG: lambda devices, _: devices.generator.go_on(),
     FaultKind.GENERATOR_UNPLUGGED: lambda devices, _: devices.generator.plug_in(),
     FaultKind.INTERLOCK_OPEN: lambda devices, _: devices.close_door(),

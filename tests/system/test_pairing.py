@@ -21,6 +21,7 @@ from tests.support.soak_kill import mispaired_exposures
 pytestmark = pytest.mark.network
 SHOTS, RATE_HZ, FRAME_S = 6, 10.0, 0.4
 DEADLINE_S = 60.0
+LAST_ID = 65535
 
 STORIES: Mapping[str, Mapping[int, Sequence[Fault]]] = {
     "cameras become ready one after the other": {
@@ -35,6 +36,15 @@ STORIES: Mapping[str, Mapping[int, Sequence[Fault]]] = {
         2: [Fault(kind=FaultKind.LATE, view="view2", amount=FRAME_S + 0.5 / RATE_HZ)],
         4: [Fault(kind=FaultKind.LATE, view="view1", amount=FRAME_S + 1 / RATE_HZ)],
     },
+    "block ids wrap between A and B, and blocks and packets come twice and in another order": {
+        0: [Fault(kind=FaultKind.IDS_WRAP, view="view1", amount=3), Fault(kind=FaultKind.IDS_WRAP, view="view2")],
+        2: [Fault(kind=FaultKind.BLOCK_DOUBLED, view=view) for view in VIEWS],
+        3: [Fault(kind=FaultKind.PACKETS_DOUBLED, view="view1", amount=50, duration_s=0.2)],
+        5: [Fault(kind=FaultKind.PACKETS_SWAPPED, view="view1", amount=50, duration_s=0.2)],
+    },
+    "the clock of a camera goes back": {
+        3: [Fault(kind=FaultKind.CLOCK_BACK, view="view2", amount=1.0)],
+    },
     "the clock of a camera jumps, then it loses a frame": {
         3: [Fault(kind=FaultKind.TIMESTAMP_JUMP, view="view2", amount=5.0)],
         4: [Fault(kind=FaultKind.DROPPED_B, view="view2")],
@@ -42,8 +52,20 @@ STORIES: Mapping[str, Mapping[int, Sequence[Fault]]] = {
 }
 
 
+HARMLESS = frozenset(
+    {
+        FaultKind.TIMESTAMP_JUMP,
+        FaultKind.IDS_WRAP,
+        FaultKind.BLOCK_DOUBLED,
+        FaultKind.PACKETS_DOUBLED,
+        FaultKind.PACKETS_SWAPPED,
+    }
+)
+"""No shot suffers from them."""
+
+
 class StoriedFire:
-    """The generator of the bench; faults happen just before some of its firings."""
+    """The generator of the bench; faults happen just before some of its firings, those at 0 before the run."""
 
     def __init__(self, generator: PulseGenerator, laboratory: SimulatedLaboratory) -> None:
         self._generator = generator
@@ -79,6 +101,8 @@ def test_only_the_shots_that_a_fault_hits_are_invalid_and_no_image_is_another_on
     generator = StoriedFire(bench.rig.generator, bench.laboratory)
     generator.story = STORIES[story]
     rig = replace(bench.rig, generator=cast(PulseGenerator, generator))
+    for fault in generator.story.get(0, ()):
+        bench.laboratory.inject(fault)
     plan = RunPlan(
         name="pairing",
         kind=RunKind.BACKGROUND,
@@ -91,10 +115,14 @@ def test_only_the_shots_that_a_fault_hits_are_invalid_and_no_image_is_another_on
     with Acquisition(rig, tmp_path, limits=limits, observers=bench.observers) as acquisition:
         run_id = acquisition.start(plan)
         status = acquisition.wait(DEADLINE_S)
+    for fault in generator.story.get(0, ()):
+        bench.laboratory.inject(fault.model_copy(update={"duration_s": 0}))
     assert status.outcome == "completed", status.message
     shots = [RunReader(tmp_path / run_id).read_shot(index) for index in range(SHOTS)]
     assert [mispaired_exposures(shot, VIEWS) for shot in shots] == [0] * SHOTS
-    hit = {firing - 1 for firing, faults in generator.story.items() if faults[0].kind is not FaultKind.TIMESTAMP_JUMP}
+    ids = {frames.record_a.frame_id for shot in shots for frames in shot.views.values()}
+    assert (LAST_ID in ids) == (0 in generator.story)
+    hit = {firing - 1 for firing, faults in generator.story.items() if faults[0].kind not in HARMLESS}
     if quota == 0:
         assert {shot.index for shot in shots if not shot.valid} == hit
     else:

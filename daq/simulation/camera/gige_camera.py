@@ -28,7 +28,7 @@ from daq.simulation.camera.gige_registers import (
     RegisterBank,
     TriggerSource,
 )
-from daq.simulation.camera.gige_stream import Block, StreamChannel, next_block_id
+from daq.simulation.camera.gige_stream import Block, StreamChannel, last_block_id, next_block_id
 from daq.simulation.camera.gige_xml import camera_xml
 from daq.simulation.camera.light import Exposure, FrameSource, exposures_of
 from daq.timing import CameraTiming
@@ -147,9 +147,7 @@ class SimulatedCamera:
         self._control_socket = self._bind(GVCP_PORT)
         self._stream_socket = self._bind(0)
         self._bank[Register.STREAM_SOURCE_PORT] = self._stream_socket.getsockname()[1]
-        self._stream = StreamChannel(
-            self._stream_socket, self._link_bits_per_s, lambda: self.faults.packet_loss, self._stopping
-        )
+        self._stream = StreamChannel(self._stream_socket, self._link_bits_per_s, self.faults, self._stopping)
         self._control = ControlChannel(self._bank, self._on_write, self._stream.resend)
         self._threads = tuple(
             Thread(target=target, name=f"{self._view} {target.__name__}", daemon=True)
@@ -222,12 +220,12 @@ class SimulatedCamera:
     def _restart(self) -> None:
         with self._changed:
             self._acquisition += 1
-            self._block_id = 0
+            self._block_id = last_block_id(self.faults.blocks_before_wrap)
             self._pending.clear()
             self._stream.forget()
 
     def _device_ns(self, host_ns: int) -> int:
-        return host_ns - self._power_on_ns + self.faults.timestamp_jump_ns
+        return max(0, host_ns - self._power_on_ns + self.faults.timestamp_jump_ns)
 
     def _stream_firings(self) -> None:
         while (firing := self._next_firing()) is not None:
@@ -257,7 +255,8 @@ class SimulatedCamera:
             for block_id, exposure, image in zip(self._claim_ids(firing, exposures), exposures, images, strict=False)
             if exposure.frame not in dropped
         ]
-        return deliveries[::-1] if self.faults.take("swapped") else deliveries
+        deliveries = deliveries[::-1] if self.faults.take("swapped") else deliveries
+        return [one for one in deliveries for _ in range(2)] if self.faults.take("doubled") else deliveries
 
     def _claim_ids(self, firing: _Firing, exposures: Sequence[Exposure]) -> Sequence[int]:
         """Ids of the blocks; none if the acquisition that the firing belongs to has ended meanwhile."""

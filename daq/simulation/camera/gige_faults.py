@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from threading import Lock
 from typing import Literal
 
-ShotFault = Literal["missed_triggers", "dropped_a", "dropped_b", "swapped", "late", "wrong_size"]
+ShotFault = Literal["missed_triggers", "dropped_a", "dropped_b", "swapped", "late", "wrong_size", "doubled"]
 
 
 @dataclass
@@ -15,12 +15,20 @@ class CameraFaults:
     ----------
     packet_loss : float
         Fraction of stream packets that never arrive, resent ones included.
+    packets_doubled : float
+        Fraction of stream packets that arrive twice.
+    packets_swapped : float
+        Fraction of stream packets that are overtaken by the one behind them.
+    blocks_before_wrap : int
+        So many blocks of every acquisition come before the block ids wrap; 0: 65535, as they start at 1.
     missed_triggers : int
         So many next trigger edges are not seen at all.
     dropped_a, dropped_b : int
         In so many next shots exposure A (B) consumes its block id, but no packet of it is sent.
     swapped : int
         In so many next shots B is sent before A.
+    doubled : int
+        In so many next shots every block is sent twice.
     late : int
         So many next shots are sent only after ``late_s``.
     late_s : float
@@ -36,10 +44,14 @@ class CameraFaults:
     """
 
     packet_loss: float = 0.0
+    packets_doubled: float = 0.0
+    packets_swapped: float = 0.0
+    blocks_before_wrap: int = 0
     missed_triggers: int = 0
     dropped_a: int = 0
     dropped_b: int = 0
     swapped: int = 0
+    doubled: int = 0
     late: int = 0
     late_s: float = 0.0
     wrong_size: int = 0

@@ -4,12 +4,12 @@ import random
 import socket
 import struct
 from collections import OrderedDict
-from collections.abc import Callable
 from dataclasses import dataclass
 from threading import Event, Lock
 from time import perf_counter
 
 from daq.simulation.camera.gige_control import Peer, ResendRequest
+from daq.simulation.camera.gige_faults import CameraFaults
 from daq.simulation.camera.gige_registers import PixelFormat
 
 Packet = tuple[bytes, memoryview]
@@ -22,6 +22,11 @@ _PACKETS_PER_PAUSE = 16
 _BLOCKS_KEPT = 4
 _LAST_BLOCK_ID = 65535
 _NOTHING = memoryview(b"")
+
+
+def last_block_id(before_wrap: int) -> int:
+    """Where to count from, so that ids wrap after so many blocks; 0: they start at 1."""
+    return -before_wrap % _LAST_BLOCK_ID
 
 
 def next_block_id(block_id: int) -> int:
@@ -94,16 +99,16 @@ class StreamChannel:
         Bound UDP socket of the stream.
     link_bits_per_s : float
         Rate of the link.
-    loss : Callable[[], float]
-        Fraction of packets that is lost at present.
+    faults : CameraFaults
+        What happens to packets at present.
     stopping : Event
         Ends every wait.
     """
 
-    def __init__(self, sock: socket.socket, link_bits_per_s: float, loss: Callable[[], float], stopping: Event) -> None:
+    def __init__(self, sock: socket.socket, link_bits_per_s: float, faults: CameraFaults, stopping: Event) -> None:
         self._sock = sock
         self._link_bits_per_s = link_bits_per_s
-        self._loss = loss
+        self._faults = faults
         self._stopping = stopping
         self._dice = random.Random(1)  # noqa: S311  a simulated fault, and reproducible
         self._kept: OrderedDict[int, tuple[Block, Peer]] = OrderedDict()
@@ -117,10 +122,10 @@ class StreamChannel:
                 self._kept.popitem(last=False)
         packet_s = (block.packet_bytes + _ETHERNET_BYTES) * 8 / self._link_bits_per_s + packet_delay_s
         started_s = perf_counter()
-        for index in range(block.packet_count):
+        for sent, index in enumerate(self._order(block.packet_count)):
             self._send(block.packet(index), client)
-            if index % _PACKETS_PER_PAUSE == 0:
-                self._stopping.wait(max(0.0, started_s + index * packet_s - perf_counter()))
+            if sent % _PACKETS_PER_PAUSE == 0:
+                self._stopping.wait(max(0.0, started_s + sent * packet_s - perf_counter()))
 
     def resend(self, request: ResendRequest) -> None:
         """Send the packets once more; a block that is gone stays gone."""
@@ -137,6 +142,17 @@ class StreamChannel:
         with self._lock:
             self._kept.clear()
 
+    def _order(self, packets: int) -> list[int]:
+        """Indices of the packets of a block as they leave: some after the one behind them, some twice."""
+        order = list(range(packets))
+        for place in range(packets - 1):
+            if self._happens(self._faults.packets_swapped):
+                order[place : place + 2] = order[place + 1], order[place]
+        return [index for index in order for _ in range(1 + self._happens(self._faults.packets_doubled))]
+
     def _send(self, packet: Packet, client: Peer) -> None:
-        if self._dice.random() >= self._loss():
+        if not self._happens(self._faults.packet_loss):
             self._sock.sendmsg(packet, (), 0, client)
+
+    def _happens(self, share: float) -> bool:
+        return share > 0 and self._dice.random() < share

@@ -1,4 +1,7 @@
+import socket
 import struct
+import threading
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -6,8 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from daq.shot import Image
+from daq.simulation.camera.gige_faults import CameraFaults
 from daq.simulation.camera.gige_registers import PixelFormat
-from daq.simulation.camera.gige_stream import Block
+from daq.simulation.camera.gige_stream import Block, StreamChannel, last_block_id, next_block_id
 
 blocks = st.builds(
     Block,
@@ -61,3 +65,45 @@ def test_the_trailer_tells_the_rows() -> None:
 )
 def test_words_go_little_endian(pixel_format: PixelFormat, image: Image, encoded: bytes) -> None:
     assert bytes(pixel_format.encode(image)) == encoded
+
+
+def sent_by(faults: CameraFaults) -> list[int]:
+    """Indices of the packets of a block of eight, in the order in which they leave."""
+    block = Block(1, 0, PixelFormat.Mono8, (6, 10), memoryview(bytes(60)), 46)
+    with (
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as here,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as there,
+    ):
+        for sock in (here, there):
+            sock.bind(("127.0.0.1", 0))
+            sock.settimeout(5.0)
+        StreamChannel(there, 1e9, faults, threading.Event()).send(block, here.getsockname())
+        StreamChannel(there, 1e9, CameraFaults(), threading.Event()).send(
+            replace(block, block_id=2), here.getsockname()
+        )
+        found = []
+        while (header := struct.unpack_from(">HHI", here.recv(100)))[1] == 1:
+            found.append(header[2] & 0xFFFFFF)
+    return found
+
+
+@pytest.mark.parametrize(
+    ("faults", "sent"),
+    [
+        (CameraFaults(), [0, 1, 2, 3, 4, 5, 6, 7]),
+        (CameraFaults(packet_loss=1.0), []),
+        (CameraFaults(packets_doubled=1.0), [0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5, 6, 6, 7, 7]),
+        (CameraFaults(packets_swapped=1.0), [1, 2, 3, 4, 5, 6, 7, 0]),
+    ],
+    ids=["all is well", "lost", "doubled", "swapped"],
+)
+def test_what_happens_to_packets_on_their_way(faults: CameraFaults, sent: list[int]) -> None:
+    assert sent_by(faults) == sent
+
+
+def test_ids_wrap_after_so_many_blocks() -> None:
+    ids = [last_block_id(3)]
+    for _ in range(4):
+        ids.append(next_block_id(ids[-1]))
+    assert ids[1:] == [65533, 65534, 65535, 1]
+    assert next_block_id(last_block_id(0)) == 1

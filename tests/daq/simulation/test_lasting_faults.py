@@ -14,7 +14,7 @@ from daq.drivers.camera_profile import load_camera_profile
 from daq.drivers.gige_question import controller_of
 from daq.drivers.serial_pulse_generator import SerialPulseGenerator
 from daq.errors import DeviceError, DeviceUnavailable
-from daq.faults import LASTING_FAULTS, Fault, FaultKind, ScriptedFault
+from daq.faults import LABORATORY_FAULTS, LASTING_FAULTS, Fault, FaultKind, ScriptedFault
 from daq.shot import FiredTrain
 from daq.simulation.camera.gige_camera import SimulatedCamera
 from daq.simulation.interlock import MemoryInterlock
@@ -49,9 +49,7 @@ def laboratory() -> Iterator[SimulatedLaboratory]:
 
 
 def fault(kind: FaultKind, duration_s: float | None = None, amount: float = 1.0) -> Fault:
-    view = (
-        VIEW if kind in (FaultKind.PACKET_LOSS, FaultKind.FROZEN, FaultKind.KILLED, FaultKind.CONTROL_TAKEN) else None
-    )
+    view = None if kind in LABORATORY_FAULTS else VIEW
     return Fault(kind=kind, view=view, duration_s=duration_s, amount=amount)
 
 
@@ -75,11 +73,24 @@ def generator_answers(laboratory: SimulatedLaboratory) -> bool:
         return False
 
 
+def generator_can_be_cleared(laboratory: SimulatedLaboratory) -> bool:
+    try:
+        with SerialPulseGenerator("generator", laboratory.devices.generator.port, {VIEW: 0}) as generator:
+            generator.clear()
+    except DeviceError:
+        return False
+    return True
+
+
 WELL: dict[FaultKind, Callable[[SimulatedLaboratory], bool]] = {
     FaultKind.PACKET_LOSS: lambda bench: bench.devices.cameras[VIEW].faults.packet_loss == 0,
+    FaultKind.PACKETS_DOUBLED: lambda bench: bench.devices.cameras[VIEW].faults.packets_doubled == 0,
+    FaultKind.PACKETS_SWAPPED: lambda bench: bench.devices.cameras[VIEW].faults.packets_swapped == 0,
+    FaultKind.IDS_WRAP: lambda bench: bench.devices.cameras[VIEW].faults.blocks_before_wrap == 0,
     FaultKind.FROZEN: answers,
     FaultKind.KILLED: answers,
     FaultKind.CONTROL_TAKEN: lambda bench: not bench.devices.cameras[VIEW].faults.held_by_another,
+    FaultKind.SET_POINT: generator_can_be_cleared,
     FaultKind.GENERATOR_HANG: generator_answers,
     FaultKind.GENERATOR_UNPLUGGED: port_is_there,
     FaultKind.INTERLOCK_OPEN: generator_answers,
