@@ -10,6 +10,8 @@ _STEP_MM = 0.05
 _STEP_RANGE_PX, _STEP_PX = (0.3, 30.0), 3.0
 """Steps that the images show by less or more are made such that they show them by 3 px: metres and micrometres too."""
 _ITERATIONS = 8
+_POINTS_AT_ONCE = 4096
+"""Of a triangulation: so many stay in the cache from step to step."""
 _FIRMNESS = 1e-12
 """Share of the normal matrix that is added to it, so that it can be solved where views stand in one place."""
 
@@ -89,16 +91,43 @@ def triangulate(
     (N, 3) array, (N, n, 2) array
         The points, and what is left: seen minus re-projected, in px.
     """
-    points_mm = np.array(start_mm, dtype=np.float64)
-    for _ in range(iterations):
-        seen = [linearise(mapping, points_mm) for mapping in mappings]
-        slopes = np.concatenate([slope for _, slope in seen], axis=1)
-        residual_px = np.concatenate([seen_px[:, view] - image for view, (image, _) in enumerate(seen)], axis=1)
-        normal = slopes.transpose(0, 2, 1) @ slopes
-        normal += _FIRMNESS * np.trace(normal, axis1=1, axis2=2)[:, None, None] * np.eye(3)
-        points_mm += np.linalg.solve(normal, slopes.transpose(0, 2, 1) @ residual_px[:, :, None])[:, :, 0]
-    reprojected_px = np.stack([mapping.project(points_mm) for mapping in mappings], axis=1)
-    return points_mm, seen_px - reprojected_px
+    points_mm, left_px = np.array(start_mm, dtype=np.float64), np.empty(np.shape(seen_px))
+    for first in range(0, len(points_mm), _POINTS_AT_ONCE):
+        some = slice(first, first + _POINTS_AT_ONCE)
+        for _ in range(iterations):
+            points_mm[some] += _step_mm(mappings, seen_px[some], points_mm[some])
+        reprojected_px = [mapping.project(points_mm[some]) for mapping in mappings]
+        left_px[some] = seen_px[some] - np.stack(reprojected_px, axis=1)
+    return points_mm, left_px
+
+
+def _step_mm(mappings: Sequence[ViewMapping], seen_px: FloatArray, points_mm: FloatArray) -> FloatArray:
+    """One Gauss-Newton step (N, 3), as ``triangulate`` takes it."""
+    normal, gradient = np.zeros((3, 3, len(points_mm))), np.zeros((3, len(points_mm)))
+    for view, mapping in enumerate(mappings):
+        image_px, slopes = linearise(mapping, points_mm)
+        left_px, along = (seen_px[:, view] - image_px).T, np.ascontiguousarray(slopes.transpose(1, 2, 0))
+        for slope, left in zip(along, left_px, strict=True):
+            gradient += slope * left
+            for row in range(3):
+                normal[row, row:] += slope[row] * slope[row:]
+    normal[range(3), range(3)] += _FIRMNESS * (normal[0, 0] + normal[1, 1] + normal[2, 2])
+    return _solved(normal, gradient)
+
+
+def _solved(matrix: FloatArray, right: FloatArray) -> FloatArray:
+    """Solutions (N, 3) of symmetric systems, whose upper halves (3, 3, N) are given, by Cramer's rule."""
+    (aa, ab, ac), (_, bb, bc), (_, _, cc) = matrix
+    adjugate_a, adjugate_b, adjugate_c = bb * cc - bc * bc, ac * bc - ab * cc, ab * bc - ac * bb
+    determinant = aa * adjugate_a + ab * adjugate_b + ac * adjugate_c
+    adjugate = np.array(
+        [
+            [adjugate_a, adjugate_b, adjugate_c],
+            [adjugate_b, aa * cc - ac * ac, ab * ac - aa * bc],
+            [adjugate_c, ab * ac - aa * bc, aa * bb - ab * ab],
+        ]
+    )
+    return np.asarray((adjugate * right).sum(axis=1).T / determinant[:, None], dtype=np.float64)
 
 
 def unseen(slopes: FloatArray) -> FloatArray:

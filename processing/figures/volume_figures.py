@@ -42,7 +42,7 @@ def slices_figure(volume: Volume, grid: VoxelGrid, title: str = "") -> Figure:
     look = GrowingLook(grid.shape)
     for _ in look.watching(slabs_of(volume)):
         pass
-    return look_figure(look.look(slabs_of(volume)), grid, title)
+    return look_figure(look.look(lambda axis, index: np.take(volume, index, axis)), grid, title)
 
 
 def look_figure(look: VolumeLook, grid: VoxelGrid, title: str = "") -> Figure:

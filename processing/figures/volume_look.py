@@ -1,6 +1,6 @@
 """VolumeLook: what the figure of a volume shows, gathered slab by slab, so that no volume has to lie in memory."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,18 +51,11 @@ class GrowingLook:
             self._sum_along_z[rows] += plane
             self._sums[z] += plane.sum()
 
-    def look(self, slabs: Slabs) -> VolumeLook:
-        """What has been seen, and the slices that show most of it, from the same slabs once more."""
+    def look(self, plane: Callable[[int, int], Plane]) -> VolumeLook:
+        """What has been seen, and the slices that show most of it; ``plane(axis, index)`` makes them, axis 0 is z."""
         sums = (self._sums, self._sum_along_z.sum(axis=1), self._sum_along_z.sum(axis=0))
         z, y, x = (int(one.argmax()) for one in sums)
-        nz, ny, nx = self._shape
-        across_z, across_y, across_x = _zeros(ny, nx), _zeros(nz, nx), _zeros(nz, ny)
-        for first_row, slab in slabs:
-            rows = slice(first_row, first_row + slab.shape[1])
-            across_z[rows], across_x[:, rows] = slab[z], slab[:, :, x]
-            if rows.start <= y < rows.stop:
-                across_y[:] = slab[:, y - first_row]
-        return VolumeLook((z, y, x), (across_z, across_y, across_x), self._projections)
+        return VolumeLook((z, y, x), (plane(0, z), plane(1, y), plane(2, x)), self._projections)
 
 
 def _zeros(rows: int, columns: int) -> Plane:

@@ -73,6 +73,8 @@ def line_of_sight(
     threads: int,
     first_row: int = 0,
     grid_rows: int = 0,
+    first_column: int = 0,
+    grid_columns: int = 0,
 ) -> None: ...
 def sum_of_sight(
     exposures: Sequence[Sequence[View]],
@@ -81,6 +83,8 @@ def sum_of_sight(
     threads: int,
     first_row: int = 0,
     grid_rows: int = 0,
+    first_column: int = 0,
+    grid_columns: int = 0,
 ) -> None: ...
 
 @final

@@ -83,11 +83,16 @@ enum class Format { single, half, byte };  // float32, float16, or 0 .. 255 for 
 
 constexpr int bytes_of(Format format) { return format == Format::single ? 4 : format == Format::half ? 2 : 1; }
 
+// Row and column of a grid where a volume begins that is a part of it; the column is the first one of a block.
+struct Corner {
+    int row, column;
+};
+
 struct LineOfSight {
     const View *views;
     int n_views;
     Shape shape;
-    int first_row;  // of the grid, in the volume: which may be a part of its rows
+    Corner first;
     Method method;
     Format format;
     void *volume;
@@ -97,8 +102,8 @@ struct LineOfSight {
 struct SumOfSight {
     const View *views;
     int n_views, n_exposures;
-    Shape shape;    // of the volume, which may begin at a later row of the grid
-    int first_row;  // of the grid: the volume's row 0
+    Shape shape;
+    Corner first;
     Method method;
     float *volume;  // is added to
 };

@@ -13,9 +13,8 @@ from processing.reconstruction.choices import ReconstructionMethod, VoxelType
 from processing.reconstruction.planning.fixed_point import FixedPoint
 from processing.reconstruction.planning.plan import Plan
 from processing.reconstruction.slab_volume import SLAB_ROWS, SlabVolume, slabs_in
-
-ROWS_TOGETHER = 2 * _native.BLOCK_ROWS
-"""Rows y that the kernels see as one block; parts of a volume begin at multiples of them."""
+from processing.reconstruction.volume_part import Part
+from processing.volume import VoxelGrid
 
 
 def line_of_sight(
@@ -108,7 +107,7 @@ def slabs_of_sight(
         raise ValueError(f"slabs of shape {memory.shape}, they need ({nz}, one or more, {nx})")
     seen = plan.resample(images, threads, resampled)
     check_brightness(seen, method, memory.dtype)
-    return _slabs_seen(plan.bind(seen), method, memory, range(ny), ny, threads)
+    return _slabs_seen(plan.bind(seen), method, memory, Part.all_of(plan.grid), plan.grid, threads)
 
 
 def volume_of_sight(
@@ -144,11 +143,11 @@ def volume_seen(
     seen: Sequence[FixedPoint],
     method: ReconstructionMethod,
     out: NDArray[Any],
+    blocks: Part | None = None,
     *,
-    rows: range | None = None,
     threads: int = DEFAULT_THREADS,
 ) -> tuple[SlabVolume, float]:
-    """The same slabs, or some rows y of them, of images that are resampled already.
+    """The same slabs, or a part of them, of images that are resampled already.
 
     Parameters
     ----------
@@ -156,16 +155,16 @@ def volume_seen(
         As ``volume_of_sight`` takes them.
     seen : sequence of FixedPoint
         The images of all views, as ``Plan.resample`` returns them; they stay as they are.
-    rows : range, optional
-        From a multiple of ``ROWS_TOGETHER`` on; by default all.
+    blocks : Part, optional
+        Whole blocks, see ``Part.in_blocks``; by default all.
     """
     check_method(method)
-    ny = plan.grid.shape[1]
+    blocks = blocks or Part.all_of(plan.grid)
     brightest = brightest_voxel(seen, method) or 1.0
     voxels = VoxelType(out.dtype.name)
     unit = 1.0 if voxels is VoxelType.FLOAT32 else 2.0 ** math.ceil(math.log2(brightest))
-    views = plan.bind(_in_unit(seen, method, unit))
-    slabs = _slabs_seen(views, method, out, rows or range(ny), ny, threads)
+    views = plan.between(blocks.z).bind(_in_unit(seen, method, unit))
+    slabs = _slabs_seen(views, method, out, blocks, plan.grid, threads)
     return SlabVolume(slabs, voxels, unit), brightest / unit
 
 
@@ -182,12 +181,13 @@ def _slabs_seen(
     views: Sequence[_native.View],
     method: ReconstructionMethod,
     memory: NDArray[Any],
-    rows: range,
-    grid_rows: int,
+    blocks: Part,
+    grid: VoxelGrid,
     threads: int,
 ) -> Iterator[tuple[int, NDArray[Any]]]:
-    for first_row, slab in slabs_in(memory, rows):
-        _native.line_of_sight(views, method, slab, threads, first_row, grid_rows)
+    _, ny, nx = grid.shape
+    for first_row, slab in slabs_in(memory, blocks.y):
+        _native.line_of_sight(views, method, slab, threads, first_row, ny, blocks.x.start, nx)
         yield first_row, slab
 
 

@@ -1,17 +1,22 @@
 """The mean volume of many exposures, without a volume for each of them."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from functools import partial
 from itertools import chain
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from processing.kernels import DEFAULT_THREADS, _native
-from processing.reconstruction.choices import ReconstructionMethod
+from processing.preprocessing import Intensity
+from processing.reconstruction.choices import ReconstructionMethod, VoxelType
 from processing.reconstruction.line_of_sight import check_brightness, check_method, check_volume
+from processing.reconstruction.planning.fixed_point import FixedPoint
 from processing.reconstruction.planning.plan import Plan
-from processing.reconstruction.slab_volume import SLAB_ROWS, Slabs, slabs_in, slabs_of
+from processing.reconstruction.slab_volume import SLAB_ROWS, Slabs, SlabVolume, slabs_in, slabs_of
+from processing.reconstruction.volume_part import Part
 
 BATCH_BYTES, BATCH_EXPOSURES = 1 << 30, 128
 """Most of resampled images in memory at the same time; the volume is read and written once for each batch."""
@@ -19,7 +24,32 @@ BATCH_BYTES, BATCH_EXPOSURES = 1 << 30, 128
 _TOO_FEW = "a mean needs one exposure or more"
 
 Exposure = Sequence[NDArray[np.float32]]
-Batch = list[list[_native.View]]
+Batch = list[list[FixedPoint]]
+
+
+@dataclass(frozen=True, eq=False)
+class MeanVolume:
+    """A mean that need not be in memory as a whole.
+
+    Parameters
+    ----------
+    slabs : callable
+        Makes its slabs, float32, as often as it is called; a slab is in the memory of the one before.
+    part : callable
+        Makes a part of it, (nz, ny, nx) float32.
+    """
+
+    slabs: Callable[[], Slabs]
+    part: Callable[[Part], Intensity]
+
+    @classmethod
+    def of(cls, volume: Intensity) -> Self:
+        """One that is in memory, (nz, ny, nx)."""
+        return cls(partial(slabs_of, volume), partial(_part_of, volume))
+
+
+def _part_of(volume: Intensity, part: Part) -> Intensity:
+    return part.of(volume)
 
 
 def mean_line_of_sight(
@@ -53,13 +83,13 @@ def mean_line_of_sight(
     check_method(method)
     mean = np.empty(plan.grid.shape, np.float32) if out is None else out
     check_volume(mean, plan, (np.float32,))
-    return _mean(mean, _batches(plan, iter(exposures), method, _memory(plan), threads), method, threads)
+    return _mean(plan, mean, _batches(plan, iter(exposures), method, _memory(plan), threads), method, threads)
 
 
-def mean_slabs(
+def mean_volume(
     plan: Plan, exposures: Iterable[Exposure], method: ReconstructionMethod, *, threads: int = DEFAULT_THREADS
-) -> Callable[[], Slabs]:
-    """The same mean in slabs, made as often as somebody calls for them, each in the memory of the one before.
+) -> MeanVolume:
+    """The same mean, made slab by slab, or a part of it, when somebody calls for that.
 
     Where the exposures do not fit into one batch, the whole mean is made now; else it never is in memory.
 
@@ -80,18 +110,35 @@ def mean_slabs(
         raise ValueError(_TOO_FEW)
     beyond = next(coming, None)
     if beyond is None:
-        return partial(_slabs, first, method, plan.grid.shape, threads)
+        whole = Part.all_of(plan.grid)
+        return MeanVolume(
+            partial(_slabs, plan, first, method, whole, threads), partial(_part, plan, first, method, threads)
+        )
     others = _batches(plan, chain([beyond], coming), method, memory, threads)
-    return partial(slabs_of, _mean(np.empty(plan.grid.shape, np.float32), chain([first], others), method, threads))
+    return MeanVolume.of(_mean(plan, np.empty(plan.grid.shape, np.float32), chain([first], others), method, threads))
 
 
-def _slabs(batch: Batch, method: ReconstructionMethod, shape: tuple[int, int, int], threads: int) -> Slabs:
-    nz, ny, nx = shape
-    for first_row, slab in slabs_in(np.empty((nz, min(SLAB_ROWS, ny), nx), np.float32), range(ny)):
+def _slabs(plan: Plan, batch: Batch, method: ReconstructionMethod, blocks: Part, threads: int) -> Slabs:
+    _, ny, nx = plan.grid.shape
+    views, memory = (
+        _bound(plan.between(blocks.z), batch),
+        np.empty((len(blocks.z), min(SLAB_ROWS, len(blocks.y)), len(blocks.x)), np.float32),
+    )
+    for first_row, slab in slabs_in(memory, blocks.y):
         slab.fill(0)
-        _native.sum_of_sight(batch, method, slab, threads, first_row, ny)
+        _native.sum_of_sight(views, method, slab, threads, first_row, ny, blocks.x.start, nx)
         slab /= np.float32(len(batch))
         yield first_row, slab
+
+
+def _part(plan: Plan, batch: Batch, method: ReconstructionMethod, threads: int, part: Part) -> Intensity:
+    blocks = part.in_blocks(plan.grid)
+    slabs = _slabs(plan, batch, method, blocks, threads)
+    return part.taken_from(SlabVolume(slabs, VoxelType.FLOAT32, 1.0), blocks)
+
+
+def _bound(plan: Plan, batch: Batch) -> list[list[_native.View]]:
+    return [plan.bind(seen) for seen in batch]
 
 
 def _memory(plan: Plan) -> list[list[NDArray[np.int16]]]:
@@ -109,23 +156,23 @@ def _batches(
 ) -> Iterator[Batch]:
     """Exposures by as many as there is memory for; those of one batch are gone when the next one is asked for."""
 
-    def bound(images: Exposure, own: Sequence[NDArray[np.int16]]) -> list[_native.View]:
+    def resampled(images: Exposure, own: Sequence[NDArray[np.int16]]) -> list[FixedPoint]:
         seen = plan.resample(images, threads, own)
         check_brightness(seen, method, np.dtype(np.float32))
-        return plan.bind(seen)
+        return seen
 
     # in this order: where the memory ends, no exposure is taken
-    while batch := [bound(one, own) for own, one in zip(memory, coming, strict=False)]:
+    while batch := [resampled(one, own) for own, one in zip(memory, coming, strict=False)]:
         yield batch
 
 
 def _mean(
-    mean: NDArray[np.float32], batches: Iterable[Batch], method: ReconstructionMethod, threads: int
+    plan: Plan, mean: NDArray[np.float32], batches: Iterable[Batch], method: ReconstructionMethod, threads: int
 ) -> NDArray[np.float32]:
     mean.fill(0)
     count = 0
     for batch in batches:
-        _native.sum_of_sight(batch, method, mean, threads)
+        _native.sum_of_sight(_bound(plan, batch), method, mean, threads)
         count += len(batch)
     if not count:
         raise ValueError(_TOO_FEW)

@@ -1,29 +1,23 @@
-"""A part of a volume, a slice or a region, bit by bit as the whole volume has it: seen by the same plan and images.
-
-A plan of a smaller grid would resample the images in another way, and be off by some 1e-4.
-"""
+"""Part: voxels of a grid, a slice or a region; and how they are taken out of the blocks that the kernels make."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from processing.kernels import DEFAULT_THREADS
+from processing.kernels import _native
 from processing.preprocessing import Intensity
-from processing.reconstruction.byte_slabs import in_bytes
-from processing.reconstruction.choices import ReconstructionMethod, VoxelType
 from processing.reconstruction.errors import ReconstructionError
-from processing.reconstruction.line_of_sight import ROWS_TOGETHER, volume_seen
-from processing.reconstruction.planning.fixed_point import FixedPoint
-from processing.reconstruction.planning.plan import PLANES_TOGETHER, Plan
+from processing.reconstruction.slab_volume import SlabVolume
 from processing.volume import VoxelGrid
 
-_ROWS_AT_ONCE = 2 * ROWS_TOGETHER
-"""A block for each of two threads; of the paper's volume 37 MB."""
-
+PLANES_TOGETHER = max(_native.NODE_SPACINGS)
+"""There every view has its nodes."""
+ROWS_TOGETHER = 2 * _native.BLOCK_ROWS
+COLUMNS_TOGETHER = _native.BLOCK_COLUMNS
 MOST_VOXELS = 1 << 24
 """Of a part: 256 along each axis, 67 MB of float32."""
 RangesMm = Mapping[str, tuple[float, float] | None]
@@ -53,6 +47,39 @@ class Part:
         """Number of voxels (nz, ny, nx)."""
         return len(self.z), len(self.y), len(self.x)
 
+    @classmethod
+    def all_of(cls, grid: VoxelGrid) -> Self:
+        """All voxels of a grid."""
+        return cls(*map(range, grid.shape))
+
+    @classmethod
+    def plane(cls, grid: VoxelGrid, axis: int, index: int) -> Self:
+        """One plane across an axis (0 is z, 1 is y, 2 is x)."""
+        ranges = [range(n) for n in grid.shape]
+        ranges[axis] = range(index, index + 1)
+        return cls(*ranges)
+
+    def in_blocks(self, grid: VoxelGrid) -> "Part":
+        """The blocks around it, which the kernels make as they make them for the whole grid."""
+        nz, ny, nx = grid.shape
+        return Part(
+            _whole(self.z, PLANES_TOGETHER, nz), _whole(self.y, ROWS_TOGETHER, ny), _whole(self.x, COLUMNS_TOGETHER, nx)
+        )
+
+    def of(self, volume: NDArray[Any]) -> NDArray[Any]:
+        """These voxels of a whole volume, not copied."""
+        return volume[_slice(self.z, 0), _slice(self.y, 0), _slice(self.x, 0)]
+
+    def taken_from(self, blocks: SlabVolume, around: "Part") -> Intensity:
+        """Intensities (nz, ny, nx) of these voxels, out of slabs of the blocks around them."""
+        z, x = _slice(self.z, around.z.start), _slice(self.x, around.x.start)
+        taken = np.empty(self.shape, np.float32)
+        for first_row, slab in blocks.slabs:
+            y = range(max(first_row, self.y.start), min(first_row + slab.shape[1], self.y.stop))
+            here: NDArray[Any] = slab[z, _slice(y, first_row), x]
+            np.multiply(here, np.float32(blocks.unit), out=taken[:, _slice(y, self.y.start)], dtype=np.float32)
+        return taken
+
     def grid(self, whole: VoxelGrid) -> VoxelGrid:
         """Where they lie, of the grid that they are a part of."""
         first = np.array([self.z.start, self.y.start, self.x.start], dtype=np.float64)
@@ -81,70 +108,6 @@ def _within(axis: str, centres_mm: NDArray[np.float64], span_mm: tuple[float, fl
         asked = f"{axis} from {span_mm[0]:g} to {span_mm[1]:g} mm"
         raise PartError(f"{asked}: no voxel there, the volume has {axis} from {first_mm:g} to {last_mm:g} mm")
     return range(begin, end)
-
-
-@dataclass(frozen=True, eq=False)
-class SeenExposure:
-    """One exposure as its views see it, from which any part of its volume is made in milliseconds.
-
-    Parameters
-    ----------
-    plan : Plan
-        Of the whole volume.
-    images : tuple of FixedPoint
-        Resampled by the plan, one per view.
-    """
-
-    plan: Plan
-    images: tuple[FixedPoint, ...]
-
-    @classmethod
-    def of(cls, plan: Plan, images: Sequence[Intensity], threads: int = DEFAULT_THREADS) -> Self:
-        """See preprocessed images (rows, columns), one per view."""
-        return cls(plan, tuple(plan.resample(images, threads)))
-
-    def part(
-        self,
-        part: Part,
-        method: ReconstructionMethod,
-        voxels: VoxelType = VoxelType.FLOAT16,
-        threads: int = DEFAULT_THREADS,
-    ) -> Intensity:
-        """Intensities of a part of the volume.
-
-        It costs what its planes z and rows y cost: 16 planes or rows at least, and all columns x.
-
-        Parameters
-        ----------
-        part : Part
-            Within the grid.
-        method : ReconstructionMethod
-            GAVLOS, MINLOS or MLOS; ValueError for others.
-        voxels : VoxelType
-            How finely the whole volume would be kept.
-        threads : int
-            The result does not depend on it.
-
-        Returns
-        -------
-        (nz, ny, nx) float32 array
-            Those that ``Reconstructor`` makes of these voxels.
-        """
-        nz, ny, nx = self.plan.grid.shape
-        planes, rows = _whole(part.z, PLANES_TOGETHER, nz), _whole(part.y, ROWS_TOGETHER, ny)
-        memory = np.empty((len(planes), min(_ROWS_AT_ONCE, len(rows)), nx), voxels.computed.value)
-        volume, brightest = volume_seen(
-            self.plan.between(planes), self.images, method, memory, rows=rows, threads=threads
-        )
-        if voxels is VoxelType.UINT8:
-            volume = in_bytes(volume, brightest)
-        z, x = _slice(part.z, planes.start), _slice(part.x, 0)
-        seen = np.empty(part.shape, np.float32)
-        for first_row, slab in volume.slabs:
-            y = range(max(first_row, part.y.start), min(first_row + slab.shape[1], part.y.stop))
-            here: NDArray[np.generic] = slab[z, _slice(y, first_row), x]
-            np.multiply(here, np.float32(volume.unit), out=seen[:, _slice(y, part.y.start)], dtype=np.float32)
-        return seen
 
 
 def _whole(some: range, together: int, of: int) -> range:

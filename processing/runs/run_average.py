@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +11,10 @@ from daq.files.run_directory import RunReader
 from processing.calibration.calibration import Calibration
 from processing.kernels import DEFAULT_THREADS
 from processing.preprocessing import Intensity
-from processing.reconstruction.mean_line_of_sight import mean_slabs
+from processing.reconstruction.mean_line_of_sight import MeanVolume, mean_volume
 from processing.reconstruction.planning.plan import plan_reconstruction
 from processing.reconstruction.reconstructor import Reconstructor
 from processing.reconstruction.settings import ReconstructionSettings
-from processing.reconstruction.slab_volume import Slabs, slabs_of
 from processing.runs.exposure_faults import exposure_faults
 from processing.runs.pipeline import default_grid
 from processing.runs.results_file import FrameName
@@ -33,8 +31,8 @@ class RunAverage:
 
     Parameters
     ----------
-    slabs : callable
-        Returns the slabs of the mean, float32, as often as it is called; a slab is in the memory of the one before.
+    mean : MeanVolume
+        Its slabs and parts, made as often as somebody asks for them.
     grid : VoxelGrid
         Where it lies.
     exposures : int
@@ -43,7 +41,7 @@ class RunAverage:
         Shots whose images may be wrong, and how: ``shot``, and what ``exposure_faults`` has found.
     """
 
-    slabs: Callable[[], Slabs]
+    mean: MeanVolume
     grid: VoxelGrid
     exposures: int
     faults: tuple[Mapping[str, Any], ...]
@@ -98,12 +96,10 @@ def average_run(
         references = bench.references(run)
         exposures = _exposures(run, shots, frame, calibration, settings, references, done, threads, faults)
         if settings.method.iterative:
-            slabs: Callable[[], Slabs] = partial(
-                slabs_of, _mean_of_each(Reconstructor.of(plan, settings, threads), exposures)
-            )
+            mean = MeanVolume.of(_mean_of_each(Reconstructor.of(plan, settings, threads), exposures))
         else:
-            slabs = mean_slabs(plan, exposures, settings.method, threads=threads)
-        return RunAverage(slabs, grid, len(shots), tuple(faults))
+            mean = mean_volume(plan, exposures, settings.method, threads=threads)
+        return RunAverage(mean, grid, len(shots), tuple(faults))
 
 
 def _exposures(

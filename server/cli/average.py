@@ -2,7 +2,6 @@
 
 import json
 from argparse import Namespace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,9 +25,9 @@ from server.cli.runs.belonging import ask_droplets, stored_belonging
 from server.cli.runs.faults import tell_faults
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
-    from processing.reconstruction.slab_volume import Slabs
+    from processing.reconstruction.mean_line_of_sight import MeanVolume
     from processing.runs.results_file import Provenance
     from processing.volume import VoxelGrid
 
@@ -70,7 +69,7 @@ def average(options: Namespace) -> Outcome:
 
 def _average_results(options: Namespace) -> dict[str, Any]:
     from processing.calibration.verdict import BELONGING
-    from processing.reconstruction.slab_volume import slabs_of
+    from processing.reconstruction.mean_line_of_sight import MeanVolume
     from processing.reconstruction.volume_file import VolumeFileError
     from processing.runs.exposure_faults import stored_faults
     from processing.runs.results_file import average_volumes, volume_files
@@ -82,13 +81,13 @@ def _average_results(options: Namespace) -> dict[str, Any]:
             "keeps previews: name the run and its --calibration"
         )
     volume, grid = average_volumes(files)
-    slabs = partial(slabs_of, volume)
+    mean = MeanVolume.of(volume)
     faults = [told for file in files if (told := stored_faults(file))]
     if (belonging := stored_belonging(files)) is None:
-        return _written(options, slabs, grid, len(files), faults, {})
+        return _written(options, mean, grid, len(files), faults, {})
     if belonging["verdict"] in ("warn", "refuse"):
         progress(f"{options.results}: droplets speak against calibration and run: {belonging['verdict']}")
-    written = _written(options, slabs, grid, len(files), faults, {BELONGING: json.dumps(belonging)})
+    written = _written(options, mean, grid, len(files), faults, {BELONGING: json.dumps(belonging)})
     return {"passed": belonging["verdict"] != "refuse", "belonging": belonging, **written}
 
 
@@ -103,7 +102,7 @@ def _average_run(options: Namespace) -> dict[str, Any]:
     shots = selected_shots(options.results, options.shots)
     share, workbench = calibrated_share(options, settings, calibration), Workbench()
     with Bar() as bar:
-        mean = average_run(
+        averaged = average_run(
             options.results,
             shots,
             calibration,
@@ -120,7 +119,7 @@ def _average_run(options: Namespace) -> dict[str, Any]:
         "method_version": METHOD_VERSION,
         **belonging.provenance,
     }
-    written = _written(options, mean.slabs, mean.grid, mean.exposures, mean.faults, made_by)
+    written = _written(options, averaged.mean, averaged.grid, averaged.exposures, averaged.faults, made_by)
     progress(belonging.text)
     told = {"passed": belonging.passed, "belonging": belonging.record()}
     return {**told, **written, "method": settings.method.value, "calibrated_share": share}
@@ -128,7 +127,7 @@ def _average_run(options: Namespace) -> dict[str, Any]:
 
 def _written(
     options: Namespace,
-    slabs: "Callable[[], Slabs]",
+    mean: "MeanVolume",
     grid: "VoxelGrid",
     count: int,
     faults: "Sequence[Mapping[str, Any]]",
@@ -139,6 +138,7 @@ def _written(
     from processing.reconstruction.settings import GridSettings
     from processing.reconstruction.slab_volume import SlabVolume
     from processing.reconstruction.volume_file import write_slabs
+    from processing.reconstruction.volume_part import Part
     from processing.runs.overwriting import replacing
 
     source: Provenance = {"average_of": str(options.results), "frame": options.exposure, "volumes": count}
@@ -146,9 +146,10 @@ def _written(
     figure = picture_beside(options.out)
     with replacing(options.out) as out:
         look = GrowingLook(grid.shape)
-        volume = SlabVolume(look.watching(slabs()), VoxelType.FLOAT32, 1.0)
+        volume = SlabVolume(look.watching(mean.slabs()), VoxelType.FLOAT32, 1.0)
         write_slabs(out, volume, grid, {**source, **told, **made_by}, threads=usable_processors())
-        drawn = look_figure(look.look(slabs()), grid, f"mean of {count} volumes")
+        seen = look.look(lambda axis, index: mean.part(Part.plane(grid, axis, index)).squeeze(axis))
+        drawn = look_figure(seen, grid, f"mean of {count} volumes")
         drawn.savefig(out.with_name(figure.name), dpi=120)
     return {
         "file": str(options.out),

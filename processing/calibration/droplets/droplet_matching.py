@@ -17,7 +17,8 @@ from processing.geometry import FloatArray, ViewMapping
 MAX_SEEDS = 1500
 """Droplets of the first view that are followed in one shot: enough for a shot, and the work stays bounded."""
 _NEIGHBOURS = 4
-_CHUNK = 256
+_LINES_AT_ONCE = 64
+"""Their distances from all droplets of a view stay in the cache."""
 
 
 @dataclass(frozen=True)
@@ -126,31 +127,40 @@ def _pairs(
     """Droplets (M, 2) of two views whose lines of sight meet in the box, and where (M, 3)."""
     axis = steepest_axis(first, box.middle_mm)
     places_mm = [box.lower_mm[axis], float(box.middle_mm[axis]), box.upper_mm[axis]]
-    chosen, points = [np.empty((0, 2), np.intp)], [np.empty((0, 3))]
-    for start in range(0, min(len(first_px), MAX_SEEDS), _CHUNK):
-        seeds = np.arange(start, min(start + _CHUNK, len(first_px), MAX_SEEDS))
-        lines_mm = [back_project(first, first_px[seeds], box.middle_mm, axis, place_mm) for place_mm in places_mm]
-        begin_px, middle_px, end_px = (second.project(points_mm) for points_mm in lines_mm)
-        chord_px = end_px - begin_px
-        length_px = np.maximum(np.linalg.norm(chord_px, axis=1, keepdims=True), 1e-9)
-        along, across = chord_px / length_px, np.column_stack([-chord_px[:, 1], chord_px[:, 0]]) / length_px
-        halfway = ((middle_px - begin_px) * along).sum(axis=1) / length_px[:, 0]
-        bend_px = ((middle_px - begin_px) * across).sum(axis=1) / (halfway * (1 - halfway))
-        offset_px = across @ second_px.T - (across * begin_px).sum(axis=1, keepdims=True)
-        seed, partner = np.nonzero(np.abs(offset_px) < tolerance_px + np.abs(bend_px[:, None]) / 4)
-        position = ((second_px[partner] - begin_px[seed]) * along[seed]).sum(axis=1) / length_px[seed, 0]
-        beside_px = offset_px[seed, partner] - bend_px[seed] * position * (1 - position)
-        near = (np.abs(beside_px) < tolerance_px) & (position > -0.05) & (position < 1.05)
-        seed, partner, position = seed[near], partner[near], position[near]
-        depth = _depth(position, halfway[seed])[:, None]
-        begin_mm, end_mm = lines_mm[0][seed], lines_mm[2][seed]
-        chosen.append(np.column_stack([seeds[seed], partner]))
-        points.append(begin_mm + depth * (end_mm - begin_mm))
-    pairs, points_mm = np.concatenate(chosen), np.concatenate(points)
+    seeds_px = first_px[:MAX_SEEDS]
+    begin_mm, middle_mm, end_mm = (back_project(first, seeds_px, box.middle_mm, axis, place) for place in places_mm)
+    begin_px, middle_px, end_px = (second.project(points_mm) for points_mm in (begin_mm, middle_mm, end_mm))
+    chord_px = end_px - begin_px
+    length_px = np.maximum(np.linalg.norm(chord_px, axis=1, keepdims=True), 1e-9)
+    along, across = chord_px / length_px, np.column_stack([-chord_px[:, 1], chord_px[:, 0]]) / length_px
+    halfway = ((middle_px - begin_px) * along).sum(axis=1) / length_px[:, 0]
+    bend_px = ((middle_px - begin_px) * across).sum(axis=1) / (halfway * (1 - halfway))
+    seed, partner, offset_px = _close(begin_px, across, second_px, tolerance_px + np.abs(bend_px) / 4)
+    position = ((second_px[partner] - begin_px[seed]) * along[seed]).sum(axis=1) / length_px[seed, 0]
+    beside_px = offset_px - bend_px[seed] * position * (1 - position)
+    near = (np.abs(beside_px) < tolerance_px) & (position > -0.05) & (position < 1.05)
+    seed, partner, position = seed[near], partner[near], position[near]
+    points_mm = begin_mm[seed] + _depth(position, halfway[seed])[:, None] * (end_mm[seed] - begin_mm[seed])
+    pairs = np.column_stack([seed, partner])
     seen_px = np.stack([first_px[pairs[:, 0]], second_px[pairs[:, 1]]], axis=1)
     points_mm, _ = triangulate([first, second], seen_px, points_mm, iterations=1)
     inside = box.contains(points_mm)
     return pairs[inside], points_mm[inside]
+
+
+def _close(
+    begin_px: FloatArray, across: FloatArray, droplets_px: FloatArray, reach_px: FloatArray
+) -> tuple[NDArray[np.intp], NDArray[np.intp], FloatArray]:
+    """Which lines, of some beginnings and normals (N, 2), and which droplets lie within reach (N,), and how far off."""
+    lines, droplets, offsets_px = [np.empty(0, np.intp)], [np.empty(0, np.intp)], [np.empty(0)]
+    for first in range(0, len(begin_px), _LINES_AT_ONCE):
+        some = slice(first, first + _LINES_AT_ONCE)
+        offset_px = across[some] @ droplets_px.T - (across[some] * begin_px[some]).sum(axis=1, keepdims=True)
+        line, droplet = np.nonzero(np.abs(offset_px) < reach_px[some, None])
+        lines.append(first + line)
+        droplets.append(droplet)
+        offsets_px.append(offset_px[line, droplet])
+    return np.concatenate(lines), np.concatenate(droplets), np.concatenate(offsets_px)
 
 
 def _depth(position: FloatArray, halfway: FloatArray) -> FloatArray:

@@ -31,19 +31,23 @@ bool same_geometry(const View &a, const View &b) {
            a.shift_v == b.shift_v && a.nodes == b.nodes && a.spacing == b.spacing;
 }
 
-// The grid of which a volume has the rows from first_row on; without a number of rows the volume is all of it.
-Shape grid_of(const Shape &shape, int first_row, int grid_rows) {
-    if (!grid_rows) grid_rows = shape.ny;
-    require(first_row >= 0 && first_row <= grid_rows - shape.ny, "volume: more rows than the grid");
-    return {shape.nz, grid_rows, shape.nx};
+// The grid of which a volume has the rows and columns from a corner on; without their numbers the volume has all of them.
+Shape grid_of(const Shape &shape, const Corner &first, int rows, int columns) {
+    if (!rows) rows = shape.ny;
+    if (!columns) columns = shape.nx;
+    require(first.row >= 0 && first.row <= rows - shape.ny, "volume: more rows than the grid");
+    require(first.column >= 0 && first.column <= columns - shape.nx, "volume: more columns than the grid");
+    require(first.column % block_columns == 0, "volume: its first column is in the middle of a block");
+    return {shape.nz, rows, columns};
 }
 
 void line_of_sight(const std::vector<const BoundView *> &bound, const std::string &method, const AnyVolume &volume, int threads,
-                   int first_row, int grid_rows) {
+                   int first_row, int grid_rows, int first_column, int grid_columns) {
     const Shape shape = shape_of(volume);
+    const Corner first{first_row, first_column};
     require_threads(threads);
-    const auto views = views_on(bound, grid_of(shape, first_row, grid_rows));
-    const LineOfSight job{views.data(), static_cast<int>(views.size()), shape, first_row, method_of(method),
+    const auto views = views_on(bound, grid_of(shape, first, grid_rows, grid_columns));
+    const LineOfSight job{views.data(),      static_cast<int>(views.size()), shape, first, method_of(method),
                           format_of(volume), volume.data()};
     const Kernels &kernels = selected_kernels();
     nb::gil_scoped_release release;
@@ -51,8 +55,10 @@ void line_of_sight(const std::vector<const BoundView *> &bound, const std::strin
 }
 
 void sum_of_sight(const std::vector<std::vector<const BoundView *>> &exposures, const std::string &method,
-                  const FloatVolume &volume, int threads, int first_row, int grid_rows) {
-    const Shape shape = shape_of(volume), grid = grid_of(shape, first_row, grid_rows);
+                  const FloatVolume &volume, int threads, int first_row, int grid_rows, int first_column,
+                  int grid_columns) {
+    const Corner first{first_row, first_column};
+    const Shape shape = shape_of(volume), grid = grid_of(shape, first, grid_rows, grid_columns);
     require(!exposures.empty(), "one exposure or more, please");
     require_threads(threads);
     std::vector<View> views;
@@ -65,7 +71,7 @@ void sum_of_sight(const std::vector<std::vector<const BoundView *>> &exposures, 
         }
     }
     const SumOfSight job{views.data(), static_cast<int>(exposures[0].size()), static_cast<int>(exposures.size()),
-                         shape,        first_row,                              method_of(method),
+                         shape,        first,                                  method_of(method),
                          volume.data()};
     const Kernels &kernels = selected_kernels();
     nb::gil_scoped_release release;
@@ -83,9 +89,9 @@ void bind_line_of_sight(nb::module_ &module) {
                     "foot"_a, "cull"_a = true)
         .def_static("mapped", &BoundView::mapped, "pixels"_a, "unit"_a, "nodes"_a, "spacing"_a, "cull"_a = true);
     module.def("line_of_sight", &line_of_sight, "views"_a, "method"_a, "volume"_a, "threads"_a, "first_row"_a = 0,
-               "grid_rows"_a = 0);
+               "grid_rows"_a = 0, "first_column"_a = 0, "grid_columns"_a = 0);
     module.def("sum_of_sight", &sum_of_sight, "exposures"_a, "method"_a, "volume"_a, "threads"_a, "first_row"_a = 0,
-               "grid_rows"_a = 0);
+               "grid_rows"_a = 0, "first_column"_a = 0, "grid_columns"_a = 0);
 }
 
 }  // namespace tomoshadow

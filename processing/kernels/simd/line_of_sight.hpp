@@ -22,13 +22,13 @@ struct Stack {
 // Where views see the rows of a slab, one stack of planes after the other.
 class SlabSight {
 public:
-    const int y0, rows;  // y0: in the volume, which may begin at a later row of the grid
-    SlabSight(const View *views, int n_views, const Shape &shape, int first_row, int slab)
+    const int y0, rows;  // y0: in the volume, which may be a part of the grid
+    SlabSight(const View *views, int n_views, const Shape &shape, const Corner &first, int slab)
         : y0(slab * sight_rows),
           rows(smaller(sight_rows, shape.ny - y0)),
-          whole_{0, shape.nz, first_row + y0, rows, 0, shape.nx},
-          planes_(views, n_views, shape.nx, whole_.y0, rows),
-          seen_(planes_.depth(), shape.nx) {}
+          whole_{0, shape.nz, first.row + y0, rows, first.column, first.column + shape.nx},
+          planes_(views, n_views, whole_.x_end, whole_.y0, rows),
+          seen_(planes_.depth(), whole_.x_end) {}
 
     int depth() const { return planes_.depth(); }
     template <class Visit>
@@ -63,9 +63,9 @@ private:
 void line_of_sight(const LineOfSight &job, int number) {
     const FlushSubnormals flush;
     const Exposures exposure{job.views, job.n_views, 1, job.method};
-    SlabSight slab(job.views, job.n_views, job.shape, job.first_row, number);
-    const int nx = job.shape.nx;
-    Staging banks[2] = {{job.format, nx, slab.rows, slab.depth()}, {job.format, nx, slab.rows, slab.depth()}};
+    SlabSight slab(job.views, job.n_views, job.shape, job.first, number);
+    const int nx = job.shape.nx, x0 = job.first.column;
+    Staging banks[2] = {{job.format, nx, slab.rows, slab.depth(), x0}, {job.format, nx, slab.rows, slab.depth(), x0}};
     Drain drain;
     const int64_t piece = static_cast<int64_t>(bytes_of(job.format)) * slab.rows * block_columns;
     Block block;
@@ -90,9 +90,10 @@ void line_of_sight(const LineOfSight &job, int number) {
 }
 
 inline void add_to_volume(const SumOfSight &job, int y0, const Tile &tile, const Block &sum) {
+    const int x0 = tile.x0 - job.first.column;
     for (int row = 0; row < tile.rows; ++row) {
-        float *voxels = job.volume + (static_cast<int64_t>(tile.z) * job.shape.ny + y0 + row) * job.shape.nx + tile.x0;
-        for (int k = 0; k < smaller(block_columns, job.shape.nx - tile.x0); ++k) voxels[k] += sum.rows[row][k];
+        float *voxels = job.volume + (static_cast<int64_t>(tile.z) * job.shape.ny + y0 + row) * job.shape.nx + x0;
+        for (int k = 0; k < smaller(block_columns, job.shape.nx - x0); ++k) voxels[k] += sum.rows[row][k];
     }
 }
 
@@ -117,11 +118,11 @@ inline void add_exposures(const SumOfSight &job, const SlabSight &slab, const St
 void sum_of_sight(const SumOfSight &job, int number) {
     constexpr int columns_at_once = 16 * block_columns;
     const FlushSubnormals flush;
-    SlabSight slab(job.views, job.n_views, job.shape, job.first_row, number);
+    SlabSight slab(job.views, job.n_views, job.shape, job.first, number);
     const int64_t bytes = static_cast<int64_t>(sizeof(Block)) * slab.depth() * (columns_at_once / block_columns);
     const Memory sums(bytes);
     slab.for_stacks([&](const Stack &stack) {
-        for (int x0 = 0; x0 < stack.x_end; x0 += columns_at_once) {
+        for (int x0 = stack.x0; x0 < stack.x_end; x0 += columns_at_once) {
             const Stack part = stack.columns(x0, x0 + columns_at_once);
             std::memset(sums.as<void>(), 0, static_cast<size_t>(bytes));
             add_exposures(job, slab, part, sums.as<Block>());

@@ -98,9 +98,10 @@ inline void finish_streams() {
 // The rows of a slab in a few planes, which lie side by side in the volume; whole blocks may overhang the last one.
 class Staging {
 public:
-    Staging(Format format, int nx, int rows, int planes = 1)
+    Staging(Format format, int nx, int rows, int planes = 1, int first_column = 0)
         : format_(format),
           nx_(nx),
+          first_column_(first_column),
           blocks_(nx / block_columns + 1),
           bytes_(bytes_of(format) * static_cast<int64_t>(nx) * rows),
           memory_(bytes_ * planes),
@@ -129,13 +130,16 @@ public:
     int64_t bytes() const { return bytes_; }
 
 private:
-    int columns_of(const Tile &tile) const { return smaller(block_columns, nx_ - tile.x0); }
+    int columns_of(const Tile &tile) const { return smaller(block_columns, nx_ - column_of(tile)); }
+    int column_of(const Tile &tile) const { return tile.x0 - first_column_; }
     int64_t row_bytes() const { return static_cast<int64_t>(bytes_of(format_)) * nx_; }
-    uint8_t *at(const Tile &tile, int plane) const { return start(plane) + bytes_of(format_) * tile.x0; }
-    bool &empty(const Tile &tile, int plane) const { return empty_.as<bool>()[plane * blocks_ + tile.x0 / block_columns]; }
+    uint8_t *at(const Tile &tile, int plane) const { return start(plane) + bytes_of(format_) * column_of(tile); }
+    bool &empty(const Tile &tile, int plane) const {
+        return empty_.as<bool>()[plane * blocks_ + column_of(tile) / block_columns];
+    }
 
     Format format_;
-    int nx_, blocks_;
+    int nx_, first_column_, blocks_;
     int64_t bytes_;  // of a plane
     Memory memory_, empty_;  // empty_: whether a block of columns is zero already
 };

@@ -18,8 +18,6 @@ from processing.volume import VoxelGrid
 MIN_VIEWS = 2
 MAX_DEVIATION_PX = 0.02
 """What a plan may add to the calibration error; a good calibration has 0.05 px."""
-PLANES_TOGETHER = max(_native.NODE_SPACINGS)
-"""Parts of a plan begin at multiples of so many planes: there every view has its nodes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +53,7 @@ class Plan:
         return sum(2 * view.shape_px[0] * view.shape_px[1] for view in self.views)
 
     def between(self, planes: range) -> "Plan":
-        """The same views of some planes z alone, of images that this plan resamples; see ``PLANES_TOGETHER``."""
+        """The same views of some planes z, of images that this plan resamples; the first one must have nodes."""
         nz, (x_mm, y_mm, z_mm) = len(planes), self.grid.origin_mm
         origin_mm = (x_mm, y_mm, z_mm + planes.start * self.grid.pitch_mm)
         grid = VoxelGrid((nz, *self.grid.shape[1:]), origin_mm, self.grid.pitch_mm)

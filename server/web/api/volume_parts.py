@@ -1,7 +1,7 @@
 """/api/runs/{run_id}/results/{results_id}/{volume}: slices and regions at full resolution, made when asked for.
 
-A slice across z or y takes some milliseconds of CPU once its exposure has been looked at, one across x as long as the
-whole volume does. Every value is, bit by bit, that of the whole volume.
+A slice takes some milliseconds of CPU once its exposure has been looked at. Every value is, bit by bit, that of the
+whole volume.
 """
 
 from typing import Annotated, Literal

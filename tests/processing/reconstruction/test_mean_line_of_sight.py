@@ -8,10 +8,11 @@ from processing.kernels import _native
 from processing.reconstruction import mean_line_of_sight as module
 from processing.reconstruction.choices import ReconstructionMethod
 from processing.reconstruction.line_of_sight import line_of_sight
-from processing.reconstruction.mean_line_of_sight import mean_line_of_sight, mean_slabs
+from processing.reconstruction.mean_line_of_sight import mean_line_of_sight, mean_volume
 from processing.reconstruction.planning.node_view import sample_mapping
 from processing.reconstruction.planning.plan import Plan, plan_reconstruction
 from processing.reconstruction.slab_volume import SLAB_ROWS
+from processing.reconstruction.volume_part import Part
 from processing.volume import VoxelGrid
 from tests.support import oracle
 
@@ -53,18 +54,25 @@ def test_slabs_are_those_of_the_whole_mean_as_often_as_they_are_made(
     monkeypatch.setattr(module, "BATCH_EXPOSURES", fitting)
     whole = mean_line_of_sight(plan, shots)
     assert whole.any()
-    slabs = mean_slabs(plan, iter(shots), ReconstructionMethod.MLOS)
+    mean = mean_volume(plan, iter(shots), ReconstructionMethod.MLOS)
     for _ in range(2):
         found = np.full(TALL.shape, np.nan, np.float32)
-        for first_row, slab in slabs():
+        for first_row, slab in mean.slabs():
             found[:, first_row : first_row + slab.shape[1]] = slab
         np.testing.assert_array_equal(found, whole)
+    for part in (
+        Part.plane(TALL, 0, 5),
+        Part.plane(TALL, 1, 77),
+        Part.plane(TALL, 2, 33),
+        Part(range(2, 4), range(60, 130), range(9, 38)),
+    ):
+        np.testing.assert_array_equal(mean.part(part), whole[np.ix_(part.z, part.y, part.x)])
 
 
 def test_what_has_no_mean_is_refused() -> None:
     plan = plan_reconstruction(oracle.cameras(3), GRID)
     with pytest.raises(ValueError, match="a mean needs one exposure or more"):
-        mean_slabs(plan, [], ReconstructionMethod.MLOS)
+        mean_volume(plan, [], ReconstructionMethod.MLOS)
     with pytest.raises(ValueError, match="a mean needs one exposure or more"):
         mean_line_of_sight(plan, [])
     other = plan_reconstruction(oracle.cameras(3), GRID)

@@ -13,8 +13,9 @@ from processing.reconstruction.choices import Accuracy, ReconstructionMethod, Vo
 from processing.reconstruction.planning.node_view import sample_mapping
 from processing.reconstruction.planning.plan import MAX_DEVIATION_PX, Plan, plan_reconstruction
 from processing.reconstruction.reconstructor import Reconstructor
+from processing.reconstruction.seen_exposure import SeenExposure
 from processing.reconstruction.settings import ReconstructionSettings
-from processing.reconstruction.volume_part import Part, SeenExposure
+from processing.reconstruction.volume_part import Part
 from processing.volume import VoxelGrid
 from tests.support import oracle
 from tests.support.sight_cases import PITCH_MM, Images, instruction_set
