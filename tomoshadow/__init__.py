@@ -8,11 +8,12 @@ Calibrate
 Reconstruct
     intensity, common_grid, VoxelGrid, plan, mlos, minlos, gavlos, smart, mart
 Measure
-    measure, measure_flat, mean_diameters, size_classes, droplet_statistics
+    measure, measure_velocities, measure_flat, mean_diameters, size_classes, droplet_statistics, velocity_statistics
 Files
     read_run, shot_intensities, read_volume, write_volume, read_droplets, export_droplets
 Judge and look
-    quality_factor, slices_figure, isosurface_figure, shadowgraph_figure, sizes_figure, droplets_in_space_figure
+    quality_factor, slices_figure, isosurface_figure, shadowgraph_figure, sizes_figure, droplets_in_space_figure,
+    velocities_figure
 Try, and err
     example, BadInput
 """
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
     from processing.analysis.exports.export import export_droplets as export_droplets
     from processing.analysis.flat.flat_droplets import measure_flat as measure_flat
     from processing.analysis.quality import quality_factor as quality_factor
+    from processing.analysis.velocity.measured_velocities import measure_velocities as measure_velocities
+    from processing.analysis.velocity.velocity_statistics import velocity_statistics as velocity_statistics
     from processing.calibration.calibrate import calibrate as calibrate
     from processing.calibration.calibration import Calibration as Calibration
     from processing.calibration.calibration_file import load_calibration as load_calibration
@@ -36,6 +39,7 @@ if TYPE_CHECKING:
     from processing.errors import BadInput as BadInput
     from processing.figures.size_figures import droplets_in_space_figure as droplets_in_space_figure
     from processing.figures.size_figures import sizes_figure as sizes_figure
+    from processing.figures.velocity_figures import velocities_figure as velocities_figure
     from processing.figures.volume_figures import isosurface_figure as isosurface_figure
     from processing.figures.volume_figures import shadowgraph_figure as shadowgraph_figure
     from processing.figures.volume_figures import slices_figure as slices_figure
@@ -64,12 +68,15 @@ _HOMES = {
     "processing.analysis.exports.export": ("export_droplets",),
     "processing.analysis.flat.flat_droplets": ("measure_flat",),
     "processing.analysis.quality": ("quality_factor",),
+    "processing.analysis.velocity.measured_velocities": ("measure_velocities",),
+    "processing.analysis.velocity.velocity_statistics": ("velocity_statistics",),
     "processing.calibration.calibrate": ("calibrate",),
     "processing.calibration.calibration": ("Calibration",),
     "processing.calibration.calibration_file": ("load_calibration", "save_calibration"),
     "processing.calibration.sets.array_set": ("find_target",),
     "processing.errors": ("BadInput",),
     "processing.figures.size_figures": ("droplets_in_space_figure", "sizes_figure"),
+    "processing.figures.velocity_figures": ("velocities_figure",),
     "processing.figures.volume_figures": ("isosurface_figure", "shadowgraph_figure", "slices_figure"),
     "processing.reconstruction.volume_file": ("read_volume", "write_volume"),
     "processing.synthetic.example": ("example",),

@@ -31,8 +31,8 @@ def droplets_figure(cases: Mapping[str, MeasuredCase]) -> Figure:
     figure = Figure(figsize=(10, 1.6 + 0.5 * len(cases)), layout="constrained")
     found_axes, ghost_axes = figure.subplots(1, 2, sharey=True)
     for line, case in enumerate(cases.values()):
-        _draw(found_axes, line, case.found, case.least_found)
-        _draw(ghost_axes, line, case.ghosts, case.most_ghosts)
+        draw_case(found_axes, line, case.found, case.least_found, 100)
+        draw_case(ghost_axes, line, case.ghosts, case.most_ghosts, 100)
     found_axes.set(xlabel="found [% of the droplets]", yticks=range(len(cases)), yticklabels=list(cases))
     ghost_axes.set(xlabel="ghosts [% of what was found]")
     found_axes.invert_yaxis()
@@ -40,10 +40,11 @@ def droplets_figure(cases: Mapping[str, MeasuredCase]) -> Figure:
     return figure
 
 
-def _draw(axes: Axes, line: int, shares: Sequence[float], limit: float | None) -> None:
-    percent = 100 * np.asarray(shares)
-    axes.plot(percent, np.full(len(percent), line), marker="o", linestyle="none", color="0.4", alpha=0.6)
-    axes.plot([percent.mean()] * 2, [line - 0.25, line + 0.25], color="0.1", linewidth=2)
+def draw_case(axes: Axes, line: int, values: Sequence[float], limit: float | None, scale: float = 1) -> None:
+    """A line of a study's figure: a dot per shot, a bar at their mean, and what is asked for in red."""
+    drawn = scale * np.asarray(values)
+    axes.plot(drawn, np.full(len(drawn), line), marker="o", linestyle="none", color="0.4", alpha=0.6)
+    axes.plot([drawn.mean()] * 2, [line - 0.25, line + 0.25], color="0.1", linewidth=2)
     if limit is not None:
-        axes.plot([100 * limit] * 2, [line - 0.4, line + 0.4], color="tab:red", linewidth=1)
+        axes.plot([scale * limit] * 2, [line - 0.4, line + 0.4], color="tab:red", linewidth=1)
     axes.grid(alpha=0.25, axis="x")

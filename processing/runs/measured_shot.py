@@ -9,7 +9,7 @@ from processing.analysis.droplets.bright_shot import BrightExposure
 from processing.analysis.droplets.ghost_share import pooled
 from processing.analysis.droplets.measured_exposure import ShotVerdict
 from processing.analysis.droplets.shadows.shadow_shot import ShadowExposure
-from processing.analysis.velocity.measured_velocities import MeasuredVelocities, measured_velocities
+from processing.analysis.velocity.measured_velocities import MeasuredVelocities, measure_velocities
 from processing.reconstruction.settings import FrozenValue
 from processing.runs.shots.separation import Separation
 from processing.volume import VoxelGrid
@@ -83,7 +83,7 @@ def shot_velocities(
     if isinstance(separation, str):
         return None, separation
     first, second = exposures
-    velocities = measured_velocities(first, second, grid, separation.mean_ns)
+    velocities = measure_velocities(first, second, grid, separation.mean_ns)
     return velocities, _told_velocity(velocities, separation)
 
 

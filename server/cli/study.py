@@ -9,6 +9,7 @@ from server.cli.output import Bar, progress
 from server.cli.studies.droplets import add_droplets
 from server.cli.studies.sizes import add_sizes
 from server.cli.studies.study_command import add_study, collected, report
+from server.cli.studies.velocity import add_velocity
 
 if TYPE_CHECKING:
     from processing.studies.density import DensityRow
@@ -31,6 +32,7 @@ def add(verbs: Verbs) -> None:
     _add_sensitivity(studies)
     add_droplets(studies)
     add_sizes(studies)
+    add_velocity(studies)
 
 
 def _add_methods(parser: ArgumentParser, default: str) -> None:

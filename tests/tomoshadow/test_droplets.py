@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 import tomoshadow as ts
-from tests.support.bright_scenes import GRID, MARGIN_VOXEL, scene, write_bright_calibration
+from processing.studies.velocity.double_scenes import SEPARATION_NS
+from tests.support.bright_scenes import GRID, MARGIN_VOXEL, moving_scene, scene, write_bright_calibration
 
 
 def test_droplets_of_named_images_are_measured_in_any_order(tmp_path: Path) -> None:
@@ -22,6 +23,19 @@ def test_droplets_of_named_images_are_measured_in_any_order(tmp_path: Path) -> N
     assert len(first.droplets) == pytest.approx(len(truth.heights), abs=2)
     assert len(second.droplets) == pytest.approx(len(first.droplets), abs=1)
     assert {len(column) for column in first.droplets.columns().values()} == {len(first.droplets)}
+
+
+def test_two_exposures_give_velocities(tmp_path: Path) -> None:
+    calibration, truth = ts.load_calibration(write_bright_calibration(tmp_path / "calibration.json")), moving_scene()
+    first, second = (
+        ts.measure(calibration, dict(zip(calibration.views, images, strict=True)), GRID) for images in truth.images
+    )
+    found = ts.measure_velocities(first, second, GRID, separation_ns=SEPARATION_NS)
+    assert found.verdict == "good"
+    assert len(found.first.velocities_m_s) == len(first.droplets)
+    assert found.mean_m_s == pytest.approx(truth.before.velocities_mm_per_s.mean(axis=0) / 1000, rel=0.1)
+    assert found.share_paired is not None
+    assert found.share_paired > 0.97
 
 
 def test_what_cannot_be_measured_is_named(tmp_path: Path) -> None:

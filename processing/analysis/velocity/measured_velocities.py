@@ -71,7 +71,7 @@ class MeasuredVelocities:
         return {"a": self.first.columns(len(self.first)), "b": self.second.columns(0)}
 
 
-def measured_velocities(
+def measure_velocities(
     first: MeasuredExposure[Rows, Seen], second: MeasuredExposure[Rows, Seen], grid: VoxelGrid, separation_ns: float
 ) -> MeasuredVelocities:
     """Find for every droplet of exposure A the one of B that it is, and its velocity.

@@ -11,6 +11,7 @@ from daq.frozen_model import FrozenModel
 from processing.analysis.droplets.droplet_file import DropletFileError, StoredDroplets, read_droplets
 from processing.analysis.droplets.droplet_statistics import DropletStatistics, droplet_statistics, hidden_share
 from processing.analysis.droplets.measured_exposure import ShotVerdict
+from processing.analysis.velocity.velocity_statistics import VelocityStatistics, velocity_statistics
 from processing.runs.measured_shot import droplets_path
 from server.lab.errors import Damaged, NotFound
 from server.lab.results import droplet_summaries
@@ -34,6 +35,7 @@ class MeasuredRun(FrozenModel):
 
     shots: Annotated[tuple[ShotOfDroplets, ...], Field(description="those that are there")]
     statistics: Annotated[DropletStatistics, Field(description="of all of them; refused exposures do not count")]
+    velocity: Annotated[VelocityStatistics, Field(description="of all of them; refused velocities do not count")]
 
 
 def measured_run(results_dir: Path) -> MeasuredRun:
@@ -67,7 +69,9 @@ def droplets_file(results_dir: Path, shot: int) -> Path:
 def _read(files: tuple[tuple[Path, int], ...]) -> MeasuredRun:
     """Once per change of the files."""
     stored = [read_droplets(path) for path, _ in files]
-    return MeasuredRun(shots=tuple(map(_told, stored)), statistics=droplet_statistics(stored))
+    return MeasuredRun(
+        shots=tuple(map(_told, stored)), statistics=droplet_statistics(stored), velocity=velocity_statistics(stored)
+    )
 
 
 def _told(stored: StoredDroplets) -> ShotOfDroplets:

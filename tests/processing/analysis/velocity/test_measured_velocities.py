@@ -7,7 +7,7 @@ import pytest
 
 from processing.analysis.droplets.droplet_table import Droplets
 from processing.analysis.droplets.measured_exposure import MeasuredExposure, ShotVerdict
-from processing.analysis.velocity.measured_velocities import MeasuredVelocities, measured_velocities
+from processing.analysis.velocity.measured_velocities import MeasuredVelocities, measure_velocities
 from processing.analysis.velocity.moving_droplets import MovingDroplets
 from processing.volume import VoxelGrid
 from tests.support.moving_droplets import BOX, Exposed, exposures
@@ -32,7 +32,7 @@ def measured(exposed: Exposed, grid: VoxelGrid = GRID, verdict: ShotVerdict = Sh
 
 
 def of(first: Exposed, second: Exposed, separation_ns: float = 6400.0) -> MeasuredVelocities:
-    return measured_velocities(measured(first), measured(second), GRID, separation_ns)
+    return measure_velocities(measured(first), measured(second), GRID, separation_ns)
 
 
 def few(exposed: Exposed, count: int) -> Exposed:
@@ -102,7 +102,7 @@ def test_errors_are_as_large_as_the_covariance_says() -> None:
 def test_the_scale_of_the_grid_scales_velocities_alone(pitch_mm: float) -> None:
     first, second = exposures(found=0.95, ghosts=0.05)
     plain, other = of(first, second), VoxelGrid(GRID.shape, (7.0, 8.0, 9.0), pitch_mm)
-    scaled = measured_velocities(measured(first, other), measured(second, other), other, 6400.0)
+    scaled = measure_velocities(measured(first, other), measured(second, other), other, 6400.0)
     np.testing.assert_array_equal(plain.first.partners.partner, scaled.first.partners.partner)
     np.testing.assert_allclose(
         scaled.first.velocities_m_s, plain.first.velocities_m_s * pitch_mm / PITCH_MM, rtol=1e-6, atol=1e-6
@@ -179,7 +179,7 @@ def test_too_few_droplets_are_refused(counts: tuple[int, int]) -> None:
 def test_an_exposure_without_droplets_says_so(empty: int) -> None:
     both = [measured(one) for one in exposures()]
     both[empty] = measured(few(exposures()[0], 0), verdict=ShotVerdict.EMPTY)
-    velocities = measured_velocities(both[0], both[1], GRID, 6400)
+    velocities = measure_velocities(both[0], both[1], GRID, 6400)
     assert velocities.verdict is ShotVerdict.EMPTY
     assert f"exposure {'AB'[empty]} is empty" in velocities.reasons[0]
     assert (velocities.pairs, velocities.share_paired, velocities.wrong_share) == (0, None, None)
@@ -187,10 +187,10 @@ def test_an_exposure_without_droplets_says_so(empty: int) -> None:
 
 def test_velocities_are_no_better_than_the_exposures() -> None:
     first, second = exposures()
-    doubtful = measured_velocities(measured(first), measured(second, verdict=ShotVerdict.DOUBTFUL), GRID, 6400)
+    doubtful = measure_velocities(measured(first), measured(second, verdict=ShotVerdict.DOUBTFUL), GRID, 6400)
     assert (doubtful.verdict, doubtful.reasons) == (ShotVerdict.DOUBTFUL, ("exposure B is doubtful",))
     nothing = measured(few(second, 0), verdict=ShotVerdict.REFUSED)
-    assert refused(measured_velocities(measured(first), nothing, GRID, 6400), "exposure B is refused")
+    assert refused(measure_velocities(measured(first), nothing, GRID, 6400), "exposure B is refused")
 
 
 def test_few_partners_are_doubtful() -> None:

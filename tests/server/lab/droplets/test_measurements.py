@@ -87,6 +87,8 @@ def test_shots_and_statistics_are_told_and_files_downloaded(measured: Serving, t
     density = statistics["number_density_per_mm3"]
     assert density["low"] < 28 < density["high"]
     assert (statistics["d32_um"], statistics["reason"][:16]) == (None, "bright particles")
+    assert told["velocity"]["pairs"] == 0
+    assert "shots have one exposure" in told["velocity"]["reason"]
     path = tmp_path / "downloaded.h5"
     path.write_bytes(measured.http.get(f"{address}/1.h5").content)
     assert len(read_droplets(path).columns["x_mm"]) == told["shots"][1]["droplets"]

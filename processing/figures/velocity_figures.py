@@ -1,0 +1,129 @@
+"""Figures of velocities: droplets of a shot with theirs, and how well a study paired them."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.quiver import Quiver
+
+from processing.analysis.droplets.droplet_file import StoredDroplets
+from processing.figures.droplet_figures import draw_case
+
+PANELS = (("x", "y", "u", "v"), ("z", "y", "w", "v"), ("x", "z", "u", "w"))
+"""Across, down, and the velocities along them."""
+LENGTH_SHARE = 0.06
+"""Of the widest side of what is drawn: the arrow of a median droplet."""
+NO_COLUMNS = "no velocities: its shot has one exposure, or is from before they were measured"
+
+
+def velocities_figure(shot: StoredDroplets, least_p_pair: float = 0.5, title: str = "") -> Figure:
+    """Droplets of exposure A seen along z, x and y, with arrows and colours of their velocities.
+
+    Parameters
+    ----------
+    shot : StoredDroplets
+        As ``read_droplets`` gives it.
+    least_p_pair : float
+        Droplets whose partner is less likely are grey dots.
+    title : str
+        Above the figure.
+
+    Raises
+    ------
+    ValueError
+        There are no velocities; the text says why.
+    """
+    if "u_m_s" not in shot.columns:
+        raise ValueError(f"{_named(shot)}: {_reasons(shot) or NO_COLUMNS}")
+    first = shot.columns["frame"] == "a"
+    columns = {name: np.asarray(column)[first] for name, column in shot.columns.items()}
+    speeds_m_s = np.linalg.norm([columns[f"{name}_m_s"].astype(np.float64) for name in "uvw"], axis=0)
+    paired = np.isfinite(speeds_m_s) & (columns["p_pair"] >= least_p_pair)
+    if not paired.any():
+        raise ValueError(f"{_named(shot)}: {_reasons(shot) or f'no pair has a p_pair of {least_p_pair:g}'}")
+    figure = Figure(figsize=(14, 5.5), layout="constrained")
+    for axes, panel in zip(figure.subplots(1, 3), PANELS, strict=True):
+        arrows = _draw_panel(axes, columns, panel, paired, speeds_m_s)
+    figure.colorbar(arrows, ax=figure.axes, label="speed [m/s]")
+    told = f"{np.count_nonzero(paired)} of {len(paired)} droplets of exposure A have a partner in B"
+    figure.suptitle(f"{title or _named(shot)}: {told}", fontsize="medium")
+    return figure
+
+
+def _draw_panel(
+    axes: Axes,
+    columns: Mapping[str, np.ndarray],
+    panel: tuple[str, str, str, str],
+    paired: np.ndarray,
+    speeds_m_s: np.ndarray,
+) -> Quiver:
+    across, down, along, below = panel
+    places = [columns[f"{axis}_mm"] for axis in (across, down)]
+    velocities_m_s = [columns[f"{name}_m_s"][paired] for name in (along, below)]
+    axes.scatter(places[0][~paired], places[1][~paired], s=4, c="0.7", linewidths=0)
+    median_m_s = float(np.median(speeds_m_s[paired]))
+    m_s_per_mm = max(median_m_s, 1e-12) / (LENGTH_SHARE * max(float(np.ptp(place)) for place in places) + 1e-12)
+    arrows = axes.quiver(
+        *(place[paired] for place in places),
+        *velocities_m_s,
+        speeds_m_s[paired],
+        angles="xy",
+        scale_units="xy",
+        scale=m_s_per_mm,
+        width=0.003,
+        cmap="viridis",
+    )
+    axes.quiverkey(arrows, 0.85, 1.03, median_m_s, f"{median_m_s:.3g} m/s", labelpos="E")
+    axes.set(xlabel=f"{across} [mm]", ylabel=f"{down} [mm]", aspect="equal")
+    axes.margins(0.08)
+    axes.invert_yaxis()
+    return arrows
+
+
+def _named(shot: StoredDroplets) -> str:
+    return f"{shot.provenance.get('run', 'a run')}, shot {shot.provenance.get('shot', '?')}"
+
+
+def _reasons(shot: StoredDroplets) -> str:
+    """Why a file has no velocities, as it says itself; empty where it does not."""
+    told = json.loads(str(shot.provenance.get("velocity", "{}")))
+    return str(told.get("reason") or "; ".join(told.get("reasons", ())))
+
+
+@dataclass(frozen=True)
+class PairedCase:
+    """Double exposures of a case.
+
+    Parameters
+    ----------
+    paired, right, rms_voxel : sequence of float
+        Share of the droplets, share of the pairs, and error of a component; one per double exposure.
+    least_paired, least_right, most_rms_voxel : float | None
+        What is asked for.
+    """
+
+    paired: Sequence[float]
+    right: Sequence[float]
+    rms_voxel: Sequence[float]
+    least_paired: float | None = None
+    least_right: float | None = None
+    most_rms_voxel: float | None = None
+
+
+def paired_figure(cases: Mapping[str, PairedCase]) -> Figure:
+    """Paired droplets, right pairs and errors of every double exposure, means, and limits as lines."""
+    figure = Figure(figsize=(12, 1.6 + 0.5 * len(cases)), layout="constrained")
+    paired_axes, right_axes, rms_axes = figure.subplots(1, 3, sharey=True)
+    for line, case in enumerate(cases.values()):
+        draw_case(paired_axes, line, case.paired, case.least_paired, 100)
+        draw_case(right_axes, line, case.right, case.least_right, 100)
+        draw_case(rms_axes, line, case.rms_voxel, case.most_rms_voxel)
+    paired_axes.set(xlabel="paired [% of the droplets in both]", yticks=range(len(cases)), yticklabels=list(cases))
+    right_axes.set(xlabel="right [% of the pairs]")
+    rms_axes.set(xlabel="rms error of a component [voxel]")
+    paired_axes.invert_yaxis()
+    figure.suptitle("each double exposure a dot, their mean a bar, what is asked for a red line", fontsize="small")
+    return figure
