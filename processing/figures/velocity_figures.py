@@ -14,8 +14,10 @@ from processing.figures.droplet_figures import draw_case
 
 PANELS = (("x", "y", "u", "v"), ("z", "y", "w", "v"), ("x", "z", "u", "w"))
 """Across, down, and the velocities along them."""
-LENGTH_SHARE = 0.06
+LENGTH_SHARE = 0.08
 """Of the widest side of what is drawn: the arrow of a median droplet."""
+LEAST = 1e-9
+"""Nothing drawn is slower, or narrower."""
 NO_COLUMNS = "no velocities: its shot has one exposure, or is from before they were measured"
 
 
@@ -44,9 +46,15 @@ def velocities_figure(shot: StoredDroplets, least_p_pair: float = 0.5, title: st
     paired = np.isfinite(speeds_m_s) & (columns["p_pair"] >= least_p_pair)
     if not paired.any():
         raise ValueError(f"{_named(shot)}: {_reasons(shot) or f'no pair has a p_pair of {least_p_pair:g}'}")
+    median_m_s = float(np.median(speeds_m_s[paired]))
+    widest_mm = max(float(np.ptp(columns[f"{axis}_mm"])) for axis in "xyz")
+    m_s_per_mm = max(median_m_s, LEAST) / (LENGTH_SHARE * max(widest_mm, LEAST))
     figure = Figure(figsize=(14, 5.5), layout="constrained")
     for axes, panel in zip(figure.subplots(1, 3), PANELS, strict=True):
-        arrows = _draw_panel(axes, columns, panel, paired, speeds_m_s)
+        arrows = _draw_panel(axes, columns, panel, paired, speeds_m_s, m_s_per_mm)
+    figure.axes[0].quiverkey(
+        arrows, 0.04, 0.96, median_m_s, f"{median_m_s:.3g} m/s", labelpos="E", coordinates="figure"
+    )
     figure.colorbar(arrows, ax=figure.axes, label="speed [m/s]")
     told = f"{np.count_nonzero(paired)} of {len(paired)} droplets of exposure A have a partner in B"
     figure.suptitle(f"{title or _named(shot)}: {told}", fontsize="medium")
@@ -59,13 +67,12 @@ def _draw_panel(
     panel: tuple[str, str, str, str],
     paired: np.ndarray,
     speeds_m_s: np.ndarray,
+    m_s_per_mm: float,
 ) -> Quiver:
     across, down, along, below = panel
     places = [columns[f"{axis}_mm"] for axis in (across, down)]
     velocities_m_s = [columns[f"{name}_m_s"][paired] for name in (along, below)]
     axes.scatter(places[0][~paired], places[1][~paired], s=4, c="0.7", linewidths=0)
-    median_m_s = float(np.median(speeds_m_s[paired]))
-    m_s_per_mm = max(median_m_s, 1e-12) / (LENGTH_SHARE * max(float(np.ptp(place)) for place in places) + 1e-12)
     arrows = axes.quiver(
         *(place[paired] for place in places),
         *velocities_m_s,
@@ -76,7 +83,6 @@ def _draw_panel(
         width=0.003,
         cmap="viridis",
     )
-    axes.quiverkey(arrows, 0.85, 1.03, median_m_s, f"{median_m_s:.3g} m/s", labelpos="E")
     axes.set(xlabel=f"{across} [mm]", ylabel=f"{down} [mm]", aspect="equal")
     axes.margins(0.08)
     axes.invert_yaxis()

@@ -45,6 +45,8 @@ class MeasuredDroplets:
         ``COUNTED_UM`` on. Droplets that liquid hides count as missed.
     true_d32_um : float
         Of all true droplets in the box.
+    velocity_rms_m_s : float | None
+        Root mean square error of a component of the velocities of true droplets; None without velocities.
     """
 
     file: Path
@@ -55,6 +57,7 @@ class MeasuredDroplets:
     missed: Placed
     ghosts: Placed
     true_d32_um: float
+    velocity_rms_m_s: float | None
 
     @property
     def found_share(self) -> float:
@@ -96,6 +99,7 @@ def measure_droplets(
         missed=_joined(missed),
         ghosts=_joined(ghosts),
         true_d32_um=1000 * float(np.sum(true_mm**3) / np.sum(true_mm**2)),
+        velocity_rms_m_s=_velocity_rms_m_s(stored, sprays["a"], grid),
     )
 
 
@@ -124,6 +128,21 @@ def _judged(stored: StoredDroplets, frame: str, spray: Spray, grid: VoxelGrid) -
     missed = matches(told.points_mm, within.positions_mm, radius_mm)[1] < 0
     true = Placed(within.positions_mm, 1000 * within.diameters_mm)
     return _counted(true, ~missed), _counted(true, missed), _counted(told, ghost)
+
+
+def _velocity_rms_m_s(stored: StoredDroplets, spray: Spray, grid: VoxelGrid) -> float | None:
+    """Of droplets of A that have a velocity and are true ones."""
+    if "u_m_s" not in stored.columns:
+        return None
+    first, truth = stored.columns["frame"] == "a", _droplets(spray)
+    points_mm, velocities_m_s = (
+        np.column_stack([np.asarray(stored.columns[name], np.float64)[first] for name in names])
+        for names in (("x_mm", "y_mm", "z_mm"), ("u_m_s", "v_m_s", "w_m_s"))
+    )
+    match = matches(points_mm, truth.positions_mm, RADIUS_VOXEL * grid.pitch_mm)[0]
+    judged = (match >= 0) & np.isfinite(velocities_m_s[:, 0])
+    errors_m_s = velocities_m_s[judged] - truth.velocities_mm_per_s[match[judged]] / 1000
+    return float(np.sqrt(np.mean(errors_m_s**2))) if judged.any() else None
 
 
 def _counted(droplets: Placed, chosen: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]) -> Placed:

@@ -9,6 +9,7 @@ from daq.files.run_directory import RunReader
 from processing.figures.found_figures import found_figure
 from processing.figures.residual_figures import residuals_figure
 from processing.figures.size_figures import droplets_in_space_figure, sizes_figure
+from processing.figures.velocity_figures import velocities_figure
 from processing.figures.volume_figures import isosurface_figure, shadowgraph_figure, slices_figure
 from processing.preprocessing import Intensity
 from processing.reconstruction.volume_file import read_volume
@@ -55,6 +56,7 @@ def _measured(droplets: MeasuredDroplets) -> dict[str, Any]:
         "reasons": _reasons(droplets),
         "d32_um": None if d32_um is None else d32_um.model_dump(mode="json"),
         "true_d32_um": droplets.true_d32_um,
+        "velocity_rms_m_s": droplets.velocity_rms_m_s,
         "file": str(droplets.file),
     }
 
@@ -88,7 +90,17 @@ def _droplets_line(droplets: dict[str, Any]) -> str:
         f"{droplets['droplets']} droplets, {droplets['verdict']}: {100 * droplets['found_share']:.1f} % of those from "
         f"{droplets['counted_from_um']:g} um on found, {100 * droplets['true_ghost_share']:.1f} % ghosts, {d32}, "
         f"true {droplets['true_d32_um']:.1f} um; {droplets['liquid_objects']} ligaments masked, "
-        f"{100 * droplets['hidden_share']:.1f} % of the volume hidden"
+        f"{100 * droplets['hidden_share']:.1f} % of the volume hidden{_velocity(droplets)}"
+    )
+
+
+def _velocity(droplets: dict[str, Any]) -> str:
+    if droplets["velocity_rms_m_s"] is None:
+        return ""
+    u, v, w = droplets["velocity"]["mean_m_s"]
+    return (
+        f"; {droplets['velocity']['pairs']} velocities, mean ({u:.2f}, {v:.2f}, {w:.2f}) m/s, "
+        f"rms error {droplets['velocity_rms_m_s']:.2f} m/s"
     )
 
 
@@ -131,6 +143,8 @@ def _droplets_section(droplets: MeasuredDroplets) -> Section:
             f"Against the truth, from {COUNTED_UM:g} µm on, both exposures",
         ),
     ]
+    if droplets.velocity_rms_m_s is not None:
+        pictures.append(Picture(velocities_figure(droplets.stored), "Velocities of droplets that both exposures show"))
     return Section("Droplets", text, [_droplets_table(droplets)], pictures)
 
 
@@ -145,10 +159,19 @@ def _droplets_table(droplets: MeasuredDroplets) -> Table:
         ["ghosts among them", f"{100 * droplets.ghost_share:.1f} %"],
         ["D32", "" if d32 is None else f"{d32.value:.1f} µm ({d32.low:.1f} to {d32.high:.1f})"],
         ["true D32", f"{droplets.true_d32_um:.1f} µm"],
+        ["velocities", _velocities(droplets)],
         ["masked ligaments", f"{shot.liquid_objects}"],
         ["volume that could not be measured", f"{100 * shot.hidden_share:.1f} %"],
     ]
     return Table(["", "box"], rows)
+
+
+def _velocities(droplets: MeasuredDroplets) -> str:
+    shot = droplets.shot
+    if shot.velocity is None or droplets.velocity_rms_m_s is None:
+        return shot.velocity_reason or "; ".join(shot.velocity.reasons if shot.velocity else ())
+    shares = f"{shot.velocity.pairs} pairs, {100 * (shot.velocity.share_paired or 0):.1f} % of what both exposures show"
+    return f"{shares}; error of a component {droplets.velocity_rms_m_s:.2f} m/s"
 
 
 _CALIBRATION_TEXT = (

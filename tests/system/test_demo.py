@@ -62,6 +62,8 @@ def test_droplets_are_measured_and_compared_with_the_truth(demonstrated: tuple[P
     assert droplets["reasons"]
     assert droplets["liquid_objects"] > 0
     assert "measure" in result["seconds"]
+    assert droplets["velocity"]["separation_source"] == "fired"
+    assert (droplets["velocity_rms_m_s"] is None) == (droplets["velocity"]["pairs"] == 0)
 
 
 def test_the_report_is_one_page_with_all_figures(demonstrated: tuple[Path, dict[str, Any]]) -> None:
