@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from processing.analysis.droplets.droplet_table import DropletRows, Droplets, SizedDroplets
 from processing.geometry import FloatArray
@@ -32,6 +33,10 @@ class MovingDroplets:
 
     def __len__(self) -> int:
         return len(self.places)
+
+    def where(self, chosen: NDArray[np.intp]) -> "MovingDroplets":
+        """The chosen ones, by index."""
+        return MovingDroplets(self.places[chosen], self.covariance[chosen], self.log_sizes[chosen])
 
     @classmethod
     def of(cls, droplets: DropletRows, grid: VoxelGrid) -> "MovingDroplets":

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from processing.analysis.droplets.droplet_table import Columns
 from processing.analysis.velocity.common_motion import Indices
-from processing.analysis.velocity.pairing import Partners
+from processing.analysis.velocity.partners import Partners
 from processing.geometry import FloatArray
 
 MM_PER_NS = 1e6

@@ -1,0 +1,112 @@
+"""Tracks of droplets that are known, with what is missed and what is invented; and motion along them."""
+
+import numpy as np
+import pytest
+
+from processing.analysis.velocity.moving_droplets import MovingDroplets
+from processing.analysis.velocity.track_motion import track_points
+from processing.analysis.velocity.tracks import Tracks, link
+from tests.support.droplet_series import Series, series, whole_and_right
+
+
+@pytest.mark.parametrize(
+    ("scene", "least_whole"),
+    [
+        ({}, 0.99),
+        ({"density_per_mm3": 4.0}, 0.97),
+        ({"step": (9.0, 7.0, 3.0), "scatter": 0.3, "frames": 8}, 0.99),
+        ({"found": 0.93, "ghosts": 0.05}, 0.98),
+    ],
+)
+def test_tracks_are_whole_and_right(scene: dict[str, float], least_whole: float) -> None:
+    shown = series(**scene)  # type: ignore[arg-type]
+    whole, right = whole_and_right(link(shown.frames), shown.labels)
+    assert whole >= least_whole
+    assert right >= 0.995
+
+
+def test_a_track_goes_on_beyond_frames_without_its_droplet() -> None:
+    shown = series(found=1.0, ghosts=0.0)
+    hidden = [
+        frame.where(np.flatnonzero((label % 3 != 0) | (number not in (5, 6))))
+        for number, (frame, label) in enumerate(zip(shown.frames, shown.labels, strict=True))
+    ]
+    labels = [label[(label % 3 != 0) | (number not in (5, 6))] for number, label in enumerate(shown.labels)]
+    whole, right = whole_and_right(link(hidden), labels)
+    assert whole > 0.98
+    assert right > 0.99
+
+
+def test_ghosts_make_no_tracks() -> None:
+    shown = series(ghosts=0.1)
+    tracks = link(shown.frames)
+    of_ghosts = np.concatenate([ids[label < 0] for ids, label in zip(tracks.ids, shown.labels, strict=True)])
+    assert len(of_ghosts) > 200
+    assert np.mean(of_ghosts >= 0) < 0.01
+
+
+def test_ids_count_from_zero_and_links_have_probabilities() -> None:
+    tracks = link(series(frames=6).frames)
+    every = np.concatenate(tracks.ids)
+    np.testing.assert_array_equal(np.unique(every[every >= 0]), np.arange(tracks.count))
+    begun: set[int] = set()
+    for ids, p_link in zip(tracks.ids, tracks.p_link, strict=True):
+        for track, p in zip(ids.tolist(), p_link.tolist(), strict=True):
+            assert np.isnan(p) == (track < 0 or track not in begun)
+            begun.add(track)
+        chosen = ids[ids >= 0]
+        assert len(np.unique(chosen)) == len(chosen)
+
+
+def test_mirrored_series_have_the_same_tracks() -> None:
+    shown = series(frames=6)
+    mirrored = [MovingDroplets(one.places * (-1, 1, -1), one.covariance, one.log_sizes) for one in shown.frames]
+    for plain, other in zip(link(shown.frames).ids, link(mirrored).ids, strict=True):
+        np.testing.assert_array_equal(plain, other)
+
+
+@pytest.mark.parametrize("step", [(4.0, 3.0, 1.5), (0.5, 0.2, 0.1)])
+def test_frames_of_different_sprays_have_no_tracks(step: tuple[float, float, float]) -> None:
+    tracks = link([series(seed, frames=1, step=step).frames[0] for seed in range(8)])
+    assert sum(np.count_nonzero(ids >= 0) for ids in tracks.ids) <= 0.005 * sum(len(ids) for ids in tracks.ids)
+
+
+def test_a_series_that_begins_with_empty_frames_is_tracked() -> None:
+    shown = series(frames=6)
+    nothing = shown.frames[0].where(np.zeros(0, np.intp))
+    tracks = link([nothing, nothing, *shown.frames])
+    whole, _ = whole_and_right(Tracks(tracks.ids[2:], tracks.p_link[2:], tracks.count), shown.labels)
+    assert whole > 0.98
+
+
+@pytest.mark.parametrize("count", [0, 1, 2])
+def test_few_frames_are_no_tracks(count: int) -> None:
+    tracks = link(series(frames=2).frames[:count])
+    assert (len(tracks.ids), tracks.count) == (count, 0)
+    assert not len(track_points(series(frames=2).frames[:count], tracks).track)
+
+
+def motion_errors(shown: Series, frames: list[MovingDroplets]) -> tuple[np.ndarray, np.ndarray]:
+    """Errors of velocities and accelerations over their standard deviations."""
+    points = track_points(frames, link(frames))
+    label = np.array([shown.labels[frame][row] for frame, row in zip(points.frame, points.row, strict=True)])
+    true = np.array([shown.velocities[frame][one] for frame, one in zip(points.frame, label, strict=True)])
+    known = (label >= 0) & np.isfinite(points.velocities[:, 0])
+    sd = np.sqrt(np.einsum("nii->ni", points.velocity_covariance))
+    velocity = (points.velocities - true) / sd
+    acceleration = (points.accelerations - shown.accelerations[label]) / points.acceleration_sd
+    return velocity[known], acceleration[known]
+
+
+def test_velocities_and_accelerations_are_as_exact_as_they_say() -> None:
+    shown = series(turn=0.05)
+    for scores in motion_errors(shown, shown.frames):
+        assert np.median(np.abs(scores)) / 0.6745 == pytest.approx(1, abs=0.1)
+        assert np.abs(np.mean(scores)) < 0.1
+
+
+def test_a_longer_window_is_surer() -> None:
+    frames = series(frames=9).frames
+    tracks = link(frames)
+    short, long = (track_points(frames, tracks, half_window) for half_window in (1, 3))
+    assert np.nanmedian(long.acceleration_sd) < 0.3 * np.nanmedian(short.acceleration_sd)
