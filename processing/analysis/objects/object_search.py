@@ -1,0 +1,148 @@
+"""ObjectSearch: where objects are looked for; and all that one exposure says of liquid that is no droplet."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from processing.analysis.objects.break_up import THRESHOLD, THRESHOLDS, Nozzle, Reach, core_of, reach_of
+from processing.analysis.objects.dark_voxels import connected, dark_voxels
+from processing.analysis.objects.liquid_objects import LiquidObjects, liquid_objects
+from processing.analysis.objects.seeing_views import map_grid, pixels_of, seeing_views, unknown_shares
+from processing.analysis.objects.silhouettes import LEAST_VIEWS, sights
+from processing.geometry import FloatArray, ViewMapping
+from processing.kernels import DEFAULT_THREADS
+from processing.preprocessing import Intensity
+from processing.reconstruction.choices import ReconstructionMethod
+from processing.reconstruction.line_of_sight import slabs_of_sight
+from processing.reconstruction.planning.plan import Plan, plan_reconstruction
+from processing.reconstruction.slab_volume import SLAB_ROWS
+from processing.volume import VoxelGrid
+
+PITCH_PX = 1.5
+"""Width of a voxel, over that of a pixel: of two, threads of 50 um are too thin; one costs three times as much."""
+NO_NOZZLE = "nobody stated where the nozzle is: add [spray] nozzle_mm, axis to the run, or measure with --nozzle X,Y,Z"
+
+
+@dataclass(frozen=True, eq=False)
+class ObjectSearch:
+    """What the exposures of a run share.
+
+    Parameters
+    ----------
+    plan : Plan
+        Of the grid in which objects are looked for.
+    sight : (views, 2, 3) array
+        How views see motions.
+    places : VoxelGrid
+        At which it is asked how many views see.
+    pixels : tuple of (N, 2) arrays
+        Where each view sees them.
+    nozzle : Nozzle | None
+        Where the liquid comes from.
+    """
+
+    plan: Plan
+    sight: FloatArray
+    places: VoxelGrid
+    pixels: tuple[NDArray[np.int32], ...]
+    nozzle: Nozzle | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class ExposureObjects:
+    """What one exposure says.
+
+    Parameters
+    ----------
+    objects : LiquidObjects
+        Those that are no droplets.
+    reach : Reach
+        How far liquid hangs together with the nozzle.
+    blind_share, unjudged_share : float
+        Of the volume: no view sees it, and fewer than three do.
+    seeing : (z, y, x) uint8 array
+        How many views see each of the search's places.
+    reason : str | None
+        Why there are no objects.
+    """
+
+    objects: LiquidObjects
+    reach: Reach
+    blind_share: float
+    unjudged_share: float
+    seeing: NDArray[np.uint8]
+    reason: str | None = None
+
+
+def plan_objects(mappings: Sequence[ViewMapping], grid: VoxelGrid, nozzle: Nozzle | None = None) -> ObjectSearch:
+    """Plan the search for objects.
+
+    Parameters
+    ----------
+    mappings : sequence of ViewMapping
+        Of the views.
+    grid : VoxelGrid
+        All that they see in common, about one voxel per pixel; objects are looked for in a coarser one.
+    nozzle : Nozzle, optional
+        For the break-up length.
+    """
+    coarse = coarser(grid)
+    places = map_grid(coarse)
+    pixels = tuple(pixels_of(mapping, places) for mapping in mappings)
+    return ObjectSearch(plan_reconstruction(mappings, coarse), sights(mappings, coarse), places, pixels, nozzle)
+
+
+def coarser(grid: VoxelGrid) -> VoxelGrid:
+    """A grid of wider voxels within another one."""
+    nz, ny, nx = (max(1, int(n / PITCH_PX)) for n in grid.shape)
+    return VoxelGrid((nz, ny, nx), grid.origin_mm, PITCH_PX * grid.pitch_mm)
+
+
+def measure_objects(
+    images: Sequence[Intensity],
+    search: ObjectSearch,
+    *,
+    trust: Sequence[Intensity] | None = None,
+    threads: int = DEFAULT_THREADS,
+) -> ExposureObjects:
+    """Look for liquid that is no droplet in one exposure of shadows.
+
+    Parameters
+    ----------
+    images : sequence of (rows, columns) float32 arrays
+        Transmissions, one per view.
+    search : ObjectSearch
+        Where to look.
+    trust : sequence of (rows, columns) float32 arrays, optional
+        0 where nothing is known of a pixel: then it says nothing against liquid.
+    threads : int
+        The result does not depend on it.
+    """
+    darkness = [np.clip(1 - image, 0, 1) for image in images]
+    if trust is not None:
+        darkness = [np.where(sure > 0, dark, np.float32(1)) for dark, sure in zip(darkness, trust, strict=True)]
+    seeing = seeing_views(darkness, search.pixels, search.places)
+    shares = unknown_shares(seeing, len(images))
+    try:
+        objects, reach = _looked_for(darkness, search, threads)
+    except ValueError as error:
+        return ExposureObjects(LiquidObjects.none(), Reach(reason=str(error)), *shares, seeing, str(error))
+    if len(images) < LEAST_VIEWS:
+        reason = f"{len(images)} views do not tell shapes: {LEAST_VIEWS} or more do"
+        return ExposureObjects(LiquidObjects.none(), reach, *shares, seeing, reason)
+    return ExposureObjects(objects, reach, *shares, seeing)
+
+
+def _looked_for(darkness: Sequence[Intensity], search: ObjectSearch, threads: int) -> tuple[LiquidObjects, Reach]:
+    grid = search.plan.grid
+    slab = np.empty((grid.shape[0], min(SLAB_ROWS, grid.shape[1]), grid.shape[2]), np.uint8)
+    slabs = slabs_of_sight(search.plan, darkness, ReconstructionMethod.MINLOS, out=slab, threads=threads)
+    voxels = dark_voxels(slabs, grid, min(THRESHOLDS))
+    told = voxels.at_least(THRESHOLD)
+    numbers = connected(told)
+    core = core_of(told, numbers, search.nozzle) if search.nozzle else None
+    found = liquid_objects(told, numbers, search.sight, core)
+    reach = reach_of(voxels, search.nozzle) if search.nozzle else Reach(reason=NO_NOZZLE)
+    return found.told(), reach

@@ -1,0 +1,63 @@
+"""How many views still see at a place: where too few do, nothing is known, whatever is there."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from processing.geometry import FloatArray, ViewMapping
+from processing.preprocessing import Intensity
+from processing.volume import VoxelGrid
+
+BLACK_ABOVE = 0.9
+"""A line of sight with less than a tenth of its light tells nothing of what else lies on it."""
+PLACES_MM = 0.15
+"""From place to place of a map."""
+JUDGING = 3
+"""So many views must see a droplet before it is believed."""
+
+
+def map_grid(grid: VoxelGrid) -> VoxelGrid:
+    """A grid of places all over another one."""
+    step = max(1, round(PLACES_MM / grid.pitch_mm))
+    pitch_mm = step * grid.pitch_mm
+    counts = tuple(max(1, n // step) for n in grid.shape)
+    starts = [0.5 * (n - 1 - (count - 1) * step) * grid.pitch_mm for n, count in zip(grid.shape, counts, strict=True)]
+    x_mm, y_mm, z_mm = (origin + start for origin, start in zip(grid.origin_mm, starts[::-1], strict=True))
+    return VoxelGrid((counts[0], counts[1], counts[2]), (x_mm, y_mm, z_mm), pitch_mm)
+
+
+def pixels_of(mapping: ViewMapping, grid: VoxelGrid) -> NDArray[np.int32]:
+    """Column and row (N, 2) of the pixel in which a view sees each place of a grid, in the order of a flat volume."""
+    z, y, x = np.meshgrid(grid.z_mm, grid.y_mm, grid.x_mm, indexing="ij")
+    seen_px = np.rint(mapping.project(np.column_stack([x.ravel(), y.ravel(), z.ravel()])))
+    return np.clip(seen_px, 0, np.array(mapping.image_size_px) - 1).astype(np.int32)
+
+
+def seeing_views(
+    darkness: Sequence[Intensity], pixels: Sequence[NDArray[np.int32]], grid: VoxelGrid
+) -> NDArray[np.uint8]:
+    """How many views see light at each place of a grid (z, y, x).
+
+    Parameters
+    ----------
+    darkness : sequence of (rows, columns) float32 arrays
+        Share of the light that is missing; 1 where nothing is known.
+    pixels : sequence of (N, 2) arrays
+        Of ``pixels_of`` for each view.
+    """
+    seeing = [
+        image[rows, columns] < BLACK_ABOVE
+        for image, (columns, rows) in zip(darkness, (p.T for p in pixels), strict=True)
+    ]
+    return np.sum(seeing, axis=0, dtype=np.uint8).reshape(grid.shape)
+
+
+def unknown_shares(seeing: NDArray[np.uint8], views: int) -> tuple[float, float]:
+    """Share of the volume that no view sees, and that too few see for a droplet."""
+    return float(np.mean(seeing == 0)), float(np.mean(seeing < min(JUDGING, views)))
+
+
+def mean_map(maps: Sequence[NDArray[np.uint8]]) -> FloatArray:
+    """Mean number of seeing views of several exposures."""
+    return np.asarray(np.mean(maps, axis=0), dtype=np.float64)
