@@ -35,6 +35,7 @@ from processing.runs.measured_shot import (
     Exposure,
     MeasuredShot,
     ShotVelocity,
+    conditions_of,
     droplets_path,
     shot_summary,
     shot_velocities,
@@ -212,6 +213,7 @@ class RunMeasurement:
             "recipe_sha256": recipe_sha256("measure", METHOD_VERSION, self.settings),
             "exposures": json.dumps(told),
             "velocity": json.dumps(reason),
+            **conditions_of(self.run.header),
         }
 
     def _exposure(self, shot: Shot, frame: FrameName, threads: int, should_stop: Callable[[], bool]) -> Exposure:

@@ -29,6 +29,7 @@ from server.cli import (
 from server.cli.calibrations import calibrate, check, self_calibrate, size_calibration
 from server.cli.keeping import pack, repair, verify
 from server.cli.output import endable, say, tell
+from server.cli.spray import report, statistics
 
 COMMANDS = (
     demo,
@@ -42,6 +43,8 @@ COMMANDS = (
     size_calibration,
     reconstruct,
     measure,
+    statistics,
+    report,
     average,
     study,
     optics,

@@ -17,7 +17,7 @@ from processing.runs.results_file import volume_path
 from processing.volume import VoxelGrid
 from server.demo.demo import Demonstration
 from server.demo.demo_droplets import COUNTED_UM, MeasuredDroplets
-from server.demo.report import Picture, Section, Table, write_report
+from server.reports.page import Picture, Section, Table, write_report
 
 DETAIL_MM = 4.0
 """Edge of the cube that is shown as an iso-surface, as in Fig. 4 of the paper."""

@@ -1,12 +1,14 @@
 """Sprays of which droplets are sampled directly, as files have them: no image is drawn, and the truth is a formula."""
 
 import json
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from processing.analysis.droplets.droplet_file import StoredDroplets
+from processing.analysis.droplets.droplet_file import StoredDroplets, write_columns
 from processing.reconstruction.settings import GridSettings
 from processing.volume import VoxelGrid
 
@@ -42,6 +44,16 @@ def stored_shot(
         **told,
     }
     return StoredDroplets(columns, provenance)
+
+
+def write_results(folder: Path, shots: Sequence[StoredDroplets], **told: str) -> Path:
+    """A directory as ``measure`` writes it, but for its settings; more of the provenance."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for shot in shots:
+        columns = {**shot.columns, "frame": shot.columns["frame"].astype("S1")}
+        columns["diameter_raw_um"] = columns["diameter_um"]
+        write_columns(folder / f"shot_{shot.provenance['shot']:05d}_droplets.h5", columns, {**shot.provenance, **told})
+    return folder
 
 
 def cone_points_mm(

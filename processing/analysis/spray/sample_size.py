@@ -54,7 +54,7 @@ def sample_verdict(sample: SpraySample, sizes: SizeStatistics) -> SampleVerdict:
         Their diameters, with 95 % intervals.
     """
     half_width = _half_width(sizes)
-    share, largest_um, without_um = _extreme(sample)
+    share, largest_um, without_um = extreme_droplet(sample)
     needed = None
     if half_width is not None and sizes.intervals_over == "shots":
         needed = int(np.ceil(sizes.shots * max((half_width / LARGEST_HALF_WIDTH) ** 2, 1 / sizes.shots)))
@@ -75,8 +75,8 @@ def _half_width(sizes: SizeStatistics) -> float | None:
     return None if d32 is None else float(np.log(d32.high / d32.low) / 2)
 
 
-def _extreme(sample: SpraySample) -> tuple[float | None, float | None, float | None]:
-    """Share, diameter, and D32 without the largest droplet; in two exposures it is there twice."""
+def extreme_droplet(sample: SpraySample) -> tuple[float | None, float | None, float | None]:
+    """Share of the volume and diameter of the largest droplet, and D32 without it; two exposures show it twice."""
     if not len(sample):
         return None, None, None
     d_um = sample.diameters_um

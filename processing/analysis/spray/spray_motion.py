@@ -18,7 +18,7 @@ from pydantic import Field
 from scipy.stats import rankdata
 
 from processing.analysis.droplets.size_statistics import size_classes
-from processing.analysis.estimates import Estimate
+from processing.analysis.estimates import CONFIDENCE, Estimate
 from processing.analysis.spray.spray_axis import SprayAxis
 from processing.analysis.spray.spray_sample import SpraySample, weighted_quantiles
 from processing.geometry import FloatArray
@@ -118,7 +118,7 @@ def axial_volumes(sample: SpraySample, axis: SprayAxis) -> FloatArray:
 def _flow(sample: SpraySample, paired: SpraySample, axis: SprayAxis, liquid_kg_m3: float | None) -> dict[str, object]:
     axial_m_s = axis.frame[0] @ paired.velocities_m_s.T
     (axial,) = _means(paired, axial_m_s[:, None], signed=[True])
-    flux = _volume_flux(sample, axis)
+    flux = volume_flux(sample, axis)
     flux_d10, flux_d32, flux_dv50 = _flux_diameters(paired, np.abs(axial_m_s))
     return {
         "axial_m_s": axial,
@@ -143,8 +143,8 @@ def _means(sample: SpraySample, values: FloatArray, signed: Sequence[bool]) -> l
     return sample.estimated(means, signed=np.array(signed))
 
 
-def _volume_flux(sample: SpraySample, axis: SprayAxis) -> Estimate | None:
-    """In mm/s; the velocities of droplets without partner are drawn with the others."""
+def volume_flux(sample: SpraySample, axis: SprayAxis, confidence: float = CONFIDENCE) -> Estimate | None:
+    """Liquid per area and time along the axis, in mm/s; droplets without partner are drawn with the others."""
     axial_m_s = np.where(sample.paired, axis.frame[0] @ sample.velocities_m_s.T, 0.0)
     columns = np.column_stack([sample.cubes_um3, sample.cubes_um3 * sample.paired, sample.cubes_um3 * axial_m_s])
 
@@ -155,7 +155,7 @@ def _volume_flux(sample: SpraySample, axis: SprayAxis) -> Estimate | None:
         mm3_per_mm3 = MM3_PER_UM3 * np.pi / 6 * carried[:, None] / sample.measured_mm3(counts)
         return np.asarray(MM_S_PER_M_S * mm3_per_mm3)
 
-    (one,) = sample.estimated(flux)
+    (one,) = sample.estimated(flux, confidence=confidence)
     return one
 
 

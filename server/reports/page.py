@@ -15,24 +15,36 @@ h1 { font-weight: 600; } h2 { font-weight: 600; margin-top: 2.5rem; border-botto
 table { border-collapse: collapse; margin: 1rem 0; } th, td { padding: .3rem .9rem; text-align: right; }
 th { border-bottom: 2px solid #1d2733; font-weight: 600; } td { border-bottom: 1px solid #d5dbe1; }
 th:first-child, td:first-child { text-align: left; }
-figure { margin: 1.5rem 0; } img { max-width: 100%; } figcaption { color: #5b6875; }
+table.words th, table.words td { text-align: left; } caption { text-align: left; color: #5b6875; }
+figure { margin: 1.5rem 0; counter-increment: figure; } img { max-width: 100%; } figcaption { color: #5b6875; }
+figcaption::before { content: "Figure " counter(figure) ". "; font-weight: 600; }
+ul { padding-left: 1.2rem; }
+@page { size: A4; margin: 18mm 16mm; }
+@media print {
+  body { font-size: 9.5pt; max-width: none; margin: 0; padding: 0; } h1 { font-size: 16pt; }
+  h2 { font-size: 12pt; margin-top: 1.2rem; break-after: avoid; } th, td { padding: .12rem .5rem; }
+  figure, tr, table { break-inside: avoid; } thead { display: table-header-group; } p { orphans: 3; widows: 3; }
+}
 """
 
 
 @dataclass(frozen=True)
 class Table:
-    """Rows under a header; numbers come formatted."""
+    """Rows under a header; numbers come formatted, and stand to the right; words to the left."""
 
     header: Sequence[str]
     rows: Sequence[Sequence[str]]
+    words: bool = False
+    caption: str = ""
 
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure and what it shows."""
+    """A figure and what it shows; as SVG it is sharp at any size, but large where there are many shapes."""
 
     figure: Figure
     caption: str
+    svg: bool = False
 
 
 @dataclass(frozen=True)
@@ -43,6 +55,7 @@ class Section:
     text: str = ""
     tables: Sequence[Table] = field(default_factory=tuple)
     pictures: Sequence[Picture] = field(default_factory=tuple)
+    points: Sequence[str] = field(default_factory=tuple)
 
 
 def write_report(file: Path, title: str, sections: Sequence[Section]) -> None:
@@ -59,6 +72,8 @@ def _section(section: Section) -> str:
     parts = [f"<h2>{escape(section.title)}</h2>"]
     if section.text:
         parts.append(f"<p>{escape(section.text)}</p>")
+    if section.points:
+        parts.append("<ul>" + "".join(f"<li>{escape(point)}</li>" for point in section.points) + "</ul>")
     parts += [_table(table) for table in section.tables]
     parts += [_picture(picture) for picture in section.pictures]
     return "\n".join(parts)
@@ -67,14 +82,16 @@ def _section(section: Section) -> str:
 def _table(table: Table) -> str:
     head = "".join(f"<th>{escape(name)}</th>" for name in table.header)
     rows = "\n".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in table.rows)
-    return f"<table><thead><tr>{head}</tr></thead>\n<tbody>{rows}</tbody></table>"
+    caption = f"<caption>{escape(table.caption)}</caption>" if table.caption else ""
+    words = ' class="words"' if table.words else ""
+    return f"<table{words}>{caption}<thead><tr>{head}</tr></thead>\n<tbody>{rows}</tbody></table>"
 
 
 def _picture(picture: Picture) -> str:
     buffer = io.BytesIO()
-    picture.figure.savefig(buffer, format="png", dpi=110)
+    kind, mime, dpi = ("svg", "svg+xml", 200) if picture.svg else ("png", "png", 110)
+    picture.figure.savefig(buffer, format=kind, dpi=dpi)
     data = base64.b64encode(buffer.getvalue()).decode()
     caption = escape(picture.caption)
-    return (
-        f'<figure><img alt="{caption}" src="data:image/png;base64,{data}"><figcaption>{caption}</figcaption></figure>'
-    )
+    image = f'<img alt="{caption}" src="data:image/{mime};base64,{data}">'
+    return f"<figure>{image}<figcaption>{caption}</figcaption></figure>"

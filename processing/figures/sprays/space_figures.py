@@ -1,0 +1,79 @@
+"""Where the liquid goes: patternation around the axis, and maps of the number density."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.projections.polar import PolarAxes
+
+from processing.analysis.spray.density_map import DensityMap
+from processing.analysis.spray.patternation import Patternation
+
+ARC = 16
+"""Straight edges of the arc of a sector."""
+
+
+def patternation_figure(one: Patternation) -> Figure:
+    """Liquid by cells as a disc around the axis, and shares of the sectors with their intervals."""
+    figure = Figure(figsize=(9.5, 4.2), layout="constrained")
+    grid = figure.add_gridspec(1, 2, width_ratios=(1, 1.05))
+    disc = figure.add_subplot(grid[0, 0], projection="polar")
+    if not isinstance(disc, PolarAxes):
+        raise TypeError("matplotlib makes no polar axes")
+    ppm = np.array([[np.nan if value is None else value for value in ring] for ring in one.liquid_ppm])
+    edges = np.linspace(0, 2 * np.pi, ARC * one.sectors + 1)
+    cells = np.ma.masked_invalid(np.repeat(ppm, ARC, axis=1))
+    mesh = disc.pcolormesh(edges, np.array(one.ring_edges_mm), cells, cmap="viridis", vmin=0, rasterized=True)
+    disc.set_facecolor("0.85")
+    disc.grid(visible=False)
+    disc.set_yticks(np.round(one.ring_edges_mm[1:], 1))
+    disc.tick_params(axis="y", colors="white")
+    disc.tick_params(labelsize="x-small")
+    figure.colorbar(mesh, ax=disc, label="liquid [ppm of volume]", shrink=0.7, pad=0.12)
+    disc.set_title(f"{one.at_mm:.3g} mm from the nozzle, rings in mm", fontsize="small")
+    _draw_shares(figure.add_subplot(grid[0, 1]), one)
+    return figure
+
+
+def _draw_shares(axes: Axes, one: Patternation) -> None:
+    axes.axhline(100 / one.sectors, color="0.6", lw=1, ls="--", label="even")
+    known = [(number, share) for number, share in enumerate(one.sector_shares) if share]
+    if known:
+        values, lows, highs = 100 * np.array([[share.value, share.low, share.high] for _, share in known]).T
+        places = [(number + 0.5) * 360 / one.sectors for number, _ in known]
+        axes.bar(places, values, 0.9 * 360 / one.sectors, color="#9ecae1")
+        axes.errorbar(places, values, [values - lows, highs - values], fmt="none", ecolor="0.3", capsize=3)
+    title = (
+        "" if one.asymmetry is None else f"asymmetry {one.asymmetry:.3f}, by chance below {one.asymmetry_by_chance:.3f}"
+    )
+    axes.set_title(title, fontsize="small")
+    axes.set(xlabel="azimuth [°]", ylabel=f"share [%], {one.weighting}", xlim=(0, 360), ylim=(0, None))
+    axes.legend(fontsize="x-small")
+
+
+def density_figure(maps: "list[DensityMap]") -> Figure:
+    """Mean and scatter of the number density; a row of pictures per map.
+
+    Parameters
+    ----------
+    maps : list of DensityMap
+        Over two axes each.
+    """
+    figure = Figure(figsize=(9.5, 3.4 * len(maps)), layout="constrained")
+    rows = np.atleast_2d(np.array(figure.subplots(len(maps), 2), dtype=object))
+    for (mean_axes, rms_axes), one in zip(rows, maps, strict=True):
+        several = np.isfinite(one.rms_per_mm3).any()
+        pictures = ((mean_axes, one.mean_per_mm3, "mean"), (rms_axes, one.rms_per_mm3, "rms of the shots"))
+        for axes, values, label in pictures:
+            shown = np.ma.masked_invalid(values)
+            mesh = axes.pcolormesh(one.across_mm, one.down_mm, shown, cmap="viridis", vmin=0, rasterized=True)
+            axes.set(aspect="equal", xlabel=f"{one.across} [mm]", ylabel=f"{one.down} [mm]")
+            axes.invert_yaxis() if one.down == "y" else None
+            figure.colorbar(mesh, ax=axes, label="droplets [1/mm³]")
+            axes.set_title(label, fontsize="small")
+        if several:
+            chance = float(np.mean(one.chance_per_mm3))
+            rms = float(np.mean(one.rms_per_mm3))
+            rms_axes.set_title(f"rms of the shots: mean {rms:.3g}, by counting alone {chance:.3g}", fontsize="small")
+        else:
+            rms_axes.set_title("rms of the shots: there is one only", fontsize="small")
+    return figure

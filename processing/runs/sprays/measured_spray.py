@@ -1,0 +1,159 @@
+"""MeasuredSpray: the droplets of some shots that were measured alike, and what their files say of nozzle and axis."""
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from daq.files.run_directory import RunReader, ShotFileError
+from processing.analysis.droplets.droplet_file import DropletFileError, StoredDroplets, read_droplets
+from processing.analysis.droplets.droplet_statistics import require_poolable
+from processing.analysis.spray.spray_axis import SprayAxis
+
+PATTERN = "shot_*_droplets.h5"
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredSpray:
+    """Droplets of shots that are pooled.
+
+    Parameters
+    ----------
+    name : str
+        Of their folders.
+    shots : tuple of StoredDroplets
+        A shot each.
+    axis : SprayAxis | None
+        As the run says; None where nobody stated it.
+    """
+
+    name: str
+    shots: tuple[StoredDroplets, ...]
+    axis: SprayAxis | None
+
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """What the shots have in common."""
+        return dict(self.shots[0].provenance)
+
+    @property
+    def runs(self) -> tuple[str, ...]:
+        """Names of the runs."""
+        return tuple(dict.fromkeys(str(shot.provenance.get("run", "")) for shot in self.shots))
+
+
+def read_spray(folders: Sequence[Path]) -> MeasuredSpray:
+    """Read the shots of results of ``measure``; a folder may hold those of several runs in folders of their names.
+
+    Parameters
+    ----------
+    folders : sequence of Path
+        Pooled.
+
+    Raises
+    ------
+    DropletFileError
+        There are none, or they do not belong together: of two recipes or calibrations, or of sprays whose nozzles are
+        at two places. The text names both.
+    """
+    files = [file for folder in folders for file in _files(folder)]
+    shots = tuple(map(read_droplets, files))
+    require_poolable(shots)
+    _require_one(shots, files, "calibration")
+    _require_one(shots, files, "spray")
+    name = ", ".join(dict.fromkeys(_name(folder) for folder in folders))
+    return MeasuredSpray(name, shots, _axis(shots, files))
+
+
+def _files(folder: Path) -> list[Path]:
+    files = sorted(folder.glob(PATTERN)) or sorted(folder.glob(f"*/{PATTERN}"))
+    if not files:
+        raise DropletFileError(f"{folder}: has no droplets ({PATTERN}): name a directory that measure wrote with -o")
+    return files
+
+
+def _name(folder: Path) -> str:
+    """Of a results folder within a run, the run's name too."""
+    path = folder.resolve()
+    return f"{path.parents[1].name}/{path.name}" if path.parent.name == "results" else path.name
+
+
+def _require_one(shots: Sequence[StoredDroplets], files: Sequence[Path], what: str) -> None:
+    first = shots[0].provenance.get(what)
+    for shot, file in zip(shots, files, strict=True):
+        if (its := shot.provenance.get(what)) != first:
+            raise DropletFileError(
+                f"{file}: measured with {what} {its}, {files[0]} with {first}: numbers of two are not pooled; "
+                "take those of one, or --compare them"
+            )
+
+
+def _axis(shots: Sequence[StoredDroplets], files: Sequence[Path]) -> SprayAxis | None:
+    """As the files say; of older ones, which do not, as the run around them does."""
+    stated = next((json.loads(str(shot.provenance["spray"])) for shot in shots if "spray" in shot.provenance), None)
+    said = stated or next(_sprays_around(files), None)
+    return SprayAxis(tuple(said["nozzle_mm"]), tuple(said["axis"])) if said else None
+
+
+def _sprays_around(files: Sequence[Path]) -> Iterator[dict[str, Any]]:
+    for run_dir in dict.fromkeys(file.resolve().parents[2] for file in files[:1]):
+        if (run_dir / "run.h5").is_file():
+            try:
+                with RunReader(run_dir) as run:
+                    spray = run.header.spray
+            except ShotFileError:
+                continue  # damaged: its droplets are good all the same
+            if spray:
+                yield spray.model_dump(mode="json")
+
+
+@dataclass(frozen=True, eq=False)
+class ComparedSprays:
+    """Sprays that are set beside each other.
+
+    Parameters
+    ----------
+    sprays : dict of name to MeasuredSpray
+        A folder each.
+    unlike : tuple of str
+        What was measured differently: a difference of two may be of the measurement.
+    """
+
+    sprays: dict[str, MeasuredSpray]
+    unlike: tuple[str, ...]
+
+
+def read_compared(folders: Sequence[Path]) -> ComparedSprays:
+    """Read the results of several sprays, a folder each, measured alike or not.
+
+    Raises
+    ------
+    DropletFileError
+        As of ``read_spray``; or there are fewer than two, or two have one name.
+    """
+    sprays = [read_spray([folder]) for folder in folders]
+    named = {spray.name: spray for spray in sprays}
+    if len(named) < max(len(folders), 2):
+        raise DropletFileError(
+            f"{', '.join(map(str, folders))}: to compare takes two directories at least, of different names"
+        )
+    first, *others = sprays
+    unlike = (f"{other.name} and {first.name} differ in {what}" for other in others if (what := _unlike(first, other)))
+    return ComparedSprays(named, tuple(unlike))
+
+
+def _unlike(first: MeasuredSpray, other: MeasuredSpray) -> str:
+    its, others = (_made_by(spray.provenance) for spray in (other, first))
+    return "; ".join(
+        f"{name}: {its.get(name)} and {others.get(name)}"
+        for name in {**its, **others}
+        if its.get(name) != others.get(name)
+    )
+
+
+def _made_by(provenance: Mapping[str, Any]) -> dict[str, object]:
+    """What a measurement depends on."""
+    names = ("calibration", "method_version")
+    settings = json.loads(str(provenance.get("settings", "{}")))
+    return {**{name: provenance.get(name) for name in names}, **settings}

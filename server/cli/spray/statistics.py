@@ -1,0 +1,84 @@
+"""``tomoshadow statistics``: what the droplets of many shots say of the spray as a whole."""
+
+from argparse import Namespace
+from typing import TYPE_CHECKING, Any
+
+from server.cli.options import Verbs, add_verb
+from server.cli.output import Outcome, table
+from server.cli.spray.spray_options import add_sprays, asked_for
+
+if TYPE_CHECKING:
+    from processing.analysis.spray.comparison import Difference
+    from processing.analysis.spray.spray_statistics import SprayStatistics
+    from processing.runs.sprays.measured_spray import MeasuredSpray
+
+NAME = "statistics"
+
+
+def add(verbs: Verbs) -> None:
+    """Add the command."""
+    parser = add_verb(
+        verbs, NAME, statistics, "diameters, flux, patternation of a spray, from droplets that are measured"
+    )
+    add_sprays(parser)
+    parser.add_argument(
+        "--compare", action="store_true", help="each directory is a spray: what differs, and how surely"
+    )
+
+
+def statistics(options: Namespace) -> Outcome:
+    """Pool the shots of all results, or compare them."""
+    from processing.runs.sprays.measured_spray import read_spray
+
+    if options.compare:
+        return _compare(options)
+    spray = read_spray(options.results)
+    told = _told(options, spray)
+    return Outcome({"results": spray.name, **told.model_dump(mode="json")}, _text(spray.name, told))
+
+
+def _told(options: Namespace, spray: "MeasuredSpray") -> "SprayStatistics":
+    from processing.analysis.spray.spray_statistics import spray_statistics
+
+    return spray_statistics(spray.shots, asked_for(options, spray))
+
+
+def _compare(options: Namespace) -> Outcome:
+    from processing.analysis.spray.comparison import ONE_SHOT, differences
+    from processing.runs.sprays.measured_spray import read_compared
+
+    sprays = read_compared(options.results)
+    told = {name: _told(options, spray) for name, spray in sprays.sprays.items()}
+    found = differences(told)
+    result = {
+        "runs": {name: one.model_dump(mode="json") for name, one in told.items()},
+        "measured_differently": list(sprays.unlike),
+        "differences": [one.model_dump(mode="json") for one in found],
+        "reason": None if found else ONE_SHOT,
+    }
+    texts = [*(_text(name, one) for name, one in told.items()), *sprays.unlike]
+    return Outcome(result, "\n\n".join([*texts, _differences(found) if found else ONE_SHOT]))
+
+
+def _text(name: str, told: "SprayStatistics") -> str:
+    from server.reports.spray_tables import figure_rows
+
+    counted = f"{told.droplets.n} droplets, shots: {told.droplets.shots}, exposures: {told.droplets.exposures}"
+    lines = [f"{name}: {counted}; sampling: {told.sampling}", table(["", "", "95 %"], figure_rows(told))]
+    if told.sample:
+        lines.append("; ".join([f"sample: {told.sample.verdict}", *told.sample.reasons]))
+    return "\n".join([*lines, *(f"no {part}: {reason}" for part, reason in told.reasons.items())])
+
+
+def _differences(found: "tuple[Difference, ...]") -> str:
+    rows: list[list[Any]] = [
+        [
+            f"{one.second} / {one.first}",
+            one.figure,
+            f"{one.ratio.value:.3f} ({one.ratio.low:.3f} to {one.ratio.high:.3f})",
+            f"{one.p_corrected:.2g}",
+            "differs" if one.significant else "",
+        ]
+        for one in found
+    ]
+    return table(["runs", "figure", "ratio, 95 %", "p, Holm", ""], rows)

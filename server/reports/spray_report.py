@@ -1,0 +1,236 @@
+"""The report of a spray: where its numbers come from, what they are, how sure, and what cannot be known.
+
+Each chapter is a function of what is reported, in ``CHAPTERS``; one that has nothing to say returns None.
+"""
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from processing.analysis.spray.density_map import density_map
+from processing.analysis.spray.spray_axis import SprayAxis
+from processing.analysis.spray.spray_sample import SpraySample, spray_sample
+from processing.analysis.spray.spray_statistics import AskedFor, SprayStatistics, spray_statistics
+from processing.figures.sprays.distribution_figure import distribution_figure
+from processing.figures.sprays.motion_figure import motion_figure
+from processing.figures.sprays.space_figures import density_figure, patternation_figure
+from processing.runs.sprays.measured_spray import MeasuredSpray
+from server.reports.page import Picture, Section, Table, write_report
+from server.reports.spray_tables import classes_table, figures_table, fits_table, patternation_table
+
+DEFINITIONS = (
+    "Sampling is spatial: a flash sees the droplets that are in a volume at an instant (ASTM E799). Flux-weighted "
+    "figures take each droplet by its velocity along the axis, as an instrument does that counts what passes an area.",
+    "D_pq = (sum d^p / sum d^q)^(1 / (p - q)) (ISO 9276-2). Dv0.1, Dv0.5, Dv0.9: 10, 50, 90 % of the volume is in "
+    "smaller droplets; relative span = (Dv0.9 - Dv0.1) / Dv0.5. Classes are geometric, R20 (ISO 9276-1).",
+    "Intervals hold 95 %, over shots drawn with replacement, with Student's t; of a single shot over its droplets: "
+    "then they do not know how shots differ.",
+    "Fits are by maximum likelihood, droplets weighted by volume; they fit where their largest gap is no larger than "
+    "chance makes it.",
+    "Cone angle: twice the angle from the axis, at the nozzle, within which that share of the liquid of the box is. "
+    "Penetration: the distance beyond which 1 % of it is. No threshold is chosen.",
+    "Asymmetry: half the sum of |share - 1/n| over the sectors; beside it what 95 % of even sprays stay below.",
+)
+
+
+@dataclass(frozen=True, eq=False)
+class ReportedSpray:
+    """What a report is about.
+
+    Parameters
+    ----------
+    spray : MeasuredSpray
+        Shots, and where they come from.
+    asked : AskedFor
+        Nozzle, axis, density of the liquid.
+    told : SprayStatistics
+        What the droplets say.
+    sample : SpraySample | None
+        The droplets themselves; None where they have no diameters.
+    """
+
+    spray: MeasuredSpray
+    asked: AskedFor
+    told: SprayStatistics
+    sample: SpraySample | None
+
+    @classmethod
+    def of(cls, spray: MeasuredSpray, asked: AskedFor) -> "ReportedSpray":
+        """Compute what is reported."""
+        told = spray_statistics(spray.shots, asked)
+        return cls(spray, asked, told, spray_sample(spray.shots) if told.classes else None)
+
+
+def write_spray_report(file: Path, reported: ReportedSpray) -> None:
+    """Write the page; an existing report is replaced."""
+    chapters = (chapter(reported) for chapter in CHAPTERS)
+    write_report(file, f"Spray report: {reported.spray.name}", [one for one in chapters if one])
+
+
+def _summary(reported: ReportedSpray) -> Section:
+    told = reported.told
+    counted = (
+        f"{told.droplets.n} droplets, exposures: {told.droplets.exposures}, shots: {told.droplets.shots}; "
+        f"sampling: {told.sampling}."
+    )
+    verdict = f"The sample is {told.sample.verdict}." if told.sample else ""
+    if told.sample and told.sample.verdict != "adequate":
+        verdict = "The sample is low: intervals may be too narrow."
+    reasons = told.sample.reasons if told.sample else ()
+    missing = [f"No {name}: {reason}" for name, reason in told.reasons.items()]
+    partial = [told.motion.reason] if told.motion and told.motion.reason else []
+    if told.extent:
+        reached = (("cone angle", told.extent.cone_reason), ("penetration", told.extent.penetration_reason))
+        partial += [f"No {name}: {why}" for name, why in reached if why]
+    return Section("Summary", f"{counted} {verdict}", [figures_table(told)], points=[*reasons, *missing, *partial])
+
+
+def _origin(reported: ReportedSpray) -> Section:
+    said, axis = reported.spray.provenance, reported.asked.axis
+    settings = json.loads(str(said.get("settings", "{}")))
+    rows = [
+        ["results", reported.spray.name],
+        ["runs", ", ".join(reported.spray.runs)],
+        ["calibration", f"{said.get('calibration', '')}, SHA-256 {str(said.get('calibration_sha256', ''))[:16]}..."],
+        [
+            "recipe",
+            f"SHA-256 {str(said.get('recipe_sha256', 'not stated'))[:16]}..., method {said.get('method_version')}",
+        ],
+        ["measured as", f"{settings.get('polarity', '')}, light {settings.get('light', 'not stated')}"],
+        ["box [mm]", _box(reported.sample)],
+        ["nozzle and axis", _axis(axis)],
+        ["programs", f"measured by tomoshadow {said.get('tomoshadow', '')}, reported by {version('tomoshadow')}"],
+        *_notes(said),
+    ]
+    return Section("Where the numbers come from", tables=[Table(["", ""], [row for row in rows if row[1]], words=True)])
+
+
+def _box(sample: SpraySample | None) -> str:
+    if sample is None or sample.box_mm is None:
+        return ""
+    low_mm, high_mm = sample.box_mm
+    return ", ".join(f"{axis} {a:.4g} to {b:.4g}" for axis, a, b in zip("xyz", low_mm, high_mm, strict=True))
+
+
+def _axis(axis: SprayAxis | None) -> str:
+    if axis is None:
+        return "not known"
+    nozzle, direction = (", ".join(f"{value:.4g}" for value in triple) for triple in (axis.nozzle_mm, axis.direction))
+    return f"nozzle at ({nozzle}) mm, axis along ({direction})"
+
+
+def _notes(said: Mapping[str, Any]) -> list[list[str]]:
+    """What the operator has written down."""
+    notes = json.loads(str(said.get("notes", "{}")))
+    more = notes.pop("more", {})
+    return [[name.replace("_", " "), str(value)] for name, value in {**notes, **more}.items()]
+
+
+def _sizes(reported: ReportedSpray) -> Section | None:
+    told = reported.told
+    if not told.classes:
+        return None
+    smallest = f"The smallest droplet has {told.smallest_um:.3g} µm." if told.smallest_um else ""
+    picture = Picture(
+        distribution_figure(told),
+        "Left: distribution of diameters over ln d, by number with 95 % intervals of counting, by area and by volume, "
+        "and fits to the volume. Right: cumulative, with mean diameters and their 95 % intervals over shots.",
+        svg=True,
+    )
+    tables = [fits_table(told.fits)] if told.fits else []
+    return Section("Sizes", smallest, tables, [picture], told.corrections)
+
+
+def _motion(reported: ReportedSpray) -> Section | None:
+    motion, sample = reported.told.motion, reported.sample
+    if motion is None or sample is None:
+        return None
+    text = (
+        f"{100 * motion.paired_share:.1f} % of the droplets have a velocity. Flux-weighted figures: "
+        f"{motion.flux_weighting}. In flux, the others take the mean velocity by volume."
+    )
+    speeds_m_s = np.linalg.norm(sample.velocities_m_s, axis=1)
+    caption = (
+        "Left: speed against diameter; right: velocities against the distance from the axis, means with 95 % intervals."
+    )
+    figure = motion_figure(motion, sample.diameters_um, speeds_m_s)
+    return Section("Velocities", text, pictures=[Picture(figure, caption, svg=True)])
+
+
+def _patternations(reported: ReportedSpray) -> Section | None:
+    found = reported.told.patternations
+    if not found:
+        return None
+    pictures = [
+        Picture(
+            patternation_figure(one),
+            f"Patternation {one.at_mm:.3g} mm from the nozzle, a slice of {one.thickness_mm:.3g} mm, {one.n} droplets. "
+            "Left: liquid by cells, grey where the box does not reach; right: shares of the sectors, 95 % intervals.",
+            svg=True,
+        )
+        for one in found
+    ]
+    return Section("Patternation", points=[one.reason for one in found if one.reason], pictures=pictures)
+
+
+def _density(reported: ReportedSpray) -> Section | None:
+    if reported.sample is None:
+        return None
+    maps = [one for down in ("y", "z") if (one := density_map(reported.sample, "x", down))]
+    if not maps:
+        return None
+    caption = "Number density, mean along the third axis: mean over all exposures, and how shots scatter."
+    return Section("Number density", pictures=[Picture(density_figure(maps), caption, svg=True)])
+
+
+def _shots(reported: ReportedSpray) -> Section:
+    rows = [row for shot in reported.spray.shots for row in _shot_rows(shot.provenance)]
+    head = ["run", "shot", "exposure", "residual / noise", "hidden [%]", "verdict", "reasons"]
+    return Section(
+        "Shots", "Refused exposures have no droplets and do not count.", tables=[Table(head, rows, words=True)]
+    )
+
+
+def _shot_rows(said: Mapping[str, Any]) -> list[list[str]]:
+    exposures = json.loads(str(said.get("exposures", "{}")))
+    return [
+        [
+            str(said.get("run", "")),
+            str(said.get("shot", "")),
+            frame.upper(),
+            "" if one.get("residual_over_noise") is None else f"{one['residual_over_noise']:.2f}",
+            f"{100 * one.get('hidden', {}).get('volume_share', 0):.1f}",
+            one["verdict"],
+            "; ".join(one.get("reasons", ())),
+        ]
+        for frame, one in exposures.items()
+    ]
+
+
+def _tables(reported: ReportedSpray) -> Section | None:
+    told = reported.told
+    tables = [classes_table(told)] if told.classes else []
+    tables += [patternation_table(one) for one in told.patternations if one.sector_shares]
+    return Section("Tables", tables=tables) if tables else None
+
+
+def _definitions(_: ReportedSpray) -> Section:
+    return Section("What the figures mean", points=DEFINITIONS)
+
+
+CHAPTERS: tuple[Callable[[ReportedSpray], Section | None], ...] = (
+    _summary,
+    _origin,
+    _sizes,
+    _motion,
+    _patternations,
+    _density,
+    _shots,
+    _tables,
+    _definitions,
+)

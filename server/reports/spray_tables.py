@@ -1,0 +1,120 @@
+"""Tables of a spray: figures with their units and intervals, for reports and for the command line."""
+
+from collections.abc import Iterator
+
+from processing.analysis.estimates import Estimate
+from processing.analysis.spray.patternation import Patternation
+from processing.analysis.spray.size_fits import SizeFit
+from processing.analysis.spray.spray_motion import SprayMotion
+from processing.analysis.spray.spray_statistics import SprayStatistics
+from server.reports.page import Table
+
+Row = list[str]
+
+
+def figure_rows(told: SprayStatistics) -> list[Row]:
+    """Name with unit, value and interval of every figure that a spray has."""
+    return [[name, *_cells(estimate)] for name, estimate in _figures(told) if estimate]
+
+
+def _figures(told: SprayStatistics) -> Iterator[tuple[str, Estimate | None]]:
+    droplets, motion, extent = told.droplets, told.motion, told.extent
+    yield "number density [1/mm³]", droplets.number_density_per_mm3
+    yield "liquid in droplets [ppm of volume]", told.liquid_ppm
+    for name in ("d10", "d20", "d30", "d32", "d43"):
+        yield f"{name.upper()} [µm]", getattr(droplets, f"{name}_um")
+    for percent in (10, 50, 90):
+        yield f"Dv0.{percent // 10} [µm]", getattr(droplets, f"dv{percent}_um")
+    yield "relative span", droplets.relative_span
+    yield "ghosts, of the twins", droplets.ghost_share
+    if motion:
+        yield from _of_motion(motion)
+    if extent:
+        yield "cone angle, 90 % of the liquid [°]", extent.cone_angle_deg
+        yield "cone angle, 50 % of the liquid [°]", extent.cone_angle_half_deg
+        yield "penetration, 99 % of the liquid [mm]", extent.penetration_mm
+
+
+def _of_motion(motion: SprayMotion) -> Iterator[tuple[str, Estimate | None]]:
+    yield "mean speed [m/s]", motion.speed_m_s
+    yield "mean axial velocity [m/s]", motion.axial_m_s
+    yield "volume flux [mm³/(mm² s)]", motion.volume_flux_mm_s
+    yield "mass flux [kg/(m² s)]", motion.mass_flux_kg_m2_s
+    yield "rank correlation, diameter and speed", motion.size_speed_correlation
+    yield "D10, flux-weighted [µm]", motion.flux_d10_um
+    yield "D32, flux-weighted [µm]", motion.flux_d32_um
+    yield "Dv0.5, flux-weighted [µm]", motion.flux_dv50_um
+
+
+def _cells(estimate: Estimate) -> Row:
+    return [f"{estimate.value:.4g}", f"{estimate.low:.4g} to {estimate.high:.4g}"]
+
+
+def figures_table(told: SprayStatistics) -> Table:
+    """All figures of a spray."""
+    return Table(["figure", "value", "95 % interval"], figure_rows(told))
+
+
+def fits_table(fits: tuple[SizeFit, ...]) -> Table:
+    """Distributions that were fitted."""
+    rows = [
+        [
+            fit.name,
+            f"{fit.scale_um:.4g}",
+            f"{fit.shape:.3g}",
+            "" if fit.d32_um is None else f"{fit.d32_um:.4g}",
+            f"{fit.dv50_um:.4g}",
+            f"{fit.largest_gap:.3f}",
+            f"{fit.gap_by_chance:.3f}",
+            "yes" if fit.fits else "no",
+        ]
+        for fit in fits
+    ]
+    head = [
+        "distribution by volume",
+        "scale [µm]",
+        "shape",
+        "D32 [µm]",
+        "Dv0.5 [µm]",
+        "largest gap",
+        "by chance",
+        "fits",
+    ]
+    return Table(head, rows)
+
+
+def classes_table(told: SprayStatistics) -> Table:
+    """Classes of diameters after ISO 9276-1."""
+    rows = [
+        [
+            f"{one.low_um:.4g} to {one.high_um:.4g}",
+            f"{one.n}",
+            f"{one.q0_per_um.value:.3g}",
+            f"{one.q2_per_um:.3g}",
+            f"{one.q3_per_um:.3g}",
+            f"{one.cumulative_q0:.3f}",
+            f"{one.cumulative_q2:.3f}",
+            f"{one.cumulative_q3:.3f}",
+        ]
+        for one in told.classes
+    ]
+    head = ["diameter [µm]", "n", "q0 [1/µm]", "q2 [1/µm]", "q3 [1/µm]", "Q0", "Q2", "Q3"]
+    caption = (
+        "Classes of diameters, ISO 9276-1: densities q and cumulative shares Q by number (0), area (2), volume (3)"
+    )
+    return Table(head, rows, caption=caption)
+
+
+def patternation_table(one: Patternation) -> Table:
+    """Shares of the sectors."""
+    step = 360 / one.sectors
+    rows = [
+        [f"{step * number:g}° to {step * (number + 1):g}°", *(_percent(share) if share else ["", ""])]
+        for number, share in enumerate(one.sector_shares)
+    ]
+    caption = f"Patternation {one.at_mm:.3g} mm from the nozzle: {one.weighting}"
+    return Table(["sector", "share [%]", "95 % interval [%]"], rows, caption=caption)
+
+
+def _percent(share: Estimate) -> Row:
+    return [f"{100 * share.value:.1f}", f"{100 * max(share.low, 0):.1f} to {100 * share.high:.1f}"]

@@ -1,0 +1,73 @@
+"""``tomoshadow report``: one page with everything in it, that a browser shows and prints."""
+
+import re
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import sync_playwright
+
+from server.cli.main import main
+from tests.support.command_line import refused, told
+from tests.support.sampled_sprays import cone_shots, stored_shot, write_results
+
+NOTES = '{"fluid": "water <pure>", "pressure_bar": 6.0}'
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("report")
+    spray = '{"nozzle_mm": [0, 0, 0], "axis": [0, 1, 0]}'
+    results = write_results(folder / "cone", cone_shots(0, 5, 120), spray=spray, notes=NOTES)
+    assert main(["report", str(results), "-o", str(folder / "report.html")]) == 0
+    return folder / "report.html"
+
+
+def test_the_report_says_it_all_in_one_file(page: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = page.read_text()
+    chapters = re.findall(r"<h2>(.*?)</h2>", text)
+    assert chapters == [
+        "Summary", "Where the numbers come from", "Sizes", "Velocities", "Patternation", "Number density", "Shots",
+        "Tables", "What the figures mean",
+    ]  # fmt: skip
+    assert not re.findall(r'(?:src|href)="(?!data:)', text), "nothing is fetched from elsewhere"
+    for said in (
+        "D32 [µm]",
+        "water &lt;pure&gt;",
+        "cal-1",
+        "sampling: spatial",
+        "lognormal",
+        "ISO 9276-1",
+        "ASTM E799",
+    ):
+        assert said in text, said
+    assert text.count("<figure>") == 4
+    assert "exists; only --overwrite replaces it" in refused(capsys, "report", page.parent / "cone", "-o", page)
+
+
+@pytest.mark.slow
+def test_a_browser_shows_every_picture_and_prints_pages(page: Path) -> None:
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(
+            executable_path="/usr/bin/chromium", args=["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic"]
+        )
+        tab = browser.new_page(viewport={"width": 1000, "height": 1000})
+        tab.goto(f"file://{page}")
+        widths = tab.evaluate("[...document.images].map(image => image.complete && image.naturalWidth)")
+        wider = tab.evaluate("document.documentElement.scrollWidth > window.innerWidth")
+        printed = tab.pdf(prefer_css_page_size=True)
+        browser.close()
+    assert len(widths) == 4
+    assert min(widths) > 300
+    assert not wider
+    assert printed.startswith(b"%PDF")
+    assert len(re.findall(rb"/Type\s*/Page\b", printed)) in range(3, 9)
+
+
+def test_of_a_few_droplets_it_says_what_there_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    shot = cone_shots(0, 1, 3)[0]
+    few = write_results(tmp_path / "few", [shot, stored_shot(shot.columns["diameter_um"][:0], shot=1)])  # type: ignore[arg-type]
+    result = told(capsys, "report", few, "-o", tmp_path / "few.html")
+    assert (result["report"], result["shots"]) == (str(tmp_path / "few.html"), 2)
+    text = (tmp_path / "few.html").read_text()
+    assert "too few droplets" in text
+    assert "nozzle and axis of the spray are not known" in text

@@ -1,0 +1,92 @@
+"""``tomoshadow statistics``: shots are pooled where they belong together, compared where they do not, else refused."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from processing.analysis.spray.spray_statistics import SprayStatistics
+from tests.support.command_line import refused, shown, told
+from tests.support.sampled_sprays import cone_shots, write_results
+
+SPRAY = '{"nozzle_mm": [0, 0, 0], "axis": [0, 1, 0]}'
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two days of one spray, in one directory each."""
+    folder = tmp_path_factory.mktemp("results")
+    write_results(folder / "monday", cone_shots(0, 5, 120), run="monday", spray=SPRAY)
+    write_results(folder / "tuesday", cone_shots(1, 5, 60), run="tuesday", spray=SPRAY)
+    return folder
+
+
+def test_shots_of_all_results_are_pooled_and_the_run_says_where_the_nozzle_is(
+    results: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    one = told(capsys, "statistics", results / "monday", "--liquid-density", 998)
+    both = told(capsys, "statistics", results / "monday", results / "tuesday")
+    above = told(capsys, "statistics", results)
+    assert one.pop("results") == "monday"
+    assert SprayStatistics.model_validate(one).extent
+    assert both["droplets"]["shots"] == above["droplets"]["shots"] == 10
+    assert both["droplets"] == above["droplets"]
+    flux = one["motion"]["volume_flux_mm_s"]["value"]
+    assert one["motion"]["mass_flux_kg_m2_s"]["value"] == pytest.approx(0.998 * flux)
+    assert one["patternations"][0]["at_mm"] == pytest.approx(10)
+
+
+def test_people_read_figures_with_units_and_intervals(results: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = shown(capsys, "statistics", results / "monday", "--at", "9")
+    assert "sampling: spatial" in text
+    assert "D32 [µm]" in text
+    assert "volume flux [mm³/(mm² s)]" in text
+    assert "sample: low sample" in text
+
+
+def test_options_say_where_the_nozzle_is(results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    mute = write_results(tmp_path / "mute", cone_shots(0, 5, 120))
+    assert told(capsys, "statistics", mute)["extent"] is None
+    stated = told(capsys, "statistics", mute, "--nozzle", "0,0,0", "--axis", "0,2,0")
+    by_run = told(capsys, "statistics", results / "monday")
+    assert stated["extent"] == by_run["extent"]
+    higher = told(capsys, "statistics", mute, "--nozzle", "0,-2,0")["extent"]["cone_angle_half_deg"]["value"]
+    assert higher < by_run["extent"]["cone_angle_half_deg"]["value"]
+    assert "--axis: where the nozzle is" in refused(capsys, "statistics", mute, "--axis", "0,1,0")
+    assert "needs a nozzle and a direction" in refused(
+        capsys, "statistics", mute, "--nozzle", "0,0,0", "--axis", "0,0,0"
+    )
+
+
+def test_a_comparison_finds_what_differs_and_says_what_was_measured_differently(
+    results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    again = write_results(tmp_path / "again", cone_shots(2, 5, 120), run="again", calibration="cal-2")
+    compared = told(capsys, "statistics", results / "monday", again, results / "tuesday", "--compare")
+    assert list(compared["runs"]) == ["monday", "again", "tuesday"]
+    assert compared["measured_differently"] == ["again and monday differ in calibration: cal-2 and cal-1"]
+    differing = {(one["first"], one["second"]) for one in compared["differences"] if one["significant"]}
+    assert differing == {("monday", "tuesday"), ("again", "tuesday")}
+    text = shown(capsys, "statistics", results / "monday", results / "tuesday", "--compare")
+    assert "tuesday / monday" in text
+    assert "differs" in text
+
+
+def test_what_does_not_belong_together_is_refused_with_the_difference(
+    results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shots = cone_shots(2, 2, 30)
+    calibration = write_results(tmp_path / "calibration", shots, run="b", calibration="cal-2", spray=SPRAY)
+    text = refused(capsys, "statistics", results / "monday", calibration)
+    assert "calibration cal-2" in text
+    assert "with cal-1" in text
+    assert "--compare" in text
+    settings = json.dumps({"polarity": "shadow", "light": 0.8})
+    recipe = write_results(tmp_path / "recipe", shots, run="c", settings=settings, spray=SPRAY)
+    assert "measured with light 0.8" in refused(capsys, "statistics", results / "monday", recipe)
+    moved = write_results(tmp_path / "moved", shots, run="d", spray='{"nozzle_mm": [1, 0, 0], "axis": [0, 1, 0]}')
+    assert "measured with spray" in refused(capsys, "statistics", results / "monday", moved)
+    (tmp_path / "empty").mkdir()
+    assert "has no droplets" in refused(capsys, "statistics", tmp_path / "empty")
+    assert "two directories at least" in refused(capsys, "statistics", results / "monday", "--compare")
+    assert "would count as often" in refused(capsys, "statistics", results / "monday", results / "monday")
