@@ -5,14 +5,12 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Literal
 
-from daq.files.run_directory import RunHeader
 from processing.analysis.droplets.bright_shot import BrightExposure
 from processing.analysis.droplets.ghost_share import pooled
 from processing.analysis.droplets.measured_exposure import ShotVerdict
 from processing.analysis.droplets.shadows.shadow_shot import ShadowExposure
 from processing.analysis.velocity.measured_velocities import MeasuredVelocities, measure_velocities
 from processing.reconstruction.settings import FrozenValue
-from processing.runs.results_file import Provenance
 from processing.runs.shots.separation import Separation
 from processing.volume import VoxelGrid
 
@@ -165,10 +163,3 @@ def _why_no_share(exposures: Sequence[Exposure], verdict: ShotVerdict) -> str:
     if verdict is not ShotVerdict.GOOD:
         return "; ".join(reason for exposure in exposures for reason in exposure.reasons)
     return "no twins were asked for (--twins)"
-
-
-def conditions_of(header: RunHeader) -> Provenance:
-    """What the operator has written down of a run, as far as it says anything of the spray."""
-    spray = header.spray.model_dump_json() if header.spray else ""
-    notes = header.notes.model_dump_json(exclude_defaults=True)
-    return {name: text for name, text in (("spray", spray), ("notes", notes)) if text not in ("", "{}")}

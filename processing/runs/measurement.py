@@ -35,7 +35,6 @@ from processing.runs.measured_shot import (
     Exposure,
     MeasuredShot,
     ShotVelocity,
-    conditions_of,
     droplets_path,
     shot_summary,
     shot_velocities,
@@ -46,6 +45,7 @@ from processing.runs.recipe import recipe_sha256
 from processing.runs.results_file import FrameName, Provenance, claim_results
 from processing.runs.shots.separation import separation_of
 from processing.runs.shots.shot_images import frame_names, require_match
+from processing.runs.sprays.conditions import conditions_of
 from processing.runs.workbench import References, read_references
 
 METHOD_VERSION = 6

@@ -49,6 +49,7 @@ from server.web.api import (
     shots,
     sign_in,
     single_shot,
+    statistics,
     timing,
     volume_parts,
 )
@@ -66,6 +67,7 @@ _RESOURCES = (
     droplets,
     results,
     volume_parts,
+    statistics,
     calibrations,
     jobs,
     events,

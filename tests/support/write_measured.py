@@ -16,7 +16,10 @@ from processing.synthetic.paper_rig import TABLE_1
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "measured.md"
-STUDIES = ("density", "ghosts", "average", "residuals", "calibration", "sensitivity", "droplets", "sizes", "velocity")
+STUDIES = (
+    *("density", "ghosts", "average", "residuals", "calibration", "sensitivity"),
+    *("droplets", "sizes", "velocity", "statistics"),
+)
 
 
 @dataclass(frozen=True)

@@ -58,11 +58,15 @@ def read_spray(folders: Sequence[Path]) -> MeasuredSpray:
         at two places. The text names both.
     """
     files = [file for folder in folders for file in _files(folder)]
+    return read_files(files, ", ".join(dict.fromkeys(map(_name, folders))))
+
+
+def read_files(files: Sequence[Path], name: str = "") -> MeasuredSpray:
+    """The same of files of droplets, one at least, under a name."""
     shots = tuple(map(read_droplets, files))
     require_poolable(shots)
     _require_one(shots, files, "calibration")
     _require_one(shots, files, "spray")
-    name = ", ".join(dict.fromkeys(_name(folder) for folder in folders))
     return MeasuredSpray(name, shots, _axis(shots, files))
 
 

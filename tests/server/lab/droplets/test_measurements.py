@@ -96,6 +96,21 @@ def test_shots_and_statistics_are_told_and_files_downloaded(measured: Serving, t
     assert measured.http.get(address.replace("droplets-", "mlos-")).status_code == 404
 
 
+def test_a_run_tells_its_spray_from_the_shots_that_are_measured(measured: Serving) -> None:
+    address, result_set = results_of(measured)
+    told = measured.http.get("/api/runs/bright/statistics").json()
+    assert (told["results"], told["shots"], told["measured"], told["recorded"]) == (result_set["id"], [0, 1], 2, 2)
+    statistics = told["statistics"]
+    assert statistics["sampling"] == "spatial"
+    assert statistics["droplets"] == measured.http.get(address).json()["statistics"]
+    assert "bright particles have no diameter" in statistics["reasons"]["fits"]
+    missing = measured.http.get("/api/runs/shadows/statistics")
+    assert missing.status_code == 404
+    assert "measure some of its shots" in missing.json()["detail"]
+    other = measured.http.get("/api/runs/bright/statistics", params={"results": "droplets-0"})
+    assert (other.status_code, measured.http.get("/api/runs/none/statistics").status_code) == (404, 404)
+
+
 def test_what_was_measured_is_measured_again_only_where_its_file_is_gone(measured: Serving) -> None:
     assert [job["state"] for job in ask(measured).json()] == ["done", "done"]
     lost = next(measured.services.data_dir.glob("bright/results/*/shot_00001_droplets.h5"))

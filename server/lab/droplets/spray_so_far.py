@@ -1,0 +1,77 @@
+"""What a run says of its spray so far, from those of its shots that are measured; while it is recorded, too."""
+
+from functools import lru_cache
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from daq.frozen_model import FrozenModel
+from daq.run_plan import ImageKey
+from processing.analysis.droplets.droplet_file import DropletFileError
+from processing.analysis.spray.spray_statistics import AskedFor, SprayStatistics, spray_statistics
+from processing.runs.measurement import droplets_path
+from processing.runs.sprays.measured_spray import read_files
+from server.lab.errors import Damaged, NotFound
+from server.lab.results import droplet_summaries, result_sets
+from server.lab.runs.run_store import RunStore
+
+MOST_SHOTS = 50
+"""Of so many at most, spread evenly over what is measured: an answer takes seconds, not minutes."""
+
+
+class SpraySoFar(FrozenModel):
+    """Statistics of the spray, and of which shots."""
+
+    results: Annotated[str, Field(description="result set of the droplets")]
+    shots: Annotated[tuple[int, ...], Field(description="the sample: shots that were taken, of those measured")]
+    measured: Annotated[int, Field(description="shots whose droplets are there")]
+    recorded: Annotated[int, Field(description="valid sample shots of the run, so far")]
+    statistics: Annotated[SprayStatistics, Field(description="of the sample; refused exposures do not count")]
+
+
+def spray_so_far(
+    runs: RunStore, run_id: str, results: str | None = None, liquid_kg_m3: float | None = None
+) -> SpraySoFar:
+    """Statistics of what is measured of a run.
+
+    Parameters
+    ----------
+    runs : RunStore
+        All runs.
+    run_id : str
+        Which one.
+    results : str | None
+        Which result set; the newest with droplets where it is not said.
+    liquid_kg_m3 : float | None
+        Density of the liquid.
+
+    Raises
+    ------
+    NotFound
+        There is no such run, or nothing of it is measured.
+    Damaged
+        A file of droplets cannot be read.
+    """
+    run_dir = runs.directory(run_id)
+    name = results or next((one.id for one in result_sets(run_dir) if one.droplets), None)
+    measured = [one.shot for one in droplet_summaries(run_dir / "results" / name)] if name else []
+    if name is None or not measured:
+        raise NotFound(f"{run_id}: no droplets are measured{f' in {name}' if name else ''}: measure some of its shots")
+    places = np.unique(np.linspace(0, len(measured) - 1, MOST_SHOTS).round().astype(int))
+    shots = tuple(measured[place] for place in places)
+    files = [droplets_path(run_dir / "results" / name, shot) for shot in shots]
+    try:
+        statistics = _of(tuple((file, file.stat().st_mtime_ns) for file in files), liquid_kg_m3)
+    except (DropletFileError, OSError) as error:
+        raise Damaged(str(error)) from error
+    recorded = int(np.count_nonzero(runs.image_keys(run_id) == ImageKey.SAMPLE))
+    return SpraySoFar(results=name, shots=shots, measured=len(measured), recorded=recorded, statistics=statistics)
+
+
+@lru_cache(maxsize=16)
+def _of(files: tuple[tuple[Path, int], ...], liquid_kg_m3: float | None) -> SprayStatistics:
+    """Once per change of the files."""
+    spray = read_files([file for file, _ in files])
+    return spray_statistics(spray.shots, AskedFor(spray.axis, liquid_kg_m3=liquid_kg_m3))

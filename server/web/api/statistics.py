@@ -1,0 +1,25 @@
+"""/api/runs/{run_id}/statistics: the spray as a whole, of what is measured so far."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Query
+
+from daq.names import Identifier
+from server.lab.droplets.spray_so_far import SpraySoFar, spray_so_far
+from server.web.api.parameters import ContextOf, RunId
+from server.web.problems import responses
+
+router = APIRouter(prefix="/api/runs/{run_id}/statistics", tags=["results"])
+
+
+@router.get("", responses=responses(404, 500))
+def show_statistics(
+    run_id: RunId,
+    context: ContextOf,
+    results: Annotated[Identifier | None, Query(description="which result set; default: the newest droplets")] = None,
+    liquid_kg_m3: Annotated[
+        float | None, Query(gt=0, le=30_000, description="density of the liquid, which makes mass of volume flux")
+    ] = None,
+) -> SpraySoFar:
+    """Sizes, densities, flux, patternation with intervals, of at most 50 measured shots; while it records, too."""
+    return spray_so_far(context.runs, run_id, results, liquid_kg_m3)

@@ -1,0 +1,31 @@
+"""Statistics of a run while it grows: from a stated sample of its shots."""
+
+from pathlib import Path
+
+import pytest
+
+from daq.run.events import RunStatus
+from daq.run.state import RunState
+from server.lab.droplets.spray_so_far import MOST_SHOTS, spray_so_far
+from server.lab.runs.run_store import RunStore
+from tests.support.droplet_run import write_run
+from tests.support.sampled_sprays import cone_shots, write_results
+
+SPRAY = '{"nozzle_mm": [0, 0, 0], "axis": [0, 1, 0]}'
+
+
+def test_of_many_shots_an_even_sample_is_taken_and_told(tmp_path: Path) -> None:
+    run_dir = write_run(tmp_path / "spray", shots=3)
+    results_dir = write_results(run_dir / "results" / "droplets-1", cone_shots(0, 60, 30), spray=SPRAY)
+    (results_dir / "settings.json").write_text("{}")
+    runs = RunStore(tmp_path, lambda: RunStatus(state=RunState.IDLE))
+    told = spray_so_far(runs, "spray", liquid_kg_m3=1000.0)
+    assert (told.results, told.measured, told.recorded) == ("droplets-1", 60, 3)
+    assert len(told.shots) == MOST_SHOTS
+    assert (told.shots[0], told.shots[-1]) == (0, 59)
+    assert told.statistics.droplets.shots == MOST_SHOTS
+    assert told.statistics.motion
+    assert told.statistics.motion.mass_flux_kg_m2_s
+    assert told.statistics.motion.volume_flux_mm_s
+    flux = told.statistics.motion.volume_flux_mm_s.value
+    assert told.statistics.motion.mass_flux_kg_m2_s.value == pytest.approx(flux)
