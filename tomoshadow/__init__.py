@@ -8,7 +8,8 @@ Calibrate
 Reconstruct
     intensity, common_grid, VoxelGrid, plan, mlos, minlos, gavlos, smart, mart
 Measure
-    measure, measure_velocities, measure_flat, mean_diameters, size_classes, droplet_statistics, velocity_statistics
+    measure, measure_velocities, measure_flat, mean_diameters, size_classes, droplet_statistics, velocity_statistics,
+    spray_statistics, AskedFor, SprayAxis
 Files
     read_run, shot_intensities, read_volume, write_volume, read_droplets, export_droplets
 Judge and look
@@ -29,6 +30,9 @@ if TYPE_CHECKING:
     from processing.analysis.exports.export import export_droplets as export_droplets
     from processing.analysis.flat.flat_droplets import measure_flat as measure_flat
     from processing.analysis.quality import quality_factor as quality_factor
+    from processing.analysis.spray.spray_axis import SprayAxis as SprayAxis
+    from processing.analysis.spray.spray_statistics import AskedFor as AskedFor
+    from processing.analysis.spray.spray_statistics import spray_statistics as spray_statistics
     from processing.analysis.velocity.measured_velocities import measure_velocities as measure_velocities
     from processing.analysis.velocity.velocity_statistics import velocity_statistics as velocity_statistics
     from processing.calibration.calibrate import calibrate as calibrate
@@ -68,6 +72,8 @@ _HOMES = {
     "processing.analysis.exports.export": ("export_droplets",),
     "processing.analysis.flat.flat_droplets": ("measure_flat",),
     "processing.analysis.quality": ("quality_factor",),
+    "processing.analysis.spray.spray_axis": ("SprayAxis",),
+    "processing.analysis.spray.spray_statistics": ("AskedFor", "spray_statistics"),
     "processing.analysis.velocity.measured_velocities": ("measure_velocities",),
     "processing.analysis.velocity.velocity_statistics": ("velocity_statistics",),
     "processing.calibration.calibrate": ("calibrate",),
