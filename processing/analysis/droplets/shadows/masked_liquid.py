@@ -26,6 +26,9 @@ LEAST_DISCS, LEAST_LENGTH = 3, 2.4
 CLOSE, UNEXPLAINED = 1.0, 1.5
 """Two discs closer than so many sums of their radii, around both of which the residual is so many times the noise, are
 a lump that is not round: droplets do not touch, or become one."""
+WITHIN = 0.9
+"""So are ``LEAST_DISCS`` that are closer than so many sums of their radii, however well they explain it: of 71,000 droplets
+of simulated shots, 14 to 56 per mm^3, nine are, some of which were placed so."""
 BLUR_REACH_SIGMAS = 3.0
 """So far around a disc its shadow reaches."""
 MASK_SHIFT = 4
@@ -65,8 +68,11 @@ def lumps(discs: Discs, residual: FloatArray) -> NDArray[np.intp]:
     residual : (N,) array
         Root mean square of what is left around each, over the noise.
     """
-    pairs = touching_pairs(discs, CLOSE)
-    labels = _linked(len(discs), pairs[np.all(residual[pairs] > UNEXPLAINED, axis=1)])
+    pairs, near = touching_pairs(discs, CLOSE), touching_pairs(discs, WITHIN)
+    heaps = _linked(len(discs), near)
+    heaped = np.bincount(heaps, minlength=1)[heaps] >= LEAST_DISCS
+    linked = [pairs[np.all(residual[pairs] > UNEXPLAINED, axis=1)], near[heaped[near[:, 0]]]]
+    labels = _linked(len(discs), np.concatenate(linked))
     lump = np.bincount(labels, minlength=1)[labels] > 1
     numbers = np.full(len(discs), -1, np.intp)
     numbers[lump] = np.unique(labels[lump], return_inverse=True)[1]

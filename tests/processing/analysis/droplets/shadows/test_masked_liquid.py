@@ -173,3 +173,22 @@ def test_discs_that_touch_and_explain_badly_are_a_lump() -> None:
     discs = Discs(np.vstack([pair, pair + 30, [[60, 0, 0], [62.1, 0, 0]]]), np.ones(6))
     assert lumps(discs, np.array([2, 2, 2, 1.1, 2, 2], dtype=float)).tolist() == [0, 0, -1, -1, -1, -1]
     assert lumps(Discs.none(), np.empty(0)).tolist() == []
+
+
+def test_three_discs_within_one_another_are_a_lump_however_well_they_explain_it() -> None:
+    """Droplets do not go through each other; two may be off by chance."""
+    row = np.array([[0, 0, 0], [1.5, 0, 0], [3.0, 0, 0]])
+    discs = Discs(np.vstack([row, row[:2] + 30, row * 1.3 + 60]), np.ones(8))
+    assert lumps(discs, np.ones(8)).tolist() == [0, 0, 0, -1, -1, -1, -1, -1]
+
+
+def test_a_short_thread_is_no_row_of_droplets() -> None:
+    """As long as two and a half diameters: discs explain it within the noise."""
+    s_mm = np.arange(-0.05, 0.051, 0.01)
+    thread = tube(np.column_stack([s_mm, 0 * s_mm, 0 * s_mm]), 0.06)
+    scene = scene_of(thread)
+    shot = scene.measured()
+    near_mm = np.linalg.norm(shot.droplets.points_mm[:, None] - thread.positions_mm, axis=2).min(axis=1)
+    assert not np.any(near_mm < 0.05)
+    assert shot.hidden.liquid_objects == 1
+    assert ghosts_and_missed(scene, shot)[0] == 0
