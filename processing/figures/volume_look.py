@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -47,9 +48,9 @@ class GrowingLook:
         for z, plane in enumerate(slab):  # one by one: a plane of a slab fits into the cache
             np.maximum(along_z[rows], plane, out=along_z[rows])
             np.maximum(along_y[z], plane.max(axis=0), out=along_y[z])
-            along_x[z, rows] = plane.max(axis=1)
+            along_x[z, rows] = cv2.reduce(plane, 1, cv2.REDUCE_MAX)[:, 0]  # twice as fast as numpy
             self._sum_along_z[rows] += plane
-            self._sums[z] += plane.sum()
+            self._sums[z] += cv2.sumElems(plane)[0]
 
     def look(self, plane: Callable[[int, int], Plane]) -> VolumeLook:
         """What has been seen, and the slices that show most of it; ``plane(axis, index)`` makes them, axis 0 is z."""

@@ -85,6 +85,7 @@ def sum_of_sight(
     grid_rows: int = 0,
     first_column: int = 0,
     grid_columns: int = 0,
+    mean: bool = False,
 ) -> None: ...
 
 @final

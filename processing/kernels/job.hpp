@@ -105,7 +105,8 @@ struct SumOfSight {
     Shape shape;
     Corner first;
     Method method;
-    float *volume;  // is added to
+    bool mean;      // the volume becomes the mean; else the sum is added to it
+    float *volume;
 };
 
 constexpr int max_bands = 16;  // of slabs, which project into images of their own

@@ -125,9 +125,7 @@ def _slabs(plan: Plan, batch: Batch, method: ReconstructionMethod, blocks: Part,
         np.empty((len(blocks.z), min(SLAB_ROWS, len(blocks.y)), len(blocks.x)), np.float32),
     )
     for first_row, slab in slabs_in(memory, blocks.y):
-        slab.fill(0)
-        _native.sum_of_sight(views, method, slab, threads, first_row, ny, blocks.x.start, nx)
-        slab /= np.float32(len(batch))
+        _native.sum_of_sight(views, method, slab, threads, first_row, ny, blocks.x.start, nx, mean=True)
         yield first_row, slab
 
 

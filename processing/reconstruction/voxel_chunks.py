@@ -39,13 +39,13 @@ def chunks_of(
 
 
 def _chunks(chunk_shape: tuple[int, int], dtype: np.dtype[Any], unit: float, planes: NDArray[Any]) -> list[bytes]:
-    chunk = np.zeros(chunk_shape, dtype)
-    chunks = []
+    chunk, chunks = np.zeros(chunk_shape, dtype), []
+    shuffled = np.empty((dtype.itemsize, *chunk_shape), np.uint8)
     for rows in planes:
         _copy(rows, chunk[: len(rows)])
         if dtype == np.float32 and unit != 1:
             chunk *= np.float32(unit)
-        chunks.append(_deflated(chunk))
+        chunks.append(_deflated(chunk, shuffled))
     return chunks
 
 
@@ -57,8 +57,9 @@ def _copy(rows: NDArray[Any], to: NDArray[Any]) -> None:
         to[:] = rows
 
 
-def _deflated(chunk: NDArray[Any]) -> bytes:
+def _deflated(chunk: NDArray[Any], shuffled: NDArray[np.uint8]) -> bytes:
+    """Bytes of one significance lie side by side in ``shuffled``, memory that is used again."""
     if chunk.itemsize == 1:
         return isal_zlib.compress(chunk, _LEVEL)
-    bytes_by_significance = cv2.split(chunk.view(np.uint8).reshape(*chunk.shape, chunk.itemsize))
-    return isal_zlib.compress(np.stack(bytes_by_significance), _LEVEL)
+    cv2.split(chunk.view(np.uint8).reshape(*chunk.shape, chunk.itemsize), list(shuffled))
+    return isal_zlib.compress(shuffled, _LEVEL)

@@ -12,11 +12,10 @@ from processing.calibration.calibration import Calibration
 from processing.kernels import DEFAULT_THREADS
 from processing.preprocessing import Intensity
 from processing.reconstruction.mean_line_of_sight import MeanVolume, mean_volume
-from processing.reconstruction.planning.plan import plan_reconstruction
 from processing.reconstruction.reconstructor import Reconstructor
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.runs.exposure_faults import exposure_faults
-from processing.runs.pipeline import default_grid
+from processing.runs.pipeline import plan_of
 from processing.runs.results_file import FrameName
 from processing.runs.shots.shot_images import require_match, shot_intensities
 from processing.runs.workbench import References, Workbench
@@ -86,12 +85,9 @@ def average_run(
     CalibrationError
         The calibration was refused.
     """
-    grid = settings.grid.to_grid() if settings.grid else default_grid(calibration)
     with (workbench or Workbench()).occupied() as bench, RunReader(run_dir) as run:
-        first = run.read_shot(shots[0])
-        require_match(run_dir.name, first, calibration)
-        mappings = [calibration.views[view].mapping for view in first.views]
-        plan = plan_reconstruction(mappings, grid, settings.accuracy, list(first.views))
+        calibration.require_usable(run.header.views)
+        plan = plan_of(calibration, settings, tuple(run.header.views))
         faults: list[Mapping[str, Any]] = []
         references = bench.references(run)
         exposures = _exposures(run, shots, frame, calibration, settings, references, done, threads, faults)
@@ -99,7 +95,7 @@ def average_run(
             mean = MeanVolume.of(_mean_of_each(Reconstructor.of(plan, settings, threads), exposures))
         else:
             mean = mean_volume(plan, exposures, settings.method, threads=threads)
-        return RunAverage(mean, grid, len(shots), tuple(faults))
+        return RunAverage(mean, plan.grid, len(shots), tuple(faults))
 
 
 def _exposures(

@@ -56,7 +56,7 @@ void line_of_sight(const std::vector<const BoundView *> &bound, const std::strin
 
 void sum_of_sight(const std::vector<std::vector<const BoundView *>> &exposures, const std::string &method,
                   const FloatVolume &volume, int threads, int first_row, int grid_rows, int first_column,
-                  int grid_columns) {
+                  int grid_columns, bool mean) {
     const Corner first{first_row, first_column};
     const Shape shape = shape_of(volume), grid = grid_of(shape, first, grid_rows, grid_columns);
     require(!exposures.empty(), "one exposure or more, please");
@@ -72,7 +72,7 @@ void sum_of_sight(const std::vector<std::vector<const BoundView *>> &exposures, 
     }
     const SumOfSight job{views.data(), static_cast<int>(exposures[0].size()), static_cast<int>(exposures.size()),
                          shape,        first,                                  method_of(method),
-                         volume.data()};
+                         mean,         volume.data()};
     const Kernels &kernels = selected_kernels();
     nb::gil_scoped_release release;
     run_sum_of_sight(kernels, job, threads);
@@ -91,7 +91,7 @@ void bind_line_of_sight(nb::module_ &module) {
     module.def("line_of_sight", &line_of_sight, "views"_a, "method"_a, "volume"_a, "threads"_a, "first_row"_a = 0,
                "grid_rows"_a = 0, "first_column"_a = 0, "grid_columns"_a = 0);
     module.def("sum_of_sight", &sum_of_sight, "exposures"_a, "method"_a, "volume"_a, "threads"_a, "first_row"_a = 0,
-               "grid_rows"_a = 0, "first_column"_a = 0, "grid_columns"_a = 0);
+               "grid_rows"_a = 0, "first_column"_a = 0, "grid_columns"_a = 0, "mean"_a = false);
 }
 
 }  // namespace tomoshadow

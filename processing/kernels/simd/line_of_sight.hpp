@@ -89,11 +89,16 @@ void line_of_sight(const LineOfSight &job, int number) {
     finish_streams();
 }
 
-inline void add_to_volume(const SumOfSight &job, int y0, const Tile &tile, const Block &sum) {
+inline void put_in_volume(const SumOfSight &job, int y0, const Tile &tile, const Block &sum) {
     const int x0 = tile.x0 - job.first.column;
     for (int row = 0; row < tile.rows; ++row) {
         float *voxels = job.volume + (static_cast<int64_t>(tile.z) * job.shape.ny + y0 + row) * job.shape.nx + x0;
-        for (int k = 0; k < smaller(block_columns, job.shape.nx - x0); ++k) voxels[k] += sum.rows[row][k];
+        const int columns = smaller(block_columns, job.shape.nx - x0);
+        const float count = static_cast<float>(job.n_exposures);
+        if (job.mean)
+            for (int k = 0; k < columns; ++k) voxels[k] = sum.rows[row][k] / count;
+        else
+            for (int k = 0; k < columns; ++k) voxels[k] += sum.rows[row][k];
     }
 }
 
@@ -127,7 +132,7 @@ void sum_of_sight(const SumOfSight &job, int number) {
             std::memset(sums.as<void>(), 0, static_cast<size_t>(bytes));
             add_exposures(job, slab, part, sums.as<Block>());
             const Block *sum = sums.as<Block>();
-            part.for_tiles([&](int, const Tile &tile) { add_to_volume(job, slab.y0, tile, *sum++); });
+            part.for_tiles([&](int, const Tile &tile) { put_in_volume(job, slab.y0, tile, *sum++); });
         }
     });
 }
