@@ -6,7 +6,6 @@ half as long again. Chunks are parts of planes, deflated by ISA-L at its fastest
 several times faster to write.
 """
 
-import os
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -19,7 +18,8 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from daq.files.atomic_file import own_part_path
+from daq.files.atomic_file import own_part_path, replacing
+from daq.files.storage import storing
 from processing.errors import BadInput
 from processing.kernels import DEFAULT_THREADS
 from processing.masked import require_unmasked
@@ -93,21 +93,23 @@ def write_slabs(
         Where it comes from: kept as attributes of the group ``/tomoshadow``.
     threads : int
         Deflate side by side; what is read does not depend on it.
+
+    Raises
+    ------
+    StorageError
+        The disk is full, say; the text names it, and what to do.
     """
-    part = own_part_path(path)
-    try:
-        with h5py.File(part, "w", libver=("v110", "v110")) as file:
-            dataset = _make_image_data(file.create_group("VTKHDF", track_order=True), volume, grid)
-            _write_voxels(dataset, volume, threads)
-            if volume.losses:
-                dataset.attrs["lost_voxels"] = volume.losses.voxel_share
-                dataset.attrs["lost_intensity"] = volume.losses.intensity_share
-            file.create_group(PROVENANCE).attrs.update({**provenance, **SCHEMA})
-        _sync(part)
-        part.replace(path)
-    except BaseException:
-        part.unlink(missing_ok=True)
-        raise
+    with (
+        storing(path.parent),
+        replacing(path, own_part_path(path)) as part,
+        h5py.File(part, "w", libver=("v110", "v110")) as file,
+    ):
+        dataset = _make_image_data(file.create_group("VTKHDF", track_order=True), volume, grid)
+        _write_voxels(dataset, volume, threads)
+        if volume.losses:
+            dataset.attrs["lost_voxels"] = volume.losses.voxel_share
+            dataset.attrs["lost_intensity"] = volume.losses.intensity_share
+        file.create_group(PROVENANCE).attrs.update({**provenance, **SCHEMA})
 
 
 @dataclass(frozen=True, eq=False)
@@ -270,8 +272,3 @@ def _read_grid(attributes: Mapping[str, Any], shape: tuple[int, ...]) -> VoxelGr
 def _plain(value: Any) -> Value:
     plain: Value = value.item() if isinstance(value, np.generic) else value
     return plain
-
-
-def _sync(path: Path) -> None:
-    with path.open("rb") as file:
-        os.fsync(file.fileno())

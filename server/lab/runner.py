@@ -10,6 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from daq.files.atomic_file import PART_SUFFIX
 from processing.calibration.verdict import BELONGING
 from processing.runs.measured_shot import droplets_path
 from server.lab.calibrations import CalibrationStore
@@ -68,6 +69,7 @@ class JobRunner:
         self._loop = asyncio.get_running_loop()
         self._changed = asyncio.Event()
         self._storing = asyncio.Lock()
+        self._unfinished = data_dir / "unfinished_volume"
         self._running: set[str] = set()
         self._checked_last = False
 
@@ -119,22 +121,30 @@ class JobRunner:
         Damaged
             Nobody can read any more how it was made.
         """
-        async with self._storing:  # who asks for the same meanwhile finds it there
-            if await asyncio.to_thread(volume.is_file):
-                return
-            made = await asyncio.to_thread(remaking, volume)
-            arguments = {**made, "calibration_file": str(self._calibrations.path(Path(made["calibration_file"]).stem))}
-            name = f"store {volume.parent.name}/{volume.stem}"
-            try:
-                async with asyncio.timeout(_STORE_S):
-                    task = self._tasks[JobKind.RECONSTRUCTION]
-                    await self._engine.submit(name, task, arguments, lambda _steps: None)
-            except TaskError as error:
-                raise Conflict(f"{volume.name} cannot be made again: {error}") from error
-            except TimeoutError as error:
-                raise Conflict(
-                    f"{volume.name} took more than {_STORE_S:g} s: others are before it, ask later"
-                ) from error
+        try:
+            async with asyncio.timeout(_STORE_S), self._storing:  # who asks for the same meanwhile finds it there
+                if not await asyncio.to_thread(volume.is_file):
+                    await self._store(volume)
+        except TimeoutError as error:
+            raise Conflict(f"{volume.name} took more than {_STORE_S:g} s: others are before it, ask later") from error
+
+    async def _store(self, volume: Path) -> None:
+        made = await asyncio.to_thread(remaking, volume)
+        arguments = {**made, "calibration_file": str(self._calibrations.path(Path(made["calibration_file"]).stem))}
+        name, task = f"store {volume.parent.name}/{volume.stem}", self._tasks[JobKind.RECONSTRUCTION]
+        await asyncio.to_thread(self._unfinished.write_text, str(volume.parent))
+        try:
+            await self._engine.submit(name, task, arguments, lambda _steps: None)
+        except TaskError as error:
+            raise Conflict(f"{volume.name} cannot be made again: {error}") from error
+        await asyncio.to_thread(self._unfinished.unlink, missing_ok=True)
+
+    def _remove_unfinished(self) -> None:
+        """Of the volume that was being stored when the server ended."""
+        with contextlib.suppress(OSError, ValueError):
+            for part in Path(self._unfinished.read_text()).glob(f"*.vtkhdf*{PART_SUFFIX}"):
+                part.unlink()
+            self._unfinished.unlink()
 
     async def run(self, duty: Duty) -> None:
         """Work until cancelled; jobs that are then unfinished are taken up by the next start."""
@@ -156,6 +166,7 @@ class JobRunner:
             await asyncio.wait_for(self._changed.wait(), _LOOK_AGAIN_S)
 
     def _take_up(self) -> None:
+        self._remove_unfinished()
         self._table.requeue_interrupted()
         for job in reversed(self._table.newest(limit=_CHECKS_REMEMBERED, kinds=[JobKind.CHECK])):
             self._watch.learn(job)

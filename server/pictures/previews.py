@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.files.atomic_file import own_part_path
+from daq.files.storage import storing
 from processing.reconstruction.slab_volume import Slabs, slabs_of
 from processing.volume import VoxelGrid
 
@@ -140,7 +141,6 @@ def preview_files(folder: Path) -> list[Path]:
 
 def save_preview(path: Path, preview: VolumePreview, provenance: Mapping[str, Any] | None = None) -> None:
     """Write a preview and what its volume is made of; it replaces an older one at once."""
-    part = own_part_path(path)
     arrays = {
         "voxels": preview.voxels,
         "origin_mm": preview.grid.origin_mm,
@@ -149,10 +149,15 @@ def save_preview(path: Path, preview: VolumePreview, provenance: Mapping[str, An
         "full_shape": preview.full_shape,
         "provenance": json.dumps(dict(provenance or {})),
     }
-    with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as file:  # numpy's own takes 6, far slower
-        for name, values in arrays.items():
-            with file.open(f"{name}.npy", "w") as entry:
-                np.lib.format.write_array(entry, np.asanyarray(values), allow_pickle=False)
+    part = own_part_path(path)
+    try:
+        with storing(path.parent), zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as file:
+            for name, values in arrays.items():  # numpy's own takes level 6, far slower
+                with file.open(f"{name}.npy", "w") as entry:
+                    np.lib.format.write_array(entry, np.asanyarray(values), allow_pickle=False)
+    except BaseException:
+        part.unlink(missing_ok=True)
+        raise
     part.replace(path)
 
 

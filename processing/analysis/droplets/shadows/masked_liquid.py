@@ -27,8 +27,8 @@ CLOSE, UNEXPLAINED = 1.0, 1.5
 """Two discs closer than so many sums of their radii, around both of which the residual is so many times the noise, are
 a lump that is not round: droplets do not touch, or become one."""
 WITHIN = 0.9
-"""So are ``LEAST_DISCS`` that are closer than so many sums of their radii, however well they explain it: of 71,000 droplets
-of simulated shots, 14 to 56 per mm^3, nine are, some of which were placed so."""
+"""So are ``LEAST_DISCS`` that are closer than so many sums of their radii, however well they explain it: of 71,000
+droplets of simulated shots, 14 to 56 per mm^3, nine are, some of which were placed so."""
 BLUR_REACH_SIGMAS = 3.0
 """So far around a disc its shadow reaches."""
 MASK_SHIFT = 4
