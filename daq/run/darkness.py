@@ -7,7 +7,7 @@ from daq.errors import DaqError, DeviceError, DeviceOvertaken, DeviceRefused, In
 from daq.run import light
 from daq.run.ending import code_of
 from daq.run.shooting import Shooting
-from daq.run.side_by_side import disarm_cameras
+from daq.run.side_by_side import disarming_of
 
 
 def attempt(run: Shooting, action: Callable[[], None]) -> None:
@@ -32,21 +32,22 @@ def fail(run: Shooting, error: Exception) -> None:
 
 
 def darken(run: Shooting) -> str | None:
-    """Light off, then cameras; returns why the light could not be confirmed off."""
-    _look_for_more_causes(run)
+    """Light confirmed off; returns why not. Cameras are disarmed meanwhile: no dead one makes it late."""
+    disarming = disarming_of(run.rig.cameras)
     reason = light.confirm_off(run.rig, run.limits.light_off_s)
+    _look_for_more_causes(run, answers=reason is None)
     if reason:
         run.ending.fail(DaqError(f"light not confirmed off: {reason}"), CauseCode.LIGHT_NOT_OFF)
-    for problem in disarm_cameras(run.rig.cameras, run.limits.disarm_s).values():
-        run.say(problem)
+    for problem in disarming.errors(run.limits.disarm_s).values():
+        run.say(str(problem))
     return reason
 
 
-def _look_for_more_causes(run: Shooting) -> None:
-    """What has failed may have had two reasons: an open door hides that the generator was reset."""
+def _look_for_more_causes(run: Shooting, *, answers: bool) -> None:
+    """What has failed may have had two reasons: an open door hides that the generator was reset, if that answers."""
     if not run.ending.at_once:
         return
-    for look in (light.check_generator, light.check_permitted):
+    for look in (light.check_generator, light.check_permitted) if answers else (light.check_closed,):
         try:
             look(run.rig)
         except DaqError as error:

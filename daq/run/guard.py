@@ -51,5 +51,6 @@ class RunGuard:
                     light.check_permitted(self._rig)
                 self._rig.interlock.wait_for_change(self._period_s)
         except DaqError as error:
-            light.try_to_switch_off(self._rig)
+            if not self._ending.at_once:  # else somebody has switched off, and nobody waits for the guard
+                light.try_to_switch_off(self._rig)
             self._ending.fail(error, code_of(error, self._rig))

@@ -60,7 +60,8 @@ class RunSession:
         """Arm, and take all shots; returns when the last one is handed to the recorder, or the run is ended."""
         with RunGuard(self._run):
             self._attempt(self._acquire)
-            light.try_to_switch_off(self._rig)
+            if not self._ending.at_once:
+                light.try_to_switch_off(self._rig)
         self._ending.end(RunStep.LAST_SHOT)
 
     def disarm(self) -> str | None:

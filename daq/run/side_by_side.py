@@ -54,7 +54,6 @@ class SideBySide:
             self._errors[view] = error
 
 
-def disarm_cameras(cameras: Mapping[str, Camera], deadline_s: float) -> dict[str, str]:
-    """Disarm all cameras; returns what went wrong by view."""
-    errors = SideBySide("disarm", lambda camera: camera.disarm(), cameras).errors(deadline_s)
-    return {view: str(error) for view, error in errors.items()}
+def disarming_of(cameras: Mapping[str, Camera]) -> SideBySide:
+    """Begin to disarm all cameras."""
+    return SideBySide("disarm", lambda camera: camera.disarm(), cameras)

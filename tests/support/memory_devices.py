@@ -151,7 +151,7 @@ class MemoryGenerator(MemoryDevice):
 
     ``unlit`` names the firings without their second pulse, ``silent_at`` the one that it does not answer;
     ``stuck`` lets it ignore ``off``; ``wrong_echo_ns`` shifts the second pulse of what it loads; ``restarted`` lets the
-    next status say that it was reset.
+    next status say that it was reset, which is then a fault until it is cleared.
     """
 
     def __init__(
@@ -244,6 +244,7 @@ class MemoryGenerator(MemoryDevice):
     def status(self) -> GeneratorStatus:
         if self.restarted:
             self.restarted = False
+            self.trip("restarted")
             raise DeviceError(self.name, "the microcontroller was reset")
         self._end_light()
         return GeneratorStatus(self.state, self._faults, self._interlock_closed, self._shots_left, dict(self.counters))

@@ -38,7 +38,8 @@ class LiveSession:
         """Thread: the whole live view, until the light is confirmed off and the cameras are disarmed."""
         with RunGuard(self._live):
             attempt(self._live, self._show)
-            light.try_to_switch_off(self._rig)
+            if not self._ending.at_once:
+                light.try_to_switch_off(self._rig)
         step = RunStep.LIGHT_UNKNOWN if darken(self._live) else RunStep.LIGHT_OFF
         self._live.progress.end(step, self._ending, live=None, message=self._ending.cause)
 

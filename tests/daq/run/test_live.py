@@ -313,6 +313,19 @@ def test_a_refusal_to_fire_is_told_by_its_reason(tmp_path: Path) -> None:
         assert lab.rest().message == "generator: fault: interlock; acknowledge it first"
 
 
+def test_cameras_are_disarmed_while_the_light_is_still_being_confirmed_off(tmp_path: Path) -> None:
+    """A generator and cameras that are all dead cost the longest of their deadlines, not all of them."""
+    lab = Laboratory(tmp_path / "runs", AcquisitionLimits(frame_s=0.1, light_off_s=DEADLINE_S))
+    with lab.acquisition:
+        lab.show(SLOW)
+        lab.memory.generator.stuck = True
+        lab.acquisition.end_live()
+        await_true(lambda: {"view1 disarm", "view2 disarm"} <= set(lab.memory.journal))
+        assert lab.acquisition.status().state is RunState.LIVE
+        lab.memory.generator.stuck = False
+        assert lab.rest().state is RunState.IDLE
+
+
 def test_light_that_does_not_go_off_is_a_fault(lab: Laboratory) -> None:
     lab.show(SLOW)
     lab.memory.generator.stuck = True
