@@ -247,7 +247,8 @@ class Acquisition:
 
     def _refusals_of_state(self, step: RunStep) -> Iterator[DaqError]:
         status = self.status()
-        yield from impossible(step, RunState.IDLE if status.state is RunState.LIVE else status.state)
+        state = RunState.IDLE if status.state is RunState.LIVE else status.state
+        yield from impossible(step, state, status.run_id if status.active else None)
         if self._left:
             yield coded(BusyError(f"no run starts any more: {self._left}"), RefusalCode.PROGRAM_ENDING)
         yield from not_acknowledged(status)

@@ -94,9 +94,13 @@ def starts_already() -> DaqError:
     return coded(BusyError("another run or live view is being started"), RefusalCode.STARTING)
 
 
-def impossible(step: RunStep, state: RunState) -> Iterator[DaqError]:
-    """Why a step does not follow a state."""
-    return refused(RefusalCode.LIGHT_NOT_OFF if state is RunState.FAULT else RefusalCode.BUSY, next_state, state, step)
+def impossible(step: RunStep, state: RunState, run_id: str | None = None) -> Iterator[DaqError]:
+    """Why a step does not follow a state; names the run that is under way."""
+    try:
+        next_state(state, step)
+    except BusyError as busy:
+        code = RefusalCode.LIGHT_NOT_OFF if state is RunState.FAULT else RefusalCode.BUSY
+        yield coded(BusyError(f"{busy}, run {run_id}") if run_id else busy, code)
 
 
 def not_acknowledged(status: RunStatus) -> Iterator[DaqError]:

@@ -65,6 +65,13 @@ class SimulatedLaboratory:
         self._ends.close()
         self._visitor.shutdown()
 
+    is_apart = False
+    """Its far ends run in this process, and end with it."""
+
+    def ask(self) -> str:
+        """Who runs the far ends."""
+        return "this process"
+
     def close_door(self) -> None:
         """Allow light."""
         self.devices.close_door()

@@ -36,7 +36,7 @@ class Lamp(FrozenModel):
     """State of one part of the rig, or of work in the background that fails."""
 
     name: Annotated[str, Field(description="of the device, or of the work")]
-    kind: Annotated[str, Field(description="camera, generator, interlock, stage, disk or work")]
+    kind: Annotated[str, Field(description="camera, generator, interlock, stage, disk, simulator or work")]
     health: Annotated[Health, Field(description="ok: green; warn: amber, it works or nobody knows; fault: red")]
     detail: Annotated[str, Field(description="what was found, or why nothing was")]
     age_s: Annotated[float | None, Field(description="since the device last answered; null: never, or no device")] = (

@@ -16,6 +16,7 @@ from daq.devices import Camera, Device, GeneratorState, Rig, TranslationStage
 from daq.errors import DaqError
 from server.lab.duty import Duty, Health, Lamp, pause
 from server.lab.errors import told
+from server.rig.laboratory import Laboratory
 
 _PERIOD_S = 1.0
 STALE_S = 2.5
@@ -25,6 +26,10 @@ _LOW_DISK_BYTES = 20e9
 Look = Callable[[], tuple[Health, str]]
 """Asks a device; health and detail of its lamp, or an error if it does not answer."""
 Clock = Callable[[], float]
+
+
+def _ask_who(laboratory: Laboratory) -> tuple[Health, str]:
+    return Health.OK, laboratory.ask()
 
 
 def _always() -> bool:
@@ -42,16 +47,24 @@ class RigMonitor:
         Its file system must have room for runs.
     resting : Callable[[], bool]
         No run is under way: what was lost may be opened again.
+    laboratory : Laboratory | None
+        Of a simulated rig. It has a lamp where it runs in another process.
     now_s : Callable[[], float]
         A clock that never goes back.
     """
 
     def __init__(
-        self, rig: Rig, data_dir: Path, resting: Callable[[], bool] = _always, now_s: Clock = time.monotonic
+        self,
+        rig: Rig,
+        data_dir: Path,
+        resting: Callable[[], bool] = _always,
+        laboratory: Laboratory | None = None,
+        now_s: Clock = time.monotonic,
     ) -> None:
         self._rig = rig
         self._data_dir = data_dir
         self._resting = resting
+        self._laboratory = laboratory
         self._who: dict[str, str] = {}
         self._watched = tuple(_Watched(name, kind, look, now_s) for name, kind, look in self._looks())
         self._threads = ThreadPoolExecutor(len(self._watched), thread_name_prefix="lamp")
@@ -88,6 +101,8 @@ class RigMonitor:
         if self._rig.stage is not None:
             yield "stage", "stage", partial(self._stage, self._rig.stage)
         yield "disk", "disk", self._disk
+        if self._laboratory is not None and self._laboratory.is_apart:
+            yield "far ends", "simulator", partial(_ask_who, self._laboratory)
 
     def _camera(self, view: str, camera: Camera) -> tuple[Health, str]:
         with self._known(view, camera):

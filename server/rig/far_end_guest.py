@@ -74,6 +74,13 @@ class FarEndGuest:
         """Serial port of the stage; the same after a restart."""
         return str(self._known["stage_port"])
 
+    is_apart = True
+    """They may end while their guest goes on."""
+
+    def ask(self) -> str:
+        """Who runs them; DeviceUnavailable if they do not answer."""
+        return f"process {self._ask('meet')['process']}"
+
     def inject(self, fault: Fault) -> None:
         """Let something go wrong; ValueError if the laboratory has no such view."""
         self._ask("inject", fault=fault.model_dump(mode="json"))

@@ -8,6 +8,13 @@ from daq.faults import Fault
 class Laboratory(Protocol):
     """Doors to open, and faults to inject."""
 
+    @property
+    def is_apart(self) -> bool:
+        """Its far ends run in another process, which may end."""
+
+    def ask(self) -> str:
+        """Who runs its far ends; DeviceUnavailable if they do not answer."""
+
     def inject(self, fault: Fault) -> None:
         """Let something go wrong; ValueError if the laboratory has no such view."""
 

@@ -199,7 +199,7 @@ def _context(services: Services, table: JobTable, index: RunIndex) -> Context:
         jobs=table,
         runner=JobRunner(services.engine, table, services.tasks, services.events, services.data_dir, store, watch),
         watch=watch,
-        monitor=RigMonitor(services.rig, services.data_dir, lambda: acquisition.status().resting),
+        monitor=RigMonitor(services.rig, services.data_dir, lambda: acquisition.status().resting, services.laboratory),
         desk=DeskWatch(acquisition.status, lambda: reasons_against(context)),
         live=LiveFeed(services.rig.cameras, lambda: acquisition.newest_shot, acquisition.keep_live),
         parts=VolumeParts(),

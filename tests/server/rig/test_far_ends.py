@@ -1,5 +1,6 @@
 """Far ends of a simulated rig in a process of their own: they outlive whoever works with them, and may be restarted."""
 
+import asyncio
 import os
 import signal
 import socket
@@ -19,6 +20,8 @@ from daq.run.limits import AcquisitionLimits
 from daq.run.state import RunOutcome
 from daq.run_plan import PulsePair, RunKind, RunPlan
 from processing.synthetic.truth_file import read_true_cameras
+from server.lab.duty import Health
+from server.lab.monitor import RigMonitor
 from server.rig.assembly import AssembledRig, open_generator, open_rig
 from server.rig.config import RigConfig, load_config
 from server.rig.far_end_guest import FarEndGuest
@@ -86,6 +89,14 @@ def pulse_generator_of(process: subprocess.Popen[str]) -> int:
     """Its firmware is the only child of the simulator."""
     (child,) = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
     return int(child)
+
+
+def lamp_of(monitor: RigMonitor) -> tuple[Health, str]:
+    """Of the far ends, now."""
+    asyncio.run(monitor.ask())
+    lamp = monitor.lamps[-1]
+    assert lamp.name == "far ends"
+    return lamp.health, lamp.detail
 
 
 def recovered(ask: Callable[[], object], recover: Callable[[], None]) -> bool:
@@ -163,15 +174,21 @@ def test_a_simulator_that_dies_is_named_and_its_successor_taken(
         opened = simulators.enter_context(open_rig(config))
         record(opened, config, tmp_path)
         assert opened.laboratory is not None
+        monitor = RigMonitor(opened.rig, tmp_path, laboratory=opened.laboratory)
+        assert lamp_of(monitor) == (Health.OK, f"process {first.pid}")
         first.kill()
         first.wait(LIMIT_S)
+        health, detail = lamp_of(monitor)
+        assert health is Health.FAULT
+        assert "start them again (tomoshadow simulate --config" in detail
         eventually(lambda: not opened.rig.interlock.is_closed(), "a door that nobody can tell about is open")
         assert "those of rig 'simulated spray4view, binned' do not answer" in caplog.text
         with pytest.raises(DeviceUnavailable, match=r"start them again \(tomoshadow simulate"):
             opened.laboratory.open_door()
         with pytest.raises(DaqError):
             record(opened, config, tmp_path / "refused")
-        with simulator():
+        with simulator() as second:
+            assert lamp_of(monitor) == (Health.OK, f"process {second.pid}")
             eventually(opened.rig.interlock.is_closed, "the door of the new one is closed")
             generator, stage = opened.rig.generator, opened.rig.stage
             assert stage is not None
