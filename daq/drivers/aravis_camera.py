@@ -24,8 +24,6 @@ _log = logging.getLogger(__name__)
 ARAVIS_REMEDY = "apt install python3-gi gir1.2-aravis-0.8, and a virtual environment with --system-site-packages"
 """No package index has them, so Debian's must be seen."""
 _RELEASE_LIMIT_S = 2.0
-JUMBO = Network(packet_bytes=9000)
-"""The loopback interface carries it."""
 
 
 def load_aravis(name: str) -> "type[AravisDevice]":
@@ -70,8 +68,8 @@ class AravisCamera:
         name: str,
         ip: str,
         profile: CameraProfile,
-        shape: tuple[int, int] = (1200, 1600),
-        network: Network = JUMBO,
+        shape: tuple[int, int],
+        network: Network,
     ) -> None:
         self._name = name
         self._ip = ip

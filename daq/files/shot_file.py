@@ -15,6 +15,7 @@ from daq.errors import DamagedFrame, ForeignFile, RecorderError, ShotFileError
 from daq.files.columns import Column, columns_of, crc32_path, frames_path, shot_from_columns, shot_to_columns, view_path
 from daq.files.encoding import EncodedFrame, decode_frame, encode_frame, is_shuffled
 from daq.files.header import RunHeader, ViewFormat
+from daq.files.text_heap import has_whole_heaps
 from daq.run_plan import ImageKey
 from daq.shot import Image, Shot
 
@@ -80,6 +81,7 @@ def reading_shot(path: Path, header: RunHeader) -> Iterator[h5py.File]:
     """Open a shot of this run and turn what can go wrong into ShotFileError."""
     try:
         with h5py.File(path, "r") as file:
+            _check_heaps(path, file)
             if (_text(file.attrs["schema"]), _text(file.attrs["run_id"])) != (SHOT_SCHEMA, header.run_id):
                 raise ForeignFile(f"{path}: not a shot of run {header.run_id}")
             yield file
@@ -180,6 +182,12 @@ def _fixed(**attributes: Any) -> Attributes:
     return {name: np.bytes_(value.encode()) if isinstance(value, str) else value for name, value in attributes.items()}
 
 
+def _check_heaps(path: Path, file: h5py.File) -> None:
+    """OSError if HDF5 would read texts for ever; in a file of version 1 they lie in heaps, its version does not."""
+    if file.attrs["schema_version"] < SHOT_VERSION and not has_whole_heaps(path):
+        raise OSError("a heap of texts is broken")
+
+
 def _text(attribute: str | bytes) -> str:
     return attribute.decode() if isinstance(attribute, bytes) else attribute
 
@@ -226,6 +234,7 @@ def read_formats(path: Path) -> tuple[str, dict[str, ViewFormat], int]:
     """
     try:
         with h5py.File(path, "r") as file:
+            _check_heaps(path, file)
             if _text(file.attrs["schema"]) != SHOT_SCHEMA:
                 raise ForeignFile(f"{path}: not a shot")
             frames = {view: group["frames"] for view, group in file["cameras"].items()}

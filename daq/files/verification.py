@@ -7,9 +7,10 @@ from pathlib import Path
 
 from daq.errors import AlreadyHeld, DamagedFrame, ForeignFile, RenamedFile, ShotFileError
 from daq.files.atomic_file import PART_SUFFIX
+from daq.files.header import RunClosing, RunHeader
 from daq.files.lock_file import hold_folder
 from daq.files.run_directory import RunReader
-from daq.files.run_file import RUN_FILE, SHOTS_FOLDER, is_shot, shot_path
+from daq.files.run_file import RUN_FILE, SHOTS_FOLDER, is_shot, read_shot_count, shot_path
 
 Done = Callable[[int, int], None]
 _EOF_ADDRESS = slice(28, 36)
@@ -91,7 +92,10 @@ def verify(run_dir: Path, done: Done = lambda _done, _total: None) -> Verificati
     reader = RunReader(run_dir)
     strangers = tuple(_strangers(run_dir))
     try:
-        header, closing, shots = reader.header, reader.closing, reader.shot_count
+        header, closing = reader.header, reader.closing
+        if not (run_dir / SHOTS_FOLDER).is_dir():
+            return _without_shots(run_dir, header, closing, strangers)
+        shots = reader.shot_count
     except ShotFileError as error:
         there = (run_dir / RUN_FILE).exists()
         flaw = Flaw(FlawKind.UNREADABLE if there else FlawKind.MISSING, RUN_FILE, str(error))
@@ -104,6 +108,19 @@ def verify(run_dir: Path, done: Done = lambda _done, _total: None) -> Verificati
     sound = shots - len(bad)
     frames = sound * header.frames_per_shot * len(header.views)
     return Verification(closing.outcome if closing else None, shots, sound, frames, (*flaws, *bad, *strangers))
+
+
+def _without_shots(
+    run_dir: Path, header: RunHeader, closing: RunClosing | None, strangers: tuple[Flaw, ...]
+) -> Verification:
+    """What run.h5 alone tells: all shots are missing, and it knows how many they were."""
+    recorded = read_shot_count(run_dir)
+    planned = header.plan.total_shots if header.plan else None
+    plan = "" if planned is None else f" of {planned} that were planned"
+    were = f"{recorded} shots{plan} were recorded" if recorded else f"nobody knows how many shots{plan} were recorded"
+    text = f"{run_dir}: has no folder {SHOTS_FOLDER}; {were}: bring it back, or copy it from a backup"
+    outcome = closing.outcome if closing else None
+    return Verification(outcome, recorded, 0, 0, (Flaw(FlawKind.MISSING, SHOTS_FOLDER, text), *strangers))
 
 
 def _flaws_of_shot(reader: RunReader, index: int) -> list[Flaw]:

@@ -5,7 +5,7 @@ import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, SecretStr, ValidationError, ValidationInfo, field_validator, model_validator
+from pydantic import AfterValidator, Field, SecretStr, ValidationError, ValidationInfo, field_validator, model_validator
 
 from daq.faults import ScriptedFault
 from daq.frozen_model import FrozenModel
@@ -20,6 +20,13 @@ CurrentA = Annotated[float, Field(gt=0, le=30)]
 
 class ConfigError(BadInput):
     """The configuration cannot be used; one line per problem, each with file, line, key, value and limit."""
+
+
+def _possible(path: Path) -> Path:
+    """A path that a file system can have."""
+    if "\0" in str(path):
+        raise ValueError("no folder has a NUL character in its name")
+    return path
 
 
 class CameraConfig(FrozenModel):
@@ -130,7 +137,9 @@ class ServerConfig(FrozenModel):
     )
     port: Annotated[int, Field(ge=1, le=65535, description="TCP port")] = 8080
     data_dir: Annotated[
-        Path, Field(description="folder of runs and calibrations, relative to the working directory")
+        Path,
+        AfterValidator(_possible),
+        Field(description="folder of runs and calibrations, relative to the working directory"),
     ] = Path("runs")
     token: Annotated[SecretStr | None, Field(description="asked of every browser and script")] = None
 

@@ -16,6 +16,7 @@ from daq.drivers.aravis_camera import AravisCamera
 from daq.drivers.camera_profile import FeatureWrite, load_camera_profile
 from daq.errors import DeviceError
 from daq.files.run_directory import ViewFormat
+from daq.network import Network
 from daq.shot import DoubleFrame, FiredTrain, Image, LightPulse
 from daq.simulation.camera.gige_camera import SimulatedCamera
 from daq.simulation.camera.light import Exposure
@@ -74,7 +75,7 @@ def driven(**changes: Any) -> Iterator[CameraStand]:
     def lose_next_b(_: int) -> None:
         simulated.faults.dropped_b = 1
 
-    with simulated, AravisCamera(VIEW, "127.0.0.31", profile, SHAPE) as camera:
+    with simulated, AravisCamera(VIEW, "127.0.0.31", profile, SHAPE, Network()) as camera:
         yield CameraStand(camera, "SN31", simulated.trigger, lose_next_b)
 
 

@@ -16,8 +16,10 @@ from pathlib import Path
 from daq.drivers.aravis_camera import AravisCamera
 from daq.drivers.camera_profile import load_camera_profile
 from daq.errors import DeviceUnavailable
+from daq.network import Network
 try:
-    AravisCamera("view1", "127.0.0.1", load_camera_profile(Path("configs/cameras/simulated.toml"))).__enter__()
+    profile = load_camera_profile(Path("configs/cameras/simulated.toml"))
+    AravisCamera("view1", "127.0.0.1", profile, (1200, 1600), Network()).__enter__()
 except DeviceUnavailable as error:
     print(error)
 """

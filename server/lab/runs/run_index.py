@@ -49,6 +49,7 @@ class RunIndex:
 
     def __init__(self, path: Path | None = None) -> None:
         self._lock = threading.Lock()
+        self._there: frozenset[str] = frozenset()
         self._database = _opened(path) if path else _with_table(_IN_MEMORY)
         weakref.finalize(self, self._database.close)  # Python 3.13 complains of one that is merely forgotten
 
@@ -74,6 +75,15 @@ class RunIndex:
         row = (run_id, stamp, run.summary.model_dump_json(), run.image_keys.astype(np.int8).tobytes())
         with suppress(sqlite3.Error), self._lock, self._database:
             self._database.execute("INSERT OR REPLACE INTO run VALUES (?, ?, ?, ?)", row)
+
+    def forget_all_but(self, run_ids: frozenset[str]) -> None:
+        """Drop what is known of runs that are gone."""
+        if run_ids == self._there:
+            return
+        with suppress(sqlite3.Error), self._lock, self._database:
+            known = {run_id for (run_id,) in self._database.execute("SELECT run_id FROM run")}
+            self._database.executemany("DELETE FROM run WHERE run_id = ?", [(gone,) for gone in known - run_ids])
+            self._there = run_ids
 
 
 def _opened(path: Path) -> sqlite3.Connection:

@@ -100,6 +100,7 @@ class RunStore:
         Ids tell it to the second, so that a long list need not be read; headers tell two of the same second apart.
         """
         directories = list_runs(self._data_dir)
+        self._index.forget_all_but(frozenset(path.name for path in directories))
         seconds = {path: self._second(path) for path in directories}
         crowd = Counter(seconds.values())
 

@@ -26,6 +26,7 @@ from daq.simulation.camera.gige_registers import Register
 from daq.simulation.camera.light import Exposure
 
 pytestmark = pytest.mark.network
+JUMBO = Network(packet_bytes=9000)
 
 IP, SHAPE = "127.0.0.32", (240, 320)
 PROFILE = load_camera_profile(Path(__file__).parents[3] / "configs" / "cameras" / "simulated.toml")
@@ -87,7 +88,7 @@ def assert_shows(shot: DoubleFrame, sequence: int) -> None:
 def wire() -> Iterator[Wire]:
     with (
         SimulatedCamera("view", IP, "SN32", TIMING, noise, SHAPE) as simulated,
-        AravisCamera("view", IP, PROFILE, SHAPE) as camera,
+        AravisCamera("view", IP, PROFILE, SHAPE, JUMBO) as camera,
     ):
         camera.arm()
         yield Wire(simulated, camera)
@@ -194,7 +195,7 @@ def test_stamps_that_do_not_fit_the_profile_make_no_pair() -> None:
     pair = PairSpacing(spacing_ns=30_000_000, tolerance_ns=100)
     with (
         SimulatedCamera("view", IP, "SN32", TIMING, noise, SHAPE) as simulated,
-        AravisCamera("view", IP, PROFILE.model_copy(update={"pair": pair}), SHAPE) as camera,
+        AravisCamera("view", IP, PROFILE.model_copy(update={"pair": pair}), SHAPE, JUMBO) as camera,
     ):
         camera.arm()
         assert not Wire(simulated, camera).shoot()[1].valid
@@ -363,7 +364,7 @@ def test_an_armed_camera_is_not_opened_again(wire: Wire) -> None:
 
 def test_an_absent_camera_is_named() -> None:
     with pytest.raises(DeviceUnavailable, match=r"view: no camera answers at 127\.0\.0\.99"):
-        AravisCamera("view", "127.0.0.99", PROFILE).__enter__()
+        AravisCamera("view", "127.0.0.99", PROFILE, SHAPE, JUMBO).__enter__()
 
 
 def test_a_camera_that_another_client_holds_is_waited_for_and_named(
@@ -371,7 +372,7 @@ def test_a_camera_that_another_client_holds_is_waited_for_and_named(
 ) -> None:
     monkeypatch.setattr(aravis_device, "_CONTROL_LIMIT_S", 1.0)
     with pytest.raises(DeviceUnavailable, match=f"second: the camera at {IP} is held by 127"):
-        AravisCamera("second", IP, PROFILE, SHAPE).__enter__()
+        AravisCamera("second", IP, PROFILE, SHAPE, JUMBO).__enter__()
     wire.assert_good_shot()
 
 
@@ -391,7 +392,7 @@ def test_the_camera_of_a_dead_client_is_free_after_its_heartbeat() -> None:
         dead.sendto(struct.pack(">BBHHH", 0x42, 1, Command.WRITE_REGISTER, len(write), 1) + write, (IP, GVCP_PORT))
         dead.recv(64)
         began_s = monotonic()
-        with AravisCamera("view", IP, PROFILE, SHAPE) as camera:
+        with AravisCamera("view", IP, PROFILE, SHAPE, JUMBO) as camera:
             assert 2.0 < monotonic() - began_s < 6.0
             camera.arm()
             Wire(simulated, camera).assert_good_shot()
@@ -422,14 +423,14 @@ def test_a_value_that_does_not_read_back_is_refused(wire: Wire) -> None:
 
 
 def test_an_image_larger_than_the_sensor_is_refused() -> None:
-    large = AravisCamera("large", IP, PROFILE, (SHAPE[0] + 1, SHAPE[1]))
+    large = AravisCamera("large", IP, PROFILE, (SHAPE[0] + 1, SHAPE[1]), JUMBO)
     refused = pytest.raises(DeviceRefused, match="large: Height = 241: ")
     with SimulatedCamera("view", IP, "SN32", TIMING, noise, SHAPE), large, refused:
         large.arm()
 
 
 def test_a_camera_that_was_not_opened_refuses() -> None:
-    camera = AravisCamera("view", IP, PROFILE, SHAPE)
+    camera = AravisCamera("view", IP, PROFILE, SHAPE, JUMBO)
     camera.disarm()
     for call in (camera.arm, camera.identity):
         with pytest.raises(DeviceError, match="view: the camera is not open"):
@@ -444,7 +445,7 @@ def test_one_exposure_per_trigger() -> None:
     profile = PROFILE.model_copy(update={"frames_per_trigger": 1, "features": features, "pair": None})
     with (
         SimulatedCamera("view", IP, "SN32", TIMING, noise, SHAPE) as simulated,
-        AravisCamera("view", IP, profile, SHAPE) as camera,
+        AravisCamera("view", IP, profile, SHAPE, JUMBO) as camera,
     ):
         camera.arm()
         _, shot = Wire(simulated, camera).shoot()
@@ -465,7 +466,7 @@ def test_one_exposure_per_trigger() -> None:
 def test_exposures_collect_the_light_that_was_fired(starts_ns: tuple[int, ...], seen: tuple[int, int]) -> None:
     with (
         SimulatedCamera("view", IP, "SN32", TIMING, light_seen, SHAPE) as simulated,
-        AravisCamera("view", IP, PROFILE, SHAPE) as camera,
+        AravisCamera("view", IP, PROFILE, SHAPE, JUMBO) as camera,
     ):
         camera.arm()
         _, shot = Wire(simulated, camera).shoot(pulses=tuple(LightPulse(ns, 1000, 10.0) for ns in starts_ns))
@@ -480,7 +481,7 @@ def test_four_cameras_deliver_every_pair_of_a_run() -> None:
         for number in range(4):
             ip = f"127.0.0.{41 + number}"
             simulated = SimulatedCamera("view", ip, f"SN{number}", TIMING, sequence_number)
-            camera = AravisCamera(f"view{number}", ip, profile)
+            camera = AravisCamera(f"view{number}", ip, profile, (1200, 1600), JUMBO)
             wires.append(Wire(stack.enter_context(simulated), stack.enter_context(camera)))
         for wire in wires:
             wire.camera.arm()
@@ -522,7 +523,7 @@ class EndlessStream:
 def test_a_camera_that_is_disarmed_meanwhile_answers_as_one_that_is_not_armed(
     ask: Callable[[AravisCamera], object],
 ) -> None:
-    camera = Overtaken("view", IP, PROFILE, SHAPE)
+    camera = Overtaken("view", IP, PROFILE, SHAPE, JUMBO)
     try:
         assert ask(camera) in (None, StreamCounters())
     except AttributeError as error:

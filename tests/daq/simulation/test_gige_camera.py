@@ -9,6 +9,7 @@ import pytest
 
 from daq.drivers.aravis_camera import AravisCamera
 from daq.drivers.camera_profile import load_camera_profile
+from daq.network import Network
 from daq.shot import FiredTrain, Image
 from daq.simulation.camera.gige_camera import SimulatedCamera
 from daq.simulation.camera.light import Exposure
@@ -48,7 +49,7 @@ def simulated(scene: SlowScene) -> Iterator[SimulatedCamera]:
 
 @pytest.fixture
 def camera(simulated: SimulatedCamera) -> Iterator[AravisCamera]:
-    with AravisCamera("view1", IP, PROFILE, SHAPE) as camera:
+    with AravisCamera("view1", IP, PROFILE, SHAPE, Network()) as camera:
         camera.arm()
         yield camera
 
@@ -121,7 +122,7 @@ def test_the_same_camera_can_be_switched_on_again(scene: SlowScene) -> None:
     simulated = SimulatedCamera("view1", IP, "SN36", PROFILE.camera_timing, scene, SHAPE)
     simulated.kill()
     for _ in range(2):
-        with simulated, AravisCamera("view1", IP, PROFILE, SHAPE) as camera:
+        with simulated, AravisCamera("view1", IP, PROFILE, SHAPE, Network()) as camera:
             camera.arm()
             camera.begin_shot()
             fire(simulated, 1)

@@ -15,6 +15,7 @@ from daq.drivers.gige_question import controller_of
 from daq.drivers.serial_pulse_generator import SerialPulseGenerator
 from daq.errors import DeviceError, DeviceUnavailable
 from daq.faults import LABORATORY_FAULTS, LASTING_FAULTS, Fault, FaultKind, ScriptedFault
+from daq.network import Network
 from daq.shot import FiredTrain
 from daq.simulation.camera.gige_camera import SimulatedCamera
 from daq.simulation.interlock import MemoryInterlock
@@ -162,7 +163,7 @@ def test_a_fault_beyond_all_measure_is_refused(wrong: dict[str, Any]) -> None:
 
 
 def test_a_camera_with_power_again_has_factory_settings_and_another_clock(laboratory: SimulatedLaboratory) -> None:
-    with AravisCamera(VIEW, IP, PROFILE, SHAPE) as camera:
+    with AravisCamera(VIEW, IP, PROFILE, SHAPE, Network()) as camera:
         camera.arm()
         time.sleep(0.5)
         before_ns = camera._connected().clock_ns()

@@ -127,6 +127,15 @@ def test_a_flaw_is_named_and_mended_or_left_alone(
     assert told(capsys, "repair", run_dir, status=0 if mended else 1)["done"] == []
 
 
+def test_a_run_without_its_shots_says_how_many_there_were(run_dir: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    shutil.rmtree(run_dir / "shots")
+    (found,) = told(capsys, "verify", run_dir, status=1)["runs"]
+    assert (found["outcome"], found["shots"], found["sound_shots"]) == ("completed", 3, 0)
+    (flaw,) = found["flaws"]
+    assert (flaw["kind"], flaw["file"]) == ("missing", "shots")
+    assert "has no folder shots; 3 shots" in flaw["text"]
+
+
 def test_a_lost_header_is_written_anew_from_the_shots_and_what_is_lost_is_named(
     run_dir: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -72,6 +72,7 @@ def test_both_examples_are_the_rig_of_table_1(name: str) -> None:
         ("pitch_mm = 1.0", "pich_mm = 1.0", r"target\.pich_mm: 1\.0 Extra inputs are not permitted"),
         ("range_mm = [-5.0, 5.0]", "range_mm = [5.0, -5.0]", r"stage\.range_mm: .* first value must be below"),
         ('host = "127.0.0.1"', 'host = "0.0.0.0"', r"server: host 0\.0\.0\.0 .* set a token"),
+        ('data_dir = "runs"', r'data_dir = "ru\u0000ns"', r"server\.data_dir: .*NUL"),
         ("[simulation]", "[simulations]", r"simulations: .*not permitted"),
         ("seed = 1", "seed = = 1", r"rig\.toml: Invalid value \(at line \d+"),
     ],

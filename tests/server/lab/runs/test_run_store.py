@@ -1,6 +1,7 @@
 """Lists of many runs: what is told, and that no file is opened that has not changed."""
 
 import os
+import shutil
 import sqlite3
 from contextlib import suppress
 from datetime import UTC, datetime, timedelta
@@ -114,6 +115,19 @@ def test_an_index_cut_in_its_middle_is_made_anew(tmp_path: Path) -> None:
     file.write_bytes(file.read_bytes()[: file.stat().st_size // 2])
     assert RunStore(tmp_path / "runs", RunStatus, RunIndex(file)).newest() == told
     assert len(told) == len(runs)
+
+
+def test_a_run_that_was_deleted_leaves_the_index_although_another_one_came(tmp_path: Path) -> None:
+    index = RunIndex(tmp_path / "runs.sqlite")
+    store = RunStore(tmp_path / "runs", RunStatus, index)
+    gone = write_run(tmp_path / "runs" / "20260301T120000-gone")
+    for run_dir in (gone, write_run(tmp_path / "runs" / "20260301T120001-stays")):
+        store.summary(run_dir.name)
+    shutil.rmtree(gone)
+    write_run(tmp_path / "runs" / "20260301T120002-new")
+    assert [run.run_id for run in store.newest()] == ["20260301T120002-new", "20260301T120001-stays"]
+    rows = index._database.execute("SELECT run_id FROM run ORDER BY run_id").fetchall()
+    assert rows == [("20260301T120001-stays",), ("20260301T120002-new",)]
 
 
 def test_where_no_index_can_be_written_runs_are_listed_even_so(run_dir: Path, tmp_path: Path) -> None:
