@@ -22,7 +22,11 @@ def serve(options: Namespace) -> Outcome:
 
     config = load_config(options.config)
     server = config.server.moved(options.host, options.port)
-    with listening(server.host, server.port) as port_held, hold_data_dir(server.data_dir):
+    with (
+        listening(server.host, server.port) as port_held,
+        listening(server.host, server.abort_port) as abort_port,
+        hold_data_dir(server.data_dir),
+    ):
         address = f"[{server.host}]" if ":" in server.host else server.host
         progress(
             f"{config.name}: opening all devices; then the page is at http://{address}:{server.port}; Ctrl-C ends it"
@@ -30,5 +34,5 @@ def serve(options: Namespace) -> Outcome:
         with hold_rig(config):  # is asked before the server is loaded, which takes seconds
             from server.web.serve import serve_rig
 
-        serve_rig(config.model_copy(update={"server": server}), port_held)
+        serve_rig(config.model_copy(update={"server": server}), port_held, abort_port)
     return Outcome({})

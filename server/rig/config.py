@@ -136,6 +136,9 @@ class ServerConfig(FrozenModel):
         "127.0.0.1"
     )
     port: Annotated[int, Field(ge=1, le=65535, description="TCP port")] = 8080
+    abort_port: Annotated[
+        int, Field(ge=0, le=65535, description="TCP port of ABORT alone, which needs no token; 0: any free one")
+    ] = 0
     data_dir: Annotated[
         Path,
         AfterValidator(_possible),

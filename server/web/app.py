@@ -31,9 +31,11 @@ from server.lab.runs.run_index import INDEX_FILE, RunIndex
 from server.lab.runs.run_store import RunStore
 from server.lab.runs.unkept_runs import UnkeptRuns
 from server.lab.services import Context, Services
+from server.lab.starting.abort import abort_all
 from server.lab.starting.readiness import reasons_against
 from server.lab.watch import CalibrationWatch
-from server.web import problems
+from server.web import port, problems
+from server.web.abort_listener import AbortListener
 from server.web.api import (
     bench,
     calibrations,
@@ -79,20 +81,22 @@ _SHUTDOWN_S = 3
 _DUTIES = ("processing", "automatic reconstruction", "lamps", "state of the rig", "live view")
 
 
-def create_app(services: Services) -> FastAPI:
+def create_app(services: Services, abort_port: socket.socket | None = None) -> FastAPI:
     """Build the application.
 
     Parameters
     ----------
     services : Services
         Opened rig, acquisition, engine (started and ended with the application), configuration.
+    abort_port : socket | None
+        Where ABORT alone is listened for; None: any free port.
     """
-    app = create_api(services)
+    app = create_api(services, abort_port)
     mount_page(app, services.config)
     return app
 
 
-def create_api(services: Services) -> FastAPI:
+def create_api(services: Services, abort_port: socket.socket | None = None) -> FastAPI:
     """Build the application without the page."""
     app = FastAPI(
         title="tomoshadow",
@@ -100,7 +104,7 @@ def create_api(services: Services) -> FastAPI:
         openapi_url="/api/openapi.json",
         docs_url=None,
         redoc_url=None,
-        lifespan=lambda app: _life(app, services),
+        lifespan=lambda app: _life(app, services, abort_port),
         responses=problems.responses(400, 401, 403, 422),
     )
     problems.install(app)
@@ -164,7 +168,7 @@ def serve(app: FastAPI, listener: socket.socket, leave: Callable[[str], None]) -
 
 
 @asynccontextmanager
-async def _life(app: FastAPI, services: Services) -> AsyncIterator[None]:
+async def _life(app: FastAPI, services: Services, abort_port: socket.socket | None) -> AsyncIterator[None]:
     services.data_dir.mkdir(parents=True, exist_ok=True)
     services.events.attach()
     async with AsyncExitStack() as stack:
@@ -173,6 +177,8 @@ async def _life(app: FastAPI, services: Services) -> AsyncIterator[None]:
         await stack.enter_async_context(services.engine)
         index = stack.enter_context(closing(RunIndex(services.data_dir / INDEX_FILE)))
         context = app.state.context = _context(services, jobs_table, index)
+        held = abort_port or stack.enter_context(port.listening(services.config.server.host, 0))
+        app.state.abort_listener = stack.enter_context(_abort_listener(services, held))
         await context.monitor.ask()
         follow = partial(follow_acquisition, context)
         works: tuple[Work, ...] = (
@@ -185,6 +191,12 @@ async def _life(app: FastAPI, services: Services) -> AsyncIterator[None]:
         for duty, work in zip(context.duties, works, strict=True):
             await stack.enter_async_context(_in_background(duty.keep(work)))
         yield
+
+
+def _abort_listener(services: Services, held: socket.socket) -> AbortListener:
+    has_token = services.config.server.token is not None
+    names = None if has_token else [name.lower() for name in services.host_names]
+    return AbortListener(partial(abort_all, services), held, names)
 
 
 def _context(services: Services, table: JobTable, index: RunIndex) -> Context:

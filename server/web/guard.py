@@ -57,7 +57,7 @@ class Guard:
     def _refusal(self, scope: Scope) -> Response | None:
         headers = Headers(scope=scope)
         host = headers.get("host", "")
-        if self._token is None and not self._is_ours(host):
+        if self._token is None and not is_ours(host, self._host_names):
             return _refuse(403, f"host {host!r} is not a name of this server")
         origin = headers.get("origin")
         if origin is not None and urlsplit(origin).netloc.lower() != host.lower():
@@ -68,12 +68,14 @@ class Guard:
             return RedirectResponse(SIGN_IN_PATH, 303)
         return _refuse(401, "a token is needed: header 'Authorization: Bearer <token>'")
 
-    def _is_ours(self, host: str) -> bool:
-        try:
-            name = urlsplit(f"//{host}").hostname or ""
-        except ValueError:
-            return False
-        return name == "localhost" or name in self._host_names or _is_loopback(name)
+
+def is_ours(host: str, host_names: Collection[str] = ()) -> bool:
+    """Whether a ``Host`` header names the loopback interface, or is one of these names, which are lower case."""
+    try:
+        name = urlsplit(f"//{host}").hostname or ""
+    except ValueError:
+        return False
+    return name == "localhost" or name in host_names or _is_loopback(name)
 
 
 def _offers(headers: Headers, token: str) -> bool:

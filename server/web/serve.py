@@ -18,15 +18,15 @@ _LAST_EVENTS_S = 3.0
 """A disk that does not keep up holds the end of a run back for longer; then its last event is in the log alone."""
 
 
-def serve_rig(config: RigConfig, port_held: socket.socket) -> None:
+def serve_rig(config: RigConfig, port_held: socket.socket, abort_port: socket.socket) -> None:
     """Serve a rig until SIGINT or SIGTERM; the light is off before and after.
 
     Parameters
     ----------
     config : RigConfig
         What to serve; its data directory is held by the caller.
-    port_held : socket
-        Where to listen.
+    port_held, abort_port : socket
+        Where to listen, for everything and for ABORT alone.
 
     Raises
     ------
@@ -48,7 +48,7 @@ def serve_rig(config: RigConfig, port_held: socket.socket) -> None:
                 tasks=TASKS,
                 laboratory=assembled.laboratory,
             )
-            serve(create_app(services), port_held, partial(leave, acquisition, events))
+            serve(create_app(services, abort_port), port_held, partial(leave, acquisition, events))
 
 
 def leave(acquisition: Acquisition, events: EventPublisher, cause: str) -> None:

@@ -21,6 +21,7 @@ from server.lab.events import EventPublisher
 from server.lab.jobs import JobKind
 from server.lab.services import Services
 from server.pictures.previews import make_preview, preview_path, save_preview
+from server.web.abort_listener import AbortListener
 from server.web.app import create_api
 from tests.support.memory_rig import VIEWS, memory_config, served_rig
 
@@ -34,6 +35,13 @@ class Serving:
     http: httpx.Client
     port: int
     services: Services
+    app: FastAPI
+
+    @property
+    def abort_listener(self) -> AbortListener:
+        """The second door, for ABORT alone."""
+        listener: AbortListener = self.app.state.abort_listener
+        return listener
 
     def run_to_its_end(self, plan: dict[str, Any]) -> tuple[str, RunStatus]:
         """Start a run and wait for it; its id and last status."""
@@ -129,12 +137,13 @@ def serving(
     token: str | None = None,
 ) -> Iterator[Serving]:
     """Serve a rig in memory until the block ends."""
-    with (
-        assembled(data_dir, engine=engine, views=views, token=token) as services,
-        listening(build(services)) as port,
-        httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=DEADLINE_S) as http,
-    ):
-        yield Serving(http, port, services)
+    with assembled(data_dir, engine=engine, views=views, token=token) as services:
+        app = build(services)
+        with (
+            listening(app) as port,
+            httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=DEADLINE_S) as http,
+        ):
+            yield Serving(http, port, services, app)
 
 
 @contextmanager

@@ -9,6 +9,7 @@ from daq.frozen_model import FrozenModel
 from daq.run.state import RunOutcome, RunState
 from server.lab.duty import Lamp
 from server.lab.runs.run_summary import RunCause
+from server.lab.starting.abort import abort_all
 from server.lab.watch import CalibrationStanding
 from server.web.api.parameters import ContextOf
 from server.web.problems import responses
@@ -72,8 +73,8 @@ async def show_configuration(context: ContextOf) -> dict[str, Any]:
 
 @router.post("/abort", status_code=202, responses=responses(503, 504))
 def abort_everything(context: ContextOf) -> AcquisitionView:
-    """Light off at once, whatever runs."""
-    context.services.acquisition.abort()
+    """Light off at once, whatever runs, and if nothing does. Its own port answers while the server is busy."""
+    abort_all(context.services)
     return view_of_acquisition(context)
 
 

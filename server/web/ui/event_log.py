@@ -32,7 +32,7 @@ def line_of(event: Event) -> str | None:
             text = whose + data["state"] + (f", {data['message']}" if data["message"] else "")
         case "shot_recorded":
             text = f"shot {data['index']} recorded" + ("" if data["valid"] else ", INVALID")
-        case "run_message":
+        case "run_message" | "abort":
             text = data["text"]
         case "job_changed":
             what = data["kind"] if data["shot"] is None else f"{data['kind']} of shot {data['shot']}"

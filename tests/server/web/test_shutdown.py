@@ -14,6 +14,7 @@ from tests.support.serving import DEADLINE_S, plan_of
 
 SCRIPT = """
 import sys
+import threading
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -28,7 +29,8 @@ def talkative_serve(services):
     started = uvicorn.Server.startup
     async def startup(server, sockets=None):
         await started(server, sockets)
-        print(server.servers[0].sockets[0].getsockname()[1], flush=True)
+        if threading.current_thread() is threading.main_thread():
+            print(server.servers[0].sockets[0].getsockname()[1], flush=True)
     uvicorn.Server.startup = startup
     with listening("127.0.0.1", 0) as listener:
         serve(app, listener, partial(leave, services.acquisition, services.events))
