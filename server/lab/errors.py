@@ -32,6 +32,10 @@ class Damaged(ServerError):
     """A file that the server keeps cannot be read; the text names it."""
 
 
+class Stale(ServerError):
+    """The request was too long on its way; what it asks for may not be wanted any more."""
+
+
 class Unprocessable(ServerError):
     """The request is well formed and makes no sense here."""
 

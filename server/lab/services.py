@@ -13,7 +13,9 @@ from daq.shot import Shot
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.runs.volume_parts import VolumeParts
 from server.lab.calibrations import CalibrationStore
+from server.lab.desk.beat import Beat
 from server.lab.desk.desk_watch import DeskWatch
+from server.lab.desk.once import Once
 from server.lab.duty import Duty, Lamp
 from server.lab.engine import Engine, Task
 from server.lab.events import EventPublisher
@@ -102,6 +104,8 @@ class Context:
     live: LiveFeed
     parts: VolumeParts
     duties: tuple[Duty, ...]
+    beat: Beat = field(default_factory=Beat)
+    once: Once = field(default_factory=Once)
 
     @property
     def lamps(self) -> tuple[Lamp, ...]:

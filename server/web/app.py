@@ -32,11 +32,14 @@ from server.lab.runs.run_store import RunStore
 from server.lab.runs.unkept_runs import UnkeptRuns
 from server.lab.services import Context, Services
 from server.lab.starting.abort import abort_all
+from server.lab.starting.alarms_now import alarms_now
 from server.lab.starting.readiness import reasons_against
 from server.lab.watch import CalibrationWatch
 from server.web import port, problems
 from server.web.abort_listener import AbortListener
 from server.web.api import (
+    alarms,
+    beat,
     bench,
     calibrations,
     droplets,
@@ -62,6 +65,7 @@ from server.web.ui.page import mount_page
 _RESOURCES = (
     rig,
     readiness,
+    alarms,
     live_view,
     single_shot,
     runs,
@@ -111,6 +115,7 @@ def create_api(services: Services, abort_port: socket.socket | None = None) -> F
     for resource in _RESOURCES:
         app.include_router(resource.router, dependencies=[Depends(forbid_unknown_query)])
     app.include_router(live.router)
+    app.include_router(beat.router)
     app.include_router(sign_in.router)
     app.add_api_route("/api/{path:path}", _nothing_here, methods=_METHODS, include_in_schema=False)
     token = services.config.server.token
@@ -212,7 +217,7 @@ def _context(services: Services, table: JobTable, index: RunIndex) -> Context:
         runner=JobRunner(services.engine, table, services.tasks, services.events, services.data_dir, store, watch),
         watch=watch,
         monitor=RigMonitor(services.rig, services.data_dir, lambda: acquisition.status().resting, services.laboratory),
-        desk=DeskWatch(acquisition.status, lambda: reasons_against(context)),
+        desk=DeskWatch(acquisition.status, lambda: reasons_against(context), lambda: alarms_now(context)),
         live=LiveFeed(services.rig.cameras, lambda: acquisition.newest_shot, acquisition.keep_live),
         parts=VolumeParts(),
         duties=tuple(Duty(name, services.events) for name in _DUTIES),

@@ -1,6 +1,7 @@
 """Errors as RFC 9457 problem documents: one table from error type to HTTP status."""
 
 import logging
+from collections.abc import Mapping
 from http import HTTPStatus
 from typing import Any
 
@@ -21,8 +22,8 @@ from daq.errors import (
     RecorderError,
     ShotFileError,
 )
-from daq.run.refusals import REMEDIES, RefusalCode
-from server.lab.errors import Conflict, Damaged, NotFound, ServerError, Unprocessable
+from daq.run.refusals import REMEDIES
+from server.lab.errors import Conflict, Damaged, NotFound, ServerError, Stale, Unprocessable
 
 MEDIA_TYPE = "application/problem+json"
 _LOG = logging.getLogger(__name__)
@@ -54,10 +55,19 @@ STATUS_OF: dict[type[Exception], HTTPStatus] = {
     DaqError: HTTPStatus.INTERNAL_SERVER_ERROR,
     NotFound: HTTPStatus.NOT_FOUND,
     Conflict: HTTPStatus.CONFLICT,
+    Stale: HTTPStatus.PRECONDITION_FAILED,
     Damaged: HTTPStatus.INTERNAL_SERVER_ERROR,
     Unprocessable: HTTPStatus.UNPROCESSABLE_ENTITY,
 }
 """The nearest base class in this table decides."""
+
+
+_REMEDIES: Mapping[str, str] = {
+    **{code.value: remedy for code, remedy in REMEDIES.items()},
+    "stale_request": "look at the rig, and ask again",
+    "in_progress": "wait for the answer of the first request",
+    "key_reused": "choose a new key for every request",
+}
 
 
 def status_of(error: Exception) -> HTTPStatus:
@@ -114,9 +124,9 @@ def describe(app: FastAPI) -> None:
 
 
 async def _on_known_error(request: Request, error: Exception) -> JSONResponse:
-    more = {"device": error.device} if isinstance(error, DeviceError) else {}
-    if isinstance(error, DaqError | ServerError) and error.code in tuple(RefusalCode):
-        more |= {"code": error.code, "remedy": REMEDIES[RefusalCode(error.code)]}
+    more: dict[str, str | None] = {"device": error.device} if isinstance(error, DeviceError) else {}
+    if isinstance(error, DaqError | ServerError) and error.code:
+        more |= {"code": error.code, "remedy": _REMEDIES.get(error.code)}
     return problem(request, status_of(error), str(error), f"urn:tomoshadow:{type(error).__name__}", **more)
 
 

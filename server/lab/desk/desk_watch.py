@@ -2,9 +2,10 @@
 
 import asyncio
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 from daq.run.events import RunStatus
+from server.lab.desk.alarms import Alarm, AlarmList
 from server.lab.desk.pace import Pace
 from server.lab.desk.reason import Reason
 from server.lab.desk.rig_state import RigState, rig_state
@@ -16,6 +17,8 @@ _STALE_S = 3.0
 
 Look = Callable[[], tuple[Reason, ...]]
 """Finds everything that speaks against a start; blocks."""
+FindAlarms = Callable[[], Iterable[Alarm]]
+"""Finds everything that is wrong; blocks."""
 
 
 class DeskWatch:
@@ -25,17 +28,23 @@ class DeskWatch:
     ----------
     status : Callable[[], RunStatus]
         What acquisition does; asked whenever somebody wants to know the state.
-    look : Look
+    look, find_alarms : Look, FindAlarms
         Asked twice a second, outside of the event loop.
     now_s : Callable[[], float]
         A clock that never goes back.
     """
 
     def __init__(
-        self, status: Callable[[], RunStatus], look: Look, now_s: Callable[[], float] = time.monotonic
+        self,
+        status: Callable[[], RunStatus],
+        look: Look,
+        find_alarms: FindAlarms = tuple,
+        now_s: Callable[[], float] = time.monotonic,
     ) -> None:
         self._status = status
         self._look = look
+        self._find_alarms = find_alarms
+        self._alarms = AlarmList()
         self._now_s = now_s
         self._pace = Pace(now_s)
         self._found: tuple[Reason, ...] = ()
@@ -46,6 +55,8 @@ class DeskWatch:
         while True:
             with duty.item("readiness"):
                 await asyncio.to_thread(self.look)
+            with duty.item("alarms"):
+                await asyncio.to_thread(self.look_for_alarms)
             await pause(_PERIOD_S)
 
     def look(self) -> RigState:
@@ -53,6 +64,19 @@ class DeskWatch:
         self._found = self._look()
         self._found_s = self._now_s()
         return self.state
+
+    def look_for_alarms(self) -> tuple[Alarm, ...]:
+        """Look now; blocks."""
+        return self._alarms.update(self._find_alarms())
+
+    @property
+    def alarms(self) -> tuple[Alarm, ...]:
+        """What was wrong at the last look."""
+        return self._alarms.now
+
+    def acknowledge(self, alarm_id: str) -> Alarm:
+        """An operator has seen an alarm; NotFound if it is gone."""
+        return self._alarms.acknowledge(alarm_id)
 
     @property
     def state(self) -> RigState:

@@ -9,7 +9,8 @@ from daq.frozen_model import FrozenModel
 from daq.run.state import RunState
 from daq.run_plan import LivePlan
 from server.lab.live import LiveCaption
-from server.web.api.parameters import ContextOf
+from server.lab.starting.light_request import obey
+from server.web.api.parameters import AsksForLight, ContextOf
 from server.web.problems import responses
 
 router = APIRouter(prefix="/api/rig/live", tags=["rig"])
@@ -32,10 +33,11 @@ def show_live(context: ContextOf) -> LiveView:
     return LiveView(state=status.state, plan=status.live, views=context.live.captions())
 
 
-@router.put("", responses=responses(409, 423, 503, 504))
-def start_live(plan: LivePlan, context: ContextOf) -> LiveView:
+@router.put("", responses=responses(409, 412, 423, 503, 504))
+def start_live(plan: LivePlan, context: ContextOf, asked: AsksForLight) -> LiveView:
     """Show the rig live; a live view of another plan ends first. Light that this rig does not permit answers 422."""
-    context.services.acquisition.start_live(plan)
+    start = context.services.acquisition.start_live
+    obey(context, asked, f"live {plan.model_dump_json()}", lambda: start(plan))
     return show_live(context)
 
 

@@ -2,13 +2,14 @@
 
 from typing import Annotated
 
-from fastapi import Depends, Path, Request
+from fastapi import Depends, Header, Path, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.routing import APIRoute
 from starlette.requests import HTTPConnection
 
 from daq.names import Identifier
 from server.lab.services import Context
+from server.lab.starting.light_request import LightRequest
 
 
 def context_of(connection: HTTPConnection) -> Context:
@@ -31,6 +32,20 @@ def forbid_unknown_query(request: Request) -> None:
         )
 
 
+def light_request(
+    idempotency_key: Annotated[
+        str | None,
+        Header(min_length=1, max_length=200, description="repeated with this key, the request is obeyed once"),
+    ] = None,
+    tomoshadow_beat: Annotated[
+        int | None, Header(ge=0, le=2**53, description="of /api/beat, heard last: more than 2 s later it is refused")
+    ] = None,
+) -> LightRequest:
+    """What a request that makes light says of itself."""
+    return LightRequest(key=idempotency_key, beat=tomoshadow_beat)
+
+
+AsksForLight = Annotated[LightRequest, Depends(light_request)]
 ContextOf = Annotated[Context, Depends(context_of)]
 RunId = Annotated[Identifier, Path(description="name of the run directory")]
 CalibrationId = Annotated[Identifier, Path(description="name of the calibration file, without its ending")]

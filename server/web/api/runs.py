@@ -8,8 +8,9 @@ from daq.files.run_directory import RunHeader
 from daq.run_plan import RunPlan
 from server.lab.errors import Conflict
 from server.lab.runs.run_summary import RunSummary
+from server.lab.starting.light_request import obey
 from server.lab.starting.run_start import start_run
-from server.web.api.parameters import ContextOf, RunId
+from server.web.api.parameters import AsksForLight, ContextOf, RunId
 from server.web.api.rig import AcquisitionView, view_of_acquisition
 from server.web.problems import responses
 
@@ -35,10 +36,10 @@ def list_runs(
     return runs
 
 
-@router.post("", status_code=201, responses=responses(409, 423, 503, 504))
-def create_run(plan: RunPlan, context: ContextOf, response: Response) -> AcquisitionView:
+@router.post("", status_code=201, responses=responses(409, 412, 423, 503, 504))
+def create_run(plan: RunPlan, context: ContextOf, asked: AsksForLight, response: Response) -> AcquisitionView:
     """Start a run. There is no queue: a busy rig answers 409, a plan that this rig cannot run 422."""
-    run_id = start_run(context, plan)
+    run_id = obey(context, asked, f"run {plan.model_dump_json()}", lambda: start_run(context, plan))
     response.headers["Location"] = f"/api/runs/{run_id}"
     return view_of_acquisition(context)
 

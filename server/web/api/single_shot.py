@@ -7,8 +7,9 @@ from pydantic import Field
 
 from daq.frozen_model import FrozenModel
 from daq.names import Identifier
+from server.lab.starting.light_request import obey
 from server.lab.starting.run_start import SingleShot, shoot
-from server.web.api.parameters import ContextOf
+from server.web.api.parameters import AsksForLight, ContextOf
 from server.web.api.rig import AcquisitionView, view_of_acquisition
 from server.web.problems import responses
 
@@ -33,10 +34,10 @@ async def list_unkept(context: ContextOf) -> UnkeptView:
     return UnkeptView(run_ids=context.unkept_runs.ids)
 
 
-@router.post("", status_code=201, responses=responses(409, 423, 503, 504))
-def take_shot(shot: SingleShot, context: ContextOf, response: Response) -> AcquisitionView:
+@router.post("", status_code=201, responses=responses(409, 412, 423, 503, 504))
+def take_shot(shot: SingleShot, context: ContextOf, asked: AsksForLight, response: Response) -> AcquisitionView:
     """Take one shot as a run of its own; a live view ends first. It is reconstructed on request only."""
-    run_id = shoot(context, shot)
+    run_id = obey(context, asked, f"shot {shot.model_dump_json()}", lambda: shoot(context, shot))
     response.headers["Location"] = f"/api/runs/{run_id}"
     return view_of_acquisition(context)
 

@@ -50,7 +50,7 @@ def test_a_run_takes_as_long_as_its_shots_do_and_before_the_first_one_as_planned
 
 def test_a_rig_that_nobody_has_looked_at_for_seconds_is_not_ready() -> None:
     now_s = [0.0]
-    watch = DeskWatch(RunStatus, tuple, lambda: now_s[0])
+    watch = DeskWatch(RunStatus, tuple, now_s=lambda: now_s[0])
     assert watch.state.state is RigWord.NOT_READY
     assert watch.look().state is RigWord.READY
     now_s[0] = 3.1

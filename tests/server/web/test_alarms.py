@@ -1,0 +1,65 @@
+"""What is wrong is told one by one, and acknowledged one by one."""
+
+from typing import Any
+
+import pytest
+
+from tests.support.server_process import eventually
+from tests.support.serving import Serving, plan_of
+
+
+@pytest.fixture
+def laboratory(server: Serving) -> Any:
+    return server.services.laboratory
+
+
+def alarms(server: Serving) -> dict[str, dict[str, Any]]:
+    return {alarm["source"]: alarm for alarm in server.http.get("/api/rig/alarms").json()}
+
+
+def await_alarms(server: Serving, *sources: str) -> dict[str, dict[str, Any]]:
+    eventually(lambda: set(alarms(server)) == set(sources), f"{sources} are told", lambda: str(alarms(server)))
+    return alarms(server)
+
+
+def acknowledge(server: Serving, alarm: dict[str, Any]) -> int:
+    return server.http.post(f"/api/rig/alarms/{alarm['id']}/acknowledge").status_code
+
+
+def test_two_causes_are_two_alarms_and_one_is_acknowledged_without_the_other(server: Serving, laboratory: Any) -> None:
+    assert alarms(server) == {}
+    laboratory.cameras["view2"].is_lost = True
+    laboratory.generator.trip("overcurrent")
+    found = await_alarms(server, "view2", "pulse generator")
+    assert all(alarm["remedy"] for alarm in found.values())
+    assert found["pulse generator"]["latched"]
+    assert acknowledge(server, found["view2"]) == 202
+    assert [alarm["acknowledged"] for alarm in alarms(server).values()] == [True, False]
+    assert acknowledge(server, found["pulse generator"]) == 202
+    await_alarms(server, "view2")
+    laboratory.cameras["view2"].is_lost = False
+    await_alarms(server)
+    laboratory.cameras["view2"].is_lost = True
+    assert not await_alarms(server, "view2")["view2"]["acknowledged"], "the same thing has happened again"
+    assert acknowledge(server, found["pulse generator"]) == 404
+
+
+def test_a_run_that_failed_says_why_until_the_next_one(server: Serving, laboratory: Any) -> None:
+    laboratory.generator.silent_at = 1
+    run_id, status = server.run_to_its_end(plan_of(shots=3))
+    assert status.outcome == "failed"
+    alarm = await_alarms(server, f"run {run_id}")[f"run {run_id}"]
+    assert "no answer" in alarm["text"]
+    assert acknowledge(server, alarm) == 202
+    assert alarms(server)[f"run {run_id}"]["acknowledged"]
+    laboratory.generator.silent_at = None
+    server.run_to_its_end(plan_of(shots=1))
+    await_alarms(server)
+
+
+def test_an_open_door_is_no_alarm_and_a_fault_that_lasts_is_not_acknowledged(server: Serving, laboratory: Any) -> None:
+    laboratory.open_door()
+    laboratory.generator.trip("interlock")
+    alarm = await_alarms(server, "pulse generator")["pulse generator"]
+    assert acknowledge(server, alarm) == 423
+    assert not alarms(server)["pulse generator"]["acknowledged"]
