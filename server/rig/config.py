@@ -14,6 +14,7 @@ from daq.network import Network
 from daq.run.limits import AcquisitionLimits
 from processing.errors import BadInput
 from processing.runs.toml_lines import line_of
+from server.rig.device_config import InterlockConfig, PulseGeneratorConfig, StageConfig
 
 CurrentA = Annotated[float, Field(gt=0, le=30)]
 
@@ -97,36 +98,6 @@ class TargetConfig(FrozenModel):
     columns: Annotated[int, Field(ge=3, le=200, description="inner corners or dots along x")] = 23
     rows: Annotated[int, Field(ge=3, le=200, description="inner corners or dots along y")] = 17
     pitch_mm: Annotated[float, Field(gt=0, le=100, description="distance of neighbouring points")] = 1.0
-
-
-class PulseGeneratorConfig(FrozenModel):
-    """The microcontroller that fires light and cameras."""
-
-    port: Annotated[str, Field(min_length=1, description="serial port, best by its id: /dev/serial/by-id/...")]
-
-
-class InterlockConfig(FrozenModel):
-    """Input line of the door and enclosure switches."""
-
-    chip: Annotated[str, Field(min_length=1, description="for example /dev/gpiochip0")]
-    line: Annotated[int, Field(ge=0, le=1023, description="line of that chip")]
-    active_low: Annotated[bool, Field(description="the closed chain connects the line to ground")] = False
-
-
-class StageConfig(FrozenModel):
-    """Motorised stage of the calibration target; absent from a rig that has none."""
-
-    port: Annotated[str, Field(min_length=1, description="serial port, for example /dev/ttyUSB0")]
-    range_mm: Annotated[tuple[float, float], Field(description="lowest and highest z")]
-    zero_mm: Annotated[float, Field(description="position on the stage's own scale where z is 0")] = 0.0
-    microstep_um: Annotated[float, Field(gt=0, le=100, description="data sheet of the stage")] = 0.047625
-
-    @field_validator("range_mm")
-    @classmethod
-    def _rises(cls, range_mm: tuple[float, float]) -> tuple[float, float]:
-        if not range_mm[0] < range_mm[1]:
-            raise ValueError("the first value must be below the second")
-        return range_mm
 
 
 class ServerConfig(FrozenModel):

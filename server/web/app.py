@@ -42,23 +42,20 @@ from server.web.api import (
     beat,
     bench,
     calibrations,
-    droplets,
     events,
     jobs,
     live,
     live_view,
     readiness,
-    results,
     rig,
     runs,
     shots,
     sign_in,
     single_shot,
-    statistics,
     timing,
-    volume_parts,
 )
 from server.web.api.parameters import forbid_unknown_query
+from server.web.api.results import droplets, results, statistics, volume_parts
 from server.web.guard import Guard
 from server.web.ui.page import mount_page
 

@@ -14,7 +14,7 @@ from server.lab.results import part_of, preview_of, volume_file
 from server.lab.services import Context
 from server.pictures.pictures import plane_png
 from server.web.api.parameters import ContextOf, ResultsId, RunId
-from server.web.api.results import VolumeName
+from server.web.api.results.results import VolumeName
 from server.web.problems import responses
 
 router = APIRouter(prefix="/api/runs/{run_id}/results/{results_id}/{volume}", tags=["results"])
