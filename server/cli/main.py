@@ -27,9 +27,11 @@ from server.cli import (
     study,
 )
 from server.cli.calibrations import calibrate, check, self_calibrate, size_calibration
+from server.cli.cluster import scheduler, worker
 from server.cli.keeping import pack, repair, verify
 from server.cli.output import endable, say, tell
 from server.cli.spray import report, statistics
+from server.lab.errors import ServerError
 
 COMMANDS = (
     demo,
@@ -53,6 +55,8 @@ COMMANDS = (
     verify,
     repair,
     pack,
+    scheduler,
+    worker,
 )
 """In the order of the help. Each adds its own parser; what is heavy is imported when it runs, so that help is quick."""
 
@@ -67,7 +71,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             outcome = options.command(options)
     except (BadInput, PlanError, ShotFileError) as error:
         return _fail(options, error, status=2)
-    except (DaqError, MemoryError, OSError) as error:
+    except (DaqError, ServerError, MemoryError, OSError) as error:
         return _fail(options, error, status=1)
     except KeyboardInterrupt:
         return _fail(options, RuntimeError("interrupted"), status=1)

@@ -6,6 +6,7 @@ from pathlib import Path
 from server.doctor.checkup import Checkup, Status
 from server.doctor.doctor_host import check_host
 from server.doctor.doctor_rig import check_rig
+from server.doctor.doctor_scheduler import check_scheduler
 from server.rig.config import ConfigError, load_config
 
 
@@ -22,4 +23,6 @@ def examine(config_file: Path | None) -> Iterator[Checkup]:
         return
     yield Checkup("configuration", Status.OK, f"{config_file}: {config.name}, {len(config.views)} views")
     yield from check_host(config.server.data_dir)
+    if config.processing.scheduler:
+        yield check_scheduler(config.processing)
     yield from check_rig(config)

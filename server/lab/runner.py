@@ -15,7 +15,7 @@ from processing.calibration.verdict import BELONGING
 from processing.runs.measured_shot import droplets_path
 from server.lab.calibrations import CalibrationStore
 from server.lab.duty import Duty, pause
-from server.lab.engine import Engine, Task, TaskAborted, TaskError
+from server.lab.engine.task import Engine, Task, TaskAborted, TaskError, Unavailable
 from server.lab.errors import Conflict, told
 from server.lab.events import EventPublisher
 from server.lab.jobs import Job, JobKind, JobState, JobTable
@@ -195,12 +195,19 @@ class JobRunner:
             self._changed.set()
 
     async def _attempt(self, job: Job) -> None:
-        """Bring a job to its end; one that the server itself cannot do has failed, with the reason."""
+        """Bring a job to its end; one that the server itself cannot do has failed, with the reason.
+
+        One that nobody is there to do is queued again.
+        """
         try:
             await self._move(job.id, JobState.RUNNING)
             await self._settle(job)
         except Conflict:
             return  # aborted between being read from the table and being started
+        except Unavailable:
+            await pause(_REST_S)
+            await self._move(job.id, JobState.QUEUED)
+            raise
         except Exception as error:
             await pause(_REST_S)  # what is queued again at once would be tried again at once, for ever
             await self._move(job.id, JobState.FAILED, error=told(error))
@@ -218,6 +225,8 @@ class JobRunner:
             )
         except TaskAborted:
             await self._move(job.id, JobState.ABORTED)
+        except Unavailable:
+            raise
         except TaskError as error:
             await self._move(job.id, JobState.FAILED, error=str(error))
         else:

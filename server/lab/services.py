@@ -17,7 +17,7 @@ from server.lab.desk.beat import Beat
 from server.lab.desk.desk_watch import DeskWatch
 from server.lab.desk.once import Once
 from server.lab.duty import Duty, Lamp
-from server.lab.engine import Engine, Task
+from server.lab.engine.task import Engine, Task
 from server.lab.events import EventPublisher
 from server.lab.jobs import JobKind, JobTable
 from server.lab.live import LiveFeed

@@ -12,21 +12,24 @@ from processing.calibration.calibrate import calibrate
 from processing.calibration.calibration_file import load_calibration, save_calibration
 from processing.calibration.sets.calibration_set import load_calibration_set
 from processing.calibration.verdict import BELONGING
+from processing.kernels import DEFAULT_THREADS
 from processing.reconstruction.settings import ReconstructionSettings
+from processing.reconstruction.volume_file import write_slabs
 from processing.runs.measurement import MeasureSettings, RunMeasurement
-from processing.runs.pipeline import reconstruct_shot
+from processing.runs.pipeline import Keep, reconstruct_shot
 from processing.runs.run_check import check_shot
 from processing.runs.workbench import Workbench
-from server.lab.engine import Task
+from server.lab.engine.task import Task
 from server.lab.jobs import JobKind
 from server.lab.results import keep_preview, keep_volume
 
+_KEEPS: Mapping[str, Keep] = {"preview": keep_preview, "volume": keep_volume, "volume alone": write_slabs}
 WORKBENCH = Workbench()
 """Of this worker process, which does one job at a time."""
 
 
 def reconstruct(job: dict[str, Any], should_stop: Callable[[], bool]) -> dict[str, Any]:
-    """Reconstruct one shot; a preview is kept of each volume, or all of it where the job says so."""
+    """Reconstruct one shot; a preview is kept of each volume, or what else the job says under ``keep``."""
     result = reconstruct_shot(
         Path(job["run_dir"]),
         job["shot"],
@@ -35,8 +38,9 @@ def reconstruct(job: dict[str, Any], should_stop: Callable[[], bool]) -> dict[st
         Path(job["results_dir"]),
         should_stop,
         workbench=WORKBENCH,
+        threads=_threads(job),
         told=lambda: {BELONGING: json.dumps(job[BELONGING])} if job.get(BELONGING) else {},
-        keep=keep_volume if job.get("keep") == "volume" else keep_preview,
+        keep=_KEEPS[job.get("keep", "preview")],
     )
     return result.model_dump(mode="json")
 
@@ -46,7 +50,7 @@ def measure_shot(job: dict[str, Any], should_stop: Callable[[], bool]) -> dict[s
     settings = MeasureSettings.model_validate(job["settings"])
     with RunReader(Path(job["run_dir"])) as run:
         measurement = RunMeasurement.of(run, job["shot"], Path(job["calibration_file"]), settings)
-        measured = measurement.measure(job["shot"], Path(job["results_dir"]), should_stop=should_stop)
+        measured = measurement.measure(job["shot"], Path(job["results_dir"]), _threads(job), should_stop)
     return measured.summary.model_dump(mode="json")
 
 
@@ -77,6 +81,11 @@ def check_run(job: dict[str, Any], should_stop: Callable[[], bool]) -> dict[str,
     calibration = load_calibration(Path(job["calibration_file"]))
     should_stop()
     return check_shot(Path(job["run_dir"]), job["shot"], calibration, WORKBENCH).record()
+
+
+def _threads(job: Mapping[str, Any]) -> int:
+    """A worker that has a computer to itself says how many."""
+    return int(job.get("threads", DEFAULT_THREADS))
 
 
 TASKS: Mapping[JobKind, Task] = MappingProxyType(

@@ -17,12 +17,8 @@ from daq.errors import DeviceUnavailable
 from daq.run.shooting import RunObserver
 from daq.simulation.gpio_chip import CHIP_PATH, ChipUnsupported, SimulatedSwitchLine, free_line
 from daq.simulation.interlock import DoorSwitch, MemoryInterlock
-from server.rig.config import (
-    PulseGeneratorConfig,
-    RigConfig,
-    SimulationConfig,
-    StageConfig,
-)
+from server.rig.config import RigConfig, SimulationConfig
+from server.rig.device_config import PulseGeneratorConfig, StageConfig
 from server.rig.far_end_guest import FarEndGuest
 from server.rig.far_end_line import somebody_listens
 from server.rig.far_ends import run_far_ends, simulated_generator

@@ -15,6 +15,7 @@ from daq.run.limits import AcquisitionLimits
 from processing.errors import BadInput
 from processing.runs.toml_lines import line_of
 from server.rig.device_config import InterlockConfig, PulseGeneratorConfig, StageConfig
+from server.rig.processing_config import ProcessingConfig
 
 CurrentA = Annotated[float, Field(gt=0, le=30)]
 
@@ -216,6 +217,7 @@ class RigConfig(FrozenModel):
     stage: StageConfig | None = None
     network: NetworkConfig = NetworkConfig()
     acquisition: AcquisitionConfig = AcquisitionConfig()
+    processing: ProcessingConfig = ProcessingConfig()
     server: ServerConfig = ServerConfig()
     simulation: SimulationConfig | None = None
 

@@ -6,7 +6,7 @@ from functools import partial
 from daq.run.acquisition import Acquisition
 from processing.calibration.calibration_file import file_sha256
 from server.lab.calibrations import CalibrationStore
-from server.lab.engine import DaskEngine
+from server.lab.engine.engine_choice import engine_of
 from server.lab.events import EventPublisher
 from server.lab.services import Services
 from server.lab.tasks import TASKS
@@ -44,7 +44,7 @@ def serve_rig(config: RigConfig, port_held: socket.socket, abort_port: socket.so
                 rig=assembled.rig,
                 acquisition=acquisition,
                 events=events,
-                engine=DaskEngine(modules=sorted({task.__module__ for task in TASKS.values()})),
+                engine=engine_of(config.processing, sorted({task.__module__ for task in TASKS.values()})),
                 tasks=TASKS,
                 laboratory=assembled.laboratory,
             )

@@ -29,7 +29,7 @@ class ServerProcess:
     """
 
     def __init__(self, work_dir: Path, config: Path) -> None:
-        port = _free_port()
+        port = free_port()
         command = [sys.executable, "-m", "server.cli", "serve", "--config", str(config), "--port", str(port)]
         with (work_dir / "serve.log").open("a") as log:
             self._process = subprocess.Popen(command, cwd=work_dir, env=ENVIRONMENT, stderr=log, stdout=log)
@@ -69,7 +69,8 @@ def eventually(is_so: Callable[[], bool], what: str, why: Callable[[], str] = st
         time.sleep(0.05)
 
 
-def _free_port() -> int:
+def free_port() -> int:
+    """A port of the loopback interface that nobody listens at."""
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         return int(free.getsockname()[1])

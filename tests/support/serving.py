@@ -16,7 +16,8 @@ from fastapi import FastAPI
 from daq.run.acquisition import Acquisition
 from daq.run.events import RunStatus
 from processing.volume import VoxelGrid
-from server.lab.engine import Engine, InlineEngine
+from server.lab.engine.inline_engine import InlineEngine
+from server.lab.engine.task import Engine
 from server.lab.events import EventPublisher
 from server.lab.jobs import JobKind
 from server.lab.services import Services

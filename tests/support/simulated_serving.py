@@ -19,7 +19,7 @@ from daq.run.limits import AcquisitionLimits
 from daq.run.state import RunOutcome
 from daq.run_plan import RunPlan
 from daq.simulation.laboratory import SimulatedLaboratory
-from server.lab.engine import InlineEngine
+from server.lab.engine.inline_engine import InlineEngine
 from server.lab.events import EventPublisher
 from server.lab.services import Services
 from server.rig.assembly import AssembledRig, open_rig

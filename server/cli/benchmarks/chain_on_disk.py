@@ -14,7 +14,7 @@ from processing.benchmarks.targets import Measured
 from processing.runs.pipeline import reconstruct_shots
 from server.cli.benchmarks.recorded_run import RecordedRun, record_run
 from server.cli.benchmarks.whole_command import cost_of
-from server.lab.engine import DaskEngine
+from server.lab.engine.dask_engine import DaskEngine
 from server.lab.results import keep_preview
 from server.lab.tasks import reconstruct
 

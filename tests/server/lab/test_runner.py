@@ -9,7 +9,8 @@ import pytest
 
 from server.lab.calibrations import CalibrationStore
 from server.lab.duty import Duty
-from server.lab.engine import InlineEngine
+from server.lab.engine.inline_engine import InlineEngine
+from server.lab.engine.task import OnProgress, Task, Unavailable, Values
 from server.lab.errors import Conflict
 from server.lab.events import EventPublisher
 from server.lab.jobs import Job, JobKind, JobState, JobTable, check_job, reconstruction_job
@@ -46,6 +47,14 @@ class Laboratory:
         self.table = table
         self._events = events
 
+    async def trouble(self) -> str:
+        """What the first red lamp of the work says."""
+        async with asyncio.timeout(DEADLINE_S):
+            async for event in self._events.follow(0):
+                if event is not None and event.name == "background_work" and event.data["error"]:
+                    return str(event.data["error"])
+        raise AssertionError("the events ended")
+
     async def reach(self, job: Job, state: JobState) -> Job:
         async with asyncio.timeout(DEADLINE_S):
             async for event in self._events.follow(0):
@@ -56,10 +65,12 @@ class Laboratory:
 
 
 @asynccontextmanager
-async def at_work(tmp_path: Path, task: Callable[..., dict[str, Any]]) -> AsyncIterator[Laboratory]:
+async def at_work(
+    tmp_path: Path, task: Callable[..., dict[str, Any]], engine_of: Callable[[], InlineEngine] = InlineEngine
+) -> AsyncIterator[Laboratory]:
     events, table = EventPublisher(), JobTable(tmp_path / "jobs.sqlite")
     events.attach()
-    async with InlineEngine() as engine:
+    async with engine_of() as engine:
         store = CalibrationStore(tmp_path / "calibrations")
         watch = CalibrationWatch(events)
         tasks = dict.fromkeys((JobKind.RECONSTRUCTION, JobKind.CHECK), task)
@@ -170,3 +181,31 @@ def test_what_droplets_say_of_the_calibration_comes_with_every_job(tmp_path: Pat
             assert done.result == {"heard": expected, "belonging": expected}
 
     asyncio.run(go())
+
+
+def test_a_job_that_nobody_is_there_to_do_waits_and_the_lamp_says_why(tmp_path: Path) -> None:
+    away = [True]
+
+    async def go() -> None:
+        async with at_work(tmp_path, answer, lambda: AwayEngine(away)) as laboratory:
+            job = laboratory.runner.submit(job_of(0))
+            await laboratory.reach(job, JobState.RUNNING)
+            assert "scheduler is away" in await laboratory.trouble()
+            assert laboratory.table.get(job.id).state is JobState.QUEUED
+            away[0] = False
+            assert (await laboratory.reach(job, JobState.DONE)).error is None
+
+    asyncio.run(go())
+
+
+class AwayEngine(InlineEngine):
+    """One that now and then cannot be reached."""
+
+    def __init__(self, away: list[bool]) -> None:
+        super().__init__()
+        self._away = away
+
+    async def submit(self, job_id: str, task: Task, job: Values, on_progress: OnProgress) -> dict[str, Any]:
+        if self._away[0]:
+            raise Unavailable("the scheduler is away")
+        return await super().submit(job_id, task, job, on_progress)

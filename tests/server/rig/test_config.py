@@ -129,3 +129,33 @@ def test_lines_of_keys_tables_and_their_elements() -> None:
     assert line_of(text, ("f", 1, "x")) == 7
     assert line_of(text, ("g", "h", "i")) == 9
     assert line_of(text, ("nowhere",)) is None
+
+
+@pytest.mark.parametrize(
+    ("lines", "text"),
+    [
+        ('scheduler = "lab:8786"', "processing.scheduler: 'lab:8786' is no address of a scheduler, for example tls://"),
+        ('scheduler = "tcp://10.0.0.1:8786"', "'tcp://10.0.0.1:8786' leaves this computer without encryption"),
+        (
+            'scheduler = "tls://10.0.0.1:8786"',
+            "scheduler tls://10.0.0.1:8786: needs certificates, the folder",
+        ),
+        (
+            'scheduler = "tls://10.0.0.1:8786"\ncertificates = "lab"',
+            "processing.certificates: 'lab' there is no file {folder}/lab/ca.pem; docs/cluster.md tells how to make it",
+        ),
+        ('scheduler = "tcp://127.0.0.1:8786"\nworkers = 2', "workers: of this computer; with a scheduler, tomoshadow"),
+        ('paths = { "/data" = "/mnt/data" }', "paths: of a scheduler, and there is none; name it, or leave it out"),
+        ('memory_per_worker = "much"', "processing.memory_per_worker: 'much' String should match pattern"),
+    ],
+)
+def test_processing_that_cannot_be_is_told_with_file_and_key(lines: str, text: str, tmp_path: Path) -> None:
+    file = tmp_path / "rig.toml"
+    small = (
+        Path("configs/simulated_small.toml").read_text().replace('"cameras/', f'"{Path("configs").absolute()}/cameras/')
+    )
+    file.write_text(f"{small}\n[processing]\n{lines}\n")
+    with pytest.raises(ConfigError) as error:
+        load_config(file)
+    assert str(error.value).startswith(f"{file}:")
+    assert text.format(folder=tmp_path) in str(error.value)

@@ -10,7 +10,9 @@ from typing import Any
 
 import pytest
 
-from server.lab.engine import DaskEngine, Engine, InlineEngine, TaskAborted, TaskError
+from server.lab.engine.dask_engine import DaskEngine
+from server.lab.engine.inline_engine import InlineEngine
+from server.lab.engine.task import Engine, TaskAborted, TaskError
 
 ENGINES = pytest.mark.parametrize("make", [InlineEngine, DaskEngine])
 

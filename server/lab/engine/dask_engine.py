@@ -1,0 +1,103 @@
+"""DaskEngine: runs tasks in worker processes of this computer."""
+
+# mypy: allow-untyped-calls
+# distributed is typed in parts only.
+
+from collections.abc import Sequence
+from contextlib import AsyncExitStack
+from types import TracebackType
+from typing import Any, Self
+
+from dask import config
+from distributed import Client, Event, LocalCluster, Nanny
+
+from server.lab.engine.in_worker import PROGRESS_TOPIC, Errand, Prepared, abort_event, perform_errand
+from server.lab.engine.task import OnProgress, Task, TaskError, Values, settled
+
+ENVIRONMENT = "distributed.nanny.pre-spawn-environ"
+MEMORY_THAT_STAYS = {"MALLOC_MMAP_THRESHOLD_": 32 << 20, "MALLOC_TRIM_THRESHOLD_": 256 << 20}
+"""Distributed lets workers give memory back at once; measured: finding it anew doubles the CPU time of a shot."""
+
+_NICENESS = 10  # measured: median answer time of the server under load falls from 65 to 24 ms
+
+
+class DaskEngine:
+    """Runs tasks in worker processes of this machine, reached on the loopback interface only.
+
+    Parameters
+    ----------
+    workers : int
+        Number of processes, one task each.
+    memory_limit : str
+        Memory per worker, for example ``"4GiB"``; a worker above it is restarted. ``"auto"``: an equal share.
+    modules : sequence of str
+        What every worker imports as soon as it has started: to load it takes longer than a shot does.
+    """
+
+    def __init__(self, workers: int = 1, memory_limit: str = "auto", modules: Sequence[str] = ()) -> None:
+        self.workers = workers
+        self._modules = modules
+        self._memory_limit = memory_limit
+        self._stack = AsyncExitStack()
+        self._client: Client | None = None
+        self._listeners: dict[str, OnProgress] = {}
+
+    async def __aenter__(self) -> Self:
+        environment = config.get(ENVIRONMENT) | MEMORY_THAT_STAYS
+        self._stack.enter_context(config.set({ENVIRONMENT: environment}))
+        cluster = await self._stack.enter_async_context(
+            LocalCluster(
+                n_workers=self.workers,
+                threads_per_worker=1,
+                processes=True,
+                asynchronous=True,
+                host="127.0.0.1",
+                dashboard_address="127.0.0.1:0",  # None would still open a fixed port
+                scheduler_kwargs={"dashboard": False},
+                memory_limit=self._memory_limit,
+                silence_logs=50,
+                worker_class=Nanny,
+            )
+        )
+        client = await self._stack.enter_async_context(Client(cluster, asynchronous=True))
+        await client.register_plugin(Prepared(self._modules, _NICENESS))
+        client.subscribe_topic(PROGRESS_TOPIC, self._on_progress)
+        self._client = client
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        await self.close()
+
+    def _on_progress(self, stamped: tuple[float, dict[str, int]]) -> None:
+        for job_id, steps in stamped[1].items():
+            if job_id in self._listeners:
+                self._listeners[job_id](steps)
+
+    async def submit(self, job_id: str, task: Task, job: Values, on_progress: OnProgress) -> dict[str, Any]:
+        """See ``Engine.submit``."""
+        client = self._started()
+        self._listeners[job_id] = on_progress
+        future = client.submit(perform_errand, task, Errand(job_id, dict(job)), pure=False)
+        try:
+            error = await future.exception()
+            return settled(error, None if error else await future)
+        finally:
+            future.release()  # a result that is still held is computed again when its worker dies
+            del self._listeners[job_id]
+            await Event(abort_event(job_id), client=client).clear()
+
+    async def abort(self, job_id: str) -> None:
+        """See ``Engine.abort``; cancelling the future would not stop a running task."""
+        await Event(abort_event(job_id), client=self._started()).set()
+
+    async def close(self) -> None:
+        """End scheduler and workers."""
+        self._client = None
+        await self._stack.aclose()
+
+    def _started(self) -> Client:
+        if self._client is None:
+            raise TaskError("the engine is not running")
+        return self._client
