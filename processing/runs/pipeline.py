@@ -3,7 +3,7 @@
 import json
 import resource
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from itertools import cycle
@@ -107,7 +107,7 @@ def reconstruct_shots(
     results_dir: Path,
     should_stop: Callable[[], bool] = lambda: False,
     **options: Unpack[Options],
-) -> Iterator[ShotResult]:
+) -> Generator[ShotResult, None, None]:
     """Reconstruct every exposure of some shots; the images of one are made while that before it is reconstructed.
 
     Parameters

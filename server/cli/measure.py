@@ -1,10 +1,12 @@
 """``tomoshadow measure``: the shots of runs become droplets; images without calibration: ``runs.single_view``."""
 
 from argparse import ArgumentTypeError, Namespace
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from server.cli.chosen_shots import selected_shots
+from server.cli.cluster.scheduler_option import add_scheduler, require_followed, shots_elsewhere
 from server.cli.light_option import add_light
 from server.cli.options import (
     Verbs,
@@ -23,10 +25,12 @@ from server.cli.runs.resuming import resumable
 from server.cli.runs.single_view import IN_THE_IMAGE, add_single_view, measure_single_view, refuse
 
 if TYPE_CHECKING:
+    from collections.abc import Generator
+
     from processing.analysis.exports.export import Export
     from processing.calibration.calibration import Calibration
     from processing.preprocessing import Polarity
-    from processing.runs.measured_shot import MeasuredShot
+    from processing.runs.measured_shot import ShotDroplets
     from processing.runs.measurement import MeasureSettings
 
 NAME = "measure"
@@ -65,6 +69,7 @@ def add(verbs: Verbs) -> None:
     parser.add_argument(
         "--export", type=_exports, default=(), metavar="csv,vtk,parquet", help="write droplets in these formats too"
     )
+    add_scheduler(parser)
     add_single_view(parser)
 
 
@@ -101,6 +106,7 @@ def measure(options: Namespace) -> Outcome:
 
     for export in options.export:
         export.require()
+    require_followed(options)
     if options.calibration is None:
         return measure_single_view(options)
     refuse(options, IN_THE_IMAGE, "is for droplets in 2-D, without --calibration")
@@ -179,41 +185,61 @@ def _measure_run(options: Namespace, settings: "MeasureSettings", run_dir: Path,
 def _measure_shots(
     options: Namespace, settings: "MeasureSettings", run_dir: Path, indices: list[int], out: Path
 ) -> dict[str, Any]:
-    from daq.files.run_directory import RunReader
     from processing.analysis.droplets.droplet_file import read_droplets
     from processing.analysis.droplets.droplet_statistics import droplet_statistics
     from processing.analysis.exports.export import export_droplets
     from processing.analysis.velocity.velocity_statistics import velocity_statistics
-    from processing.reconstruction.settings import GridSettings
-    from processing.runs.measurement import METHOD_VERSION, RunMeasurement
+    from processing.runs.measurement import METHOD_VERSION
     from processing.runs.recipe import recipe_sha256
 
-    with RunReader(run_dir) as run:
-        measurement = RunMeasurement.of(run, indices[0], options.calibration, settings)
-        shots: list[MeasuredShot] = []
-        for index in tracked(indices, lambda index: f"{run_dir.name}: shot {index}"):
-            shots.append(measurement.measure(index, out, usable_processors()))
+    shots: list[ShotDroplets] = []
+    with closing((_elsewhere if options.scheduler else _here)(options, settings, run_dir, indices, out)) as coming:
+        for _ in tracked(indices, lambda index: f"{run_dir.name}: shot {index}"):
+            shots.append(next(coming))
             for export in options.export:
-                export_droplets(out / shots[-1].summary.file, export)
+                export_droplets(out / shots[-1].file, export)
             _tell_faults(shots[-1])
-    stored = [read_droplets(out / shot.summary.file) for shot in shots]
+    stored = [read_droplets(out / shot.file) for shot in shots]
     return {
         "polarity": settings.polarity,
         "recipe_sha256": recipe_sha256(NAME, METHOD_VERSION, settings),
-        "grid": GridSettings.of(measurement.search.grid).model_dump(mode="json"),
-        "shots": [shot.summary.model_dump(mode="json") for shot in shots],
+        "grid": settings.model_dump(mode="json")["grid"],
+        "shots": [shot.model_dump(mode="json") for shot in shots],
         "statistics": droplet_statistics(stored).model_dump(mode="json"),
         "velocity": velocity_statistics(stored).model_dump(mode="json"),
-        "passed": any(shot.summary.verdict != "refused" for shot in shots),
+        "passed": any(shot.verdict != "refused" for shot in shots),
     }
 
 
-def _tell_faults(shot: "MeasuredShot") -> None:
-    for reason in shot.summary.reasons:
-        progress(f"shot {shot.summary.shot}: {shot.summary.verdict}: {reason}")
-    if velocity := shot.summary.velocity:
+def _here(
+    options: Namespace, settings: "MeasureSettings", run_dir: Path, indices: list[int], out: Path
+) -> "Generator[ShotDroplets, None, None]":
+    from daq.files.run_directory import RunReader
+    from processing.runs.measurement import RunMeasurement
+
+    with RunReader(run_dir) as run:
+        measurement = RunMeasurement.of(run, indices[0], options.calibration, settings)
+        for index in indices:
+            yield measurement.measure(index, out, usable_processors()).summary
+
+
+def _elsewhere(
+    options: Namespace, settings: "MeasureSettings", run_dir: Path, indices: list[int], out: Path
+) -> "Generator[ShotDroplets, None, None]":
+    from processing.runs.measured_shot import ShotDroplets
+    from server.lab.tasks import measure_shot
+
+    job = {"settings": settings.model_dump(mode="json")}
+    with closing(shots_elsewhere(options, measure_shot, run_dir, indices, out, job)) as coming:
+        yield from map(ShotDroplets.model_validate, coming)
+
+
+def _tell_faults(shot: "ShotDroplets") -> None:
+    for reason in shot.reasons:
+        progress(f"shot {shot.shot}: {shot.verdict}: {reason}")
+    if velocity := shot.velocity:
         for reason in velocity.reasons:
-            progress(f"shot {shot.summary.shot}: velocities {velocity.verdict}: {reason}")
+            progress(f"shot {shot.shot}: velocities {velocity.verdict}: {reason}")
 
 
 def droplets_table(result: dict[str, Any]) -> str:

@@ -2,12 +2,14 @@
 
 import resource
 from argparse import Namespace
+from contextlib import closing
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from processing.reconstruction.choices import VoxelType
 from server.cli.chosen_shots import selected_shots
+from server.cli.cluster.scheduler_option import add_scheduler, require_followed, shots_elsewhere
 from server.cli.options import (
     OPTIONS,
     Verbs,
@@ -28,6 +30,8 @@ from server.cli.runs.recipes import add_recipe, keeping_recipe, settings_of, wit
 from server.cli.runs.resuming import resumable
 
 if TYPE_CHECKING:
+    from collections.abc import Generator
+
     from processing.reconstruction.settings import ReconstructionSettings
     from processing.runs.shots.shot_result import ShotResult
 
@@ -46,6 +50,7 @@ def add(verbs: Verbs) -> None:
     add_reconstruction(parser)
     summary = "how volumes are stored: float16 keeps 11 bits in half the file of float32, uint8 256 steps"
     add_choice(parser, "voxels", VoxelType, summary)
+    add_scheduler(parser)
 
 
 def reconstruct(options: Namespace) -> Outcome:
@@ -53,6 +58,7 @@ def reconstruct(options: Namespace) -> Outcome:
     from processing.calibration.calibration_file import load_calibration
     from processing.reconstruction.settings import METHOD_VERSION, ReconstructionSettings
 
+    require_followed(options)
     calibration = load_calibration(options.calibration)
     command = (NAME, METHOD_VERSION)
     said = settings_of(
@@ -115,22 +121,36 @@ def _reconstruct_shots(
         return ask_droplets(run_dir, indices, load_calibration(options.calibration))
 
     shots: list[ShotResult] = []
-    coming = reconstruct_shots(
-        run_dir,
-        indices,
-        options.calibration,
-        settings,
-        out,
-        threads=usable_processors(),
-        told=lambda: belonging().provenance,
-    )
-    for _ in tracked(indices, lambda index: f"{run_dir.name}: shot {index} by {settings.method}"):
-        shot = next(coming)
-        if not shots:
-            _tell_slow_views(shot)
-        _tell_faults(shot)
-        shots.append(shot)
+    if options.scheduler:
+        coming = _elsewhere(options, settings, run_dir, indices, out, belonging())
+    else:
+        threads, told = usable_processors(), lambda: belonging().provenance
+        coming = reconstruct_shots(run_dir, indices, options.calibration, settings, out, threads=threads, told=told)
+    with closing(coming):
+        for _ in tracked(indices, lambda index: f"{run_dir.name}: shot {index} by {settings.method}"):
+            shot = next(coming)
+            if not shots:
+                _tell_slow_views(shot)
+            _tell_faults(shot)
+            shots.append(shot)
     return shots, belonging()
+
+
+def _elsewhere(
+    options: Namespace,
+    settings: "ReconstructionSettings",
+    run_dir: Path,
+    indices: list[int],
+    out: Path,
+    belonging: Belonging,
+) -> "Generator[ShotResult, None, None]":
+    from processing.calibration.verdict import BELONGING
+    from processing.runs.shots.shot_result import ShotResult
+    from server.lab.tasks import reconstruct as task
+
+    job = {"settings": settings.model_dump(mode="json"), "keep": "volume alone", BELONGING: belonging.record()}
+    with closing(shots_elsewhere(options, task, run_dir, indices, out, job)) as coming:
+        yield from map(ShotResult.model_validate, coming)
 
 
 def _tell_slow_views(shot: "ShotResult") -> None:

@@ -11,6 +11,7 @@ from processing.errors import BadInput
 from processing.runs.errors import PipelineError
 from server.cli.options import run_directory
 from server.cli.output import Outcome, progress
+from server.lab.errors import ServerError
 
 Work = Callable[[Path, Path], Outcome]
 """Run, directory of its results -> what was found."""
@@ -50,6 +51,6 @@ def _name(run_dir: Path) -> str:
 def _attempt(work: Work, name: str, run_dir: Path, out: Path) -> Outcome:
     try:
         return work(run_dir, out)
-    except (BadInput, DaqError, OSError) as error:
+    except (BadInput, DaqError, ServerError, OSError) as error:
         progress(f"{name}: {error}")
         return Outcome({"error": str(error), "kind": type(error).__name__, "passed": False}, f"failed: {error}")

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from processing.runs.results_file import Provenance
     from processing.runs.single_view.measurement import FlatSource
 
-IN_SPACE = ("grid", "twins", "light", "sizes", "ignore")
+IN_SPACE = ("grid", "twins", "light", "sizes", "ignore", "scheduler")
 """Options that need a calibration."""
 IN_THE_IMAGE = ("view", "um_per_px", "background")
 """Options that mean nothing with one."""
