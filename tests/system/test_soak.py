@@ -8,7 +8,7 @@ import pytest
 
 from daq.files.run_directory import DoubleFrame, ExposureRecord, FiredTrain, ImageKey, Shot
 from processing.synthetic.numbered import ImageNumber, numbered
-from tests.support import soak_faults
+from tests.support import soak_cluster, soak_faults, soak_workers
 from tests.support.simulated_serving import serving_bench, tiny_config
 from tests.support.soak_kill import Killed, kill_servers, mispaired_exposures, summary
 
@@ -81,3 +81,22 @@ def test_the_table_of_faults_counts_what_was_refused() -> None:
     assert rows[0].split() == ["(none)", "2", "3.0", "4.0", "1", "2"]
     assert [row.split()[0] for row in rows[1:]] == list(soak_faults.FAULTS)
     assert origin.endswith("load 0.5 to 1.5")
+
+
+def test_the_table_of_a_cluster_counts_lost_shots() -> None:
+    found = [soak_cluster.Fault(name, 0, 1, 2.0, 0.5) for name in soak_cluster.FAULTS]
+    found.append(soak_cluster.Fault("", 3, 0, 4.0, 1.5))
+    heads, *rows, origin = soak_cluster.summary(found).splitlines()
+    assert heads.startswith("what happens")
+    assert rows[0].split() == ["(none)", "2", "32", "3", "1", "4.0"]
+    assert rows[1].split()[-5:] == ["1", "16", "0", "1", "2.0"]
+    assert origin.endswith("load 0.5 to 1.5")
+
+
+def test_the_table_of_workers_tells_how_busy_they_were() -> None:
+    done = [soak_workers.Done("1 workers", 10.0, 9.5, 1.0), soak_workers.Done("2 workers", 5.0, 9.5, 2.0)]
+    heads, one, two, told = soak_workers.summary(done, 4, same=False).splitlines()
+    assert heads.split()[-1] == "load"
+    assert one.split() == ["1", "workers", "4", "10.0", "9.5", "0.95", "1.00", "2.38", "1.0"]
+    assert two.split()[2:7] == ["4", "5.0", "9.5", "1.90", "2.00"]
+    assert told.startswith("volumes are NOT the same bit by bit")
