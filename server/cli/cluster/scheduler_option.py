@@ -20,10 +20,11 @@ _OPTION_OF = {"paths": "path"}
 
 def add_scheduler(parser: ArgumentParser) -> None:
     """Let a command be told whose workers do its shots."""
-    group = parser.add_argument_group("on other computers (docs/cluster.md)")
-    group.add_argument("--scheduler", metavar="ADDRESS", help="tls://HOST:PORT; its workers do the shots")
-    add_certificates(group)
-    group.add_argument(
+    parser.add_argument(
+        "--scheduler", metavar="ADDRESS", help="tls://HOST:PORT; its workers do the shots, docs/cluster.md"
+    )
+    add_certificates(parser)
+    parser.add_argument(
         "--path",
         action="append",
         type=_renamed,
@@ -33,7 +34,7 @@ def add_scheduler(parser: ArgumentParser) -> None:
     )
 
 
-def add_certificates(parser: Any) -> None:
+def add_certificates(parser: ArgumentParser) -> None:
     """Let a command be told by what it is known to others."""
     parser.add_argument("--certificates", type=Path, metavar="DIR", help="folder of ca.pem, cert.pem and key.pem")
 

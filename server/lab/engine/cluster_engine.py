@@ -34,7 +34,7 @@ class _Sent:
     """An errand under way."""
 
     job_id: str
-    errand: Errand
+    name: str
     on_progress: OnProgress
     aborted: asyncio.Event = field(default_factory=asyncio.Event)
 
@@ -74,13 +74,13 @@ class ClusterEngine:
 
     async def submit(self, job_id: str, task: Task, job: Values, on_progress: OnProgress) -> dict[str, Any]:
         """See ``Engine.submit``."""
-        there, seen = await asyncio.to_thread(as_seen_by_workers, self._paths, job)
-        sent = _Sent(job_id, Errand(f"{self._session} {job_id}", there, version("tomoshadow"), seen), on_progress)
-        self._sent[sent.errand.name] = sent
+        sent = _Sent(job_id, f"{self._session} {job_id}", on_progress)
+        self._sent[sent.name] = sent
         limit_s = self._config.job_deadline_s
         try:
             async with asyncio.timeout(limit_s) as deadline:
-                return await self._insist(task, sent)
+                there, seen = await asyncio.to_thread(as_seen_by_workers, self._paths, job)
+                return await self._insist(task, sent, Errand(sent.name, there, version("tomoshadow"), seen))
         except TimeoutError as error:
             if not deadline.expired():
                 raise
@@ -90,7 +90,7 @@ class ClusterEngine:
                 f"(job_deadline_s): is a worker frozen, or are there too few of them?"
             ) from error
         finally:
-            del self._sent[sent.errand.name]
+            del self._sent[sent.name]
 
     async def abort(self, job_id: str) -> None:
         """See ``Engine.abort``."""
@@ -106,14 +106,14 @@ class ClusterEngine:
 
     async def _tell_to_abort(self, sent: _Sent) -> None:
         sent.aborted.set()
-        if self._link and not self._link.lost.is_set():
-            await self._link.tell_to_abort(sent.errand.name)
+        if self._link:
+            await self._link.tell_to_abort(sent.name)
 
-    async def _insist(self, task: Task, sent: _Sent) -> dict[str, Any]:
+    async def _insist(self, task: Task, sent: _Sent, errand: Errand) -> dict[str, Any]:
         """Ask one scheduler after the other until the task has ended."""
         while True:
             link = await self._linked(sent)
-            future = link.client.submit(perform_errand, task, sent.errand, pure=False)
+            future = link.client.submit(perform_errand, task, errand, pure=False)
             try:
                 error, is_lost = await self._outcome(link, future)
                 if isinstance(error, KilledWorker):
@@ -123,7 +123,7 @@ class ClusterEngine:
             finally:
                 with suppress(RuntimeError):  # of a client that is closed
                     future.release()  # a result that is still held is computed again when its worker dies
-                await link.forget(sent.errand.name)
+                await link.forget(sent.name)
 
     async def _outcome(self, link: SchedulerLink, future: "Future[Any]") -> tuple[BaseException | None, bool]:
         """What a task raised, if it has ended; and whether the scheduler was lost before that.

@@ -9,7 +9,7 @@ A link that is lost stays lost, and another one takes its place: what was asked 
 import asyncio
 import logging
 import time
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from contextlib import suppress
 from pathlib import Path
 from types import MappingProxyType
@@ -53,6 +53,13 @@ def security_of(certificates: Path | None) -> Security:
     return Security(require_encryption=True, tls_ca_file=str(certificates / CA), **files)
 
 
+def prepare() -> None:
+    """Let this process speak to a scheduler: what Dask logs of losses is told by errors that name the shot."""
+    config.set(LINK_SETTINGS)
+    for name in ("distributed", "distributed.client"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)
+
+
 def silent(scheduler: str, limit_s: float, limit: str, why: BaseException) -> Unavailable:
     """What an operator reads of a scheduler that does not answer."""
     reason = str(why.__cause__ or why) or type(why).__name__
@@ -88,8 +95,7 @@ class SchedulerLink:
         OSError
             There is no answer in time, or it is not the answer of a scheduler that may be trusted.
         """
-        logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what is lost is told by errors that name the shot
-        config.set(LINK_SETTINGS)
+        prepare()
         client = Client(address, security=security_of(certificates), asynchronous=True, timeout=within_s)
         try:
             async with asyncio.timeout(2 * within_s):  # the client itself knows why, if it comes to its end
@@ -103,26 +109,31 @@ class SchedulerLink:
     async def _look(self) -> None:
         """Task: ask the scheduler for its workers, until it does not answer."""
         scheduler: Any = self.client.scheduler
-        with suppress(OSError, TimeoutError):
+        try:
             while self.client.status == "running":
                 async with asyncio.timeout(ANSWER_S):
                     self.workers = len(await scheduler.ncores())
                 if self.workers:
                     self.workers_left_s = time.monotonic()
                 await asyncio.sleep(_LOOK_AGAIN_S)
-        self.lost.set()
+        except (OSError, TimeoutError):
+            pass  # which is what it looks for
+        finally:
+            self.lost.set()
 
     async def tell_to_abort(self, name: str) -> None:
         """Let an errand end at its next step, if scheduler and worker still hear."""
-        with suppress(OSError, TimeoutError):
-            async with asyncio.timeout(ANSWER_S):
-                await Event(abort_event(name), client=self.client).set()
+        await self._heard(Event(abort_event(name), client=self.client).set)
 
     async def forget(self, name: str) -> None:
         """Let the scheduler forget that an errand was told to end."""
-        with suppress(OSError, TimeoutError):
-            async with asyncio.timeout(ANSWER_S):
-                await Event(abort_event(name), client=self.client).clear()
+        await self._heard(Event(abort_event(name), client=self.client).clear)
+
+    async def _heard(self, tell: Callable[[], Awaitable[None]]) -> None:
+        if not self.lost.is_set():
+            with suppress(OSError, TimeoutError):
+                async with asyncio.timeout(ANSWER_S):
+                    await tell()
 
     async def close(self) -> None:
         """Leave the scheduler, which goes on for others."""

@@ -25,7 +25,7 @@ from distributed.core import rpc
 
 from server.lab.engine.dask_engine import ENVIRONMENT, MEMORY_THAT_STAYS
 from server.lab.engine.in_worker import THREADS_VARIABLE, Prepared
-from server.lab.engine.scheduler_link import CONNECT_S, LINK_SETTINGS, security_of, silent
+from server.lab.engine.scheduler_link import CONNECT_S, prepare, security_of, silent
 
 LOOPBACK, ALL = "127.0.0.1", "0.0.0.0"  # noqa: S104 - only with certificates
 _HTTP = f"{LOOPBACK}:0"  # None would take the address of the rest
@@ -151,9 +151,8 @@ async def _ask(options: WorkerOptions) -> None:
 
 
 def _prepare() -> None:
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)
     warnings.filterwarnings("ignore", "Couldn't detect a suitable IP address")  # of a computer without the internet
-    config.set(LINK_SETTINGS)
+    prepare()
 
 
 @asynccontextmanager
