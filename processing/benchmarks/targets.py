@@ -1,5 +1,6 @@
 """What reconstruction must reach on two cores with AVX-512, and what it should: the table that ``bench`` prints."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -68,13 +69,38 @@ CHAIN_CPU = Target("run on disk to previews of MLOS, per double exposure", "CPU-
 CHAIN_CORES = Target("cores busy meanwhile, of two", "cores", 1.7, 1.9)
 AVERAGE_CPU = Target("average, whole command", "CPU-s", 6, 3)
 AVERAGE_MEMORY = Target("average, peak resident memory of the whole command", "GB", 1.5, 0.8)
+FULL_SLICE = Target("slice of a volume that is not stored, of an exposure looked at before", "ms", 50, 20)
+FIRST_SLICE = Target("the same, of another exposure of the run", "ms", 500, 200)
+CAMERAS = {
+    8: Target("four cameras 1600 x 1200 px A/B recorded, 8 bit, per shot, simulators included", "CPU-s", 0.1, 0.06),
+    16: Target("four cameras 1600 x 1200 px A/B recorded, 16 bit, per shot, simulators included", "CPU-s", 0.2, 0.12),
+}
+TRIGGER = Target("trigger to volume in the API, full frames", "s", 2, 0.5)
+START = Target("server start, 10,000 runs on disk", "s", 5, 2)
 JOB = Target("what a job of the server adds to its work", "s", 0.3)
 
 
-def markdown_table(measured: tuple[Measured, ...]) -> str:
+Row = tuple[str, ...]
+HEADS: Row = ("work", "at least", "aim", "measured", "reached")
+
+
+def renewed(table: str, measured: Sequence[Measured]) -> str:
+    """A table with new lines in the place of old ones of the same work, and after those for which there was none."""
+    rows = {row[0]: row for row in _rows_of(table)}
+    for one, row in zip(measured, _rows(measured), strict=True):
+        before = next((work for work in rows if work.startswith(one.target.work)), row[0])
+        rows = {work if work != before else row[0]: old if work != before else row for work, old in rows.items()}
+        rows[row[0]] = row
+    return _table(list(rows.values()))
+
+
+def markdown_table(measured: Sequence[Measured]) -> str:
     """All that was measured, as Markdown that people read without rendering it, too."""
-    rows = [("work", "at least", "aim", "measured", "reached")]
-    rows += [
+    return _table(_rows(measured))
+
+
+def _rows(measured: Sequence[Measured]) -> list[Row]:
+    return [
         (
             f"{one.target.work} ({one.how})" if one.how else one.target.work,
             _figure(one.target.at_least, one.target),
@@ -84,7 +110,17 @@ def markdown_table(measured: tuple[Measured, ...]) -> str:
         )
         for one in measured
     ]
-    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
+
+
+def _rows_of(table: str) -> list[Row]:
+    """Cells of all lines of a table but its heads."""
+    lines = [line for line in table.splitlines() if line.startswith("|")]
+    return [tuple(cell.strip() for cell in line.strip("|").split("|")) for line in lines[2:]]
+
+
+def _table(rows: Sequence[Row]) -> str:
+    rows = [HEADS, *rows]
+    widths = [max(len(row[column]) for row in rows) for column in range(len(HEADS))]
     lines = ["| " + " | ".join(map(str.ljust, row, widths)) + " |" for row in rows]
     lines.insert(1, "| " + " | ".join("-" * width for width in widths) + " |")
     return "\n".join(lines)

@@ -14,6 +14,7 @@ import numpy as np
 from daq.files.run_directory import RunReader
 from daq.files.run_file import RUN_FILE
 from processing.calibration.calibration_file import file_sha256, load_calibration
+from processing.kernels import DEFAULT_THREADS
 from processing.preprocessing import Intensity
 from processing.reconstruction.choices import ReconstructionMethod
 from processing.reconstruction.planning.plan import Plan
@@ -82,9 +83,15 @@ class VolumeParts:
     """Makes parts of volumes; one at a time, whoever asks.
 
     It keeps what was looked at last: the references of one run, one plan, and ``EXPOSURES_KEPT`` exposures.
+
+    Parameters
+    ----------
+    threads : int
+        Of the kernels; the parts do not depend on it.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, threads: int = DEFAULT_THREADS) -> None:
+        self._threads = threads
         self._lock = Lock()
         self._references: Latest[References] = Latest()
         self._plans: Latest[Plan] = Latest()
@@ -106,7 +113,9 @@ class VolumeParts:
             exposure = self._exposure(recipe)
             whole = exposure.plan.grid
             part = part_within(whole, ranges_mm)
-            return VolumePart(exposure.part(part, method, recipe.settings.voxels), part.grid(whole), method)
+            return VolumePart(
+                exposure.part(part, method, recipe.settings.voxels, self._threads), part.grid(whole), method
+            )
 
     def _exposure(self, recipe: Recipe) -> SeenExposure:
         run_file, settings = recipe.run_dir / RUN_FILE, recipe.settings
@@ -125,8 +134,10 @@ class VolumeParts:
             require_match(recipe.run_dir.name, shot, calibration)
             references = self._references.of(run_key, lambda: read_references(run))
             plan = self._plans.of(plan_key, lambda: plan_of(calibration, recipe.settings, tuple(run.header.views)))
-            images = shot_intensities(run, shot, recipe.frame, recipe.settings, references=references)
-        return SeenExposure.of(plan, images)
+            images = shot_intensities(
+                run, shot, recipe.frame, recipe.settings, references=references, threads=self._threads
+            )
+        return SeenExposure.of(plan, images, self._threads)
 
 
 def stored_part(volume: Path, ranges_mm: RangesMm, method: ReconstructionMethod) -> VolumePart:

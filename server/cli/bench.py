@@ -1,10 +1,10 @@
-"""``tomoshadow bench``: how fast kernels and recorder are on this machine."""
+"""``tomoshadow bench``: how fast kernels, recorder, commands and server are on this machine."""
 
 import os
 import tempfile
 import time
 from argparse import Namespace
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +13,9 @@ from server.cli.options import Verbs, add_verb
 from server.cli.output import Outcome, progress, table
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from processing.benchmarks.scene import SpeedStudy
     from processing.benchmarks.speed import SpeedResult
     from processing.benchmarks.targets import Measured
 
@@ -22,6 +25,8 @@ TABLE_BEGIN, TABLE_END = "<!-- bench -->", "<!-- /bench -->"
 RECORDED_SHOTS = 24
 RECORDER_DEADLINE_S = 120.0
 QUICK_SHOTS = 3
+PARTS = ("kernels", "recorder", "previews", "average", "slices", "jobs", "cameras", "trigger", "start")
+"""In this order; each can be measured alone."""
 
 
 class BenchError(BadInput):
@@ -32,33 +37,92 @@ def add(verbs: Verbs) -> None:
     """Add the command."""
     parser = add_verb(verbs, "bench", bench, "speed of kernels and recorder against plain numpy and OpenCV")
     parser.add_argument("--quick", action="store_true", help="a small volume; the figures mean little")
+    parser.add_argument("--only", nargs="+", choices=PARTS, metavar="PART", help=f"some of {', '.join(PARTS)}")
     parser.add_argument("--directory", type=Path, help="where the recorder writes; default: the temporary directory")
-    parser.add_argument("--table", type=Path, help="Markdown file whose table, between <!-- bench --> marks, to renew")
+    parser.add_argument(
+        "--table",
+        type=Path,
+        help="Markdown file whose table, between <!-- bench --> marks, to renew; with --only, those lines",
+    )
 
 
 def bench(options: Namespace) -> Outcome:
-    """Measure, and renew the table."""
-    from processing.benchmarks.scene import QUICK, SpeedStudy
-    from processing.benchmarks.speed import speed_study
-    from processing.benchmarks.targets import markdown_table
-    from server.cli.benchmarks.chain_on_disk import SHOTS, chain_on_disk
+    """Measure, and renew the table, or some lines of it."""
+    from processing.benchmarks.targets import markdown_table, renewed
+    from server.cli.benchmarks.machine import measured_on
 
-    around_table = split_at_table(options.table) if options.table else None
+    before, old, after = split_at_table(options.table) if options.table else ("", "", "")
     for name in MISTUNED:
         if name in os.environ:
             progress(f"{name} is set: the baseline is not what others measure; unset it")
+    load, found = os.getloadavg()[0], _Found()
+    for part in options.only or PARTS:
+        progress(part)
+        _measure(part, options, found)
+    how, table = measured_on(load), markdown_table(found.measured)
+    if options.table:
+        whole = (
+            f"{renewed(old, found.measured)}\n\n{_stated(old, options.only, how)}"
+            if options.only
+            else f"{table}\n\n{how}"
+        )
+        options.table.write_text(f"{before}\n{whole}\n\n{after}")
+    lines = [*found.texts[:1], table, *found.texts[1:], how]
+    return Outcome(
+        {**found.result, "targets": [_target_json(one) for one in found.measured], "how": how}, "\n\n".join(lines)
+    )
+
+
+def _stated(old: str, parts: list[str], how: str) -> str:
+    """What the lines of these parts were measured on, beside what was said of others."""
+    which = f"Of these, {', '.join(parts)}: "
+    others = [line for line in old.splitlines() if line and not line.startswith(("|", which))]
+    return "\n\n".join([*others, which + how])
+
+
+@dataclass
+class _Found:
+    """What the parts have measured so far: for the table, for programs, for people."""
+
+    measured: list["Measured"] = field(default_factory=list)
+    result: dict[str, Any] = field(default_factory=dict)
+    texts: list[str] = field(default_factory=list)
+
+
+def _measure(part: str, options: Namespace, found: _Found) -> None:
+    from processing.benchmarks.scene import QUICK, SpeedStudy
+
     study = QUICK if options.quick else SpeedStudy()
-    speed = speed_study(study, progress)
-    progress("recorder")
-    recorder = recorder_speed(options.directory, study.image_size_px, speed.views)
-    progress("run on disk")
-    on_disk = tuple(chain_on_disk(study, options.directory, QUICK_SHOTS if options.quick else SHOTS))
-    speed = replace(speed, targets=(*speed.targets, *on_disk))
-    targets = markdown_table(speed.targets)
-    if around_table:
-        options.table.write_text(f"\n{targets}\n\n".join(around_table))
-    recorded = f"recorder: {recorder['shots_per_s']:.1f} shots/s, {recorder['mb_per_s']:.0f} MB/s"
-    return Outcome(speed_json(speed) | {"recorder": recorder}, f"{kernel_table(speed)}\n\n{targets}\n\n{recorded}")
+    if part == "kernels":
+        from processing.benchmarks.speed import speed_study
+
+        speed = speed_study(study, progress)
+        found.result |= speed_json(speed)
+        found.texts.append(kernel_table(speed))
+        found.measured += speed.targets
+    elif part == "recorder":
+        recorder = recorder_speed(options.directory, study.image_size_px)
+        found.result["recorder"] = recorder
+        found.texts.append(f"recorder: {recorder['shots_per_s']:.1f} shots/s, {recorder['mb_per_s']:.0f} MB/s")
+    else:
+        found.measured += _of_programs(part, study, options)
+
+
+def _of_programs(part: str, study: "SpeedStudy", options: Namespace) -> "Iterator[Measured]":
+    from server.cli.benchmarks import chain_on_disk, recorded_shots, served
+    from server.cli.benchmarks.recorded_run import record_run
+
+    directory, quick = options.directory, options.quick
+    if part == "cameras":
+        yield from recorded_shots.recorded_shots(directory, 2 if quick else 40)
+    elif part == "start":
+        yield from served.server_start(directory, 20 if quick else served.RUNS)
+    elif part == "trigger":
+        yield from served.trigger_to_volume(directory, 2 if quick else served.TRIGGERED_SHOTS)
+    else:
+        with tempfile.TemporaryDirectory(dir=directory) as folder:
+            run = record_run(Path(folder), study, QUICK_SHOTS if quick else chain_on_disk.SHOTS)
+            yield from getattr(chain_on_disk, part)(run, Path(folder), study.threads)
 
 
 def speed_json(result: "SpeedResult") -> dict[str, Any]:
@@ -69,7 +133,6 @@ def speed_json(result: "SpeedResult") -> dict[str, Any]:
         "views": result.views,
         "naive": {"mlos_cpu_s": result.naive_mlos_cpu_s, "smart_iteration_cpu_s": result.naive_smart_iteration_cpu_s},
         "kernels": [asdict(kernel) for kernel in result.kernels],
-        "targets": [_target_json(one) for one in result.targets],
     }
 
 
@@ -78,8 +141,8 @@ def _target_json(one: "Measured") -> dict[str, Any]:
     return asdict(one.target) | stated | (asdict(one.timing) if one.timing else {})
 
 
-def split_at_table(report: Path) -> tuple[str, str]:
-    """What a Markdown file says before and after its table, marks included.
+def split_at_table(report: Path) -> tuple[str, str, str]:
+    """What a Markdown file says before its table, mark included, in its place, and after.
 
     Raises
     ------
@@ -87,10 +150,10 @@ def split_at_table(report: Path) -> tuple[str, str]:
         The file marks no place for the table.
     """
     before, begin, rest = report.read_text().partition(TABLE_BEGIN + "\n")
-    _old, end, after = rest.partition(TABLE_END + "\n")
+    old, end, after = rest.partition(TABLE_END + "\n")
     if not begin or not end:
         raise BenchError(f"{report}: no lines {TABLE_BEGIN} and {TABLE_END} to put the table between")
-    return before + begin, end + after
+    return before + begin, old, end + after
 
 
 def kernel_table(result: "SpeedResult") -> str:
@@ -102,7 +165,7 @@ def kernel_table(result: "SpeedResult") -> str:
     return table(["kernel", "wall s", "CPU s", "times naive"], rows)
 
 
-def recorder_speed(directory: Path | None, image_size_px: tuple[int, int], views: int) -> dict[str, float]:
+def recorder_speed(directory: Path | None, image_size_px: tuple[int, int], views: int = 4) -> dict[str, float]:
     """Shots and raw megabytes per second that the recorder brings safely to the disk of ``directory``."""
     import numpy as np
 

@@ -201,6 +201,9 @@ class SimulationConfig(FrozenModel):
     numbered: Annotated[
         bool, Field(description="the first pixels of every image tell firing, view and exposure: proof of a recording")
     ] = False
+    still: Annotated[
+        bool, Field(description="every shot shows what the first one did, at no cost: to measure drivers and recorder")
+    ] = False
     faults: Annotated[tuple[ScriptedFault, ...], Field(description="what goes wrong, and at which shot")] = ()
 
 

@@ -1,7 +1,7 @@
 """The scene of a simulated rig: the views of its configuration, as imperfect as real ones, and the truth of them."""
 
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from processing.geometry import PinholeCamera, view_camera
 from processing.optics import image_scale_px_per_mm
 from processing.synthetic.liquid.nozzles import flat_fan_spray, hollow_cone_spray
 from processing.synthetic.numbered import ImageNumber, numbered
-from processing.synthetic.scene import Scene
+from processing.synthetic.scene import Pulse, Scene
 from processing.synthetic.target import Checkerboard, DotTarget
 from processing.synthetic.truth_file import FiredSpray
 from processing.synthetic.view_optics import ViewOptics
@@ -52,6 +52,8 @@ class SimulatedScene:
             stage_z_mm=stage_z_mm,
         )
         self._numbered, self._views = simulation.numbered, list(config.views)
+        self._keeps = simulation.still
+        self._still: dict[tuple[str, str, int], Image] = {}
         self._rendering = threading.BoundedSemaphore(RENDERING_THREADS)
 
     def prepare(self, kind: RunKind) -> None:
@@ -62,13 +64,22 @@ class SimulatedScene:
         """Image of one exposure: the frame source of every camera."""
         pulses = [(pulse.start_ns, pulse.collected_ns, pulse.current_a) for pulse in exposure.pulses]
         with self._rendering:
-            image = self._scene.render(
-                exposure.view, exposure.sequence, exposure.frame, pulses, exposure.shape, exposure.bits
-            )
+            image = self._render(exposure, pulses)
         if not self._numbered:
             return image
         number = ImageNumber(exposure.sequence, self._views.index(exposure.view), exposure.frame)
         return numbered(image, number, exposure.bits)
+
+    def _render(self, exposure: Exposure, pulses: Sequence[Pulse]) -> Image:
+        which = (exposure.view, exposure.frame, len(pulses))
+        if which not in self._still:
+            image = self._scene.render(
+                exposure.view, exposure.sequence, exposure.frame, pulses, exposure.shape, exposure.bits
+            )
+            if not self._keeps:
+                return image
+            self._still[which] = image
+        return self._still[which]
 
     @property
     def cameras(self) -> Mapping[str, PinholeCamera]:
