@@ -214,6 +214,7 @@ class RunMeasurement:
             "exposures": json.dumps(told),
             "velocity": json.dumps(reason),
             **conditions_of(self.run.header),
+            **({"rate_hz": rate_hz} if (rate_hz := self.run.header.rate_hz) else {}),
         }
 
     def _exposure(self, shot: Shot, frame: FrameName, threads: int, should_stop: Callable[[], bool]) -> Exposure:

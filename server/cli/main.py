@@ -30,6 +30,7 @@ from server.cli.calibrations import calibrate, check, self_calibrate, size_calib
 from server.cli.cluster import scheduler, worker
 from server.cli.keeping import pack, repair, verify
 from server.cli.output import endable, say, tell
+from server.cli.runs import tracks
 from server.cli.spray import report, statistics
 from server.lab.errors import ServerError
 
@@ -45,6 +46,7 @@ COMMANDS = (
     size_calibration,
     reconstruct,
     measure,
+    tracks,
     statistics,
     report,
     average,

@@ -24,7 +24,8 @@ CORRECTED = (
     "disc that would look so behind a Gaussian blur. Where the settings have sizes, by the dots of a reticle, too"
 )
 GROUP, PROVENANCE, FRAME, ROWS = "droplets", "tomoshadow", "frame", "rows"
-UNITS = MappingProxyType({"_mm": "mm", "_mm2": "mm^2", "_um": "um", "_px": "px", "_m_s": "m/s", "_m2_s2": "m^2/s^2"})
+_UNITS = {"mm": "mm", "mm2": "mm^2", "um": "um", "px": "px", "m_s": "m/s", "m2_s2": "m^2/s^2", "m_s2": "m/s^2"}
+UNITS = MappingProxyType({f"_{ending}": unit for ending, unit in _UNITS.items()})
 """By the ending of a column's name; all others are numbers, or as bright as the images."""
 Value = str | int | float
 

@@ -91,6 +91,8 @@ def candidates_near(first: MovingDroplets, second: MovingDroplets, shifts: Float
 
 def likely_of(candidates: Candidates, first: MovingDroplets, second: MovingDroplets, spread: Spread) -> FloatArray:
     """Probability of every candidate, among all candidates of both and that neither has a partner."""
+    if not len(candidates.own):
+        return np.empty(0)
     odds = _odds(candidates, first, second, spread)
     of_own = np.bincount(candidates.own, odds, len(first))[candidates.own]
     of_other = np.bincount(candidates.other, odds, len(second))[candidates.other]

@@ -1,4 +1,4 @@
-"""What commands on recorded runs share: recipes, and many runs at once.
+"""What commands on recorded runs share: recipes, and many runs at once; and the command that links their droplets.
 
 May be imported by the commands alone.
 """

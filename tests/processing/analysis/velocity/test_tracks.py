@@ -79,6 +79,16 @@ def test_a_series_that_begins_with_empty_frames_is_tracked() -> None:
     assert whole > 0.98
 
 
+def test_tracks_go_on_beyond_an_empty_frame() -> None:
+    shown = series(frames=9, ghosts=0.0, turn=0.01)
+    frames = list(shown.frames)
+    frames[4] = frames[4].where(np.zeros(0, np.intp))
+    labels = [*shown.labels[:4], shown.labels[4][:0], *shown.labels[5:]]
+    whole, right = whole_and_right(link(frames), labels)
+    assert whole > 0.97
+    assert right > 0.995
+
+
 @pytest.mark.parametrize("count", [0, 1, 2])
 def test_few_frames_are_no_tracks(count: int) -> None:
     tracks = link(series(frames=2).frames[:count])

@@ -1,0 +1,177 @@
+"""Tracks of the droplets of a series of shots, as files have them: a row per droplet on a track."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from processing.analysis.droplets.droplet_file import DropletFileError, StoredDroplets
+from processing.analysis.droplets.droplet_table import COVARIANCES as PLACES
+from processing.analysis.droplets.droplet_table import Columns
+from processing.analysis.velocity.moving_droplets import LEAST_SIZE, MovingDroplets
+from processing.analysis.velocity.track_motion import HALF_WINDOW, TrackPoints, track_points
+from processing.analysis.velocity.tracks import Tracks, link
+from processing.analysis.velocity.velocity_table import COVARIANCES
+from processing.geometry import FloatArray
+from processing.reconstruction.settings import GridSettings
+from processing.volume import VoxelGrid
+
+M_PER_MM = 1e-3
+MOST_FRAMES = 100_000
+"""From the first shot to the last one, with those that are not there."""
+SIZES = ("diameter_um", "amplitude")
+NO_RATE = "nobody stated at which rate its shots were taken: give rate_hz (--rate-hz), or state it in the manifest"
+NO_TRACK = (
+    "no droplet is on a track: do droplets move by more than 25 voxels from shot to shot, are shots at even times, and "
+    "are they of one series?"
+)
+
+
+@dataclass(frozen=True, eq=False)
+class DropletTracks:
+    """Tracks of a series.
+
+    Parameters
+    ----------
+    columns : dict of name to (N,) array
+        A row per droplet on a track, track by track and shot by shot.
+    tracks : int
+        Their number.
+    droplets : int
+        Of all shots, on a track or not.
+    rate_hz : float
+        Of the shots.
+    reason : str | None
+        Why there is no track.
+    """
+
+    columns: Columns
+    tracks: int
+    droplets: int
+    rate_hz: float
+    reason: str | None
+
+    @property
+    def share_tracked(self) -> float:
+        """Of the droplets, those on a track."""
+        return len(self.columns["track"]) / self.droplets if self.droplets else 0.0
+
+    @property
+    def median_length(self) -> float | None:
+        """Droplets of a median track; None without tracks."""
+        return float(np.median(np.bincount(self.columns["track"].astype(np.intp)))) if self.tracks else None
+
+
+def track_droplets(
+    shots: Sequence[StoredDroplets], rate_hz: float | None = None, half_window: int = HALF_WINDOW
+) -> DropletTracks:
+    """Link the droplets of shots at even times to tracks.
+
+    Parameters
+    ----------
+    shots : sequence of StoredDroplets
+        Of one run, in any order, as ``read_droplets`` gives them; of two exposures A is taken. A shot that is not there
+        is a frame without droplets.
+    rate_hz : float, optional
+        Shots per second; default: what their files say.
+    half_window : int
+        Velocity and acceleration are those of a parabola through so many frames before and after.
+
+    Raises
+    ------
+    DropletFileError
+        They are of several runs, of one shot twice, or nobody knows their rate or their grid.
+    """
+    ordered = sorted(shots, key=_shot)
+    _require_one_series(ordered)
+    rate_hz, grid, first = rate_hz or _rate_hz(ordered[0]), _grid(ordered[0]), _shot(ordered[0])
+    frames = [_NOBODY] * (_shot(ordered[-1]) - first + 1)
+    for stored in ordered:
+        frames[_shot(stored) - first] = _moving(stored, grid)
+    linked = link(frames)
+    points = track_points(frames, linked, half_window)
+    columns = _columns(points, linked, first, grid, rate_hz) | _sizes(points, first, ordered)
+    count = sum(map(len, frames))
+    return DropletTracks(columns, linked.count, count, rate_hz, None if linked.count else NO_TRACK)
+
+
+_NOBODY = MovingDroplets(np.empty((0, 3)), np.empty((0, 3, 3)), np.empty(0))
+
+
+def _shot(stored: StoredDroplets) -> int:
+    if "shot" not in stored.provenance:
+        raise DropletFileError("a file does not say which shot it is of: tracks need their order")
+    return int(stored.provenance["shot"])
+
+
+def _rate_hz(stored: StoredDroplets) -> float:
+    if not (rate_hz := float(stored.provenance.get("rate_hz", 0))):
+        raise DropletFileError(f"{stored.provenance.get('run', 'a run')}: {NO_RATE}")
+    return rate_hz
+
+
+def _grid(stored: StoredDroplets) -> VoxelGrid:
+    if "grid" not in stored.provenance or "z_mm" not in stored.columns:
+        raise DropletFileError("a file does not say in which grid its droplets were measured: tracks are in 3-D")
+    return GridSettings.model_validate_json(str(stored.provenance["grid"])).to_grid()
+
+
+def _require_one_series(ordered: Sequence[StoredDroplets]) -> None:
+    if not ordered:
+        raise DropletFileError("there are no shots to link")
+    for name in ("run", "run_created_utc", "calibration_sha256", "recipe_sha256", "grid"):
+        if len(told := {str(stored.provenance.get(name)) for stored in ordered}) > 1:
+            raise DropletFileError(f"shots of one series, please: their {name} is {' and '.join(sorted(told)[:2])}")
+    numbers = [_shot(stored) for stored in ordered]
+    for one, other in pairwise(numbers):
+        if one == other:
+            raise DropletFileError(f"shot {one} is there twice")
+    if numbers[-1] - numbers[0] >= MOST_FRAMES:
+        raise DropletFileError(f"shots {numbers[0]} to {numbers[-1]}: a series has at most {MOST_FRAMES} frames")
+
+
+def _of_a(stored: StoredDroplets, name: str) -> FloatArray:
+    values: FloatArray = np.asarray(stored.columns[name], np.float64)[stored.columns["frame"] == "a"]
+    return values
+
+
+def _moving(stored: StoredDroplets, grid: VoxelGrid) -> MovingDroplets:
+    points_mm = np.column_stack([_of_a(stored, f"{axis}_mm") for axis in "xyz"])
+    covariance = np.empty((len(points_mm), 3, 3))
+    for name in PLACES:
+        row, column = ("xyz".index(axis) for axis in name)
+        covariance[:, row, column] = covariance[:, column, row] = _of_a(stored, f"cov_{name}_mm2")
+    sizes = _of_a(stored, next(name for name in SIZES if name in stored.columns))
+    return MovingDroplets(
+        grid.to_index(points_mm)[:, ::-1], covariance / grid.pitch_mm**2, np.log(np.maximum(sizes, LEAST_SIZE))
+    )
+
+
+def _columns(points: TrackPoints, linked: Tracks, first: int, grid: VoxelGrid, rate_hz: float) -> Columns:
+    m_s, m_s2 = grid.pitch_mm * M_PER_MM * rate_hz, grid.pitch_mm * M_PER_MM * rate_hz**2
+    places_mm = grid.to_mm(points.places[:, ::-1])
+    covariance = points.velocity_covariance * m_s**2
+    p_link = np.array([linked.p_link[frame][row] for frame, row in zip(points.frame, points.row, strict=True)])
+    return {
+        "track": points.track.astype(np.int64),
+        "shot": (points.frame + first).astype(np.int64),
+        "droplet": points.row.astype(np.int64),
+        **{f"{axis}_mm": places_mm[:, number] for number, axis in enumerate("xyz")},
+        **{f"{name}_m_s": points.velocities[:, number] * m_s for number, name in enumerate("uvw")},
+        **{f"cov_{pair}_m2_s2": covariance[:, "uvw".index(pair[0]), "uvw".index(pair[1])] for pair in COVARIANCES},
+        **{f"a{axis}_m_s2": points.accelerations[:, number] * m_s2 for number, axis in enumerate("xyz")},
+        **{f"a{axis}_sd_m_s2": points.acceleration_sd[:, number] * m_s2 for number, axis in enumerate("xyz")},
+        "p_link": p_link.astype(np.float64),
+    }
+
+
+def _sizes(points: TrackPoints, first: int, ordered: Sequence[StoredDroplets]) -> Columns:
+    """Diameter or amplitude of every droplet, as its own shot has it."""
+    name = next(name for name in SIZES if name in ordered[0].columns)
+    sizes: NDArray[np.float64] = np.empty(len(points.track))
+    for stored in ordered:
+        chosen = points.frame == _shot(stored) - first
+        sizes[chosen] = _of_a(stored, name)[points.row[chosen]]
+    return {name: sizes}

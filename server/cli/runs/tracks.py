@@ -1,0 +1,65 @@
+"""``tomoshadow tracks``: the measured droplets of a series of shots become tracks."""
+
+from argparse import Namespace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from server.cli.options import Verbs, add_out, add_verb, positive
+from server.cli.output import Outcome
+
+if TYPE_CHECKING:
+    from processing.analysis.velocity.track_table import DropletTracks
+
+KEPT = ("run", "run_created_utc", "calibration", "calibration_sha256", "grid", "recipe_sha256", "tomoshadow")
+"""Of what the files of droplets say of themselves."""
+
+
+def add(verbs: Verbs) -> None:
+    """Add the command."""
+    parser = add_verb(verbs, "tracks", tracks, "link the droplets of a series of shots to tracks")
+    parser.add_argument("results", type=Path, help="directory of what measure wrote of one run")
+    add_out(parser, "file of the tracks, *.h5")
+    parser.add_argument(
+        "--rate-hz", type=positive, metavar="HZ", help="of the shots, at even times; default: as the run states it"
+    )
+
+
+def tracks(options: Namespace) -> Outcome:
+    """Read, link, write."""
+    from processing.analysis.droplets.droplet_file import DropletFileError, read_droplets
+    from processing.analysis.velocity.track_file import write_tracks
+    from processing.analysis.velocity.track_table import track_droplets
+    from processing.runs.overwriting import require_free
+
+    require_free(options.out, overwrite=options.overwrite)
+    files = sorted(options.results.glob("shot_*_droplets.h5"))
+    if not files:
+        raise DropletFileError(f"{options.results}: has no droplets of shots; measure them first (tomoshadow measure)")
+    shots = [read_droplets(file) for file in files]
+    linked = track_droplets(shots, options.rate_hz)
+    write_tracks(
+        options.out, linked, {name: one for name in KEPT if (one := shots[0].provenance.get(name)) is not None}
+    )
+    result = _told(linked, len(shots), options.out)
+    return Outcome(result, _summary(result))
+
+
+def _told(linked: "DropletTracks", shots: int, file: Path) -> dict[str, Any]:
+    return {
+        "tracks": linked.tracks,
+        "shots": shots,
+        "droplets": linked.droplets,
+        "share_tracked": linked.share_tracked,
+        "median_length": linked.median_length,
+        "rate_hz": linked.rate_hz,
+        "reason": linked.reason,
+        "file": str(file),
+        "passed": linked.tracks > 0,
+    }
+
+
+def _summary(result: dict[str, Any]) -> str:
+    if result["reason"]:
+        return f"{result['droplets']} droplets of {result['shots']} shots: {result['reason']}"
+    tracked = f"{100 * result['share_tracked']:.1f} % of {result['droplets']} droplets of {result['shots']} shots"
+    return f"{result['tracks']} tracks with {tracked}, {result['median_length']:g} in a median one; {result['file']}"

@@ -1,0 +1,97 @@
+"""``tomoshadow tracks``: droplets of a series become tracks in physical units; bad input gets one clear sentence."""
+
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+from processing.analysis.droplets.droplet_file import write_droplets
+from processing.analysis.droplets.droplet_table import Droplets
+from processing.analysis.velocity.tracks import Tracks
+from processing.reconstruction.settings import GridSettings
+from processing.volume import VoxelGrid
+from tests.support.command_line import refused, told
+from tests.support.droplet_series import BOX, Series, series, whole_and_right
+
+RATE_HZ = 20_000.0
+GRID = VoxelGrid((int(BOX[2]), int(BOX[1]), int(BOX[0])), (1.0, -2.0, 0.5), 1 / 60)
+
+
+def write_series(folder: Path, shown: Series, missing: tuple[int, ...] = (), **more: Any) -> Path:
+    """Files as measure writes them, the first shot being number 3."""
+    folder.mkdir()
+    for number, frame in enumerate(shown.frames):
+        if number in missing:
+            continue
+        droplets = Droplets(
+            points_mm=frame.places * GRID.pitch_mm + GRID.origin_mm,
+            covariance_mm2=frame.covariance * GRID.pitch_mm**2,
+            amplitudes=np.exp(frame.log_sizes),
+            amplitude_sd=np.zeros(len(frame)),
+            views=np.full(len(frame), 4),
+            residual=np.ones(len(frame)),
+        )
+        provenance = {"run": "spray", "shot": number + 3, "grid": GridSettings.of(GRID).model_dump_json(), **more}
+        write_droplets(folder / f"shot_{number + 3:05d}_droplets.h5", {"a": droplets}, provenance)
+    return folder
+
+
+def test_tracks_of_a_series_lie_in_a_file_in_physical_units(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    shown = series(frames=8)
+    results = write_series(tmp_path / "droplets", shown, rate_hz=RATE_HZ)
+    result = told(capsys, "tracks", results, "-o", tmp_path / "tracks.h5")
+    with h5py.File(tmp_path / "tracks.h5") as file:
+        columns = {name: column[:] for name, column in file["tracks"].items()}
+        units = {name: column.attrs["units"] for name, column in file["tracks"].items()}
+        attributes = dict(file["tomoshadow"].attrs)
+    assert (attributes["schema"], attributes["rate_hz"], attributes["run"]) == ("tomoshadow/tracks", RATE_HZ, "spray")
+    assert (units["u_m_s"], units["ax_m_s2"], units["cov_uv_m2_s2"]) == ("m/s", "m/s^2", "m^2/s^2")
+    assert result["tracks"] == len(np.unique(columns["track"]))
+    assert result["share_tracked"] > 0.9
+    ids = [np.full(len(frame), -1) for frame in shown.frames]
+    for track, shot, row in zip(columns["track"], columns["shot"], columns["droplet"], strict=True):
+        ids[shot - 3][row] = track
+    whole, right = whole_and_right(Tracks(tuple(ids), (), result["tracks"]), shown.labels)
+    assert whole > 0.98
+    assert right > 0.995
+    rows = list(zip(columns["shot"] - 3, columns["droplet"], strict=True))
+    labels = np.array([shown.labels[frame][row] for frame, row in rows])
+    true = [shown.velocities[frame][label] for (frame, _), label in zip(rows, labels, strict=True)]
+    known = np.isfinite(columns["u_m_s"]) & (labels >= 0)
+    m_s = GRID.pitch_mm * 1e-3 * RATE_HZ
+    error_m_s = columns["u_m_s"][known] - m_s * np.array(true)[known, 0]
+    assert np.median(np.abs(error_m_s)) < 0.02 * m_s
+    assert np.median(np.abs(error_m_s) / np.sqrt(columns["cov_uu_m2_s2"][known])) == pytest.approx(0.6745, rel=0.15)
+    seen_mm = [shown.frames[frame].places[row][0] * GRID.pitch_mm + GRID.origin_mm[0] for frame, row in rows]
+    assert np.median(np.abs(columns["x_mm"] - seen_mm)) < 0.035 * GRID.pitch_mm
+
+
+def test_a_shot_that_is_not_there_is_a_frame_without_droplets(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    results = write_series(tmp_path / "droplets", series(frames=8), missing=(4,))
+    result = told(capsys, "tracks", results, "--rate-hz", "1000", "-o", tmp_path / "tracks.h5")
+    assert (result["shots"], result["rate_hz"]) == (7, 1000)
+    assert result["median_length"] >= 5
+
+
+def test_shots_without_a_common_motion_have_no_tracks(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    mixed = Series([series(seed, frames=1).frames[0] for seed in range(4)], [], [], np.empty(0))
+    results = write_series(tmp_path / "droplets", mixed, rate_hz=RATE_HZ)
+    result = told(capsys, "tracks", results, "-o", tmp_path / "tracks.h5", status=1)
+    assert (result["tracks"], result["passed"], result["median_length"]) == (0, False, None)
+    assert "no droplet is on a track" in result["reason"]
+
+
+def test_bad_input_gets_a_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    shown = series(frames=2)
+    unstated = write_series(tmp_path / "unstated", shown)
+    out = tmp_path / "tracks.h5"
+    assert "nobody stated at which rate" in refused(capsys, "tracks", unstated, "-o", out)
+    assert "has no droplets of shots" in refused(capsys, "tracks", tmp_path, "-o", out)
+    other = write_series(tmp_path / "other", shown, run="another", rate_hz=RATE_HZ)
+    (other / "shot_00003_droplets.h5").rename(unstated / "shot_00007_droplets.h5")
+    assert "shots of one series, please: their run is" in refused(capsys, "tracks", unstated, "-o", out)
+    assert not out.exists()
