@@ -1,7 +1,7 @@
 """What became of a shot that was measured: its droplets, its velocities, and whether to believe them."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
@@ -106,18 +106,6 @@ def _told_velocity(velocities: MeasuredVelocities, separation: Separation) -> Sh
         separation_ns=separation.mean_ns,
         separation_source=separation.source,
     )
-
-
-def told_exposure(exposure: Exposure) -> Mapping[str, object]:
-    """What a file says of an exposure."""
-    return {
-        "verdict": exposure.verdict.value,
-        "reasons": exposure.reasons,
-        "residual_over_noise": exposure.residual_over_noise,
-        "views": {name: asdict(view) for name, view in exposure.views.items()},
-        "ghosts": asdict(exposure.ghosts) if exposure.ghosts else None,
-        "hidden": asdict(exposure.hidden),
-    }
 
 
 def shot_summary(

@@ -23,6 +23,7 @@ from processing.kernels import DEFAULT_THREADS
 from processing.preprocessing import Polarity
 from processing.reconstruction.settings import FrozenValue, GridSettings
 from processing.runs.errors import PipelineError
+from processing.runs.liquid.objects import NozzleNumbers, RunObjects, told_objects
 from processing.runs.measured_images import (
     IgnoredPixels,
     bright_images,
@@ -38,7 +39,6 @@ from processing.runs.measured_shot import (
     droplets_path,
     shot_summary,
     shot_velocities,
-    told_exposure,
 )
 from processing.runs.pipeline import Stopped, default_grid, provenance_of
 from processing.runs.recipe import recipe_sha256
@@ -71,6 +71,8 @@ class MeasureSettings(FrozenValue):
         Field(description="rectangles of shadow images that are not asked, VIEW=LEFT:RIGHT,TOP:BOTTOM in px"),
     ] = ()
 
+    nozzle: Annotated[NozzleNumbers | None, Field(description="x, y, z in mm, and axis; default: the run's own")] = None
+
     @model_validator(mode="after")
     def _sizes_of_one_light(self) -> Self:
         if self.sizes and self.light == "estimated":
@@ -95,8 +97,8 @@ def require_measurable(run_name: str, recorded: Polarity, settings: MeasureSetti
         raise PipelineError(
             f"{run_name}: its images are recorded as {recorded}, they are not measured as {settings.polarity}"
         )
-    if recorded == "bright" and settings.ignored:
-        raise PipelineError("pixels to ignore are for shadows: bright particles are measured with all pixels")
+    if recorded == "bright" and (settings.ignored or settings.nozzle):
+        raise PipelineError("pixels to ignore, and a nozzle, are for shadows: of bright particles all pixels are asked")
     if recorded == "bright" and settings.light != "estimated":
         raise PipelineError(f"light {settings.light} is for shadows: bright particles have no diameter to correct")
 
@@ -119,6 +121,8 @@ class RunMeasurement:
         Of the run.
     provenance : Provenance
         Where the droplets come from, but for the shot.
+    objects : RunObjects
+        How liquid that is no droplet is looked for.
     """
 
     run: RunReader
@@ -127,6 +131,7 @@ class RunMeasurement:
     search: DropletSearch
     references: References
     provenance: Provenance
+    objects: RunObjects
 
     @classmethod
     def of(cls, run: RunReader, shot: int, calibration_file: Path, settings: MeasureSettings) -> "RunMeasurement":
@@ -155,7 +160,8 @@ class RunMeasurement:
             require_backgrounds(run, references)
         require_fitting(settings.ignored, {view: calibration.views[view].mapping.image_size_px for view in views})
         provenance = provenance_of(run, calibration, calibration_file, settings, METHOD_VERSION)
-        return cls(run, calibration, settings, search, references, provenance)
+        objects = RunObjects.of(run, calibration, references, grid, settings.nozzle, settings.ignored)
+        return cls(run, calibration, settings, search, references, provenance, objects)
 
     def measure(
         self,
@@ -192,20 +198,24 @@ class RunMeasurement:
         claim_results(results_dir, self.provenance)
         frames = frame_names(self.run)
         exposures = tuple(self._exposure(recorded, frame, threads, should_stop) for frame in frames)
+        by_frame = dict(zip(frames, exposures, strict=True))
         velocities, velocity = shot_velocities(exposures, self.search.grid, separation_of(self.run, recorded))
+        objects = self.objects.measure(recorded, [frame for frame in frames if by_frame[frame].views], threads)
+        told = {frame: {**one.told(), **told_objects(objects.get(frame))} for frame, one in by_frame.items()}
         file = droplets_path(results_dir, shot)
-        by_frame = {str(frame): exposure for frame, exposure in zip(frames, exposures, strict=True)}
         write_droplets(
             file,
-            {frame: exposure.droplets for frame, exposure in by_frame.items()},
-            {**self.provenance, **self._told_of(shot, by_frame, velocity)},
-            velocities.columns() if velocities else None,
+            {str(frame): one.droplets for frame, one in by_frame.items()},
+            {**self.provenance, **self._told_of(shot, told, velocity)},
+            velocities=velocities.columns() if velocities else None,
+            objects={str(frame): found.objects for frame, found in objects.items()},
         )
         summary = shot_summary(shot, exposures, velocity, time.process_time() - started_cpu_s, file)
         return MeasuredShot(summary, exposures, velocities)
 
-    def _told_of(self, shot: int, exposures: Mapping[str, Exposure], velocity: ShotVelocity | str) -> Provenance:
-        told = {frame: told_exposure(exposure) for frame, exposure in exposures.items()}
+    def _told_of(
+        self, shot: int, told: Mapping[FrameName, Mapping[str, object]], velocity: ShotVelocity | str
+    ) -> Provenance:
         reason = {"reason": velocity} if isinstance(velocity, str) else velocity.model_dump(mode="json")
         return {
             "shot": shot,

@@ -13,13 +13,13 @@ from server.cli.options import (
     add_out,
     add_shots,
     add_verb,
-    describe_grid,
     parse_grid,
     setting,
     usable_processors,
 )
-from server.cli.output import Outcome, progress, table, tracked
+from server.cli.output import Outcome, progress, tracked
 from server.cli.runs.batch import add_runs, over_runs
+from server.cli.runs.measured_text import droplets_summary, droplets_table
 from server.cli.runs.recipes import add_recipe, keeping_recipe, settings_of, with_grid
 from server.cli.runs.resuming import resumable
 from server.cli.runs.single_view import IN_THE_IMAGE, add_single_view, measure_single_view, refuse
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from processing.runs.measurement import MeasureSettings
 
 NAME = "measure"
-SAID = ("polarity", "grid", "twins", "light", "sizes", "ignore")
+SAID = ("polarity", "grid", "twins", "light", "sizes", "ignore", "nozzle")
 """Options that a recipe takes the place of."""
 
 
@@ -67,6 +67,12 @@ def add(verbs: Verbs) -> None:
         help="pixels of a view that are not asked, as a nozzle or a reflection; may be repeated",
     )
     parser.add_argument(
+        "--nozzle",
+        type=_nozzle,
+        metavar="X,Y,Z[,AX,AY,AZ]",
+        help="of shadows: orifice in mm and axis of the spray, for the break-up length; default: [spray] of the run",
+    )
+    parser.add_argument(
         "--export", type=_exports, default=(), metavar="csv,vtk,parquet", help="write droplets in these formats too"
     )
     add_scheduler(parser)
@@ -88,6 +94,15 @@ def _ignored(text: str) -> str:
     except PipelineError as error:
         raise ArgumentTypeError(str(error)) from error
     return text
+
+
+def _nozzle(text: str) -> tuple[float, ...]:
+    from processing.runs.liquid.objects import place_and_axis
+
+    try:
+        return place_and_axis(tuple(float(number) for number in text.split(",")))
+    except ValueError as error:
+        raise ArgumentTypeError(f"{text}: {error}") from error
 
 
 def _exports(text: str) -> "tuple[Export, ...]":
@@ -137,6 +152,7 @@ def _by_options(options: Namespace, calibration: "Calibration") -> "MeasureSetti
         grid=grid,
         twins=options.twins or 0,
         ignored=ignored,
+        nozzle=options.nozzle,
         **_light_and_sizes(options, calibration),
     )
 
@@ -179,7 +195,7 @@ def _measure_run(options: Namespace, settings: "MeasureSettings", run_dir: Path,
         require_free(*files, *(export_path(file, kind) for file in files for kind in options.export), overwrite=False)
         with resumable(place, indices, lambda index: [droplets_path(place, index)]):
             result = _measure_shots(options, settings, run_dir, indices, place)
-    return Outcome(result, f"{droplets_table(result)}\n{place}: {_summary(result)}")
+    return Outcome(result, f"{droplets_table(result)}\n{place}: {droplets_summary(result)}")
 
 
 def _measure_shots(
@@ -189,6 +205,7 @@ def _measure_shots(
     from processing.analysis.droplets.droplet_statistics import droplet_statistics
     from processing.analysis.exports.export import export_droplets
     from processing.analysis.velocity.velocity_statistics import velocity_statistics
+    from processing.runs.liquid.objects import liquid_summary
     from processing.runs.measurement import METHOD_VERSION
     from processing.runs.recipe import recipe_sha256
 
@@ -207,6 +224,7 @@ def _measure_shots(
         "shots": [shot.model_dump(mode="json") for shot in shots],
         "statistics": droplet_statistics(stored).model_dump(mode="json"),
         "velocity": velocity_statistics(stored).model_dump(mode="json"),
+        **liquid_summary(stored).model_dump(mode="json"),
         "passed": any(shot.verdict != "refused" for shot in shots),
     }
 
@@ -240,55 +258,3 @@ def _tell_faults(shot: "ShotDroplets") -> None:
     if velocity := shot.velocity:
         for reason in velocity.reasons:
             progress(f"shot {shot.shot}: velocities {velocity.verdict}: {reason}")
-
-
-def droplets_table(result: dict[str, Any]) -> str:
-    """A line per shot, for people."""
-    rows = [
-        [
-            str(shot["shot"]),
-            str(shot["droplets"]),
-            _number(shot["residual_over_noise"], 3),
-            "" if shot["ghost_share"] is None else f"{100 * shot['ghost_share']:.2f}",
-            f"{100 * shot['hidden_share']:.1f}" if shot["hidden_share"] else "",
-            _paired(shot["velocity"]),
-            f"{shot['cpu_s']:.1f}",
-            shot["verdict"],
-            shot["file"],
-        ]
-        for shot in result["shots"]
-    ]
-    head = ["shot", "droplets", "residual/noise", "ghosts %", "hidden %", "paired %", "CPU-s", "verdict", "file"]
-    return table(head, rows)
-
-
-def _paired(velocity: dict[str, Any] | None) -> str:
-    return f"{100 * velocity['share_paired']:.1f}" if velocity and velocity["pairs"] else ""
-
-
-def _number(value: float | None, digits: int) -> str:
-    return "" if value is None else f"{value:.{digits}f}"
-
-
-def _summary(result: dict[str, Any]) -> str:
-    statistics = result["statistics"]
-    grid = describe_grid(result["grid"]["shape"], result["grid"]["pitch_mm"])
-    if not statistics["exposures"]:
-        return f"no shot could be measured, {grid}"
-    counted = f"{statistics['n']} droplets in {statistics['exposures']} exposures"
-    density = _with_interval(statistics["number_density_per_mm3"])
-    d32_um, why = statistics["d32_um"], statistics["reason"]
-    d32 = f"D32 {_with_interval(d32_um)} um" if d32_um else f"no D32: {why}"
-    hidden = f", {100 * statistics['hidden_share']:.1f} % of the volume hidden" if statistics["hidden_share"] else ""
-    return f"{counted}, {density} per mm3, {d32}{hidden}, {_mean_velocity(result['velocity'])}, {grid}"
-
-
-def _mean_velocity(velocity: dict[str, Any]) -> str:
-    if velocity["mean_m_s"] is None:
-        return f"no velocity: {velocity['reason']}"
-    components = (f"{name} {_with_interval(estimate)}" for name, estimate in velocity["mean_m_s"].items())
-    return f"{velocity['pairs']} pairs, {', '.join(components)} m/s"
-
-
-def _with_interval(estimate: dict[str, float]) -> str:
-    return f"{estimate['value']:.3g} ({estimate['low']:.3g} to {estimate['high']:.3g})"

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from server.cli.options import Verbs, count, positive, seed, width
 from server.cli.output import Bar, progress
+from server.cli.studies.breakup import add_break_up
 from server.cli.studies.droplets import add_droplets
 from server.cli.studies.sizes import add_sizes
 from server.cli.studies.statistics import add_statistics
@@ -35,6 +36,7 @@ def add(verbs: Verbs) -> None:
     add_sizes(studies)
     add_velocity(studies)
     add_statistics(studies)
+    add_break_up(studies)
 
 
 def _add_methods(parser: ArgumentParser, default: str) -> None:

@@ -1,9 +1,10 @@
-"""Droplets of a shot in an HDF5 file: 1-D columns, a row per droplet and exposure."""
+"""Droplets of a shot in an HDF5 file: 1-D columns, a row per droplet and exposure; and objects that are none."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
+from typing import Protocol
 
 import h5py
 import numpy as np
@@ -24,10 +25,21 @@ CORRECTED = (
     "disc that would look so behind a Gaussian blur. Where the settings have sizes, by the dots of a reticle, too"
 )
 GROUP, PROVENANCE, FRAME, ROWS = "droplets", "tomoshadow", "frame", "rows"
+OBJECTS = "objects"
+"""Group of liquid that is no droplet; files of bright particles and of older programs have none."""
 _UNITS = {"mm": "mm", "mm2": "mm^2", "um": "um", "px": "px", "m_s": "m/s", "m2_s2": "m^2/s^2", "m_s2": "m/s^2"}
 UNITS = MappingProxyType({f"_{ending}": unit for ending, unit in _UNITS.items()})
 """By the ending of a column's name; all others are numbers, or as bright as the images."""
 Value = str | int | float
+
+
+class Rows(Protocol):
+    """A table of one exposure."""
+
+    def __len__(self) -> int: ...
+
+    def columns(self) -> Columns:
+        """Columns by their names, as files have them."""
 
 
 class DropletFileError(BadInput):
@@ -44,10 +56,13 @@ class StoredDroplets:
         ``frame`` is ``a`` or ``b``.
     provenance : dict
         Where they come from.
+    objects : dict of name to (M,) array
+        Columns of liquid that is no droplet; empty where nobody looked for it.
     """
 
     columns: dict[str, NDArray[np.generic]]
     provenance: dict[str, Value]
+    objects: dict[str, NDArray[np.generic]] = field(default_factory=dict)
 
 
 def write_droplets(
@@ -55,6 +70,7 @@ def write_droplets(
     exposures: Mapping[str, DropletRows],
     provenance: Mapping[str, Value],
     velocities: Mapping[str, Columns] | None = None,
+    objects: Mapping[str, Rows] | None = None,
 ) -> None:
     """Write the droplets of all exposures of a shot; the file appears whole or not at all, an old one is replaced.
 
@@ -68,14 +84,22 @@ def write_droplets(
         Where they come from: kept as attributes of the group ``/tomoshadow``.
     velocities : mapping of frame name to columns, optional
         More columns of the same rows, where velocities are measured.
+    objects : mapping of frame name to LiquidObjects, optional
+        Liquid that is no droplet.
     """
     more = velocities or {}
-    tables = [{**exposure.columns(), **more.get(frame, {})} for frame, exposure in exposures.items()]
-    frames = [np.full(len(exposure), frame, "S1") for frame, exposure in exposures.items()]
-    columns = {FRAME: np.concatenate(frames)} | {
+    droplets = {frame: {**exposure.columns(), **more.get(frame, {})} for frame, exposure in exposures.items()}
+    others = {frame: exposure.columns() for frame, exposure in (objects or {}).items()}
+    write_columns(path, _joined(droplets), provenance, _joined(others) if others else {})
+
+
+def _joined(exposures: Mapping[str, Columns]) -> Columns:
+    """Columns of all exposures, one below the other."""
+    tables = list(exposures.values())
+    frames = [np.full(len(next(iter(table.values()))), frame, "S1") for frame, table in exposures.items()]
+    return {FRAME: np.concatenate(frames)} | {
         name: np.concatenate([table[name] for table in tables]) for name in tables[0]
     }
-    write_columns(path, columns, provenance)
 
 
 def unit_of(column: str) -> str:
@@ -83,7 +107,12 @@ def unit_of(column: str) -> str:
     return next((unit for ending, unit in UNITS.items() if column.endswith(ending)), "1")
 
 
-def write_columns(path: Path, columns: Mapping[str, NDArray[np.generic]], provenance: Mapping[str, Value]) -> None:
+def write_columns(
+    path: Path,
+    columns: Mapping[str, NDArray[np.generic]],
+    provenance: Mapping[str, Value],
+    objects: Mapping[str, NDArray[np.generic]] = MappingProxyType({}),
+) -> None:
     """Write a table of droplets; the file appears whole or not at all, an old one is replaced.
 
     Parameters
@@ -94,12 +123,13 @@ def write_columns(path: Path, columns: Mapping[str, NDArray[np.generic]], proven
         ``frame`` among them, as bytes.
     provenance : Mapping[str, str | int | float]
         As of ``write_droplets``.
+    objects : mapping of name to (M,) array
+        Likewise, of liquid that is no droplet; no group of them where it is empty.
     """
     with replacing(path, own_part_path(path)) as part, h5py.File(part, "w") as file:
-        group = file.create_group(GROUP, track_order=True)
-        group.attrs[ROWS] = len(columns[FRAME])
-        for name, values in columns.items():
-            group.create_dataset(name, data=values).attrs["units"] = unit_of(name)
+        group = _write_table(file, GROUP, columns)
+        if objects:
+            _write_table(file, OBJECTS, objects)
         if "p_real" in group:
             group["p_real"].attrs["reason"] = P_REAL_UNKNOWN
         if RAW_DIAMETER in columns:
@@ -107,6 +137,14 @@ def write_columns(path: Path, columns: Mapping[str, NDArray[np.generic]], proven
             group[DIAMETER].attrs["correction"] = NOT_CORRECTED if same else CORRECTED
         schema = {"schema": SCHEMA, "schema_version": SCHEMA_VERSION}
         file.create_group(PROVENANCE).attrs.update({**provenance, **schema})
+
+
+def _write_table(file: h5py.File, name: str, columns: Mapping[str, NDArray[np.generic]]) -> h5py.Group:
+    group = file.create_group(name, track_order=True)
+    group.attrs[ROWS] = len(columns[FRAME])
+    for column, values in columns.items():
+        group.create_dataset(column, data=values).attrs["units"] = unit_of(column)
+    return group
 
 
 def read_droplets(path: str | Path) -> StoredDroplets:
@@ -129,14 +167,21 @@ def read_droplets(path: str | Path) -> StoredDroplets:
     """
     try:
         with h5py.File(path, "r") as file:
-            columns = {name: column[:] for name, column in file[GROUP].items()}
-            attributes, rows = dict(file[PROVENANCE].attrs), file[GROUP].attrs.get(ROWS)
+            columns = _read_table(path, file[GROUP])
+            objects = _read_table(path, file[OBJECTS]) if OBJECTS in file else {}
+            attributes = dict(file[PROVENANCE].attrs)
     except (OSError, KeyError, ValueError) as error:
         raise DropletFileError(f"{path}: not a readable file of droplets: {error}") from error
+    plain = {name: value.item() if isinstance(value, np.generic) else value for name, value in attributes.items()}
+    provenance = {name: value for name, value in plain.items() if name not in SCHEMA_KEYS}
+    return StoredDroplets(columns, provenance, objects)
+
+
+def _read_table(path: str | Path, group: h5py.Group) -> Columns:
+    columns = {name: column[:] for name, column in group.items()}
+    rows = group.attrs.get(ROWS)
     if len(lengths := {len(column) for column in columns.values()}) > 1:
         raise DropletFileError(f"{path}: was changed: its columns have {min(lengths)} to {max(lengths)} rows")
     if rows is not None and lengths != {rows}:
         raise DropletFileError(f"{path}: was changed: it was written with {rows} rows, and has {min(lengths)}")
-    columns[FRAME] = columns[FRAME].astype("U1")
-    plain = {name: value.item() if isinstance(value, np.generic) else value for name, value in attributes.items()}
-    return StoredDroplets(columns, {name: value for name, value in plain.items() if name not in SCHEMA_KEYS})
+    return {name: column.astype("U") if column.dtype.kind == "S" else column for name, column in columns.items()}

@@ -19,8 +19,8 @@ DIAMETER, REFUSED = "diameter_um", "refused"
 NO_DIAMETERS = "bright particles have no diameter: only shadows tell how large a droplet is"
 IN_PIXELS, NO_SCALE = "diameter_px", "diameters are in pixels: measure with --um-per-px"
 NOTHING_COUNTED = "no exposure could be measured"
-_SAME_DROPLETS = ("grid", "margin_voxel", "twins", "seed")
-"""Settings that say where droplets are looked for, and how ghosts are counted."""
+_SAME_DROPLETS = ("grid", "margin_voxel", "twins", "seed", "nozzle")
+"""Settings that say where droplets are looked for, how ghosts are counted, and where the nozzle is."""
 NO_VOLUME = "a file does not say in which volume its droplets were measured"
 
 

@@ -1,9 +1,9 @@
 """What the measurement of an exposure comes to, bright particles or shadows: droplets, and whether to believe them."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from enum import StrEnum
-from typing import Generic, TypeVar
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,9 @@ from processing.analysis.droplets.droplet_table import DropletRows
 from processing.analysis.droplets.gaussian_blobs import Image
 from processing.analysis.droplets.ghost_share import GhostShare, matches
 from processing.geometry import FloatArray
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 MOST_SHIFT_PX = 0.3
 """Views that lie farther beside their calibration are refused."""
@@ -27,7 +30,7 @@ LIT_SIGMAS, LIT_PIXELS = 6.0, 4
 TWIN_MOVE_VOXEL = 15.0
 """So far at most droplets of a twin are moved along every axis: chance alignments are new, density stays."""
 Rows = TypeVar("Rows", bound=DropletRows, covariant=True)
-Seen = TypeVar("Seen", covariant=True)
+Seen = TypeVar("Seen", bound="DataclassInstance", covariant=True)
 
 
 class ShotVerdict(StrEnum):
@@ -91,6 +94,17 @@ class MeasuredExposure(Generic[Rows, Seen]):
     reasons: tuple[str, ...] = ()
     ghosts: GhostShare | None = None
     hidden: Hidden = NOTHING_HIDDEN
+
+    def told(self) -> dict[str, object]:
+        """What files say of it, beside the droplets."""
+        return {
+            "verdict": self.verdict.value,
+            "reasons": self.reasons,
+            "residual_over_noise": self.residual_over_noise,
+            "views": {name: asdict(view) for name, view in self.views.items()},
+            "ghosts": asdict(self.ghosts) if self.ghosts else None,
+            "hidden": asdict(self.hidden),
+        }
 
 
 def check_images(images: Sequence[Image], search: DropletSearch) -> None:

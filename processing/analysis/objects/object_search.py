@@ -3,13 +3,14 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from processing.analysis.objects.break_up import THRESHOLD, THRESHOLDS, Nozzle, Reach, core_of, reach_of
-from processing.analysis.objects.dark_voxels import connected, dark_voxels
+from processing.analysis.objects.dark_voxels import DarkVoxels, connected, dark_voxels
 from processing.analysis.objects.liquid_objects import LiquidObjects, liquid_objects
-from processing.analysis.objects.seeing_views import map_grid, pixels_of, seeing_views, unknown_shares
+from processing.analysis.objects.seeing_views import map_grid, pixels_of, places_of, seeing_views, unknown_shares
 from processing.analysis.objects.silhouettes import LEAST_VIEWS, sights
 from processing.geometry import FloatArray, ViewMapping
 from processing.kernels import DEFAULT_THREADS
@@ -22,6 +23,8 @@ from processing.volume import VoxelGrid
 
 PITCH_PX = 1.5
 """Width of a voxel, over that of a pixel: of two, threads of 50 um are too thin; one costs three times as much."""
+LEAST_KNOWING = 2
+"""So many views must know something of a place that is dark."""
 NO_NOZZLE = "nobody stated where the nozzle is: add [spray] nozzle_mm, axis to the run, or measure with --nozzle X,Y,Z"
 
 
@@ -33,6 +36,8 @@ class ObjectSearch:
     ----------
     plan : Plan
         Of the grid in which objects are looked for.
+    mappings : tuple of ViewMapping
+        Of the views.
     sight : (views, 2, 3) array
         How views see motions.
     places : VoxelGrid
@@ -44,6 +49,7 @@ class ObjectSearch:
     """
 
     plan: Plan
+    mappings: tuple[ViewMapping, ...]
     sight: FloatArray
     places: VoxelGrid
     pixels: tuple[NDArray[np.int32], ...]
@@ -90,8 +96,9 @@ def plan_objects(mappings: Sequence[ViewMapping], grid: VoxelGrid, nozzle: Nozzl
     """
     coarse = coarser(grid)
     places = map_grid(coarse)
-    pixels = tuple(pixels_of(mapping, places) for mapping in mappings)
-    return ObjectSearch(plan_reconstruction(mappings, coarse), sights(mappings, coarse), places, pixels, nozzle)
+    pixels = tuple(pixels_of(mapping, places_of(places)) for mapping in mappings)
+    plan = plan_reconstruction(mappings, coarse)
+    return ObjectSearch(plan, tuple(mappings), sights(mappings, coarse), places, pixels, nozzle)
 
 
 def coarser(grid: VoxelGrid) -> VoxelGrid:
@@ -116,33 +123,57 @@ def measure_objects(
     search : ObjectSearch
         Where to look.
     trust : sequence of (rows, columns) float32 arrays, optional
-        0 where nothing is known of a pixel: then it says nothing against liquid.
+        0 where nothing is known of a pixel: then it says nothing against liquid; two views must know something.
     threads : int
         The result does not depend on it.
     """
-    darkness = [np.clip(1 - image, 0, 1) for image in images]
-    if trust is not None:
-        darkness = [np.where(sure > 0, dark, np.float32(1)) for dark, sure in zip(darkness, trust, strict=True)]
+    darkness = _darkness(images, trust)
     seeing = seeing_views(darkness, search.pixels, search.places)
     shares = unknown_shares(seeing, len(images))
     try:
-        objects, reach = _looked_for(darkness, search, threads)
+        voxels = _known(_dark(darkness, search, threads), trust, search)
     except ValueError as error:
         return ExposureObjects(LiquidObjects.none(), Reach(reason=str(error)), *shares, seeing, str(error))
+    reach = reach_of(voxels, search.nozzle) if search.nozzle else Reach(reason=NO_NOZZLE)
     if len(images) < LEAST_VIEWS:
         reason = f"{len(images)} views do not tell shapes: {LEAST_VIEWS} or more do"
         return ExposureObjects(LiquidObjects.none(), reach, *shares, seeing, reason)
-    return ExposureObjects(objects, reach, *shares, seeing)
+    return ExposureObjects(_objects(voxels, search).told(), reach, *shares, seeing)
 
 
-def _looked_for(darkness: Sequence[Intensity], search: ObjectSearch, threads: int) -> tuple[LiquidObjects, Reach]:
+def all_objects(images: Sequence[Intensity], search: ObjectSearch, *, threads: int = DEFAULT_THREADS) -> LiquidObjects:
+    """All objects of an exposure, droplets and what may be a ghost included."""
+    return _objects(_dark(_darkness(images, None), search, threads), search)
+
+
+def _darkness(images: Sequence[Intensity], trust: Sequence[Intensity] | None) -> list[Intensity]:
+    """Share of the light that is missing; all of it where nothing is known."""
+    darkness = [np.clip(1 - image, 0, 1) for image in images]
+    if trust is None:
+        return darkness
+    return [np.where(sure > 0, dark, np.float32(1)) for dark, sure in zip(darkness, trust, strict=True)]
+
+
+def _dark(darkness: Sequence[Intensity], search: ObjectSearch, threads: int) -> DarkVoxels:
     grid = search.plan.grid
     slab = np.empty((grid.shape[0], min(SLAB_ROWS, grid.shape[1]), grid.shape[2]), np.uint8)
     slabs = slabs_of_sight(search.plan, darkness, ReconstructionMethod.MINLOS, out=slab, threads=threads)
-    voxels = dark_voxels(slabs, grid, min(THRESHOLDS))
+    return dark_voxels(slabs, grid, min(THRESHOLDS))
+
+
+def _known(voxels: DarkVoxels, trust: Sequence[Intensity] | None, search: ObjectSearch) -> DarkVoxels:
+    """Those of which enough views know something: a pixel and its neighbours, which samples mix."""
+    if trust is None or all((sure > 0).all() for sure in trust):
+        return voxels
+    points_mm = voxels.points_mm
+    pixels = [pixels_of(mapping, points_mm).T for mapping in search.mappings]
+    sures = [cv2.erode((sure > 0).astype(np.uint8), np.ones((5, 5), np.uint8)) for sure in trust]
+    known = np.sum([sure[rows, columns] for sure, (columns, rows) in zip(sures, pixels, strict=True)], axis=0)
+    return voxels.where(known >= LEAST_KNOWING)
+
+
+def _objects(voxels: DarkVoxels, search: ObjectSearch) -> LiquidObjects:
     told = voxels.at_least(THRESHOLD)
     numbers = connected(told)
     core = core_of(told, numbers, search.nozzle) if search.nozzle else None
-    found = liquid_objects(told, numbers, search.sight, core)
-    reach = reach_of(voxels, search.nozzle) if search.nozzle else Reach(reason=NO_NOZZLE)
-    return found.told(), reach
+    return liquid_objects(told, numbers, search.sight, core)

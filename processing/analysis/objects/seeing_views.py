@@ -27,10 +27,15 @@ def map_grid(grid: VoxelGrid) -> VoxelGrid:
     return VoxelGrid((counts[0], counts[1], counts[2]), (x_mm, y_mm, z_mm), pitch_mm)
 
 
-def pixels_of(mapping: ViewMapping, grid: VoxelGrid) -> NDArray[np.int32]:
-    """Column and row (N, 2) of the pixel in which a view sees each place of a grid, in the order of a flat volume."""
+def places_of(grid: VoxelGrid) -> FloatArray:
+    """All centres (N, 3) x, y, z of a grid, in the order of a flat volume."""
     z, y, x = np.meshgrid(grid.z_mm, grid.y_mm, grid.x_mm, indexing="ij")
-    seen_px = np.rint(mapping.project(np.column_stack([x.ravel(), y.ravel(), z.ravel()])))
+    return np.column_stack([x.ravel(), y.ravel(), z.ravel()])
+
+
+def pixels_of(mapping: ViewMapping, points_mm: FloatArray) -> NDArray[np.int32]:
+    """Column and row (N, 2) of the pixel in which a view sees each point (N, 3); the nearest one beside the image."""
+    seen_px = np.rint(mapping.project(points_mm))
     return np.clip(seen_px, 0, np.array(mapping.image_size_px) - 1).astype(np.int32)
 
 

@@ -2,12 +2,11 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TypeVar
 
 import numpy as np
 
 from processing.analysis.droplets.droplet_table import Columns, Droplets, SizedDroplets
-from processing.analysis.droplets.measured_exposure import MeasuredExposure, ShotVerdict
+from processing.analysis.droplets.measured_exposure import MeasuredExposure, Seen, ShotVerdict
 from processing.analysis.velocity.moving_droplets import MovingDroplets
 from processing.analysis.velocity.pairing import Pairing, pair
 from processing.analysis.velocity.velocity_table import MM_PER_NS, Velocities
@@ -15,7 +14,6 @@ from processing.analysis.velocity.velocity_verdict import judged
 from processing.volume import VoxelGrid
 
 Rows = Droplets | SizedDroplets
-Seen = TypeVar("Seen", covariant=True)
 
 
 @dataclass(frozen=True, eq=False)

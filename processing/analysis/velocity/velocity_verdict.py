@@ -3,7 +3,7 @@
 import numpy as np
 
 from processing.analysis.droplets.droplet_table import DropletRows
-from processing.analysis.droplets.measured_exposure import MeasuredExposure, ShotVerdict
+from processing.analysis.droplets.measured_exposure import MeasuredExposure, Seen, ShotVerdict
 from processing.analysis.velocity.common_motion import REACH_VOXEL
 from processing.analysis.velocity.moving_droplets import MovingDroplets
 from processing.analysis.velocity.pairing import Pairing
@@ -18,7 +18,7 @@ Verdict = tuple[ShotVerdict, tuple[str, ...]]
 
 
 def judged(
-    exposures: tuple[MeasuredExposure[DropletRows, object], MeasuredExposure[DropletRows, object]],
+    exposures: tuple[MeasuredExposure[DropletRows, Seen], MeasuredExposure[DropletRows, Seen]],
     droplets: tuple[MovingDroplets, MovingDroplets],
     pairing: Pairing,
     stayed: int,

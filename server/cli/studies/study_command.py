@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from processing.studies.report import Statement
 
-ENDINGS = (".csv", ".png", "-profiles.csv")  # of the files that studies write
+ENDINGS = (".csv", ".png", "-profiles.csv", "-classes.csv")  # of the files that studies write
 Row = TypeVar("Row")
 Study = Callable[[Namespace], dict[str, Any]]
 

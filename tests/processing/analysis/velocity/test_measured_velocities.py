@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from processing.analysis.droplets.bright_shot import SeenView
 from processing.analysis.droplets.droplet_table import Droplets
 from processing.analysis.droplets.measured_exposure import MeasuredExposure, ShotVerdict
 from processing.analysis.velocity.measured_velocities import MeasuredVelocities, measure_velocities
@@ -14,7 +15,7 @@ from tests.support.moving_droplets import BOX, Exposed, exposures
 
 PITCH_MM = 1 / 60
 GRID = VoxelGrid((200, 80, 300), (-2.0, 1.0, 0.5), PITCH_MM)
-Exposure = MeasuredExposure[Droplets, object]
+Exposure = MeasuredExposure[Droplets, SeenView]
 
 
 def measured(exposed: Exposed, grid: VoxelGrid = GRID, verdict: ShotVerdict = ShotVerdict.GOOD) -> Exposure:

@@ -1,0 +1,168 @@
+"""Liquid that is no droplet, in recorded shots of shadows: looked for in all that the views see in common."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import AfterValidator, Field
+
+from daq.files.run_directory import RunReader, Shot
+from processing.analysis.droplets.droplet_file import StoredDroplets
+from processing.analysis.objects.break_up import Nozzle, Reach
+from processing.analysis.objects.connected_share import break_up_of
+from processing.analysis.objects.liquid_objects import ObjectClass
+from processing.analysis.objects.object_search import ExposureObjects, ObjectSearch, measure_objects, plan_objects
+from processing.calibration.calibration import Calibration
+from processing.kernels import DEFAULT_THREADS
+from processing.reconstruction.errors import ReconstructionError
+from processing.reconstruction.settings import FrozenValue
+from processing.runs.measured_images import shadow_images, without_ignored
+from processing.runs.pipeline import default_grid
+from processing.runs.results_file import FrameName
+from processing.runs.workbench import References
+from processing.volume import VoxelGrid
+
+
+def place_and_axis(numbers: tuple[float, ...]) -> tuple[float, ...]:
+    """Numbers that say where a nozzle is; ValueError if they do not."""
+    if len(numbers) not in (3, 6) or not np.isfinite(numbers).all() or (len(numbers) == 6 and not any(numbers[3:])):
+        raise ValueError(
+            "x, y, z of the orifice in mm, and if the spray does not go along y, three numbers of its axis"
+        )
+    return numbers
+
+
+NozzleNumbers = Annotated[tuple[float, ...], AfterValidator(place_and_axis)]
+"""x, y, z of the orifice in mm, and of the direction of the spray."""
+
+
+@dataclass(frozen=True, eq=False)
+class RunObjects:
+    """What the shots of a run share when objects are looked for.
+
+    Parameters
+    ----------
+    run : RunReader
+        The recorded run, of shadows.
+    references : References
+        Of the run.
+    ignored : tuple of IgnoredPixels
+        That are not asked.
+    search : ObjectSearch | None
+        Where objects are looked for; None for bright particles.
+    """
+
+    run: RunReader
+    references: References
+    ignored: tuple[str, ...]
+    search: ObjectSearch | None
+
+    @classmethod
+    def of(
+        cls,
+        run: RunReader,
+        calibration: Calibration,
+        references: References,
+        box: VoxelGrid,
+        nozzle: NozzleNumbers | None,
+        ignored: tuple[str, ...],
+    ) -> "RunObjects":
+        """Plan the search. A box is searched where views see no volume in common."""
+        if run.header.polarity != "shadow":
+            return cls(run, references, ignored, None)
+        try:
+            grid = default_grid(calibration)
+        except ReconstructionError:
+            grid = box
+        mappings = [calibration.views[view].mapping for view in run.header.views]
+        return cls(run, references, ignored, plan_objects(mappings, grid, nozzle_of(run, nozzle)))
+
+    def measure(
+        self, shot: Shot, frames: Sequence[FrameName], threads: int = DEFAULT_THREADS
+    ) -> dict[FrameName, ExposureObjects]:
+        """Objects of some exposures; none of bright particles."""
+        if self.search is None:
+            return {}
+        return {frame: self._exposure(shot, frame, self.search, threads) for frame in frames}
+
+    def _exposure(self, shot: Shot, frame: FrameName, search: ObjectSearch, threads: int) -> ExposureObjects:
+        images, trust = shadow_images(self.run, shot, frame, self.references)
+        known = without_ignored(dict(zip(shot.views, trust, strict=True)), self.ignored)
+        return measure_objects(images, search, trust=list(known.values()), threads=threads)
+
+
+def nozzle_of(run: RunReader, stated: NozzleNumbers | None) -> Nozzle | None:
+    """The nozzle that is stated, else that of the run."""
+    if stated is not None:
+        x_mm, y_mm, z_mm, *axis = stated
+        return Nozzle((x_mm, y_mm, z_mm), (axis[0], axis[1], axis[2])) if axis else Nozzle((x_mm, y_mm, z_mm))
+    spray = run.header.spray
+    return Nozzle(spray.nozzle_mm, spray.axis) if spray else None
+
+
+def told_objects(found: ExposureObjects | None) -> dict[str, Any]:
+    """What a file says of one exposure, beside the table; nothing where nobody looked."""
+    if found is None:
+        return {}
+    told = {
+        **{f"{kind.value}s": found.objects.count(kind) for kind in _COUNTED},
+        "reason": found.reason,
+        "blind_share": found.blind_share,
+        "unjudged_share": found.unjudged_share,
+        "reach": asdict(found.reach),
+    }
+    return {"objects": told}
+
+
+_COUNTED = (ObjectClass.LIGAMENT, ObjectClass.SHEET, ObjectClass.CLUSTER)
+
+
+class BreakUpLength(FrozenValue):
+    """Along the axis of the spray, in mm, and where it lies with 95 % confidence."""
+
+    value: Annotated[float, Field(description="half of the shots still hang together with the nozzle there")]
+    low: Annotated[float, Field(description="it is not below this, with 97.5 %, at whichever threshold")]
+    high: Annotated[float | None, Field(description="nor above this; null: it lies beyond what all views see")]
+
+
+class LiquidSummary(FrozenValue):
+    """Objects of all exposures, and the break-up length."""
+
+    ligaments: Annotated[int, Field(description="in all exposures")] = 0
+    sheets: Annotated[int, Field(description="in all exposures")] = 0
+    clusters: Annotated[int, Field(description="in all exposures; neither of both, or several that touch")] = 0
+    break_up_mm: Annotated[BreakUpLength | None, Field(description="how far liquid hangs together")] = None
+    break_up_longer_than_mm: Annotated[
+        float | None, Field(description="where more than half leave the field before they end")
+    ] = None
+    break_up_reason: Annotated[str | None, Field(description="why there is no break-up length")] = None
+
+
+NO_OBJECTS = "nobody looked for it: bright particles, or a file of an older program"
+
+
+def liquid_summary(shots: Sequence[StoredDroplets]) -> LiquidSummary:
+    """Objects of some shots by their files; the break-up length is of the first exposure of each."""
+    told = [list(_objects_of(shot)) for shot in shots]
+    counts = {f"{kind}s": sum(one[f"{kind}s"] for shot in told for one in shot) for kind in _COUNTED}
+    reaches = [Reach(**{name: _frozen(value) for name, value in shot[0]["reach"].items()}) for shot in told if shot]
+    if not reaches:
+        return LiquidSummary(**counts, break_up_reason=NO_OBJECTS)
+    found = break_up_of(reaches)
+    value = None
+    if found.value_mm is not None and found.low_mm is not None:
+        value = BreakUpLength(value=found.value_mm, low=found.low_mm, high=found.high_mm)
+    return LiquidSummary(
+        **counts, break_up_mm=value, break_up_longer_than_mm=found.longer_than_mm, break_up_reason=found.reason
+    )
+
+
+def _objects_of(shot: StoredDroplets) -> list[Mapping[str, Any]]:
+    exposures = json.loads(str(shot.provenance.get("exposures", "{}"))).values()
+    return [exposure["objects"] for exposure in exposures if exposure.get("objects")]
+
+
+def _frozen(value: Any) -> Any:
+    return tuple(value) if isinstance(value, list) else value

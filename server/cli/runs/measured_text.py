@@ -1,0 +1,71 @@
+"""What ``measure`` tells people: a line per shot, and a sentence for the run."""
+
+from typing import Any
+
+from server.cli.options import describe_grid
+from server.cli.output import table
+
+
+def droplets_table(result: dict[str, Any]) -> str:
+    """A line per shot, for people."""
+    rows = [
+        [
+            str(shot["shot"]),
+            str(shot["droplets"]),
+            _number(shot["residual_over_noise"], 3),
+            "" if shot["ghost_share"] is None else f"{100 * shot['ghost_share']:.2f}",
+            f"{100 * shot['hidden_share']:.1f}" if shot["hidden_share"] else "",
+            _paired(shot["velocity"]),
+            f"{shot['cpu_s']:.1f}",
+            shot["verdict"],
+            shot["file"],
+        ]
+        for shot in result["shots"]
+    ]
+    head = ["shot", "droplets", "residual/noise", "ghosts %", "hidden %", "paired %", "CPU-s", "verdict", "file"]
+    return table(head, rows)
+
+
+def _paired(velocity: dict[str, Any] | None) -> str:
+    return f"{100 * velocity['share_paired']:.1f}" if velocity and velocity["pairs"] else ""
+
+
+def _number(value: float | None, digits: int) -> str:
+    return "" if value is None else f"{value:.{digits}f}"
+
+
+def droplets_summary(result: dict[str, Any]) -> str:
+    """What was measured of a run, in a sentence."""
+    statistics = result["statistics"]
+    grid = describe_grid(result["grid"]["shape"], result["grid"]["pitch_mm"])
+    if not statistics["exposures"]:
+        return f"no shot could be measured, {grid}"
+    counted = f"{statistics['n']} droplets in {statistics['exposures']} exposures"
+    density = _with_interval(statistics["number_density_per_mm3"])
+    d32_um, why = statistics["d32_um"], statistics["reason"]
+    d32 = f"D32 {_with_interval(d32_um)} um" if d32_um else f"no D32: {why}"
+    hidden = f", {100 * statistics['hidden_share']:.1f} % of the volume hidden" if statistics["hidden_share"] else ""
+    return f"{counted}, {density} per mm3, {d32}{hidden}, {_mean_velocity(result['velocity'])}, {grid}{_liquid(result)}"
+
+
+def _liquid(result: dict[str, Any]) -> str:
+    """What is no droplet, in a line of its own; nothing where nobody looked."""
+    if result["polarity"] != "shadow":
+        return ""
+    objects = ", ".join(f"{result[name]} {name}" for name in ("ligaments", "sheets", "clusters"))
+    length = result["break_up_mm"]
+    if length is None:
+        return f"\n{objects}; no break-up length: {result['break_up_reason']}"
+    most = "beyond the field" if length["high"] is None else f"{length['high']:.2f}"
+    return f"\n{objects}; break-up length {length['value']:.2f} mm ({length['low']:.2f} to {most})"
+
+
+def _mean_velocity(velocity: dict[str, Any]) -> str:
+    if velocity["mean_m_s"] is None:
+        return f"no velocity: {velocity['reason']}"
+    components = (f"{name} {_with_interval(estimate)}" for name, estimate in velocity["mean_m_s"].items())
+    return f"{velocity['pairs']} pairs, {', '.join(components)} m/s"
+
+
+def _with_interval(estimate: dict[str, float]) -> str:
+    return f"{estimate['value']:.3g} ({estimate['low']:.3g} to {estimate['high']:.3g})"
