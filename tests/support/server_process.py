@@ -44,6 +44,17 @@ class ServerProcess:
         except httpx.TransportError:
             return False
 
+    @property
+    def pid(self) -> int:
+        """Process id."""
+        return self._process.pid
+
+    @property
+    def rss_kib(self) -> float:
+        """Memory that it occupies."""
+        status = Path(f"/proc/{self.pid}/status").read_text()
+        return float(status.partition("VmRSS:")[2].split()[0])
+
     def kill(self) -> None:
         """End it without a warning."""
         self._process.kill()

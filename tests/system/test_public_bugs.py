@@ -104,11 +104,11 @@ def test_6_a_recording_server_that_hangs_or_dies_leaves_darkness_and_a_named_fau
         eventually(first.answers, "the server answers")
         assert first.http.post("/api/runs", json=plan).status_code == 201
         eventually(lambda: bool(fired), "there is a shot")
-        os.kill(first._process.pid, signal.SIGSTOP)
+        os.kill(first.pid, signal.SIGSTOP)
         time.sleep(0.5)  # what was on its way
         before = len(fired)
         time.sleep(3.5)  # the heartbeat of the generator is over after 3 s
-        os.kill(first._process.pid, signal.SIGCONT)
+        os.kill(first.pid, signal.SIGCONT)
         eventually(lambda: acquisition(first)["outcome"] == "failed", "the run has failed")
         causes = first.http.get(f"/api/runs/{acquisition(first)['run_id']}").json()["causes"]
         assert any("heartbeat" in cause["text"] for cause in causes), causes

@@ -8,7 +8,7 @@ import pytest
 
 from daq.files.run_directory import DoubleFrame, ExposureRecord, FiredTrain, ImageKey, Shot
 from processing.synthetic.numbered import ImageNumber, numbered
-from tests.support import soak_cluster, soak_faults, soak_workers
+from tests.support import soak_cluster, soak_faults, soak_long, soak_workers
 from tests.support.simulated_serving import serving_bench, tiny_config
 from tests.support.soak_kill import Killed, kill_servers, mispaired_exposures, summary
 
@@ -72,6 +72,33 @@ def test_after_a_camera_was_without_power_the_next_run_is_completed(
     assert (sound.fault, sound.refused, sound.failed) == ("", 0, 0)
     assert returned.fault == "killed"
     assert returned.next_run_s > 0
+
+
+@pytest.mark.network
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+def test_runs_through_one_server_lose_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    runs: list[soak_long.Recorded] = []
+    monkeypatch.setattr(soak_long, "SHOTS", 5)
+    soak_long.record_runs(8, tmp_path, "here", runs.append)
+    assert [(run.planned, run.told, run.valid, run.lost, run.mispaired) for run in runs] == [
+        (5, 5, 5, 0, 0),
+        (3, 3, 3, 0, 0),
+    ]
+    assert [run.rss_kib[-1][0] for run in runs] == [5, 8]
+
+
+def test_memory_that_grows_with_every_shot_is_found_after_the_warm_up() -> None:
+    def run(server: int, *samples: tuple[int, float]) -> soak_long.Recorded:
+        return soak_long.Recorded("abc", server, 500, 500, 499, 0, 1, samples, 2.0)
+
+    growing = [run(7, (0, 1e5), (200, 2e5), (500, 2e5 + 300)), run(7, (800, 2e5 + 600)), run(8, (200, 1.0))]
+    assert soak_long.slope_bytes(growing) == pytest.approx(1024)
+    assert soak_long.slope_bytes(growing[2:]) is None
+    heads, row, origin = soak_long.summary(growing).splitlines()
+    assert heads.split()[:5] == ["runs", "shots", "told", "valid", "lost"]
+    assert row.split()[:7] == ["3", "1500", "1500", "1497", "0", "3", "1024"]
+    assert origin.startswith("commit abc; ")
 
 
 def test_the_table_of_faults_counts_what_was_refused() -> None:
