@@ -60,6 +60,8 @@ BEGINNINGS: Mapping[FaultKind, Act] = {
     FaultKind.PACKET_LOSS: _spoil(lambda percent: {"packet_loss": percent / 100}),
     FaultKind.PACKETS_DOUBLED: _spoil(lambda percent: {"packets_doubled": percent / 100}),
     FaultKind.PACKETS_SWAPPED: _spoil(lambda percent: {"packets_swapped": percent / 100}),
+    FaultKind.LEADER_LOST: _spoil(lambda images: {"leaders_lost": int(images)}),
+    FaultKind.TRAILER_LOST: _spoil(lambda images: {"trailers_lost": int(images)}),
     FaultKind.BLOCK_DOUBLED: _spoil(lambda shots: {"doubled": int(shots)}),
     FaultKind.IDS_WRAP: _spoil(lambda blocks: {"blocks_before_wrap": int(blocks)}),
     FaultKind.MISSED_TRIGGER: _spoil(lambda shots: {"missed_triggers": int(shots)}),

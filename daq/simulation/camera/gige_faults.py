@@ -4,7 +4,17 @@ from dataclasses import dataclass, field
 from threading import Lock
 from typing import Literal
 
-ShotFault = Literal["missed_triggers", "dropped_a", "dropped_b", "swapped", "late", "wrong_size", "doubled"]
+ShotFault = Literal[
+    "missed_triggers",
+    "dropped_a",
+    "dropped_b",
+    "swapped",
+    "late",
+    "wrong_size",
+    "doubled",
+    "leaders_lost",
+    "trailers_lost",
+]
 
 
 @dataclass
@@ -19,6 +29,8 @@ class CameraFaults:
         Fraction of stream packets that arrive twice.
     packets_swapped : float
         Fraction of stream packets that are overtaken by the one behind them.
+    leaders_lost, trailers_lost : int
+        Of so many next blocks the first (last) packet does not arrive, until it is asked for again.
     blocks_before_wrap : int
         So many blocks of every acquisition come before the block ids wrap; 0: 65535, as they start at 1.
     missed_triggers : int
@@ -46,6 +58,8 @@ class CameraFaults:
     packet_loss: float = 0.0
     packets_doubled: float = 0.0
     packets_swapped: float = 0.0
+    leaders_lost: int = 0
+    trailers_lost: int = 0
     blocks_before_wrap: int = 0
     missed_triggers: int = 0
     dropped_a: int = 0
@@ -65,7 +79,7 @@ class CameraFaults:
         self.timestamp_jump_ns, self.frozen, self.held_by_another = 0, False, False
 
     def take(self, fault: ShotFault) -> bool:
-        """True if the fault hits this shot; uses up one of its shots."""
+        """True if the fault hits this shot, or block; uses up one of them."""
         with self._lock:
             left = int(getattr(self, fault))
             setattr(self, fault, max(0, left - 1))

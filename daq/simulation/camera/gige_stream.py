@@ -143,9 +143,10 @@ class StreamChannel:
             self._kept.clear()
 
     def _order(self, packets: int) -> list[int]:
-        """Indices of the packets of a block as they leave: some after the one behind them, some twice."""
-        order = list(range(packets))
-        for place in range(packets - 1):
+        """Indices of the packets of a block as they leave: some after the one behind them, some twice, some not."""
+        last = packets - self._faults.take("trailers_lost")
+        order = list(range(self._faults.take("leaders_lost"), last))
+        for place in range(len(order) - 1):
             if self._happens(self._faults.packets_swapped):
                 order[place : place + 2] = order[place + 1], order[place]
         return [index for index in order for _ in range(1 + self._happens(self._faults.packets_doubled))]

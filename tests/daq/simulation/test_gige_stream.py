@@ -92,10 +92,12 @@ def sent_by(faults: CameraFaults) -> list[int]:
     [
         (CameraFaults(), [0, 1, 2, 3, 4, 5, 6, 7]),
         (CameraFaults(packet_loss=1.0), []),
+        (CameraFaults(leaders_lost=1), [1, 2, 3, 4, 5, 6, 7]),
+        (CameraFaults(trailers_lost=1), [0, 1, 2, 3, 4, 5, 6]),
         (CameraFaults(packets_doubled=1.0), [0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5, 6, 6, 7, 7]),
         (CameraFaults(packets_swapped=1.0), [1, 2, 3, 4, 5, 6, 7, 0]),
     ],
-    ids=["all is well", "lost", "doubled", "swapped"],
+    ids=["all is well", "lost", "no leader", "no trailer", "doubled", "swapped"],
 )
 def test_what_happens_to_packets_on_their_way(faults: CameraFaults, sent: list[int]) -> None:
     assert sent_by(faults) == sent

@@ -163,7 +163,7 @@ def test_a_fault_beyond_all_measure_is_refused(wrong: dict[str, Any]) -> None:
 
 
 def test_a_camera_with_power_again_has_factory_settings_and_another_clock(laboratory: SimulatedLaboratory) -> None:
-    with AravisCamera(VIEW, IP, PROFILE, SHAPE, Network()) as camera:
+    with AravisCamera(VIEW, IP, PROFILE, SHAPE, Network(packet_bytes=9000)) as camera:
         camera.arm()
         time.sleep(0.5)
         before_ns = camera._connected().clock_ns()
