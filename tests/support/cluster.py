@@ -89,7 +89,7 @@ class Cluster:
         process.wait(LIMIT_S)
 
     def _start(self, name: str, prefix: list[str], *arguments: str, **environment: str) -> None:
-        command = [*prefix, sys.executable, "-m", "server.cli", *arguments]
+        command = [*prefix, str(Path(sys.executable).with_name("tomoshadow")), *arguments]
         with (self.work_dir / f"{name}.log").open("ab") as log:
             self.processes[name] = subprocess.Popen(
                 command, cwd=self.work_dir, env={**ENVIRONMENT, **environment}, stdout=log, stderr=log

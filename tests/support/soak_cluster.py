@@ -13,15 +13,17 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 from server.cli.output import endable, table
 from server.lab.engine.cluster_engine import ClusterEngine
 from server.lab.engine.in_order import results_in_order
+from server.lab.engine.task import Values
 from server.rig.processing_config import ProcessingConfig
 from tests.support.cluster import Cluster, FarNetwork, cluster, far_network, write_certificates
 from tests.support.cluster_tasks import write_slowly
@@ -39,9 +41,15 @@ class Batch:
         out.mkdir()
         self.out, self.shots = out, list(range(shots))
         jobs = {f"run, shot {shot}": {"results_dir": str(out), "shot": shot, "steps": steps} for shot in self.shots}
-        pool = ThreadPoolExecutor(1)
-        self._results = pool.submit(lambda: list(results_in_order(ClusterEngine(config), write_slowly, jobs)))
-        pool.shutdown(wait=False)
+        self._results: Future[list[dict[str, Any]]] = Future()
+        threading.Thread(target=self._work, args=(config, jobs), daemon=True).start()
+
+    def _work(self, config: ProcessingConfig, jobs: Mapping[str, Values]) -> None:
+        """Thread: one that never ends holds up no test."""
+        try:
+            self._results.set_result(list(results_in_order(ClusterEngine(config), write_slowly, jobs)))
+        except Exception as error:  # noqa: BLE001  told where the results are asked for
+            self._results.set_exception(error)
 
     def await_begun(self, count: int) -> list[int]:
         """Wait until so many shots have begun; the processes that do them, the latest last."""

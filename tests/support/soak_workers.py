@@ -93,7 +93,7 @@ def _start(lab: Cluster, number: int, network: FarNetwork) -> None:
 
 def _warm_up(lab: Cluster, run: RecordedRun, out: Path, workers: int) -> None:
     """Every worker has loaded what it needs, and has planned."""
-    _do(lab, run, out, workers, 4 * workers)
+    _do(lab, run, out, workers, 2 * workers)
     shutil.rmtree(out)
 
 

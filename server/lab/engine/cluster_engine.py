@@ -27,6 +27,7 @@ from server.lab.engine.task import OnProgress, Task, TaskAborted, TaskError, Una
 from server.rig.processing_config import ProcessingConfig
 
 _TRY_AGAIN_S = 0.5
+_Told = tuple[BaseException | None, dict[str, Any] | None]
 
 
 @dataclass(eq=False)
@@ -115,36 +116,36 @@ class ClusterEngine:
             link = await self._linked(sent)
             future = link.client.submit(perform_errand, task, errand, pure=False)
             try:
-                error, is_lost = await self._outcome(link, future)
-                if isinstance(error, KilledWorker):
-                    raise TaskError(_deadly(sent.job_id, error)) from error
-                if not is_lost:
-                    return settled(error, None if error else await future)
+                if told := await self._told(link, future):
+                    error, result = told
+                    if isinstance(error, KilledWorker):
+                        raise TaskError(_deadly(sent.job_id, error)) from error
+                    return settled(error, result)
             finally:
                 with suppress(RuntimeError):  # of a client that is closed
                     future.release()  # a result that is still held is computed again when its worker dies
                 await link.forget(sent.name)
 
-    async def _outcome(self, link: SchedulerLink, future: "Future[Any]") -> tuple[BaseException | None, bool]:
-        """What a task raised, if it has ended; and whether the scheduler was lost before that.
+    async def _told(self, link: SchedulerLink, future: "Future[Any]") -> _Told | None:
+        """What a task raised, or its result; None if the scheduler was lost before that was here.
 
         Raises
         ------
         Unavailable
             The scheduler has had no workers for too long.
         """
-        ended, lost = asyncio.ensure_future(future.exception()), asyncio.ensure_future(link.lost.wait())
+        told, lost = asyncio.ensure_future(_fetched(future)), asyncio.ensure_future(link.lost.wait())
         try:
-            while not ended.done() and not lost.done():
-                await asyncio.wait({ended, lost}, timeout=_TRY_AGAIN_S, return_when=asyncio.FIRST_COMPLETED)
+            while not told.done() and not lost.done():
+                await asyncio.wait({told, lost}, timeout=_TRY_AGAIN_S, return_when=asyncio.FIRST_COMPLETED)
                 self._require_workers(link)
         finally:
-            ended.cancel()
+            told.cancel()
             lost.cancel()
-        raised = ended.exception() if ended.done() and not ended.cancelled() else None
-        if not ended.done() or ended.cancelled() or future.status in ("cancelled", "lost"):
-            return None, True
-        return raised or ended.result(), False
+        if not told.done() or told.cancelled() or told.exception() or future.status in ("cancelled", "lost"):
+            link.lost.set()  # if it was not, the result was lost on its way: who does not know why takes another link
+            return None
+        return told.result()
 
     def _require_workers(self, link: SchedulerLink) -> None:
         limit_s = self._config.unreachable_s
@@ -192,6 +193,11 @@ class ClusterEngine:
         for name, steps in steps_by_name.items():
             if sent := self._sent.get(name):
                 sent.on_progress(steps)
+
+
+async def _fetched(future: "Future[Any]") -> _Told:
+    error = await future.exception()
+    return (error, None) if error else (None, await future)
 
 
 def _deadly(job_id: str, error: KilledWorker) -> str:

@@ -54,7 +54,7 @@ def _started(engine: Engine) -> Iterator[Begin]:
     """Run an engine in an event loop of its own, in a thread; yields what begins a coroutine there."""
     loop = asyncio.new_event_loop()
     loop.set_exception_handler(_leave_to_jobs)
-    thread = threading.Thread(target=loop.run_forever, name="engine")
+    thread = threading.Thread(target=loop.run_forever, name="engine", daemon=True)
     thread.start()
 
     def begin(work: Coroutine[Any, Any, Any]) -> "Future[Any]":

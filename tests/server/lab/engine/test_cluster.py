@@ -52,7 +52,7 @@ def _ignore(_steps: int) -> None:
 def test_workers_load_neither_server_nor_drivers(lab: Cluster) -> None:
     (told,) = results_in_order(ClusterEngine(lab.config()), tell_modules, {"a": {}})
     loaded = set(told["modules"])
-    assert not {"fastapi", "nicegui", "uvicorn", "daq.drivers", "server.cli.reconstruct", "server.web"} & loaded
+    assert not {"fastapi", "nicegui", "uvicorn", "daq.drivers", "server.web", "server.rig.config"} & loaded
     assert told["threads"] == 1
     assert told["niceness"] == os.nice(0)
 
