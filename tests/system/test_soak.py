@@ -85,14 +85,15 @@ def test_runs_through_one_server_lose_nothing(tmp_path: Path, monkeypatch: pytes
         (5, 5, 5, 0, 0),
         (3, 3, 3, 0, 0),
     ]
-    assert [run.rss_kib[-1][0] for run in runs] == [5, 8]
+    assert all(run.rss_kib for run in runs)
+    assert min(shots for shots, _ in runs[1].rss_kib) >= 5
 
 
 def test_memory_that_grows_with_every_shot_is_found_after_the_warm_up() -> None:
     def run(server: int, *samples: tuple[int, float]) -> soak_long.Recorded:
         return soak_long.Recorded("abc", server, 500, 500, 499, 0, 1, samples, 2.0)
 
-    growing = [run(7, (0, 1e5), (200, 2e5), (500, 2e5 + 300)), run(7, (800, 2e5 + 600)), run(8, (200, 1.0))]
+    growing = [run(7, (0, 1e5), (2500, 2e5), (2800, 2e5 + 300)), run(7, (3100, 2e5 + 600)), run(8, (2500, 1.0))]
     assert soak_long.slope_bytes(growing) == pytest.approx(1024)
     assert soak_long.slope_bytes(growing[2:]) is None
     heads, row, origin = soak_long.summary(growing).splitlines()
