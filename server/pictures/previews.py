@@ -9,7 +9,9 @@ import json
 import math
 import zipfile
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +21,7 @@ from numpy.typing import NDArray
 
 from daq.files.atomic_file import own_part_path
 from daq.files.storage import storing
+from processing.kernels import DEFAULT_THREADS
 from processing.reconstruction.slab_volume import Slabs, slabs_of
 from processing.volume import VoxelGrid
 
@@ -89,10 +92,17 @@ class GrowingPreview:
         """Take in the rows y from ``first_row`` on."""
         if self._maxima.dtype != slab.dtype:
             self._maxima = self._maxima.astype(slab.dtype)
-        layers = _maxima_along(_ordered(slab), 0, self._factor)
+        layers = math.ceil(self._shape[0] / DEFAULT_THREADS)
+        with ThreadPoolExecutor(DEFAULT_THREADS) as pool:  # it takes longer than to make the slab
+            list(pool.map(partial(self._add_layers, first_row, slab, layers), range(0, self._shape[0], layers)))
+
+    def _add_layers(self, first_row: int, slab: NDArray[Any], count: int, first_layer: int) -> None:
+        """Take in the planes of so many layers of blocks."""
+        planes = _ordered(slab)[first_layer * self._factor : (first_layer + count) * self._factor]
+        layers = _maxima_along(planes, 0, self._factor)
         blocks = _maxima_in_rows(_maxima_along(layers, 1, self._factor, first_row), self._factor)
         first = first_row // self._factor
-        to = _ordered(self._maxima)[:, first : first + blocks.shape[1]]
+        to = _ordered(self._maxima)[first_layer : first_layer + count, first : first + blocks.shape[1]]
         np.maximum(to, blocks, out=to)
 
     def watching(self, slabs: Slabs) -> Slabs:
