@@ -14,8 +14,10 @@ HALF_WINDOW = 2
 """Frames before and after a droplet that have a say: five points smooth noise to a third and blur little."""
 PARABOLA = 3
 """Points without which there is no motion."""
-UNKNOWN = 1e6
+UNKNOWN = 1e4
 """Standard deviation of what nothing is known of, in voxels and frames."""
+LEAST_VARIANCE = 1e-6
+"""Of a place, in square voxels: droplets without noise have some."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +94,7 @@ def _parabolas(
     normal = np.zeros((len(track), 9, 9))
     right = np.zeros((len(track), 9))
     votes = np.zeros(len(track), np.intp)
-    weights = np.linalg.inv(covariance) if len(track) else covariance
+    weights = np.linalg.inv(covariance + LEAST_VARIANCE * np.eye(3))
     for step in range(-half_window, half_window + 1):
         own, other = _neighbours(track, frame, step, half_window)
         after = (frame[other] - frame[own]).astype(np.float64)

@@ -115,6 +115,24 @@ def test_velocities_and_accelerations_are_as_exact_as_they_say() -> None:
         assert np.abs(np.mean(scores)) < 0.1
 
 
+def test_where_two_droplets_of_a_track_are_near_there_is_no_motion() -> None:
+    frames = series(frames=6, noise=0.01).frames
+    nothing = frames[0].where(np.zeros(0, np.intp))
+    gappy = [frames[0], frames[1], nothing, nothing, frames[4], frames[5]]
+    points = track_points(gappy, link(gappy), half_window=2)
+    assert len(points.track) > 100
+    alone = (points.frame == 0) | (points.frame == 5)
+    assert np.isnan(points.velocities[alone]).all()
+    assert np.isnan(points.acceleration_sd[alone]).all()
+    assert np.isfinite(points.places).all()
+
+
+def test_droplets_without_any_noise_have_motion() -> None:
+    exact = series(frames=5, noise=0.0, turn=0.0).frames
+    points = track_points(exact, link(exact))
+    assert np.nanmax(np.abs(points.accelerations)) < 1e-3
+
+
 def test_a_longer_window_is_surer() -> None:
     frames = series(frames=9).frames
     tracks = link(frames)
