@@ -8,8 +8,8 @@ Calibrate
 Reconstruct
     intensity, common_grid, VoxelGrid, plan, mlos, minlos, gavlos, smart, mart
 Measure
-    measure, measure_velocities, measure_flat, mean_diameters, size_classes, droplet_statistics, velocity_statistics,
-    spray_statistics, AskedFor, SprayAxis
+    measure, measure_velocities, measure_flat, track_droplets, mean_diameters, size_classes, droplet_statistics,
+    velocity_statistics, spray_statistics, AskedFor, SprayAxis
 Files
     read_run, shot_intensities, read_volume, write_volume, read_droplets, export_droplets
 Judge and look
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from processing.analysis.spray.spray_statistics import AskedFor as AskedFor
     from processing.analysis.spray.spray_statistics import spray_statistics as spray_statistics
     from processing.analysis.velocity.measured_velocities import measure_velocities as measure_velocities
+    from processing.analysis.velocity.track_table import track_droplets as track_droplets
     from processing.analysis.velocity.velocity_statistics import velocity_statistics as velocity_statistics
     from processing.calibration.calibrate import calibrate as calibrate
     from processing.calibration.calibration import Calibration as Calibration
@@ -75,6 +76,7 @@ _HOMES = {
     "processing.analysis.spray.spray_axis": ("SprayAxis",),
     "processing.analysis.spray.spray_statistics": ("AskedFor", "spray_statistics"),
     "processing.analysis.velocity.measured_velocities": ("measure_velocities",),
+    "processing.analysis.velocity.track_table": ("track_droplets",),
     "processing.analysis.velocity.velocity_statistics": ("velocity_statistics",),
     "processing.calibration.calibrate": ("calibrate",),
     "processing.calibration.calibration": ("Calibration",),
