@@ -97,8 +97,11 @@ def require_measurable(run_name: str, recorded: Polarity, settings: MeasureSetti
         raise PipelineError(
             f"{run_name}: its images are recorded as {recorded}, they are not measured as {settings.polarity}"
         )
-    if recorded == "bright" and (settings.ignored or settings.nozzle):
-        raise PipelineError("pixels to ignore, and a nozzle, are for shadows: of bright particles all pixels are asked")
+    for stated, what in ((settings.ignored, "pixels to ignore are"), (settings.nozzle, "a nozzle is")):
+        if recorded == "bright" and stated:
+            raise PipelineError(
+                f"{what} for shadows: of bright particles all pixels are asked, and nothing hangs together"
+            )
     if recorded == "bright" and settings.light != "estimated":
         raise PipelineError(f"light {settings.light} is for shadows: bright particles have no diameter to correct")
 

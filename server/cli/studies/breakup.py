@@ -12,7 +12,7 @@ def add_break_up(studies: Verbs) -> None:
     """Add the study."""
     parser = add_study(studies, "breakup", break_up, "break-up lengths, and classes of liquid that is no droplet")
     parser.add_argument("--runs", type=count, default=5, help="of each nozzle")
-    parser.add_argument("--shots", type=count, default=8, help="of each run")
+    parser.add_argument("--shots", type=count, default=4, help="of each run")
     parser.add_argument("--binning", type=int, choices=(1, 2), default=1, help="of pixels; 1 is the paper's")
     parser.add_argument("--seed", type=seed, default=601, help="of the first run")
 

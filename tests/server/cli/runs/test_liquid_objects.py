@@ -96,4 +96,4 @@ def test_numbers_that_are_no_nozzle_are_refused(
 def test_bright_particles_have_no_nozzle_and_no_objects(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write_bright_run(tmp_path / "run", shots=1)
     write_bright_calibration(tmp_path / "calibration.json")
-    assert "a nozzle, are for shadows" in refused(capsys, *_command(tmp_path, tmp_path / "out", "--nozzle=0,0,0"))
+    assert "a nozzle is for shadows" in refused(capsys, *_command(tmp_path, tmp_path / "out", "--nozzle=0,0,0"))
