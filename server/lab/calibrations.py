@@ -79,6 +79,10 @@ class CalibrationStore:
         except (NotFound, Damaged, AttributeError, KeyError, TypeError):
             return {}
 
+    def made_s(self, calibration_id: str) -> float | None:
+        """When its file was written, Unix time; None if there is none."""
+        return _time_ns(self.path(calibration_id)) / 1e9 or None
+
     @property
     def current(self) -> str | None:
         """Id of the calibration for runs that name none; None where none was chosen, or nobody can read which."""

@@ -43,6 +43,11 @@ class Lamp(FrozenModel):
         None
     )
 
+    @property
+    def trouble(self) -> str:
+        """The detail without the age of the last answer: the same as long as the trouble is the same."""
+        return self.detail.split("; last answer ")[0]
+
 
 class Duty:
     """One background loop, and what is wrong with it.

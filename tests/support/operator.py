@@ -17,7 +17,7 @@ def drive_the_page(page: Page, base_url: str, views: tuple[str, ...], shots: int
     for view in views:
         expect(page.get_by_role("img", name=f"{view} live view")).to_be_visible()
         expect(page.get_by_role("status", name=re.compile(f"^{view}: ok"))).to_be_visible()
-    expect(page.get_by_role("status", name="acquisition state")).to_have_text("IDLE")
+    expect(page.get_by_role("status", name="rig state")).to_have_text("READY")
     _is_refused(page, shots)
     page.get_by_role("button", name="Start run").click()
     counts = page.get_by_role("status", name="run counts")

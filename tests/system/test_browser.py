@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 from fastapi import FastAPI
+from nicegui import app as pages
 from playwright.sync_api import Page, expect
 
 from daq.run.events import ShotRecorded
@@ -44,6 +45,7 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
     data_dir = tmp_path_factory.mktemp("browser") / "runs"
     data_dir.mkdir()
     (data_dir / "draft.json").write_text('{"shots": 7')
+    pages.middleware_stack = None  # NiceGUI has one application per process; another module may have used it
     with serving(data_dir, build=build, views=VIEWS) as server:
         (data_dir / "calibrations" / "paper.json").write_text('{"id": "paper"}')
         server.http.put("/api/calibrations/current", json={"id": "paper"})
@@ -68,7 +70,7 @@ def test_an_operator_records_a_run_and_sees_its_volume(page: Page, server: Servi
 
 def test_an_operator_looks_at_the_rig_live(page: Page, server: Serving) -> None:
     page.goto(str(server.http.base_url))
-    live, state = page.get_by_role("region", name="Live"), page.get_by_role("status", name="acquisition state")
+    live, state = page.get_by_role("region", name="Live"), page.get_by_role("status", name="rig state")
     live.get_by_label("Live / Hz").fill("50")
     live.get_by_role("button", name="Live", exact=True).click()
     expect(page.get_by_text("less than or equal to 10")).to_be_visible()
@@ -82,7 +84,7 @@ def test_an_operator_looks_at_the_rig_live(page: Page, server: Serving) -> None:
     live.get_by_role("button", name="Apply").click()
     expect(caption).to_have_text(re.compile("A 0 % · B 0 %"))
     live.get_by_role("button", name="End live").click()
-    expect(state).to_have_text("IDLE")
+    expect(state).to_have_text("READY")
     expect(page.get_by_role("log")).to_contain_text("live, live view at 10 Hz, ambient light")
     expect(page.get_by_role("log")).to_contain_text("idle, ended by the operator")
 
@@ -102,8 +104,8 @@ def test_an_operator_takes_a_single_shot_and_keeps_it(page: Page, server: Servin
 def test_a_drift_raises_an_alarm_and_a_larger_one_stops_reconstruction(page: Page, server: Serving) -> None:
     write_droplet_run(server.services.data_dir / DRIFTED)
     page.goto(str(server.http.base_url))
-    alarm = page.locator(".alarm-banner")
-    expect(alarm).to_be_hidden()
+    alarm = page.get_by_role("region", name="alarms").locator(".alarm")
+    expect(alarm).to_have_count(0)
     _reconstruct(server, "drifting", _calibration_off_by(0.45))
     expect(alarm).to_contain_text("CALIBRATION ALARM: view2 0.4")
     _take_picture(page, "page-calibration-alarm")
@@ -114,18 +116,12 @@ def test_a_drift_raises_an_alarm_and_a_larger_one_stops_reconstruction(page: Pag
     expect(page.get_by_role("log")).to_contain_text(f"calibration moved does not fit run {DRIFTED}")
     _take_picture(page, "page-calibration-stop")
     _reconstruct(server, "good", _calibration_off_by(0))
-    expect(alarm).to_be_hidden()
+    expect(alarm).to_have_count(0)
 
 
-def test_a_torn_draft_does_not_keep_the_page_from_opening_and_a_page_without_a_server_is_grey(
-    page: Page, server: Serving
-) -> None:
+def test_a_torn_draft_does_not_keep_the_page_from_opening(page: Page, server: Serving) -> None:
     page.goto(str(server.http.base_url))
     expect(page.get_by_role("button", name="Start run")).to_be_visible()
-    expect(page.get_by_role("status", name="acquisition state")).to_have_text("IDLE")
-    page.evaluate("window.socket.disconnect()")
-    for part in (".q-header", ".screen"):  # what a page shows without a server is old: no lamp stays green
-        expect(page.locator(part)).to_have_css("filter", "grayscale(1)")
     (aside,) = server.services.data_dir.glob("draft.json.damaged-*")
     assert aside.read_text() == '{"shots": 7'
 

@@ -68,7 +68,7 @@ class AlarmList:
 def of_lamps(lamps: Iterable[Lamp]) -> Iterator[Alarm]:
     """Devices and work with a red lamp; a door that is open is no alarm."""
     for lamp in lamps:
-        text = lamp.detail.split("; last answer")[0]
+        text = lamp.trouble
         if lamp.health is not Health.FAULT or (lamp.kind == "interlock" and text.startswith("open")):
             continue
         latched = lamp.kind == "generator" and text.startswith("fault")

@@ -42,7 +42,7 @@ def _silent_cameras(context: Context) -> Iterator[DaqError]:
     """A run without one of its cameras would fail at once."""
     for lamp in context.monitor.lamps:
         if lamp.kind == "camera" and lamp.health is Health.FAULT:
-            reason = lamp.detail.removeprefix(f"{lamp.name}: ")
+            reason = lamp.trouble.removeprefix(f"{lamp.name}: ")
             yield coded(DeviceUnavailable(lamp.name, reason), RefusalCode.CAMERA_SILENT)
 
 

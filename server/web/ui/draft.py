@@ -1,6 +1,7 @@
 """Draft: the run form as the operator left it, kept by the server, so that a reload or a restart loses nothing."""
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -14,6 +15,9 @@ from server.rig.config import RigConfig
 
 PLAN_FIELDS = RunPlan.model_fields
 PULSE_FIELDS = PulsePair.model_fields
+
+
+_TEXTS = ("name", "stage_z_mm")
 
 
 def first_draft(config: RigConfig) -> dict[str, Any]:
@@ -74,6 +78,18 @@ class DraftStore:
         part.write_text(json.dumps({**self._stored(), name: value}))
         part.replace(self._path)
 
+    def adopt(self, shown: Mapping[str, str]) -> None:
+        """Take over what the page shows, by ``data-draft``: the last letters may have been lost in a network.
+
+        A number that is none is left empty, as the page would.
+        """
+        for name, text in shown.items():
+            field, _, view = name.partition(":")
+            value = text if field in _TEXTS else _number(text)
+            new = {**self.values[field], view: value} if view else value
+            if new != self.values[field]:
+                self.set(field, new)
+
     def _stored(self) -> dict[str, Any]:
         if not self._path.is_file():
             return {}
@@ -85,6 +101,13 @@ class DraftStore:
         values = stored.model_dump(mode="json", exclude_unset=True)
         values.setdefault("are_references_chosen", bool(stored.references))  # an older draft does not say
         return values
+
+
+def _number(text: str) -> float | None:
+    try:
+        return float(text)
+    except ValueError:
+        return None
 
 
 def problem_of(fields: dict[str, FieldInfo], name: str, value: Any) -> str | None:

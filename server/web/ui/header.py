@@ -1,64 +1,69 @@
-"""Header of the page: which rig, its lamps, the state of acquisition, dark or light."""
+"""Header: what is always in sight. Which rig, its lamps, its state, its calibration, the connection, ABORT, alarms."""
+
+import time
 
 from nicegui import ui
 
-from daq.run.state import RunState
-from server.lab.duty import Lamp
 from server.lab.services import Context
-
-_STATE_COLOURS = {
-    RunState.IDLE: "positive",
-    RunState.LIVE: "primary",
-    RunState.ARMING: "warning",
-    RunState.ACQUIRING: "primary",
-    RunState.DISARMING: "warning",
-    RunState.FAULT: "negative",
-}
+from server.web.ui.abort_button import AbortButton
+from server.web.ui.alarm_strip import AlarmStrip
+from server.web.ui.lamp_row import LampRow
+from server.web.ui.link import Link
+from server.web.ui.state_chip import StateChip
 
 
 class Header:
     """Built once per page, refreshed by its timer."""
 
-    def __init__(self, context: Context, dark: ui.dark_mode) -> None:
+    def __init__(self, context: Context, dark: ui.dark_mode, abort_port: int) -> None:
         self._context = context
-        self._shown: tuple[str, ...] = ()
-        config = context.services.config
-        with (
-            ui.header(elevated=False)
-            .classes("items-center q-py-none q-px-md gap-3")
-            .style("background:#10161e;min-height:52px;padding:4px 16px")
-        ):
-            ui.icon("blur_on", size="26px").classes("text-primary")
-            ui.label("tomoshadow").classes("text-lg font-medium")
-            ui.label(config.name).classes("text-sm opacity-60")
-            self._lamps = ui.row().classes("gap-2 items-center").props('role=group aria-label="rig status"')
-            ui.space()
-            self._state = (
-                ui.badge("").props('role=status aria-label="acquisition state"').classes("text-sm q-px-md q-py-xs")
-            )
-            ui.button(icon="contrast", on_click=dark.toggle).props(
-                'flat round dense color=white aria-label="dark or light"'
-            )
+        with ui.header(elevated=False).classes("desk-bar q-pa-none"):
+            with ui.element("div").classes("desk-row"):
+                self._add_name()
+                self._lamps = LampRow()
+                ui.space()
+                self._calibration = ui.label("").classes("calibration lockable")
+                self._calibration.props('role=status aria-label="current calibration"')
+                self._state = StateChip()
+                self._link = Link()
+                dark_button = ui.button(icon="contrast", on_click=dark.toggle).classes("lockable")
+                dark_button.props('flat round dense color=white aria-label="dark or light"')
+                AbortButton(abort_port)
+            self._alarms = AlarmStrip(context)
 
     def refresh(self) -> None:
         """Show what has changed."""
-        state = self._context.services.acquisition.status().state
-        self._state.set_text(state.upper())
-        self._state.props(f"color={_STATE_COLOURS[state]}")
-        lamps = self._context.lamps
-        texts = tuple(f"{lamp.name}: {lamp.health}, {lamp.detail}" for lamp in lamps)
-        if texts != self._shown:
-            self._shown = texts
-            self._lamps.clear()
-            with self._lamps:
-                for lamp, text in zip(lamps, texts, strict=True):
-                    _show(lamp, text)
+        self._lamps.show(self._context.lamps)
+        self._state.show(self._context.desk.state)
+        self._calibration.set_text(calibration_text(self._context))
+        self._alarms.refresh()
+        self._link.show(self._context.beat.number)
+
+    def _add_name(self) -> None:
+        config = self._context.services.config
+        ui.icon("blur_on", size="26px").classes("text-primary")
+        with ui.element("div").classes("desk-name"):
+            ui.label("tomoshadow").classes("font-medium")
+            ui.label(config.name).classes("text-xs")
+        if config.simulation is not None:
+            ui.label("SIMULATED").classes("simulated").tooltip("The devices of this rig are simulated")
 
 
-def _show(lamp: Lamp, text: str) -> None:
-    chip = ui.element("div").classes("lamp-chip").props("role=status")
-    chip.props["aria-label"] = text  # whatever it says: a parser of props would stumble over quotes and lines
-    with chip:
-        ui.element("span").classes(f"lamp {lamp.health}")
-        ui.label(lamp.name if lamp.kind != "disk" else lamp.detail)
-        ui.tooltip(text)
+def calibration_text(context: Context) -> str:
+    """The calibration for new runs, how old it is, and by how much the views disagree, where that is known."""
+    calibration = context.calibrations.current
+    if calibration is None:
+        return "no calibration"
+    made_s, standing = context.calibrations.made_s(calibration), context.standing
+    age = "" if made_s is None else f", {age_text(time.time() - made_s)} old"
+    known = standing is not None and standing.calibration == calibration and bool(standing.views)
+    drift = f", off by {max(standing.views.values()):.2f} px" if standing is not None and known else ""
+    return f"{calibration}{age}{drift}"
+
+
+def age_text(age_s: float) -> str:
+    """A time in its largest unit."""
+    for unit_s, unit in ((86_400, "d"), (3600, "h"), (60, "min")):
+        if age_s >= unit_s:
+            return f"{age_s / unit_s:.0f} {unit}"
+    return f"{max(0.0, age_s):.0f} s"

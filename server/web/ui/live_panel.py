@@ -2,16 +2,20 @@
 
 import asyncio
 from collections.abc import Callable
+from functools import partial
 
 from nicegui import ui
+from nicegui.events import GenericEventArguments
 
 from daq.errors import DaqError
 from daq.run.state import RunState
 from daq.run_plan import LivePlan
 from server.lab.errors import ServerError
 from server.lab.services import Context
+from server.lab.starting.light_request import obey
 from server.lab.starting.run_start import SingleShot, shoot
 from server.web.ui.draft import DraftStore, problem_of, pulse_of
+from server.web.ui.link import TICKET, light_request, shown_form
 from server.web.ui.live_tiles import LiveTiles
 from server.web.ui.theme import panel
 
@@ -36,7 +40,8 @@ class LivePanel:
         with panel("Live"):
             LiveTiles(list(context.services.config.views))
             with ui.row().classes("w-full gap-2 items-center no-wrap"):
-                self._start = ui.button("Live", icon="videocam", on_click=self._on_start).props("outline dense no-caps")
+                self._start = ui.button("Live", icon="videocam").props("outline dense no-caps")
+                self._start.on("click", self._on_start, js_handler=TICKET)
                 self._end = ui.button("End live", icon="videocam_off", on_click=self._acquisition.end_live)
                 self._end.props("outline dense no-caps")
                 self._rate = ui.number(
@@ -47,7 +52,8 @@ class LivePanel:
                 self._rate.props("dense outlined hide-bottom-space").classes("w-20")
                 self._lit = ui.switch("Pulsed light", value=True)
                 self._lit.tooltip("Pulses and currents of the form of a new run; off: no light but that of the room")
-                self._shoot = ui.button("Shoot one", icon="photo_camera", on_click=self._on_shoot)
+                self._shoot = ui.button("Shoot one", icon="photo_camera")
+                self._shoot.on("click", self._on_shoot, js_handler=TICKET)
                 self._shoot.props("outline dense no-caps")
                 self._shoot.tooltip("One shot with the light of the form of a new run; the next one takes its place")
                 self._keep = ui.button("Keep shot", icon="save", on_click=self._on_keep).props("outline dense no-caps")
@@ -64,16 +70,18 @@ class LivePanel:
         self._shoot.set_enabled(status.resting or is_live)
         self._keep.set_visibility(bool(self._context.unkept_runs.ids) and status.resting)
 
-    async def _on_start(self) -> None:
+    async def _on_start(self, click: GenericEventArguments) -> None:
+        self._draft.adopt(shown_form(click.args))
         if self._rate.validate():
-            await self._try(self._show)
+            await self._try(partial(obey, self._context, light_request(click.args), "live", self._show))
 
     def _show(self) -> None:
         pulse = pulse_of(self._draft.values) if self._lit.value else None
         self._acquisition.start_live(LivePlan(rate_hz=self._rate.value, pulse=pulse))
 
-    async def _on_shoot(self) -> None:
-        await self._try(self._take)
+    async def _on_shoot(self, click: GenericEventArguments) -> None:
+        self._draft.adopt(shown_form(click.args))
+        await self._try(partial(obey, self._context, light_request(click.args), "shot", self._take))
 
     def _take(self) -> None:
         values = self._draft.values

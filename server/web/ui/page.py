@@ -1,12 +1,12 @@
 """The page: one screen for one operator. Mounted last, because it answers every path that nobody else does."""
 
-from fastapi import FastAPI
+from fastapi import FastAPI, Request
 from nicegui import ui
 
 from server.lab.services import Context
 from server.rig.config import RigConfig
+from server.web.abort_listener import AbortListener
 from server.web.ui import theme
-from server.web.ui.alarm_banner import AlarmBanner
 from server.web.ui.draft import DraftStore
 from server.web.ui.droplet_panel import DropletPanel
 from server.web.ui.event_log import EventLog
@@ -26,8 +26,10 @@ def mount_page(app: FastAPI, config: RigConfig) -> None:
     """Serve the page at ``/``; register every other route before."""
 
     @ui.page("/", title=f"tomoshadow: {config.name}")
-    def show() -> None:
-        Page(app.state.context)
+    def show(request: Request) -> None:
+        abort: AbortListener = app.state.abort_listener
+        abort.admit(request.headers["host"])
+        Page(app.state.context, abort.port)
 
     ui.run_with(app, dark=None, show_welcome_message=False, reconnect_timeout=10)
 
@@ -35,14 +37,13 @@ def mount_page(app: FastAPI, config: RigConfig) -> None:
 class Page:
     """The page of one browser tab."""
 
-    def __init__(self, context: Context) -> None:
+    def __init__(self, context: Context, abort_port: int) -> None:
         self._events = context.services.events
         self._seen = max(0, self._events.newest - _EVENTS_SHOWN)
         self._are_lists_old = True
         dark = theme.apply()
         draft = DraftStore(context.services.data_dir / "draft.json", context.services.config, self._events)
-        self._header = Header(context, dark)
-        self._alarm = AlarmBanner(context)
+        self._header = Header(context, dark, abort_port)
         with ui.element("div").classes("screen"):
             with ui.element("div").classes("column"):
                 self._live = LivePanel(context, draft)
@@ -57,8 +58,9 @@ class Page:
     async def _refresh(self) -> None:
         events = self._events.since(self._seen)
         self._log.add(events)
-        for part in (self._header, self._alarm, self._live, self._run, self._form):
+        for part in (self._header, self._live, self._run, self._form):
             part.refresh()
+        await self._form.judge()
         if events:
             self._seen = events[-1].id
         if self._are_lists_old or any(event.name in _LISTS_CHANGED for event in events):

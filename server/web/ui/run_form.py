@@ -2,17 +2,22 @@
 
 import asyncio
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from nicegui import ui
+from nicegui.events import GenericEventArguments
 
 from daq.errors import DaqError
+from daq.run.refusals import RefusalCode
 from daq.run.state import RunOutcome
 from daq.run_plan import RunKind
-from daq.timing import plan_shot_timing
+from server.lab.desk.reason import Reason
 from server.lab.errors import ServerError
 from server.lab.runs.run_summary import RunSummary
 from server.lab.services import Context
+from server.lab.starting.light_request import obey
+from server.lab.starting.readiness import reasons_against
 from server.lab.starting.run_start import start_run
 from server.web.ui.draft import (
     PLAN_FIELDS,
@@ -23,9 +28,11 @@ from server.web.ui.draft import (
     problem_of_current,
     problem_of_positions,
 )
+from server.web.ui.link import TICKET, light_request, shown_form
 from server.web.ui.theme import panel
 
 _REFERENCE_KINDS = (RunKind.DARK, RunKind.BACKGROUND)
+_PASSING = (RefusalCode.BUSY, RefusalCode.STARTING)
 _CALIBRATION = "Calibration (none: the current one)"
 _NO_CALIBRATION = "Calibration (none: no volumes)"
 
@@ -46,6 +53,7 @@ class RunForm:
         self._draft = draft
         self._shown: list[str] = []
         self._fields: list[ui.input | ui.number] = []
+        self._judged: tuple[Reason, ...] | None = None
         with panel("New run"):
             self._add_kind_and_name()
             with ui.grid(columns=2).classes("w-full gap-2"):
@@ -57,7 +65,8 @@ class RunForm:
                     self._add_current(view)
             self._add_choices()
             self._refusal = ui.label("").classes("refusal").props("role=alert")
-            self._start = ui.button("Start run", icon="play_arrow", on_click=self._on_start).classes("w-full")
+            self._start = ui.button("Start run", icon="play_arrow").classes("w-full")
+            self._start.on("click", self._on_start, js_handler=TICKET)
         self._check()
 
     def refresh(self) -> None:
@@ -104,7 +113,7 @@ class RunForm:
             on_change=self._changed("name"),
             validation=lambda text: problem_of(PLAN_FIELDS, "name", text) and "letters, digits, space . _ -",
         )
-        self._fields.append(name.props("dense outlined hide-bottom-space").classes("w-full"))
+        self._fields.append(name.props("dense outlined hide-bottom-space data-draft=name").classes("w-full"))
 
     def _add_number(self, name: str, label: str, fields: dict[str, Any], *, whole: bool = False) -> ui.number:
         number = ui.number(
@@ -114,7 +123,7 @@ class RunForm:
             validation=lambda value: problem_of(fields, name, value),
             precision=0 if whole else None,
         )
-        self._fields.append(number.props("dense outlined hide-bottom-space"))
+        self._fields.append(number.props(f"dense outlined hide-bottom-space data-draft={name}"))
         return number
 
     def _add_current(self, view: str) -> None:
@@ -129,7 +138,7 @@ class RunForm:
             on_change=keep,
             validation=lambda value: problem_of_current(value, limit_a),
         )
-        self._fields.append(number.props("dense outlined hide-bottom-space"))
+        self._fields.append(number.props(f'dense outlined hide-bottom-space data-draft="current_a:{view}"'))
 
     def _add_choices(self) -> None:
         positions = ui.input(
@@ -138,7 +147,7 @@ class RunForm:
             on_change=self._changed("stage_z_mm"),
             validation=problem_of_positions,
         )
-        self._fields.append(positions.props("dense outlined hide-bottom-space").classes("w-full"))
+        self._fields.append(positions.props("dense outlined hide-bottom-space data-draft=stage_z_mm").classes("w-full"))
         self._positions = positions
         self._references = (
             ui.select({}, label="Dark and background runs", multiple=True, value=[], on_change=self._keep_references)
@@ -168,25 +177,32 @@ class RunForm:
         self._positions.set_visibility(kind is RunKind.CALIBRATION and has_stage)
         self._references.set_visibility(kind is RunKind.SAMPLE)
         self._calibration.set_visibility(kind is RunKind.SAMPLE)
-        self._refusal.set_text(self._reason_against() or "")
+        self._judged = None
 
-    def _reason_against(self) -> str | None:
+    async def judge(self) -> None:
+        """Say why the rig would refuse this plan, again whenever the form or the rig has changed."""
+        reasons = self._context.desk.state.reasons
+        if self._judged == reasons:
+            return
+        self._judged = reasons
+        against = await asyncio.to_thread(self._reasons_against)
+        self._refusal.set_text("\n".join(f"{one.text} ({one.remedy})" for one in against if one.code not in _PASSING))
+
+    def _reasons_against(self) -> tuple[Reason, ...]:
         try:
             plan = plan_of(self._draft.values)
         except ValueError:
-            return None  # the field itself says what is wrong with it
-        cameras = {name: camera.timing for name, camera in self._context.services.rig.cameras.items()}
-        try:
-            plan_shot_timing(plan, cameras)
-        except DaqError as error:
-            return str(error)
-        return None
+            return ()  # the field itself says what is wrong with it
+        return reasons_against(self._context, plan)
 
-    async def _on_start(self) -> None:
+    async def _on_start(self, click: GenericEventArguments) -> None:
         if not all([field.validate() for field in self._fields if field.visible]):
             return
+        self._draft.adopt(shown_form(click.args))
         try:
-            await asyncio.to_thread(start_run, self._context, plan_of(self._draft.values))
+            plan = plan_of(self._draft.values)
+            start = partial(start_run, self._context, plan)
+            await asyncio.to_thread(obey, self._context, light_request(click.args), plan.model_dump_json(), start)
         except (DaqError, ServerError, ValueError) as error:
             self._refusal.set_text(str(error))
         else:

@@ -1,4 +1,4 @@
-"""RunPanel: what the run is doing, and the buttons that end it. ABORT is always there and always enabled."""
+"""RunPanel: what the run is doing, and the button that ends it after the present shot; ABORT is in the header."""
 
 from collections.abc import Callable, Sequence
 
@@ -26,12 +26,8 @@ class RunPanel:
             self._bar = ui.linear_progress(0, show_value=False, size="10px").props('rounded aria-label="run progress"')
             self._counts = ui.label("").classes("text-sm").props('role=status aria-label="run counts"')
             self._message = ui.label("").classes("text-xs opacity-70").props('role=status aria-label="run message"')
-            with ui.row().classes("w-full gap-2 no-wrap"):
-                self._stop = (
-                    ui.button("Stop", icon="stop", on_click=self._acquisition.stop).props("outline").classes("flex-1")
-                )
-                self._stop.tooltip("Ends the run after the present shot")
-                ui.button("ABORT", icon="front_hand", on_click=self._on_abort, color="negative").classes("flex-1")
+            self._stop = ui.button("Stop", icon="stop", on_click=self._acquisition.stop).props("outline")
+            self._stop.classes("w-full").tooltip("Ends the run after the present shot")
             self._acknowledge = ui.button("Acknowledge fault", icon="verified_user", on_click=self._on_acknowledge)
             self._acknowledge.props("outline no-caps color=negative").classes("w-full")
 
@@ -48,9 +44,6 @@ class RunPanel:
         self._stop.set_enabled(status.active)
         self._acknowledge.set_text(acknowledge_text(status))
         self._acknowledge.set_visibility(waits_for_acknowledgement(status, self._monitor.lamps))
-
-    async def _on_abort(self) -> None:
-        await _notify_failure(self._acquisition.abort)
 
     async def _on_acknowledge(self) -> None:
         await _notify_failure(self._acquisition.acknowledge)

@@ -98,3 +98,11 @@ def test_a_page_does_not_undo_what_another_one_has_changed(tmp_path: Path) -> No
     second.set("name", "fan")
     kept = DraftStore(path, config, EventPublisher()).values
     assert (kept["shots"], kept["name"]) == (77, "fan")
+
+
+def test_what_the_page_shows_is_adopted_and_a_number_that_is_none_is_left_empty(tmp_path: Path) -> None:
+    draft = DraftStore(tmp_path / "draft.json", memory_config(tmp_path / "runs"), EventPublisher())
+    draft.adopt({"name": "late words", "rate_hz": "3.5", "current_a:view2": "4", "shots": "", "width_ns": "1000"})
+    values = draft.values
+    assert (values["name"], values["rate_hz"], values["shots"], values["width_ns"]) == ("late words", 3.5, None, 1000)
+    assert values["current_a"] == {"view1": 10.0, "view2": 4.0}

@@ -1,0 +1,47 @@
+"""Link: whether the page hears the server; without it the page is grey and locked, but for ABORT."""
+
+from nicegui.element import Element
+from pydantic import ValidationError
+
+from server.lab.desk.beat import PERIOD_S
+from server.lab.starting.light_request import LightRequest
+from server.web.api.beat import BEAT_PATH
+
+TICKET = "() => emit(window.desk?.ticket() ?? {})"
+"""Handler in the browser of every button that makes light: which beat was heard last, and what the form shows."""
+_NEVER = 0
+BEATS_PER_S = round(1 / PERIOD_S)
+
+
+class Link(Element, component="link.js"):
+    """Listens to the beat of the server."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._props["path"] = BEAT_PATH
+        self._props["shown"] = 0
+
+    def show(self, beat: int) -> None:
+        """Tell the page, by the way of all that it shows, which beat that is of; once a second."""
+        if beat - self._props["shown"] >= BEATS_PER_S:
+            self._props["shown"] = beat
+            self.update()
+
+
+def light_request(ticket: object) -> LightRequest:
+    """What a click said of itself; one that says nothing heard no beat, and makes no light."""
+    try:
+        request = LightRequest.model_validate({name: _said(ticket).get(name) for name in LightRequest.model_fields})
+    except ValidationError:
+        request = LightRequest()
+    return request if request.beat is not None else LightRequest(key=request.key, beat=_NEVER)
+
+
+def shown_form(ticket: object) -> dict[str, str]:
+    """What the fields of the form showed when somebody clicked, by their names."""
+    form = _said(ticket).get("form")
+    return {str(name): str(text) for name, text in form.items()} if isinstance(form, dict) else {}
+
+
+def _said(ticket: object) -> dict[str, object]:
+    return ticket if isinstance(ticket, dict) else {}

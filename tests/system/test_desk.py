@@ -1,0 +1,231 @@
+"""What is always in sight: a page that never lies, whatever happens to network and rig; headless Chromium."""
+
+import os
+import re
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from nicegui import app as pages
+from playwright.sync_api import Browser, Locator, Page, Route, expect
+
+from server.web.app import create_app
+from tests.support.cut_link import CutLink, cut_link
+from tests.support.operator import VIEWS
+from tests.support.server_process import eventually
+from tests.support.serving import Serving, plan_of, serving
+
+pytestmark = pytest.mark.timeout(900)
+
+PICTURES = os.environ.get("TOMOSHADOW_PICTURES")
+PULSE = {"current_a": dict.fromkeys(VIEWS, 5)}
+AWAY_S = 3.0
+"""Longer than a request may be on its way."""
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
+    pages.middleware_stack = None  # NiceGUI has one application per process; another module may have used it
+    with serving(tmp_path_factory.mktemp("desk") / "runs", build=create_app, views=VIEWS) as server:
+        (server.services.data_dir / "calibrations" / "paper.json").write_text('{"id": "paper"}')
+        server.http.put("/api/calibrations/current", json={"id": "paper"})
+        yield server
+
+
+@pytest.fixture
+def link(server: Serving) -> Iterator[CutLink]:
+    with cut_link(server.port) as link:
+        yield link
+
+
+@pytest.fixture
+def tab(browser: Browser, link: CutLink) -> Iterator[Page]:
+    """A tab that sees the server through a wire that can be cut; what a browser says of that is no complaint."""
+    context = browser.new_context(viewport={"width": 1600, "height": 950})
+    page = context.new_page()
+    page.goto(f"http://127.0.0.1:{link.port}")
+    expect(rig_state(page)).to_have_text("READY")
+    expect(page.get_by_role("status", name="connection")).to_have_text("connected")
+    yield page
+    link.mend()
+    context.close()
+
+
+@pytest.fixture(autouse=True)
+def at_rest(server: Serving) -> Iterator[None]:
+    """Every test leaves a rig behind on which nothing is wrong."""
+    yield
+    laboratory(server).close_door()
+    server.http.post("/api/rig/abort")
+    server.wait()
+    server.http.post("/api/rig/acknowledge")
+
+
+def laboratory(server: Serving) -> Any:
+    return server.services.laboratory
+
+
+def rig_state(page: Page) -> Locator:
+    return page.get_by_role("status", name="rig state").locator(".rig-known")
+
+
+def unknown(page: Page) -> Locator:
+    return page.get_by_role("status", name="rig state").locator(".rig-unknown")
+
+
+def press(page: Page, name: str) -> None:
+    """Click as fast as a browser can, and even where a person could not any more."""
+    page.get_by_role("button", name=name, exact=True).evaluate("button => button.click()")
+
+
+def answer(page: Page) -> Locator:
+    return page.get_by_role("alert", name="abort answer")
+
+
+def start(server: Serving, **changes: Any) -> None:
+    plan = plan_of(pulse=PULSE, **{"kind": "dark", "shots": 1000, "rate_hz": 5.0, **changes})
+    assert server.http.post("/api/runs", json=plan).status_code == 201
+
+
+@pytest.mark.parametrize("button", ["Start run", "Live", "Shoot one"])
+def test_a_click_that_waited_in_the_network_fires_no_light(
+    tab: Page, link: CutLink, server: Serving, button: str
+) -> None:
+    before, run_id = laboratory(server).generator.fired, server.services.acquisition.status().run_id
+    link.cut()
+    press(tab, button)
+    expect(unknown(tab)).to_be_visible()
+    press(tab, button)
+    threading.Event().wait(AWAY_S)
+    link.mend()
+    expect(rig_state(tab)).to_be_visible()
+    threading.Event().wait(1.0)
+    assert server.services.acquisition.status().resting
+    assert (laboratory(server).generator.fired, server.services.acquisition.status().run_id) == (before, run_id)
+    tab.get_by_role("button", name=button, exact=True).click()
+    eventually(lambda: laboratory(server).generator.fired > before, "a click of now fires")
+
+
+def test_without_a_beat_the_page_is_grey_and_locked_but_for_abort(tab: Page, link: CutLink, server: Serving) -> None:
+    start(server)
+    expect(rig_state(tab)).to_have_text(re.compile(r"^ACQUIRING \d+/1000, \d+:\d\d left$"))
+    link.cut()
+    expect(unknown(tab)).to_have_text(re.compile(r"^unknown since \d\d:\d\d:\d\d$"))
+    expect(tab.locator(".q-page-container")).to_have_attribute("inert", "")
+    expect(tab.locator(".q-page-container")).to_have_css("filter", "grayscale(1)")
+    expect(tab.locator(".alarm-strip")).to_have_attribute("inert", "")
+    assert tab.locator(".abort-button").evaluate("button => button.closest('[inert]')") is None
+    tab.get_by_role("button", name="ABORT").click()
+    expect(answer(tab)).to_have_text(re.compile("light off confirmed.*; ended run "))
+    assert server.wait().outcome == "aborted"
+    link.mend()
+    expect(rig_state(tab)).to_have_text("READY")
+    expect(tab.locator(".q-page-container")).not_to_have_attribute("inert", "")
+    expect(tab.get_by_label("run outcome")).to_have_text("aborted")
+
+
+def test_after_an_outage_the_page_is_current_and_text_is_still_there(tab: Page, link: CutLink, server: Serving) -> None:
+    tab.get_by_label("Name", exact=True).fill("typed before")
+    expect(tab.get_by_role("region", name="Run", exact=True)).to_be_visible()
+    draft = server.services.data_dir / "draft.json"
+    eventually(lambda: draft.is_file() and "typed before" in draft.read_text(), "the text has reached the server")
+    link.cut()
+    expect(unknown(tab)).to_be_visible()
+    run_id, _ = server.run_to_its_end(plan_of(kind="dark", name="meanwhile", shots=1, pulse=PULSE))
+    laboratory(server).open_door()
+    link.mend()
+    expect(rig_state(tab)).to_have_text("NOT READY: door: the interlock is open")
+    expect(tab.get_by_role("region", name="Runs").get_by_text(run_id)).to_be_visible()
+    expect(tab.get_by_label("Name", exact=True)).to_have_value("typed before")
+
+
+def test_abort_says_when_it_is_not_delivered_and_counts_when_it_is_late(browser: Browser, server: Serving) -> None:
+    context = browser.new_context()
+    page, held = context.new_page(), list[Route]()
+    page.route(re.compile("/abort$"), lambda route: held.append(route))
+    page.goto(str(server.http.base_url))
+    expect(rig_state(page)).to_have_text("READY")
+    start(server)
+    page.get_by_label("Name", exact=True).focus()
+    page.keyboard.press("F8")
+    expect(answer(page)).to_have_text("NOT DELIVERED: use the hardware stop")
+    assert server.services.acquisition.status().active
+    assert len(held) == 2, "it goes two ways"
+    held[0].continue_()
+    expect(answer(page)).to_have_text(re.compile(r"^light off confirmed, \d+\.\d s after the click: ABORT was late"))
+    assert server.wait().outcome == "aborted"
+    context.close()
+
+
+def test_abort_answers_when_nothing_runs(page: Page, server: Serving) -> None:
+    page.goto(str(server.http.base_url))
+    page.get_by_role("button", name="ABORT").click()
+    expect(answer(page)).to_have_text(re.compile("^light off confirmed"))
+    expect(page.get_by_role("log")).to_contain_text("ABORT of nothing: no run was under way: light confirmed off")
+
+
+def test_the_rig_says_why_it_is_not_ready_and_the_form_too_until_it_is_mended(page: Page, server: Serving) -> None:
+    page.goto(str(server.http.base_url))
+    laboratory(server).open_door()
+    expect(rig_state(page)).to_have_text("NOT READY: door: the interlock is open")
+    page.get_by_role("button", name="why this state").click()
+    reasons = page.get_by_role("region", name="reasons against a start")
+    expect(reasons).to_contain_text("close the door")
+    page.keyboard.press("Escape")
+    refusal = page.get_by_role("region", name="New run").get_by_role("alert")
+    expect(refusal).to_contain_text("the interlock is open (close the door)")
+    laboratory(server).close_door()
+    expect(rig_state(page)).to_have_text("READY")
+    expect(refusal).to_have_text("")
+
+
+def test_alarms_are_acknowledged_one_by_one(page: Page, server: Serving) -> None:
+    page.goto(str(server.http.base_url))
+    laboratory(server).cameras["view2"].is_lost = True
+    laboratory(server).generator.trip("overcurrent")
+    alarms = page.get_by_role("region", name="alarms")
+    expect(alarms.locator(".alarm.stop")).to_have_count(2)
+    _picture(page, "alarms")
+    alarms.get_by_role("button", name=re.compile("^Acknowledge view2")).click()
+    expect(alarms.locator(".alarm.seen")).to_have_text(re.compile("view2"))
+    expect(alarms.locator(".alarm.stop")).to_have_text(re.compile("pulse generator.*look for its reason"))
+    alarms.get_by_role("button", name=re.compile("^Acknowledge pulse generator")).click()
+    expect(alarms.locator(".alarm.stop")).to_have_count(0)
+    laboratory(server).cameras["view2"].is_lost = False
+    expect(alarms).to_be_hidden()
+
+
+@pytest.mark.parametrize("width", [800, 1280, 1920])
+def test_the_bar_is_in_sight_at_every_width_dark_and_light(page: Page, server: Serving, width: int) -> None:
+    page.set_viewport_size({"width": width, "height": 900})
+    page.goto(str(server.http.base_url))
+    expect(rig_state(page)).to_have_text("READY")
+    lamps = page.get_by_role("status", name="sum of all lamps")
+    if width <= 1500:
+        expect(lamps).to_have_text("7 ok")
+    else:
+        expect(page.get_by_role("status", name=re.compile("^view1: ok"))).to_be_visible()
+    for shade in ("dark", "light"):
+        _picture(page, f"bar-{width}-{shade}")
+        page.get_by_role("button", name="dark or light").click()
+    laboratory(server).open_door()
+    laboratory(server).generator.trip("overcurrent")
+    expect(page.locator(".alarm.stop")).to_have_count(1)
+    if width <= 1500:
+        expect(lamps).to_have_text("2 faults")
+    page.get_by_role("log").scroll_into_view_if_needed()
+    page.mouse.wheel(0, 3000)
+    for part in (page.get_by_role("button", name="ABORT"), rig_state(page), page.locator(".alarm.stop")):
+        expect(part).to_be_in_viewport(ratio=1)
+    expect(page.get_by_text("SIMULATED")).to_be_in_viewport(ratio=1)
+    expect(page.get_by_role("status", name="current calibration")).to_have_text(re.compile(r"^paper, \d+ (s|min) old$"))
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "the page is wider than the window"
+    _picture(page, f"bar-{width}-trouble")
+
+
+def _picture(page: Page, name: str) -> None:
+    if PICTURES:
+        page.wait_for_timeout(1000)
+        page.screenshot(path=str(Path(PICTURES) / f"{name}.png"))
