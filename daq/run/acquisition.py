@@ -10,7 +10,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from daq.causes import CauseCode
+from daq.causes import Cause, CauseCode
 from daq.devices import Rig
 from daq.errors import BusyError, DaqError, PlanError, StorageError
 from daq.files.recovery import recover
@@ -210,8 +210,8 @@ class Acquisition:
             self._end_at_once(self._left, CauseCode.PROGRAM_ENDED)
             light.try_to_switch_off(self._rig)
 
-    def acknowledge(self) -> None:
-        """Clear the generator's latched faults, and acknowledge the first cause that waits; the last one ends FAULT.
+    def acknowledge(self, cause: Cause | None = None) -> None:
+        """Clear latched faults, and acknowledge a cause that waits, by default the first; the last one ends FAULT.
 
         Raises
         ------
@@ -222,13 +222,17 @@ class Acquisition:
         DeviceError
             The generator does not answer, refuses, or is still armed.
         """
-        status = self.status()
-        if status.state is not RunState.IDLE:
-            next_state(status.state, RunStep.ACKNOWLEDGE)
-        if any(cause.code is CauseCode.INTERLOCK_OPEN for cause in status.to_acknowledge[:1]):
+        seen = [cause] if cause else list(self.status().to_acknowledge[:1])
+        if any(one.code is CauseCode.INTERLOCK_OPEN for one in seen):
             light.check_closed(self._rig)
+        self.clear_faults()
+        self._progress.acknowledge(seen)
+
+    def clear_faults(self) -> None:
+        """Clear the generator's latched faults alone; raises what ``acknowledge`` does."""
+        if (state := self.status().state) is not RunState.IDLE:
+            next_state(state, RunStep.ACKNOWLEDGE)
         light.acknowledge_faults(self._rig)
-        self._progress.acknowledge()
 
     def wait(self, deadline_s: float) -> RunStatus:
         """Wait until no run and no live view is under way; returns the status then, or the one at the deadline."""

@@ -1,11 +1,11 @@
 """RunProgress: where acquisition stands, and the one who tells it; every run has it as its listener."""
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
-from daq.causes import to_acknowledge
+from daq.causes import Cause, to_acknowledge
 from daq.run.ending import RunEnding
 from daq.run.events import RunEvent, RunMessage, RunStatus, ShotRecorded, StateChanged
 from daq.run.state import RunState, RunStep, next_state
@@ -67,14 +67,14 @@ class RunProgress:
                 self.tell(self._run_id, f"a second cause, to be acknowledged by itself: {cause.text}")
             self.move(step, to_acknowledge=waiting, **changes)
 
-    def acknowledge(self) -> None:
-        """The operator has seen to the first cause that waits; the last one ends FAULT."""
+    def acknowledge(self, causes: Sequence[Cause]) -> None:
+        """The operator has seen to causes that wait; the last one ends FAULT."""
         with self._changed:
-            waiting = self._status.to_acknowledge
-            if waiting:
-                self._status = replace(self._status, to_acknowledge=waiting[1:])
-                self.tell(self._run_id, f"acknowledged: {waiting[0].text}")
-            if self._status.state is RunState.FAULT and not waiting[1:]:
+            waiting = tuple(cause for cause in self._status.to_acknowledge if cause not in causes)
+            self._status = replace(self._status, to_acknowledge=waiting)
+            for cause in causes:
+                self.tell(self._run_id, f"acknowledged: {cause.text}")
+            if self._status.state is RunState.FAULT and not waiting:
                 self.move(RunStep.ACKNOWLEDGE)
 
     @property

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
 
+from daq.causes import Cause
 from daq.devices import Rig
 from daq.errors import DaqError
 from daq.run.events import RunStatus
@@ -40,7 +41,8 @@ class RunControl(Protocol):
     def end_live(self) -> None: ...  # noqa: D102
     def stop(self) -> None: ...  # noqa: D102
     def abort(self) -> None: ...  # noqa: D102
-    def acknowledge(self) -> None: ...  # noqa: D102
+    def acknowledge(self, cause: Cause | None = None) -> None: ...  # noqa: D102
+    def clear_faults(self) -> None: ...  # noqa: D102
     def status(self) -> RunStatus: ...  # noqa: D102
     @property
     def newest_shot(self) -> Shot | None: ...  # noqa: D102

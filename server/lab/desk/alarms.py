@@ -6,12 +6,13 @@ from typing import Annotated
 
 from pydantic import Field
 
+from daq.causes import Cause
 from daq.frozen_model import FrozenModel
 from daq.run.refusals import REMEDIES, RefusalCode
 from processing.calibration.verdict import Verdict
 from server.lab.duty import Health, Lamp
 from server.lab.errors import NotFound
-from server.lab.runs.run_summary import RunSummary
+from server.lab.runs.run_summary import RunCause
 from server.lab.watch import CalibrationStanding
 
 _OF_LAMPS = {
@@ -76,10 +77,10 @@ def of_lamps(lamps: Iterable[Lamp]) -> Iterator[Alarm]:
         yield _alarm(lamp.name, text.removeprefix(f"{lamp.name}: "), remedy, latched=latched)
 
 
-def of_run(run: RunSummary, *, latched: bool) -> Iterator[Alarm]:
-    """Why a run failed."""
-    for cause in run.causes:
-        yield _alarm(f"run {run.run_id}", cause.text, cause.remedy, latched=latched)
+def of_causes(source: str, causes: Iterable[Cause | RunCause], *, latched: bool) -> Iterator[Alarm]:
+    """Why a run or a live view ended."""
+    for cause in causes:
+        yield _alarm(source, cause.text, cause.remedy, latched=latched)
 
 
 def of_calibration(standing: CalibrationStanding | None) -> Iterator[Alarm]:

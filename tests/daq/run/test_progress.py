@@ -18,7 +18,7 @@ def test_a_fault_is_left_with_the_last_cause() -> None:
     progress.end(RunStep.LIGHT_UNKNOWN, ending)
     for state, left in ((RunState.FAULT, 2), (RunState.FAULT, 1), (RunState.IDLE, 0)):
         assert (progress.status().state, len(progress.status().to_acknowledge)) == (state, left)
-        progress.acknowledge()
+        progress.acknowledge(progress.status().to_acknowledge[:1])
     assert [event.text for event in told if isinstance(event, RunMessage)] == [
         "a second cause, to be acknowledged by itself: generator_failed",
         "acknowledged: interlock_open",

@@ -57,6 +57,33 @@ def test_a_run_that_failed_says_why_until_the_next_one(server: Serving, laborato
     await_alarms(server)
 
 
+def test_of_two_causes_of_a_run_the_one_that_is_named_is_acknowledged(server: Serving, laboratory: Any) -> None:
+    run_id = server.http.post("/api/runs", json=plan_of(shots=1000, rate_hz=5.0)).json()["run_id"]
+    eventually(lambda: server.http.get("/api/rig").json()["acquisition"]["shots_recorded"] > 0, "shots are recorded")
+    laboratory.generator.restarted = True
+    laboratory.open_door()
+    server.wait()
+    laboratory.close_door()
+
+    def left() -> list[str]:
+        return [cause["text"] for cause in server.http.get("/api/rig").json()["acquisition"]["to_acknowledge"]]
+
+    both = left()
+    assert len(both) == 2
+    eventually(lambda: len(of_run(server, run_id)) == 2, "both causes are told")
+    alarm = next(alarm for alarm in of_run(server, run_id) if alarm["text"] == both[1])
+    assert acknowledge(server, alarm) == 202
+    assert left() == both[:1]
+    seen = {alarm["text"]: alarm["acknowledged"] for alarm in of_run(server, run_id)}
+    assert seen == {both[0]: False, both[1]: True}
+    assert acknowledge(server, next(alarm for alarm in of_run(server, run_id) if alarm["text"] == both[0])) == 202
+    assert left() == []
+
+
+def of_run(server: Serving, run_id: str) -> list[dict[str, Any]]:
+    return [alarm for alarm in server.http.get("/api/rig/alarms").json() if alarm["source"] == f"run {run_id}"]
+
+
 def test_an_open_door_is_no_alarm_and_a_fault_that_lasts_is_not_acknowledged(server: Serving, laboratory: Any) -> None:
     laboratory.open_door()
     laboratory.generator.trip("interlock")
