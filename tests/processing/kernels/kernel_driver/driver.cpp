@@ -123,12 +123,18 @@ void look(const Kernels &kernels, int number) {
     const std::unique_ptr<float[]> volume(new float[voxels(shape)]), sum(new float[voxels(shape)]());
     for (Format format : {Format::half, Format::byte}) {
         const std::unique_ptr<uint8_t[]> bytes(new uint8_t[voxels(shape) * bytes_of(format)]);
-        run_line_of_sight(kernels, {scene.views.data(), n_views, shape, 0, method, format, bytes.get()}, 2);
+        run_line_of_sight(kernels, {scene.views.data(), n_views, shape, {0, 0}, method, format, bytes.get()}, 2);
     }
-    run_line_of_sight(kernels, {scene.views.data(), n_views, shape, 0, method, Format::single, volume.get()}, 2);
+    run_line_of_sight(kernels, {scene.views.data(), n_views, shape, {0, 0}, method, Format::single, volume.get()}, 2);
     std::vector<View> exposures;
     for (int e = 0; e < 5; ++e) exposures.insert(exposures.end(), scene.views.begin(), scene.views.end());
-    run_sum_of_sight(kernels, {exposures.data(), n_views, 5, shape, 0, method, sum.get()}, 2);
+    run_sum_of_sight(kernels, {exposures.data(), n_views, 5, shape, {0, 0}, method, false, sum.get()}, 2);
+    if (shape.nx > block_columns) {
+        const Shape part{shape.nz, shape.ny, shape.nx - block_columns};
+        const std::unique_ptr<float[]> seen(new float[voxels(part)]);
+        run_line_of_sight(kernels, {scene.views.data(), n_views, part, {0, block_columns}, method, Format::single, seen.get()}, 2);
+        run_sum_of_sight(kernels, {exposures.data(), n_views, 5, part, {0, block_columns}, method, true, seen.get()}, 2);
+    }
     std::printf("sight %d %.6f %.6f\n", number, sum_of(volume.get(), voxels(shape)), sum_of(sum.get(), voxels(shape)));
 }
 
