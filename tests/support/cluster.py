@@ -103,13 +103,15 @@ class Cluster:
 
 
 @contextmanager
-def cluster(work_dir: Path, certificates: Path | None, workers: int, host: str = "127.0.0.1") -> Iterator[Cluster]:
-    """A scheduler with so many workers, until the block ends."""
+def cluster(
+    work_dir: Path, certificates: Path | None, workers: int, host: str = "127.0.0.1", prefix: Sequence[str] = ()
+) -> Iterator[Cluster]:
+    """A scheduler with so many workers, until the block ends; the prefix takes the scheduler elsewhere."""
     work_dir.mkdir(exist_ok=True)
     with ExitStack() as stack:
         made = Cluster(work_dir, certificates, host)
         stack.callback(made.end)
-        made.start_scheduler()
+        made.start_scheduler(prefix)
         for number in range(workers):
             made.start_worker(f"worker{number}")
         for number in range(workers):

@@ -30,6 +30,8 @@ from server.lab.engine.scheduler_link import CONNECT_S, prepare, security_of, si
 LOOPBACK, ALL = "127.0.0.1", "0.0.0.0"  # noqa: S104 - only with certificates
 _HTTP = f"{LOOPBACK}:0"  # None would take the address of the rest
 _TRY_AGAIN_S = 1.0
+_START_S = 120.0
+"""Two CPU-s on a machine where everybody else works, too."""
 Tell = Callable[[str], None]
 
 
@@ -92,8 +94,10 @@ async def serve_worker(options: WorkerOptions, tell: Tell) -> None:
     async with _told_to_end() as end:
         while not end.is_set():
             await _await_scheduler(options, end, tell)
-            with suppress(OSError, TimeoutError, RuntimeError):
+            try:
                 await _work(options, end, tell)
+            except (OSError, TimeoutError, RuntimeError) as error:  # the scheduler went while the process started, say
+                tell(f"could not work, and tries again: {error.__cause__ or error or type(error).__name__}")
 
 
 async def _work(options: WorkerOptions, end: asyncio.Event, tell: Tell) -> None:
@@ -105,7 +109,7 @@ async def _work(options: WorkerOptions, end: asyncio.Event, tell: Tell) -> None:
         security=security_of(options.certificates),
         host=_own_address(options.scheduler),
         env={THREADS_VARIABLE: options.threads},
-        death_timeout=4 * CONNECT_S,
+        death_timeout=_START_S,
         dashboard_address=_HTTP,
         plugins=(Prepared(options.modules),),
         silence_logs=logging.CRITICAL,

@@ -5,6 +5,7 @@ import os
 import signal
 import socket
 import ssl
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -12,6 +13,7 @@ import pytest
 
 from server.lab.engine.cluster_engine import ClusterEngine
 from server.lab.engine.in_order import results_in_order
+from server.lab.engine.scheduler_link import DEAD_S
 from server.lab.engine.task import TaskAborted, TaskError, Unavailable
 from server.rig.processing_config import ProcessingConfig
 from tests.support.cluster import Cluster, cluster, far_network, write_certificates
@@ -168,15 +170,20 @@ async def _endless(config: ProcessingConfig, tmp_path: Path) -> None:
         await engine.submit("run, shot 7", write_slowly, job, _ignore)
 
 
-def test_what_is_beyond_a_cut_cable_comes_back_and_costs_no_shot(certificates: Path, tmp_path: Path) -> None:
-    """A worker and its tasks are cut off for longer than a connection lives; another worker does them meanwhile."""
-    with far_network() as far, cluster(tmp_path / "lab", certificates, workers=1, host=far.near_ip) as lab:
-        lab.start_worker("far", far.enter)
-        lab.await_word("far", f"as tls://{far.far_ip}")
-        batch = Batch(lab.config(), tmp_path / "out", SHOTS)
+def test_a_cable_that_is_out_costs_no_shot_and_who_was_cut_off_comes_back(certificates: Path, tmp_path: Path) -> None:
+    """Who asks and a worker are cut off from the scheduler and the other worker, for longer than a connection lives."""
+    with (
+        far_network() as far,
+        cluster(tmp_path / "lab", certificates, workers=0, host=far.far_ip, prefix=far.enter) as lab,
+    ):
+        for name, prefix, ip in (("far", far.enter, far.far_ip), ("near", (), far.near_ip)):
+            lab.start_worker(name, prefix)
+            lab.await_word(name, f"as tls://{ip}")
+        batch = Batch(lab.config(), tmp_path / "out", 2 * SHOTS)
         batch.await_begun(3)
         far.cut()
-        assert batch.lost() == 0
+        threading.Event().wait(DEAD_S + 3)
         far.mend()
-        lab.await_word("far", "works for", times=2)
-        assert Batch(lab.config(), tmp_path / "again", SHOTS).lost() == 0
+        assert batch.lost() == 0
+        assert len(batch.begun()) > 2 * SHOTS, "no shot was begun anew: nothing was cut off"
+        lab.await_word("near", "works for", times=2)
