@@ -6,7 +6,7 @@ logarithm. Percentiles of the draws and Efron's BCa hold the truth far less ofte
 ``docs/measure.md``.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Annotated
 
 import numpy as np
@@ -128,3 +128,26 @@ def estimated(
             values.tolist(), *(ends.tolist() for ends in limits(values, half_widths, signed)), strict=True
         )
     ]
+
+
+def weighted_quantiles(values: FloatArray, weights: FloatArray, shares: Sequence[float]) -> FloatArray:
+    """Values below which so much of the weight lies.
+
+    Parameters
+    ----------
+    values : (N,) array
+        Sorted.
+    weights : (rows, N) array
+        Of each value, row by row.
+    shares : sequence of k float
+        0 to 1.
+
+    Returns
+    -------
+    (rows, k) array
+        Not a number where a row has no weight.
+    """
+    summed = np.cumsum(weights, axis=1)
+    wanted = summed[:, -1:] * np.asarray(shares)
+    below = np.array([np.searchsorted(row, row_wanted) for row, row_wanted in zip(summed, wanted, strict=True)])
+    return np.where(summed[:, -1:] > 0, values[np.minimum(below, len(values) - 1)], np.nan)

@@ -14,6 +14,7 @@ from daq.files.run_directory import RunReader
 from daq.run.acquisition import Acquisition
 from daq.run.events import RunEvent, RunMessage
 from daq.run.state import RunOutcome
+from daq.run_notes import Spray
 from daq.run_plan import PulsePair, RunKind, RunPlan
 from processing.analysis.quality import quality_factor
 from processing.calibration.calibrate import calibrate
@@ -27,6 +28,7 @@ from processing.runs.pipeline import default_grid, reconstruct_shot
 from processing.runs.results_file import volume_path
 from processing.runs.shots.shot_result import ShotResult
 from processing.runs.workbench import Workbench
+from processing.synthetic.liquid.nozzles import HOLLOW_CONE_FLOW
 from processing.synthetic.spray import droplet_volume
 from processing.synthetic.truth_file import read_true_cameras, read_true_spray
 from processing.volume import VoxelGrid
@@ -164,7 +166,12 @@ def _record_sample(recorder: "_Runs", shots: int, calibration: Calibration) -> P
         recorder.record(kind, REFERENCE_SHOTS, SAMPLE_RATE_HZ).name for kind in (RunKind.DARK, RunKind.BACKGROUND)
     ]
     return recorder.record(
-        RunKind.SAMPLE, shots, SAMPLE_RATE_HZ, references=tuple(references), calibration=calibration.id
+        RunKind.SAMPLE,
+        shots,
+        SAMPLE_RATE_HZ,
+        references=tuple(references),
+        calibration=calibration.id,
+        spray=Spray(nozzle_mm=HOLLOW_CONE_FLOW.orifice_mm),
     )
 
 

@@ -6,18 +6,21 @@ from typing import Any
 import numpy as np
 
 from daq.files.run_directory import RunReader
+from processing.analysis.spray.spray_statistics import AskedFor
 from processing.figures.found_figures import found_figure
 from processing.figures.residual_figures import residuals_figure
-from processing.figures.size_figures import droplets_in_space_figure, sizes_figure
+from processing.figures.size_figures import droplets_in_space_figure
 from processing.figures.velocity_figures import velocities_figure
 from processing.figures.volume_figures import isosurface_figure, shadowgraph_figure, slices_figure
 from processing.preprocessing import Intensity
 from processing.reconstruction.volume_file import read_volume
 from processing.runs.results_file import volume_path
+from processing.runs.sprays.measured_spray import read_files
 from processing.volume import VoxelGrid
 from server.demo.demo import Demonstration
 from server.demo.demo_droplets import COUNTED_UM, MeasuredDroplets
 from server.reports.page import Picture, Section, Table, write_report
+from server.reports.spray_report import ReportedSpray, spray_sections
 
 DETAIL_MM = 4.0
 """Edge of the cube that is shown as an iso-surface, as in Fig. 4 of the paper."""
@@ -119,6 +122,7 @@ def write_demo_report(demo: Demonstration, file: Path) -> None:
         Section("Shadowgraphs", pictures=[_shadowgraphs(demo.sample_run, first)]),
         Section("Volume", pictures=[Picture(slices_figure(volume, grid, title), "Slices and maximum projections")]),
         _droplets_section(demo.droplets),
+        *_spray_sections(demo.droplets),
         Section("Detail", pictures=[_detail({name: entry[0] for name, entry in volumes.items()}, grid)]),
     ]
     write_report(file, f"tomoshadow: {demo.sample_run.name}", sections)
@@ -137,7 +141,6 @@ def _droplets_section(droplets: MeasuredDroplets) -> Section:
         return Section("Droplets", text, [_droplets_table(droplets)])
     pictures = [
         Picture(droplets_in_space_figure(droplets.stored), "Measured droplets, larger ones larger"),
-        Picture(sizes_figure([droplets.stored]), "Distribution of their diameters, with 95 % intervals"),
         Picture(
             found_figure(droplets.found, droplets.missed, droplets.ghosts),
             f"Against the truth, from {COUNTED_UM:g} µm on, both exposures",
@@ -146,6 +149,12 @@ def _droplets_section(droplets: MeasuredDroplets) -> Section:
     if droplets.velocity_rms_m_s is not None:
         pictures.append(Picture(velocities_figure(droplets.stored), "Velocities of droplets that both exposures show"))
     return Section("Droplets", text, [_droplets_table(droplets)], pictures)
+
+
+def _spray_sections(droplets: MeasuredDroplets) -> list[Section]:
+    """Sizes, patternation and number density of the box, as the report of any spray has them."""
+    spray = read_files([droplets.file])
+    return spray_sections(ReportedSpray.of(spray, AskedFor(spray.axis)))
 
 
 def _droplets_table(droplets: MeasuredDroplets) -> Table:

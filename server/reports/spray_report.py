@@ -4,7 +4,8 @@ Each chapter is a function of what is reported, in ``CHAPTERS``; one that has no
 """
 
 import json
-from collections.abc import Callable, Mapping
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -38,6 +39,13 @@ DEFINITIONS = (
 )
 
 
+SHOT_HEAD = ("run", "shot", "exposure", "residual / noise", "hidden [%]", "verdict", "reasons")
+VERDICT = SHOT_HEAD.index("verdict")
+LEAST_ROWS = 4
+"""Of a map of number density: a box that is thinner has none over that axis."""
+Chapter = Callable[["ReportedSpray"], Section | None]
+
+
 @dataclass(frozen=True, eq=False)
 class ReportedSpray:
     """What a report is about.
@@ -68,8 +76,13 @@ class ReportedSpray:
 
 def write_spray_report(file: Path, reported: ReportedSpray) -> None:
     """Write the page; an existing report is replaced."""
-    chapters = (chapter(reported) for chapter in CHAPTERS)
-    write_report(file, f"Spray report: {reported.spray.name}", [one for one in chapters if one])
+    write_report(file, f"Spray report: {reported.spray.name}", spray_sections(reported, CHAPTERS))
+
+
+def spray_sections(reported: ReportedSpray, chapters: Sequence[Chapter] = ()) -> list[Section]:
+    """Chapters that have something to say; by default those of the spray alone, for another report."""
+    said = (chapter(reported) for chapter in chapters or OF_THE_SPRAY)
+    return [one for one in said if one]
 
 
 def _summary(reported: ReportedSpray) -> Section:
@@ -78,16 +91,28 @@ def _summary(reported: ReportedSpray) -> Section:
         f"{told.droplets.n} droplets, exposures: {told.droplets.exposures}, shots: {told.droplets.shots}; "
         f"sampling: {told.sampling}."
     )
-    verdict = f"The sample is {told.sample.verdict}." if told.sample else ""
-    if told.sample and told.sample.verdict != "adequate":
-        verdict = "The sample is low: intervals may be too narrow."
-    reasons = told.sample.reasons if told.sample else ()
-    missing = [f"No {name}: {reason}" for name, reason in told.reasons.items()]
-    partial = [told.motion.reason] if told.motion and told.motion.reason else []
+    adequate = told.sample and told.sample.verdict == "adequate"
+    verdict = "The sample is adequate." if adequate else "The sample is low: intervals may be too narrow."
+    text = f"{counted} {verdict} {_verdicts(reported)}"
+    return Section("Summary", text, [figures_table(told)], points=_doubts(told))
+
+
+def _doubts(told: SprayStatistics) -> list[str]:
+    """What is unsure or missing, and what to do."""
+    doubts = list(told.sample.reasons) if told.sample else []
+    doubts += [f"No {name}: {reason}" for name, reason in told.reasons.items()]
+    if told.motion and told.motion.reason:
+        doubts.append(told.motion.reason)
     if told.extent:
         reached = (("cone angle", told.extent.cone_reason), ("penetration", told.extent.penetration_reason))
-        partial += [f"No {name}: {why}" for name, why in reached if why]
-    return Section("Summary", f"{counted} {verdict}", [figures_table(told)], points=[*reasons, *missing, *partial])
+        doubts += [f"No {name}: {why}" for name, why in reached if why]
+    return doubts
+
+
+def _verdicts(reported: ReportedSpray) -> str:
+    """How many exposures are good, doubtful, refused."""
+    counted = Counter(row[VERDICT] for row in _exposures(reported))
+    return "Verdicts on the exposures: " + ", ".join(f"{n} {verdict}" for verdict, n in counted.items()) + "."
 
 
 def _origin(reported: ReportedSpray) -> Section:
@@ -181,7 +206,8 @@ def _patternations(reported: ReportedSpray) -> Section | None:
 def _density(reported: ReportedSpray) -> Section | None:
     if reported.sample is None:
         return None
-    maps = [one for down in ("y", "z") if (one := density_map(reported.sample, "x", down))]
+    found = (density_map(reported.sample, "x", down) for down in ("y", "z"))
+    maps = [one for one in found if one and len(one.mean_per_mm3) >= LEAST_ROWS]
     if not maps:
         return None
     caption = "Number density, mean along the third axis: mean over all exposures, and how shots scatter."
@@ -189,11 +215,12 @@ def _density(reported: ReportedSpray) -> Section | None:
 
 
 def _shots(reported: ReportedSpray) -> Section:
-    rows = [row for shot in reported.spray.shots for row in _shot_rows(shot.provenance)]
-    head = ["run", "shot", "exposure", "residual / noise", "hidden [%]", "verdict", "reasons"]
-    return Section(
-        "Shots", "Refused exposures have no droplets and do not count.", tables=[Table(head, rows, words=True)]
-    )
+    text = "Refused exposures have no droplets and do not count."
+    return Section("Shots", text, [Table(SHOT_HEAD, _exposures(reported), words=True)])
+
+
+def _exposures(reported: ReportedSpray) -> list[list[str]]:
+    return [row for shot in reported.spray.shots for row in _shot_rows(shot.provenance)]
 
 
 def _shot_rows(said: Mapping[str, Any]) -> list[list[str]]:
@@ -223,14 +250,5 @@ def _definitions(_: ReportedSpray) -> Section:
     return Section("What the figures mean", points=DEFINITIONS)
 
 
-CHAPTERS: tuple[Callable[[ReportedSpray], Section | None], ...] = (
-    _summary,
-    _origin,
-    _sizes,
-    _motion,
-    _patternations,
-    _density,
-    _shots,
-    _tables,
-    _definitions,
-)
+OF_THE_SPRAY: tuple[Chapter, ...] = (_sizes, _motion, _patternations, _density)
+CHAPTERS: tuple[Chapter, ...] = (_summary, _origin, *OF_THE_SPRAY, _shots, _tables, _definitions)

@@ -70,8 +70,17 @@ def test_the_report_is_one_page_with_all_figures(demonstrated: tuple[Path, dict[
     out, result = demonstrated
     assert Path(result["report"]) == out / "report.html"
     page = (out / "report.html").read_text()
-    assert page.count("data:image/png;base64,") == 8
-    for chapter in ("Summary", "Calibration", "Shadowgraphs", "Volume", "Droplets", "Detail"):
+    assert page.count("data:image/png;base64,") == 6
+    for chapter in (
+        "Summary",
+        "Calibration",
+        "Shadowgraphs",
+        "Volume",
+        "Droplets",
+        "Sizes",
+        "Number density",
+        "Detail",
+    ):
         assert f"<h2>{chapter}</h2>" in page
     assert "src=http" not in page
 

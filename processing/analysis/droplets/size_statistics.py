@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
 from scipy.special import chdtri
 
-from processing.analysis.estimates import CONFIDENCE, Estimate, estimated
+from processing.analysis.estimates import CONFIDENCE, Estimate, estimated, weighted_quantiles
 from processing.geometry import FloatArray
 from processing.masked import require_unmasked
 from processing.reconstruction.settings import FrozenValue
@@ -258,7 +258,5 @@ def _figures(diameters_um: FloatArray, powers: FloatArray, weights: FloatArray) 
     """Mean diameters, quantiles by volume and relative span of sorted diameters; a row of each row of weights."""
     sums = powers @ weights.T
     means = [(sums[p] / sums[q]) ** (1 / (p - q)) for p, q in ORDERS]
-    volumes = np.cumsum(powers[3] * weights, axis=1)
-    least = [np.count_nonzero(volumes < share * volumes[:, -1:], axis=1) for share in QUANTILES]
-    low_um, half_um, high_um = (diameters_um[index] for index in least)
+    low_um, half_um, high_um = weighted_quantiles(diameters_um, powers[3] * weights, QUANTILES).T
     return np.column_stack([*means, low_um, half_um, high_um, (high_um - low_um) / half_um])

@@ -1,6 +1,6 @@
 """Patternation: which part of the liquid goes where, by sectors and rings around the axis, at a distance of the nozzle.
 
-What an optical or mechanical patternator measures (ASTM has no standard for it; Tate 1960 compares tubes). Liquid per
+What an optical or mechanical patternator measures (Tate, Spray patternation, Ind. Eng. Chem. 52, 1960). Liquid per
 measured volume of each cell times the volume of the whole cell: what a box leaves out at a cell's edge counts as the
 rest of it. A cell of which the box holds less than half is not known.
 
@@ -142,7 +142,7 @@ def _shares(sample: SpraySample, cell: NDArray[np.intp], flow: FloatArray, cover
         "sector_shares": tuple(estimates[:sectors]),
         "ring_shares": tuple(estimates[sectors:]),
         "asymmetry": float(_asymmetry(by_sector.sum(0))),
-        "asymmetry_by_chance": _by_chance(by_sector),
+        "asymmetry_by_chance": sample.widening * _by_chance(by_sector),
     }
 
 

@@ -1,10 +1,10 @@
 """SampleVerdict: whether there are enough droplets, and whether a single one decides.
 
-ASTM E799 asks for a sample that is large enough, and that no extreme drop carries the result, of droplets that are
-independent. Here they come in shots, so the size of the sample is judged by the interval over shots, and the extreme
-drop by its share of the volume. **The limit of 2 % is measured** (``tomoshadow study statistics``): below it, 90 %
-intervals of D32, Dv0.5, span and flux of 3 to 40 shots hold the truth in 85 to 90 %, from 2 to 4 % in 80 to 88 %,
-beyond in 50 to 83 %.
+ASTM E799 asks for a sample that is large enough, and that no extreme drop carries the result. Here droplets come in
+shots, and those of one are not independent: the size of the sample is judged by the interval over shots, and the
+extreme drop by its share of the volume. **The limit of 2 % is measured, not the standard's**: below it, 90 % intervals
+of D32, Dv0.5, span and flux of 3 to 40 shots hold the truth in 85 to 90 %, from 2 to 4 % in 80 to 88 %, beyond in 50
+to 83 % (``docs/measure.md``).
 """
 
 from typing import Annotated, Literal
@@ -20,7 +20,7 @@ from processing.reconstruction.settings import FrozenValue
 MOST_EXTREME = 0.02
 """Share of the volume in the largest droplet."""
 LARGEST_HALF_WIDTH = 0.05
-"""Of the 95 % interval of D32, over its value: 5 % is what E799 and its users take for a sample that is adequate."""
+"""Of the 95 % interval of D32, over its value, of a sample that is adequate."""
 FEWEST_SHOTS = 5
 """Student's t of fewer is above 2.8, and says little of how shots differ."""
 
@@ -89,9 +89,8 @@ def extreme_droplet(sample: SpraySample) -> tuple[float | None, float | None, fl
 def _reasons(sizes: SizeStatistics, share: float | None, half_width: float | None, needed: int | None) -> list[str]:
     reasons = []
     if sizes.shots < FEWEST_SHOTS:
-        reasons.append(
-            f"{sizes.shots} shots with droplets say little of how shots differ: measure {FEWEST_SHOTS} at least"
-        )
+        few = f"shots with droplets: {sizes.shots}, which say little of how shots differ"
+        reasons.append(f"{few}; measure {FEWEST_SHOTS} at least")
     if share is not None and share > MOST_EXTREME:
         reasons.append(
             f"the largest droplet has {100 * share:.1f} % of the volume, more than {100 * MOST_EXTREME:g} %: intervals "

@@ -131,4 +131,4 @@ def _gap_by_chance(
     if sample.n_units < 2:
         return 1.0
     _, drawn = sample.drawn(gaps_of)
-    return float(np.nanquantile(drawn, CONFIDENCE))
+    return float(min(sample.widening * np.nanquantile(drawn, CONFIDENCE), 1.0))

@@ -12,9 +12,9 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from processing.analysis.estimates import Estimate
+from processing.analysis.estimates import Estimate, weighted_quantiles
 from processing.analysis.spray.spray_axis import SprayAxis, cell_volumes_mm3
-from processing.analysis.spray.spray_sample import SpraySample, weighted_quantiles
+from processing.analysis.spray.spray_sample import SpraySample
 from processing.geometry import FloatArray
 from processing.reconstruction.settings import FrozenValue
 
@@ -77,7 +77,11 @@ def spray_extent(sample: SpraySample, axis: SprayAxis) -> SprayExtent:
 def _quantiles(sample: SpraySample, values: FloatArray, shares: tuple[float, ...]) -> list[Estimate | None]:
     order = np.argsort(values, kind="stable")
     sorted_values, units, cubes = values[order], sample.units[order], sample.cubes_um3[order]
-    return sample.estimated(lambda counts: weighted_quantiles(sorted_values, counts[:, units] * cubes, shares))
+
+    def quantiles(counts: FloatArray) -> FloatArray:
+        return weighted_quantiles(sorted_values, counts[:, units] * cubes, shares)
+
+    return sample.estimated(quantiles, by_droplet=True)
 
 
 def _covered(axis: SprayAxis, box_mm: FloatArray, angle_deg: float) -> float:

@@ -18,9 +18,9 @@ from pydantic import Field
 from scipy.stats import rankdata
 
 from processing.analysis.droplets.size_statistics import size_classes
-from processing.analysis.estimates import CONFIDENCE, Estimate
+from processing.analysis.estimates import CONFIDENCE, Estimate, weighted_quantiles
 from processing.analysis.spray.spray_axis import SprayAxis
-from processing.analysis.spray.spray_sample import SpraySample, weighted_quantiles
+from processing.analysis.spray.spray_sample import SpraySample
 from processing.geometry import FloatArray
 from processing.reconstruction.settings import FrozenValue
 
@@ -134,9 +134,10 @@ def _flow(sample: SpraySample, paired: SpraySample, axis: SprayAxis, liquid_kg_m
 
 def _means(sample: SpraySample, values: FloatArray, signed: Sequence[bool]) -> list[Estimate | None]:
     """Means by number of columns of values."""
+    total = sample.totals(np.column_stack([values, np.ones(len(sample))]))
 
     def means(counts: FloatArray) -> FloatArray:
-        sums = sample.sums(counts, np.column_stack([values, np.ones(len(sample))]))
+        sums = total(counts)
         with np.errstate(invalid="ignore"):
             return np.asarray(sums[:, :-1] / sums[:, -1:])
 
@@ -147,9 +148,10 @@ def volume_flux(sample: SpraySample, axis: SprayAxis, confidence: float = CONFID
     """Liquid per area and time along the axis, in mm/s; droplets without partner are drawn with the others."""
     axial_m_s = np.where(sample.paired, axis.frame[0] @ sample.velocities_m_s.T, 0.0)
     columns = np.column_stack([sample.cubes_um3, sample.cubes_um3 * sample.paired, sample.cubes_um3 * axial_m_s])
+    total = sample.totals(columns)
 
     def flux(counts: FloatArray) -> FloatArray:
-        liquid, known, moved = np.moveaxis(sample.sums(counts, columns), 1, 0)
+        liquid, known, moved = np.moveaxis(total(counts), 1, 0)
         with np.errstate(invalid="ignore", divide="ignore"):
             carried = liquid * moved / known
         mm3_per_mm3 = MM3_PER_UM3 * np.pi / 6 * carried[:, None] / sample.measured_mm3(counts)
@@ -163,25 +165,25 @@ def _flux_diameters(sample: SpraySample, weights: FloatArray) -> list[Estimate |
     order = np.argsort(sample.diameters_um, kind="stable")
     d_um, units = sample.diameters_um[order], sample.units[order]
     columns = weights[:, None] * sample.diameters_um[:, None] ** np.arange(4)
-    by_volume = columns[order, 3]
+    by_volume, total = columns[order, 3], sample.totals(columns)
 
     def diameters(counts: FloatArray) -> FloatArray:
-        sums = sample.sums(counts, columns)
+        sums = total(counts)
         with np.errstate(invalid="ignore", divide="ignore"):
             d10, d32 = sums[:, 1] / sums[:, 0], sums[:, 3] / sums[:, 2]
         return np.column_stack([d10, d32, weighted_quantiles(d_um, counts[:, units] * by_volume, (0.5,))])
 
-    return sample.estimated(diameters)
+    return sample.estimated(diameters, by_droplet=True)
 
 
 def _rank_correlation(sample: SpraySample, speeds_m_s: FloatArray) -> Estimate | None:
     """Pearson's correlation of the ranks in the whole sample; limits stay within -1 and 1."""
     ranks = np.column_stack([rankdata(sample.diameters_um), rankdata(speeds_m_s)])
     x, y = (ranks / len(ranks) - 0.5).T
-    columns = np.column_stack([np.ones(len(x)), x, y, x * x, y * y, x * y])
+    total = sample.totals(np.column_stack([np.ones(len(x)), x, y, x * x, y * y, x * y]))
 
     def correlation(counts: FloatArray) -> FloatArray:
-        n, sx, sy, sxx, syy, sxy = np.moveaxis(sample.sums(counts, columns), 1, 0)
+        n, sx, sy, sxx, syy, sxy = np.moveaxis(total(counts), 1, 0)
         with np.errstate(invalid="ignore", divide="ignore"):
             return np.asarray((sxy - sx * sy / n) / np.sqrt((sxx - sx**2 / n) * (syy - sy**2 / n)))[:, None]
 

@@ -64,6 +64,11 @@ class SpraySample:
         return self.diameters_um**3
 
     @property
+    def widening(self) -> float:
+        """Of what draws say: two exposures of one shot show the same droplets, and make nothing surer."""
+        return 1.0 if self.several else float(np.sqrt(self.exposures_per_shot))
+
+    @property
     def n_units(self) -> int:
         """How many things there are to draw."""
         return len(self.volumes_mm3) if self.several else len(self)
@@ -83,11 +88,10 @@ class SpraySample:
             shot=self.shot[which],
         )
 
-    def sums(self, counts: FloatArray, values: FloatArray) -> FloatArray:
-        """Sums of values of the droplets, (N, k), when units are taken so often, (rows, units): (rows, k)."""
-        per_unit = np.zeros((self.n_units, values.shape[1]))
-        np.add.at(per_unit, self.units, values)
-        return counts @ per_unit
+    def totals(self, values: FloatArray) -> Figures:
+        """Sums of values of the droplets, (N, k), as a function of how often each unit is taken: (rows, k)."""
+        per_unit = np.column_stack([np.bincount(self.units, column, self.n_units) for column in values.T])
+        return lambda counts: counts @ per_unit
 
     def measured_mm3(self, counts: FloatArray) -> FloatArray:
         """Volumes that belong to so many shots, (rows, 1)."""
@@ -96,22 +100,29 @@ class SpraySample:
         return np.full((len(counts), 1), self.volumes_mm3.sum())
 
     def estimated(
-        self, figures: Figures, signed: bool | NDArray[np.bool_] = False, confidence: float = CONFIDENCE
+        self,
+        figures: Figures,
+        signed: bool | NDArray[np.bool_] = False,
+        confidence: float = CONFIDENCE,
+        *,
+        by_droplet: bool = False,
     ) -> list[Estimate | None]:
-        """Figures with intervals over shots; of a single shot over its droplets, whose number is left to chance."""
-        widening = 1.0 if self.several else float(np.sqrt(self.exposures_per_shot))
+        """Figures with intervals over shots; of a single shot over its droplets, whose number is left to chance.
+
+        Those that look at every droplet by itself say so: fewer draws are then made at once.
+        """
         return estimated(
             figures,
             self.n_units,
-            len(self),
+            len(self) if by_droplet else 1,
             counting=not self.several,
-            widening=widening,
+            widening=self.widening,
             signed=signed,
             confidence=confidence,
         )
 
     def drawn(self, figures: Figures) -> tuple[FloatArray, FloatArray]:
-        """Figures as measured, and of every draw."""
+        """Figures that look at every droplet by itself, as measured, and of every draw."""
         return drawn_figures(figures, self.n_units, len(self), counting=not self.several)
 
 
@@ -152,27 +163,3 @@ def _common_box(shots: Sequence[StoredDroplets]) -> FloatArray | None:
         return None
     first, last = np.array([[axis[0], axis[-1]] for axis in (grid.x_mm, grid.y_mm, grid.z_mm)]).T
     return np.array([first - grid.pitch_mm / 2, last + grid.pitch_mm / 2])
-
-
-def weighted_quantiles(values: FloatArray, weights: FloatArray, shares: Sequence[float]) -> FloatArray:
-    """Values below which so much of the weight lies.
-
-    Parameters
-    ----------
-    values : (N,) array
-        Sorted.
-    weights : (rows, N) array
-        Of each value, row by row.
-    shares : sequence of k float
-        0 to 1.
-
-    Returns
-    -------
-    (rows, k) array
-        Not a number where a row has no weight.
-    """
-    summed = np.cumsum(weights, axis=1)
-    total = summed[:, -1:]
-    below = [np.count_nonzero(summed < share * total, axis=1) for share in shares]
-    found = np.column_stack([values[np.minimum(index, len(values) - 1)] for index in below])
-    return np.where(total > 0, found, np.nan)

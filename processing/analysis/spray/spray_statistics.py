@@ -135,10 +135,10 @@ def _in_space(sample: SpraySample, asked: AskedFor) -> tuple[SprayExtent | None,
 
 
 def _liquid_ppm(sample: SpraySample) -> Estimate | None:
-    volumes_mm3 = MM3_PER_UM3 * np.pi / 6 * sample.cubes_um3[:, None]
+    volumes_mm3 = sample.totals(MM3_PER_UM3 * np.pi / 6 * sample.cubes_um3[:, None])
 
     def ppm(counts: FloatArray) -> FloatArray:
-        return np.asarray(1e6 * sample.sums(counts, volumes_mm3) / sample.measured_mm3(counts))
+        return np.asarray(1e6 * volumes_mm3(counts) / sample.measured_mm3(counts))
 
     (one,) = sample.estimated(ppm)
     return one

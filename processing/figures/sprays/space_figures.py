@@ -1,5 +1,7 @@
 """Where the liquid goes: patternation around the axis, and maps of the number density."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -7,6 +9,7 @@ from matplotlib.projections.polar import PolarAxes
 
 from processing.analysis.spray.density_map import DensityMap
 from processing.analysis.spray.patternation import Patternation
+from processing.geometry import FloatArray
 
 ARC = 16
 """Straight edges of the arc of a sector."""
@@ -50,30 +53,33 @@ def _draw_shares(axes: Axes, one: Patternation) -> None:
     axes.legend(fontsize="x-small")
 
 
-def density_figure(maps: "list[DensityMap]") -> Figure:
-    """Mean and scatter of the number density; a row of pictures per map.
+def density_figure(maps: Sequence[DensityMap]) -> Figure:
+    """Mean number density, and of several shots how they scatter.
 
     Parameters
     ----------
-    maps : list of DensityMap
-        Over two axes each.
+    maps : sequence of DensityMap
+        Over two axes each; a row of pictures, or of single shots a picture.
     """
-    figure = Figure(figsize=(9.5, 3.4 * len(maps)), layout="constrained")
-    rows = np.atleast_2d(np.array(figure.subplots(len(maps), 2), dtype=object))
-    for (mean_axes, rms_axes), one in zip(rows, maps, strict=True):
-        several = np.isfinite(one.rms_per_mm3).any()
-        pictures = ((mean_axes, one.mean_per_mm3, "mean"), (rms_axes, one.rms_per_mm3, "rms of the shots"))
-        for axes, values, label in pictures:
-            shown = np.ma.masked_invalid(values)
-            mesh = axes.pcolormesh(one.across_mm, one.down_mm, shown, cmap="viridis", vmin=0, rasterized=True)
-            axes.set(aspect="equal", xlabel=f"{one.across} [mm]", ylabel=f"{one.down} [mm]")
-            axes.invert_yaxis() if one.down == "y" else None
-            figure.colorbar(mesh, ax=axes, label="droplets [1/mm³]")
-            axes.set_title(label, fontsize="small")
+    several = any(np.isfinite(one.rms_per_mm3).any() for one in maps)
+    shape = (len(maps), 2) if several else (1, len(maps))
+    figure = Figure(figsize=(9.5 if shape[1] > 1 else 5, 3.6 * shape[0]), layout="constrained")
+    axes = np.array(figure.subplots(*shape, squeeze=False), dtype=object).reshape(len(maps), -1)
+    for places, one in zip(axes, maps, strict=True):
+        _draw_map(places[0], one, one.mean_per_mm3, "mean")
         if several:
-            chance = float(np.mean(one.chance_per_mm3))
-            rms = float(np.mean(one.rms_per_mm3))
-            rms_axes.set_title(f"rms of the shots: mean {rms:.3g}, by counting alone {chance:.3g}", fontsize="small")
-        else:
-            rms_axes.set_title("rms of the shots: there is one only", fontsize="small")
+            rms, chance = float(np.mean(one.rms_per_mm3)), float(np.mean(one.chance_per_mm3))
+            title = f"rms of the shots: mean {rms:.3g}, by counting alone {chance:.3g}"
+            _draw_map(places[1], one, one.rms_per_mm3, title)
     return figure
+
+
+def _draw_map(axes: Axes, one: DensityMap, values: FloatArray, title: str) -> None:
+    mesh = axes.pcolormesh(
+        one.across_mm, one.down_mm, np.ma.masked_invalid(values), cmap="viridis", vmin=0, rasterized=True
+    )
+    axes.set(aspect="equal", xlabel=f"{one.across} [mm]", ylabel=f"{one.down} [mm]")
+    if one.down == "y":
+        axes.invert_yaxis()
+    axes.figure.colorbar(mesh, ax=axes, label="droplets [1/mm³]", shrink=0.8)
+    axes.set_title(title, fontsize="small")

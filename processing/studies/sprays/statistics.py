@@ -57,14 +57,14 @@ class StatisticsStudy:
 
 @dataclass(frozen=True)
 class StatisticsRow:
-    """A case: how often intervals hold the truth, of those that are told, and how large the largest droplet was."""
+    """A case: how often intervals that are told hold the truth (None: none is), and the largest droplet's share."""
 
     case: str
     sprays: int
-    d32_held: float
-    dv50_held: float
-    span_held: float
-    flux_held: float
+    d32_held: float | None
+    dv50_held: float | None
+    span_held: float | None
+    flux_held: float | None
     least_told: float
     extreme_share: float
     low_samples: float
@@ -90,7 +90,7 @@ def _row(case: SprayCase, study: StatisticsStudy) -> StatisticsRow:
         share = extreme_droplet(sample)[0] or 1.0
         shares.append(share)
         low += share > MOST_EXTREME
-    held_shares = {f"{name}_held": float(np.mean(flags)) if flags else float("nan") for name, flags in held.items()}
+    held_shares = {f"{name}_held": float(np.mean(flags)) if flags else None for name, flags in held.items()}
     return StatisticsRow(
         case=case.name,
         sprays=study.sprays,
@@ -119,16 +119,20 @@ def _estimates(sample: SpraySample) -> Mapping[str, Estimate | None]:
 def all_held(rows: Sequence[StatisticsRow]) -> bool | None:
     """Whether the intervals of all cases asked for hold the truth in 85 to 95 %; None where nothing is asked for."""
     asked = [held for row in rows if row.asked for held in _held(row)]
-    return all(LEAST_HELD <= held <= MOST_HELD for held in asked) if asked else None
+    return all(held is not None and LEAST_HELD <= held <= MOST_HELD for held in asked) if asked else None
 
 
-def _held(row: StatisticsRow) -> list[float]:
+def _held(row: StatisticsRow) -> list[float | None]:
     return [getattr(row, f"{name}_held") for name in FIGURES]
+
+
+def _percent(held: float | None) -> str:
+    return "-" if held is None else f"{100 * held:.1f}"
 
 
 def statistics_line(row: StatisticsRow) -> str:
     """A case, for people."""
-    held = ", ".join(f"{FIGURES[name]} {100 * one:.0f} %" for name, one in zip(FIGURES, _held(row), strict=True))
+    held = ", ".join(f"{FIGURES[name]} {_percent(one)} %" for name, one in zip(FIGURES, _held(row), strict=True))
     return f"{row.case}: held by 90 % intervals: {held}; largest droplet {100 * row.extreme_share:.1f} % of the volume"
 
 
@@ -139,7 +143,7 @@ def statistics_statements(rows: Sequence[StatisticsRow]) -> list[Statement]:
         Statement(
             f"{row.case}: 90 % intervals of {names} that hold the truth, %",
             "left open, here asked for 85 to 95" if row.asked else "left open",
-            f"{'/'.join(f'{100 * one:.1f}' for one in _held(row))}; told in {100 * row.least_told:.0f} %; largest "
+            f"{'/'.join(map(_percent, _held(row)))}; told in {100 * row.least_told:.0f} %; largest "
             f"droplet {100 * row.extreme_share:.1f} % of the volume, low sample by it in {100 * row.low_samples:.0f} %",
         )
         for row in rows

@@ -1,5 +1,7 @@
 """The spray as a whole, against formulas and by what must not change."""
 
+import json
+import operator
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -226,6 +228,41 @@ def test_one_shot_draws_its_droplets_and_says_that_its_sample_is_low(cone: list[
     assert "how shots differ" in one.sample.reasons[0]
     assert one.motion
     assert one.motion.volume_flux_mm_s
+
+
+def test_two_exposures_of_one_shot_make_nothing_surer() -> None:
+    (shot,) = cone_shots(0, 1, 1500)
+    columns = {name: np.concatenate([column, column]) for name, column in shot.columns.items()}
+    columns["frame"] = np.repeat(["a", "b"], len(shot.columns["frame"]))
+    exposure = json.loads(str(shot.provenance["exposures"]))["a"]
+    both = {**shot.provenance, "exposures": json.dumps({"a": exposure, "b": exposure})}
+    once, twice = (spray_statistics([one], ASKED) for one in (shot, StoredDroplets(columns, both)))
+    assert figures(twice) == pytest.approx(figures(once), rel=1e-9)
+    for told in ("extent.cone_angle_deg", "motion.volume_flux_mm_s", "liquid_ppm"):
+        widths = [width(operator.attrgetter(told)(one)) for one in (once, twice)]
+        assert widths[1] == pytest.approx(widths[0], rel=0.25), told
+    assert twice.fits[0].gap_by_chance == pytest.approx(once.fits[0].gap_by_chance, rel=0.25)
+    by_chance = [one.patternations[0].asymmetry_by_chance for one in (once, twice)]
+    assert by_chance[1] == pytest.approx(by_chance[0], rel=0.25)
+
+
+def width(estimate: Estimate) -> float:
+    return float(np.log(estimate.high / estimate.low))
+
+
+def test_droplets_without_places_and_volume_have_sizes_and_say_what_is_missing() -> None:
+    """As of a single view, whose files have x_um and no grid."""
+    flat = []
+    for shot in cone_shots(0, 3, 60):
+        columns = {name: shot.columns[name] for name in ("frame", "diameter_um")}
+        flat.append(StoredDroplets(columns, {**shot.provenance, "grid": "null"}))
+    told = spray_statistics(flat, ASKED)
+    assert told.droplets.d32_um
+    assert (told.liquid_ppm, told.patternations, told.motion) == (None, (), None)
+    assert set(told.reasons) == {"motion", "patternations", "liquid_ppm"}
+    assert told.extent
+    assert told.extent.cone_reason
+    assert "NaN" not in told.model_dump_json()
 
 
 def test_nothing_is_not_a_number_in_json(told: SprayStatistics) -> None:

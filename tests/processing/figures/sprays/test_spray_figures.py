@@ -1,0 +1,72 @@
+"""Figures of a spray: what is drawn is what was computed."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from processing.analysis.spray.density_map import density_map
+from processing.analysis.spray.spray_axis import SprayAxis
+from processing.analysis.spray.spray_sample import SpraySample, spray_sample
+from processing.analysis.spray.spray_statistics import AskedFor, SprayStatistics, spray_statistics
+from processing.figures.sprays.distribution_figure import distribution_figure
+from processing.figures.sprays.motion_figure import MOST_DOTS, motion_figure
+from processing.figures.sprays.space_figures import density_figure, patternation_figure
+from tests.support.sampled_sprays import cone_shots
+
+ASKED = AskedFor(SprayAxis((0, 0, 0), (0, 1, 0)))
+
+
+@pytest.fixture(scope="module")
+def sample() -> SpraySample:
+    return spray_sample(cone_shots(0, 4, 150))
+
+
+@pytest.fixture(scope="module")
+def told() -> SprayStatistics:
+    return spray_statistics(cone_shots(0, 4, 150), ASKED)
+
+
+def test_areas_over_the_logarithm_of_the_diameter_are_shares(told: SprayStatistics) -> None:
+    densities, cumulative = distribution_figure(told).axes
+    for patch in densities.patches[:3]:
+        stairs = patch.get_data()  # type: ignore[attr-defined]
+        assert np.sum(stairs.values * np.diff(np.log(stairs.edges))) == pytest.approx(1)
+    names = {str(line.get_label()) for line in densities.lines}
+    assert {"lognormal, by volume", "rosin-rammler, by volume"} <= names
+    by_volume = next(line for line in cumulative.lines if line.get_label() == "by volume")
+    assert np.asarray(by_volume.get_ydata())[-1] == pytest.approx(1)
+    assert any(str(line.get_label()).startswith("D32 ") for line in cumulative.lines)
+
+
+def test_dots_are_droplets_and_means_have_their_intervals(told: SprayStatistics, sample: SpraySample) -> None:
+    assert told.motion
+    speeds_m_s = np.linalg.norm(sample.velocities_m_s, axis=1)
+    by_size, by_radius = motion_figure(told.motion, sample.diameters_um, speeds_m_s).axes
+    assert len(by_size.lines[0].get_xydata()) == len(sample) <= MOST_DOTS  # type: ignore[arg-type]
+    assert {text.get_text() for text in by_radius.get_legend().get_texts()} == {"axial", "radial"}  # type: ignore[union-attr]
+    without = told.motion.model_copy(update={"by_radius": ()})
+    assert motion_figure(without, sample.diameters_um, speeds_m_s).axes[1].get_title() == "no axis, no profile"
+
+
+def test_cells_that_the_box_does_not_hold_are_left_out_of_the_disc(told: SprayStatistics) -> None:
+    (one,) = told.patternations
+    ring, *others = one.liquid_ppm
+    hidden = one.model_copy(update={"liquid_ppm": ((None, *ring[1:]), *others)})
+    disc, _bar, shares = patternation_figure(hidden).axes
+    (mesh,) = (artist for artist in disc.collections if hasattr(artist, "get_array"))
+    drawn = mesh.get_array()
+    assert drawn is not None
+    assert np.count_nonzero(np.ma.getmaskarray(drawn)) == 16
+    assert len(shares.patches) == one.sectors
+
+
+def test_shots_scatter_beside_the_mean_and_of_one_shot_there_is_the_mean(sample: SpraySample) -> None:
+    several = density_map(sample)
+    single = density_map(replace(sample, shot=np.zeros_like(sample.shot), volumes_mm3=sample.volumes_mm3[:1]))
+    assert several
+    assert single
+    mean, rms = (axes for axes in density_figure([several]).axes if axes.get_title())
+    assert "by counting alone" in rms.get_title()
+    assert mean.yaxis_inverted()
+    assert [axes.get_title() for axes in density_figure([single, single]).axes if axes.get_title()] == ["mean", "mean"]
