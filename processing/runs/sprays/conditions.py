@@ -3,7 +3,7 @@
 from daq.files.run_directory import RunHeader
 
 
-def conditions_of(header: RunHeader) -> dict[str, str | int | float]:
+def conditions_of(header: RunHeader) -> dict[str, str]:
     """What the operator has written down of a run, as far as it says anything of the spray."""
     spray = header.spray.model_dump_json() if header.spray else ""
     notes = header.notes.model_dump_json(exclude_defaults=True)

@@ -1,0 +1,42 @@
+"""Results as sprays: where the nozzle is, by the files, or by the run that they lie in."""
+
+from pathlib import Path
+
+import pytest
+
+from daq.files.run_directory import RunNotes, RunReader, Spray
+from processing.analysis.spray.spray_axis import SprayAxis
+from processing.runs.sprays.conditions import conditions_of
+from processing.runs.sprays.measured_spray import read_spray
+from tests.support.droplet_run import write_run
+from tests.support.sampled_sprays import cone_shots, write_results
+
+SPRAY = Spray(nozzle_mm=(1, 2, 3), axis=(0, 0, 1))
+
+
+def test_what_the_operator_wrote_travels_with_what_is_measured(tmp_path: Path) -> None:
+    noted = write_run(tmp_path / "noted", spray=SPRAY, notes=RunNotes(fluid="water", pressure_bar=6.0))
+    with RunReader(noted) as run, RunReader(write_run(tmp_path / "bare")) as bare:
+        said = conditions_of(run.header)
+        assert conditions_of(bare.header) == {}
+    assert Spray.model_validate_json(said["spray"]) == SPRAY
+    assert RunNotes.model_validate_json(said["notes"]) == RunNotes(fluid="water", pressure_bar=6.0)
+    results = write_results(tmp_path / "results", cone_shots(0, 2, 10), **said)
+    assert read_spray([results]).axis == SprayAxis((1, 2, 3), (0, 0, 1))
+
+
+def test_older_results_have_the_nozzle_of_the_run_that_they_lie_in(tmp_path: Path) -> None:
+    run_dir = write_run(tmp_path / "run", spray=SPRAY)
+    results = write_results(run_dir / "results" / "droplets-1", cone_shots(0, 2, 10))
+    spray = read_spray([results])
+    assert (spray.axis, spray.name) == (SprayAxis((1, 2, 3), (0, 0, 1)), "run/droplets-1")
+    (run_dir / "run.h5").write_bytes(b"damaged")
+    assert read_spray([results]).axis is None
+    elsewhere = write_results(tmp_path / "elsewhere", cone_shots(0, 2, 10))
+    assert read_spray([elsewhere]).axis is None
+
+
+@pytest.mark.parametrize("direction", [(0, 0, 0), (0, float("nan"), 1)])
+def test_an_axis_leads_somewhere(direction: tuple[float, float, float]) -> None:
+    with pytest.raises(ValueError, match="a spray needs a nozzle and a direction"):
+        SprayAxis((0, 0, 0), direction)
