@@ -20,11 +20,11 @@ def run(rng: np.random.Generator, median_um: float = 40.0, shots: int = 8) -> li
 def test_runs_of_one_spray_seldom_differ_in_anything() -> None:
     rng = np.random.default_rng(0)
     called = 0
-    for _ in range(60):
+    for _ in range(30):
         found = differences({name: spray_statistics(run(rng)) for name in ("monday", "tuesday")})
         assert {one.figure for one in found} >= {"d32_um", "number_density_per_mm3", "liquid_ppm"}
         called += any(one.significant for one in found)
-    assert called <= 8, "3 are expected, more than 8 have 0.3 %"
+    assert called <= 5, "1.5 are expected, more than 5 have 0.3 %"
 
 
 def test_a_larger_spray_is_larger() -> None:

@@ -21,7 +21,7 @@ def rosin_rammler_um(scale_um: float = 80.0, q: float = 4.0) -> np.ndarray[tuple
     By number their density is ``d^(q - 4) exp(-(d / X)^q)``: ``(d / X)^q`` is gamma distributed, of order (q - 3) / q.
     """
     rng = np.random.default_rng(5)
-    return np.asarray(scale_um * rng.gamma((q - 3) / q, 1, 20 * N) ** (1 / q))
+    return np.asarray(scale_um * rng.gamma((q - 3) / q, 1, 10 * N) ** (1 / q))
 
 
 def sample_of(diameters_um: np.ndarray[tuple[int, ...], np.dtype[np.float64]], shots: int = 10) -> SpraySample:

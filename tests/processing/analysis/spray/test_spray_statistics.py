@@ -231,7 +231,7 @@ def test_one_shot_draws_its_droplets_and_says_that_its_sample_is_low(cone: list[
 
 
 def test_two_exposures_of_one_shot_make_nothing_surer() -> None:
-    (shot,) = cone_shots(0, 1, 1500)
+    (shot,) = cone_shots(0, 1, 1000)
     columns = {name: np.concatenate([column, column]) for name, column in shot.columns.items()}
     columns["frame"] = np.repeat(["a", "b"], len(shot.columns["frame"]))
     exposure = json.loads(str(shot.provenance["exposures"]))["a"]

@@ -24,7 +24,7 @@ from processing.studies.sprays.statistics import (
     statistics_study,
 )
 
-SMALL = (SprayCase(6, 120, 0.2), SprayCase(6, 25, 0.6, asked=False))
+SMALL = (SprayCase(5, 100, 0.2), SprayCase(5, 25, 0.6, asked=False))
 
 
 @pytest.fixture(scope="module")
