@@ -1,0 +1,88 @@
+"""What views see at all, and what pixels that know nothing do: they are no evidence for liquid, nor against it."""
+
+import numpy as np
+import pytest
+
+from processing.analysis.objects.object_search import ObjectSearch, all_objects, measure_objects, plan_objects
+from processing.analysis.objects.seeing_views import map_grid, unknown_shares
+from processing.preprocessing import Intensity
+from processing.studies.simulated_droplets import study_cameras, study_grid
+
+GRID, SIZE_PX = study_grid((90, 90, 90)), (200, 140)
+
+
+@pytest.fixture(scope="module")
+def search() -> ObjectSearch:
+    return plan_objects(study_cameras(SIZE_PX), GRID)
+
+
+def _images(views: int = 4) -> list[Intensity]:
+    return [np.ones(SIZE_PX[::-1], np.float32) for _ in range(views)]
+
+
+def test_all_views_see_an_empty_volume_and_find_nothing(search: ObjectSearch) -> None:
+    found = measure_objects(_images(), search)
+    assert (found.seeing == 4).all()
+    assert (found.blind_share, found.unjudged_share, len(found.objects)) == (0.0, 0.0, 0)
+    assert "--nozzle" in (found.reach.reason or "")
+
+
+def test_a_black_half_of_two_views_leaves_two(search: ObjectSearch) -> None:
+    images = _images()
+    for image in images[:2]:
+        image[70:] = 0.02
+    found = measure_objects(images, search)
+    upper, lower = found.seeing[:, :2], found.seeing[:, -2:]
+    assert (upper == 4).all()
+    assert (lower == 2).all()
+    assert found.unjudged_share == pytest.approx(0.5, abs=0.15)
+    assert found.blind_share == 0
+
+
+def test_pixels_that_know_nothing_are_no_liquid(search: ObjectSearch) -> None:
+    trust = _images()
+    for sure in trust:
+        sure[:70] = 0
+    found = measure_objects(_images(), search, trust=trust)
+    assert len(found.objects) == 0
+    assert found.blind_share == pytest.approx(0.5, abs=0.15)
+
+
+def test_one_view_that_knows_nothing_says_nothing_against_what_others_see(search: ObjectSearch) -> None:
+    images, trust = _images(), _images()
+    for image in images[:3]:
+        image[60:80, 40:160] = 0.1
+    trust[3][:] = 0
+    assert len(measure_objects(images, search).objects) == 0
+    assert measure_objects(images, search, trust=trust).objects.open.any()
+
+
+def test_two_views_do_not_tell_shapes() -> None:
+    cameras = study_cameras(SIZE_PX)[:2]
+    found = measure_objects(_images(2), plan_objects(cameras, GRID))
+    assert found.reason == "2 views do not tell shapes: 3 or more do"
+
+
+def test_a_volume_that_is_all_dark_says_so(search: ObjectSearch, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("processing.analysis.objects.dark_voxels.MOST_VOXELS", 1000)
+    found = measure_objects([0 * image for image in _images()], search)
+    assert "voxels are dark in all views" in (found.reason or "")
+    assert found.reach.reason == found.reason
+    assert found.blind_share == 1.0
+
+
+def test_nothing_dark_is_no_object(search: ObjectSearch) -> None:
+    assert len(all_objects(_images(), search)) == 0
+
+
+def test_places_of_the_map_lie_within_the_grid_and_in_its_middle() -> None:
+    places = map_grid(GRID)
+    for one, all_of_it in ((places.x_mm, GRID.x_mm), (places.y_mm, GRID.y_mm), (places.z_mm, GRID.z_mm)):
+        assert all_of_it[0] <= one[0] <= one[-1] <= all_of_it[-1]
+        np.testing.assert_allclose(one[0] + one[-1], all_of_it[0] + all_of_it[-1], atol=1e-9)
+
+
+def test_shares_count_places_by_views() -> None:
+    seeing = np.array([[[0, 1, 2, 3, 4]]], np.uint8)
+    assert unknown_shares(seeing, 4) == (0.2, 0.6)
+    assert unknown_shares(seeing, 2) == (0.2, 0.4)
