@@ -3,6 +3,7 @@
 Bodies closer than a pixel or two look like one: what is told is where a gap can be seen.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -77,7 +78,7 @@ def reach_of(voxels: DarkVoxels, nozzle: Nozzle) -> Reach:
     outside = np.maximum(np.abs(_from_middle(voxels, nozzle)) - _half(voxels), 0)
     if np.linalg.norm(outside) * voxels.grid.pitch_mm > NEAR_MM:
         return Reach(reason=_not_seen(voxels, nozzle))
-    judged = [_connected(voxels.at_least(threshold), nozzle) for threshold in THRESHOLDS]
+    judged = list(_bodies(voxels, nozzle))
     main = judged[THRESHOLDS.index(THRESHOLD)]
     if not len(main):
         return Reach(reason=f"no liquid within {NEAR_MM} mm of the nozzle at {_place(nozzle)}: is it stated rightly?")
@@ -101,6 +102,13 @@ def black_width_mm(body: DarkVoxels, nozzle: Nozzle) -> float:
     layers = np.rint(nozzle.along_mm(body.points_mm) / body.grid.pitch_mm).astype(np.int64)
     black = np.bincount(layers - layers.min(), body.darkness >= BLACK * FULL)
     return float(np.sqrt(np.median(black)) * body.grid.pitch_mm)
+
+
+def _bodies(body: DarkVoxels, nozzle: Nozzle) -> Iterator[DarkVoxels]:
+    """What hangs together with the nozzle at each threshold: of darker voxels, a part of what does at the last one."""
+    for threshold in THRESHOLDS:
+        body = _connected(body.at_least(threshold), nozzle)
+        yield body
 
 
 def _connected(voxels: DarkVoxels, nozzle: Nozzle) -> DarkVoxels:
