@@ -101,6 +101,16 @@ def test_the_token_does_not_show_in_the_configuration(guarded: Serving) -> None:
     assert TOKEN not in answer.text
 
 
+@pytest.mark.parametrize("path", ["/api/rig", "/api/nothing", "/sign-in"])
+def test_no_other_page_shows_ours_in_a_frame_and_no_browser_guesses_what_an_answer_is(
+    guarded: Serving, path: str
+) -> None:
+    for headers in (bearer(TOKEN), bearer("wrong")):
+        answer = guarded.http.get(path, headers=headers)
+        assert "frame-ancestors 'none'" in answer.headers["content-security-policy"]
+        assert answer.headers["x-content-type-options"] == "nosniff"
+
+
 @given(st.text(max_size=40))
 def test_no_host_but_a_loopback_name_is_ours(host: str) -> None:
     is_plain_loopback = host in ("localhost", "127.0.0.1") or host.startswith(("localhost:", "127.", "[::1]"))
