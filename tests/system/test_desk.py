@@ -197,7 +197,7 @@ def test_alarms_are_acknowledged_one_by_one(page: Page, server: Serving) -> None
     expect(alarms).to_be_hidden()
 
 
-@pytest.mark.parametrize("width", [800, 1280, 1920])
+@pytest.mark.parametrize("width", [480, 800, 1280, 1920])
 def test_the_bar_is_in_sight_at_every_width_dark_and_light(page: Page, server: Serving, width: int) -> None:
     page.set_viewport_size({"width": width, "height": 900})
     page.goto(str(server.http.base_url))
