@@ -69,6 +69,7 @@ def write_droplets(
     path: Path,
     exposures: Mapping[str, DropletRows],
     provenance: Mapping[str, Value],
+    *,
     velocities: Mapping[str, Columns] | None = None,
     objects: Mapping[str, Rows] | None = None,
 ) -> None:

@@ -26,7 +26,7 @@ ONE = LiquidObjects(
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
     path, none = tmp_path / "shot.h5", SizedDroplets.none()
-    write_droplets(path, {"a": none, "b": none}, {"run": "spray"}, {"a": ONE, "b": LiquidObjects.none()})
+    write_droplets(path, {"a": none, "b": none}, {"run": "spray"}, objects={"a": ONE, "b": LiquidObjects.none()})
     return path
 
 
