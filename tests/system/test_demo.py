@@ -70,7 +70,7 @@ def test_the_report_is_one_page_with_all_figures(demonstrated: tuple[Path, dict[
     out, result = demonstrated
     assert Path(result["report"]) == out / "report.html"
     page = (out / "report.html").read_text()
-    assert page.count("data:image/png;base64,") == 6
+    assert page.count("data:image/png;base64,") == 7
     for chapter in (
         "Summary",
         "Calibration",

@@ -175,10 +175,10 @@ def right_shares(objects: Sequence[IsolatedObject]) -> dict[str, float]:
 
 def break_up_reached(rows: Sequence[BreakUpRow], objects: Sequence[IsolatedObject]) -> bool:
     """Whether lengths, intervals and classes keep what is asked for."""
-    close = np.mean([abs(row.value_mm - row.true_mm) <= MOST_ERROR_MM for row in rows])
-    held = np.mean([row.held for row in rows])
+    close = all(abs(row.value_mm - row.true_mm) <= MOST_ERROR_MM for row in rows)
+    held = np.mean([row.held for row in rows]) >= LEAST_RUNS
     right = all(share >= LEAST_RIGHT[kind] for kind, share in right_shares(objects).items())
-    return bool(min(close, held) >= LEAST_RUNS and right)
+    return bool(close and held and right)
 
 
 def break_up_statements(rows: Sequence[BreakUpRow], objects: Sequence[IsolatedObject]) -> list[Statement]:
@@ -202,7 +202,7 @@ def _length_statement(name: str, rows: Sequence[BreakUpRow]) -> Statement:
     spans = ", ".join(f"{min(one):+.2f} to {max(one):+.2f}" for one in medians)
     return Statement(
         f"{name}: break-up length, error of runs of {rows[0].shots} shots, largest and mean",
-        f"left open, here asked for {MOST_ERROR_MM} mm, and limits around the truth, in {LEAST_RUNS:.0%} of the runs",
+        f"left open, here asked for {MOST_ERROR_MM} mm, and limits around the truth in {LEAST_RUNS:.0%} of the runs",
         f"{errors_mm[np.abs(errors_mm).argmax()]:+.2f}, {errors_mm.mean():+.2f} mm, held in {held} of {len(rows)}; "
         f"by thresholds 0.2, 0.3, 0.4, 0.5: {spans} mm; worst single shot {max(r.worst_shot_mm for r in rows):.2f} mm; "
         f"{np.mean([row.cpu_s_per_exposure for row in rows]):.1f} CPU-s per exposure",
