@@ -150,4 +150,5 @@ def shot_summary(
 def _why_no_share(exposures: Sequence[Exposure], verdict: ShotVerdict) -> str:
     if verdict is not ShotVerdict.GOOD:
         return "; ".join(reason for exposure in exposures for reason in exposure.reasons)
-    return "no twins were asked for (--twins)"
+    uncounted = "; ".join(dict.fromkeys(exposure.uncounted for exposure in exposures if exposure.uncounted))
+    return uncounted or "no twins were asked for (--twins)"

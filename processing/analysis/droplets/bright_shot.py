@@ -24,11 +24,16 @@ from processing.analysis.droplets.measured_exposure import (
     judged_by_twins,
     judged_by_volume,
     moved,
+    told_real,
 )
+from processing.analysis.droplets.reality import Evidence, Reality, crowding
 from processing.geometry import FloatArray
 from processing.kernels import DEFAULT_THREADS
 
 LIMITS = RatioLimits(trusted=1.05, refused=1.5)
+LEAST_LIGHT = 1e-30
+"""Of a droplet in a view: it divides."""
+REALITY = Reality(-13.97, (1.13, 2.42, 6.86, -1.32, -15.86, -2.23, -4.24), widths_px=(0.95, 2.05), most_crowding=1.7)
 
 
 @dataclass(frozen=True)
@@ -112,11 +117,12 @@ def measure_bright(
     droplets = _droplets(shot, fit, residuals, search, left, noises).within(search.grid)
     hidden = Hidden(volume_share=_unseen_share(shot, search))
     found = MeasuredExposure(droplets, views, ratio, verdict, reasons, hidden=hidden)
-    told = judged_by_volume(judged_by_company(found, search.grid))
+    told = told_real(judged_by_volume(judged_by_company(found, search.grid)))
     if not twins or told.verdict is not ShotVerdict.GOOD:
         return told
     rng = np.random.default_rng(seed)
-    return judged_by_twins(told, pooled(_twin_ghosts(shot, fit, search, left, rng, before_round) for _ in range(twins)))
+    ghosts = pooled(_twin_ghosts(shot, fit, search, left, rng, before_round) for _ in range(twins))
+    return told_real(judged_by_twins(told, ghosts))
 
 
 def _unseen_share(shot: BlobImages, search: DropletSearch) -> float:
@@ -147,19 +153,31 @@ def _droplets(
     blobs, optics = fit.blobs, fit.optics
     if not len(blobs):
         return Droplets.none()
-    _, shapes, squares, pixels = np.moveaxis(shot.supports(optics, blobs, residuals), -1, 0)
+    products, shapes, squares, pixels = np.moveaxis(shot.supports(optics, blobs, residuals), -1, 0)
     weights = (optics.gains / left)[:, None] ** 2 * shapes
     slopes = search.lattice.slopes_px(blobs.positions_voxel) / optics.sigmas_px[:, None, :, None]
     information = 0.5 * blobs.amplitudes[:, None, None] ** 2 * np.einsum("kn,knci,kncj->nij", weights, slopes, slopes)
     unit = float(np.mean(optics.gains * noises))
     whole = np.pi * optics.sigmas_px.prod(axis=1)[:, None]
+    views = np.count_nonzero(shapes > 0.5 * whole, axis=0)
+    residual = np.sqrt((squares / left[:, None] ** 2).sum(axis=0) / pixels.sum(axis=0))
+    width_px = rms_of(optics.sigmas_px)
+    evidence = Evidence(
+        together=blobs.amplitudes,
+        alone=blobs.amplitudes + products / np.maximum(optics.gains[:, None] * shapes, LEAST_LIGHT),
+        alone_sd=1 / np.sqrt(np.maximum(weights, LEAST_LIGHT)),
+        residual=residual,
+        crowding=crowding(search.lattice.seen_px(blobs.positions_voxel), np.full(len(blobs), 2 * width_px**2)),
+        width_px=width_px,
+    )
     return Droplets(
         points_mm=search.searched.to_mm(blobs.positions_voxel[:, ::-1]),
         covariance_mm2=np.linalg.pinv(information, hermitian=True) * search.searched.pitch_mm**2,
         amplitudes=blobs.amplitudes * unit,
         amplitude_sd=unit / np.sqrt(weights.sum(axis=0)),
-        views=np.count_nonzero(shapes > 0.5 * whole, axis=0),
-        residual=np.sqrt((squares / left[:, None] ** 2).sum(axis=0) / pixels.sum(axis=0)),
+        views=views,
+        residual=residual,
+        p_real=REALITY.p_real(evidence, views),
     )
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.files.atomic_file import own_part_path, replacing
-from processing.analysis.droplets.droplet_table import P_REAL_UNKNOWN, Columns, DropletRows
+from processing.analysis.droplets.droplet_table import P_REAL_TRIED, Columns, DropletRows
 from processing.errors import BadInput
 
 SCHEMA, SCHEMA_VERSION = "tomoshadow/droplets", 3
@@ -132,7 +132,7 @@ def write_columns(
         if objects:
             _write_table(file, OBJECTS, objects)
         if "p_real" in group:
-            group["p_real"].attrs["reason"] = P_REAL_UNKNOWN
+            group["p_real"].attrs["reason"] = P_REAL_TRIED
         if RAW_DIAMETER in columns:
             same = np.array_equal(columns[DIAMETER], columns[RAW_DIAMETER])
             group[DIAMETER].attrs["correction"] = NOT_CORRECTED if same else CORRECTED

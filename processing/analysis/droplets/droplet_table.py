@@ -1,6 +1,6 @@
 """Droplets: what is measured of every droplet of an exposure, a row for each. A value, whatever found them."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Protocol, Self, TypeVar
 
 import numpy as np
@@ -9,8 +9,11 @@ from numpy.typing import NDArray
 from processing.geometry import FloatArray
 from processing.volume import VoxelGrid
 
-P_REAL_UNKNOWN = "a single shot does not tell a ghost from a droplet; ghost_share says how many there are"
-"""Why ``p_real`` is not a number as yet."""
+P_REAL_TRIED = (
+    "not a number where it was not tried: in shots whose verdict is not good, with more or less than four views, where "
+    "not all four know a droplet, among more crowded or wider spots than were tried, in coherent light"
+)
+"""Why ``p_real`` may not be a number."""
 COVARIANCES = ("xx", "xy", "xz", "yy", "yz", "zz")
 Columns = dict[str, NDArray[np.generic]]
 
@@ -22,6 +25,9 @@ class DropletRows(Protocol):
 
     def within(self, grid: VoxelGrid) -> Self:
         """Those in a grid, to half a voxel beyond its outermost centres, its own volume."""
+
+    def unsure(self) -> Self:
+        """The same, of none of which is told how probably it is real."""
 
     def columns(self) -> Columns:
         """Columns by their names, as files have them."""
@@ -45,6 +51,8 @@ class Droplets:
         Views that see more than half of the droplet.
     residual : (N,) array
         Root mean square of what the fit leaves around the droplet, over the noise; 1 is noise.
+    p_real : (N,) array
+        Probability that it is no ghost; not a number where that was not tried.
     """
 
     points_mm: FloatArray
@@ -53,11 +61,13 @@ class Droplets:
     amplitude_sd: FloatArray
     views: NDArray[np.int64]
     residual: FloatArray
+    p_real: FloatArray
 
     @classmethod
     def none(cls) -> "Droplets":
         """No droplets."""
-        return cls(np.empty((0, 3)), np.empty((0, 3, 3)), np.empty(0), np.empty(0), np.empty(0, np.int64), np.empty(0))
+        empty = np.empty(0)
+        return cls(np.empty((0, 3)), np.empty((0, 3, 3)), empty, empty, np.empty(0, np.int64), empty, empty)
 
     def __len__(self) -> int:
         return len(self.amplitudes)
@@ -66,13 +76,17 @@ class Droplets:
         """Those in a grid, to half a voxel beyond its outermost centres, its own volume."""
         return _rows(self, _inside(self.points_mm, grid))
 
+    def unsure(self) -> "Droplets":
+        """The same, of none of which is told how probably it is real."""
+        return replace(self, p_real=np.full(len(self), np.nan))
+
     def columns(self) -> Columns:
-        """Columns by their names, as files have them; ``p_real`` is not a number, see ``P_REAL_UNKNOWN``."""
+        """Columns by their names, as files have them."""
         return {
             **_places(self.points_mm),
             "amplitude": self.amplitudes,
             "amplitude_sd": self.amplitude_sd,
-            **_sureness(self.views, self.residual, self.covariance_mm2),
+            **_sureness(self.p_real, self.views, self.residual, self.covariance_mm2),
         }
 
 
@@ -82,7 +96,7 @@ class SizedDroplets:
 
     Parameters
     ----------
-    points_mm, covariance_mm2, views, residual : arrays
+    points_mm, covariance_mm2, views, residual, p_real : arrays
         As of ``Droplets``; here ``views`` are those that support the droplet, each alone.
     diameters_raw_um : (N,) array
         As fitted to the images.
@@ -99,12 +113,13 @@ class SizedDroplets:
     diameter_sd_um: FloatArray
     views: NDArray[np.int64]
     residual: FloatArray
+    p_real: FloatArray
 
     @classmethod
     def none(cls) -> "SizedDroplets":
         """No droplets."""
         empty = np.empty(0)
-        return cls(np.empty((0, 3)), np.empty((0, 3, 3)), empty, empty, empty, np.empty(0, np.int64), empty)
+        return cls(np.empty((0, 3)), np.empty((0, 3, 3)), empty, empty, empty, np.empty(0, np.int64), empty, empty)
 
     def __len__(self) -> int:
         return len(self.diameters_um)
@@ -117,14 +132,18 @@ class SizedDroplets:
         """Those in a grid, to half a voxel beyond its outermost centres, its own volume."""
         return _rows(self, _inside(self.points_mm, grid))
 
+    def unsure(self) -> "SizedDroplets":
+        """The same, of none of which is told how probably it is real."""
+        return replace(self, p_real=np.full(len(self), np.nan))
+
     def columns(self) -> Columns:
-        """Columns by their names, as files have them; ``p_real`` is not a number, see ``P_REAL_UNKNOWN``."""
+        """Columns by their names, as files have them."""
         return {
             **_places(self.points_mm),
             "diameter_um": self.diameters_um,
             "diameter_raw_um": self.diameters_raw_um,
             "diameter_sd_um": self.diameter_sd_um,
-            **_sureness(self.views, self.residual, self.covariance_mm2),
+            **_sureness(self.p_real, self.views, self.residual, self.covariance_mm2),
         }
 
 
@@ -144,8 +163,10 @@ def _places(points_mm: FloatArray) -> Columns:
     return dict(zip(("x_mm", "y_mm", "z_mm"), points_mm.T, strict=True))
 
 
-def _sureness(views: NDArray[np.int64], residual: FloatArray, covariance_mm2: FloatArray) -> Columns:
+def _sureness(
+    p_real: FloatArray, views: NDArray[np.int64], residual: FloatArray, covariance_mm2: FloatArray
+) -> Columns:
     covariances = {
         f"cov_{pair}_mm2": covariance_mm2[:, "xyz".index(pair[0]), "xyz".index(pair[1])] for pair in COVARIANCES
     }
-    return {"p_real": np.full(len(views), np.nan), "views": views, "residual": residual, **covariances}
+    return {"p_real": p_real, "views": views, "residual": residual, **covariances}

@@ -83,6 +83,8 @@ class MeasuredExposure(Generic[Rows, Seen]):
         Why it is no better, and what to do.
     ghosts : GhostShare | None
         From twins; None where none were asked for, or where they would not tell.
+    uncounted : str
+        Why ghosts of a good exposure are not counted in twins; empty where they may be.
     hidden : Hidden
         What could not be measured.
     """
@@ -93,6 +95,7 @@ class MeasuredExposure(Generic[Rows, Seen]):
     verdict: ShotVerdict
     reasons: tuple[str, ...] = ()
     ghosts: GhostShare | None = None
+    uncounted: str = ""
     hidden: Hidden = NOTHING_HIDDEN
 
     def told(self) -> dict[str, object]:
@@ -248,6 +251,11 @@ def judged_by_twins(shot: "MeasuredExposure[Rows, Seen]", ghosts: GhostShare) ->
         "droplets for so few views"
     )
     return replace(shot, ghosts=ghosts, verdict=ShotVerdict.DOUBTFUL, reasons=(*shot.reasons, reason))
+
+
+def told_real(shot: "MeasuredExposure[Rows, Seen]") -> "MeasuredExposure[Rows, Seen]":
+    """A shot that tells how probably its droplets are real, or does not: only in good shots that was tried."""
+    return shot if shot.verdict is ShotVerdict.GOOD else replace(shot, droplets=shot.droplets.unsure())
 
 
 def within_grid(positions_voxel: FloatArray, search: DropletSearch) -> NDArray[np.bool_]:

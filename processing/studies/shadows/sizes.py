@@ -50,6 +50,8 @@ class SizeCase:
         By which each view lies beside its calibration, in a direction of its own.
     condenser_ratio : float | None
         Numerical aperture of the light over that of the lens; None: blur is Gaussian.
+    aperture_ratio : float
+        Numerical aperture of the lenses over those of the paper: less blurs more.
     least_found, most_ghosts : float | None
         Shares of the droplets from 20 um on that the mean of the shots must keep.
     most_d32_error, most_sd_um : float | None
@@ -62,6 +64,7 @@ class SizeCase:
     noise_percent: float = 1.2
     calibration_error_px: float = 0.0
     condenser_ratio: float | None = None
+    aperture_ratio: float = 1.0
     least_found: float | None = None
     most_ghosts: float | None = None
     most_d32_error: float | None = None
@@ -75,6 +78,8 @@ class SizeCase:
             parts.append(f"calibration {self.calibration_error_px:g} px off")
         if self.condenser_ratio:
             parts.append(f"condenser ratio {self.condenser_ratio:g}")
+        if self.aperture_ratio != 1:
+            parts.append(f"aperture x {self.aperture_ratio:g}")
         return ", ".join(parts)
 
 
@@ -175,7 +180,10 @@ def size_scene(
 ) -> ShadowScene:
     """A shot of a case: droplets all over a grid and a little beyond, uniformly."""
     cameras = study_cameras(image_size_px)
-    optics = [replace(view, condenser_ratio=case.condenser_ratio) for view in paper_optics().values()]
+    optics = [
+        replace(view, f_number=view.f_number / case.aperture_ratio, condenser_ratio=case.condenser_ratio)
+        for view in paper_optics().values()
+    ]
     sizes = LogNormal(case.median_um / 1000, case.spread)
     spray = droplet_cloud(Box.around(grid, BESIDE_MM), case.density_per_mm3, sizes, rng)
     images = transmission_images(cameras, optics, spray, Counting.of_noise(case.noise_percent / 100), rng)

@@ -82,8 +82,8 @@ def test_a_file_says_where_it_comes_from_and_what_each_column_is(
         assert {column.ndim for column in columns.values()} == {1}
         assert columns["x_mm"].attrs["units"] == "mm"
         assert columns["cov_xz_mm2"].attrs["units"] == "mm^2"
-        assert "ghost_share" in columns["p_real"].attrs["reason"]
-        assert np.isnan(columns["p_real"][:]).all()
+        assert columns["p_real"].attrs["reason"].startswith("not a number where it was not tried")
+        assert np.median(columns["p_real"][:]) > 0.99
         attributes = dict(file["tomoshadow"].attrs)
     assert (attributes["schema"], attributes["schema_version"]) == ("tomoshadow/droplets", 3)
     assert (attributes["run"], attributes["shot"]) == ("run", 1)

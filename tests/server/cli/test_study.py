@@ -31,7 +31,11 @@ def test_a_study_writes_csv_and_figure_and_says_what_the_paper_says(
 
 
 @pytest.mark.parametrize(
-    "study", ["density", "ghosts", "average", "residuals", "calibration", "sensitivity", "droplets", "sizes", "breakup"]
+    "study",
+    [
+        *("density", "ghosts", "average", "residuals", "calibration", "sensitivity"),
+        *("droplets", "sizes", "reality", "velocity", "breakup", "statistics"),
+    ],
 )
 def test_every_study_explains_itself(study: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as stopped:

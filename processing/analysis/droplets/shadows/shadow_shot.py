@@ -22,19 +22,19 @@ from processing.analysis.droplets.measured_exposure import (
     judged_by_twins,
     judged_by_volume,
     moved,
+    told_real,
     within_grid,
 )
-from processing.analysis.droplets.shadows.disc_supports import supporting_views
 from processing.analysis.droplets.shadows.judged_volume import judging_views, knowing_views, unjudged_share
 from processing.analysis.droplets.shadows.light_search import Light, light_doubts
 from processing.analysis.droplets.shadows.masked_liquid import liquid_objects, lumps
-from processing.analysis.droplets.shadows.opaque_discs import DiscImages, Discs, Shadows
+from processing.analysis.droplets.shadows.opaque_discs import DiscImages, Discs
 from processing.analysis.droplets.shadows.shadow_finder import behind_gaussian_blur, find_shadows
 from processing.analysis.droplets.shadows.shadow_fit import ShadowFit, Transmissions, rms_over_noise, seen_by
 from processing.analysis.droplets.shadows.shadow_light import grey, judged_by_shape, unlit
+from processing.analysis.droplets.shadows.shadow_table import sized_droplets
 from processing.analysis.droplets.shadows.shadow_union import union_defects
 from processing.analysis.droplets.size_correction import SizeCorrection
-from processing.geometry import FloatArray
 from processing.kernels import DEFAULT_THREADS
 
 LIMITS = RatioLimits(trusted=1.25, refused=2.0)
@@ -42,12 +42,10 @@ LIMITS = RatioLimits(trusted=1.25, refused=2.0)
 per mm^3, up to 1.25 have 0.3 to 1.7 % ghosts, from 1.33 to 1.45 2 to 5 %."""
 COHERENT_LIMITS = RatioLimits(trusted=1.1, refused=2.0)
 """In partially coherent light fringes look like faint droplets: 0 % ghosts at 1.06, 4 % at 1.16, 18 % at 1.24."""
+TWINS_TRIED = 1.1
+"""Residual over noise up to which twins have been compared with truth."""
 FRINGELESS = 1.2
 """Light of more than so many apertures of the lens makes no fringes."""
-
-
-COHERENT_SHARE = 0.02
-"""Of a diameter: what is wrong in any light that shows, common to the droplets of a shot."""
 
 
 @dataclass(frozen=True)
@@ -134,11 +132,21 @@ def measure_shadows(
     if blind := blind_verdict(known_shadows, shot.noises_of(shot.images), search.names):
         return MeasuredExposure(SizedDroplets.none(), {}, None, *blind)
     fit = find_shadows(shot, search, light, before_round)
-    told = judged_by_volume(judged_by_shape(_told(shot, fit, search, sizes)))
-    if not twins or told.verdict is not ShotVerdict.GOOD:
+    told = judged_by_ratio(told_real(judged_by_volume(judged_by_shape(_told(shot, fit, search, sizes)))))
+    if not twins or told.verdict is not ShotVerdict.GOOD or told.uncounted:
         return told
     rng = np.random.default_rng(seed)
-    return judged_by_twins(told, pooled(_twin_ghosts(shot, fit, search, rng, before_round) for _ in range(twins)))
+    ghosts = pooled(_twin_ghosts(shot, fit, search, rng, before_round) for _ in range(twins))
+    return told_real(judged_by_twins(told, ghosts))
+
+
+def judged_by_ratio(shot: ShadowExposure) -> ShadowExposure:
+    """A shot whose ghosts are counted in twins, or are not: only where droplets explain it well was that tried."""
+    ratio = shot.residual_over_noise or 0.0
+    if ratio < TWINS_TRIED:
+        return shot
+    reason = f"droplets explain the images to {ratio:.2f} times the noise, twins were tried up to {TWINS_TRIED:g}"
+    return replace(shot, uncounted=f"{reason}: the sum of 1 - p_real tells how many ghosts to expect")
 
 
 def _refused(*reasons: str) -> ShadowExposure:
@@ -171,7 +179,7 @@ def _told(shot: Transmissions, fit: ShadowFit, search: DropletSearch, sizes: Siz
         return MeasuredExposure(SizedDroplets.none(), views, ratio, verdict, reasons)
     known = knowing_views(shot, fit, fit.discs.positions_voxel) >= judging_views(len(shot.images))
     raw = behind_gaussian_blur(shot, search, fit)[known]
-    droplets = _droplets(seen, shadows, fit.where(known), raw, search, sizes)
+    droplets = sized_droplets(shot, seen, shadows, fit.where(known), raw, search, sizes)
     lump = lumps(fit.where(known).discs, droplets.residual)
     hidden = Hidden(
         liquid_objects=_counted(liquid_objects(fit.liquid)) + _counted(lump),
@@ -239,43 +247,6 @@ def _seen(fit: ShadowFit, search: DropletSearch, masked: Sequence[float]) -> dic
     ratio = fit.optics.condenser_ratio
     seen = {name: SeenShadows(*row) for name, row in zip(search.names, rows.tolist(), strict=True)}
     return {name: replace(view, condenser_ratio=ratio) for name, view in seen.items()}
-
-
-def _droplets(
-    seen: DiscImages,
-    shadows: Shadows,
-    fit: ShadowFit,
-    raw_voxel2: FloatArray,
-    search: DropletSearch,
-    sizes: SizeCorrection | None,
-) -> SizedDroplets:
-    """Droplets with the covariance of the fit: each as if it stood alone, enlarged by the disagreement of its views."""
-    discs = fit.discs
-    if not len(discs):
-        return SizedDroplets.none()
-    supports = seen.supports(shadows, fit.optics, discs)
-    information = supports.information(search.lattice.slopes_px(discs.positions_voxel))
-    alone = np.linalg.pinv(information, hermitian=True)
-    covariance = np.asarray(alone * supports.disagreement[:, None, None] ** 2, dtype=np.float64)
-    pitch_um = 1000 * search.searched.pitch_mm
-    diameters_um = 2 * discs.radii_voxel * pitch_um
-    common_sd_um = _common_sd_um(fit, diameters_um, pitch_um) if sizes is None else sizes.sd(diameters_um)
-    return SizedDroplets(
-        points_mm=search.searched.to_mm(discs.positions_voxel[:, ::-1]),
-        covariance_mm2=covariance[:, :3, :3] * search.searched.pitch_mm**2,
-        diameters_um=diameters_um if sizes is None else sizes.corrected(diameters_um),
-        diameters_raw_um=2 * np.sqrt(raw_voxel2) * pitch_um,
-        diameter_sd_um=np.hypot(np.sqrt(covariance[:, 3, 3]) / discs.radii_voxel * pitch_um, common_sd_um),
-        views=supporting_views(supports),
-        residual=supports.residual,
-    )
-
-
-def _common_sd_um(fit: ShadowFit, diameters_um: FloatArray, pitch_um: float) -> FloatArray:
-    """What all diameters share because of the light."""
-    if fit.optics.condenser_ratio is None:
-        return np.zeros(len(diameters_um))
-    return np.hypot(COHERENT_SHARE * diameters_um, 2 * fit.light_sd_voxel * pitch_um)
 
 
 def _twin_ghosts(

@@ -22,7 +22,8 @@ def droplets(n: int, seed: int) -> Droplets:
     rng = np.random.default_rng(seed)
     points_mm, roots = rng.normal(size=(n, 3)), rng.normal(size=(n, 3, 3))
     return Droplets(
-        points_mm, roots @ roots.swapaxes(1, 2), rng.random(n), rng.random(n), np.full(n, 4), rng.random(n)
+        points_mm, roots @ roots.swapaxes(1, 2), rng.random(n), rng.random(n), np.full(n, 4), rng.random(n),
+        np.full(n, np.nan),
     )  # fmt: skip
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from processing.analysis.droplets.droplet_search import plan_droplets
 from processing.analysis.droplets.ghost_share import matches
 from processing.analysis.droplets.measured_exposure import ShotVerdict
-from processing.analysis.droplets.shadows.shadow_shot import ShadowExposure, measure_shadows
+from processing.analysis.droplets.shadows.shadow_shot import ShadowExposure, judged_by_ratio, measure_shadows
 from processing.volume import VoxelGrid
 from tests.support.shadow_scenes import ShadowScene, search_of, shadow_scene
 
@@ -34,6 +34,13 @@ def test_a_shot_without_faults_is_good_and_its_twin_has_no_ghosts_or_few(shot: S
     assert shot.ghosts is not None
     assert shot.ghosts.found > 0.8 * len(shot.droplets)
     assert shot.ghosts.ghosts <= 2
+
+
+def test_ghosts_are_not_counted_in_twins_where_that_was_not_tried(shot: ShadowExposure) -> None:
+    assert judged_by_ratio(shot) is shot
+    assert judged_by_ratio(replace(shot, residual_over_noise=1.2)).uncounted.startswith(
+        "droplets explain the images to 1.20 times the noise, twins were tried up to 1.1: the sum of 1 - p_real"
+    )
 
 
 def test_covariances_say_how_far_places_and_diameters_are_off(scene: ShadowScene, shot: ShadowExposure) -> None:

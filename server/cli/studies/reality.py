@@ -1,0 +1,34 @@
+"""``tomoshadow study reality``: how probably droplets are told to be real, against how many are."""
+
+from argparse import Namespace
+from typing import Any
+
+from server.cli.options import Verbs, count, seed, usable_processors
+from server.cli.output import progress
+from server.cli.studies.study_command import add_study, collected, report
+
+
+def add_reality(studies: Verbs) -> None:
+    """Add the study."""
+    parser = add_study(studies, "reality", reality, "how probably droplets are told to be real, and how many are")
+    parser.add_argument("--seed", type=seed, default=301, help="of the first shot of a case")
+    parser.add_argument("--repeats", type=count, default=3, help="shots of a case")
+
+
+def reality(options: Namespace) -> dict[str, Any]:
+    """Run the study."""
+    from processing.studies.real_droplets.reality import (
+        RealityStudy,
+        all_true,
+        reality_line,
+        reality_of_rows,
+        reality_statements,
+        reality_study,
+    )
+
+    study = RealityStudy(seeds=tuple(range(options.seed, options.seed + options.repeats)))
+    rows = collected(reality_study(study, usable_processors()), reality_line)
+    result = report(options.out, "reality", rows, reality_of_rows(rows), reality_statements(rows))
+    passed = all_true(rows)
+    progress(f"as many are real as is told: {'PASSED' if passed else 'FAILED'}")
+    return {**result, "passed": passed}
