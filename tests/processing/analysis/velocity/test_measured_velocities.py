@@ -27,6 +27,7 @@ def measured(exposed: Exposed, grid: VoxelGrid = GRID, verdict: ShotVerdict = Sh
         amplitude_sd=np.zeros(count),
         views=np.full(count, 4),
         residual=np.ones(count),
+        p_real=np.ones(count),
     )
     reasons = () if verdict is ShotVerdict.GOOD else ("because",)
     return MeasuredExposure(droplets, {}, 1.0, verdict, reasons)

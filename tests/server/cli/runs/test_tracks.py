@@ -32,6 +32,7 @@ def write_series(folder: Path, shown: Series, missing: tuple[int, ...] = (), **m
             amplitude_sd=np.zeros(len(frame)),
             views=np.full(len(frame), 4),
             residual=np.ones(len(frame)),
+            p_real=np.ones(len(frame)),
         )
         provenance = {"run": "spray", "shot": number + 3, "grid": GridSettings.of(GRID).model_dump_json(), **more}
         write_droplets(folder / f"shot_{number + 3:05d}_droplets.h5", {"a": droplets}, provenance)
