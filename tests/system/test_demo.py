@@ -71,6 +71,7 @@ def test_the_report_is_one_page_with_all_figures(demonstrated: tuple[Path, dict[
     assert Path(result["report"]) == out / "report.html"
     page = (out / "report.html").read_text()
     assert page.count("data:image/png;base64,") == 7
+    assert page.count("data:image/svg+xml;base64,") >= 2
     for chapter in (
         "Summary",
         "Calibration",
