@@ -96,6 +96,7 @@ class Preflight:
             The first refusal; see ``daq.run.refusals``.
         """
         raise_first(self.refusals_of_rig())
+        self.data_dir.mkdir(parents=True, exist_ok=True)
         raise_first(self.refusals_of_plan(plan))
         header = _header(self.data_dir, plan, self.views, configuration, self.calibration_sha256(plan))
         references = find_references(self.data_dir, plan, self.views)
@@ -170,18 +171,23 @@ def _check_disk_is_ours(data_dir: Path, disk: int | None) -> None:
 
 
 def _check_folder(data_dir: Path) -> None:
-    data_dir.mkdir(parents=True, exist_ok=True)
-    if not os.access(data_dir, os.W_OK | os.X_OK):
-        raise PlanError(f"the run cannot be stored: {data_dir} may not be written by this program")
+    folder = _existing(data_dir)
+    if not folder.is_dir() or not os.access(folder, os.W_OK | os.X_OK):
+        raise PlanError(f"the run cannot be stored: {folder} is no folder that this program may write to")
 
 
 def _check_margin(data_dir: Path, margin_bytes: int) -> None:
-    free = shutil.disk_usage(data_dir).free
+    free = shutil.disk_usage(_existing(data_dir)).free
     if free < margin_bytes:
         raise PlanError(
             f"the disk of {data_dir} has {free} bytes left, and a run leaves {margin_bytes} bytes free: "
             "delete or move away what is not needed"
         )
+
+
+def _existing(folder: Path) -> Path:
+    """The folder, or where it would be made: looking makes none, or nobody would see that it is gone."""
+    return next(one for one in (folder, *folder.absolute().parents) if one.exists())
 
 
 def _check_stage(rig: Rig, plan: RunPlan) -> None:
@@ -213,7 +219,7 @@ def _check_disk(data_dir: Path, plan: RunPlan, views: Mapping[str, ViewFormat], 
     pixels = sum(view.shape[0] * view.shape[1] for view in views.values())
     reference_bytes = 2 * _FRAMES_PER_SHOT * pixels * _REFERENCE_ITEM_BYTES if plan.references else 0
     needed = plan.total_shots * shot_bytes + reference_bytes + margin_bytes
-    free = shutil.disk_usage(data_dir).free
+    free = shutil.disk_usage(_existing(data_dir)).free
     if needed > free:
         raise PlanError(
             f"shots: {plan.total_shots} shots of {shot_bytes} bytes need {needed} bytes on the disk of {data_dir}, "
