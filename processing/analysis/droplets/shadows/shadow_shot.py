@@ -25,7 +25,12 @@ from processing.analysis.droplets.measured_exposure import (
     told_real,
     within_grid,
 )
-from processing.analysis.droplets.shadows.judged_volume import judging_views, knowing_views, unjudged_share
+from processing.analysis.droplets.shadows.judged_volume import (
+    beside_what_is_not_known,
+    judging_views,
+    knowing_views,
+    unjudged_share,
+)
 from processing.analysis.droplets.shadows.light_search import Light, light_doubts
 from processing.analysis.droplets.shadows.masked_liquid import liquid_objects, lumps
 from processing.analysis.droplets.shadows.opaque_discs import DiscImages, Discs
@@ -177,7 +182,11 @@ def _told(shot: Transmissions, fit: ShadowFit, search: DropletSearch, sizes: Siz
         verdict, reasons = ShotVerdict.DOUBTFUL if verdict is ShotVerdict.GOOD else verdict, (*reasons, *doubts)
     if verdict is ShotVerdict.REFUSED:
         return MeasuredExposure(SizedDroplets.none(), views, ratio, verdict, reasons)
-    known = knowing_views(shot, fit, fit.discs.positions_voxel) >= judging_views(len(shot.images))
+    knowing = knowing_views(shot, fit, fit.discs.positions_voxel)
+    known = knowing >= judging_views(len(shot.images))
+    inside = known & within_grid(fit.discs.positions_voxel, search)
+    if verdict is ShotVerdict.GOOD and (few := beside_what_is_not_known(knowing[inside], len(shot.images), ratio)):
+        verdict, reasons = ShotVerdict.DOUBTFUL, few
     raw = behind_gaussian_blur(shot, search, fit)[known]
     droplets = sized_droplets(shot, seen, shadows, fit.where(known), raw, search, sizes)
     lump = lumps(fit.where(known).discs, droplets.residual)

@@ -10,7 +10,11 @@ from numpy.typing import NDArray
 from processing.analysis.droplets.droplet_search import plan_droplets
 from processing.analysis.droplets.ghost_share import matches
 from processing.analysis.droplets.measured_exposure import ShotVerdict
+from processing.analysis.droplets.shadows.judged_volume import beside_what_is_not_known
 from processing.analysis.droplets.shadows.shadow_shot import ShadowExposure, judged_by_ratio, measure_shadows
+from processing.studies.droplets import IMAGE_SIZE_PX as STUDY_SIZE_PX
+from processing.studies.shadows.sizes import SizeCase, size_scene
+from processing.studies.simulated_droplets import study_grid
 from processing.volume import VoxelGrid
 from tests.support.shadow_scenes import ShadowScene, search_of, shadow_scene
 
@@ -215,3 +219,26 @@ def test_droplets_too_small_to_be_told_are_no_sparse_spray() -> None:
     assert told.verdict is ShotVerdict.DOUBTFUL
     assert len(told.droplets) < 0.5 * len(tiny.points_mm)
     assert ["of what views see beyond their noise" in reason for reason in told.reasons] == [True]
+
+
+def test_a_dense_spray_that_two_views_do_not_know_a_band_of_is_doubted() -> None:
+    """A third of what is told is ghosts, and droplets and ghosts together explain the images well."""
+    grid = study_grid((250, 20, 500))
+    spray = size_scene(SizeCase(density_per_mm3=28), grid, STUDY_SIZE_PX, np.random.default_rng(14))
+    trust = [np.ones_like(image) for image in spray.images]
+    for known in trust[:2]:
+        known[:, known.shape[1] // 2 - 50 : known.shape[1] // 2 + 50] = 0
+    shot = measure_shadows(spray.images, plan_droplets(spray.believed, grid), trust=trust, light="gaussian")
+    match, _ = matches(shot.droplets.points_mm, spray.spray.positions_mm, grid.pitch_mm)
+    assert np.mean(match < 0) > 0.2, "this shot has ghosts"
+    assert shot.verdict is ShotVerdict.DOUBTFUL
+    assert "not all views know" in shot.reasons[0]
+
+
+def test_droplets_that_all_views_know_or_that_explain_the_images_are_not_doubted() -> None:
+    knowing = np.array([4] * 8 + [3] * 2)
+    assert beside_what_is_not_known(knowing, 3, 1.2) == ()
+    assert beside_what_is_not_known(knowing, 4, 1.09) == ()
+    assert beside_what_is_not_known(np.full(5, 4), 4, 1.2) == ()
+    assert beside_what_is_not_known(np.empty(0, np.int64), 4, 1.2) == ()
+    assert beside_what_is_not_known(knowing, 4, 1.2)[0].startswith("not all views know 20 % of the droplets")
