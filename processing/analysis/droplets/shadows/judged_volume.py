@@ -12,10 +12,10 @@ JUDGING_VIEWS = 3
 """So many views, or all where there are fewer, must know something of a droplet."""
 
 
-MOST_BESIDE, TRUSTED_BESIDE = 0.1, 1.1
-"""Share of the droplets that not all views know, and residual over noise, from which on together ghosts are too many:
-in shots of which two views do not know a band, 20 droplets per mm^3 had 13 and 17 % ghosts at 1.17 and 1.13; 14 and 17
-had 2 to 3 % at 1.07 to 1.10."""
+MOST_BESIDE, TRUSTED_BESIDE, MOST_COVERED = 0.1, 1.1, 0.1
+"""Share of the droplets that not all views know, residual over noise, and share of the views that droplets cover, from
+which on together ghosts are too many: in shots of which two views do not know a band, with 0.11 to 0.16 covered,
+ghosts were 13 to 29 % at 1.13 to 1.24; with 0.08 and 0.10, 2 to 3 % at 1.07 to 1.10."""
 
 
 def judging_views(views: int) -> int:
@@ -43,7 +43,7 @@ def unjudged_share(shot: Transmissions, fit: ShadowFit, search: DropletSearch) -
     return float(np.mean(knowing_views(shot, fit, search.places()) < judging_views(len(shot.images))))
 
 
-def beside_what_is_not_known(knowing: NDArray[np.int64], views: int, ratio: float) -> tuple[str, ...]:
+def beside_what_is_not_known(knowing: NDArray[np.int64], views: int, ratio: float, covered: float) -> tuple[str, ...]:
     """Why droplets are doubted which not all views know.
 
     Parameters
@@ -54,13 +54,16 @@ def beside_what_is_not_known(knowing: NDArray[np.int64], views: int, ratio: floa
         All of them.
     ratio : float
         Residual over noise.
+    covered : float
+        Share of the views that droplets cover.
     """
     share = float(np.mean(knowing < views)) if len(knowing) else 0.0
-    if share <= MOST_BESIDE or ratio < TRUSTED_BESIDE:
+    if share <= MOST_BESIDE or ratio < TRUSTED_BESIDE or covered < MOST_COVERED:
         return ()
     reason = (
-        f"not all views know {100 * share:.0f} % of the droplets, limit {100 * MOST_BESIDE:.0f} %, and these explain "
-        f"the images to {ratio:.2f} times the noise, more than {TRUSTED_BESIDE:g}: fewer views make ghosts in a dense "
-        "spray; take a box that all views know (--grid)"
+        f"not all views know {100 * share:.0f} % of the droplets, limit {100 * MOST_BESIDE:.0f} %, which cover "
+        f"{100 * covered:.0f} % of the views, limit {100 * MOST_COVERED:.0f} %, and explain the images to {ratio:.2f} "
+        f"times the noise, more than {TRUSTED_BESIDE:g}: fewer views make ghosts in a dense spray; take a box that all "
+        "views know (--grid)"
     )
     return (reason,)

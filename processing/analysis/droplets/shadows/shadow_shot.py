@@ -33,7 +33,7 @@ from processing.analysis.droplets.shadows.judged_volume import (
 )
 from processing.analysis.droplets.shadows.light_search import Light, light_doubts
 from processing.analysis.droplets.shadows.masked_liquid import liquid_objects, lumps
-from processing.analysis.droplets.shadows.opaque_discs import DiscImages, Discs
+from processing.analysis.droplets.shadows.opaque_discs import DiscImages, Discs, Shadows
 from processing.analysis.droplets.shadows.shadow_finder import behind_gaussian_blur, find_shadows
 from processing.analysis.droplets.shadows.shadow_fit import ShadowFit, Transmissions, rms_over_noise, seen_by
 from processing.analysis.droplets.shadows.shadow_light import grey, judged_by_shape, unlit
@@ -185,7 +185,9 @@ def _told(shot: Transmissions, fit: ShadowFit, search: DropletSearch, sizes: Siz
     knowing = knowing_views(shot, fit, fit.discs.positions_voxel)
     known = knowing >= judging_views(len(shot.images))
     inside = known & within_grid(fit.discs.positions_voxel, search)
-    if verdict is ShotVerdict.GOOD and (few := beside_what_is_not_known(knowing[inside], len(shot.images), ratio)):
+    covered = _covered(shadows, judged_weights)
+    few = beside_what_is_not_known(knowing[inside], len(shot.images), ratio, covered)
+    if verdict is ShotVerdict.GOOD and few:
         verdict, reasons = ShotVerdict.DOUBTFUL, few
     raw = behind_gaussian_blur(shot, search, fit)[known]
     droplets = sized_droplets(shot, seen, shadows, fit.where(known), raw, search, sizes)
@@ -197,6 +199,12 @@ def _told(shot: Transmissions, fit: ShadowFit, search: DropletSearch, sizes: Siz
     )
     told = droplets.where(lump < 0).within(search.grid)
     return MeasuredExposure(told, views, ratio, verdict, reasons, hidden=hidden)
+
+
+def _covered(shadows: Shadows, weights: Sequence[Image]) -> float:
+    """Share of the views that droplets cover, where they are asked."""
+    views = zip(shadows.transmissions, weights, strict=True)
+    return float(np.mean([np.mean(1 - drawn[asked > 0]) if np.any(asked > 0) else 0.0 for drawn, asked in views]))
 
 
 def _unseen(trusts: Sequence[Image], into_grid: Sequence[NDArray[np.bool_]], names: Sequence[str]) -> str:

@@ -237,8 +237,9 @@ def test_a_dense_spray_that_two_views_do_not_know_a_band_of_is_doubted() -> None
 
 def test_droplets_that_all_views_know_or_that_explain_the_images_are_not_doubted() -> None:
     knowing = np.array([4] * 8 + [3] * 2)
-    assert beside_what_is_not_known(knowing, 3, 1.2) == ()
-    assert beside_what_is_not_known(knowing, 4, 1.09) == ()
-    assert beside_what_is_not_known(np.full(5, 4), 4, 1.2) == ()
-    assert beside_what_is_not_known(np.empty(0, np.int64), 4, 1.2) == ()
-    assert beside_what_is_not_known(knowing, 4, 1.2)[0].startswith("not all views know 20 % of the droplets")
+    assert beside_what_is_not_known(knowing, 3, 1.2, 0.2) == ()
+    assert beside_what_is_not_known(knowing, 4, 1.09, 0.2) == ()
+    assert beside_what_is_not_known(knowing, 4, 1.2, 0.09) == ()
+    assert beside_what_is_not_known(np.full(5, 4), 4, 1.2, 0.2) == ()
+    assert beside_what_is_not_known(np.empty(0, np.int64), 4, 1.2, 0.2) == ()
+    assert beside_what_is_not_known(knowing, 4, 1.2, 0.2)[0].startswith("not all views know 20 % of the droplets")
