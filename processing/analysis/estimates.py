@@ -88,7 +88,7 @@ def limits(
     values: FloatArray, half_widths: FloatArray, signed: bool | NDArray[np.bool_] = False
 ) -> tuple[FloatArray, FloatArray]:
     """Lower and upper limits; of figures that are not signed half widths are of their logarithm."""
-    factors = np.exp(half_widths)
+    factors = np.exp(np.where(signed, 0.0, half_widths))
     lows = np.where(signed, values - half_widths, values / factors)
     return lows, np.where(signed, values + half_widths, values * factors)
 

@@ -22,7 +22,7 @@ from processing.figures.sprays.motion_figure import motion_figure
 from processing.figures.sprays.space_figures import density_figure, patternation_figure
 from processing.runs.sprays.measured_spray import MeasuredSpray
 from server.reports.page import Picture, Section, Table, write_report
-from server.reports.spray_tables import classes_table, figures_table, fits_table, patternation_table
+from server.reports.spray_tables import classes_table, doubts, figures_table, fits_table, patternation_table
 
 DEFINITIONS = (
     "Sampling is spatial: a flash sees the droplets that are in a volume at an instant (ASTM E799). Flux-weighted "
@@ -94,19 +94,7 @@ def _summary(reported: ReportedSpray) -> Section:
     adequate = told.sample and told.sample.verdict == "adequate"
     verdict = "The sample is adequate." if adequate else "The sample is low: intervals may be too narrow."
     text = f"{counted} {verdict} {_verdicts(reported)}"
-    return Section("Summary", text, [figures_table(told)], points=_doubts(told))
-
-
-def _doubts(told: SprayStatistics) -> list[str]:
-    """What is unsure or missing, and what to do."""
-    doubts = list(told.sample.reasons) if told.sample else []
-    doubts += [f"No {name}: {reason}" for name, reason in told.reasons.items()]
-    if told.motion and told.motion.reason:
-        doubts.append(told.motion.reason)
-    if told.extent:
-        reached = (("cone angle", told.extent.cone_reason), ("penetration", told.extent.penetration_reason))
-        doubts += [f"No {name}: {why}" for name, why in reached if why]
-    return doubts
+    return Section("Summary", text, [figures_table(told)], points=doubts(told))
 
 
 def _verdicts(reported: ReportedSpray) -> str:

@@ -55,6 +55,18 @@ def figures_table(told: SprayStatistics) -> Table:
     return Table(["figure", "value", "95 % interval"], figure_rows(told))
 
 
+def doubts(told: SprayStatistics) -> list[str]:
+    """What is doubtful, unsure or missing, and what to do."""
+    said = [*told.doubts, *(told.sample.reasons if told.sample else ())]
+    said += [f"No {name}: {reason}" for name, reason in told.reasons.items()]
+    if told.motion and told.motion.reason:
+        said.append(told.motion.reason)
+    if told.extent:
+        reached = (("cone angle", told.extent.cone_reason), ("penetration", told.extent.penetration_reason))
+        said += [f"No {name}: {why}" for name, why in reached if why]
+    return [*said, *(f"No shares at {one.at_mm:.3g} mm: {one.reason}" for one in told.patternations if one.reason)]
+
+
 def fits_table(fits: tuple[SizeFit, ...]) -> Table:
     """Distributions that were fitted."""
     rows = [

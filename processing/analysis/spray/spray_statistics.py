@@ -20,6 +20,7 @@ from processing.analysis.spray.patternation import Patternation, patternation
 from processing.analysis.spray.sample_size import SampleVerdict, sample_verdict
 from processing.analysis.spray.size_fits import SizeFit, size_fits
 from processing.analysis.spray.spray_axis import SprayAxis
+from processing.analysis.spray.spray_doubts import spray_doubts
 from processing.analysis.spray.spray_extent import SprayExtent, spray_extent
 from processing.analysis.spray.spray_motion import (
     MM3_PER_UM3,
@@ -77,6 +78,9 @@ class SprayStatistics(FrozenValue):
     extent: Annotated[SprayExtent | None, Field(description="cone angle and penetration")] = None
     patternations: Annotated[tuple[Patternation, ...], Field(description="liquid by sectors and rings")] = ()
     corrections: Annotated[tuple[str, ...], Field(description="what is corrected, and what is not")] = CORRECTIONS
+    doubts: Annotated[
+        tuple[str, ...], Field(description="why not to trust the figures: verdicts of exposures, what contradicts")
+    ] = ()
     reasons: Annotated[
         dict[str, str], Field(description="why a part is null or empty, and what to do about it, by its name")
     ] = Field(default_factory=dict)
@@ -101,8 +105,11 @@ def spray_statistics(shots: Sequence[StoredDroplets], asked: AskedFor | None = N
     pooled = droplet_statistics(shots)
     if not pooled.n or any(DIAMETER not in shot.columns for shot in shots):
         why = pooled.reason or "no droplet was measured"
-        return SprayStatistics(droplets=pooled, reasons=dict.fromkeys(("sample", "fits", "motion", "extent"), why))
-    return _of_sample(spray_sample(shots), pooled, asked)
+        reasons = dict.fromkeys(("sample", "fits", "motion", "extent"), why)
+        return SprayStatistics(droplets=pooled, reasons=reasons, doubts=spray_doubts(shots, None, asked.axis))
+    sample = spray_sample(shots)
+    told = _of_sample(sample, pooled, asked)
+    return told.model_copy(update={"doubts": spray_doubts(shots, sample, asked.axis)})
 
 
 def _of_sample(sample: SpraySample, pooled: DropletStatistics, asked: AskedFor) -> SprayStatistics:

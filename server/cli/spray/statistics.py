@@ -61,13 +61,12 @@ def _compare(options: Namespace) -> Outcome:
 
 
 def _text(name: str, told: "SprayStatistics") -> str:
-    from server.reports.spray_tables import figure_rows
+    from server.reports.spray_tables import doubts, figure_rows
 
     counted = f"{told.droplets.n} droplets, shots: {told.droplets.shots}, exposures: {told.droplets.exposures}"
-    lines = [f"{name}: {counted}; sampling: {told.sampling}", table(["", "", "95 %"], figure_rows(told))]
-    if told.sample:
-        lines.append("; ".join([f"sample: {told.sample.verdict}", *told.sample.reasons]))
-    return "\n".join([*lines, *(f"no {part}: {reason}" for part, reason in told.reasons.items())])
+    sample = f"; sample: {told.sample.verdict}" if told.sample else ""
+    head = f"{name}: {counted}; sampling: {told.sampling}{sample}"
+    return "\n".join([head, table(["", "", "95 %"], figure_rows(told)), *doubts(told)])
 
 
 def _differences(found: "tuple[Difference, ...]") -> str:

@@ -44,6 +44,17 @@ def test_people_read_figures_with_units_and_intervals(results: Path, capsys: pyt
     assert "sample: low sample" in text
 
 
+def test_people_read_what_is_doubtful_and_why_figures_are_missing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    said = {"exposures": json.dumps({"a": {"verdict": "doubtful", "ghosts": None, "reasons": ["it is blurred"]}})}
+    results = write_results(tmp_path / "blurred", cone_shots(0, 5, 60, 29.0), **said, spray=SPRAY)
+    text = shown(capsys, "statistics", results)
+    assert "5 of 5 exposures are doubtful, and count: it is blurred" in text
+    assert "No cone angle: the box does not reach around the cone" in text
+    assert "density of the liquid is not known" in text
+
+
 def test_options_say_where_the_nozzle_is(results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     mute = write_results(tmp_path / "mute", cone_shots(0, 5, 120))
     assert told(capsys, "statistics", mute)["extent"] is None

@@ -1,0 +1,68 @@
+"""What makes the figures of a spray doubtful: verdicts on its exposures and velocities, and what contradicts the axis.
+
+A figure is no better than the shots that it comes from. Each of these is told beside the figures, wherever they go.
+"""
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from processing.analysis.droplets.droplet_file import StoredDroplets
+from processing.analysis.spray.spray_axis import SprayAxis
+from processing.analysis.spray.spray_sample import SpraySample
+
+UNSURE = {"doubtful": "are doubtful, and count", "refused": "are refused, and do not count"}
+MOST_ASIDE_DEG = 45.0
+"""Of the mean velocity from the axis; a spray flies along its axis, however wide it is."""
+LEAST_TOGETHER = 0.3
+"""Amount of the mean velocity over the mean speed: droplets that fly in all directions have none."""
+FASTEST_M_S = 1000.0
+"""No spray is as fast; diesel at 300 MPa leaves its nozzle with 800 m/s."""
+
+
+def spray_doubts(
+    shots: Sequence[StoredDroplets], sample: SpraySample | None, axis: SprayAxis | None
+) -> tuple[str, ...]:
+    """What is doubtful, and what to do.
+
+    Parameters
+    ----------
+    shots : sequence of StoredDroplets
+        All of them, refused ones too.
+    sample : SpraySample | None
+        Their droplets; None where they have no diameters.
+    axis : SprayAxis | None
+        As stated.
+    """
+    exposures = [one for shot in shots for one in json.loads(str(shot.provenance["exposures"])).values()]
+    velocities = [json.loads(str(shot.provenance.get("velocity", "{}"))) for shot in shots]
+    doubts = [f"{count} exposures {why}" for count, why in _unsure(exposures)]
+    doubts += [f"velocities of {count} shots {why}" for count, why in _unsure(velocities)]
+    return (*doubts, *(_of_motion(sample, axis) if sample else ()))
+
+
+def _unsure(told: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, str]]:
+    """How many are doubtful and refused, and the reasons of the first one."""
+    for verdict, what in UNSURE.items():
+        if chosen := [one for one in told if one.get("verdict") == verdict]:
+            yield f"{len(chosen)} of {len(told)}", ": ".join([what, *chosen[0].get("reasons", ())[:1]])
+
+
+def _of_motion(sample: SpraySample, axis: SprayAxis | None) -> Iterator[str]:
+    velocities_m_s = sample.velocities_m_s[sample.paired]
+    if not len(velocities_m_s):
+        return
+    mean_m_s, speed_m_s = velocities_m_s.mean(axis=0), np.linalg.norm(velocities_m_s, axis=1).mean()
+    amount_m_s = np.linalg.norm(mean_m_s)
+    if speed_m_s > FASTEST_M_S:
+        yield f"mean speed {speed_m_s:.3g} m/s: no spray is as fast; is the separation stated rightly, in ns?"
+    if axis is None or amount_m_s <= LEAST_TOGETHER * speed_m_s:
+        return
+    aside_deg = np.degrees(np.arccos(np.clip(axis.frame[0] @ mean_m_s / amount_m_s, -1, 1)))
+    if aside_deg > MOST_ASIDE_DEG:
+        yield (
+            f"droplets fly {aside_deg:.0f} degrees from the axis, in the mean: is it stated rightly, and are exposures "
+            "A and B exchanged? Figures along the axis are of another direction"
+        )

@@ -1,0 +1,80 @@
+"""What makes the figures of a spray doubtful is told with them, not only shot by shot."""
+
+import json
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from processing.analysis.droplets.droplet_file import StoredDroplets
+from processing.analysis.spray.spray_axis import SprayAxis
+from processing.analysis.spray.spray_statistics import AskedFor, spray_statistics
+from tests.support.sampled_sprays import cone_shots
+
+DOWN = SprayAxis((0, 0, 0), (0, 1, 0))
+SHOTS = cone_shots(0, 4, 60)
+
+
+def saying(shot: StoredDroplets, **told: str) -> StoredDroplets:
+    return replace(shot, provenance={**shot.provenance, **told})
+
+
+def exposure(verdict: str) -> str:
+    return json.dumps({"a": {"verdict": verdict, "ghosts": None, "reasons": ["it is blurred"]}})
+
+
+def doubts(*shots: StoredDroplets, axis: SprayAxis = DOWN) -> str:
+    return "\n".join(spray_statistics(shots, AskedFor(axis)).doubts)
+
+
+def moved(shot: StoredDroplets, factor: float) -> StoredDroplets:
+    velocities: dict[str, Any] = {
+        name: shot.columns[name].astype(float) * factor for name in ("u_m_s", "v_m_s", "w_m_s")
+    }
+    return replace(shot, columns={**shot.columns, **velocities})
+
+
+def test_nothing_is_doubted_of_good_shots() -> None:
+    assert not doubts(*SHOTS)
+
+
+def test_doubtful_and_refused_exposures_are_told_with_their_reasons() -> None:
+    told = doubts(saying(SHOTS[0], exposures=exposure("doubtful")), *SHOTS[1:])
+    assert told == "1 of 4 exposures are doubtful, and count: it is blurred"
+    nobody = replace(SHOTS[0], columns={name: one[:0] for name, one in SHOTS[0].columns.items()})
+    told = doubts(saying(nobody, exposures=exposure("refused")), *SHOTS[1:])
+    assert told == "1 of 4 exposures are refused, and do not count: it is blurred"
+    alone = spray_statistics([saying(nobody, exposures=exposure("refused"))])
+    assert alone.doubts == ("1 of 1 exposures are refused, and do not count: it is blurred",)
+
+
+def test_doubtful_velocities_are_told() -> None:
+    said = json.dumps({"verdict": "doubtful", "reasons": ["half of the droplets have no partner"]})
+    told = doubts(saying(SHOTS[0], velocity=said), *SHOTS[1:])
+    assert told == "velocities of 1 of 4 shots are doubtful, and count: half of the droplets have no partner"
+    assert not doubts(*(saying(shot, velocity='{"reason": "shots have one exposure"}') for shot in SHOTS))
+
+
+@pytest.mark.parametrize("direction", [(0, -1, 0), (0, 0, 1), (1, 0.5, 0)])
+def test_an_axis_along_which_the_droplets_do_not_fly_is_told(direction: tuple[float, float, float]) -> None:
+    told = doubts(*SHOTS, axis=SprayAxis((0, 0, 0), direction))
+    assert "from the axis" in told
+    assert "is it stated rightly" in told
+
+
+def test_exposures_that_are_exchanged_are_told() -> None:
+    assert "are exposures A and B exchanged" in doubts(*(moved(shot, -1.0) for shot in SHOTS))
+
+
+def test_droplets_faster_than_any_spray_are_told() -> None:
+    assert "is the separation stated rightly" in doubts(*(moved(shot, 1000.0) for shot in SHOTS))
+    assert not doubts(*(moved(shot, 50.0) for shot in SHOTS))
+
+
+def test_droplets_that_fly_in_all_directions_contradict_no_axis() -> None:
+    rng = np.random.default_rng(0)
+    names = ("u_m_s", "v_m_s", "w_m_s")
+    any_way = [dict(zip(names, rng.standard_normal((3, len(shot.columns["frame"]))), strict=True)) for shot in SHOTS]
+    scattered = [replace(shot, columns={**shot.columns, **its}) for shot, its in zip(SHOTS, any_way, strict=True)]
+    assert not doubts(*scattered)
