@@ -19,6 +19,8 @@ THRESHOLD = 0.3
 """Of what is told; the others say how much it depends on it."""
 NEAR_MM = 0.3
 """Liquid begins so close to the nozzle, as it is stated."""
+LEAST_ALONG, JUDGED_MM = 0.4, 1.0
+"""Of how far liquid goes from the nozzle, what it does along the axis: a cone of 130 degrees. Of longer bodies only."""
 BLACK, BLACK_CORE_MM = 0.9, 1.0
 """Where all views are so black over half of a length, as wide as that, nobody knows whether it is one body."""
 
@@ -86,8 +88,23 @@ def reach_of(voxels: DarkVoxels, nozzle: Nozzle) -> Reach:
         return Reach(
             reason=f"all views are black over {width_mm:.1f} mm: one body, or a cloud too dense to see through"
         )
+    if (aside := _goes_aside(main, nozzle)) is not None:
+        return Reach(reason=aside)
     reach_mm, leaves = zip(*(_reach(body, nozzle) for body in judged), strict=True)
     return Reach(THRESHOLDS, reach_mm, leaves, main.grid.pitch_mm)
+
+
+def _goes_aside(body: DarkVoxels, nozzle: Nozzle) -> str | None:
+    """Why the axis is not that of the liquid, if it goes elsewhere."""
+    far_mm = float(nozzle.distances_mm(body.points_mm).max())
+    along_mm, _ = _reach(body, nozzle)
+    if far_mm <= JUDGED_MM or along_mm >= LEAST_ALONG * far_mm:
+        return None
+    return (
+        f"liquid goes {far_mm:.2f} mm from the nozzle, but {along_mm:.2f} mm along its axis "
+        f"({', '.join(f'{value:g}' for value in nozzle.axis)}): is the axis stated rightly? If it is the nozzle that is "
+        "seen, leave its pixels unasked (--ignore)"
+    )
 
 
 def core_of(voxels: DarkVoxels, objects: NDArray[np.int32], nozzle: Nozzle) -> NDArray[np.bool_]:

@@ -33,7 +33,7 @@ class BreakUp:
     longer_than_mm : float | None
         Where more than half still hang together when they leave the field.
     reason : str | None
-        Why there is no value.
+        Why there is no value, and why it is not known of some shots.
     """
 
     shots: int = 0
@@ -65,9 +65,10 @@ class ConnectedShare:
 def break_up_of(shots: Sequence[Reach], seed: int = 0) -> BreakUp:
     """Break-up length from one exposure each of some shots."""
     known = [shot for shot in shots if shot.reason is None]
+    reasons = "; ".join(dict.fromkeys(shot.reason for shot in shots if shot.reason))
     if not known:
-        reasons = dict.fromkeys(shot.reason for shot in shots if shot.reason)
-        return BreakUp(reason="; ".join(reasons) or "no shot was measured")
+        return BreakUp(reason=reasons or "no shot was measured")
+    unknown = f"not known of {len(shots) - len(known)} of {len(shots)} shots: {reasons}" if reasons else None
     reach_mm, leaves = _table(known)
     told = known[0].thresholds.index(THRESHOLD)
     value_mm = _half_connected_mm(reach_mm[:, told], leaves[:, told])
@@ -75,13 +76,11 @@ def break_up_of(shots: Sequence[Reach], seed: int = 0) -> BreakUp:
     low_mm, high_mm = (drawn_mm[round((DRAWS - 1) * percent / 100)] for percent in LIMITS_PERCENT)
     if not np.isfinite(value_mm):
         longer_mm = float(np.median(reach_mm[:, told]))
-        return BreakUp(
-            len(known),
-            longer_than_mm=longer_mm,
-            reason=f"still connected where it leaves the field: longer than {longer_mm:.2f} mm",
-        )
+        longer = f"still connected where it leaves the field: longer than {longer_mm:.2f} mm"
+        return BreakUp(len(known), longer_than_mm=longer_mm, reason="; ".join(filter(None, (longer, unknown))))
     low_mm, high_mm = min(low_mm, value_mm), max(high_mm, value_mm)
-    return BreakUp(len(known), value_mm, float(low_mm), float(high_mm) if np.isfinite(high_mm) else None)
+    high = float(high_mm) if np.isfinite(high_mm) else None
+    return BreakUp(len(known), value_mm, float(low_mm), high, reason=unknown)
 
 
 def connected_share(shots: Sequence[Reach], distances_mm: FloatArray, seed: int = 0) -> ConnectedShare:

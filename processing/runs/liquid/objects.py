@@ -137,7 +137,8 @@ class LiquidSummary(FrozenValue):
     break_up_longer_than_mm: Annotated[
         float | None, Field(description="where more than half leave the field before they end")
     ] = None
-    break_up_reason: Annotated[str | None, Field(description="why there is no break-up length")] = None
+    break_up_shots: Annotated[int, Field(description="of which it is known")] = 0
+    break_up_reason: Annotated[str | None, Field(description="why there is none, or why not of some shots")] = None
 
 
 NO_OBJECTS = "nobody looked for it: bright particles, or a file of an older program"
@@ -155,7 +156,11 @@ def liquid_summary(shots: Sequence[StoredDroplets]) -> LiquidSummary:
     if found.value_mm is not None and found.low_mm is not None:
         value = BreakUpLength(value=found.value_mm, low=found.low_mm, high=found.high_mm)
     return LiquidSummary(
-        **counts, break_up_mm=value, break_up_longer_than_mm=found.longer_than_mm, break_up_reason=found.reason
+        **counts,
+        break_up_mm=value,
+        break_up_longer_than_mm=found.longer_than_mm,
+        break_up_shots=found.shots,
+        break_up_reason=found.reason,
     )
 
 

@@ -57,7 +57,9 @@ def _liquid(result: dict[str, Any]) -> str:
     if length is None:
         return f"\n{objects}; no break-up length: {result['break_up_reason']}"
     most = "beyond the field" if length["high"] is None else f"{length['high']:.2f}"
-    return f"\n{objects}; break-up length {length['value']:.2f} mm ({length['low']:.2f} to {most})"
+    unknown = f"; {result['break_up_reason']}" if result["break_up_reason"] else ""
+    told = f"break-up length {length['value']:.2f} mm ({length['low']:.2f} to {most})"
+    return f"\n{objects}; {told}, shots: {result['break_up_shots']}{unknown}"
 
 
 def _mean_velocity(velocity: dict[str, Any]) -> str:

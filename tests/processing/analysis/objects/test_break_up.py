@@ -50,6 +50,8 @@ def test_what_leaves_the_field_is_longer_than_told() -> None:
         (_column(-1.0, 1.0), NOZZLE, "no liquid within 0.3 mm of the nozzle at 0, -3, 0 mm"),
         (_column(-3.0, 1.0), Nozzle((0.0, -4.6, 0.0)), "lies outside of what all views see"),
         (_column(-3.0, 1.0, darkness=1.0, width=15), NOZZLE, "all views are black over 1.5 mm"),
+        (_column(-3.0, 1.0), Nozzle((0.0, -3.0, 0.0), (0.0, -1.0, 0.0)), "goes 4.01 mm from the nozzle, but 0.05 mm"),
+        (_column(-3.0, 1.0), Nozzle((0.0, -3.0, 0.0), (0.0, 0.0, 1.0)), "is the axis stated rightly"),
     ],
 )
 def test_where_nothing_is_known_it_is_said_why(voxels: DarkVoxels, nozzle: Nozzle, reason: str) -> None:
@@ -84,6 +86,16 @@ def test_limits_tell_how_it_depends_on_the_threshold() -> None:
     assert found.low_mm is not None
     assert found.low_mm < 3.0
     assert THRESHOLDS[1] == THRESHOLD
+
+
+def test_shots_of_which_it_is_not_known_are_counted() -> None:
+    known = _reaches(4.0, 5.0)
+    assert (break_up_of(known).shots, break_up_of(known).reason) == (2, None)
+    some = break_up_of([*known, Reach(reason="all views are black"), Reach(reason="all views are black")])
+    assert (some.value_mm, some.shots) == (break_up_of(known).value_mm, 2)
+    assert some.reason == "not known of 2 of 4 shots: all views are black"
+    longer = break_up_of([*_reaches(5.0, open_from=0.0), Reach(reason="all views are black")])
+    assert "leaves the field: longer than 5.00 mm; not known of 1 of 2 shots" in (longer.reason or "")
 
 
 def test_the_curve_falls_from_one_and_is_unknown_beyond_the_field() -> None:
