@@ -102,8 +102,8 @@ def _goes_aside(body: DarkVoxels, nozzle: Nozzle) -> str | None:
         return None
     return (
         f"liquid goes {far_mm:.2f} mm from the nozzle, but {along_mm:.2f} mm along its axis "
-        f"({', '.join(f'{value:g}' for value in nozzle.axis)}): is the axis stated rightly? If it is the nozzle that is "
-        "seen, leave its pixels unasked (--ignore)"
+        f"({', '.join(f'{value:g}' for value in nozzle.axis)}): is the axis stated rightly? If it is the nozzle that "
+        "is seen, leave its pixels unasked (--ignore)"
     )
 
 
