@@ -33,6 +33,10 @@ UNITS = MappingProxyType({f"_{ending}": unit for ending, unit in _UNITS.items()}
 Value = str | int | float
 
 
+PLACES = ("x_", "y_", "z_")
+"""Names of columns that say where a droplet is begin so."""
+
+
 class Rows(Protocol):
     """A table of one exposure."""
 
@@ -168,7 +172,7 @@ def read_droplets(path: str | Path) -> StoredDroplets:
     """
     try:
         with h5py.File(path, "r") as file:
-            columns = _read_table(path, file[GROUP])
+            columns = _placed(path, _read_table(path, file[GROUP]))
             objects = _read_table(path, file[OBJECTS]) if OBJECTS in file else {}
             attributes = dict(file[PROVENANCE].attrs)
     except (OSError, KeyError, ValueError) as error:
@@ -176,6 +180,14 @@ def read_droplets(path: str | Path) -> StoredDroplets:
     plain = {name: value.item() if isinstance(value, np.generic) else value for name, value in attributes.items()}
     provenance = {name: value for name, value in plain.items() if name not in SCHEMA_KEYS}
     return StoredDroplets(columns, provenance, objects)
+
+
+def _placed(path: str | Path, columns: Columns) -> Columns:
+    """The same, if every droplet is somewhere."""
+    for name in (name for name in columns if name.startswith(PLACES)):
+        if not np.isfinite(columns[name]).all():
+            raise DropletFileError(f"{path}: was changed: {name} of a droplet is not finite")
+    return columns
 
 
 def _read_table(path: str | Path, group: h5py.Group) -> Columns:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from processing.analysis.copied_shots import copies, named
 from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.analysis.spray.spray_axis import SprayAxis
 from processing.analysis.spray.spray_sample import SpraySample
@@ -40,6 +41,7 @@ def spray_doubts(
     velocities = [json.loads(str(shot.provenance.get("velocity", "{}"))) for shot in shots]
     doubts = [f"{count} exposures {why}" for count, why in _unsure(exposures)]
     doubts += [f"velocities of {count} shots {why}" for count, why in _unsure(velocities)]
+    doubts += [f"{named(shot)} has the very droplets of {named(other)}: one is a copy" for shot, other in copies(shots)]
     return (*doubts, *(_of_motion(sample, axis) if sample else ()))
 
 

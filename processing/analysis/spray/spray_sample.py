@@ -141,7 +141,7 @@ def spray_sample(shots: Sequence[StoredDroplets]) -> SpraySample:
         points_mm=_joined([_columns(shot, ("x_mm", "y_mm", "z_mm")) for shot, _ in counted], 3),
         velocities_m_s=_joined([_columns(shot, VELOCITY) for shot, _ in counted], 3),
         shot=np.repeat(np.arange(len(counted)), [len(shot.columns["frame"]) for shot, _ in counted]),
-        volumes_mm3=np.array([measured_mm3(shot, exposures) or np.nan for shot, exposures in counted], np.float64),
+        volumes_mm3=np.array([measured_mm3(shot, exposures) for shot, exposures in counted], np.float64),
         exposures_per_shot=sum(len(exposures) for _, exposures in counted) / max(len(counted), 1),
         box_mm=_common_box([shot for shot, _ in counted]),
     )

@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from processing.analysis.copied_shots import copies, named
 from processing.analysis.droplets.droplet_file import DropletFileError, StoredDroplets
 from processing.analysis.droplets.droplet_table import COVARIANCES as PLACES
 from processing.analysis.droplets.droplet_table import Columns
@@ -82,11 +83,15 @@ def track_droplets(
     Raises
     ------
     DropletFileError
-        They are of several runs, of one shot twice, or nobody knows their rate or their grid.
+        They are of several runs, of one shot twice, or nobody knows their rate or their grid; or a shot is a copy of
+        another one.
     """
     ordered = sorted(shots, key=_shot)
     _require_one_series(ordered)
-    rate_hz, grid, first = rate_hz or _rate_hz(ordered[0]), _grid(ordered[0]), _shot(ordered[0])
+    rate_hz = _rate_hz(ordered[0]) if rate_hz is None else rate_hz
+    if not 0 < rate_hz < np.inf:
+        raise DropletFileError(f"rate_hz {rate_hz}: must be above 0, and finite")
+    grid, first = _grid(ordered[0]), _shot(ordered[0])
     frames = [_NOBODY] * (_shot(ordered[-1]) - first + 1)
     for stored in ordered:
         frames[_shot(stored) - first] = _moving(stored, grid)
@@ -121,13 +126,17 @@ def _grid(stored: StoredDroplets) -> VoxelGrid:
 def _require_one_series(ordered: Sequence[StoredDroplets]) -> None:
     if not ordered:
         raise DropletFileError("there are no shots to link")
-    for name in ("run", "run_created_utc", "calibration_sha256", "recipe_sha256", "grid"):
+    for name in ("run", "run_created_utc", "calibration_sha256", "recipe_sha256", "grid", "rate_hz"):
         if len(told := {str(stored.provenance.get(name)) for stored in ordered}) > 1:
             raise DropletFileError(f"shots of one series, please: their {name} is {' and '.join(sorted(told)[:2])}")
     numbers = [_shot(stored) for stored in ordered]
     for one, other in pairwise(numbers):
         if one == other:
             raise DropletFileError(f"shot {one} is there twice")
+    for copied, original in copies(ordered):
+        raise DropletFileError(
+            f"{named(copied)} has the very droplets of {named(original)}: one is a copy; take it away"
+        )
     if numbers[-1] - numbers[0] >= MOST_FRAMES:
         raise DropletFileError(f"shots {numbers[0]} to {numbers[-1]}: a series has at most {MOST_FRAMES} frames")
 

@@ -3,10 +3,12 @@
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
 from daq.files.run_directory import RunReader, ShotFileError
+from processing.analysis.copied_shots import in_common
 from processing.analysis.droplets.droplet_file import DropletFileError, StoredDroplets, read_droplets
 from processing.analysis.droplets.droplet_statistics import require_poolable
 from processing.analysis.spray.spray_axis import SprayAxis
@@ -71,7 +73,7 @@ def read_files(files: Sequence[Path], name: str = "") -> MeasuredSpray:
 
 
 def _files(folder: Path) -> list[Path]:
-    files = sorted(folder.glob(PATTERN)) or sorted(folder.glob(f"*/{PATTERN}"))
+    files = [*sorted(folder.glob(PATTERN)), *sorted(folder.glob(f"*/{PATTERN}"))]
     if not files:
         raise DropletFileError(f"{folder}: has no droplets ({PATTERN}): name a directory that measure wrote with -o")
     return files
@@ -101,7 +103,7 @@ def _axis(shots: Sequence[StoredDroplets], files: Sequence[Path]) -> SprayAxis |
 
 
 def _sprays_around(files: Sequence[Path]) -> Iterator[dict[str, Any]]:
-    for run_dir in dict.fromkeys(file.resolve().parents[2] for file in files[:1]):
+    for run_dir in (above for file in files[:1] for above in file.resolve().parents[2:3]):
         if (run_dir / "run.h5").is_file():
             try:
                 with RunReader(run_dir) as run:
@@ -121,7 +123,7 @@ class ComparedSprays:
     sprays : dict of name to MeasuredSpray
         A folder each.
     unlike : tuple of str
-        What was measured differently: a difference of two may be of the measurement.
+        What was measured differently: a difference of two may be of the measurement; and what is the same shots.
     """
 
     sprays: dict[str, MeasuredSpray]
@@ -143,8 +145,17 @@ def read_compared(folders: Sequence[Path]) -> ComparedSprays:
             f"{', '.join(map(str, folders))}: to compare takes two directories at least, of different names"
         )
     first, *others = sprays
-    unlike = (f"{other.name} and {first.name} differ in {what}" for other in others if (what := _unlike(first, other)))
-    return ComparedSprays(named, tuple(unlike))
+    unlike = [f"{other.name} and {first.name} differ in {what}" for other in others if (what := _unlike(first, other))]
+    return ComparedSprays(named, (*unlike, *_shared(sprays)))
+
+
+def _shared(sprays: Sequence[MeasuredSpray]) -> Iterator[str]:
+    for first, other in combinations(sprays, 2):
+        if shared := in_common(other.shots, first.shots):
+            yield (
+                f"{other.name} and {first.name} have {shared} shots in common: they are no two samples, and "
+                "chance makes less of a difference than is told"
+            )
 
 
 def _unlike(first: MeasuredSpray, other: MeasuredSpray) -> str:

@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 import pytest
 
-from processing.analysis.droplets.droplet_file import DropletFileError, read_droplets, write_droplets
+from processing.analysis.droplets.droplet_file import DropletFileError, read_droplets, write_columns, write_droplets
 from processing.analysis.droplets.droplet_table import SizedDroplets
 from processing.analysis.objects.liquid_objects import LiquidObjects
 
@@ -51,3 +51,16 @@ def test_objects_that_were_changed_are_told(file: Path) -> None:
         changed["objects/length_mm"] = np.zeros(3)
     with pytest.raises(DropletFileError, match="was changed: its columns have 1 to 3 rows"):
         read_droplets(file)
+
+
+@pytest.mark.parametrize("place_mm", [np.nan, np.inf])
+def test_a_droplet_that_is_nowhere_is_told(tmp_path: Path, place_mm: float) -> None:
+    columns = {
+        "frame": np.array([b"a"]),
+        "x_mm": np.zeros(1),
+        "z_mm": np.array([place_mm]),
+        "u_m_s": np.array([np.nan]),
+    }
+    write_columns(tmp_path / "shot.h5", columns, {"run": "spray"})
+    with pytest.raises(DropletFileError, match="was changed: z_mm of a droplet is not finite"):
+        read_droplets(tmp_path / "shot.h5")

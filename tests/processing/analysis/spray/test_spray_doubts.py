@@ -78,3 +78,17 @@ def test_droplets_that_fly_in_all_directions_contradict_no_axis() -> None:
     any_way = [dict(zip(names, rng.standard_normal((3, len(shot.columns["frame"]))), strict=True)) for shot in SHOTS]
     scattered = [replace(shot, columns={**shot.columns, **its}) for shot, its in zip(SHOTS, any_way, strict=True)]
     assert not doubts(*scattered)
+
+
+def test_a_shot_that_is_a_copy_of_another_one_is_told_whatever_it_is_called() -> None:
+    copied = replace(SHOTS[1], provenance={**SHOTS[1].provenance, "run": "renamed", "shot": 9})
+    assert doubts(*SHOTS, copied) == "renamed, shot 9 has the very droplets of spray, shot 1: one is a copy"
+
+
+def test_an_exposure_that_is_hidden_as_a_whole_leaves_the_others_what_they_are() -> None:
+    hidden = json.dumps({"a": {"verdict": "doubtful", "ghosts": None, "hidden": {"volume_share": 1.0}}})
+    nobody = replace(SHOTS[0], columns={name: one[:0] for name, one in SHOTS[0].columns.items()})
+    told, without = spray_statistics([saying(nobody, exposures=hidden), *SHOTS[1:]]), spray_statistics(SHOTS[1:])
+    assert told.liquid_ppm
+    assert without.liquid_ppm
+    assert told.liquid_ppm.value == without.liquid_ppm.value

@@ -7,7 +7,7 @@ import pytest
 from daq.files.run_directory import RunNotes, RunReader, Spray
 from processing.analysis.spray.spray_axis import SprayAxis
 from processing.runs.sprays.conditions import conditions_of
-from processing.runs.sprays.measured_spray import read_spray
+from processing.runs.sprays.measured_spray import read_compared, read_spray
 from tests.support.droplet_run import write_run
 from tests.support.sampled_sprays import cone_shots, write_results
 
@@ -40,3 +40,27 @@ def test_older_results_have_the_nozzle_of_the_run_that_they_lie_in(tmp_path: Pat
 def test_an_axis_leads_somewhere(direction: tuple[float, float, float]) -> None:
     with pytest.raises(ValueError, match="a spray needs a nozzle and a direction"):
         SprayAxis((0, 0, 0), direction)
+
+
+def test_shots_beside_folders_of_shots_are_all_read(tmp_path: Path) -> None:
+    write_results(tmp_path / "all", cone_shots(0, 2, 10), run="monday")
+    write_results(tmp_path / "all" / "tuesday", cone_shots(1, 3, 10), run="tuesday")
+    assert len(read_spray([tmp_path / "all"]).shots) == 5
+
+
+def test_results_right_below_the_root_are_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    results = write_results(tmp_path / "out", cone_shots(0, 2, 10))
+    monkeypatch.setattr(Path, "resolve", lambda path: Path("/", *path.parts[-2:]))
+    assert read_spray([results]).axis is None
+
+
+def test_shots_that_are_in_both_of_two_sprays_are_told(tmp_path: Path) -> None:
+    shots = cone_shots(0, 3, 20)
+    monday = write_results(tmp_path / "monday", shots, run="monday")
+    copied = write_results(tmp_path / "copied", shots[:2], run="another")
+    again = write_results(tmp_path / "again", cone_shots(1, 2, 20), run="monday")
+    other = write_results(tmp_path / "other", cone_shots(2, 2, 20), run="other")
+    assert read_compared([monday, other]).unlike == ()
+    for two in (copied, again):
+        (told,) = read_compared([monday, two]).unlike
+        assert f"{two.name} and monday have 2 shots in common" in told

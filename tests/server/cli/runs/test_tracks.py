@@ -7,8 +7,9 @@ import h5py
 import numpy as np
 import pytest
 
-from processing.analysis.droplets.droplet_file import write_droplets
+from processing.analysis.droplets.droplet_file import DropletFileError, read_droplets, write_droplets
 from processing.analysis.droplets.droplet_table import Droplets
+from processing.analysis.velocity.track_table import track_droplets
 from processing.analysis.velocity.tracks import Tracks
 from processing.reconstruction.settings import GridSettings
 from processing.volume import VoxelGrid
@@ -95,4 +96,14 @@ def test_bad_input_gets_a_sentence(tmp_path: Path, capsys: pytest.CaptureFixture
     other = write_series(tmp_path / "other", shown, run="another", rate_hz=RATE_HZ)
     (other / "shot_00003_droplets.h5").rename(unstated / "shot_00007_droplets.h5")
     assert "shots of one series, please: their run is" in refused(capsys, "tracks", unstated, "-o", out)
+    copied = write_series(tmp_path / "copied", Series(shown.frames[:1] * 3, [], [], np.empty(0)), rate_hz=RATE_HZ)
+    assert "spray, shot 4 has the very droplets of spray, shot 3" in refused(capsys, "tracks", copied, "-o", out)
     assert not out.exists()
+
+
+@pytest.mark.parametrize("rate_hz", [0.0, -5.0, float("nan")])
+def test_a_rate_that_none_can_be_is_refused(tmp_path: Path, rate_hz: float) -> None:
+    results = write_series(tmp_path / "droplets", series(frames=2))
+    shots = [read_droplets(file) for file in results.glob("*.h5")]
+    with pytest.raises(DropletFileError, match="must be above 0"):
+        track_droplets(shots, rate_hz)
