@@ -13,11 +13,9 @@ FEWEST_PLACES = 5
 
 def copies(shots: Sequence[StoredDroplets]) -> list[tuple[StoredDroplets, StoredDroplets]]:
     """Shots with those before them that have the same droplets, whatever they are called."""
-    found, first = [], dict[bytes, StoredDroplets]()
-    for shot in shots:
-        if (print_of := _print_of(shot)) and (other := first.setdefault(print_of, shot)) is not shot:
-            found.append((shot, other))
-    return found
+    first: dict[bytes, StoredDroplets] = {}
+    those_before = [(shot, first.setdefault(one, shot)) for shot in shots if (one := _print_of(shot))]
+    return [(shot, other) for shot, other in those_before if other is not shot]
 
 
 def in_common(first: Iterable[StoredDroplets], second: Iterable[StoredDroplets]) -> int:

@@ -33,6 +33,8 @@ from processing.analysis.spray.spray_sample import SpraySample, spray_sample
 from processing.geometry import FloatArray
 from processing.reconstruction.settings import FrozenValue
 
+LIQUIDS_KG_M3 = (50.0, 30_000.0)
+"""Densities: hydrogen has 71, and none is as heavy as 30 000. Another one is in another unit."""
 SLICE = 0.25
 """Of the box's reach along the axis: length of the slice of a patternation."""
 CORRECTIONS = (
@@ -53,12 +55,17 @@ class AskedFor:
     at_mm : tuple of float
         Distances of patternations along the axis; none stands for the middle of the box.
     liquid_kg_m3 : float | None
-        Density of the liquid.
+        Density of the liquid, within ``LIQUIDS_KG_M3``; ValueError otherwise.
     """
 
     axis: SprayAxis | None = None
     at_mm: tuple[float, ...] = ()
     liquid_kg_m3: float | None = None
+
+    def __post_init__(self) -> None:
+        low, high = LIQUIDS_KG_M3
+        if self.liquid_kg_m3 is not None and not low <= self.liquid_kg_m3 <= high:
+            raise ValueError(f"{self.liquid_kg_m3:g} kg/m3: liquids have {low:g} to {high:g}; water has 998")
 
 
 class SprayStatistics(FrozenValue):
@@ -125,7 +132,7 @@ def _of_sample(sample: SpraySample, pooled: DropletStatistics, asked: AskedFor) 
         motion=motion,
         extent=extent,
         patternations=patternations,
-        reasons=_reasons(sample, asked, bool(fits), motion is not None, bool(patternations)),
+        reasons=_reasons(sample, asked, bool(fits), motion is not None, patternations),
     )
 
 
@@ -151,7 +158,9 @@ def _liquid_ppm(sample: SpraySample) -> Estimate | None:
     return one
 
 
-def _reasons(sample: SpraySample, asked: AskedFor, fits: bool, motion: bool, patternations: bool) -> dict[str, str]:
+def _reasons(
+    sample: SpraySample, asked: AskedFor, fits: bool, motion: bool, patternations: Sequence[Patternation]
+) -> dict[str, str]:
     reasons = {}
     if not fits:
         reasons["fits"] = "fewer than 20 different diameters: measure more shots"
@@ -159,8 +168,11 @@ def _reasons(sample: SpraySample, asked: AskedFor, fits: bool, motion: bool, pat
         reasons["motion"] = NO_VELOCITIES
     if asked.axis is None:
         reasons |= {"extent": NO_AXIS, "patternations": NO_AXIS}
-    elif not patternations:
-        reasons["patternations"] = "fewer than 20 droplets in the slice across the axis, or no common box"
+    elif len(patternations) < max(len(asked.at_mm), 1):
+        told_mm = {one.at_mm for one in patternations}
+        where = ", ".join(f"{at_mm:g}" for at_mm in asked.at_mm if at_mm not in told_mm)
+        few = "fewer than 20 droplets in the slice across the axis, or no common box"
+        reasons["patternations"] = f"{where} mm from the nozzle: {few}" if where else few
     if not np.isfinite(sample.volumes_mm3).all():
         reasons["liquid_ppm"] = NO_VOLUME
     return reasons

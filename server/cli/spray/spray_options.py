@@ -44,7 +44,7 @@ def asked_for(options: Namespace, spray: "MeasuredSpray") -> "AskedFor":
     Raises
     ------
     DropletFileError
-        An axis without a nozzle, or one that is no direction.
+        An axis without a nozzle, or one that is no direction; or a density that no liquid has.
     """
     from processing.analysis.droplets.droplet_file import DropletFileError
     from processing.analysis.spray.spray_axis import SprayAxis
@@ -60,4 +60,7 @@ def asked_for(options: Namespace, spray: "MeasuredSpray") -> "AskedFor":
             axis = SprayAxis(nozzle_mm, direction)
         except ValueError as error:
             raise DropletFileError(f"--nozzle, --axis: {error}") from error
-    return AskedFor(axis, tuple(options.at or ()), options.liquid_density)
+    try:
+        return AskedFor(axis, tuple(options.at or ()), options.liquid_density)
+    except ValueError as error:
+        raise DropletFileError(f"--liquid-density: {error}") from error

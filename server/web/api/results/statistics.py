@@ -5,6 +5,7 @@ from typing import Annotated
 from fastapi import APIRouter, Query
 
 from daq.names import Identifier
+from processing.analysis.spray.spray_statistics import LIQUIDS_KG_M3
 from server.lab.droplets.spray_so_far import SpraySoFar, spray_so_far
 from server.web.api.parameters import ContextOf, RunId
 from server.web.problems import responses
@@ -18,7 +19,12 @@ def show_statistics(
     context: ContextOf,
     results: Annotated[Identifier | None, Query(description="which result set; default: the newest droplets")] = None,
     liquid_kg_m3: Annotated[
-        float | None, Query(gt=0, le=30_000, description="density of the liquid, which makes mass of volume flux")
+        float | None,
+        Query(
+            ge=LIQUIDS_KG_M3[0],
+            le=LIQUIDS_KG_M3[1],
+            description="density of the liquid, which makes mass of volume flux",
+        ),
     ] = None,
 ) -> SpraySoFar:
     """Sizes, densities, flux, patternation with intervals, of at most 50 measured shots; while it records, too."""

@@ -101,3 +101,16 @@ def test_what_does_not_belong_together_is_refused_with_the_difference(
     assert "has no droplets" in refused(capsys, "statistics", tmp_path / "empty")
     assert "two directories at least" in refused(capsys, "statistics", results / "monday", "--compare")
     assert "would count as often" in refused(capsys, "statistics", results / "monday", results / "monday")
+
+
+def test_a_distance_without_droplets_is_told_beside_one_that_has_some(
+    results: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    one = told(capsys, "statistics", results / "monday", "--at", 9, "--at", 500)
+    assert [slice["at_mm"] for slice in one["patternations"]] == [9]
+    assert one["reasons"]["patternations"].startswith("500 mm from the nozzle: fewer than 20 droplets")
+
+
+def test_a_density_in_another_unit_is_refused(results: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = refused(capsys, "statistics", results / "monday", "--liquid-density", 0.998)
+    assert text == "--liquid-density: 0.998 kg/m3: liquids have 50 to 30000; water has 998"
