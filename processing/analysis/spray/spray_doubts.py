@@ -13,14 +13,13 @@ from processing.analysis.copied_shots import copies, named
 from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.analysis.spray.spray_axis import SprayAxis
 from processing.analysis.spray.spray_sample import SpraySample
+from processing.analysis.velocity.velocity_verdict import FASTEST_M_S
 
 UNSURE = {"doubtful": "are doubtful, and count", "refused": "are refused, and do not count"}
 MOST_ASIDE_DEG = 45.0
 """Of the mean velocity from the axis; a spray flies along its axis, however wide it is."""
 LEAST_TOGETHER = 0.3
 """Amount of the mean velocity over the mean speed: droplets that fly in all directions have none."""
-FASTEST_M_S = 1000.0
-"""No spray is as fast; diesel at 300 MPa leaves its nozzle with 800 m/s."""
 
 
 def spray_doubts(

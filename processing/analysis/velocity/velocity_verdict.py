@@ -12,6 +12,8 @@ LEAST_SHARE, TRUSTED_SHARE = 0.1, 0.5
 """Of the droplets that should be in the grid in both: with fewer pairs velocities are refused, or doubtful."""
 MOST_WRONG = 0.02
 """Of the pairs, by their own probabilities."""
+FASTEST_M_S = 1000.0
+"""No spray is as fast; diesel at 300 MPa leaves its nozzle with 800 m/s."""
 LEAST_NOISE = 0.1
 """Of the noise of displacements. An image that is there twice has none."""
 Verdict = tuple[ShotVerdict, tuple[str, ...]]

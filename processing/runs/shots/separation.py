@@ -1,5 +1,6 @@
 """Time from exposure A to B of a shot: as the pulses were fired, else as the run states it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -43,11 +44,18 @@ def separation_of(run: RunReader, shot: Shot) -> Separation | str:
     trains = [pulses for pulses in shot.fired.pulses.values() if pulses] if shot.fired else []
     if not trains:
         stated_ns = run.header.separation_ns
-        return Separation(float(stated_ns), 0.0, "stated") if stated_ns else UNKNOWN
+        return _separation([float(stated_ns)], "stated") if stated_ns else UNKNOWN
     if odd := {len(pulses) for pulses in trains if len(pulses) != 2}:
         return f"views were lit {', '.join(map(str, sorted(odd)))} times: which pulse is in which exposure is not known"
     fired_ns = [_middle_ns(second) - _middle_ns(first) for first, second in trains]
-    return Separation(float(np.mean(fired_ns)), float(np.ptp(fired_ns)), "fired")
+    return _separation(fired_ns, "fired")
+
+
+def _separation(by_view_ns: Sequence[float], source: Literal["fired", "stated"]) -> Separation | str:
+    if (least_ns := min(by_view_ns)) <= 0:
+        span = " to ".join(f"{one_ns:g}" for one_ns in dict.fromkeys((least_ns, max(by_view_ns))))
+        return f"B comes {span} ns after A, as {source}: exposures or pulses are exchanged"
+    return Separation(float(np.mean(by_view_ns)), float(np.ptp(by_view_ns)), source)
 
 
 def _middle_ns(pulse: LightPulse) -> float:

@@ -64,6 +64,9 @@ def test_without_pulses_it_is_as_stated(tmp_path: Path) -> None:
         (None, None, 2, "nobody knows the time from exposure A to B"),
         (None, None, 1, "one exposure"),
         ({"view1": PULSES[:1], "view2": PULSES}, 6400, 2, "views were lit 1 times"),
+        (None, -6400, 2, "B comes -6400 ns after A"),
+        ({"view1": PULSES[::-1]}, 6400, 2, "B comes -6400 ns after A"),
+        ({"view1": PULSES, "view2": PULSES[:1] * 2}, 6400, 2, "B comes 0 to 6400 ns after A"),
         ({"view1": PULSES, "view2": (*PULSES, LightPulse(9000, 100, 1.0))}, 6400, 2, "views were lit 3 times"),
     ],
 )

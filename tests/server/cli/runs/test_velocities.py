@@ -69,6 +69,13 @@ def test_columns_have_units_and_the_file_says_where_velocities_come_from(
     assert said == result["shots"][0]["velocity"]
 
 
+def test_a_separation_in_another_unit_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run = write_bright_run(tmp_path / "run", frames=2, moving=moving_scene(), separation_ns=SEPARATION_NS // 1000)
+    (shot,) = measured(tmp_path, capsys, run)["shots"]
+    assert shot["velocity"]["verdict"] == "doubtful"
+    assert "faster than any spray: is the separation of" in shot["velocity"]["reasons"][0]
+
+
 def test_an_image_that_is_there_twice_gives_no_velocity(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     result = measured(tmp_path, capsys, write_bright_run(tmp_path / "run", frames=2))
     (shot,) = result["shots"]
