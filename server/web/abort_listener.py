@@ -9,7 +9,6 @@ import threading
 from collections.abc import Callable, Collection
 from types import TracebackType
 from typing import Self
-from urllib.parse import urlsplit
 
 import uvicorn
 from starlette.applications import Starlette
@@ -19,7 +18,7 @@ from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
 from daq.errors import DaqError
-from server.web.guard import is_ours
+from server.web.guard import is_ours, site_of
 from server.web.problems import MEDIA_TYPE
 
 PATH = "/abort"
@@ -79,7 +78,7 @@ class AbortListener:
         host, origin = request.headers.get("host", ""), request.headers.get("origin")
         if self._host_names is not None and not is_ours(host, self._host_names):
             return _problem(403, f"host {host!r} is not a name of this server")
-        if origin is not None and urlsplit(origin).netloc.lower() not in self._origins:
+        if origin is not None and site_of(origin) not in self._origins:
             return _problem(403, f"origin {origin!r} is no page of this server")
         answer = await run_in_threadpool(self._switch_off)
         if origin is not None:

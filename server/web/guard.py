@@ -72,13 +72,21 @@ class Guard:
         if self._token is None and not is_ours(host, self._host_names):
             return _refuse(403, f"host {host!r} is not a name of this server")
         origin = headers.get("origin")
-        if origin is not None and urlsplit(origin).netloc.lower() != host.lower():
+        if origin is not None and site_of(origin) != host.lower():
             return _refuse(403, f"origin {origin!r} is not this server, {host!r}")
         if self._token is None or scope["path"] == SIGN_IN_PATH or _offers(headers, self._token):
             return None
         if "text/html" in headers.get("accept", ""):
             return RedirectResponse(SIGN_IN_PATH, 303)
         return _refuse(401, "a token is needed: header 'Authorization: Bearer <token>'")
+
+
+def site_of(origin: str) -> str:
+    """Host and port of an ``Origin`` header, lower case; empty where it names none."""
+    try:
+        return urlsplit(origin).netloc.lower()
+    except ValueError:
+        return ""
 
 
 def is_ours(host: str, host_names: Collection[str] = ()) -> bool:

@@ -89,6 +89,7 @@ def test_pages_of_other_sites_and_foreign_names_of_this_machine_are_refused(
     for headers in (
         {"Origin": "http://evil.example"},
         {"Origin": "null"},
+        {"Origin": "http://[::1"},
         {"Origin": f"http://127.0.0.1:{listener.port}"},
         {"Host": "evil.example"},
     ):

@@ -60,6 +60,7 @@ def test_a_browser_is_led_to_the_form_and_gets_a_cookie_that_scripts_cannot_read
         {"Origin": "http://evil.example"},
         {"Origin": "http://evil.example:8080"},
         {"Origin": "null"},
+        {"Origin": "http://[::1"},
         {"Origin": "http://127.0.0.1:1"},
     ],
 )
