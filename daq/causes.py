@@ -109,10 +109,19 @@ class Cause:
         return EXPLANATIONS[self.code].remedy
 
 
-_NEEDS_NO_WORD = frozenset({CauseCode.STOPPED, CauseCode.ABORTED, CauseCode.PROGRAM_ENDED, CauseCode.LIGHT_NOT_OFF})
-"""What the operator did himself, and what the state FAULT stands for."""
+_BY_OPERATOR = frozenset({CauseCode.STOPPED, CauseCode.ABORTED, CauseCode.PROGRAM_ENDED})
+
+
+def wrong(causes: tuple[Cause, ...]) -> tuple[Cause, ...]:
+    """What went wrong: all but what the operator did himself."""
+    return tuple(cause for cause in causes if cause.code not in _BY_OPERATOR)
 
 
 def to_acknowledge(causes: tuple[Cause, ...]) -> tuple[Cause, ...]:
-    """What an operator has to acknowledge one by one, so that no cause hides another; a single one hides none."""
-    return tuple(cause for cause in causes if cause.code not in _NEEDS_NO_WORD) if len(causes) > 1 else ()
+    """What an operator has to acknowledge one by one, so that no cause hides another; a single one hides none.
+
+    The state FAULT stands for a light that was not confirmed off.
+    """
+    if len(causes) < 2:
+        return ()
+    return tuple(cause for cause in wrong(causes) if cause.code is not CauseCode.LIGHT_NOT_OFF)

@@ -27,6 +27,10 @@ class RunStatus:
         What the run named by ``run_id`` was asked to do; known although its directory may be gone.
     live : LivePlan | None
         What the live view shows; None in every other state.
+    causes : tuple[Cause, ...]
+        Why what ended last did so, run or live view; none if it was completed, and while the next one is active.
+    ended_run : str
+        Whose causes those are: a run id; empty: of a live view.
     to_acknowledge : tuple[Cause, ...]
         Where there was more than one cause: those that wait to be acknowledged, one by one. Nothing starts before.
     """
@@ -40,6 +44,8 @@ class RunStatus:
     message: str = ""
     plan: RunPlan | None = None
     live: LivePlan | None = None
+    causes: tuple[Cause, ...] = ()
+    ended_run: str = ""
     to_acknowledge: tuple[Cause, ...] = ()
 
     @property

@@ -46,8 +46,8 @@ class RunProgress:
         self.move(RunStep.START, **vars(RunStatus(run_id=run_id, shots_planned=plan.total_shots, plan=plan)))
 
     def begin_live(self, plan: LivePlan) -> None:
-        """A live view starts; BusyError if it cannot. What is known of the last run stays."""
-        self.move(RunStep.LIVE, live=plan, message=str(plan))
+        """A live view starts; BusyError if it cannot. What is known of the last run stays, but for its causes."""
+        self.move(RunStep.LIVE, live=plan, message=str(plan), causes=())
 
     def move(self, step: RunStep, **changes: Any) -> None:
         """Go to the state after a step, and change other fields of the status; BusyError if it is not permitted."""
@@ -65,7 +65,8 @@ class RunProgress:
             waiting = to_acknowledge(ending.causes)
             for cause in waiting[1:]:
                 self.tell(self._run_id, f"a second cause, to be acknowledged by itself: {cause.text}")
-            self.move(step, to_acknowledge=waiting, **changes)
+            about = {"causes": ending.causes, "ended_run": self._run_id}
+            self.move(step, to_acknowledge=waiting, **about, **changes)
 
     def acknowledge(self, causes: Sequence[Cause]) -> None:
         """The operator has seen to causes that wait; the last one ends FAULT."""
@@ -73,7 +74,7 @@ class RunProgress:
             waiting = tuple(cause for cause in self._status.to_acknowledge if cause not in causes)
             self._status = replace(self._status, to_acknowledge=waiting)
             for cause in causes:
-                self.tell(self._run_id, f"acknowledged: {cause.text}")
+                self.tell(self._status.ended_run, f"acknowledged: {cause.text}")
             if self._status.state is RunState.FAULT and not waiting:
                 self.move(RunStep.ACKNOWLEDGE)
 

@@ -12,7 +12,6 @@ from daq.run.refusals import REMEDIES, RefusalCode
 from processing.calibration.verdict import Verdict
 from server.lab.duty import Health, Lamp
 from server.lab.errors import NotFound
-from server.lab.runs.run_summary import RunCause
 from server.lab.watch import CalibrationStanding
 
 _OF_LAMPS = {
@@ -77,7 +76,7 @@ def of_lamps(lamps: Iterable[Lamp]) -> Iterator[Alarm]:
         yield _alarm(lamp.name, text.removeprefix(f"{lamp.name}: "), remedy, latched=latched)
 
 
-def of_causes(source: str, causes: Iterable[Cause | RunCause], *, latched: bool) -> Iterator[Alarm]:
+def of_causes(source: str, causes: Iterable[Cause], *, latched: bool) -> Iterator[Alarm]:
     """Why a run or a live view ended."""
     for cause in causes:
         yield _alarm(source, cause.text, cause.remedy, latched=latched)

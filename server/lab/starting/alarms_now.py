@@ -2,21 +2,18 @@
 
 from collections.abc import Iterator
 
+from daq.causes import Cause, CauseCode, wrong
 from daq.run.events import RunStatus
-from daq.run.state import RunOutcome, RunState
+from daq.run.state import RunState
 from server.lab.desk.alarms import Alarm, of_calibration, of_causes, of_lamps
 from server.lab.services import Context, RunControl
 
 
 def alarms_now(context: Context) -> Iterator[Alarm]:
-    """Everything that is wrong: the last run, devices and work, the calibration. Reads the last run if it failed."""
+    """Everything that is wrong: why the last run or live view ended, devices and work, the calibration."""
     status = context.services.acquisition.status()
-    waiting = status.to_acknowledge
-    yield from of_causes(_source(status), waiting, latched=True)
-    if status.outcome is RunOutcome.FAILED and status.run_id is not None and status.resting:
-        known = {cause.text for cause in waiting}
-        others = [cause for cause in context.runs.summary(status.run_id).causes if cause.text not in known]
-        yield from of_causes(_source(status), others, latched=status.state is RunState.FAULT and not waiting)
+    for cause in wrong(status.causes):
+        yield from of_causes(_source(status), [cause], latched=_is_latched(cause, status))
     yield from of_lamps(context.lamps)
     yield from of_calibration(context.standing)
 
@@ -38,15 +35,22 @@ def acknowledge(context: Context, alarm_id: str) -> None:
 
 
 def _clear(acquisition: RunControl, alarm: Alarm) -> None:
-    """Of several causes that wait for an operator this one alone; a lamp is none of them."""
+    """Acknowledge its cause alone; a lamp is none, and its fault is cleared while a cause goes on waiting."""
     status = acquisition.status()
-    waiting = {(_source(status), cause.text): cause for cause in status.to_acknowledge}
-    cause = waiting.get((alarm.source, alarm.text))
-    if cause or not waiting:
+    causes = {(_source(status), cause.text): cause for cause in status.causes}
+    cause = causes.get((alarm.source, alarm.text))
+    if cause:
         acquisition.acknowledge(cause)
     else:
         acquisition.clear_faults()
 
 
+def _is_latched(cause: Cause, status: RunStatus) -> bool:
+    """It waits for an operator, or is the last thing that keeps the state FAULT."""
+    if status.to_acknowledge:
+        return cause in status.to_acknowledge
+    return status.state is RunState.FAULT and cause.code is CauseCode.LIGHT_NOT_OFF
+
+
 def _source(status: RunStatus) -> str:
-    return f"run {status.run_id}" if status.run_id else "live view"
+    return f"run {status.ended_run}" if status.ended_run else "live view"

@@ -4,6 +4,7 @@ from typing import Any
 
 import pytest
 
+from daq.errors import DeviceTimeout
 from tests.support.server_process import eventually
 from tests.support.serving import Serving, plan_of
 
@@ -78,6 +79,44 @@ def test_of_two_causes_of_a_run_the_one_that_is_named_is_acknowledged(server: Se
     assert seen == {both[0]: False, both[1]: True}
     assert acknowledge(server, next(alarm for alarm in of_run(server, run_id) if alarm["text"] == both[0])) == 202
     assert left() == []
+
+
+def test_a_live_view_that_failed_is_told_as_itself_until_the_next_start(server: Serving, laboratory: Any) -> None:
+    run_id, _ = server.run_to_its_end(plan_of(shots=1))
+    laboratory.generator.silent_at = laboratory.generator.fired + 1
+    assert server.http.put("/api/rig/live", json={"rate_hz": 10, "pulse": None}).status_code == 200
+    server.wait()
+    laboratory.generator.silent_at = None
+    alarm = await_alarms(server, "live view")["live view"]
+    assert "no answer" in alarm["text"]
+    assert not of_run(server, run_id), "that run was completed"
+    assert acknowledge(server, alarm) == 202
+    assert alarms(server)["live view"]["acknowledged"]
+    server.run_to_its_end(plan_of(shots=1))
+    await_alarms(server)
+
+
+@pytest.mark.parametrize("end", [("DELETE", "/api/rig/live"), ("POST", "/api/rig/abort")])
+def test_a_fault_has_a_line_of_its_own_which_ends_it(
+    server: Serving, laboratory: Any, monkeypatch: pytest.MonkeyPatch, end: tuple[str, str]
+) -> None:
+    assert server.http.put("/api/rig/live", json={"rate_hz": 10, "pulse": None}).status_code == 200
+
+    def silent() -> None:
+        raise DeviceTimeout("generator", "off", 0.5)
+
+    monkeypatch.setattr(laboratory.generator, "off", silent)
+    server.http.request(*end)
+    assert server.wait().state == "fault"
+    monkeypatch.undo()
+    laboratory.generator.trip("overcurrent")
+    found = await_alarms(server, "live view", "pulse generator")
+    assert "light not confirmed off" in found["live view"]["text"]
+    assert "look at the LEDs" in found["live view"]["remedy"]
+    assert acknowledge(server, found["pulse generator"]) == 202
+    assert server.services.acquisition.status().state == "fault", "the light is another matter"
+    assert acknowledge(server, found["live view"]) == 202
+    assert server.services.acquisition.status().state == "idle"
 
 
 def of_run(server: Serving, run_id: str) -> list[dict[str, Any]]:
