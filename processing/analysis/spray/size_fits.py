@@ -39,6 +39,11 @@ class SizeFit(FrozenValue):
     gap_by_chance: Annotated[float, Field(description="that 95 % of the draws of shots stay below")]
     fits: Annotated[bool, Field(description="whether the gap is no larger than chance makes it")]
 
+    @property
+    def told_name(self) -> str:
+        """As a text names it: after people, with capitals."""
+        return self.name if self.name == "lognormal" else "Rosin-Rammler"
+
     def cumulative(self, diameters_um: FloatArray) -> FloatArray:
         """Share by volume of smaller droplets."""
         ratio = np.asarray(diameters_um, np.float64) / self.scale_um

@@ -50,7 +50,8 @@ def _draw_densities(axes: Axes, told: SprayStatistics) -> None:
     d_um = np.geomspace(edges_um[0], edges_um[-1], 300)
     for fit in told.fits:
         line, colour = FIT_LINES[fit.name]
-        axes.plot(d_um, d_um * fit.density_per_um(d_um), line, color=colour, lw=1.2, label=f"{fit.name}, by volume")
+        label = f"{fit.told_name}, by volume"
+        axes.plot(d_um, d_um * fit.density_per_um(d_um), line, color=colour, lw=1.2, label=label)
     axes.set_ylabel("density per ln d")
 
 

@@ -4,12 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib.quiver import Quiver
 
 from processing.analysis.spray.density_map import density_map
 from processing.analysis.spray.spray_axis import SprayAxis
 from processing.analysis.spray.spray_sample import SpraySample, spray_sample
 from processing.analysis.spray.spray_statistics import AskedFor, SprayStatistics, spray_statistics
+from processing.analysis.spray.velocity_field import field_across_axis, field_through_axis
 from processing.figures.sprays.distribution_figure import distribution_figure
+from processing.figures.sprays.field_figure import velocity_field_figure
 from processing.figures.sprays.motion_figure import MOST_DOTS, motion_figure
 from processing.figures.sprays.space_figures import density_figure, patternation_figure
 from tests.support.sampled_sprays import cone_shots
@@ -33,7 +36,7 @@ def test_areas_over_the_logarithm_of_the_diameter_are_shares(told: SprayStatisti
         stairs = patch.get_data()  # type: ignore[attr-defined]
         assert np.sum(stairs.values * np.diff(np.log(stairs.edges))) == pytest.approx(1)
     names = {str(line.get_label()) for line in densities.lines}
-    assert {"lognormal, by volume", "rosin-rammler, by volume"} <= names
+    assert {"lognormal, by volume", "Rosin-Rammler, by volume"} <= names
     by_volume = next(line for line in cumulative.lines if line.get_label() == "by volume")
     assert np.asarray(by_volume.get_ydata())[-1] == pytest.approx(1)
     assert any(str(line.get_label()).startswith("D32 ") for line in cumulative.lines)
@@ -70,3 +73,16 @@ def test_shots_scatter_beside_the_mean_and_of_one_shot_there_is_the_mean(sample:
     assert "by counting alone" in rms.get_title()
     assert mean.yaxis_inverted()
     assert [axes.get_title() for axes in density_figure([single, single]).axes if axes.get_title()] == ["mean", "mean"]
+
+
+def test_arrows_are_drawn_where_a_mean_velocity_is_told(sample: SpraySample) -> None:
+    assert ASKED.axis
+    fields = field_through_axis(sample, ASKED.axis), field_across_axis(sample, ASKED.axis)
+    through, across = (axes for axes in velocity_field_figure(*fields).axes if axes.get_title(loc="left"))
+    assert through.yaxis_inverted()
+    assert not across.yaxis_inverted()
+    for axes, field in zip((through, across), fields, strict=True):
+        assert field
+        (arrows,) = (artist for artist in axes.collections if isinstance(artist, Quiver))
+        assert np.count_nonzero(~np.asarray(arrows.Umask)) == np.isfinite(field.axial_m_s).sum()
+    assert len(velocity_field_figure(None, fields[1]).axes) == 2
