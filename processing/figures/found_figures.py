@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from processing.geometry import FloatArray
 
@@ -35,7 +36,7 @@ class Placed:
 
 def found_figure(found: Placed, missed: Placed, ghosts: Placed, title: str = "") -> Figure:
     """Seen along the axis of the spray, and by size: true droplets that were found, those that were not, and ghosts."""
-    figure = Figure(figsize=(11, 5.2), layout="constrained")
+    figure = Figure(figsize=(9.5, 4.5), layout="constrained")
     above, by_size = figure.subplots(1, 2)
     for droplets, colour, label in (
         (found, "0.55", "found"),
@@ -52,6 +53,9 @@ def found_figure(found: Placed, missed: Placed, ghosts: Placed, title: str = "")
         color=["0.55", "tab:red", "tab:blue"],
     )
     by_size.set(xlabel="diameter [µm]", ylabel="droplets", xscale="log", title="by size")
+    by_size.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    by_size.xaxis.set_major_formatter("{x:g}")
+    by_size.xaxis.set_minor_formatter(NullFormatter())
     figure.suptitle(title)
     return figure
 

@@ -50,6 +50,23 @@ def objects_figure(curves: Mapping[str, BreakUpCurve], shot: ObjectsShot) -> Fig
     return figure
 
 
+def break_up_figure(curve: BreakUpCurve | None, name: str, objects: LiquidObjects, grid: VoxelGrid | None) -> Figure:
+    """Break-up curve, if there is one, and the objects of one exposure."""
+    figure = Figure(figsize=(9.5 if curve else 5, 4.4), layout="constrained")
+    *curve_axes, object_axes = figure.subplots(1, 2 if curve else 1, squeeze=False).ravel()
+    if curve:
+        draw_break_up(curve_axes[0], {name: curve})
+    draw_objects(object_axes, objects, grid)
+    return figure
+
+
+def seeing_figure(shot: ObjectsShot) -> Figure:
+    """Where too few views see."""
+    figure = Figure(figsize=(5.5, 3.8), layout="constrained")
+    draw_seeing(figure.add_subplot(), shot.seeing, shot.places)
+    return figure
+
+
 def draw_break_up(axes: Axes, curves: Mapping[str, BreakUpCurve]) -> None:
     """Curves with their intervals, and the truth as broken lines."""
     for (name, curve), colour in zip(curves.items(), VIEW_COLOURS, strict=False):
@@ -68,8 +85,11 @@ def draw_break_up(axes: Axes, curves: Mapping[str, BreakUpCurve]) -> None:
     axes.grid(alpha=0.25)
 
 
-def draw_objects(axes: Axes, objects: LiquidObjects, grid: VoxelGrid) -> None:
-    """Objects seen along z: ligaments as lines of their length and direction, others as circles of their length."""
+def draw_objects(axes: Axes, objects: LiquidObjects, grid: VoxelGrid | None) -> None:
+    """Objects seen along z: ligaments as lines of their length and direction, others as circles of their length.
+
+    Axes are those of the grid; without one, they are as wide as the objects.
+    """
     for kind, colour in CLASS_COLOURS.items():
         chosen = objects.where(objects.classes == kind)
         if kind is ObjectClass.LIGAMENT:
@@ -79,7 +99,7 @@ def draw_objects(axes: Axes, objects: LiquidObjects, grid: VoxelGrid) -> None:
         axes.plot([], [], color=colour, linewidth=2, label=f"{kind} ({len(chosen)})")
     _frame(axes, grid)
     axes.set_title("one exposure; circles are as wide as the object is long", fontsize="small")
-    axes.legend(fontsize="small", loc="lower right")
+    axes.legend(fontsize="x-small", loc="upper right")
 
 
 def _draw_circles(axes: Axes, objects: LiquidObjects, colour: str) -> None:
@@ -99,12 +119,17 @@ def draw_seeing(axes: Axes, seeing: NDArray[np.uint8], grid: VoxelGrid) -> None:
     half_mm = grid.pitch_mm / 2
     span = (grid.x_mm[0] - half_mm, grid.x_mm[-1] + half_mm, grid.y_mm[-1] + half_mm, grid.y_mm[0] - half_mm)
     image = axes.imshow(share, extent=span, cmap="magma_r", vmin=0, vmax=max(1.0, float(share.max())))
-    axes.figure.colorbar(image, ax=axes, label="of the depth seen by fewer than 3 views [%]", shrink=0.8)
+    axes.figure.colorbar(image, ax=axes, label="of the depth, below 3 views [%]", shrink=0.75)
     _frame(axes, grid)
     axes.set_title(
         f"{100 * np.mean(seeing < 3):.1f} % of the volume, {100 * np.mean(seeing == 0):.2f} % by none", fontsize="small"
     )
 
 
-def _frame(axes: Axes, grid: VoxelGrid) -> None:
-    axes.set(xlabel="x [mm]", ylabel="y [mm]", xlim=grid.x_mm[[0, -1]], ylim=grid.y_mm[[-1, 0]], aspect="equal")
+def _frame(axes: Axes, grid: VoxelGrid | None) -> None:
+    axes.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
+    if grid is None:
+        axes.autoscale_view()
+        axes.invert_yaxis()
+    else:
+        axes.set(xlim=grid.x_mm[[0, -1]], ylim=grid.y_mm[[-1, 0]])

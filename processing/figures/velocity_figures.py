@@ -14,6 +14,10 @@ from processing.figures.droplet_figures import draw_case
 
 PANELS = (("x", "y", "u", "v"), ("z", "y", "w", "v"), ("x", "z", "u", "w"))
 """Across, down, and the velocities along them."""
+BESIDE, STACKED = "vuw", "vw;uw"
+"""Panels side by side; of a flat box two are strips, one above the other."""
+FLAT = 0.3
+"""Height over width of a flat box."""
 LENGTH_SHARE = 0.08
 """Of the widest side of what is drawn: the arrow of a median droplet."""
 LEAST = 1e-9
@@ -49,8 +53,10 @@ def velocities_figure(shot: StoredDroplets, least_p_pair: float = 0.5, title: st
     median_m_s = float(np.median(speeds_m_s[paired]))
     widest_mm = max(float(np.ptp(columns[f"{axis}_mm"])) for axis in "xyz")
     m_s_per_mm = max(median_m_s, LEAST) / (LENGTH_SHARE * max(widest_mm, LEAST))
-    figure = Figure(figsize=(14, 5.5), layout="constrained")
-    for axes, panel in zip(figure.subplots(1, 3), PANELS, strict=True):
+    figure = Figure(figsize=(10.5, 4.2), layout="constrained")
+    flat = float(np.ptp(columns["y_mm"])) < FLAT * widest_mm
+    panels = figure.subplot_mosaic(STACKED if flat else BESIDE)
+    for axes, panel in zip((panels[name] for name in BESIDE), PANELS, strict=True):
         arrows = _draw_panel(axes, columns, panel, paired, speeds_m_s, m_s_per_mm)
     figure.axes[0].quiverkey(
         arrows, 0.04, 0.96, median_m_s, f"{median_m_s:.3g} m/s", labelpos="E", coordinates="figure"

@@ -106,7 +106,7 @@ def shadowgraph_figure(images: Mapping[str, NDArray[np.generic]], title: str = "
     title : str
         Title of the figure.
     """
-    figure = Figure(figsize=(3.4 * len(images), 2.9))
+    figure = Figure(figsize=(2.6 * len(images), 2.4))
     room = Room(left=0.65, right=0.1, bottom=0.45, top=_top_in(title), across=0.45)
     (panels,) = spaced_panels(figure, 1, len(images), room)
     for axes, (name, image) in zip(panels, images.items(), strict=True):

@@ -17,10 +17,13 @@ from processing.analysis.spray.density_map import density_map
 from processing.analysis.spray.spray_axis import SprayAxis
 from processing.analysis.spray.spray_sample import SpraySample, spray_sample
 from processing.analysis.spray.spray_statistics import AskedFor, SprayStatistics, spray_statistics
+from processing.analysis.spray.velocity_field import field_across_axis, field_through_axis
 from processing.figures.sprays.distribution_figure import distribution_figure
+from processing.figures.sprays.field_figure import velocity_field_figure
 from processing.figures.sprays.motion_figure import motion_figure
 from processing.figures.sprays.space_figures import density_figure, patternation_figure
 from processing.runs.sprays.measured_spray import MeasuredSpray
+from server.reports.liquid_sections import ReportedLiquid, break_up_section, unknown_section
 from server.reports.page import Picture, Section, Table, write_report
 from server.reports.spray_tables import classes_table, doubts, figures_table, fits_table, patternation_table
 
@@ -175,6 +178,25 @@ def _motion(reported: ReportedSpray) -> Section | None:
     return Section("Velocities", text, pictures=[Picture(figure, caption, svg=True)])
 
 
+def _velocity_field(reported: ReportedSpray) -> Section | None:
+    sample, axis = reported.sample, reported.asked.axis
+    if sample is None or axis is None:
+        return None
+    through, across = field_through_axis(sample, axis), field_across_axis(sample, axis)
+    if through is None and across is None:
+        return None
+    caption = (
+        "Arrows: mean velocities of the droplets of a cell, within the slice. "
+        + ("Left: through the axis; colours are numbers of droplets. Right: " if through and across else "A slice ")
+        + ("across the axis; colours are velocities along it. " if across else "through it; colours count droplets. ")
+        + "Cells with fewer than five droplets that have a velocity have no arrow."
+    )
+    flat = "" if through else "The box is too flat along the axis for a slice through it."
+    return Section(
+        "Velocity field", flat, pictures=[Picture(velocity_field_figure(through, across), caption, svg=True)]
+    )
+
+
 def _patternations(reported: ReportedSpray) -> Section | None:
     found = reported.told.patternations
     if not found:
@@ -198,8 +220,18 @@ def _density(reported: ReportedSpray) -> Section | None:
     maps = [one for one in found if one and len(one.mean_per_mm3) >= LEAST_ROWS]
     if not maps:
         return None
-    caption = "Number density, mean along the third axis: mean over all exposures, and how shots scatter."
+    scatter = ", and how shots scatter" if reported.sample.several else ""
+    caption = f"Number density, mean along the third axis: mean over all exposures{scatter}."
     return Section("Number density", pictures=[Picture(density_figure(maps), caption, svg=True)])
+
+
+def _break_up(reported: ReportedSpray) -> Section | None:
+    liquid = ReportedLiquid.of_files(reported.spray.shots)
+    return break_up_section(liquid) if liquid else None
+
+
+def _unknown(reported: ReportedSpray) -> Section | None:
+    return unknown_section(reported.spray.shots)
 
 
 def _shots(reported: ReportedSpray) -> Section:
@@ -238,5 +270,5 @@ def _definitions(_: ReportedSpray) -> Section:
     return Section("What the figures mean", points=DEFINITIONS)
 
 
-OF_THE_SPRAY: tuple[Chapter, ...] = (_sizes, _motion, _patternations, _density)
-CHAPTERS: tuple[Chapter, ...] = (_summary, _origin, *OF_THE_SPRAY, _shots, _tables, _definitions)
+OF_THE_SPRAY: tuple[Chapter, ...] = (_sizes, _motion, _velocity_field, _patternations, _density)
+CHAPTERS: tuple[Chapter, ...] = (_summary, _origin, *OF_THE_SPRAY, _break_up, _unknown, _shots, _tables, _definitions)

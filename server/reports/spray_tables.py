@@ -47,7 +47,13 @@ def _of_motion(motion: SprayMotion) -> Iterator[tuple[str, Estimate | None]]:
 
 
 def _cells(estimate: Estimate) -> Row:
-    return [f"{estimate.value:.4g}", f"{estimate.low:.4g} to {estimate.high:.4g}"]
+    value, low, high = (three_digits(one) for one in (estimate.value, estimate.low, estimate.high))
+    return [value, f"{low} to {high}"]
+
+
+def three_digits(value: float) -> str:
+    """No more than a figure with an interval bears, and zeros at the end where they are known."""
+    return f"{value:#.3g}".rstrip(".")
 
 
 def figures_table(told: SprayStatistics) -> Table:
@@ -71,11 +77,11 @@ def fits_table(fits: tuple[SizeFit, ...]) -> Table:
     """Distributions that were fitted."""
     rows = [
         [
-            fit.name,
-            f"{fit.scale_um:.4g}",
-            f"{fit.shape:.3g}",
-            "" if fit.d32_um is None else f"{fit.d32_um:.4g}",
-            f"{fit.dv50_um:.4g}",
+            fit.told_name,
+            three_digits(fit.scale_um),
+            three_digits(fit.shape),
+            "" if fit.d32_um is None else three_digits(fit.d32_um),
+            three_digits(fit.dv50_um),
             f"{fit.largest_gap:.3f}",
             f"{fit.gap_by_chance:.3f}",
             "yes" if fit.fits else "no",

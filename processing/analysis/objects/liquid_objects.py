@@ -4,6 +4,7 @@ There is no volume of liquid: the hull holds 4 to 13 times as much. Length and w
 object's own as long as nothing else lies behind it or before it.
 """
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from enum import StrEnum
 
@@ -78,6 +79,33 @@ class LiquidObjects:
         """No objects."""
         empty, vectors = np.empty(0), np.empty((0, 3))
         return cls(vectors, np.empty(0, "U8"), empty, empty, empty, empty, vectors, empty, np.empty(0, bool))
+
+    @classmethod
+    def of(cls, columns: Mapping[str, NDArray[np.generic]]) -> "LiquidObjects":
+        """Objects of the columns of a file; no objects of none."""
+        if not columns:
+            return cls.none()
+
+        def vectors(*names: str) -> FloatArray:
+            return np.column_stack([np.asarray(columns[name], np.float64) for name in names])
+
+        return cls(
+            points_mm=vectors("x_mm", "y_mm", "z_mm"),
+            classes=columns["class"].astype("U8"),
+            lengths_mm=np.asarray(columns["length_mm"], np.float64),
+            widths_mm=np.asarray(columns["width_mm"], np.float64),
+            thicknesses_mm=np.asarray(columns["thickness_mm"], np.float64),
+            length_sd_mm=np.asarray(columns["length_sd_mm"], np.float64),
+            directions=vectors("direction_x", "direction_y", "direction_z"),
+            own_share=np.asarray(columns["own_share"], np.float64),
+            open=columns["open"].astype(bool),
+        )
+
+    @classmethod
+    def joined(cls, parts: Sequence["LiquidObjects"]) -> "LiquidObjects":
+        """Objects of several exposures, one below the other; at least one."""
+        names = [field.name for field in fields(cls)]
+        return cls(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in names})
 
     def where(self, chosen: NDArray[np.bool_]) -> "LiquidObjects":
         """The chosen ones."""

@@ -107,7 +107,7 @@ def told_objects(found: ExposureObjects | None) -> dict[str, Any]:
     if found is None:
         return {}
     told = {
-        **{f"{kind.value}s": found.objects.count(kind) for kind in _COUNTED},
+        **{f"{kind.value}s": found.objects.count(kind) for kind in COUNTED},
         "reason": found.reason,
         "blind_share": found.blind_share,
         "unjudged_share": found.unjudged_share,
@@ -116,7 +116,7 @@ def told_objects(found: ExposureObjects | None) -> dict[str, Any]:
     return {"objects": told}
 
 
-_COUNTED = (ObjectClass.LIGAMENT, ObjectClass.SHEET, ObjectClass.CLUSTER)
+COUNTED = (ObjectClass.LIGAMENT, ObjectClass.SHEET, ObjectClass.CLUSTER)
 
 
 class BreakUpLength(FrozenValue):
@@ -146,25 +146,37 @@ NO_OBJECTS = "nobody looked for it: bright particles, or a file of an older prog
 
 def liquid_summary(shots: Sequence[StoredDroplets]) -> LiquidSummary:
     """Objects of some shots by their files; the break-up length is of the first exposure of each."""
-    told = [list(_objects_of(shot)) for shot in shots]
-    counts = {f"{kind}s": sum(one[f"{kind}s"] for shot in told for one in shot) for kind in _COUNTED}
-    reaches = [Reach(**{name: _frozen(value) for name, value in shot[0]["reach"].items()}) for shot in told if shot]
+    told = [one for shot in shots for one in told_of_exposures(shot)]
+    counts = {kind: sum(int(one[f"{kind}s"]) for one in told) for kind in COUNTED}
+    return summary_of(counts, reaches_of(shots))
+
+
+def summary_of(counts: Mapping[ObjectClass, int], reaches: Sequence[Reach]) -> LiquidSummary:
+    """Objects by their classes, and the break-up length of one exposure each of some shots."""
+    counted = LiquidSummary.model_validate({f"{kind}s": counts[kind] for kind in COUNTED})
     if not reaches:
-        return LiquidSummary(**counts, break_up_reason=NO_OBJECTS)
+        return counted.model_copy(update={"break_up_reason": NO_OBJECTS})
     found = break_up_of(reaches)
     value = None
     if found.value_mm is not None and found.low_mm is not None:
         value = BreakUpLength(value=found.value_mm, low=found.low_mm, high=found.high_mm)
-    return LiquidSummary(
-        **counts,
-        break_up_mm=value,
-        break_up_longer_than_mm=found.longer_than_mm,
-        break_up_shots=found.shots,
-        break_up_reason=found.reason,
-    )
+    length = {
+        "break_up_mm": value,
+        "break_up_longer_than_mm": found.longer_than_mm,
+        "break_up_shots": found.shots,
+        "break_up_reason": found.reason,
+    }
+    return counted.model_copy(update=length)
 
 
-def _objects_of(shot: StoredDroplets) -> list[Mapping[str, Any]]:
+def reaches_of(shots: Sequence[StoredDroplets]) -> list[Reach]:
+    """How far liquid hangs together in the first exposure of each shot of which the file says it."""
+    told = map(told_of_exposures, shots)
+    return [Reach(**{name: _frozen(value) for name, value in shot[0]["reach"].items()}) for shot in told if shot]
+
+
+def told_of_exposures(shot: StoredDroplets) -> list[Mapping[str, Any]]:
+    """What the file of a shot says of liquid that is no droplet, exposure by exposure."""
     exposures = json.loads(str(shot.provenance.get("exposures", "{}"))).values()
     return [exposure["objects"] for exposure in exposures if exposure.get("objects")]
 

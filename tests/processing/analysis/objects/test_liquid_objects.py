@@ -123,3 +123,13 @@ def test_of_no_voxels_there_are_no_objects() -> None:
     nothing = hull_of(*_ball(1e-6), distant_views(), VoxelGrid.centred((4, 4, 4), 0.1))
     assert len(liquid_objects(nothing, connected(nothing), distant_views())) == 0
     assert set(LiquidObjects.none().columns()) == set(_seen(_ball()).columns())
+
+
+def test_columns_of_a_file_are_the_objects_again() -> None:
+    found = _seen(_thread((0, 1, 0)))
+    columns = {
+        name: column.astype("U") if column.dtype.kind == "S" else column for name, column in found.columns().items()
+    }
+    both = LiquidObjects.joined([LiquidObjects.of(columns), LiquidObjects.of({})])
+    for name, column in found.columns().items():
+        np.testing.assert_array_equal(both.columns()[name], column, name)

@@ -26,8 +26,8 @@ def test_the_report_says_it_all_in_one_file(page: Path, capsys: pytest.CaptureFi
     text = page.read_text()
     chapters = re.findall(r"<h2>(.*?)</h2>", text)
     assert chapters == [
-        "Summary", "Where the numbers come from", "Sizes", "Velocities", "Patternation", "Number density", "Shots",
-        "Tables", "What the figures mean",
+        "Summary", "Where the numbers come from", "Sizes", "Velocities", "Velocity field", "Patternation",
+        "Number density", "Shots", "Tables", "What the figures mean",
     ]  # fmt: skip
     assert not re.findall(r'(?:src|href)="(?!data:)', text), "nothing is fetched from elsewhere"
     for said in (
@@ -36,11 +36,12 @@ def test_the_report_says_it_all_in_one_file(page: Path, capsys: pytest.CaptureFi
         "cal-1",
         "sampling: spatial",
         "lognormal",
+        "Rosin-Rammler",
         "ISO 9276-1",
         "ASTM E799",
     ):
         assert said in text, said
-    assert text.count("<figure>") == 4
+    assert text.count("<figure>") == 5
     assert "exists; only --overwrite replaces it" in refused(capsys, "report", page.parent / "cone", "-o", page)
 
 
@@ -56,7 +57,7 @@ def test_a_browser_shows_every_picture_and_prints_pages(page: Path) -> None:
         wider = tab.evaluate("document.documentElement.scrollWidth > window.innerWidth")
         printed = tab.pdf(prefer_css_page_size=True)
         browser.close()
-    assert len(widths) == 4
+    assert len(widths) == 5
     assert min(widths) > 300
     assert not wider
     assert printed.startswith(b"%PDF")

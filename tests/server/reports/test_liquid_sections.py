@@ -1,0 +1,82 @@
+"""Chapters on ligaments, break-up, and what nobody can know: they say what files say, and why something is missing."""
+
+import json
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from processing.analysis.droplets.droplet_file import StoredDroplets
+from processing.analysis.objects.break_up import THRESHOLDS, Reach
+from processing.analysis.objects.liquid_objects import LiquidObjects
+from processing.figures.object_figures import ObjectsShot
+from processing.volume import VoxelGrid
+from server.reports.liquid_sections import NO_MAP, ReportedLiquid, break_up_section, unknown_section
+
+GRID = VoxelGrid((4, 5, 6), (0.0, 0.0, 0.0), 0.1)
+
+
+def reach(length_mm: float) -> Reach:
+    return Reach(THRESHOLDS, (length_mm,) * 4, (False,) * 4, 0.01)
+
+
+def shot(*reaches: Reach) -> StoredDroplets:
+    """A ligament and a sheet in each exposure."""
+    classes = ["ligament", "sheet"] * len(reaches)
+    numbers = {"x_mm": 0.0, "y_mm": 1.0, "z_mm": 0.0, "length_mm": 0.5, "width_mm": 0.1, "thickness_mm": 0.1}
+    more = {"length_sd_mm": 0.01, "direction_x": 0.6, "direction_y": 0.8, "direction_z": 0.0, "own_share": 1.0}
+    objects: dict[str, Any] = {name: np.full(len(classes), value) for name, value in {**numbers, **more}.items()}
+    objects |= {"frame": np.repeat(["a", "b"], 2)[: len(classes)], "class": np.array(classes)}
+    objects["open"] = np.zeros(len(classes), np.uint8)
+    told: dict[str, Any] = {"ligaments": 1, "sheets": 1, "clusters": 0, "blind_share": 0.01}
+    exposures = {
+        frame: {
+            "objects": {**told, "unjudged_share": 0.02 * (1 + number), "reach": asdict(one)},
+            "hidden": {"volume_share": 0.1},
+        }
+        for number, (frame, one) in enumerate(zip("ab", reaches, strict=False))
+    }
+    return StoredDroplets({"frame": np.empty(0, "U1")}, {"exposures": json.dumps(exposures)}, objects)
+
+
+def test_lengths_have_limits_and_truth_and_objects_are_counted_by_exposure() -> None:
+    liquid = ReportedLiquid.of_files([shot(reach(length_mm), reach(9.0)) for length_mm in (4.0, 5.0, 6.0)])
+    assert liquid
+    section = break_up_section(liquid)
+    assert section.text.startswith("Break-up length 5.00 mm along the axis (95 % limits ")
+    assert "3 shots" in section.text
+    (table,) = section.tables
+    rows = {row[0]: row[1:] for row in table.rows}
+    assert rows["ligaments"] == ["6", "1.0", "0.50", "0.50 to 0.50", "0.100"]
+    assert rows["clusters"] == ["0", "0.0", "", "", ""]
+    curve, objects = section.pictures[0].figure.axes
+    assert "share of shots" in curve.get_ylabel()
+    assert "ligament (1)" in {text.get_text() for text in objects.get_legend().get_texts()}  # type: ignore[union-attr]
+    known = ReportedLiquid(liquid.reaches, 6, liquid.objects, liquid.shown, np.array([4.9, 5.2, 5.0]), GRID)
+    assert "In truth it is 5.00 mm" in break_up_section(known).text
+
+
+def test_without_a_length_the_reason_is_told_and_there_is_no_curve() -> None:
+    liquid = ReportedLiquid.of_files([shot(Reach(reason="nobody stated where the nozzle is"))])
+    assert liquid
+    section = break_up_section(liquid)
+    assert section.text.startswith("No break-up length: nobody stated where the nozzle is.")
+    assert len(section.pictures[0].figure.axes) == 1
+
+
+def test_shares_that_cannot_be_known_are_told_and_mapped_where_images_were_seen() -> None:
+    shots = [shot(reach(5.0), reach(5.0))]
+    section = unknown_section(shots)
+    assert section
+    assert NO_MAP in section.text
+    assert [row[1:] for row in section.tables[0].rows] == [["3.00", "4.00"], ["1.00", "1.00"], ["10.00", "10.00"]]
+    mapped = unknown_section(shots, ObjectsShot(LiquidObjects.none(), np.full(GRID.shape, 4, np.uint8), GRID))
+    assert mapped
+    assert NO_MAP not in mapped.text
+    assert len(mapped.pictures) == 1
+
+
+def test_of_files_that_say_nothing_there_is_no_chapter() -> None:
+    old = StoredDroplets({"frame": np.empty(0, "U1")}, {"exposures": json.dumps({"a": {"verdict": "good"}})})
+    assert ReportedLiquid.of_files([old]) is None
+    assert unknown_section([old]) is None
