@@ -19,7 +19,8 @@ def add(verbs: Verbs) -> None:
 def demo(options: Namespace) -> Outcome:
     """Record, calibrate, reconstruct, and judge all that by the truth."""
     from server.demo.demo import demonstrate
-    from server.demo.demo_report import readable_summary, summary, write_demo_report
+    from server.demo.demo_report import write_demo_report
+    from server.demo.demo_summary import readable_summary, summary
 
     options.out.mkdir(parents=True, exist_ok=True)
     demonstration = demonstrate(options.config, options.out, options.shots, progress, options.firmware)

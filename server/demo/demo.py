@@ -33,6 +33,7 @@ from processing.synthetic.spray import droplet_volume
 from processing.synthetic.truth_file import read_true_cameras, read_true_spray
 from processing.volume import VoxelGrid
 from server.demo.demo_droplets import MeasuredDroplets, measure_droplets
+from server.demo.demo_liquid import MeasuredLiquid, measure_liquid
 from server.rig.assembly import AssembledRig, open_rig
 from server.rig.config import ConfigError, RigConfig, load_config
 from server.rig.rig_lock import hold_data_dir
@@ -74,6 +75,7 @@ class Demonstration:
     results_dir: Path
     quality_factors: tuple[float, ...]
     droplets: MeasuredDroplets
+    liquid: MeasuredLiquid
     shots_planned: int
     shots_recorded: int
     shots_valid: int
@@ -83,7 +85,7 @@ class Demonstration:
 def demonstrate(
     config_file: Path, out: Path, shots: int, progress: Progress, firmware: str | None = None
 ) -> Demonstration:
-    """Calibrate, record dark, background and samples, reconstruct each shot, measure one, compare with the truth.
+    """Calibrate, record references and spray, reconstruct each shot, measure droplets and break-up, ask the truth.
 
     ``firmware`` stands for the configuration's ``simulation.firmware``.
 
@@ -117,6 +119,8 @@ def demonstrate(
         droplets = measure_droplets(
             sample, valid[0], calibration, calibration_path(out, calibration.id), sample / TRUTH_FILE
         )
+        progress("looking for ligaments and the break-up in exposure A of every shot")
+        liquid = measure_liquid(sample, valid, calibration, sample / TRUTH_FILE)
     with watch.step("judge"):
         progress("comparing with the truth")
         qualities = tuple(_quality(sample, results_dir, result.shot) for result in results)
@@ -128,6 +132,7 @@ def demonstrate(
         results_dir=results_dir,
         quality_factors=qualities,
         droplets=droplets,
+        liquid=liquid,
         shots_planned=shots,
         shots_recorded=recorded,
         shots_valid=len(results),

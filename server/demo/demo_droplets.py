@@ -12,6 +12,7 @@ from processing.analysis.droplets.droplet_statistics import DropletStatistics, d
 from processing.analysis.droplets.ghost_share import RADIUS_VOXEL, matches
 from processing.calibration.calibration import Calibration
 from processing.figures.found_figures import Placed
+from processing.geometry import FloatArray
 from processing.reconstruction.settings import GridSettings
 from processing.runs.measured_shot import ShotDroplets
 from processing.runs.measurement import MeasureSettings, RunMeasurement
@@ -24,6 +25,23 @@ HALF_WIDTH_MM, TOP_MM, BOTTOM_MM = 5.8, -1.1, -0.4
 """Of the box, in x and z as wide as the cone and the droplets around it; the sheet ends 3 mm above."""
 COUNTED_UM = 30.0
 """Droplets found and ghosts are counted from this diameter on."""
+
+
+@dataclass(frozen=True)
+class JudgedVelocities:
+    """Velocities of true droplets.
+
+    Parameters
+    ----------
+    mean_m_s, true_mean_m_s : tuple of 3 float
+        Of the same droplets, as measured and in truth.
+    rms_m_s : float
+        Root mean square error of a component.
+    """
+
+    mean_m_s: tuple[float, float, float]
+    true_mean_m_s: tuple[float, float, float]
+    rms_m_s: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,8 +63,8 @@ class MeasuredDroplets:
         ``COUNTED_UM`` on. Droplets that liquid hides count as missed.
     true_d32_um : float
         Of all true droplets in the box.
-    velocity_rms_m_s : float | None
-        Root mean square error of a component of the velocities of true droplets; None without velocities.
+    velocities : JudgedVelocities | None
+        Against the truth; None without velocities.
     """
 
     file: Path
@@ -57,7 +75,7 @@ class MeasuredDroplets:
     missed: Placed
     ghosts: Placed
     true_d32_um: float
-    velocity_rms_m_s: float | None
+    velocities: JudgedVelocities | None
 
     @property
     def found_share(self) -> float:
@@ -86,7 +104,7 @@ def measure_droplets(
     results_dir = run_dir / "results" / settings.results_id(calibration.id)
     with RunReader(run_dir) as run:
         told = RunMeasurement.of(run, shot, calibration_file, settings).measure(shot, results_dir).summary
-        sprays = _true_sprays(run, shot, truth_file)
+        sprays = true_sprays(run, shot, truth_file)
     stored = read_droplets(results_dir / told.file)
     found, missed, ghosts = zip(*(_judged(stored, frame, spray, grid) for frame, spray in sprays.items()), strict=True)
     true_mm = np.concatenate([_droplets(spray).inside(grid).diameters_mm for spray in sprays.values()])
@@ -99,11 +117,11 @@ def measure_droplets(
         missed=_joined(missed),
         ghosts=_joined(ghosts),
         true_d32_um=1000 * float(np.sum(true_mm**3) / np.sum(true_mm**2)),
-        velocity_rms_m_s=_velocity_rms_m_s(stored, sprays["a"], grid),
+        velocities=_judged_velocities(stored, sprays["a"], grid),
     )
 
 
-def _true_sprays(run: RunReader, shot: int, truth_file: Path) -> Mapping[str, Spray]:
+def true_sprays(run: RunReader, shot: int, truth_file: Path) -> Mapping[str, Spray]:
     """The liquid of both exposures: that of A is on file, and flies on until the second pulse."""
     fired = run.read_shot(shot).fired
     if fired is None:
@@ -130,7 +148,7 @@ def _judged(stored: StoredDroplets, frame: str, spray: Spray, grid: VoxelGrid) -
     return _counted(true, ~missed), _counted(true, missed), _counted(told, ghost)
 
 
-def _velocity_rms_m_s(stored: StoredDroplets, spray: Spray, grid: VoxelGrid) -> float | None:
+def _judged_velocities(stored: StoredDroplets, spray: Spray, grid: VoxelGrid) -> JudgedVelocities | None:
     """Of droplets of A that have a velocity and are true ones."""
     if "u_m_s" not in stored.columns:
         return None
@@ -141,8 +159,15 @@ def _velocity_rms_m_s(stored: StoredDroplets, spray: Spray, grid: VoxelGrid) -> 
     )
     match = matches(points_mm, truth.positions_mm, RADIUS_VOXEL * grid.pitch_mm)[0]
     judged = (match >= 0) & np.isfinite(velocities_m_s[:, 0])
-    errors_m_s = velocities_m_s[judged] - truth.velocities_mm_per_s[match[judged]] / 1000
-    return float(np.sqrt(np.mean(errors_m_s**2))) if judged.any() else None
+    if not judged.any():
+        return None
+    told_m_s, true_m_s = velocities_m_s[judged], truth.velocities_mm_per_s[match[judged]] / 1000
+    return JudgedVelocities(_mean(told_m_s), _mean(true_m_s), float(np.sqrt(np.mean((told_m_s - true_m_s) ** 2))))
+
+
+def _mean(velocities_m_s: FloatArray) -> tuple[float, float, float]:
+    u, v, w = (float(one) for one in velocities_m_s.mean(0))
+    return u, v, w
 
 
 def _counted(droplets: Placed, chosen: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]) -> Placed:
