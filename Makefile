@@ -150,7 +150,7 @@ REMOVE_CV2 := $(PYTHON) -m pip uninstall -qq --yes opencv-python-headless opencv
 	@touch $@
 
 # An editable install remembers where each module was, and finds one that has moved no more.
-MODULES := $(sort $(shell find daq processing server -name '*.py'))
+MODULES := $(sort $(shell find daq processing server tomoshadow -name '*.py'))
 build/.modules: FORCE
 	@mkdir -p build
 	@echo $(MODULES) | cmp -s - $@ || echo $(MODULES) >$@

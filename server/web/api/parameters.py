@@ -10,12 +10,19 @@ from starlette.requests import HTTPConnection
 from daq.names import Identifier
 from server.lab.services import Context
 from server.lab.starting.light_request import LightRequest
+from server.web.abort_listener import AbortListener
 
 
 def context_of(connection: HTTPConnection) -> Context:
     """Return what the application built at start-up."""
     context: Context = connection.app.state.context
     return context
+
+
+def abort_port_of(connection: HTTPConnection) -> int:
+    """Return where ABORT alone is listened for."""
+    listener: AbortListener = connection.app.state.abort_listener
+    return listener.port
 
 
 def forbid_unknown_query(request: Request) -> None:
@@ -46,6 +53,7 @@ def light_request(
 
 
 AsksForLight = Annotated[LightRequest, Depends(light_request)]
+AbortPort = Annotated[int, Depends(abort_port_of)]
 ContextOf = Annotated[Context, Depends(context_of)]
 RunId = Annotated[Identifier, Path(description="name of the run directory")]
 CalibrationId = Annotated[Identifier, Path(description="name of the calibration file, without its ending")]

@@ -11,7 +11,7 @@ from server.lab.duty import Lamp
 from server.lab.runs.run_summary import RunCause
 from server.lab.starting.abort import abort_all
 from server.lab.watch import CalibrationStanding
-from server.web.api.parameters import ContextOf
+from server.web.api.parameters import AbortPort, ContextOf
 from server.web.problems import responses
 
 router = APIRouter(prefix="/api/rig", tags=["rig"])
@@ -45,6 +45,8 @@ class RigView(FrozenModel):
     views: Annotated[list[str], Field(description="names of the lines of sight, in the order of the live view")]
     lamps: Annotated[tuple[Lamp, ...], Field(description="every device, and work in the background that fails")]
     acquisition: Annotated[AcquisitionView, Field(description="what acquisition does")]
+    beat: Annotated[int, Field(description="of /api/beat, now; a script names it where it asks for light")]
+    abort_port: Annotated[int, Field(description="TCP port of ABORT alone; it answers while this one is busy")]
     calibration: Annotated[
         CalibrationStanding | None,
         Field(description="how the calibration in use fitted the last shot that was checked; null: nothing is known"),
@@ -52,7 +54,7 @@ class RigView(FrozenModel):
 
 
 @router.get("")
-async def show_rig(context: ContextOf) -> RigView:
+async def show_rig(context: ContextOf, abort_port: AbortPort) -> RigView:
     """State of every device and of acquisition; devices are asked once a second."""
     config = context.services.config
     return RigView(
@@ -61,6 +63,8 @@ async def show_rig(context: ContextOf) -> RigView:
         views=list(config.views),
         lamps=context.lamps,
         acquisition=view_of_acquisition(context),
+        beat=context.beat.number,
+        abort_port=abort_port,
         calibration=context.standing,
     )
 
