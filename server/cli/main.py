@@ -27,16 +27,22 @@ from server.cli import (
     study,
 )
 from server.cli.calibrations import calibrate, check, self_calibrate, size_calibration
+from server.cli.clients import abort, run, runs, watch
 from server.cli.cluster import scheduler, worker
 from server.cli.keeping import pack, repair, verify
 from server.cli.output import endable, say, tell
 from server.cli.runs import tracks
 from server.cli.spray import report, statistics
 from server.lab.errors import ServerError
+from tomoshadow.client.errors import ClientError
 
 COMMANDS = (
     demo,
     serve,
+    run,
+    watch,
+    abort,
+    runs,
     simulate,
     doctor,
     import_images,
@@ -73,6 +79,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             outcome = options.command(options)
     except (BadInput, PlanError, ShotFileError) as error:
         return _fail(options, error, status=2)
+    except ClientError as error:
+        return _fail(options, error, status=2 if error.is_bad_input else 1)
     except (DaqError, ServerError, MemoryError, OSError) as error:
         return _fail(options, error, status=1)
     except KeyboardInterrupt:
@@ -95,7 +103,8 @@ def _joined(arguments: Sequence[str]) -> list[str]:
 def _fail(options: Namespace, error: BaseException, status: int) -> int:
     say(f"tomoshadow: {error}", sys.stderr)
     if options.json:
-        say(json.dumps({"error": str(error), "kind": type(error).__name__}), sys.stdout)
+        code = {"code": error.code} if isinstance(error, ClientError) else {}
+        say(json.dumps({"error": str(error), "kind": type(error).__name__, **code}), sys.stdout)
     return status
 
 

@@ -29,7 +29,8 @@ def serve(options: Namespace) -> Outcome:
     ):
         address = f"[{server.host}]" if ":" in server.host else server.host
         progress(
-            f"{config.name}: opening all devices; then the page is at http://{address}:{server.port}; Ctrl-C ends it"
+            f"{config.name}: opening all devices; then the page is at http://{address}:{server.port}, "
+            f"and ABORT alone at port {abort_port.getsockname()[1]}; Ctrl-C ends it"
         )
         with hold_rig(config):  # is asked before the server is loaded, which takes seconds
             from server.web.serve import serve_rig

@@ -82,7 +82,8 @@ class Connection:
                 content = None if body is None else json.dumps(body)
                 connection.request(method, path, content, {**self._headers, **kind, **headers})
                 answer = connection.getresponse()
-            yield answer
+            with answer:
+                yield answer
         finally:
             connection.close()
 

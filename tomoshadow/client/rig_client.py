@@ -160,8 +160,15 @@ class RigClient:
         """End a run after the shot under way."""
         self._server.ask("POST", f"/api/runs/{quote(run_id, safe='')}/stop")
 
-    def abort(self, limit_s: float = LIMIT_S) -> str:
+    def abort(self, limit_s: float = LIMIT_S, port: int | None = None) -> str:
         """Light off at once, whatever runs; what was ended, in words.
+
+        Parameters
+        ----------
+        limit_s : float
+            How long it may take until that is confirmed.
+        port : int | None
+            Of ABORT alone; None: as it is known.
 
         Raises
         ------
@@ -169,6 +176,7 @@ class RigClient:
             Not confirmed within a second (``not_delivered``): use the hardware stop.
         """
         began_s = time.monotonic()
+        self._abort_port = port or self._abort_port
         if self._abort_port is None:
             with suppress(ClientError):
                 told, _ = self._server.within(limit_s / 3).ask("GET", "/api/rig")

@@ -13,7 +13,19 @@ from tests.support.command_line import refused
 from tests.support.fresh_interpreter import modules_after, packages_of
 
 ROOT = Path(__file__).parents[3]
-CHAIN = ("demo", "serve", "doctor", "import", "calibrate", "check", "self-calibrate", "reconstruct", "average")
+CLIENTS = ("run", "watch", "abort", "runs")
+CHAIN = (
+    "demo",
+    "serve",
+    *CLIENTS,
+    "doctor",
+    "import",
+    "calibrate",
+    "check",
+    "self-calibrate",
+    "reconstruct",
+    "average",
+)
 STUDIES = ("density", "ghosts", "average", "residuals", "calibration", "sensitivity")
 TOOLS = ("info", "selftest", "scope", "light", "flash")
 WORDS = [

@@ -1,0 +1,4 @@
+"""Commands that ask a running server by its API: start a run, list runs, watch one, abort.
+
+``server/cli/main.py`` imports them. They are thin: what can be asked is in ``tomoshadow.client``.
+"""

@@ -1,0 +1,26 @@
+"""``tomoshadow run``: start a run by the server, and watch it."""
+
+from argparse import Namespace
+from pathlib import Path
+
+from server.cli.clients.server_option import add_server, client_of
+from server.cli.clients.watching import watched
+from server.cli.options import Verbs, add_verb
+from server.cli.output import Outcome
+
+
+def add(verbs: Verbs) -> None:
+    """Add the command."""
+    parser = add_verb(verbs, "run", run, "start a run by a server that is running, and watch it to its end")
+    parser.add_argument(
+        "plan", type=Path, metavar="PLAN.toml", help="name, kind, shots, rate_hz, [pulse], as in the API"
+    )
+    add_server(parser)
+
+
+def run(options: Namespace) -> Outcome:
+    """Check the plan, start it once, and watch it; passed: the run was completed."""
+    from server.cli.clients.plan_file import read_plan
+
+    plan, client = read_plan(options.plan), client_of(options)
+    return watched(client, client.start(plan), options)

@@ -1,0 +1,46 @@
+"""What is shown of a run under way until it ends, or until nobody wants to see more."""
+
+from argparse import Namespace
+from dataclasses import asdict
+from typing import TYPE_CHECKING
+
+from server.cli.clients.server_option import named
+from server.cli.output import Bar, Outcome, progress
+
+if TYPE_CHECKING:
+    from tomoshadow.client import Event, RigClient, Run
+
+LONGEST_S = 24 * 3600.0
+"""A run that lasts longer is watched anew."""
+
+
+def watched(client: "RigClient", run_id: str, options: Namespace) -> Outcome:
+    """Show a run until its end; Ctrl-C ends the watching, and not the run."""
+    progress(f"run {run_id}; Ctrl-C ends the watching, and not the run")
+    try:
+        planned = client.run(run_id).shots_planned or 0
+        with Bar() as bar:
+            for event in client.follow(run_id, LONGEST_S):
+                _show(bar, event, planned)
+        return _told(client.run(run_id))
+    except KeyboardInterrupt:
+        server = named(options)
+        text = (
+            f"run {run_id} goes on. See it again: tomoshadow watch {run_id}{server}. "
+            f"End it now: tomoshadow abort{server}; after its shot: Stop on the page"
+        )
+        return Outcome({"passed": False, "run_id": run_id, "outcome": "active"}, text)
+
+
+def _show(bar: Bar, event: "Event", planned: int) -> None:
+    if event.name == "shot_recorded":
+        number = event.data["index"] + 1
+        bar.step(number, planned, f"shot {number} of {planned}{'' if event.data['valid'] else ': INVALID'}")
+    elif text := event.data.get("message") or event.data.get("text"):
+        progress(text)
+
+
+def _told(run: "Run") -> Outcome:
+    counts = f"{run.shots_recorded} of {run.shots_planned} shots recorded, {run.shots_valid} valid"
+    text = f"run {run.run_id}: {run.outcome}, {counts}{f'; {run.cause}' if run.cause else ''}"
+    return Outcome({"passed": run.outcome == "completed", **asdict(run)}, text)
