@@ -46,6 +46,6 @@ def switch_off(doors: list[_Door], limit_s: float = LIMIT_S) -> str:
 def _knock(connection: Connection, path: str, heard: "Queue[str | ClientError]") -> None:
     try:
         told, _ = connection.ask("POST", path)
-        heard.put(str(told.get("ended") or told.get("message") or "whatever was under way"))
+        heard.put(str(told.get("ended") or told.get("run_id") or "whatever was under way"))
     except ClientError as error:
         heard.put(error)
