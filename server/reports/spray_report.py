@@ -44,6 +44,7 @@ DEFINITIONS = (
 
 SHOT_HEAD = ("run", "shot", "exposure", "residual / noise", "hidden [%]", "verdict", "reasons")
 VERDICT = SHOT_HEAD.index("verdict")
+SAMPLES = {"adequate": "The sample is adequate.", "low sample": "The sample is low: intervals may be too narrow."}
 LEAST_ROWS = 4
 """Of a map of number density: a box that is thinner has none over that axis."""
 Chapter = Callable[["ReportedSpray"], Section | None]
@@ -94,9 +95,7 @@ def _summary(reported: ReportedSpray) -> Section:
         f"{told.droplets.n} droplets, exposures: {told.droplets.exposures}, shots: {told.droplets.shots}; "
         f"sampling: {told.sampling}."
     )
-    adequate = told.sample and told.sample.verdict == "adequate"
-    verdict = "The sample is adequate." if adequate else "The sample is low: intervals may be too narrow."
-    text = f"{counted} {verdict} {_verdicts(reported)}"
+    text = f"{counted} {SAMPLES[told.sample.verdict] if told.sample else ''} {_verdicts(reported)}"
     return Section("Summary", text, [figures_table(told)], points=doubts(told))
 
 

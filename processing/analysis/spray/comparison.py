@@ -21,7 +21,9 @@ from processing.reconstruction.settings import FrozenValue
 OF_DROPLETS = ("number_density_per_mm3", "d10_um", "d32_um", "dv10_um", "dv50_um", "dv90_um", "relative_span")
 OF_MOTION = ("speed_m_s", "volume_flux_mm_s", "flux_d32_um")
 OF_EXTENT = ("cone_angle_deg", "cone_angle_half_deg", "penetration_mm")
-ONE_SHOT = "a run of one shot says nothing of how shots differ: measure more of it"
+NOTHING = (
+    "no two runs have a figure of several shots in common; one shot says nothing of how shots differ: measure more"
+)
 
 
 class Difference(FrozenValue):

@@ -3,19 +3,17 @@
 A figure is no better than the shots that it comes from. Each of these is told beside the figures, wherever they go.
 """
 
-import json
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from processing.analysis.copied_shots import copies, named
 from processing.analysis.droplets.droplet_file import StoredDroplets
+from processing.analysis.shot_doubts import shot_doubts
 from processing.analysis.spray.spray_axis import SprayAxis
 from processing.analysis.spray.spray_sample import SpraySample
 from processing.analysis.velocity.velocity_verdict import FASTEST_M_S
 
-UNSURE = {"doubtful": "are doubtful, and count", "refused": "are refused, and do not count"}
 MOST_ASIDE_DEG = 45.0
 """Of the mean velocity from the axis; a spray flies along its axis, however wide it is."""
 LEAST_TOGETHER = 0.3
@@ -36,19 +34,8 @@ def spray_doubts(
     axis : SprayAxis | None
         As stated.
     """
-    exposures = [one for shot in shots for one in json.loads(str(shot.provenance["exposures"])).values()]
-    velocities = [json.loads(str(shot.provenance.get("velocity", "{}"))) for shot in shots]
-    doubts = [f"{count} exposures {why}" for count, why in _unsure(exposures)]
-    doubts += [f"velocities of {count} shots {why}" for count, why in _unsure(velocities)]
-    doubts += [f"{named(shot)} has the very droplets of {named(other)}: one is a copy" for shot, other in copies(shots)]
-    return (*doubts, *(_of_motion(sample, axis) if sample else ()))
-
-
-def _unsure(told: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, str]]:
-    """How many are doubtful and refused, and the reasons of the first one."""
-    for verdict, what in UNSURE.items():
-        if chosen := [one for one in told if one.get("verdict") == verdict]:
-            yield f"{len(chosen)} of {len(told)}", ": ".join([what, *chosen[0].get("reasons", ())[:1]])
+    copied = [f"{named(shot)} has the very droplets of {named(other)}: one is a copy" for shot, other in copies(shots)]
+    return (*shot_doubts(shots), *copied, *(_of_motion(sample, axis) if sample else ()))
 
 
 def _of_motion(sample: SpraySample, axis: SprayAxis | None) -> Iterator[str]:

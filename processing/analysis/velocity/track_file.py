@@ -1,5 +1,6 @@
 """Tracks of a series in an HDF5 file: 1-D columns, a row per droplet on a track."""
 
+import json
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -29,5 +30,6 @@ def write_tracks(path: Path, tracks: DropletTracks, provenance: Mapping[str, Val
         group = file.create_group(GROUP, track_order=True)
         for name, values in tracks.columns.items():
             group.create_dataset(name, data=values).attrs["units"] = unit_of(name)
-        told = {"schema": SCHEMA, "schema_version": SCHEMA_VERSION, "rate_hz": tracks.rate_hz}
+        told: dict[str, Value] = {"schema": SCHEMA, "schema_version": SCHEMA_VERSION, "rate_hz": tracks.rate_hz}
+        told["doubts"] = json.dumps(tracks.doubts)
         file.create_group(PROVENANCE).attrs.update({**provenance, **told})

@@ -11,7 +11,9 @@ from processing.analysis.copied_shots import copies, named
 from processing.analysis.droplets.droplet_file import DropletFileError, StoredDroplets
 from processing.analysis.droplets.droplet_table import COVARIANCES as PLACES
 from processing.analysis.droplets.droplet_table import Columns
+from processing.analysis.shot_doubts import shot_doubts
 from processing.analysis.velocity.moving_droplets import LEAST_SIZE, MovingDroplets
+from processing.analysis.velocity.track_doubts import rate_doubts
 from processing.analysis.velocity.track_motion import HALF_WINDOW, TrackPoints, track_points
 from processing.analysis.velocity.tracks import Tracks, link
 from processing.analysis.velocity.velocity_table import COVARIANCES
@@ -46,6 +48,8 @@ class DropletTracks:
         Of the shots.
     reason : str | None
         Why there is no track.
+    doubts : tuple of str
+        Why not to trust them: verdicts on the shots, velocities that contradict the rate.
     """
 
     columns: Columns
@@ -53,6 +57,7 @@ class DropletTracks:
     droplets: int
     rate_hz: float
     reason: str | None
+    doubts: tuple[str, ...] = ()
 
     @property
     def share_tracked(self) -> float:
@@ -99,7 +104,8 @@ def track_droplets(
     points = track_points(frames, linked, half_window)
     columns = _columns(points, linked, first, grid, rate_hz) | _sizes(points, first, ordered)
     count = sum(map(len, frames))
-    return DropletTracks(columns, linked.count, count, rate_hz, None if linked.count else NO_TRACK)
+    doubts = (*shot_doubts(ordered, "a"), *rate_doubts(columns, ordered, rate_hz))
+    return DropletTracks(columns, linked.count, count, rate_hz, None if linked.count else NO_TRACK, doubts)
 
 
 _NOBODY = MovingDroplets(np.empty((0, 3)), np.empty((0, 3, 3)), np.empty(0))

@@ -53,6 +53,7 @@ def _told(linked: "DropletTracks", shots: int, file: Path) -> dict[str, Any]:
         "median_length": linked.median_length,
         "rate_hz": linked.rate_hz,
         "reason": linked.reason,
+        "doubts": list(linked.doubts),
         "file": str(file),
         "passed": linked.tracks > 0,
     }
@@ -60,6 +61,8 @@ def _told(linked: "DropletTracks", shots: int, file: Path) -> dict[str, Any]:
 
 def _summary(result: dict[str, Any]) -> str:
     if result["reason"]:
-        return f"{result['droplets']} droplets of {result['shots']} shots: {result['reason']}"
+        nothing = f"{result['droplets']} droplets of {result['shots']} shots: {result['reason']}"
+        return "\n".join([nothing, *result["doubts"]])
     tracked = f"{100 * result['share_tracked']:.1f} % of {result['droplets']} droplets of {result['shots']} shots"
-    return f"{result['tracks']} tracks with {tracked}, {result['median_length']:g} in a median one; {result['file']}"
+    told = f"{result['tracks']} tracks with {tracked}, {result['median_length']:g} in a median one; {result['file']}"
+    return "\n".join([told, *result["doubts"]])

@@ -44,7 +44,7 @@ def _told(options: Namespace, spray: "MeasuredSpray") -> "SprayStatistics":
 
 
 def _compare(options: Namespace) -> Outcome:
-    from processing.analysis.spray.comparison import ONE_SHOT, differences
+    from processing.analysis.spray.comparison import NOTHING, differences
     from processing.runs.sprays.measured_spray import read_compared
 
     sprays = read_compared(options.results)
@@ -54,10 +54,10 @@ def _compare(options: Namespace) -> Outcome:
         "runs": {name: one.model_dump(mode="json") for name, one in told.items()},
         "measured_differently": list(sprays.unlike),
         "differences": [one.model_dump(mode="json") for one in found],
-        "reason": None if found else ONE_SHOT,
+        "reason": None if found else NOTHING,
     }
     texts = [*(_text(name, one) for name, one in told.items()), *sprays.unlike]
-    return Outcome(result, "\n\n".join([*texts, _differences(found) if found else ONE_SHOT]))
+    return Outcome(result, "\n\n".join([*texts, _differences(found) if found else NOTHING]))
 
 
 def _text(name: str, told: "SprayStatistics") -> str:

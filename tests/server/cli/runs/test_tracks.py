@@ -1,5 +1,6 @@
 """``tomoshadow tracks``: droplets of a series become tracks in physical units; bad input gets one clear sentence."""
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from processing.analysis.velocity.track_table import track_droplets
 from processing.analysis.velocity.tracks import Tracks
 from processing.reconstruction.settings import GridSettings
 from processing.volume import VoxelGrid
-from tests.support.command_line import refused, told
+from tests.support.command_line import refused, shown, told
 from tests.support.droplet_series import BOX, Series, series, whole_and_right
 
 RATE_HZ = 20_000.0
@@ -107,3 +108,29 @@ def test_a_rate_that_none_can_be_is_refused(tmp_path: Path, rate_hz: float) -> N
     shots = [read_droplets(file) for file in results.glob("*.h5")]
     with pytest.raises(DropletFileError, match="must be above 0"):
         track_droplets(shots, rate_hz)
+
+
+def test_what_contradicts_the_rate_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    shown_series = series(frames=4)
+    results = write_series(tmp_path / "droplets", shown_series, rate_hz=RATE_HZ)
+    files = sorted(results.glob("*.h5"))
+    for file, velocities in zip(files, shown_series.frames, strict=True):
+        with h5py.File(file, "r+") as changed:
+            for name in ("u_m_s", "v_m_s", "w_m_s"):
+                changed["droplets"][name] = np.full(len(velocities), 1.2)
+    out = tmp_path / "tracks.h5"
+    assert told(capsys, "tracks", results, "-o", out)["doubts"] == []
+    (doubt,) = told(capsys, "tracks", results, "--rate-hz", RATE_HZ / 10, "-o", out, "--overwrite")["doubts"]
+    assert "m/s from A to B: is the rate of 2000 Hz right, and the separation?" in doubt
+    assert doubt in shown(capsys, "tracks", results, "--rate-hz", RATE_HZ / 10, "-o", out, "--overwrite")
+    fast, _ = told(capsys, "tracks", results, "--rate-hz", 1000 * RATE_HZ, "-o", out, "--overwrite")["doubts"]
+    assert "faster than any spray: is the rate of 2e+07 Hz right?" in fast
+
+
+def test_shots_that_are_not_good_are_told_with_their_tracks(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    said = {"a": {"verdict": "doubtful", "reasons": ["it is blurred"]}, "b": {"verdict": "refused", "reasons": []}}
+    results = write_series(tmp_path / "droplets", series(frames=4), rate_hz=RATE_HZ, exposures=json.dumps(said))
+    result = told(capsys, "tracks", results, "-o", tmp_path / "tracks.h5")
+    assert result["doubts"] == ["4 of 4 exposures are doubtful, and count: it is blurred"]
+    with h5py.File(tmp_path / "tracks.h5") as file:
+        assert json.loads(file["tomoshadow"].attrs["doubts"]) == result["doubts"]
