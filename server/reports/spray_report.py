@@ -106,23 +106,34 @@ def _verdicts(reported: ReportedSpray) -> str:
 
 
 def _origin(reported: ReportedSpray) -> Section:
-    said, axis = reported.spray.provenance, reported.asked.axis
-    settings = json.loads(str(said.get("settings", "{}")))
+    axis, settings = reported.asked.axis, json.loads(str(reported.spray.provenance.get("settings", "{}")))
+    recipes = "; ".join(f"SHA-256 {one[:16]}..." for one in _stated(reported, "recipe_sha256")) or "not stated"
+    sha256 = _stated(reported, "calibration_sha256")
     rows = [
         ["results", reported.spray.name],
         ["runs", ", ".join(reported.spray.runs)],
-        ["calibration", f"{said.get('calibration', '')}, SHA-256 {str(said.get('calibration_sha256', ''))[:16]}..."],
-        [
-            "recipe",
-            f"SHA-256 {str(said.get('recipe_sha256', 'not stated'))[:16]}..., method {said.get('method_version')}",
-        ],
+        ["calibration", f"{_said(reported, 'calibration')}, SHA-256 {' and '.join(one[:16] for one in sha256)}..."],
+        ["recipe", f"{recipes}, method {_said(reported, 'method_version')}"],
         ["measured as", f"{settings.get('polarity', '')}, light {settings.get('light', 'not stated')}"],
         ["box [mm]", _box(reported.sample)],
         ["nozzle and axis", _axis(axis)],
-        ["programs", f"measured by tomoshadow {said.get('tomoshadow', '')}, reported by {version('tomoshadow')}"],
-        *_notes(said),
+        [
+            "programs",
+            f"measured by tomoshadow {_said(reported, 'tomoshadow')}, reported by {version('tomoshadow')}",
+        ],
+        *_notes(reported),
     ]
     return Section("Where the numbers come from", tables=[Table(["", ""], [row for row in rows if row[1]], words=True)])
+
+
+def _stated(reported: ReportedSpray, name: str) -> list[str]:
+    """What the shots say of themselves, each once."""
+    said = (shot.provenance.get(name) for shot in reported.spray.shots)
+    return list(dict.fromkeys(str(one) for one in said if one is not None))
+
+
+def _said(reported: ReportedSpray, name: str) -> str:
+    return " and ".join(_stated(reported, name))
 
 
 def _box(sample: SpraySample | None) -> str:
@@ -139,11 +150,14 @@ def _axis(axis: SprayAxis | None) -> str:
     return f"nozzle at ({nozzle}) mm, axis along ({direction})"
 
 
-def _notes(said: Mapping[str, Any]) -> list[list[str]]:
-    """What the operator has written down."""
-    notes = json.loads(str(said.get("notes", "{}")))
-    more = notes.pop("more", {})
-    return [[name.replace("_", " "), str(value)] for name, value in {**notes, **more}.items()]
+def _notes(reported: ReportedSpray) -> list[list[str]]:
+    """What the operator has written down, of all runs."""
+    values: dict[str, dict[str, None]] = {}
+    for notes in map(json.loads, _stated(reported, "notes")):
+        more = notes.pop("more", {})
+        for name, value in {**notes, **more}.items():
+            values.setdefault(name, {})[str(value)] = None
+    return [[name.replace("_", " "), " and ".join(said)] for name, said in values.items()]
 
 
 def _sizes(reported: ReportedSpray) -> Section | None:

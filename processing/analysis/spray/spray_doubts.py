@@ -3,6 +3,7 @@
 A figure is no better than the shots that it comes from. Each of these is told beside the figures, wherever they go.
 """
 
+import json
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -14,6 +15,8 @@ from processing.analysis.spray.spray_axis import SprayAxis
 from processing.analysis.spray.spray_sample import SpraySample
 from processing.analysis.velocity.velocity_verdict import FASTEST_M_S
 
+NO_CONDITIONS = ("operator", "remark", "more")
+"""Of the notes, what may differ in one spray; what is in ``more`` is looked at by its own names."""
 MOST_ASIDE_DEG = 45.0
 """Of the mean velocity from the axis; a spray flies along its axis, however wide it is."""
 LEAST_TOGETHER = 0.3
@@ -35,7 +38,16 @@ def spray_doubts(
         As stated.
     """
     copied = [f"{named(shot)} has the very droplets of {named(other)}: one is a copy" for shot, other in copies(shots)]
-    return (*shot_doubts(shots), *copied, *(_of_motion(sample, axis) if sample else ()))
+    return (*shot_doubts(shots), *copied, *_of_conditions(shots), *(_of_motion(sample, axis) if sample else ()))
+
+
+def _of_conditions(shots: Sequence[StoredDroplets]) -> Iterator[str]:
+    """What the operator has written down of some shots, and of others otherwise."""
+    noted = [json.loads(str(shot.provenance.get("notes", "{}"))) for shot in shots]
+    stated = [{**notes, **notes.get("more", {})} for notes in noted]
+    for name in dict.fromkeys(name for one in stated for name in one if name not in NO_CONDITIONS):
+        if len(values := dict.fromkeys(str(one.get(name, "not stated")) for one in stated)) > 1:
+            yield f"shots differ in {name}: {' and '.join(values)}; they are no one spray"
 
 
 def _of_motion(sample: SpraySample, axis: SprayAxis | None) -> Iterator[str]:

@@ -92,3 +92,14 @@ def test_an_exposure_that_is_hidden_as_a_whole_leaves_the_others_what_they_are()
     assert told.liquid_ppm
     assert without.liquid_ppm
     assert told.liquid_ppm.value == without.liquid_ppm.value
+
+
+def test_shots_of_different_conditions_are_told() -> None:
+    notes = json.dumps({"fluid": "water", "operator": "Ada", "pressure_bar": 6.0, "more": {"flow_l_min": 1.2}})
+    others = json.dumps({"fluid": "water", "operator": "Bo", "pressure_bar": 20.0})
+    told = doubts(saying(SHOTS[0], notes=notes), *(saying(shot, notes=others) for shot in SHOTS[1:]))
+    assert told.splitlines() == [
+        "shots differ in pressure_bar: 6.0 and 20.0; they are no one spray",
+        "shots differ in flow_l_min: 1.2 and not stated; they are no one spray",
+    ]
+    assert not doubts(*(saying(shot, notes=notes) for shot in SHOTS))

@@ -10,7 +10,7 @@ from server.cli.main import main
 from tests.support.command_line import refused, told
 from tests.support.sampled_sprays import cone_shots, stored_shot, write_results
 
-NOTES = '{"fluid": "water <pure>", "pressure_bar": 6.0}'
+NOTES = '{"fluid": "water <pure>", "pressure_bar": 6.0, "more": {"flow_l_min": 1.25}}'
 
 
 @pytest.fixture(scope="module")
@@ -33,6 +33,7 @@ def test_the_report_says_it_all_in_one_file(page: Path, capsys: pytest.CaptureFi
     for said in (
         "D32 [µm]",
         "water &lt;pure&gt;",
+        "<td>1.25</td>",
         "cal-1",
         "sampling: spatial",
         "lognormal",
@@ -43,6 +44,16 @@ def test_the_report_says_it_all_in_one_file(page: Path, capsys: pytest.CaptureFi
         assert said in text, said
     assert text.count("<figure>") == 5
     assert "exists; only --overwrite replaces it" in refused(capsys, "report", page.parent / "cone", "-o", page)
+
+
+def test_what_shots_of_two_runs_do_not_share_is_said_of_both(tmp_path: Path) -> None:
+    first = write_results(tmp_path / "first", cone_shots(0, 1, 30), run="first", notes=NOTES, tomoshadow="1.0")
+    second = NOTES.replace("6.0", "20.0")
+    other = write_results(tmp_path / "other", cone_shots(1, 1, 30), run="other", notes=second, tomoshadow="1.1")
+    assert main(["report", str(first), str(other), "-o", str(tmp_path / "report.html")]) == 0
+    text = (tmp_path / "report.html").read_text()
+    assert "6.0 and 20.0" in text
+    assert "measured by tomoshadow 1.0 and 1.1" in text
 
 
 @pytest.mark.slow
