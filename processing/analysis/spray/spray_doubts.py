@@ -10,7 +10,7 @@ import numpy as np
 
 from processing.analysis.copied_shots import copies, named
 from processing.analysis.droplets.droplet_file import StoredDroplets
-from processing.analysis.shot_doubts import shot_doubts
+from processing.analysis.shot_doubts import exposure_doubts, velocity_doubts
 from processing.analysis.spray.spray_axis import SprayAxis
 from processing.analysis.spray.spray_sample import SpraySample
 from processing.analysis.velocity.velocity_verdict import FASTEST_M_S
@@ -38,7 +38,13 @@ def spray_doubts(
         As stated.
     """
     copied = [f"{named(shot)} has the very droplets of {named(other)}: one is a copy" for shot, other in copies(shots)]
-    return (*shot_doubts(shots), *copied, *_of_conditions(shots), *(_of_motion(sample, axis) if sample else ()))
+    return (
+        *exposure_doubts(shots),
+        *velocity_doubts(shots),
+        *copied,
+        *_of_conditions(shots),
+        *(_of_motion(sample, axis) if sample else ()),
+    )
 
 
 def _of_conditions(shots: Sequence[StoredDroplets]) -> Iterator[str]:

@@ -11,6 +11,7 @@ from scipy.special import stdtrit
 from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.analysis.droplets.ghost_share import share_interval
 from processing.analysis.estimates import CONFIDENCE, Estimate
+from processing.analysis.shot_doubts import velocity_doubts
 from processing.geometry import FloatArray
 from processing.reconstruction.settings import FrozenValue
 
@@ -41,6 +42,7 @@ class VelocityStatistics(FrozenValue):
         Literal["shots", "pairs"] | None, Field(description="what the interval of the mean knows to differ")
     ] = None
     reason: Annotated[str | None, Field(description="why there is no mean; null where there is one")] = None
+    doubts: Annotated[tuple[str, ...], Field(description="velocities that are doubtful, and count, or refused")] = ()
 
 
 def velocity_statistics(shots: Sequence[StoredDroplets]) -> VelocityStatistics:
@@ -54,7 +56,8 @@ def velocity_statistics(shots: Sequence[StoredDroplets]) -> VelocityStatistics:
     told = [(shot, _told(shot)) for shot in shots]
     believed = [(shot, its) for shot, its in told if its.get("pairs")]
     if not believed:
-        return VelocityStatistics(shots=0, pairs=0, reason=_why(its for _, its in told))
+        reason = _why(its for _, its in told)
+        return VelocityStatistics(shots=0, pairs=0, reason=reason, doubts=velocity_doubts(shots))
     velocities_m_s = [_of_pairs(shot) for shot, _ in believed]
     pairs, stayed = sum(map(len, velocities_m_s)), sum(its["stayed"] for _, its in believed)
     several = len(believed) > 1
@@ -65,6 +68,7 @@ def velocity_statistics(shots: Sequence[StoredDroplets]) -> VelocityStatistics:
         share_paired=Estimate(value=min(1.0, pairs / stayed), low=low, high=high),
         mean_m_s=_mean(velocities_m_s if several else list(velocities_m_s[0][:, None])),
         intervals_over="shots" if several else "pairs",
+        doubts=velocity_doubts(shots),
     )
 
 

@@ -169,6 +169,6 @@ def _unlike(first: MeasuredSpray, other: MeasuredSpray) -> str:
 
 def _made_by(provenance: Mapping[str, Any]) -> dict[str, object]:
     """What a measurement depends on."""
-    names = ("calibration", "method_version")
+    names = ("calibration", "method_version", "spray")
     settings = json.loads(str(provenance.get("settings", "{}")))
     return {**{name: provenance.get(name) for name in names}, **settings}

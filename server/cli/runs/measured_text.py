@@ -66,7 +66,7 @@ def _mean_velocity(velocity: dict[str, Any]) -> str:
     if velocity["mean_m_s"] is None:
         return f"no velocity: {velocity['reason']}"
     components = (f"{name} {_with_interval(estimate)}" for name, estimate in velocity["mean_m_s"].items())
-    return f"{velocity['pairs']} pairs, {', '.join(components)} m/s"
+    return "; ".join([f"{velocity['pairs']} pairs, {', '.join(components)} m/s", *velocity["doubts"]])
 
 
 def _with_interval(estimate: dict[str, float]) -> str:

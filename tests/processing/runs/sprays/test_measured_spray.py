@@ -64,3 +64,14 @@ def test_shots_that_are_in_both_of_two_sprays_are_told(tmp_path: Path) -> None:
     for two in (copied, again):
         (told,) = read_compared([monday, two]).unlike
         assert f"{two.name} and monday have 2 shots in common" in told
+
+
+def test_nozzles_at_two_places_are_told_where_sprays_are_compared(tmp_path: Path) -> None:
+    one = write_results(
+        tmp_path / "one", cone_shots(0, 2, 20), run="one", spray='{"nozzle_mm": [0, 0, 0], "axis": [0, 1, 0]}'
+    )
+    two = write_results(
+        tmp_path / "two", cone_shots(1, 2, 20), run="two", spray='{"nozzle_mm": [0, 2, 0], "axis": [0, 1, 0]}'
+    )
+    (told,) = read_compared([one, two]).unlike
+    assert "two and one differ in spray" in told

@@ -71,9 +71,12 @@ def test_columns_have_units_and_the_file_says_where_velocities_come_from(
 
 def test_a_separation_in_another_unit_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     run = write_bright_run(tmp_path / "run", frames=2, moving=moving_scene(), separation_ns=SEPARATION_NS // 1000)
-    (shot,) = measured(tmp_path, capsys, run)["shots"]
+    result = measured(tmp_path, capsys, run)
+    (shot,) = result["shots"]
     assert shot["velocity"]["verdict"] == "doubtful"
     assert "faster than any spray: is the separation of" in shot["velocity"]["reasons"][0]
+    (doubt,) = result["velocity"]["doubts"]
+    assert doubt.startswith("velocities of 1 of 1 shots are doubtful, and count: droplets fly at")
 
 
 def test_an_image_that_is_there_twice_gives_no_velocity(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
