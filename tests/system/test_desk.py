@@ -225,6 +225,23 @@ def test_the_bar_is_in_sight_at_every_width_dark_and_light(page: Page, server: S
     _picture(page, f"bar-{width}-trouble")
 
 
+@pytest.mark.parametrize("width", [800, 1280])
+def test_no_words_of_the_page_are_cut(page: Page, server: Serving, width: int) -> None:
+    page.set_viewport_size({"width": width, "height": 900})
+    page.goto(str(server.http.base_url))
+    live = page.get_by_role("region", name="Live", exact=True)
+    live.get_by_role("button", name="Shoot one").click()
+    expect(live.get_by_role("button", name="Keep shot")).to_be_visible()
+    words = page.locator(".q-field__label, [role=log] *, .live-caption")
+    expect(page.get_by_role("log")).to_contain_text("single-shot: idle, 1 of 1 shots recorded, 1 valid")
+    cut = words.evaluate_all(
+        "found => found.filter(one => one.scrollWidth > one.clientWidth + 1).map(one => one.innerText)"
+    )
+    assert cut == []
+    live.get_by_role("button", name="Keep shot").click()
+    expect(live.get_by_role("button", name="Keep shot")).to_be_hidden()
+
+
 def _picture(page: Page, name: str) -> None:
     if PICTURES:
         page.wait_for_timeout(1000)

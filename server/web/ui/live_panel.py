@@ -39,7 +39,7 @@ class LivePanel:
         self._draft = draft
         with panel("Live"):
             LiveTiles(list(context.services.config.views))
-            with ui.row().classes("w-full gap-2 items-center no-wrap"):
+            with ui.row().classes("w-full gap-2 items-center"):
                 self._start = ui.button("Live", icon="videocam").props("outline dense no-caps")
                 self._start.on("click", self._on_start, js_handler=TICKET)
                 self._end = ui.button("End live", icon="videocam_off", on_click=self._acquisition.end_live)
@@ -49,7 +49,7 @@ class LivePanel:
                     value=_FIELDS["rate_hz"].default,
                     validation=lambda value: problem_of(_FIELDS, "rate_hz", value),
                 )
-                self._rate.props("dense outlined hide-bottom-space").classes("w-20")
+                self._rate.props("dense outlined hide-bottom-space").classes("w-24")
                 self._lit = ui.switch("Pulsed light", value=True)
                 self._lit.tooltip("Pulses and currents of the form of a new run; off: no light but that of the room")
                 self._shoot = ui.button("Shoot one", icon="photo_camera")

@@ -70,9 +70,9 @@ def acknowledge_text(status: RunStatus) -> str:
 
 
 def counts_text(status: RunStatus) -> str:
-    """Shots in words."""
+    """Shots in words; nothing before the first run: whether the rig is ready, the bar says."""
     if status.run_id is None:
-        return "ready"
+        return ""
     invalid = status.shots_recorded - status.shots_valid
     text = f"{status.shots_recorded} / {status.shots_planned} shots recorded, {status.shots_valid} valid"
     return f"{text}, {invalid} INVALID" if invalid else text

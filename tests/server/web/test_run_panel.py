@@ -36,4 +36,5 @@ def test_of_two_causes_the_button_names_the_first_and_how_many_wait() -> None:
 
 def test_invalid_shots_are_never_left_out() -> None:
     status = RunStatus(run_id="run", shots_planned=5, shots_recorded=4, shots_valid=3)
+    assert counts_text(RunStatus()) == "", "that no run was yet says nothing of the rig"
     assert counts_text(status) == "4 / 5 shots recorded, 3 valid, 1 INVALID"
