@@ -24,7 +24,7 @@ def serve(options: Namespace) -> Outcome:
     server = config.server.moved(options.host, options.port)
     with (
         listening(server.host, server.port) as port_held,
-        listening(server.host, server.abort_port) as abort_port,
+        listening(server.host, server.abort_port, "choose another abort_port in the rig file") as abort_port,
         hold_data_dir(server.data_dir),
     ):
         address = f"[{server.host}]" if ":" in server.host else server.host

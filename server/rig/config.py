@@ -124,7 +124,13 @@ class ServerConfig(FrozenModel):
         try:
             return ServerConfig.model_validate(self.model_dump() | changes)
         except ValidationError as error:
-            raise ConfigError("; ".join(problem["msg"] for problem in error.errors())) from error
+            raise ConfigError("; ".join(map(_told, error.errors()))) from error
+
+    @model_validator(mode="after")
+    def _abort_has_a_port_of_its_own(self) -> Self:
+        if self.abort_port == self.port:
+            raise ValueError(f"abort_port {self.port} is that of all else: choose another one, or 0 for any")
+        return self
 
     @model_validator(mode="after")
     def _an_open_door_has_a_key(self) -> Self:
@@ -269,6 +275,12 @@ def load_config(path: Path) -> RigConfig:
         raise ConfigError(f"{path}: {error}") from error
     except ValidationError as error:
         raise ConfigError("\n".join(_problem(path, text, problem) for problem in error.errors())) from error
+
+
+def _told(problem: Any) -> str:
+    key = ".".join(map(str, problem["loc"]))
+    reason: str = problem["msg"].removeprefix("Value error, ")
+    return f"{key} {problem['input']}: {reason}" if key else reason
 
 
 def _problem(path: Path, text: str, problem: Any) -> str:

@@ -1,5 +1,6 @@
 """The port of a server: held before anything heavy is loaded, so that a server that cannot be says so at once."""
 
+import os
 import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -8,7 +9,7 @@ from daq.errors import AlreadyHeld
 
 
 @contextmanager
-def listening(host: str, port: int) -> Iterator[socket.socket]:
+def listening(host: str, port: int, remedy: str = "choose --port") -> Iterator[socket.socket]:
     """Hold a port until the block ends; whoever asks meanwhile waits for ``serve``.
 
     Raises
@@ -20,9 +21,8 @@ def listening(host: str, port: int) -> Iterator[socket.socket]:
     try:
         listener = socket.create_server((host, port), family=family)
     except OSError as error:
-        reason = (
-            f"{host}, port {port}: cannot listen there ({error.strerror}): end the server that does, or choose --port"
-        )
+        why = os.strerror(error.errno) if error.errno else str(error)
+        reason = f"{host}, port {port}: cannot listen there ({why}): end the server that does, or {remedy}"
         raise AlreadyHeld(reason) from error
     with listener:
         yield listener
