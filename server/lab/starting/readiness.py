@@ -52,12 +52,12 @@ def _against_calibration(context: Context, calibration: str) -> Iterator[ServerE
         reason = f"calibration: there is no calibration {calibration!r}"
         yield Unprocessable(reason, RefusalCode.CALIBRATION_UNKNOWN)
     sizes_px = context.calibrations.image_sizes_px(calibration)
+    misfits = []
     for view, camera in context.services.rig.cameras.items():
         rows, columns = camera.image_shape
         made_for = sizes_px.get(view, (columns, rows))
         if made_for != (columns, rows):
-            reason = (
-                f"calibration: {calibration!r} is made for images of {made_for[0]} x {made_for[1]} px of {view}, its "
-                f"camera delivers {columns} x {rows} px: choose another calibration, or calibrate again"
-            )
-            yield Unprocessable(reason, RefusalCode.CALIBRATION_SIZE)
+            misfits.append(f"{made_for[0]} x {made_for[1]} px of {view}, its camera delivers {columns} x {rows} px")
+    if misfits:
+        reason = f"calibration: {calibration!r} is made for images of {'; '.join(misfits)}"
+        yield Unprocessable(reason, RefusalCode.CALIBRATION_SIZE)

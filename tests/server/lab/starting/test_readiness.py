@@ -41,6 +41,7 @@ def starting(server: Serving, patch: pytest.MonkeyPatch) -> Iterator[None]:
 @contextmanager
 def busy(server: Serving, patch: pytest.MonkeyPatch) -> Iterator[None]:
     assert server.http.post("/api/runs", json=plan_of(shots=1000, rate_hz=5.0)).status_code == 201
+    eventually(lambda: acquisition(server).status().shots_recorded > 0, "it is armed, which the text would tell")
     yield
     server.http.post("/api/rig/abort")
     server.wait()
@@ -160,7 +161,7 @@ def thin_wire(server: Serving, patch: pytest.MonkeyPatch) -> Iterator[None]:
 
 @contextmanager
 def other_size(server: Serving, patch: pytest.MonkeyPatch) -> Iterator[None]:
-    views = {"view1": {"mapping": {"image_size_px": [64, 48]}}}
+    views = {view: {"mapping": {"image_size_px": [64, 48]}} for view in ("view1", "view2")}
     (server.services.data_dir / "calibrations" / "small.json").write_text(json.dumps({"id": "small", "views": views}))
     yield
 
