@@ -10,6 +10,7 @@ import pytest
 
 from processing.calibration.sets.calibration_set import load_calibration_set
 from server.cli.main import main
+from tests.support.sampled_sprays import cone_shots, write_results
 from tests.support.write_measured import PARTS
 from tests.support.write_rig_file import rig_file_page
 
@@ -198,14 +199,15 @@ def test_the_code_that_reads_runs_reads_them() -> None:
 
 
 @pytest.mark.usefixtures("workplace")
-def test_five_lines_give_a_d32_with_its_interval(capsys: pytest.CaptureFixture[str]) -> None:
-    folder = Path("demo-out/runs/demo_sample/results/droplets-0")
-    folder.mkdir(parents=True)
-    shutil.copy(next((OLD_DATA / "droplets" / "shadows").rglob("*_droplets.h5")), folder)
-    (block,) = (block for block in python_of(DOCS / "measure.md") if "demo-out" in block)
-    assert len([line for line in block.splitlines() if line]) == 5
-    exec(compile(block, "measure.md", "exec"), {})
-    assert re.fullmatch(r"D32 \d+\.\d um, 95 % between \d+\.\d and \d+\.\d", capsys.readouterr().out.strip())
+def test_five_lines_give_a_d32_and_five_a_velocity_with_intervals(capsys: pytest.CaptureFixture[str]) -> None:
+    velocity = '{"verdict": "good", "reasons": [], "pairs": 120, "stayed": 125}'
+    write_results(Path("demo-out/runs/demo_sample/results/droplets-0"), cone_shots(0, 1, 120), velocity=velocity)
+    blocks = [block for block in python_of(DOCS / "measure.md") if "demo-out" in block]
+    for block in blocks:
+        assert len([line for line in block.splitlines() if line]) == 5
+        exec(compile(block, "measure.md", "exec"), {})
+    interval = r"95 % between \d+\.\d+ and \d+\.\d+"
+    assert re.fullmatch(rf"v \d\.\d\d m/s, {interval}\nD32 \d+\.\d um, {interval}", capsys.readouterr().out.strip())
 
 
 @pytest.mark.usefixtures("workplace")

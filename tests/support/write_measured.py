@@ -83,7 +83,7 @@ def _demonstration(said: Mapping[str, Any]) -> str:
     rows = [(name, *(f"{view[key]:.4f}" for key in errors), view["verdict"]) for name, view in said["views"].items()]
     quality = f"Quality factor of MLOS against the true spray: {said['quality_factor']:.2f}"
     shots = f"{said['shots_valid']} of {said['shots_planned']} shots valid.\n"
-    return f"{_markdown(head, rows)}\n{quality}; {shots}\n{_measured(said['droplets'])}"
+    return f"{_markdown(head, rows)}\n{quality}; {shots}\n{_measured(said['droplets'])}\n{_flow(said)}"
 
 
 def _measured(said: Mapping[str, Any]) -> str:
@@ -99,6 +99,23 @@ def _measured(said: Mapping[str, Any]) -> str:
         "verdict",
     )
     return _markdown(head, [(*shares, d32, f"{said['true_d32_um']:.1f}", said["verdict"])])
+
+
+def _flow(said: Mapping[str, Any]) -> str:
+    """A table of the break-up and the velocities of the demonstration."""
+    liquid, droplets = said["liquid"], said["droplets"]
+    length = "{value:.2f} ({low:.2f} to {high:.2f})".format(**liquid["break_up_mm"])
+    means = (droplets["velocity"]["mean_m_s"], droplets["true_velocity_m_s"])
+    told, true = (", ".join(f"{one:.2f}" for one in mean) for mean in means)
+    head = (
+        f"break-up length of {liquid['shots']} shots [mm]",
+        "true [mm]",
+        "mean u, v, w [m/s]",
+        "true [m/s]",
+        "rms error of a component [m/s]",
+    )
+    rms = f"{droplets['velocity_rms_m_s']:.2f}"
+    return _markdown(head, [(length, f"{liquid['true_break_up_mm']:.2f}", told, true, rms)])
 
 
 def _airy_disks(said: Mapping[str, Any]) -> str:
