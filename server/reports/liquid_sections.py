@@ -130,11 +130,14 @@ def _row(kind: ObjectClass, liquid: ReportedLiquid) -> list[str]:
 
 
 def unknown_section(shots: Sequence[StoredDroplets], mapped: ObjectsShot | None = None) -> Section | None:
-    """Which share of the volume too few views see; where, of an exposure whose images were looked at."""
-    rows = [row for row in _unknown_rows(shots) if row]
-    if not rows:
+    """Which share of the volume too few views see; where, of an exposure whose images were looked at.
+
+    None where nobody looked for liquid that hides: bright particles, and files of older programs.
+    """
+    if not any(map(told_of_exposures, shots)):
         return None
-    table = Table(["share of the volume", "mean [%]", "most [%]"], rows, caption="Exposures by themselves")
+    rows = [row for row in _unknown_rows(shots) if row]
+    table = Table(["share of the volume", "mean [%]", "most [%]"], rows, caption="Mean and largest of the exposures")
     if mapped is None:
         return Section("Where nothing can be known", f"{BLACK_TEXT} {NO_MAP}", [table])
     caption = "One exposure, seen along z: how much of each line of sight fewer than three views see"

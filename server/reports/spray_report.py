@@ -168,7 +168,8 @@ def _sizes(reported: ReportedSpray) -> Section | None:
     picture = Picture(
         distribution_figure(told),
         "Left: distribution of diameters over ln d, by number with 95 % intervals of counting, by area and by volume, "
-        "and fits to the volume. Right: cumulative, with mean diameters and their 95 % intervals over shots.",
+        "and fits to the volume. Right: cumulative, with mean diameters and their 95 % intervals over "
+        f"{told.droplets.intervals_over or 'shots'}.",
         svg=True,
     )
     tables = [fits_table(told.fits)] if told.fits else []

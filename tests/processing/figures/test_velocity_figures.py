@@ -44,6 +44,14 @@ def test_every_pair_is_an_arrow_where_its_droplet_is_in_each_of_three_panels() -
     assert figure.axes[-1].get_ylabel() == "speed [m/s]"
 
 
+def test_of_a_flat_box_the_two_strips_are_one_above_the_other() -> None:
+    flat = shot(20)
+    flat.columns["y_mm"] = 0.1 * flat.columns["y_mm"]  # type: ignore[operator]
+    panels = {axes.get_xlabel() + axes.get_ylabel(): axes for axes in velocities_figure(flat).axes}
+    strips = [panels[f"{across} [mm]y [mm]"].get_subplotspec() for across in "xz"]
+    assert [(one.rowspan.start, one.colspan.start) for one in strips if one] == [(0, 0), (1, 0)]
+
+
 def test_pairs_that_are_not_sure_enough_are_left_out() -> None:
     drawn = shot(20)
     sure = int(np.count_nonzero(np.asarray(drawn.columns["p_pair"][:20], np.float64) >= 0.75))

@@ -80,3 +80,5 @@ def test_of_files_that_say_nothing_there_is_no_chapter() -> None:
     old = StoredDroplets({"frame": np.empty(0, "U1")}, {"exposures": json.dumps({"a": {"verdict": "good"}})})
     assert ReportedLiquid.of_files([old]) is None
     assert unknown_section([old]) is None
+    bright = {"a": {"verdict": "good", "hidden": {"volume_share": 0.1}}}
+    assert unknown_section([StoredDroplets(old.columns, {"exposures": json.dumps(bright)})]) is None
