@@ -161,6 +161,24 @@ def test_an_answer_that_does_not_come_is_waited_for_until_the_deadline() -> None
     assert late.value.code == "no_answer"
 
 
+@pytest.mark.parametrize("content", [b"<html>hello</html>", b'{"name": "another"}'])
+def test_a_server_of_another_kind_is_told(content: bytes) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as other:
+
+        def answer() -> None:
+            visitor, _ = other.accept()
+            with visitor:
+                visitor.recv(65536)
+                visitor.sendall(b"HTTP/1.0 200 OK\r\n\r\n" + content)
+
+        answering = threading.Thread(target=answer)
+        answering.start()
+        with pytest.raises(ClientError) as told:
+            RigClient(f"http://127.0.0.1:{other.getsockname()[1]}").rig()
+        answering.join(DEADLINE_S)
+    assert told.value.code == "senseless"
+
+
 def test_abort_is_confirmed(server: Serving, client: RigClient) -> None:
     run_id = client.start(LONG)
     assert run_id in client.abort(limit_s=DEADLINE_S)

@@ -3,7 +3,7 @@
 from argparse import Namespace
 from pathlib import Path
 
-from server.cli.clients.server_option import add_server, client_of
+from server.cli.clients.server_option import add_server, client_of, named
 from server.cli.clients.watching import watched
 from server.cli.options import Verbs, add_verb
 from server.cli.output import Outcome
@@ -23,4 +23,10 @@ def run(options: Namespace) -> Outcome:
     from server.cli.clients.plan_file import read_plan
 
     plan, client = read_plan(options.plan), client_of(options)
-    return watched(client, client.start(plan), options)
+    try:
+        run_id = client.start(plan)
+    except KeyboardInterrupt:
+        ask = f"tomoshadow watch{named(options)}"
+        text = f"interrupted while the start was asked for: {ask} tells whether the run is under way"
+        return Outcome({"passed": False, "run_id": None}, text)
+    return watched(client, run_id, options)

@@ -1,9 +1,9 @@
 """``run``, ``watch``, ``runs`` and ``abort`` ask a server on a real socket, with a rig in memory behind it."""
 
 import json
-import os
 import re
 import signal
+import socket
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -149,10 +149,23 @@ def test_ctrl_c_ends_the_watching_and_not_the_run(server: Serving, at_server: li
         assert watching.stderr is not None
         assert run_id in watching.stderr.readline()
         assert watching.stderr.readline().startswith("shot ")
-        os.kill(watching.pid, signal.SIGINT)
+        watching.send_signal(signal.SIGINT)
         out, err = watching.communicate(timeout=DEADLINE_S)
     assert watching.returncode == 1
     assert json.loads(out) == {"passed": False, "run_id": run_id, "outcome": "active"}
     assert f"run {run_id} goes on" in err
     assert "tomoshadow abort --server" in err
     assert server.http.get(f"/api/runs/{run_id}").json()["outcome"] == "active"
+
+
+def test_ctrl_c_while_a_start_is_asked_for_says_how_to_find_out(plan: Path) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        url = f"http://127.0.0.1:{silent.getsockname()[1]}"
+        command = [sys.executable, "-m", "server.cli", "run", str(plan), "--server", url]
+        with subprocess.Popen(command, cwd=ROOT, env=ENVIRONMENT, stdout=subprocess.PIPE, text=True) as starting:
+            visitor, _ = silent.accept()
+            with visitor:
+                starting.send_signal(signal.SIGINT)
+                out, _ = starting.communicate(timeout=DEADLINE_S)
+    assert starting.returncode == 1
+    assert f"tomoshadow watch --server {url} tells whether the run is under way" in out
