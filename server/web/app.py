@@ -59,6 +59,7 @@ from server.web.api.results import droplets, results, statistics, volume_parts
 from server.web.body_limit import BodyLimit
 from server.web.guard import Guard
 from server.web.readings import Readings
+from server.web.stream_cap import StreamCap
 from server.web.ui.page import mount_page
 
 _RESOURCES = (
@@ -119,6 +120,7 @@ def create_api(services: Services, abort_port: socket.socket | None = None) -> F
     app.add_api_route("/api/{path:path}", _nothing_here, methods=_METHODS, include_in_schema=False)
     token = services.config.server.token
     problems.describe(app)
+    app.add_middleware(StreamCap)
     app.add_middleware(Readings)
     app.add_middleware(BodyLimit)
     app.add_middleware(Guard, host_names=services.host_names, token=token.get_secret_value() if token else None)

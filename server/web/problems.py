@@ -10,6 +10,7 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from pydantic import BaseModel, ConfigDict, Field
 from starlette.exceptions import HTTPException
+from starlette.requests import HTTPConnection
 
 from daq.errors import (
     BusyError,
@@ -91,7 +92,9 @@ def responses(*statuses: int) -> dict[int | str, dict[str, Any]]:
     }
 
 
-def problem(request: Request, status: int, detail: str | None, kind: str = "about:blank", **more: Any) -> JSONResponse:
+def problem(
+    request: HTTPConnection, status: int, detail: str | None, kind: str = "about:blank", **more: Any
+) -> JSONResponse:
     """Build the answer."""
     document = Problem(
         type=kind, title=_phrase(status), status=status, detail=detail, instance=request.url.path, **more

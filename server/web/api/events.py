@@ -13,11 +13,14 @@ from fastapi.responses import StreamingResponse
 
 from server.lab.events import Event, EventPublisher
 from server.web.api.parameters import ContextOf
+from server.web.problems import responses
 
 router = APIRouter(prefix="/api/events", tags=["events"])
 
 
-@router.get("", response_class=StreamingResponse, responses={200: {"content": {"text/event-stream": {}}}})
+@router.get(
+    "", response_class=StreamingResponse, responses={**responses(429), 200: {"content": {"text/event-stream": {}}}}
+)
 async def follow_events(
     context: ContextOf, last_event_id: Annotated[int | None, Header(ge=0, description="resume after this event")] = None
 ) -> StreamingResponse:
