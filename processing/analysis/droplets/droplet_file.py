@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from daq.files.atomic_file import own_part_path, replacing
 from processing.analysis.droplets.droplet_table import P_REAL_TRIED, Columns, DropletRows
+from processing.analysis.droplets.stored_texts import fault_of
 from processing.errors import BadInput
 
 SCHEMA, SCHEMA_VERSION = "tomoshadow/droplets", 3
@@ -179,6 +180,8 @@ def read_droplets(path: str | Path) -> StoredDroplets:
         raise DropletFileError(f"{path}: not a readable file of droplets: {error}") from error
     plain = {name: value.item() if isinstance(value, np.generic) else value for name, value in attributes.items()}
     provenance = {name: value for name, value in plain.items() if name not in SCHEMA_KEYS}
+    if fault := fault_of(provenance):
+        raise DropletFileError(f"{path}: was changed: {fault}")
     return StoredDroplets(columns, provenance, objects)
 
 

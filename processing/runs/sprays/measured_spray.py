@@ -146,7 +146,16 @@ def read_compared(folders: Sequence[Path]) -> ComparedSprays:
         )
     first, *others = sprays
     unlike = [f"{other.name} and {first.name} differ in {what}" for other in others if (what := _unlike(first, other))]
-    return ComparedSprays(named, (*unlike, *_shared(sprays)))
+    return ComparedSprays(named, (*unlike, *_elsewhere(sprays), *_shared(sprays)))
+
+
+def _elsewhere(sprays: Sequence[MeasuredSpray]) -> Iterator[str]:
+    stated = [(spray.name, spray.axis) for spray in sprays if spray.axis]
+    for other, axis in stated[1:]:
+        first, its = stated[0]
+        if axis != its:
+            places = " and ".join(f"{one.nozzle_mm} mm along {one.direction}" for one in (axis, its))
+            yield f"{other} and {first} differ in nozzle and axis: {places}"
 
 
 def _shared(sprays: Sequence[MeasuredSpray]) -> Iterator[str]:
@@ -169,6 +178,6 @@ def _unlike(first: MeasuredSpray, other: MeasuredSpray) -> str:
 
 def _made_by(provenance: Mapping[str, Any]) -> dict[str, object]:
     """What a measurement depends on."""
-    names = ("calibration", "method_version", "spray")
+    names = ("calibration", "method_version")
     settings = json.loads(str(provenance.get("settings", "{}")))
     return {**{name: provenance.get(name) for name in names}, **settings}

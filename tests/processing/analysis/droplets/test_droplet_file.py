@@ -64,3 +64,20 @@ def test_a_droplet_that_is_nowhere_is_told(tmp_path: Path, place_mm: float) -> N
     write_columns(tmp_path / "shot.h5", columns, {"run": "spray"})
     with pytest.raises(DropletFileError, match="was changed: z_mm of a droplet is not finite"):
         read_droplets(tmp_path / "shot.h5")
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        *[(name, "{") for name in ("exposures", "grid", "spray", "settings", "notes", "velocity")],
+        ("exposures", '{"a": {"verdict": "great"}}'),
+        ("exposures", '{"a": {"verdict": "good", "hidden": {"volume_share": 2.0}}}'),
+        ("grid", '{"shape": [0, 1, 2], "origin_mm": [0, 0, 0], "pitch_mm": 0.1}'),
+        ("spray", '{"nozzle_mm": [0, 1]}'),
+        ("notes", "[1]"),
+    ],
+)
+def test_a_text_that_was_changed_is_told(tmp_path: Path, name: str, text: str) -> None:
+    write_droplets(tmp_path / "shot.h5", {"a": SizedDroplets.none()}, {"run": "spray", name: text})
+    with pytest.raises(DropletFileError, match=f"shot.h5: was changed: {name}"):
+        read_droplets(tmp_path / "shot.h5")

@@ -74,4 +74,5 @@ def test_nozzles_at_two_places_are_told_where_sprays_are_compared(tmp_path: Path
         tmp_path / "two", cone_shots(1, 2, 20), run="two", spray='{"nozzle_mm": [0, 2, 0], "axis": [0, 1, 0]}'
     )
     (told,) = read_compared([one, two]).unlike
-    assert "two and one differ in spray" in told
+    assert "two and one differ in nozzle and axis" in told
+    assert "(0, 2, 0) mm along (0, 1, 0)" in told
