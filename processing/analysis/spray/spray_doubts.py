@@ -19,6 +19,8 @@ NO_CONDITIONS = ("operator", "remark", "more")
 """Of the notes, what may differ in one spray; what is in ``more`` is looked at by its own names."""
 MOST_ASIDE_DEG = 45.0
 """Of the mean velocity from the axis; a spray flies along its axis, however wide it is."""
+MOST_BEHIND = 0.05
+"""Of the droplets; some are carried back."""
 LEAST_TOGETHER = 0.3
 """Amount of the mean velocity over the mean speed: droplets that fly in all directions have none."""
 
@@ -44,6 +46,7 @@ def spray_doubts(
         *copied,
         *_of_conditions(shots),
         *(_of_motion(sample, axis) if sample else ()),
+        *(_behind(sample, axis) if sample and axis else ()),
     )
 
 
@@ -54,6 +57,12 @@ def _of_conditions(shots: Sequence[StoredDroplets]) -> Iterator[str]:
     for name in dict.fromkeys(name for one in stated for name in one if name not in NO_CONDITIONS):
         if len(values := dict.fromkeys(str(one.get(name, "not stated")) for one in stated)) > 1:
             yield f"shots differ in {name}: {' and '.join(values)}; they are no one spray"
+
+
+def _behind(sample: SpraySample, axis: SprayAxis) -> Iterator[str]:
+    along_mm, _, _ = axis.coordinates(sample.points_mm)
+    if len(sample) and (share := float(np.mean(along_mm < 0))) > MOST_BEHIND:
+        yield f"{100 * share:.0f} % of the droplets lie behind the nozzle: is it stated rightly, and the axis?"
 
 
 def _of_motion(sample: SpraySample, axis: SprayAxis | None) -> Iterator[str]:

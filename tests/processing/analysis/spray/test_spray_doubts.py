@@ -63,6 +63,11 @@ def test_an_axis_along_which_the_droplets_do_not_fly_is_told(direction: tuple[fl
     assert "is it stated rightly" in told
 
 
+def test_droplets_behind_the_nozzle_are_told() -> None:
+    told = doubts(*SHOTS, axis=SprayAxis((0, 9, 0), (0, 1, 0)))
+    assert "% of the droplets lie behind the nozzle: is it stated rightly" in told
+
+
 def test_exposures_that_are_exchanged_are_told() -> None:
     assert "are exposures A and B exchanged" in doubts(*(moved(shot, -1.0) for shot in SHOTS))
 
