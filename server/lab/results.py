@@ -161,6 +161,7 @@ def remaking(volume: Path) -> dict[str, Any]:
     """
     try:
         made_by = load_provenance(preview_path(volume))
+        _require_own_name(volume, made_by)
         return {
             "run_dir": str(volume.parents[2]),
             "shot": int(made_by["shot"]),
@@ -172,6 +173,12 @@ def remaking(volume: Path) -> dict[str, Any]:
         }
     except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
         raise Damaged(f"{volume.name} cannot be made again: its preview does not say how ({error})") from error
+
+
+def _require_own_name(volume: Path, made_by: Provenance) -> None:
+    shot, frame = int(made_by["shot"]), made_by.get("frame", volume.stem[-1])
+    if (name := VOLUME_NAME.fullmatch(volume.stem)) and (int(name["shot"]), name["frame"]) != (shot, frame):
+        raise ValueError(f"it was renamed, and is of shot {shot}, exposure {frame}")
 
 
 def part_of(

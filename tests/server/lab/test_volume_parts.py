@@ -107,6 +107,15 @@ def test_what_is_looked_at_again_is_not_read_again(kept: Kept) -> None:
     assert part_of(parts, volume, kept.store, ALL, ReconstructionMethod.MINLOS).voxels.any()
 
 
+@pytest.mark.parametrize("name", ["shot_00001_b", "shot_00000_a"])
+def test_a_preview_that_was_renamed_stands_for_no_other_volume(kept: Kept, name: str) -> None:
+    volume = kept.made(SETTINGS)
+    renamed = volume.with_name(f"{name}.vtkhdf")
+    shutil.copy(preview_path(volume), preview_path(renamed))
+    with pytest.raises(Damaged, match=f"{name}.vtkhdf.*is of shot 0, exposure b"):
+        part_of(VolumeParts(), renamed, kept.store, ALL)
+
+
 def test_a_part_of_another_volume_than_was_kept_is_refused(kept: Kept) -> None:
     volume, parts = kept.made(SETTINGS), VolumeParts()
     document = json.loads(kept.store.path("c").read_text())
