@@ -11,6 +11,7 @@ import pytest
 from nicegui import app as pages
 from playwright.sync_api import Browser, Locator, Page, Route, expect
 
+from server.lab.jobs import JobKind, JobState, shot_job
 from server.web.app import create_app
 from tests.support.cut_link import CutLink, cut_link
 from tests.support.operator import VIEWS
@@ -240,6 +241,21 @@ def test_no_words_of_the_page_are_cut(page: Page, server: Serving, width: int) -
     assert cut == []
     live.get_by_role("button", name="Keep shot").click()
     expect(live.get_by_role("button", name="Keep shot")).to_be_hidden()
+
+
+def test_many_reasons_of_droplets_make_no_row_of_the_height_of_the_page(page: Page, server: Serving) -> None:
+    run_id, _ = server.run_to_its_end(plan_of(kind="dark", shots=1, pulse=PULSE))
+    jobs, named = server.app.state.context.jobs, "a reason " * 26 + "more"
+    job = jobs.add(shot_job(JobKind.MEASUREMENT, run_id, 0, "paper", named, {}))
+    for state in (JobState.RUNNING, JobState.DONE):
+        jobs.move(job.id, state, result={"droplets": 0, "verdict": "doubtful", "reasons": []})
+    page.set_viewport_size({"width": 1280, "height": 900})
+    page.goto(str(server.http.base_url))
+    verdict = page.get_by_role("region", name="Droplets").get_by_role("cell").last
+    expect(verdict).to_contain_text(named)
+    box = verdict.bounding_box()
+    assert box is not None
+    assert box["height"] < 120
 
 
 def _picture(page: Page, name: str) -> None:

@@ -22,6 +22,8 @@ _COLUMNS = {
     "ghosts": "Ghosts, %",
     "verdict": "Verdict",
 }
+_VERDICT = '<q-td :props="props"><div class="verdict" tabindex="0">{{ props.value }}</div></q-td>'
+"""Reasons may be many lines: they scroll."""
 
 
 class DropletPanel:
@@ -35,6 +37,7 @@ class DropletPanel:
             ]
             self._table = ui.table(columns=columns, rows=[], row_key="id").classes("w-full")
             self._table.props('dense flat wrap-cells hide-bottom :pagination="{rowsPerPage: 0}"')
+            self._table.add_slot("body-cell-verdict", _VERDICT)
         self._panel.set_visibility(False)
 
     async def reload(self) -> None:
