@@ -119,7 +119,7 @@ def draw_seeing(axes: Axes, seeing: NDArray[np.uint8], grid: VoxelGrid) -> None:
     half_mm = grid.pitch_mm / 2
     span = (grid.x_mm[0] - half_mm, grid.x_mm[-1] + half_mm, grid.y_mm[-1] + half_mm, grid.y_mm[0] - half_mm)
     image = axes.imshow(share, extent=span, cmap="magma_r", vmin=0, vmax=max(1.0, float(share.max())))
-    axes.figure.colorbar(image, ax=axes, label="of the depth, below 3 views [%]", shrink=0.75)
+    axes.figure.colorbar(image, ax=axes, label="depth seen by < 3 views [%]", shrink=0.75)
     _frame(axes, grid)
     axes.set_title(
         f"{100 * np.mean(seeing < 3):.1f} % of the volume, {100 * np.mean(seeing == 0):.2f} % by none", fontsize="small"

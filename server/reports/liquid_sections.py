@@ -18,6 +18,8 @@ from server.reports.page import Picture, Section, Table
 
 CURVE_POINTS, BEYOND = 400, 1.25
 """Of the break-up curve, which ends so far beyond the longest length."""
+FEWEST = 5
+"""Objects whose lengths have a spread."""
 CLASSES_TEXT = (
     "A ligament's longest axis is 1.8 times the next; a sheet's shortest is 1.8 times shorter than the next; a cluster "
     "is several bodies that touch, a ring or a net; the core hangs together with the nozzle. Shorter ones are droplets."
@@ -126,7 +128,8 @@ def _row(kind: ObjectClass, liquid: ReportedLiquid) -> list[str]:
     if not len(chosen):
         return [*counted, "", "", ""]
     low_mm, median_mm, high_mm = np.percentile(chosen.lengths_mm, (10, 50, 90))
-    return [*counted, f"{median_mm:.2f}", f"{low_mm:.2f} to {high_mm:.2f}", f"{np.median(chosen.widths_mm):.3f}"]
+    between = f"{low_mm:.2f} to {high_mm:.2f}" if len(chosen) >= FEWEST else ""
+    return [*counted, f"{median_mm:.2f}", between, f"{np.median(chosen.widths_mm):.3f}"]
 
 
 def unknown_section(shots: Sequence[StoredDroplets], mapped: ObjectsShot | None = None) -> Section | None:

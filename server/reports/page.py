@@ -9,6 +9,8 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
+DPI = 180
+"""Dots of a picture per inch: sharp in print."""
 STYLE = """
 body { font: 16px/1.5 system-ui, sans-serif; max-width: 68rem; margin: 2rem auto; padding: 0 1rem; color: #1d2733; }
 h1 { font-weight: 600; } h2 { font-weight: 600; margin-top: 2.5rem; border-bottom: 1px solid #d5dbe1; }
@@ -89,9 +91,10 @@ def _table(table: Table) -> str:
 
 def _picture(picture: Picture) -> str:
     buffer = io.BytesIO()
-    kind, mime, dpi = ("svg", "svg+xml", 200) if picture.svg else ("png", "png", 110)
+    kind, mime, dpi = ("svg", "svg+xml", DPI) if picture.svg else ("png", "png", DPI)
     picture.figure.savefig(buffer, format=kind, dpi=dpi)
     data = base64.b64encode(buffer.getvalue()).decode()
     caption = escape(picture.caption)
-    image = f'<img alt="{caption}" src="data:image/{mime};base64,{data}">'
+    width = f"{picture.figure.get_figwidth():g}in"
+    image = f'<img alt="{caption}" style="width: {width}" src="data:image/{mime};base64,{data}">'
     return f"<figure>{image}<figcaption>{caption}</figcaption></figure>"
