@@ -92,9 +92,9 @@ _DROPLETS_TEXT = (
 
 def _droplets_section(droplets: MeasuredDroplets) -> Section:
     """What was measured, where and how large, and beside it the truth; the reason where nothing could be."""
-    text = " ".join([_DROPLETS_TEXT, *reasons_of(droplets)])
+    table, points = _droplets_table(droplets), reasons_of(droplets)
     if droplets.statistics.d32_um is None:
-        return Section("Droplets", text, [_droplets_table(droplets)])
+        return Section("Droplets", _DROPLETS_TEXT, [table], points=points)
     pictures = [
         Picture(
             found_figure(droplets.found, droplets.missed, droplets.ghosts),
@@ -104,7 +104,7 @@ def _droplets_section(droplets: MeasuredDroplets) -> Section:
     if droplets.velocities:
         figure = velocities_figure(droplets.stored, title=f"shot {droplets.shot.shot}")
         pictures.append(Picture(figure, "Velocities of droplets that both exposures show, seen along z, x and y"))
-    return Section("Droplets", text, [_droplets_table(droplets)], pictures)
+    return Section("Droplets", _DROPLETS_TEXT, [table], pictures, points)
 
 
 def _spray_sections(demo: Demonstration) -> list[Section]:

@@ -89,7 +89,8 @@ def _velocity(droplets: dict[str, Any]) -> str:
     means_m_s = (droplets["velocity"]["mean_m_s"], droplets["true_velocity_m_s"])
     told, true = (", ".join(f"{one:.2f}" for one in mean) for mean in means_m_s)
     return (
-        f"; {droplets['velocity']['pairs']} velocities, mean ({told}) m/s, true ({true}) m/s, "
+        f"; {droplets['velocity']['pairs']} velocities, mean ({told}) m/s, in truth ({true}) m/s for those that "
+        "are of true droplets, "
         f"rms error {droplets['velocity_rms_m_s']:.2f} m/s"
     )
 
