@@ -127,7 +127,9 @@ def test_a_second_server_is_refused_and_leaves_the_run_of_the_first_one_alone(tm
         port = free_port()
         late = refused(port, tmp_path / "elsewhere")
         assert holder in late
-        assert f"http://127.0.0.1:{port}; " in late, "whoever starts a server is told where the page is"
+        assert f"http://127.0.0.1:{port}, and ABORT alone at port " in late, (
+            "whoever starts a server is told where the page is"
+        )
         shots = client.get(run_url).json()["shots_recorded"]
         eventually(lambda: client.get(run_url).json()["shots_recorded"] > shots, "the run goes on")
         assert client.get(run_url).json()["outcome"] == "active"

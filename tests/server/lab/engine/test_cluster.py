@@ -143,7 +143,7 @@ def test_whoever_has_another_ca_is_told_why(lab: Cluster, tmp_path: Path) -> Non
 
 def test_a_scheduler_that_is_not_there_is_told_and_so_is_one_without_workers(tmp_path: Path) -> None:
     config = ProcessingConfig(scheduler=f"tcp://127.0.0.1:{free_port()}", unreachable_s=1, job_deadline_s=60)
-    with pytest.raises(Unavailable, match=rf"{config.scheduler} does not answer within 1 s \(unreachable_s\).*refused"):
+    with pytest.raises(Unavailable, match=rf"{config.scheduler} does not answer within 1 s \(unreachable_s\)"):
         alone(config, tmp_path)
     metadata = tmp_path / "site" / "tomoshadow-9.9.dist-info" / "METADATA"
     metadata.parent.mkdir(parents=True)
