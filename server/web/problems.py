@@ -77,8 +77,9 @@ def status_of(error: Exception) -> HTTPStatus:
 
 
 def _phrase(status: int) -> str:
-    """Phrase of RFC 9110; Python before 3.13 has an older one for 422."""
-    return "Unprocessable Content" if status == HTTPStatus.UNPROCESSABLE_ENTITY else HTTPStatus(status).phrase
+    """Phrases of RFC 9110, which Python before 3.13 does not have."""
+    newer = {HTTPStatus.UNPROCESSABLE_ENTITY: "Unprocessable Content", HTTPStatus(413): "Content Too Large"}
+    return newer.get(HTTPStatus(status), HTTPStatus(status).phrase)
 
 
 def responses(*statuses: int) -> dict[int | str, dict[str, Any]]:

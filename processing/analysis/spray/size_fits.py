@@ -47,10 +47,9 @@ class SizeFit(FrozenValue):
     def cumulative(self, diameters_um: FloatArray) -> FloatArray:
         """Share by volume of smaller droplets."""
         ratio = np.asarray(diameters_um, np.float64) / self.scale_um
-        by_volume: FloatArray = (
-            ndtr(np.log(ratio) / self.shape) if self.name == "lognormal" else -np.expm1(-(ratio**self.shape))
-        )
-        return by_volume
+        if self.name == "lognormal":
+            return np.asarray(ndtr(np.log(ratio) / self.shape), np.float64)
+        return np.asarray(-np.expm1(-(ratio**self.shape)), np.float64)
 
     def density_per_um(self, diameters_um: FloatArray) -> FloatArray:
         """Density by volume."""
