@@ -11,9 +11,22 @@ PROCESSED_MS = 180_000
 VIEWS = ("view1", "view2", "view3", "view4")
 
 
+def go_to(page: Page, title: str) -> None:
+    """Follow the rail to a page."""
+    page.get_by_role("navigation", name="pages").get_by_role("link", name=title, exact=True).click()
+    expect(page.get_by_role("navigation", name="pages").locator("[aria-current=page]")).to_have_text(re.compile(title))
+
+
+def open_drawer(page: Page) -> None:
+    """Look at jobs and events."""
+    page.get_by_role("button", name="jobs and events").click()
+    expect(page.get_by_role("log")).to_be_visible()
+
+
 def drive_the_page(page: Page, base_url: str, views: tuple[str, ...], shots: int) -> None:
     """What an operator does: look, be refused, start a run, watch it end, see it, find its volume."""
     page.goto(base_url)
+    open_drawer(page)
     for view in views:
         expect(page.get_by_role("img", name=f"{view} live view")).to_be_visible()
         expect(page.get_by_role("status", name=re.compile(f"^{view}: ok"))).to_be_visible()
@@ -29,6 +42,7 @@ def drive_the_page(page: Page, base_url: str, views: tuple[str, ...], shots: int
     drawn = page.locator(".live-grid").get_attribute("data-pictures")
     assert int(drawn or 0) >= len(views), f"{drawn} pictures of {len(views)} views"
     expect(page.get_by_role("region", name="Processing").get_by_text("done").first).to_be_visible(timeout=PROCESSED_MS)
+    go_to(page, "Results")
     _look_at_the_volume(page)
 
 

@@ -14,7 +14,7 @@ from playwright.sync_api import Browser, Locator, Page, Route, expect
 from server.lab.jobs import JobKind, JobState, shot_job
 from server.web.app import create_app
 from tests.support.cut_link import CutLink, cut_link
-from tests.support.operator import VIEWS
+from tests.support.operator import VIEWS, go_to, open_drawer
 from tests.support.server_process import eventually
 from tests.support.serving import Serving, plan_of, serving
 
@@ -95,6 +95,7 @@ def test_a_click_that_waited_in_the_network_fires_no_light(
     tab: Page, link: CutLink, server: Serving, button: str
 ) -> None:
     before, run_id = laboratory(server).generator.fired, server.services.acquisition.status().run_id
+    go_to(tab, "Run" if button == "Start run" else "Live")
     link.cut()
     press(tab, button)
     expect(unknown(tab)).to_be_visible()
@@ -138,8 +139,9 @@ def test_after_an_outage_the_page_is_current_and_text_is_still_there(tab: Page, 
     laboratory(server).open_door()
     link.mend()
     expect(rig_state(tab)).to_have_text("NOT READY: door: the interlock is open")
-    expect(tab.get_by_role("region", name="Runs").get_by_text(run_id)).to_be_visible()
     expect(tab.get_by_label("Name", exact=True)).to_have_value("typed before")
+    go_to(tab, "Runs")
+    expect(tab.get_by_role("region", name="Runs").get_by_text(run_id)).to_be_visible()
 
 
 def test_abort_says_when_it_is_not_delivered_and_counts_when_it_is_late(browser: Browser, server: Serving) -> None:
@@ -162,6 +164,7 @@ def test_abort_says_when_it_is_not_delivered_and_counts_when_it_is_late(browser:
 
 def test_abort_answers_when_nothing_runs(page: Page, server: Serving) -> None:
     page.goto(str(server.http.base_url))
+    open_drawer(page)
     page.get_by_role("button", name="ABORT").click()
     expect(answer(page)).to_have_text(re.compile("^light off confirmed"))
     expect(page.get_by_role("log")).to_contain_text("ABORT of nothing: no run was under way: light confirmed off")
@@ -202,6 +205,7 @@ def test_alarms_are_acknowledged_one_by_one(page: Page, server: Serving) -> None
 def test_the_bar_is_in_sight_at_every_width_dark_and_light(page: Page, server: Serving, width: int) -> None:
     page.set_viewport_size({"width": width, "height": 900})
     page.goto(str(server.http.base_url))
+    open_drawer(page)
     expect(rig_state(page)).to_have_text("READY")
     lamps = page.get_by_role("status", name="sum of all lamps")
     if width <= 1500:
@@ -230,6 +234,8 @@ def test_the_bar_is_in_sight_at_every_width_dark_and_light(page: Page, server: S
 def test_no_words_of_the_page_are_cut(page: Page, server: Serving, width: int) -> None:
     page.set_viewport_size({"width": width, "height": 900})
     page.goto(str(server.http.base_url))
+    open_drawer(page)
+    go_to(page, "Live")
     live = page.get_by_role("region", name="Live", exact=True)
     live.get_by_role("button", name="Shoot one").click()
     expect(live.get_by_role("button", name="Keep shot")).to_be_visible()
@@ -251,6 +257,7 @@ def test_many_reasons_of_droplets_make_no_row_of_the_height_of_the_page(page: Pa
         jobs.move(job.id, state, result={"droplets": 0, "verdict": "doubtful", "reasons": []})
     page.set_viewport_size({"width": 1280, "height": 900})
     page.goto(str(server.http.base_url))
+    go_to(page, "Results")
     verdict = page.get_by_role("region", name="Droplets").get_by_role("cell").last
     expect(verdict).to_contain_text(named)
     box = verdict.bounding_box()

@@ -1,4 +1,10 @@
-"""The page: one screen for one operator. Mounted last, because it answers every path that nobody else does."""
+"""The desk: one for each browser tab. The bar and the rail stay, pages come and go between them by their addresses.
+
+Mounted last, because it answers every path that nobody else does.
+"""
+
+from collections.abc import Callable
+from functools import partial
 
 from fastapi import FastAPI, Request
 from nicegui import ui
@@ -7,66 +13,78 @@ from server.lab.services import Context
 from server.rig.config import RigConfig
 from server.web.abort_listener import AbortListener
 from server.web.ui import theme
+from server.web.ui.bar.header import Header
+from server.web.ui.calibrate.calibrate_page import CalibratePage
+from server.web.ui.desk_page import DeskPage
 from server.web.ui.draft import DraftStore
-from server.web.ui.droplet_panel import DropletPanel
-from server.web.ui.event_log import EventLog
-from server.web.ui.header import Header
-from server.web.ui.live_panel import LivePanel
-from server.web.ui.run_form import RunForm
-from server.web.ui.run_panel import RunPanel
-from server.web.ui.tables import JobPanel, RunTable
-from server.web.ui.volume_panel import VolumePanel
+from server.web.ui.drawer.drawer import Drawer
+from server.web.ui.live.live_page import LivePage
+from server.web.ui.rail import Rail
+from server.web.ui.results.results_page import ResultsPage
+from server.web.ui.rig.rig_page import RigPage
+from server.web.ui.run.run_page import RunPage
+from server.web.ui.runs.runs_page import RunsPage
 
 _REFRESH_S = 0.25
-_EVENTS_SHOWN = 100
 _LISTS_CHANGED = {"run_state", "job_changed", "calibration_chosen"}
+_PATHS = ("/", "/rig", "/live", "/calibrate", "/run", "/results", "/runs")
 
 
 def mount_page(app: FastAPI, config: RigConfig) -> None:
-    """Serve the page at ``/``; register every other route before."""
+    """Serve the desk at the addresses of its pages; register every other route before."""
 
-    @ui.page("/", title=f"tomoshadow: {config.name}")
     def show(request: Request) -> None:
         abort: AbortListener = app.state.abort_listener
         abort.admit(request.headers["host"])
-        Page(app.state.context, abort.port)
+        Desk(app.state.context, abort.port)
 
+    for path in _PATHS:
+        ui.page(path, title=f"tomoshadow: {config.name}")(show)
     ui.run_with(app, dark=None, show_welcome_message=False, reconnect_timeout=10)
 
 
-class Page:
-    """The page of one browser tab."""
+class Desk:
+    """What one browser tab shows; a page lives as long as the tab is at its address."""
 
     def __init__(self, context: Context, abort_port: int) -> None:
+        self._context = context
         self._events = context.services.events
-        self._seen = max(0, self._events.newest - _EVENTS_SHOWN)
+        self._page: DeskPage | None = None
         self._are_lists_old = True
+        self._draft = DraftStore(context.services.data_dir / "draft.json", context.services.config, self._events)
         dark = theme.apply()
-        draft = DraftStore(context.services.data_dir / "draft.json", context.services.config, self._events)
         self._header = Header(context, dark, abort_port)
-        with ui.element("div").classes("screen"):
-            with ui.element("div").classes("column"):
-                self._live = LivePanel(context, draft)
-                self._runs, self._jobs = RunTable(context), JobPanel(context)
-            with ui.element("div").classes("column wide"):
-                self._volume = VolumePanel(context)
-                self._droplets = DropletPanel(context)
-            with ui.element("div").classes("column controls"):
-                self._run, self._form, self._log = RunPanel(context), RunForm(context, draft), EventLog()
+        with ui.element("div").classes("desk"):
+            self._rail = Rail(context)
+            ui.sub_pages(self._routes()).classes("desk-page")
+            self._drawer = Drawer(context, self._rail.drawer_button)
         ui.timer(_REFRESH_S, self._refresh)
 
+    def _routes(self) -> dict[str, Callable[[], None]]:
+        context, draft = self._context, self._draft
+        pages: dict[str, Callable[[], DeskPage]] = {
+            "/rig": lambda: RigPage(context),
+            "/live": lambda: LivePage(context, draft),
+            "/calibrate": lambda: CalibratePage(context),
+            "/run": lambda: RunPage(context, draft),
+            "/results": lambda: ResultsPage(context),
+            "/runs": lambda: RunsPage(context),
+        }
+        return {path: partial(self._open, path, build) for path, build in ({"/": pages["/run"]} | pages).items()}
+
+    def _open(self, path: str, build: Callable[[], DeskPage]) -> None:
+        self._page = build()
+        self._rail.mark(path)
+        self._are_lists_old = True
+
     async def _refresh(self) -> None:
-        events = self._events.since(self._seen)
-        self._log.add(events)
-        for part in (self._header, self._live, self._run, self._form):
+        events = self._drawer.new_events()
+        for part in (self._header, self._rail):
             part.refresh()
-        await self._form.judge()
-        if events:
-            self._seen = events[-1].id
+        if page := self._page:
+            await page.refresh()
         if self._are_lists_old or any(event.name in _LISTS_CHANGED for event in events):
             self._are_lists_old = False
-            await self._runs.reload()
-            await self._jobs.reload()
-            await self._volume.reload()
-            await self._droplets.reload()
-            await self._form.reload_choices()
+            await self._drawer.reload()
+            if page := self._page:
+                await page.reload()

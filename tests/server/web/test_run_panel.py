@@ -4,7 +4,7 @@ from daq.causes import Cause, CauseCode
 from daq.run.events import RunStatus
 from daq.run.state import RunState
 from server.lab.duty import Health, Lamp
-from server.web.ui.run_panel import acknowledge_text, counts_text, waits_for_acknowledgement
+from server.web.ui.run.run_panel import acknowledge_text, counts_text, waits_for_acknowledgement
 
 
 def generator_lamp(health: Health) -> Lamp:

@@ -7,8 +7,9 @@ import pytest
 from daq.run_plan import RunKind
 from server.lab.jobs import JobKind, JobState, calibration_job, reconstruction_job, shot_job
 from server.lab.runs.run_summary import RunSummary
-from server.web.ui import tables
-from server.web.ui.tables import job_row
+from server.web.ui.asking import answer_of
+from server.web.ui.drawer.job_panel import job_row
+from server.web.ui.runs.run_table import run_row
 
 
 def told(views: dict[str, Any], not_checked: tuple[str, ...] = ()) -> str:
@@ -59,17 +60,17 @@ def test_a_completed_run_that_lost_shots_is_not_green(valid: int, colour: str) -
         shots_valid=valid,
         calibration=None,
     )
-    row = tables.run_row(run)
+    row = run_row(run)
     assert (row["colour"], row["run"]) == (colour, "20261129T032014-spray")
 
 
 def test_whoever_asks_for_work_is_told_what_came_of_it() -> None:
     queued = calibration_job("run", "cal", "pinhole")
     done = queued.model_copy(update={"state": JobState.DONE})
-    assert tables.answer_of([done, queued]) == ("1 job is queued, see Processing", True)
-    assert tables.answer_of([queued, queued]) == ("2 jobs are queued, see Processing", True)
-    assert tables.answer_of([done]) == ("nothing to do: it is done already", False)
-    assert tables.answer_of([]) == ("nothing to do: the run has no valid shot", False)
+    assert answer_of([done, queued]) == ("1 job is queued, see Processing", True)
+    assert answer_of([queued, queued]) == ("2 jobs are queued, see Processing", True)
+    assert answer_of([done]) == ("nothing to do: it is done already", False)
+    assert answer_of([]) == ("nothing to do: the run has no valid shot", False)
 
 
 GOOD = {"verdict": "good", "shots": [{"shot": 3, "verdict": "good"}]}

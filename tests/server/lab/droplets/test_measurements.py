@@ -21,8 +21,8 @@ from server.lab.job_recovery import jobs_on_disk
 from server.lab.jobs import JobKind, JobState
 from server.lab.tasks import measure_shot
 from server.web.app import create_api
-from server.web.ui.droplet_panel import droplet_row
-from server.web.ui.tables import job_row
+from server.web.ui.drawer.job_panel import job_row
+from server.web.ui.results.droplet_panel import droplet_row
 from tests.server.web.test_api import wait_for_jobs
 from tests.support.bright_scenes import GRID, MARGIN_VOXEL, write_bright_calibration, write_bright_run
 from tests.support.droplet_run import write_run

@@ -19,6 +19,7 @@ from server.lab.services import Context
 from server.lab.starting.light_request import obey
 from server.lab.starting.readiness import reasons_against
 from server.lab.starting.run_start import start_run
+from server.web.ui.bar.server_link import TICKET, light_request, shown_form
 from server.web.ui.draft import (
     PLAN_FIELDS,
     PULSE_FIELDS,
@@ -28,7 +29,6 @@ from server.web.ui.draft import (
     problem_of_current,
     problem_of_positions,
 )
-from server.web.ui.link import TICKET, light_request, shown_form
 from server.web.ui.theme import panel
 
 _REFERENCE_KINDS = (RunKind.DARK, RunKind.BACKGROUND)

@@ -5,11 +5,11 @@ import time
 from nicegui import ui
 
 from server.lab.services import Context
-from server.web.ui.abort_button import AbortButton
-from server.web.ui.alarm_strip import AlarmStrip
-from server.web.ui.lamp_row import LampRow
-from server.web.ui.link import Link
-from server.web.ui.state_chip import StateChip
+from server.web.ui.bar.abort_button import AbortButton
+from server.web.ui.bar.alarm_strip import AlarmStrip
+from server.web.ui.bar.lamp_row import LampRow
+from server.web.ui.bar.server_link import ServerLink
+from server.web.ui.bar.state_chip import StateChip
 
 
 class Header:
@@ -25,7 +25,7 @@ class Header:
                 self._calibration = ui.label("").classes("calibration lockable")
                 self._calibration.props('role=status aria-label="current calibration"')
                 self._state = StateChip()
-                self._link = Link()
+                self._link = ServerLink()
                 dark_button = ui.button(icon="contrast", on_click=dark.toggle).classes("lockable")
                 dark_button.props('flat round dense color=white aria-label="dark or light"')
                 AbortButton(abort_port)

@@ -1,4 +1,4 @@
-"""Link: whether the page hears the server; without it the page is grey and locked, but for ABORT."""
+"""ServerLink: whether the page hears the server; without it the page is grey and locked, but for ABORT."""
 
 from nicegui.element import Element
 from pydantic import ValidationError
@@ -13,7 +13,7 @@ _NEVER = 0
 BEATS_PER_S = round(1 / PERIOD_S)
 
 
-class Link(Element, component="link.js"):
+class ServerLink(Element, component="server_link.js"):
     """Listens to the beat of the server."""
 
     def __init__(self) -> None:

@@ -14,9 +14,9 @@ from server.lab.errors import ServerError
 from server.lab.services import Context
 from server.lab.starting.light_request import obey
 from server.lab.starting.run_start import SingleShot, shoot
+from server.web.ui.bar.server_link import TICKET, light_request, shown_form
 from server.web.ui.draft import DraftStore, problem_of, pulse_of
-from server.web.ui.link import TICKET, light_request, shown_form
-from server.web.ui.live_tiles import LiveTiles
+from server.web.ui.live.live_tiles import LiveTiles
 from server.web.ui.theme import panel
 
 _FIELDS = LivePlan.model_fields

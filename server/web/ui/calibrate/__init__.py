@@ -1,0 +1,4 @@
+"""The page of calibrations.
+
+Its modules may import ``lab``, ``pictures``, the addresses of REST and what all pages share.
+"""

@@ -1,0 +1,42 @@
+"""Drawer: jobs and events beside every page; a button of the rail opens it."""
+
+from nicegui import ui
+
+from server.lab.events import Event
+from server.lab.services import Context
+from server.web.ui.drawer.event_log import EventLog
+from server.web.ui.drawer.job_panel import JobPanel
+
+_EVENTS_SHOWN = 100
+
+
+class Drawer:
+    """Built once per tab; closed at first.
+
+    Parameters
+    ----------
+    context : Context
+        The application.
+    button : ui.button
+        Opens and closes it.
+    """
+
+    def __init__(self, context: Context, button: ui.button) -> None:
+        self._events = context.services.events
+        self._seen = max(0, self._events.newest - _EVENTS_SHOWN)
+        with ui.element("aside").classes("drawer").props('aria-label="jobs and events"') as self._box:
+            self._jobs, self._log = JobPanel(context), EventLog()
+        self._box.set_visibility(False)
+        button.on_click(lambda: self._box.set_visibility(not self._box.visible))
+
+    def new_events(self) -> list[Event]:
+        """Events since the last call; those that say something to a person are in the log."""
+        events = self._events.since(self._seen)
+        self._log.add(events)
+        if events:
+            self._seen = events[-1].id
+        return events
+
+    async def reload(self) -> None:
+        """Read the jobs again."""
+        await self._jobs.reload()

@@ -1,0 +1,162 @@
+"""JobPanel: jobs with their states and what came of them; one that has not ended can be aborted."""
+
+import asyncio
+import math
+from typing import Any
+
+from nicegui import ui
+
+from processing.analysis.droplets.measured_exposure import ShotVerdict
+from processing.calibration.verdict import BELONGING, Verdict
+from processing.runs.exposure_faults import fault_lines
+from server.lab.jobs import Job, JobKind, JobState
+from server.lab.services import Context
+from server.lab.starting.run_start import choose_calibration
+from server.web.ui.asking import try_to
+from server.web.ui.run.run_panel import outcome_colour
+from server.web.ui.table import table_of
+from server.web.ui.theme import panel
+
+_SHOWN = 60
+_TRUSTED = (Verdict.GOOD, Verdict.USABLE)
+
+
+class JobPanel:
+    """Jobs, newest first; an unfinished one can be aborted, a fitted calibration chosen."""
+
+    def __init__(self, context: Context) -> None:
+        self._context = context
+        with panel("Processing", "flex-1"):
+            self._table = table_of(
+                ("job", "Job"), ("run", "Run"), ("outcome", "State"), ("actions", ""), ("detail", "")
+            )
+            self._table.on("act", self._on_act)
+
+    async def reload(self) -> None:
+        """Read the job table again."""
+        jobs = await asyncio.to_thread(self._context.jobs.newest, None, JobState, _SHOWN)
+        self._table.rows = [job_row(job) for job in jobs]
+        self._table.update()
+
+    async def _on_act(self, event: Any) -> None:
+        if event.args["action"] == "Abort":
+            await try_to(lambda: self._context.runner.abort(event.args["id"]))
+        else:
+            await try_to(lambda: self._choose(event.args["calibration"]))
+
+    async def _choose(self, calibration: str) -> None:
+        await asyncio.to_thread(choose_calibration, self._context, calibration)
+        ui.notify(f"{calibration} is the current calibration", type="positive")
+
+
+def job_row(job: Job) -> dict[str, Any]:
+    """One job in the table, what came of it included."""
+    is_calibration = job.kind is JobKind.CALIBRATION
+    choices = {
+        JobState.QUEUED: ["Abort"],
+        JobState.RUNNING: ["Abort"],
+        JobState.DONE: ["Use"] if is_calibration else [],
+    }
+    return {
+        "id": job.id,
+        "job": _name(job),
+        "run": job.run_id,
+        "outcome": job.state,
+        "colour": "warning" if job.state is JobState.DONE and _is_doubtful(job) else outcome_colour(job.state),
+        "detail": job.error or "; ".join(told for told in (_DETAIL[job.kind](job), _belonging(job)) if told),
+        "actions": choices.get(job.state, []),
+        "calibration": job.calibration,
+    }
+
+
+def _name(job: Job) -> str:
+    method = str(job.settings.get("method", "")).upper()
+    return {
+        JobKind.CALIBRATION: "calibration",
+        JobKind.CHECK: f"check of shot {job.shot}",
+        JobKind.RECONSTRUCTION: f"{method} shot {job.shot}",
+        JobKind.MEASUREMENT: f"droplets of shot {job.shot}",
+    }[job.kind]
+
+
+def _disparity(job: Job) -> str:
+    """The view that disagrees most, or why the droplets do not tell; nothing before the check has ended."""
+    result = job.result or {"views": {}}
+    if not result["views"]:
+        return ", ".join(str(result[key]) for key in ("problem", "verdict") if result.get(key))
+    worst = result["moved"] or max(result["views"], key=result["views"].__getitem__)
+    return f"{worst} {result['views'][worst]:.2f} px, {result['verdict']}"
+
+
+def _quality(job: Job) -> str:
+    """Hold-out error, verdict and reasons of the worst view of a calibration; nothing before it has ended."""
+    result = job.result or {"views": {}}
+    badness = {
+        name: (list(Verdict).index(view["verdict"]), _holdout_px(view)) for name, view in result["views"].items()
+    }
+    if not badness:
+        return ""
+    worst = max(badness, key=badness.__getitem__)
+    view = result["views"][worst]
+    told = f"{worst}: hold-out {_holdout_px(view):.3f} px, {view['verdict']}"
+    unchecked = [f"not checked {one['what']}" for one in result.get("not_checked", [])]
+    return "; ".join([told, *view.get("reasons", []), *unchecked])
+
+
+def _holdout_px(view: dict[str, Any]) -> float:
+    return math.inf if view["holdout_error_px"] is None else float(view["holdout_error_px"])
+
+
+def _volumes(job: Job) -> str:
+    """What is wrong with the images of an exposure, and the views that could not be rectified; nothing where all is."""
+    result = job.result or {}
+    views = result.get("views", {})
+    faults = [
+        f"exposure {volume['frame']}: {line}" for volume in result.get("volumes", ()) for line in fault_lines(volume)
+    ]
+    slow = [f"{name} exact: {view['reason']}" for name, view in views.items() if view["reason"]]
+    return "; ".join([*faults, *slow])
+
+
+def _belonging(job: Job) -> str:
+    """What droplets say against run and calibration, or that they say nothing; nothing where they agree."""
+    asked = (job.result or {}).get(BELONGING)
+    if asked is None or asked["verdict"] in _TRUSTED:
+        return ""
+    shots = ", ".join(str(check["shot"]) for check in asked["shots"])
+    if asked["verdict"] is None and job.kind is JobKind.MEASUREMENT:
+        return ""  # droplets have been fitted: their own verdict tells more
+    if not asked["shots"]:
+        return "not checked yet whether run and calibration belong together"
+    if asked["verdict"] is None:
+        return f"not checked whether run and calibration belong together (asked: shot {shots})"
+    return f"droplets speak against run and calibration: {asked['verdict']} (shot {asked['shots'][0]['shot']})"
+
+
+def _is_doubtful(job: Job) -> bool:
+    """Whether something that is done is not to be trusted without a look: amber, not green."""
+    result = job.result or {}
+    verdicts = [result.get("verdict"), *(view.get("verdict") for view in _views(result).values())]
+    doubted = [verdict for verdict in verdicts if verdict not in (*_TRUSTED, ShotVerdict.GOOD, ShotVerdict.EMPTY, None)]
+    belonging = result.get(BELONGING, {}).get("verdict") in (Verdict.WARN, Verdict.REFUSE)
+    return bool(doubted) or belonging or any(fault_lines(volume) for volume in result.get("volumes", ()))
+
+
+def _views(result: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """Views of a calibration or a reconstruction; those of a check are figures."""
+    return {name: view for name, view in result.get("views", {}).items() if isinstance(view, dict)}
+
+
+def _found(job: Job) -> str:
+    """Droplets, verdict and reasons of a measurement; nothing before it has ended."""
+    if not job.result:
+        return ""
+    return "; ".join([f"{job.result['droplets']} droplets, {job.result['verdict']}", *job.result["reasons"]])
+
+
+_DETAIL = {
+    JobKind.CALIBRATION: _quality,
+    JobKind.CHECK: _disparity,
+    JobKind.RECONSTRUCTION: _volumes,
+    JobKind.MEASUREMENT: _found,
+}

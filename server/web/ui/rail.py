@@ -1,0 +1,86 @@
+"""Rail: the pages in the order of the day, each with its address, and a tick where its work is done."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from nicegui import ui
+
+from daq.run.state import RunOutcome
+from server.lab.duty import Health
+from server.lab.services import Context
+
+
+@dataclass(frozen=True)
+class Stop:
+    """A page on the rail.
+
+    Attributes
+    ----------
+    path, title, icon : str
+        Where it is, what it is called, how it looks.
+    is_done : Callable[[Context], bool] | None
+        Whether what it is for is done; None: it is never done.
+    """
+
+    path: str
+    title: str
+    icon: str
+    is_done: Callable[[Context], bool] | None = None
+
+
+def _has_good_lamps(context: Context) -> bool:
+    return all(lamp.health is Health.OK for lamp in context.lamps)
+
+
+def _is_calibrated(context: Context) -> bool:
+    return context.calibrations.current is not None
+
+
+def _has_completed_a_run(context: Context) -> bool:
+    return context.services.acquisition.status().outcome is RunOutcome.COMPLETED
+
+
+STOPS = (
+    Stop("/rig", "Rig", "precision_manufacturing", _has_good_lamps),
+    Stop("/live", "Live", "videocam"),
+    Stop("/calibrate", "Calibrate", "straighten", _is_calibrated),
+    Stop("/run", "Run", "play_circle", _has_completed_a_run),
+    Stop("/results", "Results", "view_in_ar"),
+    Stop("/runs", "Runs", "list_alt"),
+)
+
+
+class Rail:
+    """Built once per tab, refreshed by its timer."""
+
+    def __init__(self, context: Context) -> None:
+        self._context = context
+        with ui.element("nav").classes("rail").props('aria-label="pages"'):
+            self._links = {stop.path: ui.link(target=stop.path).classes("rail-stop") for stop in STOPS}
+            self._ticks = {stop: _fill(self._links[stop.path], stop) for stop in STOPS}
+            ui.space()
+            self.drawer_button = ui.button(icon="receipt_long").classes("rail-drawer")
+            self.drawer_button.props('flat no-caps stack aria-label="jobs and events"')
+            with self.drawer_button:
+                ui.label("Jobs")
+        self.refresh()
+
+    def mark(self, path: str) -> None:
+        """Show which page is open; that of the next run is where a day begins."""
+        for own, link in self._links.items():
+            if path == own or (path == "/" and own == "/run"):
+                link.props("aria-current=page")
+            else:
+                link.props(remove="aria-current")
+
+    def refresh(self) -> None:
+        """Show what is done."""
+        for stop, tick in self._ticks.items():
+            tick.set_visibility(stop.is_done is not None and stop.is_done(self._context))
+
+
+def _fill(link: ui.link, stop: Stop) -> ui.icon:
+    with link.props(f'aria-label="{stop.title}"'):
+        ui.icon(stop.icon, size="22px")
+        ui.label(stop.title)
+        return ui.icon("check_circle", size="14px").classes("rail-tick").props('aria-label="done"')

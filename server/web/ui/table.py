@@ -1,0 +1,21 @@
+"""Tables of the page: dense, with a badge for outcomes and buttons for what can be done."""
+
+from nicegui import ui
+
+_BADGE = '<q-td :props="props"><q-badge :color="props.row.colour" :label="props.value" /></q-td>'
+_ACTIONS = """<q-td :props="props" auto-width><q-btn v-for="action in props.value" :key="action" :label="action"
+dense flat no-caps size="sm" color="primary" @click.stop="$parent.$emit('act', { ...props.row, action })" /></q-td>"""
+
+
+def table_of(*columns: tuple[str, str]) -> ui.table:
+    """A table with these columns, by field and title; ``outcome`` is a badge, ``actions`` are buttons."""
+    described = [
+        {"name": name, "label": label, "field": name, "align": "left", "classes": name} for name, label in columns
+    ]
+    table = (
+        ui.table(columns=described, rows=[], row_key="id").classes("w-full").props("dense flat wrap-cells hide-bottom")
+    )
+    table.props('rows-per-page-options="[0]" :pagination="{rowsPerPage: 0}"')
+    table.add_slot("body-cell-outcome", _BADGE)
+    table.add_slot("body-cell-actions", _ACTIONS)
+    return table
