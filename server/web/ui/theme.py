@@ -6,13 +6,15 @@ from nicegui import ui
 
 ACCENT = "#2f7de1"
 
-_STYLE_SHEET = Path(__file__).with_name("theme.css")
+_STYLE_SHEETS = sorted(Path(__file__).parent.rglob("*.css"), key=lambda path: (len(path.parts), path))
+"""That of all pages first, then that of each room, beside its modules."""
 
 
 def apply() -> ui.dark_mode:
     """Give the present page its look; returns the switch between dark and light."""
     ui.colors(primary=ACCENT, positive="#35b26a", negative="#d83c42", warning="#f0a92e")
-    ui.add_css(_STYLE_SHEET)
+    for style_sheet in _STYLE_SHEETS:
+        ui.add_css(style_sheet)
     return ui.dark_mode(True)
 
 
