@@ -4,8 +4,27 @@ import csv
 import io
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
+
+class NamedCase(Protocol):
+    """What a study simulates."""
+
+    @property
+    def name(self) -> str:
+        """For tables and figures."""
+
+
+class CaseRow(Protocol):
+    """What became of a shot of a case."""
+
+    @property
+    def case(self) -> str:
+        """Its name."""
+
+
+Case = TypeVar("Case", bound=NamedCase)
+OfCase = TypeVar("OfCase", bound=CaseRow)
 Row = TypeVar("Row")
 Key = TypeVar("Key")
 
@@ -34,6 +53,21 @@ def grouped(rows: Iterable[Row], key: Callable[[Row], Key]) -> dict[Key, list[Ro
     for row in rows:
         groups.setdefault(key(row), []).append(row)
     return groups
+
+
+def asked_case(case: Case, asked_for: Iterable[Case]) -> Case:
+    """A case; with what is asked for, if it is one of those for which something is."""
+    return next((known for known in asked_for if known.name == case.name), case)
+
+
+def all_kept(
+    cases: Iterable[Case], rows: Iterable[OfCase], kept: Callable[[Case, Sequence[OfCase]], bool | None]
+) -> bool | None:
+    """Whether every case that was tried keeps what is asked for; None where nothing is."""
+    by_case = grouped(rows, lambda row: row.case)
+    judged = [kept(case, by_case[case.name]) for case in cases if case.name in by_case]
+    asked = [one for one in judged if one is not None]
+    return all(asked) if asked else None
 
 
 def csv_text(rows: Sequence[Any]) -> str:

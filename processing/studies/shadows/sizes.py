@@ -18,7 +18,7 @@ from processing.figures.droplet_figures import MeasuredCase, droplets_figure
 from processing.geometry import PinholeCamera
 from processing.kernels import DEFAULT_THREADS
 from processing.studies.droplets import IMAGE_SIZE_PX, SLAB
-from processing.studies.report import Statement, grouped
+from processing.studies.report import Statement, all_kept, grouped
 from processing.studies.sensitivity import misaligned
 from processing.studies.shadows.size_errors import d32_of, size_errors
 from processing.studies.simulated_droplets import study_cameras, study_grid
@@ -227,18 +227,18 @@ def size_line(row: SizeRow) -> str:
 
 def all_reached(rows: Sequence[SizeRow], cases: Sequence[SizeCase]) -> bool | None:
     """Whether every case keeps what is asked for; None where nothing is."""
-    by_name, groups = {case.name: case for case in cases}, grouped(rows, _case)
-    judged = [_reached(by_name[name], chosen) for name, chosen in groups.items() if by_name[name].least_found]
-    return all(judged) if judged else None
+    return all_kept(cases, rows, _reached)
 
 
-def _reached(case: SizeCase, rows: Sequence[SizeRow]) -> bool:
+def _reached(case: SizeCase, rows: Sequence[SizeRow]) -> bool | None:
+    if case.least_found is None:
+        return None
     limits = [
         (case.most_ghosts, float(np.mean([row.ghosts for row in rows]))),
         (case.most_d32_error, max(abs(row.d32_error) for row in rows)),
         (case.most_sd_um, float(np.mean([row.sd_um for row in rows]))),
     ]
-    enough = case.least_found is None or np.mean([row.found for row in rows]) >= case.least_found
+    enough = np.mean([row.found for row in rows]) >= case.least_found
     return bool(enough) and all(limit is None or value <= limit for limit, value in limits)
 
 

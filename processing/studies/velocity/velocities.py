@@ -22,7 +22,7 @@ from processing.figures.velocity_figures import PairedCase, paired_figure
 from processing.geometry import FloatArray
 from processing.kernels import DEFAULT_THREADS
 from processing.studies.droplets import IMAGE_SIZE_PX, SLAB
-from processing.studies.report import Statement, grouped
+from processing.studies.report import Statement, all_kept, grouped
 from processing.studies.simulated_droplets import study_grid
 from processing.studies.velocity.double_scenes import SEPARATION_NS, DoubleScene, bright_double, shadow_double
 from processing.volume import VoxelGrid
@@ -218,15 +218,15 @@ def velocity_line(row: VelocityRow) -> str:
 
 def all_reached(rows: Sequence[VelocityRow], cases: Sequence[VelocityCase]) -> bool | None:
     """Whether every case keeps what is asked for; None where nothing is."""
-    by_name, groups = {case.name: case for case in cases}, grouped(rows, _case)
-    judged = [_reached(by_name[name], chosen) for name, chosen in groups.items() if by_name[name].least_paired]
-    return all(judged) if judged else None
+    return all_kept(cases, rows, _reached)
 
 
-def _reached(case: VelocityCase, rows: Sequence[VelocityRow]) -> bool:
+def _reached(case: VelocityCase, rows: Sequence[VelocityRow]) -> bool | None:
+    if case.least_paired is None:
+        return None
     paired, right, rms_voxel, z_sd = _means(rows)
     return (
-        (case.least_paired is None or paired >= case.least_paired)
+        paired >= case.least_paired
         and (case.least_right is None or right >= case.least_right)
         and (case.most_rms_voxel is None or rms_voxel <= case.most_rms_voxel)
         and case.z_scores[0] <= z_sd <= case.z_scores[1]

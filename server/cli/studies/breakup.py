@@ -4,8 +4,7 @@ from argparse import Namespace
 from typing import Any
 
 from server.cli.options import Verbs, count, seed, usable_processors
-from server.cli.output import progress
-from server.cli.studies.study_command import add_study, collected, report
+from server.cli.studies.study_command import add_study, collected, passing, report
 
 
 def add_break_up(studies: Verbs) -> None:
@@ -38,6 +37,6 @@ def break_up(options: Namespace) -> dict[str, Any]:
     result = report(options.out, "breakup", rows, break_up_figure(runs), break_up_statements(rows, objects))
     classes = options.out / "breakup-classes.csv"
     classes.write_text(csv_text(objects), encoding="utf-8")
+    result = {**result, "classes": str(classes)}
     passed = break_up_reached(rows, objects)
-    progress(f"lengths, intervals and classes reach what is asked for: {'PASSED' if passed else 'FAILED'}")
-    return {**result, "classes": str(classes), "passed": passed}
+    return passing(result, passed, "lengths, intervals and classes reach what is asked for")

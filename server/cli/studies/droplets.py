@@ -5,8 +5,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from server.cli.options import Verbs, count, positive, seed, usable_processors, width
-from server.cli.output import progress
-from server.cli.studies.study_command import add_study, collected, report
+from server.cli.studies.study_command import add_study, collected, passing, report
 
 if TYPE_CHECKING:
     from processing.studies.droplets import DropletCase
@@ -57,20 +56,15 @@ def droplets(options: Namespace) -> dict[str, Any]:
         study = replace(study, cases=(case,))
     rows = collected(droplet_study(study, usable_processors()), droplet_line)
     result = report(options.out, "droplets", rows, droplet_figure(rows), droplet_statements(rows))
-    passed = all_reached(rows)
-    if passed is None:
-        progress("nothing is asked for of this case")
-        return result
-    progress(f"every mean reaches what is asked for: {'PASSED' if passed else 'FAILED'}")
-    return {**result, "passed": passed}
+    return passing(result, all_reached(rows), "every mean reaches what is asked for")
 
 
 def _stated_case(options: Namespace) -> "DropletCase | None":
     """The case of the options; with what is asked for, where it is one of those."""
     from processing.studies.droplets import ASKED_FOR, DropletCase
+    from processing.studies.report import asked_case
 
     stated = {field: value for name, field in VARIED.items() if (value := getattr(options, name)) is not None}
     if not stated:
         return None
-    case = DropletCase(**stated)
-    return next((asked for asked in ASKED_FOR if asked.name == case.name), case)
+    return asked_case(DropletCase(**stated), ASKED_FOR)

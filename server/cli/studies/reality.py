@@ -4,8 +4,7 @@ from argparse import Namespace
 from typing import Any
 
 from server.cli.options import Verbs, count, seed, usable_processors
-from server.cli.output import progress
-from server.cli.studies.study_command import add_study, collected, report
+from server.cli.studies.study_command import add_study, collected, passing, report
 
 
 def add_reality(studies: Verbs) -> None:
@@ -29,6 +28,4 @@ def reality(options: Namespace) -> dict[str, Any]:
     study = RealityStudy(seeds=tuple(range(options.seed, options.seed + options.repeats)))
     rows = collected(reality_study(study, usable_processors()), reality_line)
     result = report(options.out, "reality", rows, reality_of_rows(rows), reality_statements(rows))
-    passed = all_true(rows)
-    progress(f"as many are real as is told: {'PASSED' if passed else 'FAILED'}")
-    return {**result, "passed": passed}
+    return passing(result, all_true(rows), "as many are real as is told")

@@ -5,8 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 from server.cli.options import Verbs, count, positive, seed, usable_processors
-from server.cli.output import progress
-from server.cli.studies.study_command import add_study, collected, report
+from server.cli.studies.study_command import add_study, collected, passing, report
 
 VARIED = {
     "density": "density_per_mm3",
@@ -42,6 +41,7 @@ def _ratio(text: str) -> float:
 
 def sizes(options: Namespace) -> dict[str, Any]:
     """Run the study."""
+    from processing.studies.report import asked_case
     from processing.studies.shadows.sizes import (
         ASKED_FOR,
         SizeCase,
@@ -57,13 +57,8 @@ def sizes(options: Namespace) -> dict[str, Any]:
     stated = {field: value for name, field in VARIED.items() if (value := getattr(options, name)) is not None}
     if stated:
         case = SizeCase(**stated)
-        study = replace(study, cases=(next((known for known in ASKED_FOR if known.name == case.name), case),))
+        study = replace(study, cases=(asked_case(case, ASKED_FOR),))
     rows = collected(size_study(study, usable_processors()), size_line)
     figure, statements = size_figure(rows, study.cases), size_statements(rows, study.cases)
     result = report(options.out, "sizes", rows, figure, statements)
-    passed = all_reached(rows, study.cases)
-    if passed is None:
-        progress("nothing is asked for of this case")
-        return result
-    progress(f"every case reaches what is asked for: {'PASSED' if passed else 'FAILED'}")
-    return {**result, "passed": passed}
+    return passing(result, all_reached(rows, study.cases), "every case reaches what is asked for")

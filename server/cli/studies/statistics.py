@@ -4,8 +4,7 @@ from argparse import Namespace
 from typing import Any
 
 from server.cli.options import Verbs, count, seed
-from server.cli.output import progress
-from server.cli.studies.study_command import add_study, collected, report
+from server.cli.studies.study_command import add_study, collected, passing, report
 
 
 def add_statistics(studies: Verbs) -> None:
@@ -31,6 +30,4 @@ def statistics(options: Namespace) -> dict[str, Any]:
     study = StatisticsStudy(sprays=options.sprays, seed=options.seed)
     rows = collected(statistics_study(study), statistics_line)
     result = report(options.out, "statistics", rows, statistics_figure(rows), statistics_statements(rows))
-    passed = all_held(rows)
-    progress(f"every interval asked for holds the truth in 85 to 95 %: {'PASSED' if passed else 'FAILED'}")
-    return {**result, "passed": passed}
+    return passing(result, all_held(rows), "every interval asked for holds the truth in 85 to 95 %")

@@ -59,6 +59,15 @@ def collected(rows: Iterable[Row], line: Callable[[Row], str]) -> list[Row]:
     return collected
 
 
+def passing(result: dict[str, Any], passed: bool | None, what: str) -> dict[str, Any]:
+    """The JSON object of a study with whether it passed, which is told; None where nothing is asked for."""
+    if passed is None:
+        progress("nothing is asked for of this case")
+        return result
+    progress(f"{what}: {'PASSED' if passed else 'FAILED'}")
+    return {**result, "passed": passed}
+
+
 def report(
     out: Path, name: str, rows: Sequence[Any], figure: "Figure", statements: "Sequence[Statement]"
 ) -> dict[str, Any]:
