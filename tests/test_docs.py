@@ -5,6 +5,7 @@ import re
 import shutil
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -158,6 +159,32 @@ def test_every_measured_table_is_there() -> None:
     for name in [*PARTS, "bench"]:
         table = page.partition(f"<!-- {name} -->")[2].partition(f"<!-- /{name} -->")[0]
         assert table.count("\n|") >= 3, name
+
+
+@pytest.mark.parametrize(
+    ("break_up_mm", "told"),
+    [
+        ({"value": 5.5, "low": 1.25, "high": 5.75}, "5.50 (1.25 to 5.75)"),
+        ({"value": 5.5, "low": 1.25, "high": None}, "5.50 (1.25 to beyond the field)"),
+        (None, "none: it is too dense"),
+    ],
+    ids=["between", "beyond", "none"],
+)
+def test_a_break_up_length_without_an_upper_limit_is_written_down(
+    break_up_mm: dict[str, float | None] | None, told: str
+) -> None:
+    droplets: dict[str, Any] = {
+        "d32_um": {"value": 40.0, "low": 38.0, "high": 42.0},
+        "velocity": {"mean_m_s": (0.0, 20.0, 0.0)},
+        "true_velocity_m_s": (0.0, 20.0, 0.0),
+        **dict.fromkeys(("found_share", "true_ghost_share", "hidden_share"), 0.0),
+        **dict.fromkeys(("counted_from_um", "true_d32_um", "velocity_rms_m_s"), 1.0),
+        "verdict": "good",
+    }
+    liquid = {"break_up_mm": break_up_mm, "break_up_reason": "it is too dense", "shots": 8, "true_break_up_mm": 5.4}
+    said = {"views": {}, "quality_factor": 0.5, "shots_valid": 8, "shots_planned": 8}
+    table = PARTS["demo"].table({**said, "droplets": droplets, "liquid": liquid})
+    assert f"| {told} | 5.40 |" in table
 
 
 @pytest.fixture

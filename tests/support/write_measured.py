@@ -104,7 +104,6 @@ def _measured(said: Mapping[str, Any]) -> str:
 def _flow(said: Mapping[str, Any]) -> str:
     """A table of the break-up and the velocities of the demonstration."""
     liquid, droplets = said["liquid"], said["droplets"]
-    length = "{value:.2f} ({low:.2f} to {high:.2f})".format(**liquid["break_up_mm"])
     means = (droplets["velocity"]["mean_m_s"], droplets["true_velocity_m_s"])
     told, true = (", ".join(f"{one:.2f}" for one in mean) for mean in means)
     head = (
@@ -115,7 +114,15 @@ def _flow(said: Mapping[str, Any]) -> str:
         "rms error of a component [m/s]",
     )
     rms = f"{droplets['velocity_rms_m_s']:.2f}"
-    return _markdown(head, [(length, f"{liquid['true_break_up_mm']:.2f}", told, true, rms)])
+    return _markdown(head, [(_length(liquid), f"{liquid['true_break_up_mm']:.2f}", told, true, rms)])
+
+
+def _length(liquid: Mapping[str, Any]) -> str:
+    """The break-up length, whose upper limit may lie beyond the field, or why there is none."""
+    if (length := liquid["break_up_mm"]) is None:
+        return f"none: {liquid['break_up_reason']}"
+    high = "beyond the field" if length["high"] is None else f"{length['high']:.2f}"
+    return f"{length['value']:.2f} ({length['low']:.2f} to {high})"
 
 
 def _airy_disks(said: Mapping[str, Any]) -> str:
