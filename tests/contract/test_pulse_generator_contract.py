@@ -4,6 +4,7 @@ What only the firmware does is tested on a ``board``.
 """
 
 import threading
+import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field, replace
@@ -30,6 +31,8 @@ CAMERA = CameraTiming(
 PERIOD_MS, LONG_PERIOD_MS = 10, 20
 CONVERTER_FOUND_MS = 150
 """A converter that failed is tried ten times a second."""
+SETTLE_S = 0.020
+"""From the set-points of pulses to those of continuous light, at least."""
 LIMIT_S = 5.0
 
 
@@ -530,11 +533,23 @@ def test_continuous_light_and_pulses_exclude_each_other(armed: Stand) -> None:
 
 
 def test_continuous_light_waits_for_the_shortest_period(armed_board: Board) -> None:
+    """On a busy computer the waiting time may be over before light is asked for: then it may come."""
+    asked_s = time.monotonic()
     armed_board.generator.off()
-    with pytest.raises(DeviceRefused, match="before the shortest period"):
-        armed_board.generator.light({"left": 0.1}, 1.0)
-    armed_board.around.advance(30)
+    refusal = _refusal_of_light(armed_board)
+    assert refusal is not None or time.monotonic() - asked_s >= SETTLE_S
+    assert refusal is None or "before the shortest period" in refusal
+    armed_board.generator.off()
+    armed_board.around.advance(LONG_PERIOD_MS + 10)
     armed_board.generator.light({"left": 0.1}, 1.0)
+
+
+def _refusal_of_light(board: Board) -> str | None:
+    try:
+        board.generator.light({"left": 0.1}, 1.0)
+    except DeviceRefused as error:
+        return str(error)
+    return None
 
 
 def test_a_silent_host_ends_continuous_light(board: Board) -> None:
