@@ -5,7 +5,15 @@ import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, Field, SecretStr, ValidationError, ValidationInfo, field_validator, model_validator
+from pydantic import (
+    BeforeValidator,
+    Field,
+    SecretStr,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 
 from daq.faults import ScriptedFault
 from daq.frozen_model import FrozenModel
@@ -24,8 +32,10 @@ class ConfigError(BadInput):
     """The configuration cannot be used; one line per problem, each with file, line, key, value and limit."""
 
 
-def _possible(path: Path) -> Path:
-    """A path that a file system can have."""
+def _possible(path: object) -> object:
+    """A path that a file system can have; an empty one would be the working directory, whichever that is."""
+    if not str(path).strip():
+        raise ValueError("the name of a folder is empty: name one, or leave the line out")
     if "\0" in str(path):
         raise ValueError("no folder has a NUL character in its name")
     return path
@@ -113,7 +123,7 @@ class ServerConfig(FrozenModel):
     ] = 0
     data_dir: Annotated[
         Path,
-        AfterValidator(_possible),
+        BeforeValidator(_possible),
         Field(description="folder of runs and calibrations, relative to the working directory"),
     ] = Path("runs")
     token: Annotated[SecretStr | None, Field(description="asked of every browser and script")] = None

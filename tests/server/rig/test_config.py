@@ -73,6 +73,8 @@ def test_both_examples_are_the_rig_of_table_1(name: str) -> None:
         ("range_mm = [-5.0, 5.0]", "range_mm = [5.0, -5.0]", r"stage\.range_mm: .* first value must be below"),
         ('host = "127.0.0.1"', 'host = "0.0.0.0"', r"server: host 0\.0\.0\.0 .* set a token"),
         ('data_dir = "runs"', r'data_dir = "ru\u0000ns"', r"server\.data_dir: .*NUL"),
+        ('data_dir = "runs"', 'data_dir = ""', r":\d+: server\.data_dir: .*empty"),
+        ('data_dir = "runs"', 'data_dir = "  "', r":\d+: server\.data_dir: .*empty"),
         ("[simulation]", "[simulations]", r"simulations: .*not permitted"),
         ("seed = 1", "seed = = 1", r"rig\.toml: Invalid value \(at line \d+"),
     ],
