@@ -53,12 +53,13 @@ def require_room(path: Path, needed_bytes: int, margin_bytes: int) -> None:
         )
 
 
-def disk_of(path: Path) -> int | None:
-    """Number of the disk that a folder lies on; None if there is no such folder."""
+def folder_number(path: Path) -> tuple[int, int] | None:
+    """Number of the disk that a folder lies on, and its own there; None if there is no such folder."""
     try:
-        return path.stat().st_dev
+        found = path.stat()
     except OSError:
         return None
+    return found.st_dev, found.st_ino
 
 
 def _errno_of(error: OSError | RuntimeError) -> int | None:

@@ -15,7 +15,7 @@ from daq.devices import Rig
 from daq.errors import BusyError, DaqError, PlanError, StorageError
 from daq.files.recovery import recover
 from daq.files.run_directory import RunWriter
-from daq.files.storage import disk_of
+from daq.files.storage import folder_number
 from daq.run import light
 from daq.run.ending import RunEnding, why_it_ends
 from daq.run.events import RunEvent, RunMessage, RunStatus
@@ -95,11 +95,11 @@ class Acquisition:
         self._ending = RunEnding()
         self._live_ending = RunEnding()
         self._audience = Audience()
-        self._disk: int | None = None
+        self._folder: tuple[int, int] | None = None
 
     def __enter__(self) -> Self:
         self._data_dir.mkdir(parents=True, exist_ok=True)
-        self._disk = disk_of(self._data_dir)
+        self._folder = folder_number(self._data_dir)
         return self
 
     def __exit__(
@@ -258,7 +258,9 @@ class Acquisition:
         yield from not_acknowledged(status)
 
     def _preflight(self) -> Preflight:
-        return Preflight(self._rig, self._data_dir, self._hash_calibration, self._limits.disk_margin_bytes, self._disk)
+        return Preflight(
+            self._rig, self._data_dir, self._hash_calibration, self._limits.disk_margin_bytes, self._folder
+        )
 
     def _shooting(self, plan: RunPlan, timing: ShotTiming, ending: RunEnding) -> Shooting:
         return Shooting(self._rig, plan, timing, self._progress, self._limits, self._observers, ending)

@@ -12,10 +12,10 @@ from typing import Any
 from daq.devices import Rig
 from daq.errors import DaqError, PlanError
 from daq.files.run_directory import RunHeader, ViewFormat
-from daq.files.storage import disk_of
+from daq.files.storage import folder_number
 from daq.run import light
 from daq.run.references import find_references
-from daq.run.refusals import RefusalCode, raise_first, refused
+from daq.run.refusals import RefusalCode, raise_first, refused, refusing
 from daq.run_plan import RunKind, RunPlan
 from daq.timing import ShotTiming, plan_shot_timing
 
@@ -60,31 +60,27 @@ class Preflight:
         SHA-256 of a calibration by its id.
     disk_margin_bytes : int
         What a run leaves free on the disk.
-    disk : int | None
-        On which the folder was when the program started; None if that does not matter.
+    folder : tuple[int, int] | None
+        Number of the folder when the program started; None if that does not matter.
     """
 
     rig: Rig
     data_dir: Path
     hash_calibration: Callable[[str], str | None]
     disk_margin_bytes: int
-    disk: int | None = None
+    folder: tuple[int, int] | None = None
 
     def refusals_of_rig(self) -> Iterator[DaqError]:
         """Why no run at all can start."""
-        yield from refused(RefusalCode.FOLDER_GONE, _check_disk_is_ours, self.data_dir, self.disk)
+        yield from refused(RefusalCode.FOLDER_GONE, _check_folder_is_ours, self.data_dir, self.folder)
         yield from refused(RefusalCode.STORAGE, _check_folder, self.data_dir)
         yield from refused(RefusalCode.DISK_FULL, _check_margin, self.data_dir, self.disk_margin_bytes)
         yield from light.obstacles(self.rig)
 
     def refusals_of_plan(self, plan: RunPlan) -> Iterator[DaqError]:
         """Why this plan cannot run on this rig; no device is asked."""
-        views = self.views
-        yield from refusals_of_light(self.rig, plan)
-        yield from refused(RefusalCode.STAGE, _check_stage, self.rig, plan)
-        yield from refused(RefusalCode.REFERENCES, find_references, self.data_dir, plan, views)
-        yield from refused(RefusalCode.DISK_FULL, _check_disk, self.data_dir, plan, views, self.disk_margin_bytes)
-        yield from refused(RefusalCode.NETWORK, _check_network, self.rig, plan, views)
+        yield from self._refusals_of_numbers(plan)
+        yield from refused(RefusalCode.REFERENCES, find_references, self.data_dir, plan, self.views)
         yield from refused(RefusalCode.STORAGE, self.calibration_sha256, plan)
 
     def prepare(self, plan: RunPlan, configuration: Mapping[str, Any]) -> PreparedRun:
@@ -97,9 +93,12 @@ class Preflight:
         """
         raise_first(self.refusals_of_rig())
         self.data_dir.mkdir(parents=True, exist_ok=True)
-        raise_first(self.refusals_of_plan(plan))
-        header = _header(self.data_dir, plan, self.views, configuration, self.calibration_sha256(plan))
-        references = find_references(self.data_dir, plan, self.views)
+        raise_first(self._refusals_of_numbers(plan))
+        with refusing(RefusalCode.REFERENCES):
+            references = find_references(self.data_dir, plan, self.views)
+        with refusing(RefusalCode.STORAGE):
+            calibration_sha256 = self.calibration_sha256(plan)
+        header = _header(self.data_dir, plan, self.views, configuration, calibration_sha256)
         return PreparedRun(self.data_dir / header.run_id, header, _timing(self.rig, plan), references)
 
     @property
@@ -110,6 +109,13 @@ class Preflight:
     def calibration_sha256(self, plan: RunPlan) -> str | None:
         """Hash of the calibration that a plan names; None if it names none."""
         return self.hash_calibration(plan.calibration) if plan.calibration else None
+
+    def _refusals_of_numbers(self, plan: RunPlan) -> Iterator[DaqError]:
+        """Why this plan cannot run, whatever its files say; they are read after this, as that takes longer."""
+        yield from refusals_of_light(self.rig, plan)
+        yield from refused(RefusalCode.STAGE, _check_stage, self.rig, plan)
+        yield from refused(RefusalCode.DISK_FULL, _check_disk, self.data_dir, plan, self.views, self.disk_margin_bytes)
+        yield from refused(RefusalCode.NETWORK, _check_network, self.rig, plan, self.views)
 
 
 def permitted_timing(rig: Rig, plan: RunPlan) -> ShotTiming:
@@ -162,10 +168,10 @@ def _check_currents(rig: Rig, plan: RunPlan) -> None:
             raise PlanError(f"pulse.current_a: {current_a:g} A is above {limit_a:g} A, the limit of the LED of {view}")
 
 
-def _check_disk_is_ours(data_dir: Path, disk: int | None) -> None:
-    if disk is not None and disk_of(data_dir) != disk:
+def _check_folder_is_ours(data_dir: Path, folder: tuple[int, int] | None) -> None:
+    if folder is not None and folder_number(data_dir) != folder:
         raise PlanError(
-            f"{data_dir} is gone, or on another disk than when the server was started: "
+            f"{data_dir} is gone, or another folder or disk has taken its place since the server was started: "
             "mount or bring back the right one, or start the server again"
         )
 

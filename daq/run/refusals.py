@@ -5,6 +5,7 @@ checks in the same order. An error that is a refusal has its code in ``code``.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from enum import StrEnum
 from types import MappingProxyType
 
@@ -36,6 +37,7 @@ class RefusalCode(StrEnum):
     STAGE = "stage"
     REFERENCES = "references"
     CALIBRATION_UNKNOWN = "calibration_unknown"
+    CALIBRATION_DAMAGED = "calibration_damaged"
     CALIBRATION_SIZE = "calibration_size"
 
 
@@ -61,6 +63,7 @@ REMEDIES: Mapping[RefusalCode, str] = MappingProxyType(
         RefusalCode.STAGE: "choose positions that the stage reaches",
         RefusalCode.REFERENCES: "choose other dark and background runs, or record them again",
         RefusalCode.CALIBRATION_UNKNOWN: "choose a calibration that exists",
+        RefusalCode.CALIBRATION_DAMAGED: "choose another calibration, or copy this one back from a backup",
         RefusalCode.CALIBRATION_SIZE: "choose another calibration, or calibrate again",
     }
 )
@@ -72,15 +75,26 @@ def coded(error: DaqError, code: RefusalCode) -> DaqError:
     return error
 
 
-def refused(code: RefusalCode, check: Callable[..., object], *given: object) -> Iterator[DaqError]:
-    """What a check raises, as a refusal: of its own code, or of the disk where it cannot be read."""
+@contextmanager
+def refusing(code: RefusalCode) -> Iterator[None]:
+    """What the block raises is a refusal: of this code, or of the disk where that cannot be read."""
     try:
-        check(*given)
+        yield
     except DaqError as error:
-        yield coded(error, code)
+        coded(error, code)
+        raise
     except OSError as error:
         reason = PlanError(f"the run cannot be stored, or its calibration not be read: {error}")
-        yield coded(reason, RefusalCode.STORAGE)
+        raise coded(reason, RefusalCode.STORAGE) from error
+
+
+def refused(code: RefusalCode, check: Callable[..., object], *given: object) -> Iterator[DaqError]:
+    """What a check raises, as a refusal."""
+    try:
+        with refusing(code):
+            check(*given)
+    except DaqError as error:
+        yield error
 
 
 def raise_first(refusals: Iterable[Exception]) -> None:

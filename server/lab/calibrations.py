@@ -40,10 +40,6 @@ class CalibrationStore:
             raise NotFound(f"there is no calibration {calibration_id!r}")
         return self._folder / f"{calibration_id}.json"
 
-    def has(self, calibration_id: str) -> bool:
-        """Whether there is such a calibration."""
-        return is_identifier(calibration_id) and self.path(calibration_id).is_file()
-
     def list(self) -> list[CalibrationSummary]:
         """All calibrations, newest first."""
         current = self.current

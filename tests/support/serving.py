@@ -15,7 +15,9 @@ from fastapi import FastAPI
 
 from daq.run.acquisition import Acquisition
 from daq.run.events import RunStatus
+from processing.calibration.calibration_file import file_sha256
 from processing.volume import VoxelGrid
+from server.lab.calibrations import CalibrationStore
 from server.lab.engine.inline_engine import InlineEngine
 from server.lab.engine.task import Engine
 from server.lab.events import EventPublisher
@@ -112,7 +114,12 @@ def assembled(
     """A rig in memory with its acquisition, ready to be served."""
     laboratory, events = served_rig(views), EventPublisher()
     rig = replace(laboratory.rig, stage=None)
-    with Acquisition(rig, data_dir, events.publish_run_event) as acquisition:
+    calibrations = CalibrationStore(data_dir / "calibrations")
+
+    def hashed(name: str) -> str:
+        return file_sha256(calibrations.path(name))
+
+    with Acquisition(rig, data_dir, events.publish_run_event, hash_calibration=hashed) as acquisition:
         yield Services(
             config=memory_config(data_dir, views, token),
             rig=rig,

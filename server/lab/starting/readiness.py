@@ -8,7 +8,7 @@ from daq.run.refusals import RefusalCode, coded
 from daq.run_plan import RunKind, RunPlan
 from server.lab.desk.reason import Reason, Refusal, reason_of
 from server.lab.duty import Health
-from server.lab.errors import ServerError, Unprocessable
+from server.lab.errors import Damaged, NotFound, ServerError, Unprocessable
 from server.lab.services import Context
 
 
@@ -17,9 +17,11 @@ def reasons_against(context: Context, plan: RunPlan | None = None) -> tuple[Reas
 
     Devices are asked, so that it may take a second where one is silent; the light stays as it is.
     """
+    others = None
     if plan is not None:
         plan = with_calibration(context, plan)
-    refusals = chain(refusals_of_lab(context, plan), context.services.acquisition.refusals(plan))
+        others = plan.model_copy(update={"calibration": None})  # the laboratory has read it: one reason is enough
+    refusals = chain(refusals_of_lab(context, plan), context.services.acquisition.refusals(others))
     return tuple(map(reason_of, refusals))
 
 
@@ -48,9 +50,12 @@ def _silent_cameras(context: Context) -> Iterator[DaqError]:
 
 def _against_calibration(context: Context, calibration: str) -> Iterator[ServerError]:
     """A camera that is binned, or another one, needs another calibration; later nothing could be reconstructed."""
-    if not context.calibrations.has(calibration):
-        reason = f"calibration: there is no calibration {calibration!r}"
-        yield Unprocessable(reason, RefusalCode.CALIBRATION_UNKNOWN)
+    try:
+        context.calibrations.document(calibration)
+    except NotFound as error:
+        yield Unprocessable(f"calibration: {error}", RefusalCode.CALIBRATION_UNKNOWN)
+    except Damaged as error:
+        yield Unprocessable(f"calibration: {error}", RefusalCode.CALIBRATION_DAMAGED)
     sizes_px = context.calibrations.image_sizes_px(calibration)
     misfits = []
     for view, camera in context.services.rig.cameras.items():

@@ -81,7 +81,7 @@ def test_light_goes_off_first_and_outcome_and_cause_are_stored(trials: dict[str,
 def test_no_run_starts_on_the_disk_that_lies_below_one_that_is_gone(trials: dict[str, dict[str, Any]]) -> None:
     found = trials["unmounted"]
     data_dir = Path(found["run_dir"]).parent
-    assert found["refused"].startswith(f"{data_dir} is gone, or on another disk than when the server was started")
+    assert found["refused"].startswith(f"{data_dir} is gone, or another folder or disk has taken its place")
     assert found["left_behind"] == []
 
 

@@ -79,8 +79,13 @@ def not_acknowledged(server: Serving, patch: pytest.MonkeyPatch) -> Iterator[Non
 
 @contextmanager
 def folder_gone(server: Serving, patch: pytest.MonkeyPatch) -> Iterator[None]:
-    patch.setattr(acquisition(server), "_disk", -1)
+    """Another one has taken its place, on the same disk."""
+    folder = server.services.data_dir
+    aside = folder.rename(folder.with_name("before"))
+    (folder / "calibrations").mkdir(parents=True)
     yield
+    shutil.rmtree(folder)
+    aside.rename(folder)
 
 
 @contextmanager
@@ -160,6 +165,12 @@ def thin_wire(server: Serving, patch: pytest.MonkeyPatch) -> Iterator[None]:
 
 
 @contextmanager
+def torn(server: Serving, patch: pytest.MonkeyPatch) -> Iterator[None]:
+    (server.services.data_dir / "calibrations" / "torn.json").write_text('{"id": "torn", "views": {"vie')
+    yield
+
+
+@contextmanager
 def other_size(server: Serving, patch: pytest.MonkeyPatch) -> Iterator[None]:
     views = {view: {"mapping": {"image_size_px": [64, 48]}} for view in ("view1", "view2")}
     (server.services.data_dir / "calibrations" / "small.json").write_text(json.dumps({"id": "small", "views": views}))
@@ -189,6 +200,7 @@ OF_THE_PLAN: dict[RefusalCode, tuple[Situation | None, dict[str, Any]]] = {
     RefusalCode.STAGE: (None, {"kind": "calibration", "stage_z_mm": [0.0]}),
     RefusalCode.REFERENCES: (None, {"references": ["nothing"]}),
     RefusalCode.CALIBRATION_UNKNOWN: (None, {"calibration": "nothing"}),
+    RefusalCode.CALIBRATION_DAMAGED: (torn, {"calibration": "torn"}),
     RefusalCode.CALIBRATION_SIZE: (other_size, {"calibration": "small"}),
 }
 
