@@ -295,10 +295,10 @@ struct DiscSweeps {
 };
 
 // What a view says of a disc: weighted sums over its window of products of the transmission's changes with u, v and the
-// square of the radius; of the change that the whole disc makes, squared and times the residual; of residuals squared; and
-// the number of pixels.
+// square of the radius; of the change that the whole disc makes, squared and times the residual; of residuals squared; the
+// number of pixels; and of residuals squared, each times what its pixel adds to uu + vv.
 struct DiscSupport {
-    double uu, uv, vv, us, vs, ss, whole, missing, residual, pixels;
+    double uu, uv, vv, us, vs, ss, whole, missing, residual, pixels, placing;
 };
 
 constexpr int strip_columns = 64;  // columns that are worked on at once

@@ -19,7 +19,7 @@ using Images = std::vector<ImageArray>;
 using RecordedImages = std::vector<RecordedArray>;
 using OpticsArray = nb::ndarray<const double, nb::shape<-1, 5>, nb::c_contig, nb::device::cpu>;
 using ProfileArray = nb::ndarray<const float, nb::shape<disc_rows, 3, disc_nodes>, nb::c_contig, nb::device::cpu>;
-using SupportArray = nb::ndarray<double, nb::shape<-1, -1, 10>, nb::c_contig, nb::device::cpu>;
+using SupportArray = nb::ndarray<double, nb::shape<-1, -1, 11>, nb::c_contig, nb::device::cpu>;
 
 constexpr size_t least_pixels = 64;  // rows and columns of an image
 
@@ -105,7 +105,7 @@ void weigh(const Images &logs, const RecordedImages &images, const RecordedImage
     require_same_shapes(logs, images, weights);
     bound.see(images, weights);
     require(out.shape(0) == bound.views.size() && out.shape(1) == squares.shape(0), "support: (views, discs, 10), please");
-    static_assert(sizeof(DiscSupport) == 10 * sizeof(double), "a support is ten numbers");
+    static_assert(sizeof(DiscSupport) == 11 * sizeof(double), "a support is eleven numbers");
     require_threads(threads);
     auto *support = reinterpret_cast<DiscSupport *>(out.data());
     const Kernels &kernels = selected_kernels();

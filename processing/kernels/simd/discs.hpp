@@ -258,9 +258,9 @@ void draw_discs(const Discs &discs, int view, double factor) {
 
 // What the window of a disc says beside its sums: see DiscSupport.
 inline void weigh_window(const DiscView &view, const SeenDisc &disc, double square, DiscSupport &support) {
-    Floats whole{}, missing{}, squares{}, pixels{};
+    Floats whole{}, missing{}, squares{}, pixels{}, placing{};
     const Floats zero{}, one = all(1.0f), within = all(disc_nodes - 2.5f);
-    for_pixels(view, disc, [&](int64_t pixel, Floats, float, const Places &places) {
+    for_pixels(view, disc, [&](int64_t pixel, Floats offset_u, float offset_v, const Places &places) {
         const Floats transmission = power_of_2(load<Floats>(view.log_transmission + pixel));
         const Floats residual = load<Floats>(view.image + pixel) - transmission;
         const Floats inside = __builtin_convertvector(places.node, Floats) < within ? one : zero;
@@ -268,13 +268,16 @@ inline void weigh_window(const DiscView &view, const SeenDisc &disc, double squa
         const Floats change = transmission - transmission * power_of_2(zero - at(disc.profile.log_transmission, places));
         whole = multiply_add(weight * change, change, whole);
         missing = multiply_add(weight * change, residual, missing);
-        squares = multiply_add(weight * residual, residual, squares);
+        const Floats rest = weight * residual * residual, pull = transmission * at(disc.profile.pull, places);
+        squares += rest;
+        placing = multiply_add(rest * weight * pull * pull, multiply_add(offset_u, offset_u, all(offset_v * offset_v)), placing);
         pixels += weight > zero ? inside : zero;
     });
     support.whole = sum_of(whole) / (square * square);
     support.missing = sum_of(missing) / square;
     support.residual = sum_of(squares);
     support.pixels = sum_of(pixels);
+    support.placing = disc.pull_unit * disc.pull_unit * sum_of(placing);
 }
 
 void weigh_discs(const Discs &discs, int view, DiscSupport *support) {
@@ -284,7 +287,7 @@ void weigh_discs(const Discs &discs, int view, DiscSupport *support) {
         see(seen, discs, discs.views[view], discs.positions + 3 * number, discs.squares[number]);
         if (seen.empty) continue;
         const DiscSums sums = sums_of(discs.views[view], seen);
-        support[number] = {sums.uu, sums.uv, sums.vv, sums.us, sums.vs, sums.ss, 0, 0, 0, 0};
+        support[number] = {sums.uu, sums.uv, sums.vv, sums.us, sums.vs, sums.ss, 0, 0, 0, 0, 0};
         weigh_window(discs.views[view], seen, discs.squares[number], support[number]);
     }
 }

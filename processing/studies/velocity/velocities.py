@@ -27,9 +27,8 @@ from processing.studies.simulated_droplets import study_grid
 from processing.studies.velocity.double_scenes import SEPARATION_NS, DoubleScene, bright_double, shadow_double
 from processing.volume import VoxelGrid
 
-Z_SCORES, Z_SCORES_OF_SHADOWS = (0.9, 1.2), (0.6, 1.2)
-"""Their standard deviation must lie between. Shadows are surer of places than they say: where views disagree on a size,
-as shadows overlap, places are trusted less, too."""
+Z_SCORES = (0.9, 1.2)
+"""Their standard deviation must lie between."""
 
 
 @dataclass(frozen=True)
@@ -55,11 +54,6 @@ class VelocityCase:
     least_paired: float | None = None
     least_right: float | None = None
     most_rms_voxel: float | None = None
-
-    @property
-    def z_scores(self) -> tuple[float, float]:
-        """Limits of the standard deviation of z-scores."""
-        return Z_SCORES if self.droplets == "bright" else Z_SCORES_OF_SHADOWS
 
     @property
     def name(self) -> str:
@@ -229,7 +223,7 @@ def _reached(case: VelocityCase, rows: Sequence[VelocityRow]) -> bool | None:
         paired >= case.least_paired
         and (case.least_right is None or right >= case.least_right)
         and (case.most_rms_voxel is None or rms_voxel <= case.most_rms_voxel)
-        and case.z_scores[0] <= z_sd <= case.z_scores[1]
+        and Z_SCORES[0] <= z_sd <= Z_SCORES[1]
     )
 
 

@@ -77,7 +77,7 @@ def test_what_a_recipe_does_not_say_has_its_default(tmp_path: Path) -> None:
         (HEAD + "[settings.grid]\npitch_um = 1\n", r"line 5: settings\.grid\.pitch_um: there is no such key"),
         (HEAD + "[setting]\ntwins = 1\n", r"line 4: setting: there is no such key here.*schema, schema_version"),
         (HEAD.replace("measure", "reconstruct"), r"line 3: command: a recipe for reconstruct, not for"),
-        (HEAD + "method_version = 7\n", r"line 4: method_version: numbers of version 7 .* not comparable"),
+        (HEAD + "method_version = 8\n", r"line 4: method_version: numbers of version 8 .* not comparable"),
         (HEAD.replace("= 1", "= 2"), r"line 2: schema_version: Input should be 1"),
         (HEAD.replace("schema =", "# schema ="), r"recipe\.toml: schema: this key is missing"),
         (HEAD + "[settings\n", r"recipe\.toml: .*line 4"),

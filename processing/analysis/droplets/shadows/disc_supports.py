@@ -22,7 +22,7 @@ class DiscSupports:
     ----------
     squares_voxel2 : (N,) array
         Of the discs.
-    sums : (K, N, 10) array
+    sums : (K, N, 11) array
         As ``job.hpp`` has them.
     """
 
@@ -58,6 +58,15 @@ class DiscSupports:
     def residual(self) -> FloatArray:
         """Root mean square (N,) of what is left around the discs, over the noise."""
         return np.asarray(np.sqrt(self.sums[:, :, 8].sum(axis=0) / np.maximum(self.sums[:, :, 9].sum(axis=0), 1)))
+
+    @property
+    def place_noise(self) -> FloatArray:
+        """Root mean square (N,) of what is left, over the noise, where the images tell the places.
+
+        That is at edges, which are darker than the light, and so less noisy (White, Econometrica 48, 817, 1980).
+        """
+        told = self.sums[:, :, 0].sum(axis=0) + self.sums[:, :, 2].sum(axis=0)
+        return np.asarray(np.sqrt(self.sums[:, :, 10].sum(axis=0) / np.maximum(told, 1e-30)))
 
     def information(self, slopes_px: FloatArray) -> FloatArray:
         """Information (N, 4, 4) on x, y, z and the squared radius, by the slopes (K, N, 2, 3) of the lattice."""

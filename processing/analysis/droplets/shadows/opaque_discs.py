@@ -189,7 +189,7 @@ class DiscImages:
 
     def supports(self, shadows: "Shadows", optics: DiscOptics, discs: Discs) -> DiscSupports:
         """What every view says of every disc, all others fixed."""
-        out = np.empty((len(self.images), len(discs), 10))
+        out = np.empty((len(self.images), len(discs), 11))
         _native.weigh_discs(
             shadows.logs,
             list(self.images),

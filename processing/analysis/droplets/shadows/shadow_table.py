@@ -14,6 +14,8 @@ from processing.geometry import FloatArray
 
 COHERENT_SHARE = 0.02
 """Of a diameter: what is wrong in any light that shows, common to the droplets of a shot."""
+LEAST_NOISE = 0.5
+"""Where places are told, over that of the image: less would be no noise of pixels."""
 REALITY = Reality(-8.76, (0.97, 2.53, 0.96, -2.07, -3.2, -2.51, -1.46), widths_px=(0.8, 1.6), most_crowding=1.0)
 
 
@@ -26,23 +28,29 @@ def sized_droplets(
     search: DropletSearch,
     sizes: SizeCorrection | None,
 ) -> SizedDroplets:
-    """Droplets with the covariance of the fit: each as if it stood alone, enlarged by the disagreement of its views."""
+    """Droplets with the covariance of the fit: each as if it stood alone, enlarged by the disagreement of its views.
+
+    It enlarges the standard deviation of a size by as much, and those of the place, in the noise that is found where
+    the images tell it, by its root: a shadow that overlaps changes the size that a view sees by all that it hides, the
+    place only where it is lopsided.
+    """
     discs = fit.discs
     if not len(discs):
         return SizedDroplets.none()
     supports = seen.supports(shadows, fit.optics, discs)
     information = supports.information(search.lattice.slopes_px(discs.positions_voxel))
     alone = np.linalg.pinv(information, hermitian=True)
-    covariance = np.asarray(alone * supports.disagreement[:, None, None] ** 2, dtype=np.float64)
+    place_variance = np.maximum(supports.place_noise, LEAST_NOISE) ** 2 * supports.disagreement
+    square_sd_voxel2 = np.sqrt(alone[:, 3, 3]) * supports.disagreement
     pitch_um = 1000 * search.searched.pitch_mm
     diameters_um = 2 * discs.radii_voxel * pitch_um
     common_sd_um = _common_sd_um(fit, diameters_um, pitch_um) if sizes is None else sizes.sd(diameters_um)
     return SizedDroplets(
         points_mm=search.searched.to_mm(discs.positions_voxel[:, ::-1]),
-        covariance_mm2=covariance[:, :3, :3] * search.searched.pitch_mm**2,
+        covariance_mm2=alone[:, :3, :3] * place_variance[:, None, None] * search.searched.pitch_mm**2,
         diameters_um=diameters_um if sizes is None else sizes.corrected(diameters_um),
         diameters_raw_um=2 * np.sqrt(raw_voxel2) * pitch_um,
-        diameter_sd_um=np.hypot(np.sqrt(covariance[:, 3, 3]) / discs.radii_voxel * pitch_um, common_sd_um),
+        diameter_sd_um=np.hypot(square_sd_voxel2 / discs.radii_voxel * pitch_um, common_sd_um),
         views=supporting_views(supports),
         residual=supports.residual,
         p_real=_p_real(shot, fit, supports),

@@ -27,7 +27,7 @@ def rows() -> list[SizeRow]:
 
 def test_what_is_asked_for_is_reached(rows: list[SizeRow]) -> None:
     assert all_reached(rows, SMALL.cases), [size_line(row) for row in rows]
-    assert all(0.6 < row.z_sd < 1.2 and 0.6 < row.z_size < 1.2 for row in rows)
+    assert all(0.9 < row.z_sd < 1.2 and 0.6 < row.z_size < 1.2 for row in rows)
     assert all(row.held > 0.9 and row.size_held > 0.87 for row in rows)
 
 

@@ -130,6 +130,20 @@ def test_views_that_disagree_say_so_and_views_that_agree_leave_the_noise_alone()
     assert supports.disagreement == pytest.approx(expected, rel=0.2)  # shadows are compared as wholes, not edges
 
 
+def test_noise_counts_as_much_as_its_pixels_tell_the_place() -> None:
+    one, step, rng = Discs(np.array([[80.3, 20.1, 40.2]]), np.array([4.0])), 0.01, np.random.default_rng(3)
+    plain = EMPTY.drawn(OPTICS, one).transmissions
+    noise = [rng.normal(0, 0.01 * np.sqrt(image)) for image in plain]  # light that is counted: less of it, less noise
+    seen = shot_of([image + one for image, one in zip(plain, noise, strict=True)])
+    shifts = (replace(OPTICS, shifts_px=OPTICS.shifts_px + step * np.eye(2)[axis]) for axis in (0, 1))
+    moved = [EMPTY.drawn(shifted, one).transmissions for shifted in shifts]
+    telling = np.array([sum((axis[k] - plain[k]) ** 2 for axis in moved) for k in range(len(plain))])
+    expected = np.sqrt(np.sum(telling * 1e4 * np.array(noise) ** 2) / np.sum(telling))
+    supports = seen.supports(seen.drawn(OPTICS, one), OPTICS, one)
+    assert supports.place_noise == pytest.approx(expected, rel=0.02)
+    assert expected < 0.85 < supports.residual
+
+
 def test_the_truth_is_a_fixed_point_of_the_fit() -> None:
     some = discs(beyond=-15)
     full = shot_of(EMPTY.drawn(OPTICS, some).transmissions)

@@ -65,7 +65,7 @@ def test_of_discs_within_a_larger_one_the_larger_stays() -> None:
 
 def said(alone: list[float], sd: float) -> DiscSupports:
     """What four views say of one disc whose squared radius is 1."""
-    sums = np.zeros((4, 1, 10))
+    sums = np.zeros((4, 1, 11))
     sums[:, 0, 6] = 1 / sd**2
     sums[:, 0, 7] = (np.array(alone) - 1) / sd**2
     return DiscSupports(np.ones(1), sums)
