@@ -11,7 +11,7 @@ from daq.errors import DiskFull, RecorderError
 from daq.files.atomic_file import replacing
 from daq.files.columns import columns_of, frames_path
 from daq.files.header import RunHeader
-from daq.files.run_file import RUN_FILE, shot_path
+from daq.files.run_file import RUN_FILE, reading, shot_path
 from daq.files.shot_file import LIBRARY_VERSIONS, create_frames, is_missing, reading_shot
 from daq.files.storage import storing
 
@@ -33,6 +33,13 @@ def pack_run(run_dir: Path, header: RunHeader, shot_count: int, out: Path) -> No
             _replace_view(packed, header, shot_count)
             for index in range(shot_count):
                 _copy_shot(shot_path(run_dir, index), header, index, packed)
+
+
+def holds_its_shots(run_dir: Path) -> bool:
+    """Whether ``run.h5`` is a packed file, which holds the shots itself; ShotFileError if it cannot be read."""
+    with reading(run_dir) as file:
+        frames = [file[frames_path(view)] for view in file["cameras"]]
+        return any(stored.shape[0] and not stored.is_virtual for stored in frames)
 
 
 def require_free(out: Path) -> None:

@@ -36,7 +36,7 @@ from server.pictures.previews import (
     save_preview,
     volume_of,
 )
-from server.pictures.surfaces import surface_glb
+from server.pictures.surfaces import BLUE, RED, surface_glb
 
 VOLUME_NAME = re.compile(r"shot_(?P<shot>[0-9]{5,7})_(?P<frame>[ab])")
 """Name of a volume, without the ending of its file."""
@@ -232,8 +232,8 @@ def _recipe(volume: Path, calibrations: CalibrationStore) -> Recipe:
 
 @lru_cache(maxsize=16)
 def surface_of(volume: Path, level: float) -> bytes:
-    """Iso-surface of a volume, binary glTF."""
-    return surface_glb(preview_of(volume), level)
+    """Iso-surface of a volume, binary glTF; blue of exposure A, red of B."""
+    return surface_glb(preview_of(volume), level, RED if volume.stem.endswith("_b") else BLUE)
 
 
 @lru_cache(maxsize=8)

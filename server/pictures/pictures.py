@@ -18,6 +18,8 @@ from processing.preprocessing import DIM
 Grey = NDArray[np.uint8]
 _QUANTILES = (0.001, 0.999)
 _JPEG_QUALITY = 82
+_BRIGHTEST = {"blue": (255, 144, 64), "red": (64, 96, 255)}
+"""Blue, green, red; the two together are nearly white."""
 
 
 class Stretch(StrEnum):
@@ -25,6 +27,22 @@ class Stretch(StrEnum):
 
     AUTO = "auto"
     FULL = "full"
+
+
+class Colours(StrEnum):
+    """How an intensity becomes a colour: all of them begin with black."""
+
+    HEAT = "heat"
+    BLUE = "blue"
+    """Of exposure A where both are shown, one upon the other."""
+    RED = "red"
+    """Of exposure B."""
+
+
+_SHADES = {
+    colours: np.rint(np.linspace((0, 0, 0), _BRIGHTEST[colours], 256)).astype(np.uint8)
+    for colours in (Colours.BLUE, Colours.RED)
+}
 
 
 def frame_png(image: NDArray[Any], bits: int, stretch: Stretch = Stretch.AUTO, width_px: int | None = None) -> bytes:
@@ -60,10 +78,12 @@ def to_grey(image: NDArray[Any], bits: int, stretch: Stretch) -> Grey:
     return grey
 
 
-def plane_png(plane: NDArray[Any], limit: float) -> bytes:
+def plane_png(plane: NDArray[Any], limit: float, colours: Colours = Colours.HEAT) -> bytes:
     """PNG of a plane of a volume, (rows, columns), coloured from 0 to ``limit``."""
     grey = np.clip(plane.astype(np.float32) * (255.0 / max(limit, 1e-9)), 0, 255).astype(np.uint8)
-    return _encode(".png", np.asarray(cv2.applyColorMap(grey, cv2.COLORMAP_INFERNO)))
+    if colours is Colours.HEAT:
+        return _encode(".png", np.asarray(cv2.applyColorMap(grey, cv2.COLORMAP_INFERNO)))
+    return _encode(".png", _SHADES[colours][grey])
 
 
 def _limits(image: NDArray[Any], full: float) -> tuple[float, float]:

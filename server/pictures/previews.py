@@ -64,6 +64,30 @@ class VolumePreview:
             raise IndexError(f"{axis} = {index}: the preview has planes 0 to {self.voxels.shape[number] - 1}")
         return np.asarray(np.take(self.voxels, index, number), np.uint8)
 
+    @property
+    def full_grid(self) -> VoxelGrid:
+        """Where the voxels of the volume itself lie."""
+        factor = math.ceil(max(self.full_shape) / max(self.voxels.shape))
+        pitch_mm = self.grid.pitch_mm / factor
+        x_mm, y_mm, z_mm = (origin_mm - 0.5 * (factor - 1) * pitch_mm for origin_mm in self.grid.origin_mm)
+        return VoxelGrid(self.full_shape, (x_mm, y_mm, z_mm), pitch_mm)
+
+    @property
+    def fullest_mm(self) -> tuple[float, float, float]:
+        """Where there is something to be seen, x, y, z: of each axis the plane of the largest sum."""
+        others = {"x": (0, 1), "y": (0, 2), "z": (1, 2)}
+        planes = {axis: int(self.voxels.sum(axis=over, dtype=np.int64).argmax()) for axis, over in others.items()}
+        grid = self.grid
+        return float(grid.x_mm[planes["x"]]), float(grid.y_mm[planes["y"]]), float(grid.z_mm[planes["z"]])
+
+    @property
+    def telling_level(self) -> float:
+        """Level of an iso-surface that shows something: brighter voxels have half of all the intensity."""
+        sums = np.bincount(self.voxels.ravel(), minlength=256) * np.arange(256)
+        brighter = np.cumsum(sums[::-1])[::-1]
+        level = int(np.count_nonzero(2 * brighter >= brighter[0])) - 1
+        return float(np.clip(level, 1, 254)) / 256
+
     def projection(self, axis: str) -> NDArray[np.uint8]:
         """Maximum along an axis."""
         return np.asarray(self.voxels.max(axis=AXES.index(axis)), np.uint8)

@@ -20,12 +20,14 @@ from server.pictures.previews import VolumePreview, make_preview
 _LONGEST_AXIS = 112  # keeps a dense spray below about 10 MB
 _ELEMENT_ARRAY_BUFFER, _ARRAY_BUFFER = 34963, 34962  # glTF 2.0, section 5.11.5
 _FLOAT, _UINT = 5126, 5125  # glTF 2.0, section 3.6.2.2
-_COLOUR = [0.03, 0.2, 0.75, 1.0]  # linear light
+BLUE, RED = (0.03, 0.2, 0.75, 1.0), (0.75, 0.06, 0.03, 1.0)
+"""Linear light, with opacity: of exposures A and B."""
+Colour = tuple[float, float, float, float]
 
 Array = NDArray[Any]
 
 
-def surface_glb(preview: VolumePreview, level: float) -> bytes:
+def surface_glb(preview: VolumePreview, level: float, colour: Colour = BLUE) -> bytes:
     """GLB file with the surface where the volume has a value.
 
     Parameters
@@ -34,6 +36,8 @@ def surface_glb(preview: VolumePreview, level: float) -> bytes:
         The volume.
     level : float
         Fraction of the largest value, 0 < level < 1.
+    colour : tuple of float
+        Red, green, blue as linear light, and opacity.
 
     Returns
     -------
@@ -43,12 +47,12 @@ def surface_glb(preview: VolumePreview, level: float) -> bytes:
     coarse = make_preview(preview.voxels, preview.grid, _LONGEST_AXIS)
     closed = np.pad(coarse.voxels, 1)  # surfaces that leave the volume are closed at its faces
     if closed.max() <= 255 * level:
-        return glb(np.zeros((3, 3), np.float32), np.zeros((3, 3), np.float32), np.array([[0, 1, 2]]))
+        return glb(np.zeros((3, 3), np.float32), np.zeros((3, 3), np.float32), np.array([[0, 1, 2]]), colour)
     corners, faces, normals, _ = marching_cubes(closed, 255 * level)
-    return glb(_to_viewer_mm(corners - 1, coarse.grid), normals[:, ::-1] * (1, -1, -1), faces)
+    return glb(_to_viewer_mm(corners - 1, coarse.grid), normals[:, ::-1] * (1, -1, -1), faces, colour)
 
 
-def glb(positions: Array, normals: Array, faces: Array) -> bytes:
+def glb(positions: Array, normals: Array, faces: Array, colour: Colour = BLUE) -> bytes:
     """Binary glTF 2.0 of one mesh; positions and normals (N, 3), faces (M, 3) indices."""
     parts = [faces.astype("<u4").tobytes(), positions.astype("<f4").tobytes(), normals.astype("<f4").tobytes()]
     offsets = np.cumsum([0, *map(len, parts)]).tolist()
@@ -61,7 +65,7 @@ def glb(positions: Array, normals: Array, faces: Array) -> bytes:
         "meshes": [{"primitives": [{"indices": 0, "attributes": {"POSITION": 1, "NORMAL": 2}, "material": 0}]}],
         "materials": [
             {
-                "pbrMetallicRoughness": {"baseColorFactor": _COLOUR, "metallicFactor": 0.0, "roughnessFactor": 0.6},
+                "pbrMetallicRoughness": {"baseColorFactor": colour, "metallicFactor": 0.0, "roughnessFactor": 0.6},
                 "doubleSided": True,
             }
         ],

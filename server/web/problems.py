@@ -13,6 +13,7 @@ from starlette.exceptions import HTTPException
 from starlette.requests import HTTPConnection
 
 from daq.errors import (
+    AlreadyHeld,
     BusyError,
     DaqError,
     DeviceError,
@@ -46,6 +47,7 @@ class Problem(BaseModel):
 
 STATUS_OF: dict[type[Exception], HTTPStatus] = {
     PlanError: HTTPStatus.UNPROCESSABLE_ENTITY,
+    AlreadyHeld: HTTPStatus.CONFLICT,
     BusyError: HTTPStatus.CONFLICT,
     InterlockOpen: HTTPStatus.LOCKED,
     NotAcknowledged: HTTPStatus.LOCKED,

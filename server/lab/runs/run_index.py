@@ -18,7 +18,7 @@ from server.lab.runs.run_summary import RunSummary
 
 INDEX_FILE = "runs.sqlite"
 _IN_MEMORY = ":memory:"
-_VERSION = 1
+_VERSION = 2
 """Of the table; one of another version is made anew."""
 
 
@@ -75,6 +75,11 @@ class RunIndex:
         row = (run_id, stamp, run.summary.model_dump_json(), run.image_keys.astype(np.int8).tobytes())
         with suppress(sqlite3.Error), self._lock, self._database:
             self._database.execute("INSERT OR REPLACE INTO run VALUES (?, ?, ?, ?)", row)
+
+    def forget(self, run_id: str) -> None:
+        """Drop what is known of a run."""
+        with suppress(sqlite3.Error), self._lock, self._database:
+            self._database.execute("DELETE FROM run WHERE run_id = ?", (run_id,))
 
     def forget_all_but(self, run_ids: frozenset[str]) -> None:
         """Drop what is known of runs that are gone."""

@@ -1,9 +1,11 @@
 """RunStore: what lies in the run directories, for lists and pages. The directories are the truth."""
 
+import os
 import re
 import threading
 from collections import Counter
 from collections.abc import Callable
+from contextlib import suppress
 from datetime import UTC, datetime
 from functools import lru_cache
 from pathlib import Path
@@ -12,23 +14,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.errors import ShotFileError
+from daq.files.packed_file import holds_its_shots
 from daq.files.run_directory import RunReader, list_runs
 from daq.files.run_file import RUN_FILE, SHOTS_FOLDER, shot_path
 from daq.files.shot_file import read_image_key
 from daq.names import is_identifier
 from daq.run.events import RunStatus
 from daq.run.state import RunOutcome
-from server.lab.errors import NotFound
+from server.lab.errors import Conflict, NotFound
+from server.lab.runs.run_filter import EVERY_RUN, RunFilter
 from server.lab.runs.run_index import IndexedRun, RunIndex
 from server.lab.runs.run_summary import (
     ACTIVE,
     DAMAGED,
+    PACKED,
     RunSummary,
     summary_of,
     summary_of_absent,
     summary_of_damaged,
+    summary_of_packed,
 )
 
+_ALL = 10**9
 _TIME = "%Y%m%dT%H%M%S"
 _TIME_IN_ID = re.compile(r"\d{8}T\d{6}(?=-)")
 
@@ -71,9 +78,14 @@ class RunStore:
         return self._summary_of(self.directory(run_id))
 
     def require_sound(self, summary: RunSummary) -> None:
-        """Raise ShotFileError if a run is damaged."""
-        if summary.outcome == DAMAGED:
-            raise ShotFileError(summary.cause)
+        """Raise ShotFileError if the shots of a run cannot be read."""
+        if summary.outcome in (DAMAGED, PACKED):
+            raise ShotFileError(f"run {summary.run_id}: {summary.cause}; {summary.remedy}")
+
+    def require_closed(self, run_id: str) -> None:
+        """Raise Conflict if a run is being recorded."""
+        if self._is_active(self.directory(run_id)):
+            raise Conflict(f"run {run_id} is being recorded: stop it first")
 
     def image_keys(self, run_id: str) -> NDArray[np.int64]:
         """ImageKey of every shot of a run, (shot,); INVALID where one cannot be read.
@@ -94,8 +106,32 @@ class RunStore:
         """Runs, newest first by their own time, whatever has been done to their directories since."""
         return self.page(limit, offset)[0]
 
-    def page(self, limit: int, offset: int) -> tuple[list[RunSummary], int]:
-        """Some runs, as ``newest`` has them, and how many there are in all.
+    def page(self, limit: int, offset: int, wanted: RunFilter = EVERY_RUN) -> tuple[list[RunSummary], int]:
+        """Some of the runs that are wanted, as ``newest`` has them, and how many of those there are.
+
+        Nothing is read of the other pages of a list of all runs.
+        """
+        directories = self._by_age()
+        if not wanted.takes_all:
+            directories = [path for path in directories if self._is_wanted(path, wanted)]
+        return [self._summary_of(path) for path in directories[offset : offset + limit]], len(directories)
+
+    def referring_to(self, run_id: str) -> tuple[str, ...]:
+        """Runs that name this one as a reference, newest first."""
+        wanted = RunFilter(text=run_id)
+        return tuple(run.run_id for run in self.page(_ALL, 0, wanted)[0] if run_id in run.references)
+
+    def forget(self, run_id: str) -> None:
+        """Drop what is remembered of a run that has been removed."""
+        self._index.forget(run_id)
+
+    def _is_wanted(self, run_dir: Path, wanted: RunFilter) -> bool:
+        if wanted.results not in (None, has_results(run_dir)):
+            return False
+        return wanted.accepts(self._summary_of(run_dir))
+
+    def _by_age(self) -> list[Path]:
+        """All run directories, the newest first.
 
         Ids tell it to the second, so that a long list need not be read; headers tell two of the same second apart.
         """
@@ -108,8 +144,7 @@ class RunStore:
             second = seconds[path]
             return second, self._created(path).isoformat() if crowd[second] > 1 else ""
 
-        page = sorted(directories, key=age, reverse=True)[offset : offset + limit]
-        return [self._summary_of(path) for path in page], len(directories)
+        return sorted(directories, key=age, reverse=True)
 
     def _is_active(self, run_dir: Path) -> bool:
         status = self._status()
@@ -123,7 +158,14 @@ class RunStore:
             begun = _begun(run_dir, _changed_ns(run_dir / RUN_FILE))
             return begun.model_copy(update={"outcome": ACTIVE, "shots_recorded": recorded, "shots_valid": None})
         except ShotFileError as error:
-            return summary_of_damaged(run_dir, self._started(run_dir), str(error))
+            return self._unreadable(run_dir, error)
+
+    def _unreadable(self, run_dir: Path, error: ShotFileError) -> RunSummary:
+        """A run of which no shot can be read: it hides no other."""
+        with suppress(ShotFileError):
+            if not (run_dir / SHOTS_FOLDER).is_dir() and holds_its_shots(run_dir):
+                return summary_of_packed(RunReader(run_dir))
+        return summary_of_damaged(run_dir, self._started(run_dir), str(error))
 
     def _indexed(self, run_dir: Path) -> IndexedRun:
         """What is known of a run that is not active: read again where its files have changed."""
@@ -180,6 +222,11 @@ class _ShotKeys:
             return np.array(self._keys, np.int64) if is_same else run.image_keys()
 
 
+def has_results(run_dir: Path) -> bool:
+    """Whether anything came of a run."""
+    return os.path.isdir(f"{run_dir}/results") and any(run_dir.glob("results/*/settings.json"))
+
+
 def _closed(read: RunSummary, status: RunStatus) -> RunSummary:
     """A run that is not active: acquisition knows how its last one ended, although no file may say it."""
     if status.run_id != read.run_id or read.outcome != RunOutcome.INTERRUPTED:
@@ -188,13 +235,14 @@ def _closed(read: RunSummary, status: RunStatus) -> RunSummary:
 
 
 def _stamp(run_dir: Path) -> str:
-    return f"{_changed_ns(run_dir / RUN_FILE)} {_changed_ns(run_dir / SHOTS_FOLDER)}"
+    folder = str(run_dir)  # of thousands of runs: paths are joined slowly
+    return f"{_changed_ns(f'{folder}/{RUN_FILE}')} {_changed_ns(f'{folder}/{SHOTS_FOLDER}')}"
 
 
-def _changed_ns(path: Path) -> int:
+def _changed_ns(path: Path | str) -> int:
     """When a file or folder was changed; 0 if it is gone."""
     try:
-        return path.stat().st_mtime_ns
+        return os.stat(path).st_mtime_ns
     except OSError:
         return 0
 

@@ -2,12 +2,15 @@
 
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Query, Response
+from fastapi import APIRouter, Header, Query, Response
 
 from daq.files.run_directory import RunHeader
-from daq.run_plan import RunPlan
+from daq.run_plan import RunKind, RunPlan
 from server.lab.errors import Conflict
+from server.lab.runs.run_filter import MOST_TEXT, ListedOutcome, RunFilter
+from server.lab.runs.run_removal import RemovedRun, remove_run
 from server.lab.runs.run_summary import RunSummary
+from server.lab.runs.thumbnail import thumbnail_of
 from server.lab.starting.light_request import obey
 from server.lab.starting.run_start import start_run
 from server.web.api.parameters import AsksForLight, ContextOf, RunId
@@ -16,10 +19,10 @@ from server.web.problems import responses
 
 router = APIRouter(prefix="/api/runs", tags=["runs"])
 
-
+_FOR_A_DAY = {"Cache-Control": "private, max-age=86400"}
 _COUNT = "X-Total-Count"
 _COUNTED: dict[int | str, dict[str, Any]] = {
-    200: {"headers": {_COUNT: {"description": "number of all runs", "schema": {"type": "integer"}}}}
+    200: {"headers": {_COUNT: {"description": "number of all runs that are wanted", "schema": {"type": "integer"}}}}
 }
 
 
@@ -29,9 +32,16 @@ def list_runs(
     response: Response,
     limit: Annotated[int, Query(ge=1, le=1000, description="at most so many")] = 100,
     offset: Annotated[int, Query(ge=0, le=10_000_000, description="leave out so many of the newest ones")] = 0,
+    kind: Annotated[RunKind | None, Query(description="of this kind alone")] = None,
+    outcome: Annotated[ListedOutcome | None, Query(description="that ended like this alone")] = None,
+    text: Annotated[
+        str, Query(max_length=MOST_TEXT, description="words, all of which id, name, cause, references or notes hold")
+    ] = "",
+    results: Annotated[bool | None, Query(description="true: with results; false: without any")] = None,
 ) -> list[RunSummary]:
     """Runs, newest first."""
-    runs, count = context.runs.page(limit, offset)
+    wanted = RunFilter(kind=kind, outcome=outcome, text=text, results=results)
+    runs, count = context.runs.page(limit, offset, wanted)
     response.headers[_COUNT] = str(count)
     return runs
 
@@ -54,6 +64,26 @@ def show_run(run_id: RunId, context: ContextOf) -> RunSummary:
 def show_header(run_id: RunId, context: ContextOf) -> RunHeader:
     """Plan, configuration, devices and versions, as they were when the run started."""
     return context.runs.reader(run_id).header
+
+
+@router.get(
+    "/{run_id}/thumbnail.jpg",
+    response_class=Response,
+    responses={**responses(404), 200: {"content": {"image/jpeg": {}}}},
+)
+def show_thumbnail(run_id: RunId, context: ContextOf) -> Response:
+    """A small picture: exposure A of the first shot, by the first view."""
+    return Response(thumbnail_of(context.runs.directory(run_id)), media_type="image/jpeg", headers=_FOR_A_DAY)
+
+
+@router.delete("/{run_id}", responses=responses(404, 409, 507))
+def delete_run(
+    run_id: RunId,
+    context: ContextOf,
+    tomoshadow_name: Annotated[str, Header(max_length=300, description="the id of the run once more, as typed")],
+) -> RemovedRun:
+    """Delete a run for ever, with its results and jobs; one that is being recorded or worked on is refused with 409."""
+    return remove_run(context.runs, context.unkept_runs, context.jobs, run_id, tomoshadow_name)
 
 
 @router.post("/{run_id}/stop", status_code=202, responses=responses(409))

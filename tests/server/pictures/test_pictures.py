@@ -1,9 +1,10 @@
 import cv2
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server.pictures.pictures import Stretch, frame_png, plane_png, preview_jpeg, to_grey
+from server.pictures.pictures import Colours, Stretch, frame_png, plane_png, preview_jpeg, to_grey
 
 
 @given(st.integers(0, 2000), st.integers(550, 2000))
@@ -46,3 +47,12 @@ def test_planes_are_coloured_from_zero_to_one_limit() -> None:
     assert picture is not None
     brightness = picture.sum(axis=2)[0]
     assert brightness[0] < brightness[1] < brightness[2] == brightness[3]
+
+
+@pytest.mark.parametrize("colours", [Colours.BLUE, Colours.RED])
+def test_shades_begin_with_black_and_grow_brighter(colours: Colours) -> None:
+    pixels = cv2.imdecode(np.frombuffer(plane_png(np.arange(256)[None], 255, colours), np.uint8), cv2.IMREAD_COLOR)
+    assert pixels is not None
+    assert pixels[0, 0].tolist() == [0, 0, 0]
+    assert (np.diff(pixels[0].astype(int), axis=0) >= 0).all()
+    assert pixels[0, -1].argmax() == (0 if colours is Colours.BLUE else 2)

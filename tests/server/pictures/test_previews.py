@@ -62,3 +62,55 @@ def test_a_plane_outside_is_refused_with_its_limit() -> None:
     preview = make_preview(np.ones((3, 4, 5), np.float32), VoxelGrid.centred((3, 4, 5), 1.0))
     with pytest.raises(IndexError, match="planes 0 to 3"):
         preview.plane("y", 4)
+
+
+VOLUMES = st.tuples(SHAPES, st.integers(1, 12), st.integers(0, 2**31))
+
+
+@given(VOLUMES)
+def test_a_preview_knows_the_grid_of_its_volume(drawn: tuple[tuple[int, int, int], int, int]) -> None:
+    shape, longest, _ = drawn
+    grid = VoxelGrid(shape, (1.0, -2.0, 3.0), 0.25)
+    again = make_preview(np.zeros(shape, np.float32), grid, longest).full_grid
+    assert again.shape == shape
+    np.testing.assert_allclose((*again.origin_mm, again.pitch_mm), (*grid.origin_mm, grid.pitch_mm))
+
+
+@given(VOLUMES)
+def test_where_one_looks_first_there_is_something(drawn: tuple[tuple[int, int, int], int, int]) -> None:
+    shape, longest, seed = drawn
+    rng = np.random.default_rng(seed)
+    volume = np.zeros(shape, np.float32)
+    voxel = tuple(int(rng.integers(size)) for size in shape)
+    volume[voxel] = 0.01
+    preview = make_preview(volume, VoxelGrid(shape, (0.0, 0.0, 0.0), 1.0), longest)
+    index = np.rint(preview.grid.to_index(np.array([preview.fullest_mm]))[0]).astype(int)
+    for axis, number in zip("zyx", index, strict=True):
+        assert preview.plane(axis, int(number)).any()
+
+
+@given(VOLUMES, st.floats(1e-6, 1e6))
+def test_a_telling_level_shows_something_and_not_all_and_no_brightness_changes_it(
+    drawn: tuple[tuple[int, int, int], int, int], scale: float
+) -> None:
+    shape, longest, seed = drawn
+    volume = np.random.default_rng(seed).lognormal(size=shape).astype(np.float32)
+    grid = VoxelGrid(shape, (0.0, 0.0, 0.0), 1.0)
+    preview = make_preview(volume, grid, longest)
+    assert 0 < preview.telling_level < 1
+    brighter = preview.voxels[preview.voxels > 255 * preview.telling_level].sum(dtype=np.int64)
+    assert 0.5 * preview.voxels.sum(dtype=np.int64) <= brighter
+    scaled = make_preview(volume * np.float32(scale), grid, longest)
+    assert abs(scaled.telling_level - preview.telling_level) <= 2 / 256
+
+
+def test_faint_droplets_beside_a_bright_one_are_shown() -> None:
+    volume = np.zeros((20, 20, 20), np.float32)
+    volume[::4, ::4, ::4] = 0.12
+    volume[10, 10, 10] = 1.0
+    preview = make_preview(volume, VoxelGrid.centred((20, 20, 20), 1.0))
+    assert np.count_nonzero(preview.voxels > 255 * preview.telling_level) == 126
+
+
+def test_nothing_has_a_level_too() -> None:
+    assert 0 < make_preview(np.zeros((2, 2, 2), np.float32), VoxelGrid.centred((2, 2, 2), 1.0)).telling_level < 1

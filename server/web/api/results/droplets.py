@@ -20,4 +20,4 @@ def show_droplets(run_id: RunId, results_id: ResultsId, context: ContextOf) -> M
 def download_droplets(run_id: RunId, results_id: ResultsId, shot: ShotIndex, context: ContextOf) -> FileResponse:
     """The droplets of a shot, HDF5: 1-D columns, a row per droplet and exposure."""
     path = droplets_file(context.runs.directory(run_id) / "results" / results_id, shot)
-    return FileResponse(path, media_type="application/x-hdf5", filename=f"{run_id}_{path.name}")
+    return FileResponse(path, media_type="application/x-hdf5", filename=f"{run_id}_{results_id}_{path.name}")

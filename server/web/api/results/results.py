@@ -18,7 +18,7 @@ from daq.frozen_model import FrozenModel
 from server.lab.errors import NotFound
 from server.lab.results import ResultSet, preview_of, result_sets, surface_of, volume_file
 from server.lab.services import Context
-from server.pictures.pictures import plane_png
+from server.pictures.pictures import Colours, plane_png
 from server.pictures.previews import VolumePreview
 from server.web.api.parameters import ContextOf, ResultsId, RunId
 from server.web.problems import responses
@@ -27,6 +27,7 @@ router = APIRouter(prefix="/api/runs/{run_id}/results", tags=["results"])
 
 Axis = Annotated[Literal["x", "y", "z"], Path(description="axis of the world across which the picture lies")]
 VolumeName = Annotated[str, Path(pattern=r"^shot_[0-9]{5,7}_[ab]$", description="for example shot_00012_a")]
+ColoursOf = Annotated[Colours, Query(description="heat; blue and red can be laid one upon the other")]
 _SHORTLY = {"Cache-Control": "private, max-age=60"}
 _PNG = {**responses(404, 500), 200: {"content": {"image/png": {}}}}
 
@@ -67,7 +68,7 @@ async def download_volume(run_id: RunId, results_id: ResultsId, volume: VolumeNa
     path = await to_thread(_volume, context, run_id, results_id, volume)
     if not await to_thread(path.is_file):
         await context.runner.store(path)
-    return FileResponse(path, media_type="application/x-hdf5", filename=f"{run_id}_{path.name}")
+    return FileResponse(path, media_type="application/x-hdf5", filename=f"{run_id}_{results_id}_{path.name}")
 
 
 @router.get("/{results_id}/{volume}/slices/{axis}/{index}.png", response_class=Response, responses=_PNG)
@@ -78,19 +79,25 @@ def show_slice(
     axis: Axis,
     index: Annotated[int, Path(ge=0, description="number of the plane along the axis, from 0")],
     context: ContextOf,
+    colours: ColoursOf = Colours.HEAT,
 ) -> Response:
     """One plane of the preview, coloured from 0 to the largest value of the volume."""
     preview = preview_of(volume_file(context.runs.directory(run_id), results_id, volume))
-    return _picture(_plane(preview, axis, index), axis)
+    return _picture(_plane(preview, axis, index), axis, colours)
 
 
 @router.get("/{results_id}/{volume}/projections/{axis}.png", response_class=Response, responses=_PNG)
 def show_projection(
-    run_id: RunId, results_id: ResultsId, volume: VolumeName, axis: Axis, context: ContextOf
+    run_id: RunId,
+    results_id: ResultsId,
+    volume: VolumeName,
+    axis: Axis,
+    context: ContextOf,
+    colours: ColoursOf = Colours.HEAT,
 ) -> Response:
     """Maximum along an axis."""
     preview = preview_of(volume_file(context.runs.directory(run_id), results_id, volume))
-    return _picture(preview.projection(axis), axis)
+    return _picture(preview.projection(axis), axis, colours)
 
 
 @router.get(
@@ -121,6 +128,6 @@ def _plane(preview: VolumePreview, axis: Axis, index: int) -> NDArray[np.uint8]:
         raise NotFound(str(error)) from error
 
 
-def _picture(plane: NDArray[np.uint8], axis: Axis) -> Response:
+def _picture(plane: NDArray[np.uint8], axis: Axis, colours: Colours) -> Response:
     upright = plane.T if axis == "x" else plane
-    return Response(plane_png(upright, 255), media_type="image/png", headers=_SHORTLY)
+    return Response(plane_png(upright, 255, colours), media_type="image/png", headers=_SHORTLY)

@@ -12,9 +12,9 @@ from processing.reconstruction.choices import ReconstructionMethod
 from processing.runs.volume_parts import VolumePart
 from server.lab.results import part_of, preview_of, volume_file
 from server.lab.services import Context
-from server.pictures.pictures import plane_png
+from server.pictures.pictures import Colours, plane_png
 from server.web.api.parameters import ContextOf, ResultsId, RunId
-from server.web.api.results.results import VolumeName
+from server.web.api.results.results import ColoursOf, VolumeName
 from server.web.problems import responses
 
 router = APIRouter(prefix="/api/runs/{run_id}/results/{results_id}/{volume}", tags=["results"])
@@ -41,14 +41,17 @@ def show_full_slice(
     axis: Annotated[Literal["x", "y", "z"], Query(description="of the world, across which the slice lies")],
     at_mm: Annotated[float, Query(ge=-1e6, le=1e6, description="where; the nearest plane is shown")],
     method: LineOfSight = None,
+    colours: ColoursOf = Colours.HEAT,
+    limit: Annotated[float | None, Query(gt=0, le=1e6, description="intensity of the brightest colour")] = None,
 ) -> Response:
     """A slice of the volume, coloured as its preview; by another method, up to the brightest voxel of the slice."""
     part = _part(context, run_id, results_id, volume, {axis: (at_mm, at_mm)}, method)
     plane = part.voxels.squeeze("zyx".index(axis))
     file = volume_file(context.runs.directory(run_id), results_id, volume)
-    limit = preview_of(file).limit if method is None else float(plane.max())
-    png = plane_png(plane.T if axis == "x" else plane, limit)
-    return Response(png, media_type="image/png", headers={**_SHORTLY, **_place(part)})
+    brightest = limit or (preview_of(file).limit if method is None else float(plane.max()))
+    png = plane_png(plane.T if axis == "x" else plane, brightest, colours)
+    name = _named(f"{run_id}_{results_id}_{volume}_{part.method.value}_{axis}_{at_mm:.3f}_mm.png")
+    return Response(png, media_type="image/png", headers={**_SHORTLY, **_place(part), **name})
 
 
 @router.get(
@@ -73,9 +76,9 @@ def show_region(
     """
     ranges_mm = {"x": _span(x_mm), "y": _span(y_mm), "z": _span(z_mm)}
     part = _part(context, run_id, results_id, volume, ranges_mm, method)
-    return Response(
-        part.voxels.astype("<f4", copy=False).tobytes(), media_type="application/octet-stream", headers=_place(part)
-    )
+    name = _named(f"{run_id}_{results_id}_{volume}_{part.method.value}_region.f32")
+    voxels = part.voxels.astype("<f4", copy=False).tobytes()
+    return Response(voxels, media_type="application/octet-stream", headers={**_place(part), **name})
 
 
 def _part(
@@ -95,6 +98,11 @@ def _span(text: str | None) -> tuple[float, float] | None:
         return None
     low, _, high = text.partition(":")
     return float(low), float(high or low)
+
+
+def _named(file: str) -> dict[str, str]:
+    """Name of a download; no two parts have the same. Ids hold nothing that has to be quoted."""
+    return {"Content-Disposition": f'inline; filename="{file}"'}
 
 
 def _place(part: VolumePart) -> dict[str, str]:
