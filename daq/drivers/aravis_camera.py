@@ -212,9 +212,13 @@ class AravisCamera:
         ------
         DeviceUnavailable
             An exposure is missing and the camera no longer answers.
+        DeviceRefused
+            It was disarmed meanwhile.
         """
         receiver = self._armed()
         arrivals = receiver.take(self._form.arrivals, deadline_s)
+        if receiver is not self._receiver:
+            raise DeviceRefused(self._name, "the camera was disarmed while its frames were awaited")
         shot = double_frame(arrivals, self._last_id, self._form)
         late_frames, self._late_frames = self._late_frames, receiver.counters.stale_frames
         shot = replace(shot, late_frames=self._late_frames - late_frames)

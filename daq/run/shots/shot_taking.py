@@ -17,11 +17,11 @@ from daq.run.side_by_side import SideBySide
 from daq.run_plan import ImageKey
 from daq.shot import DoubleFrame, FiredTrain, Shot
 
-_LEAST_COLLECT_S = 0.05
-"""What a camera gets although another one used up the deadline: its frames lie in its buffers already."""
+_SLICE_S = 0.02
+"""How often is looked whether something ends a shot whose frames have not all come."""
 
 _PATIENCE_S = 0.2
-"""For cameras that re-base, before the light is switched off; they need milliseconds."""
+"""For cameras that re-base, or are late with their frames, before the light is switched off; they need milliseconds."""
 
 _ANSWER_LIMIT_S = 2.0
 """For cameras of which nothing came, in the dark; each gives up on the answer itself before."""
@@ -155,15 +155,21 @@ class ShotTaker:
 
     def _collect(self) -> dict[str, DoubleFrame] | None:
         """Collect the exposures of all views before one common deadline; None if the run ends at once."""
-        deadline_s = time.monotonic() + self._frame_deadline_s
-        views = {}
-        for view, camera in self._rig.cameras.items():
-            views[view] = camera.collect(max(_LEAST_COLLECT_S, deadline_s - time.monotonic()))
-            if views[view].silent and self._armed:
-                self._darken()
+        collecting = SideBySide("frames", self._frames_of, self._rig.cameras)
+        too_late_s = time.monotonic() + self._frame_deadline_s + _PATIENCE_S
+        while not (collecting.wait(_SLICE_S) or collecting.has_failed or time.monotonic() > too_late_s):
             if self._ending.at_once:
                 return None
-        return views
+        views = collecting.answers
+        if self._armed and (len(views) < len(self._rig.cameras) or any(frames.silent for frames in views.values())):
+            self._darken()
+        if self._ending.at_once:
+            return None
+        _raise_first(collecting.errors(_ANSWER_LIMIT_S))
+        return collecting.answers
+
+    def _frames_of(self, camera: Camera) -> DoubleFrame:
+        return camera.collect(self._frame_deadline_s)
 
     def _ask_silent(self, index: int, views: dict[str, DoubleFrame]) -> None:
         """Whether cameras of which nothing came are there at all; it is dark."""

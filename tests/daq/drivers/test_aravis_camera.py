@@ -528,3 +528,9 @@ def test_a_camera_that_is_disarmed_meanwhile_answers_as_one_that_is_not_armed(
         assert ask(camera) in (None, StreamCounters())
     except AttributeError as error:
         pytest.fail(f"the receiver went between being looked for and being used: {error}")
+
+
+def test_frames_that_were_awaited_while_it_was_disarmed_count_for_nothing() -> None:
+    """Whoever waited for them was left behind; the next run may be armed already."""
+    with pytest.raises(DeviceRefused, match="view: the camera was disarmed while its frames were awaited"):
+        Overtaken("view", IP, PROFILE, SHAPE, JUMBO).collect(0.0)

@@ -258,6 +258,22 @@ def test_a_dead_camera_ends_it_and_is_named(lab: Laboratory) -> None:
     assert lab.memory.generator.fired == 2
 
 
+def test_nobody_waits_for_frames_once_something_ends_it_at_once(tmp_path: Path) -> None:
+    """Cameras and generator are gone together: the guard hears it long before the deadline of the frames."""
+    lab = Laboratory(tmp_path / "runs", AcquisitionLimits(frame_s=10 * DEADLINE_S, light_off_s=0.2, disarm_s=0.3))
+    with lab.acquisition:
+        lab.show(LIT)
+        thaw = lab.memory.cameras["view1"].frozen = threading.Event()
+        before = lab.memory.generator.fired
+        await_true(lambda: lab.memory.generator.fired > before)
+        lab.memory.open_door()
+        status = lab.acquisition.wait(DEADLINE_S)
+        thaw.set()
+        lab.rest()
+        assert status.resting
+        assert "interlock" in status.message
+
+
 def test_a_camera_that_is_not_disarmed_is_told(lab: Laboratory) -> None:
     lab.show(SLOW)
     thaw = lab.memory.cameras["view2"].frozen = threading.Event()
