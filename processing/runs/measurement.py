@@ -137,8 +137,15 @@ class RunMeasurement:
     objects: RunObjects
 
     @classmethod
-    def of(cls, run: RunReader, shot: int, calibration_file: Path, settings: MeasureSettings) -> "RunMeasurement":
-        """Plan the measurement of all shots by one of them.
+    def of(
+        cls,
+        run: RunReader,
+        shot: int,
+        calibration_file: Path,
+        settings: MeasureSettings,
+        references: References | None = None,
+    ) -> "RunMeasurement":
+        """Plan the measurement of all shots by one of them; somebody may have read the references of the run already.
 
         Raises
         ------
@@ -158,7 +165,7 @@ class RunMeasurement:
         search = plan_droplets(
             [calibration.views[view].mapping for view in views], grid, views, margin_voxel=settings.margin_voxel
         )
-        references = read_references(run)
+        references = read_references(run) if references is None else references
         if settings.polarity == "shadow":
             require_backgrounds(run, references)
         require_fitting(settings.ignored, {view: calibration.views[view].mapping.image_size_px for view in views})

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Hashable, Iterator, Mapping
 from contextlib import contextmanager
 from threading import Lock
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from daq.files.run_directory import RunReader
 from daq.files.run_file import RUN_FILE
@@ -46,7 +46,7 @@ class Latest(Generic[Made]):
 
 
 class Workbench:
-    """Keeps the latest plan with its memory, and the latest references. Serves one shot at a time.
+    """Keeps the latest plan with its memory, and the latest references and plan of a run. Serves one shot at a time.
 
     A thread that comes while another one works at it waits; threads that work side by side have one each.
     """
@@ -54,6 +54,7 @@ class Workbench:
     def __init__(self) -> None:
         self._lock = Lock()
         self._references: Latest[References] = Latest()
+        self._planned: Latest[Any] = Latest()
         self._reconstructor: Latest[Reconstructor] = Latest()
 
     @contextmanager
@@ -64,9 +65,17 @@ class Workbench:
 
     def references(self, run: RunReader) -> References:
         """References of a run, read again when its file has changed."""
-        written_ns = (run.run_dir / RUN_FILE).stat().st_mtime_ns
-        return self._references.of((run.run_dir, written_ns), lambda: read_references(run))
+        return self._references.of(_content(run), lambda: read_references(run))
+
+    def planned(self, run: RunReader, key: Hashable, make: Callable[[], Made]) -> Made:
+        """What was planned for a run and all that the key names; planned anew when the file of the run has changed."""
+        plan: Made = self._planned.of((_content(run), key), make)
+        return plan
 
     def reconstructor(self, key: Hashable, make: Callable[[], Reconstructor]) -> Reconstructor:
         """The reconstructor for all that the key names."""
         return self._reconstructor.of(key, make)
+
+
+def _content(run: RunReader) -> Hashable:
+    return run.run_dir, (run.run_dir / RUN_FILE).stat().st_mtime_ns

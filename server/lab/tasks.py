@@ -9,7 +9,7 @@ from typing import Any
 
 from daq.files.run_directory import RunReader
 from processing.calibration.calibrate import calibrate
-from processing.calibration.calibration_file import load_calibration, save_calibration
+from processing.calibration.calibration_file import file_sha256, load_calibration, save_calibration
 from processing.calibration.sets.calibration_set import load_calibration_set
 from processing.calibration.verdict import BELONGING
 from processing.kernels import DEFAULT_THREADS
@@ -47,9 +47,13 @@ def reconstruct(job: dict[str, Any], should_stop: Callable[[], bool]) -> dict[st
 
 def measure_shot(job: dict[str, Any], should_stop: Callable[[], bool]) -> dict[str, Any]:
     """Measure the droplets of one shot; no volume is needed."""
-    settings = MeasureSettings.model_validate(job["settings"])
-    with RunReader(Path(job["run_dir"])) as run:
-        measurement = RunMeasurement.of(run, job["shot"], Path(job["calibration_file"]), settings)
+    settings, calibration_file = MeasureSettings.model_validate(job["settings"]), Path(job["calibration_file"])
+    with WORKBENCH.occupied() as bench, RunReader(Path(job["run_dir"])) as run:
+        measurement = bench.planned(
+            run,
+            (calibration_file, file_sha256(calibration_file), settings),
+            lambda: RunMeasurement.of(run, job["shot"], calibration_file, settings, bench.references(run)),
+        )
         measured = measurement.measure(job["shot"], Path(job["results_dir"]), _threads(job), should_stop)
     return measured.summary.model_dump(mode="json")
 

@@ -11,6 +11,7 @@ import httpx
 import pytest
 
 from processing.analysis.droplets.droplet_file import read_droplets
+from processing.analysis.droplets.droplet_search import DropletSearch, plan_droplets
 from processing.calibration.calibration_file import load_calibration, save_calibration
 from processing.calibration.calibration_record import content_id
 from processing.runs.measurement import MeasureSettings
@@ -184,6 +185,37 @@ def test_a_measurement_can_be_aborted_in_any_round(measured: Serving, tmp_path: 
     with pytest.raises(Stopped, match="shot 0: stopped in exposure a"):
         measure_shot(job, lambda: next(asked))
     assert not list((tmp_path / "out").glob("*.h5"))
+
+
+def test_jobs_of_a_run_plan_once_until_settings_or_calibration_are_others(
+    measured: Serving, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    planned: list[object] = []
+
+    def counted(*given: Any, **more: Any) -> DropletSearch:
+        planned.append(given)
+        return plan_droplets(*given, **more)
+
+    monkeypatch.setattr("processing.runs.measurement.plan_droplets", counted)
+    calibration = write_bright_calibration(tmp_path / "cal.json")
+
+    def plans_after(shot: int, seed: int, out: str) -> int:
+        job = {
+            "run_dir": str(measured.services.data_dir / "bright"),
+            "shot": shot,
+            "calibration_file": str(calibration),
+            "results_dir": str(tmp_path / out),
+            "settings": SETTINGS.model_copy(update={"seed": seed}).model_dump(mode="json"),
+        }
+        with pytest.raises(Stopped):
+            measure_shot(job, lambda: True)
+        return len(planned)
+
+    assert [plans_after(shot, 0, "first") for shot in (0, 1)] == [1, 1]
+    assert [plans_after(shot, 5, "second") for shot in (1, 0)] == [2, 2]
+    anew = replace(load_calibration(calibration), notes=("made again",))
+    save_calibration(anew.with_id(content_id(anew)), calibration, overwrite=True)
+    assert plans_after(0, 5, "third") == 3
 
 
 def test_what_was_measured_with_a_calibration_that_was_replaced_is_not_done(measured: Serving) -> None:
