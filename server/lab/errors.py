@@ -28,6 +28,14 @@ class Conflict(ServerError):
     """The thing is not in a state that allows this; the text names the state."""
 
 
+class Forbidden(ServerError):
+    """Not everybody may do that."""
+
+
+class Locked(ServerError):
+    """Somebody else holds control of the rig; the text names him."""
+
+
 class Damaged(ServerError):
     """A file that the server keeps cannot be read; the text names it."""
 

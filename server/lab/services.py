@@ -15,6 +15,7 @@ from processing.reconstruction.settings import ReconstructionSettings
 from processing.runs.volume_parts import VolumeParts
 from server.lab.calibrations import CalibrationStore
 from server.lab.desk.beat import Beat
+from server.lab.desk.control import Control
 from server.lab.desk.desk_watch import DeskWatch
 from server.lab.desk.once import Once
 from server.lab.duty import Duty, Lamp
@@ -105,9 +106,10 @@ class Context:
     desk: DeskWatch
     live: LiveFeed
     parts: VolumeParts
+    control: Control
+    once: Once
     duties: tuple[Duty, ...]
     beat: Beat = field(default_factory=Beat)
-    once: Once = field(default_factory=Once)
 
     @property
     def lamps(self) -> tuple[Lamp, ...]:

@@ -126,7 +126,10 @@ class ServerConfig(FrozenModel):
         BeforeValidator(_possible),
         Field(description="folder of runs and calibrations, relative to the working directory"),
     ] = Path("runs")
-    token: Annotated[SecretStr | None, Field(description="asked of every browser and script")] = None
+    token: Annotated[SecretStr | None, Field(description="of operators: asked of every browser and script")] = None
+    viewer_token: Annotated[
+        SecretStr | None, Field(description="of viewers, who look and abort, and do nothing else; needs token too")
+    ] = None
 
     def moved(self, host: str | None, port: int | None) -> "ServerConfig":
         """The same at another address; ConfigError if that may not be served."""
@@ -140,6 +143,12 @@ class ServerConfig(FrozenModel):
     def _abort_has_a_port_of_its_own(self) -> Self:
         if self.abort_port == self.port:
             raise ValueError(f"abort_port {self.port} is that of all else: choose another one, or 0 for any")
+        return self
+
+    @model_validator(mode="after")
+    def _viewers_have_a_token_of_their_own(self) -> Self:
+        if self.viewer_token is not None and (self.token is None or self.token == self.viewer_token):
+            raise ValueError("viewer_token: operators need a token too, another one: set token")
         return self
 
     @model_validator(mode="after")

@@ -19,7 +19,10 @@ from starlette.routing import Match
 from daq.errors import DaqError
 from processing.runs.volume_parts import VolumeParts
 from server.lab.calibrations import CalibrationStore
+from server.lab.desk.control import Control
 from server.lab.desk.desk_watch import DeskWatch
+from server.lab.desk.once import Once
+from server.lab.desk.request_table import REQUESTS_FILE, opened_requests
 from server.lab.duty import Duty, Work
 from server.lab.job_recovery import opened_table
 from server.lab.jobs import JobTable
@@ -42,6 +45,7 @@ from server.web.api import (
     beat,
     bench,
     calibrations,
+    control,
     events,
     jobs,
     live,
@@ -57,7 +61,9 @@ from server.web.api import (
 from server.web.api.parameters import forbid_unknown_query
 from server.web.api.results import droplets, results, statistics, volume_parts
 from server.web.body_limit import BodyLimit
+from server.web.door import Door
 from server.web.guard import Guard
+from server.web.keys import Keys
 from server.web.readings import Readings
 from server.web.stream_cap import StreamCap
 from server.web.ui.page import mount_page
@@ -78,6 +84,7 @@ _RESOURCES = (
     jobs,
     events,
     bench,
+    control,
     timing,
 )
 _METHODS = ["GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"]
@@ -109,7 +116,7 @@ def create_api(services: Services, abort_port: socket.socket | None = None) -> F
         docs_url=None,
         redoc_url=None,
         lifespan=lambda app: _life(app, services, abort_port),
-        responses=problems.responses(400, 401, 403, 413, 422),
+        responses=problems.responses(400, 401, 403, 413, 422, 429),
     )
     problems.install(app)
     for resource in _RESOURCES:
@@ -118,12 +125,14 @@ def create_api(services: Services, abort_port: socket.socket | None = None) -> F
     app.include_router(beat.router)
     app.include_router(sign_in.router)
     app.add_api_route("/api/{path:path}", _nothing_here, methods=_METHODS, include_in_schema=False)
-    token = services.config.server.token
+    door = app.state.door = Door(Keys.of(services.config.server))
     problems.describe(app)
     app.add_middleware(StreamCap)
     app.add_middleware(Readings)
     app.add_middleware(BodyLimit)
-    app.add_middleware(Guard, host_names=services.host_names, token=token.get_secret_value() if token else None)
+    app.add_middleware(
+        Guard, door=door, host_names=services.host_names, abort_port=lambda: app.state.abort_listener.port
+    )
     return app
 
 
@@ -184,7 +193,8 @@ async def _life(app: FastAPI, services: Services, abort_port: socket.socket | No
         jobs_table = stack.enter_context(opened_table(services.data_dir, services.events))
         await stack.enter_async_context(services.engine)
         index = stack.enter_context(closing(RunIndex(services.data_dir / INDEX_FILE)))
-        context = app.state.context = _context(services, jobs_table, index)
+        requests = stack.enter_context(opened_requests(services.data_dir / REQUESTS_FILE, services.events))
+        context = app.state.context = _context(services, jobs_table, index, Once(table=requests))
         held = abort_port or stack.enter_context(port.listening(services.config.server.host, 0))
         app.state.abort_listener = stack.enter_context(_abort_listener(services, held))
         await context.monitor.ask()
@@ -202,12 +212,12 @@ async def _life(app: FastAPI, services: Services, abort_port: socket.socket | No
 
 
 def _abort_listener(services: Services, held: socket.socket) -> AbortListener:
-    has_token = services.config.server.token is not None
+    has_token = Keys.of(services.config.server).are_any
     names = None if has_token else [name.lower() for name in services.host_names]
     return AbortListener(partial(abort_all, services), held, names)
 
 
-def _context(services: Services, table: JobTable, index: RunIndex) -> Context:
+def _context(services: Services, table: JobTable, index: RunIndex, once: Once) -> Context:
     store = CalibrationStore(services.data_dir / "calibrations")
     watch = CalibrationWatch(services.events)
     acquisition = services.acquisition
@@ -223,6 +233,8 @@ def _context(services: Services, table: JobTable, index: RunIndex) -> Context:
         desk=DeskWatch(acquisition.status, lambda: reasons_against(context), lambda: alarms_now(context)),
         live=LiveFeed(services.rig.cameras, lambda: acquisition.newest_shot, acquisition.keep_live),
         parts=VolumeParts(),
+        control=Control(lambda: not acquisition.status().resting, services.events.publish),
+        once=once,
         duties=tuple(Duty(name, services.events) for name in _DUTIES),
     )
     return context

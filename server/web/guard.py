@@ -1,84 +1,155 @@
 """Guard: who may talk to the server. A pure ASGI layer, because middleware of Starlette does not see websockets.
 
 It checks every request and every socket, pages included. The ``Origin`` header: another site's page in the operator's
-browser stays outside. The token, if there is one. Without a token, the ``Host`` header: a foreign name that somebody
-points at this machine would make his page our own origin; with one, his page lacks the cookie. Every answer says what a
-browser may do with it.
+browser stays outside. The token or the session, if there is a token. Without one, the ``Host`` header: a foreign name
+that somebody points at this machine would make his page our own origin; with one, his page lacks the cookie. A viewer
+looks and ends the light. Every answer says what a browser may do with it.
 """
 
-import hmac
-from collections.abc import Collection
+import re
+from collections.abc import Callable, Collection
 from http.cookies import CookieError, SimpleCookie
 from ipaddress import ip_address
 from urllib.parse import urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders
-from starlette.responses import JSONResponse, RedirectResponse, Response
+from starlette.requests import HTTPConnection
+from starlette.responses import RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from server.web.problems import MEDIA_TYPE
+from server.lab.desk.visitor import Role, Visitor, named_script, unnamed_script
+from server.web.door import Door
+from server.web.problems import CONTROL_REMEDIES, problem
 
 COOKIE = "tomoshadow"
 SIGN_IN_PATH = "/sign-in"
-_PROTECTION = {
-    "X-Content-Type-Options": "nosniff",
-    "Referrer-Policy": "same-origin",
-    # NiceGUI writes scripts and styles into the page, and compiles templates; ABORT has a port of its own.
-    "Content-Security-Policy": (
-        "default-src 'self'; script-src 'self' 'unsafe-inline' 'unsafe-eval'; style-src 'self' 'unsafe-inline'; "
-        "img-src 'self' data: blob:; font-src 'self' data:; worker-src 'self' blob:; "
-        "connect-src 'self' data: blob: http: https: ws: wss:; "
-        "base-uri 'self'; form-action 'self'; frame-ancestors 'none'; object-src 'none'"
-    ),
-}
+VISITOR = "visitor"
+"""Where the scope of a request says who asks."""
+OPERATOR_HEADER = "Tomoshadow-Operator"
+_POLICY = (
+    # NiceGUI writes scripts and styles into the page, and compiles templates.
+    "default-src 'self'; script-src 'self' 'unsafe-inline' 'unsafe-eval'; style-src 'self' 'unsafe-inline'; "
+    "img-src 'self' data: blob:; font-src 'self' data:; worker-src 'self' blob:; "
+    "connect-src 'self' data: blob: {own}; "
+    "base-uri 'self'; form-action 'self'; frame-ancestors 'none'; object-src 'none'"
+)
 _POLICY_VIOLATION = 1008  # RFC 6455, section 7.4.1
+_LOOKING = ("GET", "HEAD", "OPTIONS")
+_OF_VIEWERS = re.compile(r"/api/rig/(abort|readiness)|/api/runs/[^/]+/abort")
+_SESSION_AGE_S = 30 * 24 * 3600
+"""A browser forgets the session then; the server does so long before, unless it is used."""
 
 
 class Guard:
-    """Lets pass who comes from here and knows the token.
+    """Lets pass who comes from here and knows the token, and says who that is.
 
     Parameters
     ----------
     app : ASGIApp
         What is guarded.
+    door : Door
+        Who is let in; without tokens the loopback interface is protection enough.
     host_names : Collection[str]
         Names of this server beside the loopback ones.
-    token : str | None
-        What operators have to know; None where the loopback interface is protection enough.
+    abort_port : Callable[[], int | None]
+        Where pages ask for ABORT.
     """
 
-    def __init__(self, app: ASGIApp, host_names: Collection[str] = (), token: str | None = None) -> None:
+    def __init__(
+        self,
+        app: ASGIApp,
+        door: Door,
+        host_names: Collection[str] = (),
+        abort_port: Callable[[], int | None] = lambda: None,
+    ) -> None:
         self._app = app
+        self._door = door
         self._host_names = frozenset(name.lower() for name in host_names)
-        self._token = token
+        self._abort_port = abort_port
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass the request on, or refuse it."""
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
-        refusal = self._refusal(scope)
+        headers, cookie = Headers(scope=scope), ""
+        refusal = self._foreign(scope, headers) or self._wait(scope, headers)
+        visitor = None if refusal else self._visitor(scope, headers)
+        if visitor is None and refusal is None and not self._door.keys.are_any:
+            visitor, cookie = self._let_in(scope, headers)
+        refusal = refusal or self._refusal(scope, headers, visitor)
+        send = _protected(send, self._policy(headers.get("host", "")), cookie)
         if refusal is None:
-            await self._app(scope, receive, _protected(send))
+            await self._app({**scope, VISITOR: visitor}, receive, send)
         elif scope["type"] == "websocket":
             await receive()
             await send({"type": "websocket.close", "code": _POLICY_VIOLATION})
         else:
-            await refusal(scope, receive, _protected(send))
+            await refusal(scope, receive, send)
 
-    def _refusal(self, scope: Scope) -> Response | None:
-        headers = Headers(scope=scope)
-        host = headers.get("host", "")
-        if self._token is None and not is_ours(host, self._host_names):
-            return _refuse(403, f"host {host!r} is not a name of this server")
-        origin = headers.get("origin")
+    def _foreign(self, scope: Scope, headers: Headers) -> Response | None:
+        host, origin = headers.get("host", ""), headers.get("origin")
+        if not self._door.keys.are_any and not is_ours(host, self._host_names):
+            return _refuse(scope, 403, f"host {host!r} is not a name of this server")
         if origin is not None and site_of(origin) != host.lower():
-            return _refuse(403, f"origin {origin!r} is not this server, {host!r}")
-        if self._token is None or scope["path"] == SIGN_IN_PATH or _offers(headers, self._token):
+            return _refuse(scope, 403, f"origin {origin!r} is not this server, {host!r}")
+        return None
+
+    def _wait(self, scope: Scope, headers: Headers) -> Response | None:
+        """Who has offered too many wrong tokens is not listened to for a while; a session goes on."""
+        wait_s = self._door.tries.wait_s(address_of(scope)) if "authorization" in headers else 0
+        if not wait_s:
             return None
+        answer = _refuse(scope, 429, f"too many wrong tokens: wait {wait_s} s")
+        answer.headers["Retry-After"] = str(wait_s)
+        return answer
+
+    def _visitor(self, scope: Scope, headers: Headers) -> Visitor | None:
+        """Who has a session or a token."""
+        if session := self._door.sessions.find(cookie_of(headers)):
+            return session
+        bearer = headers.get("authorization", "").removeprefix("Bearer ")
+        if not bearer:
+            return None
+        role = self._door.keys.role_of(bearer)
+        if role is None and self._door.keys.are_any:
+            self._door.tries.count(address_of(scope))
+        return _script(headers, scope, role) if role else None
+
+    def _let_in(self, scope: Scope, headers: Headers) -> tuple[Visitor, str]:
+        """Without a token: a browser that opens a page gets a session, a script needs none."""
+        if "text/html" not in headers.get("accept", "") or scope["path"].startswith("/api"):
+            return _script(headers, scope, Role.OPERATOR), ""
+        visitor = self._door.sessions.begin(Role.OPERATOR, address_of(scope))
+        return visitor, session_cookie(visitor.id, headers, scope["scheme"] == "https")
+
+    def _refusal(self, scope: Scope, headers: Headers, visitor: Visitor | None) -> Response | None:
+        if scope["path"] == SIGN_IN_PATH:
+            return None
+        if visitor is not None:
+            return _not_for_viewers(scope) if visitor.role is Role.VIEWER and _is_command(scope) else None
         if "text/html" in headers.get("accept", ""):
             return RedirectResponse(SIGN_IN_PATH, 303)
-        return _refuse(401, "a token is needed: header 'Authorization: Bearer <token>'")
+        return _refuse(scope, 401, "a token is needed: header 'Authorization: Bearer <token>'")
+
+    def _policy(self, host: str) -> str:
+        """What a page may connect to: this server and the port of ABORT, and nothing else."""
+        port, name = self._abort_port(), _name_of(host)
+        if not re.fullmatch(r"[A-Za-z0-9.:_\[\]-]+", host):
+            return _POLICY.format(own="")
+        door = f" http://{name}:{port} https://{name}:{port}" if port else ""
+        return _POLICY.format(own=f"ws://{host} wss://{host}{door}")
+
+
+def visitor_of(connection: HTTPConnection) -> Visitor:
+    """Who asks, as the guard has found."""
+    visitor: Visitor = connection.scope[VISITOR]
+    return visitor
+
+
+def address_of(scope: Scope) -> str:
+    """From where a request comes."""
+    return str((scope.get("client") or ("",))[0])
 
 
 def site_of(origin: str) -> str:
@@ -98,25 +169,63 @@ def is_ours(host: str, host_names: Collection[str] = ()) -> bool:
     return name == "localhost" or name in host_names or _is_loopback(name)
 
 
-def _protected(send: Send) -> Send:
+def cookie_of(headers: Headers) -> str:
+    """The session that a browser names; empty where it names none."""
+    try:
+        morsel = SimpleCookie(headers.get("cookie", "")).get(_cookie_name(headers))
+    except CookieError:
+        return ""
+    return morsel.value if morsel else ""
+
+
+def session_cookie(session_id: str, headers: Headers, is_secure: bool) -> str:
+    """The header that gives a browser its session; an empty one ends it."""
+    age_s = _SESSION_AGE_S if session_id else 0
+    kept = f"{_cookie_name(headers)}={session_id}; Path=/; Max-Age={age_s}; HttpOnly; SameSite=Strict"
+    return f"{kept}; Secure" if is_secure else kept
+
+
+def _cookie_name(headers: Headers) -> str:
+    """Browsers keep cookies by host, not by port: another server on this computer has another one."""
+    port = headers.get("host", "").rpartition(":")[2]
+    return f"{COOKIE}-{port}" if port.isdecimal() else COOKIE
+
+
+def _protected(send: Send, policy: str, cookie: str) -> Send:
     """Say with every answer what a browser may do with it."""
+    protection = {
+        "X-Content-Type-Options": "nosniff",
+        "Referrer-Policy": "same-origin",
+        "Content-Security-Policy": policy,
+    }
 
     async def send_protected(message: Message) -> None:
         if message["type"] == "http.response.start":
-            MutableHeaders(scope=message).update(_PROTECTION)
+            headers = MutableHeaders(scope=message)
+            headers.update(protection)
+            if cookie:
+                headers.append("Set-Cookie", cookie)
         await send(message)
 
     return send_protected
 
 
-def _offers(headers: Headers, token: str) -> bool:
-    bearer = headers.get("authorization", "").removeprefix("Bearer ")
-    return is_token(bearer, token) or is_token(_cookie(headers), token)
+def _script(headers: Headers, scope: Scope, role: Role) -> Visitor:
+    name = headers.get(OPERATOR_HEADER, "").strip()
+    return named_script(name, role) if name else unnamed_script(address_of(scope), role)
 
 
-def is_token(offered: str, token: str) -> bool:
-    """Compare in constant time."""
-    return hmac.compare_digest(offered.encode(), token.encode())
+def _is_command(scope: Scope) -> bool:
+    """What a viewer may not ask for; pages know the role and refuse by themselves."""
+    if scope["type"] != "http" or not scope["path"].startswith("/api"):
+        return False
+    return scope["method"] not in _LOOKING and not _OF_VIEWERS.fullmatch(scope["path"])
+
+
+def _name_of(host: str) -> str:
+    """A host without its port."""
+    name, _, port = host.rpartition(":")
+    return name if name and port.isdecimal() else host
 
 
 def _is_loopback(name: str) -> bool:
@@ -126,16 +235,13 @@ def _is_loopback(name: str) -> bool:
         return False
 
 
-def _cookie(headers: Headers) -> str:
-    try:
-        morsel = SimpleCookie(headers.get("cookie", "")).get(COOKIE)
-    except CookieError:
-        return ""
-    return morsel.value if morsel else ""
+def _not_for_viewers(scope: Scope) -> Response:
+    text, remedy = "a viewer may look and end the light, and do nothing else", CONTROL_REMEDIES["viewer"]
+    return problem(HTTPConnection(scope), 403, text, code="viewer", remedy=remedy)
 
 
-def _refuse(status: int, detail: str) -> Response:
-    title = "Unauthorized" if status == 401 else "Forbidden"
-    document = {"type": "about:blank", "title": title, "status": status, "detail": detail}
-    headers = {"WWW-Authenticate": "Bearer"} if status == 401 else None
-    return JSONResponse(document, status, headers, MEDIA_TYPE)
+def _refuse(scope: Scope, status: int, detail: str) -> Response:
+    answer = problem(HTTPConnection(scope), status, detail)
+    if status == 401:
+        answer.headers["WWW-Authenticate"] = "Bearer"
+    return answer

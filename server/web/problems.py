@@ -25,7 +25,7 @@ from daq.errors import (
     ShotFileError,
 )
 from daq.run.refusals import REMEDIES
-from server.lab.errors import Conflict, Damaged, NotFound, ServerError, Stale, Unprocessable
+from server.lab.errors import Conflict, Damaged, Forbidden, Locked, NotFound, ServerError, Stale, Unprocessable
 
 MEDIA_TYPE = "application/problem+json"
 _LOG = logging.getLogger(__name__)
@@ -58,6 +58,8 @@ STATUS_OF: dict[type[Exception], HTTPStatus] = {
     DaqError: HTTPStatus.INTERNAL_SERVER_ERROR,
     NotFound: HTTPStatus.NOT_FOUND,
     Conflict: HTTPStatus.CONFLICT,
+    Forbidden: HTTPStatus.FORBIDDEN,
+    Locked: HTTPStatus.LOCKED,
     Stale: HTTPStatus.PRECONDITION_FAILED,
     Damaged: HTTPStatus.INTERNAL_SERVER_ERROR,
     Unprocessable: HTTPStatus.UNPROCESSABLE_ENTITY,
@@ -65,10 +67,17 @@ STATUS_OF: dict[type[Exception], HTTPStatus] = {
 """The nearest base class in this table decides."""
 
 
+CONTROL_REMEDIES = {
+    "control_held": "wait, or take control over: in the bar, by PUT /api/rig/control, or tomoshadow run --take-control",
+    "viewer": "sign in with the token of an operator",
+    "no_name": "say who you are: header Tomoshadow-Operator",
+}
 _REMEDIES: Mapping[str, str] = {
+    **CONTROL_REMEDIES,
     **{code.value: remedy for code, remedy in REMEDIES.items()},
     "stale_request": "look at the rig, and ask again",
     "in_progress": "wait for the answer of the first request",
+    "outcome_unknown": "look at the rig and its runs, then ask with a new key",
     "key_reused": "choose a new key for every request",
 }
 

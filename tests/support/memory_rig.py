@@ -112,7 +112,9 @@ def served_rig(views: tuple[str, ...] = VIEWS) -> MemoryRig:
     return MemoryRig(dict.fromkeys(views, ViewFormat(SHAPE, 8)), two_discs, slow)
 
 
-def memory_config(data_dir: Path, views: tuple[str, ...] = VIEWS, token: str | None = None) -> RigConfig:
+def memory_config(
+    data_dir: Path, views: tuple[str, ...] = VIEWS, token: str | None = None, viewer_token: str | None = None
+) -> RigConfig:
     """Configuration of such a rig; lens and sensor are those of nobody."""
     profile = data_dir.parent / "profile.toml"
     profile.touch()
@@ -131,7 +133,7 @@ def memory_config(data_dir: Path, views: tuple[str, ...] = VIEWS, token: str | N
                 }
                 for number, view in enumerate(views)
             },
-            "server": {"data_dir": str(data_dir), "token": token},
+            "server": {"data_dir": str(data_dir), "token": token, "viewer_token": viewer_token},
             "simulation": {},
         },
         context={"folder": data_dir.parent},

@@ -109,7 +109,12 @@ def tell_nothing(job: dict[str, Any], should_stop: Callable[[], bool]) -> dict[s
 
 @contextmanager
 def assembled(
-    data_dir: Path, *, engine: Engine | None = None, views: tuple[str, ...] = VIEWS, token: str | None = None
+    data_dir: Path,
+    *,
+    engine: Engine | None = None,
+    views: tuple[str, ...] = VIEWS,
+    token: str | None = None,
+    viewer_token: str | None = None,
 ) -> Iterator[Services]:
     """A rig in memory with its acquisition, ready to be served."""
     laboratory, events = served_rig(views), EventPublisher()
@@ -121,7 +126,7 @@ def assembled(
 
     with Acquisition(rig, data_dir, events.publish_run_event, hash_calibration=hashed) as acquisition:
         yield Services(
-            config=memory_config(data_dir, views, token),
+            config=memory_config(data_dir, views, token, viewer_token),
             rig=rig,
             acquisition=acquisition,
             events=events,
@@ -143,9 +148,10 @@ def serving(
     engine: Engine | None = None,
     views: tuple[str, ...] = VIEWS,
     token: str | None = None,
+    viewer_token: str | None = None,
 ) -> Iterator[Serving]:
     """Serve a rig in memory until the block ends."""
-    with assembled(data_dir, engine=engine, views=views, token=token) as services:
+    with assembled(data_dir, engine=engine, views=views, token=token, viewer_token=viewer_token) as services:
         app = build(services)
         with (
             listening(app) as port,

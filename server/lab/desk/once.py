@@ -5,6 +5,7 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any, TypeVar
 
+from server.lab.desk.request_table import RequestTable
 from server.lab.errors import Conflict, Unprocessable
 
 _KEPT = 1000
@@ -13,10 +14,19 @@ Answer = TypeVar("Answer")
 
 
 class Once:
-    """Remembers the newest requests that had a key, and what came of them."""
+    """Remembers the newest requests that had a key, and what came of them.
 
-    def __init__(self, kept: int = _KEPT) -> None:
+    Parameters
+    ----------
+    kept : int
+        How many of them.
+    table : RequestTable | None
+        Where they are kept for the next life of the server; None: they are not.
+    """
+
+    def __init__(self, kept: int = _KEPT, table: RequestTable | None = None) -> None:
         self._kept = kept
+        self._table = table
         self._lock = threading.Lock()
         self._known: dict[str, tuple[str, Future[Any]]] = {}
 
@@ -29,11 +39,13 @@ class Once:
             Chosen by who asks, anew for everything that he asks; None: do it in any case.
         what : str
             The whole request: one key for two different ones is a mistake.
+        action : Callable[[], Answer]
+            Its answer is made of what JSON knows.
 
         Raises
         ------
         Conflict
-            The same request is being worked on.
+            The same request is being worked on, or was when the server died.
         Unprocessable
             The key was used for another request.
         """
@@ -41,7 +53,7 @@ class Once:
             return action()
         answer, is_new = self._remembered(key, what)
         if is_new:
-            _work_out(answer, action)
+            self._work_out(key, what, answer, action)
         elif not answer.done():
             raise Conflict(f"the request with idempotency key {key!r} is being worked on", "in_progress")
         result: Answer = answer.result()
@@ -49,7 +61,7 @@ class Once:
 
     def _remembered(self, key: str, what: str) -> tuple[Future[Any], bool]:
         with self._lock:
-            known = self._known.get(key)
+            known = self._known.get(key) or self._of_another_life(key)
             if known is None:
                 answer = Future[Any]()
                 self._known[key] = what, answer
@@ -60,9 +72,28 @@ class Once:
             raise Unprocessable(f"idempotency key {key!r} was used for another request: choose a new one", "key_reused")
         return known[1], False
 
+    def _of_another_life(self, key: str) -> tuple[str, Future[Any]] | None:
+        obeyed = self._table.find(key) if self._table else None
+        if obeyed is None:
+            return None
+        answer = Future[Any]()
+        if obeyed.is_answered:
+            answer.set_result(obeyed.answer)
+        else:
+            text = f"the server ended while it worked on the request with idempotency key {key!r}"
+            answer.set_exception(Conflict(text, "outcome_unknown"))
+        return obeyed.what, answer
 
-def _work_out(answer: Future[Any], action: Callable[[], Any]) -> None:
-    try:
-        answer.set_result(action())
-    except Exception as error:  # noqa: BLE001  whatever it is, it is the answer
-        answer.set_exception(error)
+    def _work_out(self, key: str, what: str, answer: Future[Any], action: Callable[[], Any]) -> None:
+        if self._table:
+            self._table.begin(key, what)
+        try:
+            result = action()
+        except Exception as error:  # noqa: BLE001  whatever it is, it is the answer
+            if self._table:
+                self._table.drop(key)
+            answer.set_exception(error)
+            return
+        if self._table:
+            self._table.end(key, result)
+        answer.set_result(result)

@@ -1,18 +1,18 @@
 """/api/calibrations: calibration files, which one is current, and making one from a calibration run."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Response
 from pydantic import Field
 
 from daq.frozen_model import FrozenModel
 from daq.names import Identifier
-from daq.run_plan import RunKind
 from server.lab.calibrations import CalibrationSummary
-from server.lab.errors import Unprocessable
-from server.lab.jobs import Job, calibration_job
+from server.lab.jobs import Job
+from server.lab.starting.calibrating import CameraModel, request_calibration
+from server.lab.starting.command import command
 from server.lab.starting.run_start import choose_calibration as choose
-from server.web.api.parameters import CalibrationId, ContextOf
+from server.web.api.parameters import CalibrationId, ContextOf, IdempotencyKey, Who
 from server.web.problems import responses
 
 router = APIRouter(prefix="/api/calibrations", tags=["calibrations"])
@@ -23,7 +23,7 @@ class CalibrationRequest(FrozenModel):
 
     run_id: Annotated[Identifier, Field(description="a run of kind calibration")]
     model: Annotated[
-        Literal["pinhole", "pinhole_tilted", "polynomial", "auto"],
+        CameraModel,
         Field(description="camera model; auto: the one with the least hold-out error"),
     ] = "pinhole"
 
@@ -40,22 +40,27 @@ def list_calibrations(context: ContextOf) -> list[CalibrationSummary]:
     return context.calibrations.list()
 
 
-@router.post("", status_code=202, responses=responses(404, 500))
-def create_calibration(request: CalibrationRequest, context: ContextOf, response: Response) -> Job:
+@router.post("", status_code=202, responses=responses(404, 409, 500))
+def create_calibration(
+    request: CalibrationRequest,
+    context: ContextOf,
+    response: Response,
+    who: Who,
+    idempotency_key: IdempotencyKey = None,
+) -> Job:
     """Queue the fit; ``Location`` names the job, its result the calibration."""
-    summary = context.runs.summary(request.run_id)
-    context.runs.require_sound(summary)
-    if summary.kind not in (RunKind.CALIBRATION, None):
-        raise Unprocessable(f"run {request.run_id} is a {summary.kind} run, a calibration run is needed")
-    job = context.runner.submit(calibration_job(request.run_id, f"{request.run_id}-{request.model}", request.model))
-    response.headers["Location"] = f"/api/jobs/{job.id}"
-    return job
+    what = f"calibration {request.model_dump_json()}"
+    job_id = context.once.do(
+        idempotency_key, what, lambda: request_calibration(context, request.run_id, request.model, who).id
+    )
+    response.headers["Location"] = f"/api/jobs/{job_id}"
+    return context.jobs.get(job_id)
 
 
-@router.put("/current", responses=responses(404, 500))
-def choose_calibration(choice: CurrentCalibration, context: ContextOf) -> CurrentCalibration:
-    """Use this one for sample runs that name none."""
-    choose(context, choice.id)
+@router.put("/current", responses=responses(404, 423, 500))
+def choose_calibration(choice: CurrentCalibration, context: ContextOf, who: Who) -> CurrentCalibration:
+    """Use this one for sample runs that name none; needs control of the rig."""
+    command(context, who, f"chose calibration {choice.id}", lambda: choose(context, choice.id))
     return choice
 
 

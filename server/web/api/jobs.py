@@ -1,5 +1,6 @@
 """/api/jobs: reconstructions, measurements, checks and calibrations, waiting, running and done."""
 
+from collections.abc import Callable
 from typing import Annotated
 
 from fastapi import APIRouter, Query
@@ -9,10 +10,13 @@ from daq.frozen_model import FrozenModel
 from daq.names import Identifier
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.runs.measurement import MeasureSettings
+from server.lab.desk.visitor import Visitor
 from server.lab.droplets.measurement import request_measurement
 from server.lab.jobs import Job, JobKind, JobState
 from server.lab.reconstruction import request_reconstruction
-from server.web.api.parameters import ContextOf, JobId
+from server.lab.services import Context
+from server.lab.starting.command import tell_deed
+from server.web.api.parameters import ContextOf, IdempotencyKey, JobId, Who
 from server.web.problems import responses
 
 router = APIRouter(prefix="/api/jobs", tags=["jobs"])
@@ -56,16 +60,28 @@ def list_jobs(
     return context.jobs.newest(run_id, [state] if state else JobState, limit, [kind] if kind else JobKind)
 
 
-@router.post("", status_code=202, responses=responses(404, 500))
-def create_jobs(request: ReconstructionRequest, context: ContextOf) -> list[Job]:
+@router.post("", status_code=202, responses=responses(404, 409, 500))
+def create_jobs(
+    request: ReconstructionRequest, context: ContextOf, who: Who, idempotency_key: IdempotencyKey = None
+) -> list[Job]:
     """Queue one job per shot; work that is waiting, running or done already is not repeated."""
-    return request_reconstruction(context, request.run_id, request.shots, request.calibration, request.settings)
+
+    def queue() -> list[Job]:
+        return request_reconstruction(context, request.run_id, request.shots, request.calibration, request.settings)
+
+    return _queued_once(context, who, idempotency_key, f"reconstruction {request.model_dump_json()}", queue)
 
 
-@router.post("/measurements", status_code=202, responses=responses(404, 500))
-def create_measurements(request: MeasurementRequest, context: ContextOf) -> list[Job]:
+@router.post("/measurements", status_code=202, responses=responses(404, 409, 500))
+def create_measurements(
+    request: MeasurementRequest, context: ContextOf, who: Who, idempotency_key: IdempotencyKey = None
+) -> list[Job]:
     """Queue the measurement of droplets, one job per shot; no volume is needed, and nothing is done twice."""
-    return request_measurement(context, request.run_id, request.shots, request.calibration, request.settings)
+
+    def queue() -> list[Job]:
+        return request_measurement(context, request.run_id, request.shots, request.calibration, request.settings)
+
+    return _queued_once(context, who, idempotency_key, f"measurement {request.model_dump_json()}", queue)
 
 
 @router.get("/{job_id}", responses=responses(404))
@@ -78,3 +94,16 @@ def show_job(job_id: JobId, context: ContextOf) -> Job:
 async def abort_job(job_id: JobId, context: ContextOf) -> Job:
     """A waiting job ends at once, a running one at its next step."""
     return await context.runner.abort(job_id)
+
+
+def _queued_once(
+    context: Context, who: Visitor, key: str | None, what: str, queue: Callable[[], list[Job]]
+) -> list[Job]:
+    """Queue jobs at the first time; the same ones, as they are now, at every other."""
+
+    def queued() -> list[str]:
+        ids = [job.id for job in queue()]
+        tell_deed(context, who, f"asked for {what.partition(' ')[0]} of {len(ids)} shots")
+        return ids
+
+    return [context.jobs.get(job_id) for job_id in context.once.do(key, what, queued)]

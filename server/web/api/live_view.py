@@ -9,8 +9,9 @@ from daq.frozen_model import FrozenModel
 from daq.run.state import RunState
 from daq.run_plan import LivePlan
 from server.lab.live import LiveCaption
+from server.lab.starting.command import tell_deed
 from server.lab.starting.light_request import obey
-from server.web.api.parameters import AsksForLight, ContextOf
+from server.web.api.parameters import AsksForLight, ContextOf, Who
 from server.web.problems import responses
 
 router = APIRouter(prefix="/api/rig/live", tags=["rig"])
@@ -42,7 +43,8 @@ def start_live(plan: LivePlan, context: ContextOf, asked: AsksForLight) -> LiveV
 
 
 @router.delete("", status_code=202)
-def end_live(context: ContextOf) -> LiveView:
-    """End the live view after the shot under way; without one there is nothing to do."""
+def end_live(context: ContextOf, who: Who) -> LiveView:
+    """End the live view after the shot under way; nobody needs control, and without one there is nothing to do."""
     context.services.acquisition.end_live()
+    tell_deed(context, who, "ended the live view")
     return show_live(context)

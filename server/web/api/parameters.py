@@ -8,9 +8,12 @@ from fastapi.routing import APIRoute
 from starlette.requests import HTTPConnection
 
 from daq.names import Identifier
+from server.lab.desk.visitor import Visitor
 from server.lab.services import Context
 from server.lab.starting.light_request import LightRequest
 from server.web.abort_listener import AbortListener
+from server.web.door import Door
+from server.web.guard import visitor_of
 
 
 def context_of(connection: HTTPConnection) -> Context:
@@ -39,20 +42,44 @@ def forbid_unknown_query(request: Request) -> None:
         )
 
 
-def light_request(
-    idempotency_key: Annotated[
+def door_of(connection: HTTPConnection) -> Door:
+    """Return what decides who comes in."""
+    door: Door = connection.app.state.door
+    return door
+
+
+def who_of(
+    connection: HTTPConnection,
+    tomoshadow_operator: Annotated[
         str | None,
-        Header(min_length=1, max_length=200, description="repeated with this key, the request is obeyed once"),
+        Header(max_length=100, description="a script says who runs it, as ann@lab, and may then hold control"),
     ] = None,
+) -> Visitor:
+    """Who asks; the guard has found out."""
+    del tomoshadow_operator  # declared here, read there
+    return visitor_of(connection)
+
+
+IdempotencyKey = Annotated[
+    str | None,
+    Header(min_length=1, max_length=200, description="repeated with this key, the request is obeyed once"),
+]
+
+
+def light_request(
+    who: Annotated[Visitor, Depends(who_of)],
+    idempotency_key: IdempotencyKey = None,
     tomoshadow_beat: Annotated[
         int | None, Header(ge=0, le=2**53, description="of /api/beat, heard last: more than 2 s later it is refused")
     ] = None,
 ) -> LightRequest:
     """What a request that makes light says of itself."""
-    return LightRequest(key=idempotency_key, beat=tomoshadow_beat)
+    return LightRequest(key=idempotency_key, beat=tomoshadow_beat, who=who)
 
 
 AsksForLight = Annotated[LightRequest, Depends(light_request)]
+Who = Annotated[Visitor, Depends(who_of)]
+DoorOf = Annotated[Door, Depends(door_of)]
 AbortPort = Annotated[int, Depends(abort_port_of)]
 ContextOf = Annotated[Context, Depends(context_of)]
 RunId = Annotated[Identifier, Path(description="name of the run directory")]

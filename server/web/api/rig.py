@@ -10,8 +10,9 @@ from daq.run.state import RunOutcome, RunState
 from server.lab.duty import Lamp
 from server.lab.runs.run_summary import RunCause
 from server.lab.starting.abort import abort_all
+from server.lab.starting.command import tell_deed
 from server.lab.watch import CalibrationStanding
-from server.web.api.parameters import AbortPort, ContextOf
+from server.web.api.parameters import AbortPort, ContextOf, Who
 from server.web.problems import responses
 
 router = APIRouter(prefix="/api/rig", tags=["rig"])
@@ -71,21 +72,23 @@ async def show_rig(context: ContextOf, abort_port: AbortPort) -> RigView:
 
 @router.get("/configuration")
 async def show_configuration(context: ContextOf) -> dict[str, Any]:
-    """Configuration of the rig as it was read; the token is masked."""
+    """Configuration of the rig as it was read; tokens are masked."""
     return context.services.config.model_dump(mode="json")
 
 
 @router.post("/abort", status_code=202, responses=responses(503, 504))
-def abort_everything(context: ContextOf) -> AcquisitionView:
+def abort_everything(context: ContextOf, who: Who) -> AcquisitionView:
     """Light off at once, whatever runs, and if nothing does. Its own port answers while the server is busy."""
     abort_all(context.services)
+    tell_deed(context, who, "pressed ABORT")
     return view_of_acquisition(context)
 
 
 @router.post("/acknowledge", status_code=202, responses=responses(409, 423, 503, 504))
-def acknowledge_fault(context: ContextOf) -> AcquisitionView:
+def acknowledge_fault(context: ContextOf, who: Who) -> AcquisitionView:
     """The operator has seen to a fault, or to the first of several causes; the last one ends the state FAULT."""
     context.services.acquisition.acknowledge()
+    tell_deed(context, who, "acknowledged a fault")
     return view_of_acquisition(context)
 
 

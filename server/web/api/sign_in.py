@@ -1,15 +1,18 @@
-"""/sign-in: the token becomes a cookie that scripts of other sites neither read nor send."""
+"""/sign-in and /sign-out: a token becomes a session, whose cookie scripts of other sites neither read nor send."""
 
+from html import escape
 from typing import Annotated
 
 from fastapi import APIRouter, Form, Request
 from fastapi.responses import HTMLResponse, RedirectResponse, Response
 
-from server.web.api.parameters import ContextOf
-from server.web.guard import COOKIE, SIGN_IN_PATH, is_token
+from server.web.api.parameters import ContextOf, DoorOf
+from server.web.guard import SIGN_IN_PATH, address_of, cookie_of, session_cookie
 
 router = APIRouter(include_in_schema=False)
-_FORM = """<!doctype html><html lang="en"><meta charset="utf-8"><title>tomoshadow</title>
+SIGN_OUT_PATH = "/sign-out"
+_FORM = """<!doctype html><html lang="en"><meta charset="utf-8"><title>tomoshadow: sign in</title>
+<meta name="viewport" content="width=device-width">
 <style>
 body {{ font: 16px system-ui; background: #0f141a; color: #dde5ee; display: grid; place-items: center; height: 90vh }}
 form {{ display: grid; gap: 12px; width: 280px }}
@@ -17,8 +20,10 @@ input, button {{ font: inherit; padding: 8px; border-radius: 6px; border: 1px so
 </style>
 <form method="post">
 <h1>tomoshadow</h1>
-<label for="token">Operator token</label>
-<input id="token" name="token" type="password" autofocus required>
+<label for="name">Your name</label>
+<input id="name" name="name" maxlength="40" autocomplete="name" autofocus>
+<label for="token">Token of an operator or a viewer</label>
+<input id="token" name="token" type="password" required>
 <button>Sign in</button>
 <p role="alert">{message}</p>
 </form>"""
@@ -27,15 +32,43 @@ input, button {{ font: inherit; padding: 8px; border-radius: 6px; border: 1px so
 @router.get(SIGN_IN_PATH)
 async def show_form() -> HTMLResponse:
     """Ask for the token."""
-    return HTMLResponse(_FORM.format(message=""))
+    return _form("")
 
 
 @router.post(SIGN_IN_PATH)
-async def sign_in(token: Annotated[str, Form()], request: Request, context: ContextOf) -> Response:
-    """Check the token and remember it for this browser."""
-    expected = context.services.config.server.token
-    if expected is None or not is_token(token, expected.get_secret_value()):
-        return HTMLResponse(_FORM.format(message="This is not the token."), 401)
+async def sign_in(
+    token: Annotated[str, Form(max_length=1000)],
+    request: Request,
+    door: DoorOf,
+    context: ContextOf,
+    name: Annotated[str, Form(max_length=200)] = "",
+) -> Response:
+    """Check the token and begin a session."""
+    address = address_of(request.scope)
+    if wait_s := door.tries.wait_s(address):
+        return _form(f"Too many wrong tokens: wait {wait_s} s.", 429, {"Retry-After": str(wait_s)})
+    role = door.keys.role_of(token)
+    if role is None:
+        door.tries.count(address)
+        return _form("This is not the token.", 401)
+    visitor = door.sessions.begin(role, address, name)
+    context.services.events.publish("deed", who=visitor.name, text=f"signed in as {role}")
     answer = RedirectResponse("/", 303)
-    answer.set_cookie(COOKIE, token, httponly=True, samesite="strict", secure=request.url.scheme == "https")
+    answer.headers["Set-Cookie"] = session_cookie(visitor.id, request.headers, request.url.scheme == "https")
     return answer
+
+
+@router.post(SIGN_OUT_PATH)
+async def sign_out(request: Request, door: DoorOf, context: ContextOf) -> Response:
+    """End the session, and the control that it holds."""
+    if visitor := door.sessions.find(cookie_of(request.headers)):
+        context.control.release(visitor)
+        door.sessions.end(visitor.id)
+        context.services.events.publish("deed", who=visitor.name, text="signed out")
+    answer = RedirectResponse(SIGN_IN_PATH if door.keys.are_any else "/", 303)
+    answer.headers["Set-Cookie"] = session_cookie("", request.headers, request.url.scheme == "https")
+    return answer
+
+
+def _form(message: str, status: int = 200, headers: dict[str, str] | None = None) -> HTMLResponse:
+    return HTMLResponse(_FORM.format(message=escape(message)), status, headers)

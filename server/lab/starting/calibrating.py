@@ -1,0 +1,31 @@
+"""Making a calibration from a run: the one way for API and page."""
+
+from typing import Literal
+
+from daq.run_plan import RunKind
+from server.lab.desk.visitor import Visitor
+from server.lab.errors import Unprocessable
+from server.lab.jobs import Job, calibration_job
+from server.lab.services import Context
+from server.lab.starting.command import tell_deed
+
+CameraModel = Literal["pinhole", "pinhole_tilted", "polynomial", "auto"]
+
+
+def request_calibration(context: Context, run_id: str, model: CameraModel, who: Visitor) -> Job:
+    """Queue the fit; it takes nobody's control, because nothing uses its result before somebody chooses it.
+
+    Raises
+    ------
+    NotFound
+        There is no such run.
+    Unprocessable
+        The run shows no target.
+    """
+    summary = context.runs.summary(run_id)
+    context.runs.require_sound(summary)
+    if summary.kind not in (RunKind.CALIBRATION, None):
+        raise Unprocessable(f"run {run_id} is a {summary.kind} run, a calibration run is needed")
+    job = context.runner.submit(calibration_job(run_id, f"{run_id}-{model}", model))
+    tell_deed(context, who, f"asked for calibration {job.calibration}")
+    return job

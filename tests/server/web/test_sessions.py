@@ -1,0 +1,53 @@
+"""Sessions of browsers, and how many wrong tokens an address may offer."""
+
+from server.lab.desk.visitor import Role
+from server.web.sessions import KEPT_S, Sessions
+from server.web.tries import MOST, WITHIN_S, Tries
+
+
+def test_a_session_is_a_random_word_that_ends_twelve_hours_after_the_last_request() -> None:
+    now_s = [0.0]
+    sessions = Sessions(lambda: now_s[0])
+    one, two = (sessions.begin(Role.VIEWER, "10.0.0.1") for _ in range(2))
+    assert one.id != two.id
+    assert len(one.id) > 40
+    for _ in range(3):
+        now_s[0] += KEPT_S
+        assert sessions.find(one.id) == one
+    assert sessions.find(two.id) is None
+    sessions.end(one.id)
+    assert sessions.find(one.id) is None
+
+
+def test_an_operator_may_say_his_name() -> None:
+    sessions = Sessions()
+    nameless = sessions.begin(Role.OPERATOR, "127.0.0.1")
+    assert nameless.name == "operator 1 at 127.0.0.1"
+    sessions.rename(nameless.id, " ann ")
+    named = sessions.find(nameless.id)
+    assert named is not None
+    assert (named.name, named.role) == ("ann", Role.OPERATOR)
+    assert sessions.rename("nobody", "ann") is None
+
+
+def test_the_number_of_sessions_is_bounded() -> None:
+    now_s = [0.0]
+    sessions = Sessions(lambda: now_s[0])
+    first = sessions.begin(Role.OPERATOR, "a")
+    for _ in range(1000):
+        now_s[0] += 1
+        sessions.begin(Role.OPERATOR, "a")
+    assert sessions.find(first.id) is None
+
+
+def test_twenty_wrong_tokens_in_a_minute_are_the_last_ones_of_an_address_for_a_while() -> None:
+    now_s = [0.0]
+    tries = Tries(lambda: now_s[0])
+    for _ in range(MOST):
+        assert tries.wait_s("evil") == 0
+        tries.count("evil")
+        now_s[0] += 1
+    assert tries.wait_s("evil") == WITHIN_S - MOST
+    assert tries.wait_s("ann") == 0
+    now_s[0] += WITHIN_S - MOST
+    assert tries.wait_s("evil") == 0
