@@ -27,7 +27,7 @@ from server.cli import (
     study,
 )
 from server.cli.calibrations import calibrate, check, self_calibrate, size_calibration
-from server.cli.clients import abort, run, runs, watch
+from server.cli.clients import abort, run, runs, stop, watch
 from server.cli.cluster import scheduler, worker
 from server.cli.keeping import pack, repair, verify
 from server.cli.output import endable, say, tell
@@ -42,6 +42,7 @@ COMMANDS = (
     run,
     watch,
     abort,
+    stop,
     runs,
     simulate,
     doctor,

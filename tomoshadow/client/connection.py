@@ -4,6 +4,7 @@ import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from http.client import HTTPConnection, HTTPException, HTTPResponse, HTTPSConnection
+from types import MappingProxyType
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -24,9 +25,11 @@ class Connection:
         Sent as a bearer token.
     timeout_s : float
         How long an answer may keep us waiting.
+    headers : Mapping of str to str
+        Sent with every request.
     """
 
-    def __init__(self, url: str, token: str | None, timeout_s: float) -> None:
+    def __init__(self, url: str, token: str | None, timeout_s: float, headers: Headers = MappingProxyType({})) -> None:
         parts = urlsplit(url)
         try:
             self._kind, self.host, self._port = _SCHEMES[parts.scheme], parts.hostname or "", parts.port
@@ -36,12 +39,13 @@ class Connection:
             raise ClientError(f"{url!r} is no address of a server", "bad_url", "write http://HOST:PORT", 400)
         self.url = url.rstrip("/")
         self._token = token
-        self._headers = {"Authorization": f"Bearer {token}"} if token else {}
+        self._more = headers
+        self._headers = {**headers, **({"Authorization": f"Bearer {token}"} if token else {})}
         self.timeout_s = timeout_s
 
     def within(self, timeout_s: float) -> "Connection":
         """To the same server, with another patience."""
-        return Connection(self.url, self._token, timeout_s)
+        return Connection(self.url, self._token, timeout_s, self._more)
 
     def to_port(self, port: int) -> "Connection":
         """To another port of the same computer, which needs no token."""

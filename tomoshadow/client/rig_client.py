@@ -1,6 +1,8 @@
 """RigClient: what a script asks of a rig."""
 
+import getpass
 import os
+import socket
 import time
 import uuid
 from collections.abc import Callable, Iterator, Mapping
@@ -18,6 +20,7 @@ Value = TypeVar("Value")
 
 DEFAULT_URL = "http://127.0.0.1:8080"
 TOKEN_VARIABLE = "TOMOSHADOW_TOKEN"  # noqa: S105  where it is, not what it is
+OPERATOR_HEADER = "Tomoshadow-Operator"
 SILENCE_S = 20.0
 """The server says something every 15 s."""
 _RETRY_S = 0.5
@@ -43,7 +46,8 @@ class RigClient:
     def __init__(
         self, url: str = DEFAULT_URL, token: str | None = None, abort_port: int | None = None, timeout_s: float = 30.0
     ) -> None:
-        self._server = Connection(url, os.environ.get(TOKEN_VARIABLE) if token is None else token, timeout_s)
+        token = os.environ.get(TOKEN_VARIABLE) if token is None else token
+        self._server = Connection(url, token, timeout_s, {OPERATOR_HEADER: _user()})
         self._abort_port = abort_port
 
     @property
@@ -156,6 +160,14 @@ class RigClient:
                 break
         raise ClientError("the stream of events has ended", "no_answer")
 
+    def take_control(self) -> None:
+        """Take control from whoever holds it; a start takes it by itself where nobody does."""
+        self._server.ask("PUT", "/api/rig/control")
+
+    def give_control_back(self) -> None:
+        """Let the next one have it at once, and not in ten minutes."""
+        self._server.ask("DELETE", "/api/rig/control")
+
     def stop(self, run_id: str) -> None:
         """End a run after the shot under way."""
         self._server.ask("POST", f"/api/runs/{quote(run_id, safe='')}/stop")
@@ -196,6 +208,15 @@ class RigClient:
 
     def _get(self, path: str) -> Any:
         return self._server.ask("GET", path)[0]
+
+
+def _user() -> str:
+    """Who runs this script, as others are told."""
+    try:
+        user = getpass.getuser()
+    except (KeyError, OSError):
+        user = "somebody"
+    return f"{user}@{socket.gethostname()}".encode("ascii", "replace").decode()[:100]
 
 
 def _read(value_of: Callable[[Mapping[str, Any]], Value], told: Any) -> Value:

@@ -27,7 +27,7 @@ def watched(client: "RigClient", run_id: str, options: Namespace) -> Outcome:
         server = named(options)
         text = (
             f"run {run_id} goes on. See it again: tomoshadow watch {run_id}{server}. "
-            f"End it now: tomoshadow abort{server}; after its shot: Stop on the page"
+            f"End it now: tomoshadow abort{server}; after its shot: tomoshadow stop{server}"
         )
         return Outcome({"passed": False, "run_id": run_id, "outcome": "active"}, text)
 

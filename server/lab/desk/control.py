@@ -5,7 +5,8 @@ What ends the light never asks for it.
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -84,6 +85,19 @@ class Control:
             self.check(who)
             if who.id:
                 self._hold(who)
+
+    @contextmanager
+    def acting(self, who: Visitor) -> Iterator[None]:
+        """Let somebody act, as ``require``; who took it for what fails gives it back."""
+        with self._lock:
+            was_free = self.holder is None
+            self.require(who)
+        try:
+            yield
+        except Exception:
+            if was_free:
+                self.release(who)
+            raise
 
     def take(self, who: Visitor) -> None:
         """Take control, from whoever holds it.

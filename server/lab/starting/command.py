@@ -17,8 +17,8 @@ def command(context: Context, who: Visitor, deed: str, action: Callable[[], Answ
     Forbidden, Locked
         A viewer asks, or somebody else holds control.
     """
-    context.control.require(who)
-    answer = action()
+    with context.control.acting(who):
+        answer = action()
     tell_deed(context, who, deed)
     return answer
 

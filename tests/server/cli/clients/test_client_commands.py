@@ -1,4 +1,4 @@
-"""``run``, ``watch``, ``runs`` and ``abort`` ask a server on a real socket, with a rig in memory behind it."""
+"""``run``, ``watch``, ``runs``, ``stop`` and ``abort`` ask a real socket, with a rig in memory behind it."""
 
 import json
 import re
@@ -115,6 +115,31 @@ def test_abort_is_confirmed(server: Serving, capsys: pytest.CaptureFixture[str],
     assert told(capsys, "abort", *at_server)["light"] == "off"
     assert server.wait().outcome == "aborted"
     assert "light off confirmed" in shown(capsys, "abort", *at_server, "--abort-port", server.abort_listener.port)
+
+
+def test_stop_ends_the_run_after_its_shot(
+    server: Serving, capsys: pytest.CaptureFixture[str], at_server: list[str]
+) -> None:
+    assert "no run is under way" in shown(capsys, "stop", *at_server)
+    started = server.http.post("/api/runs", json=plan_of(shots=1000, rate_hz=5.0))
+    assert started.headers["location"].endswith(told(capsys, "stop", *at_server)["run_id"])
+    assert server.wait().outcome == "stopped"
+
+
+def test_run_holds_control_while_it_lasts_and_takes_it_over_only_when_asked_to(
+    server: Serving, capsys: pytest.CaptureFixture[str], at_server: list[str], plan: Path
+) -> None:
+    bob = {"Tomoshadow-Operator": "bob@lab"}
+    server.http.put("/api/rig/control", headers=bob)
+    error = failed(capsys, "run", plan, *at_server)
+    assert (error["code"], "bob@lab holds control" in error["error"]) == ("control_held", True)
+    assert "--take-control" in error["error"]
+    told(capsys, "run", plan, *at_server, "--take-control")
+    assert server.http.get("/api/rig/control").json()["holder"] is None
+    holders = [event.data["holder"] for event in server.services.events.since(0) if event.name == "control"]
+    assert holders[-1] == ""
+    assert "@" in holders[-2]
+    assert holders[-2] != "bob@lab"
 
 
 def test_without_a_server_every_command_says_what_to_do(capsys: pytest.CaptureFixture[str], plan: Path) -> None:

@@ -90,3 +90,15 @@ def test_a_viewer_never_acts() -> None:
             ask(viewer)
         assert refusal.value.code == "viewer"
     assert bench.control.holder is None
+
+
+def test_what_fails_takes_no_control_and_leaves_it_to_who_has_it() -> None:
+    control = Bench().control
+    with pytest.raises(ValueError, match="no"), control.acting(ANN):
+        raise ValueError("no")
+    assert control.holder is None
+    with control.acting(ANN):
+        pass
+    with pytest.raises(ValueError, match="no"), control.acting(ANN):
+        raise ValueError("no")
+    assert control.holder is not None
