@@ -8,6 +8,22 @@ from daq.run_plan import LivePlan, RunPlan
 
 
 @dataclass(frozen=True)
+class Waiting:
+    """What a run or a live view waits for.
+
+    Parameters
+    ----------
+    text : str
+        Names device, or the shot whose time is to come.
+    since_s : float
+        When it began, by ``time.monotonic``.
+    """
+
+    text: str
+    since_s: float
+
+
+@dataclass(frozen=True)
 class RunStatus:
     """Snapshot of acquisition.
 
@@ -33,6 +49,8 @@ class RunStatus:
         Whose causes those are: a run id; empty: of a live view.
     to_acknowledge : tuple[Cause, ...]
         Where there was more than one cause: those that wait to be acknowledged, one by one. Nothing starts before.
+    waiting : Waiting | None
+        What acquisition waits for at the moment; None where it does not, or rests.
     """
 
     state: RunState = RunState.IDLE
@@ -47,6 +65,7 @@ class RunStatus:
     causes: tuple[Cause, ...] = ()
     ended_run: str = ""
     to_acknowledge: tuple[Cause, ...] = ()
+    waiting: Waiting | None = None
 
     @property
     def active(self) -> bool:
@@ -76,11 +95,12 @@ class StateChanged:
 
 @dataclass(frozen=True)
 class ShotRecorded:
-    """A shot reached the disk."""
+    """A shot reached the disk; ``fault`` says what is wrong with one that is not valid."""
 
     run_id: str
     index: int
     valid: bool
+    fault: str = ""
 
 
 @dataclass(frozen=True)

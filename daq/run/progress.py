@@ -1,13 +1,14 @@
 """RunProgress: where acquisition stands, and the one who tells it; every run has it as its listener."""
 
 import threading
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
 from daq.causes import Cause, to_acknowledge
 from daq.run.ending import RunEnding
-from daq.run.events import RunEvent, RunMessage, RunStatus, ShotRecorded, StateChanged
+from daq.run.events import RunEvent, RunMessage, RunStatus, ShotRecorded, StateChanged, Waiting
 from daq.run.state import RunState, RunStep, next_state
 from daq.run_plan import LivePlan, RunPlan
 from daq.shot import Shot
@@ -53,7 +54,7 @@ class RunProgress:
         """Go to the state after a step, and change other fields of the status; BusyError if it is not permitted."""
         with self._changed:
             before, state = self._status.state, next_state(self._status.state, step)
-            status = self._status = replace(self._status, **{**changes, "state": state})
+            status = self._status = replace(self._status, **{"waiting": None, **changes, "state": state})
             is_of_run = RunState.LIVE not in (before, state) and step is not RunStep.ACKNOWLEDGE
             run_id, outcome = (status.run_id or "", status.outcome) if is_of_run else ("", None)
             self._publish(StateChanged(run_id, state, outcome, status.message))
@@ -87,13 +88,19 @@ class RunProgress:
         """A shot has been taken."""
         self._newest = shot
 
-    def count(self, shot: Shot) -> None:
-        """A shot has reached the disk."""
+    def wait_for(self, text: str) -> None:
+        """Something is waited for from now on, unless it is already."""
+        with self._changed:
+            if self._status.waiting is None or self._status.waiting.text != text:
+                self._status = replace(self._status, waiting=Waiting(text, time.monotonic()))
+
+    def count(self, shot: Shot, fault: str = "") -> None:
+        """A shot has reached the disk; what is wrong with it."""
         with self._changed:
             status = self._status
             recorded, valid = status.shots_recorded + 1, status.shots_valid + shot.valid
             self._status = replace(status, shots_recorded=recorded, shots_valid=valid)
-            self._publish(ShotRecorded(status.run_id or "", shot.index, shot.valid))
+            self._publish(ShotRecorded(status.run_id or "", shot.index, shot.valid, fault))
 
     def say(self, text: str) -> None:
         """Something is worth a line."""

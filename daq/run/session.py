@@ -70,6 +70,7 @@ class RunSession:
 
     def close(self) -> None:
         """Wait until every shot is on the disk, and the outcome too; a disk that hangs is left alone."""
+        self._run.progress.wait_for("the disk: to take the last shots")
         self._attempt(self._storage.close)
         self._ended_utc = datetime.now(UTC).isoformat()
         if unstored := self._unstored():
@@ -110,6 +111,9 @@ class RunSession:
             streak.count(shot)
         streak.require_a_valid_one()
 
+    def _count(self, shot: Shot) -> None:
+        self._run.progress.count(shot, "" if shot.valid else str(self._findings(shot)))
+
     def _findings(self, shot: Shot) -> ShotFindings:
         misfired = train_deviation(self._run.timing, shot.fired) if shot.fired else None
         return check_exposures(shot.views, misfired or "")
@@ -118,6 +122,7 @@ class RunSession:
         for camera in self._rig.cameras.values():
             if self._ending.step:
                 return
+            self._run.progress.wait_for(f"{camera.name}: to be armed")
             camera.arm()
         taker.load_position(0)
         if not self._ending.step:
@@ -150,8 +155,8 @@ class RunSession:
         limits, writer = self._run.limits, self._writer
         for observer in self._run.observers:
             self._storage.callback(self._attempt, partial(observer.after_run, writer.run_dir))
-        count = self._run.progress.count
-        recorder = Recorder(writer, limits.recorder_depth, limits.recorder_threads, count, partial(fail, self._run))
+        depth, threads = limits.recorder_depth, limits.recorder_threads
+        recorder = Recorder(writer, depth, threads, self._count, partial(fail, self._run))
         self._storage.enter_context(recorder)
         self._storage.callback(self._attempt, partial(recorder.close, limits.drain_s))
         return recorder

@@ -68,6 +68,7 @@ class ShotTaker:
         self._timing = run.timing
         self._ending = run.ending
         self._say = run.say
+        self._wait_for = run.progress.wait_for
         self._thresholds = thresholds
         self._frame_deadline_s = round(self._timing.shortest_period_ns / 1e9 + run.limits.frame_s, 2)
         self._refires_left = self._plan.refire_quota
@@ -90,7 +91,9 @@ class ShotTaker:
         """
         if self._plan.stage_z_mm and self._rig.stage:
             self._darken()
-            self._stage_z_mm = self._rig.stage.move_to(self._plan.stage_z_mm[position])
+            z_mm = self._plan.stage_z_mm[position]
+            self._wait_for(f"{self._rig.stage.name}: to be at {z_mm:g} mm")
+            self._stage_z_mm = self._rig.stage.move_to(z_mm)
         self._arm(self._plan.shots)
 
     def take(self, index: int) -> Shot | None:
@@ -99,6 +102,7 @@ class ShotTaker:
         if position and not number:
             self.load_position(position)
         refires = 0
+        self._wait_for(f"the time of shot {index}")
         while self._ending.wait_until(self._due_s):
             self._rebase()
             if not self._armed and not self._arm(self._plan.shots - number):
@@ -114,6 +118,7 @@ class ShotTaker:
     def _arm(self, shots: int) -> bool:
         """Load the train, verify its echo, arm for these shots and the refires; False if the run is ended."""
         generator = self._rig.generator
+        self._wait_for(f"{generator.name}: to load its pulse train")
         if deviation := train_deviation(self._timing, generator.configure(self._timing)):
             raise DeviceRefused(generator.name, f"loaded another pulse train: {deviation}")
         if self._ending.step:
@@ -142,7 +147,7 @@ class ShotTaker:
         self.last_fired = index
         commanded_s = at.steady_ns / 1e9
         self._due_s = next_due_s(self._due_s, (commanded_s, time.monotonic()), self._period_s, self._shortest_s)
-        collected = self._collect()
+        collected = self._collect(index)
         if collected is None:
             return None, ShotFindings()
         self._ask_silent(index, collected)
@@ -153,11 +158,13 @@ class ShotTaker:
         when = (at.host_time_ns, self._stage_z_mm, refires, at.period_ns, at.clock_step_ns)
         return Shot(index, key, views, fired, *when), findings
 
-    def _collect(self) -> dict[str, DoubleFrame] | None:
+    def _collect(self, index: int) -> dict[str, DoubleFrame] | None:
         """Collect the exposures of all views before one common deadline; None if the run ends at once."""
         collecting = SideBySide("frames", self._frames_of, self._rig.cameras)
         too_late_s = time.monotonic() + self._frame_deadline_s + _PATIENCE_S
+        self._tell_missing(index, collecting)
         while not (collecting.wait(_SLICE_S) or collecting.has_failed or time.monotonic() > too_late_s):
+            self._tell_missing(index, collecting)
             if self._ending.at_once:
                 return None
         views = collecting.answers
@@ -167,6 +174,10 @@ class ShotTaker:
             return None
         _raise_first(collecting.errors(_ANSWER_LIMIT_S))
         return collecting.answers
+
+    def _tell_missing(self, index: int, collecting: SideBySide[DoubleFrame]) -> None:
+        missing = [view for view in self._rig.cameras if view not in collecting.answers]
+        self._wait_for(f"{', '.join(missing)}: exposures A and B of shot {index}")
 
     def _frames_of(self, camera: Camera) -> DoubleFrame:
         return camera.collect(self._frame_deadline_s)

@@ -31,7 +31,7 @@ from daq.files.recovery import INTERRUPTED_CAUSE
 from daq.files.run_directory import ImageKey, PulsePair, RunKind, RunPlan, RunReader, RunWriter
 from daq.network import Network
 from daq.run.acquisition import Acquisition
-from daq.run.events import RunEvent, RunMessage, ShotRecorded, StateChanged
+from daq.run.events import RunEvent, RunMessage, ShotRecorded, StateChanged, Waiting
 from daq.run.limits import AcquisitionLimits
 from daq.run.state import RunOutcome, RunState
 from daq.run_plan import LivePlan
@@ -211,6 +211,8 @@ def test_beyond_the_quota_a_lost_frame_keeps_its_slot(lab: Laboratory) -> None:
     assert not lost.frame_b.any()
     status = lab.acquisition.status()
     assert (status.outcome, status.shots_recorded, status.shots_valid) == (RunOutcome.COMPLETED, 5, 3)
+    faults = [(event.index, event.fault) for event in lab.events if isinstance(event, ShotRecorded) and event.fault]
+    assert faults == [(1, "no exposure B of view2"), (3, "no exposure B of view2")]
 
 
 def test_a_lost_pulse_is_flagged_and_not_taken_for_a_lost_frame(lab: Laboratory) -> None:
@@ -416,6 +418,33 @@ def frozen(lab: Laboratory) -> Iterator[threading.Event]:
     lab.memory.cameras["view1"].frozen = thaw
     yield thaw
     thaw.set()
+
+
+def test_what_a_run_waits_for_is_told(lab: Laboratory, frozen: threading.Event) -> None:
+    lab.acquisition.start(plan_of(rate_hz=0.1))
+    lab.await_in_journal("fire 1")
+    waiting = await_waiting(lab, "view1")
+    assert waiting.text == "view1: exposures A and B of shot 0"
+    assert 0 <= time.monotonic() - waiting.since_s < DEADLINE_S
+    lab.acquisition.abort()
+    frozen.set()
+    assert lab.acquisition.wait(DEADLINE_S).waiting is None
+
+
+def test_a_slow_run_waits_for_the_time_of_its_next_shot(lab: Laboratory) -> None:
+    lab.start_and_await_shot(plan_of(**SLOW), 0)
+    assert await_waiting(lab, "shot 1").text == "the time of shot 1"
+    lab.acquisition.abort()
+
+
+def await_waiting(lab: Laboratory, word: str) -> Waiting:
+    deadline, tick = time.monotonic() + DEADLINE_S, threading.Event()
+    while True:
+        waiting = lab.acquisition.status().waiting
+        if waiting is not None and word in waiting.text:
+            return waiting
+        assert time.monotonic() < deadline, waiting
+        tick.wait(0.002)
 
 
 @pytest.mark.parametrize("reason", ["abort", "door"])

@@ -61,9 +61,12 @@ def test_readers_end_when_the_server_does() -> None:
 
 def test_what_acquisition_says_becomes_an_event() -> None:
     events = EventPublisher()
-    events.publish_run_event(ShotRecorded("run", 3, valid=False))
+    events.publish_run_event(ShotRecorded("run", 3, False, "no exposure B of view2"))
     (event,) = events.since(0)
-    assert (event.name, dict(event.data)) == ("shot_recorded", {"run_id": "run", "index": 3, "valid": False})
+    assert (event.name, dict(event.data)) == (
+        "shot_recorded",
+        {"run_id": "run", "index": 3, "valid": False, "fault": "no exposure B of view2"},
+    )
 
 
 def test_a_script_follows_a_run_and_resumes_where_it_was(server: Serving) -> None:
@@ -71,7 +74,7 @@ def test_a_script_follows_a_run_and_resumes_where_it_was(server: Serving) -> Non
     with server.http.stream("GET", "/api/events", headers={"Last-Event-ID": "0"}) as stream:
         assert stream.headers["content-type"].startswith("text/event-stream")
         seen = list(itertools.islice(_messages(stream), 4))
-    assert {event["name"] for event in seen} == {"run_state", "shot_recorded"}
+    assert {event["name"] for event in seen} <= {"run_state", "shot_recorded", "deed"}
     with server.http.stream("GET", "/api/events", headers={"Last-Event-ID": str(seen[1]["id"])}) as stream:
         assert list(itertools.islice(_messages(stream), 2)) == seen[2:]
 
