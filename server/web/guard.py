@@ -17,9 +17,10 @@ from starlette.requests import HTTPConnection
 from starlette.responses import RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from server.lab.desk.control import REMEDIES
 from server.lab.desk.visitor import Role, Visitor, named_script, unnamed_script
 from server.web.door import Door
-from server.web.problems import CONTROL_REMEDIES, problem
+from server.web.problems import problem
 
 COOKIE = "tomoshadow"
 SIGN_IN_PATH = "/sign-in"
@@ -236,7 +237,7 @@ def _is_loopback(name: str) -> bool:
 
 
 def _not_for_viewers(scope: Scope) -> Response:
-    text, remedy = "a viewer may look and end the light, and do nothing else", CONTROL_REMEDIES["viewer"]
+    text, remedy = "a viewer may look and end the light, and do nothing else", REMEDIES["viewer"]
     return problem(HTTPConnection(scope), 403, text, code="viewer", remedy=remedy)
 
 

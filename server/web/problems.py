@@ -25,6 +25,7 @@ from daq.errors import (
     ShotFileError,
 )
 from daq.run.refusals import REMEDIES
+from server.lab.desk import control
 from server.lab.errors import Conflict, Damaged, Forbidden, Locked, NotFound, ServerError, Stale, Unprocessable
 
 MEDIA_TYPE = "application/problem+json"
@@ -67,13 +68,8 @@ STATUS_OF: dict[type[Exception], HTTPStatus] = {
 """The nearest base class in this table decides."""
 
 
-CONTROL_REMEDIES = {
-    "control_held": "wait, or take control over: in the bar, by PUT /api/rig/control, or tomoshadow run --take-control",
-    "viewer": "sign in with the token of an operator",
-    "no_name": "say who you are: header Tomoshadow-Operator",
-}
 _REMEDIES: Mapping[str, str] = {
-    **CONTROL_REMEDIES,
+    **control.REMEDIES,
     **{code.value: remedy for code, remedy in REMEDIES.items()},
     "stale_request": "look at the rig, and ask again",
     "in_progress": "wait for the answer of the first request",

@@ -13,6 +13,12 @@ from typing import Protocol
 from server.lab.desk.visitor import Role, Visitor
 from server.lab.errors import Forbidden, Locked, Unprocessable
 
+REMEDIES = {
+    "control_held": "wait, or take control over: in the bar, by PUT /api/rig/control, or tomoshadow run --take-control",
+    "viewer": "sign in with the token of an operator",
+    "no_name": "say who you are: header Tomoshadow-Operator",
+}
+"""By code, for the operator."""
 KEPT_S = 600.0
 """After the last action, or the end of the run."""
 

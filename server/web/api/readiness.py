@@ -9,8 +9,9 @@ from daq.frozen_model import FrozenModel
 from daq.run_plan import RunPlan
 from server.lab.desk.reason import Reason
 from server.lab.desk.rig_state import RigState
+from server.lab.starting.preflight_list import Check, preflight
 from server.lab.starting.readiness import reasons_against
-from server.web.api.parameters import ContextOf
+from server.web.api.parameters import ContextOf, Who
 
 router = APIRouter(prefix="/api/rig/readiness", tags=["rig"])
 
@@ -22,6 +23,7 @@ class PlanReadiness(FrozenModel):
     reasons: Annotated[
         tuple[Reason, ...], Field(description="everything against it; a start names the first one; empty: nothing")
     ]
+    checks: Annotated[tuple[Check, ...], Field(description="everything that was looked at, with figures")]
 
 
 @router.get("")
@@ -31,7 +33,7 @@ def show_readiness(context: ContextOf) -> RigState:
 
 
 @router.post("")
-def judge_plan(plan: RunPlan, context: ContextOf) -> PlanReadiness:
+def judge_plan(plan: RunPlan, context: ContextOf, who: Who) -> PlanReadiness:
     """What speaks against starting this plan now, without starting it."""
     reasons = reasons_against(context, plan)
-    return PlanReadiness(ready=not reasons, reasons=reasons)
+    return PlanReadiness(ready=not reasons, reasons=reasons, checks=preflight(context, plan, who, reasons))

@@ -1,0 +1,209 @@
+"""Pre-flight: everything that is looked at before a run, one line each, with figures where nothing is wrong."""
+
+import shutil
+import time
+from collections.abc import Callable, Mapping, Sequence
+from enum import StrEnum
+from typing import Annotated
+
+from pydantic import Field
+
+from daq.files.header import ViewFormat
+from daq.frozen_model import FrozenModel
+from daq.run.refusals import RefusalCode as Code
+from daq.run.state import RunOutcome
+from daq.run_plan import RunKind, RunPlan
+from server.lab.desk.control import REMEDIES
+from server.lab.desk.reason import Reason
+from server.lab.desk.visitor import Visitor
+from server.lab.errors import ServerError
+from server.lab.services import Context
+from server.lab.starting.readiness import reasons_against, with_calibration
+
+_FRAMES_PER_SHOT = 2
+
+CODES: Mapping[str, tuple[Code, ...]] = {
+    "Rig": (Code.STARTING, Code.BUSY, Code.LIGHT_NOT_OFF, Code.PROGRAM_ENDING, Code.NOT_ACKNOWLEDGED),
+    "Interlock": (Code.INTERLOCK_OPEN, Code.INTERLOCK_SILENT, Code.ESTOP_OPEN),
+    "Pulse generator": (Code.GENERATOR_FAULT, Code.GENERATOR_SILENT),
+    "Cameras": (Code.CAMERA_SILENT,),
+    "Light": (Code.CURRENT,),
+    "Timing": (Code.TIMING,),
+    "Network": (Code.NETWORK,),
+    "Disk": (Code.FOLDER_GONE, Code.STORAGE, Code.DISK_FULL),
+    "Stage": (Code.STAGE,),
+    "References": (Code.REFERENCES,),
+    "Calibration": (Code.CALIBRATION_UNKNOWN, Code.CALIBRATION_SIZE),
+}
+"""Every refusal has one place."""
+
+
+class Finding(StrEnum):
+    """What came of a look."""
+
+    GOOD = "good"
+    WARN = "warn"
+    REFUSED = "refused"
+
+
+class Check(FrozenModel):
+    """One thing that was looked at."""
+
+    name: Annotated[str, Field(description="what was looked at")]
+    finding: Annotated[Finding, Field(description="refused: a start would be, for this reason")]
+    text: Annotated[str, Field(description="what was found, with figures")]
+    remedy: Annotated[str, Field(description="what to do about it; empty: nothing")] = ""
+
+
+Told = tuple[str, str]
+"""Text, and remedy of a warning; an empty remedy: nothing is wrong."""
+
+
+def preflight(
+    context: Context, plan: RunPlan, who: Visitor, reasons: Sequence[Reason] | None = None
+) -> tuple[Check, ...]:
+    """Look at everything that could speak against a plan.
+
+    Parameters
+    ----------
+    reasons : Sequence[Reason] | None
+        What ``reasons_against`` has found already; None: devices are asked now, which may take a second.
+    """
+    plan = with_calibration(context, plan)
+    reasons = reasons_against(context, plan) if reasons is None else reasons
+    checks = [_control(context, who)]
+    for name, tell in _ROWS.items():
+        against = [reason for reason in reasons if reason.code in CODES[name]]
+        if against:
+            checks.append(_refused(name, against))
+        elif told := tell(context, plan):
+            text, remedy = told
+            checks.append(Check(name=name, finding=Finding.WARN if remedy else Finding.GOOD, text=text, remedy=remedy))
+    return tuple(checks)
+
+
+def _control(context: Context, who: Visitor) -> Check:
+    try:
+        context.control.check(who)
+    except ServerError as error:
+        return Check(name="Control", finding=Finding.REFUSED, text=str(error), remedy=REMEDIES[error.code])
+    held = context.control.holder is not None
+    return Check(name="Control", finding=Finding.GOOD, text="yours" if held else "free: a start takes it")
+
+
+def _refused(name: str, reasons: list[Reason]) -> Check:
+    text, remedies = "; ".join(reason.text for reason in reasons), dict.fromkeys(reason.remedy for reason in reasons)
+    return Check(name=name, finding=Finding.REFUSED, text=text, remedy="; ".join(remedies))
+
+
+def _light(context: Context, plan: RunPlan) -> Told:
+    limits = context.services.rig.max_current_a
+    currents = plan.pulse.current_a
+    if plan.kind is RunKind.DARK:
+        return "none: this is a dark run", ""
+    view = max(currents, key=lambda view: currents[view] / limits.get(view, 30), default=None)
+    if view is None:
+        return "no view has a current", "give a current"
+    return f"at most {currents[view]:g} A, of {limits.get(view, 30):g} A that {view} may have", ""
+
+
+def _timing(_context: Context, plan: RunPlan) -> Told:
+    pulse = plan.pulse
+    return f"pulses of {pulse.width_ns} ns, {pulse.separation_ns} ns apart, at {plan.rate_hz:g} Hz", ""
+
+
+def _network(context: Context, plan: RunPlan) -> Told:
+    rig = context.services.rig
+    shot_s = rig.network.shot_s({view: _FRAMES_PER_SHOT * size for view, size in _frame_bytes(context).items()})
+    return f"{shot_s * plan.rate_hz:.0%} of the wires: a shot takes {1e3 * shot_s:.0f} ms", ""
+
+
+def _disk(context: Context, plan: RunPlan) -> Told:
+    needed = plan.total_shots * _FRAMES_PER_SHOT * sum(_frame_bytes(context).values())
+    free = shutil.disk_usage(context.services.data_dir).free
+    took = _duration(plan.total_shots / plan.rate_hz)
+    return f"{_gigabytes(needed)} of {_gigabytes(free)} free; {took} at {plan.rate_hz:g} Hz", ""
+
+
+def _stage(_context: Context, plan: RunPlan) -> Told | None:
+    z_mm = plan.stage_z_mm
+    return (f"{len(z_mm)} positions, {min(z_mm):g} to {max(z_mm):g} mm", "") if z_mm else None
+
+
+def _references(context: Context, plan: RunPlan) -> Told | None:
+    if plan.kind is not RunKind.SAMPLE:
+        return None
+    newest = newest_references(context)
+    kinds = {run_id: kind for kind, runs in newest.items() for run_id in runs}
+    chosen = {kinds.get(run_id, RunKind.DARK): run_id for run_id in plan.references}
+    newer = [
+        f"a newer {kind} exists: {runs[0]}" for kind, runs in newest.items() if chosen.get(kind, runs[0]) != runs[0]
+    ]
+    absent = [f"no {kind} run" for kind in (RunKind.DARK, RunKind.BACKGROUND) if kind not in chosen]
+    if absent or newer:
+        remedy = "choose it below, or go on with what is chosen" if newer else "record it, or choose it below"
+        return ", ".join([*absent, *newer]), remedy
+    return f"{', '.join(chosen)} fit this light", ""
+
+
+def newest_references(context: Context) -> dict[RunKind, list[str]]:
+    """Completed dark and background runs that a run may name, the newest first."""
+    found: dict[RunKind, list[str]] = {}
+    for run in context.runs.newest():
+        if run.kind in (RunKind.DARK, RunKind.BACKGROUND) and run.outcome == RunOutcome.COMPLETED:
+            found.setdefault(run.kind, []).append(run.run_id)
+    return found
+
+
+def _calibration(context: Context, plan: RunPlan) -> Told | None:
+    if plan.kind is not RunKind.SAMPLE:
+        return None
+    if plan.calibration is None:
+        return "none: no volumes will be made", "calibrate, or choose one on the page Calibrate"
+    standing = context.standing
+    if standing is not None and standing.calibration == plan.calibration and standing.is_alarm:
+        return f"{plan.calibration}: {standing.message}", "calibrate again"
+    made_s = context.calibrations.made_s(plan.calibration)
+    age = "" if made_s is None else f", {_duration(time.time() - made_s)} old"
+    return f"{plan.calibration}{age}; fits the images of this rig", ""
+
+
+def _always(text: str) -> Callable[[Context, RunPlan], Told]:
+    return lambda _context, _plan: (text, "")
+
+
+def _cameras(context: Context, _plan: RunPlan) -> Told:
+    return f"{len(context.services.rig.cameras)} answer", ""
+
+
+_ROWS: Mapping[str, Callable[[Context, RunPlan], Told | None]] = {
+    "Rig": _always("at rest"),
+    "Interlock": _always("closed"),
+    "Pulse generator": _always("answers, without a fault"),
+    "Cameras": _cameras,
+    "Light": _light,
+    "Timing": _timing,
+    "Network": _network,
+    "Disk": _disk,
+    "Stage": _stage,
+    "References": _references,
+    "Calibration": _calibration,
+}
+
+
+def _frame_bytes(context: Context) -> dict[str, int]:
+    cameras = context.services.rig.cameras
+    formats = {view: ViewFormat(camera.image_shape, camera.bits) for view, camera in cameras.items()}
+    return {view: one.frame_bytes for view, one in formats.items()}
+
+
+def _gigabytes(count: float) -> str:
+    return f"{count / 1e9:.0f} GB" if count >= 1e11 else f"{count / 1e9:.2g} GB"
+
+
+def _duration(time_s: float) -> str:
+    """A time in a unit in which it is two or more."""
+    for unit_s, unit in ((86_400, "d"), (3600, "h"), (60, "min")):
+        if time_s >= 2 * unit_s:
+            return f"{time_s / unit_s:.1f} {unit}"
+    return f"{max(0.0, time_s):.0f} s"

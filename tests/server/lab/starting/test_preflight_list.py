@@ -1,0 +1,71 @@
+"""Pre-flight: everything that is looked at before a run, with figures where it is good and the refusal where not."""
+
+import pytest
+
+from daq.run.refusals import RefusalCode
+from daq.run_plan import RunPlan
+from server.lab.desk.visitor import Visitor
+from server.lab.starting.preflight_list import CODES, Check, Finding, preflight
+from tests.server.web.test_api import use_a_calibration
+from tests.support.serving import Serving, plan_of
+
+ANN = Visitor("a", "ann")
+
+
+def looked_at(server: Serving, **changes: object) -> dict[str, Check]:
+    plan = RunPlan.model_validate(plan_of(**changes))
+    return {check.name: check for check in preflight(server.app.state.context, plan, ANN)}
+
+
+def test_every_refusal_has_its_place_in_the_list() -> None:
+    placed = [code for codes in CODES.values() for code in codes]
+    assert sorted(placed) == sorted(RefusalCode)
+
+
+def test_where_nothing_is_wrong_the_figures_are_told(server: Serving) -> None:
+    use_a_calibration(server)
+    found = looked_at(server, shots=1200, rate_hz=20)
+    assert found["Cameras"].text == "2 answer"
+    assert found["Interlock"].text == "closed"
+    assert found["Light"].text == "at most 5 A, of 26 A that view2 may have"
+    assert found["Disk"].text.startswith("0.")
+    assert found["Disk"].text.endswith("GB free; 60 s at 20 Hz")
+    assert "of the wires" in found["Network"].text
+    assert found["Calibration"].text.startswith("cal, ")
+    assert (found["References"].finding, found["References"].text) == (Finding.WARN, "no dark run, no background run")
+    assert {check.finding for check in found.values()} == {Finding.GOOD, Finding.WARN}
+
+
+def test_what_is_wrong_stands_in_its_place_with_a_remedy_and_all_of_it(server: Serving) -> None:
+    laboratory = server.services.laboratory
+    assert laboratory is not None
+    laboratory.open_door()
+    server.app.state.context.control.require(Visitor("b", "bob"))
+    found = looked_at(server, rate_hz=99, references=["no-run"], calibration="none")
+    for name, word in (
+        ("Interlock", "the interlock is open"),
+        ("Timing", "limit of the cameras"),
+        ("References", "no-run"),
+        ("Calibration", "there is no calibration 'none'"),
+        ("Control", "bob holds control"),
+    ):
+        assert found[name].finding is Finding.REFUSED, name
+        assert word in found[name].text
+        assert found[name].remedy
+    laboratory.close_door()
+
+
+@pytest.mark.parametrize("kind", ["dark", "background"])
+def test_a_background_needs_neither_references_nor_a_calibration(server: Serving, kind: str) -> None:
+    assert not {"References", "Calibration"} & set(looked_at(server, kind=kind))
+
+
+def test_references_say_what_differs_and_what_is_newer(server: Serving) -> None:
+    old, _ = server.run_to_its_end(plan_of(kind="background", shots=1))
+    new, _ = server.run_to_its_end(plan_of(kind="background", shots=1))
+    found = looked_at(server, references=[old])["References"]
+    assert found.finding is Finding.WARN
+    assert f"a newer background exists: {new}" in found.text
+    brighter = {"current_a": {"view1": 6, "view2": 5}}
+    refused = looked_at(server, references=[new], pulse=brighter)["References"]
+    assert "current_a of view1 5.0 instead of 6.0" in refused.text
