@@ -11,7 +11,7 @@ from server.lab.runs.run_filter import MOST_TEXT, ListedOutcome, RunFilter
 from server.lab.runs.run_removal import RemovedRun, remove_run
 from server.lab.runs.run_summary import RunSummary
 from server.lab.runs.thumbnail import thumbnail_of
-from server.lab.starting.command import tell_deed
+from server.lab.starting.command import command, tell_deed
 from server.lab.starting.light_request import obey
 from server.lab.starting.run_start import start_run
 from server.web.api.parameters import AsksForLight, ContextOf, RunId, Who
@@ -77,14 +77,16 @@ def show_thumbnail(run_id: RunId, context: ContextOf) -> Response:
     return Response(thumbnail_of(context.runs.directory(run_id)), media_type="image/jpeg", headers=_FOR_A_DAY)
 
 
-@router.delete("/{run_id}", responses=responses(404, 409, 507))
+@router.delete("/{run_id}", responses=responses(404, 409, 423, 507))
 def delete_run(
     run_id: RunId,
     context: ContextOf,
+    who: Who,
     tomoshadow_name: Annotated[str, Header(max_length=300, description="the id of the run once more, as typed")],
 ) -> RemovedRun:
     """Delete a run for ever, with its results and jobs; one that is being recorded or worked on is refused with 409."""
-    return remove_run(context.runs, context.unkept_runs, context.jobs, run_id, tomoshadow_name)
+    stores = context.runs, context.unkept_runs, context.jobs
+    return command(context, who, f"deleted run {run_id}", lambda: remove_run(*stores, run_id, tomoshadow_name))
 
 
 @router.post("/{run_id}/stop", status_code=202, responses=responses(409))

@@ -423,7 +423,7 @@ def frozen(lab: Laboratory) -> Iterator[threading.Event]:
 def test_what_a_run_waits_for_is_told(lab: Laboratory, frozen: threading.Event) -> None:
     lab.acquisition.start(plan_of(rate_hz=0.1))
     lab.await_in_journal("fire 1")
-    waiting = await_waiting(lab, "view1")
+    waiting = await_waiting(lab, "view1: ")
     assert waiting.text == "view1: exposures A and B of shot 0"
     assert 0 <= time.monotonic() - waiting.since_s < DEADLINE_S
     lab.acquisition.abort()
