@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from processing.analysis.droplets.ghost_share import GhostShare
+from processing.analysis.estimates import Estimate
 
 COLOURS = ("tab:blue", "tab:orange")
 
@@ -27,26 +28,45 @@ class StatedShares:
     ghosts: GhostShare
 
 
-def reality_figure(
-    shares: Mapping[str, Sequence[StatedShares]], ghosts: Mapping[str, Sequence[tuple[float, int]]]
-) -> Figure:
-    """True against stated shares with their intervals, and ghosts of every case against expected ones, by kind."""
+@dataclass(frozen=True)
+class ToldShare:
+    """Ghosts of a case.
+
+    Parameters
+    ----------
+    told : Estimate
+        Share of the droplets, as it is told.
+    true : float
+        As it is.
+    """
+
+    told: Estimate
+    true: float
+
+
+def reality_figure(shares: Mapping[str, Sequence[StatedShares]], ghosts: Mapping[str, Sequence[ToldShare]]) -> Figure:
+    """True against stated shares with their intervals, and shares of ghosts of every case, by kind."""
     figure = Figure(figsize=(10, 4.8), layout="constrained")
     share_axes, ghost_axes = figure.subplots(1, 2)
     for colour, (kind, told) in zip(COLOURS, shares.items(), strict=False):
         _draw_shares(share_axes, kind, told, colour)
-        expected, found = zip(*ghosts[kind], strict=True)
-        ghost_axes.plot(expected, found, "o", color=colour, label=kind)
+        _draw_ghosts(ghost_axes, kind, ghosts[kind], colour)
     share_axes.plot([0, 1], [0, 1], color="0.6", linewidth=1)
     share_axes.set(xlabel="told: probability of being real", ylabel="share that is real, 95 % by counting")
-    most = max(max(pair) for pairs in ghosts.values() for pair in pairs) or 1
+    most = 100 * max(max(one.told.high, one.true) for told in ghosts.values() for one in told)
     ghost_axes.plot([0, most], [0, most], color="0.6", linewidth=1)
-    ghost_axes.set(xlabel="ghosts expected, sum of 1 - p_real, a dot per case", ylabel="ghosts")
+    ghost_axes.set(xlabel="told: ghosts among the droplets of a case [%]", ylabel="ghosts [%]")
     ghost_axes.set(xscale="symlog", yscale="symlog")
     for axes in (share_axes, ghost_axes):
         axes.grid(alpha=0.25)
         axes.legend()
     return figure
+
+
+def _draw_ghosts(axes: Axes, kind: str, told: Sequence[ToldShare], colour: str) -> None:
+    for number, one in enumerate(told):
+        axes.plot([100 * one.told.low, 100 * one.told.high], [100 * one.true] * 2, color=colour, linewidth=1.5)
+        axes.plot(100 * one.told.value, 100 * one.true, "o", color=colour, label=None if number else kind)
 
 
 def _draw_shares(axes: Axes, kind: str, told: Sequence[StatedShares], colour: str) -> None:

@@ -8,9 +8,10 @@ from typing import Literal
 import numpy as np
 
 from processing.analysis.droplets.bright_shot import BrightExposure
-from processing.analysis.droplets.ghost_share import pooled
+from processing.analysis.droplets.ghost_share import pooled, told_share
 from processing.analysis.droplets.measured_exposure import ShotVerdict
 from processing.analysis.droplets.shadows.shadow_shot import ShadowExposure
+from processing.analysis.estimates import Estimate
 from processing.analysis.velocity.measured_velocities import MeasuredVelocities, measure_velocities
 from processing.analysis.velocity.velocity_verdict import FASTEST_M_S
 from processing.reconstruction.settings import FrozenValue
@@ -44,6 +45,7 @@ class ShotDroplets(FrozenValue):
     ghost_share: float | None
     ghost_interval: tuple[float, float] | None
     ghost_reason: str | None
+    twin_ghost_share: float | None
     residual_over_noise: float | None
     hidden_share: float
     liquid_objects: int
@@ -139,15 +141,17 @@ def shot_summary(
     file : Path
         Of the droplets.
     """
-    ghosts = pooled(exposure.ghosts for exposure in exposures if exposure.ghosts)
+    share = _ghost_share(exposures)
+    twins = pooled(exposure.twins for exposure in exposures if exposure.twins)
     ratios = [exposure.residual_over_noise for exposure in exposures if exposure.residual_over_noise is not None]
     verdict = max((exposure.verdict for exposure in exposures), key=list(ShotVerdict).index)
     return ShotDroplets(
         shot=shot,
         droplets=sum(len(exposure.droplets) for exposure in exposures),
-        ghost_share=ghosts.share,
-        ghost_interval=ghosts.interval,
-        ghost_reason=None if ghosts.share is not None else _why_no_share(exposures, verdict),
+        ghost_share=None if isinstance(share, str) else share.value,
+        ghost_interval=None if isinstance(share, str) else (share.low, share.high),
+        ghost_reason=share if isinstance(share, str) else None,
+        twin_ghost_share=twins.share,
         residual_over_noise=max(ratios, default=None),
         hidden_share=max(exposure.hidden.volume_share for exposure in exposures),
         liquid_objects=sum(exposure.hidden.liquid_objects for exposure in exposures),
@@ -160,8 +164,10 @@ def shot_summary(
     )
 
 
-def _why_no_share(exposures: Sequence[Exposure], verdict: ShotVerdict) -> str:
-    if verdict is not ShotVerdict.GOOD:
-        return "; ".join(reason for exposure in exposures for reason in exposure.reasons)
-    uncounted = "; ".join(dict.fromkeys(exposure.uncounted for exposure in exposures if exposure.uncounted))
-    return uncounted or "no twins were asked for (--twins)"
+def _ghost_share(exposures: Sequence[Exposure]) -> Estimate | str:
+    """Of the exposures together; where one does not tell, why."""
+    reasons = dict.fromkeys(one.ghost_share for one in exposures if isinstance(one.ghost_share, str))
+    if reasons:
+        return "; ".join(reasons)
+    p_real = np.concatenate([one.droplets.p_real for one in exposures])
+    return told_share(p_real, exposures[0].droplets.sized, len(exposures))

@@ -60,7 +60,9 @@ class MeasureSettings(FrozenValue):
     margin_voxel: Annotated[int, Field(ge=0, le=500, description="so far around the grid droplets are looked for")] = (
         MARGIN_VOXEL
     )
-    twins: Annotated[int, Field(ge=0, le=100, description="simulated twins per exposure that tell ghosts; 0: none")] = 0
+    twins: Annotated[
+        int, Field(ge=0, le=100, description="simulated twins per exposure in which ghosts are counted; 0: none")
+    ] = 0
     seed: Annotated[int, Field(ge=0, description="of the twins")] = 0
     light: Annotated[Light, Field(description="of shadows: condenser ratio; incoherent, gaussian or estimated")] = (
         "estimated"

@@ -201,7 +201,7 @@ def _row(study: DropletStudy, case: DropletCase, seed: int, threads: int) -> Dro
         z_sd=z_sd,
         residual_over_noise=shot.residual_over_noise or 0.0,
         verdict=shot.verdict.value,
-        twin_ghosts=shot.ghosts.share if shot.ghosts else None,
+        twin_ghosts=shot.twins.share if shot.twins else None,
         cpu_ms_per_droplet=1000 * cpu_s / len(scene.heights),
         least_found=case.least_found,
         most_ghosts=case.most_ghosts,

@@ -53,7 +53,10 @@ def add(verbs: Verbs) -> None:
         help="box in mm; default: the largest that all views see where they are calibrated",
     )
     parser.add_argument(
-        "--twins", type=_twins, metavar="N", help="simulated twins per exposure that tell ghosts; default none"
+        "--twins",
+        type=_twins,
+        metavar="N",
+        help="simulated twins per exposure in which ghosts are counted, a witness; default none",
     )
     add_light(parser)
     parser.add_argument(

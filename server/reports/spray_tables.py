@@ -26,13 +26,19 @@ def _figures(told: SprayStatistics) -> Iterator[tuple[str, Estimate | None]]:
     for percent in (10, 50, 90):
         yield f"Dv0.{percent // 10} [µm]", getattr(droplets, f"dv{percent}_um")
     yield "relative span", droplets.relative_span
-    yield "ghosts, of the twins", droplets.ghost_share
+    yield "ghosts expected among them [%]", droplets.ghost_share and _in_percent(droplets.ghost_share)
     if motion:
         yield from _of_motion(motion)
     if extent:
         yield "cone angle, 90 % of the liquid [°]", extent.cone_angle_deg
         yield "cone angle, 50 % of the liquid [°]", extent.cone_angle_half_deg
         yield "penetration, 99 % of the liquid [mm]", extent.penetration_mm
+
+
+def _in_percent(share: Estimate) -> Estimate:
+    """No more digits than a share of ghosts bears."""
+    value, low, high = (round(100 * one, 2) for one in (share.value, share.low, share.high))
+    return Estimate(value=value, low=low, high=high)
 
 
 def _of_motion(motion: SprayMotion) -> Iterator[tuple[str, Estimate | None]]:

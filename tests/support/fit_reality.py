@@ -1,7 +1,7 @@
 """Fit what evidence weighs for ``p_real`` to simulated shots: ``python -m tests.support.fit_reality bright|shadows``.
 
-The weights in use are those of these cases; of shadows some had shots of further seeds, 51 to 54. Cases and seeds are
-others than those of ``processing.studies.real_droplets``, which tries the outcome.
+What it prints is what is in use. Cases and seeds are others than those of ``processing.studies.real_droplets``, which
+tries the outcome.
 """
 
 import sys
@@ -21,43 +21,24 @@ from processing.studies.droplets import DropletCase
 from processing.studies.real_droplets.judged_shots import judged_shot
 from processing.studies.shadows.sizes import SizeCase
 
-SEEDS = {"bright": (1, 2, 3), "shadows": (1, 2, 3)}
+SEEDS = (1, 2, 3)
+BRIGHT = (
+    *((28, 1, 3), (56, 1, 3), (111, 1, 3), (70, 1, 5), (56, 1, 10), (56, 1, 20), (40, 1, 25), (28, 1, 20), (14, 1, 20)),
+    *((56, 1.5, 3), (56, 1.5, 10), (20, 1.5, 20), (40, 2, 3), (40, 2, 10), (28, 2, 6)),
+)
+"""Density per mm3, width in px, noise in percent."""
+DARK = (
+    *((14, 40, 1.2, 1), (28, 40, 1.2, 1), (28, 40, 3, 1), (40, 40, 3, 1), (28, 40, 6, 1), (40, 40, 6, 1)),
+    *((14, 40, 10, 1), (28, 40, 10, 1), (48, 40, 8, 1), (34, 40, 2, 1), (56, 25, 1.2, 1), (56, 25, 3, 1)),
+    *((28, 40, 3, 0.5), (20, 40, 3, 0.5), (34, 40, 4, 2 / 3)),
+)
+"""Density per mm3, median diameter in um, noise in percent, aperture over that of the paper's lenses."""
 CASES: dict[str, tuple[DropletCase | SizeCase, ...]] = {
-    "bright": (
-        DropletCase(28),
-        DropletCase(56),
-        DropletCase(111),
-        DropletCase(70, noise_percent=5),
-        DropletCase(56, noise_percent=10),
-        DropletCase(56, noise_percent=20),
-        DropletCase(40, noise_percent=25),
-        DropletCase(28, noise_percent=20),
-        DropletCase(14, noise_percent=20),
-        DropletCase(56, 1.5),
-        DropletCase(56, 1.5, 10),
-        DropletCase(20, 1.5, 20),
-        DropletCase(40, 2.0),
-        DropletCase(40, 2.0, 10),
-        DropletCase(28, 2.0, 6),
-    ),
+    "bright": tuple(DropletCase(density, width, noise) for density, width, noise in BRIGHT),
     "shadows": (
-        SizeCase(14),
-        SizeCase(28),
+        *(SizeCase(n, median, noise_percent=noise, aperture_ratio=ratio) for n, median, noise, ratio in DARK),
         SizeCase(28, calibration_error_px=0.1),
-        SizeCase(28, noise_percent=3),
-        SizeCase(40, noise_percent=3),
-        SizeCase(28, noise_percent=6),
-        SizeCase(40, noise_percent=6),
-        SizeCase(14, noise_percent=10),
-        SizeCase(28, noise_percent=10),
-        SizeCase(48, noise_percent=8),
-        SizeCase(34, noise_percent=2),
-        SizeCase(56, 25),
-        SizeCase(56, 25, noise_percent=3),
         SizeCase(40, 30, spread=0.6, noise_percent=2),
-        SizeCase(28, noise_percent=3, aperture_ratio=0.5),
-        SizeCase(20, noise_percent=3, aperture_ratio=0.5),
-        SizeCase(34, noise_percent=4, aperture_ratio=2 / 3),
     ),
 }
 
@@ -80,7 +61,7 @@ def evidence_of(kind: str) -> Iterator[tuple[FloatArray, FloatArray]]:
     setattr(bright_shot, "REALITY", recorder)  # noqa: B010
     setattr(shadow_table, "REALITY", recorder)  # noqa: B010
     for case in CASES[kind]:
-        for seed in SEEDS[kind]:
+        for seed in SEEDS:
             shot = judged_shot(case, seed)
             told = np.isfinite(shot.p_real)
             ghosts = int(np.count_nonzero(~shot.real[told]))

@@ -32,7 +32,7 @@ def stored_shot(
     columns |= dict(zip(("x_mm", "y_mm", "z_mm"), points_mm.T, strict=True))
     if velocities_m_s is not None:
         columns |= dict(zip(("u_m_s", "v_m_s", "w_m_s"), velocities_m_s.T, strict=True))
-    exposures: dict[str, Any] = {"a": {"verdict": "good", "ghosts": None, "reasons": [], "residual_over_noise": 1.0}}
+    exposures: dict[str, Any] = {"a": {"verdict": "good", "reasons": [], "residual_over_noise": 1.0}}
     provenance = {
         "run": "spray",
         "calibration": "cal-1",

@@ -2,14 +2,14 @@
 
 import json
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field
 
 from processing.analysis.droplets.droplet_file import DropletFileError, StoredDroplets
-from processing.analysis.droplets.ghost_share import GhostShare, pooled
+from processing.analysis.droplets.ghost_share import told_share
 from processing.analysis.droplets.size_statistics import SizeStatistics, mean_diameters, shots_density
 from processing.analysis.estimates import Estimate
 from processing.reconstruction.settings import GridSettings
@@ -18,6 +18,10 @@ from processing.volume import VoxelGrid
 DIAMETER, REFUSED = "diameter_um", "refused"
 NO_DIAMETERS = "bright particles have no diameter: only shadows tell how large a droplet is"
 IN_PIXELS, NO_SCALE = "diameter_px", "diameters are in pixels: measure with --um-per-px"
+P_REAL, NO_P_REAL = (
+    "p_real",
+    "a single view, and files from before it was told, do not say how probably droplets are real",
+)
 NOTHING_COUNTED = "no exposure could be measured"
 _SAME_DROPLETS = ("grid", "margin_voxel", "twins", "seed", "nozzle")
 """Settings that say where droplets are looked for, how ghosts are counted, and where the nozzle is."""
@@ -36,7 +40,10 @@ class DropletStatistics(SizeStatistics):
     hidden_share: Annotated[
         float, Field(description="of the volume: behind, before or in liquid that is no droplet, not measured")
     ] = 0.0
-    ghost_share: Annotated[Estimate | None, Field(description="of the twins of all exposures; null without")] = None
+    ghost_share: Annotated[
+        Estimate | None, Field(description="of the droplets: mean of 1 - p_real, and where the true share lies")
+    ] = None
+    ghost_reason: Annotated[str | None, Field(description="why it is null")] = None
 
 
 def droplet_statistics(shots: Sequence[StoredDroplets]) -> DropletStatistics:
@@ -59,13 +66,15 @@ def droplet_statistics(shots: Sequence[StoredDroplets]) -> DropletStatistics:
     per_shot = len(hidden) / max(len(counted), 1)
     sizes = _sizes([shot for shot, _ in counted], per_shot)
     density, reason = _density(counted, per_shot)
+    ghosts = _ghost_share([shot for shot, _ in counted], per_shot)
     return DropletStatistics(
         **dict(sizes),
         exposures=len(hidden),
         number_density_per_mm3=density,
         number_density_reason=reason,
         hidden_share=float(np.mean(hidden)) if hidden else 0.0,
-        ghost_share=_ghost_share(exposure for shot in told for exposure in shot),
+        ghost_share=None if isinstance(ghosts, str) else ghosts,
+        ghost_reason=ghosts if isinstance(ghosts, str) else None,
     )
 
 
@@ -175,8 +184,10 @@ def measured_grid(shot: StoredDroplets) -> VoxelGrid | None:
     return GridSettings.model_validate(grid).to_grid() if grid else None
 
 
-def _ghost_share(exposures: Iterator[Mapping[str, Any]]) -> Estimate | None:
-    ghosts = pooled(GhostShare(**exposure["ghosts"]) for exposure in exposures if exposure["ghosts"])
-    if ghosts.share is None or ghosts.interval is None:
-        return None
-    return Estimate(value=ghosts.share, low=ghosts.interval[0], high=ghosts.interval[1])
+def _ghost_share(shots: Sequence[StoredDroplets], per_shot: float) -> Estimate | str:
+    if not shots:
+        return NOTHING_COUNTED
+    if any(P_REAL not in shot.columns for shot in shots):
+        return NO_P_REAL
+    p_real = np.concatenate([np.asarray(shot.columns[P_REAL], np.float64) for shot in shots])
+    return told_share(p_real, all(DIAMETER in shot.columns for shot in shots), per_shot)

@@ -21,6 +21,14 @@ Columns = dict[str, NDArray[np.generic]]
 class DropletRows(Protocol):
     """Droplets of one exposure, a row each, whatever is known of them beside their place."""
 
+    @property
+    def p_real(self) -> FloatArray:
+        """Probability that each is no ghost; not a number where that was not tried."""
+
+    @property
+    def sized(self) -> bool:
+        """Whether they have diameters, as shadows do."""
+
     def __len__(self) -> int: ...
 
     def within(self, grid: VoxelGrid) -> Self:
@@ -62,6 +70,11 @@ class Droplets:
     views: NDArray[np.int64]
     residual: FloatArray
     p_real: FloatArray
+
+    @property
+    def sized(self) -> bool:
+        """Whether they have diameters."""
+        return False
 
     @classmethod
     def none(cls) -> "Droplets":
@@ -114,6 +127,11 @@ class SizedDroplets:
     views: NDArray[np.int64]
     residual: FloatArray
     p_real: FloatArray
+
+    @property
+    def sized(self) -> bool:
+        """Whether they have diameters."""
+        return True
 
     @classmethod
     def none(cls) -> "SizedDroplets":

@@ -1,17 +1,67 @@
-"""GhostShare: which part of what was found is no droplet, counted where the truth is known."""
+"""Which part of what was found is no droplet: as ``p_real`` makes expect, and counted where the truth is known."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial import cKDTree
-from scipy.special import betaincinv
+from scipy.special import betaincinv, gammaincinv
 
-from processing.analysis.estimates import CONFIDENCE
+from processing.analysis.droplets.droplet_table import P_REAL_TRIED
+from processing.analysis.droplets.size_statistics import NOTHING_MEASURED
+from processing.analysis.estimates import CONFIDENCE, Estimate
 from processing.geometry import FloatArray
 
 RADIUS_VOXEL = 1.0
 """How far a droplet may be found from where it is."""
+LEAST_TOLD = 0.5
+"""Of so many of the droplets ``p_real`` must be a number, or nothing is told of how many are ghosts."""
+MOST_BRIGHT = 0.01
+"""Of bright particles a share above is not told: among noisy, wide spots 0.7 to 3.5 times as many were expected."""
+MODEL_SD = 0.2
+"""Relative, beyond chance: of true over expected ghosts among the cases that were tried."""
+_TAIL = (1 - CONFIDENCE) / 2
+
+
+def told_share(p_real: FloatArray, sized: bool, exposures_per_shot: float = 1) -> Estimate | str:
+    """Which share of some droplets are ghosts, as ``p_real`` has it, or why it is not told.
+
+    Parameters
+    ----------
+    p_real : (N,) array
+        Of all droplets, of one shot or many; those of which it is not a number do not count.
+    sized : bool
+        Whether they are shadows, which have diameters, or bright particles.
+    exposures_per_shot : float
+        2 where exposures A and B, which show the same droplets, are both in the array.
+    """
+    told = p_real[np.isfinite(p_real)]
+    if not len(p_real):
+        return NOTHING_MEASURED
+    if len(told) < LEAST_TOLD * len(p_real):
+        return f"p_real is told of {len(told)} of {len(p_real)} droplets; it is {P_REAL_TRIED}"
+    share = expected_share(float(np.sum(1 - told)), len(told), exposures_per_shot)
+    if not sized and share.value > MOST_BRIGHT:
+        return (
+            f"{100 * share.value:.1f} % are expected: of bright particles a share above {100 * MOST_BRIGHT:g} % is not "
+            "told, as 0.3 to 1.4 times as many were ghosts; twins are a witness (--twins)"
+        )
+    return share
+
+
+def expected_share(ghosts: float, droplets: int, exposures_per_shot: float = 1) -> Estimate:
+    """Share of the ghosts, where so many are expected among so many droplets.
+
+    Its interval is of these droplets: what chance leaves open, and what probabilities are wrong by. So many ghosts
+    follow Poisson's distribution, with a mean that is itself gamma distributed around the expected one.
+    """
+    expected, among = ghosts / exposures_per_shot, droplets / exposures_per_shot
+    spread = 1 + MODEL_SD**2 * expected
+    shape = max(expected / spread, np.finfo(np.float64).tiny)
+    low, high = (spread * float(gammaincinv(shape, share)) for share in (_TAIL, 1 - _TAIL))
+    return Estimate(
+        value=expected / among, low=float(np.floor(low)) / among, high=min(1.0, float(np.ceil(high)) / among)
+    )
 
 
 @dataclass(frozen=True)
@@ -40,9 +90,8 @@ class GhostShare:
 
 def share_interval(chosen: int, of: int) -> tuple[float, float]:
     """Where a share lies with 95 % confidence, by counting alone (Clopper and Pearson)."""
-    tail = (1 - CONFIDENCE) / 2
-    low = betaincinv(chosen, of - chosen + 1, tail) if chosen else 0.0
-    high = betaincinv(chosen + 1, of - chosen, 1 - tail) if chosen < of else 1.0
+    low = betaincinv(chosen, of - chosen + 1, _TAIL) if chosen else 0.0
+    high = betaincinv(chosen + 1, of - chosen, 1 - _TAIL) if chosen < of else 1.0
     return float(low), float(high)
 
 

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from processing.analysis.droplets.droplet_search import DropletSearch
 from processing.analysis.droplets.droplet_table import DropletRows
 from processing.analysis.droplets.gaussian_blobs import Image
-from processing.analysis.droplets.ghost_share import GhostShare, matches
+from processing.analysis.droplets.ghost_share import GhostShare, matches, told_share
+from processing.analysis.estimates import Estimate
 from processing.geometry import FloatArray
 
 if TYPE_CHECKING:
@@ -81,10 +82,8 @@ class MeasuredExposure(Generic[Rows, Seen]):
         What it is good for.
     reasons : tuple of str
         Why it is no better, and what to do.
-    ghosts : GhostShare | None
-        From twins; None where none were asked for, or where they would not tell.
-    uncounted : str
-        Why ghosts of a good exposure are not counted in twins; empty where they may be.
+    twins : GhostShare | None
+        Ghosts of its twins, a witness; None where none were asked for, or where they would not tell.
     hidden : Hidden
         What could not be measured.
     """
@@ -94,9 +93,15 @@ class MeasuredExposure(Generic[Rows, Seen]):
     residual_over_noise: float | None
     verdict: ShotVerdict
     reasons: tuple[str, ...] = ()
-    ghosts: GhostShare | None = None
-    uncounted: str = ""
+    twins: GhostShare | None = None
     hidden: Hidden = NOTHING_HIDDEN
+
+    @property
+    def ghost_share(self) -> Estimate | str:
+        """Which share of the droplets are ghosts, or why that is not told."""
+        if self.verdict in (ShotVerdict.DOUBTFUL, ShotVerdict.REFUSED):
+            return "; ".join(self.reasons)
+        return told_share(self.droplets.p_real, self.droplets.sized)
 
     def told(self) -> dict[str, object]:
         """What files say of it, beside the droplets."""
@@ -105,7 +110,7 @@ class MeasuredExposure(Generic[Rows, Seen]):
             "reasons": self.reasons,
             "residual_over_noise": self.residual_over_noise,
             "views": {name: asdict(view) for name, view in self.views.items()},
-            "ghosts": asdict(self.ghosts) if self.ghosts else None,
+            "twins": asdict(self.twins) if self.twins else None,
             "hidden": asdict(self.hidden),
         }
 
@@ -245,12 +250,12 @@ def judged_by_volume(shot: "MeasuredExposure[Rows, Seen]") -> "MeasuredExposure[
 def judged_by_twins(shot: "MeasuredExposure[Rows, Seen]", ghosts: GhostShare) -> "MeasuredExposure[Rows, Seen]":
     """A shot with the ghosts of its twins; doubtful where they are many, however well droplets explain the images."""
     if ghosts.share is None or ghosts.share <= MANY_GHOSTS:
-        return replace(shot, ghosts=ghosts)
+        return replace(shot, twins=ghosts)
     reason = (
         f"of the droplets of a twin {100 * ghosts.share:.0f} % are ghosts, limit {100 * MANY_GHOSTS:.0f} %: too many "
         "droplets for so few views"
     )
-    return replace(shot, ghosts=ghosts, verdict=ShotVerdict.DOUBTFUL, reasons=(*shot.reasons, reason))
+    return replace(shot, twins=ghosts, verdict=ShotVerdict.DOUBTFUL, reasons=(*shot.reasons, reason))
 
 
 def told_real(shot: "MeasuredExposure[Rows, Seen]") -> "MeasuredExposure[Rows, Seen]":

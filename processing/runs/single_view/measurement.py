@@ -235,7 +235,7 @@ def _measured(exposure: Exposure, settings: FlatSettings) -> FlatDroplets | Ligh
 
 
 def _told(found: FlatDroplets | BadInput) -> dict[str, Any]:
-    unmeasured = {"residual_over_noise": None, "ghosts": None}
+    unmeasured = {"residual_over_noise": None}
     if isinstance(found, BadInput):
         return {"verdict": "refused", "reasons": [str(found)], "droplets": 0, "left_out": {}, **unmeasured}
     verdict = "good" if len(found) else "empty"

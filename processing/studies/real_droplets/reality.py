@@ -11,9 +11,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from processing.analysis.droplets.ghost_share import GhostShare
-from processing.figures.reality_figure import StatedShares, reality_figure
+from processing.figures.reality_figure import StatedShares, ToldShare, reality_figure
 from processing.kernels import DEFAULT_THREADS
 from processing.studies.droplets import DropletCase
+from processing.studies.real_droplets.case_shares import CaseShare, share_statements
 from processing.studies.real_droplets.judged_shots import SLAB, JudgedShot, judged_shot
 from processing.studies.report import Statement, grouped
 from processing.studies.shadows.sizes import SizeCase
@@ -35,6 +36,13 @@ TRIED: tuple[DropletCase | SizeCase, ...] = (
     SizeCase(45, median_um=30, noise_percent=2),
     SizeCase(25, noise_percent=8),
     SizeCase(24, noise_percent=2, aperture_ratio=0.55),
+    SizeCase(32, 36, noise_percent=5, aperture_ratio=0.6),
+    SizeCase(28, noise_percent=5, aperture_ratio=0.55),
+    SizeCase(40, noise_percent=8),
+    SizeCase(40, 36, noise_percent=3, aperture_ratio=0.7),
+    SizeCase(62, 25, noise_percent=5),
+    SizeCase(36, 45, noise_percent=4),
+    SizeCase(30, 35, spread=0.6, noise_percent=5),
 )
 
 
@@ -122,10 +130,6 @@ def _kind(row: RealityRow) -> str:
     return row.kind
 
 
-def _case(row: RealityRow) -> str:
-    return f"{row.kind}, {row.case}"
-
-
 def _ghosts(rows: Sequence[RealityRow]) -> tuple[float, int]:
     """How many are to be expected, and how many there are."""
     expected = sum(row.droplets * (1 - row.stated) for row in rows)
@@ -138,14 +142,25 @@ def _unsure(rows: Sequence[RealityRow]) -> GhostShare:
 
 
 def reality_statements(rows: Sequence[RealityRow]) -> list[Statement]:
-    """True and stated shares of each kind, and ghosts of each case."""
-    kinds = [
-        Statement(f"{kind}: real of those told as {UNSURE[0]:g} to {UNSURE[1]:g}", "left open", _unsure_text(chosen))
-        for kind, chosen in grouped(rows, _kind).items()
+    """True and stated shares of each kind, and shares of ghosts of each case."""
+    kinds = grouped(rows, _kind).items()
+    topic = f"real of those told as {UNSURE[0]:g} to {UNSURE[1]:g}"
+    return [
+        *(Statement(f"{kind}: {topic}", "left open", _unsure_text(chosen)) for kind, chosen in kinds),
+        *(Statement(f"{kind}: ghosts", "left open", _ghosts_text(chosen)) for kind, chosen in kinds),
+        *share_statements(case_shares(rows)),
     ]
-    both = {**grouped(rows, _kind), **grouped(rows, _case)}
-    ghosts = [Statement(f"{name}: ghosts", "left open", _ghosts_text(chosen)) for name, chosen in both.items()]
-    return [*kinds, *ghosts]
+
+
+def case_shares(rows: Sequence[RealityRow]) -> list[CaseShare]:
+    """Told and true shares of ghosts, case by case."""
+    return [_share(chosen) for chosen in grouped(rows, lambda row: (row.kind, row.case)).values()]
+
+
+def _share(rows: Sequence[RealityRow]) -> CaseShare:
+    expected, ghosts = _ghosts(rows)
+    ratio, droplets = max(row.residual_over_noise for row in rows), sum(row.droplets for row in rows)
+    return CaseShare(rows[0].kind, rows[0].case, ratio, expected, GhostShare(ghosts, droplets))
 
 
 def _unsure_text(rows: Sequence[RealityRow]) -> str:
@@ -165,7 +180,7 @@ def _ghosts_text(rows: Sequence[RealityRow]) -> str:
 
 
 def reality_of_rows(rows: Sequence[RealityRow]) -> Figure:
-    """True against stated shares of each kind, and ghosts against expected ones of each case."""
+    """True against stated shares of each kind, and true against told shares of ghosts of each case."""
     shares = {
         kind: [
             StatedShares(
@@ -176,11 +191,9 @@ def reality_of_rows(rows: Sequence[RealityRow]) -> Figure:
         ]
         for kind, chosen in grouped(rows, _kind).items()
     }
-    ghosts = {
-        kind: [_ghosts(same) for same in grouped(chosen, _case).values()]
-        for kind, chosen in grouped(rows, _kind).items()
-    }
-    return reality_figure(shares, ghosts)
+    ghosts = grouped(case_shares(rows), lambda share: share.kind)
+    told = {kind: [ToldShare(one.estimate, one.true_share) for one in chosen] for kind, chosen in ghosts.items()}
+    return reality_figure(shares, told)
 
 
 def _least(row: RealityRow) -> str:

@@ -213,7 +213,7 @@ def _row(study: SizeStudy, case: SizeCase, seed: int, threads: int) -> SizeRow:
         d32_error=d32_um / d32_of(1000 * truth.diameters_mm) - 1,
         residual_over_noise=shot.residual_over_noise or 0.0,
         verdict=shot.verdict.value,
-        twin_ghosts=shot.ghosts.share if shot.ghosts else None,
+        twin_ghosts=shot.twins.share if shot.twins else None,
         cpu_ms_per_droplet=1000 * cpu_s / len(truth.diameters_mm),
     )
 

@@ -16,9 +16,11 @@ def add_reality(studies: Verbs) -> None:
 
 def reality(options: Namespace) -> dict[str, Any]:
     """Run the study."""
+    from processing.studies.real_droplets.case_shares import all_close
     from processing.studies.real_droplets.reality import (
         RealityStudy,
         all_true,
+        case_shares,
         reality_line,
         reality_of_rows,
         reality_statements,
@@ -28,4 +30,5 @@ def reality(options: Namespace) -> dict[str, Any]:
     study = RealityStudy(seeds=tuple(range(options.seed, options.seed + options.repeats)))
     rows = collected(reality_study(study, usable_processors()), reality_line)
     result = report(options.out, "reality", rows, reality_of_rows(rows), reality_statements(rows))
-    return passing(result, all_true(rows), "as many are real as is told")
+    passed = all_true(rows) and all_close(case_shares(rows))
+    return passing(result, passed, "as many are real, and as many ghosts, as is told")

@@ -17,7 +17,7 @@ def shot(n: int, seed: int = 0, sized: bool = True) -> StoredDroplets:
     columns |= {f"{axis}_mm": rng.uniform(-1, 1, n) for axis in "xyz"} | {"amplitude": rng.random(n) + 0.1}
     if sized:
         columns["diameter_um"] = 40 * np.exp(0.4 * rng.standard_normal(n))
-    told = {frame: {"verdict": "good", "ghosts": None} for frame in "ab"}
+    told = {frame: {"verdict": "good"} for frame in "ab"}
     return StoredDroplets(columns, {"settings": "{}", "exposures": json.dumps(told)})
 
 

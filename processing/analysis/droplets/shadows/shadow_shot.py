@@ -47,8 +47,6 @@ LIMITS = RatioLimits(trusted=1.25, refused=2.0)
 per mm^3, up to 1.25 have 0.3 to 1.7 % ghosts, from 1.33 to 1.45 2 to 5 %."""
 COHERENT_LIMITS = RatioLimits(trusted=1.1, refused=2.0)
 """In partially coherent light fringes look like faint droplets: 0 % ghosts at 1.06, 4 % at 1.16, 18 % at 1.24."""
-TWINS_TRIED = 1.1
-"""Residual over noise up to which twins have been compared with truth."""
 FRINGELESS = 1.2
 """Light of more than so many apertures of the lens makes no fringes."""
 
@@ -137,21 +135,12 @@ def measure_shadows(
     if blind := blind_verdict(known_shadows, shot.noises_of(shot.images), search.names):
         return MeasuredExposure(SizedDroplets.none(), {}, None, *blind)
     fit = find_shadows(shot, search, light, before_round)
-    told = judged_by_ratio(told_real(judged_by_volume(judged_by_shape(_told(shot, fit, search, sizes)))))
-    if not twins or told.verdict is not ShotVerdict.GOOD or told.uncounted:
+    told = told_real(judged_by_volume(judged_by_shape(_told(shot, fit, search, sizes))))
+    if not twins or told.verdict is not ShotVerdict.GOOD:
         return told
     rng = np.random.default_rng(seed)
     ghosts = pooled(_twin_ghosts(shot, fit, search, rng, before_round) for _ in range(twins))
     return told_real(judged_by_twins(told, ghosts))
-
-
-def judged_by_ratio(shot: ShadowExposure) -> ShadowExposure:
-    """A shot whose ghosts are counted in twins, or are not: only where droplets explain it well was that tried."""
-    ratio = shot.residual_over_noise or 0.0
-    if ratio < TWINS_TRIED:
-        return shot
-    reason = f"droplets explain the images to {ratio:.2f} times the noise, twins were tried up to {TWINS_TRIED:g}"
-    return replace(shot, uncounted=f"{reason}: the sum of 1 - p_real tells how many ghosts to expect")
 
 
 def _refused(*reasons: str) -> ShadowExposure:

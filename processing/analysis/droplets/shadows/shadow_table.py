@@ -16,7 +16,7 @@ COHERENT_SHARE = 0.02
 """Of a diameter: what is wrong in any light that shows, common to the droplets of a shot."""
 LEAST_NOISE = 0.5
 """Where places are told, over that of the image: less would be no noise of pixels."""
-REALITY = Reality(-8.76, (0.97, 2.53, 0.96, -2.07, -3.2, -2.51, -1.46), widths_px=(0.8, 1.6), most_crowding=1.0)
+REALITY = Reality(-8.94, (0.84, 2.74, 1.01, -2.2, -3.07, -2.65, -1.14), widths_px=(0.8, 1.6), most_crowding=1.0)
 
 
 def sized_droplets(

@@ -2,6 +2,7 @@
 
 import asyncio
 from collections import Counter
+from collections.abc import Callable
 from typing import Any
 
 from nicegui import ui
@@ -67,16 +68,20 @@ def droplet_row(run: MeasuredRun) -> dict[str, str]:
         "droplets": f"{statistics.n} in {statistics.exposures} exposures",
         "density": _told(statistics.number_density_per_mm3, statistics.number_density_reason),
         "d32": _told(statistics.d32_um, statistics.reason),
-        "ghosts": _told(statistics.ghost_share, "no twins", scale=100),
+        "ghosts": _told(statistics.ghost_share, statistics.ghost_reason, _percent),
         "verdict": _verdicts(run),
     }
 
 
-def _told(estimate: Estimate | None, reason: str | None, scale: float = 1) -> str:
+def _told(estimate: Estimate | None, reason: str | None, written: Callable[[float], str] = "{:.3g}".format) -> str:
     if estimate is None:
         return reason or ""
-    value, low, high = (f"{scale * number:.3g}" for number in (estimate.value, estimate.low, estimate.high))
+    value, low, high = map(written, (estimate.value, estimate.low, estimate.high))
     return f"{value} ({low} to {high})"
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.2f}"
 
 
 def _verdicts(run: MeasuredRun) -> str:

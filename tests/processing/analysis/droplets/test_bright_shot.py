@@ -9,8 +9,9 @@ import pytest
 from processing.analysis.droplets.bright_shot import BrightExposure, measure_bright
 from processing.analysis.droplets.droplet_search import plan_droplets
 from processing.analysis.droplets.gaussian_blobs import Image
-from processing.analysis.droplets.ghost_share import GhostShare, matches
+from processing.analysis.droplets.ghost_share import GhostShare, matches, told_share
 from processing.analysis.droplets.measured_exposure import RatioLimits, ShotVerdict, judged, judged_by_twins
+from processing.analysis.estimates import Estimate
 from processing.reconstruction.errors import ReconstructionError
 from processing.studies.droplets import BrightScene, DropletCase
 from processing.volume import VoxelGrid
@@ -62,12 +63,19 @@ def test_noise_and_widths_come_from_the_images(shot: BrightExposure) -> None:
 
 
 def test_twins_of_a_shot_without_ghosts_have_none_or_few(shot: BrightExposure) -> None:
-    assert shot.ghosts is not None
-    assert shot.ghosts.found > 0.8 * len(shot.droplets)
-    assert shot.ghosts.share is not None
-    assert shot.ghosts.share < 0.03
-    assert shot.ghosts.interval is not None
-    assert shot.ghosts.interval[1] > shot.ghosts.share
+    assert shot.twins is not None
+    assert shot.twins.found > 0.8 * len(shot.droplets)
+    assert shot.twins.share is not None
+    assert shot.twins.share < 0.03
+    assert shot.twins.interval is not None
+    assert shot.twins.interval[1] > shot.twins.share
+
+
+def test_a_good_shot_tells_its_ghosts_and_a_doubtful_one_why_it_does_not(shot: BrightExposure) -> None:
+    assert shot.ghost_share == told_share(shot.droplets.p_real, False)
+    assert isinstance(shot.ghost_share, Estimate)
+    assert shot.ghost_share.value < 0.02
+    assert replace(shot, verdict=ShotVerdict.DOUBTFUL, reasons=("it is blurred",)).ghost_share == "it is blurred"
 
 
 def test_a_shot_whose_twin_is_full_of_ghosts_is_doubtful(shot: BrightExposure) -> None:
@@ -108,7 +116,7 @@ def test_droplets_beside_the_grid_are_told_by_the_residual_without_a_margin_and_
     truth = scene(grid=VoxelGrid((104, 40, 184), (x_mm - beside_mm, y_mm, z_mm - beside_mm), GRID.pitch_mm))
     alone = measure_bright(truth.images, search_of(truth, margin_voxel=0), twins=1)
     assert alone.verdict in (ShotVerdict.DOUBTFUL, ShotVerdict.REFUSED)
-    assert alone.ghosts is None
+    assert alone.twins is None
     with_margin = measure_bright(truth.images, search_of(truth, margin_voxel=14))
     assert with_margin.verdict is ShotVerdict.GOOD
     assert found_and_ghosts(with_margin, truth)[1] < 0.02
@@ -161,7 +169,7 @@ def test_a_black_view_is_named_and_nothing_is_told(truth: BrightScene) -> None:
 def test_exchanged_views_are_refused(truth: BrightScene) -> None:
     images = [truth.images[3], *truth.images[1:3], truth.images[0]]
     shot = measure_bright(images, search_of(truth), twins=1)
-    assert (shot.verdict, len(shot.droplets), shot.ghosts) == (ShotVerdict.REFUSED, 0, None)
+    assert (shot.verdict, len(shot.droplets), shot.twins) == (ShotVerdict.REFUSED, 0, None)
     assert shot.residual_over_noise is not None
     assert shot.residual_over_noise > 1.5
 

@@ -10,6 +10,7 @@ import pytest
 
 from processing.analysis.droplets.droplet_file import DropletFileError, StoredDroplets, read_droplets, write_columns
 from processing.analysis.droplets.droplet_statistics import droplet_statistics
+from processing.analysis.droplets.ghost_share import told_share
 from processing.analysis.droplets.size_statistics import mean_diameters, number_density, shots_density
 from processing.reconstruction.settings import GridSettings
 
@@ -28,20 +29,32 @@ def shot(sizes_um: list[float] | None, n: int = 0, **told: Any) -> StoredDroplet
     )
 
 
-def exposure(verdict: str = "good", ghosts: tuple[int, int] | None = None) -> dict[str, Any]:
-    counted = {"ghosts": ghosts[0], "found": ghosts[1]} if ghosts else None
-    return {"verdict": verdict, "ghosts": counted}
+def exposure(verdict: str = "good") -> dict[str, Any]:
+    return {"verdict": verdict}
+
+
+def with_p_real(stored: StoredDroplets, *p_real: float) -> StoredDroplets:
+    return StoredDroplets({**stored.columns, "p_real": np.array(p_real)}, stored.provenance)
 
 
 def test_shots_are_pooled() -> None:
-    told = {"a": exposure(ghosts=(1, 40))}, {"a": exposure("doubtful", ghosts=(2, 60))}
-    statistics = droplet_statistics([shot([20.0, 30.0], exposures=told[0]), shot([40.0], exposures=told[1], shot=4)])
+    doubtful = {"a": exposure("doubtful")}
+    statistics = droplet_statistics([shot([20.0, 30.0]), shot([40.0], exposures=doubtful, shot=4)])
     sizes = mean_diameters([[20.0, 30.0], [40.0]])
     assert (statistics.n, statistics.shots, statistics.exposures) == (3, 2, 2)
     assert {name: getattr(statistics, name) for name in type(sizes).model_fields} == dict(sizes)
     assert statistics.number_density_per_mm3 == shots_density([2, 1], [VOLUME_MM3] * 2)
-    assert statistics.ghost_share
-    assert statistics.ghost_share.value == pytest.approx(0.03)
+
+
+def test_ghosts_are_those_of_all_droplets_whose_probability_is_told() -> None:
+    first, other = shot([20.0, 30.0]), shot([40.0, 50.0], shot=4, exposures={"a": exposure("doubtful")})
+    told = droplet_statistics([with_p_real(first, 0.8, 1.0), with_p_real(other, np.nan, np.nan)])
+    assert told.ghost_share == told_share(np.array([0.8, 1.0]), True)
+    assert told.ghost_reason is None
+    untold = droplet_statistics([with_p_real(first, 0.8, np.nan), with_p_real(other, np.nan, np.nan)])
+    assert (untold.ghost_share, (untold.ghost_reason or "")[:34]) == (None, "p_real is told of 1 of 4 droplets;")
+    old = droplet_statistics([first, with_p_real(other, 1.0, 1.0)])
+    assert (old.ghost_share, "files from before" in (old.ghost_reason or "")) == (None, True)
 
 
 def test_exposures_of_one_shot_show_the_same_droplets_twice() -> None:

@@ -21,7 +21,7 @@ def saying(shot: StoredDroplets, **told: str) -> StoredDroplets:
 
 
 def exposure(verdict: str) -> str:
-    return json.dumps({"a": {"verdict": verdict, "ghosts": None, "reasons": ["it is blurred"]}})
+    return json.dumps({"a": {"verdict": verdict, "reasons": ["it is blurred"]}})
 
 
 def doubts(*shots: StoredDroplets, axis: SprayAxis = DOWN) -> str:
@@ -91,7 +91,7 @@ def test_a_shot_that_is_a_copy_of_another_one_is_told_whatever_it_is_called() ->
 
 
 def test_an_exposure_that_is_hidden_as_a_whole_leaves_the_others_what_they_are() -> None:
-    hidden = json.dumps({"a": {"verdict": "doubtful", "ghosts": None, "hidden": {"volume_share": 1.0}}})
+    hidden = json.dumps({"a": {"verdict": "doubtful", "hidden": {"volume_share": 1.0}}})
     nobody = replace(SHOTS[0], columns={name: one[:0] for name, one in SHOTS[0].columns.items()})
     told, without = spray_statistics([saying(nobody, exposures=hidden), *SHOTS[1:]]), spray_statistics(SHOTS[1:])
     assert told.liquid_ppm

@@ -47,7 +47,7 @@ def test_people_read_figures_with_units_and_intervals(results: Path, capsys: pyt
 def test_people_read_what_is_doubtful_and_why_figures_are_missing(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    said = {"exposures": json.dumps({"a": {"verdict": "doubtful", "ghosts": None, "reasons": ["it is blurred"]}})}
+    said = {"exposures": json.dumps({"a": {"verdict": "doubtful", "reasons": ["it is blurred"]}})}
     results = write_results(tmp_path / "blurred", cone_shots(0, 5, 60, 29.0), **said, spray=SPRAY)
     text = shown(capsys, "statistics", results)
     assert "5 of 5 exposures are doubtful, and count: it is blurred" in text

@@ -11,7 +11,7 @@ from processing.analysis.droplets.droplet_search import plan_droplets
 from processing.analysis.droplets.ghost_share import matches
 from processing.analysis.droplets.measured_exposure import ShotVerdict
 from processing.analysis.droplets.shadows.judged_volume import beside_what_is_not_known
-from processing.analysis.droplets.shadows.shadow_shot import ShadowExposure, judged_by_ratio, measure_shadows
+from processing.analysis.droplets.shadows.shadow_shot import ShadowExposure, measure_shadows
 from processing.studies.droplets import IMAGE_SIZE_PX as STUDY_SIZE_PX
 from processing.studies.shadows.sizes import SizeCase, size_scene
 from processing.studies.simulated_droplets import study_grid
@@ -35,16 +35,9 @@ def shot(scene: ShadowScene) -> ShadowExposure:
 def test_a_shot_without_faults_is_good_and_its_twin_has_no_ghosts_or_few(shot: ShadowExposure) -> None:
     assert shot.verdict is ShotVerdict.GOOD
     assert shot.residual_over_noise == pytest.approx(1, abs=0.05)
-    assert shot.ghosts is not None
-    assert shot.ghosts.found > 0.8 * len(shot.droplets)
-    assert shot.ghosts.ghosts <= 2
-
-
-def test_ghosts_are_not_counted_in_twins_where_that_was_not_tried(shot: ShadowExposure) -> None:
-    assert judged_by_ratio(shot) is shot
-    assert judged_by_ratio(replace(shot, residual_over_noise=1.2)).uncounted.startswith(
-        "droplets explain the images to 1.20 times the noise, twins were tried up to 1.1: the sum of 1 - p_real"
-    )
+    assert shot.twins is not None
+    assert shot.twins.found > 0.8 * len(shot.droplets)
+    assert shot.twins.ghosts <= 2
 
 
 def test_covariances_say_how_far_places_and_diameters_are_off(scene: ShadowScene, shot: ShadowExposure) -> None:
@@ -153,7 +146,7 @@ def test_a_grid_that_no_pixel_looks_into_is_refused_and_not_good(scene: ShadowSc
 def test_exchanged_views_are_refused(scene: ShadowScene) -> None:
     images = [scene.images[k] for k in (3, 1, 2, 0)]
     other = measure_shadows(images, search_of(scene, MARGIN_VOXEL), twins=1)
-    assert (other.verdict, len(other.droplets), other.ghosts) == (ShotVerdict.REFUSED, 0, None)
+    assert (other.verdict, len(other.droplets), other.twins) == (ShotVerdict.REFUSED, 0, None)
     assert other.residual_over_noise is not None
     assert other.residual_over_noise > 2
 
