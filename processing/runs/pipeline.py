@@ -4,10 +4,11 @@ import json
 import resource
 import time
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from contextlib import closing
+from dataclasses import dataclass, field, replace
 from importlib.metadata import version
-from itertools import cycle
 from pathlib import Path
+from threading import Lock
 from typing import TypedDict, Unpack
 
 from daq.files.run_directory import RunReader
@@ -26,11 +27,15 @@ from processing.runs.exposure_faults import Faults, exposure_faults
 from processing.runs.recipe import recipe_sha256
 from processing.runs.results_file import FrameName, Provenance, claim_results, volume_path
 from processing.runs.shots.clocked_slabs import ClockedSlabs
+from processing.runs.shots.lanes import in_lanes
 from processing.runs.shots.read_ahead import read_ahead
 from processing.runs.shots.shot_images import frame_names, require_match, shot_intensities
 from processing.runs.shots.shot_result import ShotResult, VolumeRecord
 from processing.runs.workbench import References, Workbench
 from processing.volume import VoxelGrid
+
+_MOST_LANES = 2
+"""Shots side by side: where one is read, packed or waits for the disk, another one is computed. Each takes memory."""
 
 
 class Stopped(Exception):
@@ -69,10 +74,17 @@ class _Chain:
     run: RunReader
     calibration: Calibration
     settings: ReconstructionSettings
-    reconstructor: Reconstructor
+    lanes: tuple[Reconstructor, ...]
     references: References
     provenance: Provenance
     views: Mapping[str, PlannedView]
+    threads: int
+    writing: Lock = field(default_factory=Lock)
+
+    @property
+    def grid(self) -> VoxelGrid:
+        """Of all volumes."""
+        return self.lanes[0].plan.grid
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +120,9 @@ def reconstruct_shots(
     should_stop: Callable[[], bool] = lambda: False,
     **options: Unpack[Options],
 ) -> Generator[ShotResult, None, None]:
-    """Reconstruct every exposure of some shots; the images of one are made while that before it is reconstructed.
+    """Reconstruct every exposure of some shots; two shots side by side where there are two threads.
+
+    The images of one exposure are made while that before it is reconstructed.
 
     Parameters
     ----------
@@ -139,58 +153,72 @@ def reconstruct_shots(
         ``should_stop`` said so.
     """
     threads, keep = options.get("threads", DEFAULT_THREADS), options.get("keep", write_slabs)
+    told = options.get("told", dict)
     started_cpu_s = time.process_time()
     with (options.get("workbench") or Workbench()).occupied() as bench, RunReader(run_dir) as run:
-        chain = _chain_of(run, calibration_file, settings, bench, threads)
-        volumes: list[VolumeRecord] = []
-        for exposure in read_ahead(_exposures(chain, shots, threads)):
-            if should_stop():
-                raise Stopped(f"{run_dir.name}, shot {exposure.shot}: stopped before exposure {exposure.frame}")
-            claim_results(results_dir, chain.provenance)
-            told = options["told"]() if "told" in options else {}
-            volumes.append(_reconstruct(chain, exposure, results_dir, told, keep))
-            if exposure.frame == frame_names(run)[-1]:
+        chain = _chain_of(run, calibration_file, settings, bench, threads, len(shots))
+
+        def volumes_of(lane: Reconstructor, shot: int) -> list[VolumeRecord]:
+            volumes = []
+            for exposure in read_ahead(_exposures(chain, lane, shot)):
+                if should_stop():
+                    raise Stopped(f"{run_dir.name}, shot {exposure.shot}: stopped before exposure {exposure.frame}")
+                with chain.writing:  # whoever is first makes the folder, and has told what is known for all
+                    claim_results(results_dir, chain.provenance)
+                    known = told()
+                volumes.append(_reconstruct(chain, lane, exposure, results_dir, known, keep))
+            return volumes
+
+        with closing(in_lanes(shots, chain.lanes, volumes_of)) as coming:
+            for volumes in coming:
                 yield _result(chain, volumes, time.process_time() - started_cpu_s)
-                volumes, started_cpu_s = [], time.process_time()
+                started_cpu_s = time.process_time()
 
 
 def _chain_of(
-    run: RunReader, calibration_file: Path, settings: ReconstructionSettings, bench: Workbench, threads: int
+    run: RunReader,
+    calibration_file: Path,
+    settings: ReconstructionSettings,
+    bench: Workbench,
+    threads: int,
+    shots: int,
 ) -> _Chain:
+    lanes = 1 if settings.method.iterative else min(_MOST_LANES, threads, shots)
+    threads //= lanes
     calibration, shown = load_calibration(calibration_file), tuple(run.header.views)
     calibration.require_usable(shown)
     made_by = provenance_of(run, calibration, calibration_file, settings, METHOD_VERSION)
-    reconstructor = bench.reconstructor(
-        (made_by["calibration_sha256"], settings, shown, threads),
-        lambda: _reconstructor(calibration, settings, shown, threads),
+    reconstructors = bench.reconstructors(
+        (made_by["calibration_sha256"], settings, shown, threads, lanes),
+        lambda: _reconstructors(calibration, settings, shown, threads, lanes),
     )
-    views = {name: PlannedView.of(view) for name, view in zip(shown, reconstructor.plan.views, strict=True)}
+    views = {name: PlannedView.of(view) for name, view in zip(shown, reconstructors[0].plan.views, strict=True)}
     provenance = {**made_by, "views": json.dumps({name: view.model_dump() for name, view in views.items()})}
-    return _Chain(run, calibration, settings, reconstructor, bench.references(run), provenance, views)
+    return _Chain(run, calibration, settings, reconstructors, bench.references(run), provenance, views, threads)
 
 
-def _exposures(chain: _Chain, shots: Sequence[int], threads: int) -> Iterator[_Exposure]:
-    """Exposure after exposure; the memory of its images is used again for the next but one."""
+def _exposures(chain: _Chain, lane: Reconstructor, index: int) -> Iterator[_Exposure]:
+    """Exposure after exposure of a shot, each in memory of its own."""
     run, settings, references = chain.run, chain.settings, chain.references
-    memory = cycle(chain.reconstructor.images)
-    for index in shots:
-        shot = run.read_shot(index)
-        require_match(run.run_dir.name, shot, chain.calibration)
-        for frame in frame_names(run):
-            images = shot_intensities(run, shot, frame, settings, next(memory), references=references, threads=threads)
-            yield _Exposure(index, frame, images, exposure_faults(run, shot, frame, images, references))
+    shot = run.read_shot(index)
+    require_match(run.run_dir.name, shot, chain.calibration)
+    for frame, memory in zip(frame_names(run), lane.images, strict=False):
+        images = shot_intensities(run, shot, frame, settings, memory, references=references, threads=chain.threads)
+        yield _Exposure(index, frame, images, exposure_faults(run, shot, frame, images, references))
 
 
-def _reconstruct(chain: _Chain, exposure: _Exposure, results_dir: Path, told: Provenance, keep: Keep) -> VolumeRecord:
+def _reconstruct(
+    chain: _Chain, lane: Reconstructor, exposure: _Exposure, results_dir: Path, told: Provenance, keep: Keep
+) -> VolumeRecord:
     """Slabs are kept as they are made; the time of keeping them does not count."""
     started_s = time.perf_counter()
-    volume, residuals = chain.reconstructor.reconstruct(exposure.images)
+    volume, residuals = lane.reconstruct(exposure.images)
     begun_s = time.perf_counter() - started_s
     slabs = ClockedSlabs(volume.slabs)
     file = volume_path(results_dir, exposure.shot, exposure.frame)
     convergence = {"residuals": json.dumps(residuals)} if residuals else {}
     named = {**_named(chain, exposure), **told, "shot": exposure.shot, "frame": exposure.frame, **convergence}
-    keep(file, replace(volume, slabs=slabs), chain.reconstructor.plan.grid, named)
+    keep(file, replace(volume, slabs=slabs), chain.grid, named)
     record = VolumeRecord(
         shot=exposure.shot,
         frame=exposure.frame,
@@ -213,7 +241,7 @@ def _result(chain: _Chain, volumes: Sequence[VolumeRecord], cpu_s: float) -> Sho
     return ShotResult(
         shot=volumes[0].shot,
         method=chain.settings.method,
-        grid=GridSettings.of(chain.reconstructor.plan.grid),
+        grid=GridSettings.of(chain.grid),
         views=chain.views,
         volumes=tuple(volumes),
         cpu_s=cpu_s,
@@ -248,10 +276,11 @@ def provenance_of(
     }
 
 
-def _reconstructor(
-    calibration: Calibration, settings: ReconstructionSettings, views: Sequence[str], threads: int
-) -> Reconstructor:
-    return Reconstructor.of(plan_of(calibration, settings, views), settings, threads)
+def _reconstructors(
+    calibration: Calibration, settings: ReconstructionSettings, views: Sequence[str], threads: int, count: int
+) -> tuple[Reconstructor, ...]:
+    plan = plan_of(calibration, settings, views)
+    return tuple(Reconstructor.of(plan, settings, threads) for _ in range(count))
 
 
 def plan_of(calibration: Calibration, settings: ReconstructionSettings, views: Sequence[str]) -> Plan:

@@ -55,7 +55,7 @@ class Workbench:
         self._lock = Lock()
         self._references: Latest[References] = Latest()
         self._planned: Latest[Any] = Latest()
-        self._reconstructor: Latest[Reconstructor] = Latest()
+        self._reconstructors: Latest[tuple[Reconstructor, ...]] = Latest()
 
     @contextmanager
     def occupied(self) -> Iterator["Workbench"]:
@@ -72,9 +72,9 @@ class Workbench:
         plan: Made = self._planned.of((_content(run), key), make)
         return plan
 
-    def reconstructor(self, key: Hashable, make: Callable[[], Reconstructor]) -> Reconstructor:
-        """The reconstructor for all that the key names."""
-        return self._reconstructor.of(key, make)
+    def reconstructors(self, key: Hashable, make: Callable[[], tuple[Reconstructor, ...]]) -> tuple[Reconstructor, ...]:
+        """The reconstructors for all that the key names, which share its plan."""
+        return self._reconstructors.of(key, make)
 
 
 def _content(run: RunReader) -> Hashable:

@@ -144,15 +144,15 @@ def test_a_workbench_keeps_what_is_asked_for_again_and_no_more(
     run_dir: Path, calibration_file: Path, tmp_path: Path
 ) -> None:
     workbench = Workbench()
-    made: list[Reconstructor] = []
+    made: list[tuple[Reconstructor, ...]] = []
 
-    def make() -> Reconstructor:
-        made.append(Reconstructor.of(plan_reconstruction(list(cameras().values()), GRID), SETTINGS))
+    def make() -> tuple[Reconstructor, ...]:
+        made.append((Reconstructor.of(plan_reconstruction(list(cameras().values()), GRID), SETTINGS),))
         return made[-1]
 
-    assert workbench.reconstructor("one", make) is workbench.reconstructor("one", make) is made[0]
-    assert workbench.reconstructor("other", make) is workbench.reconstructor("other", make) is made[1]
-    assert workbench.reconstructor("one", make) is made[2]
+    assert workbench.reconstructors("one", make) is workbench.reconstructors("one", make) is made[0]
+    assert workbench.reconstructors("other", make) is workbench.reconstructors("other", make) is made[1]
+    assert workbench.reconstructors("one", make) is made[2]
     settings = [SETTINGS, SETTINGS.model_copy(update={"noise_floor": 0.2}), SETTINGS]
     for number, one in enumerate(settings):
         out = tmp_path / f"kept{number}"
@@ -170,8 +170,9 @@ def test_shots_of_a_series_are_those_that_come_alone_until_one_is_not_valid(
     assert [next(coming).shot, next(coming).shot] == [1, 0]
     with pytest.raises(PipelineError, match="shot 2: exposures are missing"):
         next(coming)
-    assert len(volume_files(tmp_path / "series")) == 4
-    for shot in (0, 1):
+    made = {int(file.stem.split("_")[1]) for file in volume_files(tmp_path / "series")}
+    assert made - {3} == {0, 1}  # the last one may have been made beside the one that is not valid
+    for shot in made:
         reconstruct_shot(run_dir, shot, calibration_file, SETTINGS, tmp_path / "alone")
     for file in volume_files(tmp_path / "series"):
         np.testing.assert_array_equal(read_volume(file)[0], read_volume(tmp_path / "alone" / file.name)[0])
