@@ -258,9 +258,8 @@ class Acquisition:
         yield from not_acknowledged(status)
 
     def _preflight(self) -> Preflight:
-        return Preflight(
-            self._rig, self._data_dir, self._hash_calibration, self._limits.disk_margin_bytes, self._folder
-        )
+        margin_bytes = self._limits.disk_margin_bytes
+        return Preflight(self._rig, self._data_dir, self._hash_calibration, margin_bytes, self._folder)
 
     def _shooting(self, plan: RunPlan, timing: ShotTiming, ending: RunEnding) -> Shooting:
         return Shooting(self._rig, plan, timing, self._progress, self._limits, self._observers, ending)

@@ -34,10 +34,8 @@ class ConfigError(BadInput):
 
 def _possible(path: object) -> object:
     """A path that a file system can have; an empty one would be the working directory, whichever that is."""
-    if not str(path).strip():
-        raise ValueError("the name of a folder is empty: name one, or leave the line out")
-    if "\0" in str(path):
-        raise ValueError("no folder has a NUL character in its name")
+    if not str(path).strip() or "\0" in str(path):
+        raise ValueError("no folder has an empty name, or a NUL character in it: name one, or leave the line out")
     return path
 
 
