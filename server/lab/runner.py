@@ -5,6 +5,7 @@ The table is the queue. Whatever is asked for while the server is down, or was r
 
 import asyncio
 import contextlib
+import secrets
 from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -131,7 +132,9 @@ class JobRunner:
     async def _store(self, volume: Path) -> None:
         made = await asyncio.to_thread(remaking, volume)
         arguments = {**made, "calibration_file": str(self._calibrations.path(Path(made["calibration_file"]).stem))}
-        name, task = f"store {volume.parent.name}/{volume.stem}", self._tasks[JobKind.RECONSTRUCTION]
+        # A name of its own: one that was asked for before and took too long is still being told to stop.
+        name = f"store {volume.parent.name}/{volume.stem} {secrets.token_hex(4)}"
+        task = self._tasks[JobKind.RECONSTRUCTION]
         await asyncio.to_thread(self._unfinished.write_text, str(volume.parent))
         try:
             await self._engine.submit(name, task, arguments, lambda _steps: None)

@@ -82,6 +82,9 @@ class ClusterEngine:
             async with asyncio.timeout(limit_s) as deadline:
                 there, seen = await asyncio.to_thread(as_seen_by_workers, self._paths, job)
                 return await self._insist(task, sent, Errand(sent.name, there, version("tomoshadow"), seen))
+        except asyncio.CancelledError:
+            await self._tell_to_abort(sent)  # whoever waited is gone: the task shall not stay behind
+            raise
         except TimeoutError as error:
             if not deadline.expired():
                 raise

@@ -3,6 +3,7 @@
 # mypy: allow-untyped-calls
 # distributed is typed in parts only.
 
+import asyncio
 from collections.abc import Sequence
 from contextlib import AsyncExitStack
 from types import TracebackType
@@ -82,11 +83,14 @@ class DaskEngine:
         future = client.submit(perform_errand, task, Errand(job_id, dict(job)), pure=False)
         try:
             error = await future.exception()
+            await Event(abort_event(job_id), client=client).clear()
             return settled(error, None if error else await future)
+        except asyncio.CancelledError:
+            await self.abort(job_id)  # whoever waited is gone: the task shall not stay behind
+            raise
         finally:
             future.release()  # a result that is still held is computed again when its worker dies
             del self._listeners[job_id]
-            await Event(abort_event(job_id), client=client).clear()
 
     async def abort(self, job_id: str) -> None:
         """See ``Engine.abort``; cancelling the future would not stop a running task."""

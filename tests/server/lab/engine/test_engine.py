@@ -99,6 +99,24 @@ def test_an_engine_returns_results_reports_errors_obeys_aborts_and_outlives_its_
     assert seen.get("survived") == (None if make is InlineEngine else {"niceness": min(19, os.nice(0) + 10)})
 
 
+@ENGINES
+def test_a_task_for_which_nobody_waits_any_more_does_not_stay_behind(make: Callable[[], Engine]) -> None:
+    """Its one worker is free again, and what asks for the same work anew has no second writer beside it."""
+
+    async def go() -> dict[str, Any]:
+        async with make() as engine:
+            going = asyncio.Event()
+            waiting = asyncio.ensure_future(
+                engine.submit("a", step_until_stopped, {}, lambda steps: going.set() if steps else None)
+            )
+            await asyncio.wait_for(going.wait(), 20)
+            waiting.cancel()
+            await asyncio.wait({waiting})
+            return await asyncio.wait_for(engine.submit("b", double, {"value": 21}, _ignore), 10)
+
+    assert asyncio.run(go()) == {"value": 42}
+
+
 def test_an_engine_that_was_not_started_says_so() -> None:
     with pytest.raises(TaskError, match="not running"):
         asyncio.run(DaskEngine().abort("x"))
