@@ -98,7 +98,8 @@ def verify(run_dir: Path, done: Done = lambda _done, _total: None) -> Verificati
         shots = reader.shot_count
     except ShotFileError as error:
         there = (run_dir / RUN_FILE).exists()
-        flaw = Flaw(FlawKind.UNREADABLE if there else FlawKind.MISSING, RUN_FILE, str(error))
+        text = f"{error}; tomoshadow repair {run_dir} writes it anew from the shots, where one can be read"
+        flaw = Flaw(FlawKind.UNREADABLE if there else FlawKind.MISSING, RUN_FILE, text)
         return Verification(None, 0, 0, 0, (flaw, *strangers))
     flaws = [] if closing else [_open_flaw(run_dir)]
     bad: list[Flaw] = []

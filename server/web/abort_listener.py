@@ -4,6 +4,7 @@ Whatever the server is busy with, this answers. It knows neither token nor lock:
 light, and nothing else. Other sites' pages are refused, as ``server.web.guard`` refuses them.
 """
 
+import asyncio
 import socket
 import threading
 from collections.abc import Callable, Collection
@@ -16,12 +17,15 @@ from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
+from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from daq.errors import DaqError
 from server.web.guard import is_ours, site_of
 from server.web.problems import MEDIA_TYPE
 
 PATH = "/abort"
+REQUEST_S = 5.0
+"""In which a whole request must have come; a connection is for one."""
 _END_S = 3.0
 _MOST_ORIGINS = 64
 
@@ -47,7 +51,15 @@ class AbortListener:
         self._host_names = host_names
         self._origins: dict[str, None] = {}
         app = Starlette(routes=[Route(PATH, self._answer, methods=["POST"])])
-        config = uvicorn.Config(app, lifespan="off", log_config=None, access_log=False, timeout_graceful_shutdown=1)
+        config = uvicorn.Config(
+            app,
+            http=_OneRequest,
+            headers=[("Connection", "close")],
+            lifespan="off",
+            log_config=None,
+            access_log=False,
+            timeout_graceful_shutdown=1,
+        )
         self._server = uvicorn.Server(config)
         self._thread = threading.Thread(
             target=self._server.run, kwargs={"sockets": [held]}, name="abort listener", daemon=True
@@ -90,6 +102,18 @@ class AbortListener:
             return JSONResponse({"light": "off", "ended": self._abort()})
         except DaqError as error:
             return _problem(503, f"the light is not confirmed off: {error}")
+
+
+class _OneRequest(H11Protocol):
+    """A connection that is closed where no request comes in time."""
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]  # as uvicorn has it
+        super().connection_made(transport)
+        self.loop.call_later(REQUEST_S, self._close_without_request)
+
+    def _close_without_request(self) -> None:
+        if self.cycle is None:
+            self.transport.close()
 
 
 def _problem(status: int, detail: str) -> Response:

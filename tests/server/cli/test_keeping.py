@@ -142,7 +142,9 @@ def test_a_lost_header_is_written_anew_from_the_shots_and_what_is_lost_is_named(
     (run_dir / "run.h5").write_bytes(b"nonsense")
     for path in (*(run_dir / "shots").iterdir(), run_dir / "shots"):
         os.utime(path, (1.8e9, 1.8e9))
-    assert told(capsys, "verify", run_dir, status=1)["runs"][0]["flaws"][0]["kind"] == "unreadable"
+    flaw = told(capsys, "verify", run_dir, status=1)["runs"][0]["flaws"][0]
+    assert flaw["kind"] == "unreadable"
+    assert flaw["text"].endswith(f"tomoshadow repair {run_dir} writes it anew from the shots, where one can be read")
     done = told(capsys, "repair", run_dir)["done"]
     assert done[0] == f"run.h5 is set aside as {run_dir / 'set-aside' / 'run.h5'}"
     assert "plan, configuration" in done[1]

@@ -1,5 +1,6 @@
 """ABORT has a door of its own: it is open while the server is busy, and to no page but ours."""
 
+import socket
 import threading
 import time
 from collections.abc import Iterator
@@ -125,3 +126,31 @@ def test_the_oldest_of_many_pages_is_forgotten(listener: AbortListener) -> None:
         listener.admit(f"127.0.0.1:{port}")
     assert abort(listener, Origin="http://127.0.0.1:1").status_code == 403
     assert abort(listener, Origin="http://127.0.0.1:99").status_code == 200
+
+
+@pytest.mark.parametrize("said", [b"", b"POST /abort HTTP/1.1\r\nHost: 127.0.0.1\r\n"])
+def test_a_connection_without_a_whole_request_is_closed(
+    listener: AbortListener, monkeypatch: pytest.MonkeyPatch, said: bytes
+) -> None:
+    """Thousands of them would leave no room for the one that counts."""
+    monkeypatch.setattr("server.web.abort_listener.REQUEST_S", 0.2)
+    with socket.create_connection(("127.0.0.1", listener.port), timeout=10) as half:
+        half.sendall(said)
+        assert ends(half)
+
+
+def test_a_connection_ends_with_its_answer(listener: AbortListener) -> None:
+    with socket.create_connection(("127.0.0.1", listener.port), timeout=2) as asking:
+        asking.sendall(b"POST /abort HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 9\r\n\r\n")
+        assert asking.recv(1000).startswith(b"HTTP/1.1 200")
+        assert ends(asking)
+
+
+def ends(connection: socket.socket) -> bool:
+    """The other side closes it, whatever it says before."""
+    try:
+        while connection.recv(1000):
+            pass
+    except TimeoutError:
+        return False
+    return True
