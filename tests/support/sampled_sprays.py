@@ -46,6 +46,15 @@ def stored_shot(
     return StoredDroplets(columns, provenance)
 
 
+def in_box(shot: StoredDroplets) -> StoredDroplets:
+    """What is seen of it in the box."""
+    seen = np.ones(len(shot.columns["frame"]), bool)
+    for name, axis in (("x_mm", BOX.x_mm), ("y_mm", BOX.y_mm), ("z_mm", BOX.z_mm)):
+        places: Any = shot.columns[name]
+        seen &= (places >= axis[0]) & (places <= axis[-1])
+    return StoredDroplets({name: values[seen] for name, values in shot.columns.items()}, shot.provenance)
+
+
 def write_results(folder: Path, shots: Sequence[StoredDroplets], **told: str) -> Path:
     """A directory as ``measure`` writes it, but for its settings; more of the provenance."""
     folder.mkdir(parents=True, exist_ok=True)

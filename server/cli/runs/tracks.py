@@ -26,16 +26,17 @@ def add(verbs: Verbs) -> None:
 
 def tracks(options: Namespace) -> Outcome:
     """Read, link, write."""
-    from processing.analysis.droplets.droplet_file import DropletFileError, read_droplets
+    from processing.analysis.droplets.droplet_file import DropletFileError
     from processing.analysis.velocity.track_file import write_tracks
     from processing.analysis.velocity.track_table import track_droplets
+    from processing.runs.droplet_seal import read_sealed
     from processing.runs.overwriting import require_free
 
     require_free(options.out, overwrite=options.overwrite)
     files = sorted(options.results.glob("shot_*_droplets.h5"))
     if not files:
         raise DropletFileError(f"{options.results}: has no droplets of shots; measure them first (tomoshadow measure)")
-    shots = [read_droplets(file) for file in files]
+    shots = [read_sealed(file) for file in files]
     linked = track_droplets(shots, options.rate_hz)
     write_tracks(
         options.out, linked, {name: one for name in KEPT if (one := shots[0].provenance.get(name)) is not None}

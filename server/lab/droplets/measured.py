@@ -8,10 +8,11 @@ from typing import Annotated
 from pydantic import Field
 
 from daq.frozen_model import FrozenModel
-from processing.analysis.droplets.droplet_file import DropletFileError, StoredDroplets, read_droplets
+from processing.analysis.droplets.droplet_file import DropletFileError, StoredDroplets
 from processing.analysis.droplets.droplet_statistics import DropletStatistics, droplet_statistics, hidden_share
 from processing.analysis.droplets.measured_exposure import ShotVerdict
 from processing.analysis.velocity.velocity_statistics import VelocityStatistics, velocity_statistics
+from processing.runs.droplet_seal import read_sealed
 from processing.runs.measured_shot import droplets_path
 from server.lab.errors import Damaged, NotFound
 from server.lab.results import droplet_summaries
@@ -68,7 +69,7 @@ def droplets_file(results_dir: Path, shot: int) -> Path:
 @lru_cache(maxsize=16)
 def _read(files: tuple[tuple[Path, int], ...]) -> MeasuredRun:
     """Once per change of the files."""
-    stored = [read_droplets(path) for path, _ in files]
+    stored = [read_sealed(path) for path, _ in files]
     return MeasuredRun(
         shots=tuple(map(_told, stored)), statistics=droplet_statistics(stored), velocity=velocity_statistics(stored)
     )

@@ -27,7 +27,7 @@ def test_what_the_operator_wrote_travels_with_what_is_measured(tmp_path: Path) -
 
 def test_older_results_have_the_nozzle_of_the_run_that_they_lie_in(tmp_path: Path) -> None:
     run_dir = write_run(tmp_path / "run", spray=SPRAY)
-    results = write_results(run_dir / "results" / "droplets-1", cone_shots(0, 2, 10))
+    results = write_results(run_dir / "results" / "droplets-1", cone_shots(0, 2, 10), run="run")
     spray = read_spray([results])
     assert (spray.axis, spray.name) == (SprayAxis((1, 2, 3), (0, 0, 1)), "run/droplets-1")
     (run_dir / "run.h5").write_bytes(b"damaged")

@@ -94,7 +94,7 @@ def test_bad_input_gets_a_sentence(tmp_path: Path, capsys: pytest.CaptureFixture
     out = tmp_path / "tracks.h5"
     assert "nobody stated at which rate" in refused(capsys, "tracks", unstated, "-o", out)
     assert "has no droplets of shots" in refused(capsys, "tracks", tmp_path, "-o", out)
-    other = write_series(tmp_path / "other", shown, run="another", rate_hz=RATE_HZ)
+    other = write_series(tmp_path / "other", shown, run="another", rate_hz=RATE_HZ, shot=7)
     (other / "shot_00003_droplets.h5").rename(unstated / "shot_00007_droplets.h5")
     assert "shots of one series, please: their run is" in refused(capsys, "tracks", unstated, "-o", out)
     copied = write_series(tmp_path / "copied", Series(shown.frames[:1] * 3, [], [], np.empty(0)), rate_hz=RATE_HZ)

@@ -7,7 +7,7 @@ import pytest
 
 from processing.analysis.spray.spray_statistics import SprayStatistics
 from tests.support.command_line import refused, shown, told
-from tests.support.sampled_sprays import cone_shots, write_results
+from tests.support.sampled_sprays import cone_shots, in_box, write_results
 
 SPRAY = '{"nozzle_mm": [0, 0, 0], "axis": [0, 1, 0]}'
 
@@ -48,7 +48,8 @@ def test_people_read_what_is_doubtful_and_why_figures_are_missing(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     said = {"exposures": json.dumps({"a": {"verdict": "doubtful", "reasons": ["it is blurred"]}})}
-    results = write_results(tmp_path / "blurred", cone_shots(0, 5, 60, 29.0), **said, spray=SPRAY)
+    shots = [in_box(shot) for shot in cone_shots(0, 5, 60, 29.0)]
+    results = write_results(tmp_path / "blurred", shots, **said, spray=SPRAY)
     text = shown(capsys, "statistics", results)
     assert "5 of 5 exposures are doubtful, and count: it is blurred" in text
     assert "No cone angle: the box does not reach around the cone" in text

@@ -2,20 +2,23 @@
 
 import json
 import re
-from collections.abc import Iterator
+import shutil
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import h5py
 import httpx
 import pytest
 
-from processing.analysis.droplets.droplet_file import read_droplets
+from processing.analysis.droplets.droplet_file import DropletFileError, read_droplets
 from processing.analysis.droplets.droplet_search import DropletSearch, plan_droplets
 from processing.calibration.calibration_file import load_calibration, save_calibration
 from processing.calibration.calibration_record import content_id
 from processing.runs.measurement import MeasureSettings
 from processing.runs.pipeline import Stopped
+from processing.runs.sprays.measured_spray import read_spray
 from server.lab.droplets.measured import measured_run
 from server.lab.events import EventPublisher
 from server.lab.job_recovery import jobs_on_disk
@@ -155,6 +158,49 @@ def test_a_damaged_file_is_named(measured: Serving) -> None:
     path.write_bytes(whole)
     assert answer.status_code == 500
     assert "shot_00000_droplets.h5: not a readable file of droplets" in answer.json()["detail"]
+
+
+def edit(column: str, change: Callable[[Any], Any], *, old: bool = False) -> Callable[[Path], None]:
+    """Change a column of the first shot, in the file of an older program where there was no seal."""
+
+    def spoil(results: Path) -> None:
+        with h5py.File(results / "shot_00000_droplets.h5", "r+") as file:
+            values = file[f"droplets/{column}"]
+            values[:] = change(values[:])
+            if old:
+                del file["tomoshadow"].attrs["seal_sha256"]
+
+    return spoil
+
+
+def exchange(results: Path) -> None:
+    (results / "shot_00000_droplets.h5").replace(results / "shot_00001_droplets.h5")
+
+
+def bring_to_another_run(results: Path) -> None:
+    write_run(results.parents[1].with_name("other"))
+    results.parents[1].joinpath("run.h5").write_bytes((results.parents[2] / "other" / "run.h5").read_bytes())
+
+
+@pytest.mark.parametrize(
+    ("spoil", "said"),
+    [
+        (edit("x_mm", lambda x_mm: x_mm + 0.01), "was changed after it had been measured"),
+        (edit("x_mm", lambda x_mm: x_mm + 100, old=True), r"droplets have x_mm outside of .* mm, where they were"),
+        (edit("amplitude", lambda amplitude: amplitude / 2), "was changed after it had been measured"),
+        (exchange, "was renamed, it holds the droplets of shot 0"),
+        (bring_to_another_run, "holds droplets of run bright and lies in run other"),
+    ],
+)
+def test_droplets_that_are_not_those_that_were_measured_are_refused(
+    measured: Serving, tmp_path: Path, spoil: Callable[[Path], None], said: str
+) -> None:
+    run_dir = Path(shutil.copytree(measured.services.data_dir / "bright", tmp_path / "bright"))
+    (results,) = (run_dir / "results").iterdir()
+    assert len(read_spray([results]).shots) == 2
+    spoil(results)
+    with pytest.raises(DropletFileError, match=said):
+        read_spray([results])
 
 
 def test_the_page_tells_numbers_with_intervals_and_reasons(measured: Serving) -> None:
