@@ -18,8 +18,10 @@ def serve(options: Namespace) -> Outcome:
     """Serve until interrupted; whoever else has the port, the data directory or the rig is named before all else."""
     from server.rig.config import load_config
     from server.rig.rig_lock import hold_data_dir, hold_rig
+    from server.web.malloc_arenas import keep_few_arenas
     from server.web.port import listening
 
+    keep_few_arenas()
     config = load_config(options.config)
     server = config.server.moved(options.host, options.port)
     with (
