@@ -7,6 +7,7 @@ from scipy.optimize import minimize_scalar
 
 from processing.calibration.calibration import Model, ViewCalibration
 from processing.calibration.fit.placement import OBLIQUE_DEG, line_angle_deg, sight_azimuth_deg
+from processing.calibration.fit.shear_check import check_shear
 from processing.calibration.observation import CalibrationSet
 from processing.calibration.triangulation import linearise
 from processing.calibration.verdict import Doubt
@@ -51,6 +52,7 @@ def check_scales(calibration_set: CalibrationSet, views: Mapping[str, ViewCalibr
     mappings = {name: view.mapping for name, view in views.items()}
     yield from _longer(calibration_set, mappings)
     yield from _askew(mappings)
+    yield from check_shear(mappings)
 
 
 def _other_scales(found_px_per_mm: Mapping[str, float], said_px_per_mm: Mapping[str, float]) -> Iterator[Doubt]:
