@@ -123,6 +123,20 @@ def doubtful_views(
     return {name: float(angles.min()) for name, angles in off_deg.items() if angles.min() > DOUBTFUL_DEG}
 
 
+def opposite_views(
+    mappings: Mapping[str, ViewMapping], middle_mm: FloatArray, azimuths_deg: Mapping[str, float]
+) -> list[str]:
+    """Cameras whose lines of sight agree with the rig's azimuths, but run the other way than those of most others."""
+    beside_rad = {
+        name: np.deg2rad(sight_azimuth_deg(mapping, middle_mm) - azimuths_deg[name])
+        for name, mapping in mappings.items()
+        if name in azimuths_deg and isinstance(mapping, PinholeCamera)
+    }
+    alike = {name: np.cos(beside - next(iter(beside_rad.values()))) > 0 for name, beside in beside_rad.items()}
+    fewer = 2 * sum(alike.values()) <= len(alike)
+    return [name for name, same in alike.items() if same == fewer]
+
+
 def same_either_way(
     mappings: Mapping[str, ViewMapping], middle_mm: FloatArray, turned_deg: Mapping[str, int]
 ) -> list[str]:

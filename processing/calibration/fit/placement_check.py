@@ -9,6 +9,7 @@ from processing.calibration.fit.placement import (
     doubtful_views,
     exchanged_views,
     in_one_place,
+    opposite_views,
     same_either_way,
     sight_azimuth_deg,
     turned_views,
@@ -54,7 +55,16 @@ def check_placements(calibration_set: CalibrationSet, mappings: Mapping[str, Vie
             "azimuths count the other way, or all images are mirrored"
             + (f"; {upright}" if (upright := _upright(calibration_set, turned_deg)) else ""),
         )
-    yield from _doubtful(calibration_set, mappings, middle_mm)
+    doubtful_deg = doubtful_views(mappings, middle_mm, azimuths_deg)
+    yield from _doubtful(calibration_set, mappings, middle_mm, doubtful_deg)
+    in_line = {name: angle for name, angle in azimuths_deg.items() if not turned_deg and name not in doubtful_deg}
+    for name in opposite_views(mappings, middle_mm, in_line):
+        yield Doubt(
+            (name,),
+            f"{name}: {_both_azimuths(calibration_set, name, mappings[name], middle_mm)}, on the other side of the "
+            "target than the other views agree on: do x and z count the other way there, or is its azimuth half a turn "
+            "off?",
+        )
     for one, other in in_one_place(mappings, middle_mm):
         yield Doubt(
             (one, other),
@@ -64,11 +74,13 @@ def check_placements(calibration_set: CalibrationSet, mappings: Mapping[str, Vie
 
 
 def _doubtful(
-    calibration_set: CalibrationSet, mappings: Mapping[str, ViewMapping], middle_mm: FloatArray
+    calibration_set: CalibrationSet,
+    mappings: Mapping[str, ViewMapping],
+    middle_mm: FloatArray,
+    doubtful_deg: Mapping[str, float],
 ) -> Iterator[Doubt]:
     """Views beside their azimuths, and what would explain it; refuses those that stand in the places of others."""
     azimuths_deg = calibration_set.azimuths_deg
-    doubtful_deg = doubtful_views(mappings, middle_mm, azimuths_deg)
     if not doubtful_deg:
         return
     if exchanged := list(_exchanged(mappings, middle_mm, azimuths_deg)):

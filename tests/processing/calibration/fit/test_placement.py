@@ -190,3 +190,19 @@ def test_axes_are_those_of_the_target_however_the_camera_is_turned(roll_deg: flo
     seen_px = small.project(np.column_stack([on_board_mm, np.zeros(len(points))]))
     assert len(points) > 0.97 * size[0] * size[1]
     assert np.abs(seen_px - points.image_px).max() < 0.5
+
+
+def test_a_view_whose_x_and_z_count_the_other_way_is_doubted() -> None:
+    """Right-handed, and on the line of the rig; but its lines of sight meet no other."""
+    seen = rig(AZIMUTHS_DEG)
+    planes = tuple(replace(plane, points_mm=plane.points_mm * (-1, 1, -1)) for plane in seen.views["view3"].planes)
+    views = {**seen.views, "view3": replace(seen.views["view3"], planes=planes)}
+    calibration = calibrate(replace(seen, views=views))
+    assert [name for name, view in calibration.views.items() if view.verdict == "warn"] == ["view3"]
+    assert "on the other side of the target" in " ".join(calibration.notes)
+
+
+def test_views_from_both_sides_and_azimuths_that_all_count_the_other_way_are_no_matter() -> None:
+    sides = {"view1": 30.0, "view2": -30.0, "view3": 170.0}
+    assert calibrate(rig(sides)).notes == ()
+    assert calibrate(replace(rig(sides), azimuths_deg={name: angle - 180 for name, angle in sides.items()})).notes == ()
