@@ -74,6 +74,7 @@ def calibrate(
     if placed:
         missed_px = rays_miss_px(calibration_set.views, {name: view.mapping for name, view in views.items()})
         views = {name: replace(view, rays_miss_px=missed_px.get(name)) for name, view in views.items()}
+    shapeless = [name for name, view in views.items() if not isinstance(view.mapping, PinholeCamera)]
     undated = Calibration(
         id="",
         created_utc=created_utc or datetime.now(UTC).isoformat(timespec="seconds"),
@@ -82,7 +83,7 @@ def calibrate(
         z_range_mm=_common_z_range_mm(calibration_set),
         source=calibration_set.source,
         notes=calibration_set.notes,
-        not_checked=tuple(not_checked(calibration_set, undirected)) if placed else (),
+        not_checked=tuple(not_checked(calibration_set, undirected, shapeless)) if placed else (),
     ).doubted(disordered or (_doubts(calibration_set, views) if placed else ()))
     return undated.with_id(content_id(undated))
 

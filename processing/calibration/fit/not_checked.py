@@ -12,7 +12,9 @@ DROPLETS = Unchecked(
 """Told by droplets alone: the points of each view are labelled by what that view shows."""
 
 
-def not_checked(calibration_set: CalibrationSet, undirected: Sequence[str]) -> Iterator[Unchecked]:
+def not_checked(
+    calibration_set: CalibrationSet, undirected: Sequence[str], shapeless: Sequence[str]
+) -> Iterator[Unchecked]:
     """What nothing tells of a set at known places.
 
     Parameters
@@ -21,6 +23,8 @@ def not_checked(calibration_set: CalibrationSet, undirected: Sequence[str]) -> I
         With all that was stated.
     undirected : sequence of str
         Views whose perspective is too weak to tell right-handed axes from left-handed ones.
+    shapeless : sequence of str
+        Views whose model has no pixels that ought to be square.
     """
     if undirected:
         yield Unchecked(
@@ -42,6 +46,12 @@ def not_checked(calibration_set: CalibrationSet, undirected: Sequence[str]) -> I
         yield Unchecked(
             f"whether the scale of {', '.join(unscaled)} is right: pitch_mm, z_mm, and their unit",
             f"scale_px_per_mm of {', '.join(unscaled)}: magnification over pixel pitch",
+        )
+    if shapeless:
+        yield Unchecked(
+            f"whether x, y and z of {', '.join(shapeless)} are in one unit, and square to each other: a polynomial "
+            "fits a wrong pitch, step or travel of the stage as well as the right ones",
+            "--model pinhole once, which asks whether pixels are square",
         )
     if calibration_set.unplaced_pixels:
         names = ", ".join(calibration_set.unplaced_pixels)

@@ -16,7 +16,10 @@ SIZE_PX = (1200, 1000)
 
 
 def calibrated(
-    z_mm: Sequence[float], claimed_mm: Sequence[float], azimuths_deg: Mapping[str, float] | None = None
+    z_mm: Sequence[float],
+    claimed_mm: Sequence[float],
+    azimuths_deg: Mapping[str, float] | None = None,
+    model: str = "pinhole",
 ) -> Calibration:
     """Of planes that stand somewhere, and are said to stand somewhere else."""
     x_mm, y_mm = np.meshgrid(np.linspace(-8, 8, 9), np.linspace(-6, 6, 7))
@@ -31,7 +34,7 @@ def calibrated(
             seen_px = camera.project(true) + rng.normal(0, 0.03, (63, 2))
             planes.append(PlaneObservation(f"z {said_mm}", said, seen_px, said_mm))
         views[name] = ViewObservations(SIZE_PX, tuple(planes))
-    return calibrate(CalibrationSet("set", None, views, azimuths_deg=azimuths_deg or {}))
+    return calibrate(CalibrationSet("set", None, views, azimuths_deg=azimuths_deg or {}), model)
 
 
 def test_two_planes_at_a_wrong_distance_fit_and_that_is_said() -> None:
@@ -50,3 +53,9 @@ def test_a_third_plane_or_the_azimuths_tell(
     calibration = calibrated(z_mm, claimed_mm, azimuths_deg)
     assert {view.verdict for view in calibration.views.values()} <= {Verdict.WARN, Verdict.REFUSE}
     assert not [one for one in calibration.not_checked if "two planes" in one.what]
+
+
+@pytest.mark.parametrize(("model", "says"), [("pinhole", False), ("polynomial", True)])
+def test_a_polynomial_says_that_it_fits_any_pitch_and_step(model: str, says: bool) -> None:
+    calibration = calibrated((-4, -2, 0, 2, 4), (-4.2, -2.1, 0, 2.1, 4.2), model=model)
+    assert any("step or travel of the stage" in one.what for one in calibration.not_checked) == says
