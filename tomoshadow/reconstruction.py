@@ -19,6 +19,7 @@ from processing.preprocessing import Intensity, Polarity, Preprocessing
 from processing.reconstruction import smart as iterative
 from processing.reconstruction.choices import Accuracy, ReconstructionMethod
 from processing.reconstruction.line_of_sight import line_of_sight
+from processing.reconstruction.planning.common_volume import too_coarse
 from processing.reconstruction.planning.plan import Plan, plan_reconstruction
 from processing.reconstruction.smart import SmartResult
 from processing.runs.pipeline import default_grid
@@ -79,13 +80,21 @@ def plan(
         Too few or too many views, or a mapping too rough to be sampled.
     ValueError
         A view is named twice.
+
+    Warns
+    -----
+    UserWarning
+        Voxels are so wide that droplets are missed between them.
     """
     names = tuple(calibration.views if views is None else views)
     if twice := sorted({name for name in names if names.count(name) > 1}):
         raise ValueError(f"views {', '.join(twice)} are named twice; each sees the volume once")
     calibration.require_usable(names)
     mappings = [calibration.views[name].mapping for name in names]
-    return plan_reconstruction(mappings, grid, Accuracy(accuracy), names)
+    planned = plan_reconstruction(mappings, grid, Accuracy(accuracy), names)
+    if coarse := too_coarse(mappings, grid):
+        warnings.warn(coarse, stacklevel=2)
+    return planned
 
 
 def intensity(

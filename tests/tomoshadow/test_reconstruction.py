@@ -54,6 +54,12 @@ def test_images_belong_to_views_by_name_whatever_their_order(method: str) -> Non
     np.testing.assert_array_equal(backwards, by_hand)
 
 
+def test_voxels_between_which_droplets_are_missed_are_told() -> None:
+    coarse = ts.VoxelGrid.centred((4, 6, 8), 0.5)
+    with pytest.warns(UserWarning, match=r"a voxel is [\d.]+ px wide, .* one voxel per pixel has a pitch of 0"):
+        ts.plan(calibration(), coarse)
+
+
 @pytest.mark.parametrize("method", ["mlos", "smart", "mart"])
 def test_an_image_too_few_or_too_many_is_an_error_that_names_it(method: str) -> None:
     plan, seen = ts.plan(calibration(), GRID), images()

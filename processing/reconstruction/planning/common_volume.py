@@ -9,6 +9,8 @@ from processing.geometry import FloatArray, ViewMapping
 from processing.reconstruction.errors import ReconstructionError
 from processing.volume import VoxelGrid
 
+MOST_PX_PER_VOXEL = 2.0
+"""Voxels are looked at in their middle: between wider ones, droplets of a few pixels are missed."""
 LATTICE = 81
 """Points along x and y at which visibility is looked up."""
 LEVELS = 17
@@ -84,6 +86,18 @@ def share_within(
         held_mm = min(within_mm[-1], high_mm) - max(within_mm[0], low_mm)
         shares.append(max(held_mm, 0.0) / (high_mm - low_mm))
     return float(np.prod(shares))
+
+
+def too_coarse(mappings: Sequence[ViewMapping], grid: VoxelGrid) -> str:
+    """What to say of voxels that are wider than ``MOST_PX_PER_VOXEL``; empty where they are not."""
+    middle_mm = grid.to_mm((np.array([grid.shape]) - 1) / 2)[0]
+    finest_px_per_mm = max(scale_px_per_mm(mapping, middle_mm) for mapping in mappings)
+    if (width_px := grid.pitch_mm * finest_px_per_mm) <= MOST_PX_PER_VOXEL:
+        return ""
+    return (
+        f"a voxel is {width_px:.2g} px wide, and looked at in its middle alone: droplets of a few pixels are missed or "
+        f"pale; one voxel per pixel has a pitch of {1 / finest_px_per_mm:.3g} mm"
+    )
 
 
 def largest_box(seen: NDArray[np.bool_]) -> tuple[int, int, int, int, int, int] | None:
