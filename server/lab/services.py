@@ -22,7 +22,7 @@ from server.lab.duty import Duty, Lamp
 from server.lab.engine.task import Engine, Task
 from server.lab.events import EventPublisher
 from server.lab.jobs import JobKind, JobTable
-from server.lab.live import LiveFeed
+from server.lab.live_view.live_feed import LiveFeed
 from server.lab.monitor import RigMonitor
 from server.lab.runner import JobRunner
 from server.lab.runs.run_store import RunStore

@@ -62,17 +62,37 @@ def frame_png(image: NDArray[Any], bits: int, stretch: Stretch = Stretch.AUTO, w
     return _encode(".png", to_grey(_narrowed(image, width_px), bits, stretch))
 
 
-def preview_jpeg(image: NDArray[Any], bits: int, width_px: int) -> bytes:
+def preview_jpeg(image: NDArray[Any], bits: int, stretch: Stretch, width_px: int) -> bytes:
     """Small JPEG of a camera frame for the live view, about 1 ms of work."""
-    return _encode(
-        ".jpg", to_grey(_narrowed(image, width_px), bits, Stretch.AUTO), cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY
+    rough = halved(image) if image.shape[1] >= 2 * width_px else image  # a quarter of the work, hardly to be seen
+    small = _narrowed(rough, width_px)
+    return _encode(".jpg", to_grey(small, bits, stretch), cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY)
+
+
+def halved(image: NDArray[Any]) -> NDArray[Any]:
+    """A frame at half its size, each pixel the mean of four."""
+    rows, columns = image.shape
+    size_px = (max(1, columns // 2), max(1, rows // 2))
+    return np.asarray(cv2.resize(image, size_px, interpolation=cv2.INTER_AREA))
+
+
+def square_at(image: NDArray[Any], row: int, column: int, size_px: int) -> NDArray[Any]:
+    """A square part of a frame around a pixel; beyond the edge there are zeros."""
+    square = np.zeros((size_px, size_px), image.dtype)
+    (rows, to_rows), (columns, to_columns) = (
+        _overlap(middle - size_px // 2, size_px, length)
+        for middle, length in zip((row, column), image.shape, strict=True)
     )
+    square[to_rows, to_columns] = image[rows, columns]
+    return square
 
 
 def to_grey(image: NDArray[Any], bits: int, stretch: Stretch) -> Grey:
     """Brightness 0 to 255 of grey values."""
     full = float(2**bits - 1)
-    low, high = (0.0, full) if stretch is Stretch.FULL else _limits(image, full)
+    if stretch is Stretch.FULL:
+        return np.asarray(cv2.convertScaleAbs(image, alpha=255 / full), np.uint8)
+    low, high = _limits(image, full)
     scaled = (image.astype(np.float32) - low) * (255.0 / (high - low))
     grey: Grey = np.clip(np.rint(scaled), 0, 255).astype(np.uint8)
     return grey
@@ -84,6 +104,12 @@ def plane_png(plane: NDArray[Any], limit: float, colours: Colours = Colours.HEAT
     if colours is Colours.HEAT:
         return _encode(".png", np.asarray(cv2.applyColorMap(grey, cv2.COLORMAP_INFERNO)))
     return _encode(".png", _SHADES[colours][grey])
+
+
+def _overlap(first: int, size: int, length: int) -> tuple[slice, slice]:
+    """Which part of a line is in a window that begins at ``first``, and where in the window that lies."""
+    start, stop = min(max(first, 0), length), min(max(first + size, 0), length)
+    return slice(start, stop), slice(start - first, stop - first)
 
 
 def _limits(image: NDArray[Any], full: float) -> tuple[float, float]:

@@ -26,7 +26,7 @@ from server.lab.desk.request_table import REQUESTS_FILE, opened_requests
 from server.lab.duty import Duty, Work
 from server.lab.job_recovery import opened_table
 from server.lab.jobs import JobTable
-from server.lab.live import LiveFeed
+from server.lab.live_view.live_feed import LiveFeed
 from server.lab.monitor import RigMonitor
 from server.lab.reconstruction import follow_acquisition
 from server.lab.runner import JobRunner

@@ -2,19 +2,22 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Path, Query, Response
 from pydantic import Field
 
 from daq.frozen_model import FrozenModel
+from daq.names import ViewName
 from daq.run.state import RunState
 from daq.run_plan import LivePlan
-from server.lab.live import LiveCaption
+from server.lab.live_view.live_feed import ExposureName, LiveCaption
 from server.lab.starting.command import tell_deed
 from server.lab.starting.light_request import obey
+from server.pictures.pictures import Stretch, frame_png, square_at
 from server.web.api.parameters import AsksForLight, ContextOf, Who
 from server.web.problems import responses
 
-router = APIRouter(prefix="/api/rig/live", tags=["rig"])
+PIXELS_PATH = "/api/rig/live"
+router = APIRouter(prefix=PIXELS_PATH, tags=["rig"])
 
 
 class LiveView(FrozenModel):
@@ -48,3 +51,24 @@ def end_live(context: ContextOf, who: Who) -> LiveView:
     context.services.acquisition.end_live()
     tell_deed(context, who, "ended the live view")
     return show_live(context)
+
+
+@router.get(
+    "/{view}/{exposure}.png",
+    response_class=Response,
+    responses={**responses(404), 200: {"content": {"image/png": {}}}},
+)
+def show_pixels(
+    view: Annotated[ViewName, Path(description="name of a view")],
+    exposure: Annotated[ExposureName, Path(description="first or second exposure")],
+    context: ContextOf,
+    row: Annotated[int, Query(ge=0, le=65_535, description="of the middle of a part")] = 0,
+    column: Annotated[int, Query(ge=0, le=65_535, description="of the middle of a part")] = 0,
+    size_px: Annotated[int | None, Query(ge=2, le=512, description="edge of a part; without it, the frame")] = None,
+    scale: Annotated[Stretch, Query(description="full: grey values as they are; auto: stretched")] = Stretch.FULL,
+) -> Response:
+    """The newest shot of a view, pixel by pixel, or a square part of it; beyond the edge of the frame it is black."""
+    image = context.live.image(view, exposure)
+    part = image if size_px is None else square_at(image, row, column, size_px)
+    bits = context.services.rig.cameras[view].bits
+    return Response(frame_png(part, bits, scale), media_type="image/png", headers={"Cache-Control": "no-store"})

@@ -35,8 +35,8 @@ def test_an_even_frame_is_no_error() -> None:
 
 def test_pictures_are_narrowed_and_never_widened() -> None:
     image = np.zeros((60, 80), np.uint8)
-    for width_px, expected in ((40, (30, 40)), (160, (60, 80))):
-        jpeg = preview_jpeg(image, 8, width_px)
+    for width_px, expected in ((40, (30, 40)), (20, (15, 20)), (160, (60, 80))):
+        jpeg = preview_jpeg(image, 8, Stretch.FULL, width_px)
         picture = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_UNCHANGED)
         assert picture is not None
         assert picture.shape == expected

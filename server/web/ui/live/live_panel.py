@@ -10,7 +10,7 @@ from nicegui.events import GenericEventArguments
 from daq.errors import DaqError
 from daq.run.state import RunState
 from daq.run_plan import LivePlan
-from server.lab.errors import ServerError
+from server.lab.errors import ServerError, refusal_text
 from server.lab.services import Context
 from server.lab.starting.light_request import obey
 from server.lab.starting.run_start import SingleShot, shoot
@@ -20,6 +20,7 @@ from server.web.ui.live.live_tiles import LiveTiles
 from server.web.ui.theme import panel
 
 _FIELDS = LivePlan.model_fields
+_HINT = "No picture yet. Live shows the cameras and records nothing; Shoot one takes a single shot."
 
 
 class LivePanel:
@@ -38,7 +39,6 @@ class LivePanel:
         self._acquisition = context.services.acquisition
         self._draft = draft
         with panel("Live"):
-            LiveTiles(list(context.services.config.views))
             with ui.row().classes("w-full gap-2 items-center"):
                 self._start = ui.button("Live", icon="videocam").props("outline dense no-caps")
                 self._start.on("click", self._on_start, js_handler=TICKET)
@@ -58,6 +58,7 @@ class LivePanel:
                 self._shoot.tooltip("One shot with the light of the form of a new run; the next one takes its place")
                 self._keep = ui.button("Keep shot", icon="save", on_click=self._on_keep).props("outline dense no-caps")
             self._refusal = ui.label("").classes("refusal").props('role=alert aria-label="live refusal"')
+            LiveTiles(context.services.rig.cameras, _HINT, full=True)
         self.refresh()
 
     def refresh(self) -> None:
@@ -72,8 +73,16 @@ class LivePanel:
 
     async def _on_start(self, click: GenericEventArguments) -> None:
         self._draft.adopt(shown_form(click.args))
+        await self._obey_start(click)
+
+    async def _obey_start(self, click: GenericEventArguments) -> None:
         if self._rate.validate():
             await self._try(partial(obey, self._context, light_request(click.args), "live", self._show))
+
+    async def apply(self, click: GenericEventArguments) -> None:
+        """Show pulses and currents that have changed, if the rig is shown live by them; gets the click that did it."""
+        if self._lit.value and self._acquisition.status().state is RunState.LIVE:
+            await self._obey_start(click)
 
     def _show(self) -> None:
         pulse = pulse_of(self._draft.values) if self._lit.value else None
@@ -96,6 +105,6 @@ class LivePanel:
         try:
             await asyncio.to_thread(action)
         except (DaqError, ServerError, ValueError) as error:
-            self._refusal.set_text(str(error))
+            self._refusal.set_text(refusal_text(error))
         else:
             self._refusal.set_text("")

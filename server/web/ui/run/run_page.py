@@ -16,7 +16,7 @@ class RunPage:
     def __init__(self, context: Context, draft: DraftStore) -> None:
         with ui.element("div").classes("columns"):
             with ui.element("div").classes("column"), panel("Cameras"):
-                LiveTiles(list(context.services.config.views))
+                LiveTiles(context.services.rig.cameras, "no picture yet")
             with ui.element("div").classes("column controls"):
                 self._run, self._form = RunPanel(context), RunForm(context, draft)
 

@@ -1,0 +1,249 @@
+"""The pages Rig and Live in a real browser: what an operator needs to align cameras and to set light."""
+
+import math
+import os
+import re
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from nicegui import app as pages
+from playwright.sync_api import Locator, Page, WebSocket, expect
+
+from server.web.app import create_app
+from tests.support.operator import VIEWS, go_to
+from tests.support.server_process import eventually
+from tests.support.serving import Serving, serving
+
+pytestmark = pytest.mark.timeout(600)
+
+PICTURES = os.environ.get("TOMOSHADOW_PICTURES")
+PULSE = {"current_a": dict.fromkeys(VIEWS, 5)}
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
+    pages.middleware_stack = None  # NiceGUI has one application per process; another module may have used it
+    with serving(tmp_path_factory.mktemp("live") / "runs", build=create_app, views=VIEWS) as server:
+        yield server
+
+
+@pytest.fixture(autouse=True)
+def at_rest(server: Serving) -> Iterator[None]:
+    yield
+    laboratory(server).close_door()
+    server.http.post("/api/rig/abort")
+    server.wait()
+    server.http.post("/api/rig/acknowledge")
+
+
+def laboratory(server: Serving) -> Any:
+    return server.services.laboratory
+
+
+def open_live(page: Page, server: Serving) -> Locator:
+    page.goto(f"{server.http.base_url}/live")
+    return page.get_by_role("region", name="Live", exact=True)
+
+
+def show_live(page: Page, server: Serving, rate_hz: str = "10") -> Locator:
+    live = open_live(page, server)
+    live.get_by_label("Live / Hz").fill(rate_hz)
+    live.get_by_role("button", name="Live", exact=True).click()
+    expect(page.get_by_role("status", name="rig state")).to_have_text("LIVE")
+    return live
+
+
+def caption(live: Locator, view: str = "view1") -> Locator:
+    return live.get_by_role("status", name=f"{view} newest shot")
+
+
+def tile_of(live: Locator, view: str = "view1") -> Locator:
+    return live.get_by_role("img", name=f"{view} live view")
+
+
+def brightness(canvas: Locator) -> float:
+    """Mean of what a canvas shows, 0 to 255."""
+    mean = canvas.evaluate(
+        "c => { const copy = new OffscreenCanvas(c.width, c.height).getContext('2d', { willReadFrequently: true });"
+        " copy.drawImage(c, 0, 0); const d = copy.getImageData(0, 0, c.width, c.height).data;"
+        " let s = 0; for (let i = 0; i < d.length; i += 4) s += d[i]; return 4 * s / d.length; }"
+    )
+    return float(mean)
+
+
+def test_an_empty_page_says_what_to_do_first(page: Page, server: Serving) -> None:
+    live = open_live(page, server)
+    expect(live.get_by_text("No picture yet. Live shows the cameras and records nothing")).to_have_count(len(VIEWS))
+    page.get_by_role("button", name="Set to half range").click()
+    expect(page.get_by_role("status", name="light assistant")).to_contain_text("show the rig live with pulsed light")
+    _picture(page, "live-empty")
+
+
+def test_a_tile_tells_light_saturation_focus_and_rate(page: Page, server: Serving) -> None:
+    live = show_live(page, server)
+    figures = live.get_by_role("group", name="view1 figures")
+    expect(caption(live)).to_have_text(re.compile(r"^shot \d+ · \d+\.\d s old · A \d+ % · B \d+ % · \d+\.\d Hz$"))
+    expect(figures).to_contain_text(re.compile(r"light \d+ % of range, half is the aim"))
+    expect(figures).to_contain_text("saturated 0.00 %")
+    expect(figures).to_contain_text(re.compile(r"focus \d+\.\d %/px \(best \d+\.\d\)"))
+    expect(figures.get_by_role("img", name="view1 histogram")).to_be_visible()
+
+
+def test_a_dark_frame_looks_dark_until_the_operator_stretches_it(page: Page, server: Serving) -> None:
+    live = show_live(page, server)
+    expect(caption(live)).to_have_text(re.compile("A [1-9]"))
+    lit = brightness(tile_of(live))
+    live.get_by_role("button", name="view1 stretched grey scale").click()
+    eventually(lambda: brightness(tile_of(live)) > lit + 15, "the stretched picture is brighter")
+    live.get_by_role("button", name="view1 stretched grey scale").click()
+    live.get_by_role("switch", name="Pulsed light").click()
+    live.get_by_role("button", name="Apply").click()
+    expect(caption(live)).to_have_text(re.compile("A 0 % · B 0 %"))
+    eventually(lambda: brightness(tile_of(live)) < 2, "the dark looks dark")
+    expect(live.get_by_role("group", name="view1 figures")).to_contain_text("focus: no light")
+
+
+def test_a_tile_shows_the_other_exposure_and_a_hidden_one_costs_nothing(page: Page, server: Serving) -> None:
+    wishes = wishes_of(page)
+    live = show_live(page, server)
+    expect(caption(live)).to_have_text(re.compile("^shot"))
+    live.get_by_role("button", name="view1 exposure A").click()
+    expect(live.get_by_role("button", name="view1 exposure A")).to_have_attribute("aria-pressed", "true")
+    eventually(lambda: '"view1":{"exposure":"a","scale":"full"}' in wishes[-1], "exposure A is asked for")
+    live.get_by_role("button", name="view2 hidden").click()
+    eventually(lambda: "view2" not in wishes[-1], "nobody asks for view2")
+    expect(caption(live, "view2")).to_have_text("hidden")
+    feed = server.app.state.context.live
+    eventually(lambda: {view for view, _ in feed._pictures} == set(VIEWS) - {"view2"}, "nothing is made of view2")
+    page.evaluate("Object.defineProperty(document, 'hidden', { value: true, configurable: true })")
+    page.evaluate("document.dispatchEvent(new Event('visibilitychange'))")
+    eventually(lambda: wishes[-1] == "{}", "a page in the background asks for nothing")
+    page.evaluate("delete document.hidden; document.dispatchEvent(new Event('visibilitychange'))")
+    eventually(lambda: '"view3"' in wishes[-1], "it asks again when it is seen")
+
+
+def test_the_loupe_shows_pixels_one_to_one_and_the_cross_hair_the_middle(page: Page, server: Serving) -> None:
+    live = show_live(page, server, "2")
+    expect(caption(live)).to_have_text(re.compile("^shot"))
+    live.get_by_role("button", name="Cross-hair").click()
+    expect(live.get_by_role("img", name="view1 cross-hair")).to_be_visible()
+    live.get_by_role("button", name="Loupe 1:1").click()
+    tile = tile_of(live)
+    tile.hover(position={"x": 100, "y": 90})
+    loupe = live.get_by_role("img", name="view1 loupe")
+    expect(loupe).to_be_visible()
+    eventually(lambda: brightness(loupe) > 100, "the loupe shows what is at the mouse")
+    point = live.locator(".live-point")
+    expect(point).to_have_text(re.compile(r"^view1: column \d+, row \d+ px$"))
+    before = point.inner_text()
+    tile.focus()
+    page.keyboard.press("ArrowRight")
+    expect(point).not_to_have_text(before)
+    _picture(page, "live-loupe")
+
+
+def test_the_slider_of_a_current_asks_once_and_the_form_agrees(page: Page, server: Serving) -> None:
+    open_live(page, server)
+    thumb = page.get_by_label("LED view1 current").locator(".q-slider__track-container")
+    box = thumb.bounding_box()
+    assert box is not None
+    page.evaluate(
+        "() => { const emit = window.socket.emit; window.sent = [];"
+        " window.socket.emit = function (...all) { window.sent.push(all[0]); return emit.apply(this, all); }; }"
+    )
+    page.mouse.move(box["x"] + 5, box["y"] + box["height"] / 2)
+    page.mouse.down()
+    for step in range(40):
+        page.mouse.move(box["x"] + 5 + step * box["width"] / 50, box["y"] + box["height"] / 2)
+        threading.Event().wait(0.02)
+    page.mouse.up()
+    number = page.get_by_label("LED view1 / A")
+    expect(number).to_have_value(re.compile(r"^9\.\d$"))
+    sent = page.evaluate("window.sent")
+    assert 1 <= sent.count("event") <= 5
+    value = number.input_value()
+    go_to(page, "Run")
+    expect(page.get_by_label("LED view1 / A")).to_have_value(value)
+
+
+def test_the_assistant_sets_currents_to_half_range_and_says_what_it_did(page: Page, server: Serving) -> None:
+    live = show_live(page, server)
+    expect(caption(live)).to_have_text(re.compile("^shot"))
+    page.get_by_role("button", name="Set to half range").click()
+    advice = page.get_by_role("status", name="light assistant")
+    expect(advice).to_contain_text(re.compile(r"By shot \d+, 0 s old:"))
+    expect(advice).to_contain_text(re.compile(r"view1: 7\d % at \d[\d.]* A: set to \d[\d.]* A"))
+    eventually(lambda: shown_current_a(server, "view1") < 9, "it is shown")
+    page.wait_for_function("() => document.querySelector('.live-caption').textContent.startsWith('shot')")
+    page.get_by_role("button", name="Set to half range").click()
+    expect(advice).to_contain_text("not proportional")  # in memory, light does not depend on current
+    _picture(page, "live-assistant")
+
+
+def test_the_timing_follows_the_form_and_says_why_it_is_impossible(page: Page, server: Serving) -> None:
+    open_live(page, server)
+    timing = page.get_by_role("region", name="Timing")
+    expect(timing).to_contain_text("separation 6400 ns, pulses 1000 ns")
+    page.get_by_label("Separation / ns").fill("12000")
+    expect(timing).to_contain_text("separation 12 µs")
+    page.get_by_label("Separation / ns").fill("2500")
+    problem = timing.get_by_role("alert", name="timing problem")
+    expect(problem).to_contain_text("is below 3400 ns")
+    expect(problem).to_contain_text("change rate, width or separation")
+    page.get_by_label("Separation / ns").fill("6400")
+    expect(problem).to_be_hidden()
+
+
+def test_a_refusal_of_the_live_view_has_its_remedy(page: Page, server: Serving) -> None:
+    live = open_live(page, server)
+    laboratory(server).open_door()
+    live.get_by_role("button", name="Live", exact=True).click()
+    expect(live.get_by_role("alert", name="live refusal")).to_contain_text("(close the door)")
+
+
+@pytest.mark.parametrize("width", [800, 1280, 1920])
+def test_the_live_page_fits_every_width_dark_and_light(page: Page, server: Serving, width: int) -> None:
+    page.set_viewport_size({"width": width, "height": 1000})
+    live = show_live(page, server)
+    expect(caption(live)).to_have_text(re.compile("Hz$"))
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "the page is wider than the window"
+    expect_nothing_cut(page)
+    for shade in ("dark", "light"):
+        _picture(page, f"live-{width}-{shade}")
+        page.get_by_role("button", name="dark or light").click()
+
+
+def shown_current_a(server: Serving, view: str) -> float:
+    """Current of a view that the live view is shown by."""
+    plan = server.services.acquisition.status().live
+    return plan.pulse.current_a[view] if plan and plan.pulse else math.inf
+
+
+def expect_nothing_cut(page: Page) -> None:
+    words = page.locator(".q-field__label, .live-caption, .live-figures *, .live-choice button, .device-card *")
+    cut = words.evaluate_all(
+        "found => found.filter(one => one.scrollWidth > one.clientWidth + 1 && one.clientWidth"
+        " && getComputedStyle(one).display !== 'inline').map(one => one.className + ': ' + one.textContent)"
+    )
+    assert cut == []
+
+
+def wishes_of(page: Page) -> list[str]:
+    """What the page says to the live socket, from now on."""
+    wishes = ["nothing yet"]
+
+    def listen(socket: WebSocket) -> None:
+        if socket.url.endswith("/api/live"):
+            socket.on("framesent", lambda payload: wishes.append(str(payload)))
+
+    page.on("websocket", listen)
+    return wishes
+
+
+def _picture(page: Page, name: str) -> None:
+    if PICTURES:
+        page.wait_for_timeout(1000)
+        page.screenshot(path=str(Path(PICTURES) / f"{name}.png"))
