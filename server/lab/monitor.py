@@ -7,15 +7,16 @@ import asyncio
 import contextlib
 import shutil
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
+from threading import Lock
 
-from daq.devices import Camera, Device, GeneratorState, Rig, TranslationStage
+from daq.devices import Camera, Device, DeviceIdentity, GeneratorState, Rig, TranslationStage
 from daq.errors import DaqError
 from server.lab.duty import Duty, Health, Lamp, pause
-from server.lab.errors import told
+from server.lab.errors import Conflict, NotFound, told
 from server.rig.laboratory import Laboratory
 
 _PERIOD_S = 1.0
@@ -65,7 +66,7 @@ class RigMonitor:
         self._data_dir = data_dir
         self._resting = resting
         self._laboratory = laboratory
-        self._who: dict[str, str] = {}
+        self._who: dict[str, DeviceIdentity] = {}
         self._watched = tuple(_Watched(name, kind, look, now_s) for name, kind, look in self._looks())
         self._threads = ThreadPoolExecutor(len(self._watched), thread_name_prefix="lamp")
 
@@ -73,6 +74,29 @@ class RigMonitor:
     def lamps(self) -> tuple[Lamp, ...]:
         """What every device answers; never green where that is long ago."""
         return tuple(watched.lamp for watched in self._watched)
+
+    @property
+    def identities(self) -> Mapping[str, DeviceIdentity]:
+        """Who the devices are that have said so, by the names of their lamps."""
+        return dict(self._who)
+
+    async def reconnect(self, name: str) -> None:
+        """Ask a device now who and how it is, and open it again if it was lost.
+
+        Raises
+        ------
+        NotFound
+            No lamp has this name.
+        Conflict
+            A run is under way.
+        """
+        watched = next((one for one in self._watched if one.name == name), None)
+        if watched is None:
+            raise NotFound(f"there is no device {name!r}")
+        if not self._resting():
+            raise Conflict(f"{name}: devices are opened again between runs only; wait for the end of what goes on")
+        self._who.pop(name, None)
+        await self._ask(watched)
 
     async def run(self, duty: Duty) -> None:
         """Ask until cancelled."""
@@ -109,14 +133,18 @@ class RigMonitor:
             if self._resting():
                 camera.recover()
             camera.ask()
-        return Health.OK, self._who[view]
+        return Health.OK, self._told(view)
 
     def _stage(self, stage: TranslationStage) -> tuple[Health, str]:
         with self._known("stage", stage):
             if self._resting():
                 stage.recover()
             stage.position_mm()
-        return Health.OK, self._who["stage"]
+        return Health.OK, self._told("stage")
+
+    def _told(self, name: str) -> str:
+        known = self._who.get(name)
+        return f"{known.vendor} {known.model}, {known.serial}" if known else ""
 
     @contextlib.contextmanager
     def _known(self, name: str, device: Device) -> Iterator[None]:
@@ -127,19 +155,19 @@ class RigMonitor:
             self._who.pop(name, None)  # whoever answers next may be another one
             raise
         if name not in self._who and self._resting():
-            known = device.identity()
-            self._who[name] = f"{known.vendor} {known.model}, {known.serial}"
-        self._who.setdefault(name, "")
+            self._who[name] = device.identity()
 
     def _generator(self) -> tuple[Health, str]:
-        if self._resting():
-            self._rig.generator.recover()
-        status = self._rig.generator.status()
+        with self._known("pulse generator", self._rig.generator):
+            if self._resting():
+                self._rig.generator.recover()
+            status = self._rig.generator.status()
         health = Health.FAULT if status.state is GeneratorState.FAULT else Health.OK
         return health, ", ".join([status.state.value, *status.faults])
 
     def _interlock(self) -> tuple[Health, str]:
-        closed = self._rig.interlock.is_closed()
+        with self._known("interlock", self._rig.interlock):
+            closed = self._rig.interlock.is_closed()
         return (Health.OK, "closed") if closed else (Health.FAULT, "open: the light is locked")
 
     def _disk(self) -> tuple[Health, str]:
@@ -158,15 +186,17 @@ class _Watched:
         self._answer = (Health.WARN, "not asked yet")
         self._answered_s: float | None = None
         self._silence = ""
+        self._asking = Lock()
 
     def ask(self) -> None:
         """Ask once; an error of any kind is a red lamp, and hides no other device."""
-        try:
-            answer = self._look()
-        except Exception as error:  # noqa: BLE001  a driver's own mistake must not freeze the lamp
-            self._silence = told(error)
-        else:
-            self._answer, self._answered_s, self._silence = answer, self._now_s(), ""
+        with self._asking:  # an operator asks too
+            try:
+                answer = self._look()
+            except Exception as error:  # noqa: BLE001  a driver's own mistake must not freeze the lamp
+                self._silence = told(error)
+            else:
+                self._answer, self._answered_s, self._silence = answer, self._now_s(), ""
 
     @property
     def lamp(self) -> Lamp:

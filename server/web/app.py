@@ -46,6 +46,7 @@ from server.web.api import (
     bench,
     calibrations,
     control,
+    devices,
     events,
     jobs,
     live,
@@ -70,6 +71,7 @@ from server.web.ui.page import mount_page
 
 _RESOURCES = (
     rig,
+    devices,
     readiness,
     alarms,
     live_view,

@@ -204,6 +204,66 @@ def test_a_refusal_of_the_live_view_has_its_remedy(page: Page, server: Serving) 
     expect(live.get_by_role("alert", name="live refusal")).to_contain_text("(close the door)")
 
 
+def test_a_card_per_device_says_who_how_and_what_to_do(page: Page, server: Serving) -> None:
+    page.goto(f"{server.http.base_url}/rig")
+    camera = page.get_by_role("region", name="view1", exact=True)
+    expect(camera).to_contain_text("tomoshadow memory, view1, firmware 1")
+    expect(camera).to_contain_text("128 x 96 px, 8 bit")
+    expect(page.get_by_role("region", name="pulse generator")).to_contain_text("at most 12 A, nominal 10 A, channel 1")
+    expect(page.get_by_role("region", name="interlock")).to_contain_text("closed")
+    expect(page.get_by_role("region", name="work in the background")).to_contain_text("all of it goes on")
+    expect(page.get_by_role("status", name="link budget")).to_contain_text("At most 47.6 pass: the limit is the camera")
+    camera.evaluate("card => card.dataset.mark = 'the same'")
+    laboratory(server).cameras["view1"].is_lost = True
+    laboratory(server).open_door()
+    expect(camera).to_contain_text("does not answer")
+    expect(camera).to_contain_text("Do: check power and cable of the camera")
+    expect(page.get_by_role("region", name="interlock")).to_contain_text("Do: close the door")
+    expect(camera).to_contain_text(re.compile(r"last answer \d+ s ago"))
+    _picture(page, "rig-trouble")
+    laboratory(server).cameras["view1"].is_lost = False
+    camera.get_by_role("button", name="Reconnect").click()
+    expect(camera).to_contain_text("tomoshadow memory, view1, firmware 1")
+    expect(camera).to_have_attribute("data-mark", "the same")
+
+
+def test_a_page_at_rest_changes_nothing(page: Page, server: Serving) -> None:
+    """Cards that are built anew four times a second cost browsers and readers; only what changes may change."""
+    page.goto(f"{server.http.base_url}/rig")
+    expect(page.get_by_role("region", name="view1", exact=True)).to_contain_text("firmware 1")
+    page.wait_for_timeout(500)
+    page.evaluate(
+        "() => { window.changes = 0; new MutationObserver(all => { window.changes += all.length; }).observe("
+        "document.querySelector('.desk-page'), { subtree: true, childList: true, characterData: true }); }"
+    )
+    page.wait_for_timeout(2000)
+    assert page.evaluate("window.changes") == 0
+
+
+def test_the_doctor_looks_when_asked_and_between_runs_only(page: Page, server: Serving) -> None:
+    page.goto(f"{server.http.base_url}/rig")
+    doctor = page.get_by_role("region", name="Doctor")
+    doctor.get_by_role("button", name="Examine").click()
+    expect(doctor.get_by_role("status", name="doctor")).to_have_text(re.compile(r"^\d+ things looked at: .*at \d"))
+    expect(doctor).to_contain_text("network of view1")
+    _picture(page, "rig-doctor")
+    server.http.put("/api/rig/live", json={"rate_hz": 2})
+    expect(doctor.get_by_role("button", name="Examine")).to_be_disabled()
+    expect(page.get_by_role("region", name="view1", exact=True).get_by_role("button")).to_be_disabled()
+
+
+@pytest.mark.parametrize("width", [800, 1280, 1920])
+def test_the_rig_page_fits_every_width_dark_and_light(page: Page, server: Serving, width: int) -> None:
+    page.set_viewport_size({"width": width, "height": 1000})
+    page.goto(f"{server.http.base_url}/rig")
+    expect(page.get_by_role("region", name="view1", exact=True)).to_contain_text("firmware 1")
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "the page is wider than the window"
+    expect_nothing_cut(page)
+    for shade in ("dark", "light"):
+        _picture(page, f"rig-{width}-{shade}")
+        page.get_by_role("button", name="dark or light").click()
+
+
 @pytest.mark.parametrize("width", [800, 1280, 1920])
 def test_the_live_page_fits_every_width_dark_and_light(page: Page, server: Serving, width: int) -> None:
     page.set_viewport_size({"width": width, "height": 1000})

@@ -71,9 +71,22 @@ def of_lamps(lamps: Iterable[Lamp]) -> Iterator[Alarm]:
         text = lamp.trouble
         if lamp.health is not Health.FAULT or (lamp.kind == "interlock" and text.startswith("open")):
             continue
-        latched = lamp.kind == "generator" and text.startswith("fault")
-        remedy = REMEDIES[RefusalCode.GENERATOR_FAULT] if latched else _OF_LAMPS[lamp.kind]
-        yield _alarm(lamp.name, text.removeprefix(f"{lamp.name}: "), remedy, latched=latched)
+        yield _alarm(lamp.name, text.removeprefix(f"{lamp.name}: "), remedy_of(lamp), latched=_is_latched(lamp))
+
+
+def remedy_of(lamp: Lamp) -> str:
+    """What to do about a lamp that is not green; empty for one that is."""
+    if lamp.health is Health.OK:
+        return ""
+    if lamp.kind == "interlock" and lamp.trouble.startswith("open"):
+        return REMEDIES[RefusalCode.INTERLOCK_OPEN]
+    if lamp.kind == "disk" and lamp.health is Health.WARN:
+        return REMEDIES[RefusalCode.DISK_FULL]
+    return REMEDIES[RefusalCode.GENERATOR_FAULT] if _is_latched(lamp) else _OF_LAMPS[lamp.kind]
+
+
+def _is_latched(lamp: Lamp) -> bool:
+    return lamp.kind == "generator" and lamp.trouble.startswith("fault")
 
 
 def of_causes(source: str, causes: Iterable[Cause], *, latched: bool) -> Iterator[Alarm]:

@@ -63,7 +63,7 @@ class Desk:
     def _routes(self) -> dict[str, Callable[[], None]]:
         context, draft = self._context, self._draft
         pages: dict[str, Callable[[], DeskPage]] = {
-            "/rig": lambda: RigPage(context),
+            "/rig": lambda: RigPage(context, draft),
             "/live": lambda: LivePage(context, draft),
             "/calibrate": lambda: CalibratePage(context),
             "/run": lambda: RunPage(context, draft),
