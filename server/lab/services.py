@@ -23,6 +23,7 @@ from server.lab.engine.task import Engine, Task
 from server.lab.events import EventPublisher
 from server.lab.jobs import JobKind, JobTable
 from server.lab.live_view.live_feed import LiveFeed
+from server.lab.live_view.live_volume import LiveVolume
 from server.lab.monitor import RigMonitor
 from server.lab.runner import JobRunner
 from server.lab.runs.run_store import RunStore
@@ -105,6 +106,7 @@ class Context:
     monitor: RigMonitor
     desk: DeskWatch
     live: LiveFeed
+    live_volume: LiveVolume
     parts: VolumeParts
     control: Control
     once: Once

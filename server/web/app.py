@@ -27,6 +27,7 @@ from server.lab.duty import Duty, Work
 from server.lab.job_recovery import opened_table
 from server.lab.jobs import JobTable
 from server.lab.live_view.live_feed import LiveFeed
+from server.lab.live_view.live_volume import LiveVolume
 from server.lab.monitor import RigMonitor
 from server.lab.reconstruction import follow_acquisition
 from server.lab.runner import JobRunner
@@ -51,6 +52,7 @@ from server.web.api import (
     jobs,
     live,
     live_view,
+    live_volume,
     readiness,
     rig,
     runs,
@@ -75,6 +77,7 @@ _RESOURCES = (
     readiness,
     alarms,
     live_view,
+    live_volume,
     single_shot,
     runs,
     shots,
@@ -234,6 +237,13 @@ def _context(services: Services, table: JobTable, index: RunIndex, once: Once) -
         monitor=RigMonitor(services.rig, services.data_dir, lambda: acquisition.status().resting, services.laboratory),
         desk=DeskWatch(acquisition.status, lambda: reasons_against(context), lambda: alarms_now(context)),
         live=LiveFeed(services.rig.cameras, lambda: acquisition.newest_shot, acquisition.keep_live),
+        live_volume=LiveVolume(
+            services.rig.cameras,
+            store,
+            lambda: acquisition.newest_shot,
+            lambda: acquisition.status().state,
+            services.settings,
+        ),
         parts=VolumeParts(),
         control=Control(lambda: not acquisition.status().resting, services.events.publish),
         once=once,

@@ -13,6 +13,8 @@ from nicegui import app as pages
 from playwright.sync_api import Locator, Page, WebSocket, expect
 
 from server.web.app import create_app
+from tests.support.drifting_views import SIZE_PX
+from tests.support.live_shots import save_droplet_calibration, spray_scene
 from tests.support.operator import VIEWS, go_to
 from tests.support.server_process import eventually
 from tests.support.serving import Serving, serving
@@ -27,6 +29,8 @@ PULSE = {"current_a": dict.fromkeys(VIEWS, 5)}
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
     pages.middleware_stack = None  # NiceGUI has one application per process; another module may have used it
     with serving(tmp_path_factory.mktemp("live") / "runs", build=create_app, views=VIEWS) as server:
+        for camera in laboratory(server).cameras.values():
+            camera.image_shape, camera._scene = SIZE_PX[::-1], spray_scene
         yield server
 
 
@@ -101,7 +105,7 @@ def test_a_dark_frame_looks_dark_until_the_operator_stretches_it(page: Page, ser
     live.get_by_role("button", name="view1 stretched grey scale").click()
     live.get_by_role("switch", name="Pulsed light").click()
     live.get_by_role("button", name="Apply").click()
-    expect(caption(live)).to_have_text(re.compile("A 0 % · B 0 %"))
+    expect(caption(live)).to_have_text(re.compile("A 2 % · B 2 %"))
     eventually(lambda: brightness(tile_of(live)) < 2, "the dark looks dark")
     expect(live.get_by_role("group", name="view1 figures")).to_contain_text("focus: no light")
 
@@ -175,12 +179,49 @@ def test_the_assistant_sets_currents_to_half_range_and_says_what_it_did(page: Pa
     page.get_by_role("button", name="Set to half range").click()
     advice = page.get_by_role("status", name="light assistant")
     expect(advice).to_contain_text(re.compile(r"By shot \d+, 0 s old:"))
-    expect(advice).to_contain_text(re.compile(r"view1: 7\d % at \d[\d.]* A: set to \d[\d.]* A"))
-    eventually(lambda: shown_current_a(server, "view1") < 9, "it is shown")
-    page.wait_for_function("() => document.querySelector('.live-caption').textContent.startsWith('shot')")
-    page.get_by_role("button", name="Set to half range").click()
-    expect(advice).to_contain_text("not proportional")  # in memory, light does not depend on current
+    expect(advice).to_contain_text(re.compile(r"view1: 7\d % at [\d.]+ A: set to 6[\d.]* A"))
+    expect(advice).to_contain_text(re.compile(r"view3: 3\d % at 10 A: set to 12 A, its limit, about 3\d %; for more"))
+    expect(advice).to_contain_text("saturated: halved, look again")
+    expect(page.get_by_label("LED view4 / A")).to_have_value("5")
+    eventually(lambda: shown_current_a(server, "view1") < 7, "it is shown")
+    expect(caption(live)).to_have_text(re.compile("A (49|50|51) %"))
     _picture(page, "live-assistant")
+    page.get_by_role("button", name="Set to half range").click()
+    expect(advice).to_contain_text(re.compile(r"view1: \d+ % at 6[\d.]* A: left as it is, half of the range"))
+    expect(caption(live, "view4")).to_have_text(re.compile("A (49|50|51) %"))
+
+
+def test_the_live_volume_says_what_it_lacks_and_follows_every_shot(page: Page, server: Serving) -> None:
+    live = show_live(page, server, "4")
+    volume = page.get_by_role("region", name="Live volume")
+    volume.get_by_role("switch", name="live slices").click()
+    problem = volume.get_by_role("note", name="why there is no newer volume")
+    expect(problem).to_contain_text("there is no calibration")
+    expect(problem).to_contain_text("on the page Calibrate")
+    _picture(page, "live-volume-empty")
+    save_droplet_calibration(server.services.data_dir / "calibrations" / "paper.json")
+    server.http.put("/api/calibrations/current", json={"id": "paper"})
+    told = volume.get_by_role("status", name="live volume")
+    expect(told).to_have_text(
+        re.compile(r"^shot \d+ · \d+\.\d s old · MLOS at half resolution · calibration paper · took \d\.\d\d s")
+    )
+    expect(volume.get_by_role("img", name="live slice z")).to_be_visible()
+    made = server.app.state.context.live_volume
+    first = made.view.number
+    eventually(lambda: made.view.number > first + 1, "the next ones follow")
+    volume.get_by_role("switch", name="live iso-surface").click()
+    expect(volume.get_by_role("img", name="live iso-surface").locator("canvas")).to_be_visible()
+    page.wait_for_timeout(1500)
+    volume.scroll_into_view_if_needed()
+    _picture(page, "live-volume")
+    volume.get_by_role("switch", name="live iso-surface").click()
+    volume.get_by_role("switch", name="live slices").click()
+    expect(volume.get_by_role("img", name="live slice z")).to_have_count(0)
+    page.wait_for_timeout(300)
+    last = made.view.number
+    page.wait_for_timeout(1000)
+    assert made.view.number == last, "nobody looks"
+    live.get_by_role("button", name="End live").click()
 
 
 def test_the_timing_follows_the_form_and_says_why_it_is_impossible(page: Page, server: Serving) -> None:
@@ -208,7 +249,7 @@ def test_a_card_per_device_says_who_how_and_what_to_do(page: Page, server: Servi
     page.goto(f"{server.http.base_url}/rig")
     camera = page.get_by_role("region", name="view1", exact=True)
     expect(camera).to_contain_text("tomoshadow memory, view1, firmware 1")
-    expect(camera).to_contain_text("128 x 96 px, 8 bit")
+    expect(camera).to_contain_text("400 x 300 px, 8 bit")
     expect(page.get_by_role("region", name="pulse generator")).to_contain_text("at most 12 A, nominal 10 A, channel 1")
     expect(page.get_by_role("region", name="interlock")).to_contain_text("closed")
     expect(page.get_by_role("region", name="work in the background")).to_contain_text("all of it goes on")

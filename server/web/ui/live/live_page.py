@@ -7,6 +7,7 @@ from server.web.ui.draft import DraftStore
 from server.web.ui.live.light_panel import LightPanel
 from server.web.ui.live.live_panel import LivePanel
 from server.web.ui.live.timing_panel import TimingPanel
+from server.web.ui.live.volume_panel import LiveVolumePanel
 
 
 class LivePage:
@@ -16,6 +17,7 @@ class LivePage:
         with ui.element("div").classes("columns live-page"):
             with ui.element("div").classes("column"):
                 self._live = LivePanel(context, draft)
+                self._volume = LiveVolumePanel(context)
             with ui.element("div").classes("column side"):
                 LightPanel(context, draft, self._live.apply)
                 self._timing = TimingPanel(context, draft)
@@ -23,6 +25,7 @@ class LivePage:
     async def refresh(self) -> None:
         """Follow the state of acquisition and the light of the form."""
         self._live.refresh()
+        self._volume.refresh()
         await self._timing.refresh()
 
     async def reload(self) -> None:
