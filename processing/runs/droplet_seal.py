@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from daq.errors import ShotFileError
-from daq.files.run_directory import RunReader
+from daq.files.run_directory import RunReader, ShotFileError
 from daq.files.run_file import RUN_FILE
 from processing.analysis.droplets.droplet_file import FRAME, DropletFileError, StoredDroplets, read_droplets
 from processing.analysis.droplets.droplet_search import MARGIN_VOXEL

@@ -7,7 +7,7 @@ from daq.errors import ShotFileError
 from daq.files.run_directory import RunReader
 from daq.files.run_file import shot_path
 from server.lab.errors import NotFound
-from server.pictures.pictures import preview_jpeg
+from server.pictures.pictures import Stretch, preview_jpeg
 
 _WIDTH_PX = 128
 _KEPT = 1000
@@ -27,4 +27,4 @@ def _of(run_dir: Path, _changed_ns: int) -> bytes:
     run = RunReader(run_dir)
     views = run.read_shot(0).views.items()
     view, image = next((view, frames.frame_a) for view, frames in views if frames.frame_a is not None)
-    return preview_jpeg(image, run.header.views[view].bits, _WIDTH_PX)
+    return preview_jpeg(image, run.header.views[view].bits, Stretch.FULL, _WIDTH_PX)
