@@ -42,18 +42,14 @@ from server.lab.watch import CalibrationWatch
 from server.web import port, problems
 from server.web.abort_listener import AbortListener
 from server.web.api import (
-    alarms,
-    beat,
     bench,
     calibrations,
-    control,
     devices,
     events,
     jobs,
     live,
     live_view,
     live_volume,
-    readiness,
     rig,
     runs,
     shots,
@@ -61,6 +57,7 @@ from server.web.api import (
     single_shot,
     timing,
 )
+from server.web.api.desk import alarms, beat, control, readiness
 from server.web.api.parameters import forbid_unknown_query
 from server.web.api.results import droplets, results, statistics, volume_parts
 from server.web.body_limit import BodyLimit

@@ -5,7 +5,7 @@ from pydantic import ValidationError
 
 from server.lab.desk.beat import PERIOD_S
 from server.lab.starting.light_request import LightRequest
-from server.web.api.beat import BEAT_PATH
+from server.web.api.desk.beat import BEAT_PATH
 
 TICKET = "() => emit(window.desk?.ticket() ?? {})"
 """Handler in the browser of every button that makes light: which beat was heard last, and what the form shows."""
