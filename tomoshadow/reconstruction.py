@@ -247,6 +247,7 @@ def smart(
     ValueError
         Images or ``start`` do not fit the plan, or an option is out of range.
     """
+    require_unmasked("start", start)
     return iterative.smart(
         plan,
         _in_order(plan, images),
@@ -271,6 +272,7 @@ def mart(
     threads: int = DEFAULT_THREADS,
 ) -> SmartResult:
     """MART by views: one view after the other corrects the volume. All else as ``smart``."""
+    require_unmasked("start", start)
     return iterative.mart(
         plan,
         _in_order(plan, images),

@@ -16,6 +16,9 @@ from processing.reconstruction.slab_volume import SLAB_ROWS, SlabVolume, slabs_i
 from processing.reconstruction.volume_part import Part
 from processing.volume import VoxelGrid
 
+FAR = 16.0
+"""From 1: the eighth power of what is dimmer or brighter leaves float32, and so do voxels below a hundredth of it."""
+
 
 def line_of_sight(
     plan: Plan,
@@ -61,7 +64,10 @@ def line_of_sight(
     check_volume(volume, plan, (np.float32, np.float16, np.uint8))
     seen = plan.resample(images, threads, resampled)
     check_brightness(seen, method, volume.dtype)
-    _native.line_of_sight(plan.bind(seen), method, volume, threads)
+    unit = _unit_of_products(seen, method, volume.dtype)
+    _native.line_of_sight(plan.bind(_in_unit(seen, method, unit)), method, volume, threads)
+    if unit != 1:
+        volume *= volume.dtype.type(unit)
     return volume
 
 
@@ -168,13 +174,20 @@ def volume_seen(
     return SlabVolume(slabs, voxels, unit), brightest / unit
 
 
+def _unit_of_products(images: Sequence[FixedPoint], method: ReconstructionMethod, dtype: np.dtype[Any]) -> float:
+    """A power of two near the brightest voxel of GAVLOS if that is far from 1: products of many views have no room."""
+    most = brightest_voxel(images, method)
+    if method is not ReconstructionMethod.GAVLOS or dtype == np.uint8 or not most or 1 / FAR < most < FAR:
+        return 1.0
+    return float(2.0 ** math.ceil(math.log2(most)))
+
+
 def _in_unit(images: Sequence[FixedPoint], method: ReconstructionMethod, unit: float) -> list[FixedPoint]:
     """Images whose voxels are those of the given ones over the unit; powers of two are exact."""
     first, *others = images
-    if method is ReconstructionMethod.MINLOS:
+    if method is not ReconstructionMethod.MLOS:
         return [replace(image, unit=image.unit / unit) for image in images]
-    power = len(images) if method is ReconstructionMethod.GAVLOS else 1
-    return [replace(first, unit=first.unit / unit**power), *others]
+    return [replace(first, unit=first.unit / unit), *others]
 
 
 def _slabs_seen(

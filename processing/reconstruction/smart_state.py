@@ -11,7 +11,7 @@ from processing.kernels import _native
 from processing.reconstruction.line_of_sight import check_volume
 from processing.reconstruction.planning.fixed_point import FixedPoint
 from processing.reconstruction.planning.plan import Plan
-from processing.reconstruction.sparse_volume import SparseVolume
+from processing.reconstruction.sparse_volume import FAR_FROM_ONE, SparseVolume
 
 Image = NDArray[np.float32]
 
@@ -138,4 +138,5 @@ def _first_guess(
     least, most = float(volume.min()), float(volume.max())
     if not (least >= 0 and np.isfinite(most)):
         raise ValueError(f"start must not be negative and finite, its values are {least} to {most}")
-    return replace(SparseVolume.of(volume, threads=threads, memory=start.memory), unit=scale)
+    near_one = volume if 1 / FAR_FROM_ONE <= most <= FAR_FROM_ONE else np.ldexp(volume, -frexp(most)[1])
+    return replace(SparseVolume.of(near_one, threads=threads, memory=start.memory), unit=scale)

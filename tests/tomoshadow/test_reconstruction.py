@@ -146,6 +146,13 @@ def test_masked_pixels_do_not_count_as_they_are() -> None:
         ts.intensity(masked, bits=8, background=LIGHT)
 
 
+@pytest.mark.parametrize("solve", [ts.smart, ts.mart])
+def test_masked_voxels_of_a_start_do_not_count_as_they_are(solve: Any) -> None:
+    masked: Any = np.ma.masked_less(np.ones(GRID.shape, np.float32), 2)
+    with pytest.raises(ValueError, match="start: has masked values"):
+        solve(ts.plan(calibration(), GRID), images(), iterations=1, start=masked)
+
+
 @pytest.mark.parametrize(
     ("references", "warning"),
     [

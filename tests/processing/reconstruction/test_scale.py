@@ -49,6 +49,26 @@ def test_a_volume_has_the_scale_of_its_images(plan: Plan, images: Images, solve:
 
 
 @pytest.mark.parametrize("solve", [smart, mart])
+@pytest.mark.parametrize("scale", [1e-30, 1e-7, 1e30])
+def test_the_scale_of_a_start_does_not_matter(plan: Plan, images: Images, solve: type(smart), scale: float) -> None:  # type: ignore[valid-type]
+    """MLOS of dim images is one of 1e-7."""
+    start = line_of_sight(plan, images)
+    expected = solve(plan, images, iterations=3, start=start).volume
+    missed = solve(plan, images, iterations=3, start=start * np.float32(scale)).volume - expected
+    assert np.linalg.norm(missed) < 2e-3 * np.linalg.norm(expected)
+
+
+@pytest.mark.parametrize("scale", [1e-5, 1e-3, 1e5])
+def test_products_of_eight_views_have_room(scale: float) -> None:
+    views = plan_reconstruction(oracle.cameras(8), GRID)
+    rng = np.random.default_rng(3)
+    images = [(0.05 + 0.9 * rng.random(view.image_size_px[::-1])).astype(np.float32) for view in views.views]
+    expected = line_of_sight(views, images, ReconstructionMethod.GAVLOS)
+    found = line_of_sight(views, times(images, scale), ReconstructionMethod.GAVLOS) / scale
+    np.testing.assert_allclose(found, expected, rtol=2e-3, atol=1e-3)
+
+
+@pytest.mark.parametrize("solve", [smart, mart])
 def test_powers_of_two_change_no_other_bit(plan: Plan, images: Images, solve: type(smart)) -> None:  # type: ignore[valid-type]
     expected = solve(plan, images, iterations=3)
     for scale in (2.0**-20, 0.5, 2.0**20):
