@@ -61,7 +61,8 @@ def average_volumes(files: list[Path]) -> tuple[Intensity, VoxelGrid]:
     Raises
     ------
     VolumeFileError
-        There are none, their grids, calibrations or settings differ, or two are of one exposure.
+        There are none, their grids, calibrations or settings differ, two are of one exposure, or one was renamed or
+        changed.
     """
     if not files:
         raise VolumeFileError("there are no volumes to average")
@@ -77,9 +78,13 @@ def average_volumes(files: list[Path]) -> tuple[Intensity, VoxelGrid]:
                 raise VolumeFileError(f"{file}: {differing} of {files[0].name}; these have no common mean")
             if (first_file := counted.setdefault(_exposure(volume.provenance) or str(file), file)) != file:
                 raise VolumeFileError(f"{file}: the same exposure as {first_file.name}; it would count twice")
+            if (called := _own_name(volume.provenance)) not in ("", file.name):
+                raise VolumeFileError(f"{file}: was renamed, and is {called}: another shot, or another exposure")
             for first_row, slab in volume.slabs():
                 if not np.isfinite(slab).all():
                     raise VolumeFileError(f"{file}: was changed: a voxel is infinite, or not a number")
+                if slab.min(initial=0) < 0:
+                    raise VolumeFileError(f"{file}: was changed: a voxel is negative")
                 total[:, first_row : first_row + slab.shape[1]] += slab
     total /= np.float32(len(files))
     return total, grid
@@ -91,6 +96,13 @@ def _exposure(provenance: Provenance) -> str:
     return (
         ", ".join(f"{name} {provenance[name]}" for name in names) if all(name in provenance for name in names) else ""
     )
+
+
+def _own_name(provenance: Provenance) -> str:
+    """How the file of a volume was called; empty where it does not say."""
+    if not _exposure(provenance):
+        return ""
+    return volume_path(Path(), int(provenance["shot"]), "a" if provenance["frame"] == "a" else "b").name
 
 
 def _made_by(provenance: Provenance) -> dict[str, object]:

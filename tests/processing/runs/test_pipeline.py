@@ -272,13 +272,25 @@ def test_the_average_is_the_mean(run_dir: Path, calibration_file: Path, voxels: 
     np.testing.assert_allclose(mean, (read_volume(files[0])[0] + read_volume(files[1])[0]) / 2, atol=1e-7)
 
 
-def test_a_volume_that_was_changed_to_hold_no_numbers_has_no_average(run_dir: Path, calibration_file: Path) -> None:
+@pytest.mark.parametrize(("value", "said"), [(np.nan, "infinite, or not a number"), (-1, "negative")])
+def test_a_volume_that_was_changed_has_no_average(
+    run_dir: Path, calibration_file: Path, value: float, said: str
+) -> None:
     reconstructed(run_dir, calibration_file)
     first = volume_files(run_dir / "results")[0]
     with h5py.File(first, "r+") as file:
-        file["VTKHDF/PointData/intensity"][0, 0, 0] = np.nan
-    with pytest.raises(VolumeFileError, match=f"{first.name}: was changed: a voxel is infinite, or not a number"):
+        file["VTKHDF/PointData/intensity"][0, 0, 0] = value
+    with pytest.raises(VolumeFileError, match=f"{first.name}: was changed: a voxel is {said}"):
         average_volumes([first])
+
+
+def test_a_volume_of_the_other_exposure_under_a_name_of_this_one_has_no_average(
+    run_dir: Path, calibration_file: Path
+) -> None:
+    reconstructed(run_dir, calibration_file)
+    renamed = volume_path(run_dir / "results", 0, "b").rename(volume_path(run_dir / "results", 1, "a"))
+    with pytest.raises(VolumeFileError, match=f"{renamed.name}: was renamed, and is shot_00000_b.vtkhdf"):
+        average_volumes(volume_files(run_dir / "results", "a"))
 
 
 def test_volumes_of_all_types_agree_and_name_theirs(run_dir: Path, calibration_file: Path) -> None:
