@@ -230,10 +230,17 @@ def _recipe(volume: Path, calibrations: CalibrationStore) -> Recipe:
     )
 
 
-@lru_cache(maxsize=16)
 def surface_of(volume: Path, level: float) -> bytes:
-    """Iso-surface of a volume, binary glTF; blue of exposure A, red of B."""
-    return surface_glb(preview_of(volume), level, RED if volume.stem.endswith("_b") else BLUE)
+    """Iso-surface of a volume as it is now, binary glTF; blue of exposure A, red of B."""
+    preview_of(volume)
+    stored = preview_path(volume)
+    colour = RED if volume.stem.endswith("_b") else BLUE
+    return _surface(stored, stored.stat().st_mtime_ns, level, colour)
+
+
+@lru_cache(maxsize=16)
+def _surface(stored: Path, mtime_ns: int, level: float, colour: str) -> bytes:
+    return surface_glb(_load(stored, mtime_ns), level, colour)
 
 
 @lru_cache(maxsize=8)

@@ -10,12 +10,12 @@ import pytest
 from daq.files.run_directory import RunReader
 from processing.reconstruction.choices import VoxelType
 from processing.reconstruction.settings import GridSettings, ReconstructionSettings
-from processing.reconstruction.volume_file import read_volume
+from processing.reconstruction.volume_file import read_volume, write_volume
 from processing.runs.pipeline import reconstruct_shot
 from processing.runs.workbench import References, read_references
 from processing.volume import VoxelGrid
 from server.lab.errors import Damaged
-from server.lab.results import preview_of, remaking, volume_summaries
+from server.lab.results import preview_of, remaking, surface_of, volume_summaries
 from server.lab.tasks import check_run, reconstruct
 from server.pictures.previews import load_provenance, preview_files, preview_path, save_preview
 from tests.support.droplet_run import write_calibration, write_run
@@ -64,6 +64,17 @@ def test_of_a_volume_a_preview_is_kept_from_which_all_of_it_can_be_made(tmp_path
     later = preview_of(volume)
     assert (later.grid, later.limit, later.full_shape) == (at_once.grid, at_once.limit, at_once.full_shape)
     np.testing.assert_array_equal(later.voxels, at_once.voxels)
+
+
+def test_the_surface_is_that_of_the_volume_as_it_is_now(tmp_path: Path) -> None:
+    volume = tmp_path / "shot_00000_a.vtkhdf"
+    ball = np.zeros(GRID.shape, np.float32)
+    ball[20:30, 20:30, 20:30] = 1
+    write_volume(volume, ball, GRID)
+    first = surface_of(volume, 0.5)
+    assert surface_of(volume, 0.5) == first
+    write_volume(volume, ball[::-1], GRID)
+    assert surface_of(volume, 0.5) != first
 
 
 def test_a_preview_that_does_not_say_how_it_was_made_is_named(tmp_path: Path) -> None:
