@@ -23,6 +23,7 @@ from pydantic import Field, ValidationError
 
 from daq.frozen_model import FrozenModel
 from server.lab.errors import Conflict, NotFound
+from server.lab.work_progress import PROGRESS_QUERY, WorkProgress
 
 
 class JobKind(StrEnum):
@@ -223,6 +224,11 @@ class JobTable:
         for job in interrupted:
             self.move(job.id, JobState.QUEUED)
         return len(interrupted)
+
+    def progress(self, run_id: str) -> list[WorkProgress]:
+        """How far the work on a run is, a line per result set, newest first."""
+        with self._lock:
+            return [WorkProgress.of(row) for row in self._database.execute(PROGRESS_QUERY, (run_id,))]
 
     def restore(self, jobs: Iterable[Job]) -> int:
         """Take in jobs that the table does not know; how many."""

@@ -36,7 +36,7 @@ from server.pictures.previews import (
     save_preview,
     volume_of,
 )
-from server.pictures.surfaces import BLUE, RED, surface_glb
+from server.pictures.surfaces import BLUE, RED, Colour, surface_glb
 
 VOLUME_NAME = re.compile(r"shot_(?P<shot>[0-9]{5,7})_(?P<frame>[ab])")
 """Name of a volume, without the ending of its file."""
@@ -239,7 +239,7 @@ def surface_of(volume: Path, level: float) -> bytes:
 
 
 @lru_cache(maxsize=16)
-def _surface(stored: Path, mtime_ns: int, level: float, colour: str) -> bytes:
+def _surface(stored: Path, mtime_ns: int, level: float, colour: Colour) -> bytes:
     return surface_glb(_load(stored, mtime_ns), level, colour)
 
 

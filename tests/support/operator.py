@@ -59,12 +59,13 @@ def _is_refused(page: Page, shots: int) -> None:
 
 def _look_at_the_volume(page: Page) -> None:
     for axis in "xyz":
-        image = page.get_by_role("img", name=f"slice {axis}").locator("img")
-        expect(image).to_have_attribute("src", re.compile(rf"slices/{axis}/\d+\.png"), timeout=PROCESSED_MS)
+        image = page.get_by_role("img", name=f"slice {axis}").locator("image").first
+        expect(image).to_have_attribute("href", re.compile(rf"slices/{axis}/\d+\.png"), timeout=PROCESSED_MS)
     slider = page.get_by_role("slider", name="slice y")
-    before = page.get_by_role("img", name="slice y").locator("img").get_attribute("src")
+    before = page.get_by_role("img", name="slice y").locator("image").first.get_attribute("href")
     slider.locator("[tabindex='0']").first.focus()
     for _ in range(5):
         page.keyboard.press("ArrowRight")
-    expect(page.get_by_role("img", name="slice y").locator("img")).not_to_have_attribute("src", before or "")
+    after = page.get_by_role("img", name="slice y").locator("image").first
+    expect(after).not_to_have_attribute("href", before or "")
     expect(page.get_by_role("img", name="iso-surface").locator("canvas")).to_be_visible()

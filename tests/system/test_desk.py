@@ -11,7 +11,6 @@ import pytest
 from nicegui import app as pages
 from playwright.sync_api import Browser, Locator, Page, Route, expect
 
-from server.lab.jobs import JobKind, JobState, shot_job
 from server.web.app import create_app
 from tests.support.cut_link import CutLink, cut_link
 from tests.support.operator import VIEWS, go_to, open_drawer
@@ -251,13 +250,13 @@ def test_no_words_of_the_page_are_cut(page: Page, server: Serving, width: int) -
 
 def test_many_reasons_of_droplets_make_no_row_of_the_height_of_the_page(page: Page, server: Serving) -> None:
     run_id, _ = server.run_to_its_end(plan_of(kind="dark", shots=1, pulse=PULSE))
-    jobs, named = server.app.state.context.jobs, "a reason " * 26 + "more"
-    job = jobs.add(shot_job(JobKind.MEASUREMENT, run_id, 0, "paper", named, {}))
-    for state in (JobState.RUNNING, JobState.DONE):
-        jobs.move(job.id, state, result={"droplets": 0, "verdict": "doubtful", "reasons": []})
+    named = "a reason " * 21 + "more"
+    measured = server.services.data_dir / run_id / "results" / named
+    measured.mkdir(parents=True)
+    (measured / "settings.json").write_text("{}")
+    (measured / "shot_00000_droplets.h5").write_bytes(b"no HDF5")
     page.set_viewport_size({"width": 1280, "height": 900})
-    page.goto(str(server.http.base_url))
-    go_to(page, "Results")
+    page.goto(f"{server.http.base_url}/results/{run_id}")
     verdict = page.get_by_role("region", name="Droplets").get_by_role("cell").last
     expect(verdict).to_contain_text(named)
     box = verdict.bounding_box()

@@ -66,6 +66,20 @@ def droplets_file(results_dir: Path, shot: int) -> Path:
     return path
 
 
+def droplets_of(results_dir: Path, shot: int) -> StoredDroplets:
+    """The droplets of a shot; NotFound if there are none, Damaged if they cannot be read."""
+    path = droplets_file(results_dir, shot)
+    try:
+        return _droplets(path, path.stat().st_mtime_ns)
+    except (DropletFileError, OSError) as error:
+        raise Damaged(str(error)) from error
+
+
+@lru_cache(maxsize=8)
+def _droplets(path: Path, _changed_ns: int) -> StoredDroplets:
+    return read_droplets(path)
+
+
 @lru_cache(maxsize=16)
 def _read(files: tuple[tuple[Path, int], ...]) -> MeasuredRun:
     """Once per change of the files."""

@@ -5,12 +5,12 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Path, Query, Response
 from pydantic import Field
 
-from daq.files.run_directory import ExposureRecord, FiredTrain, Shot
+from daq.files.run_directory import ExposureRecord, FiredTrain
 from daq.frozen_model import FrozenModel
 from daq.names import ViewName
 from daq.run_plan import ImageKey
 from server.lab.errors import NotFound
-from server.lab.runs.run_store import RunStore
+from server.lab.runs.shot_seen import fault_of, shot_of
 from server.pictures.pictures import Stretch, frame_png
 from server.web.api.parameters import ContextOf, RunId, ShotIndex
 from server.web.problems import responses
@@ -31,6 +31,7 @@ class ShotDetail(FrozenModel):
 
     index: Annotated[int, Field(description="position in the run, from 0")]
     image_key: Annotated[str, Field(description="what it shows: sample, flat, dark, invalid or background")]
+    fault: Annotated[str, Field(description="why it is invalid; empty where it is valid")]
     host_time_ns: Annotated[int, Field(description="Unix time of the firing; 0 for imported images")]
     stage_z_mm: Annotated[float | None, Field(description="position of the calibration target, where there is one")]
     fired: Annotated[FiredTrain | None, Field(description="the actual pulse train; null for imported images")]
@@ -54,10 +55,11 @@ def list_shots(
 @router.get("/{shot}", responses=responses(404, 500))
 def show_shot(run_id: RunId, shot: ShotIndex, context: ContextOf) -> ShotDetail:
     """Frame ids, timestamps, packet counters and the actual pulse train."""
-    recorded = _read(context.runs, run_id, shot)
+    recorded = shot_of(context.runs.reader(run_id), shot)
     return ShotDetail(
         index=recorded.index,
         image_key=recorded.image_key.name.lower(),
+        fault=fault_of(recorded),
         host_time_ns=recorded.host_time_ns,
         stage_z_mm=recorded.stage_z_mm,
         fired=recorded.fired,
@@ -82,16 +84,11 @@ def show_frame(
     width_px: Annotated[int | None, Query(ge=16, le=8192, description="narrower than the frame")] = None,
 ) -> Response:
     """One exposure as an 8 bit picture; the raw values are in the shot file."""
-    exposures = _read(context.runs, run_id, shot).views.get(view)
+    run = context.runs.reader(run_id)
+    exposures = shot_of(run, shot).views.get(view)
     image = None if exposures is None else exposures.frame_a if frame == "a" else exposures.frame_b
     if image is None:
         raise NotFound(f"run {run_id}, shot {shot} has no exposure {frame} of {view!r}")
-    bits = context.runs.reader(run_id).header.views[view].bits
-    return Response(frame_png(image, bits, stretch, width_px), media_type="image/png", headers=_FOR_EVER)
-
-
-def _read(runs: RunStore, run_id: str, shot: int) -> Shot:
-    reader = runs.reader(run_id)
-    if shot >= reader.shot_count:
-        raise NotFound(f"run {run_id} has {reader.shot_count} shots, not {shot}")
-    return reader.read_shot(shot)
+    return Response(
+        frame_png(image, run.header.views[view].bits, stretch, width_px), media_type="image/png", headers=_FOR_EVER
+    )

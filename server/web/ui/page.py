@@ -5,6 +5,7 @@ Mounted last, because it answers every path that nobody else does.
 
 from collections.abc import Callable
 from functools import partial
+from urllib.parse import unquote
 
 from fastapi import FastAPI, Request
 from nicegui import ui
@@ -23,11 +24,18 @@ from server.web.ui.rail import Rail
 from server.web.ui.results.results_page import ResultsPage
 from server.web.ui.rig.rig_page import RigPage
 from server.web.ui.run.run_page import RunPage
+from server.web.ui.runs.one_run_page import OneRunPage
 from server.web.ui.runs.runs_page import RunsPage
 
 _REFRESH_S = 0.25
 _LISTS_CHANGED = {"run_state", "job_changed", "calibration_chosen"}
 _PATHS = ("/", "/rig", "/live", "/calibrate", "/run", "/results", "/runs")
+_DEEP_PATHS = (
+    "/results/{run_id}",
+    "/results/{run_id}/{results_id}/{shot}",
+    "/runs/{run_id}",
+    "/runs/{run_id}/shots/{shot}",
+)
 
 
 def mount_page(app: FastAPI, config: RigConfig) -> None:
@@ -38,7 +46,7 @@ def mount_page(app: FastAPI, config: RigConfig) -> None:
         abort.admit(request.headers["host"])
         Desk(app.state.context, abort.port)
 
-    for path in _PATHS:
+    for path in (*_PATHS, *_DEEP_PATHS):
         ui.page(path, title=f"tomoshadow: {config.name}")(show)
     ui.run_with(app, dark=None, show_welcome_message=False, reconnect_timeout=10)
 
@@ -60,7 +68,7 @@ class Desk:
             self._drawer = Drawer(context, self._rail.drawer_button)
         ui.timer(_REFRESH_S, self._refresh)
 
-    def _routes(self) -> dict[str, Callable[[], None]]:
+    def _routes(self) -> dict[str, Callable[..., None]]:
         context, draft = self._context, self._draft
         pages: dict[str, Callable[[], DeskPage]] = {
             "/rig": lambda: RigPage(context, draft),
@@ -70,7 +78,18 @@ class Desk:
             "/results": lambda: ResultsPage(context),
             "/runs": lambda: RunsPage(context),
         }
-        return {path: partial(self._open, path, build) for path, build in ({"/": pages["/run"]} | pages).items()}
+        shallow: dict[str, Callable[..., None]] = {
+            path: partial(self._open, path, build) for path, build in ({"/": pages["/run"]} | pages).items()
+        }
+        deep = {path: self._open_results if path.startswith("/results") else self._open_run for path in _DEEP_PATHS}
+        return shallow | deep
+
+    def _open_results(self, run_id: str, results_id: str = "", shot: str = "") -> None:
+        named = unquote(run_id), unquote(results_id), shot
+        self._open("/results", lambda: ResultsPage(self._context, *named))
+
+    def _open_run(self, run_id: str, shot: str = "0") -> None:
+        self._open("/runs", lambda: OneRunPage(self._context, unquote(run_id), shot))
 
     def _open(self, path: str, build: Callable[[], DeskPage]) -> None:
         self._page = build()

@@ -10,7 +10,8 @@ dense flat no-caps size="sm" color="primary" @click.stop="$parent.$emit('act', {
 def table_of(*columns: tuple[str, str]) -> ui.table:
     """A table with these columns, by field and title; ``outcome`` is a badge, ``actions`` are buttons."""
     described = [
-        {"name": name, "label": label, "field": name, "align": "left", "classes": name} for name, label in columns
+        {"name": name, "label": label, "field": name, "align": "left", "classes": name, "headerClasses": name}
+        for name, label in columns
     ]
     table = (
         ui.table(columns=described, rows=[], row_key="id").classes("w-full").props("dense flat wrap-cells hide-bottom")

@@ -9,7 +9,7 @@ from server.lab.jobs import JobKind, JobState, calibration_job, reconstruction_j
 from server.lab.runs.run_summary import RunSummary
 from server.web.ui.asking import answer_of
 from server.web.ui.drawer.job_panel import job_row
-from server.web.ui.runs.run_table import run_row
+from server.web.ui.runs.run_rows import run_row
 
 
 def told(views: dict[str, Any], not_checked: tuple[str, ...] = ()) -> str:
@@ -44,7 +44,7 @@ def test_results_of_before_have_no_reasons() -> None:
     assert job_row(job)["detail"] == ""
 
 
-@pytest.mark.parametrize(("valid", "colour"), [(6, "positive"), (1, "warning"), (0, "warning")])
+@pytest.mark.parametrize(("valid", "colour"), [(6, "positive"), (1, "warning"), (0, "negative")])
 def test_a_completed_run_that_lost_shots_is_not_green(valid: int, colour: str) -> None:
     run = RunSummary(
         run_id="20261129T032014-spray",
@@ -61,7 +61,7 @@ def test_a_completed_run_that_lost_shots_is_not_green(valid: int, colour: str) -
         calibration=None,
     )
     row = run_row(run)
-    assert (row["colour"], row["run"]) == (colour, "20261129T032014-spray")
+    assert (row["colour"], row["id"]) == (colour, "20261129T032014-spray")
 
 
 def test_whoever_asks_for_work_is_told_what_came_of_it() -> None:

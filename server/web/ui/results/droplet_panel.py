@@ -1,8 +1,8 @@
-"""DropletPanel: what was measured of the droplets, a line per result set; hidden until something was."""
+"""DropletPanel: what was measured of the droplets of a run, a line per result set; hidden until something was."""
 
 import asyncio
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from nicegui import ui
@@ -10,13 +10,13 @@ from nicegui import ui
 from processing.analysis.estimates import Estimate
 from server.lab.droplets.measured import MeasuredRun, measured_run
 from server.lab.errors import ServerError
-from server.lab.jobs import JobKind, JobState
+from server.lab.results import ResultSet
 from server.lab.services import Context
 from server.web.ui.theme import panel
 
-_JOBS, _SHOWN = 2000, 8
+_SHOWN = 8
 _COLUMNS = {
-    "run": "Run",
+    "results": "Result set",
     "droplets": "Droplets",
     "density": "per mm³",
     "d32": "D32, µm",
@@ -28,7 +28,7 @@ _VERDICT = '<q-td :props="props"><div class="verdict" tabindex="0">{{ props.valu
 
 
 class DropletPanel:
-    """Built once per page; shows what was measured last."""
+    """Built once per page."""
 
     def __init__(self, context: Context) -> None:
         self._context = context
@@ -41,24 +41,20 @@ class DropletPanel:
             self._table.add_slot("body-cell-verdict", _VERDICT)
         self._panel.set_visibility(False)
 
-    async def reload(self) -> None:
-        """Read the newest result sets again."""
-        rows = await asyncio.to_thread(self._rows)
+    async def show(self, run_id: str, sets: Sequence[ResultSet]) -> None:
+        """Tell of the result sets of a run; they are read again where their files have changed."""
+        measured = [one.id for one in sets if one.droplets][:_SHOWN]
+        rows = await asyncio.to_thread(lambda: [self._row(run_id, results_id) for results_id in measured])
         self._panel.set_visibility(bool(rows))
         self._table.rows = rows
         self._table.update()
-
-    def _rows(self) -> list[dict[str, Any]]:
-        jobs = self._context.jobs.newest(None, [JobState.DONE], _JOBS, [JobKind.MEASUREMENT])
-        measured = list(dict.fromkeys((job.run_id, str(job.results_id)) for job in jobs))[:_SHOWN]
-        return [self._row(run_id, results_id) for run_id, results_id in measured]
 
     def _row(self, run_id: str, results_id: str) -> dict[str, Any]:
         try:
             run = measured_run(self._context.runs.directory(run_id) / "results" / results_id)
         except ServerError as error:
-            return {"id": f"{run_id}/{results_id}", "run": run_id, "verdict": str(error)}
-        return {"id": f"{run_id}/{results_id}", "run": run_id, **droplet_row(run)}
+            return {"id": results_id, "results": results_id, "verdict": str(error)}
+        return {"id": results_id, "results": results_id, **droplet_row(run)}
 
 
 def droplet_row(run: MeasuredRun) -> dict[str, str]:

@@ -1,0 +1,76 @@
+"""DropletTable: the droplets of the shot that is shown, a row each; a click puts the cross-hair there."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from nicegui import ui
+
+from processing.analysis.droplets.droplet_file import StoredDroplets
+from server.web.ui.results.slice_group import Dots
+from server.web.ui.theme import panel
+
+_SHOWN = 2000
+_COLUMNS = {
+    "exposure": "Exposure",
+    "x_mm": "x, mm",
+    "y_mm": "y, mm",
+    "z_mm": "z, mm",
+    "diameter_um": "Diameter, µm",
+    "p_real": "Probability real",
+}
+_FORMATS = {"diameter_um": ".3g", "p_real": ".2f"}
+
+
+class DropletTable:
+    """Built once per page; hidden where the shot is not measured."""
+
+    def __init__(self, go_to: Callable[[tuple[float, float, float]], None]) -> None:
+        self._go_to = go_to
+        with panel("Droplets of this shot") as self._panel:
+            self._count = ui.label("").classes("text-sm")
+            columns = [
+                {"name": name, "label": label, "field": name, "align": "left", "sortable": True}
+                for name, label in _COLUMNS.items()
+            ]
+            self._table = ui.table(columns=columns, rows=[], row_key="id", pagination=10).classes(
+                "w-full cursor-pointer"
+            )
+            self._table.props("dense flat")
+            self._table.on("rowClick", self._on_row, [[], ["x_mm", "y_mm", "z_mm"], None])
+        self._panel.set_visibility(False)
+
+    def show(self, droplets: StoredDroplets | None) -> None:
+        """Show those of another shot, or none."""
+        rows = droplet_rows(droplets) if droplets else []
+        self._panel.set_visibility(droplets is not None)
+        self._count.set_text(f"{len(droplets.columns['frame']) if droplets else 0} droplets; a row leads to its place")
+        self._table.rows = rows
+        self._table.update()
+
+    def _on_row(self, event: Any) -> None:
+        x_mm, y_mm, z_mm = (float(event.args[1][name]) for name in ("x_mm", "y_mm", "z_mm"))
+        self._go_to((x_mm, y_mm, z_mm))
+
+
+def droplet_rows(droplets: StoredDroplets) -> list[dict[str, Any]]:
+    """Rows of the table: the largest ones first where diameters are known."""
+    columns = {name: droplets.columns[name] for name in _COLUMNS if name in droplets.columns}
+    frames = droplets.columns["frame"].astype("U1")
+    order = np.arange(len(frames))
+    if "diameter_um" in columns:
+        order = np.argsort(-np.nan_to_num(columns["diameter_um"].astype(np.float64)), kind="stable")
+    rows = []
+    for number in order[:_SHOWN].tolist():
+        told = {name: format(float(values[number]), _FORMATS.get(name, ".3f")) for name, values in columns.items()}
+        rows.append({"id": number, "exposure": frames[number].upper()} | told)
+    return rows
+
+
+def dots_of(droplets: StoredDroplets | None) -> Dots:
+    """Places of droplets by exposure."""
+    if droplets is None:
+        return {}
+    points_mm = np.stack([droplets.columns[f"{axis}_mm"].astype(np.float64) for axis in "xyz"], axis=1)
+    frames = droplets.columns["frame"].astype("U1")
+    return {str(frame): points_mm[frames == frame] for frame in np.unique(frames)}

@@ -1,0 +1,275 @@
+"""The pages of runs and results: whatever was recorded can be found again, and looked at; headless Chromium."""
+
+import os
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from nicegui import app as pages
+from playwright.sync_api import Locator, Page, expect
+
+from processing.analysis.droplets.droplet_file import StoredDroplets
+from processing.reconstruction.choices import ReconstructionMethod
+from processing.reconstruction.settings import GridSettings, ReconstructionSettings
+from processing.runs.pipeline import reconstruct_shots
+from processing.volume import VoxelGrid
+from server.lab.results import keep_preview
+from server.web.app import create_app
+from tests.server.web.test_api import wait_for_jobs
+from tests.support.droplet_run import write_calibration, write_run
+from tests.support.operator import VIEWS, go_to
+from tests.support.sampled_sprays import cone_shots, write_results
+from tests.support.serving import Serving, plan_of, serving
+
+pytestmark = pytest.mark.timeout(900)
+
+PICTURES = os.environ.get("TOMOSHADOW_PICTURES")
+expect.set_options(timeout=15_000)
+PULSE = {"current_a": dict.fromkeys(VIEWS, 5)}
+OLD = "old-spray"
+GRID = VoxelGrid.centred((41, 61, 71), 0.05)
+MLOS = ReconstructionSettings(grid=GridSettings.of(GRID), minimum_window_px=0)
+SMART = MLOS.model_copy(update={"method": ReconstructionMethod.SMART, "iterations": 1})
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
+    pages.middleware_stack = None  # NiceGUI has one application per process; another module may have used it
+    with serving(tmp_path_factory.mktemp("results") / "runs", build=create_app, views=VIEWS) as server:
+        yield server
+
+
+@pytest.fixture(scope="module")
+def old_run(server: Serving) -> Path:
+    """A run of January, reconstructed twice and measured by commands: no job of this server knows of it."""
+    calibration = write_calibration(server.services.data_dir / "calibrations" / "c.json")
+    run_dir = write_run(server.services.data_dir / OLD, shots=5, invalid=(2,))
+    for settings in (SMART, MLOS):
+        out = run_dir / "results" / settings.results_id("c")
+        list(reconstruct_shots(run_dir, [0, 1, 3], calibration, settings, out, keep=keep_preview))
+    measured = write_results(run_dir / "results" / "droplets-1", [_within(shot) for shot in cone_shots(0, 2, 40)])
+    (measured / "settings.json").write_text("{}")
+    return run_dir
+
+
+def _within(shot: StoredDroplets) -> StoredDroplets:
+    """The cone, moved into the grid of the volumes."""
+    begin_mm = {"x_mm": 0.0, "y_mm": -2.5, "z_mm": 0.0}
+    moved = {name: shot.columns[name].astype(float) / 4 + begin for name, begin in begin_mm.items()}
+    return StoredDroplets({**shot.columns, **moved}, shot.provenance, shot.objects)
+
+
+def url(server: Serving, path: str) -> str:
+    return f"{server.http.base_url}/{path}"
+
+
+def slice_of(page: Page, axis: str) -> Locator:
+    return page.get_by_role("img", name=f"slice {axis}")
+
+
+def place(page: Page, axis: str) -> Locator:
+    return page.get_by_role("status", name=f"place {axis}")
+
+
+def resolution(page: Page) -> Locator:
+    return page.get_by_role("status", name="resolution")
+
+
+def shot_shown(page: Page) -> Locator:
+    return page.get_by_role("status", name="shot shown")
+
+
+def choose(page: Page, label: str, option: str | re.Pattern[str]) -> None:
+    page.get_by_label(label, exact=True).first.click()
+    page.get_by_role("option", name=option).click()
+
+
+def press(page: Page, slider: str, key: str) -> None:
+    page.get_by_role("slider", name=slider, exact=True).locator("[tabindex='0']").first.focus()
+    page.keyboard.press(key)
+
+
+def test_before_there_is_anything_both_pages_say_what_to_do_first(page: Page, server: Serving) -> None:
+    page.goto(url(server, "runs"))
+    expect(page.get_by_text("Record the first one on the page Run")).to_be_visible()
+    go_to(page, "Results")
+    expect(page.get_by_role("status", name="results")).to_contain_text("Choose a calibration on the page Calibrate")
+
+
+def test_runs_are_found_by_what_they_are(page: Page, server: Serving, old_run: Path) -> None:
+    dark, _ = server.run_to_its_end(plan_of(kind="dark", name="night", shots=3, pulse=PULSE))
+    notes = {"operator": "Ada", "fluid": "water", "pressure_bar": 40, "remark": "nozzle three"}
+    sample, _ = server.run_to_its_end(plan_of(name="day", shots=2, pulse=PULSE, references=[dark], notes=notes))
+    damaged = server.services.data_dir / "20250101T000000-damaged"
+    damaged.mkdir()
+    (damaged / "run.h5").write_bytes(b"no HDF5")
+    page.goto(url(server, "runs"))
+    runs, shown = page.get_by_role("region", name="Runs"), page.get_by_role("status", name="runs shown")
+    expect(runs.get_by_role("link")).to_have_text([sample, dark, OLD, damaged.name])
+    expect(runs.get_by_role("row", name=OLD)).to_contain_text("4 / 5")
+    expect(runs.get_by_role("row", name=damaged.name)).to_contain_text("tomoshadow repair")
+    for width in (800, 1280, 1920):
+        _picture(page, f"desk-runs-{width}", width)
+    page.get_by_label("search runs").fill("ADA water")
+    expect(shown).to_have_text("1 to 1 of 1")
+    expect(runs.get_by_role("link")).to_have_text([sample])
+    page.get_by_label("search runs").fill("no such words")
+    expect(page.get_by_text("No run is like that")).to_be_visible()
+    page.get_by_label("search runs").fill("")
+    choose(page, "kind of runs", "dark")
+    expect(runs.get_by_role("link")).to_have_text([dark])
+    choose(page, "kind of runs", "any kind")
+    choose(page, "results of runs", "with results")
+    expect(runs.get_by_role("link")).to_have_text([OLD])
+
+
+def test_a_run_shows_its_shots_and_why_one_is_invalid(page: Page, server: Serving, old_run: Path) -> None:
+    page.goto(url(server, f"runs/{OLD}/shots/1"))
+    fault = page.get_by_role("status", name="fault of the shot")
+    expect(shot_shown(page)).to_have_text("shot 1 (2 of 5)")
+    expect(fault).to_have_text("")
+    press(page, "shot", "ArrowRight")
+    expect(shot_shown(page)).to_have_text("shot 2 (3 of 5)")
+    expect(fault).to_have_text("INVALID: no exposure B of view2")
+    expect(page).to_have_url(re.compile("/runs/old-spray/shots/2$"))
+    page.get_by_role("button", name="next invalid").click()
+    expect(shot_shown(page)).to_have_text("shot 2 (3 of 5)")
+    for view in ("view1", "view2", "view3"):
+        for name in "AB":
+            picture = page.get_by_alt_text(f"{view} exposure {name}")
+            picture.scroll_into_view_if_needed()
+            expect(picture).to_have_js_property("complete", True)
+            assert picture.evaluate("image => image.naturalWidth") > 0
+    for width in (800, 1280):
+        _picture(page, f"one-run-{width}", width)
+    page.get_by_role("link", name="Results", exact=True).last.click()
+    expect(page).to_have_url(re.compile("/results/old-spray/"))
+
+
+def test_what_is_not_there_is_told_with_the_way_back(page: Page, server: Serving, old_run: Path) -> None:
+    page.goto(url(server, "runs/nowhere/shots/7"))
+    expect(page.get_by_text("there is no run 'nowhere'")).to_be_visible()
+    page.get_by_role("link", name="All runs").click()
+    expect(page.get_by_role("region", name="Runs").get_by_role("link", name=OLD)).to_be_visible()
+    page.goto(url(server, "results/nowhere/mlos-1/0"))
+    expect(page.get_by_role("status", name="results")).to_contain_text("there is no run 'nowhere'")
+    page.goto(url(server, f"results/{OLD}/mlos-gone/99"))
+    expect(shot_shown(page)).to_have_text("shot 3 (3 of 3)")
+
+
+def test_volumes_of_an_old_run_are_seen_from_all_sides_at_full_resolution(
+    page: Page, server: Serving, old_run: Path
+) -> None:
+    page.goto(url(server, f"results/{OLD}"))
+    expect(resolution(page)).to_have_text("MLOS, full resolution")
+    for axis in "xyz":
+        pictures = slice_of(page, axis).locator("image")
+        expect(pictures).to_have_count(2)
+        expect(pictures.last).to_have_attribute("href", re.compile(rf"slice\.png\?axis={axis}&"))
+    before = {axis: place(page, axis).inner_text() for axis in "xyz"}
+    slice_of(page, "z").locator("svg").click(position={"x": 120, "y": 90})
+    for axis in "xy":
+        expect(place(page, axis)).not_to_have_text(before[axis])
+    expect(place(page, "z")).to_have_text(before["z"])
+    press(page, "slice z", "ArrowRight")
+    expect(place(page, "z")).not_to_have_text(before["z"])
+    expect(slice_of(page, "z").locator("image").last).to_have_attribute("href", re.compile(r"slice\.png"))
+    page.get_by_role("button", name="maxima").click()
+    expect(place(page, "z")).to_have_text("maximum along z")
+    expect(slice_of(page, "z").locator("image")).to_have_attribute("href", re.compile("projections/z.png"))
+    page.get_by_role("button", name="slices", exact=True).click()
+    expect(page.get_by_role("img", name="iso-surface").locator("canvas")).to_be_visible()
+
+
+def test_both_exposures_lie_one_upon_the_other_and_another_method_is_tried(
+    page: Page, server: Serving, old_run: Path
+) -> None:
+    page.goto(url(server, f"results/{OLD}/{MLOS.results_id('c')}/1"))
+    expect(resolution(page)).to_have_text("MLOS, full resolution")
+    page.get_by_role("button", name="both").click()
+    addresses = slice_of(page, "y").locator("image")
+    expect(addresses).to_have_count(4)
+    expect(addresses.nth(1)).to_have_attribute("href", re.compile("_a/slice.png.*colours=blue"))
+    expect(addresses.nth(3)).to_have_attribute("href", re.compile("_b/slice.png.*colours=red"))
+    choose(page, "Slices by", "MINLOS")
+    expect(resolution(page)).to_have_text("MINLOS, full resolution")
+    expect(addresses.nth(3)).to_have_attribute("href", re.compile("method=minlos"))
+    choose(page, "Result set", re.compile("SMART"))
+    choose(page, "Slices by", re.compile("as made, SMART"))
+    expect(resolution(page)).to_contain_text("SMART, preview only")
+    expect(addresses).to_have_count(2)
+
+
+def test_droplets_lie_over_the_slices_and_in_a_table_that_leads_to_them(
+    page: Page, server: Serving, old_run: Path
+) -> None:
+    page.goto(url(server, f"results/{OLD}/{MLOS.results_id('c')}/1"))
+    table = page.get_by_role("region", name="Droplets of this shot")
+    expect(table).to_contain_text(re.compile(r"\d+ droplets"))
+    first = table.get_by_role("row").nth(1)
+    at_mm = {axis: float(first.get_by_role("cell").nth(1 + number).inner_text()) for number, axis in enumerate("xyz")}
+    first.click()
+    expect(place(page, "x")).to_have_text(re.compile(f"x = {round(at_mm['x'] / 0.05) * 0.05:.3f} mm"))
+    assert slice_of(page, "z").locator("circle").count() > 0
+    expect(page.get_by_role("region", name="Droplets", exact=True)).to_contain_text("droplets-1")
+    press(page, "shot", "ArrowRight")
+    expect(shot_shown(page)).to_have_text("shot 3 (3 of 3)")
+    expect(table).to_be_hidden()
+
+
+def test_the_shot_that_a_hand_has_picked_is_never_torn_away(page: Page, server: Serving, old_run: Path) -> None:
+    page.goto(url(server, "results"))
+    (server.services.data_dir / "calibrations" / "paper.json").write_text('{"id": "paper"}')
+    server.http.put("/api/calibrations/current", json={"id": "paper"})
+    sample, _ = server.run_to_its_end(plan_of(name="later", shots=2, pulse=PULSE))
+    wait_for_jobs(server, 2)
+    expect(page).to_have_url(re.compile(f"/results/{sample}/.*/1$"))
+    expect(page.get_by_role("status", name="work on this run")).to_contain_text("2 of 2 shots done")
+    expect(page.get_by_label("Result set", exact=True).first).to_have_value(re.compile("MLOS nominal"))
+    press(page, "shot", "ArrowLeft")
+    expect(shot_shown(page)).to_have_text("shot 0 (1 of 2)")
+    newest, _ = server.run_to_its_end(plan_of(name="newest", shots=1, pulse=PULSE))
+    wait_for_jobs(server, 3)
+    page.get_by_role("button", name="jobs and events").click()
+    expect(page.get_by_role("region", name="Processing")).to_contain_text(newest)
+    expect(page).to_have_url(re.compile(f"/results/{sample}/.*/0$"))
+    page.get_by_role("switch", name="newest").click()
+    expect(page).to_have_url(re.compile(f"/results/{newest}/.*/0$"))
+
+
+def test_a_run_is_deleted_by_its_name_alone(page: Page, server: Serving) -> None:
+    run_id, _ = server.run_to_its_end(plan_of(kind="dark", name="in vain", shots=1, pulse=PULSE))
+    page.goto(url(server, f"runs/{run_id}".replace(" ", "%20")))
+    page.get_by_role("button", name="Delete...").click()
+    confirm = page.get_by_role("button", name="Delete", exact=True)
+    expect(confirm).to_be_disabled()
+    page.get_by_label("Name of the run").fill("in vain")
+    expect(confirm).to_be_disabled()
+    page.get_by_label("Name of the run").fill(run_id)
+    confirm.click()
+    expect(page).to_have_url(re.compile("/runs$"))
+    expect(page.get_by_role("region", name="Runs").get_by_role("link", name=run_id)).to_have_count(0)
+    assert not (server.services.data_dir / run_id).exists()
+
+
+@pytest.mark.parametrize("width", [800, 1280, 1920])
+def test_the_page_of_results_fits_every_width(page: Page, server: Serving, old_run: Path, width: int) -> None:
+    page.set_viewport_size({"width": width, "height": 1000})
+    page.goto(url(server, f"results/{OLD}/{MLOS.results_id('c')}/1"))
+    expect(resolution(page)).to_have_text("MLOS, full resolution")
+    page.get_by_role("button", name="both").click()
+    expect(slice_of(page, "y").locator("image")).to_have_count(4)
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "the page is wider than the window"
+    _picture(page, f"desk-results-{width}", width)
+
+
+def _picture(page: Page, name: str, width: int) -> None:
+    """Dark and light."""
+    if not PICTURES:
+        return
+    page.set_viewport_size({"width": width, "height": 1000})
+    for shade in ("dark", "light"):
+        page.wait_for_timeout(1500)
+        page.screenshot(path=str(Path(PICTURES) / f"{name}-{shade}.png"))
+        page.get_by_role("button", name="dark or light").click()
