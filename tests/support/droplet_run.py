@@ -57,6 +57,7 @@ def write_run(
     covered: tuple[str, ...] = (),
     bits: int = 8,
     polarity: Polarity = "shadow",
+    droplets_mm: NDArray[np.float64] = DROPLETS_A_MM,
     **told: Any,
 ) -> Path:
     """Record shots; in the invalid ones exposure B of view2 is missing; covered views are dark; more of the header."""
@@ -71,17 +72,17 @@ def write_run(
     )
     with RunWriter(run_dir, header) as writer:
         for index in range(shots):
-            writer.write_shot(_shot(index, valid=index not in invalid, covered=covered, bits=bits))
+            writer.write_shot(_shot(index, droplets_mm, valid=index not in invalid, covered=covered, bits=bits))
         writer.finish("completed")
     return run_dir
 
 
-def _shot(index: int, *, valid: bool, covered: tuple[str, ...], bits: int) -> Shot:
+def _shot(index: int, droplets_mm: NDArray[np.float64], *, valid: bool, covered: tuple[str, ...], bits: int) -> Shot:
     views = {}
     for name, camera in cameras().items():
         light = name not in covered
         frame_a, frame_b = (
-            grey_values(light * shadowgraph(camera, DROPLETS_A_MM + step * MOTION_MM), bits) for step in (0, 1)
+            grey_values(light * shadowgraph(camera, droplets_mm + step * MOTION_MM), bits) for step in (0, 1)
         )
         views[name] = DoubleFrame(frame_a, frame_b, SEEN, SEEN)
     if not valid:

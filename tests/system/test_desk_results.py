@@ -5,6 +5,7 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 from nicegui import app as pages
 from playwright.sync_api import Locator, Page, expect
@@ -44,12 +45,14 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
 def old_run(server: Serving) -> Path:
     """A run of January, reconstructed twice and measured by commands: no job of this server knows of it."""
     calibration = write_calibration(server.services.data_dir / "calibrations" / "c.json")
-    run_dir = write_run(server.services.data_dir / OLD, shots=5, invalid=(2,))
+    measured = [_within(shot) for shot in cone_shots(0, 2, 30)]
+    cone_mm = np.stack([measured[1].columns[f"{axis}_mm"].astype(float) for axis in "xyz"], axis=1)
+    run_dir = write_run(server.services.data_dir / OLD, shots=5, invalid=(2,), droplets_mm=cone_mm)
     for settings in (SMART, MLOS):
         out = run_dir / "results" / settings.results_id("c")
         list(reconstruct_shots(run_dir, [0, 1, 3], calibration, settings, out, keep=keep_preview))
-    measured = write_results(run_dir / "results" / "droplets-1", [_within(shot) for shot in cone_shots(0, 2, 40)])
-    (measured / "settings.json").write_text("{}")
+    results_dir = write_results(run_dir / "results" / "droplets-1", measured)
+    (results_dir / "settings.json").write_text("{}")
     return run_dir
 
 
@@ -101,16 +104,18 @@ def test_runs_are_found_by_what_they_are(page: Page, server: Serving, old_run: P
     dark, _ = server.run_to_its_end(plan_of(kind="dark", name="night", shots=3, pulse=PULSE))
     notes = {"operator": "Ada", "fluid": "water", "pressure_bar": 40, "remark": "nozzle three"}
     sample, _ = server.run_to_its_end(plan_of(name="day", shots=2, pulse=PULSE, references=[dark], notes=notes))
+    page.goto(url(server, "runs"))
+    expect(page.get_by_role("region", name="Runs").get_by_role("link")).to_have_count(3)
+    for width in (800, 1280, 1920):
+        _picture(page, f"desk-runs-{width}", width)
     damaged = server.services.data_dir / "20250101T000000-damaged"
     damaged.mkdir()
     (damaged / "run.h5").write_bytes(b"no HDF5")
-    page.goto(url(server, "runs"))
+    page.reload()
     runs, shown = page.get_by_role("region", name="Runs"), page.get_by_role("status", name="runs shown")
     expect(runs.get_by_role("link")).to_have_text([sample, dark, OLD, damaged.name])
     expect(runs.get_by_role("row", name=OLD)).to_contain_text("4 / 5")
     expect(runs.get_by_role("row", name=damaged.name)).to_contain_text("tomoshadow repair")
-    for width in (800, 1280, 1920):
-        _picture(page, f"desk-runs-{width}", width)
     page.get_by_label("search runs").fill("ADA water")
     expect(shown).to_have_text("1 to 1 of 1")
     expect(runs.get_by_role("link")).to_have_text([sample])
@@ -216,6 +221,33 @@ def test_droplets_lie_over_the_slices_and_in_a_table_that_leads_to_them(
     press(page, "shot", "ArrowRight")
     expect(shot_shown(page)).to_have_text("shot 3 (3 of 3)")
     expect(table).to_be_hidden()
+
+
+def test_the_camera_stays_when_the_shot_changes(page: Page, server: Serving, old_run: Path) -> None:
+    page.goto(url(server, f"results/{OLD}/{MLOS.results_id('c')}/0"))
+    expect(resolution(page)).to_have_text("MLOS, full resolution")
+    scene = page.get_by_role("img", name="iso-surface")
+    scene.scroll_into_view_if_needed()
+    at_first = _camera(scene)
+    scene.locator("canvas").drag_to(scene, source_position={"x": 60, "y": 60}, target_position={"x": 160, "y": 120})
+    turned = _camera(scene)
+    assert turned != at_first
+    press(page, "shot", "ArrowRight")
+    expect(shot_shown(page)).to_have_text("shot 1 (2 of 3)")
+    expect(resolution(page)).to_have_text("MLOS, full resolution")
+    assert _camera(scene) == pytest.approx(turned, rel=1e-3)
+    page.get_by_role("button", name="see the whole volume").click()
+    page.wait_for_function(
+        "([scene, at]) => Math.abs(getElement(scene).camera.position.x - at) < 1e-3", arg=[_id(scene), at_first[0]]
+    )
+
+
+def _id(scene: Locator) -> int:
+    return int(scene.evaluate("element => Number(element.id.slice(1))"))
+
+
+def _camera(scene: Locator) -> list[float]:
+    return list(scene.page.evaluate("scene => getElement(scene).camera.position.toArray()", _id(scene)))
 
 
 def test_the_shot_that_a_hand_has_picked_is_never_torn_away(page: Page, server: Serving, old_run: Path) -> None:

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from datetime import UTC, datetime
 from functools import lru_cache
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -115,6 +116,11 @@ class RunStore:
         if not wanted.takes_all:
             directories = [path for path in directories if self._is_wanted(path, wanted)]
         return [self._summary_of(path) for path in directories[offset : offset + limit]], len(directories)
+
+    def with_results(self, limit: int) -> list[RunSummary]:
+        """The newest runs of which something came."""
+        found = (path for path in self._by_age() if has_results(path))
+        return [self._summary_of(path) for path in islice(found, limit)]
 
     def referring_to(self, run_id: str) -> tuple[str, ...]:
         """Runs that name this one as a reference, newest first."""

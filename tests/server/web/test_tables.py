@@ -64,6 +64,32 @@ def test_a_completed_run_that_lost_shots_is_not_green(valid: int, colour: str) -
     assert (row["colour"], row["id"]) == (colour, "20261129T032014-spray")
 
 
+def test_an_interrupted_run_says_so_with_the_shots_that_it_has() -> None:
+    run = RunSummary(
+        run_id="run",
+        name="run",
+        kind=RunKind.SAMPLE,
+        created_utc="2026-11-29T03:20:14Z",
+        outcome="interrupted",
+        cause="its process ended",
+        views=("view1",),
+        frames_per_shot=2,
+        shots_planned=6,
+        shots_recorded=3,
+        shots_valid=2,
+        calibration=None,
+    )
+    row = run_row(run)
+    assert (row["outcome"], row["colour"], row["shots"], row["cause"]) == (
+        "interrupted",
+        "warning",
+        "2 / 6",
+        "its process ended",
+    )
+    active = run_row(run.model_copy(update={"outcome": "active", "shots_valid": None}))
+    assert active["shots"] == "3 of 6 so far"
+
+
 def test_whoever_asks_for_work_is_told_what_came_of_it() -> None:
     queued = calibration_job("run", "cal", "pinhole")
     done = queued.model_copy(update={"state": JobState.DONE})

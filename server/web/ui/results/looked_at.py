@@ -8,7 +8,6 @@ from processing.reconstruction.choices import ReconstructionMethod
 from server.lab.errors import NotFound
 from server.lab.jobs import JobKind, JobState
 from server.lab.results import ResultSet, result_sets
-from server.lab.runs.run_filter import RunFilter
 from server.lab.runs.run_summary import RunSummary
 from server.lab.services import Context
 
@@ -39,7 +38,7 @@ class LookedAt:
 
 def runs_with_results(context: Context) -> list[RunSummary]:
     """Runs of which something came, newest first by their own time."""
-    return context.runs.page(_RUNS, 0, RunFilter(results=True))[0]
+    return context.runs.with_results(_RUNS)
 
 
 def sets_of(context: Context, run_id: str) -> list[ResultSet]:

@@ -56,6 +56,8 @@ def test_pages_of_a_filter_are_the_filtered_list_and_its_count(tmp_path: Path) -
     told = [[run.run_id for run in store.page(1, offset, RunFilter(results=True))[0]] for offset in range(3)]
     assert told == [[runs[3].name], [runs[1].name], []]
     assert store.page(1, 0, RunFilter(results=False))[1] == 3
+    assert [run.run_id for run in store.with_results(9)] == [runs[3].name, runs[1].name]
+    assert [run.run_id for run in store.with_results(1)] == [runs[3].name]
     assert store.page(9, 0, RunFilter(text="T120004"))[1] == 1
     assert store.page(9, 0, RunFilter(kind=RunKind.DARK)) == ([], 0)
 
