@@ -11,7 +11,8 @@ Measure
     measure, measure_velocities, measure_flat, track_droplets, mean_diameters, size_classes, droplet_statistics,
     velocity_statistics, spray_statistics, AskedFor, SprayAxis
 Files
-    read_run, shot_intensities, read_volume, write_volume, read_droplets, export_droplets
+    read_run, shot_intensities, read_volume, write_volume, read_droplets, export_droplets, read_tracks,
+    export_tracks
 Judge and look
     quality_factor, slices_figure, isosurface_figure, shadowgraph_figure, sizes_figure, droplets_in_space_figure,
     velocities_figure
@@ -28,12 +29,14 @@ if TYPE_CHECKING:
     from processing.analysis.droplets.size_statistics import mean_diameters as mean_diameters
     from processing.analysis.droplets.size_statistics import size_classes as size_classes
     from processing.analysis.exports.export import export_droplets as export_droplets
+    from processing.analysis.exports.export import export_tracks as export_tracks
     from processing.analysis.flat.flat_droplets import measure_flat as measure_flat
     from processing.analysis.quality import quality_factor as quality_factor
     from processing.analysis.spray.spray_axis import SprayAxis as SprayAxis
     from processing.analysis.spray.spray_statistics import AskedFor as AskedFor
     from processing.analysis.spray.spray_statistics import spray_statistics as spray_statistics
     from processing.analysis.velocity.measured_velocities import measure_velocities as measure_velocities
+    from processing.analysis.velocity.track_file import read_tracks as read_tracks
     from processing.analysis.velocity.track_table import track_droplets as track_droplets
     from processing.analysis.velocity.velocity_statistics import velocity_statistics as velocity_statistics
     from processing.calibration.calibrate import calibrate as calibrate
@@ -70,12 +73,13 @@ _HOMES = {
     "processing.analysis.droplets.droplet_file": ("read_droplets",),
     "processing.analysis.droplets.droplet_statistics": ("droplet_statistics",),
     "processing.analysis.droplets.size_statistics": ("mean_diameters", "size_classes"),
-    "processing.analysis.exports.export": ("export_droplets",),
+    "processing.analysis.exports.export": ("export_droplets", "export_tracks"),
     "processing.analysis.flat.flat_droplets": ("measure_flat",),
     "processing.analysis.quality": ("quality_factor",),
     "processing.analysis.spray.spray_axis": ("SprayAxis",),
     "processing.analysis.spray.spray_statistics": ("AskedFor", "spray_statistics"),
     "processing.analysis.velocity.measured_velocities": ("measure_velocities",),
+    "processing.analysis.velocity.track_file": ("read_tracks",),
     "processing.analysis.velocity.track_table": ("track_droplets",),
     "processing.analysis.velocity.velocity_statistics": ("velocity_statistics",),
     "processing.calibration.calibrate": ("calibrate",),

@@ -19,6 +19,7 @@ from server.cli.options import (
 )
 from server.cli.output import Outcome, progress, tracked
 from server.cli.runs.batch import add_runs, over_runs
+from server.cli.runs.export_option import add_export
 from server.cli.runs.measured_text import droplets_summary, droplets_table
 from server.cli.runs.recipes import add_recipe, keeping_recipe, settings_of, with_grid
 from server.cli.runs.resuming import resumable
@@ -27,7 +28,6 @@ from server.cli.runs.single_view import IN_THE_IMAGE, add_single_view, measure_s
 if TYPE_CHECKING:
     from collections.abc import Generator
 
-    from processing.analysis.exports.export import Export
     from processing.calibration.calibration import Calibration
     from processing.preprocessing import Polarity
     from processing.runs.measured_shot import ShotDroplets
@@ -75,9 +75,7 @@ def add(verbs: Verbs) -> None:
         metavar="X,Y,Z[,AX,AY,AZ]",
         help="of shadows: orifice in mm and axis of the spray, for the break-up length; default: [spray] of the run",
     )
-    parser.add_argument(
-        "--export", type=_exports, default=(), metavar="csv,vtk,parquet", help="write droplets in these formats too"
-    )
+    add_export(parser, "droplets")
     add_scheduler(parser)
     add_single_view(parser)
 
@@ -106,15 +104,6 @@ def _nozzle(text: str) -> tuple[float, ...]:
         return place_and_axis(tuple(float(number) for number in text.split(",")))
     except ValueError as error:
         raise ArgumentTypeError(f"{text}: {error}") from error
-
-
-def _exports(text: str) -> "tuple[Export, ...]":
-    from processing.analysis.exports.export import Export
-
-    try:
-        return tuple(dict.fromkeys(Export(name) for name in text.split(",")))
-    except ValueError as error:
-        raise ArgumentTypeError(f"{text}: formats are {', '.join(Export)}, with commas between them") from error
 
 
 def measure(options: Namespace) -> Outcome:

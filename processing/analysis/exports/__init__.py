@@ -1,4 +1,4 @@
-"""Tables of droplets as files of other programs: CSV, Parquet, and VTKHDF for ParaView.
+"""Tables of droplets and of tracks as files of other programs: CSV, Parquet, VTKHDF for ParaView, Tecplot.
 
-May import ``analysis.droplets`` and what lies below it.
+May import ``analysis.droplets``, ``analysis.velocity`` and what lies below them.
 """

@@ -1,4 +1,4 @@
-"""Droplets as CSV (RFC 4180): names with units, then a row per droplet and exposure; what is no number is empty."""
+"""Droplets or tracks as CSV (RFC 4180): names with units, then a row per droplet; what is no number is empty."""
 
 import csv
 from pathlib import Path
@@ -7,21 +7,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.files.atomic_file import replacing
-from processing.analysis.droplets.droplet_file import StoredDroplets
-from processing.analysis.exports.shot_table import shot_table
+from processing.analysis.exports.shot_table import Stored, shot_table
 
 
-def write_csv(path: Path, droplets: StoredDroplets) -> None:
+def write_csv(path: Path, stored: Stored) -> None:
     """Write a table; numbers have all digits that tell them apart, and a point, whatever the country.
 
     Parameters
     ----------
     path : Path
         Usually ``*.csv``; an existing file is replaced.
-    droplets : StoredDroplets
-        Of a shot.
+    stored : Stored
+        Droplets of a shot, or tracks.
     """
-    table = shot_table(droplets)
+    table = shot_table(stored)
     with replacing(path) as part, part.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(table)

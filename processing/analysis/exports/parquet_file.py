@@ -1,4 +1,4 @@
-"""Droplets as Parquet, by pyarrow, which is an extra: ``pip install 'tomoshadow[tables]'``."""
+"""Droplets or tracks as Parquet, by pyarrow, which is an extra: ``pip install 'tomoshadow[tables]'``."""
 
 import json
 from importlib import import_module
@@ -6,8 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from daq.files.atomic_file import replacing
-from processing.analysis.droplets.droplet_file import StoredDroplets
-from processing.analysis.exports.shot_table import shot_table
+from processing.analysis.exports.shot_table import Stored, shot_table
 from processing.errors import BadInput
 
 PROVENANCE = "tomoshadow"
@@ -34,15 +33,15 @@ def require_pyarrow() -> tuple[Any, Any]:
         ) from error
 
 
-def write_parquet(path: Path, droplets: StoredDroplets) -> None:
+def write_parquet(path: Path, stored: Stored) -> None:
     """Write a table.
 
     Parameters
     ----------
     path : Path
         Usually ``*.parquet``; an existing file is replaced.
-    droplets : StoredDroplets
-        Of a shot; its provenance becomes metadata of the table.
+    stored : Stored
+        Droplets of a shot, or tracks; their provenance becomes metadata of the table.
 
     Raises
     ------
@@ -51,8 +50,8 @@ def write_parquet(path: Path, droplets: StoredDroplets) -> None:
     """
     pyarrow, parquet = require_pyarrow()
     table = pyarrow.table(
-        {name: pyarrow.array(column, from_pandas=True) for name, column in shot_table(droplets).items()}
+        {name: pyarrow.array(column, from_pandas=True) for name, column in shot_table(stored).items()}
     )
-    metadata = {PROVENANCE: json.dumps(droplets.provenance)}
+    metadata = {PROVENANCE: json.dumps(stored.provenance)}
     with replacing(path) as part:
         parquet.write_table(table.replace_schema_metadata(metadata), part)

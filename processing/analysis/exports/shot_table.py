@@ -1,14 +1,29 @@
-"""The columns of a shot as tables of many shots want them: with the shot, or the image, in front."""
+"""The columns of a file as tables of many files want them: with the shot, or the image, in front."""
+
+from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from processing.analysis.droplets.droplet_file import StoredDroplets
+from processing.analysis.droplets.droplet_file import Value
+from processing.analysis.droplets.droplet_table import Columns
+
+TRACK, SHOT, IMAGE = "track", "shot", "image"
 
 
-def shot_table(droplets: StoredDroplets) -> dict[str, NDArray[np.generic]]:
+class Stored(Protocol):
+    """A table as a file has it: droplets of a shot, or tracks of a series."""
+
+    @property
+    def columns(self) -> Columns:
+        """By their names."""
+
+    @property
+    def provenance(self) -> dict[str, Value]:
+        """Where they come from."""
+
+
+def shot_table(stored: Stored) -> Columns:
     """Columns by name: ``shot`` or ``image``, if the file says which, and those of the file."""
-    columns = droplets.columns
-    rows = len(next(iter(columns.values())))
-    named = {name: droplets.provenance[name] for name in ("shot", "image") if name in droplets.provenance}
-    return {name: np.full(rows, value) for name, value in named.items()} | columns
+    rows = len(next(iter(stored.columns.values())))
+    named = {name: stored.provenance[name] for name in (SHOT, IMAGE) if name in stored.provenance}
+    return {name: np.full(rows, value) for name, value in named.items()} | stored.columns

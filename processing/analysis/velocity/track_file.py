@@ -2,16 +2,35 @@
 
 import json
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import h5py
+import numpy as np
 
 from daq.files.atomic_file import replacing
-from processing.analysis.droplets.droplet_file import PROVENANCE, Value, unit_of
+from processing.analysis.droplets.droplet_file import PROVENANCE, SCHEMA_KEYS, DropletFileError, Value, unit_of
+from processing.analysis.droplets.droplet_table import Columns
 from processing.analysis.velocity.track_table import DropletTracks
 
 SCHEMA, SCHEMA_VERSION = "tomoshadow/tracks", 1
 GROUP = "tracks"
+
+
+@dataclass(frozen=True, eq=False)
+class StoredTracks:
+    """Tracks as a file has them.
+
+    Parameters
+    ----------
+    columns : dict of name to (N,) array
+        A row per droplet on a track, track by track and shot by shot.
+    provenance : dict
+        Where they come from; ``rate_hz`` and ``doubts``, a JSON list, among it.
+    """
+
+    columns: Columns
+    provenance: dict[str, Value]
 
 
 def write_tracks(path: Path, tracks: DropletTracks, provenance: Mapping[str, Value]) -> None:
@@ -33,3 +52,26 @@ def write_tracks(path: Path, tracks: DropletTracks, provenance: Mapping[str, Val
         told: dict[str, Value] = {"schema": SCHEMA, "schema_version": SCHEMA_VERSION, "rate_hz": tracks.rate_hz}
         told["doubts"] = json.dumps(tracks.doubts)
         file.create_group(PROVENANCE).attrs.update({**provenance, **told})
+
+
+def read_tracks(path: str | Path) -> StoredTracks:
+    """Read a file of ``tomoshadow tracks``.
+
+    Parameters
+    ----------
+    path : path
+        The file, ``*.h5``.
+
+    Raises
+    ------
+    DropletFileError
+        The file is missing, truncated, or not of tracks.
+    """
+    try:
+        with h5py.File(path, "r") as file:
+            columns = {name: column[:] for name, column in file[GROUP].items()}
+            attributes = dict(file[PROVENANCE].attrs)
+    except (OSError, KeyError, ValueError) as error:
+        raise DropletFileError(f"{path}: not a readable file of tracks: {error}") from error
+    plain = {name: value.item() if isinstance(value, np.generic) else value for name, value in attributes.items()}
+    return StoredTracks(columns, {name: value for name, value in plain.items() if name not in SCHEMA_KEYS})

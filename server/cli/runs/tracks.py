@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from server.cli.options import Verbs, add_out, add_verb, positive
 from server.cli.output import Outcome
+from server.cli.runs.export_option import add_export
 
 if TYPE_CHECKING:
     from processing.analysis.velocity.track_table import DropletTracks
@@ -22,17 +23,22 @@ def add(verbs: Verbs) -> None:
     parser.add_argument(
         "--rate-hz", type=positive, metavar="HZ", help="of the shots, at even times; default: as the run states it"
     )
+    add_export(parser, "tracks")
 
 
 def tracks(options: Namespace) -> Outcome:
     """Read, link, write."""
     from processing.analysis.droplets.droplet_file import DropletFileError
+    from processing.analysis.exports.export import export_path, export_tracks
     from processing.analysis.velocity.track_file import write_tracks
     from processing.analysis.velocity.track_table import track_droplets
     from processing.runs.droplet_seal import read_sealed
     from processing.runs.overwriting import require_free
 
-    require_free(options.out, overwrite=options.overwrite)
+    for export in options.export:
+        export.require()
+    exports = [export_path(options.out, export) for export in options.export]
+    require_free(options.out, *exports, overwrite=options.overwrite)
     files = sorted(options.results.glob("shot_*_droplets.h5"))
     if not files:
         raise DropletFileError(f"{options.results}: has no droplets of shots; measure them first (tomoshadow measure)")
@@ -41,6 +47,8 @@ def tracks(options: Namespace) -> Outcome:
     write_tracks(
         options.out, linked, {name: one for name in KEPT if (one := shots[0].provenance.get(name)) is not None}
     )
+    for export in options.export:
+        export_tracks(options.out, export)
     result = _told(linked, len(shots), options.out)
     return Outcome(result, _summary(result))
 

@@ -1,4 +1,4 @@
-"""Droplets in formats of other programs, read by readers that are not ours."""
+"""Droplets and tracks in formats of other programs, read by readers that are not ours."""
 
 import csv
 import json
@@ -12,8 +12,11 @@ import pytest
 
 from processing.analysis.droplets.droplet_file import DropletFileError, read_droplets, write_droplets
 from processing.analysis.droplets.droplet_table import Droplets
-from processing.analysis.exports.export import Export, export_droplets
+from processing.analysis.exports.export import Export, export_droplets, export_tracks
 from processing.analysis.exports.parquet_file import MissingLibraryError
+from processing.analysis.velocity.track_file import read_tracks, write_tracks
+from processing.analysis.velocity.track_table import DropletTracks
+from tests.support.tecplot import tecplot_zones
 
 KINDS = [kind.value for kind in Export]
 
@@ -40,6 +43,20 @@ def empty(tmp_path: Path) -> Path:
     """A shot without droplets."""
     path = tmp_path / "shot_00008_droplets.h5"
     write_droplets(path, {"a": Droplets.none()}, {"run": "spray", "shot": 8})
+    return path
+
+
+@pytest.fixture
+def tracks(tmp_path: Path) -> Path:
+    """Two tracks of three and four droplets, without motion and link where they begin."""
+    rng, path = np.random.default_rng(5), tmp_path / "tracks.h5"
+    columns = {
+        "track": np.array([0, 0, 0, 1, 1, 1, 1]),
+        "shot": np.array([3, 4, 6, 3, 4, 5, 6]),
+        **{name: rng.normal(size=7) for name in ("x_mm", "y_mm", "z_mm", "u_m_s")},
+        "p_link": np.where([0, 1, 1, 0, 1, 1, 1], rng.random(7), np.nan),
+    }
+    write_tracks(path, DropletTracks(columns, 2, 9, 2000.0, None), {"run": 'a "spray"'})
     return path
 
 
@@ -132,3 +149,70 @@ def test_an_export_that_cannot_be_written_leaves_the_old_one(file: Path) -> None
     with pytest.raises(DropletFileError, match="droplets without z_mm have no place in space; export csv"):
         export_droplets(file, "vtk")
     assert file.with_suffix(".vtkhdf").read_text() == "old"
+
+
+def test_tracks_are_read_as_they_were_written(tracks: Path, file: Path) -> None:
+    stored = read_tracks(tracks)
+    assert stored.columns["shot"].tolist() == [3, 4, 6, 3, 4, 5, 6]
+    assert stored.provenance == {"run": 'a "spray"', "rate_hz": 2000.0, "doubts": "[]"}
+    with pytest.raises(DropletFileError, match="not a readable file of tracks"):
+        read_tracks(file)
+
+
+def test_tracks_are_a_row_per_droplet_in_csv_and_parquet(tracks: Path) -> None:
+    stored = read_tracks(tracks).columns
+    with export_tracks(tracks, "csv").open(newline="") as text:
+        rows = list(csv.DictReader(text))
+    assert list(rows[0]) == list(stored)
+    assert [float(row["u_m_s"]) for row in rows] == stored["u_m_s"].tolist()
+    assert [row["p_link"] == "" for row in rows] == np.isnan(stored["p_link"]).tolist()
+    parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed, extra [tables]")
+    table = parquet.read_table(export_tracks(tracks, "parquet"))
+    assert table["track"].to_pylist() == stored["track"].tolist()
+    assert json.loads(table.schema.metadata[b"tomoshadow"])["rate_hz"] == 2000.0
+
+
+def test_tracks_are_lines_in_vtkhdf(tracks: Path) -> None:
+    stored = read_tracks(tracks).columns
+    with h5py.File(export_tracks(tracks, "vtk")) as written:
+        poly = written["VTKHDF"]
+        np.testing.assert_array_equal(poly["Points"], np.column_stack([stored[f"{axis}_mm"] for axis in "xyz"]))
+        lines = poly["Lines"]
+        assert (lines["NumberOfCells"][:].tolist(), lines["NumberOfConnectivityIds"][:].tolist()) == ([2], [7])
+        assert lines["Offsets"][:].tolist() == [0, 3, 7]
+        assert lines["Connectivity"][:].tolist() == list(range(7))
+        assert poly["Vertices"]["NumberOfCells"][:].tolist() == [0]
+        np.testing.assert_array_equal(poly["PointData/u_m_s"], stored["u_m_s"])
+
+
+def test_tecplot_has_a_zone_per_exposure_and_no_number_that_is_none(file: Path) -> None:
+    path, stored = export_droplets(file, "tecplot"), read_droplets(file).columns
+    assert path.name == "shot_00007_droplets.dat"
+    title, names, zones = tecplot_zones(path)
+    assert title == "spray, 7"
+    assert names[:3] == ["x_mm", "y_mm", "z_mm"]
+    assert set(names) == {"shot", *stored} - {"frame"}
+    assert [(zone.title, zone.time, len(zone.rows)) for zone in zones] == [("exposure a", 7, 5), ("exposure b", 7, 3)]
+    assert zones[0].strand != zones[1].strand
+    read = np.vstack([zone.rows for zone in zones])
+    for number, name in enumerate(names):
+        np.testing.assert_array_equal(read[:, number], np.full(8, 7) if name == "shot" else stored[name])
+
+
+def test_tecplot_has_a_zone_per_shot_of_tracks_and_its_time(tracks: Path) -> None:
+    title, names, zones = tecplot_zones(export_tracks(tracks, "tecplot"))
+    stored = read_tracks(tracks).columns
+    assert title == "a 'spray'"
+    assert [(zone.title, zone.time) for zone in zones] == [
+        ("shot 3", 0.0015), ("shot 4", 0.002), ("shot 5", 0.0025), ("shot 6", 0.003)
+    ]  # fmt: skip
+    assert len({(zone.strand, zone.time) for zone in zones}) == len(zones)
+    read = np.vstack([zone.rows for zone in zones])
+    order = np.lexsort([stored["track"], stored["shot"]])
+    for number, name in enumerate(names):
+        np.testing.assert_array_equal(read[:, number], stored[name][order])
+
+
+def test_a_shot_without_droplets_has_no_zones(empty: Path) -> None:
+    _, names, zones = tecplot_zones(export_droplets(empty, "tecplot"))
+    assert (names[0], zones) == ("x_mm", [])
