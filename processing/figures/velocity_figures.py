@@ -106,36 +106,47 @@ def _reasons(shot: StoredDroplets) -> str:
 
 
 @dataclass(frozen=True)
-class PairedCase:
-    """Double exposures of a case.
+class LinkedCase:
+    """Double exposures, or series, of a case.
 
     Parameters
     ----------
-    paired, right, rms_voxel : sequence of float
-        Share of the droplets, share of the pairs, and error of a component; one per double exposure.
-    least_paired, least_right, most_rms_voxel : float | None
+    share, right, rms_voxel : sequence of float
+        Share of the droplets that are paired, or whole tracks; share of the pairs, or links, that are right; and error
+        of a component of the motion. One per double exposure, or series.
+    least_share, least_right, most_rms_voxel : float | None
         What is asked for.
     """
 
-    paired: Sequence[float]
+    share: Sequence[float]
     right: Sequence[float]
     rms_voxel: Sequence[float]
-    least_paired: float | None = None
+    least_share: float | None = None
     least_right: float | None = None
     most_rms_voxel: float | None = None
 
 
-def paired_figure(cases: Mapping[str, PairedCase]) -> Figure:
-    """Paired droplets, right pairs and errors of every double exposure, means, and limits as lines."""
+def linked_figure(cases: Mapping[str, LinkedCase], labels: tuple[str, str, str], each: str) -> Figure:
+    """What is linked, how rightly, and errors of every double exposure or series, means, and limits as lines.
+
+    Parameters
+    ----------
+    cases : mapping of str to LinkedCase
+        By their names.
+    labels : three str
+        Of share, right and error.
+    each : str
+        What a dot is.
+    """
     figure = Figure(figsize=(12, 1.6 + 0.5 * len(cases)), layout="constrained")
-    paired_axes, right_axes, rms_axes = figure.subplots(1, 3, sharey=True)
+    share_axes, right_axes, rms_axes = figure.subplots(1, 3, sharey=True)
     for line, case in enumerate(cases.values()):
-        draw_case(paired_axes, line, case.paired, case.least_paired, 100)
+        draw_case(share_axes, line, case.share, case.least_share, 100)
         draw_case(right_axes, line, case.right, case.least_right, 100)
         draw_case(rms_axes, line, case.rms_voxel, case.most_rms_voxel)
-    paired_axes.set(xlabel="paired [% of the droplets in both]", yticks=range(len(cases)), yticklabels=list(cases))
-    right_axes.set(xlabel="right [% of the pairs]")
-    rms_axes.set(xlabel="rms error of a component [voxel]")
-    paired_axes.invert_yaxis()
-    figure.suptitle("each double exposure a dot, their mean a bar, what is asked for a red line", fontsize="small")
+    share_axes.set(yticks=range(len(cases)), yticklabels=list(cases))
+    for axes, label in zip(figure.axes, labels, strict=True):
+        axes.set_xlabel(label)
+    share_axes.invert_yaxis()
+    figure.suptitle(f"each {each} a dot, their mean a bar, what is asked for a red line", fontsize="small")
     return figure

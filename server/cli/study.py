@@ -12,6 +12,7 @@ from server.cli.studies.reality import add_reality
 from server.cli.studies.sizes import add_sizes
 from server.cli.studies.statistics import add_statistics
 from server.cli.studies.study_command import add_study, collected, report
+from server.cli.studies.tracks import add_tracks
 from server.cli.studies.velocity import add_velocity
 
 if TYPE_CHECKING:
@@ -36,6 +37,7 @@ def add(verbs: Verbs) -> None:
     add_droplets(studies)
     add_sizes(studies)
     add_velocity(studies)
+    add_tracks(studies)
     add_statistics(studies)
     add_break_up(studies)
     add_reality(studies)

@@ -1,13 +1,11 @@
 """Droplets of a series in time whose tracks are known: labels are drawn first, and no code of the product is asked."""
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from processing.analysis.velocity.moving_droplets import MovingDroplets
-from processing.analysis.velocity.tracks import Tracks
 from processing.geometry import FloatArray
 
 BOX = np.array([250.0, 80.0, 160.0])
@@ -68,21 +66,3 @@ def _expose(
     out.frames.append(MovingDroplets(there, covariance, looks).where(order))
     out.labels.append(np.append(labels, np.full(invented, -1))[order])
     out.velocities.append(velocities)
-
-
-def whole_and_right(tracks: Tracks, labels: list[NDArray[np.intp]], least: int = 3) -> tuple[float, float]:
-    """Share of the true droplets seen often enough that are one track, and share of the links that are right."""
-    by_label: dict[int, set[int]] = {}
-    seen: dict[int, int] = {}
-    by_track: dict[int, list[int]] = {}
-    for of_frame, ids in zip(labels, tracks.ids, strict=True):
-        for label, track in zip(of_frame.tolist(), ids.tolist(), strict=True):
-            if label >= 0:
-                by_label.setdefault(label, set()).add(track)
-                seen[label] = seen.get(label, 0) + 1
-            if track >= 0:
-                by_track.setdefault(track, []).append(label)
-    judged = [label for label, times in seen.items() if times >= least]
-    whole = [len(by_label[label]) == 1 and by_label[label] != {-1} for label in judged]
-    links = [one == other >= 0 for chain in by_track.values() for one, other in pairwise(chain)]
-    return float(np.mean(whole)), float(np.mean(links))

@@ -12,6 +12,10 @@ import pytest
 from scipy.ndimage import maximum_filter
 from scipy.spatial import cKDTree
 
+from processing.analysis.velocity.moving_droplets import MovingDroplets
+from processing.analysis.velocity.pairing import pair
+from processing.geometry import FloatArray
+from processing.reconstruction.settings import GridSettings
 from processing.reconstruction.volume_file import read_volume
 from server.cli.main import main
 from tomoshadow import read_droplets
@@ -53,30 +57,69 @@ def test_particles_of_another_laboratory_are_found(fluidimage: tuple[Path, dict[
     told("reconstruct", given / "set" / "run", "--calibration", given / "calibration.json", "-o", tmp_path / "volumes")
     for frame in "ab":
         volume, grid, _ = read_volume(tmp_path / "volumes" / f"shot_00000_{frame}.vtkhdf")
-        assert DATA is not None
-        listed_mm = np.loadtxt(
-            Path(DATA, FLUIDIMAGE, f"triangulated_frame_{frame}_xyz_mm.csv"), delimiter=",", skiprows=1
-        )
         maxima = np.argwhere((volume == maximum_filter(volume, 3)) & (volume > 0))
-        distance_voxel, _ = cKDTree(maxima).query(grid.to_index(listed_mm[:, :3]))
+        distance_voxel, _ = cKDTree(maxima).query(grid.to_index(listed_mm(frame)))
         assert np.mean(distance_voxel <= 1.0) >= 0.95
 
 
-def test_droplets_of_another_laboratory_are_measured(fluidimage: tuple[Path, dict[str, Any]], tmp_path: Path) -> None:
-    """Nearly all particles that matching of single spots gives, to a hundredth of a voxel, and more."""
+@pytest.fixture(scope="module")
+def measured(fluidimage: tuple[Path, dict[str, Any]], tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """Droplets of both exposures: what was told of the shot, and its columns."""
     given, _ = fluidimage
-    arguments = ["--calibration", given / "calibration.json", "--polarity", "bright", "-o", tmp_path / "droplets"]
+    out = tmp_path_factory.mktemp("droplets")
+    arguments = ["--calibration", given / "calibration.json", "--polarity", "bright", "-o", out / "droplets"]
     (shot,) = told("measure", given / "set", *arguments)["shots"]
-    assert (shot["verdict"], shot["droplets"]) == ("good", pytest.approx(3199, abs=20))
-    columns = read_droplets(tmp_path / "droplets" / shot["file"]).columns
+    return {**shot, "stored": read_droplets(out / "droplets" / shot["file"])}
+
+
+def listed_mm(frame: str) -> FloatArray:
+    """Particles as matching of single spots gives them."""
+    file = Path(str(DATA), FLUIDIMAGE, f"triangulated_frame_{frame}_xyz_mm.csv")
+    return np.asarray(np.loadtxt(file, delimiter=",", skiprows=1)[:, :3], np.float64)
+
+
+def test_droplets_of_another_laboratory_are_measured(measured: dict[str, Any]) -> None:
+    """Nearly all particles that matching of single spots gives, to a hundredth of a voxel, and more."""
+    assert (measured["verdict"], measured["droplets"]) == ("good", pytest.approx(3199, abs=20))
+    columns = measured["stored"].columns
     points_mm = np.column_stack([columns[axis] for axis in ("x_mm", "y_mm", "z_mm")])
     for frame in ("a", "b"):
-        listed_mm = np.loadtxt(
-            Path(str(DATA), FLUIDIMAGE, f"triangulated_frame_{frame}_xyz_mm.csv"), delimiter=",", skiprows=1
-        )[:, :3]
-        distance_mm, _ = cKDTree(points_mm[columns["frame"] == frame]).query(listed_mm)
+        distance_mm, _ = cKDTree(points_mm[columns["frame"] == frame]).query(listed_mm(frame))
         assert np.mean(distance_mm < 0.05) >= 0.99
         assert np.median(distance_mm) < 0.002
+
+
+def test_droplets_of_another_laboratory_are_paired(measured: dict[str, Any]) -> None:
+    """Displacements of at most 0.8 mm, as of the single spots; one of twelve scatters by several voxels."""
+    stored = measured["stored"]
+    grid = GridSettings.model_validate_json(stored.provenance["grid"]).to_grid()
+    moving, points_mm = [], []
+    for frame in "ab":
+        own = stored.columns["frame"] == frame
+        column = {
+            name: np.asarray(values[own], np.float64) for name, values in stored.columns.items() if name != "frame"
+        }
+        points_mm.append(np.column_stack([column[f"{axis}_mm"] for axis in "xyz"]))
+        covariance = np.array([[column[f"cov_{min(a, b)}{max(a, b)}_mm2"] for a in "xyz"] for b in "xyz"])
+        moving.append(
+            MovingDroplets(
+                grid.to_index(points_mm[-1])[:, ::-1],
+                np.moveaxis(covariance, -1, 0) / grid.pitch_mm**2,
+                np.log(column["amplitude"]),
+            )
+        )
+    partners = pair(*moving).first
+    paired = np.flatnonzero(partners.partner >= 0)
+    moved_mm = points_mm[1][partners.partner[paired]] - points_mm[0][paired]
+    assert len(paired) >= 0.91 * len(points_mm[0])
+    assert np.linalg.norm(moved_mm, axis=1).max() < 0.8
+    first_mm, second_mm = listed_mm("a"), listed_mm("b")
+    near_mm, listed = cKDTree(first_mm).query(points_mm[0][paired])
+    back_mm, there = cKDTree(second_mm).query(first_mm[listed] + moved_mm)
+    both = (near_mm < 0.02) & (back_mm < 0.02)
+    assert np.count_nonzero(both) >= 0.75 * len(first_mm)
+    off_mm = second_mm[there[both]] - first_mm[listed[both]] - moved_mm[both]
+    assert np.median(np.abs(off_mm)) < 0.002
 
 
 def test_measured_points_of_another_laboratory(tmp_path: Path) -> None:

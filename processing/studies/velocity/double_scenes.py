@@ -1,5 +1,6 @@
 """Double exposures of droplets that fly, bright or as shadows, with their truth."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -69,12 +70,16 @@ def bright_double(
     before = droplet_cloud(Box.around(grid), density_per_mm3, LogNormal(), rng, flow)
     heights = rng.lognormal(0, AMPLITUDE_SPREAD, len(before))
     after = before.advanced(1e-9 * SEPARATION_NS)
+    first, second = (bright_images(cameras, spray, heights, rng) for spray in (before, after))
+    return DoubleScene(before, after, (first, second), cameras)
 
-    def images(spray: Spray) -> list[Image]:
-        drawn = [spots_image(camera, spray.positions_mm, heights, SIGMA_PX) for camera in cameras]
-        return [(image + rng.normal(0, NOISE, image.shape)).astype(np.float32) for image in drawn]
 
-    return DoubleScene(before, after, (images(before), images(after)), cameras)
+def bright_images(
+    cameras: Sequence[PinholeCamera], spray: Spray, heights: FloatArray, rng: np.random.Generator
+) -> list[Image]:
+    """What cameras see of bright particles of such heights (N,), with noise."""
+    drawn = [spots_image(camera, spray.positions_mm, heights, SIGMA_PX) for camera in cameras]
+    return [(image + rng.normal(0, NOISE, image.shape)).astype(np.float32) for image in drawn]
 
 
 def shadow_double(
@@ -85,13 +90,14 @@ def shadow_double(
     flow: Flow = FLOW,
 ) -> DoubleScene:
     """Opaque droplets all over a grid and a little beyond, and where they have flown in B."""
-    cameras, optics, counting = (
-        study_cameras(image_size_px),
-        list(paper_optics().values()),
-        Counting.of_noise(COUNTING_NOISE),
-    )
-    sizes = LogNormal(MEDIAN_MM, SPREAD)
-    before = droplet_cloud(Box.around(grid, BESIDE_MM), density_per_mm3, sizes, rng, flow)
+    cameras = study_cameras(image_size_px)
+    before = droplet_cloud(Box.around(grid, BESIDE_MM), density_per_mm3, LogNormal(MEDIAN_MM, SPREAD), rng, flow)
     after = before.advanced(1e-9 * SEPARATION_NS)
-    first, second = (transmission_images(cameras, optics, spray, counting, rng) for spray in (before, after))
+    first, second = (shadow_images(cameras, spray, rng) for spray in (before, after))
     return DoubleScene(before, after, (first, second), cameras)
+
+
+def shadow_images(cameras: Sequence[PinholeCamera], spray: Spray, rng: np.random.Generator) -> list[Image]:
+    """What the paper's lenses show of opaque droplets, with noise."""
+    counting = Counting.of_noise(COUNTING_NOISE)
+    return list(transmission_images(cameras, list(paper_optics().values()), spray, counting, rng))

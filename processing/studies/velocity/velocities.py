@@ -18,7 +18,7 @@ from processing.analysis.droplets.ghost_share import RADIUS_VOXEL, matches
 from processing.analysis.droplets.shadows.shadow_shot import ShadowExposure, measure_shadows
 from processing.analysis.velocity.measured_velocities import MeasuredVelocities, measure_velocities
 from processing.analysis.velocity.velocity_table import MM_PER_NS
-from processing.figures.velocity_figures import PairedCase, paired_figure
+from processing.figures.velocity_figures import LinkedCase, linked_figure
 from processing.geometry import FloatArray
 from processing.kernels import DEFAULT_THREADS
 from processing.studies.droplets import IMAGE_SIZE_PX, SLAB
@@ -267,14 +267,16 @@ def _told(rows: Sequence[VelocityRow]) -> str:
 def velocity_figure(rows: Sequence[VelocityRow], cases: Sequence[VelocityCase]) -> Figure:
     """Paired droplets, wrong pairs and errors of every case."""
     limits = {case.name: case for case in cases}
-    return paired_figure(
+    return linked_figure(
         {
-            name: PairedCase(
+            name: LinkedCase(
                 [row.paired for row in chosen],
                 [row.right for row in chosen],
                 [row.rms_voxel for row in chosen],
                 *(getattr(limits[name], limit) for limit in ("least_paired", "least_right", "most_rms_voxel")),
             )
             for name, chosen in grouped(rows, _case).items()
-        }
+        },
+        ("paired [% of the droplets in both]", "right [% of the pairs]", "rms error of a component [voxel]"),
+        "double exposure",
     )

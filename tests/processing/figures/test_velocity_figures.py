@@ -8,7 +8,7 @@ import pytest
 from matplotlib.quiver import Quiver
 
 from processing.analysis.droplets.droplet_file import StoredDroplets
-from processing.figures.velocity_figures import PANELS, PairedCase, paired_figure, velocities_figure
+from processing.figures.velocity_figures import PANELS, LinkedCase, linked_figure, velocities_figure
 from processing.geometry import FloatArray
 
 
@@ -69,6 +69,8 @@ def test_without_velocities_there_is_no_figure_and_the_reason_is_told() -> None:
 
 
 def test_a_study_is_drawn_with_its_limits() -> None:
-    figure = paired_figure({"28": PairedCase([0.99, 0.98], [1.0, 1.0], [0.03, 0.05], 0.95, 0.995, 0.06)})
+    case = LinkedCase([0.99, 0.98], [1.0, 1.0], [0.03, 0.05], 0.95, 0.995, 0.06)
+    figure = linked_figure({"28": case}, ("paired [%]", "right [%]", "rms [voxel]"), "shot")
+    assert [axes.get_xlabel() for axes in figure.axes] == ["paired [%]", "right [%]", "rms [voxel]"]
     limits = [next(line.get_xdata()[0] for line in axes.lines if line.get_color() == "tab:red") for axes in figure.axes]  # type: ignore[index]
     assert limits == [95, 99.5, 0.06]

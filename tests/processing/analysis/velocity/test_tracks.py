@@ -5,8 +5,9 @@ import pytest
 
 from processing.analysis.velocity.moving_droplets import MovingDroplets
 from processing.analysis.velocity.track_motion import track_points
-from processing.analysis.velocity.tracks import Tracks, link
-from tests.support.droplet_series import Series, series, whole_and_right
+from processing.analysis.velocity.tracks import link
+from processing.studies.velocity.track_truth import whole_and_right
+from tests.support.droplet_series import Series, series
 
 
 @pytest.mark.parametrize(
@@ -20,7 +21,7 @@ from tests.support.droplet_series import Series, series, whole_and_right
 )
 def test_tracks_are_whole_and_right(scene: dict[str, float], least_whole: float) -> None:
     shown = series(**scene)  # type: ignore[arg-type]
-    whole, right = whole_and_right(link(shown.frames), shown.labels)
+    whole, right = whole_and_right(link(shown.frames).ids, shown.labels)
     assert whole >= least_whole
     assert right >= 0.995
 
@@ -32,7 +33,7 @@ def test_a_track_goes_on_beyond_frames_without_its_droplet() -> None:
         for number, (frame, label) in enumerate(zip(shown.frames, shown.labels, strict=True))
     ]
     labels = [label[(label % 3 != 0) | (number not in (5, 6))] for number, label in enumerate(shown.labels)]
-    whole, right = whole_and_right(link(hidden), labels)
+    whole, right = whole_and_right(link(hidden).ids, labels)
     assert whole > 0.98
     assert right > 0.99
 
@@ -75,7 +76,7 @@ def test_a_series_that_begins_with_empty_frames_is_tracked() -> None:
     shown = series(frames=6)
     nothing = shown.frames[0].where(np.zeros(0, np.intp))
     tracks = link([nothing, nothing, *shown.frames])
-    whole, _ = whole_and_right(Tracks(tracks.ids[2:], tracks.p_link[2:], tracks.count), shown.labels)
+    whole, _ = whole_and_right(tracks.ids[2:], shown.labels)
     assert whole > 0.98
 
 
@@ -84,7 +85,7 @@ def test_tracks_go_on_beyond_an_empty_frame() -> None:
     frames = list(shown.frames)
     frames[4] = frames[4].where(np.zeros(0, np.intp))
     labels = [*shown.labels[:4], shown.labels[4][:0], *shown.labels[5:]]
-    whole, right = whole_and_right(link(frames), labels)
+    whole, right = whole_and_right(link(frames).ids, labels)
     assert whole > 0.97
     assert right > 0.995
 

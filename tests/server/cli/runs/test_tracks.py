@@ -11,11 +11,11 @@ import pytest
 from processing.analysis.droplets.droplet_file import DropletFileError, read_droplets, write_droplets
 from processing.analysis.droplets.droplet_table import Droplets
 from processing.analysis.velocity.track_table import track_droplets
-from processing.analysis.velocity.tracks import Tracks
 from processing.reconstruction.settings import GridSettings
+from processing.studies.velocity.track_truth import whole_and_right
 from processing.volume import VoxelGrid
 from tests.support.command_line import refused, shown, told
-from tests.support.droplet_series import BOX, Series, series, whole_and_right
+from tests.support.droplet_series import BOX, Series, series
 
 RATE_HZ = 20_000.0
 GRID = VoxelGrid((int(BOX[2]), int(BOX[1]), int(BOX[0])), (1.0, -2.0, 0.5), 1 / 60)
@@ -56,7 +56,7 @@ def test_tracks_of_a_series_lie_in_a_file_in_physical_units(tmp_path: Path, caps
     ids = [np.full(len(frame), -1) for frame in shown.frames]
     for track, shot, row in zip(columns["track"], columns["shot"], columns["droplet"], strict=True):
         ids[shot - 3][row] = track
-    whole, right = whole_and_right(Tracks(tuple(ids), (), result["tracks"]), shown.labels)
+    whole, right = whole_and_right(ids, shown.labels)
     assert whole > 0.98
     assert right > 0.995
     rows = list(zip(columns["shot"] - 3, columns["droplet"], strict=True))
@@ -134,3 +134,16 @@ def test_shots_that_are_not_good_are_told_with_their_tracks(tmp_path: Path, caps
     assert result["doubts"] == ["4 of 4 exposures are doubtful, and count: it is blurred"]
     with h5py.File(tmp_path / "tracks.h5") as file:
         assert json.loads(file["tomoshadow"].attrs["doubts"]) == result["doubts"]
+
+
+def test_tracks_are_exported_beside_their_file_and_not_over_another(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    results = write_series(tmp_path / "droplets", series(frames=4), rate_hz=RATE_HZ)
+    command = ("tracks", results, "-o", tmp_path / "tracks.h5", "--export", "csv,vtk,tecplot")
+    result = told(capsys, *command)
+    assert result["tracks"] > 0
+    written = [tmp_path / f"tracks.{ending}" for ending in ("csv", "vtkhdf", "dat")]
+    assert all(file.is_file() for file in written)
+    (tmp_path / "tracks.h5").unlink()
+    assert "tracks.csv" in refused(capsys, *command)
