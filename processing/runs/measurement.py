@@ -218,13 +218,13 @@ class RunMeasurement:
         file = droplets_path(results_dir, shot)
         more = velocities.columns() if velocities else {}
         tables = {str(frame): {**one.droplets.columns(), **more.get(frame, {})} for frame, one in by_frame.items()}
-        others = {str(frame): found.objects.columns() for frame, found in objects.items()}
+        others = {str(frame): moving.columns() for frame, moving in objects.items()}
         write_droplets(
             file,
             {str(frame): one.droplets for frame, one in by_frame.items()},
             sealed(tables, {**self.provenance, **self._told_of(shot, told, velocity)}, others),
             velocities=more or None,
-            objects={str(frame): found.objects for frame, found in objects.items()},
+            objects={str(frame): moving for frame, moving in objects.items()},
         )
         summary = shot_summary(shot, exposures, velocity, time.process_time() - started_cpu_s, file)
         return MeasuredShot(summary, exposures, velocities)

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
 from daq.files.run_directory import DoubleFrame, ExposureRecord, ImageKey, RunHeader, RunWriter, Shot, ViewFormat
@@ -14,6 +15,7 @@ from processing.calibration.calibration_record import content_id
 from processing.geometry import FloatArray, PinholeCamera
 from processing.studies.seen_droplets import droplet_calibration
 from processing.studies.simulated_droplets import droplet_centres, study_cameras, study_grid
+from processing.studies.velocity.double_scenes import SEPARATION_NS
 from processing.volume import VoxelGrid
 
 BLURS_PX = (0.95, 0.72, 0.72, 0.95)
@@ -112,8 +114,10 @@ class Shadows(Protocol):
         """One per image."""
 
 
-def write_shadow_run(run_dir: Path, scene: Shadows, *further: Shadows, background: bool = True) -> Path:
-    """Shots of one exposure before a light that falls off to one side, with its references."""
+def write_shadow_run(
+    run_dir: Path, scene: Shadows, *further: Shadows, background: bool = True, later: Shadows | None = None
+) -> Path:
+    """Shots of one exposure before a light that falls off to one side, with its references; ``later`` is exposure B."""
     names = [f"view{number}" for number in range(1, 5)]
     rows, columns = scene.images[0].shape
     light = np.repeat(np.linspace(LIGHT, 0.7 * LIGHT, columns)[None], rows, axis=0)
@@ -123,22 +127,27 @@ def write_shadow_run(run_dir: Path, scene: Shadows, *further: Shadows, backgroun
         run_id=run_dir.name,
         created_utc="2026-01-01T00:00:00+00:00",
         views={name: ViewFormat((rows, columns), BITS) for name in names},
-        frames_per_shot=1,
+        frames_per_shot=2 if later else 1,
+        separation_ns=SEPARATION_NS if later else None,
         polarity="shadow",
     )
 
-    def views(seen: Shadows) -> dict[str, DoubleFrame]:
-        greys = [np.clip(np.rint(DARK + light * image), 0, full_scale).astype(np.uint16) for image in seen.images]
-        for grey in greys:
+    def greys(seen: Shadows) -> list[NDArray[np.uint16]]:
+        out = [np.clip(np.rint(DARK + light * image), 0, full_scale).astype(np.uint16) for image in seen.images]
+        for grey in out:
             grey[UNKNOWN] = full_scale
-        frames = (DoubleFrame(grey, None, recorded, recorded) for grey in greys)
+        return out
+
+    def views(seen: Shadows) -> dict[str, DoubleFrame]:
+        second = greys(later) if later else [None] * len(names)
+        frames = (DoubleFrame(a, b, recorded, recorded) for a, b in zip(greys(seen), second, strict=True))
         return dict(zip(names, frames, strict=True))
 
-    lit = (DARK + light).astype(np.float32)[None]
+    lit = np.repeat((DARK + light).astype(np.float32)[None], 2 if later else 1, axis=0)
     lit[:, UNKNOWN] = full_scale
     with RunWriter(run_dir, header) as writer:
         if background:
-            dark = np.full((1, rows, columns), DARK, np.float32)
+            dark = np.full((len(lit), rows, columns), DARK, np.float32)
             writer.write_references(dict.fromkeys(names, dark), dict.fromkeys(names, lit))
         for number, seen in enumerate((scene, *further)):
             writer.write_shot(Shot(number, ImageKey.SAMPLE, views(seen)))

@@ -111,9 +111,14 @@ class LiquidObjects:
         """The chosen ones."""
         return LiquidObjects(**{field.name: getattr(self, field.name)[chosen] for field in fields(self)})
 
+    @property
+    def is_told(self) -> NDArray[np.bool_]:
+        """Which (N,) are liquid and no droplets, as far as their silhouettes tell."""
+        return np.asarray((self.classes != ObjectClass.DROPLET) & (self.own_share >= LEAST_OWN_SHARE))
+
     def told(self) -> "LiquidObjects":
-        """Those that are liquid and no droplets, as far as their silhouettes tell."""
-        return self.where((self.classes != ObjectClass.DROPLET) & (self.own_share >= LEAST_OWN_SHARE))
+        """Those that are liquid and no droplets."""
+        return self.where(self.is_told)
 
     def count(self, kind: ObjectClass) -> int:
         """How many are of a class."""

@@ -72,6 +72,8 @@ class ExposureObjects:
         How many views see each of the search's places.
     reason : str | None
         Why there are no objects.
+    bodies : tuple of (M, 3) arrays
+        Voxels of the hull of each object, in mm.
     """
 
     objects: LiquidObjects
@@ -80,6 +82,7 @@ class ExposureObjects:
     unjudged_share: float
     seeing: NDArray[np.uint8]
     reason: str | None = None
+    bodies: tuple[FloatArray, ...] = ()
 
 
 def plan_objects(mappings: Sequence[ViewMapping], grid: VoxelGrid, nozzle: Nozzle | None = None) -> ObjectSearch:
@@ -138,12 +141,15 @@ def measure_objects(
     if len(images) < LEAST_VIEWS:
         reason = f"{len(images)} views do not tell shapes: {LEAST_VIEWS} or more do"
         return ExposureObjects(LiquidObjects.none(), reach, *shares, seeing, reason)
-    return ExposureObjects(_objects(voxels, search).told(), reach, *shares, seeing)
+    told, numbers = _connected(voxels)
+    objects = _objects(told, numbers, search)
+    bodies = _bodies(told, numbers, np.flatnonzero(objects.is_told))
+    return ExposureObjects(objects.told(), reach, *shares, seeing, bodies=bodies)
 
 
 def all_objects(images: Sequence[Intensity], search: ObjectSearch, *, threads: int = DEFAULT_THREADS) -> LiquidObjects:
     """All objects of an exposure, droplets and what may be a ghost included."""
-    return _objects(_dark(_darkness(images, None), search, threads), search)
+    return _objects(*_connected(_dark(_darkness(images, None), search, threads)), search)
 
 
 def _darkness(images: Sequence[Intensity], trust: Sequence[Intensity] | None) -> list[Intensity]:
@@ -172,8 +178,21 @@ def _known(voxels: DarkVoxels, trust: Sequence[Intensity] | None, search: Object
     return voxels.where(known >= LEAST_KNOWING)
 
 
-def _objects(voxels: DarkVoxels, search: ObjectSearch) -> LiquidObjects:
-    told = voxels.at_least(THRESHOLD)
-    numbers = connected(told)
-    core = core_of(told, numbers, search.nozzle) if search.nozzle else None
-    return liquid_objects(told, numbers, search.sight, core)
+def _connected(voxels: DarkVoxels) -> tuple[DarkVoxels, NDArray[np.int32]]:
+    """What is dark enough, and the number of the object of each voxel."""
+    dark = voxels.at_least(THRESHOLD)
+    return dark, connected(dark)
+
+
+def _objects(voxels: DarkVoxels, numbers: NDArray[np.int32], search: ObjectSearch) -> LiquidObjects:
+    core = core_of(voxels, numbers, search.nozzle) if search.nozzle else None
+    return liquid_objects(voxels, numbers, search.sight, core)
+
+
+def _bodies(voxels: DarkVoxels, numbers: NDArray[np.int32], chosen: NDArray[np.intp]) -> tuple[FloatArray, ...]:
+    """Voxels of some objects, in mm."""
+    own = voxels.where(np.isin(numbers, chosen))
+    owners = numbers[np.isin(numbers, chosen)]
+    order, points_mm = np.argsort(owners, kind="stable"), own.points_mm
+    ends = np.searchsorted(owners[order], chosen, side="right")
+    return tuple(np.split(points_mm[order], ends[:-1])) if len(chosen) else ()

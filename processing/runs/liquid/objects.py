@@ -13,14 +13,17 @@ from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.analysis.objects.break_up import Nozzle, Reach
 from processing.analysis.objects.connected_share import break_up_of
 from processing.analysis.objects.liquid_objects import ObjectClass
-from processing.analysis.objects.object_search import ExposureObjects, ObjectSearch, measure_objects, plan_objects
+from processing.analysis.objects.object_search import ObjectSearch, measure_objects, plan_objects
+from processing.analysis.objects.object_velocities import MovingObjects, object_velocities
 from processing.calibration.calibration import Calibration
 from processing.kernels import DEFAULT_THREADS
+from processing.preprocessing import Intensity
 from processing.reconstruction.errors import ReconstructionError
 from processing.reconstruction.settings import FrozenValue
 from processing.runs.measured_images import shadow_images, without_ignored
 from processing.runs.pipeline import default_grid
 from processing.runs.results_file import FrameName
+from processing.runs.shots.separation import separation_of
 from processing.runs.workbench import References
 from processing.volume import VoxelGrid
 
@@ -81,16 +84,35 @@ class RunObjects:
 
     def measure(
         self, shot: Shot, frames: Sequence[FrameName], threads: int = DEFAULT_THREADS
-    ) -> dict[FrameName, ExposureObjects]:
-        """Objects of some exposures; none of bright particles."""
-        if self.search is None:
+    ) -> dict[FrameName, MovingObjects]:
+        """Objects of some exposures, with their velocities where both are there; none of bright particles."""
+        search = self.search
+        if search is None:
             return {}
-        return {frame: self._exposure(shot, frame, self.search, threads) for frame in frames}
+        seen = {frame: self._seen(shot, frame) for frame in frames}
+        found = {
+            frame: measure_objects(images, search, trust=trust, threads=threads)
+            for frame, (images, trust) in seen.items()
+        }
+        light = {frame: [_known(*one) for one in zip(*both, strict=True)] for frame, both in seen.items()}
+        separation = separation_of(self.run, shot)
+        if isinstance(separation, str) or len(found) != len(BOTH):
+            return {frame: MovingObjects(one) for frame, one in found.items()}
+        moving = {}
+        for frame, other, later_ns in ((*BOTH, separation.mean_ns), (*BOTH[::-1], -separation.mean_ns)):
+            velocities = object_velocities(found[frame], light[frame], light[other], search.mappings, later_ns)
+            moving[frame] = MovingObjects(found[frame], velocities)
+        return moving
 
-    def _exposure(self, shot: Shot, frame: FrameName, search: ObjectSearch, threads: int) -> ExposureObjects:
+    def _seen(self, shot: Shot, frame: FrameName) -> tuple[Sequence[Intensity], list[Intensity]]:
+        """Transmissions, and which pixels are known."""
         images, trust = shadow_images(self.run, shot, frame, self.references)
-        known = without_ignored(dict(zip(shot.views, trust, strict=True)), self.ignored)
-        return measure_objects(images, search, trust=list(known.values()), threads=threads)
+        return images, list(without_ignored(dict(zip(shot.views, trust, strict=True)), self.ignored).values())
+
+
+def _known(image: Intensity, trust: Intensity) -> Intensity:
+    """The same, light where nothing is known: what is light in both exposures does not move."""
+    return np.where(trust > 0, image, np.float32(1))
 
 
 def nozzle_of(run: RunReader, stated: NozzleNumbers | None) -> Nozzle | None:
@@ -102,10 +124,11 @@ def nozzle_of(run: RunReader, stated: NozzleNumbers | None) -> Nozzle | None:
     return Nozzle(spray.nozzle_mm, spray.axis) if spray else None
 
 
-def told_objects(found: ExposureObjects | None) -> dict[str, Any]:
+def told_objects(moving: MovingObjects | None) -> dict[str, Any]:
     """What a file says of one exposure, beside the table; nothing where nobody looked."""
-    if found is None:
+    if moving is None:
         return {}
+    found = moving.found
     told = {
         **{f"{kind.value}s": found.objects.count(kind) for kind in COUNTED},
         "reason": found.reason,
@@ -116,6 +139,7 @@ def told_objects(found: ExposureObjects | None) -> dict[str, Any]:
     return {"objects": told}
 
 
+BOTH: tuple[FrameName, FrameName] = ("a", "b")
 COUNTED = (ObjectClass.LIGAMENT, ObjectClass.SHEET, ObjectClass.CLUSTER)
 
 
