@@ -31,7 +31,7 @@ from server.cli.clients import abort, run, runs, stop, watch
 from server.cli.cluster import scheduler, worker
 from server.cli.keeping import pack, repair, verify
 from server.cli.output import endable, say, tell
-from server.cli.runs import tracks
+from server.cli.runs import separation, tracks
 from server.cli.spray import report, statistics
 from server.lab.errors import ServerError
 from tomoshadow.client.errors import ClientError
@@ -54,6 +54,7 @@ COMMANDS = (
     reconstruct,
     measure,
     tracks,
+    separation,
     statistics,
     report,
     average,

@@ -118,7 +118,7 @@ def test_droplets_of_another_laboratory_are_paired(measured: dict[str, Any]) -> 
     back_mm, there = cKDTree(second_mm).query(first_mm[listed] + moved_mm)
     both = (near_mm < 0.02) & (back_mm < 0.02)
     assert np.count_nonzero(both) >= 0.75 * len(first_mm)
-    off_mm = second_mm[there[both]] - first_mm[listed[both]] - moved_mm[both]
+    off_mm = second_mm[np.asarray(there)[both]] - first_mm[np.asarray(listed)[both]] - moved_mm[both]
     assert np.median(np.abs(off_mm)) < 0.002
 
 
