@@ -25,6 +25,7 @@ from processing.analysis.droplets.measured_exposure import (
     judged_by_volume,
     moved,
     told_real,
+    twins_of,
 )
 from processing.analysis.droplets.reality import Evidence, Reality, crowding
 from processing.geometry import FloatArray
@@ -82,7 +83,8 @@ def measure_bright(
     search : DropletSearch
         Where to look.
     twins : int
-        Simulated twins of the exposure in which ghosts are counted: each costs as much as the exposure itself.
+        Simulated twins of the exposure in which ghosts are counted: each costs as much as the exposure itself. Where
+        views are not four there is one at least.
     seed : int
         Of the twins.
     threads : int
@@ -118,10 +120,11 @@ def measure_bright(
     hidden = Hidden(volume_share=_unseen_share(shot, search))
     found = MeasuredExposure(droplets, views, ratio, verdict, reasons, hidden=hidden)
     told = told_real(judged_by_volume(judged_by_company(found, search.grid)))
-    if not twins or told.verdict is not ShotVerdict.GOOD:
+    count = twins_of(twins, len(images))
+    if not count or told.verdict is not ShotVerdict.GOOD:
         return told
     rng = np.random.default_rng(seed)
-    ghosts = pooled(_twin_ghosts(shot, fit, search, left, rng, before_round) for _ in range(twins))
+    ghosts = pooled(_twin_ghosts(shot, fit, search, left, rng, before_round) for _ in range(count))
     return told_real(judged_by_twins(told, ghosts))
 
 

@@ -12,6 +12,7 @@ from processing.analysis.droplets.droplet_search import DropletSearch
 from processing.analysis.droplets.droplet_table import DropletRows
 from processing.analysis.droplets.gaussian_blobs import Image
 from processing.analysis.droplets.ghost_share import GhostShare, matches, told_share
+from processing.analysis.droplets.reality import TRIED_VIEWS
 from processing.analysis.estimates import Estimate
 from processing.geometry import FloatArray
 
@@ -245,6 +246,11 @@ def judged_by_volume(shot: "MeasuredExposure[Rows, Seen]") -> "MeasuredExposure[
         else f"too few views see {share}: take a box that all of them see (--grid)"
     )
     return replace(shot, verdict=ShotVerdict.DOUBTFUL, reasons=(*shot.reasons, reason))
+
+
+def twins_of(asked: int, views: int) -> int:
+    """How many twins to make: one at least where views are not four, as then no probability tells of ghosts."""
+    return asked or int(views != TRIED_VIEWS)
 
 
 def judged_by_twins(shot: "MeasuredExposure[Rows, Seen]", ghosts: GhostShare) -> "MeasuredExposure[Rows, Seen]":

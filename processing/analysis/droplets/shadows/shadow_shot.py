@@ -23,6 +23,7 @@ from processing.analysis.droplets.measured_exposure import (
     judged_by_volume,
     moved,
     told_real,
+    twins_of,
     within_grid,
 )
 from processing.analysis.droplets.shadows.judged_volume import (
@@ -112,7 +113,8 @@ def measure_shadows(
     sizes : SizeCorrection, optional
         What a reticle of dots says, in the same light.
     twins : int
-        Simulated twins of the exposure in which ghosts are counted: each costs as much as the exposure itself.
+        Simulated twins of the exposure in which ghosts are counted: each costs as much as the exposure itself. Where
+        views are not four there is one at least.
     seed : int
         Of the twins.
     threads : int
@@ -136,10 +138,11 @@ def measure_shadows(
         return MeasuredExposure(SizedDroplets.none(), {}, None, *blind)
     fit = find_shadows(shot, search, light, before_round)
     told = told_real(judged_by_volume(judged_by_shape(_told(shot, fit, search, sizes))))
-    if not twins or told.verdict is not ShotVerdict.GOOD:
+    count = twins_of(twins, len(images))
+    if not count or told.verdict is not ShotVerdict.GOOD:
         return told
     rng = np.random.default_rng(seed)
-    ghosts = pooled(_twin_ghosts(shot, fit, search, rng, before_round) for _ in range(twins))
+    ghosts = pooled(_twin_ghosts(shot, fit, search, rng, before_round) for _ in range(count))
     return told_real(judged_by_twins(told, ghosts))
 
 

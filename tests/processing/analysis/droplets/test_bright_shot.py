@@ -55,6 +55,15 @@ def test_covariances_say_how_far_droplets_are_off(truth: BrightScene, shot: Brig
     assert 0.8 < np.median(np.abs(scores)) / 0.6745 < 1.3
 
 
+def test_two_views_of_a_dense_spray_are_doubted_although_they_explain_their_images() -> None:
+    """Nobody asked for twins; more than half of what two views give is ghosts."""
+    truth = scene(DropletCase(28, views=2))
+    shot = measure_bright(truth.images, search_of(truth))
+    assert found_and_ghosts(shot, truth)[1] > 0.3
+    assert shot.residual_over_noise == pytest.approx(1, abs=0.04)
+    assert (shot.verdict, shot.reasons[0][:25]) == (ShotVerdict.DOUBTFUL, "of the droplets of a twin")
+
+
 def test_noise_and_widths_come_from_the_images(shot: BrightExposure) -> None:
     for view in shot.views.values():
         assert view.noise == pytest.approx(0.03, rel=0.03)
