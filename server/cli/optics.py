@@ -32,13 +32,14 @@ def views_table(result: dict[str, Any]) -> str:
             f"{view['depth_of_field_mm']:.2f}",
             f"{view['airy_diameter_um']:.1f}",
             f"{view['resolved_diameter_um']:.1f}",
+            f"{view['smallest_droplet_um']:.1f}",
             f"{view['blur_px']:.2f}",
             f"{view['displacement_px']:.1f}",
             _window(view["straddling_window_ns"]),
         ]
         for name, view in result["views"].items()
     ]
-    heads = ["view", "px/mm", "field [mm]", "depth of field [mm]", "d_A [um]", "resolved [um]"]
+    heads = ["view", "px/mm", "field [mm]", "depth of field [mm]", "d_A [um]", "resolved [um]", "smallest [um]"]
     return table([*heads, "blur [px]", "displacement [px]", "separation [ns]"], rows)
 
 

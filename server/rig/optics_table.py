@@ -10,6 +10,7 @@ from processing.optics import (
     depth_of_field_mm,
     image_scale_px_per_mm,
     resolved_diameter_um,
+    smallest_droplet_um,
     travel_um,
 )
 from server.rig.config import RigConfig, ViewConfig
@@ -82,6 +83,7 @@ def _view(view: ViewConfig, motion: Motion) -> dict[str, float]:
         "airy_diameter_um": airy_um,
         "airy_diameter_px": airy_um / sensor.pixel_pitch_um,
         "resolved_diameter_um": resolved_diameter_um(lens.f_number, lens.magnification),
+        "smallest_droplet_um": smallest_droplet_um(airy_um / sensor.pixel_pitch_um, scale_px_per_mm),
         "depth_of_field_mm": depth_of_field_mm(lens.f_number, lens.magnification),
         "image_scale_px_per_mm": scale_px_per_mm,
         "field_width_mm": sensor.width_px / scale_px_per_mm,

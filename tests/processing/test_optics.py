@@ -9,6 +9,7 @@ from processing.optics import (
     depth_of_field_mm,
     image_scale_px_per_mm,
     resolved_diameter_um,
+    smallest_droplet_um,
     travel_um,
 )
 from processing.synthetic.paper_rig import TABLE_1
@@ -33,7 +34,20 @@ def test_depth_of_field_holds_the_volume_of_the_paper() -> None:
     assert depth_of_field_mm(22, 0.43) > 10
 
 
-def test_scale_and_smallest_droplet_of_the_paper() -> None:
+@pytest.mark.parametrize("view", TABLE_1)
+def test_the_smallest_droplet_is_as_dark_as_simulated_ones_that_are_found(view: str) -> None:
+    """Area of a disc of 12 to 13 um over that of the blur with which it is seen; see ``study sizes``."""
+    row = TABLE_1[view]
+    smallest_um = smallest_droplet_um(row.airy_diameter_um / 7.4, image_scale_px_per_mm(row.magnification, 7.4))
+    assert 9 < smallest_um < 13.5
+
+
+def test_a_lens_twice_as_open_shows_smaller_droplets_down_to_the_pixels() -> None:
+    assert smallest_droplet_um(2, 60) < 0.65 * smallest_droplet_um(4, 60)
+    assert smallest_droplet_um(0, 60) == pytest.approx(smallest_droplet_um(0, 120) * 2)
+
+
+def test_scale_and_resolution_of_the_paper() -> None:
     assert image_scale_px_per_mm(0.444, 7.4) == pytest.approx(60)
     assert resolved_diameter_um(16, 0.43) == pytest.approx(65, abs=1)
 
