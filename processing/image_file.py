@@ -25,6 +25,9 @@ T = TypeVar("T")
 _STDERR = threading.Lock()
 _BLANK = rb"(?:\s|#[^\n]*\n)+"
 _NETPBM = re.compile(rb"P([56])" + 3 * (_BLANK + rb"(\d+)") + rb"\s")
+_PAM, _PAM_FIELD = re.compile(rb"P7\n(.*?)ENDHDR\n", re.DOTALL), re.compile(rb"^(\w+)\s+(\w+)\s*$", re.MULTILINE)
+_JPEG_SEGMENT, _JPEG_PIXELS, _MPO = 0xFF, 0xDA, b"MPF\0"
+"""Before a segment, the one of the pixels; how one begins that lists further images (CIPA DC-007)."""
 _SUN_RASTER = b"\x59\xa6\x6a\x95"
 """Of whose images OpenCV makes zeros, or other grey values."""
 
@@ -93,6 +96,10 @@ def _pages(path: Path, content: NDArray[np.uint8]) -> tuple[int, ...]:
         raise ImageFileError(f"{path}: holds {described} images, and lists {len(offsets)}; save them one by one")
     if _is_netpbm_stack(content):
         raise ImageFileError(f"{path}: holds several images, one after the other; of all formats only TIFF may do so")
+    if content[:2].tobytes() == b"P7" and not _is_grey_pam(content):
+        raise ImageFileError(f"{path}: of PAM files only those with one image of GRAYSCALE are read right: convert it")
+    if _is_jpeg(content) and _lists_images(content):
+        raise ImageFileError(f"{path}: holds several images, as MPO; of all formats only TIFF may do so")
     if not offsets and (count := cv2.imcount(str(path), cv2.IMREAD_UNCHANGED)) > 1:
         raise ImageFileError(f"{path}: is an animation of {count} images; of all formats only TIFF may hold several")
     return offsets
@@ -107,6 +114,29 @@ def _is_netpbm_stack(content: NDArray[np.uint8]) -> bool:
     pixel = (3 if header[1] == b"6" else 1) * (2 if brightest > np.iinfo(np.uint8).max else 1)
     after = header.end() + columns * rows * pixel
     return bool(_NETPBM.match(content[after : after + 1024].tobytes()))
+
+
+def _is_grey_pam(content: NDArray[np.uint8]) -> bool:
+    """Whether a PAM is one grey image: of others OpenCV takes red for blue, or leaves out what follows."""
+    header = _PAM.match(content[:1024].tobytes())
+    fields = dict(_PAM_FIELD.findall(header[1])) if header else {}
+    try:
+        columns, rows, depth, brightest = (int(fields[name]) for name in (b"WIDTH", b"HEIGHT", b"DEPTH", b"MAXVAL"))
+    except (KeyError, ValueError):
+        return False
+    size = columns * rows * (2 if brightest > np.iinfo(np.uint8).max else 1)
+    whole = header is not None and content.size == header.end() + size
+    return whole and (fields.get(b"TUPLTYPE"), depth) == (b"GRAYSCALE", 1)
+
+
+def _lists_images(content: NDArray[np.uint8]) -> bool:
+    """Whether a segment before the pixels of a JPEG says that there are images after them."""
+    start = 2
+    while start + 4 <= content.size and content[start] == _JPEG_SEGMENT and content[start + 1] != _JPEG_PIXELS:
+        if content[start + 4 : start + 8].tobytes() == _MPO:
+            return True
+        start += 2 + int.from_bytes(content[start + 2 : start + 4].tobytes(), "big")
+    return False
 
 
 def _decoded(content: NDArray[np.uint8]) -> NDArray[Any] | None:

@@ -222,3 +222,44 @@ def test_white_may_be_0_where_that_is_understood(tmp_path: Path) -> None:
     grey = np.arange(240, dtype=np.uint8).reshape(12, 20)
     tifffile.imwrite(tmp_path / "white.tif", 255 - grey, photometric="miniswhite")
     np.testing.assert_array_equal(read_image(tmp_path / "white.tif"), grey)
+
+
+def pam(kind: str, pixels: np.ndarray[Any, Any], brightest: int) -> bytes:
+    """A file of the format that came after PGM, where what the values are is a word."""
+    rows, columns, *depth = pixels.shape
+    header = f"P7\nWIDTH {columns}\nHEIGHT {rows}\nDEPTH {depth[0] if depth else 1}\nMAXVAL {brightest}\n"
+    return f"{header}TUPLTYPE {kind}\nENDHDR\n".encode() + pixels.astype(">u2" if brightest > 255 else "u1").tobytes()
+
+
+@pytest.mark.parametrize("brightest", [127, 255, 4095, 65535])
+def test_grey_values_of_a_pam_are_those_of_the_file(tmp_path: Path, brightest: int) -> None:
+    grey = np.linspace(0, brightest, 60 * 80).astype(np.uint16).reshape(60, 80)
+    (tmp_path / "grey.pam").write_bytes(pam("GRAYSCALE", grey, brightest))
+    np.testing.assert_array_equal(read_image(tmp_path / "grey.pam"), grey)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        pam("RGB", np.dstack([np.full((60, 80), level, np.uint8) for level in (250, 100, 10)]), 255),
+        pam("BLACKANDWHITE", np.ones((60, 80), np.uint8), 1),
+        pam("GRAYSCALE", np.ones((60, 80), np.uint8), 255) * 2,
+        b"P7\nWIDTH 80\nHEIGHT 60\nDEPTH 1\nMAXVAL 255\nENDHDR\n" + bytes(4800),
+    ],
+    ids=["colour", "bits", "stack", "no word"],
+)
+def test_a_pam_of_anything_else_is_refused(tmp_path: Path, content: bytes) -> None:
+    """OpenCV takes red for blue, multiplies bits, and reads the first image of several, without a word."""
+    (tmp_path / "shot.pam").write_bytes(content)
+    with pytest.raises(ImageFileError, match=r"shot\.pam: .* PAM .* one image of GRAYSCALE"):
+        read_image(tmp_path / "shot.pam")
+
+
+def test_the_first_image_of_an_mpo_is_not_the_whole_file(tmp_path: Path) -> None:
+    images = [Image.fromarray(np.full((60, 80, 3), level, np.uint8)) for level in (50, 200)]
+    images[0].save(tmp_path / "both.jpg", format="MPO", save_all=True, append_images=images[1:])
+    for ask in (read_image, page_count):
+        with pytest.raises(ImageFileError, match=r"both\.jpg: holds several images, as MPO"):
+            ask(tmp_path / "both.jpg")
+    images[0].save(tmp_path / "one.jpg")
+    assert read_image(tmp_path / "one.jpg").shape == (60, 80)
