@@ -68,6 +68,40 @@ def test_droplets_behind_the_nozzle_are_told() -> None:
     assert "% of the droplets lie behind the nozzle: is it stated rightly" in told
 
 
+def without_velocities(shot: StoredDroplets) -> StoredDroplets:
+    columns = {name: values for name, values in shot.columns.items() if not name.endswith("_m_s")}
+    return replace(shot, columns=columns)
+
+
+@pytest.mark.parametrize("nozzle_mm", [(6, 0, 0), (0, 0, -5), (-4, 1, 4)])
+def test_a_nozzle_beside_the_spray_is_told_by_the_flight_of_the_droplets(nozzle_mm: tuple[float, float, float]) -> None:
+    told = doubts(*SHOTS, axis=SprayAxis(nozzle_mm, (0, 1, 0)))
+    assert "degrees aside of the way from the nozzle, in the mean: is its place stated rightly" in told
+
+
+def test_a_nozzle_beside_the_spray_is_told_by_the_places_of_the_droplets() -> None:
+    still = [without_velocities(shot) for shot in SHOTS]
+    assert "beside the droplets, farther than the box is wide" in doubts(*still, axis=SprayAxis((30, 0, 0), (0, 1, 0)))
+    narrow = [without_velocities(shot) for shot in cone_shots(0, 4, 60, 4.0)]
+    assert "lie on one side of the axis" in doubts(*narrow, axis=SprayAxis((4.5, 0, 0), (0, 1, 0)))
+    assert not doubts(*narrow, axis=SprayAxis((0.5, 0, 0), (0, 1, 0)))
+    assert not doubts(*narrow)
+
+
+def test_a_part_of_a_cone_contradicts_no_nozzle() -> None:
+    """A box that shows a quarter of it, and the axis at its edge."""
+    whole = json.loads(str(SHOTS[0].provenance["grid"]))
+    nz, ny, nx = whole["shape"]
+    grid = json.dumps({**whole, "shape": [nz // 2, ny, nx // 2], "origin_mm": [0.05, whole["origin_mm"][1], 0.05]})
+    quarter = []
+    for shot in (saying(one, grid=grid) for one in SHOTS):
+        x_mm, z_mm = (np.asarray(shot.columns[name], float) for name in ("x_mm", "z_mm"))
+        rows = (x_mm > 0) & (z_mm > 0)
+        quarter.append(replace(shot, columns={name: values[rows] for name, values in shot.columns.items()}))
+    assert not doubts(*quarter)
+    assert not doubts(*map(without_velocities, quarter))
+
+
 def test_exposures_that_are_exchanged_are_told() -> None:
     assert "are exposures A and B exchanged" in doubts(*(moved(shot, -1.0) for shot in SHOTS))
 
