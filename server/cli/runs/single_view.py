@@ -131,6 +131,7 @@ def _measure_all(
     from processing.analysis.exports.export import export_droplets
     from processing.runs.recipe import recipe_sha256
     from processing.runs.single_view.measurement import COMMAND, METHOD_VERSION, flat_statistics, measure_source
+    from processing.runs.unchecked_images import told_unchecked, unchecked_images
 
     shots = []
     for source in tracked(sources, lambda source: source.name):
@@ -144,6 +145,7 @@ def _measure_all(
         "um_per_px": options.um_per_px,
         "recipe_sha256": recipe_sha256(COMMAND, METHOD_VERSION, settings),
         "shots": [shot.model_dump(mode="json") for shot in shots],
+        "not_checked": told_unchecked(unchecked_images(settings.polarity, single=True), progress),
         "statistics": flat_statistics([read_droplets(out / shot.file) for shot in shots]),
         "passed": any(shot.verdict != "refused" for shot in shots),
     }

@@ -52,6 +52,9 @@ def test_droplets_of_a_run_lie_in_files_where_they_are(
         "shot", "droplets", "ghost_share", "ghost_interval", "residual_over_noise", "verdict", "cpu_s", "file"
     }  # fmt: skip
     assert (shot["shot"], shot["verdict"], result["polarity"]) == (0, "good", "bright")
+    (unchecked,) = result["not_checked"]
+    assert "in proportion to light: any gamma fits bright particles" in unchecked["what"]
+    assert unchecked["state"] == "gamma 1 in the settings of the cameras"
     assert shot["ghost_share"] < 0.03
     assert shot["ghost_interval"][0] <= shot["ghost_share"] <= shot["ghost_interval"][1]
     assert shot["ghost_reason"] is None
@@ -200,6 +203,7 @@ def test_shadows_of_a_run_become_droplets_with_diameters(tmp_path: Path, capsys:
     shot, arguments = shadow_run(tmp_path)
     result = told(capsys, *arguments)
     assert (result["polarity"], result["shots"][0]["verdict"]) == ("shadow", "good")
+    assert ["a gamma near to 1 fits shadows" in one["what"] for one in result["not_checked"]] == [True]
     stored = read_droplets(tmp_path / "out" / result["shots"][0]["file"])
     points_mm = np.column_stack([stored.columns[f"{axis}_mm"] for axis in "xyz"])
     of_found, of_truth = matches(points_mm, shot.points_mm, shot.grid.pitch_mm)

@@ -46,6 +46,8 @@ def test_images_are_measured_in_pixels(images: list[Path], tmp_path: Path, capsy
     assert stored.columns["overlapping"].dtype == np.uint8
     assert stored.provenance["image"] == "first"
     assert stored.provenance["recipe_sha256"] == result["recipe_sha256"]
+    said = [one["what"] for one in result["not_checked"]]
+    assert ["in proportion to light" in said[0], "squeezed, or half covered" in said[1]] == [True, True]
     statistics = result["statistics"]
     assert (statistics["n"], statistics["d32_px"], statistics["relative_span"]) == (3, None, None)
     text = shown(capsys, "measure", *images, "-o", tmp_path / "again")

@@ -1,0 +1,52 @@
+"""What may be wrong with images without showing in them: told with what is measured, and what to state."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import asdict
+
+from processing.calibration.verdict import Unchecked
+from processing.preprocessing import Polarity
+
+PROPORTION = {
+    "bright": Unchecked(
+        "whether grey values are in proportion to light: any gamma fits bright particles, and makes their amplitudes "
+        "nearer to each other, or farther from each other, than they are",
+        "gamma 1 in the settings of the cameras",
+    ),
+    "shadow": Unchecked(
+        "whether grey values are in proportion to light: a gamma near to 1 fits shadows that are a little smaller or "
+        "larger; one that is far from 1 is told",
+        "gamma 1 in the settings of the cameras, or --sizes: dots of known diameters, seen by the same cameras",
+    ),
+}
+SCALE = Unchecked(
+    "whether the image is whole, and as wide as it is high for equal lengths: of one view nothing tells one that was "
+    "squeezed, or half covered",
+    "its size as the camera has it, and um_per_px along rows and columns by a reticle",
+)
+"""Of a single view, whose lines of sight meet no others."""
+
+
+def unchecked_images(polarity: Polarity, *, sizes_known: bool = False, single: bool = False) -> Iterator[Unchecked]:
+    """What nothing tells of the images that droplets were measured in.
+
+    Parameters
+    ----------
+    polarity : {"shadow", "bright"}
+        Of the images.
+    sizes_known : bool
+        Diameters were compared with those of dots.
+    single : bool
+        There is one view.
+    """
+    if polarity == "bright" or not sizes_known:
+        yield PROPORTION[polarity]
+    if single:
+        yield SCALE
+
+
+def told_unchecked(unchecked: Iterator[Unchecked], tell: Callable[[str], None]) -> list[dict[str, str]]:
+    """Tell people each of them in a line; what programs get."""
+    found = list(unchecked)
+    for one in found:
+        tell(f"not checked: {one.what}; state {one.state}")
+    return [asdict(one) for one in found]
