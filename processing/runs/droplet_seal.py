@@ -53,7 +53,7 @@ def read_sealed(path: str | Path) -> StoredDroplets:
     seal = stored.provenance.get(SEAL)
     if seal is None:
         _require_in_box(path, stored)
-    elif seal != _hash(_by_frame(stored.columns), _by_frame(stored.objects), stored.provenance):
+    elif seal != _hash(by_frame(stored.columns), by_frame(stored.objects), stored.provenance):
         raise DropletFileError(f"{path}: was changed after it had been measured: {_REMEDY}")
     return stored
 
@@ -79,8 +79,9 @@ def _bytes_of(table: Table) -> Iterator[bytes]:
             yield "\0".join(values.astype("U").tolist()).encode() if text else values.tobytes()
 
 
-def _by_frame(columns: Table) -> dict[str, Table]:
-    frames = columns.get(FRAME, np.empty(0, "U1"))
+def by_frame(columns: Table) -> dict[str, Table]:
+    """A table for each exposure that has rows."""
+    frames = columns.get(FRAME, np.empty(0, "U1")).astype("U1")
     return {
         str(frame): {name: values[frames == frame] for name, values in columns.items()} for frame in np.unique(frames)
     }

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from daq.files.run_directory import DoubleFrame, ExposureRecord, ImageKey, RunHeader, RunWriter, Shot, ViewFormat
-from processing.analysis.droplets.droplet_file import read_droplets
+from processing.analysis.droplets.droplet_file import DropletFileError, read_droplets
+from processing.runs.droplet_seal import read_sealed
 from server.cli.main import main
 from tests.support.command_line import refused, shown, told
 from tests.support.droplet_run import write_run
@@ -52,6 +53,16 @@ def test_images_are_measured_in_pixels(images: list[Path], tmp_path: Path, capsy
     assert (statistics["n"], statistics["d32_px"], statistics["relative_span"]) == (3, None, None)
     text = shown(capsys, "measure", *images, "-o", tmp_path / "again")
     assert "3 droplets in 2 images: too few droplets: means need 5" in text
+
+
+def test_diameters_that_were_edited_are_refused(images: list[Path], tmp_path: Path) -> None:
+    file = tmp_path / "out" / "first_droplets.h5"
+    assert main(["measure", *map(str, images), "-o", str(file.parent)]) == 0
+    assert len(read_sealed(file).columns["diameter_px"]) == 2
+    with h5py.File(file, "r+") as stored:
+        stored["droplets/diameter_px"][:] *= 2
+    with pytest.raises(DropletFileError, match="was changed after it had been measured"):
+        read_sealed(file)
 
 
 def test_a_scale_turns_pixels_into_micrometres(
