@@ -64,8 +64,7 @@ def frame_png(image: NDArray[Any], bits: int, stretch: Stretch = Stretch.AUTO, w
 
 def preview_jpeg(image: NDArray[Any], bits: int, stretch: Stretch, width_px: int) -> bytes:
     """Small JPEG of a camera frame for the live view, about 1 ms of work."""
-    rough = halved(image) if image.shape[1] >= 2 * width_px else image  # a quarter of the work, hardly to be seen
-    small = _narrowed(rough, width_px)
+    small = _narrowed_roughly(image, width_px) if image.shape[1] >= 2 * width_px else _narrowed(image, width_px)
     return _encode(".jpg", to_grey(small, bits, stretch), cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY)
 
 
@@ -129,6 +128,13 @@ def _narrowed(image: NDArray[Any], width_px: int | None) -> NDArray[Any]:
         return image
     size = (width_px, max(1, round(rows * width_px / columns)))
     return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA))
+
+
+def _narrowed_roughly(image: NDArray[Any], width_px: int) -> NDArray[Any]:
+    """The same by way of half the size, for a seventh of the work."""
+    half = halved(image)
+    size_px = (width_px, max(1, round(image.shape[0] * width_px / image.shape[1])))
+    return np.asarray(cv2.resize(half, size_px, interpolation=cv2.INTER_LINEAR))
 
 
 def _encode(suffix: str, pixels: NDArray[Any], *parameters: int) -> bytes:

@@ -172,7 +172,13 @@ def serve(app: FastAPI, listener: socket.socket, leave: Callable[[str], None]) -
     DaqError
         The application did not start; the log says why.
     """
-    config = uvicorn.Config(app, timeout_graceful_shutdown=_SHUTDOWN_S, access_log=False, log_level="warning")
+    config = uvicorn.Config(
+        app,
+        timeout_graceful_shutdown=_SHUTDOWN_S,
+        access_log=False,
+        log_level="warning",
+        ws_per_message_deflate=False,  # pictures are compressed already: it would double what a live view costs
+    )
     server = _Server(config, leave)
     # The server passes a signal on once it has ended. By default SIGTERM would then kill the process before the caller
     # has switched off the light and closed the devices.
