@@ -57,5 +57,5 @@ def told(error: BaseException) -> str:
 
 def refusal_text(error: Exception) -> str:
     """What an operator reads of a refusal: its text, and what to do about it where that is known."""
-    code = getattr(error, "code", "")
-    return f"{error} ({REMEDIES[RefusalCode(code)]})" if code else str(error)
+    remedy = next((REMEDIES[code] for code in RefusalCode if code == getattr(error, "code", "")), "")
+    return f"{error} ({remedy})" if remedy else str(error)
