@@ -76,6 +76,7 @@ CAMERAS = {
     16: Target("four cameras 1600 x 1200 px A/B recorded, 16 bit, per shot, simulators included", "CPU-s", 0.2, 0.12),
 }
 TRIGGER = Target("trigger to volume in the API, full frames", "s", 2, 0.5)
+LOOKED_AT = Target("what 3 browsers with 4 tiles at 10 Hz add to a server, of one processor", "%", 40, 25)
 START = Target("server start, 10,000 runs on disk", "s", 5, 2)
 JOB = Target("what a job of the server adds to its work", "s", 0.3)
 

@@ -25,7 +25,7 @@ TABLE_BEGIN, TABLE_END = "<!-- bench -->", "<!-- /bench -->"
 RECORDED_SHOTS = 24
 RECORDER_DEADLINE_S = 120.0
 QUICK_SHOTS = 3
-PARTS = ("kernels", "recorder", "previews", "average", "slices", "jobs", "cameras", "trigger", "start")
+PARTS = ("kernels", "recorder", "previews", "average", "slices", "jobs", "cameras", "trigger", "start", "desk")
 """In this order; each can be measured alone."""
 
 
@@ -109,7 +109,7 @@ def _measure(part: str, options: Namespace, found: _Found) -> None:
 
 
 def _of_programs(part: str, study: "SpeedStudy", options: Namespace) -> "Iterator[Measured]":
-    from server.cli.benchmarks import chain_on_disk, recorded_shots, served
+    from server.cli.benchmarks import chain_on_disk, desk, recorded_shots, served
     from server.cli.benchmarks.recorded_run import record_run
 
     directory, quick = options.directory, options.quick
@@ -117,6 +117,8 @@ def _of_programs(part: str, study: "SpeedStudy", options: Namespace) -> "Iterato
         yield from recorded_shots.recorded_shots(directory, 2 if quick else 40)
     elif part == "start":
         yield from served.server_start(directory, 20 if quick else served.RUNS)
+    elif part == "desk":
+        yield from desk.looked_at(directory, 3 if quick else desk.LOOKED_S)
     elif part == "trigger":
         yield from served.trigger_to_volume(directory, 2 if quick else served.TRIGGERED_SHOTS)
     else:

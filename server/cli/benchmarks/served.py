@@ -52,6 +52,7 @@ class Server:
         command = [sys.executable, "-m", "server.cli", "serve", "--config", str(config), "--port", str(port)]
         self.begun_s = time.perf_counter()
         self._url = f"http://127.0.0.1:{port}/api"
+        self.live_address = f"ws://127.0.0.1:{port}/api/live"
         self.process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
     def ask(self, path: str, body: Any = None, method: str | None = None) -> Any:

@@ -1,0 +1,95 @@
+"""What people who look cost a server: browsers with the tiles of a live view, whose cameras are simulated elsewhere."""
+
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from websockets.sync.client import connect
+
+from processing.benchmarks import targets
+from processing.benchmarks.targets import Measured
+from server.cli.benchmarks.bench_rig import NoRig, rig_in
+from server.cli.benchmarks.served import Server, served
+from server.rig.config import load_config
+
+BROWSERS, RATE_HZ, LOOKED_S = 3, 10.0, 20.0
+_WARM_S, _DEADLINE_S = 3.0, 30.0
+
+
+@dataclass(frozen=True)
+class _Spent:
+    """CPU time of a server per second, and the pictures that a reader got of each view."""
+
+    cores: float
+    pictures_hz: float
+
+
+def looked_at(directory: Path | None, time_s: float) -> Iterator[Measured]:
+    """CPU time of a server whose live view is looked at, less that of the same live view in the dark."""
+    with TemporaryDirectory(dir=directory) as folder:
+        config = rig_in(Path(folder), still=True)
+        views = load_config(config).views
+        currents_a = {name: view.nominal_current_a for name, view in views.items()}
+        with _far_ends(config), served(config) as server:
+            server.ask("rig/live", {"rate_hz": RATE_HZ, "pulse": {"current_a": currents_a}}, "PUT")
+            alone = _spent(server, 0, len(views), time_s)
+            looked = _spent(server, BROWSERS, len(views), time_s)
+            server.ask("rig/live", method="DELETE")
+    if not looked.pictures_hz:
+        raise NoRig(f"not one picture came within {time_s:g} s: this machine is too busy")
+    added_cores = (looked.cores - alone.cores) * RATE_HZ / looked.pictures_hz
+    how = (
+        f"from {looked.pictures_hz:.1f} pictures/s of each view; then the server with its cameras takes "
+        f"{100 * looked.cores:.0f} %, {100 * alone.cores:.0f} % with nobody there"
+    )
+    yield Measured(targets.LOOKED_AT, 100 * added_cores, how=how)
+
+
+def _spent(server: Server, readers: int, views: int, time_s: float) -> _Spent:
+    with ThreadPoolExecutor(max(1, readers)) as pool:
+        counts = [pool.submit(_count_pictures, server.live_address, _WARM_S, time_s) for _ in range(readers)]
+        time.sleep(_WARM_S)
+        began_s, cpu_s = time.perf_counter(), _cpu_s(server.process.pid)
+        time.sleep(time_s)
+        cores = (_cpu_s(server.process.pid) - cpu_s) / (time.perf_counter() - began_s)
+        pictures = sum(count.result(_DEADLINE_S) for count in counts)
+    return _Spent(cores, pictures / max(1, readers) / views / time_s)
+
+
+def _count_pictures(address: str, warm_s: float, time_s: float) -> int:
+    """Pictures that one reader gets in a time, as fast as they come."""
+    count, begin_s = 0, time.perf_counter() + warm_s
+    with connect(address) as reader:
+        while (now_s := time.perf_counter()) < begin_s + time_s:
+            message = reader.recv(_DEADLINE_S, decode=False)
+            json.loads(message[3 : 3 + int.from_bytes(message[1:3], "big")])
+            count += now_s >= begin_s
+    return count
+
+
+def _cpu_s(process: int) -> float:
+    """CPU time of a process so far, all threads: fields 14 and 15 of proc(5)."""
+    fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+@contextmanager
+def _far_ends(config: Path) -> Iterator[None]:
+    """The devices of the rig in a process of their own, so that their work is not the server's."""
+    command = [sys.executable, "-m", "server.cli", "simulate", "--config", str(config)]
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    try:
+        if not any("its far ends run" in line for line in process.stderr or ()):
+            raise NoRig(f"tomoshadow simulate ended with {process.wait(_DEADLINE_S)}")
+        yield
+    finally:
+        process.terminate()
+        process.wait(_DEADLINE_S)
