@@ -56,8 +56,9 @@ class LightPanel:
                 self._add_current(view)
             half = ui.button("Set to half range", icon="auto_fix_high").props("outline dense no-caps").classes("w-full")
             half.on("click", self._on_half, js_handler=TICKET)
-            half.tooltip("Sets every LED so that its background has half of the range, by the newest shot")
             self._advice = ui.column().classes("w-full gap-0 text-xs").props('role=status aria-label="light assistant"')
+        with self._advice:
+            ui.label("Sets every LED so that its background has half of the range, by the newest shot.")
 
     def _limit_a(self, view: str) -> float:
         return self._context.services.config.views[view].max_current_a

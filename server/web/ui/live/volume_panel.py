@@ -1,9 +1,11 @@
 """LiveVolumePanel: the newest shot as slices and iso-surface, while the operator wants to see it."""
 
 import math
+import time
 
 from nicegui import ui
 from nicegui.element import Element
+from nicegui.elements.scene import Object3D
 
 from processing.volume import VoxelGrid
 from server.lab.services import Context
@@ -11,6 +13,9 @@ from server.web.api.live_volume import VOLUME_PATH
 from server.web.ui.theme import panel
 
 _LEVEL = 0.3
+_REDRAW_S = 1.0
+_SHOWN = 2
+"""The last surface stays until the browser has the next one."""
 _HINT = "Off: costs nothing. On: each new shot of the live view becomes a volume, by the current calibration."
 
 
@@ -29,6 +34,8 @@ class LiveVolumePanel:
     def __init__(self, context: Context) -> None:
         self._volume = context.live_volume
         self._drawn = 0
+        self._drawn_s = 0.0
+        self._meshes: list[Object3D] = []
         self._scene: ui.scene | None = None
         with panel("Live volume"):
             with ui.row().classes("w-full items-center gap-4"):
@@ -42,19 +49,23 @@ class LiveVolumePanel:
         if self._scene is None:
             return
         view = self._volume.view
-        if view.number == self._drawn or view.shape is None or view.origin_mm is None or view.pitch_mm is None:
+        if view.number == self._drawn or time.monotonic() - self._drawn_s < _REDRAW_S:
+            return
+        if view.shape is None or view.origin_mm is None or view.pitch_mm is None:
             return
         grid = VoxelGrid(view.shape, view.origin_mm, view.pitch_mm)
         if not self._drawn:
             self._look_at(grid)
-        self._drawn = view.number
-        self._scene.clear()
-        with self._scene:  # the mesh has y up; the scene has z up
-            self._scene.gltf(f"{VOLUME_PATH}/surface.glb?level={_LEVEL}").rotate(math.pi / 2, 0, 0)
+        self._drawn, self._drawn_s = view.number, time.monotonic()
+        with self._scene:
+            mesh = self._scene.gltf(f"{VOLUME_PATH}/surface.glb?level={_LEVEL}")
+        self._meshes.append(mesh.rotate(math.pi / 2, 0, 0))  # the mesh has y up; the scene has z up
+        while len(self._meshes) > _SHOWN:
+            self._meshes.pop(0).delete()
 
     def _rebuild(self) -> None:
         self._box.clear()
-        self._scene, self._drawn = None, 0
+        self._scene, self._drawn, self._meshes = None, 0, []
         self._hint.set_visibility(not (self._wanted.value or self._surface.value))
         with self._box:
             if self._wanted.value or self._surface.value:
