@@ -36,11 +36,13 @@ class LinkBudget(FrozenModel):
     @property
     def limited_by(self) -> str:
         """What permits no more, in words."""
-        link, slowest = max((max(one.wire_s, one.cycle_s), view) for view, one in self.cameras.items())
-        if self.shared_s is not None and self.shared_s >= link:
+        times = {view: max(one.wire_s, one.cycle_s) for view, one in self.cameras.items()}
+        longest_s = max(times.values())
+        if self.shared_s is not None and self.shared_s >= longest_s:
             return "the wire that all cameras share"
-        by_wire = self.cameras[slowest].wire_s >= self.cameras[slowest].cycle_s
-        return f"the wire of {slowest}" if by_wire else f"the camera of {slowest}"
+        slowest = [view for view, time_s in times.items() if time_s == longest_s]
+        what = "wire" if self.cameras[slowest[0]].wire_s == longest_s else "camera"
+        return f"every {what}" if len(slowest) == len(times) > 1 else f"the {what} of {' and '.join(slowest)}"
 
 
 def link_budget(network: Network, cameras: Mapping[str, Camera]) -> LinkBudget:

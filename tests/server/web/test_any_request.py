@@ -23,7 +23,7 @@ from tests.support.serving import assembled, plan_of, serving
 EXAMPLES = 5
 NOT_IN_THE_SCHEMA: Any = [positive_data_acceptance]
 """What this rig can do, and what there is on this server, is not in the schema."""
-MISREAD = "/api/runs/{run_id}/results/{results_id}/{volume}"
+MISREAD = ("/api/runs/{run_id}/results/{results_id}/{volume}", "/api/rig/live/volume")
 """Schemathesis 4.32 rewrites ``prefixItems`` of an answer, and then takes what it has written for no schema."""
 ENDLESS = "/api/events"
 Known = dict[str, Any]
@@ -80,7 +80,7 @@ def _try(operation: Any, mode: GenerationMode, known: Known) -> None:
             case.path_parameters.update({name: known[name] for name in case.path_parameters if name in known})
         answer = case.call()
         assert answer.status_code < 500, f"{case.as_curl_command()}\n{answer.text}"
-        misread = [response_schema_conformance] if operation.path == MISREAD else []
+        misread = [response_schema_conformance] if operation.path in MISREAD else []
         case.validate_response(answer, excluded_checks=[*NOT_IN_THE_SCHEMA, *misread])
 
     try:

@@ -18,9 +18,9 @@ class RigPage:
         with ui.element("div").classes("columns one"):
             with ui.element("div").classes("device-cards"):
                 self._devices = {card.name: DeviceView(context, card) for card in device_cards(context)}
-            with ui.element("div").classes("device-cards"):
+            with ui.element("div").classes("rig-panels"):
                 self._link = LinkPanel(context, draft)
-            self._doctor = DoctorPanel(context)
+                self._doctor = DoctorPanel(context)
 
     async def refresh(self) -> None:
         """Show what the devices say now."""
