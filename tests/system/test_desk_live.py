@@ -52,7 +52,7 @@ def open_live(page: Page, server: Serving) -> Locator:
     return page.get_by_role("region", name="Live", exact=True)
 
 
-def show_live(page: Page, server: Serving, rate_hz: str = "10") -> Locator:
+def show_live(page: Page, server: Serving, rate_hz: str = "4") -> Locator:
     live = open_live(page, server)
     live.get_by_label("Live / Hz").fill(rate_hz)
     live.get_by_role("button", name="Live", exact=True).click()
@@ -106,7 +106,7 @@ def test_a_dark_frame_looks_dark_until_the_operator_stretches_it(page: Page, ser
     live.get_by_role("switch", name="Pulsed light").click()
     live.get_by_role("button", name="Apply").click()
     expect(caption(live)).to_have_text(re.compile("A 2 % · B 2 %"))
-    eventually(lambda: brightness(tile_of(live)) < 2, "the dark looks dark")
+    eventually(lambda: brightness(tile_of(live)) < 8, "the dark looks dark")
     expect(live.get_by_role("group", name="view1 figures")).to_contain_text("focus: no light")
 
 
@@ -253,7 +253,9 @@ def test_a_card_per_device_says_who_how_and_what_to_do(page: Page, server: Servi
     expect(page.get_by_role("region", name="pulse generator")).to_contain_text("at most 12 A, nominal 10 A, channel 1")
     expect(page.get_by_role("region", name="interlock")).to_contain_text("closed")
     expect(page.get_by_role("region", name="work in the background")).to_contain_text("all of it goes on")
-    expect(page.get_by_role("status", name="link budget")).to_contain_text("At most 47.6 pass: the limit is the camera")
+    expect(page.get_by_role("status", name="link budget")).to_contain_text(
+        "At most 47.6 pass: the limit is every camera"
+    )
     camera.evaluate("card => card.dataset.mark = 'the same'")
     laboratory(server).cameras["view1"].is_lost = True
     laboratory(server).open_door()
@@ -293,28 +295,27 @@ def test_the_doctor_looks_when_asked_and_between_runs_only(page: Page, server: S
     expect(page.get_by_role("region", name="view1", exact=True).get_by_role("button")).to_be_disabled()
 
 
-@pytest.mark.parametrize("width", [800, 1280, 1920])
-def test_the_rig_page_fits_every_width_dark_and_light(page: Page, server: Serving, width: int) -> None:
-    page.set_viewport_size({"width": width, "height": 1000})
+def test_the_rig_page_fits_every_width_dark_and_light(page: Page, server: Serving) -> None:
     page.goto(f"{server.http.base_url}/rig")
     expect(page.get_by_role("region", name="view1", exact=True)).to_contain_text("firmware 1")
-    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "the page is wider than the window"
-    expect_nothing_cut(page)
-    for shade in ("dark", "light"):
-        _picture(page, f"rig-{width}-{shade}")
-        page.get_by_role("button", name="dark or light").click()
+    expect_to_fit(page, "rig")
 
 
-@pytest.mark.parametrize("width", [800, 1280, 1920])
-def test_the_live_page_fits_every_width_dark_and_light(page: Page, server: Serving, width: int) -> None:
-    page.set_viewport_size({"width": width, "height": 1000})
+def test_the_live_page_fits_every_width_dark_and_light(page: Page, server: Serving) -> None:
     live = show_live(page, server)
     expect(caption(live)).to_have_text(re.compile("Hz$"))
-    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "the page is wider than the window"
-    expect_nothing_cut(page)
-    for shade in ("dark", "light"):
-        _picture(page, f"live-{width}-{shade}")
-        page.get_by_role("button", name="dark or light").click()
+    expect_to_fit(page, "live")
+
+
+def expect_to_fit(page: Page, name: str) -> None:
+    for width in (800, 1280, 1920):
+        page.set_viewport_size({"width": width, "height": 1000})
+        page.wait_for_function(f"innerWidth === {width}")
+        assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "the page is wider than the window"
+        expect_nothing_cut(page)
+        for shade in ("dark", "light"):
+            _picture(page, f"{name}-{width}-{shade}")
+            page.get_by_role("button", name="dark or light").click()
 
 
 def shown_current_a(server: Serving, view: str) -> float:
