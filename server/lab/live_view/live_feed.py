@@ -9,7 +9,7 @@ readers look at, one picture is made.
 import asyncio
 import json
 import time
-from collections.abc import AsyncGenerator, Callable, Iterable, Mapping
+from collections.abc import AsyncGenerator, Callable, Mapping
 from dataclasses import dataclass
 from itertools import count
 from typing import Annotated, Any, Literal
@@ -118,6 +118,7 @@ class LiveFeed:
         self._newest_shot = newest_shot
         self._look = look
         self._encoded: Shot | None = None
+        self._tried: set[tuple[str, Tile]] = set()
         self._captions: dict[str, LiveCaption] = {}
         self._pictures: dict[tuple[str, Tile], LivePicture] = {}
         self._numbers = count(1)
@@ -131,7 +132,7 @@ class LiveFeed:
             await self._wanted.wait()
             self._look()
             shot, wishes = self._newest_shot(), self._wishes
-            if shot is not None and (shot is not self._encoded or not wishes <= self._pictures.keys()):
+            if shot is not None and (shot is not self._encoded or not wishes <= self._tried):
                 await asyncio.to_thread(self._encode, shot, wishes, duty)
                 self._wake()
             await pause(_PERIOD_S)
@@ -191,10 +192,10 @@ class LiveFeed:
         tick, self._tick = self._tick, asyncio.Event()
         tick.set()
 
-    def _encode(self, shot: Shot, wishes: Iterable[tuple[str, Tile]], duty: Duty) -> None:
-        """Make the pictures that are wished for of a shot; those that nobody wishes for any more are forgotten."""
+    def _encode(self, shot: Shot, wishes: set[tuple[str, Tile]], duty: Duty) -> None:
+        """Make the pictures that are wished for of a shot, once; what nobody wishes for any more is forgotten."""
         is_new = shot is not self._encoded
-        self._encoded, old = shot, {} if is_new else self._pictures
+        self._encoded, self._tried, old = shot, wishes, {} if is_new else self._pictures
         captions = {} if is_new else self._captions
         made: dict[tuple[str, Tile], LivePicture] = {}
         for view, tile in wishes:

@@ -185,6 +185,35 @@ def test_what_nobody_looks_at_is_not_looked_at(monkeypatch: pytest.MonkeyPatch) 
     assert set(feed._captions) == {"view2"}
 
 
+def test_a_picture_that_fails_is_tried_once_per_shot_and_hides_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    shots, tried = [shot_of(0)], list[str]()
+    feed = LiveFeed(served_rig().cameras, lambda: shots[-1], lambda: None)
+    encode = feed._picture
+
+    def fail(shot: Shot, view: str, tile: Tile, caption: LiveCaption) -> LivePicture:
+        tried.append(view)
+        if view == "view1":
+            raise ValueError("broken")
+        return encode(shot, view, tile, caption)
+
+    monkeypatch.setattr(feed, "_picture", fail)
+
+    async def look() -> Duty:
+        duty = Duty("live view", EventPublisher())
+        work, stream = asyncio.create_task(feed.run(duty)), feed.pictures()
+        assert (await asyncio.wait_for(anext(stream), DEADLINE_S))[0] == 1
+        await asyncio.sleep(0.3)
+        await stream.aclose()
+        work.cancel()
+        await asyncio.wait([work])
+        return duty
+
+    lamp = asyncio.run(look()).lamp
+    assert lamp is not None
+    assert "view1: ValueError: broken" in lamp.detail
+    assert sorted(tried) == ["view1", "view2"]
+
+
 def test_a_slow_reader_gets_the_newest_picture_next() -> None:
     feed, shots = LiveFeed(served_rig().cameras, lambda: shots[-1], lambda: None), [shot_of(0)]
 
