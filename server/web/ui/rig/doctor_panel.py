@@ -25,18 +25,19 @@ class DoctorPanel:
             with ui.row().classes("w-full items-center gap-3"):
                 self._button = ui.button("Examine", icon="medical_services", on_click=self._on_click)
                 self._button.props("outline dense no-caps")
-                with self._button:
-                    self._why = ui.tooltip("")
                 self._told = ui.label("").classes("text-sm flex-1").props('role=status aria-label="doctor"')
+            self._why = ui.label("Between runs only: end what goes on.").classes("text-xs opacity-70")
             self._list = ui.element("div").classes("doctor-list")
-        self._told.set_text("Looks at computer, network and devices, as tomoshadow doctor does; takes some seconds.")
+        self._told.set_text(
+            "Looks at computer, network and devices, as tomoshadow doctor does; takes some seconds, no light."
+        )
         self.refresh()
 
     def refresh(self) -> None:
         """Follow the state of acquisition."""
         resting = self._context.services.acquisition.status().resting
         self._button.set_enabled(resting and not self._is_looking)
-        self._why.set_text("Makes no light" if resting else "Between runs only: end what goes on")
+        self._why.set_visibility(not resting)
 
     async def _on_click(self) -> None:
         self._is_looking = True
