@@ -77,7 +77,7 @@ def droplets_of(results_dir: Path, shot: int) -> StoredDroplets:
 
 @lru_cache(maxsize=8)
 def _droplets(path: Path, _changed_ns: int) -> StoredDroplets:
-    return read_droplets(path)
+    return read_sealed(path)
 
 
 @lru_cache(maxsize=16)
