@@ -1,7 +1,6 @@
 """Errors of the laboratory: what cannot be done, whoever asked for it."""
 
 from daq.errors import DaqError
-from daq.run.refusals import REMEDIES, RefusalCode
 from processing.errors import BadInput
 
 
@@ -53,9 +52,3 @@ def told(error: BaseException) -> str:
     """What an operator reads of an error: its text; before that of a mistake of the program, its kind."""
     is_raised_on_purpose = isinstance(error, BadInput | DaqError | ServerError)
     return str(error) if is_raised_on_purpose else f"{type(error).__name__}: {error}"
-
-
-def refusal_text(error: Exception) -> str:
-    """What an operator reads of a refusal: its text, and what to do about it where that is known."""
-    remedy = next((REMEDIES[code] for code in RefusalCode if code == getattr(error, "code", "")), "")
-    return f"{error} ({remedy})" if remedy else str(error)

@@ -25,3 +25,9 @@ def reason_of(refusal: Refusal) -> Reason:
     """What a refusal says."""
     code = RefusalCode(refusal.code)
     return Reason(code=code, text=str(refusal), remedy=REMEDIES[code])
+
+
+def refusal_text(error: Exception) -> str:
+    """What an operator reads of a refusal: its text, and what to do about it where that is known."""
+    remedy = next((REMEDIES[code] for code in RefusalCode if code == getattr(error, "code", "")), "")
+    return f"{error} ({remedy})" if remedy else str(error)

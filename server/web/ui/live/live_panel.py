@@ -10,7 +10,8 @@ from nicegui.events import GenericEventArguments
 from daq.errors import DaqError
 from daq.run.state import RunState
 from daq.run_plan import LivePlan
-from server.lab.errors import ServerError, refusal_text
+from server.lab.desk.reason import refusal_text
+from server.lab.errors import ServerError
 from server.lab.services import Context
 from server.lab.starting.light_request import obey
 from server.lab.starting.run_start import SingleShot, shoot

@@ -9,7 +9,7 @@ from nicegui import ui
 from daq.errors import DaqError
 from daq.run.preflight import permitted_timing
 from daq.run_plan import RunPlan
-from server.lab.errors import refusal_text
+from server.lab.desk.reason import refusal_text
 from server.lab.services import Context
 from server.pictures.timing_sketch import timing_sketch
 from server.web.ui.draft import DraftStore, pulse_of

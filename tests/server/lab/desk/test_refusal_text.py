@@ -2,7 +2,8 @@ import pytest
 
 from daq.errors import DaqError, InterlockOpen
 from daq.run.refusals import REMEDIES, RefusalCode, coded
-from server.lab.errors import ServerError, Stale, refusal_text
+from server.lab.desk.reason import refusal_text
+from server.lab.errors import ServerError, Stale
 
 
 @pytest.mark.parametrize("code", RefusalCode)
