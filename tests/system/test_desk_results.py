@@ -29,6 +29,10 @@ PICTURES = os.environ.get("TOMOSHADOW_PICTURES")
 expect.set_options(timeout=15_000)
 PULSE = {"current_a": dict.fromkeys(VIEWS, 5)}
 OLD = "old-spray"
+FILLED = """scene => {
+    const box = getElement(scene).$el;
+    return Math.abs(box.clientWidth - box.querySelector("canvas").clientWidth) < 2;
+}"""
 GRID = VoxelGrid.centred((41, 61, 71), 0.05)
 MLOS = ReconstructionSettings(grid=GridSettings.of(GRID), minimum_window_px=0)
 SMART = MLOS.model_copy(update={"method": ReconstructionMethod.SMART, "iterations": 1})
@@ -240,6 +244,15 @@ def test_the_camera_stays_when_the_shot_changes(page: Page, server: Serving, old
     page.wait_for_function(
         "([scene, at]) => Math.abs(getElement(scene).camera.position.x - at) < 1e-3", arg=[_id(scene), at_first[0]]
     )
+
+
+def test_the_scene_fills_its_place_when_the_drawer_comes_and_goes(page: Page, server: Serving, old_run: Path) -> None:
+    page.goto(url(server, f"results/{OLD}/{MLOS.results_id('c')}/0"))
+    scene = page.get_by_role("img", name="iso-surface")
+    for _ in range(2):
+        page.get_by_role("button", name="jobs and events").click()
+        page.wait_for_timeout(300)
+        page.wait_for_function(FILLED, arg=_id(scene))
 
 
 def _id(scene: Locator) -> int:
