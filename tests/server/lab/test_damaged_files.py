@@ -50,7 +50,7 @@ def a_folder(run_dir: Path) -> None:
     (run_dir / "run.h5").mkdir()
 
 
-@pytest.mark.parametrize("harm", [garbage, cut, empty, packed])
+@pytest.mark.parametrize("harm", [garbage, cut, empty])
 def test_a_run_that_cannot_be_read_is_listed_as_damaged_beside_the_others(
     server: Serving, harm: Callable[[Path], None]
 ) -> None:
@@ -67,6 +67,20 @@ def test_a_run_that_cannot_be_read_is_listed_as_damaged_beside_the_others(
     assert server.http.get(f"/api/runs/{bad.name}").json() == runs[bad.name]
     refused = server.http.post("/api/jobs", json={"run_id": bad.name})
     assert (refused.status_code, refused.json()["type"]) == (500, "urn:tomoshadow:ShotFileError")
+
+
+def test_a_run_that_was_packed_is_listed_as_such_and_not_reconstructed(server: Serving) -> None:
+    use_a_calibration(server)
+    sound, _ = server.run_to_its_end(plan_of(shots=1))
+    bad = server.services.data_dir / "20200101T000000-bad"
+    shutil.copytree(server.services.data_dir / sound, bad)
+    packed(bad)
+    told = listed(server)[bad.name]
+    assert (told["outcome"], told["shots_recorded"], told["shots_valid"], told["name"]) == ("packed", 1, None, "test")
+    assert server.http.get(f"/api/runs/{bad.name}").json() == told
+    refused = server.http.post("/api/jobs", json={"run_id": bad.name})
+    assert (refused.status_code, refused.json()["type"]) == (500, "urn:tomoshadow:ShotFileError")
+    assert "copy its folder shots back" in refused.json()["detail"]
 
 
 def test_a_folder_in_the_place_of_a_file_is_a_damaged_run(server: Serving) -> None:

@@ -21,7 +21,7 @@ from server.lab.calibrations import CalibrationStore
 from server.lab.errors import Conflict, Damaged
 from server.lab.results import keep_preview, part_of, remaking
 from server.lab.tasks import reconstruct
-from server.pictures.pictures import plane_png
+from server.pictures.pictures import Colours, plane_png
 from server.pictures.previews import preview_path
 from tests.support.droplet_run import write_calibration, write_run
 from tests.support.serving import Serving
@@ -173,6 +173,9 @@ def test_a_slice_comes_as_a_picture_of_every_voxel(looking: Looking, axis: str, 
     other = looking.ask("slice.png", axis=axis, at_mm=at_mm, method="minlos")
     assert other.headers["tomoshadow-method"] == "minlos"
     assert other.content != answer.content
+    assert other.headers["content-disposition"] != answer.headers["content-disposition"]
+    shown = looking.ask("slice.png", axis=axis, at_mm=at_mm, colours="red", limit=0.25)
+    assert shown.content == plane_png(plane.T if axis == "x" else plane, 0.25, Colours.RED)
 
 
 @pytest.mark.parametrize(
