@@ -14,7 +14,7 @@ from server.web.ui.results.slice_view import SHOWN_AXES, Layer, SliceView, spans
 
 _REST_S = 0.2
 """Full resolution is asked for once the hand rests."""
-_MOST_DOTS = 800
+_MOST_DOTS = 300
 Dots = dict[str, NDArray[np.float64]]
 """Points x, y, z in mm, (N, 3), by exposure."""
 

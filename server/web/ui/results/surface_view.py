@@ -47,8 +47,10 @@ class SurfaceView:
 
     def mark(self, dots: Dots) -> None:
         """Show droplets as points."""
+        is_nothing_new = not dots and not self._dots
         self._dots = dots
-        self._draw()
+        if not is_nothing_new:
+            self._draw()
 
     def _choose_level(self) -> None:
         self._is_level_chosen = True

@@ -57,7 +57,7 @@ class VolumeView:
         self._panel.set_visibility(bool(names))
         if (looked, names) == (self._looked, self._names):
             return
-        self._looked, self._names = looked, names
+        self._looked, self._names, self._dots = looked, names, {}
         if names:
             if not self._is_built:
                 self._build()
