@@ -19,7 +19,7 @@ Grey = NDArray[np.uint8]
 _QUANTILES = (0.001, 0.999)
 _JPEG_QUALITY = 82
 _BRIGHTEST = {"blue": (255, 144, 64), "red": (64, 96, 255)}
-"""Blue, green, red; the two together are nearly white."""
+"""Blue, green, red; the two together are a light violet."""
 
 
 class Stretch(StrEnum):
