@@ -82,6 +82,11 @@ class _Chain:
     writing: Lock = field(default_factory=Lock)
 
     @property
+    def is_alone(self) -> bool:
+        """No other lane works while one reads."""
+        return len(self.lanes) == 1
+
+    @property
     def grid(self) -> VoxelGrid:
         """Of all volumes."""
         return self.lanes[0].plan.grid
@@ -160,7 +165,8 @@ def reconstruct_shots(
 
         def volumes_of(lane: Reconstructor, shot: int) -> list[VolumeRecord]:
             volumes = []
-            for exposure in read_ahead(_exposures(chain, lane, shot)):
+            exposures = _exposures(chain, lane, shot)
+            for exposure in read_ahead(exposures) if chain.is_alone else exposures:
                 if should_stop():
                     raise Stopped(f"{run_dir.name}, shot {exposure.shot}: stopped before exposure {exposure.frame}")
                 with chain.writing:  # whoever is first makes the folder, and has told what is known for all
@@ -198,11 +204,11 @@ def _chain_of(
 
 
 def _exposures(chain: _Chain, lane: Reconstructor, index: int) -> Iterator[_Exposure]:
-    """Exposure after exposure of a shot, each in memory of its own."""
+    """Exposure after exposure of a shot, each in memory of its own if it is read ahead."""
     run, settings, references = chain.run, chain.settings, chain.references
     shot = run.read_shot(index)
     require_match(run.run_dir.name, shot, chain.calibration)
-    for frame, memory in zip(frame_names(run), lane.images, strict=False):
+    for frame, memory in zip(frame_names(run), lane.images if chain.is_alone else 2 * lane.images[:1], strict=False):
         images = shot_intensities(run, shot, frame, settings, memory, references=references, threads=chain.threads)
         yield _Exposure(index, frame, images, exposure_faults(run, shot, frame, images, references))
 
