@@ -75,6 +75,14 @@ class CalibrationStore:
         except (NotFound, Damaged, AttributeError, KeyError, TypeError):
             return {}
 
+    def picture_folder(self, calibration_id: str) -> Path:
+        """Where pictures of a calibration are, whether there are any or not."""
+        return self._folder / "pictures" / self.path(calibration_id).stem
+
+    def pictures(self, calibration_id: str) -> tuple[str, ...]:
+        """Names of the pictures of a calibration."""
+        return tuple(sorted(path.stem for path in self.picture_folder(calibration_id).glob("*.png")))
+
     def made_s(self, calibration_id: str) -> float | None:
         """When its file was written, Unix time; None if there is none."""
         return _time_ns(self.path(calibration_id)) / 1e9 or None

@@ -8,6 +8,7 @@ looks and ends the light. Every answer says what a browser may do with it.
 
 import re
 from collections.abc import Callable, Collection
+from dataclasses import dataclass
 from http.cookies import CookieError, SimpleCookie
 from ipaddress import ip_address
 from urllib.parse import urlsplit
@@ -25,7 +26,8 @@ from server.web.problems import problem
 COOKIE = "tomoshadow"
 SIGN_IN_PATH = "/sign-in"
 VISITOR = "visitor"
-"""Where the scope of a request says who asks."""
+SESSIONS = "sessions"
+"""Where the scope of a request says who asks, and where a page asks whether his session goes on."""
 OPERATOR_HEADER = "Tomoshadow-Operator"
 _POLICY = (
     # NiceGUI writes scripts and styles into the page, and compiles templates.
@@ -73,20 +75,24 @@ class Guard:
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
-        headers, cookie = Headers(scope=scope), ""
-        refusal = self._foreign(scope, headers) or self._wait(scope, headers)
-        visitor = None if refusal else self._visitor(scope, headers)
-        if visitor is None and refusal is None and not self._door.keys.are_any:
-            visitor, cookie = self._let_in(scope, headers)
-        refusal = refusal or self._refusal(scope, headers, visitor)
-        send = _protected(send, self._policy(headers.get("host", "")), cookie)
-        if refusal is None:
-            await self._app({**scope, VISITOR: visitor}, receive, send)
+        headers = Headers(scope=scope)
+        entry = self._entry(scope, headers)
+        send = _protected(send, self._policy(headers.get("host", "")), entry.cookie)
+        if entry.refusal is None:
+            await self._app({**scope, VISITOR: entry.visitor, SESSIONS: self._door.sessions}, receive, send)
         elif scope["type"] == "websocket":
             await receive()
             await send({"type": "websocket.close", "code": _POLICY_VIOLATION})
         else:
-            await refusal(scope, receive, send)
+            await entry.refusal(scope, receive, send)
+
+    def _entry(self, scope: Scope, headers: Headers) -> "_Entry":
+        if refusal := self._foreign(scope, headers) or self._wait(scope, headers):
+            return _Entry(refusal)
+        visitor, cookie = self._visitor(scope, headers), ""
+        if visitor is None and not self._door.keys.are_any:
+            visitor, cookie = self._let_in(scope, headers)
+        return _Entry(self._refusal(scope, headers, visitor), visitor, cookie)
 
     def _foreign(self, scope: Scope, headers: Headers) -> Response | None:
         host, origin = headers.get("host", ""), headers.get("origin")
@@ -140,6 +146,15 @@ class Guard:
             return _POLICY.format(own="")
         door = f" http://{name}:{port} https://{name}:{port}" if port else ""
         return _POLICY.format(own=f"ws://{host} wss://{host}{door}")
+
+
+@dataclass(frozen=True)
+class _Entry:
+    """Why somebody stays outside, or who he is, and the session that his browser gets."""
+
+    refusal: Response | None
+    visitor: Visitor | None = None
+    cookie: str = ""
 
 
 def visitor_of(connection: HTTPConnection) -> Visitor:

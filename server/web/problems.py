@@ -74,6 +74,7 @@ _REMEDIES: Mapping[str, str] = {
     "stale_request": "look at the rig, and ask again",
     "in_progress": "wait for the answer of the first request",
     "outcome_unknown": "look at the rig and its runs, then ask with a new key",
+    "calibration_refused": "choose another calibration, or calibrate again",
     "key_reused": "choose a new key for every request",
 }
 

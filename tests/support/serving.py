@@ -53,6 +53,12 @@ class Serving:
         status = self.wait()
         return answer.headers["location"].rsplit("/", 1)[-1], status
 
+    def free_control(self) -> None:
+        """Nobody holds control any more."""
+        control = self.app.state.context.control
+        if holder := control.holder:
+            control.release(holder.who)
+
     def wait(self) -> RunStatus:
         """Status once no run is active."""
         acquisition = self.services.acquisition

@@ -61,6 +61,7 @@ def at_rest(server: Serving) -> Iterator[None]:
     server.http.post("/api/rig/abort")
     server.wait()
     server.http.post("/api/rig/acknowledge")
+    server.free_control()
 
 
 def laboratory(server: Serving) -> Any:

@@ -135,4 +135,12 @@ class Control:
 
     def _change(self, who: Visitor | None) -> None:
         before, self._who = self._who, who
-        self._tell("control", holder=who.name if who else "", before=before.name if before else "")
+        holder, former = (one.name if one else "" for one in (who, before))
+        self._tell("control", holder=holder, before=former, text=_told(holder, former))
+
+
+def _told(holder: str, before: str) -> str:
+    """Who took control from whom."""
+    if not holder:
+        return f"{before} no longer holds control"
+    return f"{holder} has taken control from {before}" if before else f"{holder} holds control"

@@ -51,13 +51,14 @@ def _text(word: RigWord, status: RunStatus, reasons: Sequence[Reason] | None, et
     title = word.value.upper()
     if word is RigWord.ACQUIRING:
         counts = f"{title} {status.shots_recorded}/{status.shots_planned}"
-        return counts if eta_s is None else f"{counts}, {_minutes(eta_s)} left"
+        return counts if eta_s is None else f"{counts}, {minutes(eta_s)} left"
     if word is RigWord.NOT_READY:
         return f"{title}: {reasons[0].text if reasons else 'nobody has looked at the rig for seconds'}"
     return title
 
 
-def _minutes(time_s: float) -> str:
+def minutes(time_s: float) -> str:
+    """A time as a clock shows it."""
     whole_s = round(time_s)
     hours, rest_s = divmod(whole_s, 3600)
     minutes, seconds = divmod(rest_s, 60)

@@ -6,6 +6,7 @@ from itertools import chain
 from daq.errors import DaqError, DeviceUnavailable
 from daq.run.refusals import RefusalCode, coded
 from daq.run_plan import RunKind, RunPlan
+from server.lab.calibration_story import misfits
 from server.lab.desk.reason import Reason, Refusal, reason_of
 from server.lab.duty import Health
 from server.lab.errors import Damaged, NotFound, ServerError, Unprocessable
@@ -54,15 +55,9 @@ def _against_calibration(context: Context, calibration: str) -> Iterator[ServerE
         context.calibrations.document(calibration)
     except NotFound as error:
         yield Unprocessable(f"calibration: {error}", RefusalCode.CALIBRATION_UNKNOWN)
+        return
     except Damaged as error:
         yield Unprocessable(f"calibration: {error}", RefusalCode.CALIBRATION_DAMAGED)
-    sizes_px = context.calibrations.image_sizes_px(calibration)
-    misfits = []
-    for view, camera in context.services.rig.cameras.items():
-        rows, columns = camera.image_shape
-        made_for = sizes_px.get(view, (columns, rows))
-        if made_for != (columns, rows):
-            misfits.append(f"{made_for[0]} x {made_for[1]} px of {view}, its camera delivers {columns} x {rows} px")
-    if misfits:
-        reason = f"calibration: {calibration!r} is made for images of {'; '.join(misfits)}"
-        yield Unprocessable(reason, RefusalCode.CALIBRATION_SIZE)
+        return
+    if found := misfits(context, calibration):
+        yield Unprocessable(f"calibration: {'; '.join(found)}", RefusalCode.CALIBRATION_SIZE)

@@ -41,9 +41,3 @@ def shoot(context: Context, shot: SingleShot) -> str:
         name="single-shot", shots=1, pulse=shot.pulse, references=shot.references, calibration=shot.calibration
     )
     return context.unkept_runs.add(lambda: start_run(context, plan))
-
-
-def choose_calibration(context: Context, calibration_id: str) -> None:
-    """Make a calibration the current one, and tell every page; see ``CalibrationStore.choose``."""
-    context.calibrations.choose(calibration_id)
-    context.services.events.publish("calibration_chosen", calibration=calibration_id)

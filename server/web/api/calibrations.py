@@ -2,16 +2,17 @@
 
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Response
+from fastapi import APIRouter, Path, Response
+from fastapi.responses import FileResponse
 from pydantic import Field
 
 from daq.frozen_model import FrozenModel
 from daq.names import Identifier
+from server.lab.calibration_story import CalibrationStory, story_of
 from server.lab.calibrations import CalibrationSummary
+from server.lab.errors import NotFound
 from server.lab.jobs import Job
-from server.lab.starting.calibrating import CameraModel, request_calibration
-from server.lab.starting.command import command
-from server.lab.starting.run_start import choose_calibration as choose
+from server.lab.starting.calibrating import CameraModel, request_calibration, use_calibration
 from server.web.api.parameters import CalibrationId, ContextOf, IdempotencyKey, Who
 from server.web.problems import responses
 
@@ -60,8 +61,31 @@ def create_calibration(
 @router.put("/current", responses=responses(404, 423, 500))
 def choose_calibration(choice: CurrentCalibration, context: ContextOf, who: Who) -> CurrentCalibration:
     """Use this one for sample runs that name none; needs control of the rig."""
-    command(context, who, f"chose calibration {choice.id}", lambda: choose(context, choice.id))
+    use_calibration(context, who, choice.id)
     return choice
+
+
+@router.get("/{calibration_id}/story", responses=responses(404, 500))
+def tell_calibration(calibration_id: CalibrationId, context: ContextOf) -> CalibrationStory:
+    """Verdicts, residuals by view and plane, the worst plane, and what would make it better."""
+    return story_of(context, calibration_id)
+
+
+@router.get(
+    "/{calibration_id}/pictures/{picture}.png",
+    response_class=FileResponse,
+    responses={**responses(404), 200: {"content": {"image/png": {}}}},
+)
+def show_picture(
+    calibration_id: CalibrationId,
+    picture: Annotated[Identifier, Path(description="one of the pictures that its story names")],
+    context: ContextOf,
+) -> FileResponse:
+    """A picture that was drawn when the calibration was made."""
+    path = context.calibrations.picture_folder(calibration_id) / f"{picture}.png"
+    if not path.is_file():
+        raise NotFound(f"calibration {calibration_id!r} has no picture {picture!r}")
+    return FileResponse(path, media_type="image/png", headers={"Cache-Control": "no-cache"})
 
 
 @router.get("/{calibration_id}", responses=responses(404, 500))

@@ -12,7 +12,7 @@ from server.web.guard import SIGN_IN_PATH, address_of, cookie_of, session_cookie
 router = APIRouter(include_in_schema=False)
 SIGN_OUT_PATH = "/sign-out"
 _FORM = """<!doctype html><html lang="en"><meta charset="utf-8"><title>tomoshadow: sign in</title>
-<meta name="viewport" content="width=device-width">
+<meta name="viewport" content="width=device-width"><link rel="icon" href="data:,">
 <style>
 body {{ font: 16px system-ui; background: #0f141a; color: #dde5ee; display: grid; place-items: center; height: 90vh }}
 form {{ display: grid; gap: 12px; width: 280px }}

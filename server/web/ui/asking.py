@@ -9,6 +9,7 @@ from nicegui import ui
 from daq.errors import DaqError
 from server.lab.errors import ServerError
 from server.lab.jobs import Job, JobState
+from server.web.ui.visiting import require_operator, told
 
 
 async def queue(request: Callable[[], list[Job]]) -> None:
@@ -32,8 +33,9 @@ def answer_of(jobs: list[Job]) -> tuple[str, bool]:
 
 
 async def try_to(action: Callable[[], Awaitable[Any]]) -> None:
-    """Do it, and say why it was refused."""
+    """Do it for an operator, and say why it was refused."""
     try:
+        require_operator()
         await action()
     except (DaqError, ServerError) as error:
-        ui.notify(str(error), type="negative")
+        ui.notify(told(error), type="negative")

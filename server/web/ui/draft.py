@@ -1,4 +1,4 @@
-"""Draft: the run form as the operator left it, kept by the server, so that a reload or a restart loses nothing."""
+"""Draft: the run form as the operator left it, one for all tabs, kept by the server: no reload or restart loses it."""
 
 import json
 from collections.abc import Mapping
@@ -8,6 +8,7 @@ from typing import Annotated, Any
 from pydantic import BaseModel, TypeAdapter, ValidationError
 from pydantic.fields import FieldInfo
 
+from daq.run_notes import RunNotes
 from daq.run_plan import PulsePair, RunKind, RunPlan
 from server.lab.damage import set_aside
 from server.lab.events import EventPublisher
@@ -17,7 +18,8 @@ PLAN_FIELDS = RunPlan.model_fields
 PULSE_FIELDS = PulsePair.model_fields
 
 
-_TEXTS = ("name", "stage_z_mm")
+NOTES_FIELDS = RunNotes.model_fields
+_TEXTS = ("name", "stage_z_mm", "operator", "fluid", "nozzle", "remark")
 
 
 def first_draft(config: RigConfig) -> dict[str, Any]:
@@ -33,6 +35,11 @@ def first_draft(config: RigConfig) -> dict[str, Any]:
         "references": [],
         "are_references_chosen": False,
         "calibration": None,
+        "operator": "",
+        "fluid": "",
+        "nozzle": "",
+        "pressure_bar": None,
+        "remark": "",
         "current_a": {name: view.nominal_current_a for name, view in config.views.items()},
     }
 
@@ -50,6 +57,11 @@ class StoredDraft(BaseModel):
     references: list[str] = []
     are_references_chosen: bool = False
     calibration: str | None = None
+    operator: str | None = None
+    fluid: str | None = None
+    nozzle: str | None = None
+    pressure_bar: float | None = None
+    remark: str | None = None
     current_a: dict[str, float | None] = {}
 
 
@@ -70,10 +82,15 @@ class DraftStore:
         self._path = path
         self._events = events
         self.values = first_draft(config) | self._stored()
+        first, stored = first_draft(config)["current_a"], self.values["current_a"]
+        self.values["current_a"] = {view: stored.get(view, current_a) for view, current_a in first.items()}
+        self.version = 0
+        """Grows with every change, so that other tabs see that there was one."""
 
     def set(self, name: str, value: Any) -> None:
-        """Remember a value of the form; what another page has changed meanwhile stays as it is in the file."""
+        """Remember a value of the form; what another program has changed meanwhile stays as it is in the file."""
         self.values[name] = value
+        self.version += 1
         part = self._path.with_suffix(".part")
         part.write_text(json.dumps({**self._stored(), name: value}))
         part.replace(self._path)
@@ -140,6 +157,21 @@ def positions(text: str | None) -> tuple[float, ...]:
     return tuple(float(part) for part in (text or "").split(",") if part.strip())
 
 
+def notes_of(values: dict[str, Any]) -> RunNotes:
+    """What no device knows; ValueError if it is too long."""
+    texts = {name: values.get(name) or "" for name in ("operator", "fluid", "nozzle", "remark")}
+    return RunNotes.model_validate({**texts, "pressure_bar": values.get("pressure_bar")})
+
+
+def limits_of(fields: dict[str, FieldInfo], name: str) -> str:
+    """The limits of a number, by the plan itself."""
+    limits = {
+        key: getattr(one, key) for one in fields[name].metadata for key in ("ge", "gt", "le") if hasattr(one, key)
+    }
+    low = f"above {limits['gt']:g}" if "gt" in limits else f"{limits['ge']:g}"
+    return f"{low} to {limits['le']:g}"
+
+
 def pulse_of(values: dict[str, Any]) -> PulsePair:
     """The light that a draft describes; ValueError if it describes none."""
     return PulsePair(width_ns=values["width_ns"], separation_ns=values["separation_ns"], current_a=values["current_a"])
@@ -160,6 +192,7 @@ def plan_of(values: dict[str, Any]) -> RunPlan:
         shots=values["shots"],
         rate_hz=values["rate_hz"],
         pulse=pulse_of(values),
+        notes=notes_of(values),
         stage_z_mm=positions(values["stage_z_mm"]) if kind is RunKind.CALIBRATION else (),
         references=tuple(values["references"]) if kind is RunKind.SAMPLE else (),
         calibration=values["calibration"] if kind is RunKind.SAMPLE else None,

@@ -13,6 +13,7 @@ from nicegui import ui
 from server.lab.services import Context
 from server.rig.config import RigConfig
 from server.web.abort_listener import AbortListener
+from server.web.guard import SIGN_IN_PATH
 from server.web.ui import theme
 from server.web.ui.bar.header import Header
 from server.web.ui.calibrate.calibrate_page import CalibratePage
@@ -26,6 +27,7 @@ from server.web.ui.rig.rig_page import RigPage
 from server.web.ui.run.run_page import RunPage
 from server.web.ui.runs.one_run_page import OneRunPage
 from server.web.ui.runs.runs_page import RunsPage
+from server.web.ui.visiting import is_signed_in
 
 _REFRESH_S = 0.25
 _LISTS_CHANGED = {"run_state", "job_changed", "calibration_chosen"}
@@ -40,33 +42,55 @@ _DEEP_PATHS = (
 
 def mount_page(app: FastAPI, config: RigConfig) -> None:
     """Serve the desk at the addresses of its pages; register every other route before."""
+    drafts = _Drafts()
 
     def show(request: Request) -> None:
         abort: AbortListener = app.state.abort_listener
         abort.admit(request.headers["host"])
-        Desk(app.state.context, abort.port)
+        Desk(app.state.context, drafts.of(app.state.context), abort.port)
 
     for path in (*_PATHS, *_DEEP_PATHS):
         ui.page(path, title=f"tomoshadow: {config.name}")(show)
     ui.run_with(app, dark=None, show_welcome_message=False, reconnect_timeout=10)
 
 
+class _Drafts:
+    """One draft for all tabs; made when the first of them is opened, because only then its folder is known."""
+
+    def __init__(self) -> None:
+        self._draft: DraftStore | None = None
+
+    def of(self, context: Context) -> DraftStore:
+        """The draft of this rig."""
+        if self._draft is None:
+            path, config = context.services.data_dir / "draft.json", context.services.config
+            self._draft = DraftStore(path, config, context.services.events)
+        return self._draft
+
+
 class Desk:
     """What one browser tab shows; a page lives as long as the tab is at its address."""
 
-    def __init__(self, context: Context, abort_port: int) -> None:
+    def __init__(self, context: Context, draft: DraftStore, abort_port: int) -> None:
         self._context = context
         self._events = context.services.events
         self._page: DeskPage | None = None
         self._are_lists_old = True
-        self._draft = DraftStore(context.services.data_dir / "draft.json", context.services.config, self._events)
-        dark = theme.apply()
-        self._header = Header(context, dark, abort_port)
+        self._has_tokens, self._has_left = context.services.config.server.token is not None, False
+        self._draft = draft
+        theme.apply()
+        self._header = Header(context, abort_port)
         with ui.element("div").classes("desk"):
             self._rail = Rail(context)
             ui.sub_pages(self._routes()).classes("desk-page")
             self._drawer = Drawer(context, self._rail.drawer_button)
         ui.timer(_REFRESH_S, self._refresh)
+
+    def _leave(self) -> None:
+        """The session is over: sign in again, or begin another one; asked once, or the browser never gets there."""
+        if not self._has_left:
+            self._has_left = True
+            ui.run_javascript(f"location.assign({SIGN_IN_PATH if self._has_tokens else '/'!r})")
 
     def _routes(self) -> dict[str, Callable[..., None]]:
         context, draft = self._context, self._draft
@@ -97,6 +121,9 @@ class Desk:
         self._are_lists_old = True
 
     async def _refresh(self) -> None:
+        if not is_signed_in():
+            self._leave()
+            return
         events = self._drawer.new_events()
         for part in (self._header, self._rail):
             part.refresh()

@@ -10,12 +10,11 @@ _STYLE_SHEETS = sorted(Path(__file__).parent.rglob("*.css"), key=lambda path: (l
 """That of all pages first, then that of each room, beside its modules."""
 
 
-def apply() -> ui.dark_mode:
-    """Give the present page its look; returns the switch between dark and light."""
+def apply() -> None:
+    """Give the present page its look; whether it is dark is the browser's affair."""
     ui.colors(primary=ACCENT, positive="#35b26a", negative="#d83c42", warning="#f0a92e")
     for style_sheet in _STYLE_SHEETS:
         ui.add_css(style_sheet)
-    return ui.dark_mode(True)
 
 
 def panel(title: str, extra: str = "") -> ui.card:

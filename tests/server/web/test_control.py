@@ -47,9 +47,9 @@ def test_the_first_action_takes_it_and_it_can_be_taken_over_and_given_back(serve
     assert server.http.delete("/api/rig/control", headers=ANN).json()["holder"] == "bob@lab"
     assert server.http.delete("/api/rig/control", headers=BOB).json()["holder"] is None
     events = server.services.events.since(0)
-    assert [event.data for event in events if event.name == "control"][:2] == [
-        {"holder": "ann@lab", "before": ""},
-        {"holder": "bob@lab", "before": "ann@lab"},
+    assert [event.data["text"] for event in events if event.name == "control"][:2] == [
+        "ann@lab holds control",
+        "bob@lab has taken control from ann@lab",
     ]
     deeds = [(event.data["who"], event.data["text"]) for event in events if event.name == "deed"]
     assert deeds == [("ann@lab", "started live"), ("bob@lab", "ended the live view")]

@@ -9,6 +9,7 @@ from server.web.ui.draft import (
     PULSE_FIELDS,
     DraftStore,
     first_draft,
+    limits_of,
     plan_of,
     positions,
     problem_of,
@@ -106,3 +107,28 @@ def test_what_the_page_shows_is_adopted_and_a_number_that_is_none_is_left_empty(
     values = draft.values
     assert (values["name"], values["rate_hz"], values["shots"], values["width_ns"]) == ("late words", 3.5, None, 1000)
     assert values["current_a"] == {"view1": 10.0, "view2": 4.0}
+
+
+def test_a_draft_of_another_rig_gives_this_one_no_views(tmp_path: Path) -> None:
+    config, path = memory_config(tmp_path / "runs"), tmp_path / "draft.json"
+    path.write_text('{"current_a": {"view1": 3, "top": 9}}')
+    assert DraftStore(path, config, EventPublisher()).values["current_a"] == {"view1": 3, "view2": 10.0}
+
+
+def test_other_tabs_see_that_something_was_changed(tmp_path: Path) -> None:
+    draft = DraftStore(tmp_path / "draft.json", memory_config(tmp_path / "runs"), EventPublisher())
+    before = draft.version
+    draft.set("shots", 5)
+    assert draft.version > before
+
+
+def test_limits_are_those_of_the_plan() -> None:
+    assert limits_of(PLAN_FIELDS, "shots") == "1 to 100000"
+    assert limits_of(PLAN_FIELDS, "rate_hz") == "above 0 to 100"
+    assert limits_of(PULSE_FIELDS, "width_ns") == "250 to 2000"
+
+
+def test_what_no_device_knows_is_part_of_the_plan(tmp_path: Path) -> None:
+    values = DraftStore(tmp_path / "draft.json", memory_config(tmp_path / "runs"), EventPublisher()).values
+    notes = plan_of(values | {"operator": "ann", "fluid": None, "pressure_bar": 40}).notes
+    assert (notes.operator, notes.fluid, notes.pressure_bar) == ("ann", "", 40)

@@ -10,6 +10,8 @@ from server.lab.desk.alarms import Alarm
 from server.lab.errors import ServerError
 from server.lab.services import Context
 from server.lab.starting.alarms_now import acknowledge
+from server.lab.starting.command import tell_deed
+from server.web.ui.visiting import require_operator, told
 
 
 class AlarmStrip:
@@ -47,6 +49,8 @@ class AlarmStrip:
 
     async def _on_acknowledge(self, alarm_id: str) -> None:
         try:
+            who = require_operator()
             await run_in_threadpool(acknowledge, self._context, alarm_id)
+            tell_deed(self._context, who, "acknowledged an alarm")
         except (DaqError, ServerError) as error:
-            ui.notify(str(error), type="negative")
+            ui.notify(told(error), type="negative")

@@ -1,4 +1,4 @@
-"""Header: what is always in sight. Which rig, its lamps, its state, its calibration, the connection, ABORT, alarms."""
+"""Header: what is always in sight. Which rig, its lamps, state and calibration, who holds control, ABORT, alarms."""
 
 import time
 
@@ -7,15 +7,17 @@ from nicegui import ui
 from server.lab.services import Context
 from server.web.ui.bar.abort_button import AbortButton
 from server.web.ui.bar.alarm_strip import AlarmStrip
+from server.web.ui.bar.control_chip import ControlChip
 from server.web.ui.bar.lamp_row import LampRow
 from server.web.ui.bar.server_link import ServerLink
 from server.web.ui.bar.state_chip import StateChip
+from server.web.ui.bar.theme_button import ThemeButton
 
 
 class Header:
     """Built once per page, refreshed by its timer."""
 
-    def __init__(self, context: Context, dark: ui.dark_mode, abort_port: int) -> None:
+    def __init__(self, context: Context, abort_port: int) -> None:
         self._context = context
         with ui.header(elevated=False).classes("desk-bar q-pa-none"):
             with ui.element("div").classes("desk-row"):
@@ -24,10 +26,10 @@ class Header:
                 ui.space()
                 self._calibration = ui.label("").classes("calibration lockable")
                 self._calibration.props('role=status aria-label="current calibration"')
+                self._control = ControlChip(context)
                 self._state = StateChip()
                 self._link = ServerLink()
-                dark_button = ui.button(icon="contrast", on_click=dark.toggle).classes("lockable")
-                dark_button.props('flat round dense color=white aria-label="dark or light"')
+                ThemeButton()
                 AbortButton(abort_port)
             self._alarms = AlarmStrip(context)
 
@@ -36,6 +38,7 @@ class Header:
         self._lamps.show(self._context.lamps)
         self._state.show(self._context.desk.state)
         self._calibration.set_text(calibration_text(self._context))
+        self._control.refresh()
         self._alarms.refresh()
         self._link.show(self._context.beat.number)
 

@@ -6,6 +6,7 @@ from pydantic import ValidationError
 from server.lab.desk.beat import PERIOD_S
 from server.lab.starting.light_request import LightRequest
 from server.web.api.desk.beat import BEAT_PATH
+from server.web.ui.visiting import visitor
 
 TICKET = "() => emit(window.desk?.ticket() ?? {})"
 """Handler in the browser of every button that makes light: which beat was heard last, and what the form shows."""
@@ -31,10 +32,11 @@ class ServerLink(Element, component="server_link.js"):
 def light_request(ticket: object) -> LightRequest:
     """What a click said of itself; one that says nothing heard no beat, and makes no light."""
     try:
-        request = LightRequest.model_validate({name: _said(ticket).get(name) for name in LightRequest.model_fields})
+        request = LightRequest.model_validate({name: _said(ticket).get(name) for name in ("key", "beat")})
     except ValidationError:
         request = LightRequest()
-    return request if request.beat is not None else LightRequest(key=request.key, beat=_NEVER)
+    beat = _NEVER if request.beat is None else request.beat
+    return LightRequest(key=request.key, beat=beat, who=visitor())
 
 
 def shown_form(ticket: object) -> dict[str, str]:

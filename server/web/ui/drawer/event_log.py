@@ -32,11 +32,13 @@ def line_of(event: Event) -> str | None:
             text = whose + data["state"] + (f", {data['message']}" if data["message"] else "")
         case "shot_recorded":
             text = f"shot {data['index']} recorded" + ("" if data["valid"] else ", INVALID")
-        case "run_message" | "abort":
+        case "run_message" | "abort" | "control":
             text = data["text"]
         case "job_changed":
             what = data["kind"] if data["shot"] is None else f"{data['kind']} of shot {data['shot']}"
             text = f"{what}: {data['state']}" + (f", {data['error']}" if data["error"] else "")
+        case "deed":
+            text = f"{data['who']} {data['text']}"
         case "calibration_alarm":
             text = data["message"] or f"calibration {data['calibration']} fits run {data['run']} again"
         case "calibration_chosen":

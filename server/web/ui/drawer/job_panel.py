@@ -11,11 +11,12 @@ from processing.calibration.verdict import BELONGING, Verdict
 from processing.runs.exposure_faults import fault_lines
 from server.lab.jobs import Job, JobKind, JobState
 from server.lab.services import Context
-from server.lab.starting.run_start import choose_calibration
+from server.lab.starting.calibrating import use_calibration
 from server.web.ui.asking import try_to
 from server.web.ui.run.run_panel import outcome_colour
 from server.web.ui.table import table_of
 from server.web.ui.theme import panel
+from server.web.ui.visiting import visitor
 
 _SHOWN = 60
 _TRUSTED = (Verdict.GOOD, Verdict.USABLE)
@@ -45,7 +46,7 @@ class JobPanel:
             await try_to(lambda: self._choose(event.args["calibration"]))
 
     async def _choose(self, calibration: str) -> None:
-        await asyncio.to_thread(choose_calibration, self._context, calibration)
+        await asyncio.to_thread(use_calibration, self._context, visitor(), calibration)
         ui.notify(f"{calibration} is the current calibration", type="positive")
 
 
@@ -90,9 +91,10 @@ def _disparity(job: Job) -> str:
 
 def _quality(job: Job) -> str:
     """Hold-out error, verdict and reasons of the worst view of a calibration; nothing before it has ended."""
-    result = job.result or {"views": {}}
+    result = job.result or {}
     badness = {
-        name: (list(Verdict).index(view["verdict"]), _holdout_px(view)) for name, view in result["views"].items()
+        name: (list(Verdict).index(view["verdict"]), _holdout_px(view))
+        for name, view in result.get("views", {}).items()
     }
     if not badness:
         return ""

@@ -63,7 +63,7 @@ def test_it_is_taken_over_and_everybody_is_told() -> None:
     bench.control.take(BOB)
     with pytest.raises(Locked, match="bob"):
         bench.control.require(ANN)
-    assert bench.told[-1] == ("control", {"holder": "bob", "before": "ann"})
+    assert bench.told[-1] == ("control", {"holder": "bob", "before": "ann", "text": "bob has taken control from ann"})
     bench.control.release(ANN)
     assert bench.control.holder is not None
     assert bench.control.holder.who == BOB

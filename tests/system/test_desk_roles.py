@@ -1,0 +1,49 @@
+"""What a viewer sees and may do; headless Chromium. A module of its own: NiceGUI has one application per process."""
+
+import re
+from collections.abc import Iterator
+
+import pytest
+from nicegui import app as pages
+from playwright.sync_api import Page, expect
+
+from server.web.app import create_app
+from tests.support.operator import VIEWS
+from tests.support.serving import Serving, serving
+
+pytestmark = pytest.mark.timeout(900)
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
+    pages.middleware_stack = None
+    data_dir = tmp_path_factory.mktemp("roles") / "runs"
+    with serving(data_dir, build=create_app, views=VIEWS, token="operate", viewer_token="look") as server:
+        yield server
+
+
+def sign_in(page: Page, server: Serving, name: str, token: str) -> None:
+    page.goto(f"{server.http.base_url}/run")
+    page.get_by_label("Your name").fill(name)
+    page.get_by_label("Token of an operator or a viewer").fill(token)
+    page.get_by_role("button", name="Sign in").click()
+    expect(page.get_by_role("status", name="connection")).to_have_text("connected")
+
+
+def test_a_viewer_looks_and_aborts_and_signs_out(page: Page, server: Serving) -> None:
+    sign_in(page, server, "eve", "look")
+    expect(page.get_by_role("button", name="control: viewer")).to_be_visible()
+    expect(page.get_by_role("button", name="Start run")).to_be_disabled()
+    page.get_by_role("button", name="ABORT").click()
+    expect(page.get_by_role("alert", name="abort answer")).to_have_text(re.compile("^light off confirmed"))
+    page.get_by_role("button", name="control: viewer").click()
+    page.get_by_role("button", name="Sign out").click()
+    expect(page.get_by_role("button", name="Sign in")).to_be_visible()
+
+
+def test_a_session_that_is_ended_elsewhere_closes_its_page(page: Page, server: Serving) -> None:
+    sign_in(page, server, "ann", "operate")
+    expect(page.get_by_role("button", name="control: free")).to_be_visible()
+    expect(page.get_by_role("button", name="Start run")).to_be_enabled()
+    page.context.request.post(f"{server.http.base_url}/sign-out", max_redirects=0)
+    expect(page.get_by_role("button", name="Sign in")).to_be_visible()
