@@ -141,7 +141,7 @@ def _references(context: Context, plan: RunPlan) -> Told | None:
     ]
     absent = [f"no {kind} run" for kind in (RunKind.DARK, RunKind.BACKGROUND) if kind not in chosen]
     if absent or newer:
-        remedy = "choose it below, or go on with what is chosen" if newer else "record it, or choose it below"
+        remedy = "choose it, or go on with what is chosen" if newer else "record it, or choose it in the form"
         return ", ".join([*absent, *newer]), remedy
     return f"{', '.join(chosen)} fit this light", ""
 
@@ -198,7 +198,9 @@ def _frame_bytes(context: Context) -> dict[str, int]:
 
 
 def _gigabytes(count: float) -> str:
-    return f"{count / 1e9:.0f} GB" if count >= 1e11 else f"{count / 1e9:.2g} GB"
+    if count < 1e8:
+        return f"{count / 1e6:.2g} MB"
+    return f"{count / 1e9:.0f} GB" if count >= 1e10 else f"{count / 1e9:.2g} GB"
 
 
 def _duration(time_s: float) -> str:

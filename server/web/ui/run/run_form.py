@@ -1,40 +1,36 @@
 """RunForm: the next run. Limits are those of the plan and of the rig; a refusal is shown with its reason."""
 
 import asyncio
-from collections.abc import Callable
+import time
 from functools import partial
-from typing import Any
 
 from nicegui import ui
 from nicegui.events import GenericEventArguments
 
 from daq.errors import DaqError
 from daq.run.refusals import RefusalCode
-from daq.run.state import RunOutcome
-from daq.run_plan import RunKind
+from daq.run_plan import RunKind, RunPlan
 from server.lab.desk.reason import Reason
+from server.lab.desk.visitor import Visitor
 from server.lab.errors import ServerError
-from server.lab.runs.run_summary import RunSummary
 from server.lab.services import Context
 from server.lab.starting.light_request import obey
+from server.lab.starting.preflight_list import Check, preflight
 from server.lab.starting.readiness import reasons_against
 from server.lab.starting.run_start import start_run
 from server.web.ui.bar.server_link import TICKET, light_request, shown_form
-from server.web.ui.draft import (
-    PLAN_FIELDS,
-    PULSE_FIELDS,
-    DraftStore,
-    plan_of,
-    problem_of,
-    problem_of_current,
-    problem_of_positions,
-)
+from server.web.ui.draft import DraftStore, plan_of
+from server.web.ui.run.chosen_runs import ChosenRuns
+from server.web.ui.run.form_fields import FormFields
+from server.web.ui.run.preflight_panel import PreflightPanel
+from server.web.ui.run.template_bar import TemplateBar
+from server.web.ui.run.templates import TemplateStore
 from server.web.ui.theme import panel
+from server.web.ui.visiting import told, visitor
 
-_REFERENCE_KINDS = (RunKind.DARK, RunKind.BACKGROUND)
 _PASSING = (RefusalCode.BUSY, RefusalCode.STARTING)
-_CALIBRATION = "Calibration (none: the current one)"
-_NO_CALIBRATION = "Calibration (none: no volumes)"
+_LOOK_AGAIN_S = 5.0
+"""Disk and references change without a word."""
 
 
 class RunForm:
@@ -46,175 +42,99 @@ class RunForm:
         The application.
     draft : DraftStore
         What the form shows first, and where every change goes.
+    checks : PreflightPanel
+        Shows what speaks against the form, and what does not.
     """
 
-    def __init__(self, context: Context, draft: DraftStore) -> None:
-        self._context = context
-        self._draft = draft
-        self._shown: list[str] = []
-        self._fields: list[ui.input | ui.number] = []
-        self._judged: tuple[Reason, ...] | None = None
+    def __init__(self, context: Context, draft: DraftStore, checks: PreflightPanel) -> None:
+        self._context, self._draft, self._checks = context, draft, checks
+        self._shown = draft.version
+        self._judged: object = None
+        self._judged_s = 0.0
+        templates = TemplateStore(context.services.data_dir / "templates", context.services.events)
         with panel("New run"):
-            self._add_kind_and_name()
-            with ui.grid(columns=2).classes("w-full gap-2"):
-                self._shots = self._add_number("shots", "Shots", PLAN_FIELDS, whole=True)
-                self._add_number("rate_hz", "Rate / Hz", PLAN_FIELDS)
-                self._add_number("width_ns", "Pulse width / ns", PULSE_FIELDS, whole=True)
-                self._add_number("separation_ns", "Separation / ns", PULSE_FIELDS, whole=True)
-                for view in context.services.config.views:
-                    self._add_current(view)
-            self._add_choices()
+            self._templates = TemplateBar(templates, draft, self._show)
+            self._fields = FormFields(context, draft, self._changed)
+            self._chosen = ChosenRuns(context, draft, self._changed)
+            with ui.expansion("Notes", icon="edit_note", value=True).classes("w-full notes"):
+                self._fields.add_notes()
             self._refusal = ui.label("").classes("refusal").props("role=alert")
             self._start = ui.button("Start run", icon="play_arrow").classes("w-full")
             self._start.on("click", self._on_start, js_handler=TICKET)
-        self._check()
+        self._show_kind()
 
     def refresh(self) -> None:
-        """Follow the state of acquisition."""
-        self._start.set_enabled(not self._context.services.acquisition.status().active)
+        """Follow the state of acquisition, who holds control, and other tabs."""
+        may_change = self._may_change()
+        self._start.set_enabled(may_change and not self._context.services.acquisition.status().active)
+        self._fields.allow(may_change)
+        self._chosen.allow(may_change)
+        if self._draft.version != self._shown:
+            self._show()
 
     async def reload_choices(self) -> None:
         """Show the reference runs and calibrations that exist now."""
-        runs, calibrations = await asyncio.gather(
-            asyncio.to_thread(self._context.runs.newest), asyncio.to_thread(self._context.calibrations.list)
-        )
-        references = [run for run in runs if run.kind in _REFERENCE_KINDS and run.outcome == RunOutcome.COMPLETED]
-        self._show_references(references)
-        known = {item.id: item.id + (" (current)" if item.current else "") for item in calibrations}
-        calibration = self._draft.values["calibration"]
-        is_any_current = any(item.current for item in calibrations)
-        self._calibration.set_label(_CALIBRATION if is_any_current else _NO_CALIBRATION)
-        self._calibration.set_options(known, value=calibration if calibration in known else None)
-
-    def _show_references(self, references: list[RunSummary]) -> None:
-        """Offer the reference runs. What the operator chose stays chosen; until then the newest of each kind are."""
-        values, labels = self._draft.values, {run.run_id: _reference_label(run) for run in references}
-        newest = sorted({run.kind: run.run_id for run in reversed(references)}.values())
-        self._shown = values["references"] if values["are_references_chosen"] else newest
-        gone = {run_id: f"{run_id}: is gone" for run_id in self._shown if run_id not in labels}
-        self._references.set_options(labels | gone, value=self._shown)
-
-    def _keep_references(self, event: Any) -> None:
-        """Whatever is not what we show is a choice; a browser may also repeat what it was told."""
-        self._draft.values["references"] = event.value
-        if self._draft.values["are_references_chosen"] or sorted(event.value) != sorted(self._shown):
-            self._draft.set("are_references_chosen", True)
-            self._draft.set("references", event.value)
-        self._check()
-
-    def _add_kind_and_name(self) -> None:
-        kinds = {kind.value: kind.value.capitalize() for kind in RunKind}
-        ui.toggle(kinds, value=self._draft.values["kind"], on_change=self._changed("kind")).props(
-            'dense unelevated spread no-caps size=sm aria-label="Kind of run"'
-        ).classes("w-full")
-        name = ui.input(
-            "Name",
-            value=self._draft.values["name"],
-            on_change=self._changed("name"),
-            validation=lambda text: problem_of(PLAN_FIELDS, "name", text) and "letters, digits, space . _ -",
-        )
-        self._fields.append(name.props("dense outlined hide-bottom-space data-draft=name").classes("w-full"))
-
-    def _add_number(self, name: str, label: str, fields: dict[str, Any], *, whole: bool = False) -> ui.number:
-        number = ui.number(
-            label,
-            value=self._draft.values[name],
-            on_change=self._changed(name),
-            validation=lambda value: problem_of(fields, name, value),
-            precision=0 if whole else None,
-        )
-        self._fields.append(number.props(f"dense outlined hide-bottom-space data-draft={name}"))
-        return number
-
-    def _add_current(self, view: str) -> None:
-        limit_a = self._context.services.config.views[view].max_current_a
-
-        def keep(event: Any) -> None:
-            self._changed("current_a")(_Changed({**self._draft.values["current_a"], view: event.value}))
-
-        number = ui.number(
-            f"LED {view} / A",
-            value=self._draft.values["current_a"].get(view),
-            on_change=keep,
-            validation=lambda value: problem_of_current(value, limit_a),
-        )
-        self._fields.append(number.props(f'dense outlined hide-bottom-space data-draft="current_a:{view}"'))
-
-    def _add_choices(self) -> None:
-        positions = ui.input(
-            "Target positions / mm",
-            value=self._draft.values["stage_z_mm"],
-            on_change=self._changed("stage_z_mm"),
-            validation=problem_of_positions,
-        )
-        self._fields.append(positions.props("dense outlined hide-bottom-space data-draft=stage_z_mm").classes("w-full"))
-        self._positions = positions
-        self._references = (
-            ui.select({}, label="Dark and background runs", multiple=True, value=[], on_change=self._keep_references)
-            .props("dense outlined use-chips options-dense")
-            .classes("w-full")
-        )
-        self._calibration = (
-            ui.select({}, label=_CALIBRATION, clearable=True, on_change=self._changed("calibration"))
-            .props("dense outlined options-dense")
-            .classes("w-full")
-        )
-
-    def _changed(self, name: str) -> Callable[[Any], None]:
-        def keep(event: Any) -> None:
-            self._draft.set(name, event.value)
-            self._check()
-
-        return keep
-
-    def _check(self) -> None:
-        """Say at once why the rig would refuse this plan."""
-        if not hasattr(self, "_start"):
-            return  # while the form is being built
-        kind = RunKind(self._draft.values["kind"])
-        has_stage = self._context.services.rig.stage is not None
-        self._shots.set_label("Shots per position" if kind is RunKind.CALIBRATION and has_stage else "Shots")
-        self._positions.set_visibility(kind is RunKind.CALIBRATION and has_stage)
-        self._references.set_visibility(kind is RunKind.SAMPLE)
-        self._calibration.set_visibility(kind is RunKind.SAMPLE)
-        self._judged = None
+        await self._chosen.reload()
 
     async def judge(self) -> None:
-        """Say why the rig would refuse this plan, again whenever the form or the rig has changed."""
-        reasons = self._context.desk.state.reasons
-        if self._judged == reasons:
+        """Look at everything again whenever form, rig or control has changed, and every few seconds."""
+        who, holder = visitor(), self._context.control.holder
+        basis = (self._context.desk.state.reasons, self._draft.version, holder and holder.who, who)
+        if basis == self._judged and time.monotonic() < self._judged_s + _LOOK_AGAIN_S:
             return
-        self._judged = reasons
-        against = await asyncio.to_thread(self._reasons_against)
-        self._refusal.set_text("\n".join(f"{one.text} ({one.remedy})" for one in against if one.code not in _PASSING))
+        self._judged, self._judged_s = basis, time.monotonic()
+        plan = self._plan()
+        if plan is None:
+            self._checks.show(None)
+            self._refusal.set_text("")
+            return
+        reasons, checks = await asyncio.to_thread(self._look, plan, who)
+        self._checks.show(checks)
+        self._refusal.set_text("\n".join(f"{one.text} ({one.remedy})" for one in reasons if one.code not in _PASSING))
 
-    def _reasons_against(self) -> tuple[Reason, ...]:
+    def _look(self, plan: RunPlan, who: Visitor) -> tuple[tuple[Reason, ...], tuple[Check, ...]]:
+        reasons = reasons_against(self._context, plan)
+        return reasons, preflight(self._context, plan, who, reasons)
+
+    def _may_change(self) -> bool:
         try:
-            plan = plan_of(self._draft.values)
-        except ValueError:
-            return ()  # the field itself says what is wrong with it
-        return reasons_against(self._context, plan)
+            self._context.control.check(visitor())
+        except ServerError:
+            return False
+        return True
+
+    def _plan(self) -> RunPlan | None:
+        try:
+            return plan_of(self._draft.values)
+        except (ValueError, TypeError):
+            return None  # the field itself says what is wrong with it
+
+    def _changed(self) -> None:
+        self._shown = self._draft.version
+        self._show_kind()
+
+    def _show(self) -> None:
+        self._shown = self._draft.version
+        self._fields.show()
+        self._chosen.show()
+        self._show_kind()
+
+    def _show_kind(self) -> None:
+        kind = RunKind(self._draft.values["kind"])
+        for part in (self._fields, self._chosen):
+            part.show_kind(kind)
 
     async def _on_start(self, click: GenericEventArguments) -> None:
-        if not all([field.validate() for field in self._fields if field.visible]):
-            return
-        self._draft.adopt(shown_form(click.args))
+        request, shown = light_request(click.args), shown_form(click.args)
         try:
+            self._context.control.check(request.who)
+            self._draft.adopt(shown)
+            if not self._fields.are_good():
+                return
             plan = plan_of(self._draft.values)
             start = partial(start_run, self._context, plan)
-            await asyncio.to_thread(obey, self._context, light_request(click.args), plan.model_dump_json(), start)
+            await asyncio.to_thread(obey, self._context, request, f"run {plan.model_dump_json()}", start)
         except (DaqError, ServerError, ValueError) as error:
-            self._refusal.set_text(str(error))
+            self._refusal.set_text(told(error))
         else:
             self._refusal.set_text("")
-
-
-class _Changed:
-    """A new value, in the shape of an event."""
-
-    def __init__(self, value: Any) -> None:
-        self.value = value
-
-
-def _reference_label(run: RunSummary) -> str:
-    return f"{run.kind}: {run.name}, {run.shots_valid} shots, {run.run_id}"

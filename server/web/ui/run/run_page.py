@@ -5,6 +5,7 @@ from nicegui import ui
 from server.lab.services import Context
 from server.web.ui.draft import DraftStore
 from server.web.ui.live.live_tiles import LiveTiles
+from server.web.ui.run.preflight_panel import PreflightPanel
 from server.web.ui.run.run_form import RunForm
 from server.web.ui.run.run_panel import RunPanel
 from server.web.ui.theme import panel
@@ -15,10 +16,12 @@ class RunPage:
 
     def __init__(self, context: Context, draft: DraftStore) -> None:
         with ui.element("div").classes("columns"):
-            with ui.element("div").classes("column"), panel("Cameras"):
-                LiveTiles(context.services.rig.cameras, "no picture yet")
+            with ui.element("div").classes("column"):
+                self._run, checks = RunPanel(context), PreflightPanel()
+                with panel("Cameras"):
+                    LiveTiles(context.services.rig.cameras, "no picture yet")
             with ui.element("div").classes("column controls"):
-                self._run, self._form = RunPanel(context), RunForm(context, draft)
+                self._form = RunForm(context, draft, checks)
 
     async def refresh(self) -> None:
         """Follow the state of acquisition, and say what speaks against a start."""

@@ -1,5 +1,6 @@
 """RunPanel: what the run is doing, and the button that ends it after the present shot; ABORT is in the header."""
 
+import time
 from collections.abc import Callable, Sequence
 
 from nicegui import ui
@@ -8,35 +9,49 @@ from starlette.concurrency import run_in_threadpool
 from daq.errors import DaqError
 from daq.run.events import RunStatus
 from daq.run.state import RunState
+from server.lab.desk.rig_state import minutes
 from server.lab.duty import Health, Lamp
+from server.lab.errors import ServerError
 from server.lab.services import Context
+from server.lab.starting.command import tell_deed
+from server.web.ui.run.shot_strip import ShotStrip
 from server.web.ui.theme import panel
+from server.web.ui.visiting import require_operator, told
 
 
 class RunPanel:
     """Built once per page, refreshed by its timer."""
 
     def __init__(self, context: Context) -> None:
+        self._context = context
         self._acquisition = context.services.acquisition
         self._monitor = context.monitor
         with panel("Run"):
             with ui.row().classes("w-full items-baseline justify-between no-wrap"):
                 self._name = ui.label("no run yet").classes("text-base font-medium ellipsis")
                 self._outcome = ui.badge("").props('aria-label="run outcome"')
-            self._bar = ui.linear_progress(0, show_value=False, size="10px").props('rounded aria-label="run progress"')
+            self._bar = ui.linear_progress(0, show_value=False, size="10px").props(
+                'rounded instant-feedback aria-label="run progress"'
+            )
+            self._strip = ShotStrip(context.services.events)
             self._counts = ui.label("").classes("text-sm").props('role=status aria-label="run counts"')
-            self._message = ui.label("").classes("text-xs opacity-70").props('role=status aria-label="run message"')
-            self._stop = ui.button("Stop", icon="stop", on_click=self._acquisition.stop).props("outline")
-            self._stop.classes("w-full").tooltip("Ends the run after the present shot")
+            self._waits = ui.label("").classes("text-xs run-line").props('role=status aria-label="waits for"')
+            self._message = (
+                ui.label("").classes("text-xs opacity-70 run-line").props('role=status aria-label="run message"')
+            )
+            self._stop = ui.button("Stop", icon="stop", on_click=self._on_stop).props("outline")
+            self._stop.tooltip("Ends the run after the present shot")
             self._acknowledge = ui.button("Acknowledge fault", icon="verified_user", on_click=self._on_acknowledge)
-            self._acknowledge.props("outline no-caps color=negative").classes("w-full")
+            self._acknowledge.props("outline no-caps color=negative")
 
     def refresh(self) -> None:
         """Show the present state."""
         status = self._acquisition.status()
         self._name.set_text(status.run_id or "no run yet")
         self._bar.set_value(status.shots_recorded / max(1, status.shots_planned))
-        self._counts.set_text(counts_text(status))
+        self._strip.refresh(status.run_id)
+        self._counts.set_text(counts_text(status, self._context.desk.state.eta_s))
+        self._waits.set_text(waiting_text(status, time.monotonic()))
         self._message.set_text(status.message)
         self._outcome.set_text(status.outcome.value if status.outcome else "active" if status.active else "")
         self._outcome.props(f"color={outcome_colour(status.outcome)}")
@@ -45,16 +60,20 @@ class RunPanel:
         self._acknowledge.set_text(acknowledge_text(status))
         self._acknowledge.set_visibility(waits_for_acknowledgement(status, self._monitor.lamps))
 
+    async def _on_stop(self) -> None:
+        await self._command(self._acquisition.stop, "stopped the run")
+
     async def _on_acknowledge(self) -> None:
-        await _notify_failure(self._acquisition.acknowledge)
+        await self._command(self._acquisition.acknowledge, "acknowledged a fault")
 
-
-async def _notify_failure(command: Callable[[], None]) -> None:
-    """Give a command to acquisition in a thread of the pool that is kept for requests, and say if it failed."""
-    try:
-        await run_in_threadpool(command)
-    except DaqError as error:
-        ui.notify(str(error), type="negative")
+    async def _command(self, command: Callable[[], None], deed: str) -> None:
+        """Give a command to acquisition in a thread of the pool that is kept for requests, and say if it failed."""
+        try:
+            who = require_operator()
+            await run_in_threadpool(command)
+            tell_deed(self._context, who, deed)
+        except (DaqError, ServerError) as error:
+            ui.notify(told(error), type="negative")
 
 
 def waits_for_acknowledgement(status: RunStatus, lamps: Sequence[Lamp]) -> bool:
@@ -69,13 +88,20 @@ def acknowledge_text(status: RunStatus) -> str:
     return f"Acknowledge 1 of {len(waiting)}: {waiting[0].text}" if waiting else "Acknowledge fault"
 
 
-def counts_text(status: RunStatus) -> str:
+def waiting_text(status: RunStatus, now_s: float) -> str:
+    """What the run waits for, and since when; nothing where it does not wait."""
+    waiting = status.waiting
+    return f"waits for {waiting.text}, {max(0.0, now_s - waiting.since_s):.1f} s" if waiting and status.active else ""
+
+
+def counts_text(status: RunStatus, eta_s: float | None = None) -> str:
     """Shots in words; nothing before the first run: whether the rig is ready, the bar says."""
     if status.run_id is None:
         return ""
     invalid = status.shots_recorded - status.shots_valid
     text = f"{status.shots_recorded} / {status.shots_planned} shots recorded, {status.shots_valid} valid"
-    return f"{text}, {invalid} INVALID" if invalid else text
+    text = f"{text}, {invalid} INVALID" if invalid else text
+    return text if eta_s is None else f"{text}; {minutes(eta_s)} left"
 
 
 def outcome_colour(outcome: str | None) -> str:

@@ -1,0 +1,118 @@
+"""ChosenRuns: references and calibration of the next run. What is shown stays; a newer one is only told."""
+
+import asyncio
+from collections.abc import Callable
+from typing import Any
+
+from nicegui import ui
+
+from daq.run.state import RunOutcome
+from daq.run_plan import RunKind
+from server.lab.runs.run_summary import RunSummary
+from server.lab.services import Context
+from server.web.ui.draft import DraftStore
+
+_REFERENCE_KINDS = (RunKind.DARK, RunKind.BACKGROUND)
+_CALIBRATION = "Calibration; none: current"
+_NO_CALIBRATION = "Calibration; none: no volumes"
+
+
+class ChosenRuns:
+    """Built once per page.
+
+    Parameters
+    ----------
+    context : Context
+        Knows runs and calibrations.
+    draft : DraftStore
+        What is chosen.
+    changed : Callable[[], None]
+        Called after each choice.
+    """
+
+    def __init__(self, context: Context, draft: DraftStore, changed: Callable[[], None]) -> None:
+        self._context, self._draft, self._changed = context, draft, changed
+        self._known: list[RunSummary] = []
+        with ui.column().classes("w-full gap-2") as self._box:
+            self._references = ui.select(
+                {}, label="Dark and background runs", multiple=True, value=[], on_change=self._keep_references
+            )
+            self._references.props("dense outlined use-chips options-dense").classes("w-full")
+            self._newest = ui.button("Use the newest", on_click=self._use_newest).props("flat dense no-caps")
+            self._newest.set_visibility(False)
+            self._calibration = ui.select({}, label=_CALIBRATION, clearable=True, on_change=self._keep_calibration)
+            self._calibration.props("dense outlined options-dense").classes("w-full")
+
+    def show_kind(self, kind: RunKind) -> None:
+        """Only a sample run has any."""
+        self._box.set_visibility(kind is RunKind.SAMPLE)
+
+    def allow(self, may_change: bool) -> None:
+        """Nobody chooses while somebody else holds control."""
+        for field in (self._references, self._calibration, self._newest):
+            field.set_enabled(may_change)
+
+    async def reload(self) -> None:
+        """Offer the runs and calibrations that exist now."""
+        runs, calibrations = await asyncio.gather(
+            asyncio.to_thread(self._context.runs.newest), asyncio.to_thread(self._context.calibrations.list)
+        )
+        self._known = [run for run in runs if run.kind in _REFERENCE_KINDS and run.outcome == RunOutcome.COMPLETED]
+        self._pin_what_is_missing()
+        known = {item.id: item.id + (" (current)" if item.current else "") for item in calibrations}
+        self._calibration.set_label(_CALIBRATION if any(item.current for item in calibrations) else _NO_CALIBRATION)
+        chosen = self._draft.values["calibration"]
+        self._calibration.set_options(known, value=chosen if chosen in known else None)
+        self.show()
+
+    def show(self) -> None:
+        """Show what is chosen, here or in another tab."""
+        chosen = self._draft.values["references"]
+        labels = {run.run_id: _label(run) for run in self._known}
+        gone = {run_id: f"{run_id}: is gone" for run_id in chosen if run_id not in labels}
+        if self._references.options != labels | gone or self._references.value != chosen:
+            self._references.set_options(labels | gone, value=list(chosen))
+        self._newest.set_visibility(bool(chosen) and set(newest_of(self._known).values()) != set(chosen))
+        calibration = self._draft.values["calibration"]
+        if calibration in (*self._calibration.options, None) and self._calibration.value != calibration:
+            self._calibration.set_value(calibration)
+
+    def _pin_what_is_missing(self) -> None:
+        """Propose the newest of each kind of which none is chosen, until the operator has chosen himself."""
+        values = self._draft.values
+        if values["are_references_chosen"]:
+            return
+        kinds = {run.run_id: run.kind for run in self._known}
+        kept = [run_id for run_id in values["references"] if run_id in kinds]
+        has = {kinds[run_id] for run_id in kept}
+        pinned = kept + [run_id for kind, run_id in newest_of(self._known).items() if kind not in has]
+        if sorted(pinned) != sorted(values["references"]):
+            self._draft.set("references", pinned)
+            self._changed()
+
+    def _use_newest(self) -> None:
+        self._draft.set("references", list(newest_of(self._known).values()))
+        self.show()
+        self._changed()
+
+    def _keep_references(self, event: Any) -> None:
+        """Whatever is not what we show is a choice; a browser may also repeat what it was told."""
+        if sorted(event.value) != sorted(self._draft.values["references"]):
+            self._draft.set("are_references_chosen", True)
+            self._draft.set("references", list(event.value))
+            self.show()
+            self._changed()
+
+    def _keep_calibration(self, event: Any) -> None:
+        if event.value != self._draft.values["calibration"]:
+            self._draft.set("calibration", event.value)
+            self._changed()
+
+
+def newest_of(runs: list[RunSummary]) -> dict[RunKind, str]:
+    """The newest run of each kind, of runs that are listed newest first."""
+    return {run.kind: run.run_id for run in reversed(runs) if run.kind is not None}
+
+
+def _label(run: RunSummary) -> str:
+    return f"{run.kind}: {run.name}, {run.shots_valid} shots, {run.run_id}"

@@ -1,0 +1,43 @@
+"""PreflightPanel: everything that is looked at before a run, always evaluated, one line each."""
+
+from collections.abc import Sequence
+
+from nicegui import ui
+
+from server.lab.starting.preflight_list import Check, Finding
+from server.web.ui.theme import panel
+
+_ICONS = {Finding.GOOD: "check_circle", Finding.WARN: "info", Finding.REFUSED: "cancel"}
+_OF_THE_FORM = Check(name="Form", finding=Finding.REFUSED, text="a field is empty or out of its limits")
+
+
+class PreflightPanel:
+    """Built once per page; told by the form what was found."""
+
+    def __init__(self) -> None:
+        self._shown: tuple[Check, ...] = ()
+        with panel("Pre-flight"):
+            self._list = ui.element("ul").classes("checks")
+
+    def show(self, checks: Sequence[Check] | None) -> None:
+        """Show what was found; None: the form is no plan."""
+        found = (_OF_THE_FORM,) if checks is None else tuple(checks)
+        if found == self._shown:
+            return
+        self._shown = found
+        self._list.clear()
+        with self._list:
+            for check in found:
+                _show(check)
+
+
+def _show(check: Check) -> None:
+    row = ui.element("li").classes(f"check {check.finding}")
+    row.props["aria-label"] = check.name
+    with row:
+        ui.icon(_ICONS[check.finding], size="17px").props(f'aria-label="{check.finding}"')
+        ui.label(check.name).classes("check-name")
+        with ui.element("div").classes("check-text"):
+            ui.label(check.text)
+            if check.remedy:
+                ui.label(check.remedy).classes("check-remedy")

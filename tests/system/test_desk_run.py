@@ -1,0 +1,254 @@
+"""The pages Run and Calibrate, and who may use them; headless Chromium."""
+
+import json
+import os
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from nicegui import app as pages
+from playwright.sync_api import Browser, Locator, Page, expect
+
+from server.lab.tasks import calibrate_run
+from server.web.app import create_app
+from tests.support.operator import VIEWS
+from tests.support.server_process import eventually
+from tests.support.serving import Serving, plan_of, serving
+
+pytestmark = pytest.mark.timeout(900)
+
+PICTURES = os.environ.get("TOMOSHADOW_PICTURES")
+PULSE = {"current_a": dict.fromkeys(VIEWS, 5)}
+ANN = {"Tomoshadow-Operator": "ann@lab"}
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
+    pages.middleware_stack = None  # NiceGUI has one application per process; another module may have used it
+    with serving(tmp_path_factory.mktemp("desk_run") / "runs", build=create_app, views=VIEWS) as server:
+        yield server
+
+
+@pytest.fixture
+def tab(page: Page, server: Serving) -> Page:
+    page.set_viewport_size({"width": 1280, "height": 900})
+    page.goto(f"{server.http.base_url}/run")
+    expect(page.get_by_role("status", name="rig state").locator(".rig-known")).to_have_text("READY")
+    return page
+
+
+@pytest.fixture(autouse=True)
+def at_rest(server: Serving) -> Iterator[None]:
+    """Every test leaves a rig behind that nobody holds, on which nothing is wrong."""
+    yield
+    laboratory(server).close_door()
+    server.http.post("/api/rig/abort")
+    server.wait()
+    server.http.post("/api/rig/acknowledge")
+    server.free_control()
+
+
+def laboratory(server: Serving) -> Any:
+    return server.services.laboratory
+
+
+def control(page: Page) -> Locator:
+    return page.get_by_role("button", name=re.compile("^control: "))
+
+
+def row(page: Page, name: str) -> Locator:
+    return page.get_by_role("region", name="Pre-flight").get_by_role("listitem", name=name)
+
+
+def test_the_first_action_takes_control_and_a_take_over_is_seen(tab: Page, server: Serving) -> None:
+    expect(control(tab)).to_have_text(re.compile("free"))
+    tab.get_by_label("Shots", exact=True).fill("2")
+    tab.get_by_role("button", name="Start run").click()
+    expect(control(tab)).to_have_text(re.compile("you"))
+    server.wait()
+    server.http.put("/api/rig/control", headers=ANN)
+    expect(tab.get_by_role("alert").filter(has_text="ann@lab has taken control")).to_be_visible()
+    expect(tab.get_by_role("button", name="Start run")).to_be_disabled()
+    expect(row(tab, "Control")).to_contain_text("ann@lab holds control")
+    control(tab).click()
+    tab.get_by_role("button", name="Take control").click()
+    expect(control(tab)).to_have_text(re.compile("you"))
+    expect(tab.get_by_role("button", name="Start run")).to_be_enabled()
+
+
+def test_a_change_in_one_tab_appears_in_the_other(tab: Page, browser: Browser, server: Serving) -> None:
+    context = browser.new_context()
+    other = context.new_page()
+    other.goto(f"{server.http.base_url}/run")
+    tab.get_by_label("Name", exact=True).fill("typed in one tab")
+    expect(other.get_by_label("Name", exact=True)).to_have_value("typed in one tab")
+    other.get_by_label("Shots", exact=True).fill("17")
+    expect(tab.get_by_label("Shots", exact=True)).to_have_value("17")
+    other.get_by_label("LED view2 / A").fill("7.5")
+    expect(tab.get_by_label("LED view2 / A")).to_have_value("7.5")
+    tab.reload()
+    expect(tab.get_by_label("Name", exact=True)).to_have_value("typed in one tab")
+    expect(tab.get_by_label("LED view2 / A")).to_have_value("7.5")
+    context.close()
+
+
+def test_the_pre_flight_list_has_figures_and_follows_form_and_rig(tab: Page, server: Serving) -> None:
+    tab.get_by_label("Shots", exact=True).fill("1200")
+    tab.get_by_label("Rate / Hz").fill("4")
+    expect(row(tab, "Disk")).to_have_text(re.compile(r"GB of .* GB free; 5\.0 min at 4 Hz"))
+    expect(row(tab, "Cameras")).to_contain_text("4 answer")
+    laboratory(server).open_door()
+    expect(row(tab, "Interlock")).to_contain_text("the interlock is open")
+    expect(row(tab, "Interlock")).to_contain_text("close the door")
+    laboratory(server).close_door()
+    expect(row(tab, "Interlock")).to_contain_text("closed")
+    tab.get_by_label("Rate / Hz").fill("99")
+    expect(row(tab, "Timing")).to_contain_text("the limit of the cameras")
+    tab.get_by_label("Rate / Hz").fill("4")
+
+
+def test_what_no_device_knows_travels_with_the_run(tab: Page, server: Serving) -> None:
+    tab.get_by_role("button", name="Background").click()
+    tab.get_by_label("Shots", exact=True).fill("1")
+    for label, text in (("Operator", "ann"), ("Fluid", "water"), ("Nozzle", "N 3"), ("Pressure / bar", "40")):
+        tab.get_by_label(label).fill(text)
+    tab.get_by_label("Remark").fill("windows cleaned")
+    tab.get_by_role("button", name="Start run").click()
+    expect(tab.get_by_role("status", name="run counts")).to_have_text("1 / 1 shots recorded, 1 valid")
+    run_id = server.wait().run_id
+    notes = server.http.get(f"/api/runs/{run_id}/header").json()["notes"]
+    wanted = {"operator": "ann", "fluid": "water", "nozzle": "N 3", "pressure_bar": 40, "remark": "windows cleaned"}
+    assert wanted.items() <= notes.items()
+
+
+def test_a_form_is_kept_under_a_name_and_a_torn_one_is_set_aside(tab: Page, server: Serving) -> None:
+    folder = server.services.data_dir / "templates"
+    tab.get_by_label("Shots", exact=True).fill("123")
+    tab.get_by_role("button", name="keep as a template").click()
+    tab.get_by_label("Save as").fill("long run")
+    tab.get_by_role("button", name="Save template").click()
+    eventually(lambda: (folder / "long run.json").is_file(), "the template is in its folder")
+    (folder / "torn.json").write_text('{"shots": ')
+    tab.get_by_label("Shots", exact=True).fill("4")
+    tab.reload()
+    tab.get_by_role("combobox", name="Template").click()
+    tab.get_by_role("option", name="long run").click()
+    expect(tab.get_by_label("Shots", exact=True)).to_have_value("123")
+    eventually(lambda: bool(list(folder.glob("torn.json.damaged-*"))), "the torn one is set aside")
+
+
+def test_a_run_shows_its_shots_and_why_one_is_invalid_and_what_it_waits_for(tab: Page, server: Serving) -> None:
+    laboratory(server).cameras["view2"].lost = {laboratory(server).generator.fired + 2}
+    plan = plan_of(kind="dark", shots=100, rate_hz=0.5, pulse=PULSE, refire_quota=0)
+    server.http.post("/api/runs", json=plan)
+    strip = tab.get_by_role("list", name="shots")
+    expect(strip.get_by_role("listitem", name="shot 0: valid")).to_be_visible()
+    expect(tab.get_by_label("run progress")).to_have_attribute("aria-valuenow", re.compile(r"^0\.0\d"))
+    invalid = strip.get_by_role("listitem", name=re.compile("^shot 1: INVALID"))
+    expect(invalid).to_have_attribute("aria-label", "shot 1: INVALID, no exposure B of view2")
+    expect(tab.get_by_role("status", name="invalid shots")).to_contain_text("shot 1: no exposure B of view2")
+    waits = tab.get_by_role("status", name="waits for")
+    expect(waits).to_have_text(re.compile(r"^waits for the time of shot \d, \d\.\d s$"))
+    expect(tab.get_by_role("status", name="run counts")).to_contain_text("left")
+    picture(tab, "run-acquiring")
+
+
+def test_references_stay_as_they_are_and_a_newer_one_is_only_told(tab: Page, server: Serving) -> None:
+    first, _ = server.run_to_its_end(plan_of(kind="background", shots=1, pulse=PULSE))
+    tab.get_by_role("button", name="Sample").click()
+    chosen = tab.get_by_role("region", name="New run").locator(".q-chip")
+    expect(chosen.filter(has_text="background")).to_have_count(1)
+    pinned = chosen.filter(has_text="background").inner_text()
+    second, _ = server.run_to_its_end(plan_of(kind="background", shots=1, pulse=PULSE))
+    assert first != second
+    expect(row(tab, "References")).to_contain_text(f"a newer background exists: {second}")
+    assert chosen.filter(has_text="background").inner_text() == pinned
+    tab.get_by_role("button", name="Use the newest").click()
+    expect(chosen.filter(has_text=second)).to_have_count(1)
+
+
+def test_dark_or_light_is_as_the_system_has_it_until_somebody_chooses(browser: Browser, server: Serving) -> None:
+    context = browser.new_context(color_scheme="dark")
+    page = context.new_page()
+    page.goto(str(server.http.base_url))
+    expect(page.locator("body")).to_have_class(re.compile("body--dark"))
+    page.emulate_media(color_scheme="light")
+    expect(page.locator("body")).to_have_class(re.compile("body--light"))
+    page.get_by_role("button", name="dark or light").click()
+    expect(page.locator("body")).to_have_class(re.compile("body--dark"))
+    page.reload()
+    expect(page.locator("body")).to_have_class(re.compile("body--dark"))
+    context.close()
+
+
+def test_a_target_run_becomes_the_current_calibration(page: Page, server: Serving) -> None:
+    run_id, _ = server.run_to_its_end(plan_of(kind="calibration", shots=1, pulse=PULSE))
+    page.set_viewport_size({"width": 1280, "height": 900})
+    page.goto(f"{server.http.base_url}/calibrate")
+    page.get_by_label("Kind of camera").click()
+    page.get_by_role("option", name=re.compile("^polynomial")).click()
+    page.get_by_role("region", name="Calibration runs").get_by_role("button", name="Calibrate").click()
+    made = page.get_by_role("region", name="Calibrations").get_by_role("row", name=re.compile(f"{run_id}-polynomial"))
+    made.get_by_role("button", name="Use").click()
+    expect(made).to_contain_text("(current)")
+    expect(page.get_by_role("status", name="current calibration")).to_contain_text(f"{run_id}-polynomial")
+
+
+def test_a_calibration_shows_its_planes_its_pictures_and_why_it_is_not_used(page: Page, server: Serving) -> None:
+    folder = server.services.data_dir / "calibrations"
+    document = calibrate_kept_run(folder / "kept.json")
+    for view in document["views"].values():
+        view |= {"verdict": "refuse", "reasons": ["hold-out error 7.1 px, more than 1 px"]}
+    (folder / "bad.json").write_text(json.dumps(document))
+    page.set_viewport_size({"width": 1280, "height": 900})
+    page.goto(f"{server.http.base_url}/calibrate")
+    rows = page.get_by_role("region", name="Calibrations").get_by_role("row")
+    rows.filter(has_text="bad").get_by_role("button", name="Use").click()
+    refusal = page.get_by_role("alert", name="why it is not used")
+    expect(refusal).to_contain_text("view1 is refused: hold-out error 7.1 px, more than 1 px")
+    rows.filter(has_text="kept").get_by_role("button", name="Show").click()
+    shown = page.get_by_role("region", name="Calibration", exact=True)
+    expect(shown.get_by_role("table", name="residuals by plane and view")).to_contain_text("view1")
+    image = shown.get_by_role("img", name="picture of the calibration")
+    expect(image).to_have_attribute("src", re.compile("kept/pictures/errors.png"))
+    shown.get_by_role("combobox", name="Picture").click()
+    page.get_by_role("option", name="Corners, plane 2").click()
+    expect(image).to_have_attribute("src", re.compile("grid-2.png"))
+    for width in (800, 1280, 1920):
+        page.set_viewport_size({"width": width, "height": 1000})
+        for shade in ("dark", "light"):
+            page.emulate_media(color_scheme=shade)
+            picture(page, f"calibrate-{width}-{shade}")
+        assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "the page is wider than the window"
+
+
+def calibrate_kept_run(file: Path) -> Any:
+    """What a job makes of a small run of an earlier version: a calibration of three views, and its pictures."""
+    (run_dir,) = (Path(__file__).parents[1] / "fixtures" / "v0.1.0" / "runs").glob("*-target")
+    job = {"run_dir": str(run_dir), "settings": {"model": "polynomial"}, "calibration_file": str(file)}
+    calibrate_run(job, lambda: False)
+    return json.loads(file.read_text())
+
+
+@pytest.mark.parametrize("shade", ["dark", "light"])
+@pytest.mark.parametrize("width", [800, 1280, 1920])
+def test_nothing_of_the_page_is_cut(page: Page, server: Serving, width: int, shade: Any) -> None:
+    page.emulate_media(color_scheme=shade)
+    page.set_viewport_size({"width": width, "height": 950})
+    page.goto(f"{server.http.base_url}/run")
+    expect(row(page, "Disk")).to_be_visible()
+    picture(page, f"run-{width}-{shade}")
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "the page is wider than the window"
+    words = page.locator(".q-field__label, .check, .calibration, .rig-state, .control-text, .run-line")
+    cut = words.evaluate_all(
+        "found => found.filter(one => one.scrollWidth > one.clientWidth + 1).map(one => one.innerText)"
+    )
+    assert cut == []
+
+
+def picture(page: Page, name: str) -> None:
+    if PICTURES:
+        page.wait_for_timeout(1000)
+        page.screenshot(path=str(Path(PICTURES) / f"{name}.png"))
