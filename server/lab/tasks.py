@@ -59,11 +59,15 @@ def measure_shot(job: dict[str, Any], should_stop: Callable[[], bool]) -> dict[s
 
 
 def calibrate_run(job: dict[str, Any], should_stop: Callable[[], bool]) -> dict[str, Any]:
-    """Fit all views to the shots of a calibration run."""
+    """Fit all views to the shots of a calibration run, and draw what it says."""
+    from server.pictures.calibration_pictures import store_pictures  # its library of figures is large
+
     calibration_set = load_calibration_set(Path(job["run_dir"]))
     should_stop()
     calibration = calibrate(calibration_set, model=job["settings"]["model"])
-    save_calibration(calibration, Path(job["calibration_file"]))
+    out = Path(job["calibration_file"])
+    save_calibration(calibration, out)
+    store_pictures(Path(job["run_dir"]), calibration_set, calibration, out.parent / "pictures" / out.stem)
     return {
         "calibration": calibration.id,
         "views": {

@@ -1,4 +1,4 @@
-"""Pictures beside a calibration file: the assigned grid, and the error vectors."""
+"""Pictures of a calibration: the assigned grid, error vectors, and residuals."""
 
 from pathlib import Path
 
@@ -6,6 +6,7 @@ from processing.calibration.calibration import Calibration
 from processing.calibration.observation import CalibrationSet
 from processing.calibration.sets.target_image import target_image
 from processing.figures.calibration_figures import error_vectors_figure, grid_figure
+from processing.figures.residual_figures import residuals_figure
 
 
 def picture_paths(calibration_file: Path) -> tuple[Path, Path]:
@@ -30,3 +31,20 @@ def calibration_pictures(
         written.append(errors)
         error_vectors_figure(calibration_set, calibration).savefig(written[-1], dpi=100)
     return written
+
+
+def store_pictures(source: Path, calibration_set: CalibrationSet, calibration: Calibration, folder: Path) -> None:
+    """Draw ``residuals.png``, ``errors.png``, and ``grid-N.png`` for every plane, into a folder of their own."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for old in folder.glob("*.png"):
+        old.unlink()
+    residuals_figure(calibration).savefig(folder / "residuals.png", dpi=100)
+    if not any(view.intrinsics_only for view in calibration.views.values()):
+        error_vectors_figure(calibration_set, calibration).savefig(folder / "errors.png", dpi=100)
+    for number in range(max(len(seen.planes) for seen in calibration_set.views.values())):
+        planes = {
+            name: seen.planes[number] for name, seen in calibration_set.views.items() if len(seen.planes) > number
+        }
+        found = {name: target_image(source, name, plane) for name, plane in planes.items()}
+        if images := {name: image for name, image in found.items() if image is not None}:
+            grid_figure(images, planes).savefig(folder / f"grid-{number + 1}.png", dpi=80)

@@ -280,7 +280,8 @@ def test_a_rig_that_is_ready_starts(server: Serving) -> None:
         "reasons": [],
         "eta_s": None,
     }
-    assert judge(server) == {"ready": True, "reasons": []}
+    judged = judge(server)
+    assert (judged["ready"], judged["reasons"]) == (True, [])
     _, status = server.run_to_its_end(plan_of())
     assert status.outcome == "completed"
 
