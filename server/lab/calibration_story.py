@@ -95,14 +95,13 @@ def remedy_of(views: Mapping[str, ViewFigures]) -> str:
 
 
 def refusals_of_use(context: Context, calibration_id: str) -> Sequence[str]:
-    """Why new runs cannot use a calibration; empty: they can."""
+    """Why nothing can be reconstructed with a calibration; empty: it can. Old runs may have had other cameras."""
     story = story_of(context, calibration_id)
-    refused = [
+    return [
         f"{name} is refused: {'; '.join(view.reasons) or 'its errors are too large'}"
         for name, view in story.views.items()
         if view.verdict is Verdict.REFUSE
     ]
-    return [*refused, *misfits(context, calibration_id)]
 
 
 def misfits(context: Context, calibration_id: str) -> list[str]:

@@ -52,6 +52,13 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
         yield server
 
 
+@pytest.fixture(autouse=True)
+def nobody_holds_control(server: Serving) -> Iterator[None]:
+    """Every test has a browser of its own, and so is another person."""
+    yield
+    server.free_control()
+
+
 def _take_picture(page: Page, name: str) -> None:
     if PICTURES:
         page.wait_for_timeout(1500)
@@ -136,6 +143,10 @@ def test_a_reference_that_the_operator_chose_is_not_replaced_by_a_newer_one(page
     server.run_to_its_end(plan_of(kind="dark", name="proposed", shots=1, pulse=PULSE))
     page.goto(str(server.http.base_url))
     chosen = page.get_by_role("region", name="New run").locator(".q-chip")
+    newest = page.get_by_role("button", name="Use the newest")
+    expect(newest.or_(chosen.filter(has_text="proposed")).first).to_be_visible()
+    if newest.is_visible():  # a dark run of another test was proposed before, and stays until somebody says otherwise
+        newest.click()
     expect(chosen.filter(has_text="proposed")).to_have_count(1)
     page.get_by_label("Dark and background runs").click()
     page.get_by_role("option", name="dark: proposed").click()

@@ -40,7 +40,7 @@ def use_calibration(context: Context, who: Visitor, calibration_id: str) -> None
     NotFound, Damaged
         There is none, or nobody can read it.
     Unprocessable
-        A view of it is refused, or the cameras deliver other images.
+        A view of it is refused.
     Forbidden, Locked
         See ``command``.
     """

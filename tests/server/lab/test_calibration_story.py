@@ -55,14 +55,6 @@ def test_a_refused_one_and_one_of_other_images_is_not_used(server: Serving) -> N
     assert "calibration_chosen" not in [event.name for event in server.services.events.since(0)]
 
 
-def test_one_that_is_made_for_other_images_is_not_used(server: Serving) -> None:
-    (server.services.data_dir / "calibrations" / "small.json").write_text(
-        json.dumps({"id": "small", "views": {"view1": {"mapping": {"image_size_px": [7, 5]}}}})
-    )
-    (reason,) = refusals_of_use(server.app.state.context, "small")
-    assert reason.startswith("'small' is made for images of 7 x 5 px of view1, its camera delivers ")
-
-
 def test_what_is_no_calibration_is_damaged(server: Serving) -> None:
     (server.services.data_dir / "calibrations" / "odd.json").write_text('{"views": {"view1": {"planes": 7}}}')
     assert server.http.get("/api/calibrations/odd/story").status_code == 500
