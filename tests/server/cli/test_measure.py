@@ -130,7 +130,7 @@ def test_formats_that_are_not_there_are_refused_before_anything_is_measured(
 ) -> None:
     with pytest.raises(SystemExit):
         main([*map(str, command(bright, tmp_path / "out", "--export", "csv,xlsx"))])
-    assert "formats are csv, vtk, parquet, with commas between them" in capsys.readouterr().err
+    assert "formats are csv, vtk, parquet, tecplot, with commas between them" in capsys.readouterr().err
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     assert "pip install 'tomoshadow[tables]'" in refused(
         capsys, *command(bright, tmp_path / "out", "--export", "parquet")
