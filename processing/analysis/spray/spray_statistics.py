@@ -17,6 +17,7 @@ from processing.analysis.droplets.droplet_statistics import (
 from processing.analysis.droplets.size_statistics import SizeClass, size_classes
 from processing.analysis.estimates import Estimate
 from processing.analysis.spray.patternation import Patternation, patternation
+from processing.analysis.spray.proposed_axis import ProposedAxis, proposed_axis
 from processing.analysis.spray.sample_size import SampleVerdict, sample_verdict
 from processing.analysis.spray.size_fits import SizeFit, size_fits
 from processing.analysis.spray.spray_axis import SprayAxis
@@ -83,6 +84,9 @@ class SprayStatistics(FrozenValue):
     fits: Annotated[tuple[SizeFit, ...], Field(description="lognormal and Rosin-Rammler, the better one first")] = ()
     motion: Annotated[SprayMotion | None, Field(description="velocities and flux")] = None
     extent: Annotated[SprayExtent | None, Field(description="cone angle and penetration")] = None
+    proposed_axis: Annotated[
+        ProposedAxis | None, Field(description="where nobody stated nozzle and axis: by how droplets fly")
+    ] = None
     patternations: Annotated[tuple[Patternation, ...], Field(description="liquid by sectors and rings")] = ()
     corrections: Annotated[tuple[str, ...], Field(description="what is corrected, and what is not")] = CORRECTIONS
     doubts: Annotated[
@@ -121,6 +125,7 @@ def spray_statistics(shots: Sequence[StoredDroplets], asked: AskedFor | None = N
 
 def _of_sample(sample: SpraySample, pooled: DropletStatistics, asked: AskedFor) -> SprayStatistics:
     extent, patternations = _in_space(sample, asked)
+    proposed = proposed_axis(sample) if asked.axis is None else None
     fits, motion = size_fits(sample), spray_motion(sample, asked.axis, asked.liquid_kg_m3)
     return SprayStatistics(
         droplets=pooled,
@@ -131,8 +136,9 @@ def _of_sample(sample: SpraySample, pooled: DropletStatistics, asked: AskedFor) 
         fits=fits,
         motion=motion,
         extent=extent,
+        proposed_axis=proposed,
         patternations=patternations,
-        reasons=_reasons(sample, asked, bool(fits), motion is not None, patternations),
+        reasons=_reasons(sample, proposed, bool(fits), motion is not None) | _missing(asked, patternations),
     )
 
 
@@ -158,21 +164,24 @@ def _liquid_ppm(sample: SpraySample) -> Estimate | None:
     return one
 
 
-def _reasons(
-    sample: SpraySample, asked: AskedFor, fits: bool, motion: bool, patternations: Sequence[Patternation]
-) -> dict[str, str]:
+def _reasons(sample: SpraySample, proposed: ProposedAxis | None, fits: bool, motion: bool) -> dict[str, str]:
     reasons = {}
     if not fits:
         reasons["fits"] = "fewer than 20 different diameters: measure more shots"
     if not motion:
         reasons["motion"] = NO_VELOCITIES
-    if asked.axis is None:
-        reasons |= {"extent": NO_AXIS, "patternations": NO_AXIS}
-    elif len(patternations) < max(len(asked.at_mm), 1):
-        told_mm = {one.at_mm for one in patternations}
-        where = ", ".join(f"{at_mm:g}" for at_mm in asked.at_mm if at_mm not in told_mm)
-        few = "fewer than 20 droplets in the slice across the axis, or no common box"
-        reasons["patternations"] = f"{where} mm from the nozzle: {few}" if where else few
+    if proposed:
+        reasons |= dict.fromkeys(("extent", "patternations"), f"{NO_AXIS}; {proposed.words}")
     if not np.isfinite(sample.volumes_mm3).all():
         reasons["liquid_ppm"] = NO_VOLUME
     return reasons
+
+
+def _missing(asked: AskedFor, patternations: Sequence[Patternation]) -> dict[str, str]:
+    """Why patternations that are asked for are not there."""
+    if asked.axis is None or len(patternations) >= max(len(asked.at_mm), 1):
+        return {}
+    told_mm = {one.at_mm for one in patternations}
+    where = ", ".join(f"{at_mm:g}" for at_mm in asked.at_mm if at_mm not in told_mm)
+    few = "fewer than 20 droplets in the slice across the axis, or no common box"
+    return {"patternations": f"{where} mm from the nozzle: {few}" if where else few}

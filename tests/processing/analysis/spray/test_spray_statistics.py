@@ -173,7 +173,10 @@ def test_a_spray_that_is_turned_with_its_axis_is_the_same(cone: list[StoredDropl
 def test_what_cannot_be_known_is_null_with_a_reason_and_a_remedy(cone: list[StoredDroplets]) -> None:
     blind = spray_statistics(cone)
     assert (blind.extent, blind.patternations) == (None, ())
-    assert blind.reasons["extent"] == blind.reasons["patternations"] == NO_AXIS
+    assert blind.reasons["extent"] == blind.reasons["patternations"]
+    assert blind.reasons["extent"].startswith(f"{NO_AXIS}; proposed by how droplets fly: --nozzle=0.00,0.00,0.00")
+    assert blind.proposed_axis is not None
+    assert blind.proposed_axis.axis == pytest.approx((0, 1, 0), abs=0.02)
     assert "--nozzle" in NO_AXIS
     assert blind.motion
     assert (blind.motion.volume_flux_mm_s, blind.motion.reason) == (None, NO_AXIS)

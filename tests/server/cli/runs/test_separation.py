@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -29,12 +30,7 @@ def write_shots(folder: Path, v_m_s: float = V_M_S) -> Path:
         }
         velocity = {"pairs": 50, "stayed": 50} if np.isfinite(v_m_s) else {"reasons": ["no motion in common"]}
         grid = GridSettings.of(study_grid((20, 20, 20))).model_dump_json()
-        told_of: dict[str, str | int | float] = {
-            "run": "trial",
-            "shot": number,
-            "grid": grid,
-            "velocity": json.dumps(velocity),
-        }
+        told_of: dict[str, Any] = {"run": "trial", "shot": number, "grid": grid, "velocity": json.dumps(velocity)}
         write_columns(folder / f"shot_{number:05d}_droplets.h5", columns, told_of)
     return folder
 
