@@ -79,13 +79,19 @@ def doubts(told: SprayStatistics) -> list[str]:
     return [*said, *(f"No shares at {one.at_mm:.3g} mm: {one.reason}" for one in told.patternations if one.reason)]
 
 
+def _within(value: float, estimate: Estimate | None) -> str:
+    if estimate is None:
+        return three_digits(value)
+    return f"{three_digits(value)} ({three_digits(estimate.low)} to {three_digits(estimate.high)})"
+
+
 def fits_table(fits: tuple[SizeFit, ...]) -> Table:
     """Distributions that were fitted."""
     rows = [
         [
             fit.told_name,
-            three_digits(fit.scale_um),
-            three_digits(fit.shape),
+            _within(fit.scale_um, fit.scale_within_um),
+            _within(fit.shape, fit.shape_within),
             "" if fit.d32_um is None else three_digits(fit.d32_um),
             three_digits(fit.dv50_um),
             f"{fit.largest_gap:.3f}",
@@ -96,8 +102,8 @@ def fits_table(fits: tuple[SizeFit, ...]) -> Table:
     ]
     head = [
         "distribution by volume",
-        "scale [µm]",
-        "shape",
+        "scale [µm], 95 %",
+        "shape, 95 %",
         "D32 [µm]",
         "Dv0.5 [µm]",
         "largest gap",

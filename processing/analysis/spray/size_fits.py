@@ -15,7 +15,8 @@ from pydantic import Field
 from scipy.optimize import brentq
 from scipy.special import gamma, ndtr
 
-from processing.analysis.estimates import CONFIDENCE
+from processing.analysis.estimates import CONFIDENCE, Estimate
+from processing.analysis.spray.fit_intervals import LEAST_Q, MOST_Q, fit_estimates
 from processing.analysis.spray.spray_sample import SpraySample
 from processing.geometry import FloatArray
 from processing.reconstruction.settings import FrozenValue
@@ -23,7 +24,6 @@ from processing.reconstruction.settings import FrozenValue
 Name = Literal["lognormal", "rosin-rammler"]
 FEWEST = 20
 """Droplets of different diameters of a fit."""
-_LEAST_Q, _MOST_Q = 0.05, 500.0
 _LN_2 = float(np.log(2))
 
 
@@ -33,6 +33,8 @@ class SizeFit(FrozenValue):
     name: Annotated[Name, Field(description="which distribution")]
     scale_um: Annotated[float, Field(description="lognormal: median by volume; Rosin-Rammler: X, 63.2 % is smaller")]
     shape: Annotated[float, Field(description="lognormal: standard deviation of ln d; Rosin-Rammler: exponent q")]
+    scale_within_um: Annotated[Estimate | None, Field(description="the same with its 95 % interval over shots")] = None
+    shape_within: Annotated[Estimate | None, Field(description="likewise")] = None
     d32_um: Annotated[float | None, Field(description="Sauter's mean that it has; null where it has none: q up to 1")]
     dv50_um: Annotated[float, Field(description="median by volume that it has")]
     largest_gap: Annotated[float, Field(description="between its cumulative volume and the measured one, 0 to 1")]
@@ -70,8 +72,14 @@ def size_fits(sample: SpraySample) -> tuple[SizeFit, ...]:
         return ()
     weights = d_um**3 / np.sum(d_um**3)
     by_chance = _gap_by_chance(sample, order, weights)
-    fits = [_fit("lognormal", d_um, weights, by_chance), _fit("rosin-rammler", d_um, weights, by_chance)]
+    within = fit_estimates(sample)
+    names: tuple[Name, Name] = ("lognormal", "rosin-rammler")
+    fits = [_fit(name, d_um, weights, by_chance).model_copy(update=_within(*within[name])) for name in names]
     return tuple(sorted(fits, key=lambda fit: fit.largest_gap))
+
+
+def _within(scale_um: Estimate | None, shape: Estimate | None) -> dict[str, Estimate | None]:
+    return {"scale_within_um": scale_um, "shape_within": shape}
 
 
 def _fit(name: Name, d_um: FloatArray, weights: FloatArray, by_chance: float) -> SizeFit:
@@ -105,7 +113,7 @@ def _rosin_rammler(d_um: FloatArray, weights: FloatArray) -> tuple[float, float]
         powers = weights * np.exp(q * logs)
         return 1 / q + mean - float(powers @ logs / powers.sum())
 
-    q = float(brentq(slope, _LEAST_Q, _MOST_Q)) if slope(_MOST_Q) < 0 else _MOST_Q
+    q = float(brentq(slope, LEAST_Q, MOST_Q)) if slope(MOST_Q) < 0 else MOST_Q
     return float(d_um.max() * np.sum(weights * np.exp(q * logs)) ** (1 / q)), q
 
 

@@ -62,6 +62,24 @@ def test_a_spray_of_rosin_and_rammler_has_their_exponent_and_moments_by_gamma_fu
     np.testing.assert_allclose(fit.density_per_um(np.array([30.0, 90.0])), by_volume.pdf([30.0, 90.0]))
 
 
+@pytest.mark.parametrize("law", ["lognormal", "rosin-rammler"])
+def test_intervals_hold_the_parameters_that_sprays_have(law: str) -> None:
+    held: list[tuple[bool, bool]] = []
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        if law == "lognormal":
+            d_um, truth = rng.lognormal(np.log(40), 0.3, 1500), (40 * np.exp(3 * 0.3**2), 0.3)
+        else:
+            d_um, truth = 80 * rng.gamma(1 - 3 / 5, 1, 1500) ** (1 / 5), (80, 5)
+        fit = by_name(sample_of(d_um, shots=6))[law]
+        scale_um, shape = fit.scale_within_um, fit.shape_within
+        assert scale_um is not None
+        assert shape is not None
+        assert (scale_um.value, shape.value) == pytest.approx((fit.scale_um, fit.shape), rel=2e-3)
+        held.append((scale_um.low <= truth[0] <= scale_um.high, shape.low <= truth[1] <= shape.high))
+    assert np.mean(held, axis=0) == pytest.approx([0.95, 0.95], abs=0.11)
+
+
 def test_fewer_than_20_diameters_are_not_fitted() -> None:
     assert size_fits(sample_of(np.linspace(10, 20, 19), shots=2)) == ()
 
