@@ -45,7 +45,8 @@ def measure(
         directions; or whatever is behind a Gaussian blur. ``diameters_um`` are corrected for it, ``diameters_raw_um``
         are not.
     twins : int
-        Simulated twins of the exposure that tell how many are ghosts; each costs as much as the exposure itself.
+        Simulated twins of the exposure in which ghosts are counted, a witness; each costs as much as the exposure
+        itself. Where views are not four there is one at least.
     seed : int
         Of the twins.
     margin_voxel : int
@@ -57,8 +58,8 @@ def measure(
     -------
     MeasuredExposure
         ``droplets`` with ``points_mm``, ``covariance_mm2``, ``amplitudes`` or ``diameters_um``, and ``columns()``;
-        ``verdict``, ``reasons``, ``residual_over_noise``, ``views`` as they were found to be, ``ghosts`` with
-        ``share`` and ``interval``, and ``hidden``: what could not be measured.
+        ``verdict``, ``reasons``, ``residual_over_noise``, ``views`` as they were found to be, ``ghost_share``
+        with its interval, or why it is not told, and ``hidden``: what could not be measured.
 
     Raises
     ------

@@ -53,7 +53,7 @@ def reality_figure(shares: Mapping[str, Sequence[StatedShares]], ghosts: Mapping
         _draw_ghosts(ghost_axes, kind, ghosts[kind], colour)
     share_axes.plot([0, 1], [0, 1], color="0.6", linewidth=1)
     share_axes.set(xlabel="told: probability of being real", ylabel="share that is real, 95 % by counting")
-    most = 100 * max(max(one.told.high, one.true) for told in ghosts.values() for one in told)
+    most = 100 * max((max(one.told.high, one.true) for told in ghosts.values() for one in told), default=0.01)
     ghost_axes.plot([0, most], [0, most], color="0.6", linewidth=1)
     ghost_axes.set(xlabel="told: ghosts among the droplets of a case [%]", ylabel="ghosts [%]")
     ghost_axes.set(xscale="symlog", yscale="symlog")

@@ -17,7 +17,7 @@ RADIUS_VOXEL = 1.0
 LEAST_TOLD = 0.5
 """Of so many of the droplets ``p_real`` must be a number, or nothing is told of how many are ghosts."""
 MOST_BRIGHT = 0.01
-"""Of bright particles a share above is not told: among noisy, wide spots 0.7 to 3.5 times as many were expected."""
+"""Of bright particles a share above is not told: 0.8 to 3.5 times the true one was expected, most in noise"""
 MODEL_SD = 0.2
 """Relative, beyond chance: of true over expected ghosts among the cases that were tried."""
 _TAIL = (1 - CONFIDENCE) / 2
@@ -44,7 +44,7 @@ def told_share(p_real: FloatArray, sized: bool, exposures_per_shot: float = 1) -
     if not sized and share.value > MOST_BRIGHT:
         return (
             f"{100 * share.value:.1f} % are expected: of bright particles a share above {100 * MOST_BRIGHT:g} % is not "
-            "told, as 0.3 to 1.4 times as many were ghosts; twins are a witness (--twins)"
+            "told, as 0.3 to 1.3 times as many were ghosts; twins are a witness (--twins)"
         )
     return share
 

@@ -43,6 +43,8 @@ TRIED: tuple[DropletCase | SizeCase, ...] = (
     SizeCase(62, 25, noise_percent=5),
     SizeCase(36, 45, noise_percent=4),
     SizeCase(30, 35, spread=0.6, noise_percent=5),
+    SizeCase(26, noise_percent=8, aperture_ratio=0.6),
+    SizeCase(38, noise_percent=7),
 )
 
 
@@ -180,7 +182,7 @@ def _ghosts_text(rows: Sequence[RealityRow]) -> str:
 
 
 def reality_of_rows(rows: Sequence[RealityRow]) -> Figure:
-    """True against stated shares of each kind, and true against told shares of ghosts of each case."""
+    """True against stated shares of each kind, and true shares of ghosts against those that are told."""
     shares = {
         kind: [
             StatedShares(
@@ -192,7 +194,9 @@ def reality_of_rows(rows: Sequence[RealityRow]) -> Figure:
         for kind, chosen in grouped(rows, _kind).items()
     }
     ghosts = grouped(case_shares(rows), lambda share: share.kind)
-    told = {kind: [ToldShare(one.estimate, one.true_share) for one in chosen] for kind, chosen in ghosts.items()}
+    told = {
+        kind: [ToldShare(one.estimate, one.true_share) for one in chosen if one.told] for kind, chosen in ghosts.items()
+    }
     return reality_figure(shares, told)
 
 

@@ -15,6 +15,7 @@ from server.lab.errors import ServerError
 from server.lab.services import Context
 from server.lab.starting.light_request import obey
 from server.lab.starting.run_start import SingleShot, shoot
+from server.web.ui.asking import try_to
 from server.web.ui.bar.server_link import TICKET, light_request, shown_form
 from server.web.ui.draft import DraftStore, problem_of, pulse_of
 from server.web.ui.live.live_tiles import LiveTiles
@@ -99,7 +100,8 @@ class LivePanel:
         shoot(self._context, SingleShot(pulse=pulse_of(values), references=references, calibration=calibration))
 
     async def _on_keep(self) -> None:
-        await self._try(lambda: self._context.unkept_runs.keep(self._context.unkept_runs.ids[-1]))
+        unkept = self._context.unkept_runs
+        await try_to(lambda: asyncio.to_thread(unkept.keep, unkept.ids[-1]))
 
     async def _try(self, action: Callable[[], object]) -> None:
         """Do what takes its time outside of the event loop, and say why it was refused."""

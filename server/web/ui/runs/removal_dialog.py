@@ -1,6 +1,7 @@
 """RemovalDialog: a run is deleted by whoever types its name."""
 
 import asyncio
+from functools import partial
 
 from nicegui import ui
 
@@ -8,6 +9,8 @@ from daq.errors import DaqError
 from server.lab.errors import ServerError
 from server.lab.runs.run_removal import remove_run
 from server.lab.services import Context
+from server.lab.starting.command import command
+from server.web.ui.visiting import told, visitor
 
 
 class RemovalDialog:
@@ -42,13 +45,12 @@ class RemovalDialog:
         self._button.set_enabled(self._typed.value == self._run_id)
 
     async def _remove(self) -> None:
-        context = self._context
+        context, run_id = self._context, self._run_id
+        remove = partial(remove_run, context.runs, context.unkept_runs, context.jobs, run_id, self._typed.value)
         try:
-            await asyncio.to_thread(
-                remove_run, context.runs, context.unkept_runs, context.jobs, self._run_id, self._typed.value
-            )
+            await asyncio.to_thread(command, context, visitor(), f"deleted run {run_id}", remove)
         except (DaqError, ServerError) as error:
-            self._refusal.set_text(str(error))
+            self._refusal.set_text(told(error))
             return
         self._dialog.close()
         ui.notify(f"{self._run_id} is deleted", type="positive")
