@@ -38,7 +38,7 @@ CODES: Mapping[str, tuple[Code, ...]] = {
 """Every refusal has one place."""
 
 
-class Finding(StrEnum):
+class CheckResult(StrEnum):
     """What came of a look."""
 
     GOOD = "good"
@@ -50,7 +50,7 @@ class Check(FrozenModel):
     """One thing that was looked at."""
 
     name: Annotated[str, Field(description="what was looked at")]
-    finding: Annotated[Finding, Field(description="refused: a start would be, for this reason")]
+    finding: Annotated[CheckResult, Field(description="refused: a start would be, for this reason")]
     text: Annotated[str, Field(description="what was found, with figures")]
     remedy: Annotated[str, Field(description="what to do about it; empty: nothing")] = ""
 
@@ -78,7 +78,9 @@ def preflight(
             checks.append(_refused(name, against))
         elif told := tell(context, plan):
             text, remedy = told
-            checks.append(Check(name=name, finding=Finding.WARN if remedy else Finding.GOOD, text=text, remedy=remedy))
+            checks.append(
+                Check(name=name, finding=CheckResult.WARN if remedy else CheckResult.GOOD, text=text, remedy=remedy)
+            )
     return tuple(checks)
 
 
@@ -86,14 +88,14 @@ def _control(context: Context, who: Visitor) -> Check:
     try:
         context.control.check(who)
     except ServerError as error:
-        return Check(name="Control", finding=Finding.REFUSED, text=str(error), remedy=REMEDIES[error.code])
+        return Check(name="Control", finding=CheckResult.REFUSED, text=str(error), remedy=REMEDIES[error.code])
     held = context.control.holder is not None
-    return Check(name="Control", finding=Finding.GOOD, text="yours" if held else "free: a start takes it")
+    return Check(name="Control", finding=CheckResult.GOOD, text="yours" if held else "free: a start takes it")
 
 
 def _refused(name: str, reasons: list[Reason]) -> Check:
     text, remedies = "; ".join(reason.text for reason in reasons), dict.fromkeys(reason.remedy for reason in reasons)
-    return Check(name=name, finding=Finding.REFUSED, text=text, remedy="; ".join(remedies))
+    return Check(name=name, finding=CheckResult.REFUSED, text=text, remedy="; ".join(remedies))
 
 
 def _light(context: Context, plan: RunPlan) -> Told:

@@ -4,11 +4,11 @@ from collections.abc import Sequence
 
 from nicegui import ui
 
-from server.lab.starting.preflight_list import Check, Finding
+from server.lab.starting.preflight_list import Check, CheckResult
 from server.web.ui.theme import panel
 
-_ICONS = {Finding.GOOD: "check_circle", Finding.WARN: "info", Finding.REFUSED: "cancel"}
-_OF_THE_FORM = Check(name="Form", finding=Finding.REFUSED, text="a field is empty or out of its limits")
+_ICONS = {CheckResult.GOOD: "check_circle", CheckResult.WARN: "info", CheckResult.REFUSED: "cancel"}
+_OF_THE_FORM = Check(name="Form", finding=CheckResult.REFUSED, text="a field is empty or out of its limits")
 
 
 class PreflightPanel:

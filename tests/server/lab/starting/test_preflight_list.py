@@ -7,7 +7,7 @@ import pytest
 from daq.run.refusals import RefusalCode
 from daq.run_plan import RunPlan
 from server.lab.desk.visitor import Visitor
-from server.lab.starting.preflight_list import CODES, Check, Finding, preflight
+from server.lab.starting.preflight_list import CODES, Check, CheckResult, preflight
 from tests.server.web.test_api import use_a_calibration
 from tests.support.serving import Serving, plan_of
 
@@ -33,8 +33,11 @@ def test_where_nothing_is_wrong_the_figures_are_told(server: Serving) -> None:
     assert re.fullmatch(r"\d+ MB of \d+ GB free; 60 s at 20 Hz", found["Disk"].text)
     assert "of the wires" in found["Network"].text
     assert found["Calibration"].text.startswith("cal, ")
-    assert (found["References"].finding, found["References"].text) == (Finding.WARN, "no dark run, no background run")
-    assert {check.finding for check in found.values()} == {Finding.GOOD, Finding.WARN}
+    assert (found["References"].finding, found["References"].text) == (
+        CheckResult.WARN,
+        "no dark run, no background run",
+    )
+    assert {check.finding for check in found.values()} == {CheckResult.GOOD, CheckResult.WARN}
 
 
 def test_what_is_wrong_stands_in_its_place_with_a_remedy_and_all_of_it(server: Serving) -> None:
@@ -50,7 +53,7 @@ def test_what_is_wrong_stands_in_its_place_with_a_remedy_and_all_of_it(server: S
         ("Calibration", "there is no calibration 'none'"),
         ("Control", "bob holds control"),
     ):
-        assert found[name].finding is Finding.REFUSED, name
+        assert found[name].finding is CheckResult.REFUSED, name
         assert word in found[name].text
         assert found[name].remedy
     laboratory.close_door()
@@ -65,7 +68,7 @@ def test_references_say_what_differs_and_what_is_newer(server: Serving) -> None:
     old, _ = server.run_to_its_end(plan_of(kind="background", shots=1))
     new, _ = server.run_to_its_end(plan_of(kind="background", shots=1))
     found = looked_at(server, references=[old])["References"]
-    assert found.finding is Finding.WARN
+    assert found.finding is CheckResult.WARN
     assert f"a newer background exists: {new}" in found.text
     brighter = {"current_a": {"view1": 6, "view2": 5}}
     refused = looked_at(server, references=[new], pulse=brighter)["References"]
