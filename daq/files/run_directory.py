@@ -169,7 +169,7 @@ class RunReader:
 
 def list_runs(data_dir: Path) -> tuple[Path, ...]:
     """Run directories below a folder, by name: run ids begin with their time."""
-    with suppress(FileNotFoundError), os.scandir(data_dir) as entries:
+    with suppress(FileNotFoundError, NotADirectoryError), os.scandir(data_dir) as entries:
         names = [entry.name for entry in entries if os.path.exists(f"{entry.path}/{RUN_FILE}")]  # of many thousands
         return tuple(data_dir / name for name in sorted(names))
     return ()

@@ -33,7 +33,7 @@ CODES: Mapping[str, tuple[Code, ...]] = {
     "Disk": (Code.FOLDER_GONE, Code.STORAGE, Code.DISK_FULL),
     "Stage": (Code.STAGE,),
     "References": (Code.REFERENCES,),
-    "Calibration": (Code.CALIBRATION_UNKNOWN, Code.CALIBRATION_SIZE),
+    "Calibration": (Code.CALIBRATION_UNKNOWN, Code.CALIBRATION_DAMAGED, Code.CALIBRATION_SIZE),
 }
 """Every refusal has one place."""
 
