@@ -25,9 +25,8 @@ from processing.analysis.droplets.measured_exposure import (
     judged_by_volume,
     moved,
     told_real,
-    twins_of,
 )
-from processing.analysis.droplets.reality import Evidence, Reality, crowding
+from processing.analysis.droplets.reality import Evidence, Reality, crowding, twins_of
 from processing.geometry import FloatArray
 from processing.kernels import DEFAULT_THREADS
 

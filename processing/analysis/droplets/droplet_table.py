@@ -11,7 +11,8 @@ from processing.volume import VoxelGrid
 
 P_REAL_TRIED = (
     "not a number where it was not tried: in shots whose verdict is not good, with more or less than four views, where "
-    "not all four know a droplet, among more crowded or wider spots than were tried, in coherent light"
+    "not all four know a droplet, among more crowded or wider spots than were tried, in coherent light, "
+    "beside ligaments and the like"
 )
 """Why ``p_real`` may not be a number."""
 COVARIANCES = ("xx", "xy", "xz", "yy", "yz", "zz")

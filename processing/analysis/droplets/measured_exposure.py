@@ -12,7 +12,6 @@ from processing.analysis.droplets.droplet_search import DropletSearch
 from processing.analysis.droplets.droplet_table import DropletRows
 from processing.analysis.droplets.gaussian_blobs import Image
 from processing.analysis.droplets.ghost_share import GhostShare, matches, told_share
-from processing.analysis.droplets.reality import TRIED_VIEWS
 from processing.analysis.estimates import Estimate
 from processing.geometry import FloatArray
 
@@ -23,6 +22,8 @@ MOST_SHIFT_PX = 0.3
 """Views that lie farther beside their calibration are refused."""
 MANY_GHOSTS = 0.1
 """Share in a twin from which on a shot is doubtful: ghosts can explain images as well as the truth does."""
+MANY_OBJECTS = 0.01
+"""Ligaments and the like per droplet: they may have round ends, which are told as droplets, and surely real ones."""
 MOST_HIDDEN = 0.5
 """Share of the volume that may be hidden."""
 EVEN, MOSTLY = 1.05, 0.9
@@ -100,9 +101,8 @@ class MeasuredExposure(Generic[Rows, Seen]):
     @property
     def ghost_share(self) -> Estimate | str:
         """Which share of the droplets are ghosts, or why that is not told."""
-        if self.verdict in (ShotVerdict.DOUBTFUL, ShotVerdict.REFUSED):
-            return "; ".join(self.reasons)
-        return told_share(self.droplets.p_real, self.droplets.sized)
+        doubted = self.verdict in (ShotVerdict.DOUBTFUL, ShotVerdict.REFUSED)
+        return "; ".join(self.reasons) if doubted else told_share(self.droplets.p_real, self.droplets.sized)
 
     def told(self) -> dict[str, object]:
         """What files say of it, beside the droplets."""
@@ -248,11 +248,6 @@ def judged_by_volume(shot: "MeasuredExposure[Rows, Seen]") -> "MeasuredExposure[
     return replace(shot, verdict=ShotVerdict.DOUBTFUL, reasons=(*shot.reasons, reason))
 
 
-def twins_of(asked: int, views: int) -> int:
-    """How many twins to make: one at least where views are not four, as then no probability tells of ghosts."""
-    return asked or int(views != TRIED_VIEWS)
-
-
 def judged_by_twins(shot: "MeasuredExposure[Rows, Seen]", ghosts: GhostShare) -> "MeasuredExposure[Rows, Seen]":
     """A shot with the ghosts of its twins; doubtful where they are many, however well droplets explain the images."""
     if ghosts.share is None or ghosts.share <= MANY_GHOSTS:
@@ -265,8 +260,9 @@ def judged_by_twins(shot: "MeasuredExposure[Rows, Seen]", ghosts: GhostShare) ->
 
 
 def told_real(shot: "MeasuredExposure[Rows, Seen]") -> "MeasuredExposure[Rows, Seen]":
-    """A shot that tells how probably its droplets are real, or does not: only in good shots that was tried."""
-    return shot if shot.verdict is ShotVerdict.GOOD else replace(shot, droplets=shot.droplets.unsure())
+    """A shot that tells how probably droplets are real, or does not: only in good ones of droplets that was tried."""
+    tried = shot.verdict is ShotVerdict.GOOD and shot.hidden.liquid_objects <= MANY_OBJECTS * len(shot.droplets)
+    return shot if tried else replace(shot, droplets=shot.droplets.unsure())
 
 
 def within_grid(positions_voxel: FloatArray, search: DropletSearch) -> NDArray[np.bool_]:

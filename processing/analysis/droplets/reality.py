@@ -110,6 +110,11 @@ class Reality:
         return np.where(tried, expit(self.base + evidence.columns @ np.array(self.weights)), np.nan)
 
 
+def twins_of(asked: int, views: int) -> int:
+    """How many twins to make: one at least where views are not four, as then no probability tells of ghosts."""
+    return asked or int(views != TRIED_VIEWS)
+
+
 def crowding(seen_px: FloatArray, areas_px2: FloatArray) -> FloatArray:
     """How much of the views (N,) around each droplet others cover, mean of the views.
 

@@ -23,9 +23,9 @@ from processing.analysis.droplets.measured_exposure import (
     judged_by_volume,
     moved,
     told_real,
-    twins_of,
     within_grid,
 )
+from processing.analysis.droplets.reality import twins_of
 from processing.analysis.droplets.shadows.judged_volume import (
     beside_what_is_not_known,
     judging_views,

@@ -10,7 +10,14 @@ from processing.analysis.droplets.bright_shot import BrightExposure, measure_bri
 from processing.analysis.droplets.droplet_search import plan_droplets
 from processing.analysis.droplets.gaussian_blobs import Image
 from processing.analysis.droplets.ghost_share import GhostShare, matches, told_share
-from processing.analysis.droplets.measured_exposure import RatioLimits, ShotVerdict, judged, judged_by_twins
+from processing.analysis.droplets.measured_exposure import (
+    Hidden,
+    RatioLimits,
+    ShotVerdict,
+    judged,
+    judged_by_twins,
+    told_real,
+)
 from processing.analysis.estimates import Estimate
 from processing.reconstruction.errors import ReconstructionError
 from processing.studies.droplets import BrightScene, DropletCase
@@ -85,6 +92,13 @@ def test_a_good_shot_tells_its_ghosts_and_a_doubtful_one_why_it_does_not(shot: B
     assert isinstance(shot.ghost_share, Estimate)
     assert shot.ghost_share.value < 0.02
     assert replace(shot, verdict=ShotVerdict.DOUBTFUL, reasons=("it is blurred",)).ghost_share == "it is blurred"
+
+
+def test_beside_many_ligaments_nothing_tells_of_ghosts(shot: BrightExposure) -> None:
+    many = told_real(replace(shot, hidden=Hidden(liquid_objects=1 + len(shot.droplets) // 100)))
+    assert told_real(shot).ghost_share == shot.ghost_share
+    assert isinstance(many.ghost_share, str)
+    assert many.ghost_share.endswith("beside ligaments and the like")
 
 
 def test_a_shot_whose_twin_is_full_of_ghosts_is_doubtful(shot: BrightExposure) -> None:
