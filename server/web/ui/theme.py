@@ -4,7 +4,9 @@ from pathlib import Path
 
 from nicegui import ui
 
-ACCENT = "#2f7de1"
+_COLOURS = {"primary": "#1f5fb8", "positive": "#1d7a48", "negative": "#c4272d", "warning": "#f0a92e"}
+"""Each but amber with white words on it; on a dark page, words of these colours are lighter (theme.css)."""
+_LANGUAGE = '<script>document.documentElement.lang = "en"</script>'
 
 _STYLE_SHEETS = sorted(Path(__file__).parent.rglob("*.css"), key=lambda path: (len(path.parts), path))
 """That of all pages first, then that of each room, beside its modules."""
@@ -12,7 +14,8 @@ _STYLE_SHEETS = sorted(Path(__file__).parent.rglob("*.css"), key=lambda path: (l
 
 def apply() -> None:
     """Give the present page its look; whether it is dark is the browser's affair."""
-    ui.colors(primary=ACCENT, positive="#35b26a", negative="#d83c42", warning="#f0a92e")
+    ui.colors(**_COLOURS)
+    ui.add_head_html(_LANGUAGE)
     for style_sheet in _STYLE_SHEETS:
         ui.add_css(style_sheet)
 

@@ -86,7 +86,7 @@ def _row(story: CalibrationStory) -> dict[str, Any]:
         "name": f"{story.id} (current)" if story.current else story.id,
         "made": story.created_utc[:16].replace("T", " "),
         "outcome": story.verdict or "not known",
-        "colour": COLOURS.get(story.verdict, "blue-grey") if story.verdict else "blue-grey",
+        "colour": COLOURS.get(story.verdict, "blue-grey-7") if story.verdict else "blue-grey-7",
         "worst": _worst(story),
         "actions": [_SHOW] if story.current else [_SHOW, _USE],
     }

@@ -96,7 +96,7 @@ def _show_views(views: Mapping[str, ViewFigures]) -> None:
             "id": name,
             "view": name,
             "outcome": view.verdict or "not known",
-            "colour": COLOURS[view.verdict] if view.verdict else "blue-grey",
+            "colour": COLOURS[view.verdict] if view.verdict else "blue-grey-7",
             "model": view.model.replace("_", " "),
             "holdout": "" if view.holdout_error_px is None else f"{view.holdout_error_px:.4f}",
             "points": f"{view.n_points} ({view.n_rejected})",

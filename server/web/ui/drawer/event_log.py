@@ -14,7 +14,7 @@ class EventLog:
     def __init__(self) -> None:
         with panel("Events"):
             self._log = ui.log(max_lines=200).classes("w-full text-xs").style("height:150px")
-            self._log.props('role=log aria-label="event log"')
+            self._log.props('role=log tabindex=0 aria-label="event log"')
 
     def add(self, events: list[Event]) -> None:
         """Append events that say something to a person."""

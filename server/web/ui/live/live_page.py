@@ -15,7 +15,7 @@ class LivePage:
 
     def __init__(self, context: Context, draft: DraftStore) -> None:
         with ui.element("div").classes("columns live-page"):
-            with ui.element("div").classes("column"):
+            with ui.element("div").classes("column").props("tabindex=0"):
                 self._live = LivePanel(context, draft)
                 self._volume = LiveVolumePanel(context)
             with ui.element("div").classes("column side"):

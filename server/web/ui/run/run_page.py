@@ -16,7 +16,7 @@ class RunPage:
 
     def __init__(self, context: Context, draft: DraftStore) -> None:
         with ui.element("div").classes("columns"):
-            with ui.element("div").classes("column"):
+            with ui.element("div").classes("column").props("tabindex=0"):
                 self._run, checks = RunPanel(context), PreflightPanel()
                 with panel("Cameras"):
                     LiveTiles(context.services.rig.cameras, "no picture yet")

@@ -109,7 +109,7 @@ def outcome_colour(outcome: str | None) -> str:
     return {
         "completed": "positive",
         "done": "positive",
-        "stopped": "blue-grey",
+        "stopped": "blue-grey-7",
         "aborted": "warning",
         "interrupted": "warning",
         "failed": "negative",

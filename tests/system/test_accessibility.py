@@ -1,0 +1,52 @@
+"""Every page for everybody: nothing serious or critical of what axe-core looks for, dark and light; in Chromium."""
+
+from collections.abc import Iterator
+from typing import Literal
+
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+from nicegui import app as pages
+from playwright.sync_api import Page
+
+from server.web.app import create_app
+from server.web.ui.rail import STOPS
+from tests.support.operator import VIEWS, go_to, open_drawer
+from tests.support.serving import Serving, plan_of, serving
+
+pytestmark = pytest.mark.timeout(900)
+
+PULSE = {"current_a": dict.fromkeys(VIEWS, 5)}
+OF_QUASAR = (".q-loading-bar",)
+"""Elements of Quasar itself that nothing of ours can mend: the line at the top while something loads has no name."""
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
+    pages.middleware_stack = None  # NiceGUI has one application per process; another module may have used it
+    with serving(tmp_path_factory.mktemp("everybody") / "runs", build=create_app, views=VIEWS) as server:
+        (server.services.data_dir / "calibrations" / "paper.json").write_text('{"id": "paper"}')
+        server.http.put("/api/calibrations/current", json={"id": "paper"})
+        server.run_to_its_end(plan_of(shots=2, pulse=PULSE))
+        yield server
+
+
+def findings(page: Page) -> list[str]:
+    """Serious and critical ones, each with its element."""
+    found = Axe().run(page, {"exclude": [[element] for element in OF_QUASAR]}).response["violations"]
+    return [
+        f"{one['id']}: {node['html'][:160]} {node['any'][0]['message'] if node['any'] else ''}"
+        for one in found
+        if one["impact"] in ("serious", "critical")
+        for node in one["nodes"]
+    ]
+
+
+@pytest.mark.parametrize("scheme", ["dark", "light"])
+def test_nothing_serious_is_found_on_any_page(page: Page, server: Serving, scheme: Literal["dark", "light"]) -> None:
+    page.emulate_media(color_scheme=scheme)
+    page.goto(str(server.http.base_url))
+    open_drawer(page)
+    for stop in STOPS:
+        go_to(page, stop.title)
+        page.wait_for_timeout(500)  # lists are there, and nothing is blended over any more
+        assert {stop.title: findings(page)} == {stop.title: []}
