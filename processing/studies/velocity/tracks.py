@@ -22,7 +22,7 @@ from processing.analysis.velocity.tracks import link
 from processing.figures.velocity_figures import LinkedCase, linked_figure
 from processing.geometry import FloatArray
 from processing.kernels import DEFAULT_THREADS
-from processing.studies.report import Statement, grouped
+from processing.studies.report import Statement, all_kept, grouped
 from processing.studies.simulated_droplets import study_cameras, study_grid
 from processing.studies.velocity.double_scenes import bright_images, shadow_images
 from processing.studies.velocity.series_scenes import RATE_HZ, FlyingDroplets, flying_droplets
@@ -204,14 +204,15 @@ def track_line(row: TrackRow) -> str:
 
 def all_reached(rows: Sequence[TrackRow], cases: Sequence[TrackCase]) -> bool | None:
     """Whether every case keeps what is asked for; None where nothing is."""
-    by_name, groups = {case.name: case for case in cases}, grouped(rows, _case)
-    judged = [_reached(by_name[name], chosen) for name, chosen in groups.items() if by_name[name].least_whole]
-    return all(judged) if judged else None
+    return all_kept(cases, rows, _reached)
 
 
-def _reached(case: TrackCase, rows: Sequence[TrackRow]) -> bool:
-    limits = ((case.least_whole, "whole"), (case.least_right, "right"))
-    return all(least is None or _mean(rows, name) >= least for least, name in limits)
+def _reached(case: TrackCase, rows: Sequence[TrackRow]) -> bool | None:
+    if case.least_whole is None:
+        return None
+    return _mean(rows, "whole") >= case.least_whole and (
+        case.least_right is None or _mean(rows, "right") >= case.least_right
+    )
 
 
 def _mean(rows: Sequence[TrackRow], name: str) -> float:

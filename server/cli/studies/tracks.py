@@ -5,8 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 from server.cli.options import Verbs, count, positive, seed, usable_processors
-from server.cli.output import progress
-from server.cli.studies.study_command import add_study, collected, report
+from server.cli.studies.study_command import add_study, collected, passing, report
 
 
 def add_tracks(studies: Verbs) -> None:
@@ -20,6 +19,7 @@ def add_tracks(studies: Verbs) -> None:
 
 def tracks(options: Namespace) -> dict[str, Any]:
     """Run the study."""
+    from processing.studies.report import asked_case
     from processing.studies.velocity.tracks import (
         ASKED_FOR,
         TrackCase,
@@ -35,13 +35,8 @@ def tracks(options: Namespace) -> dict[str, Any]:
     stated = {"droplets": options.droplets, "density_per_mm3": options.density}
     if stated := {name: value for name, value in stated.items() if value is not None}:
         case = TrackCase(**stated)
-        study = replace(study, cases=(next((known for known in ASKED_FOR if known.name == case.name), case),))
+        study = replace(study, cases=(asked_case(case, ASKED_FOR),))
     rows = collected(track_study(study, usable_processors()), track_line)
     figure, statements = track_figure(rows, study.cases), track_statements(rows, study.cases)
     result = report(options.out, "tracks", rows, figure, statements)
-    passed = all_reached(rows, study.cases)
-    if passed is None:
-        progress("nothing is asked for of this case")
-        return result
-    progress(f"every case reaches what is asked for: {'PASSED' if passed else 'FAILED'}")
-    return {**result, "passed": passed}
+    return passing(result, all_reached(rows, study.cases), "every case reaches what is asked for")
