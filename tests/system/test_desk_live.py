@@ -41,6 +41,7 @@ def at_rest(server: Serving) -> Iterator[None]:
     server.http.post("/api/rig/abort")
     server.wait()
     server.http.post("/api/rig/acknowledge")
+    server.free_control()
 
 
 def laboratory(server: Serving) -> Any:
@@ -200,7 +201,8 @@ def test_the_live_volume_says_what_it_lacks_and_follows_every_shot(page: Page, s
     expect(problem).to_contain_text("on the page Calibrate")
     _picture(page, "live-volume-empty")
     save_droplet_calibration(server.services.data_dir / "calibrations" / "paper.json")
-    server.http.put("/api/calibrations/current", json={"id": "paper"})
+    server.free_control()  # the page holds it
+    assert server.http.put("/api/calibrations/current", json={"id": "paper"}).is_success
     told = volume.get_by_role("status", name="live volume")
     expect(told).to_have_text(
         re.compile(r"^shot \d+ · \d+\.\d s old · MLOS at half resolution · calibration paper · took \d\.\d\d s")

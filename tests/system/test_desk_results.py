@@ -55,7 +55,8 @@ def old_run(server: Serving) -> Path:
     for settings in (SMART, MLOS):
         out = run_dir / "results" / settings.results_id("c")
         list(reconstruct_shots(run_dir, [0, 1, 3], calibration, settings, out, keep=keep_preview))
-    results_dir = write_results(run_dir / "results" / "droplets-1", measured)
+    of_run = {"run": OLD, "grid": GridSettings.of(GRID).model_dump_json()}
+    results_dir = write_results(run_dir / "results" / "droplets-1", measured, **of_run)
     (results_dir / "settings.json").write_text("{}")
     return run_dir
 

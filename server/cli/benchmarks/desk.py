@@ -85,11 +85,11 @@ def _cpu_s(process: int) -> float:
 def _far_ends(config: Path) -> Iterator[None]:
     """The devices of the rig in a process of their own, so that their work is not the server's."""
     command = [sys.executable, "-m", "server.cli", "simulate", "--config", str(config)]
-    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-    try:
-        if not any("its far ends run" in line for line in process.stderr or ()):
-            raise NoRig(f"tomoshadow simulate ended with {process.wait(_DEADLINE_S)}")
-        yield
-    finally:
-        process.terminate()
-        process.wait(_DEADLINE_S)
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            if not any("its far ends run" in line for line in process.stderr or ()):
+                raise NoRig(f"tomoshadow simulate ended with {process.wait(_DEADLINE_S)}")
+            yield
+        finally:
+            process.terminate()
+            process.wait(_DEADLINE_S)

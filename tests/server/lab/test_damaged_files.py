@@ -204,7 +204,8 @@ def test_a_deleted_volume_is_made_again_although_its_job_is_done(server: Serving
     volume.with_suffix(".preview.npz").unlink()
     assert server.http.get(shown).status_code == 404
     (again,) = server.http.post("/api/jobs", json={"run_id": run_id}).json()
-    assert (again["id"], again["state"]) == (job["id"], "queued")
+    assert again["id"] == job["id"]
+    assert again["state"] in ("queued", "running")
     wait_for_jobs(server, 1)
     assert volume.is_file()
     (done,) = server.http.post("/api/jobs", json={"run_id": run_id}).json()

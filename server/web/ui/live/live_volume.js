@@ -34,6 +34,7 @@ export default {
   mounted() {
     this.observer = new IntersectionObserver(([entry]) => { this.inSight = entry.isIntersecting; });
     this.observer.observe(this.$refs.box);
+    this.$refs.box.scrollIntoView({ block: "nearest" }); // who switches it on wants to see it
     this.follow();
   },
   unmounted() {

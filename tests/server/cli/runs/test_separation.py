@@ -23,7 +23,7 @@ def write_shots(folder: Path, v_m_s: float = V_M_S) -> Path:
         rng = np.random.default_rng(number)
         columns = {
             "frame": np.repeat([b"a", b"b"], 50),
-            **{f"{axis}_mm": rng.normal(size=100) for axis in "xyz"},
+            **{f"{axis}_mm": rng.uniform(-0.1, 0.1, 100) for axis in "xyz"},
             **{
                 f"{name}_m_s": along + rng.normal(0, 0.5, 100) for name, along in zip("uvw", (0, v_m_s, 0), strict=True)
             },
