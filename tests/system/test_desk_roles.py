@@ -8,9 +8,10 @@ from nicegui import app as pages
 from playwright.sync_api import Page, expect
 
 from server.web.app import create_app
-from tests.support.operator import VIEWS
+from tests.support.operator import VIEWS, go_to
 from tests.support.serving import Serving, serving
 
+OPERATOR = {"Authorization": "Bearer operate", "Tomoshadow-Operator": "ann@lab"}
 pytestmark = pytest.mark.timeout(900)
 
 
@@ -47,3 +48,21 @@ def test_a_session_that_is_ended_elsewhere_closes_its_page(page: Page, server: S
     expect(page.get_by_role("button", name="Start run")).to_be_enabled()
     page.context.request.post(f"{server.http.base_url}/sign-out", max_redirects=0)
     expect(page.get_by_role("button", name="Sign in")).to_be_visible()
+
+
+def test_a_viewer_changes_neither_the_form_nor_the_live_view(page: Page, server: Serving) -> None:
+    (server.services.data_dir / "templates").mkdir(exist_ok=True)
+    (server.services.data_dir / "templates" / "bright.json").write_text('{"shots": 77}')
+    sign_in(page, server, "eve", "look")
+    expect(page.locator(".q-field--disabled").filter(has_text="Template")).to_be_visible()
+    expect(page.get_by_role("button", name="keep as a template")).to_be_disabled()
+    go_to(page, "Live")
+    plan = {"rate_hz": 2.0, "pulse": {"current_a": dict.fromkeys(VIEWS, 5)}}
+    server.http.put("/api/rig/live", json=plan, headers=OPERATOR).raise_for_status()
+    expect(page.get_by_role("status", name="rig state")).to_have_text("LIVE")
+    for name in ("Apply", "End live", "Shoot one", "Set to half range"):
+        expect(page.get_by_role("button", name=name)).to_be_disabled()
+    for label in ("Pulse width / ns", "LED view1 / A"):
+        expect(page.get_by_label(label)).to_be_disabled()
+    server.http.delete("/api/rig/live", headers=OPERATOR).raise_for_status()
+    server.free_control()

@@ -13,7 +13,7 @@ from playwright.sync_api import Browser, Locator, Page, expect
 
 from server.lab.tasks import calibrate_run
 from server.web.app import create_app
-from tests.support.operator import VIEWS
+from tests.support.operator import VIEWS, go_to
 from tests.support.server_process import eventually
 from tests.support.serving import Serving, plan_of, serving
 
@@ -76,6 +76,19 @@ def test_the_first_action_takes_control_and_a_take_over_is_seen(tab: Page, serve
     tab.get_by_role("button", name="Take control").click()
     expect(control(tab)).to_have_text(re.compile("you"))
     expect(tab.get_by_role("button", name="Start run")).to_be_enabled()
+
+
+def test_who_does_not_hold_control_changes_the_light_nowhere(tab: Page, server: Serving) -> None:
+    go_to(tab, "Live")
+    current = tab.get_by_label("LED view1 / A")
+    expect(current).to_be_enabled()
+    server.http.put("/api/rig/control", headers=ANN)
+    expect(current).to_be_disabled()
+    for name in ("Live", "Shoot one", "Set to half range"):
+        expect(tab.get_by_role("button", name=name, exact=True)).to_be_disabled()
+    expect(tab.get_by_role("slider", name="LED view1 current")).to_have_attribute("aria-disabled", "true")
+    go_to(tab, "Run")
+    expect(tab.locator(".q-field--disabled").filter(has_text="Template")).to_be_visible()
 
 
 def test_a_change_in_one_tab_appears_in_the_other(tab: Page, browser: Browser, server: Serving) -> None:

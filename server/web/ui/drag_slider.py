@@ -3,13 +3,13 @@
 from collections.abc import Awaitable, Callable
 from typing import Any
 
-from nicegui.element import Element
+from nicegui.elements.mixins.disableable_element import DisableableElement
 from nicegui.events import GenericEventArguments
 
 _SECOND = 1.0
 
 
-class DragSlider(Element):
+class DragSlider(DisableableElement):
     """One request for a drag, however long.
 
     Parameters
@@ -31,7 +31,7 @@ class DragSlider(Element):
         on_release: Callable[[GenericEventArguments], Awaitable[None] | None],
         js_handler: str = "(value) => emit(value)",
     ) -> None:
-        super().__init__("q-slider")
+        super().__init__(tag="q-slider")
         self._props |= {"model-value": value, "min": low, "max": high, "step": step, "label": True, "loopback": False}
         # The browser moves the thumb by itself, as long as there is somebody who could be told.
         self.on("update:model-value", _ignore, [None], throttle=_SECOND, leading_events=False, trailing_events=False)

@@ -6,7 +6,8 @@ from nicegui import ui
 
 from server.lab.desk.control import REMEDIES
 from server.lab.desk.visitor import Role, Visitor
-from server.lab.errors import Forbidden
+from server.lab.errors import Forbidden, ServerError
+from server.lab.services import Context
 from server.web.guard import SESSIONS, VISITOR
 from server.web.sessions import Sessions
 
@@ -38,6 +39,15 @@ def require_operator() -> Visitor:
     if who.role is Role.VIEWER:
         raise Forbidden("a viewer may look and end the light, and do nothing else", "viewer")
     return who
+
+
+def may_command(context: Context) -> bool:
+    """Whether who looks may make light and change its form: no viewer, and nobody while somebody else holds control."""
+    try:
+        context.control.check(visitor())
+    except ServerError:
+        return False
+    return True
 
 
 def told(error: Exception) -> str:

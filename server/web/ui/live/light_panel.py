@@ -15,6 +15,7 @@ from server.web.ui.bar.server_link import TICKET, shown_form
 from server.web.ui.draft import PULSE_FIELDS, DraftStore, problem_of, problem_of_current
 from server.web.ui.drag_slider import DragSlider
 from server.web.ui.theme import panel
+from server.web.ui.visiting import may_command
 
 _RELEASED = "(value) => emit({ ...(window.desk?.ticket() ?? {}), value })"
 _STEP_A = 0.1
@@ -47,6 +48,7 @@ class LightPanel:
         self._apply = apply
         self._seen: dict[str, list[SeenLight]] = {view: [] for view in context.services.config.views}
         self._numbers: dict[str, ui.number] = {}
+        self._times: list[ui.number] = []
         self._sliders: dict[str, DragSlider] = {}
         with panel("Light"):
             with ui.row().classes("w-full no-wrap gap-2"):
@@ -54,11 +56,17 @@ class LightPanel:
                 self._add_time("separation_ns", "Separation / ns")
             for view in context.services.config.views:
                 self._add_current(view)
-            half = ui.button("Set to half range", icon="auto_fix_high").props("outline dense no-caps").classes("w-full")
-            half.on("click", self._on_half, js_handler=TICKET)
+            self._half = ui.button("Set to half range", icon="auto_fix_high")
+            self._half.props("outline dense no-caps").classes("w-full").on("click", self._on_half, js_handler=TICKET)
             self._advice = ui.column().classes("w-full gap-0 text-xs").props('role=status aria-label="light assistant"')
         with self._advice:
             ui.label("Sets every LED so that its background has half of the range, by the newest shot.")
+
+    def refresh(self) -> None:
+        """Nobody changes the light while somebody else holds control."""
+        may_change = may_command(self._context)
+        for field in (*self._times, *self._numbers.values(), *self._sliders.values(), self._half):
+            field.set_enabled(may_change)
 
     def _limit_a(self, view: str) -> float:
         return self._context.services.config.views[view].max_current_a
@@ -72,6 +80,7 @@ class LightPanel:
             validation=lambda value: problem_of(PULSE_FIELDS, name, value),
         )
         number.props(f"dense outlined hide-bottom-space data-draft={name}").classes("flex-1 min-w-0")
+        self._times.append(number)
 
     def _add_current(self, view: str) -> None:
         limit_a, value = self._limit_a(view), self._draft.values["current_a"].get(view)

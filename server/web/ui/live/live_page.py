@@ -19,12 +19,13 @@ class LivePage:
                 self._live = LivePanel(context, draft)
                 self._volume = LiveVolumePanel(context)
             with ui.element("div").classes("column side"):
-                LightPanel(context, draft, self._live.apply)
+                self._light = LightPanel(context, draft, self._live.apply)
                 self._timing = TimingPanel(context, draft)
 
     async def refresh(self) -> None:
         """Follow the state of acquisition and the light of the form."""
         self._live.refresh()
+        self._light.refresh()
         self._volume.refresh()
         await self._timing.refresh()
 

@@ -11,8 +11,10 @@ from daq.errors import DaqError
 from daq.run.state import RunState
 from daq.run_plan import LivePlan
 from server.lab.desk.reason import refusal_text
+from server.lab.desk.visitor import Role
 from server.lab.errors import ServerError
 from server.lab.services import Context
+from server.lab.starting.command import tell_deed
 from server.lab.starting.light_request import obey
 from server.lab.starting.run_start import SingleShot, shoot
 from server.web.ui.asking import try_to
@@ -20,6 +22,7 @@ from server.web.ui.bar.server_link import TICKET, light_request, shown_form
 from server.web.ui.draft import DraftStore, problem_of, pulse_of
 from server.web.ui.live.live_tiles import LiveTiles
 from server.web.ui.theme import panel
+from server.web.ui.visiting import may_command, visitor
 
 _FIELDS = LivePlan.model_fields
 _HINT = "No picture yet. Live shows the cameras and records nothing; Shoot one takes a single shot."
@@ -44,7 +47,7 @@ class LivePanel:
             with ui.row().classes("w-full gap-2 items-center"):
                 self._start = ui.button("Live", icon="videocam").props("outline dense no-caps")
                 self._start.on("click", self._on_start, js_handler=TICKET)
-                self._end = ui.button("End live", icon="videocam_off", on_click=self._acquisition.end_live)
+                self._end = ui.button("End live", icon="videocam_off", on_click=self._on_end)
                 self._end.props("outline dense no-caps")
                 self._rate = ui.number(
                     "Live / Hz",
@@ -67,11 +70,19 @@ class LivePanel:
         """Follow the state of acquisition."""
         status = self._acquisition.status()
         is_live = status.state is RunState.LIVE
-        self._start.set_enabled(status.resting or is_live)
+        may_shoot = (status.resting or is_live) and may_command(self._context)
+        self._start.set_enabled(may_shoot)
         self._start.set_text("Apply" if is_live else "Live")
-        self._end.set_enabled(is_live)
-        self._shoot.set_enabled(status.resting or is_live)
+        self._end.set_enabled(is_live and visitor().role is not Role.VIEWER)
+        self._shoot.set_enabled(may_shoot)
         self._keep.set_visibility(bool(self._context.unkept_runs.ids) and status.resting)
+
+    async def _on_end(self) -> None:
+        async def end() -> None:
+            await asyncio.to_thread(self._acquisition.end_live)
+            tell_deed(self._context, visitor(), "ended the live view")
+
+        await try_to(end)
 
     async def _on_start(self, click: GenericEventArguments) -> None:
         self._draft.adopt(shown_form(click.args))

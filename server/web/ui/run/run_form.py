@@ -26,7 +26,7 @@ from server.web.ui.run.preflight_panel import PreflightPanel
 from server.web.ui.run.template_bar import TemplateBar
 from server.web.ui.run.templates import TemplateStore
 from server.web.ui.theme import panel
-from server.web.ui.visiting import told, visitor
+from server.web.ui.visiting import may_command, told, visitor
 
 _PASSING = (RefusalCode.BUSY, RefusalCode.STARTING)
 _LOOK_AGAIN_S = 5.0
@@ -65,8 +65,9 @@ class RunForm:
 
     def refresh(self) -> None:
         """Follow the state of acquisition, who holds control, and other tabs."""
-        may_change = self._may_change()
+        may_change = may_command(self._context)
         self._start.set_enabled(may_change and not self._context.services.acquisition.status().active)
+        self._templates.allow(may_change)
         self._fields.allow(may_change)
         self._chosen.allow(may_change)
         if self._draft.version != self._shown:
@@ -95,13 +96,6 @@ class RunForm:
     def _look(self, plan: RunPlan, who: Visitor) -> tuple[tuple[Reason, ...], tuple[Check, ...]]:
         reasons = reasons_against(self._context, plan)
         return reasons, preflight(self._context, plan, who, reasons)
-
-    def _may_change(self) -> bool:
-        try:
-            self._context.control.check(visitor())
-        except ServerError:
-            return False
-        return True
 
     def _plan(self) -> RunPlan | None:
         try:

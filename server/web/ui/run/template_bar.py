@@ -28,7 +28,8 @@ class TemplateBar:
         with ui.row().classes("w-full gap-2 items-center no-wrap"):
             self._chosen = ui.select([], label="Template", on_change=self._on_choose).classes("grow")
             self._chosen.props('dense outlined options-dense aria-label="Template"')
-            with ui.button(icon="save_as").props('flat dense round aria-label="keep as a template"'):
+            self._keep = ui.button(icon="save_as").props('flat dense round aria-label="keep as a template"')
+            with self._keep:
                 ui.tooltip("Keep this form as a template, or remove one")
                 self._add_menu()
         self.reload()
@@ -36,6 +37,11 @@ class TemplateBar:
     def reload(self) -> None:
         """Offer the templates that there are."""
         self._chosen.set_options(self._templates.names())
+
+    def allow(self, may_change: bool) -> None:
+        """Nobody fills the form while somebody else holds control."""
+        self._chosen.set_enabled(may_change)
+        self._keep.set_enabled(may_change)
 
     def _add_menu(self) -> None:
         with ui.menu() as self._menu, ui.column().classes("q-pa-md gap-2").style("width:260px"):
