@@ -33,10 +33,12 @@ from server.lab.runs.run_summary import (
     summary_of,
     summary_of_absent,
     summary_of_damaged,
+    summary_of_misnamed,
     summary_of_packed,
 )
 
 _ALL = 10**9
+_NO_ID = "{!r} is no id of a run, which has letters, digits, space . _ - and begins with one of the first two"
 _TIME = "%Y%m%dT%H%M%S"
 _TIME_IN_ID = re.compile(r"\d{8}T\d{6}(?=-)")
 
@@ -63,7 +65,9 @@ class RunStore:
     def directory(self, run_id: str) -> Path:
         """Directory of a run; NotFound if there is none."""
         path = self._data_dir / run_id
-        if not is_identifier(run_id) or not (path / RUN_FILE).is_file():
+        if not is_identifier(run_id):
+            raise NotFound(f"{_NO_ID.format(run_id)}: rename the folder, if there is one")
+        if not (path / RUN_FILE).is_file():
             raise NotFound(f"there is no run {run_id!r}")
         return path
 
@@ -157,6 +161,8 @@ class RunStore:
         return status.active and status.run_id == run_dir.name
 
     def _summary_of(self, run_dir: Path) -> RunSummary:
+        if not is_identifier(run_dir.name):
+            return summary_of_misnamed(run_dir, self._started(run_dir), _NO_ID.format(run_dir.name))
         try:
             if not self._is_active(run_dir):
                 return _closed(self._indexed(run_dir).summary, self._status())

@@ -124,6 +124,12 @@ def summary_of_absent(run_id: str, status: RunStatus, plan: RunPlan) -> RunSumma
     )
 
 
+def summary_of_misnamed(run_dir: Path, started: datetime, cause: str) -> RunSummary:
+    """A run whose folder has a name by which nobody can ask for it."""
+    remedy = f"rename the folder {shlex.quote(str(run_dir))}"
+    return summary_of_damaged(run_dir, started, cause).model_copy(update={"remedy": remedy})
+
+
 def summary_of_damaged(run_dir: Path, started: datetime, cause: str) -> RunSummary:
     """A run that cannot be read: it hides no other."""
     return RunSummary(

@@ -29,7 +29,7 @@ def answer_of(jobs: list[Job]) -> tuple[str, bool]:
         return "nothing to do: the run has no valid shot", False
     if not waiting:
         return "nothing to do: it is done already", False
-    return f"{waiting} {'job is' if waiting == 1 else 'jobs are'} queued, see Processing", True
+    return f"{waiting} {'job is' if waiting == 1 else 'jobs are'} queued, see Jobs", True
 
 
 async def try_to(action: Callable[[], Awaitable[Any]]) -> None:

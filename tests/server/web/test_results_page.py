@@ -8,12 +8,22 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
+from daq.run_plan import RunKind
 from processing.reconstruction.choices import ReconstructionMethod
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.volume import VoxelGrid
 from server.lab.jobs import JobState, JobTable, reconstruction_job
 from server.lab.results import DropletsSummary, ResultSet, VolumeSummary
-from server.web.ui.results.looked_at import exposures_of, first_of, label_of, method_of, set_with_droplets, shots_of
+from server.lab.runs.run_summary import ACTIVE, DAMAGED, RunSummary
+from server.web.ui.results.looked_at import (
+    exposures_of,
+    first_of,
+    label_of,
+    method_of,
+    nothing_text,
+    set_with_droplets,
+    shots_of,
+)
 from server.web.ui.results.seen_exposure import FullSlices
 from server.web.ui.results.slice_view import SHOWN_AXES, spans_of
 from server.web.ui.results.ticks import ticks_of
@@ -23,6 +33,38 @@ from server.web.ui.runs.run_work import progress_text
 from server.web.ui.runs.shot_strip import next_invalid, strip_style, stripes
 
 PLACES = st.floats(-1e4, 1e4)
+
+
+def a_run(kind: RunKind | None, outcome: str, cause: str = "") -> RunSummary:
+    return RunSummary(
+        run_id="one",
+        name="one",
+        kind=kind,
+        created_utc="2026-11-29T03:20:14Z",
+        outcome=outcome,
+        cause=cause,
+        views=("view1",),
+        frames_per_shot=2,
+        shots_planned=6,
+        shots_recorded=6,
+        shots_valid=6,
+        calibration=None,
+    )
+
+
+def test_only_of_what_can_be_reconstructed_it_is_said_to_do_so() -> None:
+    assert "reconstruct or measure it below" in nothing_text(a_run(RunKind.SAMPLE, "completed"))
+    assert "reconstruct or measure it below" in nothing_text(a_run(None, "completed"))
+    assert nothing_text(a_run(RunKind.DARK, "completed")) == (
+        "Run one is a dark run: volumes and droplets are made of sample runs."
+    )
+    assert (
+        nothing_text(a_run(RunKind.SAMPLE, ACTIVE)) == "Run one is being recorded, and nothing has been made of it yet."
+    )
+    assert (
+        nothing_text(a_run(None, DAMAGED, "run.h5 is torn"))
+        == "Run one cannot be read: run.h5 is torn. Open the run for what to do."
+    )
 
 
 @given(low=PLACES, extent=st.floats(1e-3, 1e4), most=st.integers(2, 12))

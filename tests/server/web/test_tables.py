@@ -93,8 +93,8 @@ def test_an_interrupted_run_says_so_with_the_shots_that_it_has() -> None:
 def test_whoever_asks_for_work_is_told_what_came_of_it() -> None:
     queued = calibration_job("run", "cal", "pinhole")
     done = queued.model_copy(update={"state": JobState.DONE})
-    assert answer_of([done, queued]) == ("1 job is queued, see Processing", True)
-    assert answer_of([queued, queued]) == ("2 jobs are queued, see Processing", True)
+    assert answer_of([done, queued]) == ("1 job is queued, see Jobs", True)
+    assert answer_of([queued, queued]) == ("2 jobs are queued, see Jobs", True)
     assert answer_of([done]) == ("nothing to do: it is done already", False)
     assert answer_of([]) == ("nothing to do: the run has no valid shot", False)
 

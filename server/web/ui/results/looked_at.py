@@ -4,11 +4,12 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from daq.run_plan import RunKind
 from processing.reconstruction.choices import ReconstructionMethod
 from server.lab.errors import NotFound
 from server.lab.jobs import JobKind, JobState
 from server.lab.results import ResultSet, result_sets
-from server.lab.runs.run_summary import RunSummary
+from server.lab.runs.run_summary import ACTIVE, DAMAGED, PACKED, RunSummary
 from server.lab.services import Context
 
 _RUNS = 300
@@ -65,6 +66,17 @@ def first_of(sets: Sequence[ResultSet]) -> ResultSet | None:
 def shots_of(one: ResultSet) -> list[int]:
     """Shots of which there is something."""
     return sorted({volume.shot for volume in one.volumes} | {droplets.shot for droplets in one.droplets})
+
+
+def nothing_text(run: RunSummary) -> str:
+    """Why there are no results of a run, and how there would be some."""
+    if run.outcome in (DAMAGED, PACKED):
+        return f"Run {run.run_id} cannot be read: {run.cause}. Open the run for what to do."
+    if run.outcome == ACTIVE:
+        return f"Run {run.run_id} is being recorded, and nothing has been made of it yet."
+    if run.kind not in (RunKind.SAMPLE, None):
+        return f"Run {run.run_id} is a {run.kind} run: volumes and droplets are made of sample runs."
+    return f"Nothing has been made of run {run.run_id} yet: reconstruct or measure it below."
 
 
 def exposures_of(one: ResultSet, shot: int) -> dict[str, str]:

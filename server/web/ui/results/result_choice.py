@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Awaitable, Callable
+from urllib.parse import quote
 
 from nicegui import ui
 
@@ -9,7 +10,16 @@ from server.lab.errors import NotFound
 from server.lab.results import ResultSet
 from server.lab.runs.run_summary import RunSummary
 from server.lab.services import Context
-from server.web.ui.results.looked_at import LookedAt, first_of, label_of, newest, runs_with_results, sets_of, shots_of
+from server.web.ui.results.looked_at import (
+    LookedAt,
+    first_of,
+    label_of,
+    newest,
+    nothing_text,
+    runs_with_results,
+    sets_of,
+    shots_of,
+)
 from server.web.ui.results.slice_group import FreeSlider
 from server.web.ui.theme import panel
 
@@ -86,16 +96,16 @@ class ResultChoice:
         problem = "" if self.run_id else NO_RESULTS
         try:
             self.sets = await asyncio.to_thread(sets_of, self._context, self.run_id) if self.run_id else []
+            if self.run_id and not self.sets:
+                problem = nothing_text(await asyncio.to_thread(self._context.runs.summary, self.run_id))
         except NotFound as error:
             self.sets, problem = [], f"{error}: choose another one above, or open the page Runs."
-        if self.run_id and not self.sets and not problem:
-            problem = f"Nothing has been made of run {self.run_id} yet: reconstruct or measure it below."
         own = {self.run_id: self.run_id} if self.run_id else {}
         self._run.set_options(own | {run.run_id: _run_label(run) for run in runs}, value=self.run_id or None)
         self._message.set_text(problem)
         self._message.set_visibility(bool(problem))
         self._link.set_visibility(bool(self.run_id))
-        self._link.props(f'href="/runs/{self.run_id}"')
+        self._link.props["href"] = f"/runs/{quote(self.run_id)}"
         await self._take_set()
 
     async def _take_set(self) -> None:

@@ -14,7 +14,7 @@ from server.web.ui.results.droplet_table import DropletTable, dots_of
 from server.web.ui.results.looked_at import LookedAt, exposures_of, method_of, set_with_droplets
 from server.web.ui.results.result_choice import ResultChoice
 from server.web.ui.results.volume_view import VolumeView
-from server.web.ui.runs.run_work import RunWork
+from server.web.ui.runs.run_work import RunWork, can_be_worked_on
 from server.web.ui.runs.runs_page import STYLE_SHEET as STYLE_OF_RUNS
 from server.web.ui.theme import panel
 
@@ -60,6 +60,7 @@ class ResultsPage:
         if (looked := choice.looked) is None or (shown := choice.shown) is None:
             await self._volume.show(LookedAt(choice.run_id, "", 0), {}, None)
             self._table.show(None)
+            choice.offer_downloads({})
             return
         if looked.address != self._address:
             self._address = looked.address
@@ -79,7 +80,7 @@ class ResultsPage:
         except ServerError:
             run = None
         self._work.show(run)
-        self._work_panel.set_visibility(run is not None)
+        self._work_panel.set_visibility(run is not None and can_be_worked_on(run))
 
     def _read(self, looked: LookedAt, results_id: str) -> StoredDroplets | None:
         try:

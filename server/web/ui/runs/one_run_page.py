@@ -8,6 +8,7 @@ from nicegui import ui
 
 from daq.errors import ShotFileError
 from daq.files.run_directory import RunHeader
+from daq.names import is_identifier
 from server.lab.errors import NotFound
 from server.lab.runs.run_store import has_results
 from server.lab.runs.run_summary import ACTIVE, RunSummary
@@ -73,7 +74,8 @@ class OneRunPage:
         self._page.clear()
         self._is_built, self._shots = False, None
         with self._page, panel("Run"):
-            ui.label(f"{text}: it was deleted, moved away, or its address is wrong.").classes("empty-state")
+            why = ": it was deleted, moved away, or its address is wrong" if is_identifier(self._run_id) else ""
+            ui.label(f"{text}{why}.").classes("empty-state")
             ui.link("All runs", "/runs")
 
     def _build(self, run: RunSummary, header: RunHeader | None) -> None:

@@ -40,8 +40,7 @@ class RunWork:
     def show(self, run: RunSummary | None) -> None:
         """Offer what can be made of a run; of one that is being recorded, or cannot be read, nothing."""
         self._run_id = run.run_id if run else ""
-        can_be_worked_on = run is not None and run.outcome not in (ACTIVE, DAMAGED, PACKED)
-        kind = run.kind if run and can_be_worked_on else RunKind.DARK
+        kind = run.kind if run and can_be_worked_on(run) else RunKind.DARK
         self._of_samples.set_visibility(kind in (RunKind.SAMPLE, None))
         self._calibrate_button.set_visibility(kind is RunKind.CALIBRATION)
 
@@ -77,6 +76,11 @@ class RunWork:
     async def _queue(self, request: Callable[[], list[Job]]) -> None:
         await queue(request)
         await self.reload()
+
+
+def can_be_worked_on(run: RunSummary) -> bool:
+    """Whether anything can be made of a run."""
+    return run.outcome not in (ACTIVE, DAMAGED, PACKED) and run.kind in (RunKind.SAMPLE, RunKind.CALIBRATION, None)
 
 
 def progress_text(one: WorkProgress) -> str:

@@ -64,6 +64,18 @@ def run_dir(tmp_path: Path) -> Path:
     return write_run(tmp_path / "runs" / "20260301T120000-spray")
 
 
+@pytest.mark.parametrize("name", ["nozzle #3", ".kept", "-dash", 'say "hi"', "50 %", "ü"])
+def test_a_run_whose_folder_cannot_be_an_id_is_listed_with_what_to_do(run_dir: Path, name: str) -> None:
+    run_dir.rename(run_dir.with_name(name))
+    store = RunStore(run_dir.parent, RunStatus)
+    (told,) = store.newest()
+    assert (told.run_id, told.outcome) == (name, DAMAGED)
+    assert "no id of a run" in told.cause
+    assert told.remedy.startswith("rename the folder ")
+    with pytest.raises(NotFound, match=r"no id of a run.*rename the folder"):
+        store.directory(name)
+
+
 def test_a_run_that_has_not_changed_is_not_opened_by_another_server_either(run_dir: Path, tmp_path: Path) -> None:
     first = RunStore(run_dir.parent, RunStatus, RunIndex(tmp_path / "runs.sqlite"))
     (told,) = first.newest()
