@@ -249,6 +249,19 @@ def test_no_words_of_the_page_are_cut(page: Page, server: Serving, width: int) -
     expect(live.get_by_role("button", name="Keep shot")).to_be_hidden()
 
 
+@pytest.mark.parametrize("width", [800, 1280])
+def test_a_long_name_pushes_nothing_of_a_job_out_of_sight(page: Page, server: Serving, width: int) -> None:
+    run_id, _ = server.run_to_its_end(plan_of(name="n" * 80, shots=1, pulse=PULSE))
+    page.set_viewport_size({"width": width, "height": 900})
+    page.goto(str(server.http.base_url))
+    open_drawer(page)
+    jobs = page.get_by_role("region", name="Processing")
+    expect(jobs.get_by_role("cell", name=run_id).first).to_be_visible()
+    table = jobs.locator(".q-table__middle")
+    assert table.evaluate("table => table.scrollWidth <= table.clientWidth + 1")
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "the page is wider than the window"
+
+
 def test_many_reasons_of_droplets_make_no_row_of_the_height_of_the_page(page: Page, server: Serving) -> None:
     run_id, _ = server.run_to_its_end(plan_of(kind="dark", shots=1, pulse=PULSE))
     named = "a reason " * 21 + "more"
