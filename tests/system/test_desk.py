@@ -249,6 +249,21 @@ def test_no_words_of_the_page_are_cut(page: Page, server: Serving, width: int) -
     expect(live.get_by_role("button", name="Keep shot")).to_be_hidden()
 
 
+@pytest.mark.parametrize("path", ["nothing", "calibrate/none", "runs/one/two", "results/one/two"])
+def test_at_an_address_that_is_none_there_are_bar_rail_and_abort(browser: Browser, server: Serving, path: str) -> None:
+    context = browser.new_context()
+    page = context.new_page()
+    answer = page.goto(f"{server.http.base_url}/{path}")
+    assert answer is not None
+    assert answer.status == 404
+    expect(page.get_by_text(f"There is no page /{path}")).to_be_visible()
+    page.get_by_role("button", name="ABORT").click()
+    expect(page.get_by_role("alert", name="abort answer")).to_have_text(re.compile("^light off confirmed"))
+    go_to(page, "Runs")
+    expect(page.get_by_role("region", name="Runs")).to_be_visible()
+    context.close()
+
+
 @pytest.mark.parametrize("width", [800, 1280])
 def test_a_long_name_pushes_nothing_of_a_job_out_of_sight(page: Page, server: Serving, width: int) -> None:
     run_id, _ = server.run_to_its_end(plan_of(name="n" * 80, shots=1, pulse=PULSE))

@@ -114,6 +114,15 @@ def test_an_address_with_any_name_says_what_is_wrong_and_the_page_goes_on(page: 
         expect(page.get_by_role("region", name="Run").get_by_role("link", name="All runs")).to_be_visible()
 
 
+def test_a_run_that_is_deleted_elsewhere_is_gone_from_every_open_page(page: Page, server: Serving) -> None:
+    doomed, _ = server.run_to_its_end(plan_of(kind="dark", name="doomed", shots=1, pulse=PULSE))
+    page.goto(url(server, f"runs/{doomed}"))
+    expect(page.get_by_role("button", name="Delete...")).to_be_visible()
+    server.http.delete(f"/api/runs/{doomed}", headers={"Tomoshadow-Name": doomed}).raise_for_status()
+    expect(page.get_by_text(f"there is no run '{doomed}': it was deleted")).to_be_visible()
+    expect(page.get_by_role("button", name="Delete...")).to_be_hidden()
+
+
 def test_of_a_run_without_results_nothing_is_downloaded(page: Page, server: Serving, old_run: Path) -> None:
     dark, _ = server.run_to_its_end(plan_of(kind="dark", shots=1, pulse=PULSE))
     page.goto(url(server, f"results/{dark}"))

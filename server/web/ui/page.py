@@ -27,10 +27,12 @@ from server.web.ui.rig.rig_page import RigPage
 from server.web.ui.run.run_page import RunPage
 from server.web.ui.runs.one_run_page import OneRunPage
 from server.web.ui.runs.runs_page import RunsPage
+from server.web.ui.theme import panel
 from server.web.ui.visiting import is_signed_in
 
 _REFRESH_S = 0.25
-_LISTS_CHANGED = {"run_state", "job_changed", "calibration_chosen"}
+_LISTS_CHANGED = {"run_state", "job_changed", "calibration_chosen", "deed"}
+"""A deed may have been to delete a run."""
 _PATHS = ("/", "/rig", "/live", "/calibrate", "/run", "/results", "/runs")
 _DEEP_PATHS = (
     "/results/{run_id}",
@@ -51,7 +53,19 @@ def mount_page(app: FastAPI, config: RigConfig) -> None:
 
     for path in (*_PATHS, *_DEEP_PATHS):
         ui.page(path, title=f"tomoshadow: {config.name}")(show)
-    ui.run_with(app, dark=None, show_welcome_message=False, reconnect_timeout=10)
+    ui.run_with(
+        app, root=show, title=f"tomoshadow: {config.name}", dark=None, show_welcome_message=False, reconnect_timeout=10
+    )
+
+
+class _Pages(ui.sub_pages):
+    """Pages by their addresses; at any other one there are bar, rail and ABORT all the same."""
+
+    def _render_404(self) -> None:
+        with panel("Nothing here"):
+            ui.label(f"There is no page {ui.context.client.request.url.path}: choose one on the left.").classes(
+                "empty-state"
+            )
 
 
 class _Drafts:
@@ -82,7 +96,7 @@ class Desk:
         self._header = Header(context, abort_port)
         with ui.element("div").classes("desk"):
             self._rail = Rail(context)
-            ui.sub_pages(self._routes()).classes("desk-page")
+            _Pages(self._routes()).classes("desk-page")
             self._drawer = Drawer(context, self._rail.drawer_button)
         ui.timer(_REFRESH_S, self._refresh)
 

@@ -89,7 +89,9 @@ class FormFields:
         toggle.props('dense unelevated spread no-caps size=sm aria-label="Kind of run"').classes("w-full")
         self._fields["kind"] = toggle
         self._add_text(
-            "name", "Name", lambda text: problem_of(PLAN_FIELDS, "name", text) and "letters, digits, space . _ -"
+            "name",
+            "Name",
+            lambda text: problem_of(PLAN_FIELDS, "name", text) and "1 to 80 letters, digits, space . _ -",
         )
 
     def _add_number(self, name: str, label: str, fields: dict[str, Any], *, whole: bool = False) -> ui.number:
