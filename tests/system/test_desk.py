@@ -231,6 +231,25 @@ def test_the_bar_is_in_sight_at_every_width_dark_and_light(page: Page, server: S
 
 
 @pytest.mark.parametrize("width", [800, 1280])
+def test_the_state_is_one_word_however_long_the_name_of_the_calibration(
+    page: Page, server: Serving, width: int
+) -> None:
+    long = "20261129T171653-spray-pinhole-of-a-long-day"
+    (server.services.data_dir / "calibrations" / f"{long}.json").write_text(f'{{"id": "{long}"}}')
+    server.http.put("/api/calibrations/current", json={"id": long}).raise_for_status()
+    server.free_control()
+    page.set_viewport_size({"width": width, "height": 900})
+    page.goto(str(server.http.base_url))
+    expect(page.get_by_role("status", name="current calibration")).to_contain_text(long)
+    expect(rig_state(page)).to_have_text("READY")
+    box = rig_state(page).bounding_box()
+    server.http.put("/api/calibrations/current", json={"id": "paper"}).raise_for_status()
+    assert box is not None
+    assert box["height"] < 25, "the word is broken into two lines"
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "the page is wider than the window"
+
+
+@pytest.mark.parametrize("width", [800, 1280])
 def test_no_words_of_the_page_are_cut(page: Page, server: Serving, width: int) -> None:
     page.set_viewport_size({"width": width, "height": 900})
     page.goto(str(server.http.base_url))

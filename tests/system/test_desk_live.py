@@ -17,7 +17,7 @@ from tests.support.drifting_views import SIZE_PX
 from tests.support.live_shots import save_droplet_calibration, spray_scene
 from tests.support.operator import VIEWS, go_to
 from tests.support.server_process import eventually
-from tests.support.serving import Serving, serving
+from tests.support.serving import Serving, plan_of, serving
 
 pytestmark = pytest.mark.timeout(600)
 
@@ -95,6 +95,16 @@ def test_a_tile_tells_light_saturation_focus_and_rate(page: Page, server: Servin
     expect(figures).to_contain_text("saturated 0.00 %")
     expect(figures).to_contain_text(re.compile(r"focus \d+\.\d %/px \(best \d+\.\d\)"))
     expect(figures.get_by_role("img", name="view1 histogram")).to_be_visible()
+
+
+def test_a_picture_from_before_the_page_was_opened_is_as_old_as_it_is(page: Page, server: Serving) -> None:
+    server.free_control()
+    server.run_to_its_end(plan_of(kind="background", shots=1, pulse={"current_a": dict.fromkeys(VIEWS, 5)}))
+    threading.Event().wait(3.0)
+    live = open_live(page, server)
+    expect(caption(live)).to_have_text(re.compile(r"^shot 0 · \d+\.\d s old"))
+    assert live.locator(".lamp.ok").count() == 0
+    expect(tile_of(live)).to_have_class(re.compile("old"))
 
 
 def test_a_dark_frame_looks_dark_until_the_operator_stretches_it(page: Page, server: Serving) -> None:

@@ -9,12 +9,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from daq.run_plan import RunKind
+from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.reconstruction.choices import ReconstructionMethod
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.volume import VoxelGrid
 from server.lab.jobs import JobState, JobTable, reconstruction_job
 from server.lab.results import DropletsSummary, ResultSet, VolumeSummary
 from server.lab.runs.run_summary import ACTIVE, DAMAGED, RunSummary
+from server.web.ui.results.droplet_table import droplet_rows
 from server.web.ui.results.looked_at import (
     exposures_of,
     first_of,
@@ -65,6 +67,18 @@ def test_only_of_what_can_be_reconstructed_it_is_said_to_do_so() -> None:
         nothing_text(a_run(None, DAMAGED, "run.h5 is torn"))
         == "Run one cannot be read: run.h5 is torn. Open the run for what to do."
     )
+
+
+def test_droplets_are_numbers_that_can_be_sorted_and_an_unknown_one_is_none() -> None:
+    columns = {"frame": np.array([b"a", b"b", b"a"]), "p_real": np.array([0.5, np.nan, 1.0])}
+    columns |= {f"{axis}_mm": np.array([-5.58342, 1.5, 12.0]) for axis in "xyz"}
+    rows = droplet_rows(StoredDroplets({**columns, "diameter_um": np.array([99.14, 1234.5, np.nan])}, {}, None))
+    assert [(row["id"], row["diameter_um"], row["p_real"]) for row in rows] == [
+        (1, 1234.5, None),
+        (0, 99.14, 0.5),
+        (2, None, 1.0),
+    ]
+    assert rows[1]["x_mm"] == -5.58342
 
 
 @given(low=PLACES, extent=st.floats(1e-3, 1e4), most=st.integers(2, 12))

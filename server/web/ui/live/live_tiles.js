@@ -202,7 +202,7 @@ function within(value, size) {
 }
 
 function shownOf(tile, exposure, connected, now) {
-  const isNew = now - tile.seen < STALE_MS, lamp = !connected ? "fault" : isNew ? "ok" : "off";
+  const isNew = ageOf(tile, now) < STALE_MS / 1000, lamp = !connected ? "fault" : isNew ? "ok" : "off";
   if (!tile.told) return { lamp, caption: "" };
   const figures = tile.told.exposures[exposure], light = figures?.light_percent ?? 0;
   const missing = Object.values(tile.told.exposures).includes(null);
@@ -216,8 +216,12 @@ function shownOf(tile, exposure, connected, now) {
   };
 }
 
+function ageOf(tile, now) {
+  return (tile.told?.age_s ?? 0) + (now - tile.seen) / 1000;
+}
+
 function captionOf(tile, now) {
-  const age = tile.told.age_s + (now - tile.seen) / 1000, rate = rateOf(tile.arrivals, now);
+  const age = ageOf(tile, now), rate = rateOf(tile.arrivals, now);
   const exposures = Object.entries(tile.told.exposures).map(([name, figures]) => name.toUpperCase() + (figures === null
     ? " missing"
     : ` ${figures.light_percent.toFixed(0)} %` + (figures.saturated_percent > 0 ? `, ${figures.saturated_percent.toFixed(2)} % saturated` : "")));

@@ -1,5 +1,6 @@
 """DropletTable: the droplets of the shot that is shown, a row each; a click puts the cross-hair there."""
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -19,7 +20,8 @@ _COLUMNS = {
     "diameter_um": "Diameter, µm",
     "p_real": "Probability real",
 }
-_FORMATS = {"diameter_um": ".3g", "p_real": ".2f"}
+_SHOWN_AS = {"exposure": "value", "diameter_um": "value.toFixed(value < 100 ? 1 : 0)", "p_real": "value.toFixed(2)"}
+_UNKNOWN = "unknown"
 
 
 class DropletTable:
@@ -30,7 +32,14 @@ class DropletTable:
         with panel("Droplets of this shot") as self._panel:
             self._count = ui.label("").classes("text-sm")
             columns = [
-                {"name": name, "label": label, "field": name, "align": "left", "sortable": True}
+                {
+                    "name": name,
+                    "label": label,
+                    "field": name,
+                    "align": "left",
+                    "sortable": True,
+                    ":format": _shown(name),
+                }
                 for name, label in _COLUMNS.items()
             ]
             self._table = ui.table(columns=columns, rows=[], row_key="id", pagination=10).classes(
@@ -62,9 +71,19 @@ def droplet_rows(droplets: StoredDroplets) -> list[dict[str, Any]]:
         order = np.argsort(-np.nan_to_num(columns["diameter_um"].astype(np.float64)), kind="stable")
     rows = []
     for number in order[:_SHOWN].tolist():
-        told = {name: format(float(values[number]), _FORMATS.get(name, ".3f")) for name, values in columns.items()}
+        told = {name: _number(float(values[number])) for name, values in columns.items()}
         rows.append({"id": number, "exposure": frames[number].upper()} | told)
     return rows
+
+
+def _shown(name: str) -> str:
+    """How the browser writes a value: as text it would sort 12 before 9."""
+    return f"value => value === null ? '{_UNKNOWN}' : {_SHOWN_AS.get(name, 'value.toFixed(3)')}"
+
+
+def _number(value: float) -> float | None:
+    """What JSON has for a number that nobody knows."""
+    return value if math.isfinite(value) else None
 
 
 def dots_of(droplets: StoredDroplets | None) -> Dots:
