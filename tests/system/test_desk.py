@@ -230,7 +230,7 @@ def test_the_bar_is_in_sight_at_every_width_dark_and_light(page: Page, server: S
     _picture(page, f"bar-{width}-trouble")
 
 
-@pytest.mark.parametrize("width", [800, 1280])
+@pytest.mark.parametrize("width", [800, 1280, 1600])
 def test_the_state_is_one_word_however_long_the_name_of_the_calibration(
     page: Page, server: Serving, width: int
 ) -> None:
@@ -242,10 +242,14 @@ def test_the_state_is_one_word_however_long_the_name_of_the_calibration(
     page.goto(str(server.http.base_url))
     expect(page.get_by_role("status", name="current calibration")).to_contain_text(long)
     expect(rig_state(page)).to_have_text("READY")
-    box = rig_state(page).bounding_box()
+    box, calibration = rig_state(page).bounding_box(), page.get_by_role("status", name="current calibration")
+    expect(calibration).to_have_attribute("title", long)
     server.http.put("/api/calibrations/current", json={"id": "paper"}).raise_for_status()
+    bar = page.locator(".desk-row").bounding_box()
     assert box is not None
+    assert bar is not None
     assert box["height"] < 25, "the word is broken into two lines"
+    assert bar["height"] < 65, "the bar grows with the name"
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "the page is wider than the window"
 
 

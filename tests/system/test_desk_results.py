@@ -105,33 +105,6 @@ def test_before_there_is_anything_both_pages_say_what_to_do_first(page: Page, se
     expect(page.get_by_role("status", name="results")).to_contain_text("Choose a calibration on the page Calibrate")
 
 
-def test_an_address_with_any_name_says_what_is_wrong_and_the_page_goes_on(page: Page, server: Serving) -> None:
-    for name in ("none", 'say "hi"', "a%00b", "nozzle %233", "it's"):
-        page.goto(url(server, f"results/{name}"))
-        expect(page.get_by_role("status", name="results")).to_contain_text("choose another one above")
-        expect(page.get_by_role("link", name="Open the run")).to_have_attribute("href", re.compile("^/runs/."))
-        page.goto(url(server, f"runs/{name}"))
-        expect(page.get_by_role("region", name="Run").get_by_role("link", name="All runs")).to_be_visible()
-
-
-def test_a_run_that_is_deleted_elsewhere_is_gone_from_every_open_page(page: Page, server: Serving) -> None:
-    doomed, _ = server.run_to_its_end(plan_of(kind="dark", name="doomed", shots=1, pulse=PULSE))
-    page.goto(url(server, f"runs/{doomed}"))
-    expect(page.get_by_role("button", name="Delete...")).to_be_visible()
-    server.http.delete(f"/api/runs/{doomed}", headers={"Tomoshadow-Name": doomed}).raise_for_status()
-    expect(page.get_by_text(f"there is no run '{doomed}': it was deleted")).to_be_visible()
-    expect(page.get_by_role("button", name="Delete...")).to_be_hidden()
-
-
-def test_of_a_run_without_results_nothing_is_downloaded(page: Page, server: Serving, old_run: Path) -> None:
-    dark, _ = server.run_to_its_end(plan_of(kind="dark", shots=1, pulse=PULSE))
-    page.goto(url(server, f"results/{dark}"))
-    expect(page.get_by_role("status", name="results")).to_contain_text("is a dark run")
-    expect(page.get_by_role("region", name="Reconstruct or measure this run")).to_be_hidden()
-    page.get_by_role("button", name="Download").click()
-    expect(page.get_by_text("nothing", exact=True)).to_be_visible()
-
-
 def test_runs_are_found_by_what_they_are(page: Page, server: Serving, old_run: Path) -> None:
     dark, _ = server.run_to_its_end(plan_of(kind="dark", name="night", shots=3, pulse=PULSE))
     notes = {"operator": "Ada", "fluid": "water", "pressure_bar": 40, "remark": "nozzle three"}
@@ -346,3 +319,30 @@ def _picture(page: Page, name: str, width: int) -> None:
         page.wait_for_timeout(1500)
         page.screenshot(path=str(Path(PICTURES) / f"{name}-{shade}.png"))
         page.get_by_role("button", name="dark or light").click()
+
+
+def test_an_address_with_any_name_says_what_is_wrong_and_the_page_goes_on(page: Page, server: Serving) -> None:
+    for name in ("none", 'say "hi"', "a%00b", "nozzle %233", "it's"):
+        page.goto(url(server, f"results/{name}"))
+        expect(page.get_by_role("status", name="results")).to_contain_text("choose another one above")
+        expect(page.get_by_role("link", name="Open the run")).to_have_attribute("href", re.compile("^/runs/."))
+        page.goto(url(server, f"runs/{name}"))
+        expect(page.get_by_role("region", name="Run").get_by_role("link", name="All runs")).to_be_visible()
+
+
+def test_a_run_that_is_deleted_elsewhere_is_gone_from_every_open_page(page: Page, server: Serving) -> None:
+    doomed, _ = server.run_to_its_end(plan_of(kind="dark", name="doomed", shots=1, pulse=PULSE))
+    page.goto(url(server, f"runs/{doomed}"))
+    expect(page.get_by_role("button", name="Delete...")).to_be_visible()
+    server.http.delete(f"/api/runs/{doomed}", headers={"Tomoshadow-Name": doomed}).raise_for_status()
+    expect(page.get_by_text(f"there is no run '{doomed}': it was deleted")).to_be_visible()
+    expect(page.get_by_role("button", name="Delete...")).to_be_hidden()
+
+
+def test_of_a_run_without_results_nothing_is_downloaded(page: Page, server: Serving, old_run: Path) -> None:
+    dark, _ = server.run_to_its_end(plan_of(kind="dark", shots=1, pulse=PULSE))
+    page.goto(url(server, f"results/{dark}"))
+    expect(page.get_by_role("status", name="results")).to_contain_text("is a dark run")
+    expect(page.get_by_role("region", name="Reconstruct or measure this run")).to_be_hidden()
+    page.get_by_role("button", name="Download").click()
+    expect(page.get_by_text("nothing", exact=True)).to_be_visible()

@@ -1,12 +1,11 @@
 """Header: what is always in sight. Which rig, its lamps, state and calibration, who holds control, ABORT, alarms."""
 
-import time
-
 from nicegui import ui
 
 from server.lab.services import Context
 from server.web.ui.bar.abort_button import AbortButton
 from server.web.ui.bar.alarm_strip import AlarmStrip
+from server.web.ui.bar.calibration_chip import CalibrationChip
 from server.web.ui.bar.control_chip import ControlChip
 from server.web.ui.bar.lamp_row import LampRow
 from server.web.ui.bar.server_link import ServerLink
@@ -24,8 +23,7 @@ class Header:
                 self._add_name()
                 self._lamps = LampRow()
                 ui.space()
-                self._calibration = ui.label("").classes("calibration lockable")
-                self._calibration.props('role=status aria-label="current calibration"')
+                self._calibration = CalibrationChip(context)
                 self._control = ControlChip(context)
                 self._state = StateChip()
                 self._link = ServerLink()
@@ -37,7 +35,7 @@ class Header:
         """Show what has changed."""
         self._lamps.show(self._context.lamps)
         self._state.show(self._context.desk.state)
-        self._calibration.set_text(calibration_text(self._context))
+        self._calibration.refresh()
         self._control.refresh()
         self._alarms.refresh()
         self._link.show(self._context.beat.number)
@@ -50,23 +48,3 @@ class Header:
             ui.label(config.name).classes("text-xs")
         if config.simulation is not None:
             ui.label("SIMULATED").classes("simulated").tooltip("The devices of this rig are simulated")
-
-
-def calibration_text(context: Context) -> str:
-    """The calibration for new runs, how old it is, and by how much the views disagree, where that is known."""
-    calibration = context.calibrations.current
-    if calibration is None:
-        return "no calibration"
-    made_s, standing = context.calibrations.made_s(calibration), context.standing
-    age = "" if made_s is None else f", {age_text(time.time() - made_s)} old"
-    known = standing is not None and standing.calibration == calibration and bool(standing.views)
-    drift = f", off by {max(standing.views.values()):.2f} px" if standing is not None and known else ""
-    return f"{calibration}{age}{drift}"
-
-
-def age_text(age_s: float) -> str:
-    """A time in its largest unit."""
-    for unit_s, unit in ((86_400, "d"), (3600, "h"), (60, "min")):
-        if age_s >= unit_s:
-            return f"{age_s / unit_s:.0f} {unit}"
-    return f"{max(0.0, age_s):.0f} s"

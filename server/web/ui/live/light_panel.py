@@ -10,7 +10,7 @@ from nicegui.events import GenericEventArguments
 from daq.shot import Shot
 from server.lab.live_view.light_assistant import Advice, SeenLight, advise, seen_light
 from server.lab.services import Context
-from server.web.ui.bar.header import age_text
+from server.web.ui.bar.age import age_text
 from server.web.ui.bar.server_link import TICKET, shown_form
 from server.web.ui.draft import PULSE_FIELDS, DraftStore, problem_of, problem_of_current
 from server.web.ui.drag_slider import DragSlider

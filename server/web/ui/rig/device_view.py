@@ -8,7 +8,7 @@ from server.lab.devices.device_cards import DeviceCard
 from server.lab.monitor import STALE_S
 from server.lab.services import Context
 from server.web.ui.asking import try_to
-from server.web.ui.bar.header import age_text
+from server.web.ui.bar.age import age_text
 
 _ICONS = {
     "camera": "videocam",
