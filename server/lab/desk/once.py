@@ -1,5 +1,6 @@
 """Once: a request with a key is obeyed once, however often it comes; the answer is the same every time."""
 
+import hashlib
 import threading
 from collections.abc import Callable
 from concurrent.futures import Future
@@ -51,11 +52,14 @@ class Once:
         """
         if key is None:
             return action()
-        answer, is_new = self._remembered(key, what)
+        digest = hashlib.sha256(what.encode()).hexdigest()  # a plan may have a megabyte
+        answer, is_new = self._remembered(key, digest)
         if is_new:
-            self._work_out(key, what, answer, action)
+            self._work_out(key, digest, answer, action)
         elif not answer.done():
             raise Conflict(f"the request with idempotency key {key!r} is being worked on", "in_progress")
+        if error := answer.exception():
+            raise error.with_traceback(None)  # or it would grow with every time that it is raised
         result: Answer = answer.result()
         return result
 

@@ -3,13 +3,13 @@
 import json
 import sqlite3
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from server.lab.damage import set_aside
+from server.lab.damage import set_aside, tell
 from server.lab.events import EventPublisher
 
 REQUESTS_FILE = "requests.sqlite"
@@ -28,16 +28,22 @@ class Obeyed:
 class RequestTable:
     """The newest requests that had a key, in one SQLite file; from any thread.
 
+    A request is obeyed although the disk takes or gives nothing: then no later life of the server knows of it.
+
     Parameters
     ----------
     path : Path
         Database file; made if it does not exist.
     kept : int
         How many of them.
+    tell : Callable[[sqlite3.Error], object]
+        Told when the file refuses for the first time.
     """
 
-    def __init__(self, path: Path, kept: int = _KEPT) -> None:
+    def __init__(self, path: Path, kept: int = _KEPT, tell: Callable[[sqlite3.Error], object] = repr) -> None:
         self._kept = kept
+        self._tell = tell
+        self._is_told = False
         self._lock = threading.Lock()
         self._database = sqlite3.connect(path, check_same_thread=False, isolation_level=None)
         self._database.executescript("""
@@ -56,40 +62,53 @@ class RequestTable:
 
     def find(self, key: str) -> Obeyed | None:
         """What is known of a key."""
-        with self._lock:
-            row = self._database.execute("SELECT what, answer FROM request WHERE key = ?", (key,)).fetchone()
-        if row is None:
-            return None
-        what, answer = row
-        return Obeyed(what, answer is not None, None if answer is None else json.loads(answer))
+        found = self._ask("SELECT what, answer FROM request WHERE key = ?", key)
+        return _obeyed(*found[0]) if found else None
 
     def begin(self, key: str, what: str) -> None:
         """A request is about to be obeyed; the oldest of too many is forgotten."""
-        with self._lock, self._database:
-            self._database.execute("INSERT OR REPLACE INTO request (key, what) VALUES (?, ?)", (key, what))
-            self._database.execute(
-                "DELETE FROM request WHERE number <= (SELECT MAX(number) FROM request) - ?", (self._kept,)
-            )
+        self._ask("INSERT OR REPLACE INTO request (key, what) VALUES (?, ?)", key, what)
+        self._ask("DELETE FROM request WHERE number <= (SELECT MAX(number) FROM request) - ?", self._kept)
 
     def end(self, key: str, answer: Any) -> None:
         """It was obeyed; the answer is made of what JSON knows."""
-        with self._lock, self._database:
-            self._database.execute("UPDATE request SET answer = ? WHERE key = ?", (json.dumps(answer), key))
+        self._ask("UPDATE request SET answer = ? WHERE key = ?", json.dumps(answer), key)
 
     def drop(self, key: str) -> None:
         """It was refused, and may be asked for again."""
-        with self._lock, self._database:
-            self._database.execute("DELETE FROM request WHERE key = ?", (key,))
+        self._ask("DELETE FROM request WHERE key = ?", key)
+
+    def _ask(self, statement: str, *values: str | int) -> list[Any]:
+        """What the file answers; nothing where it refuses, which is told once."""
+        try:
+            with self._lock:
+                return self._database.execute(statement, values).fetchall()
+        except sqlite3.Error as error:
+            if not self._is_told:
+                self._is_told = True
+                self._tell(error)
+            return []
+
+
+def _obeyed(what: str, answer: str | None) -> Obeyed:
+    try:
+        return Obeyed(what, answer is not None, None if answer is None else json.loads(answer))
+    except ValueError:  # damaged
+        return Obeyed(what, False, None)
 
 
 @contextmanager
 def opened_requests(path: Path, events: EventPublisher, kept: int = _KEPT) -> Iterator[RequestTable]:
     """The table of a data directory until the block ends; one that cannot be read is set aside."""
+    lost = "a request that is repeated after a restart is obeyed again"
+
+    def refusing(error: sqlite3.Error) -> None:
+        tell(path, f"table of requests, {error}: {lost}", events)
+
     try:
-        table = RequestTable(path, kept)
+        table = RequestTable(path, kept, refusing)
     except sqlite3.Error as error:
-        lost = "a request that is repeated after a restart is obeyed again"
         set_aside(path, f"table of requests, {error}: {lost}", events, ("-wal", "-shm"))
-        table = RequestTable(path, kept)
+        table = RequestTable(path, kept, refusing)
     with closing(table):
         yield table

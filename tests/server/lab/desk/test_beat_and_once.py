@@ -33,6 +33,11 @@ def test_beats_of_another_life_of_the_server_are_old() -> None:
         after.require_fresh(before.number)
 
 
+def dying() -> str:
+    """As where the power fails."""
+    raise KeyboardInterrupt
+
+
 def failing(times: list[int]) -> Callable[[], int]:
     def act() -> int:
         times.append(1)
@@ -87,7 +92,8 @@ def test_a_key_is_known_after_a_restart_and_what_was_refused_may_be_asked_again(
         assert before.do("a", "jobs", lambda: ["job 1", "job 2"]) == ["job 1", "job 2"]
         with pytest.raises(Conflict, match="busy"):
             before.do("b", "run", failing([]))
-        table.begin("c", "run")  # and the power fails
+        with pytest.raises(KeyboardInterrupt):
+            before.do("c", "run", dying)
     with closing(RequestTable(tmp_path / "requests.sqlite")) as table:
         after = Once(table=table)
         assert after.do("a", "jobs", lambda: ["other"]) == ["job 1", "job 2"]
@@ -97,6 +103,55 @@ def test_a_key_is_known_after_a_restart_and_what_was_refused_may_be_asked_again(
         assert refusal.value.code == "outcome_unknown"
         with pytest.raises(Unprocessable, match="another request"):
             after.do("a", "run", lambda: "other")
+
+
+def test_a_table_that_takes_or_gives_nothing_stops_no_request_and_that_is_told_once(tmp_path: Path) -> None:
+    events, done = EventPublisher(), list[int]()
+
+    def act() -> str:
+        done.append(1)
+        return "run 1"
+
+    with opened_requests(tmp_path / "requests.sqlite", events) as table:
+        once = Once(table=table)
+        table._database.execute("PRAGMA query_only = ON")  # as on a disk that has become read-only
+        for _ in range(2):
+            assert once.do("a", "run", act) == "run 1"
+            with pytest.raises(Conflict, match="busy"):
+                once.do("b", "run", failing([]))
+        (told,) = events.since(0)
+        assert told.name == "file_damaged"
+        assert "is obeyed again" in str(told.data["reason"])
+        table._database.execute("PRAGMA query_only = OFF")
+        table._database.execute("DROP TABLE request")  # as where a page of the file is torn
+        assert once.do("c", "run", act) == "run 1"
+        assert len(events.since(0)) == 1
+    assert len(done) == 2
+
+
+def test_an_answer_that_cannot_be_read_any_more_is_unknown(tmp_path: Path) -> None:
+    with closing(RequestTable(tmp_path / "requests.sqlite")) as table:
+        Once(table=table).do("a", "run", lambda: "run 1")
+        table._database.execute("UPDATE request SET answer = substr(answer, 2)")
+        with pytest.raises(Conflict) as refusal:
+            Once(table=table).do("a", "run", lambda: "twice")
+    assert refusal.value.code == "outcome_unknown"
+
+
+def test_what_is_remembered_of_a_request_is_small_however_long_it_is_and_however_often_it_comes(tmp_path: Path) -> None:
+    path, long = tmp_path / "requests.sqlite", "run " + "x" * 900_000
+    with closing(RequestTable(path)) as table:
+        once = Once(table=table)
+        for key in "abc":
+            assert once.do(key, long, lambda: 1) == 1
+        assert sum(len(known[0]) for known in once._known.values()) < 1000
+    assert path.stat().st_size < 100_000
+    depths = []
+    for _ in range(5):
+        with pytest.raises(Conflict) as refusal:
+            once.do("d", "run", failing([]))
+        depths.append(len(refusal.traceback))
+    assert depths[1:] == depths[1:2] * 4
 
 
 def test_the_table_of_requests_is_bounded_and_a_damaged_one_is_set_aside(tmp_path: Path) -> None:
