@@ -6,7 +6,8 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from daq.files.atomic_file import replacing
+from daq.files.atomic_file import own_part_path, replacing
+from daq.files.storage import storing
 from daq.frozen_model import FrozenModel
 from daq.names import is_identifier
 from server.lab.errors import Damaged, NotFound
@@ -97,9 +98,18 @@ class CalibrationStore:
         return chosen if is_identifier(chosen) else None
 
     def choose(self, calibration_id: str) -> None:
-        """Make a calibration the current one; NotFound if there is none, Damaged if it cannot be read."""
+        """Make a calibration the current one.
+
+        Raises
+        ------
+        NotFound, Damaged
+            There is none, or it cannot be read.
+        StorageError
+            The disk takes no note of it.
+        """
         self.document(calibration_id)
-        with replacing(self._folder / _CURRENT) as part:
+        current = self._folder / _CURRENT
+        with storing(self._folder), replacing(current, own_part_path(current)) as part:
             part.write_text(calibration_id + "\n")
 
 

@@ -2,6 +2,7 @@
 
 import shutil
 from pathlib import Path
+from threading import Lock
 from typing import Annotated
 
 from pydantic import Field
@@ -16,6 +17,8 @@ from server.lab.runs.unkept_runs import UnkeptRuns
 
 REMOVED = "removed"
 """Folder of the data directory for runs whose files are being deleted; what a crash leaves there goes next time."""
+_REMOVING = Lock()
+"""Two who delete the same run, or empty that folder, would take it from each other."""
 
 
 class RemovedRun(FrozenModel):
@@ -50,6 +53,11 @@ def remove_run(runs: RunStore, unkept: UnkeptRuns, jobs: JobTable, run_id: str, 
     StorageError
         The disk refuses.
     """
+    with _REMOVING:
+        return _remove(runs, unkept, jobs, run_id, typed)
+
+
+def _remove(runs: RunStore, unkept: UnkeptRuns, jobs: JobTable, run_id: str, typed: str) -> RemovedRun:
     run_dir = runs.directory(run_id)
     if typed != run_id:
         raise Unprocessable(f"run {run_id} is deleted by whoever writes its name: {run_id!r}, not {typed!r}")
@@ -59,10 +67,10 @@ def remove_run(runs: RunStore, unkept: UnkeptRuns, jobs: JobTable, run_id: str, 
     referring = runs.referring_to(run_id)
     with hold_folder(run_dir):
         aside = _set_aside(run_dir)
-    unkept.keep(run_id)
-    jobs.forget(run_id)
+    shutil.rmtree(aside, ignore_errors=True)  # first: what is noted now needs room on a disk that may be full
     runs.forget(run_id)
-    shutil.rmtree(aside, ignore_errors=True)
+    jobs.forget(run_id)
+    unkept.keep(run_id)
     return RemovedRun(run_id=run_id, was_reference_of=referring)
 
 

@@ -58,7 +58,7 @@ def create_calibration(
     return context.jobs.get(job_id)
 
 
-@router.put("/current", responses=responses(404, 423, 500))
+@router.put("/current", responses=responses(404, 423, 500, 507))
 def choose_calibration(choice: CurrentCalibration, context: ContextOf, who: Who) -> CurrentCalibration:
     """Use this one for sample runs that name none; needs control of the rig."""
     use_calibration(context, who, choice.id)

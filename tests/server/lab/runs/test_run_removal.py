@@ -1,5 +1,8 @@
 """Deleting a run: by its name only, never under somebody's hands, and nothing of it is left."""
 
+import sqlite3
+from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -88,3 +91,22 @@ def test_a_damaged_run_can_be_deleted_and_what_a_crash_left_goes_too(house: Hous
     (house.data_dir / "removed" / "older").mkdir(parents=True)
     house.remove()
     assert not (house.data_dir / "removed").exists()
+
+
+def test_of_several_who_delete_a_run_at_once_one_does_and_the_others_find_none(house: House) -> None:
+    def remove(_: int) -> type[Exception] | None:
+        try:
+            house.remove()
+        except (NotFound, OSError) as error:
+            return type(error)
+        return None
+
+    with ThreadPoolExecutor(8) as threads:
+        assert Counter(threads.map(remove, range(8))) == {None: 1, NotFound: 7}
+
+
+def test_the_files_of_a_run_are_gone_although_the_disk_takes_no_note_of_it(house: House) -> None:
+    house.jobs._database.execute("PRAGMA query_only = ON")
+    with pytest.raises(sqlite3.OperationalError):
+        house.remove()
+    assert not list(house.data_dir.rglob(f"*{NAME}*"))
