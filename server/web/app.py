@@ -58,7 +58,7 @@ from server.web.api import (
     timing,
 )
 from server.web.api.desk import alarms, beat, control, readiness
-from server.web.api.parameters import forbid_unknown_query
+from server.web.api.parameters import forbid_half_characters, forbid_unknown_query
 from server.web.api.results import droplets, results, statistics, volume_parts
 from server.web.body_limit import BodyLimit
 from server.web.door import Door
@@ -89,6 +89,7 @@ _RESOURCES = (
     control,
     timing,
 )
+_REFUSING = [Depends(forbid_unknown_query), Depends(forbid_half_characters)]
 _METHODS = ["GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"]
 _SHUTDOWN_S = 3
 _DUTIES = ("processing", "automatic reconstruction", "lamps", "state of the rig", "live view")
@@ -122,7 +123,7 @@ def create_api(services: Services, abort_port: socket.socket | None = None) -> F
     )
     problems.install(app)
     for resource in _RESOURCES:
-        app.include_router(resource.router, dependencies=[Depends(forbid_unknown_query)])
+        app.include_router(resource.router, dependencies=_REFUSING)
     app.include_router(live.router)
     app.include_router(beat.router)
     app.include_router(sign_in.router)

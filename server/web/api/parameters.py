@@ -1,5 +1,8 @@
 """What handlers take: the context of the application, and identifiers that are safe as names of files."""
 
+import json
+import re
+from contextlib import suppress
 from typing import Annotated
 
 from fastapi import Depends, Header, Path, Request
@@ -14,6 +17,9 @@ from server.lab.starting.light_request import LightRequest
 from server.web.abort_listener import AbortListener
 from server.web.door import Door
 from server.web.guard import visitor_of
+
+_HALF_CHARACTER = re.compile(rb"\\u[dD][89a-fA-F]")
+"""Where a JSON text may have one: it writes a character beyond the first 65,536 as two."""
 
 
 def context_of(connection: HTTPConnection) -> Context:
@@ -40,6 +46,23 @@ def forbid_unknown_query(request: Request) -> None:
                 for name in unknown
             ]
         )
+
+
+async def forbid_half_characters(request: Request) -> None:
+    """Refuse a text that JSON can write, and that no file, answer or event can take."""
+    route = request.scope["route"]
+    if route.body_field is None or not _HALF_CHARACTER.search(await request.body()):
+        return  # ABORT waits for no body
+    with suppress(ValueError, RecursionError):  # it is refused for that
+        _require_whole_characters(await request.json())
+
+
+def _require_whole_characters(body: object) -> None:
+    try:
+        json.dumps(body, ensure_ascii=False).encode()
+    except UnicodeEncodeError as error:
+        problem = f"holds half a character, {error.object[error.start]!a}: write whole ones"
+        raise RequestValidationError([{"loc": ("body",), "msg": problem, "type": "string_unicode"}]) from error
 
 
 def door_of(connection: HTTPConnection) -> Door:

@@ -1,5 +1,6 @@
 """An id names one file in one folder, wherever it is written: path, query or body."""
 
+import json
 from typing import Any
 
 import pytest
@@ -43,3 +44,35 @@ def test_results_are_named_alike_by_server_and_command_line(server: Serving) -> 
     server.run_to_its_end(plan_of(shots=1))
     (job,) = wait_for_jobs(server, 1)
     assert job["results_id"] == ReconstructionSettings().results_id("cal")
+
+
+HALF = "\ud800"
+"""Of a character: JSON can write it, and no file, answer or event can."""
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "body"),
+    [
+        ("POST", "/api/runs", plan_of(notes={"remark": HALF})),
+        ("POST", "/api/runs", plan_of(notes={"more": {"a": HALF}})),
+        ("POST", "/api/runs", plan_of(references=[HALF])),
+        ("POST", "/api/rig/shot", {"pulse": {"current_a": {"view1": 5}}, "references": [HALF]}),
+        ("POST", "/api/bench/faults", {"kind": "killed", "view": HALF}),
+    ],
+)
+def test_half_a_character_is_refused_in_every_body(
+    server: Serving, method: str, path: str, body: dict[str, Any]
+) -> None:
+    headers = {"Content-Type": "application/json"}
+    answer = server.http.request(method, path, content=json.dumps(body), headers=headers)
+    assert answer.status_code == 422, answer.text
+    assert "half a character" in answer.json()["detail"]
+    whole = json.dumps(body).replace("ud800", "ud83d\\ude00")
+    assert "half a character" not in server.http.request(method, path, content=whole, headers=headers).text
+
+
+@pytest.mark.parametrize("text", ["\\ud800", "[" * 5000 + '"\\ud800"' + "]" * 5000, '{"\\ud800'])
+def test_abort_takes_no_notice_of_a_body(server: Serving, text: str) -> None:
+    for headers in ({}, {"Content-Type": "application/json"}):
+        assert server.http.post("/api/rig/abort", content=text, headers=headers).status_code == 202
+        assert server.http.post("/api/runs", content=text, headers=headers).status_code in (400, 422)
