@@ -20,6 +20,7 @@ from starlette.routing import Route
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from daq.errors import DaqError
+from server.web.connections import welcome
 from server.web.guard import is_ours, site_of
 from server.web.problems import MEDIA_TYPE
 
@@ -54,6 +55,7 @@ class AbortListener:
         config = uvicorn.Config(
             app,
             http=_OneRequest,
+            ws="none",
             headers=[("Connection", "close")],
             lifespan="off",
             log_config=None,
@@ -81,7 +83,8 @@ class AbortListener:
         return int(self._held.getsockname()[1])
 
     def admit(self, page: str) -> None:
-        """A page of this server has this host and port: it may ask from now on. The oldest of many is forgotten."""
+        """A page of this server has this host and port: it may ask from now on. Of many the first one is forgotten."""
+        self._origins.pop(page.lower(), None)
         self._origins[page.lower()] = None
         for oldest in list(self._origins)[:-_MOST_ORIGINS]:
             self._origins.pop(oldest, None)
@@ -109,11 +112,7 @@ class _OneRequest(H11Protocol):
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]  # as uvicorn has it
         super().connection_made(transport)
-        self.loop.call_later(REQUEST_S, self._close_without_request)
-
-    def _close_without_request(self) -> None:
-        if self.cycle is None:
-            self.transport.close()
+        welcome(self, REQUEST_S)
 
 
 def _problem(status: int, detail: str) -> Response:

@@ -61,6 +61,7 @@ from server.web.api.desk import alarms, beat, control, readiness
 from server.web.api.parameters import forbid_half_characters, forbid_unknown_query
 from server.web.api.results import droplets, results, statistics, volume_parts
 from server.web.body_limit import BodyLimit
+from server.web.connections import config_of
 from server.web.door import Door
 from server.web.guard import Guard
 from server.web.keys import Keys
@@ -91,7 +92,6 @@ _RESOURCES = (
 )
 _REFUSING = [Depends(forbid_unknown_query), Depends(forbid_half_characters)]
 _METHODS = ["GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"]
-_SHUTDOWN_S = 3
 _DUTIES = ("processing", "automatic reconstruction", "lamps", "state of the rig", "live view")
 
 
@@ -119,7 +119,7 @@ def create_api(services: Services, abort_port: socket.socket | None = None) -> F
         docs_url=None,
         redoc_url=None,
         lifespan=lambda app: _life(app, services, abort_port),
-        responses=problems.responses(400, 401, 403, 413, 422, 429),
+        responses=problems.responses(400, 401, 403, 408, 413, 422, 429),
     )
     problems.install(app)
     for resource in _RESOURCES:
@@ -173,14 +173,7 @@ def serve(app: FastAPI, listener: socket.socket, leave: Callable[[str], None]) -
     DaqError
         The application did not start; the log says why.
     """
-    config = uvicorn.Config(
-        app,
-        timeout_graceful_shutdown=_SHUTDOWN_S,
-        access_log=False,
-        log_level="warning",
-        ws_per_message_deflate=False,  # pictures are compressed already: it would double what a live view costs
-    )
-    server = _Server(config, leave)
+    server = _Server(config_of(app), leave)
     # The server passes a signal on once it has ended. By default SIGTERM would then kill the process before the caller
     # has switched off the light and closed the devices.
     previous = signal.signal(signal.SIGTERM, signal.default_int_handler)

@@ -198,6 +198,7 @@ def session_cookie(session_id: str, headers: Headers, is_secure: bool) -> str:
     """The header that gives a browser its session; an empty one ends it."""
     age_s = _SESSION_AGE_S if session_id else 0
     kept = f"{_cookie_name(headers)}={session_id}; Path=/; Max-Age={age_s}; HttpOnly; SameSite=Strict"
+    is_secure = is_secure or headers.get("x-forwarded-proto") == "https"  # it harms nobody but who says so
     return f"{kept}; Secure" if is_secure else kept
 
 

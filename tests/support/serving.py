@@ -26,6 +26,7 @@ from server.lab.services import Services
 from server.pictures.previews import make_preview, preview_path, save_preview
 from server.web.abort_listener import AbortListener
 from server.web.app import create_api
+from server.web.connections import config_of
 from tests.support.memory_rig import VIEWS, memory_config, served_rig
 
 DEADLINE_S = 60.0
@@ -170,7 +171,7 @@ def serving(
 def listening(app: FastAPI) -> Iterator[int]:
     """Serve an application at a free port of the loopback interface."""
     started = threading.Event()
-    server = _Server(uvicorn.Config(app, port=0, log_level="error", timeout_graceful_shutdown=1), started)
+    server = _Server(config_of(app, port=0, log_level="error", timeout_graceful_shutdown=1), started)
     thread = threading.Thread(target=server.run)
     thread.start()
     try:

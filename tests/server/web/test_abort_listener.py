@@ -154,3 +154,10 @@ def ends(connection: socket.socket) -> bool:
     except TimeoutError:
         return False
     return True
+
+
+def test_of_many_pages_those_that_were_opened_last_may_ask(server: Serving, listener: AbortListener) -> None:
+    for number in (*range(1, 65), 1, 65):
+        listener.admit(f"127.0.0.1:{number}")
+    assert abort(listener, Origin="http://127.0.0.1:1").status_code == 200
+    assert abort(listener, Origin="http://127.0.0.1:2").status_code == 403

@@ -1,0 +1,79 @@
+"""Who asks for nothing, or slowly, or says that he is somebody else, holds nobody up."""
+
+import socket
+from collections.abc import Iterator
+from pathlib import Path
+
+import httpx
+import pytest
+from websockets.sync.client import connect
+
+from server.web import abort_listener, body_limit, connections
+from server.web.tries import MOST
+from tests.support.serving import Serving, serving
+
+LIMIT_S = 60.0
+
+
+@pytest.fixture
+def hasty(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Serving]:
+    """A server that waits for nobody."""
+    for module, name in ((connections, "REQUEST_S"), (abort_listener, "REQUEST_S"), (body_limit, "BODY_S")):
+        monkeypatch.setattr(module, name, 0.5)
+    with serving(tmp_path / "runs") as server:
+        yield server
+
+
+def connected(port: int) -> socket.socket:
+    connection = socket.create_connection(("127.0.0.1", port), LIMIT_S)
+    connection.settimeout(LIMIT_S)
+    return connection
+
+
+@pytest.mark.parametrize("begun", [b"", b"POST /api/rig/abort HTTP/1.1\r\nHost: local"])
+def test_a_connection_that_asks_for_nothing_is_closed(hasty: Serving, begun: bytes) -> None:
+    for port in (hasty.port, hasty.abort_listener.port):
+        with connected(port) as connection:
+            connection.sendall(begun)
+            assert connection.recv(100) == b""
+
+
+def test_a_socket_stays_open(hasty: Serving) -> None:
+    with connect(f"ws://127.0.0.1:{hasty.port}/api/beat") as beats:
+        for _ in range(4):  # a second
+            beats.recv(LIMIT_S)
+
+
+def test_a_body_that_does_not_come_is_not_waited_for(hasty: Serving) -> None:
+    with connected(hasty.port) as connection:
+        head = f"POST /api/runs HTTP/1.1\r\nHost: 127.0.0.1:{hasty.port}\r\nContent-Type: application/json"
+        connection.sendall(f"{head}\r\nContent-Length: 1000\r\n\r\n{{".encode())
+        answer = b"".join(iter(lambda: connection.recv(10_000), b""))
+    assert answer.startswith(b"HTTP/1.1 408 ")
+    assert b"did not come" in answer
+
+
+@pytest.mark.parametrize("port_of", [lambda server: server.port, lambda server: server.abort_listener.port])
+def test_however_many_ask_for_nothing_the_next_one_is_heard(server: Serving, port_of: object) -> None:
+    assert callable(port_of)
+    port = port_of(server)
+    idle = [connected(port) for _ in range(connections.MOST + 20)]
+    try:
+        path = "/api/rig" if port == server.port else "/abort"
+        answer = httpx.request("GET" if port == server.port else "POST", f"http://127.0.0.1:{port}{path}", timeout=60)
+        assert answer.status_code == 200, answer.text
+        assert idle[0].recv(100) == b""
+        assert server.http.get("/api/rig").status_code == 200
+    finally:
+        for connection in idle:
+            connection.close()
+
+
+def test_nobody_who_says_that_he_comes_from_elsewhere_may_try_more_tokens(tmp_path: Path) -> None:
+    with serving(tmp_path / "runs", token="correct horse") as server:
+        for number in range(MOST):
+            headers = {"X-Forwarded-For": f"10.0.0.{number}"}
+            assert server.http.post("/sign-in", data={"token": "wrong"}, headers=headers).status_code == 401
+        assert (
+            server.http.post("/sign-in", data={"token": "wrong"}, headers={"X-Forwarded-For": "::1"}).status_code == 429
+        )
