@@ -13,6 +13,7 @@ from server.lab.live_view.live_feed import ExposureName, LiveCaption
 from server.lab.starting.command import tell_deed
 from server.lab.starting.light_request import obey
 from server.pictures.pictures import Stretch, frame_png, square_at
+from server.web.api.at_once import at_once
 from server.web.api.parameters import AsksForLight, ContextOf, Who
 from server.web.problems import responses
 
@@ -46,11 +47,11 @@ def start_live(plan: LivePlan, context: ContextOf, asked: AsksForLight) -> LiveV
 
 
 @router.delete("", status_code=202)
-def end_live(context: ContextOf, who: Who) -> LiveView:
+async def end_live(context: ContextOf, who: Who) -> LiveView:
     """End the live view after the shot under way; nobody needs control, and without one there is nothing to do."""
-    context.services.acquisition.end_live()
+    await at_once(context.services.acquisition.end_live)
     tell_deed(context, who, "ended the live view")
-    return show_live(context)
+    return await at_once(lambda: show_live(context))
 
 
 @router.get(

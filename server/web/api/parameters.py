@@ -1,4 +1,7 @@
-"""What handlers take: the context of the application, and identifiers that are safe as names of files."""
+"""What handlers take: the context of the application, and identifiers that are safe as names of files.
+
+All of them are coroutines: FastAPI lets functions wait for a thread.
+"""
 
 import json
 import re
@@ -22,19 +25,19 @@ _HALF_CHARACTER = re.compile(rb"\\u[dD][89a-fA-F]")
 """Where a JSON text may have one: it writes a character beyond the first 65,536 as two."""
 
 
-def context_of(connection: HTTPConnection) -> Context:
+async def context_of(connection: HTTPConnection) -> Context:
     """Return what the application built at start-up."""
     context: Context = connection.app.state.context
     return context
 
 
-def abort_port_of(connection: HTTPConnection) -> int:
+async def abort_port_of(connection: HTTPConnection) -> int:
     """Return where ABORT alone is listened for."""
     listener: AbortListener = connection.app.state.abort_listener
     return listener.port
 
 
-def forbid_unknown_query(request: Request) -> None:
+async def forbid_unknown_query(request: Request) -> None:
     """Refuse a misspelt query parameter instead of ignoring it."""
     route = request.scope["route"]
     assert isinstance(route, APIRoute)  # noqa: S101 - only routes of this API have this dependency
@@ -65,13 +68,13 @@ def _require_whole_characters(body: object) -> None:
         raise RequestValidationError([{"loc": ("body",), "msg": problem, "type": "string_unicode"}]) from error
 
 
-def door_of(connection: HTTPConnection) -> Door:
+async def door_of(connection: HTTPConnection) -> Door:
     """Return what decides who comes in."""
     door: Door = connection.app.state.door
     return door
 
 
-def who_of(
+async def who_of(
     connection: HTTPConnection,
     tomoshadow_operator: Annotated[
         str | None,
@@ -89,7 +92,7 @@ IdempotencyKey = Annotated[
 ]
 
 
-def light_request(
+async def light_request(
     who: Annotated[Visitor, Depends(who_of)],
     idempotency_key: IdempotencyKey = None,
     tomoshadow_beat: Annotated[

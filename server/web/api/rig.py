@@ -12,6 +12,7 @@ from server.lab.runs.run_summary import RunCause
 from server.lab.starting.abort import abort_all
 from server.lab.starting.command import tell_deed
 from server.lab.watch import CalibrationStanding
+from server.web.api.at_once import at_once
 from server.web.api.parameters import AbortPort, ContextOf, Who
 from server.web.problems import responses
 
@@ -77,9 +78,9 @@ async def show_configuration(context: ContextOf) -> dict[str, Any]:
 
 
 @router.post("/abort", status_code=202, responses=responses(503, 504))
-def abort_everything(context: ContextOf, who: Who) -> AcquisitionView:
+async def abort_everything(context: ContextOf, who: Who) -> AcquisitionView:
     """Light off at once, whatever runs, and if nothing does. Its own port answers while the server is busy."""
-    abort_all(context.services)
+    await at_once(lambda: abort_all(context.services))
     tell_deed(context, who, "pressed ABORT")
     return view_of_acquisition(context)
 

@@ -14,6 +14,7 @@ from server.lab.runs.thumbnail import thumbnail_of
 from server.lab.starting.command import command, tell_deed
 from server.lab.starting.light_request import obey
 from server.lab.starting.run_start import start_run
+from server.web.api.at_once import at_once
 from server.web.api.parameters import AsksForLight, ContextOf, RunId, Who
 from server.web.api.rig import AcquisitionView, view_of_acquisition
 from server.web.problems import responses
@@ -90,19 +91,19 @@ def delete_run(
 
 
 @router.post("/{run_id}/stop", status_code=202, responses=responses(409))
-def stop_run(run_id: RunId, context: ContextOf, who: Who) -> AcquisitionView:
+async def stop_run(run_id: RunId, context: ContextOf, who: Who) -> AcquisitionView:
     """End the run after the present shot; nobody needs control for that."""
     _require_active(run_id, context)
-    context.services.acquisition.stop()
+    await at_once(context.services.acquisition.stop)
     tell_deed(context, who, f"stopped run {run_id}")
     return view_of_acquisition(context)
 
 
 @router.post("/{run_id}/abort", status_code=202, responses=responses(409, 503, 504))
-def abort_run(run_id: RunId, context: ContextOf, who: Who) -> AcquisitionView:
+async def abort_run(run_id: RunId, context: ContextOf, who: Who) -> AcquisitionView:
     """End the run now: light off first; nobody needs control for that."""
     _require_active(run_id, context)
-    context.services.acquisition.abort()
+    await at_once(context.services.acquisition.abort)
     tell_deed(context, who, f"aborted run {run_id}")
     return view_of_acquisition(context)
 

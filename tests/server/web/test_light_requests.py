@@ -1,11 +1,14 @@
 """What makes light carries a key and the last beat: obeyed once, and now or never."""
 
+import threading
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import httpx
 import pytest
 from websockets.sync.client import connect
 
+from tests.support.server_process import eventually
 from tests.support.serving import Serving, plan_of
 
 SHOT = {"pulse": {"current_a": {"view1": 5, "view2": 5}}}
@@ -55,3 +58,31 @@ def test_what_is_asked_for_twice_with_one_key_is_done_once(server: Serving, what
     assert (other.status_code, other.json()["code"]) == (422, "key_reused")
     assert ask(server, what, **{"Idempotency-Key": "two"}).headers["location"] != first.headers["location"]
     server.wait()
+
+
+ENDS_LIGHT = (
+    ("POST", "/api/rig/abort"),
+    ("POST", "{run}/abort"),
+    ("POST", "{run}/stop"),
+    ("DELETE", "/api/rig/live"),
+)
+
+
+@pytest.mark.parametrize(("method", "path"), ENDS_LIGHT)
+def test_what_ends_the_light_waits_for_no_other_request(server: Serving, method: str, path: str) -> None:
+    run = server.http.post("/api/runs", json=plan_of(shots=1000)).headers["location"]
+    index_lock = server.app.state.context.runs._index._lock
+    with ThreadPoolExecutor(60) as others, index_lock:  # as a disk that does not answer
+        for _ in range(60):
+            others.submit(httpx.get, f"http://127.0.0.1:{server.port}/api/runs", timeout=60)
+        eventually(lambda: _waiting() >= 40, "all threads wait for the disk")
+        try:
+            answer = server.http.request(method, path.format(run=run), timeout=20)
+        finally:
+            server.services.acquisition.abort()
+    server.wait()
+    assert answer.status_code == 202, answer.text
+
+
+def _waiting() -> int:
+    return sum(thread.name.startswith("AnyIO worker") for thread in threading.enumerate())

@@ -4,7 +4,6 @@ import time
 from collections.abc import Callable, Sequence
 
 from nicegui import ui
-from starlette.concurrency import run_in_threadpool
 
 from daq.errors import DaqError
 from daq.run.events import RunStatus
@@ -14,6 +13,7 @@ from server.lab.duty import Health, Lamp
 from server.lab.errors import ServerError
 from server.lab.services import Context
 from server.lab.starting.command import tell_deed
+from server.web.api.at_once import at_once
 from server.web.ui.run.shot_strip import ShotStrip
 from server.web.ui.theme import panel
 from server.web.ui.visiting import require_operator, told
@@ -67,10 +67,10 @@ class RunPanel:
         await self._command(self._acquisition.acknowledge, "acknowledged a fault")
 
     async def _command(self, command: Callable[[], None], deed: str) -> None:
-        """Give a command to acquisition in a thread of the pool that is kept for requests, and say if it failed."""
+        """Give a command to acquisition, and say if it failed."""
         try:
             who = require_operator()
-            await run_in_threadpool(command)
+            await at_once(command)
             tell_deed(self._context, who, deed)
         except (DaqError, ServerError) as error:
             ui.notify(told(error), type="negative")
