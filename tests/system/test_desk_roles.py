@@ -42,6 +42,16 @@ def test_a_viewer_looks_and_aborts_and_signs_out(page: Page, server: Serving) ->
     expect(page.get_by_role("button", name="Sign in")).to_be_visible()
 
 
+def test_a_viewer_sees_the_light_of_the_next_run_and_does_not_change_it(page: Page, server: Serving) -> None:
+    sign_in(page, server, "eve", "look")
+    expect(page.get_by_role("combobox", name="Template")).to_have_count(0)  # a locked one is none
+    page.goto(f"{server.http.base_url}/live")
+    for name in ("Pulse width / ns", "Separation / ns", "LED view1 / A"):
+        expect(page.get_by_label(name)).to_be_disabled()
+    expect(page.get_by_role("button", name="Set to half range")).to_be_disabled()
+    page.context.request.post(f"{server.http.base_url}/sign-out", max_redirects=0)
+
+
 def test_a_session_that_is_ended_elsewhere_closes_its_page(page: Page, server: Serving) -> None:
     sign_in(page, server, "ann", "operate")
     expect(page.get_by_role("button", name="control: free")).to_be_visible()

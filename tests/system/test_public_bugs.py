@@ -219,7 +219,7 @@ def shown(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Serving, C
     with serving(tmp_path_factory.mktemp("page") / "runs", build=build) as server:
         live = {"rate_hz": 10, "pulse": {"current_a": dict.fromkeys(server.services.config.views, 5)}}
         assert server.http.put("/api/rig/live", json=live).is_success
-        yield server, lambda: apps[0].state.context.live._readers
+        yield server, lambda: len(apps[0].state.context.live._readers)
 
 
 def shot_shown(page: Page) -> int:

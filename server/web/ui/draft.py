@@ -1,7 +1,7 @@
 """Draft: the run form as the operator left it, one for all tabs, kept by the server: no reload or restart loses it."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -76,9 +76,18 @@ class DraftStore:
         Of the rig.
     events : EventPublisher
         Told of a damaged file.
+    may_change : Callable[[], bool]
+        Asked before every change whether he may who asks for it: pages lock what he may not, and sockets do not.
     """
 
-    def __init__(self, path: Path, config: RigConfig, events: EventPublisher) -> None:
+    def __init__(
+        self,
+        path: Path,
+        config: RigConfig,
+        events: EventPublisher,
+        may_change: Callable[[], bool] = lambda: True,
+    ) -> None:
+        self._may_change = may_change
         self._path = path
         self._events = events
         self.values = first_draft(config) | self._stored()
@@ -88,7 +97,12 @@ class DraftStore:
         """Grows with every change, so that other tabs see that there was one."""
 
     def set(self, name: str, value: Any) -> None:
-        """Remember a value of the form; what another program has changed meanwhile stays as it is in the file."""
+        """Remember a value of the form, from whoever may change it.
+
+        What another program has changed meanwhile stays as it is in the file.
+        """
+        if not self._may_change():
+            return
         self.values[name] = value
         self.version += 1
         part = self._path.with_suffix(".part")

@@ -28,7 +28,7 @@ from server.web.ui.run.run_page import RunPage
 from server.web.ui.runs.one_run_page import OneRunPage
 from server.web.ui.runs.runs_page import RunsPage
 from server.web.ui.theme import panel
-from server.web.ui.visiting import is_signed_in
+from server.web.ui.visiting import is_signed_in, may_command
 
 _REFRESH_S = 0.25
 _LISTS_CHANGED = {"run_state", "job_changed", "calibration_chosen", "deed"}
@@ -78,7 +78,7 @@ class _Drafts:
         """The draft of this rig."""
         if self._draft is None:
             path, config = context.services.data_dir / "draft.json", context.services.config
-            self._draft = DraftStore(path, config, context.services.events)
+            self._draft = DraftStore(path, config, context.services.events, partial(may_command, context))
         return self._draft
 
 

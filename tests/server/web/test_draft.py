@@ -132,3 +132,12 @@ def test_what_no_device_knows_is_part_of_the_plan(tmp_path: Path) -> None:
     values = DraftStore(tmp_path / "draft.json", memory_config(tmp_path / "runs"), EventPublisher()).values
     notes = plan_of(values | {"operator": "ann", "fluid": None, "pressure_bar": 40}).notes
     assert (notes.operator, notes.fluid, notes.pressure_bar) == ("ann", "", 40)
+
+
+def test_whoever_may_not_change_the_form_changes_nothing_by_any_door(tmp_path: Path) -> None:
+    config, path = memory_config(tmp_path / "runs"), tmp_path / "draft.json"
+    draft = DraftStore(path, config, EventPublisher(), may_change=lambda: False)
+    draft.set("shots", 77)
+    draft.adopt({"rate_hz": "9", "current_a:view1": "12"})
+    assert (draft.values, draft.version) == (first_draft(config), 0)
+    assert not path.exists()
