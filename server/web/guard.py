@@ -36,6 +36,8 @@ _POLICY = (
     "connect-src 'self' data: blob: {own}; "
     "base-uri 'self'; form-action 'self'; frame-ancestors 'none'; object-src 'none'"
 )
+_ELSEWHERE = ("cross-site", "same-site")
+"""Where a browser says that a page comes from whose picture this would be: such requests name no ``Origin``."""
 _POLICY_VIOLATION = 1008  # RFC 6455, section 7.4.1
 _LOOKING = ("GET", "HEAD", "OPTIONS")
 _OF_VIEWERS = re.compile(r"/api/rig/(abort|readiness)|/api/runs/[^/]+/abort")
@@ -100,6 +102,8 @@ class Guard:
             return _refuse(scope, 403, f"host {host!r} is not a name of this server")
         if origin is not None and site_of(origin) != host.lower():
             return _refuse(scope, 403, f"origin {origin!r} is not this server, {host!r}")
+        if headers.get("sec-fetch-site") in _ELSEWHERE and headers.get("sec-fetch-mode") != "navigate":
+            return _refuse(scope, 403, "a page of another server asks for this: open it by itself")
         return None
 
     def _wait(self, scope: Scope, headers: Headers) -> Response | None:

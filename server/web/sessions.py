@@ -38,7 +38,7 @@ class Sessions:
         """Let a browser in; without a name it gets a number."""
         with self._lock:
             self._begun += 1
-            named = name.strip()[:40] or f"{role} {self._begun} at {address}"
+            named = _readable(name) or f"{role} {self._begun} at {address}"
             visitor = Visitor(secrets.token_urlsafe(32), named, role)
             self._known[visitor.id] = _Session(visitor, self._now_s())
             for oldest in sorted(self._known, key=lambda one: self._known[one].seen_s)[:-_MOST]:
@@ -60,9 +60,9 @@ class Sessions:
     def rename(self, session_id: str, name: str) -> Visitor | None:
         """The operator says who he is."""
         visitor = self.find(session_id)
-        if visitor is None or not name.strip():
+        if visitor is None or not _readable(name):
             return visitor
-        visitor = replace(visitor, name=name.strip()[:40])
+        visitor = replace(visitor, name=_readable(name))
         with self._lock:
             self._known[session_id] = _Session(visitor, self._now_s())
         return visitor
@@ -71,3 +71,8 @@ class Sessions:
         """Sign out."""
         with self._lock:
             self._known.pop(session_id, None)
+
+
+def _readable(name: str) -> str:
+    """A name as others are told it: one line, without what hides or turns letters."""
+    return "".join(letter for letter in name if letter.isprintable()).strip()[:40]

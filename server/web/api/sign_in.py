@@ -6,7 +6,9 @@ from typing import Annotated
 from fastapi import APIRouter, Form, Request
 from fastapi.responses import HTMLResponse, RedirectResponse, Response
 
+from server.lab.services import Context
 from server.web.api.parameters import ContextOf, DoorOf
+from server.web.door import Door
 from server.web.guard import SIGN_IN_PATH, address_of, cookie_of, session_cookie
 
 router = APIRouter(include_in_schema=False)
@@ -51,6 +53,9 @@ async def sign_in(
     if role is None:
         door.tries.count(address)
         return _form("This is not the token.", 401)
+    if name.strip() == token:  # compared with no other token: that would tell who tries them
+        return _form("What you have written as your name is the token, and no name.", 401)
+    _end_session(request, door, context)
     visitor = door.sessions.begin(role, address, name)
     context.services.events.publish("deed", who=visitor.name, text=f"signed in as {role}")
     answer = RedirectResponse("/", 303)
@@ -61,13 +66,17 @@ async def sign_in(
 @router.post(SIGN_OUT_PATH)
 async def sign_out(request: Request, door: DoorOf, context: ContextOf) -> Response:
     """End the session, and the control that it holds."""
+    _end_session(request, door, context)
+    answer = RedirectResponse(SIGN_IN_PATH if door.keys.are_any else "/", 303)
+    answer.headers["Set-Cookie"] = session_cookie("", request.headers, request.url.scheme == "https")
+    return answer
+
+
+def _end_session(request: Request, door: Door, context: Context) -> None:
     if visitor := door.sessions.find(cookie_of(request.headers)):
         context.control.release(visitor)
         door.sessions.end(visitor.id)
         context.services.events.publish("deed", who=visitor.name, text="signed out")
-    answer = RedirectResponse(SIGN_IN_PATH if door.keys.are_any else "/", 303)
-    answer.headers["Set-Cookie"] = session_cookie("", request.headers, request.url.scheme == "https")
-    return answer
 
 
 def _form(message: str, status: int = 200, headers: dict[str, str] | None = None) -> HTMLResponse:

@@ -128,3 +128,30 @@ def test_host_names_can_be_added(tmp_path: Path) -> None:
     ):
         answer = httpx.get(f"http://127.0.0.1:{port}/api/rig", headers={"Host": "lab-pc"})
     assert answer.status_code == 200
+
+
+@pytest.mark.parametrize("site", ["cross-site", "same-site"])
+def test_what_another_page_embeds_is_refused_and_a_link_is_followed(server: Serving, site: str) -> None:
+    """Such a GET names no origin, and one of a volume makes work."""
+    embedded = {"Sec-Fetch-Site": site, "Sec-Fetch-Mode": "no-cors"}
+    assert server.http.get("/api/runs", headers=embedded).status_code == 403
+    assert server.http.get("/api/runs", headers={**embedded, "Sec-Fetch-Mode": "navigate"}).status_code == 200
+    for own in ("same-origin", "none"):
+        assert server.http.get("/api/runs", headers={**embedded, "Sec-Fetch-Site": own}).status_code == 200
+
+
+def test_who_signs_in_again_leaves_no_session_behind(guarded: Serving) -> None:
+    with httpx.Client(base_url=guarded.http.base_url) as browser:
+        cookies = [browser.post("/sign-in", data={"token": TOKEN}).headers["set-cookie"] for _ in range(2)]
+        browser.cookies.clear()
+        codes = [
+            browser.get("/api/rig", headers={"Cookie": cookie.partition(";")[0]}).status_code for cookie in cookies
+        ]
+    assert codes == [401, 200]
+
+
+def test_a_token_in_the_place_of_the_name_is_told_to_nobody(guarded: Serving) -> None:
+    answer = guarded.http.post("/sign-in", data={"token": TOKEN, "name": f" {TOKEN} "})
+    assert (answer.status_code, "set-cookie" in answer.headers) == (401, False)
+    assert "no name" in answer.text
+    assert TOKEN not in str([event.data for event in guarded.services.events.since(0)])

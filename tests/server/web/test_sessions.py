@@ -51,3 +51,12 @@ def test_twenty_wrong_tokens_in_a_minute_are_the_last_ones_of_an_address_for_a_w
     assert tries.wait_s("ann") == 0
     now_s[0] += WITHIN_S - MOST
     assert tries.wait_s("evil") == 0
+
+
+def test_a_name_is_one_line_and_reads_forwards() -> None:
+    sessions = Sessions()
+    told = sessions.begin(Role.OPERATOR, "127.0.0.1", "ann\n\x1b[31m\u202enna")
+    assert told.name == "ann[31mnna"
+    renamed = sessions.rename(told.id, "bob\r\n")
+    assert renamed is not None
+    assert renamed.name == "bob"
