@@ -16,6 +16,7 @@ import threading
 from collections.abc import Callable, Collection, Iterable, Mapping
 from datetime import UTC, datetime
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -23,6 +24,7 @@ from pydantic import Field, ValidationError
 
 from daq.frozen_model import FrozenModel
 from server.lab.errors import Conflict, NotFound
+from server.lab.table_file import changing
 from server.lab.work_progress import PROGRESS_QUERY, WorkProgress
 
 
@@ -153,6 +155,7 @@ class JobTable:
     def __init__(self, path: Path) -> None:
         self._lock = threading.Lock()
         self._database = sqlite3.connect(path, check_same_thread=False, isolation_level=None)
+        self._changing = partial(changing, self._database, self._lock, path)
         self._database.executescript("""
             PRAGMA journal_mode = WAL;
             PRAGMA synchronous = NORMAL;
@@ -174,7 +177,7 @@ class JobTable:
 
         ``is_lost`` tells of a done job whether it has to be done again, because what it made is gone.
         """
-        with self._lock, self._database:
+        with self._changing():
             known = self._find(job.id)
             if known is None:
                 self._insert(job)
@@ -193,7 +196,7 @@ class JobTable:
         Conflict
             That state does not follow its present one.
         """
-        with self._lock, self._database:
+        with self._changing():
             job = self._known(job_id)
             if to not in TRANSITIONS[job.state]:
                 raise Conflict(f"job {job_id} is {job.state}, it cannot become {to}")
@@ -232,7 +235,7 @@ class JobTable:
 
     def restore(self, jobs: Iterable[Job]) -> int:
         """Take in jobs that the table does not know; how many."""
-        with self._lock, self._database:
+        with self._changing():
             new = [job for job in jobs if self._find(job.id) is None]
             for job in new:
                 self._insert(job)
@@ -240,12 +243,12 @@ class JobTable:
 
     def forget(self, run_id: str) -> None:
         """Drop the jobs of a run that has been removed."""
-        with self._lock, self._database:
+        with self._changing():
             self._database.execute("DELETE FROM job WHERE run_id = ?", (run_id,))
 
     def set_strangers_aside(self) -> list[str]:
         """Take rows that are no jobs of this version out of queue and lists; their ids. They stay in the file."""
-        with self._lock, self._database:
+        with self._changing():
             rows = self._database.execute("SELECT id, document FROM job WHERE state <> ?", (_STRANGE,))
             strangers = [job_id for job_id, document in rows if not _is_job(document)]
             for job_id in strangers:

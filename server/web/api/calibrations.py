@@ -41,7 +41,7 @@ def list_calibrations(context: ContextOf) -> list[CalibrationSummary]:
     return context.calibrations.list()
 
 
-@router.post("", status_code=202, responses=responses(404, 409, 500))
+@router.post("", status_code=202, responses=responses(404, 409, 500, 507))
 def create_calibration(
     request: CalibrationRequest,
     context: ContextOf,

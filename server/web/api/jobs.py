@@ -60,7 +60,7 @@ def list_jobs(
     return context.jobs.newest(run_id, [state] if state else JobState, limit, [kind] if kind else JobKind)
 
 
-@router.post("", status_code=202, responses=responses(404, 409, 500))
+@router.post("", status_code=202, responses=responses(404, 409, 500, 507))
 def create_jobs(
     request: ReconstructionRequest, context: ContextOf, who: Who, idempotency_key: IdempotencyKey = None
 ) -> list[Job]:
@@ -72,7 +72,7 @@ def create_jobs(
     return _queued_once(context, who, idempotency_key, f"reconstruction {request.model_dump_json()}", queue)
 
 
-@router.post("/measurements", status_code=202, responses=responses(404, 409, 500))
+@router.post("/measurements", status_code=202, responses=responses(404, 409, 500, 507))
 def create_measurements(
     request: MeasurementRequest, context: ContextOf, who: Who, idempotency_key: IdempotencyKey = None
 ) -> list[Job]:
@@ -90,7 +90,7 @@ def show_job(job_id: JobId, context: ContextOf) -> Job:
     return context.jobs.get(job_id)
 
 
-@router.post("/{job_id}/abort", status_code=202, responses=responses(404, 409))
+@router.post("/{job_id}/abort", status_code=202, responses=responses(404, 409, 507))
 async def abort_job(job_id: JobId, context: ContextOf) -> Job:
     """A waiting job ends at once, a running one at its next step."""
     return await context.runner.abort(job_id)

@@ -1,12 +1,14 @@
 import sqlite3
 import threading
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from daq.errors import DiskFull, DiskReadOnly, StorageError
 from server.lab.errors import Conflict, NotFound
 from server.lab.jobs import (
     TRANSITIONS,
@@ -125,3 +127,12 @@ class _Reader(threading.Thread):
                 self.has_read.set()
         except sqlite3.ProgrammingError as error:
             self.ended_by = str(error)
+
+
+@pytest.mark.parametrize(("pragma", "kind"), [("query_only = ON", DiskReadOnly), ("max_page_count = 1", DiskFull)])
+def test_a_disk_that_takes_no_job_is_told(tmp_path: Path, pragma: str, kind: type[StorageError]) -> None:
+    with closing(JobTable(tmp_path / "jobs.sqlite")) as table:
+        table._database.execute(f"PRAGMA {pragma}")
+        jobs = [reconstruction_job("run", shot, "cal", "mlos-1", {}) for shot in range(1000)]
+        with pytest.raises(kind, match=r"jobs\.sqlite"):
+            table.restore(jobs)

@@ -1,13 +1,12 @@
 """Deleting a run: by its name only, never under somebody's hands, and nothing of it is left."""
 
-import sqlite3
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 
-from daq.errors import AlreadyHeld
+from daq.errors import AlreadyHeld, DiskReadOnly
 from daq.files.lock_file import hold_folder
 from daq.files.run_directory import PulsePair, RunHeader, RunPlan, RunWriter, ViewFormat
 from daq.run.events import RunStatus
@@ -107,6 +106,6 @@ def test_of_several_who_delete_a_run_at_once_one_does_and_the_others_find_none(h
 
 def test_the_files_of_a_run_are_gone_although_the_disk_takes_no_note_of_it(house: House) -> None:
     house.jobs._database.execute("PRAGMA query_only = ON")
-    with pytest.raises(sqlite3.OperationalError):
+    with pytest.raises(DiskReadOnly):
         house.remove()
     assert not list(house.data_dir.rglob(f"*{NAME}*"))
