@@ -7,7 +7,7 @@ from server.lab.events import EventPublisher
 
 
 def set_aside(path: Path, reason: str, events: EventPublisher, companions: tuple[str, ...] = ()) -> Path:
-    """Give a damaged file another name beside it; returns that name.
+    """Give a damaged file another name beside it; returns the name that it has then.
 
     Parameters
     ----------
@@ -20,11 +20,12 @@ def set_aside(path: Path, reason: str, events: EventPublisher, companions: tuple
     companions : tuple of str
         Endings of the names of files that belong to it.
     """
-    aside = _free_name(path)
-    for ending in ("", *companions):
-        whole = path.with_name(path.name + ending)
-        if whole.exists():
-            whole.rename(aside.with_name(aside.name + ending))
+    try:
+        aside = _free_name(path)
+        _rename(path, aside, ("", *companions))
+    except OSError as error:  # the disk is read-only, say: whoever asks goes on without the file
+        tell(path, f"{reason}; it cannot be set aside: {error}", events)
+        return path
     tell(path, f"{reason}; it is kept as {aside.name}", events)
     return aside
 
@@ -32,6 +33,13 @@ def set_aside(path: Path, reason: str, events: EventPublisher, companions: tuple
 def tell(path: Path, reason: str, events: EventPublisher) -> None:
     """Let the operator know of a damaged file."""
     events.publish("file_damaged", file=str(path), reason=reason)
+
+
+def _rename(path: Path, aside: Path, endings: tuple[str, ...]) -> None:
+    for ending in endings:
+        whole = path.with_name(path.name + ending)
+        if whole.exists():
+            whole.rename(aside.with_name(aside.name + ending))
 
 
 def _free_name(path: Path) -> Path:

@@ -141,3 +141,14 @@ def test_whoever_may_not_change_the_form_changes_nothing_by_any_door(tmp_path: P
     draft.adopt({"rate_hz": "9", "current_a:view1": "12"})
     assert (draft.values, draft.version) == (first_draft(config), 0)
     assert not path.exists()
+
+
+def test_a_damaged_draft_that_cannot_be_set_aside_is_told_and_stops_nobody(tmp_path: Path) -> None:
+    config, events = memory_config(tmp_path / "runs"), EventPublisher()
+    path = tmp_path / ("d" * 240)  # with more to its name no disk takes it; so does one that is read-only
+    path.write_text('{"shots": ')
+    assert DraftStore(path, config, events).values == first_draft(config)
+    (told,) = events.since(0)
+    assert told.name == "file_damaged"
+    assert "it cannot be set aside" in str(told.data["reason"])
+    assert path.is_file()
