@@ -65,7 +65,9 @@ def _within(shot: StoredDroplets) -> StoredDroplets:
     """The cone, moved into the grid of the volumes."""
     begin_mm = {"x_mm": 0.0, "y_mm": -2.5, "z_mm": 0.0}
     moved = {name: shot.columns[name].astype(float) / 4 + begin for name, begin in begin_mm.items()}
-    return StoredDroplets({**shot.columns, **moved}, shot.provenance, shot.objects)
+    searched = GridSettings.of(VoxelGrid.centred((71, 61, 71), 0.05))
+    provenance = {**shot.provenance, "run": OLD, "grid": searched.model_dump_json()}
+    return StoredDroplets({**shot.columns, **moved}, provenance, shot.objects)
 
 
 def url(server: Serving, path: str) -> str:

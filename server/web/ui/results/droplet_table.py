@@ -78,7 +78,7 @@ def droplet_rows(droplets: StoredDroplets) -> list[dict[str, Any]]:
 
 def _shown(name: str) -> str:
     """How the browser writes a value: as text it would sort 12 before 9."""
-    return f"value => value === null ? '{_UNKNOWN}' : {_SHOWN_AS.get(name, 'value.toFixed(3)')}"
+    return f"value => value == null ? '{_UNKNOWN}' : {_SHOWN_AS.get(name, 'value.toFixed(3)')}"
 
 
 def _number(value: float) -> float | None:
