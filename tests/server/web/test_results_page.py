@@ -72,7 +72,7 @@ def test_only_of_what_can_be_reconstructed_it_is_said_to_do_so() -> None:
 def test_droplets_are_numbers_that_can_be_sorted_and_an_unknown_one_is_none() -> None:
     columns = {"frame": np.array([b"a", b"b", b"a"]), "p_real": np.array([0.5, np.nan, 1.0])}
     columns |= {f"{axis}_mm": np.array([-5.58342, 1.5, 12.0]) for axis in "xyz"}
-    rows = droplet_rows(StoredDroplets({**columns, "diameter_um": np.array([99.14, 1234.5, np.nan])}, {}, None))
+    rows = droplet_rows(StoredDroplets({**columns, "diameter_um": np.array([99.14, 1234.5, np.nan])}, {}, {}))
     assert [(row["id"], row["diameter_um"], row["p_real"]) for row in rows] == [
         (1, 1234.5, None),
         (0, 99.14, 0.5),
