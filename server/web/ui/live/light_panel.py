@@ -96,7 +96,6 @@ class LightPanel:
             slider.props(f'dense aria-label="LED {view} current"').classes("flex-1 min-w-0")
             ui.label(f"max {limit_a:g} A").classes("text-xs opacity-70 whitespace-nowrap")
         self._numbers[view], self._sliders[view] = number, slider
-        self._fields += [number, slider]
 
     def _keep_current(self, view: str, value: float | None) -> None:
         self._sliders[view].set_value(value or 0.0)
