@@ -11,7 +11,6 @@ from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
-from threading import Lock
 
 from daq.devices import Camera, Device, DeviceIdentity, GeneratorState, Rig, TranslationStage
 from daq.errors import DaqError
@@ -68,7 +67,7 @@ class RigMonitor:
         self._laboratory = laboratory
         self._who: dict[str, DeviceIdentity] = {}
         self._watched = tuple(_Watched(name, kind, look, now_s) for name, kind, look in self._looks())
-        self._threads = ThreadPoolExecutor(len(self._watched), thread_name_prefix="lamp")
+        self._threads = {name: ThreadPoolExecutor(1, f"lamp {name}") for name, _, _ in self._looks()}
 
     @property
     def lamps(self) -> tuple[Lamp, ...]:
@@ -115,7 +114,7 @@ class RigMonitor:
             await pause(_PERIOD_S)
 
     async def _ask(self, watched: "_Watched") -> None:
-        await asyncio.get_running_loop().run_in_executor(self._threads, watched.ask)
+        await asyncio.get_running_loop().run_in_executor(self._threads[watched.name], watched.ask)
 
     def _looks(self) -> Iterator[tuple[str, str, Look]]:
         for view, camera in self._rig.cameras.items():
@@ -186,17 +185,15 @@ class _Watched:
         self._answer = (Health.WARN, "not asked yet")
         self._answered_s: float | None = None
         self._silence = ""
-        self._asking = Lock()
 
     def ask(self) -> None:
-        """Ask once; an error of any kind is a red lamp, and hides no other device."""
-        with self._asking:  # an operator asks too
-            try:
-                answer = self._look()
-            except Exception as error:  # noqa: BLE001  a driver's own mistake must not freeze the lamp
-                self._silence = told(error)
-            else:
-                self._answer, self._answered_s, self._silence = answer, self._now_s(), ""
+        """Ask once, in its own thread; an error of any kind is a red lamp, and hides no other device."""
+        try:
+            answer = self._look()
+        except Exception as error:  # noqa: BLE001  a driver's own mistake must not freeze the lamp
+            self._silence = told(error)
+        else:
+            self._answer, self._answered_s, self._silence = answer, self._now_s(), ""
 
     @property
     def lamp(self) -> Lamp:

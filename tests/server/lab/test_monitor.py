@@ -122,3 +122,21 @@ def test_an_error_that_no_driver_knows_is_a_red_lamp_and_hides_no_other(tmp_path
     lamps = lamps_of(memory, tmp_path / "gone")
     assert lamps["pulse generator"].detail == "ZeroDivisionError: division by zero"
     assert (lamps["disk"].health, lamps["view1"].health) == (Health.FAULT, Health.OK)
+
+
+def test_however_often_a_slow_device_is_asked_for_no_other_lamp_gets_old(tmp_path: Path) -> None:
+    memory, answers = MemoryRig(), threading.Event()
+    memory.cameras["view1"].ask = partial(answers.wait, 20)  # type: ignore[assignment, method-assign]
+    monitor = RigMonitor(memory.rig, tmp_path)
+
+    async def ask() -> None:
+        impatient = [asyncio.create_task(monitor.reconnect("view1")) for _ in range(20)]
+        await asyncio.sleep(0.1)
+        try:
+            await asyncio.wait_for(monitor.reconnect("interlock"), 15)
+        finally:
+            answers.set()
+            await asyncio.gather(*impatient)
+
+    asyncio.run(ask())
+    assert {lamp.name: lamp.health for lamp in monitor.lamps}["interlock"] is Health.OK
