@@ -61,6 +61,7 @@ class RunStore:
         self._status = status
         self._index = index or RunIndex()
         self._shots = _ShotKeys()
+        self._removed = set[str]()
 
     def directory(self, run_id: str) -> Path:
         """Directory of a run; NotFound if there is none."""
@@ -78,7 +79,8 @@ class RunStore:
     def summary(self, run_id: str) -> RunSummary:
         """What a run is and how it went, although its directory may be gone now; NotFound if there is none."""
         status = self._status()
-        if status.run_id == run_id and status.plan and not (self._data_dir / run_id / RUN_FILE).is_file():
+        is_lost = run_id not in self._removed and not (self._data_dir / run_id / RUN_FILE).is_file()
+        if status.run_id == run_id and status.plan and is_lost:
             return summary_of_absent(run_id, status, status.plan)
         return self._summary_of(self.directory(run_id))
 
@@ -133,6 +135,7 @@ class RunStore:
 
     def forget(self, run_id: str) -> None:
         """Drop what is remembered of a run that has been removed."""
+        self._removed.add(run_id)
         self._index.forget(run_id)
 
     def _is_wanted(self, run_dir: Path, wanted: RunFilter) -> bool:

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -109,3 +110,10 @@ def test_the_files_of_a_run_are_gone_although_the_disk_takes_no_note_of_it(house
     with pytest.raises(DiskReadOnly):
         house.remove()
     assert not list(house.data_dir.rglob(f"*{NAME}*"))
+
+
+def test_the_last_run_is_gone_too_once_it_is_deleted(house: House) -> None:
+    house.status = replace(house.status, run_id=NAME, plan=RunPlan(name="dark", shots=1, pulse=PulsePair(current_a={})))
+    house.remove()
+    with pytest.raises(NotFound):
+        house.runs.summary(NAME)
