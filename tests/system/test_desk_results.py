@@ -45,6 +45,13 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
         yield server
 
 
+@pytest.fixture(autouse=True)
+def at_rest(server: Serving) -> Iterator[None]:
+    """The browser of a test is another person than that of the next one."""
+    yield
+    server.free_control()
+
+
 @pytest.fixture(scope="module")
 def old_run(server: Serving) -> Path:
     """A run of January, reconstructed twice and measured by commands: no job of this server knows of it."""
@@ -336,6 +343,7 @@ def test_a_run_that_is_deleted_elsewhere_is_gone_from_every_open_page(page: Page
     doomed, _ = server.run_to_its_end(plan_of(kind="dark", name="doomed", shots=1, pulse=PULSE))
     page.goto(url(server, f"runs/{doomed}"))
     expect(page.get_by_role("button", name="Delete...")).to_be_visible()
+    page.wait_for_load_state("networkidle")  # its pictures are there
     server.http.delete(f"/api/runs/{doomed}", headers={"Tomoshadow-Name": doomed}).raise_for_status()
     expect(page.get_by_text(f"there is no run '{doomed}': it was deleted")).to_be_visible()
     expect(page.get_by_role("button", name="Delete...")).to_be_hidden()

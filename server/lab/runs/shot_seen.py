@@ -3,7 +3,7 @@
 from functools import lru_cache
 from pathlib import Path
 
-from daq.files.run_directory import RunReader, Shot
+from daq.files.run_directory import RunReader, Shot, ShotFileError
 from daq.files.run_file import shot_path
 from daq.run.shots.shot_check import check_exposures
 from server.lab.errors import NotFound
@@ -18,10 +18,19 @@ def shot_of(run: RunReader, index: int) -> Shot:
     Raises
     ------
     NotFound
-        The run has no such shot.
+        The run has no such shot, or was deleted meanwhile.
     ShotFileError
         It cannot be read.
     """
+    try:
+        return _shot(run, index)
+    except (ShotFileError, OSError) as error:
+        if run.run_dir.is_dir():
+            raise
+        raise NotFound(f"there is no run {run.run_dir.name!r}: it was deleted") from error
+
+
+def _shot(run: RunReader, index: int) -> Shot:
     if index >= run.shot_count:
         raise NotFound(f"run {run.run_dir.name} has {run.shot_count} shots, not {index}")
     path = shot_path(run.run_dir, index)
