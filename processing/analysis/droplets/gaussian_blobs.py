@@ -1,7 +1,7 @@
 """The images of a shot as a sum of Gaussian blobs, and the fit of blobs to images by coordinate descent."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -181,11 +181,6 @@ class BlobImages:
         _native.draw_blobs(
             images, self.lattice.nodes_px, self.lattice.spacing, optics.table, *_arrays(blobs), factor, self.threads
         )
-
-
-def with_amplitudes(blobs: Blobs, amplitudes: FloatArray) -> Blobs:
-    """The same places with other amplitudes."""
-    return replace(blobs, amplitudes=amplitudes)
 
 
 def _arrays(blobs: Blobs) -> tuple[FloatArray, FloatArray]:

@@ -30,11 +30,6 @@ class DiscSupports:
     sums: FloatArray
 
     @property
-    def of_size(self) -> FloatArray:
-        """Information (N,) on the squared radii from all views, positions fixed."""
-        return np.asarray(self.sums[:, :, 5].sum(axis=0))
-
-    @property
     def alone(self) -> FloatArray:
         """Squared radii (K, N) that each view alone would give the discs."""
         return self.squares_voxel2 + self.sums[:, :, 7] / np.maximum(self.sums[:, :, 6], 1e-30)
