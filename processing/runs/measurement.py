@@ -22,7 +22,6 @@ from processing.calibration.calibration_file import load_calibration
 from processing.kernels import DEFAULT_THREADS
 from processing.preprocessing import Polarity
 from processing.reconstruction.settings import FrozenValue, GridSettings
-from processing.runs.droplet_seal import sealed
 from processing.runs.errors import PipelineError
 from processing.runs.liquid.objects import NozzleNumbers, RunObjects, told_objects
 from processing.runs.measured_images import (
@@ -216,14 +215,11 @@ class RunMeasurement:
         objects = self.objects.measure(recorded, [frame for frame in frames if by_frame[frame].views], threads)
         told = {frame: {**one.told(), **told_objects(objects.get(frame))} for frame, one in by_frame.items()}
         file = droplets_path(results_dir, shot)
-        more = velocities.columns() if velocities else {}
-        tables = {str(frame): {**one.droplets.columns(), **more.get(frame, {})} for frame, one in by_frame.items()}
-        others = {str(frame): moving.columns() for frame, moving in objects.items()}
         write_droplets(
             file,
             {str(frame): one.droplets for frame, one in by_frame.items()},
-            sealed(tables, {**self.provenance, **self._told_of(shot, told, velocity)}, others),
-            velocities=more or None,
+            {**self.provenance, **self._told_of(shot, told, velocity)},
+            velocities=velocities.columns() if velocities else None,
             objects={str(frame): moving for frame, moving in objects.items()},
         )
         summary = shot_summary(shot, exposures, velocity, time.process_time() - started_cpu_s, file)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from daq.files.atomic_file import own_part_path, replacing
 from processing.analysis.droplets.droplet_table import P_REAL_TRIED, Columns, DropletRows
 from processing.analysis.droplets.stored_texts import fault_of
+from processing.analysis.seal import SEAL, Table, seal_of
 from processing.errors import BadInput
 
 SCHEMA, SCHEMA_VERSION = "tomoshadow/droplets", 3
@@ -34,6 +35,7 @@ UNITS = MappingProxyType({f"_{ending}": unit for ending, unit in _UNITS.items()}
 Value = str | int | float
 
 
+REMEDY = "copy it back from a backup, or measure the shot again"
 PLACES = ("x_", "y_", "z_")
 """Names of columns that say where a droplet is begin so."""
 
@@ -121,6 +123,8 @@ def write_columns(
 ) -> None:
     """Write a table of droplets; the file appears whole or not at all, an old one is replaced.
 
+    It is sealed with a hash of all that is written, by which ``read_droplets`` knows a file that was edited.
+
     Parameters
     ----------
     path : Path
@@ -142,7 +146,21 @@ def write_columns(
             same = np.array_equal(columns[DIAMETER], columns[RAW_DIAMETER])
             group[DIAMETER].attrs["correction"] = NOT_CORRECTED if same else CORRECTED
         schema = {"schema": SCHEMA, "schema_version": SCHEMA_VERSION}
-        file.create_group(PROVENANCE).attrs.update({**provenance, **schema})
+        sealed = {**provenance, SEAL: _seal(columns, objects, provenance)}
+        file.create_group(PROVENANCE).attrs.update({**sealed, **schema})
+
+
+def _seal(columns: Table, objects: Table, provenance: Mapping[str, Value]) -> str:
+    return seal_of({GROUP: _by_frame(columns), OBJECTS: _by_frame(objects)}, provenance)
+
+
+def _by_frame(columns: Table) -> dict[str, Table]:
+    """A table for each exposure that has rows."""
+    frames = columns.get(FRAME, np.empty(0, "U1")).astype("U1")
+    others = {name: values for name, values in columns.items() if name != FRAME}
+    return {
+        str(frame): {name: values[frames == frame] for name, values in others.items()} for frame in np.unique(frames)
+    }
 
 
 def _write_table(file: h5py.File, name: str, columns: Mapping[str, NDArray[np.generic]]) -> h5py.Group:
@@ -169,7 +187,8 @@ def read_droplets(path: str | Path) -> StoredDroplets:
     Raises
     ------
     DropletFileError
-        The file is missing, truncated, or not of droplets.
+        The file is missing, truncated, not of droplets, or was edited after it had been measured. Files of older
+        programs have no seal: edited ones are not known.
     """
     try:
         with h5py.File(path, "r") as file:
@@ -182,6 +201,8 @@ def read_droplets(path: str | Path) -> StoredDroplets:
     provenance = {name: value for name, value in plain.items() if name not in SCHEMA_KEYS}
     if fault := fault_of(provenance):
         raise DropletFileError(f"{path}: was changed: {fault}")
+    if provenance.get(SEAL) not in (None, _seal(columns, objects, provenance)):
+        raise DropletFileError(f"{path}: was changed after it had been measured: {REMEDY}")
     return StoredDroplets(columns, provenance, objects)
 
 

@@ -23,7 +23,6 @@ from processing.errors import BadInput
 from processing.image_file import ImageFileError, read_image
 from processing.preprocessing import Intensity
 from processing.reconstruction.settings import FrozenValue
-from processing.runs.droplet_seal import by_frame, sealed
 from processing.runs.errors import PipelineError
 from processing.runs.exposure_faults import grey_values
 from processing.runs.recipe import recipe_sha256
@@ -194,8 +193,7 @@ def measure_source(
         "exposures": json.dumps(told),
     }
     path = source.droplets_path(results_dir)
-    columns = _columns(found, um_per_px)
-    write_columns(path, columns, sealed(by_frame(columns), named))
+    write_columns(path, _columns(found, um_per_px), named)
     return _summary(source, told, time.process_time() - started_cpu_s, path)
 
 

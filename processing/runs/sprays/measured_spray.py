@@ -12,7 +12,7 @@ from processing.analysis.copied_shots import in_common
 from processing.analysis.droplets.droplet_file import DropletFileError, StoredDroplets
 from processing.analysis.droplets.droplet_statistics import require_poolable
 from processing.analysis.spray.spray_axis import SprayAxis
-from processing.runs.droplet_seal import read_sealed
+from processing.runs.droplets_in_place import read_in_place
 
 PATTERN = "shot_*_droplets.h5"
 
@@ -66,7 +66,7 @@ def read_spray(folders: Sequence[Path]) -> MeasuredSpray:
 
 def read_files(files: Sequence[Path], name: str = "") -> MeasuredSpray:
     """The same of files of droplets, one at least, under a name."""
-    shots = tuple(map(read_sealed, files))
+    shots = tuple(map(read_in_place, files))
     require_poolable(shots)
     _require_one(shots, files, "calibration")
     _require_one(shots, files, "spray")

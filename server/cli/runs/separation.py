@@ -25,7 +25,7 @@ def separation(options: Namespace) -> Outcome:
     """Read, propose."""
     from processing.analysis.droplets.droplet_file import DropletFileError
     from processing.analysis.velocity.separation_proposal import MOVED_VOXEL, propose_separation
-    from processing.runs.droplet_seal import read_sealed
+    from processing.runs.droplets_in_place import read_in_place
     from server.rig.config import load_config
     from server.rig.optics_table import optics_table
 
@@ -36,7 +36,7 @@ def separation(options: Namespace) -> Outcome:
     if options.config:
         shortest_ns, longest_ns = optics_table(load_config(options.config))["straddling_window_ns"]
         window_ns = (shortest_ns, longest_ns)
-    found = propose_separation([read_sealed(file) for file in files], window_ns, options.voxels or MOVED_VOXEL)
+    found = propose_separation([read_in_place(file) for file in files], window_ns, options.voxels or MOVED_VOXEL)
     result = {**found.model_dump(mode="json"), "window_ns": window_ns, "passed": found.separation_ns is not None}
     return Outcome(result, _summary(found))
 

@@ -32,7 +32,7 @@ def tracks(options: Namespace) -> Outcome:
     from processing.analysis.exports.export import export_path, export_tracks
     from processing.analysis.velocity.track_file import write_tracks
     from processing.analysis.velocity.track_table import track_droplets
-    from processing.runs.droplet_seal import read_sealed
+    from processing.runs.droplets_in_place import read_in_place
     from processing.runs.overwriting import require_free
 
     for export in options.export:
@@ -42,7 +42,7 @@ def tracks(options: Namespace) -> Outcome:
     files = sorted(options.results.glob("shot_*_droplets.h5"))
     if not files:
         raise DropletFileError(f"{options.results}: has no droplets of shots; measure them first (tomoshadow measure)")
-    shots = [read_sealed(file) for file in files]
+    shots = [read_in_place(file) for file in files]
     linked = track_droplets(shots, options.rate_hz)
     write_tracks(
         options.out, linked, {name: one for name in KEPT if (one := shots[0].provenance.get(name)) is not None}

@@ -12,7 +12,7 @@ from processing.analysis.droplets.droplet_file import DropletFileError, StoredDr
 from processing.analysis.droplets.droplet_statistics import DropletStatistics, droplet_statistics, hidden_share
 from processing.analysis.droplets.measured_exposure import ShotVerdict
 from processing.analysis.velocity.velocity_statistics import VelocityStatistics, velocity_statistics
-from processing.runs.droplet_seal import read_sealed
+from processing.runs.droplets_in_place import read_in_place
 from processing.runs.measured_shot import droplets_path
 from server.lab.errors import Damaged, NotFound
 from server.lab.results import droplet_summaries
@@ -77,13 +77,13 @@ def droplets_of(results_dir: Path, shot: int) -> StoredDroplets:
 
 @lru_cache(maxsize=8)
 def _droplets(path: Path, _changed_ns: int) -> StoredDroplets:
-    return read_sealed(path)
+    return read_in_place(path)
 
 
 @lru_cache(maxsize=16)
 def _read(files: tuple[tuple[Path, int], ...]) -> MeasuredRun:
     """Once per change of the files."""
-    stored = [read_sealed(path) for path, _ in files]
+    stored = [read_in_place(path) for path, _ in files]
     return MeasuredRun(
         shots=tuple(map(_told, stored)), statistics=droplet_statistics(stored), velocity=velocity_statistics(stored)
     )

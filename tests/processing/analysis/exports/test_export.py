@@ -3,6 +3,7 @@
 import csv
 import json
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ import h5py
 import numpy as np
 import pytest
 
-from processing.analysis.droplets.droplet_file import DropletFileError, read_droplets, write_droplets
+from processing.analysis.droplets.droplet_file import DropletFileError, read_droplets, write_columns, write_droplets
 from processing.analysis.droplets.droplet_table import Droplets
 from processing.analysis.exports.export import Export, export_droplets, export_tracks
 from processing.analysis.exports.parquet_file import MissingLibraryError
@@ -62,6 +63,22 @@ def tracks(tmp_path: Path) -> Path:
 
 def without_p_real(columns: dict[str, Any]) -> dict[str, Any]:
     return {name: column for name, column in columns.items() if name != "p_real"}
+
+
+@pytest.mark.parametrize("read", [read_droplets, lambda path: export_droplets(path, "csv")], ids=["read", "exported"])
+@pytest.mark.parametrize("edited", ["droplets/x_mm", "tomoshadow"])
+def test_a_file_that_was_edited_is_refused(file: Path, read: Callable[[Path], object], edited: str) -> None:
+    read(file)
+    with h5py.File(file, "r+") as stored:
+        if edited == "tomoshadow":
+            stored[edited].attrs["shot"] = 9
+        else:
+            stored[edited][0] += 0.01
+    with pytest.raises(DropletFileError, match=f"{file.name}: was changed after it had been measured"):
+        read(file)
+    with h5py.File(file, "r+") as stored:
+        del stored["tomoshadow"].attrs["seal_sha256"]
+    read(file)
 
 
 def test_csv_has_every_digit_and_no_nan(file: Path) -> None:
@@ -144,8 +161,9 @@ def test_a_shot_without_droplets_is_a_table_without_rows(empty: Path) -> None:
 
 def test_an_export_that_cannot_be_written_leaves_the_old_one(file: Path) -> None:
     export_droplets(file, "vtk").write_text("old")
-    with h5py.File(file, "a") as stored:
-        del stored["droplets/z_mm"]
+    stored = read_droplets(file)
+    flat = {name: column for name, column in stored.columns.items() if name != "z_mm"}
+    write_columns(file, {**flat, "frame": flat["frame"].astype("S1")}, stored.provenance)
     with pytest.raises(DropletFileError, match="droplets without z_mm have no place in space; export csv"):
         export_droplets(file, "vtk")
     assert file.with_suffix(".vtkhdf").read_text() == "old"

@@ -12,7 +12,6 @@ import pytest
 
 from daq.files.run_directory import DoubleFrame, ExposureRecord, ImageKey, RunHeader, RunWriter, Shot, ViewFormat
 from processing.analysis.droplets.droplet_file import DropletFileError, read_droplets
-from processing.runs.droplet_seal import read_sealed
 from server.cli.main import main
 from tests.support.command_line import refused, shown, told
 from tests.support.droplet_run import write_run
@@ -58,11 +57,11 @@ def test_images_are_measured_in_pixels(images: list[Path], tmp_path: Path, capsy
 def test_diameters_that_were_edited_are_refused(images: list[Path], tmp_path: Path) -> None:
     file = tmp_path / "out" / "first_droplets.h5"
     assert main(["measure", *map(str, images), "-o", str(file.parent)]) == 0
-    assert len(read_sealed(file).columns["diameter_px"]) == 2
+    assert len(read_droplets(file).columns["diameter_px"]) == 2
     with h5py.File(file, "r+") as stored:
         stored["droplets/diameter_px"][:] *= 2
     with pytest.raises(DropletFileError, match="was changed after it had been measured"):
-        read_sealed(file)
+        read_droplets(file)
 
 
 def test_a_scale_turns_pixels_into_micrometres(

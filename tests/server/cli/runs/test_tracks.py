@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 import pytest
 
-from processing.analysis.droplets.droplet_file import DropletFileError, read_droplets, write_droplets
+from processing.analysis.droplets.droplet_file import DropletFileError, read_droplets, write_columns, write_droplets
 from processing.analysis.droplets.droplet_table import Droplets
 from processing.analysis.velocity.track_table import track_droplets
 from processing.reconstruction.settings import GridSettings
@@ -115,9 +115,10 @@ def test_what_contradicts_the_rate_is_told(tmp_path: Path, capsys: pytest.Captur
     results = write_series(tmp_path / "droplets", shown_series, rate_hz=RATE_HZ)
     files = sorted(results.glob("*.h5"))
     for file, velocities in zip(files, shown_series.frames, strict=True):
-        with h5py.File(file, "r+") as changed:
-            for name in ("u_m_s", "v_m_s", "w_m_s"):
-                changed["droplets"][name] = np.full(len(velocities), 1.2)
+        stored = read_droplets(file)
+        flying = dict.fromkeys(("u_m_s", "v_m_s", "w_m_s"), np.full(len(velocities), 1.2))
+        columns = {**stored.columns, **flying, "frame": stored.columns["frame"].astype("S1")}
+        write_columns(file, columns, stored.provenance)
     out = tmp_path / "tracks.h5"
     assert told(capsys, "tracks", results, "-o", out)["doubts"] == []
     (doubt,) = told(capsys, "tracks", results, "--rate-hz", RATE_HZ / 10, "-o", out, "--overwrite")["doubts"]

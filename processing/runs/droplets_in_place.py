@@ -1,44 +1,24 @@
-"""A seal on files of droplets: one that was edited, or given the name of another shot or run, is refused when read."""
+"""Files of droplets under the name of their shot and in the folder of their run: one that was moved is refused."""
 
-import hashlib
 import json
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from daq.files.run_directory import RunReader, ShotFileError
 from daq.files.run_file import RUN_FILE
-from processing.analysis.droplets.droplet_file import FRAME, DropletFileError, StoredDroplets, read_droplets
+from processing.analysis.droplets.droplet_file import REMEDY, DropletFileError, StoredDroplets, read_droplets
 from processing.analysis.droplets.droplet_search import MARGIN_VOXEL
+from processing.analysis.seal import SEAL
 from processing.reconstruction.settings import GridSettings
-from processing.runs.results_file import Provenance
 
-SEAL = "seal_sha256"
 _NAME = re.compile(r"shot_(\d+)_droplets")
-_REMEDY = "copy it back from a backup, or measure the shot again"
-Table = Mapping[str, NDArray[Any]]
 
 
-def sealed(
-    droplets: Mapping[str, Table], provenance: Provenance, objects: Mapping[str, Table] | None = None
-) -> dict[str, Any]:
-    """The provenance of a file, with a hash of all that is written.
-
-    Parameters
-    ----------
-    droplets, objects : mapping of frame name to columns
-        As they are written.
-    provenance : Mapping[str, str | int | float]
-        Where they come from.
-    """
-    return {**provenance, SEAL: _hash(droplets, objects or {}, provenance)}
-
-
-def read_sealed(path: str | Path) -> StoredDroplets:
+def read_in_place(path: str | Path) -> StoredDroplets:
     """Read a file of droplets that are what was measured, under the name of their shot, in the folder of their run.
 
     Raises
@@ -50,41 +30,9 @@ def read_sealed(path: str | Path) -> StoredDroplets:
     path = Path(path)
     stored = read_droplets(path)
     _require_own_name(path, stored.provenance)
-    seal = stored.provenance.get(SEAL)
-    if seal is None:
+    if SEAL not in stored.provenance:
         _require_in_box(path, stored)
-    elif seal != _hash(by_frame(stored.columns), by_frame(stored.objects), stored.provenance):
-        raise DropletFileError(f"{path}: was changed after it had been measured: {_REMEDY}")
     return stored
-
-
-def _hash(droplets: Mapping[str, Table], objects: Mapping[str, Table], provenance: Mapping[str, Any]) -> str:
-    digest = hashlib.sha256()
-    for kind, tables in (("droplets", droplets), ("objects", objects)):
-        for frame in sorted(tables):
-            for part in _bytes_of(tables[frame]):
-                digest.update(f"{kind} {frame} ".encode() + part)
-    kept = {name: value for name, value in provenance.items() if name != SEAL}
-    digest.update(json.dumps(kept, sort_keys=True).encode())
-    return digest.hexdigest()
-
-
-def _bytes_of(table: Table) -> Iterator[bytes]:
-    """Column by column; texts do not depend on how many bytes each has in the file."""
-    for name in sorted(set(table) - {FRAME}):
-        values = np.ascontiguousarray(table[name])
-        if values.size:
-            text = values.dtype.kind in "SU"
-            yield f"{name} {'text' if text else values.dtype.str} ".encode()
-            yield "\0".join(values.astype("U").tolist()).encode() if text else values.tobytes()
-
-
-def by_frame(columns: Table) -> dict[str, Table]:
-    """A table for each exposure that has rows."""
-    frames = columns.get(FRAME, np.empty(0, "U1")).astype("U1")
-    return {
-        str(frame): {name: values[frames == frame] for name, values in columns.items()} for frame in np.unique(frames)
-    }
 
 
 def _require_own_name(path: Path, provenance: Mapping[str, Any]) -> None:
@@ -121,5 +69,5 @@ def _require_in_box(path: Path, stored: StoredDroplets) -> None:
         if outside.any():
             raise DropletFileError(
                 f"{path}: was changed: {int(outside.sum())} droplets have {name} outside of {span_mm[0]:g} to "
-                f"{span_mm[-1]:g} mm, where they were looked for: {_REMEDY}"
+                f"{span_mm[-1]:g} mm, where they were looked for: {REMEDY}"
             )
