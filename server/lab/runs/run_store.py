@@ -22,6 +22,7 @@ from daq.files.shot_file import read_image_key
 from daq.names import is_identifier
 from daq.run.events import RunStatus
 from daq.run.state import RunOutcome
+from daq.run_plan import RunKind
 from server.lab.errors import Conflict, NotFound
 from server.lab.runs.run_filter import EVERY_RUN, RunFilter
 from server.lab.runs.run_index import IndexedRun, RunIndex
@@ -122,6 +123,15 @@ class RunStore:
         if not wanted.takes_all:
             directories = [path for path in directories if self._is_wanted(path, wanted)]
         return [self._summary_of(path) for path in directories[offset : offset + limit]], len(directories)
+
+    def newest_that(self, is_wanted: Callable[[RunSummary], bool], limit: int) -> list[RunSummary]:
+        """The newest runs that are wanted, however many others were made since; nothing is read of older ones."""
+        found = (run for path in self._by_age() if is_wanted(run := self._summary_of(path)))
+        return list(islice(found, limit))
+
+    def references(self, kind: RunKind, limit: int = 1) -> list[RunSummary]:
+        """The newest completed runs of a kind, which others may name as their references."""
+        return self.newest_that(lambda run: run.kind is kind and run.outcome == RunOutcome.COMPLETED, limit)
 
     def with_results(self, limit: int) -> list[RunSummary]:
         """The newest runs of which something came."""

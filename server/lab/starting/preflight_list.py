@@ -10,13 +10,13 @@ from pydantic import Field
 
 from daq.files.header import ViewFormat
 from daq.frozen_model import FrozenModel
+from daq.run.references import REFERENCE_KINDS
 from daq.run.refusals import RefusalCode as Code
-from daq.run.state import RunOutcome
 from daq.run_plan import RunKind, RunPlan
 from server.lab.desk.control import REMEDIES
 from server.lab.desk.reason import Reason
 from server.lab.desk.visitor import Visitor
-from server.lab.errors import ServerError
+from server.lab.errors import NotFound, ServerError
 from server.lab.services import Context
 from server.lab.starting.readiness import reasons_against, with_calibration
 
@@ -135,26 +135,26 @@ def _stage(_context: Context, plan: RunPlan) -> Told | None:
 def _references(context: Context, plan: RunPlan) -> Told | None:
     if plan.kind is not RunKind.SAMPLE:
         return None
-    newest = newest_references(context)
-    kinds = {run_id: kind for kind, runs in newest.items() for run_id in runs}
-    chosen = {kinds.get(run_id, RunKind.DARK): run_id for run_id in plan.references}
+    kinds = {run_id: _kind_of(context, run_id) for run_id in plan.references}
+    newest = {kind: run.run_id for kind in REFERENCE_KINDS for run in context.runs.references(kind)}
     newer = [
-        f"a newer {kind} exists: {runs[0]}" for kind, runs in newest.items() if chosen.get(kind, runs[0]) != runs[0]
+        f"a newer {kind} exists: {run_id}"
+        for kind, run_id in newest.items()
+        if kind in kinds.values() and run_id not in kinds
     ]
-    absent = [f"no {kind} run" for kind in (RunKind.DARK, RunKind.BACKGROUND) if kind not in chosen]
+    absent = [f"no {kind} run" for kind in REFERENCE_KINDS if kind not in kinds.values()]
     if absent or newer:
         remedy = "choose it, or go on with what is chosen" if newer else "record it, or choose it in the form"
         return ", ".join([*absent, *newer]), remedy
-    return f"{', '.join(chosen)} fit this light", ""
+    return f"{', '.join(REFERENCE_KINDS)} fit this light", ""
 
 
-def newest_references(context: Context) -> dict[RunKind, list[str]]:
-    """Completed dark and background runs that a run may name, the newest first."""
-    found: dict[RunKind, list[str]] = {}
-    for run in context.runs.newest():
-        if run.kind in (RunKind.DARK, RunKind.BACKGROUND) and run.outcome == RunOutcome.COMPLETED:
-            found.setdefault(run.kind, []).append(run.run_id)
-    return found
+def _kind_of(context: Context, run_id: str) -> RunKind | None:
+    """What a run was prepared for; None where it was deleted meanwhile."""
+    try:
+        return context.runs.summary(run_id).kind
+    except NotFound:
+        return None
 
 
 def _calibration(context: Context, plan: RunPlan) -> Told | None:

@@ -17,7 +17,7 @@ from server.web.ui.table import table_of
 from server.web.ui.theme import panel
 from server.web.ui.visiting import visitor
 
-_LOOKED_AT = 1000
+_JOBS_LOOKED_AT = 1000
 _SHOWN = 30
 _MODELS = {
     "pinhole": "pinhole: what most lenses are",
@@ -48,14 +48,13 @@ class TargetRuns:
     async def reload(self) -> None:
         """Read the runs again, and what is being made of them."""
         runs, jobs = await asyncio.gather(
-            asyncio.to_thread(self._context.runs.newest, _LOOKED_AT),
-            asyncio.to_thread(self._context.jobs.newest, None, JobState, _LOOKED_AT, [JobKind.CALIBRATION]),
+            asyncio.to_thread(self._context.runs.newest_that, lambda run: run.kind is RunKind.CALIBRATION, _SHOWN),
+            asyncio.to_thread(self._context.jobs.newest, None, JobState, _JOBS_LOOKED_AT, [JobKind.CALIBRATION]),
         )
         newest_job = {job.run_id: job for job in reversed(jobs)}
-        shown = [run for run in runs if run.kind is RunKind.CALIBRATION][:_SHOWN]
-        self._table.rows = [_row(run, newest_job.get(run.run_id)) for run in shown]
-        self._table.set_visibility(bool(shown))
-        self._nothing.set_visibility(not shown)
+        self._table.rows = [_row(run, newest_job.get(run.run_id)) for run in runs]
+        self._table.set_visibility(bool(runs))
+        self._nothing.set_visibility(not runs)
         self._table.update()
 
     async def _on_act(self, event: Any) -> None:

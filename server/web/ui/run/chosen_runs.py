@@ -1,18 +1,22 @@
 """ChosenRuns: references and calibration of the next run. What is shown stays; a newer one is only told."""
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from contextlib import suppress
 from typing import Any
 
 from nicegui import ui
 
-from daq.run.state import RunOutcome
+from daq.run.references import REFERENCE_KINDS
 from daq.run_plan import RunKind
+from server.lab.errors import NotFound
+from server.lab.runs.run_store import RunStore
 from server.lab.runs.run_summary import RunSummary
 from server.lab.services import Context
 from server.web.ui.draft import DraftStore
 
-_REFERENCE_KINDS = (RunKind.DARK, RunKind.BACKGROUND)
+_OFFERED = 30
+"""Of each kind, the newest; what is chosen stands beside them, however old it is."""
 _CALIBRATION = "Calibration; none: current"
 _NO_CALIBRATION = "Calibration; none: no volumes"
 
@@ -55,9 +59,10 @@ class ChosenRuns:
     async def reload(self) -> None:
         """Offer the runs and calibrations that exist now."""
         runs, calibrations = await asyncio.gather(
-            asyncio.to_thread(self._context.runs.newest), asyncio.to_thread(self._context.calibrations.list)
+            asyncio.to_thread(known_references, self._context.runs, tuple(self._draft.values["references"])),
+            asyncio.to_thread(self._context.calibrations.list),
         )
-        self._known = [run for run in runs if run.kind in _REFERENCE_KINDS and run.outcome == RunOutcome.COMPLETED]
+        self._known = runs
         self._pin_what_is_missing()
         known = {item.id: item.id + (" (current)" if item.current else "") for item in calibrations}
         self._calibration.set_label(_CALIBRATION if any(item.current for item in calibrations) else _NO_CALIBRATION)
@@ -109,9 +114,18 @@ class ChosenRuns:
             self._changed()
 
 
+def known_references(runs: RunStore, chosen: Iterable[str]) -> list[RunSummary]:
+    """The newest runs that can be references, newest first of each kind, and those that are chosen already."""
+    known = {run.run_id: run for kind in REFERENCE_KINDS for run in runs.references(kind, _OFFERED)}
+    for run_id in chosen:
+        with suppress(NotFound):
+            known.setdefault(run_id, runs.summary(run_id))
+    return list(known.values())
+
+
 def newest_of(runs: list[RunSummary]) -> dict[RunKind, str]:
     """The newest run of each kind, of runs that are listed newest first."""
-    return {run.kind: run.run_id for run in reversed(runs) if run.kind is not None}
+    return {run.kind: run.run_id for run in reversed(runs) if run.kind in REFERENCE_KINDS}
 
 
 def _label(run: RunSummary) -> str:

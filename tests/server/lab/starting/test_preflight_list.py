@@ -1,6 +1,7 @@
 """Pre-flight: everything that is looked at before a run, with figures where it is good and the refusal where not."""
 
 import re
+import shutil
 
 import pytest
 
@@ -8,6 +9,7 @@ from daq.run.refusals import RefusalCode
 from daq.run_plan import RunPlan
 from server.lab.desk.visitor import Visitor
 from server.lab.starting.preflight_list import CODES, Check, CheckResult, preflight
+from server.web.ui.run.chosen_runs import known_references
 from tests.server.web.test_api import use_a_calibration
 from tests.support.serving import Serving, plan_of
 
@@ -62,6 +64,24 @@ def test_what_is_wrong_stands_in_its_place_with_a_remedy_and_all_of_it(server: S
 @pytest.mark.parametrize("kind", ["dark", "background"])
 def test_a_background_needs_neither_references_nor_a_calibration(server: Serving, kind: str) -> None:
     assert not {"References", "Calibration"} & set(looked_at(server, kind=kind))
+
+
+def test_references_older_than_any_list_are_known_for_what_they_are(server: Serving) -> None:
+    dark, newer, background = (
+        server.run_to_its_end(plan_of(kind=kind, shots=1))[0] for kind in ("dark", "dark", "background")
+    )
+    spray, _ = server.run_to_its_end(plan_of(shots=1))
+    for number in range(101):
+        shutil.copytree(server.services.data_dir / spray, server.services.data_dir / f"20990201T{number:06}-spray")
+    found = looked_at(server, references=[newer, background])["References"]
+    assert (found.finding, found.text) == (CheckResult.GOOD, "dark, background fit this light")
+    assert looked_at(server, references=[newer, background, dark])["References"].finding is CheckResult.GOOD
+    found = looked_at(server, references=[dark, background])["References"]
+    assert found.text == f"a newer dark exists: {newer}"
+    found = looked_at(server, references=[newer])["References"]
+    assert found.text == "no background run"
+    offered = [run.run_id for run in known_references(server.app.state.context.runs, [spray, "gone"])]
+    assert offered == [newer, dark, background, spray], "what is chosen stays known, whatever it is"
 
 
 def test_references_say_what_differs_and_what_is_newer(server: Serving) -> None:
