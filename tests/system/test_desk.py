@@ -115,6 +115,7 @@ def test_without_a_beat_the_page_is_grey_and_locked_but_for_abort(tab: Page, lin
     expect(rig_state(tab)).to_have_text(re.compile(r"^ACQUIRING \d+/1000, \d+:\d\d left$"))
     link.cut()
     expect(unknown(tab)).to_have_text(re.compile(r"^unknown since \d\d:\d\d:\d\d$"))
+    expect(tab).to_have_title(re.compile("^UNKNOWN · Run · "))
     expect(tab.locator(".q-page-container")).to_have_attribute("inert", "")
     expect(tab.locator(".q-page-container")).to_have_css("filter", "grayscale(1)")
     expect(tab.locator(".alarm-strip")).to_have_attribute("inert", "")

@@ -152,6 +152,54 @@ def test_a_form_is_kept_under_a_name_and_a_torn_one_is_set_aside(tab: Page, serv
     eventually(lambda: bool(list(folder.glob("torn.json.damaged-*"))), "the torn one is set aside")
 
 
+def test_a_template_is_neither_replaced_nor_removed_unasked(tab: Page, server: Serving) -> None:
+    file = server.services.data_dir / "templates" / "kept.json"
+    save_template(tab, "kept", shots=12)
+    eventually(file.is_file, "the template is in its folder")
+    save_template(tab, "kept", shots=34)
+    asked = tab.get_by_role("alertdialog", name="are you sure")
+    expect(asked).to_contain_text("Replace the template kept?")
+    asked.get_by_role("button", name="Keep it").click()
+    expect(asked).to_be_hidden()
+    assert json.loads(file.read_text())["shots"] == 12
+    tab.get_by_role("button", name="Save template").click()
+    asked.get_by_role("button", name="Replace").click()
+    eventually(lambda: json.loads(file.read_text())["shots"] == 34, "it is replaced")
+    tab.get_by_role("combobox", name="Template").click()
+    tab.get_by_role("option", name="kept").click()
+    tab.get_by_role("button", name="keep as a template").click()
+    tab.get_by_role("button", name="Remove the chosen one").click()
+    expect(asked).to_contain_text("Remove the template kept?")
+    assert file.is_file()
+    asked.get_by_role("button", name="Remove").click()
+    eventually(lambda: not file.exists(), "it is removed")
+
+
+def save_template(page: Page, name: str, shots: int) -> None:
+    page.get_by_label("Shots", exact=True).fill(str(shots))
+    page.get_by_role("button", name="keep as a template").click()
+    page.get_by_label("Save as").fill(name)
+    page.get_by_role("button", name="Save template").click()
+
+
+def test_a_browser_names_page_rig_and_state_of_a_tab(tab: Page, server: Serving) -> None:
+    rig = server.services.config.name
+    expect(tab).to_have_title(f"READY · Run · {rig}")
+    go_to(tab, "Calibrate")
+    expect(tab).to_have_title(f"READY · Calibrate · {rig}")
+    laboratory(server).open_door()
+    expect(tab).to_have_title(f"NOT READY · Calibrate · {rig}")
+
+
+def test_a_kind_brings_its_name(tab: Page) -> None:
+    name = tab.get_by_label("Name", exact=True)
+    name.fill("spray")
+    tab.get_by_role("button", name="Dark", exact=True).click()
+    expect(name).to_have_value("dark")
+    tab.get_by_role("button", name="Sample").click()
+    expect(name).to_have_value("spray")
+
+
 def test_a_run_shows_its_shots_and_why_one_is_invalid_and_what_it_waits_for(tab: Page, server: Serving) -> None:
     laboratory(server).cameras["view2"].lost = {laboratory(server).generator.fired + 2}
     plan = plan_of(kind="dark", shots=100, rate_hz=0.5, pulse=PULSE, refire_quota=0)

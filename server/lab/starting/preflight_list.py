@@ -43,6 +43,7 @@ class CheckResult(StrEnum):
 
     GOOD = "good"
     WARN = "warn"
+    WAIT = "wait"
     REFUSED = "refused"
 
 
@@ -50,10 +51,16 @@ class Check(FrozenModel):
     """One thing that was looked at."""
 
     name: Annotated[str, Field(description="what was looked at")]
-    finding: Annotated[CheckResult, Field(description="refused: a start would be, for this reason")]
+    finding: Annotated[
+        CheckResult,
+        Field(description="refused: a start would be, for this reason; wait: it would, until what goes on has ended"),
+    ]
     text: Annotated[str, Field(description="what was found, with figures")]
     remedy: Annotated[str, Field(description="what to do about it; empty: nothing")] = ""
 
+
+PASSING = frozenset({Code.STARTING, Code.BUSY})
+"""Nothing is wrong: they end by themselves."""
 
 Told = tuple[str, str]
 """Text, and remedy of a warning; an empty remedy: nothing is wrong."""
@@ -95,7 +102,8 @@ def _control(context: Context, who: Visitor) -> Check:
 
 def _refused(name: str, reasons: list[Reason]) -> Check:
     text, remedies = "; ".join(reason.text for reason in reasons), dict.fromkeys(reason.remedy for reason in reasons)
-    return Check(name=name, finding=CheckResult.REFUSED, text=text, remedy="; ".join(remedies))
+    finding = CheckResult.WAIT if all(reason.code in PASSING for reason in reasons) else CheckResult.REFUSED
+    return Check(name=name, finding=finding, text=text, remedy="; ".join(remedies))
 
 
 def _light(context: Context, plan: RunPlan) -> Told:
@@ -117,7 +125,12 @@ def _timing(_context: Context, plan: RunPlan) -> Told:
 def _network(context: Context, plan: RunPlan) -> Told:
     rig = context.services.rig
     shot_s = rig.network.shot_s({view: _FRAMES_PER_SHOT * size for view, size in _frame_bytes(context).items()})
-    return f"{shot_s * plan.rate_hz:.0%} of the wires: a shot takes {1e3 * shot_s:.0f} ms", ""
+    return f"{percent(shot_s * plan.rate_hz)} of the wires: a shot takes {1e3 * shot_s:.0f} ms", ""
+
+
+def percent(share: float) -> str:
+    """A share in percent; a small one is not nothing."""
+    return "less than 1 %" if 0 < share < 0.01 else f"{100 * share:.0f} %"
 
 
 def _disk(context: Context, plan: RunPlan) -> Told:

@@ -19,6 +19,14 @@ PULSE_FIELDS = PulsePair.model_fields
 
 
 NOTES_FIELDS = RunNotes.model_fields
+USUAL_NAMES = {
+    RunKind.SAMPLE: "spray",
+    RunKind.BACKGROUND: "background",
+    RunKind.DARK: "dark",
+    RunKind.CALIBRATION: "target",
+}
+"""Names that nobody has thought of: they follow the kind of a run."""
+
 _TEXTS = ("name", "stage_z_mm", "operator", "fluid", "nozzle", "remark")
 
 
@@ -26,7 +34,7 @@ def first_draft(config: RigConfig) -> dict[str, Any]:
     """Draft for a rig that has none yet."""
     return {
         "kind": RunKind.SAMPLE.value,
-        "name": "spray",
+        "name": USUAL_NAMES[RunKind.SAMPLE],
         "shots": 10,
         "rate_hz": 2.0,
         "width_ns": 1000,
@@ -103,6 +111,8 @@ class DraftStore:
         """
         if not self._may_change():
             return
+        if name == "kind" and self.values["name"] in USUAL_NAMES.values():
+            self.set("name", USUAL_NAMES[RunKind(value)])
         self.values[name] = value
         self.version += 1
         part = self._path.with_suffix(".part")

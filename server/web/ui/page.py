@@ -21,7 +21,7 @@ from server.web.ui.desk_page import DeskPage
 from server.web.ui.draft import DraftStore
 from server.web.ui.drawer.drawer import Drawer
 from server.web.ui.live.live_page import LivePage
-from server.web.ui.rail import Rail
+from server.web.ui.rail import STOPS, Rail
 from server.web.ui.results.results_page import ResultsPage
 from server.web.ui.rig.rig_page import RigPage
 from server.web.ui.run.run_page import RunPage
@@ -117,8 +117,9 @@ class Desk:
             "/runs": lambda: RunsPage(context),
         }
         shallow: dict[str, Callable[..., None]] = {
-            path: partial(self._open, path, build) for path, build in ({"/": pages["/run"]} | pages).items()
+            path: partial(self._open, path, build) for path, build in pages.items()
         }
+        shallow["/"] = shallow["/run"]  # where a day begins
         deep = {path: self._open_results if path.startswith("/results") else self._open_run for path in _DEEP_PATHS}
         return shallow | deep
 
@@ -132,6 +133,7 @@ class Desk:
     def _open(self, path: str, build: Callable[[], DeskPage]) -> None:
         self._page = build()
         self._rail.mark(path)
+        self._header.page = next(stop.title for stop in STOPS if stop.path == path)
         self._are_lists_old = True
 
     async def _refresh(self) -> None:

@@ -66,9 +66,9 @@ class Rail:
         self.refresh()
 
     def mark(self, path: str) -> None:
-        """Show which page is open; that of the next run is where a day begins."""
+        """Show which page is open."""
         for own, link in self._links.items():
-            if path == own or (path == "/" and own == "/run"):
+            if path == own:
                 link.props("aria-current=page")
             else:
                 link.props(remove="aria-current")

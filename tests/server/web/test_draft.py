@@ -51,6 +51,16 @@ def test_the_first_draft_is_a_plan_for_this_rig(tmp_path: Path) -> None:
     assert plan.stage_z_mm == ()
 
 
+def test_a_name_that_nobody_chose_follows_the_kind_of_the_run(tmp_path: Path) -> None:
+    draft = DraftStore(tmp_path / "draft.json", memory_config(tmp_path / "runs"), EventPublisher())
+    for kind, name in (("dark", "dark"), ("calibration", "target"), ("sample", "spray")):
+        draft.set("kind", kind)
+        assert draft.values["name"] == name
+    draft.set("name", "nozzle 3")
+    draft.set("kind", "background")
+    assert draft.values["name"] == "nozzle 3"
+
+
 def test_only_a_calibration_run_moves_the_target_and_only_a_sample_run_has_references(tmp_path: Path) -> None:
     values = DraftStore(tmp_path / "draft.json", memory_config(tmp_path / "runs"), EventPublisher()).values
     values |= {"references": ["dark-1"], "calibration": "paper"}

@@ -1,10 +1,12 @@
+from dataclasses import replace
+
 import pytest
 
 from daq.causes import Cause, CauseCode
 from daq.run.events import RunStatus
 from daq.run.state import RunState
 from server.lab.duty import Health, Lamp
-from server.web.ui.run.run_panel import acknowledge_text, counts_text, waits_for_acknowledgement
+from server.web.ui.run.run_panel import acknowledge_text, counts_text, message_text, waits_for_acknowledgement
 
 
 def generator_lamp(health: Health) -> Lamp:
@@ -38,3 +40,9 @@ def test_invalid_shots_are_never_left_out() -> None:
     status = RunStatus(run_id="run", shots_planned=5, shots_recorded=4, shots_valid=3)
     assert counts_text(RunStatus()) == "", "that no run was yet says nothing of the rig"
     assert counts_text(status) == "4 / 5 shots recorded, 3 valid, 1 INVALID"
+
+
+def test_counts_are_told_once() -> None:
+    status = RunStatus(run_id="run", shots_planned=4, shots_recorded=4, shots_valid=4)
+    assert message_text(replace(status, message=status.summary)) == ""
+    assert message_text(replace(status, message="shot 3 is fired again")) == "shot 3 is fired again"

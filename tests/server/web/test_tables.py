@@ -1,14 +1,16 @@
 """What the page's tables tell of a job: the worst there is, with its reason."""
 
+from contextlib import closing
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from daq.run_plan import RunKind
-from server.lab.jobs import JobKind, JobState, calibration_job, reconstruction_job, shot_job
+from server.lab.jobs import JobKind, JobState, JobTable, calibration_job, reconstruction_job, shot_job
 from server.lab.runs.run_summary import RunSummary
 from server.web.ui.asking import answer_of
-from server.web.ui.drawer.job_panel import job_row
+from server.web.ui.drawer.job_panel import job_row, listed_jobs
 from server.web.ui.runs.run_rows import run_row
 
 
@@ -31,6 +33,22 @@ def test_a_view_with_a_warning_is_worse_than_one_with_a_larger_error() -> None:
 def test_of_equal_verdicts_the_larger_error_counts() -> None:
     assert told({"cam1": view("good", 0.02), "cam2": view("good", 0.04)}) == "cam2: hold-out 0.040 px, good"
     assert told({"cam1": view("refuse", None), "cam2": view("refuse", 9.0)}).startswith("cam1: hold-out inf px, refuse")
+
+
+def test_a_calibration_can_be_used_unless_it_is_used_already() -> None:
+    job = calibration_job("run", "cal", "pinhole").model_copy(update={"state": JobState.DONE})
+    assert job_row(job, current="other")["actions"] == ["Use"]
+    assert job_row(job, current="cal")["actions"] == []
+
+
+def test_a_long_queue_hides_no_work(tmp_path: Path) -> None:
+    with closing(JobTable(tmp_path / "jobs.sqlite")) as jobs:
+        for shot in range(100):
+            jobs.add(reconstruction_job("run", shot, "cal", "mlos-1", {"method": "mlos"}))
+        jobs.move(jobs.oldest(JobState.QUEUED)[0].id, JobState.RUNNING)
+        listed = listed_jobs(jobs)
+    assert [job.shot for job in listed[:3]] == [0, 99, 98]
+    assert len({job.id for job in listed}) == len(listed)
 
 
 def test_what_was_not_checked_is_told() -> None:

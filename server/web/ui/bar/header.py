@@ -9,7 +9,7 @@ from server.web.ui.bar.calibration_chip import CalibrationChip
 from server.web.ui.bar.control_chip import ControlChip
 from server.web.ui.bar.lamp_row import LampRow
 from server.web.ui.bar.server_link import ServerLink
-from server.web.ui.bar.state_chip import StateChip
+from server.web.ui.bar.state_chip import StateChip, in_brief
 from server.web.ui.bar.theme_button import ThemeButton
 
 
@@ -18,6 +18,8 @@ class Header:
 
     def __init__(self, context: Context, abort_port: int) -> None:
         self._context = context
+        self.page = ""
+        """Title of the page that is open."""
         with ui.header(elevated=False).classes("desk-bar q-pa-none"):
             with ui.element("div").classes("desk-row"):
                 self._add_name()
@@ -34,11 +36,13 @@ class Header:
     def refresh(self) -> None:
         """Show what has changed."""
         self._lamps.show(self._context.lamps)
-        self._state.show(self._context.desk.state)
+        state = self._context.desk.state
+        self._state.show(state)
         self._calibration.refresh()
         self._control.refresh()
         self._alarms.refresh()
-        self._link.show(self._context.beat.number)
+        place = f"{self.page} · {self._context.services.config.name}"
+        self._link.show(self._context.beat.number, in_brief(state), place)
 
     def _add_name(self) -> None:
         config = self._context.services.config

@@ -9,7 +9,7 @@ export default {
     <div :class="['link', { lost: !linked }]" role="status" aria-label="connection">
       <span :class="['lamp', linked ? 'ok' : 'fault']"></span><span class="link-text">{{ text }}</span>
     </div>`,
-  props: { path: String, shown: Number },
+  props: { path: String, shown: Number, state: String, place: String },
   data() {
     return { linked: true, text: "connected" };
   },
@@ -67,6 +67,8 @@ export default {
     show(linked) {
       this.linked = linked;
       this.text = linked ? "connected" : "no connection";
+      const title = `${linked ? this.state : "UNKNOWN"} · ${this.place}`;
+      if (this.place && document.title !== title) document.title = title;
       document.body.classList.toggle("unlinked", !linked);
       for (const part of document.querySelectorAll(LOCKED)) if (part.inert === linked) part.inert = !linked;
       const since = linked ? "" : `unknown since ${this.heardAt.toLocaleTimeString("en-GB")}`;

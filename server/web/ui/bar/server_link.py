@@ -20,12 +20,13 @@ class ServerLink(Element, component="server_link.js"):
     def __init__(self) -> None:
         super().__init__()
         self._props["path"] = BEAT_PATH
-        self._props["shown"] = 0
+        self._props |= {"shown": 0, "state": "", "place": ""}
 
-    def show(self, beat: int) -> None:
-        """Tell the page, by the way of all that it shows, which beat that is of; once a second."""
-        if beat - self._props["shown"] >= BEATS_PER_S:
-            self._props["shown"] = beat
+    def show(self, beat: int, state: str, place: str) -> None:
+        """Tell the page, by the way of all that it shows, which beat that is of, once a second; and its title."""
+        title = {"state": state, "place": place}
+        if beat - self._props["shown"] >= BEATS_PER_S or title != {name: self._props[name] for name in title}:
+            self._props |= {"shown": beat, **title}
             self.update()
 
 

@@ -48,3 +48,8 @@ class StateChip:
                 with ui.column().classes("gap-0"):
                     ui.label(reason.text).classes("font-medium")
                     ui.label(f"Do: {reason.remedy}").classes("text-sm")
+
+
+def in_brief(state: RigState) -> str:
+    """The state without reason and remaining time, for the narrow tab of a browser."""
+    return state.text.partition(":" if state.state is RigWord.NOT_READY else ",")[0]

@@ -7,6 +7,7 @@ from urllib.parse import quote
 from nicegui import ui
 from nicegui.events import ValueChangeEventArguments
 
+from processing.calibration.fit.health import LIMITS_PX, judge
 from server.lab.calibration_story import CalibrationStory, ViewFigures, story_of
 from server.lab.errors import ServerError
 from server.lab.services import Context
@@ -15,8 +16,6 @@ from server.web.ui.table import table_of
 from server.web.ui.theme import panel
 
 _TITLES = {"errors": "Error vectors", "residuals": "Residuals"}
-_HIGH = 2.0
-"""So many times the median of all residuals is drawn as the largest."""
 
 
 class CalibrationView:
@@ -109,13 +108,11 @@ def _show_views(views: Mapping[str, ViewFigures]) -> None:
 
 
 def _show_planes(views: Mapping[str, ViewFigures]) -> None:
-    """Mean residual of every view on every plane, the larger the redder."""
+    """Mean residual of every view on every plane, coloured by the limits of a verdict."""
     planes = list(dict.fromkeys(plane.name for view in views.values() for plane in view.planes))
     if not planes:
         return
     errors = {name: {plane.name: plane.mean_error_px for plane in view.planes} for name, view in views.items()}
-    known = sorted(error for of_view in errors.values() for error in of_view.values())
-    high_px = _HIGH * known[len(known) // 2]
     ui.label("Mean residual by plane and view / px").classes("text-sm font-medium")
     with ui.element("table").classes("residuals").props('aria-label="residuals by plane and view"'):
         with ui.element("tr"):
@@ -127,12 +124,16 @@ def _show_planes(views: Mapping[str, ViewFigures]) -> None:
                 with ui.element("th"):
                     ui.label(plane)
                 for name in views:
-                    _show_cell(errors[name].get(plane), high_px)
+                    _show_cell(errors[name].get(plane))
+    good, usable, warn = LIMITS_PX.values()
+    ui.label(
+        f"No colour: at most {good:g} px, the aim. Yellow: at most {usable:g} px, still usable. "
+        f"Orange: at most {warn:g} px. Red: more."
+    ).classes("text-xs opacity-70")
 
 
-def _show_cell(error_px: float | None, high_px: float) -> None:
-    share = 0.0 if error_px is None or not high_px else min(1.0, error_px / high_px)
-    with ui.element("td").style(f"background:rgba(229,72,77,{0.65 * max(0.0, share - 0.35):.2f})"):
+def _show_cell(error_px: float | None) -> None:
+    with ui.element("td").classes("" if error_px is None else f"residual {judge(error_px)}"):
         ui.label("" if error_px is None else f"{error_px:.3f}")
 
 

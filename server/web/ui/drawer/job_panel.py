@@ -9,7 +9,7 @@ from nicegui import ui
 from processing.analysis.droplets.measured_exposure import ShotVerdict
 from processing.calibration.verdict import BELONGING, Verdict
 from processing.runs.exposure_faults import fault_lines
-from server.lab.jobs import Job, JobKind, JobState
+from server.lab.jobs import Job, JobKind, JobState, JobTable
 from server.lab.services import Context
 from server.lab.starting.calibrating import use_calibration
 from server.web.ui.asking import try_to
@@ -35,8 +35,8 @@ class JobPanel:
 
     async def reload(self) -> None:
         """Read the job table again."""
-        jobs = await asyncio.to_thread(self._context.jobs.newest, None, JobState, _SHOWN)
-        self._table.rows = [job_row(job) for job in jobs]
+        jobs = await asyncio.to_thread(listed_jobs, self._context.jobs)
+        self._table.rows = [job_row(job, self._context.calibrations.current) for job in jobs]
         self._table.update()
 
     async def _on_act(self, event: Any) -> None:
@@ -50,13 +50,19 @@ class JobPanel:
         ui.notify(f"{calibration} is the current calibration", type="positive")
 
 
-def job_row(job: Job) -> dict[str, Any]:
-    """One job in the table, what came of it included."""
-    is_calibration = job.kind is JobKind.CALIBRATION
+def listed_jobs(jobs: JobTable) -> list[Job]:
+    """What is being worked on, and the newest others: a long queue hides no work."""
+    others = [state for state in JobState if state is not JobState.RUNNING]
+    return [*jobs.oldest(JobState.RUNNING), *jobs.newest(None, others, _SHOWN)]
+
+
+def job_row(job: Job, current: str | None = None) -> dict[str, Any]:
+    """One job in the table, what came of it included; the current calibration is used already."""
+    can_be_used = job.kind is JobKind.CALIBRATION and job.calibration != current
     choices = {
         JobState.QUEUED: ["Abort"],
         JobState.RUNNING: ["Abort"],
-        JobState.DONE: ["Use"] if is_calibration else [],
+        JobState.DONE: ["Use"] if can_be_used else [],
     }
     return {
         "id": job.id,

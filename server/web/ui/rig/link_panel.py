@@ -4,6 +4,7 @@ from nicegui import ui
 
 from server.lab.devices.link_budget import link_budget
 from server.lab.services import Context
+from server.lab.starting.preflight_list import percent
 from server.web.ui.draft import DraftStore
 from server.web.ui.theme import panel
 
@@ -45,7 +46,7 @@ class LinkPanel:
             share = rate_hz * wire_s
             bar.set_value(min(share, 1.0))
             bar.props(f"color={'negative' if share > 1 else 'primary'}")
-            text.set_text(f"{100 * share:.0f} %")
+            text.set_text(percent(share))
 
     def _add_bar(self, name: str, what: str, wire_s: float) -> None:
         with ui.column().classes("gap-0"):

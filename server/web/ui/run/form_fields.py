@@ -129,6 +129,8 @@ class FormFields:
             return
         self._draft.set(field, {**self._draft.values[field], view: value} if view else value)
         self._changed()
+        if name == "kind":
+            self.show()  # it may have brought a name with it
 
 
 def _problem_of_note(name: str, text: str | None) -> str | None:

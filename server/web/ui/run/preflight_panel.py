@@ -7,7 +7,12 @@ from nicegui import ui
 from server.lab.starting.preflight_list import Check, CheckResult
 from server.web.ui.theme import panel
 
-_ICONS = {CheckResult.GOOD: "check_circle", CheckResult.WARN: "info", CheckResult.REFUSED: "cancel"}
+_ICONS = {
+    CheckResult.GOOD: "check_circle",
+    CheckResult.WARN: "info",
+    CheckResult.WAIT: "hourglass_top",
+    CheckResult.REFUSED: "cancel",
+}
 _OF_THE_FORM = Check(name="Form", finding=CheckResult.REFUSED, text="a field is empty or out of its limits")
 
 

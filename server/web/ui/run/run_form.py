@@ -8,14 +8,13 @@ from nicegui import ui
 from nicegui.events import GenericEventArguments
 
 from daq.errors import DaqError
-from daq.run.refusals import RefusalCode
 from daq.run_plan import RunKind, RunPlan
 from server.lab.desk.reason import Reason
 from server.lab.desk.visitor import Visitor
 from server.lab.errors import ServerError
 from server.lab.services import Context
 from server.lab.starting.light_request import obey
-from server.lab.starting.preflight_list import Check, preflight
+from server.lab.starting.preflight_list import PASSING, Check, preflight
 from server.lab.starting.readiness import reasons_against
 from server.lab.starting.run_start import start_run
 from server.web.ui.bar.server_link import TICKET, light_request, shown_form
@@ -28,7 +27,6 @@ from server.web.ui.run.templates import TemplateStore
 from server.web.ui.theme import panel
 from server.web.ui.visiting import may_command, told, visitor
 
-_PASSING = (RefusalCode.BUSY, RefusalCode.STARTING)
 _LOOK_AGAIN_S = 5.0
 """Disk and references change without a word."""
 
@@ -91,7 +89,7 @@ class RunForm:
             return
         reasons, checks = await asyncio.to_thread(self._look, plan, who)
         self._checks.show(checks)
-        self._refusal.set_text("\n".join(f"{one.text} ({one.remedy})" for one in reasons if one.code not in _PASSING))
+        self._refusal.set_text("\n".join(f"{one.text} ({one.remedy})" for one in reasons if one.code not in PASSING))
 
     def _look(self, plan: RunPlan, who: Visitor) -> tuple[tuple[Reason, ...], tuple[Check, ...]]:
         reasons = reasons_against(self._context, plan)

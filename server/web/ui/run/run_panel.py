@@ -18,6 +18,8 @@ from server.web.ui.run.shot_strip import ShotStrip
 from server.web.ui.theme import panel
 from server.web.ui.visiting import require_operator, told
 
+_NO_RUN = "no run since the server was started"
+
 
 class RunPanel:
     """Built once per page, refreshed by its timer."""
@@ -28,7 +30,7 @@ class RunPanel:
         self._monitor = context.monitor
         with panel("Run"):
             with ui.row().classes("w-full items-baseline justify-between no-wrap"):
-                self._name = ui.label("no run yet").classes("text-base font-medium ellipsis")
+                self._name = ui.label(_NO_RUN).classes("text-base font-medium ellipsis")
                 self._outcome = ui.badge("").props('aria-label="run outcome"')
             self._bar = ui.linear_progress(0, show_value=False, size="10px").props(
                 'rounded instant-feedback aria-label="run progress"'
@@ -47,12 +49,12 @@ class RunPanel:
     def refresh(self) -> None:
         """Show the present state."""
         status = self._acquisition.status()
-        self._name.set_text(status.run_id or "no run yet")
+        self._name.set_text(status.run_id or _NO_RUN)
         self._bar.set_value(status.shots_recorded / max(1, status.shots_planned))
         self._strip.refresh(status.run_id)
         self._counts.set_text(counts_text(status, self._context.desk.state.eta_s))
         self._waits.set_text(waiting_text(status, time.monotonic()))
-        self._message.set_text(status.message)
+        self._message.set_text(message_text(status))
         self._outcome.set_text(status.outcome.value if status.outcome else "active" if status.active else "")
         self._outcome.props(f"color={outcome_colour(status.outcome)}")
         self._outcome.set_visibility(bool(self._outcome.text))
@@ -102,6 +104,11 @@ def counts_text(status: RunStatus, eta_s: float | None = None) -> str:
     text = f"{status.shots_recorded} / {status.shots_planned} shots recorded, {status.shots_valid} valid"
     text = f"{text}, {invalid} INVALID" if invalid else text
     return text if eta_s is None else f"{text}; {minutes(eta_s)} left"
+
+
+def message_text(status: RunStatus) -> str:
+    """What happened last; nothing where that is what the counts say."""
+    return "" if status.message == status.summary else status.message
 
 
 def outcome_colour(outcome: str | None) -> str:

@@ -7,6 +7,7 @@ from nicegui import ui
 from server.lab.errors import ServerError
 from server.web.ui.draft import DraftStore
 from server.web.ui.run.templates import TemplateStore
+from server.web.ui.sure import is_sure
 from server.web.ui.visiting import require_operator, told
 
 
@@ -59,21 +60,28 @@ class TemplateBar:
         known: dict[str, float | None] = self._draft.values["current_a"]
         return {view: stored.get(view, current_a) for view, current_a in known.items()}
 
-    def _on_save(self) -> None:
+    async def _on_save(self) -> None:
+        name = (self._name.value or "").strip()
         try:
             require_operator()
-            self._templates.save((self._name.value or "").strip(), self._draft.values)
+            if name in self._templates.names() and not await is_sure(f"Replace the template {name}?", "Replace"):
+                return
+            self._templates.save(name, self._draft.values)
         except (ServerError, OSError) as error:
             ui.notify(told(error), type="negative")
         else:
             self._menu.close()
             self.reload()
 
-    def _on_remove(self) -> None:
+    async def _on_remove(self) -> None:
+        name = self._chosen.value
         try:
             require_operator()
         except ServerError as error:
             ui.notify(told(error), type="negative")
             return
-        self._templates.remove(self._chosen.value or "")
-        self.reload()
+        if not name:
+            ui.notify("Choose a template first", type="warning")
+        elif await is_sure(f"Remove the template {name}?", "Remove"):
+            self._templates.remove(name)
+            self.reload()

@@ -61,6 +61,19 @@ def test_what_is_wrong_stands_in_its_place_with_a_remedy_and_all_of_it(server: S
     laboratory.close_door()
 
 
+def test_what_only_has_to_be_waited_for_is_no_refusal_to_mend(server: Serving) -> None:
+    server.http.post("/api/runs", json=plan_of(shots=50, rate_hz=0.5))
+    found = looked_at(server)
+    assert (found["Rig"].finding, found["Rig"].remedy) == (CheckResult.WAIT, "wait for its end, or stop it")
+    server.http.post("/api/rig/abort")
+    server.wait()
+    assert looked_at(server)["Rig"].finding is CheckResult.GOOD
+
+
+def test_a_small_share_of_the_wires_is_none_of_nothing(server: Serving) -> None:
+    assert looked_at(server, rate_hz=0.01)["Network"].text.startswith("less than 1 % of the wires")
+
+
 @pytest.mark.parametrize("kind", ["dark", "background"])
 def test_a_background_needs_neither_references_nor_a_calibration(server: Serving, kind: str) -> None:
     assert not {"References", "Calibration"} & set(looked_at(server, kind=kind))
