@@ -1,6 +1,8 @@
 """VoxelGrid: where the voxels of a volume lie in space."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from numbers import Integral, Real
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,10 +27,12 @@ class VoxelGrid:
     pitch_mm: float
 
     def __post_init__(self) -> None:
-        if min(self.shape) < 1 or not 0 < self.pitch_mm < np.inf:
-            raise ValueError(f"grid needs voxels: shape {self.shape}, pitch {self.pitch_mm} mm")
-        if any(int(count) != count for count in self.shape) or not np.isfinite(self.origin_mm).all():
-            raise ValueError(f"grid has whole voxels at finite places: shape {self.shape}, origin {self.origin_mm} mm")
+        if not _are_three(self.shape, Integral) or min(self.shape) < 1:
+            raise ValueError(f"grid: shape {self.shape}: three whole numbers of voxels (nz, ny, nx), please")
+        if not _are_three(self.origin_mm, Real) or not np.isfinite(self.origin_mm).all():
+            raise ValueError(f"grid: origin {self.origin_mm}: three finite numbers (x, y, z) in mm, please")
+        if not _is_number(self.pitch_mm, Real) or not 0 < self.pitch_mm < np.inf:
+            raise ValueError(f"grid: pitch {self.pitch_mm!r}: a finite number above 0 in mm, please")
 
     @classmethod
     def centred(cls, shape: tuple[int, int, int], pitch_mm: float) -> "VoxelGrid":
@@ -77,3 +81,13 @@ class VoxelGrid:
         """Points (x, y, z) in mm of fractional voxel indices (z, y, x); the inverse of ``to_index``."""
         offsets_mm: NDArray[np.float64] = np.asarray(indices)[..., ::-1] * self.pitch_mm
         return offsets_mm + np.asarray(self.origin_mm, dtype=np.float64)
+
+
+def _are_three(values: object, kind: type) -> bool:
+    numbers = tuple(values) if isinstance(values, Iterable) else ()
+    return len(numbers) == 3 and all(_is_number(value, kind) for value in numbers)
+
+
+def _is_number(value: object, kind: type) -> bool:
+    """A truth value is none, whatever Python says."""
+    return isinstance(value, kind) and not isinstance(value, bool)

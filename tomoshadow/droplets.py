@@ -9,6 +9,7 @@ from processing.analysis.droplets.shadows.light_search import Light, NamedLight
 from processing.analysis.droplets.shadows.shadow_shot import ShadowExposure, measure_shadows
 from processing.calibration.calibration import Calibration
 from processing.coherent_light import MOST_RATIO
+from processing.count import require_count
 from processing.kernels import DEFAULT_THREADS
 from processing.masked import require_unmasked
 from processing.preprocessing import Intensity, Polarity
@@ -72,6 +73,9 @@ def measure(
         for the polarity.
     """
     _require_options(polarity, light)
+    for name, count in (("twins", twins), ("seed", seed), ("margin_voxel", margin_voxel)):
+        require_count(name, count)
+    require_count("threads", threads, 1)
     for name, image in images.items():
         require_unmasked(name, image)
     names = tuple(images)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from processing import preprocessing
 from processing.calibration.calibration import Calibration
+from processing.count import require_count
 from processing.kernels import DEFAULT_THREADS
 from processing.light import odd_light
 from processing.masked import require_unmasked
@@ -142,7 +143,8 @@ def intensity(
     UserWarning
         The light of the frame does not fit its background or its polarity: the result looks fine, and is not.
     """
-    if not 1 <= bits <= 16 or (frame.size and int(frame.max()) >= 2**bits):
+    require_count("minimum_window_px", minimum_window_px)
+    if not 1 <= require_count("bits", bits, 1) <= 16 or (frame.size and int(frame.max()) >= 2**bits):
         raise ValueError(f"bits {bits} of 1 to 16 reach to {2**bits - 1}, a pixel is {frame.max(initial=0)}")
     for name, array in (("frame", frame), ("background", background), ("dark", dark)):
         require_unmasked(name, array)
@@ -201,6 +203,7 @@ def gavlos(plan: Plan, images: Images, *, out: NDArray[Any] | None = None, threa
 def _by_sight(
     method: ReconstructionMethod, plan: Plan, images: Images, out: NDArray[Any] | None, threads: int
 ) -> Volume:
+    require_count("threads", threads, 1)
     return line_of_sight(plan, _in_order(plan, images), method, out, threads=threads)
 
 

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Literal
 
 from daq.files.run_directory import RunReader
+from processing.count import require_count
 from processing.preprocessing import Intensity, Preprocessing
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.runs.shots import shot_images
@@ -62,10 +63,13 @@ def shot_intensities(
     ------
     PipelineError
         A view has no such exposure.
+    ValueError
+        A number is no whole number.
     ShotFileError
         The shot is missing or damaged.
     """
-    recorded = run.read_shot(shot)
+    require_count("minimum_window_px", minimum_window_px)
+    recorded = run.read_shot(require_count("shot", shot))
     settings = ReconstructionSettings(minimum_window_px=minimum_window_px, noise_floor=noise_floor)
     images = shot_images.shot_intensities(run, recorded, frame, settings)
     return dict(zip(recorded.views, images, strict=True))

@@ -3,6 +3,7 @@
 from typing import Literal
 
 from processing.calibration.target.targets import Target
+from processing.count import require_count
 
 
 def Checkerboard(columns: int, rows: int, pitch_mm: float, *, y_axis: Literal["down", "up"] = "down") -> Target:
@@ -17,6 +18,7 @@ def Checkerboard(columns: int, rows: int, pitch_mm: float, *, y_axis: Literal["d
     y_axis : {"down", "up"}
         Where y grows in the image. With "up", z must grow towards the cameras, or the axes are left-handed.
     """
+    _require_counts(columns, rows)
     return Target(kind="checkerboard", columns=columns, rows=rows, pitch_mm=pitch_mm, y_axis=y_axis)
 
 
@@ -39,4 +41,11 @@ def Dots(
     y_axis : {"down", "up"}
         As for ``Checkerboard``.
     """
+    _require_counts(columns, rows)
     return Target(kind="dots", columns=columns, rows=rows, pitch_mm=pitch_mm, y_axis=y_axis)
+
+
+def _require_counts(columns: int | None, rows: int | None) -> None:
+    for name, count in (("columns", columns), ("rows", rows)):
+        if count is not None:
+            require_count(name, count, 2)

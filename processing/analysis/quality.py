@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter
 
+from processing.count import require_count
 from processing.masked import require_unmasked
 
 Volume = NDArray[np.floating]
@@ -29,7 +30,8 @@ def quality_factor(
     Returns
     -------
     float
-        1 for a perfect reconstruction. Windows in which either volume is constant have no say.
+        1 for a perfect reconstruction. Windows in which either volume is constant have no say, nor have voxels beyond
+        the last window of an axis, (n - window) % step of them: cut both volumes to look at these.
 
     Raises
     ------
@@ -37,9 +39,14 @@ def quality_factor(
         Shapes differ, a voxel is masked or not finite, no window fits in, ``window`` is no multiple of ``step``, or no
         window has a say.
     """
+    for name, array in (("truth", truth), ("volume", volume)):
+        if not isinstance(array, np.ndarray):
+            raise ValueError(f"{name} is a {type(array).__name__}: an array (z, y, x), please")
     if truth.shape != volume.shape:
         raise ValueError(f"truth has shape {truth.shape}, volume {volume.shape}")
-    if step < 1 or window % step or window < step or min(truth.shape) < window:
+    require_count("window", window, 1)
+    require_count("step", step, 1)
+    if truth.ndim != 3 or window % step or min(truth.shape) < window:
         raise ValueError(f"windows of {window} voxels at steps of {step} do not fit shape {truth.shape}")
     require_unmasked("truth", truth)
     require_unmasked("volume", volume)

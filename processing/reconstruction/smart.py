@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from processing.count import require_count
 from processing.kernels import DEFAULT_THREADS
 from processing.reconstruction.line_of_sight import check_volume
 from processing.reconstruction.planning.plan import Plan
@@ -168,8 +169,7 @@ class _End:
     stop: Stop | None
 
     def __post_init__(self) -> None:
-        if self.iterations < 1:
-            raise ValueError(f"iterations {self.iterations} must be positive")
+        require_count("iterations", self.iterations, 1)
         if not 0 <= self.least_gain < 1:
             raise ValueError(f"least_gain {self.least_gain} must be a share, 0 to 1")
 
@@ -194,6 +194,7 @@ def _run(
     memory: SmartResult | None,
     threads: int,
 ) -> SmartResult:
+    require_count("threads", threads, 1)
     if not 0 < relaxation <= MOST_RELAXATION:
         raise ValueError(
             f"relaxation {relaxation} must be above 0, and at most {MOST_RELAXATION:g}: beyond, it diverges"

@@ -34,6 +34,7 @@ PROVENANCE = "tomoshadow"
 SCHEMA = {"schema": "tomoshadow/volume", "schema_version": 1}
 Value = str | int | float
 Intensities = NDArray[np.float32]
+_STORABLE = f"an array (z, y, x) of {' or '.join(VoxelType)}"
 NO_PROVENANCE: Mapping[str, Value] = MappingProxyType({})
 
 
@@ -60,8 +61,9 @@ def write_volume(
     Raises
     ------
     ValueError
-        Volume and grid differ in shape, or a voxel is infinite or not a number.
+        Volume and grid differ in shape, a voxel is infinite or not a number, or the volume is of another type.
     """
+    _require_storable(path, volume)
     if volume.shape != grid.shape:
         raise ValueError(f"{path}: volume has shape {volume.shape}, its grid {grid.shape}")
     require_unmasked(str(path), volume)
@@ -69,6 +71,13 @@ def write_volume(
         z, y, x = np.argwhere(~np.isfinite(volume))[0]
         raise ValueError(f"{path}: voxel (z {z}, y {y}, x {x}) is {volume[z, y, x]}")
     write_slabs(Path(path), SlabVolume.of(volume), grid, provenance)
+
+
+def _require_storable(path: str | Path, volume: object) -> None:
+    if not isinstance(volume, np.ndarray):
+        raise ValueError(f"{path}: volume is a {type(volume).__name__}; {_STORABLE}, please")
+    if volume.dtype.name not in list(VoxelType):
+        raise ValueError(f"{path}: volume is of {volume.dtype}; {_STORABLE}, please")
 
 
 def write_slabs(

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from processing.count import require_count
 from processing.geometry import PinholeCamera
 from processing.synthetic.paper_rig import TABLE_1, paper_cameras, paper_optics
 from processing.synthetic.rendering import render_transmittance
@@ -65,7 +66,7 @@ def example(seed: int = 0) -> Example:
     Example
         Images and angles by view, and the truth: ``positions_mm``, ``diameters_mm``.
     """
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(require_count("seed", seed))
     cameras, optics = paper_cameras(BINNING), paper_optics(BINNING)
     positions_mm = rng.uniform(-1, 1, (DROPLETS, 3)) * HALF_EDGES_MM
     diameters_mm = rng.uniform(*DIAMETERS_MM, DROPLETS)

@@ -17,6 +17,7 @@ from processing.analysis.velocity.track_doubts import rate_doubts
 from processing.analysis.velocity.track_motion import HALF_WINDOW, TrackPoints, track_points
 from processing.analysis.velocity.tracks import Tracks, link
 from processing.analysis.velocity.velocity_table import COVARIANCES
+from processing.count import require_count
 from processing.geometry import FloatArray
 from processing.reconstruction.settings import GridSettings
 from processing.volume import VoxelGrid
@@ -91,6 +92,7 @@ def track_droplets(
         They are of several runs, of one shot twice, or nobody knows their rate or their grid; or a shot is a copy of
         another one.
     """
+    require_count("half_window", half_window, 1)
     ordered = sorted(shots, key=_shot)
     _require_one_series(ordered)
     rate_hz = _rate_hz(ordered[0]) if rate_hz is None else rate_hz

@@ -286,7 +286,7 @@ def test_dark_images_give_an_empty_volume() -> None:
 def test_what_cannot_be_done_is_refused() -> None:
     mappings = oracle.cameras(2)
     plan, images = make_plan(mappings, False), images_of(droplets(3), mappings)
-    with pytest.raises(ValueError, match="iterations 0 must be positive"):
+    with pytest.raises(ValueError, match="iterations 0: a whole number from 1"):
         smart(plan, images, iterations=0)
     for relaxation in (0.0, 5.0, np.nan, np.inf):
         with pytest.raises(ValueError, match=f"relaxation {relaxation} must be above 0, and at most 2"):
