@@ -17,7 +17,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from processing.errors import BadInput
+from processing.grey_colours import ImageFileError as ImageFileError
+from processing.grey_colours import grey_of_colours
 from processing.tiff_pages import PageKind, deflated_parts, page_kind, page_offsets, show_page
 
 GreyImage = NDArray[np.uint8] | NDArray[np.uint16]
@@ -32,12 +33,8 @@ _SUN_RASTER = b"\x59\xa6\x6a\x95"
 """Of whose images OpenCV makes zeros, or other grey values."""
 
 
-class ImageFileError(BadInput):
-    """An image file cannot be read; the text names the file."""
-
-
 def read_image(path: Path, page: int | None = None) -> GreyImage:
-    """Grey values (row, column), uint8 or uint16. Colour is converted; the file's name does not matter.
+    """Grey values (row, column), uint8 or uint16. Colours that are grey become it; the file's name does not matter.
 
     Parameters
     ----------
@@ -64,10 +61,8 @@ def read_image(path: Path, page: int | None = None) -> GreyImage:
         raise ImageFileError(f"{path}: is damaged: {complaints}")
     if offsets:
         _check_kind(path, page_kind(content, offsets[chosen]), image.dtype)
-    if image.ndim == 3 and image.shape[2] < 3:
-        raise ImageFileError(f"{path}: {image.shape[2]} values a pixel, grey or colour is needed")
     if image.ndim == 3:
-        image = cv2.cvtColor(image, cv2.COLOR_BGRA2GRAY if image.shape[2] == 4 else cv2.COLOR_BGR2GRAY)
+        image = grey_of_colours(path, image)
     if image.dtype == np.uint8:
         return np.asarray(image, dtype=np.uint8)
     if image.dtype == np.uint16:

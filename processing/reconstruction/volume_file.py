@@ -25,6 +25,7 @@ from processing.kernels import DEFAULT_THREADS
 from processing.masked import require_unmasked
 from processing.reconstruction.choices import VoxelType
 from processing.reconstruction.slab_volume import SLAB_ROWS, SlabVolume
+from processing.reconstruction.volume_seal import SEAL, seal_of
 from processing.reconstruction.voxel_chunks import chunks_of
 from processing.volume import VoxelGrid
 
@@ -119,6 +120,7 @@ def write_slabs(
             dataset.attrs["lost_voxels"] = volume.losses.voxel_share
             dataset.attrs["lost_intensity"] = volume.losses.intensity_share
         file.create_group(PROVENANCE).attrs.update({**provenance, **SCHEMA})
+        file[PROVENANCE].attrs[SEAL] = _seal_of(file)
 
 
 @dataclass(frozen=True, eq=False)
@@ -228,9 +230,17 @@ def _naming(path: Path) -> Iterator[None]:
 
 def _stored(path: Path, file: h5py.File) -> StoredVolume:
     voxels = file[f"VTKHDF/PointData/{INTENSITY}"]
-    provenance = {name: _plain(value) for name, value in file[PROVENANCE].attrs.items() if name not in SCHEMA}
+    if file[PROVENANCE].attrs.get(SEAL, seal := _seal_of(file)) != seal:
+        raise ValueError("its scale, place or origin was edited after it was written; copy it back, or make it again")
+    written = {name: _plain(value) for name, value in file[PROVENANCE].attrs.items()}
+    provenance = {name: value for name, value in written.items() if name not in {SEAL, *SCHEMA}}
     grid = _read_grid(file["VTKHDF"].attrs, voxels.shape)
     return StoredVolume(path, grid, provenance, voxels, float(voxels.attrs.get("scale_factor", 1.0)))
+
+
+def _seal_of(file: h5py.File) -> str:
+    voxels = file[f"VTKHDF/PointData/{INTENSITY}"]
+    return seal_of(voxels.shape, file["VTKHDF"].attrs, voxels.attrs, file[PROVENANCE].attrs)
 
 
 def _make_image_data(group: h5py.Group, volume: SlabVolume, grid: VoxelGrid) -> h5py.Dataset:

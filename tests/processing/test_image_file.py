@@ -29,8 +29,34 @@ def test_grey_values_come_back_under_any_name(tmp_path: Path, kind: str, dtype: 
 @pytest.mark.parametrize("channels", [3, 4])
 def test_colour_becomes_grey(tmp_path: Path, channels: int) -> None:
     image = np.full((8, 9, channels), 77, np.uint8)
+    image[..., 3:] = 255
     cv2.imwrite(str(tmp_path / "a.png"), image)
     np.testing.assert_array_equal(read_image(tmp_path / "a.png"), np.full((8, 9), 77, np.uint8))
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+@pytest.mark.parametrize("channel", range(3))
+def test_a_colour_alone_is_no_grey(tmp_path: Path, channel: int, dtype: type[np.uint8 | np.uint16]) -> None:
+    """A weighted mean would take 30 % of red, 59 % of green and 11 % of blue for the light."""
+    image = np.zeros((8, 9, 3), dtype)
+    image[2:5, 3:6, channel] = np.iinfo(dtype).max // 2
+    cv2.imwrite(str(tmp_path / "a.png"), image)
+    with pytest.raises(ImageFileError, match=r"a\.png: is coloured at column 3, row 2: red .*, green .*, blue .*grey"):
+        read_image(tmp_path / "a.png")
+
+
+def test_a_grey_jpeg_in_colours_is_grey(tmp_path: Path) -> None:
+    grey = np.random.default_rng(1).integers(0, 255, (40, 50), np.uint8)
+    Image.fromarray(np.dstack([grey] * 3)).save(tmp_path / "a.jpg", quality=60)
+    assert read_image(tmp_path / "a.jpg").shape == grey.shape
+
+
+def test_an_image_that_is_partly_seen_through_is_not_what_a_camera_saw(tmp_path: Path) -> None:
+    image = np.full((8, 9, 4), 255, np.uint8)
+    image[1, 2, 3] = 128
+    cv2.imwrite(str(tmp_path / "a.png"), image)
+    with pytest.raises(ImageFileError, match=r"a\.png: is transparent at column 2, row 1"):
+        read_image(tmp_path / "a.png")
 
 
 def test_float_images_are_refused(tmp_path: Path) -> None:

@@ -128,7 +128,30 @@ def test_a_volume_of_before_the_types_is_read(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "old.vtkhdf", "r+") as file:
         for name in ("voxels", "scale_factor"):
             del file["VTKHDF/PointData/intensity"].attrs[name]
+        del file["tomoshadow"].attrs["seal_sha256"]
     np.testing.assert_array_equal(read_volume(tmp_path / "old.vtkhdf")[0], some_volume())
+
+
+@pytest.mark.parametrize(
+    ("group", "name", "value"),
+    [
+        ("VTKHDF/PointData/intensity", "scale_factor", 0.5),
+        ("VTKHDF/PointData/intensity", "lost_intensity", 0.0),
+        ("VTKHDF", "Origin", [0.0, 0.0, 0.0]),
+        ("VTKHDF", "Spacing", [0.2, 0.2, 0.2]),
+        ("tomoshadow", "shot", 7),
+        ("tomoshadow", "settings", "{}"),
+    ],
+)
+@pytest.mark.parametrize("dtype", ["float32", "uint8"])
+def test_a_volume_whose_scale_place_or_origin_was_edited_is_refused(
+    tmp_path: Path, dtype: str, group: str, name: str, value: object
+) -> None:
+    write_volume(tmp_path / "one.vtkhdf", (200 * some_volume()).astype(dtype), GRID, {"run": "r1", "shot": 3})
+    with h5py.File(tmp_path / "one.vtkhdf", "r+") as file:
+        file[group].attrs[name] = value
+    with pytest.raises(VolumeFileError, match=r"one\.vtkhdf: .*its scale, place or origin was edited after"):
+        read_volume(tmp_path / "one.vtkhdf")
 
 
 def test_it_is_vtk_image_data(tmp_path: Path) -> None:
