@@ -6,7 +6,7 @@ from typing import Literal
 
 from processing.benchmarks.baseline import Timing
 
-Unit = Literal["x", "s", "ms", "GB", "%", "CPU-s", "cores"]
+Unit = Literal["x", "s", "ms", "GB", "%", "CPU-s", "cores", "requests"]
 
 
 @dataclass(frozen=True)
@@ -17,7 +17,7 @@ class Target:
     ----------
     work : str
         What is done.
-    unit : {"x", "s", "ms", "GB", "%", "CPU-s", "cores"}
+    unit : {"x", "s", "ms", "GB", "%", "CPU-s", "cores", "requests"}
         ``x`` is the CPU time of the baseline over that of the kernel; more is better, and more cores are. Else less is.
     at_least, aim : float
         Floor and goal, in that unit.
@@ -28,8 +28,10 @@ class Target:
     at_least: float
     aim: float | None = None
 
-    def verdict(self, value: float) -> Literal["aim", "yes", "no"]:
-        """Whether a measured value reaches the aim, the floor, or neither."""
+    def verdict(self, value: float | None) -> Literal["aim", "yes", "no", ""]:
+        """Whether a measured value reaches the aim, the floor, or neither; nothing of what was not measured."""
+        if value is None:
+            return ""
         if self.aim is not None and self._reaches(value, self.aim):
             return "aim"
         return "yes" if self._reaches(value, self.at_least) else "no"
@@ -40,10 +42,10 @@ class Target:
 
 @dataclass(frozen=True)
 class Measured:
-    """A target and what was measured of it; ``how`` says what else one should know."""
+    """A target and what was measured of it; ``how`` says what else one should know, or why there is no value."""
 
     target: Target
-    value: float
+    value: float | None
     timing: Timing | None = None
     how: str = ""
 
@@ -77,6 +79,10 @@ CAMERAS = {
 }
 TRIGGER = Target("trigger to volume in the API, full frames", "s", 2, 0.5)
 LOOKED_AT = Target("what 3 browsers with 4 tiles at 10 Hz add to a server, of one processor", "%", 40, 25)
+FIRST_PAGE = Target("first usable page of the desk", "s", 2, 1)
+ASKED = Target("`/api/rig` while full frames are recorded and reconstructed, 95 % within", "ms", 50, 20)
+ABORT = Target("ABORT on the page to light off, the server's main loop busy", "ms", 200, 100)
+DRAG = Target("drag of a slider", "requests", 10, 5)
 START = Target("server start, 10,000 runs on disk", "s", 5, 2)
 JOB = Target("what a job of the server adds to its work", "s", 0.3)
 
@@ -127,6 +133,8 @@ def _table(rows: Sequence[Row]) -> str:
     return "\n".join(lines)
 
 
-def _figure(value: float, target: Target) -> str:
+def _figure(value: float | None, target: Target) -> str:
+    if value is None:
+        return "not measured"
     digits = f"{value:.3g}" if value < 1000 else f"{value:.0f}"
     return f"{digits}x" if target.unit == "x" else f"{digits} {target.unit}"

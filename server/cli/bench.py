@@ -118,7 +118,7 @@ def _of_programs(part: str, study: "SpeedStudy", options: Namespace) -> "Iterato
     elif part == "start":
         yield from served.server_start(directory, 20 if quick else served.RUNS)
     elif part == "desk":
-        yield from desk.looked_at(directory, 3 if quick else desk.LOOKED_S)
+        yield from desk.desk(directory, 3 if quick else desk.LOOKED_S)
     elif part == "trigger":
         yield from served.trigger_to_volume(directory, 2 if quick else served.TRIGGERED_SHOTS)
     else:

@@ -10,8 +10,9 @@ from typing import Any
 
 import pytest
 from nicegui import app as pages
-from playwright.sync_api import Locator, Page, WebSocket, expect
+from playwright.sync_api import Browser, Locator, Page, WebSocket, expect
 
+from server.cli.benchmarks.browsed import drag, first_page
 from server.web.app import create_app
 from tests.support.drifting_views import SIZE_PX
 from tests.support.live_shots import save_droplet_calibration, spray_scene
@@ -182,6 +183,12 @@ def test_the_slider_of_a_current_asks_once_and_the_form_agrees(page: Page, serve
     value = number.input_value()
     go_to(page, "Run")
     expect(page.get_by_label("LED view1 / A")).to_have_value(value)
+
+
+def test_what_the_bench_measures_in_a_browser_is_there_to_be_measured(browser: Browser, server: Serving) -> None:
+    url = str(server.http.base_url)
+    assert 0 < (first_page(browser, url, 1).value or 0) < 60
+    assert 1 <= (drag(browser, url).value or 0) <= 10
 
 
 def test_the_assistant_sets_currents_to_half_range_and_says_what_it_did(page: Page, server: Serving) -> None:

@@ -10,17 +10,24 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from statistics import median, quantiles
 from tempfile import TemporaryDirectory
+from typing import Any
 
 from websockets.sync.client import connect
 
+from daq.run.state import RunState
 from processing.benchmarks import targets
 from processing.benchmarks.targets import Measured
+from server.cli.benchmarks import busy_server
 from server.cli.benchmarks.bench_rig import NoRig, rig_in
-from server.cli.benchmarks.served import Server, served
+from server.cli.benchmarks.browsed import TIMES, browsed
+from server.cli.benchmarks.served import Server, calibrated, served, start
+from server.lab.jobs import JobState
 from server.rig.config import load_config
 
 BROWSERS, RATE_HZ, LOOKED_S = 3, 10.0, 20.0
+RECORDED_HZ, _ASK_S = 1.0, 0.02
 _WARM_S, _DEADLINE_S = 3.0, 30.0
 
 
@@ -32,17 +39,25 @@ class _Spent:
     pictures_hz: float
 
 
-def looked_at(directory: Path | None, time_s: float) -> Iterator[Measured]:
-    """CPU time of a server whose live view is looked at, less that of the same live view in the dark."""
+def desk(directory: Path | None, time_s: float) -> Iterator[Measured]:
+    """All lines of the desk, by one server; its cameras are simulated in another process."""
     with TemporaryDirectory(dir=directory) as folder:
         config = rig_in(Path(folder), still=True)
-        views = load_config(config).views
-        currents_a = {name: view.nominal_current_a for name, view in views.items()}
-        with _far_ends(config), served(config) as server:
-            server.ask("rig/live", {"rate_hz": RATE_HZ, "pulse": {"current_a": currents_a}}, "PUT")
-            alone = _spent(server, 0, len(views), time_s)
-            looked = _spent(server, BROWSERS, len(views), time_s)
-            server.ask("rig/live", method="DELETE")
+        currents_a = {name: view.nominal_current_a for name, view in load_config(config).views.items()}
+        live = {"rate_hz": RATE_HZ, "pulse": {"current_a": currents_a}}
+        with _far_ends(config), served(config, busy_server.__spec__.name) as server:
+            yield from browsed(server, live, TIMES)
+            yield _looked_at(server, live, time_s)
+            yield _asked(server, config, Path(folder) / "runs", time_s)
+
+
+def _looked_at(server: Server, live: dict[str, Any], time_s: float) -> Measured:
+    """CPU time of a server whose live view is looked at, less that of the same live view in the dark."""
+    views = len(live["pulse"]["current_a"])
+    server.ask("rig/live", live, "PUT")
+    alone = _spent(server, 0, views, time_s)
+    looked = _spent(server, BROWSERS, views, time_s)
+    server.ask("rig/live", method="DELETE")
     if not looked.pictures_hz:
         raise NoRig(f"not one picture came within {time_s:g} s: this machine is too busy")
     added_cores = (looked.cores - alone.cores) * RATE_HZ / looked.pictures_hz
@@ -50,7 +65,22 @@ def looked_at(directory: Path | None, time_s: float) -> Iterator[Measured]:
         f"from {looked.pictures_hz:.1f} pictures/s of each view; then the server with its cameras takes "
         f"{100 * looked.cores:.0f} %, {100 * alone.cores:.0f} % with nobody there"
     )
-    yield Measured(targets.LOOKED_AT, 100 * added_cores, how=how)
+    return Measured(targets.LOOKED_AT, 100 * added_cores, how=how)
+
+
+def _asked(server: Server, config: Path, data_dir: Path, time_s: float) -> Measured:
+    """How long a script waits for the state of the rig, while a run is recorded and its shots are reconstructed."""
+    calibration = calibrated(server, config, data_dir)
+    start(server, config, round(time_s * RECORDED_HZ), calibration, RECORDED_HZ)
+    waits_ms = []
+    while server.ask("rig")["acquisition"]["state"] != RunState.IDLE:
+        began_s = time.perf_counter()
+        server.ask("rig")
+        waits_ms.append(1000 * (time.perf_counter() - began_s))
+        time.sleep(_ASK_S)
+    done = sum(job["state"] == JobState.DONE for job in server.ask("jobs"))
+    how = f"{len(waits_ms)} times, median {median(waits_ms):.2g} ms; shots at {RECORDED_HZ:g} Hz, {done} volumes made"
+    return Measured(targets.ASKED, quantiles(waits_ms, n=20)[-1], how=how)
 
 
 def _spent(server: Server, readers: int, views: int, time_s: float) -> _Spent:

@@ -48,10 +48,11 @@ HALF_MM = np.array([5.0, 5.0, 4.5])
 class Server:
     """``tomoshadow serve`` in a process of its own, asked by HTTP."""
 
-    def __init__(self, config: Path, port: int) -> None:
-        command = [sys.executable, "-m", "server.cli", "serve", "--config", str(config), "--port", str(port)]
+    def __init__(self, config: Path, port: int, module: str) -> None:
+        command = [sys.executable, "-m", module, "serve", "--config", str(config), "--port", str(port)]
         self.begun_s = time.perf_counter()
-        self._url = f"http://127.0.0.1:{port}/api"
+        self.page_url = f"http://127.0.0.1:{port}"
+        self._url = f"{self.page_url}/api"
         self.live_address = f"ws://127.0.0.1:{port}/api/live"
         self.process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
@@ -76,11 +77,11 @@ class Server:
 
 
 @contextmanager
-def served(config: Path) -> Iterator[Server]:
-    """A server that has just answered for the first time; it is ended with the block."""
+def served(config: Path, module: str = "server.cli") -> Iterator[Server]:
+    """A server, of a module that has its commands, that has just answered for the first time; ended with the block."""
     with listening("127.0.0.1", 0) as free:
         port = free.getsockname()[1]
-    server = Server(config, port)
+    server = Server(config, port, module)
     try:
         _until(server.up, "the server answers")
         yield server
@@ -112,11 +113,8 @@ def trigger_to_volume(directory: Path | None, shots: int = TRIGGERED_SHOTS) -> I
     with TemporaryDirectory(dir=directory) as folder:
         config, data_dir = rig_in(Path(folder), still=True), Path(folder) / "runs"
         with served(config) as server:
-            warm = _recorded(server, config, 1, None)
-            cameras = read_true_cameras(data_dir / warm / TRUTH_FILE)
-            calibration = droplet_calibration(list(cameras.values()), HALF_MM)
-            save_calibration(calibration, data_dir / "calibrations" / "true.json")
-            run_id = _recorded(server, config, shots, "true")
+            calibration = calibrated(server, config, data_dir)
+            run_id = _recorded(server, config, shots, calibration)
             _until(lambda: len(_done(server, run_id)) == shots, "all volumes are made")
             done = _done(server, run_id)
         with RunReader(data_dir / run_id) as run:
@@ -126,6 +124,14 @@ def trigger_to_volume(directory: Path | None, shots: int = TRIGGERED_SHOTS) -> I
         median(waits_s[1:]),
         how=f"median of {shots - 1}, the first {waits_s[0]:.2g} s; rendered before",
     )
+
+
+def calibrated(server: Server, config: Path, data_dir: Path) -> str:
+    """Record one shot, and keep the cameras that really took it as a calibration; its name."""
+    warm = _recorded(server, config, 1, None)
+    cameras = read_true_cameras(data_dir / warm / TRUTH_FILE)
+    save_calibration(droplet_calibration(list(cameras.values()), HALF_MM), data_dir / "calibrations" / "true.json")
+    return "true"
 
 
 def _done(server: Server, run_id: str) -> dict[int, float]:
@@ -138,10 +144,15 @@ def _done(server: Server, run_id: str) -> dict[int, float]:
     }
 
 
-def _recorded(server: Server, config: Path, shots: int, calibration: str | None) -> str:
+def start(server: Server, config: Path, shots: int, calibration: str | None, rate_hz: float = RATE_HZ) -> None:
+    """Begin a run of a spray."""
     current_a = {name: view.nominal_current_a for name, view in load_config(config).views.items()}
-    plan = {"name": "bench", "kind": "sample", "shots": shots, "rate_hz": RATE_HZ, "pulse": {"current_a": current_a}}
+    plan = {"name": "bench", "kind": "sample", "shots": shots, "rate_hz": rate_hz, "pulse": {"current_a": current_a}}
     server.ask("runs", plan | {"calibration": calibration}, "POST")
+
+
+def _recorded(server: Server, config: Path, shots: int, calibration: str | None) -> str:
+    start(server, config, shots, calibration)
     _until(lambda: server.ask("rig")["acquisition"]["state"] == RunState.IDLE, "the run has ended")
     return str(server.ask("runs")[0]["run_id"])
 
