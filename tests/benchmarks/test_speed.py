@@ -24,7 +24,8 @@ from server.cli.main import main
 IN_THIS_PROCESS = [part for part in PARTS if part not in ("cameras", "trigger", "start", "desk")]
 """Servers and cameras of full size take longer than tests may."""
 OF_SERVERS = {
-    getattr(speed_targets, name) for name in ("TRIGGER", "START", "LOOKED_AT", "FIRST_PAGE", "ASKED", "ABORT", "DRAG")
+    getattr(speed_targets, name)
+    for name in ("TRIGGER", "START", "LOOKED_AT", "FIRST_PAGE", "ASKED", "ABORT", "DRAG", "LIVE_VOLUME")
 }
 
 

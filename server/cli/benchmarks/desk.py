@@ -24,10 +24,13 @@ from server.cli.benchmarks.bench_rig import NoRig, rig_in
 from server.cli.benchmarks.browsed import TIMES, browsed
 from server.cli.benchmarks.served import Server, calibrated, served, start
 from server.lab.jobs import JobState
+from server.pictures.previews import AXES
 from server.rig.config import load_config
 
 BROWSERS, RATE_HZ, LOOKED_S = 3, 10.0, 20.0
 RECORDED_HZ, _ASK_S = 1.0, 0.02
+VOLUMES_OF_HZ, _TURN_S = 4.0, 0.1
+"""The page waits so long after each volume."""
 _WARM_S, _DEADLINE_S = 3.0, 30.0
 
 
@@ -48,7 +51,9 @@ def desk(directory: Path | None, time_s: float) -> Iterator[Measured]:
         with _far_ends(config), served(config, busy_server.__spec__.name) as server:
             yield from browsed(server, live, TIMES)
             yield _looked_at(server, live, time_s)
-            yield _asked(server, config, Path(folder) / "runs", time_s)
+            calibration = calibrated(server, config, Path(folder) / "runs")
+            yield _live_volume(server, calibration, live, time_s)
+            yield _asked(server, config, calibration, time_s)
 
 
 def _looked_at(server: Server, live: dict[str, Any], time_s: float) -> Measured:
@@ -68,9 +73,29 @@ def _looked_at(server: Server, live: dict[str, Any], time_s: float) -> Measured:
     return Measured(targets.LOOKED_AT, 100 * added_cores, how=how)
 
 
-def _asked(server: Server, config: Path, data_dir: Path, time_s: float) -> Measured:
+def _live_volume(server: Server, calibration: str, live: dict[str, Any], time_s: float) -> Measured:
+    """New volumes that a page shows of a live view of so many shots per second."""
+    server.ask("calibrations/current", {"id": calibration}, "PUT")
+    server.ask("rig/live", {**live, "rate_hz": VOLUMES_OF_HZ}, "PUT")
+    took_s, last, end_s = [], 0, time.perf_counter() + _WARM_S + time_s
+    with ThreadPoolExecutor(len(AXES)) as pool:
+        while (now_s := time.perf_counter()) < end_s:
+            view = server.ask("rig/live/volume")
+            if view["number"] != last:
+                last = view["number"]
+                middle = {axis: count // 2 for axis, count in zip(AXES, view["shape"], strict=True)}
+                list(
+                    pool.map(lambda axis, at=middle: server.get(f"rig/live/volume/slices/{axis}/{at[axis]}.png"), AXES)
+                )
+                took_s += [view["took_s"]] if now_s > end_s - time_s else []
+            time.sleep(_TURN_S)
+    server.ask("rig/live", method="DELETE")
+    how = f"live view at {VOLUMES_OF_HZ:g} Hz; a volume is seen by all views after {median(took_s):.2g} s"
+    return Measured(targets.LIVE_VOLUME, len(took_s) / time_s, how=how)
+
+
+def _asked(server: Server, config: Path, calibration: str, time_s: float) -> Measured:
     """How long a script waits for the state of the rig, while a run is recorded and its shots are reconstructed."""
-    calibration = calibrated(server, config, data_dir)
     start(server, config, round(time_s * RECORDED_HZ), calibration, RECORDED_HZ)
     waits_ms = []
     while server.ask("rig")["acquisition"]["state"] != RunState.IDLE:

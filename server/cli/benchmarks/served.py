@@ -58,11 +58,15 @@ class Server:
 
     def ask(self, path: str, body: Any = None, method: str | None = None) -> Any:
         """Send JSON, if there is any, and get what the server answers."""
+        return json.loads(self.get(path, body, method) or "null")
+
+    def get(self, path: str, body: Any = None, method: str | None = None) -> bytes:
+        """The same for what is no JSON."""
         data = None if body is None else json.dumps(body).encode()
         request = Request(f"{self._url}/{path}", data, {"Content-Type": "application/json"}, method=method)  # noqa: S310
         try:
             with urlopen(request, timeout=LIMIT_S) as answer:  # noqa: S310 - of this machine
-                return json.loads(answer.read() or "null")
+                return bytes(answer.read())
         except HTTPError as error:
             raise NoRig(f"{path}: {error.read().decode()}") from error
 
