@@ -7,6 +7,7 @@ from pydantic import Field
 
 from daq.frozen_model import FrozenModel
 from daq.names import RunName
+from daq.recipe import Recipe
 from daq.run_notes import RunNotes, Spray
 
 
@@ -75,6 +76,13 @@ class RunPlan(FrozenModel):
         int, Field(ge=0, le=1000, description="how many shots with a proven frame miss may be fired again")
     ] = 3
     calibration: Annotated[str | None, Field(description="id of the calibration that reconstructs this run")] = None
+    recipes: Annotated[
+        tuple[Recipe, ...] | None,
+        Field(
+            max_length=8,
+            description="what is made of every valid shot of a sample run by itself; empty: nothing; null: as usual",
+        ),
+    ] = None
     notes: Annotated[RunNotes, Field(description="conditions that no device knows")] = RunNotes()
     spray: Annotated[Spray | None, Field(description="where nozzle and axis are; null where nobody stated it")] = None
 

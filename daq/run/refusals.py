@@ -39,6 +39,7 @@ class RefusalCode(StrEnum):
     CALIBRATION_UNKNOWN = "calibration_unknown"
     CALIBRATION_DAMAGED = "calibration_damaged"
     CALIBRATION_SIZE = "calibration_size"
+    RECIPE = "recipe"
 
 
 REMEDIES: Mapping[RefusalCode, str] = MappingProxyType(
@@ -65,6 +66,7 @@ REMEDIES: Mapping[RefusalCode, str] = MappingProxyType(
         RefusalCode.CALIBRATION_UNKNOWN: "choose a calibration that exists",
         RefusalCode.CALIBRATION_DAMAGED: "choose another calibration, or copy this one back from a backup",
         RefusalCode.CALIBRATION_SIZE: "choose another calibration, or calibrate again",
+        RefusalCode.RECIPE: "correct what is made of every shot, or choose what it needs",
     }
 )
 

@@ -1,39 +1,14 @@
-"""What is reconstructed, and when: every valid shot of a sample run by itself, and what an operator asks for."""
+"""Reconstruction of recorded shots: which of them, by which calibration, and where results go."""
 
-import asyncio
 from collections.abc import Iterable, Sequence
 
-from daq.run.events import ShotRecorded
-from daq.run_plan import ImageKey, RunKind
+from daq.run_plan import ImageKey
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.runs.measurement import MeasureSettings
-from server.lab.duty import Duty
 from server.lab.errors import Unprocessable
-from server.lab.events import RUN_EVENTS
 from server.lab.jobs import Job, reconstruction_job
 from server.lab.results import result_calibration
 from server.lab.services import Context
-
-_SHOT_RECORDED = RUN_EVENTS[ShotRecorded]
-
-
-async def follow_acquisition(context: Context, duty: Duty) -> None:
-    """Queue a job for every shot that is recorded from now on; acquisition knows nothing of it."""
-    events = context.services.events
-    async for event in events.follow(events.newest):
-        if event is not None and event.name == _SHOT_RECORDED and event.data["valid"]:
-            with duty.item("recorded shots"):
-                await asyncio.to_thread(reconstruct_by_itself, context, event.data["run_id"], event.data["index"])
-
-
-def reconstruct_by_itself(context: Context, run_id: str, shot: int) -> None:
-    """Queue a recorded shot, if it shows a spray, a calibration is known, and it is not a single shot."""
-    if context.unkept_runs.has(run_id):
-        return
-    summary = context.runs.summary(run_id)
-    calibration = summary.calibration or context.calibrations.current
-    if summary.kind is RunKind.SAMPLE and calibration is not None:
-        request_reconstruction(context, run_id, [shot], calibration, context.services.settings)
 
 
 def request_reconstruction(

@@ -29,7 +29,7 @@ from server.lab.jobs import JobTable
 from server.lab.live_view.live_feed import LiveFeed
 from server.lab.live_view.live_volume import LiveVolume
 from server.lab.monitor import RigMonitor
-from server.lab.reconstruction import follow_acquisition
+from server.lab.recipes.by_itself import follow_acquisition
 from server.lab.runner import JobRunner
 from server.lab.runs.run_index import INDEX_FILE, RunIndex
 from server.lab.runs.run_store import RunStore

@@ -191,6 +191,34 @@ def test_a_browser_names_page_rig_and_state_of_a_tab(tab: Page, server: Serving)
     expect(tab).to_have_title(f"NOT READY · Calibrate · {rig}")
 
 
+def test_what_is_made_of_every_shot_is_what_the_page_shows(tab: Page, server: Serving) -> None:
+    (server.services.data_dir / "calibrations" / "paper.json").write_text('{"id": "paper"}')
+    server.http.put("/api/calibrations/current", json={"id": "paper"})
+    server.free_control()
+    tab.get_by_role("button", name="Sample").click()
+    tab.get_by_label("Shots", exact=True).fill("1")
+    tab.get_by_label("Volumes of every shot").click()
+    tab.get_by_role("option", name="by MINLOS").click()
+    expect(row(tab, "Recipe")).to_contain_text("volumes by MINLOS, accuracy nominal (recipe ")
+    tab.get_by_role("button", name="Start run").click()
+    made = tab.get_by_role("status", name="made by itself")
+    expect(made).to_contain_text("Of every shot: volumes by MINLOS")
+    run_id = server.wait().run_id
+    eventually(lambda: jobs_of(server, run_id) != [], "a volume is asked for")
+    assert {job["settings"]["method"] for job in jobs_of(server, run_id)} == {"minlos"}
+    tab.get_by_role("checkbox", name="Droplets too").click()
+    expect(row(tab, "Recipe")).to_contain_text("droplets are measured against a background run")
+    tab.get_by_role("checkbox", name="Droplets too").click()
+    tab.get_by_label("Volumes of every shot").click()
+    tab.get_by_role("option", name="none").click()
+    expect(row(tab, "Recipe")).to_contain_text("nothing is made by itself")
+
+
+def jobs_of(server: Serving, run_id: str | None) -> list[dict[str, Any]]:
+    jobs = server.http.get("/api/jobs", params={"run_id": run_id or ""}).json()
+    return [job for job in jobs if job["kind"] == "reconstruction"]
+
+
 def test_a_kind_brings_its_name(tab: Page) -> None:
     name = tab.get_by_label("Name", exact=True)
     name.fill("spray")

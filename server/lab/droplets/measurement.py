@@ -39,8 +39,15 @@ def request_measurement(
             require_backgrounds(run, read_references(run))
     except BadInput as error:
         raise Unprocessable(str(error)) from error
+    return queue_measurement(context, run_id, shots, calibration, chosen_settings)
+
+
+def queue_measurement(
+    context: Context, run_id: str, shots: Iterable[int] | None, calibration: str | None, settings: MeasureSettings
+) -> list[Job]:
+    """The same of a run whose images can be measured: that was asked before, or is found out by the job."""
     chosen, wanted = requested_shots(context, run_id, shots, calibration)
-    results_id = results_id_of(context, run_id, chosen, chosen_settings)
-    described = chosen_settings.model_dump(mode="json")
+    results_id = results_id_of(context, run_id, chosen, settings)
+    described = settings.model_dump(mode="json")
     jobs = [shot_job(JobKind.MEASUREMENT, run_id, shot, chosen, results_id, described) for shot in wanted]
     return context.runner.submit_checked(jobs, run_id, chosen, ends_of(wanted))

@@ -13,6 +13,7 @@ from daq.causes import CauseCode
 from daq.files.run_directory import RunReader
 from daq.files.run_file import read_shot_count
 from daq.frozen_model import FrozenModel
+from daq.recipe import Recipe
 from daq.run.events import RunStatus
 from daq.run.state import RunOutcome
 from daq.run_notes import RunNotes
@@ -64,6 +65,9 @@ class RunSummary(FrozenModel):
     ] = ()
     calibration: Annotated[str | None, Field(description="that reconstructs it, where the run names one")]
     references: Annotated[tuple[str, ...], Field(description="its dark and background runs")] = ()
+    recipes: Annotated[
+        tuple[Recipe, ...] | None, Field(description="what is made of its shots by itself; null: the run does not say")
+    ] = None
     notes: Annotated[RunNotes, Field(description="conditions that no device knows")] = RunNotes()
 
 
@@ -88,6 +92,7 @@ def summary_of(run: RunReader, image_keys: NDArray[np.int64]) -> RunSummary:
         shots_valid=int(np.count_nonzero(image_keys != ImageKey.INVALID)),
         calibration=(plan.calibration if plan else None) or run.header.calibration_id,
         references=plan.references if plan else (),
+        recipes=plan.recipes if plan else None,
         notes=run.header.notes,
     )
 
@@ -120,6 +125,7 @@ def summary_of_absent(run_id: str, status: RunStatus, plan: RunPlan) -> RunSumma
         shots_valid=None,
         calibration=plan.calibration,
         references=plan.references,
+        recipes=plan.recipes,
         notes=plan.notes,
     )
 

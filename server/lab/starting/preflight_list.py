@@ -17,8 +17,9 @@ from server.lab.desk.control import REMEDIES
 from server.lab.desk.reason import Reason
 from server.lab.desk.visitor import Visitor
 from server.lab.errors import NotFound, ServerError
+from server.lab.recipes.stated import told_recipes
 from server.lab.services import Context
-from server.lab.starting.readiness import reasons_against, with_calibration
+from server.lab.starting.readiness import reasons_against, with_defaults
 
 _FRAMES_PER_SHOT = 2
 
@@ -34,6 +35,7 @@ CODES: Mapping[str, tuple[Code, ...]] = {
     "Stage": (Code.STAGE,),
     "References": (Code.REFERENCES,),
     "Calibration": (Code.CALIBRATION_UNKNOWN, Code.CALIBRATION_DAMAGED, Code.CALIBRATION_SIZE),
+    "Recipe": (Code.RECIPE,),
 }
 """Every refusal has one place."""
 
@@ -76,7 +78,7 @@ def preflight(
     reasons : Sequence[Reason] | None
         What ``reasons_against`` has found already; None: devices are asked now, which may take a second.
     """
-    plan = with_calibration(context, plan)
+    plan = with_defaults(context, plan)
     reasons = reasons_against(context, plan) if reasons is None else reasons
     checks = [_control(context, who)]
     for name, tell in _ROWS.items():
@@ -183,6 +185,12 @@ def _calibration(context: Context, plan: RunPlan) -> Told | None:
     return f"{plan.calibration}{age}; fits the images of this rig", ""
 
 
+def _recipe(_context: Context, plan: RunPlan) -> Told | None:
+    if plan.kind is not RunKind.SAMPLE:
+        return None
+    return told_recipes(plan.recipes if plan.calibration and plan.recipes else ()), ""
+
+
 def _always(text: str) -> Callable[[Context, RunPlan], Told]:
     return lambda _context, _plan: (text, "")
 
@@ -203,6 +211,7 @@ _ROWS: Mapping[str, Callable[[Context, RunPlan], Told | None]] = {
     "Stage": _stage,
     "References": _references,
     "Calibration": _calibration,
+    "Recipe": _recipe,
 }
 
 

@@ -10,6 +10,7 @@ from server.lab.calibration_story import misfits
 from server.lab.desk.reason import Reason, Refusal, reason_of
 from server.lab.duty import Health
 from server.lab.errors import Damaged, NotFound, ServerError, Unprocessable
+from server.lab.recipes.stated import against_recipes, usual_recipe, with_recipes
 from server.lab.services import Context
 
 
@@ -20,7 +21,7 @@ def reasons_against(context: Context, plan: RunPlan | None = None) -> tuple[Reas
     """
     others = None
     if plan is not None:
-        plan = with_calibration(context, plan)
+        plan = with_defaults(context, plan)
         others = plan.model_copy(update={"calibration": None})  # the laboratory has read it: one reason is enough
     refusals = chain(refusals_of_lab(context, plan), context.services.acquisition.refusals(others))
     return tuple(map(reason_of, refusals))
@@ -32,10 +33,16 @@ def refusals_of_lab(context: Context, plan: RunPlan | None) -> Iterator[Refusal]
         yield from _silent_cameras(context)
     if plan is not None and plan.calibration is not None:
         yield from _against_calibration(context, plan.calibration)
+    if plan is not None:
+        yield from against_recipes(context.runs, plan)
 
 
-def with_calibration(context: Context, plan: RunPlan) -> RunPlan:
-    """A sample run that names no calibration gets the current one, so that it travels with the run."""
+def with_defaults(context: Context, plan: RunPlan) -> RunPlan:
+    """A sample run that does not say them gets current calibration and usual recipe, so that they travel with it."""
+    return with_recipes(_with_calibration(context, plan), usual_recipe(context.services.settings))
+
+
+def _with_calibration(context: Context, plan: RunPlan) -> RunPlan:
     if plan.calibration is not None or plan.kind is not RunKind.SAMPLE:
         return plan
     return plan.model_copy(update={"calibration": context.calibrations.current})

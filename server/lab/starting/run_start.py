@@ -9,7 +9,7 @@ from daq.names import Identifier
 from daq.run.refusals import raise_first
 from daq.run_plan import PulsePair, RunPlan
 from server.lab.services import Context
-from server.lab.starting.readiness import refusals_of_lab, with_calibration
+from server.lab.starting.readiness import refusals_of_lab, with_defaults
 
 
 def start_run(context: Context, plan: RunPlan) -> str:
@@ -20,7 +20,7 @@ def start_run(context: Context, plan: RunPlan) -> str:
     DaqError, ServerError
         The first of ``reasons_against`` this plan, see ``server.lab.starting.readiness``.
     """
-    plan = with_calibration(context, plan)
+    plan = with_defaults(context, plan)
     raise_first(refusals_of_lab(context, plan))
     return context.services.acquisition.start(plan)
 
@@ -38,6 +38,11 @@ class SingleShot(FrozenModel):
 def shoot(context: Context, shot: SingleShot) -> str:
     """Start a run of one shot, which the next one removes; the run id. Raises what ``start_run`` raises."""
     plan = RunPlan(
-        name="single-shot", shots=1, pulse=shot.pulse, references=shot.references, calibration=shot.calibration
+        name="single-shot",
+        shots=1,
+        pulse=shot.pulse,
+        references=shot.references,
+        calibration=shot.calibration,
+        recipes=(),
     )
     return context.unkept_runs.add(lambda: start_run(context, plan))

@@ -3,13 +3,15 @@
 import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, TypeAdapter, ValidationError
 from pydantic.fields import FieldInfo
 
+from daq.recipe import Recipe
 from daq.run_notes import RunNotes
 from daq.run_plan import PulsePair, RunKind, RunPlan
+from processing.reconstruction.choices import ReconstructionMethod
 from server.lab.damage import set_aside
 from server.lab.events import EventPublisher
 from server.rig.config import RigConfig
@@ -19,6 +21,7 @@ PULSE_FIELDS = PulsePair.model_fields
 
 
 NOTES_FIELDS = RunNotes.model_fields
+NO_VOLUMES = "none"
 USUAL_NAMES = {
     RunKind.SAMPLE: "spray",
     RunKind.BACKGROUND: "background",
@@ -43,6 +46,8 @@ def first_draft(config: RigConfig) -> dict[str, Any]:
         "references": [],
         "are_references_chosen": False,
         "calibration": None,
+        "volumes": ReconstructionMethod.MLOS.value,
+        "droplets": False,
         "operator": "",
         "fluid": "",
         "nozzle": "",
@@ -65,6 +70,8 @@ class StoredDraft(BaseModel):
     references: list[str] = []
     are_references_chosen: bool = False
     calibration: str | None = None
+    volumes: ReconstructionMethod | Literal["none"] = ReconstructionMethod.MLOS
+    droplets: bool = False
     operator: str | None = None
     fluid: str | None = None
     nozzle: str | None = None
@@ -201,6 +208,13 @@ def pulse_of(values: dict[str, Any]) -> PulsePair:
     return PulsePair(width_ns=values["width_ns"], separation_ns=values["separation_ns"], current_a=values["current_a"])
 
 
+def recipes_of(values: dict[str, Any]) -> tuple[Recipe, ...]:
+    """What is made of every shot by itself."""
+    volumes = Recipe(command="reconstruct", settings={"method": values["volumes"]})
+    chosen = (values["volumes"] != NO_VOLUMES and volumes, values["droplets"] and Recipe(command="measure"))
+    return tuple(recipe for recipe in chosen if recipe)
+
+
 def plan_of(values: dict[str, Any]) -> RunPlan:
     """The plan that a draft describes.
 
@@ -220,4 +234,5 @@ def plan_of(values: dict[str, Any]) -> RunPlan:
         stage_z_mm=positions(values["stage_z_mm"]) if kind is RunKind.CALIBRATION else (),
         references=tuple(values["references"]) if kind is RunKind.SAMPLE else (),
         calibration=values["calibration"] if kind is RunKind.SAMPLE else None,
+        recipes=recipes_of(values) if kind is RunKind.SAMPLE else None,
     )

@@ -20,6 +20,7 @@ from server.lab.starting.run_start import start_run
 from server.web.ui.bar.server_link import TICKET, light_request, shown_form
 from server.web.ui.draft import DraftStore, plan_of
 from server.web.ui.run.chosen_runs import ChosenRuns
+from server.web.ui.run.chosen_work import ChosenWork
 from server.web.ui.run.form_fields import FormFields
 from server.web.ui.run.preflight_panel import PreflightPanel
 from server.web.ui.run.template_bar import TemplateBar
@@ -54,6 +55,7 @@ class RunForm:
             self._templates = TemplateBar(templates, draft, self._show)
             self._fields = FormFields(context, draft, self._changed)
             self._chosen = ChosenRuns(context, draft, self._changed)
+            self._work = ChosenWork(draft, self._changed)
             with ui.expansion("Notes", icon="edit_note", value=True).classes("w-full notes"):
                 self._fields.add_notes()
             self._refusal = ui.label("").classes("refusal").props("role=alert")
@@ -68,6 +70,7 @@ class RunForm:
         self._templates.allow(may_change)
         self._fields.allow(may_change)
         self._chosen.allow(may_change)
+        self._work.allow(may_change)
         if self._draft.version != self._shown:
             self._show()
 
@@ -109,11 +112,12 @@ class RunForm:
         self._shown = self._draft.version
         self._fields.show()
         self._chosen.show()
+        self._work.show()
         self._show_kind()
 
     def _show_kind(self) -> None:
         kind = RunKind(self._draft.values["kind"])
-        for part in (self._fields, self._chosen):
+        for part in (self._fields, self._chosen, self._work):
             part.show_kind(kind)
 
     async def _on_start(self, click: GenericEventArguments) -> None:

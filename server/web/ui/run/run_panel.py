@@ -8,9 +8,11 @@ from nicegui import ui
 from daq.errors import DaqError
 from daq.run.events import RunStatus
 from daq.run.state import RunState
+from daq.run_plan import RunKind
 from server.lab.desk.rig_state import minutes
 from server.lab.duty import Health, Lamp
 from server.lab.errors import ServerError
+from server.lab.recipes.stated import told_recipes
 from server.lab.services import Context
 from server.lab.starting.command import tell_deed
 from server.web.api.at_once import at_once
@@ -41,6 +43,7 @@ class RunPanel:
             self._message = (
                 ui.label("").classes("text-xs opacity-70 run-line").props('role=status aria-label="run message"')
             )
+            self._made = ui.label("").classes("text-xs opacity-70").props('role=status aria-label="made by itself"')
             self._stop = ui.button("Stop", icon="stop", on_click=self._on_stop).props("outline")
             self._stop.tooltip("Ends the run after the present shot")
             self._acknowledge = ui.button("Acknowledge fault", icon="verified_user", on_click=self._on_acknowledge)
@@ -55,6 +58,7 @@ class RunPanel:
         self._counts.set_text(counts_text(status, self._context.desk.state.eta_s))
         self._waits.set_text(waiting_text(status, time.monotonic()))
         self._message.set_text(message_text(status))
+        self._made.set_text(made_text(status))
         self._outcome.set_text(status.outcome.value if status.outcome else "active" if status.active else "")
         self._outcome.props(f"color={outcome_colour(status.outcome)}")
         self._outcome.set_visibility(bool(self._outcome.text))
@@ -109,6 +113,15 @@ def counts_text(status: RunStatus, eta_s: float | None = None) -> str:
 def message_text(status: RunStatus) -> str:
     """What happened last; nothing where that is what the counts say."""
     return "" if status.message == status.summary else status.message
+
+
+def made_text(status: RunStatus) -> str:
+    """What is made of the shots of a spray by itself, as the plan of their run states it."""
+    is_of_spray = status.run_id and status.plan and status.plan.kind is RunKind.SAMPLE
+    if not is_of_spray or status.plan is None:
+        return ""
+    made = status.plan.recipes if status.plan.calibration else ()
+    return f"Of every shot: {told_recipes(made or ())}"
 
 
 def outcome_colour(outcome: str | None) -> str:

@@ -202,6 +202,7 @@ OF_THE_PLAN: dict[RefusalCode, tuple[Situation | None, dict[str, Any]]] = {
     RefusalCode.CALIBRATION_UNKNOWN: (None, {"calibration": "nothing"}),
     RefusalCode.CALIBRATION_DAMAGED: (torn, {"calibration": "torn"}),
     RefusalCode.CALIBRATION_SIZE: (other_size, {"calibration": "small"}),
+    RefusalCode.RECIPE: (None, {"recipes": [{"command": "reconstruct", "settings": {"methd": "smart"}}]}),
 }
 
 

@@ -1,0 +1,61 @@
+"""ChosenWork: what is made of every shot of the next run by itself; it becomes the recipe of its plan."""
+
+from collections.abc import Callable
+from typing import Any
+
+from nicegui import ui
+
+from daq.run_plan import RunKind
+from processing.reconstruction.choices import ReconstructionMethod
+from server.web.ui.draft import NO_VOLUMES, DraftStore
+
+_VOLUMES = {NO_VOLUMES: "none"} | {one.value: f"by {one.value.upper()}" for one in ReconstructionMethod}
+
+
+class ChosenWork:
+    """Built once per page.
+
+    Parameters
+    ----------
+    draft : DraftStore
+        What is chosen.
+    changed : Callable[[], None]
+        Called after each choice.
+    """
+
+    def __init__(self, draft: DraftStore, changed: Callable[[], None]) -> None:
+        self._draft, self._changed = draft, changed
+        with ui.row().classes("w-full items-center no-wrap gap-2") as self._box:
+            self._volumes = ui.select(
+                _VOLUMES,
+                label="Volumes of every shot",
+                value=draft.values["volumes"],
+                on_change=lambda event: self._keep("volumes", event.value),
+            )
+            self._volumes.props("dense outlined options-dense").classes("grow")
+            self._droplets = ui.checkbox(
+                "Droplets too",
+                value=draft.values["droplets"],
+                on_change=lambda event: self._keep("droplets", event.value),
+            )
+            self._droplets.props('aria-label="Droplets too"')
+            self._droplets.tooltip("Measured against the background run, as soon as a shot is recorded")
+
+    def show_kind(self, kind: RunKind) -> None:
+        """Nothing is made of any other run than one of the spray."""
+        self._box.set_visibility(kind is RunKind.SAMPLE)
+
+    def allow(self, may_change: bool) -> None:
+        """Nobody chooses while somebody else holds control."""
+        for field in (self._volumes, self._droplets):
+            field.set_enabled(may_change)
+
+    def show(self) -> None:
+        """Show what is chosen, here or in another tab."""
+        self._volumes.set_value(self._draft.values["volumes"])
+        self._droplets.set_value(self._draft.values["droplets"])
+
+    def _keep(self, name: str, value: Any) -> None:
+        if value != self._draft.values[name]:
+            self._draft.set(name, value)
+            self._changed()
