@@ -40,7 +40,9 @@ _ELSEWHERE = ("cross-site", "same-site")
 """Where a browser says that a page comes from whose picture this would be: such requests name no ``Origin``."""
 _POLICY_VIOLATION = 1008  # RFC 6455, section 7.4.1
 _LOOKING = ("GET", "HEAD", "OPTIONS")
-_OF_VIEWERS = re.compile(r"/api/rig/(abort|readiness)|/api/runs/[^/]+/abort")
+_ABORT = r"/api/rig/abort|/api/runs/[^/]+/abort"
+_OF_VIEWERS = rf"/api/rig/readiness|{_ABORT}"
+_UNKNOWN = "a token is needed: header 'Authorization: Bearer <token>'"
 _SESSION_AGE_S = 30 * 24 * 3600
 """A browser forgets the session then; the server does so long before, unless it is used."""
 
@@ -141,7 +143,16 @@ class Guard:
             return _not_for_viewers(scope) if visitor.role is Role.VIEWER and _is_command(scope) else None
         if "text/html" in headers.get("accept", ""):
             return RedirectResponse(SIGN_IN_PATH, 303)
-        return _refuse(scope, 401, "a token is needed: header 'Authorization: Bearer <token>'")
+        answer = problem(HTTPConnection(scope), 401, _UNKNOWN, code="token", remedy=self._way_in(scope, headers))
+        answer.headers["WWW-Authenticate"] = "Bearer"
+        return answer
+
+    def _way_in(self, scope: Scope, headers: Headers) -> str:
+        """How somebody without a token gets what he asks for; the light may be ended by everybody, at its own port."""
+        port, known = self._abort_port(), "send a token of the rig file, or sign in with a browser"
+        if scope["type"] != "http" or not re.fullmatch(_ABORT, scope["path"]) or not port:
+            return known
+        return f"POST http://{_name_of(headers.get('host', ''))}:{port}/abort, which needs no token; or {known}"
 
     def _policy(self, host: str) -> str:
         """What a page may connect to: this server and the port of ABORT, and nothing else."""
@@ -240,7 +251,7 @@ def _is_command(scope: Scope) -> bool:
     """What a viewer may not ask for; pages know the role and refuse by themselves."""
     if scope["type"] != "http" or not scope["path"].startswith("/api"):
         return False
-    return scope["method"] not in _LOOKING and not _OF_VIEWERS.fullmatch(scope["path"])
+    return scope["method"] not in _LOOKING and not re.fullmatch(_OF_VIEWERS, scope["path"])
 
 
 def _name_of(host: str) -> str:
@@ -262,7 +273,4 @@ def _not_for_viewers(scope: Scope) -> Response:
 
 
 def _refuse(scope: Scope, status: int, detail: str) -> Response:
-    answer = problem(HTTPConnection(scope), status, detail)
-    if status == 401:
-        answer.headers["WWW-Authenticate"] = "Bearer"
-    return answer
+    return problem(HTTPConnection(scope), status, detail)

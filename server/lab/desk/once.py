@@ -6,12 +6,19 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any, TypeVar
 
+from pydantic import BaseModel
+
 from server.lab.desk.request_table import RequestTable
 from server.lab.errors import Conflict, Unprocessable
 
 _KEPT = 1000
 
 Answer = TypeVar("Answer")
+
+
+def described(what: str, request: BaseModel) -> str:
+    """A whole request as text: all that was said, and nothing that was not, so that a later program says the same."""
+    return f"{what} {request.model_dump_json(exclude_unset=True)}"
 
 
 class Once:

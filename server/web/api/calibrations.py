@@ -10,6 +10,7 @@ from daq.frozen_model import FrozenModel
 from daq.names import Identifier
 from server.lab.calibration_story import CalibrationStory, story_of
 from server.lab.calibrations import CalibrationSummary
+from server.lab.desk.once import described
 from server.lab.errors import NotFound
 from server.lab.jobs import Job
 from server.lab.starting.calibrating import CameraModel, request_calibration, use_calibration
@@ -50,7 +51,7 @@ def create_calibration(
     idempotency_key: IdempotencyKey = None,
 ) -> Job:
     """Queue the fit; ``Location`` names the job, its result the calibration."""
-    what = f"calibration {request.model_dump_json()}"
+    what = described("calibration", request)
     job_id = context.once.do(
         idempotency_key, what, lambda: request_calibration(context, request.run_id, request.model, who).id
     )

@@ -10,6 +10,7 @@ from daq.frozen_model import FrozenModel
 from daq.names import Identifier
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.runs.measurement import MeasureSettings
+from server.lab.desk.once import described
 from server.lab.desk.visitor import Visitor
 from server.lab.droplets.measurement import request_measurement
 from server.lab.jobs import Job, JobKind, JobState
@@ -69,7 +70,7 @@ def create_jobs(
     def queue() -> list[Job]:
         return request_reconstruction(context, request.run_id, request.shots, request.calibration, request.settings)
 
-    return _queued_once(context, who, idempotency_key, f"reconstruction {request.model_dump_json()}", queue)
+    return _queued_once(context, who, idempotency_key, described("reconstruction", request), queue)
 
 
 @router.post("/measurements", status_code=202, responses=responses(404, 409, 500, 507))
@@ -81,7 +82,7 @@ def create_measurements(
     def queue() -> list[Job]:
         return request_measurement(context, request.run_id, request.shots, request.calibration, request.settings)
 
-    return _queued_once(context, who, idempotency_key, f"measurement {request.model_dump_json()}", queue)
+    return _queued_once(context, who, idempotency_key, described("measurement", request), queue)
 
 
 @router.get("/{job_id}", responses=responses(404))

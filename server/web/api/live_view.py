@@ -9,6 +9,7 @@ from daq.frozen_model import FrozenModel
 from daq.names import ViewName
 from daq.run.state import RunState
 from daq.run_plan import LivePlan
+from server.lab.desk.once import described
 from server.lab.live_view.live_feed import ExposureName, LiveCaption
 from server.lab.starting.command import tell_deed
 from server.lab.starting.light_request import obey
@@ -42,7 +43,7 @@ def show_live(context: ContextOf) -> LiveView:
 def start_live(plan: LivePlan, context: ContextOf, asked: AsksForLight) -> LiveView:
     """Show the rig live; a live view of another plan ends first. Light that this rig does not permit answers 422."""
     start = context.services.acquisition.start_live
-    obey(context, asked, f"live {plan.model_dump_json()}", lambda: start(plan))
+    obey(context, asked, described("live", plan), lambda: start(plan))
     return show_live(context)
 
 

@@ -6,6 +6,7 @@ from fastapi import APIRouter, Header, Query, Response
 
 from daq.files.run_directory import RunHeader
 from daq.run_plan import RunKind, RunPlan
+from server.lab.desk.once import described
 from server.lab.errors import Conflict
 from server.lab.runs.run_filter import MOST_TEXT, ListedOutcome, RunFilter
 from server.lab.runs.run_removal import RemovedRun, remove_run
@@ -51,7 +52,7 @@ def list_runs(
 @router.post("", status_code=201, responses=responses(409, 412, 423, 503, 504))
 def create_run(plan: RunPlan, context: ContextOf, asked: AsksForLight, response: Response) -> AcquisitionView:
     """Start a run. There is no queue: a busy rig answers 409, a plan that this rig cannot run 422."""
-    run_id = obey(context, asked, f"run {plan.model_dump_json()}", lambda: start_run(context, plan))
+    run_id = obey(context, asked, described("run", plan), lambda: start_run(context, plan))
     response.headers["Location"] = f"/api/runs/{run_id}"
     return view_of_acquisition(context)
 

@@ -28,6 +28,7 @@ input, button {{ font: inherit; padding: 8px; border-radius: 6px; border: 1px so
 <input id="token" name="token" type="password" required>
 <button>Sign in</button>
 <p role="alert">{message}</p>
+<p>You stay signed in until twelve hours after your last page was closed, or the server is started again.</p>
 </form>"""
 
 

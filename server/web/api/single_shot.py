@@ -7,6 +7,7 @@ from pydantic import Field
 
 from daq.frozen_model import FrozenModel
 from daq.names import Identifier
+from server.lab.desk.once import described
 from server.lab.starting.light_request import obey
 from server.lab.starting.run_start import SingleShot, shoot
 from server.web.api.parameters import AsksForLight, ContextOf
@@ -37,7 +38,7 @@ async def list_unkept(context: ContextOf) -> UnkeptView:
 @router.post("", status_code=201, responses=responses(409, 412, 423, 503, 504))
 def take_shot(shot: SingleShot, context: ContextOf, asked: AsksForLight, response: Response) -> AcquisitionView:
     """Take one shot as a run of its own; a live view ends first. It is reconstructed on request only."""
-    run_id = obey(context, asked, f"shot {shot.model_dump_json()}", lambda: shoot(context, shot))
+    run_id = obey(context, asked, described("shot", shot), lambda: shoot(context, shot))
     response.headers["Location"] = f"/api/runs/{run_id}"
     return view_of_acquisition(context)
 

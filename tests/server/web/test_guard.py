@@ -37,6 +37,16 @@ def test_without_the_token_every_path_is_closed(guarded: Serving, path: str) -> 
         assert answer.headers["www-authenticate"] == "Bearer"
 
 
+@pytest.mark.parametrize("path", ["/api/rig/abort", "/api/runs/20261129T093000-spray/abort"])
+def test_who_has_no_token_is_told_where_everybody_may_end_the_light(guarded: Serving, path: str) -> None:
+    refused = guarded.http.post(path)
+    assert (refused.status_code, refused.json()["code"]) == (401, "token")
+    door = f"http://127.0.0.1:{guarded.abort_listener.port}/abort"
+    assert refused.json()["remedy"].startswith(f"POST {door}, which needs no token; or send a token")
+    assert httpx.post(door, timeout=60).json()["light"] == "off"
+    assert "abort" not in guarded.http.post("/api/runs", json={}).json()["remedy"]
+
+
 def test_with_the_token_scripts_come_in(guarded: Serving) -> None:
     assert guarded.http.get("/api/rig", headers=bearer(TOKEN)).status_code == 200
 

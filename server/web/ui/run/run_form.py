@@ -9,6 +9,7 @@ from nicegui.events import GenericEventArguments
 
 from daq.errors import DaqError
 from daq.run_plan import RunKind, RunPlan
+from server.lab.desk.once import described
 from server.lab.desk.reason import Reason
 from server.lab.desk.visitor import Visitor
 from server.lab.errors import ServerError
@@ -129,7 +130,7 @@ class RunForm:
                 return
             plan = plan_of(self._draft.values)
             start = partial(start_run, self._context, plan)
-            await asyncio.to_thread(obey, self._context, request, f"run {plan.model_dump_json()}", start)
+            await asyncio.to_thread(obey, self._context, request, described("run", plan), start)
         except (DaqError, ServerError, ValueError) as error:
             self._refusal.set_text(told(error))
         else:

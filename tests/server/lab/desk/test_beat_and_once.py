@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from daq.run_plan import RunPlan
 from server.lab.desk.beat import MOST_BEHIND_S, PERIOD_S, Beat
-from server.lab.desk.once import Once
+from server.lab.desk.once import Once, described
 from server.lab.desk.request_table import RequestTable, opened_requests
 from server.lab.errors import Conflict, Stale, Unprocessable
 from server.lab.events import EventPublisher
@@ -66,6 +67,17 @@ def test_a_key_is_obeyed_once_and_answered_always_the_same() -> None:
     for key in (None, None, "c", "a"):  # no key is no repetition; the oldest of more than two keys is forgotten
         assert once.do(key, "run", act(9)) == 9
     assert len(done) == 6
+
+
+def test_a_later_program_with_more_to_be_said_knows_a_request_again() -> None:
+    class LaterPlan(RunPlan):
+        more: int = 7
+
+    said = {"name": "run", "shots": 2, "pulse": {"current_a": {"view1": 5}}}
+    assert described("run", LaterPlan.model_validate(said)) == described("run", RunPlan.model_validate(said))
+    assert described("run", RunPlan.model_validate(said)) != described(
+        "run", RunPlan.model_validate(said | {"shots": 3})
+    )
 
 
 def test_the_same_request_that_comes_while_it_is_obeyed_is_told_so() -> None:
