@@ -20,7 +20,7 @@ from processing.reconstruction.settings import ReconstructionSettings
 from processing.reconstruction.slab_volume import SlabVolume
 from processing.reconstruction.volume_file import VolumeFileError, open_volume, write_slabs
 from processing.reconstruction.volume_part import PartError, RangesMm
-from processing.runs.results_file import Provenance, volume_files
+from processing.runs.results_file import SETTINGS_FILE, Provenance, volume_files
 from processing.runs.volume_parts import Recipe, VolumePart, VolumeParts, stored_part
 from processing.volume import VoxelGrid
 from server.lab.calibrations import CalibrationStore
@@ -28,6 +28,7 @@ from server.lab.errors import Conflict, Damaged, NotFound, Unprocessable
 from server.pictures.previews import (
     GrowingPreview,
     VolumePreview,
+    is_preview_of,
     load_preview,
     load_provenance,
     preview_files,
@@ -111,19 +112,21 @@ def preview_of(volume: Path) -> VolumePreview:
     Raises
     ------
     Damaged
-        The volume cannot be read; the text names it.
+        The volume cannot be read, or is that of another shot, exposure, run, or of other settings; the text names it.
     """
     stored = preview_path(volume)
     try:
         with _MAKING:
-            if volume.is_file() and (not stored.is_file() or stored.stat().st_mtime_ns < volume.stat().st_mtime_ns):
+            if volume.is_file() and not is_preview_of(stored, volume):
                 write_preview(volume)
             try:
-                return _load(stored, stored.stat().st_mtime_ns)
+                preview = _load(stored, stored.stat().st_ctime_ns)
             except (OSError, ValueError, KeyError, zipfile.BadZipFile):
                 write_preview(volume)
-                return _load(stored, stored.stat().st_mtime_ns)
-    except (VolumeFileError, OSError) as error:
+                preview = _load(stored, stored.stat().st_ctime_ns)
+        _require_own_place(volume, load_provenance(stored))
+        return preview
+    except (VolumeFileError, OSError, ValueError) as error:
         raise Damaged(f"{volume.name} cannot be shown: {error}") from error
 
 
@@ -181,6 +184,17 @@ def _require_own_name(volume: Path, made_by: Provenance) -> None:
         raise ValueError(f"it was renamed, and is of shot {shot}, exposure {frame}")
 
 
+def _require_own_place(volume: Path, made_by: Provenance) -> None:
+    """What says nothing of itself may be anything."""
+    if "shot" in made_by:
+        _require_own_name(volume, made_by)
+    record = volume.parent / SETTINGS_FILE
+    told = json.loads(record.read_text(encoding="utf-8")) if record.is_file() else {}
+    for name in ("run", "calibration", "settings"):
+        if name in told and made_by.get(name, told[name]) != told[name]:
+            raise ValueError(f"it was brought from elsewhere, and is of {name} {made_by[name]}, not {told[name]}")
+
+
 def part_of(
     parts: VolumeParts,
     volume: Path,
@@ -235,16 +249,16 @@ def surface_of(volume: Path, level: float) -> bytes:
     preview_of(volume)
     stored = preview_path(volume)
     colour = RED if volume.stem.endswith("_b") else BLUE
-    return _surface(stored, stored.stat().st_mtime_ns, level, colour)
+    return _surface(stored, stored.stat().st_ctime_ns, level, colour)
 
 
 @lru_cache(maxsize=16)
-def _surface(stored: Path, mtime_ns: int, level: float, colour: Colour) -> bytes:
-    return surface_glb(_load(stored, mtime_ns), level, colour)
+def _surface(stored: Path, changed_ns: int, level: float, colour: Colour) -> bytes:
+    return surface_glb(_load(stored, changed_ns), level, colour)
 
 
 @lru_cache(maxsize=8)
-def _load(stored: Path, _mtime_ns: int) -> VolumePreview:
+def _load(stored: Path, _changed_ns: int) -> VolumePreview:
     return load_preview(stored)
 
 

@@ -7,6 +7,7 @@ of voxels, so that no droplet disappears. A small volume is its own preview.
 
 import json
 import math
+import os
 import zipfile
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -174,7 +175,7 @@ def preview_files(folder: Path) -> list[Path]:
 
 
 def save_preview(path: Path, preview: VolumePreview, provenance: Mapping[str, Any] | None = None) -> None:
-    """Write a preview and what its volume is made of; it replaces an older one at once."""
+    """Write a preview and what its volume is made of; it replaces an older one at once, and has its volume's time."""
     arrays = {
         "voxels": preview.voxels,
         "origin_mm": preview.grid.origin_mm,
@@ -192,7 +193,14 @@ def save_preview(path: Path, preview: VolumePreview, provenance: Mapping[str, An
     except BaseException:
         part.unlink(missing_ok=True)
         raise
+    if (volume := volume_of(path)).is_file():
+        os.utime(part, ns=(volume.stat().st_mtime_ns,) * 2)
     part.replace(path)
+
+
+def is_preview_of(path: Path, volume: Path) -> bool:
+    """Whether a preview was made of a volume as it is now: it has its time, as a copy of an older volume has not."""
+    return path.is_file() and path.stat().st_mtime_ns == volume.stat().st_mtime_ns
 
 
 def load_provenance(path: Path) -> dict[str, Any]:

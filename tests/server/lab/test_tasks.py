@@ -1,6 +1,8 @@
 """What a worker loads to do the work of jobs, and what it leaves of a volume."""
 
 import json
+import os
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -75,6 +77,40 @@ def test_the_surface_is_that_of_the_volume_as_it_is_now(tmp_path: Path) -> None:
     assert surface_of(volume, 0.5) == first
     write_volume(volume, ball[::-1], GRID)
     assert surface_of(volume, 0.5) != first
+
+
+def test_a_volume_that_was_copied_back_from_before_is_shown_as_it_is(tmp_path: Path) -> None:
+    """Copies keep their time, which may be older than that of the preview."""
+    volume, old = tmp_path / "shot_00000_a.vtkhdf", tmp_path / "old.vtkhdf"
+    ball = np.zeros(GRID.shape, np.float32)
+    ball[20:30, 20:30, 20:30] = 1
+    write_volume(old, ball, GRID)
+    os.utime(old, ns=(10**18, 10**18))
+    write_volume(volume, 3 * ball, GRID)
+    assert preview_of(volume).limit == 3
+    old.replace(volume)
+    assert preview_of(volume).limit == 1
+    write_volume(old, 2 * ball, GRID)
+    os.utime(old, ns=(10**18, 10**18))
+    old.replace(volume)
+    preview_path(volume).unlink()
+    assert preview_of(volume).limit == 2
+
+
+def test_a_preview_under_another_name_or_in_another_folder_is_not_shown(tmp_path: Path) -> None:
+    settings = ReconstructionSettings(grid=GridSettings.of(GRID), minimum_window_px=0)
+    reconstruct(job := job_of(tmp_path, settings), lambda: False)
+    first, _ = preview_files(results_dir := Path(job["results_dir"]))
+    for file in (results_dir / "shot_00007_a.vtkhdf", results_dir / "shot_00000_b.vtkhdf"):
+        shutil.copy(first, preview_path(file))
+        with pytest.raises(Damaged, match=rf"{file.name} cannot be shown: it was renamed, .* shot 0, exposure a"):
+            preview_of(file)
+    preview_of(results_dir / "shot_00000_a.vtkhdf")
+    elsewhere = shutil.copytree(results_dir, tmp_path / "run" / "results" / "two")
+    record = json.loads((elsewhere / "settings.json").read_text())
+    (elsewhere / "settings.json").write_text(json.dumps({**record, "calibration": "another"}))
+    with pytest.raises(Damaged, match=r"brought from elsewhere, and is of calibration .*another"):
+        preview_of(elsewhere / "shot_00000_a.vtkhdf")
 
 
 def test_a_preview_that_does_not_say_how_it_was_made_is_named(tmp_path: Path) -> None:
