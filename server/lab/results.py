@@ -127,6 +127,8 @@ def preview_of(volume: Path) -> VolumePreview:
         _require_own_place(volume, load_provenance(stored))
         return preview
     except (VolumeFileError, OSError, ValueError) as error:
+        if not is_kept(volume):
+            raise NotFound(f"{volume.name} is not there any more") from error
         raise Damaged(f"{volume.name} cannot be shown: {error}") from error
 
 

@@ -1,4 +1,4 @@
-"""Readings: HEAD for everything that can be read, and ETag for JSON. A pure ASGI layer.
+"""Readings: HEAD for everything that can be read, and ETag for JSON and pictures. A pure ASGI layer.
 
 A script that asks again names the ETag it has, and gets 304 without a body where nothing has changed. HEAD is answered
 as GET: the server that speaks HTTP sends no body then.
@@ -11,10 +11,11 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 _ENDLESS = ("/api/events",)
 """No HEAD: nobody waits for their end."""
+_TAGGED = ("application/json", "image/jpeg", "image/png")
 
 
 class Readings:
-    """Answers HEAD below /api, and gives JSON an ETag.
+    """Answers HEAD below /api, and gives JSON and pictures an ETag.
 
     Parameters
     ----------
@@ -49,8 +50,8 @@ class _Tagged:
         self._head: Message | None = None
 
     async def send(self, message: Message) -> None:
-        """Pass on a part of the answer; JSON that comes in one piece gets its ETag."""
-        if message["type"] == "http.response.start" and _is_json(message):
+        """Pass on a part of the answer; what comes in one piece gets its ETag."""
+        if message["type"] == "http.response.start" and _is_tagged(message):
             self._head = message
             return
         head, self._head = self._head, None
@@ -71,5 +72,7 @@ class _Tagged:
         return {**head, "status": 304}, {**message, "body": b""}
 
 
-def _is_json(head: Message) -> bool:
-    return head["status"] == 200 and Headers(raw=head["headers"]).get("content-type") == "application/json"
+def _is_tagged(head: Message) -> bool:
+    """A name may be given again to another run: what its pictures show tells whether they are known."""
+    headers = Headers(raw=head["headers"])
+    return head["status"] == 200 and "etag" not in headers and headers.get("content-type") in _TAGGED

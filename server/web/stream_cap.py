@@ -14,6 +14,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 from server.web.guard import address_of
 from server.web.problems import problem
+from server.web.tries import home_of
 
 MOST_STREAMS = 64
 """Of one address; a page has two."""
@@ -55,7 +56,7 @@ class StreamCap:
         if cap is None:
             await self._app(scope, receive, send)
             return
-        address = address_of(scope)
+        address = home_of(address_of(scope))
         if self._open[address, cap.what] >= cap.most:
             await _refusal(scope, address, cap)(scope, receive, send)
             return

@@ -1,5 +1,6 @@
 """Tries: whoever offers wrong tokens waits, so that nobody finds one by trying."""
 
+import ipaddress
 import math
 import threading
 import time
@@ -11,8 +12,19 @@ WITHIN_S = 60.0
 _ADDRESSES = 1000
 
 
+def home_of(address: str) -> str:
+    """Who is behind an address: of IPv6, every computer has 2**64 of them, which are one home."""
+    try:
+        parsed = ipaddress.ip_address(address)
+    except ValueError:
+        return address
+    if parsed.version == 4:
+        return address
+    return str(parsed.ipv4_mapped or ipaddress.ip_network((int(parsed) >> 64 << 64, 64)))
+
+
 class Tries:
-    """Wrong tokens of the last minute, by address; from any thread.
+    """Wrong tokens of the last minute, by home; from any thread.
 
     Parameters
     ----------
@@ -28,15 +40,16 @@ class Tries:
     def wait_s(self, address: str) -> int:
         """How long an address has to wait before it is listened to again; 0: it need not."""
         with self._lock:
-            wrong = self._wrong.get(address, deque())
+            wrong = self._wrong.get(home_of(address), deque())
             left_s = wrong[0] + WITHIN_S - self._now_s() if len(wrong) == MOST else 0.0
         return max(0, math.ceil(left_s))
 
     def count(self, address: str) -> None:
         """Remember that an address has offered a wrong one."""
+        home = home_of(address)
         with self._lock:
-            wrong = self._wrong.pop(address, None) or deque(maxlen=MOST)
+            wrong = self._wrong.pop(home, None) or deque(maxlen=MOST)
             wrong.append(self._now_s())
-            self._wrong[address] = wrong
+            self._wrong[home] = wrong
             for oldest in list(self._wrong)[:-_ADDRESSES]:
                 del self._wrong[oldest]

@@ -17,7 +17,7 @@ _KEPT = 1000
 def thumbnail_of(run_dir: Path) -> bytes:
     """JPEG; NotFound if the first shot is not there, or cannot be read."""
     try:
-        return _of(run_dir, shot_path(run_dir, 0).stat().st_mtime_ns)
+        return _of(run_dir, shot_path(run_dir, 0).stat().st_ctime_ns)
     except (OSError, ShotFileError) as error:
         raise NotFound(f"run {run_dir.name} has no picture: its first shot cannot be read") from error
 

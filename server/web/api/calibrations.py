@@ -15,6 +15,7 @@ from server.lab.errors import NotFound
 from server.lab.jobs import Job
 from server.lab.starting.calibrating import CameraModel, request_calibration, use_calibration
 from server.web.api.parameters import CalibrationId, ContextOf, IdempotencyKey, Who
+from server.web.opened_file import OpenedFile, opened_file
 from server.web.problems import responses
 
 router = APIRouter(prefix="/api/calibrations", tags=["calibrations"])
@@ -81,12 +82,12 @@ def show_picture(
     calibration_id: CalibrationId,
     picture: Annotated[Identifier, Path(description="one of the pictures that its story names")],
     context: ContextOf,
-) -> FileResponse:
+) -> OpenedFile:
     """A picture that was drawn when the calibration was made."""
     path = context.calibrations.picture_folder(calibration_id) / f"{picture}.png"
     if not path.is_file():
         raise NotFound(f"calibration {calibration_id!r} has no picture {picture!r}")
-    return FileResponse(path, media_type="image/png", headers={"Cache-Control": "no-cache"})
+    return opened_file(path, "image/png")
 
 
 @router.get("/{calibration_id}", responses=responses(404, 500))

@@ -22,7 +22,6 @@ from server.web.problems import responses
 
 router = APIRouter(prefix="/api/runs", tags=["runs"])
 
-_FOR_A_DAY = {"Cache-Control": "private, max-age=86400"}
 _COUNT = "X-Total-Count"
 _COUNTED: dict[int | str, dict[str, Any]] = {
     200: {"headers": {_COUNT: {"description": "number of all runs that are wanted", "schema": {"type": "integer"}}}}
@@ -76,7 +75,7 @@ def show_header(run_id: RunId, context: ContextOf) -> RunHeader:
 )
 def show_thumbnail(run_id: RunId, context: ContextOf) -> Response:
     """A small picture: exposure A of the first shot, by the first view."""
-    return Response(thumbnail_of(context.runs.directory(run_id)), media_type="image/jpeg", headers=_FOR_A_DAY)
+    return Response(thumbnail_of(context.runs.directory(run_id)), media_type="image/jpeg")
 
 
 @router.delete("/{run_id}", responses=responses(404, 409, 423, 507))

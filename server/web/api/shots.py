@@ -16,7 +16,6 @@ from server.web.api.parameters import ContextOf, RunId, ShotIndex
 from server.web.problems import responses
 
 router = APIRouter(prefix="/api/runs/{run_id}/shots", tags=["shots"])
-_FOR_EVER = {"Cache-Control": "private, max-age=31536000, immutable"}  # a committed shot never changes
 
 
 class ShotView(FrozenModel):
@@ -89,6 +88,4 @@ def show_frame(
     image = None if exposures is None else exposures.frame_a if frame == "a" else exposures.frame_b
     if image is None:
         raise NotFound(f"run {run_id}, shot {shot} has no exposure {frame} of {view!r}")
-    return Response(
-        frame_png(image, run.header.views[view].bits, stretch, width_px), media_type="image/png", headers=_FOR_EVER
-    )
+    return Response(frame_png(image, run.header.views[view].bits, stretch, width_px), media_type="image/png")

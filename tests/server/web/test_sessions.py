@@ -53,6 +53,20 @@ def test_twenty_wrong_tokens_in_a_minute_are_the_last_ones_of_an_address_for_a_w
     assert tries.wait_s("evil") == 0
 
 
+def test_the_many_addresses_of_an_ipv6_home_try_as_one() -> None:
+    tries = Tries(lambda: 0.0)
+    for number in range(MOST):
+        tries.count(f"2001:db8:1:2::{number:x}")
+    assert tries.wait_s("2001:db8:1:2:ffff::1") == WITHIN_S
+    assert tries.wait_s("2001:db8:1:3::1") == 0
+    for number in range(MOST):
+        tries.count(f"fe80::{number:x}%eth0")
+    assert tries.wait_s("fe80::ffff%eth0") == WITHIN_S
+    for number in range(MOST):
+        tries.count(f"::ffff:10.0.0.{number}")
+    assert tries.wait_s("::ffff:10.0.0.1") == 0
+
+
 def test_a_name_is_one_line_and_reads_forwards() -> None:
     sessions = Sessions()
     told = sessions.begin(Role.OPERATOR, "127.0.0.1", "ann\n\x1b[31m\u202enna")

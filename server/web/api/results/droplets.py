@@ -5,6 +5,7 @@ from fastapi.responses import FileResponse
 
 from server.lab.droplets.measured import MeasuredRun, droplets_file, measured_run
 from server.web.api.parameters import ContextOf, ResultsId, RunId, ShotIndex
+from server.web.opened_file import OpenedFile, opened_file
 from server.web.problems import responses
 
 router = APIRouter(prefix="/api/runs/{run_id}/results/{results_id}/droplets", tags=["results"])
@@ -17,7 +18,7 @@ def show_droplets(run_id: RunId, results_id: ResultsId, context: ContextOf) -> M
 
 
 @router.get("/{shot}.h5", response_class=FileResponse, responses=responses(404))
-def download_droplets(run_id: RunId, results_id: ResultsId, shot: ShotIndex, context: ContextOf) -> FileResponse:
+def download_droplets(run_id: RunId, results_id: ResultsId, shot: ShotIndex, context: ContextOf) -> OpenedFile:
     """The droplets of a shot, HDF5: 1-D columns, a row per droplet and exposure."""
     path = droplets_file(context.runs.directory(run_id) / "results" / results_id, shot)
-    return FileResponse(path, media_type="application/x-hdf5", filename=f"{run_id}_{results_id}_{path.name}")
+    return opened_file(path, "application/x-hdf5", f"{run_id}_{results_id}_{path.name}")

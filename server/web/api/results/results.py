@@ -21,6 +21,7 @@ from server.lab.services import Context
 from server.pictures.pictures import Colours, plane_png
 from server.pictures.previews import VolumePreview
 from server.web.api.parameters import ContextOf, ResultsId, RunId
+from server.web.opened_file import OpenedFile, opened_file
 from server.web.problems import responses
 
 router = APIRouter(prefix="/api/runs/{run_id}/results", tags=["results"])
@@ -63,12 +64,13 @@ def show_preview(run_id: RunId, results_id: ResultsId, volume: VolumeName, conte
 
 
 @router.get("/{results_id}/{volume}/volume.vtkhdf", response_class=FileResponse, responses=responses(404, 409, 500))
-async def download_volume(run_id: RunId, results_id: ResultsId, volume: VolumeName, context: ContextOf) -> FileResponse:
+async def download_volume(run_id: RunId, results_id: ResultsId, volume: VolumeName, context: ContextOf) -> OpenedFile:
     """The volume itself, VTKHDF ImageData; ParaView opens it. Only a preview is kept until somebody asks for it."""
     path = await to_thread(_volume, context, run_id, results_id, volume)
     if not await to_thread(path.is_file):
         await context.runner.store(path)
-    return FileResponse(path, media_type="application/x-hdf5", filename=f"{run_id}_{results_id}_{path.name}")
+    name = f"{run_id}_{results_id}_{path.name}"
+    return await to_thread(opened_file, path, "application/x-hdf5", name)
 
 
 @router.get("/{results_id}/{volume}/slices/{axis}/{index}.png", response_class=Response, responses=_PNG)
