@@ -257,7 +257,6 @@ def _make_image_data(group: h5py.Group, volume: SlabVolume, grid: VoxelGrid) -> 
         grid.shape,
         dtype,
         chunks=(1, min(SLAB_ROWS, ny), nx),
-        shuffle=True,
         compression="gzip",
         compression_opts=1,
     )

@@ -1,4 +1,8 @@
-"""Slabs as the chunks of a volume file: the bytes that HDF5's own shuffle and gzip filters would make of them."""
+"""Slabs as the chunks of a volume file: the bytes that HDF5's own gzip filter would make of them.
+
+They are not shuffled: most of a spray is zeros, of which long runs deflate faster than those of single bytes do, and to
+no more.
+"""
 
 from collections.abc import Iterator
 from concurrent.futures import Executor
@@ -39,13 +43,14 @@ def chunks_of(
 
 
 def _chunks(chunk_shape: tuple[int, int], dtype: np.dtype[Any], unit: float, planes: NDArray[Any]) -> list[bytes]:
+    if planes.dtype == dtype and planes.shape[1:] == chunk_shape and (unit == 1 or dtype != np.float32):
+        return [isal_zlib.compress(np.ascontiguousarray(rows), _LEVEL) for rows in planes]
     chunk, chunks = np.zeros(chunk_shape, dtype), []
-    shuffled = np.empty((dtype.itemsize, *chunk_shape), np.uint8)
     for rows in planes:
         _copy(rows, chunk[: len(rows)])
         if dtype == np.float32 and unit != 1:
             chunk *= np.float32(unit)
-        chunks.append(_deflated(chunk, shuffled))
+        chunks.append(isal_zlib.compress(chunk, _LEVEL))
     return chunks
 
 
@@ -55,11 +60,3 @@ def _copy(rows: NDArray[Any], to: NDArray[Any]) -> None:
         cv2.convertFp16(rows.view(np.int16), to)
     else:
         to[:] = rows
-
-
-def _deflated(chunk: NDArray[Any], shuffled: NDArray[np.uint8]) -> bytes:
-    """Bytes of one significance lie side by side in ``shuffled``, memory that is used again."""
-    if chunk.itemsize == 1:
-        return isal_zlib.compress(chunk, _LEVEL)
-    cv2.split(chunk.view(np.uint8).reshape(*chunk.shape, chunk.itemsize), list(shuffled))
-    return isal_zlib.compress(shuffled, _LEVEL)
