@@ -145,10 +145,13 @@ class RunReader:
         paths = (shot_path(self.run_dir, index) for index in range(self.shot_count))
         return np.array([read_image_key(path) for path in paths], np.int64)
 
-    def read_shot(self, index: int) -> Shot:
-        """Read one shot and check it against its checksums, and its number against the name of its file."""
+    def read_shot(self, index: int, exposures: str = "ab") -> Shot:
+        """Read one shot and check it against its checksums, and its number against the name of its file.
+
+        Exposures that are not asked for are not read: their pixels are 0, what the camera said of them is there.
+        """
         path = shot_path(self.run_dir, index)
-        shot = read_shot_file(path, self.header)
+        shot = read_shot_file(path, self.header, exposures)
         if shot.index != index:
             raise RenamedFile(f"{path}: holds shot {shot.index}, and is named otherwise: give it its name back")
         return shot

@@ -89,8 +89,8 @@ def reading_shot(path: Path, header: RunHeader) -> Iterator[h5py.File]:
         raise unreadable(path, error) from error
 
 
-def read_shot_file(path: Path, header: RunHeader) -> Shot:
-    """Read one shot and check it against its checksums.
+def read_shot_file(path: Path, header: RunHeader, exposures: str = "ab") -> Shot:
+    """Read one shot and check it against its checksums; of exposures that nobody asked for pixels are 0.
 
     Raises
     ------
@@ -100,7 +100,7 @@ def read_shot_file(path: Path, header: RunHeader) -> Shot:
     with reading_shot(path, header) as file:
         columns = {name: _read_column(file, name, column) for name, column in columns_of(header).items()}
         frames = {
-            view: _read_frames(path, file, view, view_format, columns[crc32_path(view)])
+            view: _read_frames(path, file, view, view_format, columns[crc32_path(view)], exposures)
             for view, view_format in header.views.items()
         }
         return shot_from_columns(columns, frames)
@@ -201,14 +201,20 @@ def _read_column(file: h5py.File, name: str, column: Column) -> Any:
     return np.zeros(column.shape, column.dtype) if is_missing(file, column) else file[name][0]
 
 
-def _read_frames(path: Path, file: h5py.File, view: str, view_format: ViewFormat, crc32: NDArray[Any]) -> list[Image]:
-    chunks = [file[frames_path(view)].id.read_direct_chunk((0, number, 0, 0))[1] for number in range(len(crc32))]
-    frames = []
-    for name, chunk, check in zip("AB", chunks, crc32, strict=False):
+def _read_frames(
+    path: Path, file: h5py.File, view: str, view_format: ViewFormat, crc32: NDArray[Any], exposures: str
+) -> list[Image]:
+    stored, shape, dtype = file[frames_path(view)].id, view_format.shape, view_format.dtype
+    frames: list[Image] = []
+    for number, (name, check) in enumerate(zip("ab", crc32, strict=False)):
+        if name not in exposures:
+            frames.append(np.broadcast_to(np.zeros((), dtype), shape))
+            continue
+        chunk = stored.read_direct_chunk((0, number, 0, 0))[1]
         try:
-            frames.append(decode_frame(EncodedFrame(chunk, int(check)), view_format.shape, view_format.dtype))
+            frames.append(decode_frame(EncodedFrame(chunk, int(check)), shape, dtype))
         except ValueError as error:
-            raise DamagedFrame(f"{path}: exposure {name} of {view}: {error}") from error
+            raise DamagedFrame(f"{path}: exposure {name.upper()} of {view}: {error}") from error
     return frames
 
 

@@ -202,6 +202,33 @@ def test_references_round_trip_whenever_they_are_written(tmp_path: Path, when: s
             reader.dark("view9")
 
 
+def test_a_damaged_reference_is_told(tmp_path: Path) -> None:
+    run_dir = tmp_path / "run"
+    dark = {name: np.full((2, *view.shape), 7, np.float32) for name, view in FORMATS.items()}
+    with RunWriter(run_dir, header_of()) as writer:
+        writer.write_references(dark, {})
+    with h5py.File(run_dir / "run.h5", "r+") as file:
+        stored = file["/cameras/view1/dark"].id
+        chunk = bytearray(stored.read_direct_chunk((1, 0, 0))[1])
+        chunk[len(chunk) // 2] ^= 0x10
+        stored.write_direct_chunk((1, 0, 0), bytes(chunk))
+    with pytest.raises(ShotFileError, match=r"run\.h5: cannot be read: it is torn or damaged: copy it back"):
+        RunReader(run_dir).dark("view1")
+    np.testing.assert_array_equal(RunReader(run_dir).dark("view2"), dark["view2"])
+
+
+def test_an_exposure_that_is_not_asked_for_is_not_read(tmp_path: Path) -> None:
+    header, path = write_run(tmp_path / "run", 1), tmp_path / "run" / "shots" / "0.h5"
+    with h5py.File(path, "r+") as file:
+        file["/cameras/view1/frames"].id.write_direct_chunk((0, 1, 0, 0), b"no exposure B")
+    with pytest.raises(ShotFileError, match="exposure B of view1"):
+        RunReader(tmp_path / "run").read_shot(0)
+    seen, whole = RunReader(tmp_path / "run").read_shot(0, "a").views["view1"], shot_of(header, 0).views["view1"]
+    np.testing.assert_array_equal(seen.frame_a, whole.frame_a)
+    np.testing.assert_array_equal(seen.frame_b, np.zeros_like(seen.frame_a))
+    assert seen.record_b == whole.record_b
+
+
 def test_nothing_is_overwritten(tmp_path: Path) -> None:
     header = write_run(tmp_path / "run", 1)
     with pytest.raises(RecorderError, match="never overwritten"), RunWriter(tmp_path / "run", header):
