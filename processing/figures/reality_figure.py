@@ -53,14 +53,30 @@ def reality_figure(shares: Mapping[str, Sequence[StatedShares]], ghosts: Mapping
         _draw_ghosts(ghost_axes, kind, ghosts[kind], colour)
     share_axes.plot([0, 1], [0, 1], color="0.6", linewidth=1)
     share_axes.set(xlabel="told: probability of being real", ylabel="share that is real, 95 % by counting")
-    most = 100 * max((max(one.told.high, one.true) for told in ghosts.values() for one in told), default=0.01)
-    ghost_axes.plot([0, most], [0, most], color="0.6", linewidth=1)
-    ghost_axes.set(xlabel="told: ghosts among the droplets of a case [%]", ylabel="ghosts [%]")
-    ghost_axes.set(xscale="symlog", yscale="symlog")
+    _frame_ghosts(ghost_axes, ghosts)
     for axes in (share_axes, ghost_axes):
         axes.grid(alpha=0.25)
         axes.legend()
     return figure
+
+
+def ghosts_figure(ghosts: Mapping[str, Sequence[ToldShare]]) -> Figure:
+    """True against told shares of ghosts of every case, with their intervals, by kind."""
+    figure = Figure(figsize=(5.4, 4.8), layout="constrained")
+    axes = figure.subplots()
+    for colour, (kind, told) in zip(COLOURS, ghosts.items(), strict=False):
+        _draw_ghosts(axes, kind, told, colour)
+    _frame_ghosts(axes, ghosts)
+    axes.grid(alpha=0.25)
+    axes.legend()
+    return figure
+
+
+def _frame_ghosts(axes: Axes, ghosts: Mapping[str, Sequence[ToldShare]]) -> None:
+    most = 100 * max((max(one.told.high, one.true) for told in ghosts.values() for one in told), default=0.01)
+    axes.plot([0, most], [0, most], color="0.6", linewidth=1)
+    axes.set(xlabel="told: ghosts among the droplets of a case [%]", ylabel="ghosts [%]")
+    axes.set(xscale="symlog", yscale="symlog")
 
 
 def _draw_ghosts(axes: Axes, kind: str, told: Sequence[ToldShare], colour: str) -> None:

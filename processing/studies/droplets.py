@@ -19,7 +19,7 @@ from processing.geometry import FloatArray, PinholeCamera
 from processing.kernels import DEFAULT_THREADS
 from processing.studies.report import Statement, grouped
 from processing.studies.sensitivity import Setup, misaligned, setup_cameras
-from processing.studies.simulated_droplets import droplet_centres, study_cameras, study_grid
+from processing.studies.simulated_droplets import Image, droplet_centres, study_cameras, study_grid
 from processing.synthetic.bright_particles import spots_image
 from processing.synthetic.paper_rig import TABLE_1
 from processing.volume import VoxelGrid
@@ -150,7 +150,7 @@ class BrightScene:
 
     points_mm: FloatArray
     heights: FloatArray
-    images: list[np.ndarray[tuple[int, int], np.dtype[np.float32]]]
+    images: list[Image]
     believed: list[PinholeCamera]
 
 
@@ -174,12 +174,21 @@ def bright_scene(
     count = round(case.density_per_mm3 * grid.volume_mm3)
     points_mm = grid.to_mm(droplet_centres(grid.shape, count, rng))
     heights = rng.lognormal(0, AMPLITUDE_SPREAD, count)
-    images = []
-    for camera in cameras:
-        image = spots_image(camera, points_mm, heights, case.sigma_px)
-        images.append((image + rng.normal(0, case.noise_percent / 100, image.shape)).astype(np.float32))
+    images = bright_images(case, cameras, points_mm, heights, rng)
     believed = [misaligned(camera, case.calibration_error_px, rng) for camera in cameras]
     return BrightScene(points_mm, heights, images, believed)
+
+
+def bright_images(
+    case: DropletCase,
+    cameras: Sequence[PinholeCamera],
+    points_mm: FloatArray,
+    heights: FloatArray,
+    rng: np.random.Generator,
+) -> list[Image]:
+    """What cameras see of bright particles at places (N, 3) and of heights (N,), with noise."""
+    drawn = [spots_image(camera, points_mm, heights, case.sigma_px) for camera in cameras]
+    return [(image + rng.normal(0, case.noise_percent / 100, image.shape)).astype(np.float32) for image in drawn]
 
 
 def _row(study: DropletStudy, case: DropletCase, seed: int, threads: int) -> DropletRow:

@@ -8,6 +8,7 @@ from server.cli.options import Verbs, count, positive, seed, width
 from server.cli.output import Bar, progress
 from server.cli.studies.breakup import add_break_up
 from server.cli.studies.droplets import add_droplets
+from server.cli.studies.persistence import add_persistence
 from server.cli.studies.reality import add_reality
 from server.cli.studies.sizes import add_sizes
 from server.cli.studies.statistics import add_statistics
@@ -41,6 +42,7 @@ def add(verbs: Verbs) -> None:
     add_statistics(studies)
     add_break_up(studies)
     add_reality(studies)
+    add_persistence(studies)
 
 
 def _add_methods(parser: ArgumentParser, default: str) -> None:

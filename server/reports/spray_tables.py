@@ -27,6 +27,7 @@ def _figures(told: SprayStatistics) -> Iterator[tuple[str, Estimate | None]]:
         yield f"Dv0.{percent // 10} [µm]", getattr(droplets, f"dv{percent}_um")
     yield "relative span", droplets.relative_span
     yield "ghosts expected among them [%]", droplets.ghost_share and _in_percent(droplets.ghost_share)
+    yield "ghosts by droplets without partner [%]", told.unpaired_ghost_share and _in_percent(told.unpaired_ghost_share)
     if motion:
         yield from _of_motion(motion)
     if extent:

@@ -13,7 +13,7 @@ from processing.calibration.calibration_record import content_id
 from processing.studies.droplets import BrightScene, DropletCase, bright_scene
 from processing.studies.seen_droplets import droplet_calibration
 from processing.studies.simulated_droplets import study_grid
-from processing.studies.velocity.double_scenes import DoubleScene, bright_double
+from processing.studies.velocity.double_scenes import DoubleScene, double_scene
 from processing.volume import VoxelGrid
 
 SHAPE = (80, 40, 160)
@@ -32,7 +32,7 @@ def scene(case: DropletCase | None = None, seed: int = 1, grid: VoxelGrid = GRID
 
 
 def moving_scene(seed: int = 1) -> DoubleScene:
-    return bright_double(28, GRID, IMAGE_SIZE_PX, np.random.default_rng(seed))
+    return double_scene(DropletCase(28), GRID, IMAGE_SIZE_PX, np.random.default_rng(seed))
 
 
 def search_of(shot: BrightScene, grid: VoxelGrid = GRID, margin_voxel: int = MARGIN_VOXEL) -> DropletSearch:

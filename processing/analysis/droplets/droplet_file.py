@@ -98,10 +98,10 @@ def write_droplets(
     more = velocities or {}
     droplets = {frame: {**exposure.columns(), **more.get(frame, {})} for frame, exposure in exposures.items()}
     others = {frame: exposure.columns() for frame, exposure in (objects or {}).items()}
-    write_columns(path, _joined(droplets), provenance, _joined(others) if others else {})
+    write_columns(path, joined(droplets), provenance, joined(others) if others else {})
 
 
-def _joined(exposures: Mapping[str, Columns]) -> Columns:
+def joined(exposures: Mapping[str, Columns]) -> Columns:
     """Columns of all exposures, one below the other."""
     tables = list(exposures.values())
     frames = [np.full(len(next(iter(table.values()))), frame, "S1") for frame, table in exposures.items()]

@@ -31,6 +31,7 @@ from processing.analysis.spray.spray_motion import (
     spray_motion,
 )
 from processing.analysis.spray.spray_sample import SpraySample, spray_sample
+from processing.analysis.velocity.velocity_statistics import velocity_statistics
 from processing.geometry import FloatArray
 from processing.reconstruction.settings import FrozenValue
 
@@ -77,6 +78,9 @@ class SprayStatistics(FrozenValue):
         Field(description="droplets in a volume at an instant, not those that pass an area: ASTM E799"),
     ] = "spatial"
     droplets: Annotated[DropletStatistics, Field(description="number, density, mean diameters and quantiles by volume")]
+    unpaired_ghost_share: Annotated[
+        Estimate | None, Field(description="ghosts by droplets without a partner, a witness beside that of droplets")
+    ] = None
     smallest_um: Annotated[float | None, Field(description="diameter of the smallest droplet")] = None
     liquid_ppm: Annotated[Estimate | None, Field(description="volume of liquid in droplets per volume, 1e-6")] = None
     sample: Annotated[SampleVerdict | None, Field(description="is it large enough; null without diameters")] = None
@@ -120,7 +124,8 @@ def spray_statistics(shots: Sequence[StoredDroplets], asked: AskedFor | None = N
         return SprayStatistics(droplets=pooled, reasons=reasons, doubts=spray_doubts(shots, None, asked.axis))
     sample = spray_sample(shots)
     told = _of_sample(sample, pooled, asked)
-    return told.model_copy(update={"doubts": spray_doubts(shots, sample, asked.axis)})
+    ghosts, doubts = velocity_statistics(shots).unpaired_ghost_share, spray_doubts(shots, sample, asked.axis)
+    return told.model_copy(update={"doubts": doubts, "unpaired_ghost_share": ghosts})
 
 
 def _of_sample(sample: SpraySample, pooled: DropletStatistics, asked: AskedFor) -> SprayStatistics:

@@ -12,6 +12,7 @@ from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.analysis.droplets.ghost_share import share_interval
 from processing.analysis.estimates import CONFIDENCE, Estimate
 from processing.analysis.shot_doubts import velocity_doubts
+from processing.analysis.velocity.unpaired_ghosts import ghost_share_by_partners
 from processing.geometry import FloatArray
 from processing.reconstruction.settings import FrozenValue
 
@@ -41,6 +42,11 @@ class VelocityStatistics(FrozenValue):
     intervals_over: Annotated[
         Literal["shots", "pairs"] | None, Field(description="what the interval of the mean knows to differ")
     ] = None
+    unpaired_ghost_share: Annotated[
+        Estimate | None,
+        Field(description="ghosts among the droplets, by those without a partner: a witness beside ghost_share"),
+    ] = None
+    unpaired_ghost_reason: Annotated[str | None, Field(description="why it is null, where there are pairs")] = None
     reason: Annotated[str | None, Field(description="why there is no mean; null where there is one")] = None
     doubts: Annotated[tuple[str, ...], Field(description="velocities that are doubtful, and count, or refused")] = ()
 
@@ -62,12 +68,15 @@ def velocity_statistics(shots: Sequence[StoredDroplets]) -> VelocityStatistics:
     pairs, stayed = sum(map(len, velocities_m_s)), sum(its["stayed"] for _, its in believed)
     several = len(believed) > 1
     low, high = share_interval(min(pairs, stayed), stayed)
+    ghosts = ghost_share_by_partners([shot for shot, _ in believed])
     return VelocityStatistics(
         shots=len(believed),
         pairs=pairs,
         share_paired=Estimate(value=min(1.0, pairs / stayed), low=low, high=high),
         mean_m_s=_mean(velocities_m_s if several else list(velocities_m_s[0][:, None])),
         intervals_over="shots" if several else "pairs",
+        unpaired_ghost_share=None if isinstance(ghosts, str) else ghosts,
+        unpaired_ghost_reason=ghosts if isinstance(ghosts, str) else None,
         doubts=velocity_doubts(shots),
     )
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import rankdata
 
-from processing.analysis.droplets.ghost_share import MOST_BRIGHT, GhostShare, expected_share
+from processing.analysis.droplets.ghost_share import GhostShare
 from processing.analysis.estimates import Estimate
 from processing.studies.report import Statement, grouped
 
@@ -30,27 +30,20 @@ class CaseShare:
         ``bright`` or ``shadows``, and what was simulated.
     residual_over_noise : float
         Largest of the shots.
-    expected : float
-        So many ghosts ``p_real`` makes expect.
+    estimate : Estimate
+        Share that is expected.
+    told : bool
+        Whether it is told.
     true : GhostShare
-        Those that there are.
+        Ghosts that there are.
     """
 
     kind: str
     case: str
     residual_over_noise: float
-    expected: float
+    estimate: Estimate
+    told: bool
     true: GhostShare
-
-    @property
-    def estimate(self) -> Estimate:
-        """Share that is expected."""
-        return expected_share(self.expected, self.true.found)
-
-    @property
-    def told(self) -> bool:
-        """Whether it is told."""
-        return self.kind == SIZED or self.estimate.value <= MOST_BRIGHT
 
     @property
     def true_share(self) -> float:

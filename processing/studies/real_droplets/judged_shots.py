@@ -5,15 +5,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from processing.analysis.droplets.bright_shot import BrightExposure, measure_bright
+from processing.analysis.droplets.bright_shot import BrightExposure
 from processing.analysis.droplets.droplet_search import plan_droplets
 from processing.analysis.droplets.ghost_share import RADIUS_VOXEL, matches
-from processing.analysis.droplets.shadows.shadow_shot import ShadowExposure, measure_shadows
+from processing.analysis.droplets.shadows.shadow_shot import ShadowExposure
 from processing.geometry import FloatArray
 from processing.kernels import DEFAULT_THREADS
 from processing.studies.droplets import IMAGE_SIZE_PX, DropletCase, bright_scene
 from processing.studies.shadows.sizes import SizeCase, size_scene
 from processing.studies.simulated_droplets import study_grid
+from processing.studies.velocity.measured_case import measured_case
 
 SLAB = (250, 60, 500)
 """The full depth and width of the paper's volume."""
@@ -52,10 +53,10 @@ def judged_shot(
     radius_mm = RADIUS_VOXEL * grid.pitch_mm
     if isinstance(case, DropletCase):
         bright = bright_scene(case, grid, IMAGE_SIZE_PX, rng)
-        found = measure_bright(bright.images, plan_droplets(bright.believed, grid), threads=threads)
+        found = measured_case(case, bright.images, plan_droplets(bright.believed, grid), threads)
         return _judged("bright", found, matches(found.droplets.points_mm, bright.points_mm, radius_mm)[0])
     dark = size_scene(case, grid, IMAGE_SIZE_PX, rng)
-    sized = measure_shadows(dark.images, plan_droplets(dark.believed, grid), light="gaussian", threads=threads)
+    sized = measured_case(case, dark.images, plan_droplets(dark.believed, grid), threads, "gaussian")
     return _judged("shadows", sized, matches(sized.droplets.points_mm, dark.spray.positions_mm, radius_mm)[0])
 
 

@@ -10,11 +10,11 @@ from itertools import pairwise
 import numpy as np
 from matplotlib.figure import Figure
 
-from processing.analysis.droplets.ghost_share import GhostShare
+from processing.analysis.droplets.ghost_share import MOST_BRIGHT, GhostShare, expected_share
 from processing.figures.reality_figure import StatedShares, ToldShare, reality_figure
 from processing.kernels import DEFAULT_THREADS
 from processing.studies.droplets import DropletCase
-from processing.studies.real_droplets.case_shares import CaseShare, share_statements
+from processing.studies.real_droplets.case_shares import SIZED, CaseShare, share_statements
 from processing.studies.real_droplets.judged_shots import SLAB, JudgedShot, judged_shot
 from processing.studies.report import Statement, grouped
 from processing.studies.shadows.sizes import SizeCase
@@ -162,7 +162,9 @@ def case_shares(rows: Sequence[RealityRow]) -> list[CaseShare]:
 def _share(rows: Sequence[RealityRow]) -> CaseShare:
     expected, ghosts = _ghosts(rows)
     ratio, droplets = max(row.residual_over_noise for row in rows), sum(row.droplets for row in rows)
-    return CaseShare(rows[0].kind, rows[0].case, ratio, expected, GhostShare(ghosts, droplets))
+    estimate, kind = expected_share(expected, droplets), rows[0].kind
+    told = kind == SIZED or estimate.value <= MOST_BRIGHT
+    return CaseShare(kind, rows[0].case, ratio, estimate, told, GhostShare(ghosts, droplets))
 
 
 def _unsure_text(rows: Sequence[RealityRow]) -> str:

@@ -21,7 +21,7 @@ from processing.studies.droplets import IMAGE_SIZE_PX, SLAB
 from processing.studies.report import Statement, all_kept, grouped
 from processing.studies.sensitivity import misaligned
 from processing.studies.shadows.size_errors import d32_of, size_errors
-from processing.studies.simulated_droplets import study_cameras, study_grid
+from processing.studies.simulated_droplets import Image, study_cameras, study_grid
 from processing.synthetic.liquid.droplet_clouds import Box, LogNormal, droplet_cloud
 from processing.synthetic.paper_rig import paper_optics
 from processing.synthetic.shadow_shots import Counting, transmission_images
@@ -81,6 +81,11 @@ class SizeCase:
         if self.aperture_ratio != 1:
             parts.append(f"aperture x {self.aperture_ratio:g}")
         return ", ".join(parts)
+
+    @property
+    def sizes(self) -> LogNormal:
+        """Of the droplets."""
+        return LogNormal(self.median_um / 1000, self.spread)
 
 
 ASKED_FOR = (
@@ -171,7 +176,7 @@ class ShadowScene:
     """
 
     spray: Spray
-    images: list[np.ndarray[tuple[int, int], np.dtype[np.float32]]]
+    images: list[Image]
     believed: list[PinholeCamera]
 
 
@@ -180,14 +185,20 @@ def size_scene(
 ) -> ShadowScene:
     """A shot of a case: droplets all over a grid and a little beyond, uniformly."""
     cameras = study_cameras(image_size_px)
+    spray = droplet_cloud(Box.around(grid, BESIDE_MM), case.density_per_mm3, case.sizes, rng)
+    images = shadow_images(case, cameras, spray, rng)
+    return ShadowScene(spray, images, [misaligned(camera, case.calibration_error_px, rng) for camera in cameras])
+
+
+def shadow_images(
+    case: SizeCase, cameras: Sequence[PinholeCamera], spray: Spray, rng: np.random.Generator
+) -> list[Image]:
+    """What the lenses of a case show of opaque droplets, with noise."""
     optics = [
         replace(view, f_number=view.f_number / case.aperture_ratio, condenser_ratio=case.condenser_ratio)
         for view in paper_optics().values()
     ]
-    sizes = LogNormal(case.median_um / 1000, case.spread)
-    spray = droplet_cloud(Box.around(grid, BESIDE_MM), case.density_per_mm3, sizes, rng)
-    images = transmission_images(cameras, optics, spray, Counting.of_noise(case.noise_percent / 100), rng)
-    return ShadowScene(spray, images, [misaligned(camera, case.calibration_error_px, rng) for camera in cameras])
+    return list(transmission_images(cameras, optics, spray, Counting.of_noise(case.noise_percent / 100), rng))
 
 
 def _row(study: SizeStudy, case: SizeCase, seed: int, threads: int) -> SizeRow:

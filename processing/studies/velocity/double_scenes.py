@@ -4,15 +4,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from processing.geometry import FloatArray, PinholeCamera
-from processing.studies.droplets import AMPLITUDE_SPREAD
-from processing.studies.simulated_droplets import study_cameras
-from processing.synthetic.bright_particles import spots_image
+from processing.studies.droplets import AMPLITUDE_SPREAD, DropletCase, bright_images
+from processing.studies.shadows.sizes import BESIDE_MM, SizeCase, shadow_images
+from processing.studies.simulated_droplets import Image, study_cameras
+from processing.studies.velocity.measured_case import AnyCase
 from processing.synthetic.liquid.droplet_clouds import Box, Flow, LogNormal, droplet_cloud
-from processing.synthetic.paper_rig import paper_optics
-from processing.synthetic.shadow_shots import Counting, transmission_images
 from processing.synthetic.spray import Spray
 from processing.volume import VoxelGrid
 
@@ -24,13 +22,6 @@ FLOW = Flow(
     780.0,
 )
 """In 6.4 us at 60 voxel/mm 9, 7 and 3 voxels in the middle, 7 to 17 in all, with a scatter of 0.3 voxel."""
-BESIDE_MM = 0.15
-"""So far around the grid there are opaque droplets, too."""
-SIGMA_PX, NOISE = 1.0, 0.03
-"""Of bright particles: width of their images, and noise over their median height."""
-MEDIAN_MM, SPREAD, COUNTING_NOISE = 0.04, 0.4, 0.012
-"""Of opaque droplets: lognormal diameters, none below 10 um; and noise of the light."""
-Image = NDArray[np.float32]
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,46 +49,30 @@ class DoubleScene:
         return self.after.positions_mm - self.before.positions_mm
 
 
-def bright_double(
-    density_per_mm3: float,
+def double_scene(
+    case: AnyCase,
     grid: VoxelGrid,
     image_size_px: tuple[int, int],
     rng: np.random.Generator,
     flow: Flow = FLOW,
 ) -> DoubleScene:
-    """Bright particles of lognormal height all over a grid in A, and where they have flown in B."""
+    """Droplets all over a grid in A, of opaque ones some beyond, and where they have flown in B."""
     cameras = study_cameras(image_size_px)
-    before = droplet_cloud(Box.around(grid), density_per_mm3, LogNormal(), rng, flow)
-    heights = rng.lognormal(0, AMPLITUDE_SPREAD, len(before))
+    if isinstance(case, SizeCase):
+        before = droplet_cloud(Box.around(grid, BESIDE_MM), case.density_per_mm3, case.sizes, rng, flow)
+        heights = np.ones(len(before))
+    else:
+        before = droplet_cloud(Box.around(grid), case.density_per_mm3, LogNormal(), rng, flow)
+        heights = rng.lognormal(0, AMPLITUDE_SPREAD, len(before))
     after = before.advanced(1e-9 * SEPARATION_NS)
-    first, second = (bright_images(cameras, spray, heights, rng) for spray in (before, after))
+    first, second = (case_images(case, cameras, spray, heights, rng) for spray in (before, after))
     return DoubleScene(before, after, (first, second), cameras)
 
 
-def bright_images(
-    cameras: Sequence[PinholeCamera], spray: Spray, heights: FloatArray, rng: np.random.Generator
+def case_images(
+    case: AnyCase, cameras: Sequence[PinholeCamera], spray: Spray, heights: FloatArray, rng: np.random.Generator
 ) -> list[Image]:
-    """What cameras see of bright particles of such heights (N,), with noise."""
-    drawn = [spots_image(camera, spray.positions_mm, heights, SIGMA_PX) for camera in cameras]
-    return [(image + rng.normal(0, NOISE, image.shape)).astype(np.float32) for image in drawn]
-
-
-def shadow_double(
-    density_per_mm3: float,
-    grid: VoxelGrid,
-    image_size_px: tuple[int, int],
-    rng: np.random.Generator,
-    flow: Flow = FLOW,
-) -> DoubleScene:
-    """Opaque droplets all over a grid and a little beyond, and where they have flown in B."""
-    cameras = study_cameras(image_size_px)
-    before = droplet_cloud(Box.around(grid, BESIDE_MM), density_per_mm3, LogNormal(MEDIAN_MM, SPREAD), rng, flow)
-    after = before.advanced(1e-9 * SEPARATION_NS)
-    first, second = (shadow_images(cameras, spray, rng) for spray in (before, after))
-    return DoubleScene(before, after, (first, second), cameras)
-
-
-def shadow_images(cameras: Sequence[PinholeCamera], spray: Spray, rng: np.random.Generator) -> list[Image]:
-    """What the paper's lenses show of opaque droplets, with noise."""
-    counting = Counting.of_noise(COUNTING_NOISE)
-    return list(transmission_images(cameras, list(paper_optics().values()), spray, counting, rng))
+    """What cameras see of droplets of a case; bright ones are of such heights (N,)."""
+    if isinstance(case, DropletCase):
+        return bright_images(case, cameras, spray.positions_mm, heights, rng)
+    return shadow_images(case, cameras, spray, rng)

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from processing.geometry import FloatArray
 from processing.studies.droplets import AMPLITUDE_SPREAD
-from processing.studies.velocity.double_scenes import BESIDE_MM, MEDIAN_MM, SPREAD
-from processing.synthetic.liquid.droplet_clouds import Box, Flow, LogNormal, droplet_cloud
+from processing.studies.shadows.sizes import BESIDE_MM, SizeCase
+from processing.synthetic.liquid.droplet_clouds import Box, Flow, droplet_cloud
 from processing.synthetic.spray import Spray
 from processing.volume import VoxelGrid
 
@@ -72,6 +72,6 @@ def flying_droplets(density_per_mm3: float, grid: VoxelGrid, shots: int, rng: np
     steady = np.abs(FLOW.velocity_mm_per_s) + np.abs(FLOW.gradient_per_s) @ corners_mm
     travel_mm = float(np.max(steady + SIGMAS * FLOW.scatter_mm_per_s)) * shots / RATE_HZ
     box = Box.around(grid, BESIDE_MM + travel_mm)
-    first = droplet_cloud(box, density_per_mm3, LogNormal(MEDIAN_MM, SPREAD), rng, FLOW)
+    first = droplet_cloud(box, density_per_mm3, SizeCase().sizes, rng, FLOW)
     accelerations = rng.normal(0, ACCELERATION_MM_PER_S2, (len(first), 3))
     return FlyingDroplets(first, accelerations, rng.lognormal(0, AMPLITUDE_SPREAD, len(first)))

@@ -11,11 +11,9 @@ from typing import Literal
 import numpy as np
 from matplotlib.figure import Figure
 
-from processing.analysis.droplets.bright_shot import measure_bright
-from processing.analysis.droplets.droplet_search import MARGIN_VOXEL, DropletSearch, plan_droplets
+from processing.analysis.droplets.droplet_search import MARGIN_VOXEL, plan_droplets
 from processing.analysis.droplets.droplet_table import Droplets, SizedDroplets
 from processing.analysis.droplets.ghost_share import RADIUS_VOXEL, matches
-from processing.analysis.droplets.shadows.shadow_shot import measure_shadows
 from processing.analysis.velocity.moving_droplets import MovingDroplets
 from processing.analysis.velocity.track_motion import TrackPoints, track_points
 from processing.analysis.velocity.tracks import link
@@ -24,7 +22,8 @@ from processing.geometry import FloatArray
 from processing.kernels import DEFAULT_THREADS
 from processing.studies.report import Statement, all_kept, grouped
 from processing.studies.simulated_droplets import study_cameras, study_grid
-from processing.studies.velocity.double_scenes import bright_images, shadow_images
+from processing.studies.velocity.double_scenes import case_images
+from processing.studies.velocity.measured_case import measured_case, plain_case
 from processing.studies.velocity.series_scenes import RATE_HZ, FlyingDroplets, flying_droplets
 from processing.studies.velocity.track_truth import Labels, whole_and_right
 from processing.volume import VoxelGrid
@@ -159,16 +158,12 @@ def _found(
     threads: int,
 ) -> Iterator[Droplets | SizedDroplets]:
     """What is found in the images of every shot."""
-    cameras = study_cameras(study.image_size_px)
-    search: DropletSearch = plan_droplets(cameras, grid, margin_voxel=study.margin_voxel)
+    cameras, plain = study_cameras(study.image_size_px), plain_case(case.droplets, case.density_per_mm3)
+    search = plan_droplets(cameras, grid, margin_voxel=study.margin_voxel)
     for shot in range(study.shots):
         shown = flying.shown(shot, grid)
-        spray = flying.spray(shot, shown)
-        if case.droplets == "bright":
-            images = bright_images(cameras, spray, flying.heights[shown], rng)
-            yield measure_bright(images, search, threads=threads).droplets
-        else:
-            yield measure_shadows(shadow_images(cameras, spray, rng), search, threads=threads).droplets
+        images = case_images(plain, cameras, flying.spray(shot, shown), flying.heights[shown], rng)
+        yield measured_case(plain, images, search, threads).droplets
 
 
 def _labels(droplets: Droplets | SizedDroplets, true_mm: FloatArray, grid: VoxelGrid) -> Labels:

@@ -12,10 +12,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from processing.analysis.droplets.bright_shot import BrightExposure, measure_bright
 from processing.analysis.droplets.droplet_search import MARGIN_VOXEL, plan_droplets
 from processing.analysis.droplets.ghost_share import RADIUS_VOXEL, matches
-from processing.analysis.droplets.shadows.shadow_shot import ShadowExposure, measure_shadows
 from processing.analysis.velocity.measured_velocities import MeasuredVelocities, measure_velocities
 from processing.analysis.velocity.velocity_table import MM_PER_NS
 from processing.figures.velocity_figures import LinkedCase, linked_figure
@@ -24,7 +22,8 @@ from processing.kernels import DEFAULT_THREADS
 from processing.studies.droplets import IMAGE_SIZE_PX, SLAB
 from processing.studies.report import Statement, all_kept, grouped
 from processing.studies.simulated_droplets import study_grid
-from processing.studies.velocity.double_scenes import SEPARATION_NS, DoubleScene, bright_double, shadow_double
+from processing.studies.velocity.double_scenes import SEPARATION_NS, DoubleScene, double_scene
+from processing.studies.velocity.measured_case import measured_case, plain_case
 from processing.volume import VoxelGrid
 
 Z_SCORES = (0.9, 1.2)
@@ -132,24 +131,15 @@ def velocity_study(study: VelocityStudy | None = None, threads: int = DEFAULT_TH
     grid = study_grid(study.shape)
     for case in study.cases:
         for seed in study.seeds:
-            make = bright_double if case.droplets == "bright" else shadow_double
-            scene = make(case.density_per_mm3, grid, study.image_size_px, np.random.default_rng(seed))
-            first, second = measured_exposures(scene, case, grid, study.margin_voxel, threads)
+            plain = plain_case(case.droplets, case.density_per_mm3)
+            scene = double_scene(plain, grid, study.image_size_px, np.random.default_rng(seed))
+            search = plan_droplets(scene.cameras, grid, margin_voxel=study.margin_voxel)
+            first, second = (measured_case(plain, images, search, threads) for images in scene.images)
             started_cpu_s = time.process_time()
             velocities = measure_velocities(first, second, grid, SEPARATION_NS)
             cpu_s = time.process_time() - started_cpu_s
             found = [exposure.droplets.points_mm for exposure in (first, second)]
             yield _row(case, seed, scene, grid, found, velocities, cpu_s)
-
-
-def measured_exposures(
-    scene: DoubleScene, case: VelocityCase, grid: VoxelGrid, margin_voxel: int, threads: int = DEFAULT_THREADS
-) -> list[BrightExposure] | list[ShadowExposure]:
-    """Droplets of both exposures, each measured by itself."""
-    search = plan_droplets(scene.cameras, grid, margin_voxel=margin_voxel)
-    if case.droplets == "bright":
-        return [measure_bright(images, search, threads=threads) for images in scene.images]
-    return [measure_shadows(images, search, threads=threads) for images in scene.images]
 
 
 def _row(

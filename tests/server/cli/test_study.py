@@ -34,7 +34,7 @@ def test_a_study_writes_csv_and_figure_and_says_what_the_paper_says(
     "study",
     [
         *("density", "ghosts", "average", "residuals", "calibration", "sensitivity"),
-        *("droplets", "sizes", "reality", "velocity", "breakup", "statistics"),
+        *("droplets", "sizes", "reality", "persistence", "velocity", "tracks", "breakup", "statistics"),
     ],
 )
 def test_every_study_explains_itself(study: str, capsys: pytest.CaptureFixture[str]) -> None:

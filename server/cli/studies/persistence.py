@@ -1,0 +1,32 @@
+"""``tomoshadow study persistence``: how many ghosts droplets without a partner tell, against how many there are."""
+
+from argparse import Namespace
+from typing import Any
+
+from server.cli.options import Verbs, count, seed, usable_processors
+from server.cli.studies.study_command import add_study, collected, passing, report
+
+
+def add_persistence(studies: Verbs) -> None:
+    """Add the study."""
+    parser = add_study(studies, "persistence", persistence, "how many ghosts droplets without a partner in B tell")
+    parser.add_argument("--seed", type=seed, default=301, help="of the first double exposure of a case")
+    parser.add_argument("--repeats", type=count, default=3, help="double exposures of a case")
+
+
+def persistence(options: Namespace) -> dict[str, Any]:
+    """Run the study."""
+    from processing.studies.real_droplets.case_shares import all_close
+    from processing.studies.real_droplets.persistence import (
+        persistence_figure,
+        persistence_line,
+        persistence_shares,
+        persistence_statements,
+        persistence_study,
+    )
+    from processing.studies.real_droplets.reality import RealityStudy
+
+    study = RealityStudy(seeds=tuple(range(options.seed, options.seed + options.repeats)))
+    rows = collected(persistence_study(study, usable_processors()), persistence_line)
+    result = report(options.out, "persistence", rows, persistence_figure(rows), persistence_statements(rows))
+    return passing(result, all_close(persistence_shares(rows)), "as many are ghosts as droplets without a partner tell")
