@@ -3,9 +3,11 @@
 import threading
 from queue import Empty, Queue
 from time import monotonic
+from typing import Any
 
 from tomoshadow.client.connection import Connection
 from tomoshadow.client.errors import ClientError
+from tomoshadow.client.values import Acquisition, read
 
 LIMIT_S = 1.0
 """Whoever has heard nothing by then goes to the hardware stop."""
@@ -46,6 +48,15 @@ def switch_off(doors: list[_Door], limit_s: float = LIMIT_S) -> str:
 def _knock(connection: Connection, path: str, heard: "Queue[str | ClientError]") -> None:
     try:
         told, _ = connection.ask("POST", path)
-        heard.put(str(told.get("ended") or told.get("run_id") or "whatever was under way"))
+        heard.put(read(_ended, told))
     except ClientError as error:
         heard.put(error)
+
+
+def _ended(told: Any) -> str:
+    """What either door says when the light is off; others may answer 200 to whatever they are asked."""
+    if "light" not in told:
+        return Acquisition.of(told).run_id or "whatever was under way"
+    if (told["light"], type(told["ended"])) != ("off", str):
+        raise ValueError(f"light {told['light']}")
+    return str(told["ended"])

@@ -3,7 +3,7 @@
 import json
 from collections.abc import Iterable, Iterator
 
-from tomoshadow.client.values import Event
+from tomoshadow.client.values import Event, read
 
 
 def events_of(lines: Iterable[str]) -> Iterator[Event | None]:
@@ -13,5 +13,9 @@ def events_of(lines: Iterable[str]) -> Iterator[Event | None]:
         if line.startswith("data:"):
             data.append(line.removeprefix("data:").removeprefix(" "))
         elif not line:
-            yield Event.of(json.loads("\n".join(data))) if data else None
+            yield read(_event, "\n".join(data)) if data else None
             data.clear()
+
+
+def _event(text: str) -> Event:
+    return Event.of(json.loads(text))

@@ -5,18 +5,16 @@ import os
 import socket
 import time
 import uuid
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from typing import Any, TypeVar
+from typing import Any
 from urllib.parse import quote
 
 from tomoshadow.client.abort import LIMIT_S, switch_off
 from tomoshadow.client.connection import Connection
 from tomoshadow.client.errors import ClientError
 from tomoshadow.client.event_stream import events_of
-from tomoshadow.client.values import Alarm, Event, Readiness, Rig, Run
-
-Value = TypeVar("Value")
+from tomoshadow.client.values import Alarm, Event, Readiness, Rig, Run, read
 
 DEFAULT_URL = "http://127.0.0.1:8080"
 TOKEN_VARIABLE = "TOMOSHADOW_TOKEN"  # noqa: S105  where it is, not what it is
@@ -57,7 +55,7 @@ class RigClient:
 
     def rig(self) -> Rig:
         """The rig at a glance."""
-        rig = _read(Rig.of, self._get("/api/rig"))
+        rig = read(Rig.of, self._get("/api/rig"))
         self._abort_port = rig.abort_port
         return rig
 
@@ -65,7 +63,7 @@ class RigClient:
         """Whether a start would be refused, and why; of a plan, or of whatever the rig might do."""
         path = "/api/rig/readiness"
         told = self._get(path) if plan is None else self._server.ask("POST", path, plan)[0]
-        return _read(Readiness.of, told)
+        return read(Readiness.of, told)
 
     def start(self, plan: Mapping[str, Any], wait_s: float = 30.0) -> str:
         """Start a run; its id. An answer that is lost is asked for again, and the run starts once.
@@ -87,23 +85,30 @@ class RigClient:
         end_s = time.monotonic() + wait_s
         while True:
             try:
-                return str(self._server.ask("POST", "/api/runs", plan, headers)[1]["location"].rsplit("/", 1)[-1])
+                return self._started(self._server.ask("POST", "/api/runs", plan, headers)[1])
             except ClientError as error:
                 if error.code not in (*_LOST, "in_progress") or time.monotonic() > end_s:
                     raise
             time.sleep(_RETRY_S)
 
+    def _started(self, told: Mapping[str, str]) -> str:
+        place = {name.lower(): value for name, value in told.items()}.get("location")
+        if not place:
+            text = f"{self.url} does not say which run was started"
+            raise ClientError(text, "senseless", "tomoshadow watch tells whether one is under way")
+        return place.rsplit("/", 1)[-1]
+
     def run(self, run_id: str) -> Run:
         """One run."""
-        return _read(Run.of, self._get(f"/api/runs/{quote(run_id, safe='')}"))
+        return read(Run.of, self._get(f"/api/runs/{quote(run_id, safe='')}"))
 
     def runs(self, limit: int | None = None, offset: int = 0) -> Iterator[Run]:
         """Runs, newest first; asked for page by page."""
         left = limit
         while left is None or left > 0:
             count = _PAGE if left is None else min(left, _PAGE)
-            page = self._get(f"/api/runs?limit={count}&offset={offset}")
-            yield from (_read(Run.of, run) for run in page)
+            page = read(list, self._get(f"/api/runs?limit={count}&offset={offset}"))
+            yield from (read(Run.of, run) for run in page)
             if len(page) < count:
                 return
             offset += count
@@ -192,7 +197,7 @@ class RigClient:
         if self._abort_port is None:
             with suppress(ClientError):
                 told, _ = self._server.within(limit_s / 3).ask("GET", "/api/rig")
-                self._abort_port = _read(Rig.of, told).abort_port
+                self._abort_port = read(Rig.of, told).abort_port
         doors = [(self._server, "/api/rig/abort")]
         if self._abort_port:
             doors.insert(0, (self._server.to_port(self._abort_port), "/abort"))
@@ -200,7 +205,7 @@ class RigClient:
 
     def alarms(self) -> tuple[Alarm, ...]:
         """What is wrong, one by one."""
-        return tuple(_read(Alarm.of, alarm) for alarm in self._get("/api/rig/alarms"))
+        return tuple(read(Alarm.of, alarm) for alarm in read(list, self._get("/api/rig/alarms")))
 
     def acknowledge(self, alarm: Alarm) -> None:
         """An operator has seen this one."""
@@ -217,11 +222,3 @@ def _user() -> str:
     except (KeyError, OSError):
         user = "somebody"
     return f"{user}@{socket.gethostname()}".encode("ascii", "replace").decode()[:100]
-
-
-def _read(value_of: Callable[[Mapping[str, Any]], Value], told: Any) -> Value:
-    try:
-        return value_of(told)
-    except (KeyError, TypeError) as error:
-        text = f"the server says something else than this client expects ({error})"
-        raise ClientError(text, "senseless", "use the client of the same version") from error

@@ -1,8 +1,29 @@
 """What a server says of rig, runs, alarms and events, as frozen values. What a newer server adds is left out."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
-from typing import Any, Self
+from types import UnionType
+from typing import Any, Self, TypeVar, get_origin
+
+from tomoshadow.client.errors import ClientError
+
+Value = TypeVar("Value")
+
+
+def read(value_of: Callable[[Any], Value], told: Any) -> Value:
+    """A value of what a server says; ClientError if it says something else."""
+    try:
+        return value_of(told)
+    except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
+        text = f"the server says something else than this client expects ({error})"
+        raise ClientError(text, "senseless", "use the client of the same version") from error
+
+
+def of_kind(name: str, value: Any, kind: Any) -> Any:
+    """The value, or TypeError if it is not of this kind."""
+    if not isinstance(value, kind if isinstance(kind, UnionType) else get_origin(kind) or kind):
+        raise TypeError(f"{name} is {str(value)[:40]!r}")
+    return value
 
 
 @dataclass(frozen=True)
@@ -11,8 +32,9 @@ class _Told:
 
     @classmethod
     def of(cls, told: Mapping[str, Any]) -> Self:
-        """Take what has a place here."""
-        return cls(**{field.name: told[field.name] for field in fields(cls) if field.name in told})
+        """Take what has a place here; TypeError where it is of another kind."""
+        known = {field.name: field.type for field in fields(cls) if field.name in told}
+        return cls(**{name: of_kind(name, told[name], kind) for name, kind in known.items()})
 
 
 @dataclass(frozen=True)
@@ -51,7 +73,7 @@ class Readiness:
         """Readiness of a rig, or of a plan on it."""
         reasons = tuple(map(Reason.of, told["reasons"]))
         state = told.get("state", "")
-        return cls(told.get("ready", state == "ready"), state, told.get("text", ""), reasons)
+        return cls(told.get("ready", state == "ready"), of_kind("state", state, str), told.get("text", ""), reasons)
 
 
 @dataclass(frozen=True)
@@ -88,7 +110,8 @@ class Rig:
         """What ``GET /api/rig`` says, without the lamps."""
         acquisition = Acquisition.of(told["acquisition"])
         views = tuple(told["views"])
-        return cls(told["name"], told["simulated"], views, acquisition, told["beat"], told["abort_port"])
+        beat, port = (of_kind(name, told[name], int) for name in ("beat", "abort_port"))
+        return cls(told["name"], told["simulated"], views, acquisition, beat, port)
 
 
 @dataclass(frozen=True)
