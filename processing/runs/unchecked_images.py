@@ -26,7 +26,16 @@ SCALE = Unchecked(
 """Of a single view, whose lines of sight meet no others."""
 
 
-def unchecked_images(polarity: Polarity, *, sizes_known: bool = False, single: bool = False) -> Iterator[Unchecked]:
+ORDER = Unchecked(
+    "whether A is the earlier exposure: were they exchanged, all droplets would fly the other way, and pair as well",
+    "[spray] nozzle and direction in the run: statistics and report doubt those against which droplets fly",
+)
+"""Of double exposures in a run that does not say where its spray comes from."""
+
+
+def unchecked_images(
+    polarity: Polarity, *, sizes_known: bool = False, single: bool = False, undirected: bool = False
+) -> Iterator[Unchecked]:
     """What nothing tells of the images that droplets were measured in.
 
     Parameters
@@ -37,11 +46,15 @@ def unchecked_images(polarity: Polarity, *, sizes_known: bool = False, single: b
         Diameters were compared with those of dots.
     single : bool
         There is one view.
+    undirected : bool
+        They are double exposures, and nobody said where the liquid comes from.
     """
     if polarity == "bright" or not sizes_known:
         yield PROPORTION[polarity]
     if single:
         yield SCALE
+    if undirected:
+        yield ORDER
 
 
 def told_unchecked(unchecked: Iterator[Unchecked], tell: Callable[[str], None]) -> list[dict[str, str]]:

@@ -200,7 +200,6 @@ def _measure_shots(
     from processing.runs.liquid.objects import liquid_summary
     from processing.runs.measurement import METHOD_VERSION
     from processing.runs.recipe import recipe_sha256
-    from processing.runs.unchecked_images import told_unchecked, unchecked_images
 
     shots: list[ShotDroplets] = []
     with closing((_elsewhere if options.scheduler else _here)(options, settings, run_dir, indices, out)) as coming:
@@ -215,12 +214,23 @@ def _measure_shots(
         "recipe_sha256": recipe_sha256(NAME, METHOD_VERSION, settings),
         "grid": settings.model_dump(mode="json")["grid"],
         "shots": [shot.model_dump(mode="json") for shot in shots],
-        "not_checked": told_unchecked(unchecked_images(settings.polarity, sizes_known=bool(settings.sizes)), progress),
+        "not_checked": _tell_unchecked(run_dir, settings),
         "statistics": droplet_statistics(stored).model_dump(mode="json"),
         "velocity": velocity_statistics(stored).model_dump(mode="json"),
         **liquid_summary(stored).model_dump(mode="json"),
         "passed": any(shot.verdict != "refused" for shot in shots),
     }
+
+
+def _tell_unchecked(run_dir: Path, settings: "MeasureSettings") -> list[dict[str, str]]:
+    from daq.files.run_directory import RunReader
+    from processing.runs.unchecked_images import told_unchecked, unchecked_images
+
+    with RunReader(run_dir) as run:
+        undirected = run.header.frames_per_shot == 2 and run.header.spray is None
+    return told_unchecked(
+        unchecked_images(settings.polarity, sizes_known=bool(settings.sizes), undirected=undirected), progress
+    )
 
 
 def _here(

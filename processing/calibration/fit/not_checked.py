@@ -10,6 +10,12 @@ DROPLETS = Unchecked(
     "a run that was recorded with these views: calibrate --run RUN, or check RUN",
 )
 """Told by droplets alone: the points of each view are labelled by what that view shows."""
+ALIKE = Unchecked(
+    "whether all views are upside down alike, by a setting of the cameras or a program: y, and velocities along it, "
+    "would be reversed, and views, azimuths and droplets agree all the same",
+    "[spray] nozzle and direction in a run: statistics and report doubt those against which droplets fly",
+)
+"""A world in which y points the other way has the same lines of sight."""
 
 
 def not_checked(
@@ -33,7 +39,8 @@ def not_checked(
         )
     if unplaced := [name for name in calibration_set.views if name not in calibration_set.azimuths_deg]:
         yield Unchecked(
-            f"where {', '.join(unplaced)} should stand: files of two cameras may be exchanged, or a camera turned",
+            f"where {', '.join(unplaced)} should stand: files of two cameras may be exchanged, or a camera turned; or "
+            "all of them mirrored alike",
             f"azimuth_deg of {', '.join(unplaced)}",
         )
     levels_mm = {plane.z_mm for view in calibration_set.views.values() for plane in view.planes}
@@ -61,3 +68,4 @@ def not_checked(
         )
     if len(calibration_set.views) > 1:
         yield DROPLETS
+    yield ALIKE

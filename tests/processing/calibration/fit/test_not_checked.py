@@ -20,6 +20,7 @@ def calibrated(
     claimed_mm: Sequence[float],
     azimuths_deg: Mapping[str, float] | None = None,
     model: str = "pinhole",
+    flipped: str = "",
 ) -> Calibration:
     """Of planes that stand somewhere, and are said to stand somewhere else."""
     x_mm, y_mm = np.meshgrid(np.linspace(-8, 8, 9), np.linspace(-6, 6, 7))
@@ -32,6 +33,8 @@ def calibrated(
         for true_mm, said_mm in zip(z_mm, claimed_mm, strict=True):
             true, said = (np.column_stack([x_mm.ravel(), y_mm.ravel(), np.full(63, z)]) for z in (true_mm, said_mm))
             seen_px = camera.project(true) + rng.normal(0, 0.03, (63, 2))
+            for axis in ("xy".index(name) for name in flipped):  # whoever finds corners labels them as he sees them
+                seen_px[:, axis], said[:, axis] = SIZE_PX[axis] - 1 - seen_px[:, axis], -said[:, axis]
             planes.append(PlaneObservation(f"z {said_mm}", said, seen_px, said_mm))
         views[name] = ViewObservations(SIZE_PX, tuple(planes))
     return calibrate(CalibrationSet("set", None, views, azimuths_deg=azimuths_deg or {}), model)
@@ -59,3 +62,19 @@ def test_a_third_plane_or_the_azimuths_tell(
 def test_a_polynomial_says_that_it_fits_any_pitch_and_step(model: str, says: bool) -> None:
     calibration = calibrated((-4, -2, 0, 2, 4), (-4.2, -2.1, 0, 2.1, 4.2), model=model)
     assert any("step or travel of the stage" in one.what for one in calibration.not_checked) == says
+
+
+def test_views_that_are_all_upside_down_agree_and_that_is_said() -> None:
+    """y points up then, in a world in which all else is as it should be: no azimuth and no droplet tells."""
+    for flipped in ("", "y"):
+        calibration = calibrated((-4, -2, 0, 2, 4), (-4, -2, 0, 2, 4), AZIMUTHS_DEG, flipped=flipped)
+        assert {view.verdict for view in calibration.views.values()} == {Verdict.GOOD}
+        (told,) = [one for one in calibration.not_checked if "all views are upside down alike" in one.what]
+        assert "nozzle and direction" in told.state
+
+
+@pytest.mark.parametrize("flipped", ["x", "xy"])
+def test_views_that_are_all_mirrored_or_turned_stand_elsewhere(flipped: str) -> None:
+    calibration = calibrated((-4, -2, 0, 2, 4), (-4, -2, 0, 2, 4), AZIMUTHS_DEG, flipped=flipped)
+    assert any(view.verdict in (Verdict.WARN, Verdict.REFUSE) for view in calibration.views.values())
+    assert any("azimuth" in reason for view in calibration.views.values() for reason in view.reasons)
