@@ -1,10 +1,9 @@
 """Does a calibration still fit the shots of a run? Asked of the droplets in them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import islice
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -12,98 +11,24 @@ from daq.files.run_directory import ImageKey, RunReader
 from daq.files.run_file import RUN_FILE
 from processing.calibration.calibration import Calibration
 from processing.calibration.calibration_record import content_id
-from processing.calibration.droplets.agreement import strangers
-from processing.calibration.droplets.disparity import MIN_VIEWS, REACH_PX, ViewDisparity, measured_box, shot_disparity
-from processing.calibration.droplets.displaced_view import displaced_view
 from processing.calibration.droplets.droplet_images import find_droplets
-from processing.calibration.droplets.self_calibration import CLEARER, NOISE_PX, SelfCalibration, self_calibrate
-from processing.calibration.errors import CalibrationError, OutOfRange
-from processing.calibration.fit.health import LIMITS_PX, judge
+from processing.calibration.droplets.self_calibration import SelfCalibration, self_calibrate
+from processing.calibration.errors import CalibrationError
 from processing.calibration.fit.not_checked import DROPLETS
 from processing.calibration.sets.calibration_set import SET_FILE
 from processing.calibration.verdict import Doubt, Verdict
-from processing.geometry import FloatArray
 from processing.progress import Counted, in_silence
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.runs.errors import PipelineError
 from processing.runs.manifest.importing import CALIBRATION_FOLDER, RUN_FOLDER
 from processing.runs.results_file import FrameName
+from processing.runs.shots.shot_check import Exposure, ShotCheck, check_exposures, require_droplets
 from processing.runs.shots.shot_images import shot_intensities
 from processing.runs.workbench import Workbench
 
 CHECKED_SHOTS = 3
 """Shots of a run that a calibration is checked by; the watch over a run checks more of them."""
-ALARM_PX, STOP_PX = LIMITS_PX[Verdict.USABLE], LIMITS_PX[Verdict.WARN]
-"""Disparity of a view above which an operator should know, and above which volumes are not worth having."""
-
-Exposure = list[FloatArray]
 _FRAMES: tuple[FrameName, ...] = ("a", "b")
-
-
-@dataclass(frozen=True)
-class ShotCheck:
-    """What the droplets of one shot say of a calibration.
-
-    Parameters
-    ----------
-    shot : int
-        Index of the shot.
-    views : dict[str, ViewDisparity]
-        By view; empty where the droplets do not tell.
-    problem : str
-        Why they do not tell.
-    beyond : tuple of str
-        Views one of which, at least, has moved further than can be measured; none, where droplets do not tell that.
-    agreed : bool
-        Some views agree. Where none do, none is known to be wrong: the spots of noisy images are no droplets.
-    """
-
-    shot: int
-    views: dict[str, ViewDisparity]
-    problem: str = ""
-    beyond: tuple[str, ...] = ()
-    agreed: bool = True
-
-    @property
-    def worst_px(self) -> float:
-        """Largest disparity of a view."""
-        return max(view.disparity_px for view in self.views.values())
-
-    @property
-    def moved(self) -> str | None:
-        """The view whose motion alone explains an alarm, clearly better than that of any other would."""
-        if len(self.beyond) == 1:
-            return self.beyond[0]
-        if len(self.views) < 2 or self._certain_px <= ALARM_PX:
-            return None
-        best, second = sorted(self.views, key=lambda name: self.views[name].left_px)[:2]
-        clearly = self.views[second].left_px > CLEARER * max(self.views[best].left_px, NOISE_PX)
-        return best if clearly else None
-
-    @property
-    def verdict(self) -> Verdict | None:
-        """By the limits of a hold-out error: ``warn`` is an alarm, ``refuse`` stops reconstruction.
-
-        A view that has moved further than can be measured is refused too; where no views agree, that is an alarm.
-        """
-        if self.beyond:
-            return Verdict.REFUSE if self.agreed else Verdict.WARN
-        return judge(self._certain_px) if self.views else None
-
-    def record(self) -> dict[str, Any]:
-        """What was found, for a program: JSON values."""
-        return {
-            "shot": self.shot,
-            "verdict": self.verdict,
-            "moved": self.moved,
-            "views": {name: view.disparity_px for name, view in self.views.items()},
-            "uncertainty_px": {name: view.uncertainty_px for name, view in self.views.items()},
-            "problem": self.problem or None,
-        }
-
-    @property
-    def _certain_px(self) -> float:
-        return max(view.certain_px for view in self.views.values())
 
 
 def check_shot(run_dir: Path, shot: int, calibration: Calibration, workbench: Workbench | None = None) -> ShotCheck:
@@ -118,39 +43,6 @@ def check_shot(run_dir: Path, shot: int, calibration: Calibration, workbench: Wo
     """
     (exposures,) = _droplets(run_dir, [shot], calibration, workbench=workbench)
     return check_exposures(shot, exposures, calibration)
-
-
-def check_exposures(shot: int, exposures: Sequence[Exposure], calibration: Calibration) -> ShotCheck:
-    """Measure the disparity of every view by the droplets (N, 2) of each exposure and view; ``shot`` is its index."""
-    mappings = [view.mapping for view in calibration.views.values()]
-    try:
-        _require_droplets(calibration, exposures)
-        measured = shot_disparity(mappings, exposures, measured_box(calibration))
-    except CalibrationError as error:
-        return _unmeasured(shot, exposures, calibration, error)
-    return ShotCheck(shot, dict(zip(calibration.views, measured, strict=True)))
-
-
-def _unmeasured(
-    shot: int, exposures: Sequence[Exposure], calibration: Calibration, error: CalibrationError
-) -> ShotCheck:
-    """A shot without disparities: a view has moved too far for that, or the droplets do not tell."""
-    names = list(calibration.views)
-    mappings, box = [view.mapping for view in calibration.views.values()], measured_box(calibration)
-    displaced = displaced_view(mappings, exposures, box)
-    alone = strangers(mappings, exposures, box) if displaced is None else [displaced]
-    if len(alone) == 1:
-        name = names[alone[0]]
-        problem = f"{name} has moved further than {REACH_PX:g} px, or shows other droplets: the other views agree"
-        return ShotCheck(shot, {}, problem, (name,))
-    if isinstance(error, OutOfRange):
-        problem = f"{error}: a view has moved further than {REACH_PX:g} px, or several have"
-        return ShotCheck(shot, {}, problem, tuple(names[number] for number in alone) or tuple(names))
-    if alone:
-        problem = f"{error}: several views have moved further than {REACH_PX:g} px, or most spots are noise"
-        return ShotCheck(shot, {}, problem, tuple(names[number] for number in alone), agreed=False)
-    told = "too few droplets, or too many, to tell whether a view has moved"
-    return ShotCheck(shot, {}, f"{error}: {told}" if len(names) >= MIN_VIEWS else str(error))
 
 
 def check_ends(
@@ -235,7 +127,7 @@ def self_calibrate_run(
         An exposure is missing.
     """
     exposures = [exposure for of_shot in _droplets(run_dir, shots, calibration, counted) for exposure in of_shot]
-    _require_droplets(calibration, exposures)
+    require_droplets(calibration, exposures)
     return self_calibrate(calibration, exposures, run_dir.name)
 
 
@@ -263,18 +155,6 @@ def _droplets(
                 exposures.append([find_droplets(images[name]) for name in calibration.views])
             found.append(exposures)
     return found
-
-
-def _require_droplets(calibration: Calibration, exposures: Sequence[Exposure]) -> None:
-    """Refuse exposures in none of which some view sees a droplet: the others cannot tell anything of it."""
-    seen = zip(calibration.views, zip(*exposures, strict=True), strict=True)
-    counts = {name: sum(map(len, droplets_px)) for name, droplets_px in seen}
-    if blind := [name for name, count in counts.items() if not count]:
-        by_view = ", ".join(f"{name} {count}" for name, count in counts.items())
-        raise CalibrationError(
-            f"{', '.join(blind)}: no droplet is seen (droplets in {len(exposures)} exposures: {by_view}); "
-            "is a lens covered, or a light off?"
-        )
 
 
 def _check_views(run: RunReader, calibration: Calibration) -> None:

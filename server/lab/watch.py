@@ -13,7 +13,7 @@ from pydantic import Field
 
 from daq.frozen_model import FrozenModel
 from processing.calibration.verdict import Verdict
-from processing.runs.run_check import ALARM_PX, STOP_PX
+from processing.runs.shots.shot_check import ALARM_PX, STOP_PX
 from server.lab.events import EventPublisher
 from server.lab.jobs import ENDED, Job, JobKind, JobState, check_job
 

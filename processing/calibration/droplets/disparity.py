@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from processing.calibration.calibration import Calibration
-from processing.calibration.droplets.droplet_matching import Box, Matches, match_exposures
+from processing.calibration.droplets.droplet_matching import MAX_SEEDS, Box, Matches, match_exposures
 from processing.calibration.errors import CalibrationError, OutOfRange
 from processing.calibration.triangulation import linearise, unseen
 from processing.geometry import FloatArray, ViewMapping
@@ -117,7 +117,7 @@ def local_disparities(
 
 
 def shot_disparity(
-    mappings: Sequence[ViewMapping], exposures: Sequence[Sequence[FloatArray]], box: Box
+    mappings: Sequence[ViewMapping], exposures: Sequence[Sequence[FloatArray]], box: Box, seeds: int = MAX_SEEDS
 ) -> tuple[ViewDisparity, ...]:
     """Disparity of every view in one shot.
 
@@ -129,6 +129,8 @@ def shot_disparity(
         By exposure: the droplets of each view.
     box : Box
         The measured volume.
+    seeds : int
+        The brightest droplets of a view are followed, no more of them.
 
     Raises
     ------
@@ -138,7 +140,7 @@ def shot_disparity(
         A view has moved so far that the search range cuts off its droplets.
     """
     require_views(len(mappings))
-    matches = match_exposures(mappings, exposures, box, SEARCH_PX)
+    matches = match_exposures(mappings, exposures, box, SEARCH_PX, seeds)
     local = local_disparities(mappings, matches, box, SHOT_DIVISIONS) or local_disparities(
         mappings, matches, box, (1, 1, 1)
     )

@@ -66,7 +66,11 @@ class Matches:
 
 
 def match_droplets(
-    mappings: Sequence[ViewMapping], droplets_px: Sequence[FloatArray], box: Box, tolerance_px: float
+    mappings: Sequence[ViewMapping],
+    droplets_px: Sequence[FloatArray],
+    box: Box,
+    tolerance_px: float,
+    seeds: int = MAX_SEEDS,
 ) -> Matches:
     """Match the droplets of one exposure.
 
@@ -80,12 +84,14 @@ def match_droplets(
         The measured volume.
     tolerance_px : float
         Largest disparity; larger than any drift that is to be found.
+    seeds : int
+        The brightest droplets of the first view are followed, no more of them.
     """
     first, second = _widest_pair(mappings, box)
     rest = [view for view in range(len(mappings)) if view not in (first, second)]
     order = [first, second, *rest]
     chosen, points_mm = _pairs(
-        mappings[first], mappings[second], droplets_px[first], droplets_px[second], box, tolerance_px
+        mappings[first], mappings[second], droplets_px[first][:seeds], droplets_px[second], box, tolerance_px
     )
     for view in rest:
         chosen, points_mm = _confirm(mappings[view], droplets_px[view], chosen, points_mm, tolerance_px)
@@ -102,10 +108,14 @@ def match_droplets(
 
 
 def match_exposures(
-    mappings: Sequence[ViewMapping], exposures: Sequence[Sequence[FloatArray]], box: Box, tolerance_px: float
+    mappings: Sequence[ViewMapping],
+    exposures: Sequence[Sequence[FloatArray]],
+    box: Box,
+    tolerance_px: float,
+    seeds: int = MAX_SEEDS,
 ) -> Matches:
     """Match the droplets of several exposures, each by itself; ``exposures`` are the droplets by exposure and view."""
-    found = [match_droplets(mappings, droplets_px, box, tolerance_px) for droplets_px in exposures]
+    found = [match_droplets(mappings, droplets_px, box, tolerance_px, seeds) for droplets_px in exposures]
     points_mm, disparities_px = [one.points_mm for one in found], [one.disparities_px for one in found]
     return Matches(np.concatenate(points_mm), np.concatenate(disparities_px))
 
@@ -127,8 +137,7 @@ def _pairs(
     """Droplets (M, 2) of two views whose lines of sight meet in the box, and where (M, 3)."""
     axis = steepest_axis(first, box.middle_mm)
     places_mm = [box.lower_mm[axis], float(box.middle_mm[axis]), box.upper_mm[axis]]
-    seeds_px = first_px[:MAX_SEEDS]
-    begin_mm, middle_mm, end_mm = (back_project(first, seeds_px, box.middle_mm, axis, place) for place in places_mm)
+    begin_mm, middle_mm, end_mm = (back_project(first, first_px, box.middle_mm, axis, place) for place in places_mm)
     begin_px, middle_px, end_px = (second.project(points_mm) for points_mm in (begin_mm, middle_mm, end_mm))
     chord_px = end_px - begin_px
     length_px = np.maximum(np.linalg.norm(chord_px, axis=1, keepdims=True), 1e-9)

@@ -9,7 +9,7 @@ from server.cli.options import Verbs, add_calibrated_run, add_shots, add_verb
 from server.cli.output import Outcome, progress, table, tracked
 
 if TYPE_CHECKING:
-    from processing.runs.run_check import ShotCheck
+    from processing.runs.shots.shot_check import ShotCheck
 
 _MEANING = {"warn": "ALARM", "refuse": "STOP: do not reconstruct with this calibration"}
 
@@ -26,7 +26,8 @@ def check(options: Namespace) -> Outcome:
     """Check shot by shot; it has not passed where a shot would stop reconstruction."""
     from processing.calibration.calibration_file import load_calibration
     from processing.calibration.verdict import Verdict
-    from processing.runs.run_check import ALARM_PX, STOP_PX, check_shot
+    from processing.runs.run_check import check_shot
+    from processing.runs.shots.shot_check import ALARM_PX, STOP_PX
 
     calibration = load_calibration(options.calibration)
     shots = []

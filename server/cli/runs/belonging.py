@@ -11,7 +11,7 @@ from server.cli.output import progress
 
 if TYPE_CHECKING:
     from processing.calibration.calibration import Calibration
-    from processing.runs.run_check import ShotCheck
+    from processing.runs.shots.shot_check import ShotCheck
     from processing.runs.workbench import Workbench
 
 

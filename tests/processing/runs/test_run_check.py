@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from processing.calibration.droplets.disparity import ViewDisparity
+from processing.calibration.droplets.disparity import ViewDisparity, measured_box, shot_disparity
 from processing.calibration.verdict import Verdict
 from processing.geometry import FloatArray, PinholeCamera
-from processing.runs.run_check import ShotCheck, check_exposures
+from processing.runs.shots.shot_check import ALARM_PX, FEW_SEEDS, ShotCheck, check_exposures
 from processing.studies.drifting_views import direction
 from tests.support.drifting_views import calibration_of, droplet_shots, inside_mm, views
 
@@ -41,6 +41,18 @@ def test_the_view_that_moved_is_named_and_its_disparity_is_its_drift(view: int, 
     assert check.moved == f"view{view + 1}"
     assert check.views[check.moved].disparity_px == pytest.approx(np.hypot(*drift_px), abs=0.06)
     assert check.views[check.moved].left_px < 0.03
+
+
+@pytest.mark.parametrize(("drift_px", "enough"), [(0.0, True), (0.5, False)])
+def test_few_droplets_are_enough_where_they_agree_beyond_doubt(drift_px: float, enough: bool) -> None:
+    exposures = [[seen.copy() for seen in one] for one in droplet_shots(2, 14.0)]
+    for seen in exposures:
+        seen[0] += drift_px * direction(0)
+    assert all(len(seen) > FEW_SEEDS for one in exposures for seen in one)
+    by_all = shot_disparity(MAPPINGS, exposures, measured_box(CALIBRATION))
+    told = check_exposures(0, exposures, CALIBRATION)
+    assert (tuple(told.views.values()) != by_all) == enough
+    assert (told.worst_px < ALARM_PX) == (max(view.disparity_px for view in by_all) < ALARM_PX) == enough
 
 
 def test_two_that_moved_are_not_blamed_on_one() -> None:

@@ -6,7 +6,7 @@ import pytest
 
 from processing.calibration.fit.health import judge
 from processing.calibration.verdict import Verdict
-from processing.runs.run_check import ALARM_PX
+from processing.runs.shots.shot_check import ALARM_PX
 from server.lab.events import EventPublisher
 from server.lab.jobs import Job, JobState, check_job, reconstruction_job
 from server.lab.watch import CalibrationWatch

@@ -6,7 +6,7 @@ from processing.calibration.droplets.agreement import strangers
 from processing.calibration.droplets.disparity import measured_box
 from processing.calibration.verdict import Verdict
 from processing.geometry import FloatArray
-from processing.runs.run_check import check_exposures
+from processing.runs.shots.shot_check import check_exposures
 from tests.support.drifting_views import calibration_of, inside_mm, views
 
 CALIBRATION = calibration_of(views())

@@ -11,7 +11,8 @@ from processing.calibration.calibration_file import load_calibration, save_calib
 from processing.calibration.droplets.disparity import ViewDisparity
 from processing.calibration.fit.not_checked import DROPLETS
 from processing.calibration.verdict import Verdict
-from processing.runs.run_check import ShotCheck, checked_by_run
+from processing.runs.run_check import checked_by_run
+from processing.runs.shots.shot_check import ShotCheck
 from server.cli.calibrations.check import check_line, views_table
 from tests.support.command_line import told
 from tests.support.drifting_run import DRIFT_PX, write_droplet_run
