@@ -29,6 +29,9 @@ _REST_S = 1.0
 _STORE_S = 600.0
 
 
+_SLOW = {JobKind.CHECK, JobKind.MEASUREMENT}
+
+
 class JobRunner:
     """Runs queued jobs, as many at a time as the engine has workers.
 
@@ -177,12 +180,15 @@ class JobRunner:
     def _waiting(self, running: frozenset[str]) -> list[Job]:
         """Who may be next: checks and all else take turns, so that neither keeps the other waiting.
 
-        The first check of a run comes after the first volumes.
+        The first check of a run comes after the first volumes. Volumes take seconds, droplets of a spray minutes:
+        they come after all volumes that wait.
         """
         self._table.requeue_interrupted(running)
         checks = self._table.oldest(JobState.QUEUED, self._engine.workers, [JobKind.CHECK])
-        others = self._table.oldest(JobState.QUEUED, self._engine.workers, set(JobKind) - {JobKind.CHECK})
-        others_first = self._checked_last or any(self._watch.goes_ahead(job) for job in others)
+        quick = self._table.oldest(JobState.QUEUED, self._engine.workers, set(JobKind) - _SLOW)
+        droplets = self._table.oldest(JobState.QUEUED, self._engine.workers, [JobKind.MEASUREMENT])
+        others = [*quick, *droplets]
+        others_first = self._checked_last or any(self._watch.goes_ahead(job) for job in quick)
         return [*others, *checks] if others_first else [*checks, *others]
 
     def _may_start(self, job: Job) -> bool:

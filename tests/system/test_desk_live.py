@@ -273,7 +273,7 @@ def test_a_card_per_device_says_who_how_and_what_to_do(page: Page, server: Servi
     expect(page.get_by_role("region", name="interlock")).to_contain_text("closed")
     expect(page.get_by_role("region", name="work in the background")).to_contain_text("all of it goes on")
     expect(page.get_by_role("status", name="link budget")).to_contain_text(
-        "At most 47.6 pass: the limit is every camera"
+        "At most 47.6 pass: the limit is the cameras"
     )
     camera.evaluate("card => card.dataset.mark = 'the same'")
     laboratory(server).cameras["view1"].is_lost = True

@@ -197,7 +197,7 @@ def test_what_is_made_of_every_shot_is_what_the_page_shows(tab: Page, server: Se
     server.free_control()
     tab.get_by_role("button", name="Sample").click()
     tab.get_by_label("Shots", exact=True).fill("1")
-    tab.get_by_label("Volumes of every shot").click()
+    tab.get_by_label("Volumes", exact=True).click()
     tab.get_by_role("option", name="by MINLOS").click()
     expect(row(tab, "Recipe")).to_contain_text("volumes by MINLOS, accuracy nominal (recipe ")
     tab.get_by_role("button", name="Start run").click()
@@ -209,7 +209,7 @@ def test_what_is_made_of_every_shot_is_what_the_page_shows(tab: Page, server: Se
     tab.get_by_role("checkbox", name="Droplets too").click()
     expect(row(tab, "Recipe")).to_contain_text("droplets are measured against a background run")
     tab.get_by_role("checkbox", name="Droplets too").click()
-    tab.get_by_label("Volumes of every shot").click()
+    tab.get_by_label("Volumes", exact=True).click()
     tab.get_by_role("option", name="none").click()
     expect(row(tab, "Recipe")).to_contain_text("nothing is made by itself")
 

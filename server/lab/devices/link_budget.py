@@ -42,7 +42,7 @@ class LinkBudget(FrozenModel):
             return "the wire that all cameras share"
         slowest = [view for view, time_s in times.items() if time_s == longest_s]
         what = "wire" if self.cameras[slowest[0]].wire_s == longest_s else "camera"
-        return f"every {what}" if len(slowest) == len(times) > 1 else f"the {what} of {' and '.join(slowest)}"
+        return f"the {what}s" if len(slowest) == len(times) > 1 else f"the {what} of {' and '.join(slowest)}"
 
 
 def link_budget(network: Network, cameras: Mapping[str, Camera]) -> LinkBudget:

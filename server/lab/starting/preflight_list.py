@@ -188,7 +188,9 @@ def _calibration(context: Context, plan: RunPlan) -> Told | None:
 def _recipe(_context: Context, plan: RunPlan) -> Told | None:
     if plan.kind is not RunKind.SAMPLE:
         return None
-    return told_recipes(plan.recipes if plan.calibration and plan.recipes else ()), ""
+    if plan.recipes and not plan.calibration:
+        return "nothing is made without a calibration", ""
+    return told_recipes(plan.recipes or ()), ""
 
 
 def _always(text: str) -> Callable[[Context, RunPlan], Told]:

@@ -13,7 +13,7 @@ from server.lab.engine.inline_engine import InlineEngine
 from server.lab.engine.task import OnProgress, Task, Unavailable, Values
 from server.lab.errors import Conflict
 from server.lab.events import EventPublisher
-from server.lab.jobs import Job, JobKind, JobState, JobTable, check_job, reconstruction_job
+from server.lab.jobs import Job, JobKind, JobState, JobTable, check_job, reconstruction_job, shot_job
 from server.lab.runner import JobRunner
 from server.lab.watch import CalibrationWatch
 
@@ -73,7 +73,7 @@ async def at_work(
     async with engine_of() as engine:
         store = CalibrationStore(tmp_path / "calibrations")
         watch = CalibrationWatch(events)
-        tasks = dict.fromkeys((JobKind.RECONSTRUCTION, JobKind.CHECK), task)
+        tasks = dict.fromkeys((JobKind.RECONSTRUCTION, JobKind.MEASUREMENT, JobKind.CHECK), task)
         runner = JobRunner(engine, table, tasks, events, tmp_path, store, watch)
         work = asyncio.create_task(runner.run(Duty("processing", events)))
         yield Laboratory(runner, table, events)
@@ -130,6 +130,30 @@ def test_the_first_volumes_come_before_the_first_check_and_all_others_after_it(t
 
     asyncio.run(go())
     assert order == [("reconstruction", 0), ("check", 0), ("reconstruction", 1)]
+
+
+def test_droplets_wait_for_volumes_and_take_turns_with_checks(tmp_path: Path) -> None:
+    order: list[tuple[str, int]] = []
+
+    def note(job: dict[str, Any], should_stop: Callable[[], bool]) -> dict[str, Any]:
+        order.append((Path(job["results_dir"]).name.partition("-")[0] if job["results_dir"] else "check", job["shot"]))
+        return {"shot": job["shot"], "views": {}}
+
+    async def go() -> None:
+        async with at_work(tmp_path, note) as laboratory:
+            asked = [job for shot in range(2) for job in (droplets_of(shot), job_of(shot))]
+            jobs = [laboratory.runner.submit(job) for job in asked]
+            checks = [laboratory.runner.submit(check_job("run", shot, "cal")) for shot in range(4)]
+            for job in (*jobs, *checks):
+                await laboratory.reach(job, JobState.DONE)
+
+    asyncio.run(go())
+    work = [("mlos", 0), ("mlos", 1), ("droplets", 0), ("droplets", 1)]
+    assert order == [one for shot in range(4) for one in (("check", shot), work[shot])]
+
+
+def droplets_of(shot: int) -> Job:
+    return shot_job(JobKind.MEASUREMENT, "run", shot, "cal", "droplets-0", {})
 
 
 def test_a_job_that_fails_says_why_and_stops_no_other(tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ import pytest
 from daq.causes import Cause, CauseCode
 from daq.run.events import RunStatus
 from daq.run.state import RunState
+from daq.run_plan import LivePlan
 from server.lab.duty import Health, Lamp
 from server.web.ui.run.run_panel import acknowledge_text, counts_text, message_text, waits_for_acknowledgement
 
@@ -45,4 +46,6 @@ def test_invalid_shots_are_never_left_out() -> None:
 def test_counts_are_told_once() -> None:
     status = RunStatus(run_id="run", shots_planned=4, shots_recorded=4, shots_valid=4)
     assert message_text(replace(status, message=status.summary)) == ""
+    ended = replace(status, live=LivePlan(), message="ended by the operator")
+    assert message_text(ended) == "live view: ended by the operator", "the run was not"
     assert message_text(replace(status, message="shot 3 is fired again")) == "shot 3 is fired again"

@@ -40,7 +40,7 @@ class ControlChip:
 
     def _add_menu(self) -> None:
         with (
-            ui.menu().props('role=region aria-label="control of the rig"'),
+            ui.menu().props('role=region aria-label="control of the rig"') as self._menu,
             ui.column().classes("q-pa-md gap-2").style("width:min(340px, 90vw)"),
         ):
             self._about = ui.label("").classes("text-sm").props("role=status")
@@ -63,6 +63,8 @@ class ControlChip:
             self._control.take(visitor())
         except ServerError as error:
             ui.notify(told(error), type="negative")
+        else:
+            self._menu.close()  # it may lie over what was to be pressed
 
     def _on_give(self) -> None:
         self._control.release(visitor())

@@ -28,18 +28,18 @@ class ChosenWork:
         with ui.row().classes("w-full items-center no-wrap gap-2") as self._box:
             self._volumes = ui.select(
                 _VOLUMES,
-                label="Volumes of every shot",
+                label="Volumes",
                 value=draft.values["volumes"],
                 on_change=lambda event: self._keep("volumes", event.value),
             )
-            self._volumes.props("dense outlined options-dense").classes("grow")
+            self._volumes.props("dense outlined options-dense").classes("grow").tooltip("Made of every shot by itself")
             self._droplets = ui.checkbox(
                 "Droplets too",
                 value=draft.values["droplets"],
                 on_change=lambda event: self._keep("droplets", event.value),
             )
             self._droplets.props('aria-label="Droplets too"')
-            self._droplets.tooltip("Measured against the background run, as soon as a shot is recorded")
+            self._droplets.tooltip("Measured in every shot by itself, against the background run")
 
     def show_kind(self, kind: RunKind) -> None:
         """Nothing is made of any other run than one of the spray."""

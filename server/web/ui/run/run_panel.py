@@ -111,7 +111,9 @@ def counts_text(status: RunStatus, eta_s: float | None = None) -> str:
 
 
 def message_text(status: RunStatus) -> str:
-    """What happened last; nothing where that is what the counts say."""
+    """What happened last; nothing where that is what the counts say. Of a live view, this says so."""
+    if status.live is not None:
+        return f"live view: {status.message}"
     return "" if status.message == status.summary else status.message
 
 

@@ -36,7 +36,7 @@ def test_the_rate_is_the_one_up_to_which_a_run_is_permitted(shared_gbit_s: float
     [
         (Network(), 1.0, "the wire of view2"),
         (Network(shared_gbit_s=1.0), 1.0, "the wire that all cameras share"),
-        (Network(camera_gbit_s=10), 200.0, "every camera"),
+        (Network(camera_gbit_s=10), 200.0, "the cameras"),
     ],
 )
 def test_it_says_what_permits_no_more(network: Network, timing_ms: float, words: str) -> None:

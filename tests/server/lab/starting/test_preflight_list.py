@@ -70,6 +70,13 @@ def test_what_only_has_to_be_waited_for_is_no_refusal_to_mend(server: Serving) -
     assert looked_at(server)["Rig"].finding is CheckResult.GOOD
 
 
+def test_without_a_calibration_nothing_is_made(server: Serving) -> None:
+    assert looked_at(server)["Recipe"].text == "nothing is made without a calibration"
+    use_a_calibration(server)
+    assert looked_at(server)["Recipe"].text.startswith("volumes by MLOS, accuracy nominal (recipe ")
+    assert looked_at(server, recipes=[])["Recipe"].text == "nothing is made by itself"
+
+
 def test_a_small_share_of_the_wires_is_none_of_nothing(server: Serving) -> None:
     assert looked_at(server, rate_hz=0.01)["Network"].text.startswith("less than 1 % of the wires")
 
