@@ -142,8 +142,7 @@ def write_run(
         for index, origin in enumerate(shots):
             shot = Shot(index, origin.image_key, {camera: _frames(reader, origin, camera) for camera in header.views})
             writer.write_shot(shot)
-            if shot.image_key == ImageKey.SAMPLE:
-                copies.look_at(shot)
+            copies.look_at(shot)
             if shot.image_key in references:
                 references[shot.image_key].add(shot)
             done(index + 1, len(shots))
@@ -181,11 +180,17 @@ class _Mean:
         return {camera: total / np.float32(self._count) for camera, total in self._totals.items()}
 
 
+_KINDS = {ImageKey.DARK: "dark", ImageKey.BACKGROUND: "background"}
+
+
 class _Copies:
-    """Exposures that have the very pixels of another one: noise never repeats."""
+    """Exposures that have the very pixels of another one: noise never repeats.
+
+    Among dark images, and among backgrounds, one file may stand for several.
+    """
 
     def __init__(self) -> None:
-        self._first: dict[bytes, str] = {}
+        self._first: dict[bytes, tuple[ImageKey, str]] = {}
         self._copies: list[str] = []
 
     def look_at(self, shot: Shot) -> None:
@@ -193,11 +198,12 @@ class _Copies:
         for camera, exposures in shot.views.items():
             for letter, frame in (("A", exposures.frame_a), ("B", exposures.frame_b)):
                 if frame is not None and frame.min() < frame.max():
-                    self._compare(f"{camera}, shot {shot.index}, exposure {letter}", frame)
+                    name = f"{camera}, {_KINDS.get(shot.image_key, 'shot')} {shot.index}, exposure {letter}"
+                    self._compare(shot.image_key, name, frame)
 
-    def _compare(self, name: str, frame: NDArray[Any]) -> None:
-        first = self._first.setdefault(hashlib.sha256(frame.tobytes()).digest(), name)
-        if first != name:
+    def _compare(self, kind: ImageKey, name: str, frame: NDArray[Any]) -> None:
+        of_kind, first = self._first.setdefault(hashlib.sha256(frame.tobytes()).digest(), (kind, name))
+        if first != name and (kind != of_kind or kind == ImageKey.SAMPLE):
             self._copies.append(f"{name} has the very pixels of {first}")
 
     def notes(self) -> tuple[str, ...]:

@@ -82,6 +82,17 @@ def test_copied_exposures_are_told_and_flat_ones_and_references_are_not(folder: 
     assert note.startswith("left, shot 1, exposure A has the very pixels of left, shot 0, exposure A: ")
 
 
+@pytest.mark.parametrize(("of", "said"), [(10, "background"), (1, "shot")])
+def test_one_image_for_two_kinds_of_images_is_told(folder: Path, of: int, said: str) -> None:
+    for camera in SIZES:
+        cv2.imwrite(str(folder / f"{camera}_5.png"), image(camera, of))
+    (folder / "manifest.toml").write_text(RUN + REFERENCES)
+    (note,) = import_manifest(folder / "manifest.toml", folder / "out")["notes"]
+    assert re.match(
+        rf"left, dark \d+, exposure A has the very pixels of left, {said} \d+, exposure A \(and 1 more", note
+    )
+
+
 def test_shots_come_back_as_they_were(folder: Path) -> None:
     with RunReader(run_import(folder, RUN) / "run") as run:
         assert (run.header.polarity, run.header.separation_ns, run.header.frames_per_shot) == ("shadow", 6400, 2)
