@@ -16,6 +16,8 @@ MOST = 400
 """Of one port: a process may as a rule have 1024 files open."""
 REQUEST_S = 10.0
 """In which the first request of a connection must have come."""
+STALLED_S = 60.0
+"""In which whoever downloads must have read a little."""
 _SHUTDOWN_S = 3
 
 Connection = HttpToolsProtocol | H11Protocol
@@ -47,6 +49,16 @@ class _Bounded(HttpToolsProtocol):
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]  # as uvicorn has it
         super().connection_made(transport)
         welcome(self, REQUEST_S)
+
+    def pause_writing(self) -> None:
+        """Whoever asks for much and reads nothing keeps a file and a connection: not for ever."""
+        super().pause_writing()
+        self._stalled = self.loop.call_later(STALLED_S, self.transport.abort)
+
+    def resume_writing(self) -> None:
+        """Some 64 kB have been read."""
+        super().resume_writing()
+        self._stalled.cancel()
 
 
 def welcome(connection: Any, request_s: float) -> None:

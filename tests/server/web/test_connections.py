@@ -1,16 +1,20 @@
 """Who asks for nothing, or slowly, or says that he is somebody else, holds nobody up."""
 
+import asyncio
 import socket
+import threading
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import httpx
 import pytest
+from starlette.types import Receive, Scope, Send
 from websockets.sync.client import connect
 
 from server.web import abort_listener, body_limit, connections
 from server.web.tries import MOST
-from tests.support.serving import Serving, serving
+from tests.support.serving import Serving, listening, serving
 
 LIMIT_S = 60.0
 
@@ -77,3 +81,26 @@ def test_nobody_who_says_that_he_comes_from_elsewhere_may_try_more_tokens(tmp_pa
         assert (
             server.http.post("/sign-in", data={"token": "wrong"}, headers={"X-Forwarded-For": "::1"}).status_code == 429
         )
+
+
+def test_who_asks_for_much_and_reads_nothing_is_let_go(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(connections, "STALLED_S", 0.3)
+    ended = threading.Event()
+
+    async def endless(scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] == "http":
+            sending = asyncio.create_task(keep_sending(send))
+            while (await receive())["type"] != "http.disconnect":
+                pass
+            sending.cancel()
+            ended.set()
+
+    async def keep_sending(send: Send) -> None:
+        await send({"type": "http.response.start", "status": 200, "headers": []})
+        while True:
+            await send({"type": "http.response.body", "body": bytes(65536), "more_body": True})
+
+    app: Any = endless
+    with listening(app) as port, socket.create_connection(("127.0.0.1", port)) as reader:
+        reader.sendall(b"GET / HTTP/1.1\r\nHost: here\r\n\r\n")
+        assert ended.wait(20)
