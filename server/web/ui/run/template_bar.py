@@ -75,13 +75,15 @@ class TemplateBar:
 
     async def _on_remove(self) -> None:
         name = self._chosen.value
-        try:
-            require_operator()
-        except ServerError as error:
-            ui.notify(told(error), type="negative")
-            return
         if not name:
             ui.notify("Choose a template first", type="warning")
-        elif await is_sure(f"Remove the template {name}?", "Remove"):
+            return
+        try:
+            require_operator()
+            if not await is_sure(f"Remove the template {name}?", "Remove"):
+                return
             self._templates.remove(name)
+        except (ServerError, OSError) as error:  # a disk that is only read, say
+            ui.notify(told(error), type="negative")
+        else:
             self.reload()
