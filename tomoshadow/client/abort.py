@@ -48,7 +48,7 @@ def switch_off(doors: list[_Door], limit_s: float = LIMIT_S) -> str:
 def _knock(connection: Connection, path: str, heard: "Queue[str | ClientError]") -> None:
     try:
         told, _ = connection.ask("POST", path)
-        heard.put(read(_ended, told))
+        heard.put(read(_ended, told, connection.url))
     except ClientError as error:
         heard.put(error)
 

@@ -6,14 +6,14 @@ from collections.abc import Iterable, Iterator
 from tomoshadow.client.values import Event, read
 
 
-def events_of(lines: Iterable[str]) -> Iterator[Event | None]:
-    """Events of a stream; None for a block without data, by which the server says that it listens, or lives."""
+def events_of(lines: Iterable[str], url: str) -> Iterator[Event | None]:
+    """Events that the server at ``url`` streams; None for a block without data: it listens, or lives."""
     data = list[str]()
     for line in lines:
         if line.startswith("data:"):
             data.append(line.removeprefix("data:").removeprefix(" "))
         elif not line:
-            yield read(_event, "\n".join(data)) if data else None
+            yield read(_event, "\n".join(data), url) if data else None
             data.clear()
 
 

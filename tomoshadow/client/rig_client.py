@@ -5,7 +5,7 @@ import os
 import socket
 import time
 import uuid
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from typing import Any
 from urllib.parse import quote
@@ -14,7 +14,7 @@ from tomoshadow.client.abort import LIMIT_S, switch_off
 from tomoshadow.client.connection import Connection
 from tomoshadow.client.errors import ClientError
 from tomoshadow.client.event_stream import events_of
-from tomoshadow.client.values import Alarm, Event, Readiness, Rig, Run, read
+from tomoshadow.client.values import Alarm, Event, Readiness, Rig, Run, Value, read
 
 DEFAULT_URL = "http://127.0.0.1:8080"
 TOKEN_VARIABLE = "TOMOSHADOW_TOKEN"  # noqa: S105  where it is, not what it is
@@ -55,7 +55,7 @@ class RigClient:
 
     def rig(self) -> Rig:
         """The rig at a glance."""
-        rig = read(Rig.of, self._get("/api/rig"))
+        rig = self._read(Rig.of, self._get("/api/rig"))
         self._abort_port = rig.abort_port
         return rig
 
@@ -63,7 +63,7 @@ class RigClient:
         """Whether a start would be refused, and why; of a plan, or of whatever the rig might do."""
         path = "/api/rig/readiness"
         told = self._get(path) if plan is None else self._server.ask("POST", path, plan)[0]
-        return read(Readiness.of, told)
+        return self._read(Readiness.of, told)
 
     def start(self, plan: Mapping[str, Any], wait_s: float = 30.0) -> str:
         """Start a run; its id. An answer that is lost is asked for again, and the run starts once.
@@ -100,15 +100,15 @@ class RigClient:
 
     def run(self, run_id: str) -> Run:
         """One run."""
-        return read(Run.of, self._get(f"/api/runs/{quote(run_id, safe='')}"))
+        return self._read(Run.of, self._get(f"/api/runs/{quote(run_id, safe='')}"))
 
     def runs(self, limit: int | None = None, offset: int = 0) -> Iterator[Run]:
         """Runs, newest first; asked for page by page."""
         left = limit
         while left is None or left > 0:
             count = _PAGE if left is None else min(left, _PAGE)
-            page = read(list, self._get(f"/api/runs?limit={count}&offset={offset}"))
-            yield from (read(Run.of, run) for run in page)
+            page = self._read(list, self._get(f"/api/runs?limit={count}&offset={offset}"))
+            yield from (self._read(Run.of, run) for run in page)
             if len(page) < count:
                 return
             offset += count
@@ -117,7 +117,7 @@ class RigClient:
     def events(self, after: int | None = None, silence_s: float = SILENCE_S) -> Iterator[Event | None]:
         """Events as they happen, or after one that was seen; None where the server says only that it lives."""
         headers = {"Accept": "text/event-stream"} | ({} if after is None else {"Last-Event-ID": str(after)})
-        return events_of(self._server.lines("/api/events", headers, silence_s))
+        return events_of(self._server.lines("/api/events", headers, silence_s), self.url)
 
     def follow(self, run_id: str, wait_s: float, absent_s: float = 15.0) -> Iterator[Event]:
         """Events of a run until it has ended, also over a connection that breaks.
@@ -197,7 +197,7 @@ class RigClient:
         if self._abort_port is None:
             with suppress(ClientError):
                 told, _ = self._server.within(limit_s / 3).ask("GET", "/api/rig")
-                self._abort_port = read(Rig.of, told).abort_port
+                self._abort_port = self._read(Rig.of, told).abort_port
         doors = [(self._server, "/api/rig/abort")]
         if self._abort_port:
             doors.insert(0, (self._server.to_port(self._abort_port), "/abort"))
@@ -205,7 +205,7 @@ class RigClient:
 
     def alarms(self) -> tuple[Alarm, ...]:
         """What is wrong, one by one."""
-        return tuple(read(Alarm.of, alarm) for alarm in read(list, self._get("/api/rig/alarms")))
+        return tuple(self._read(Alarm.of, alarm) for alarm in self._read(list, self._get("/api/rig/alarms")))
 
     def acknowledge(self, alarm: Alarm) -> None:
         """An operator has seen this one."""
@@ -213,6 +213,9 @@ class RigClient:
 
     def _get(self, path: str) -> Any:
         return self._server.ask("GET", path)[0]
+
+    def _read(self, value_of: Callable[[Any], Value], told: Any) -> Value:
+        return read(value_of, told, self.url)
 
 
 def _user() -> str:

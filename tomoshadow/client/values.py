@@ -10,12 +10,12 @@ from tomoshadow.client.errors import ClientError
 Value = TypeVar("Value")
 
 
-def read(value_of: Callable[[Any], Value], told: Any) -> Value:
-    """A value of what a server says; ClientError if it says something else."""
+def read(value_of: Callable[[Any], Value], told: Any, url: str) -> Value:
+    """A value of what the server at ``url`` says; ClientError if it says something else."""
     try:
         return value_of(told)
     except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
-        text = f"the server says something else than this client expects ({error})"
+        text = f"{url} says something else than this client expects ({error})"
         raise ClientError(text, "senseless", "use the client of the same version") from error
 
 

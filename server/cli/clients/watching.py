@@ -1,11 +1,13 @@
 """What is shown of a run under way until it ends, or until nobody wants to see more."""
 
 from argparse import Namespace
+from collections.abc import Mapping
 from dataclasses import asdict
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from server.cli.clients.server_option import named
 from server.cli.output import Bar, Outcome, progress
+from tomoshadow.client.values import read
 
 if TYPE_CHECKING:
     from tomoshadow.client import Event, RigClient, Run
@@ -21,7 +23,7 @@ def watched(client: "RigClient", run_id: str, options: Namespace) -> Outcome:
         planned = client.run(run_id).shots_planned or 0
         with Bar() as bar:
             for event in client.follow(run_id, LONGEST_S):
-                _show(bar, event, planned)
+                _show(bar, event, planned, client.url)
         return _told(client.run(run_id))
     except KeyboardInterrupt:
         server = named(options)
@@ -32,12 +34,17 @@ def watched(client: "RigClient", run_id: str, options: Namespace) -> Outcome:
         return Outcome({"passed": False, "run_id": run_id, "outcome": "active"}, text)
 
 
-def _show(bar: Bar, event: "Event", planned: int) -> None:
+def _show(bar: Bar, event: "Event", planned: int, url: str) -> None:
     if event.name == "shot_recorded":
-        number = event.data["index"] + 1
-        bar.step(number, planned, f"shot {number} of {planned}{'' if event.data['valid'] else ': INVALID'}")
+        number, valid = read(_shot, event.data, url)
+        bar.step(number, planned, f"shot {number} of {planned}{'' if valid else ': INVALID'}")
     elif text := event.data.get("message") or event.data.get("text"):
         progress(text)
+
+
+def _shot(told: Mapping[str, Any]) -> tuple[int, bool]:
+    """Number of a shot, from 1, and whether it is valid."""
+    return told["index"] + 1, told["valid"]
 
 
 def _told(run: "Run") -> Outcome:

@@ -7,7 +7,7 @@ import json
 import re
 import socket
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -143,7 +143,7 @@ def test_it_is_one_sentence_and_an_exit_code(
         assert "confirmed" not in said.out
         assert said.err.startswith("tomoshadow: ")
         assert len(said.err.splitlines()) == 1
-        assert re.search(f"{url}|hardware stop|the server says something else than this client expects", said.err)
+        assert re.search(f"{url}|hardware stop", said.err)
         assert "Traceback" not in said.err
 
 
@@ -155,8 +155,24 @@ def test_only_a_server_that_says_so_has_switched_the_light_off(body: bytes) -> N
 
 @pytest.mark.parametrize("line", ["data: {", "data: 7", "data: []", 'data: {"id": 1}', 'data: {"id": "a", "name": 3}'])
 def test_an_event_that_is_none_is_told(line: str) -> None:
-    with pytest.raises(ClientError, match="says something else than this client expects"):
-        list(events_of([line, ""]))
+    with pytest.raises(ClientError, match="http://rig:8080 says something else than this client expects"):
+        list(events_of([line, ""], "http://rig:8080"))
+
+
+@pytest.mark.parametrize("shot", [{}, {"index": "1", "valid": True}, {"index": 0}])
+@pytest.mark.usefixtures("impatient")
+def test_a_shot_that_is_none_is_told(capsys: pytest.CaptureFixture[str], shot: Mapping[str, object]) -> None:
+    event = {"id": 1, "name": "shot_recorded", "time_utc": "", "data": {"run_id": "r1", **shot}}
+    counts = {"shots_planned": 2, "shots_recorded": 1, "shots_valid": None}
+    run = {"run_id": "r1", "name": "", "kind": "sample", "created_utc": "", "outcome": "active", "cause": "", **counts}
+
+    def answer(one: socket.socket, request: bytes) -> None:
+        events = whole("200 OK", "text/event-stream", b"data: " + json.dumps(event).encode() + b"\n\n")
+        one.sendall(events if b"/api/events" in request else whole("200 OK", JSON, json.dumps(run).encode()))
+
+    with listening(answer) as url:
+        assert main(["watch", "r1", "--server", url]) == 1
+        assert f"{url} says something else than this client expects" in capsys.readouterr().err
 
 
 def test_a_line_without_an_end_is_not_kept() -> None:
