@@ -21,6 +21,7 @@ from server.demo.demo import Demonstration
 from server.demo.demo_droplets import COUNTED_UM, MeasuredDroplets
 from server.demo.demo_summary import reasons_of
 from server.reports.liquid_sections import ReportedLiquid, break_up_section, unknown_section
+from server.reports.object_motion_section import object_motion_section
 from server.reports.page import Picture, Section, Table, write_report
 from server.reports.spray_report import ReportedSpray, spray_sections
 
@@ -119,7 +120,7 @@ def _spray_sections(demo: Demonstration) -> list[Section]:
     return [
         *spray_sections(ReportedSpray.of(spray, AskedFor(spray.axis))),
         break_up_section(told),
-        *([unknown] if unknown else []),
+        *(one for one in (object_motion_section(spray.shots), unknown) if one),
     ]
 
 

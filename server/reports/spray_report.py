@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.analysis.spray.density_map import density_map
 from processing.analysis.spray.spray_axis import SprayAxis
 from processing.analysis.spray.spray_sample import SpraySample, spray_sample
@@ -24,6 +25,7 @@ from processing.figures.sprays.motion_figure import motion_figure
 from processing.figures.sprays.space_figures import density_figure, patternation_figure
 from processing.runs.sprays.measured_spray import MeasuredSpray
 from server.reports.liquid_sections import ReportedLiquid, break_up_section, unknown_section
+from server.reports.object_motion_section import object_motion_section
 from server.reports.page import Picture, Section, Table, write_report
 from server.reports.spray_tables import classes_table, doubts, figures_table, fits_table, patternation_table
 
@@ -244,8 +246,8 @@ def _break_up(reported: ReportedSpray) -> Section | None:
     return break_up_section(liquid) if liquid else None
 
 
-def _unknown(reported: ReportedSpray) -> Section | None:
-    return unknown_section(reported.spray.shots)
+def _of_shots(section: Callable[[Sequence[StoredDroplets]], Section | None]) -> Chapter:
+    return lambda reported: section(reported.spray.shots)
 
 
 def _shots(reported: ReportedSpray) -> Section:
@@ -285,4 +287,5 @@ def _definitions(_: ReportedSpray) -> Section:
 
 
 OF_THE_SPRAY: tuple[Chapter, ...] = (_sizes, _motion, _velocity_field, _patternations, _density)
-CHAPTERS: tuple[Chapter, ...] = (_summary, _origin, *OF_THE_SPRAY, _break_up, _unknown, _shots, _tables, _definitions)
+OF_LIQUID: tuple[Chapter, ...] = (_break_up, _of_shots(object_motion_section), _of_shots(unknown_section))
+CHAPTERS: tuple[Chapter, ...] = (_summary, _origin, *OF_THE_SPRAY, *OF_LIQUID, _shots, _tables, _definitions)

@@ -37,6 +37,12 @@ OUTLYING, LEAST_NOISE = 3.0, 1e-3
 GOES_BEYOND = "fewer than three views see all of it"
 CHANGED = "nothing in B is like it: it went too far, changed, or is hidden"
 NOT_UNIQUE = "several displacements are as likely"
+DISAGREE = "other shadows lie over it: without one view it would have moved elsewhere"
+MOST_APART_PX = 0.1
+"""So far a displacement may be from what it would be without one of the views: among 900 threads in 8 to 20 droplets
+per mm^3 all that were wrong by more than 0.2 px were farther apart."""
+JACKKNIFE = 0.5
+"""So much of the variance that leaving out each view tells (Tukey's jackknife) comes on top of that of the noise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +54,7 @@ class ObjectMotions:
     moved_mm : (N, 3) array
         x, y, z; not a number where there is none.
     covariance_mm2 : (N, 3, 3) array
-        By what the views leave unlike, and by how they disagree.
+        By what the views leave unlike, by how they disagree, and by what each of them changes.
     reasons : (N,) array of str
         Why there is none; empty where there is one.
     """
@@ -147,7 +153,17 @@ def _moved(
     rival = _fitted(sights, tried_mm[others[np.argmin(unlike[others])]])
     if _are_apart(sights, rival.moved_mm, fit.moved_mm) and _left(sights, rival.moved_mm) < LEAST_RATIO * left:
         return NOT_UNIQUE
-    return fit.moved_mm, fit.covariance_mm2
+    apart_mm = _without_each(sights, fit.moved_mm) - fit.moved_mm
+    if np.linalg.norm(apart_mm, axis=1).max() * _scale(sights) > MOST_APART_PX:
+        return DISAGREE
+    jackknife_mm2 = (len(sights) - 1) / len(sights) * apart_mm.T @ apart_mm
+    return fit.moved_mm, fit.covariance_mm2 + JACKKNIFE * jackknife_mm2
+
+
+def _without_each(sights: Sequence[_Sight], moved_mm: FloatArray) -> FloatArray:
+    """Displacements (views, 3) as they would be without each of the views."""
+    others = ([one for one in sights if one is not left_out] for left_out in sights)
+    return np.array([_fitted(seen, moved_mm).moved_mm for seen in others])
 
 
 def _left(sights: Sequence[_Sight], moved_mm: FloatArray) -> float:

@@ -3,7 +3,14 @@
 import numpy as np
 import pytest
 
-from processing.analysis.objects.object_motion import CHANGED, GOES_BEYOND, NOT_UNIQUE, ObjectMotions, object_motions
+from processing.analysis.objects.object_motion import (
+    CHANGED,
+    DISAGREE,
+    GOES_BEYOND,
+    NOT_UNIQUE,
+    ObjectMotions,
+    object_motions,
+)
 from processing.geometry import FloatArray
 from tests.support.moving_objects import PITCH_MM, Body, TwoExposures, exposures, hull_of_body, thread
 
@@ -44,6 +51,23 @@ def test_threads_among_droplets_move_as_far_as_is_told() -> None:
         scores.extend(off_mm / np.sqrt(np.einsum("nii->ni", found.covariance_mm2[known])))
     assert np.sqrt(np.mean(np.square(errors))) < 0.06
     assert 0.6 < np.median(np.abs(scores)) / 0.6745 < 1.4
+
+
+def test_among_many_droplets_wrong_motions_are_not_told() -> None:
+    errors, scores, told = [], [], []
+    for seed in range(203, 209):
+        rng = np.random.default_rng(seed)
+        bodies = threads(rng)
+        found = motions(exposures([*bodies, *droplets(430, rng)], rng), bodies)
+        known = found.reasons == ""
+        off_mm = (found.moved_mm - [body.moved_mm for body in bodies])[known]
+        errors.extend(np.linalg.norm(off_mm, axis=1) / PITCH_MM)
+        scores.extend((off_mm / np.sqrt(np.einsum("nii->ni", found.covariance_mm2[known]))).ravel())
+        told.extend(found.reasons.tolist())
+    assert DISAGREE in told
+    assert told.count("") > 0.6 * len(told)
+    assert max(errors) < 0.25
+    assert 0.7 < np.std(scores) < 1.4
 
 
 def test_backwards_the_motion_is_the_opposite() -> None:
