@@ -12,6 +12,7 @@ from daq.files.header import ViewFormat
 from daq.frozen_model import FrozenModel
 from daq.run.references import REFERENCE_KINDS
 from daq.run.refusals import RefusalCode as Code
+from daq.run.state import RunState
 from daq.run_plan import RunKind, RunPlan
 from server.lab.desk.control import REMEDIES
 from server.lab.desk.reason import Reason
@@ -197,12 +198,17 @@ def _always(text: str) -> Callable[[Context, RunPlan], Told]:
     return lambda _context, _plan: (text, "")
 
 
+def _rig(context: Context, _plan: RunPlan) -> Told:
+    is_live = context.services.acquisition.status().state is RunState.LIVE
+    return "a live view goes on: a start ends it" if is_live else "at rest", ""
+
+
 def _cameras(context: Context, _plan: RunPlan) -> Told:
     return f"{len(context.services.rig.cameras)} answer", ""
 
 
 _ROWS: Mapping[str, Callable[[Context, RunPlan], Told | None]] = {
-    "Rig": _always("at rest"),
+    "Rig": _rig,
     "Interlock": _always("closed"),
     "Pulse generator": _always("answers, without a fault"),
     "Cameras": _cameras,

@@ -48,4 +48,5 @@ def test_counts_are_told_once() -> None:
     assert message_text(replace(status, message=status.summary)) == ""
     ended = replace(status, live=LivePlan(), message="ended by the operator")
     assert message_text(ended) == "live view: ended by the operator", "the run was not"
+    assert message_text(replace(ended, message=str(LivePlan()))).startswith("live view at 2 Hz")
     assert message_text(replace(status, message="shot 3 is fired again")) == "shot 3 is fired again"

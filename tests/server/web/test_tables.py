@@ -10,8 +10,24 @@ from daq.run_plan import RunKind
 from server.lab.jobs import JobKind, JobState, JobTable, calibration_job, reconstruction_job, shot_job
 from server.lab.runs.run_summary import RunSummary
 from server.web.ui.asking import answer_of
+from server.web.ui.calibrate.target_runs import target_row
 from server.web.ui.drawer.job_panel import job_row, listed_jobs
 from server.web.ui.runs.run_rows import run_row
+
+RUN = RunSummary(
+    run_id="run",
+    name="run",
+    kind=RunKind.CALIBRATION,
+    created_utc="2026-11-29T03:20:14Z",
+    outcome="completed",
+    cause="",
+    views=("view1",),
+    frames_per_shot=2,
+    shots_planned=3,
+    shots_recorded=3,
+    shots_valid=3,
+    calibration=None,
+)
 
 
 def told(views: dict[str, Any], not_checked: tuple[str, ...] = ()) -> str:
@@ -39,6 +55,14 @@ def test_a_calibration_can_be_used_unless_it_is_used_already() -> None:
     job = calibration_job("run", "cal", "pinhole").model_copy(update={"state": JobState.DONE})
     assert job_row(job, current="other")["actions"] == ["Use"]
     assert job_row(job, current="cal")["actions"] == []
+
+
+def test_of_a_target_that_is_packed_no_calibration_is_offered_and_why_is_told() -> None:
+    row = target_row(RUN, None)
+    assert (row["actions"], row["detail"]) == (["Calibrate"], "")
+    packed = {"outcome": "packed", "shots_valid": None, "cause": "so", "remedy": "do this"}
+    row = target_row(RUN.model_copy(update=packed), None)
+    assert (row["actions"], row["shots"], row["detail"]) == ([], "? / 3", "so: do this")
 
 
 def test_a_long_queue_hides_no_work(tmp_path: Path) -> None:

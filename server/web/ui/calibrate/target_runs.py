@@ -8,7 +8,7 @@ from nicegui import ui
 
 from daq.run_plan import RunKind
 from server.lab.jobs import Job, JobKind, JobState
-from server.lab.runs.run_summary import ACTIVE, RunSummary
+from server.lab.runs.run_summary import ACTIVE, DAMAGED, PACKED, RunSummary
 from server.lab.services import Context
 from server.lab.starting.calibrating import request_calibration
 from server.web.ui.asking import queue
@@ -52,7 +52,7 @@ class TargetRuns:
             asyncio.to_thread(self._context.jobs.newest, None, JobState, _JOBS_LOOKED_AT, [JobKind.CALIBRATION]),
         )
         newest_job = {job.run_id: job for job in reversed(jobs)}
-        self._table.rows = [_row(run, newest_job.get(run.run_id)) for run in runs]
+        self._table.rows = [target_row(run, newest_job.get(run.run_id)) for run in runs]
         self._table.set_visibility(bool(runs))
         self._nothing.set_visibility(not runs)
         self._table.update()
@@ -62,19 +62,25 @@ class TargetRuns:
         await queue(lambda: [ask()])
 
 
-def _row(run: RunSummary, job: Job | None) -> dict[str, Any]:
+def target_row(run: RunSummary, job: Job | None) -> dict[str, Any]:
     """One run; the state of its newest calibration, where there is one."""
     state = job.state if job else run.outcome
-    valid = "…" if run.shots_valid is None else run.shots_valid
+    valid = run.shots_valid if run.shots_valid is not None else "…" if run.outcome == ACTIVE else "?"
+    is_under_way = job is not None and job.state in _UNDER_WAY
     return {
         "id": run.run_id,
         "run": run.run_id,
         "shots": f"{valid} / {run.shots_recorded}",
         "outcome": f"fit {state}" if job else state,
         "colour": outcome_colour(state),
-        "actions": [] if run.outcome == ACTIVE or (job and job.state in _UNDER_WAY) else [_CALIBRATE],
-        "detail": _detail(job),
+        "actions": [_CALIBRATE] if run.outcome not in (ACTIVE, DAMAGED, PACKED) and not is_under_way else [],
+        "detail": _detail(job) or told_of(run),
     }
+
+
+def told_of(run: RunSummary) -> str:
+    """Why nothing can be made of a run, and what to do; nothing where something can."""
+    return f"{run.cause}: {run.remedy}" if run.outcome in (DAMAGED, PACKED) else ""
 
 
 def _detail(job: Job | None) -> str:

@@ -129,4 +129,5 @@ def newest_of(runs: list[RunSummary]) -> dict[RunKind, str]:
 
 
 def _label(run: RunSummary) -> str:
-    return f"{run.kind}: {run.name}, {run.shots_valid} shots, {run.run_id}"
+    told = run.outcome if run.shots_valid is None else f"{run.shots_valid} shots"
+    return f"{run.kind}: {run.name}, {told}, {run.run_id}"

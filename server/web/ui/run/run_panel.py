@@ -20,6 +20,7 @@ from server.web.ui.run.shot_strip import ShotStrip
 from server.web.ui.theme import panel
 from server.web.ui.visiting import require_operator, told
 
+_LIVE = "live view"
 _NO_RUN = "no run since the server was started"
 
 
@@ -113,7 +114,7 @@ def counts_text(status: RunStatus, eta_s: float | None = None) -> str:
 def message_text(status: RunStatus) -> str:
     """What happened last; nothing where that is what the counts say. Of a live view, this says so."""
     if status.live is not None:
-        return f"live view: {status.message}"
+        return status.message if status.message.startswith(_LIVE) else f"{_LIVE}: {status.message}"
     return "" if status.message == status.summary else status.message
 
 

@@ -70,6 +70,13 @@ def test_what_only_has_to_be_waited_for_is_no_refusal_to_mend(server: Serving) -
     assert looked_at(server)["Rig"].finding is CheckResult.GOOD
 
 
+def test_a_live_view_is_told_and_speaks_against_nothing(server: Serving) -> None:
+    server.http.put("/api/rig/live", json={"rate_hz": 10})
+    found = looked_at(server)["Rig"]
+    assert (found.finding, found.text) == (CheckResult.GOOD, "a live view goes on: a start ends it")
+    server.http.delete("/api/rig/live")
+
+
 def test_without_a_calibration_nothing_is_made(server: Serving) -> None:
     assert looked_at(server)["Recipe"].text == "nothing is made without a calibration"
     use_a_calibration(server)
