@@ -60,12 +60,27 @@ def asked_case(case: Case, asked_for: Iterable[Case]) -> Case:
     return next((known for known in asked_for if known.name == case.name), case)
 
 
+def by_case(cases: Iterable[Case], rows: Iterable[OfCase]) -> list[tuple[Case, list[OfCase]]]:
+    """Every case that was tried, with its rows."""
+    groups = grouped(rows, lambda row: row.case)
+    return [(case, groups[case.name]) for case in cases if case.name in groups]
+
+
+def case_statements(
+    tried: Iterable[tuple[Case, Sequence[OfCase]]],
+    topic: Callable[[Sequence[OfCase]], str],
+    asked: Callable[[Case], str],
+    told: Callable[[Sequence[OfCase]], str],
+) -> list[Statement]:
+    """A statement of every case: its name and topic, what is asked for of it, and what its rows say."""
+    return [Statement(f"{case.name}{topic(rows)}", asked(case), told(rows)) for case, rows in tried]
+
+
 def all_kept(
     cases: Iterable[Case], rows: Iterable[OfCase], kept: Callable[[Case, Sequence[OfCase]], bool | None]
 ) -> bool | None:
     """Whether every case that was tried keeps what is asked for; None where nothing is."""
-    by_case = grouped(rows, lambda row: row.case)
-    judged = [kept(case, by_case[case.name]) for case in cases if case.name in by_case]
+    judged = [kept(case, its) for case, its in by_case(cases, rows)]
     asked = [one for one in judged if one is not None]
     return all(asked) if asked else None
 

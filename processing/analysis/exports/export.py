@@ -86,26 +86,14 @@ def export_droplets(droplets_file: str | Path, export: str) -> Path:
 
 
 def export_tracks(tracks_file: str | Path, export: str) -> Path:
-    """Write a file of tracks once more beside it, for other programs; an old export is replaced.
+    """Write a file of tracks once more beside it, as ``export_droplets`` does one of droplets.
 
     Parameters
     ----------
     tracks_file : path
-        Of ``tomoshadow tracks``.
-    export : {"csv", "vtk", "parquet", "tecplot"}
-        Format.
-
-    Returns
-    -------
-    Path
-        What was written.
-
-    Raises
-    ------
-    DropletFileError
-        The file is not of tracks.
-    MissingLibraryError
-        Parquet, without pyarrow.
+        Of ``tomoshadow tracks``; DropletFileError where it is none.
+    export : str
+        As of ``export_droplets``.
     """
     return _exported(Path(tracks_file), Export(export), read_tracks)
 

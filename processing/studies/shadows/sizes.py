@@ -18,7 +18,7 @@ from processing.figures.droplet_figures import MeasuredCase, droplets_figure
 from processing.geometry import PinholeCamera
 from processing.kernels import DEFAULT_THREADS
 from processing.studies.droplets import IMAGE_SIZE_PX, SLAB
-from processing.studies.report import Statement, all_kept, grouped
+from processing.studies.report import Statement, all_kept, by_case, case_statements
 from processing.studies.sensitivity import misaligned
 from processing.studies.shadows.size_errors import d32_of, size_errors
 from processing.studies.simulated_droplets import Image, study_cameras, study_grid
@@ -253,17 +253,10 @@ def _reached(case: SizeCase, rows: Sequence[SizeRow]) -> bool | None:
     return bool(enough) and all(limit is None or value <= limit for limit, value in limits)
 
 
-def _case(row: SizeRow) -> str:
-    return row.case
-
-
 def size_statements(rows: Sequence[SizeRow], cases: Sequence[SizeCase]) -> list[Statement]:
     """Mean and worst shot of every case."""
-    by_name = {case.name: case for case in cases}
-    return [
-        Statement(f"{name}: found/ghosts in % from 20 um on, mean and worst", _asked(by_name[name]), _told(chosen))
-        for name, chosen in grouped(rows, _case).items()
-    ]
+    topic = ": found/ghosts in % from 20 um on, mean and worst"
+    return case_statements(by_case(cases, rows), lambda _: topic, _asked, _told)
 
 
 def _asked(case: SizeCase) -> str:
@@ -282,15 +275,11 @@ def _told(rows: Sequence[SizeRow]) -> str:
 
 def size_figure(rows: Sequence[SizeRow], cases: Sequence[SizeCase]) -> Figure:
     """Found droplets and ghosts of every case."""
-    by_name = {case.name: case for case in cases}
     return droplets_figure(
         {
-            name: MeasuredCase(
-                [row.found for row in chosen],
-                [row.ghosts for row in chosen],
-                by_name[name].least_found,
-                by_name[name].most_ghosts,
+            case.name: MeasuredCase(
+                [row.found for row in its], [row.ghosts for row in its], case.least_found, case.most_ghosts
             )
-            for name, chosen in grouped(rows, _case).items()
+            for case, its in by_case(cases, rows)
         }
     )

@@ -20,7 +20,7 @@ from processing.analysis.velocity.tracks import link
 from processing.figures.velocity_figures import LinkedCase, linked_figure
 from processing.geometry import FloatArray
 from processing.kernels import DEFAULT_THREADS
-from processing.studies.report import Statement, all_kept, grouped
+from processing.studies.report import Statement, all_kept, by_case, case_statements
 from processing.studies.simulated_droplets import study_cameras, study_grid
 from processing.studies.velocity.double_scenes import case_images
 from processing.studies.velocity.measured_case import measured_case, plain_case
@@ -214,21 +214,10 @@ def _mean(rows: Sequence[TrackRow], name: str) -> float:
     return float(np.mean([getattr(row, name) for row in rows]))
 
 
-def _case(row: TrackRow) -> str:
-    return row.case
-
-
 def track_statements(rows: Sequence[TrackRow], cases: Sequence[TrackCase]) -> list[Statement]:
     """Mean and worst series of every case."""
-    by_name = {case.name: case for case in cases}
-    return [
-        Statement(
-            f"{name}, {chosen[0].shots} shots: whole tracks/right links in %, mean and worst; rms of a component",
-            _asked(by_name[name]),
-            _told(chosen),
-        )
-        for name, chosen in grouped(rows, _case).items()
-    ]
+    topic = "shots: whole tracks/right links in %, mean and worst; rms of a component"
+    return case_statements(by_case(cases, rows), lambda its: f", {its[0].shots} {topic}", _asked, _told)
 
 
 def _asked(case: TrackCase) -> str:
@@ -247,17 +236,16 @@ def _told(rows: Sequence[TrackRow]) -> str:
 
 def track_figure(rows: Sequence[TrackRow], cases: Sequence[TrackCase]) -> Figure:
     """Whole tracks, right links and errors of every case."""
-    limits = {case.name: case for case in cases}
     return linked_figure(
         {
-            name: LinkedCase(
-                [row.whole for row in chosen],
-                [row.right for row in chosen],
-                [row.rms_velocity_voxel for row in chosen],
-                limits[name].least_whole,
-                limits[name].least_right,
+            case.name: LinkedCase(
+                [row.whole for row in its],
+                [row.right for row in its],
+                [row.rms_velocity_voxel for row in its],
+                case.least_whole,
+                case.least_right,
             )
-            for name, chosen in grouped(rows, _case).items()
+            for case, its in by_case(cases, rows)
         },
         ("whole tracks [% of the droplets]", "right [% of the links]", "rms error of a component [voxel/shot]"),
         "series",

@@ -20,7 +20,7 @@ from processing.figures.velocity_figures import LinkedCase, linked_figure
 from processing.geometry import FloatArray
 from processing.kernels import DEFAULT_THREADS
 from processing.studies.droplets import IMAGE_SIZE_PX, SLAB
-from processing.studies.report import Statement, all_kept, grouped
+from processing.studies.report import Statement, all_kept, by_case, case_statements
 from processing.studies.simulated_droplets import study_grid
 from processing.studies.velocity.double_scenes import SEPARATION_NS, DoubleScene, double_scene
 from processing.studies.velocity.measured_case import measured_case, plain_case
@@ -224,19 +224,10 @@ def _means(rows: Sequence[VelocityRow]) -> tuple[float, float, float, float]:
     return paired, right, rms_voxel, z_sd
 
 
-def _case(row: VelocityRow) -> str:
-    return row.case
-
-
 def velocity_statements(rows: Sequence[VelocityRow], cases: Sequence[VelocityCase]) -> list[Statement]:
     """Mean and worst double exposure of every case."""
-    by_name = {case.name: case for case in cases}
-    return [
-        Statement(
-            f"{name}: paired/right in %, mean and worst; rms of a component", _asked(by_name[name]), _told(chosen)
-        )
-        for name, chosen in grouped(rows, _case).items()
-    ]
+    topic = ": paired/right in %, mean and worst; rms of a component"
+    return case_statements(by_case(cases, rows), lambda _: topic, _asked, _told)
 
 
 def _asked(case: VelocityCase) -> str:
@@ -256,16 +247,17 @@ def _told(rows: Sequence[VelocityRow]) -> str:
 
 def velocity_figure(rows: Sequence[VelocityRow], cases: Sequence[VelocityCase]) -> Figure:
     """Paired droplets, wrong pairs and errors of every case."""
-    limits = {case.name: case for case in cases}
     return linked_figure(
         {
-            name: LinkedCase(
-                [row.paired for row in chosen],
-                [row.right for row in chosen],
-                [row.rms_voxel for row in chosen],
-                *(getattr(limits[name], limit) for limit in ("least_paired", "least_right", "most_rms_voxel")),
+            case.name: LinkedCase(
+                [row.paired for row in its],
+                [row.right for row in its],
+                [row.rms_voxel for row in its],
+                case.least_paired,
+                case.least_right,
+                case.most_rms_voxel,
             )
-            for name, chosen in grouped(rows, _case).items()
+            for case, its in by_case(cases, rows)
         },
         ("paired [% of the droplets in both]", "right [% of the pairs]", "rms error of a component [voxel]"),
         "double exposure",

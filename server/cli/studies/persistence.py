@@ -4,7 +4,7 @@ from argparse import Namespace
 from typing import Any
 
 from server.cli.options import Verbs, count, seed, usable_processors
-from server.cli.studies.study_command import add_study, collected, passing, report
+from server.cli.studies.study_command import add_study, collected, passing, report, seeds_of
 
 
 def add_persistence(studies: Verbs) -> None:
@@ -26,7 +26,7 @@ def persistence(options: Namespace) -> dict[str, Any]:
     )
     from processing.studies.real_droplets.reality import RealityStudy
 
-    study = RealityStudy(seeds=tuple(range(options.seed, options.seed + options.repeats)))
+    study = RealityStudy(seeds=seeds_of(options))
     rows = collected(persistence_study(study, usable_processors()), persistence_line)
     result = report(options.out, "persistence", rows, persistence_figure(rows), persistence_statements(rows))
     return passing(result, all_close(persistence_shares(rows)), "as many are ghosts as droplets without a partner tell")

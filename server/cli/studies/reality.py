@@ -4,7 +4,7 @@ from argparse import Namespace
 from typing import Any
 
 from server.cli.options import Verbs, count, seed, usable_processors
-from server.cli.studies.study_command import add_study, collected, passing, report
+from server.cli.studies.study_command import add_study, collected, passing, report, seeds_of
 
 
 def add_reality(studies: Verbs) -> None:
@@ -27,7 +27,7 @@ def reality(options: Namespace) -> dict[str, Any]:
         reality_study,
     )
 
-    study = RealityStudy(seeds=tuple(range(options.seed, options.seed + options.repeats)))
+    study = RealityStudy(seeds=seeds_of(options))
     rows = collected(reality_study(study, usable_processors()), reality_line)
     result = report(options.out, "reality", rows, reality_of_rows(rows), reality_statements(rows))
     passed = all_true(rows) and all_close(case_shares(rows))

@@ -8,16 +8,17 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from server.cli.options import Verbs, add_out, add_verb
+from server.cli.options import Verbs, add_out, add_verb, count, positive, seed
 from server.cli.output import Outcome, heed, progress
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from processing.studies.report import Statement
+    from processing.studies.report import NamedCase, Statement
 
 ENDINGS = (".csv", ".png", "-profiles.csv", "-classes.csv")  # of the files that studies write
 Row = TypeVar("Row")
+Case = TypeVar("Case", bound="NamedCase")
 Study = Callable[[Namespace], dict[str, Any]]
 
 
@@ -27,6 +28,29 @@ def add_study(studies: Verbs, name: str, study: Study, summary: str) -> Argument
     out = Path(f"study-{name}")
     add_out(parser, f"directory of CSV and figure; default {out}", default=out)
     return parser
+
+
+def add_linked(studies: Verbs, name: str, study: Study, summary: str, each: str, first_seed: int) -> None:
+    """Add a study of droplets that fly; without a density it tries all cases for which something is asked for."""
+    parser = add_study(studies, name, study, summary)
+    parser.add_argument("--seed", type=seed, default=first_seed, help=f"of the first {each} of a case")
+    parser.add_argument("--repeats", type=count, default=5, help="how many of a case")
+    parser.add_argument("--droplets", choices=("bright", "opaque"), help="bright particles, or droplets in shadows")
+    parser.add_argument("--density", type=positive, help="droplets per mm^3")
+
+
+def linked_cases(options: Namespace, kind: Callable[..., Case], asked_for: tuple[Case, ...]) -> tuple[Case, ...]:
+    """The case that is stated, or all for which something is asked for."""
+    from processing.studies.report import asked_case
+
+    stated = {"droplets": options.droplets, "density_per_mm3": options.density}
+    stated = {name: value for name, value in stated.items() if value is not None}
+    return (asked_case(kind(**stated), asked_for),) if stated else asked_for
+
+
+def seeds_of(options: Namespace) -> tuple[int, ...]:
+    """One for each repeat."""
+    return tuple(range(options.seed, options.seed + options.repeats))
 
 
 def _run(name: str, study: Study, options: Namespace) -> Outcome:
