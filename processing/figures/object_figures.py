@@ -7,10 +7,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
-from numpy.typing import NDArray
 
 from processing.analysis.objects.connected_share import ConnectedShare
 from processing.analysis.objects.liquid_objects import LiquidObjects, ObjectClass
+from processing.analysis.objects.seeing_views import UnseenMap
 from processing.figures.colours import VIEW_COLOURS
 from processing.geometry import FloatArray
 from processing.volume import VoxelGrid
@@ -33,10 +33,10 @@ class BreakUpCurve:
 
 @dataclass(frozen=True, eq=False)
 class ObjectsShot:
-    """Objects of an exposure, and how many views see (z, y, x) places of a grid."""
+    """Objects of an exposure, where too few views see, and the grid of what is drawn."""
 
     objects: LiquidObjects
-    seeing: NDArray[np.uint8]
+    unseen: UnseenMap
     places: VoxelGrid
 
 
@@ -46,7 +46,7 @@ def objects_figure(curves: Mapping[str, BreakUpCurve], shot: ObjectsShot) -> Fig
     curve_axes, object_axes, map_axes = figure.subplots(1, 3)
     draw_break_up(curve_axes, curves)
     draw_objects(object_axes, shot.objects, shot.places)
-    draw_seeing(map_axes, shot.seeing, shot.places)
+    draw_unseen(map_axes, shot.unseen)
     return figure
 
 
@@ -60,10 +60,10 @@ def break_up_figure(curve: BreakUpCurve | None, name: str, objects: LiquidObject
     return figure
 
 
-def seeing_figure(shot: ObjectsShot) -> Figure:
+def unseen_figure(unseen: UnseenMap) -> Figure:
     """Where too few views see."""
     figure = Figure(figsize=(5.5, 3.8), layout="constrained")
-    draw_seeing(figure.add_subplot(), shot.seeing, shot.places)
+    draw_unseen(figure.add_subplot(), unseen)
     return figure
 
 
@@ -113,17 +113,13 @@ def _draw_lengths(axes: Axes, objects: LiquidObjects, colour: str) -> None:
     axes.plot([first[:, 0], last[:, 0]], [first[:, 1], last[:, 1]], color=colour, linewidth=2)
 
 
-def draw_seeing(axes: Axes, seeing: NDArray[np.uint8], grid: VoxelGrid) -> None:
+def draw_unseen(axes: Axes, unseen: UnseenMap) -> None:
     """Share of each line along z that fewer than three views see."""
-    share = 100 * np.mean(seeing < 3, axis=0)
-    half_mm = grid.pitch_mm / 2
-    span = (grid.x_mm[0] - half_mm, grid.x_mm[-1] + half_mm, grid.y_mm[-1] + half_mm, grid.y_mm[0] - half_mm)
-    image = axes.imshow(share, extent=span, cmap="magma_r", vmin=0, vmax=max(1.0, float(share.max())))
+    share, span_mm = unseen.percent, (*unseen.x_mm, *unseen.y_mm[::-1])
+    image = axes.imshow(share, extent=span_mm, cmap="magma_r", vmin=0, vmax=max(1.0, float(share.max())))
     axes.figure.colorbar(image, ax=axes, label="depth seen by < 3 views [%]", shrink=0.75)
-    _frame(axes, grid)
-    axes.set_title(
-        f"{100 * np.mean(seeing < 3):.1f} % of the volume, {100 * np.mean(seeing == 0):.2f} % by none", fontsize="small"
-    )
+    axes.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
+    axes.set_title(f"{np.mean(share):.1f} % of the volume", fontsize="small")
 
 
 def _frame(axes: Axes, grid: VoxelGrid | None) -> None:

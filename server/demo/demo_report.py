@@ -7,7 +7,6 @@ import numpy as np
 from daq.files.run_directory import RunReader
 from processing.analysis.spray.spray_statistics import AskedFor
 from processing.figures.found_figures import found_figure
-from processing.figures.object_figures import ObjectsShot
 from processing.figures.residual_figures import residuals_figure
 from processing.figures.velocity_figures import velocities_figure
 from processing.figures.volume_figures import isosurface_figure, shadowgraph_figure, slices_figure
@@ -116,7 +115,7 @@ def _spray_sections(demo: Demonstration) -> list[Section]:
     told = ReportedLiquid(
         liquid.reaches, len(liquid.found), liquid.objects, first.objects, liquid.true_mm, liquid.places
     )
-    unknown = unknown_section(spray.shots, ObjectsShot(first.objects, first.seeing, liquid.places))
+    unknown = unknown_section(spray.shots)
     return [
         *spray_sections(ReportedSpray.of(spray, AskedFor(spray.axis))),
         break_up_section(told),

@@ -10,7 +10,8 @@ from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.analysis.objects.break_up import Reach
 from processing.analysis.objects.connected_share import BreakUp, break_up_of, connected_share
 from processing.analysis.objects.liquid_objects import LiquidObjects, ObjectClass
-from processing.figures.object_figures import BreakUpCurve, ObjectsShot, break_up_figure, seeing_figure
+from processing.analysis.objects.seeing_views import UnseenMap
+from processing.figures.object_figures import BreakUpCurve, break_up_figure, unseen_figure
 from processing.geometry import FloatArray
 from processing.runs.liquid.objects import reaches_of, told_of_exposures
 from processing.volume import VoxelGrid
@@ -32,7 +33,7 @@ BLACK_TEXT = (
     "A line of sight with less than a tenth of its light tells nothing of what else lies on it. A droplet is believed "
     "where three views see it; what fewer see is not counted as empty: number densities are per volume that was seen."
 )
-NO_MAP = "Files of droplets hold these shares; a map of the places would take the images."
+NO_MAP = "There is no map: a file is of an older program, or the shots are not of the same places."
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,19 +133,22 @@ def _row(kind: ObjectClass, liquid: ReportedLiquid) -> list[str]:
     return [*counted, f"{median_mm:.2f}", between, f"{np.median(chosen.widths_mm):.3f}"]
 
 
-def unknown_section(shots: Sequence[StoredDroplets], mapped: ObjectsShot | None = None) -> Section | None:
-    """Which share of the volume too few views see; where, of an exposure whose images were looked at.
+def unknown_section(shots: Sequence[StoredDroplets]) -> Section | None:
+    """Which share of the volume too few views see, and where.
 
     None where nobody looked for liquid that hides: bright particles, and files of older programs.
     """
-    if not any(map(told_of_exposures, shots)):
+    told = [one for shot in shots for one in told_of_exposures(shot)]
+    if not told:
         return None
     rows = [row for row in _unknown_rows(shots) if row]
     table = Table(["share of the volume", "mean [%]", "most [%]"], rows, caption="Mean and largest of the exposures")
-    if mapped is None:
+    maps = [one["unseen"] for one in told if "unseen" in one]
+    if len(maps) < len(told) or len({(*one["x_mm"], *one["y_mm"]) for one in maps}) != 1:
         return Section("Where nothing can be known", f"{BLACK_TEXT} {NO_MAP}", [table])
-    caption = "One exposure, seen along z: how much of each line of sight fewer than three views see"
-    return Section("Where nothing can be known", BLACK_TEXT, [table], [Picture(seeing_figure(mapped), caption)])
+    caption = f"Seen along z: how much of each line of sight fewer than three views see, mean of {len(maps)} exposures"
+    picture = Picture(unseen_figure(UnseenMap.mean_of(maps)), caption)
+    return Section("Where nothing can be known", BLACK_TEXT, [table], [picture])
 
 
 def _unknown_rows(shots: Sequence[StoredDroplets]) -> list[list[str]]:

@@ -10,7 +10,14 @@ from numpy.typing import NDArray
 from processing.analysis.objects.break_up import THRESHOLD, THRESHOLDS, Nozzle, Reach, core_of, reach_of
 from processing.analysis.objects.dark_voxels import DarkVoxels, connected, dark_voxels
 from processing.analysis.objects.liquid_objects import LiquidObjects, liquid_objects
-from processing.analysis.objects.seeing_views import map_grid, pixels_of, places_of, seeing_views, unknown_shares
+from processing.analysis.objects.seeing_views import (
+    UnseenMap,
+    map_grid,
+    pixels_of,
+    places_of,
+    seeing_views,
+    unknown_shares,
+)
 from processing.analysis.objects.silhouettes import LEAST_VIEWS, sights
 from processing.geometry import FloatArray, ViewMapping
 from processing.kernels import DEFAULT_THREADS
@@ -68,8 +75,8 @@ class ExposureObjects:
         How far liquid hangs together with the nozzle.
     blind_share, unjudged_share : float
         Of the volume: no view sees it, and fewer than three do.
-    seeing : (z, y, x) uint8 array
-        How many views see each of the search's places.
+    unseen : UnseenMap
+        Where too few views see.
     reason : str | None
         Why there are no objects.
     bodies : tuple of (M, 3) arrays
@@ -80,7 +87,7 @@ class ExposureObjects:
     reach: Reach
     blind_share: float
     unjudged_share: float
-    seeing: NDArray[np.uint8]
+    unseen: UnseenMap
     reason: str | None = None
     bodies: tuple[FloatArray, ...] = ()
 
@@ -132,19 +139,19 @@ def measure_objects(
     """
     darkness = _darkness(images, trust)
     seeing = seeing_views(darkness, search.pixels, search.places)
-    shares = unknown_shares(seeing, len(images))
+    shares = (*unknown_shares(seeing, len(images)), UnseenMap.of(seeing, search.places, len(images)))
     try:
         voxels = _known(_dark(darkness, search, threads), trust, search)
     except ValueError as error:
-        return ExposureObjects(LiquidObjects.none(), Reach(reason=str(error)), *shares, seeing, str(error))
+        return ExposureObjects(LiquidObjects.none(), Reach(reason=str(error)), *shares, str(error))
     reach = reach_of(voxels, search.nozzle) if search.nozzle else Reach(reason=NO_NOZZLE)
     if len(images) < LEAST_VIEWS:
         reason = f"{len(images)} views do not tell shapes: {LEAST_VIEWS} or more do"
-        return ExposureObjects(LiquidObjects.none(), reach, *shares, seeing, reason)
+        return ExposureObjects(LiquidObjects.none(), reach, *shares, reason)
     told, numbers = _connected(voxels)
     objects = _objects(told, numbers, search)
     bodies = _bodies(told, numbers, np.flatnonzero(objects.is_told))
-    return ExposureObjects(objects.told(), reach, *shares, seeing, bodies=bodies)
+    return ExposureObjects(objects.told(), reach, *shares, bodies=bodies)
 
 
 def all_objects(images: Sequence[Intensity], search: ObjectSearch, *, threads: int = DEFAULT_THREADS) -> LiquidObjects:

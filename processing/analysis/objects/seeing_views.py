@@ -1,6 +1,8 @@
 """How many views still see at a place: where too few do, nothing is known, whatever is there."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +17,52 @@ PLACES_MM = 0.15
 """From place to place of a map."""
 JUDGING = 3
 """So many views must see a droplet before it is believed."""
+MOST_CELLS = 40
+"""Of a map that is kept, along an axis."""
+
+
+@dataclass(frozen=True, eq=False)
+class UnseenMap:
+    """Where too few views see, along z.
+
+    Parameters
+    ----------
+    percent : (rows, columns) array
+        Of each line along z, that fewer than three views see.
+    x_mm, y_mm : (low, high)
+        Ends of the map, from edge to edge.
+    """
+
+    percent: FloatArray
+    x_mm: tuple[float, float]
+    y_mm: tuple[float, float]
+
+    @classmethod
+    def of(cls, seeing: NDArray[np.uint8], grid: VoxelGrid, views: int = JUDGING) -> "UnseenMap":
+        """Map of how many of the views see (z, y, x) at the places of a grid, coarser where these are many."""
+        step = -(-max(grid.shape[1:]) // MOST_CELLS)
+        percent = 100 * np.mean(seeing < min(JUDGING, views), axis=0)
+        for axis in (0, 1):
+            starts = np.arange(0, percent.shape[axis], step)
+            sizes = np.diff(np.append(starts, percent.shape[axis]))
+            percent = np.moveaxis(np.moveaxis(np.add.reduceat(percent, starts, axis), axis, -1) / sizes, -1, axis)
+        half_mm = grid.pitch_mm / 2
+        x_mm, y_mm = ((float(along[0]) - half_mm, float(along[-1]) + half_mm) for along in (grid.x_mm, grid.y_mm))
+        return cls(np.asarray(percent, np.float64), x_mm, y_mm)
+
+    def told(self) -> dict[str, Any]:
+        """As files have it, in whole percent."""
+        return {"percent": np.rint(self.percent).astype(int).tolist(), "x_mm": self.x_mm, "y_mm": self.y_mm}
+
+    @classmethod
+    def mean_of(cls, told: Sequence[Mapping[str, Any]]) -> "UnseenMap":
+        """Mean of the maps of some files that are of the same places."""
+        first = told[0]
+        return cls(
+            np.mean([one["percent"] for one in told], axis=0, dtype=np.float64),
+            (first["x_mm"][0], first["x_mm"][1]),
+            (first["y_mm"][0], first["y_mm"][1]),
+        )
 
 
 def map_grid(grid: VoxelGrid) -> VoxelGrid:
@@ -61,8 +109,3 @@ def seeing_views(
 def unknown_shares(seeing: NDArray[np.uint8], views: int) -> tuple[float, float]:
     """Share of the volume that no view sees, and that too few see for a droplet."""
     return float(np.mean(seeing == 0)), float(np.mean(seeing < min(JUDGING, views)))
-
-
-def mean_map(maps: Sequence[NDArray[np.uint8]]) -> FloatArray:
-    """Mean number of seeing views of several exposures."""
-    return np.asarray(np.mean(maps, axis=0), dtype=np.float64)

@@ -135,6 +135,7 @@ def told_objects(moving: MovingObjects | None) -> dict[str, Any]:
         "blind_share": found.blind_share,
         "unjudged_share": found.unjudged_share,
         "reach": asdict(found.reach),
+        "unseen": found.unseen.told(),
     }
     return {"objects": told}
 

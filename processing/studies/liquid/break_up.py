@@ -221,4 +221,4 @@ def break_up_figure(runs: Sequence[StudiedRun]) -> Figure:
         for name, chosen in groups.items()
     }
     shot = next(iter(groups.values()))[-1]
-    return objects_figure(curves, ObjectsShot(shot.last.objects, shot.last.seeing, shot.places))
+    return objects_figure(curves, ObjectsShot(shot.last.objects, shot.last.unseen, shot.places))

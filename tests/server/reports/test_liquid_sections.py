@@ -8,8 +8,7 @@ import numpy as np
 
 from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.analysis.objects.break_up import THRESHOLDS, Reach
-from processing.analysis.objects.liquid_objects import LiquidObjects
-from processing.figures.object_figures import ObjectsShot
+from processing.analysis.objects.seeing_views import UnseenMap
 from processing.volume import VoxelGrid
 from server.reports.liquid_sections import NO_MAP, ReportedLiquid, break_up_section, unknown_section
 
@@ -70,10 +69,24 @@ def test_shares_that_cannot_be_known_are_told_and_mapped_where_images_were_seen(
     assert section
     assert NO_MAP in section.text
     assert [row[1:] for row in section.tables[0].rows] == [["3.00", "4.00"], ["1.00", "1.00"], ["10.00", "10.00"]]
-    mapped = unknown_section(shots, ObjectsShot(LiquidObjects.none(), np.full(GRID.shape, 4, np.uint8), GRID))
+    mapped = unknown_section([_mapped(one, GRID) for one in shots])
     assert mapped
     assert NO_MAP not in mapped.text
-    assert len(mapped.pictures) == 1
+    (axes, _) = mapped.pictures[0].figure.axes
+    assert axes.get_title() == "25.0 % of the volume"
+    elsewhere = unknown_section([_mapped(shots[0], GRID), _mapped(shots[0], VoxelGrid((4, 5, 7), (0, 0, 0), 0.1))])
+    assert elsewhere
+    assert NO_MAP in elsewhere.text
+
+
+def _mapped(of: StoredDroplets, places: VoxelGrid) -> StoredDroplets:
+    """The same with a map: two views see the first of four planes, four the others."""
+    exposures = json.loads(str(of.provenance["exposures"]))
+    seeing = np.full(places.shape, 4, np.uint8)
+    seeing[0] = 2
+    for one in exposures.values():
+        one["objects"]["unseen"] = UnseenMap.of(seeing, places).told()
+    return StoredDroplets(of.columns, {"exposures": json.dumps(exposures)}, of.objects)
 
 
 def test_of_files_that_say_nothing_there_is_no_chapter() -> None:

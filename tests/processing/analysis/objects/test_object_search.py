@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from processing.analysis.objects.object_search import ObjectSearch, all_objects, measure_objects, plan_objects
-from processing.analysis.objects.seeing_views import map_grid, unknown_shares
+from processing.analysis.objects.seeing_views import UnseenMap, map_grid, unknown_shares
 from processing.preprocessing import Intensity
 from processing.studies.simulated_droplets import study_cameras, study_grid
+from processing.volume import VoxelGrid
 
 GRID, SIZE_PX = study_grid((90, 90, 90)), (200, 140)
 
@@ -22,7 +23,7 @@ def _images(views: int = 4) -> list[Intensity]:
 
 def test_all_views_see_an_empty_volume_and_find_nothing(search: ObjectSearch) -> None:
     found = measure_objects(_images(), search)
-    assert (found.seeing == 4).all()
+    assert (found.unseen.percent == 0).all()
     assert (found.blind_share, found.unjudged_share, len(found.objects)) == (0.0, 0.0, 0)
     assert "--nozzle" in (found.reach.reason or "")
 
@@ -32,9 +33,9 @@ def test_a_black_half_of_two_views_leaves_two(search: ObjectSearch) -> None:
     for image in images[:2]:
         image[70:] = 0.02
     found = measure_objects(images, search)
-    upper, lower = found.seeing[:, :2], found.seeing[:, -2:]
-    assert (upper == 4).all()
-    assert (lower == 2).all()
+    upper, lower = found.unseen.percent[:2], found.unseen.percent[-2:]
+    assert (upper == 0).all()
+    assert (lower == 100).all()
     assert found.unjudged_share == pytest.approx(0.5, abs=0.15)
     assert found.blind_share == 0
 
@@ -86,3 +87,17 @@ def test_shares_count_places_by_views() -> None:
     seeing = np.array([[[0, 1, 2, 3, 4]]], np.uint8)
     assert unknown_shares(seeing, 4) == (0.2, 0.6)
     assert unknown_shares(seeing, 2) == (0.2, 0.4)
+
+
+def test_a_map_of_many_places_is_kept_coarser_and_means_the_same() -> None:
+    places = VoxelGrid((2, 50, 90), (0.0, 0.0, 0.0), 0.1)
+    seeing = np.full(places.shape, 4, np.uint8)
+    seeing[0, :, :45] = 2
+    unseen = UnseenMap.of(seeing, places)
+    assert unseen.percent.shape == (17, 30)
+    assert unseen.x_mm == pytest.approx((-0.05, 8.95))
+    np.testing.assert_array_equal(unseen.percent[:, :15], 50)
+    np.testing.assert_array_equal(unseen.percent[:, 15:], 0)
+    again = UnseenMap.mean_of([unseen.told(), UnseenMap.of(np.full_like(seeing, 4), places).told()])
+    np.testing.assert_array_equal(again.percent, unseen.percent / 2)
+    np.testing.assert_array_equal(UnseenMap.of(np.full_like(seeing, 2), places, views=2).percent, 0)
