@@ -26,8 +26,8 @@ CLASSES_TEXT = (
     "is several bodies that touch, a ring or a net; the core hangs together with the nozzle. Shorter ones are droplets."
 )
 LIMITS_TEXT = (
-    "Limits hold how shots differ, thresholds of darkness from 0.2 to 0.5, of which 0.3 is told, and that bodies less "
-    "than two pixels apart look like one. A film lets light through: at 0.5 it has holes, and liquid ends earlier."
+    "Limits hold how shots differ, thresholds of darkness of 0.2 and 0.3, by both of which the length is told, and "
+    "that bodies less than two pixels apart, or one behind the other in all views, look like one."
 )
 BLACK_TEXT = (
     "A line of sight with less than a tenth of its light tells nothing of what else lies on it. A droplet is believed "

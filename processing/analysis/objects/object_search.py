@@ -3,12 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from processing.analysis.objects.break_up import THRESHOLD, THRESHOLDS, Nozzle, Reach, core_of, reach_of
-from processing.analysis.objects.dark_voxels import DarkVoxels, connected, dark_voxels
+from processing.analysis.objects.break_up import THRESHOLD, Nozzle, Reach, core_of
+from processing.analysis.objects.dark_voxels import DarkVoxels, connected
+from processing.analysis.objects.hull import darkness_of, hull_of, known
 from processing.analysis.objects.liquid_objects import LiquidObjects, liquid_objects
 from processing.analysis.objects.seeing_views import (
     UnseenMap,
@@ -18,20 +18,17 @@ from processing.analysis.objects.seeing_views import (
     seeing_views,
     unknown_shares,
 )
+from processing.analysis.objects.sharp_reach import sharp_reach
 from processing.analysis.objects.silhouettes import LEAST_VIEWS, sights
 from processing.geometry import FloatArray, ViewMapping
 from processing.kernels import DEFAULT_THREADS
 from processing.preprocessing import Intensity
-from processing.reconstruction.choices import ReconstructionMethod
-from processing.reconstruction.line_of_sight import slabs_of_sight
 from processing.reconstruction.planning.plan import Plan, plan_reconstruction
-from processing.reconstruction.slab_volume import SLAB_ROWS
 from processing.volume import VoxelGrid
 
 PITCH_PX = 1.5
-"""Width of a voxel, over that of a pixel: of two, threads of 50 um are too thin; one costs three times as much."""
-LEAST_KNOWING = 2
-"""So many views must know something of a place that is dark."""
+"""Width of a voxel, over that of a pixel: of two, threads of 50 um are too thin; one costs three times as much. How far
+liquid hangs together is asked by finer ones."""
 NO_NOZZLE = "nobody stated where the nozzle is: add [spray] nozzle_mm, axis to the run, or measure with --nozzle X,Y,Z"
 
 
@@ -137,14 +134,14 @@ def measure_objects(
     threads : int
         The result does not depend on it.
     """
-    darkness = _darkness(images, trust)
+    darkness = darkness_of(images, trust)
     seeing = seeing_views(darkness, search.pixels, search.places)
     shares = (*unknown_shares(seeing, len(images)), UnseenMap.of(seeing, search.places, len(images)))
     try:
-        voxels = _known(_dark(darkness, search, threads), trust, search)
+        voxels = known(hull_of(darkness, search.plan, threads), trust, search.mappings)
     except ValueError as error:
         return ExposureObjects(LiquidObjects.none(), Reach(reason=str(error)), *shares, str(error))
-    reach = reach_of(voxels, search.nozzle) if search.nozzle else Reach(reason=NO_NOZZLE)
+    reach = _reach(darkness, trust, voxels, search, threads)
     if len(images) < LEAST_VIEWS:
         reason = f"{len(images)} views do not tell shapes: {LEAST_VIEWS} or more do"
         return ExposureObjects(LiquidObjects.none(), reach, *shares, reason)
@@ -156,33 +153,23 @@ def measure_objects(
 
 def all_objects(images: Sequence[Intensity], search: ObjectSearch, *, threads: int = DEFAULT_THREADS) -> LiquidObjects:
     """All objects of an exposure, droplets and what may be a ghost included."""
-    return _objects(*_connected(_dark(_darkness(images, None), search, threads)), search)
+    return _objects(*_connected(hull_of(darkness_of(images, None), search.plan, threads)), search)
 
 
-def _darkness(images: Sequence[Intensity], trust: Sequence[Intensity] | None) -> list[Intensity]:
-    """Share of the light that is missing; all of it where nothing is known."""
-    darkness = [np.clip(1 - image, 0, 1) for image in images]
-    if trust is None:
-        return darkness
-    return [np.where(sure > 0, dark, np.float32(1)) for dark, sure in zip(darkness, trust, strict=True)]
-
-
-def _dark(darkness: Sequence[Intensity], search: ObjectSearch, threads: int) -> DarkVoxels:
-    grid = search.plan.grid
-    slab = np.empty((grid.shape[0], min(SLAB_ROWS, grid.shape[1]), grid.shape[2]), np.uint8)
-    slabs = slabs_of_sight(search.plan, darkness, ReconstructionMethod.MINLOS, out=slab, threads=threads)
-    return dark_voxels(slabs, grid, min(THRESHOLDS))
-
-
-def _known(voxels: DarkVoxels, trust: Sequence[Intensity] | None, search: ObjectSearch) -> DarkVoxels:
-    """Those of which enough views know something: a pixel and its neighbours, which samples mix."""
-    if trust is None or all((sure > 0).all() for sure in trust):
-        return voxels
-    points_mm = voxels.points_mm
-    pixels = [pixels_of(mapping, points_mm).T for mapping in search.mappings]
-    sures = [cv2.erode((sure > 0).astype(np.uint8), np.ones((5, 5), np.uint8)) for sure in trust]
-    known = np.sum([sure[rows, columns] for sure, (columns, rows) in zip(sures, pixels, strict=True)], axis=0)
-    return voxels.where(known >= LEAST_KNOWING)
+def _reach(
+    darkness: Sequence[Intensity],
+    trust: Sequence[Intensity] | None,
+    voxels: DarkVoxels,
+    search: ObjectSearch,
+    threads: int,
+) -> Reach:
+    if search.nozzle is None:
+        return Reach(reason=NO_NOZZLE)
+    pixel_mm = search.plan.grid.pitch_mm / PITCH_PX
+    try:
+        return sharp_reach(darkness, trust, search.mappings, voxels, search.nozzle, pixel_mm=pixel_mm, threads=threads)
+    except ValueError as error:
+        return Reach(reason=str(error))
 
 
 def _connected(voxels: DarkVoxels) -> tuple[DarkVoxels, NDArray[np.int32]]:

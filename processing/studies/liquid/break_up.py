@@ -56,7 +56,7 @@ class BreakUpStudy:
     runs: int = 5
     shots: int = 4
     binning: int = 1
-    seed: int = 601
+    seed: int = 901
     noise: float = 0.012
 
 

@@ -13,6 +13,8 @@ from processing.geometry import FloatArray
 STEEPEST = 0.9995
 """Quantile of the slopes of an image that edges of large shadows have."""
 LEAST_BLUR_PX, MOST_BLUR_PX = 0.4, 4.0
+LEAST_SLOPE = 1e-3
+"""Of an image, where nothing is seen."""
 MOST_CHANGE = 0.15
 """Of the blur in one refinement, relative."""
 MOST_SHIFT_PX = 0.1
@@ -25,15 +27,20 @@ FOCUS_PRIOR = 0.3
 def first_disc_optics(images: Sequence[Image]) -> DiscOptics:
     """Blur by the steepest edges, one for all depths; level by the median of what is not in shadow."""
     variances = np.zeros((len(images), 3))
-    variances[:, 0] = [_edge_blur_px(image) ** 2 for image in images]
+    variances[:, 0] = [edge_blur_px(slopes_of(image)) ** 2 for image in images]
     levels = np.array([np.median(image[image > 0.9 * np.median(image)]) for image in images])
     return DiscOptics(variances, np.zeros((len(images), 2)), levels)
 
 
-def _edge_blur_px(image: Image) -> float:
-    """The slope of the edge of a large disc is ``1 / (sqrt(2 pi) s)``; central differences widen it by 1/3 px^2."""
+def slopes_of(image: Image) -> Image:
+    """How fast an image changes, per pixel, in the direction in which it changes most."""
     along_v, along_u = np.gradient(image)
-    slope = float(np.quantile(np.hypot(along_u, along_v), STEEPEST))
+    return np.asarray(np.hypot(along_u, along_v), dtype=np.float32)
+
+
+def edge_blur_px(slopes: Image) -> float:
+    """Blur by the steepest slopes: that of a large disc is ``1 / (sqrt(2 pi) s)``; differences widen it by 1/3 px^2."""
+    slope = max(float(np.quantile(slopes, STEEPEST)), LEAST_SLOPE)
     return float(np.clip(np.sqrt(max(0.1592 / slope**2 - 1 / 3, 0)), LEAST_BLUR_PX, MOST_BLUR_PX))
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from processing.analysis.objects.break_up import THRESHOLD, THRESHOLDS, Nozzle, Reach, reach_of
+from processing.analysis.objects.break_up import TELLING, THRESHOLD, THRESHOLDS, Nozzle, Reach, reach_of
 from processing.analysis.objects.connected_share import break_up_of, connected_share
 from processing.analysis.objects.dark_voxels import FULL, DarkVoxels
 from processing.volume import VoxelGrid
@@ -80,12 +80,21 @@ def test_shots_that_leave_the_field_count_as_longer() -> None:
 
 
 def test_limits_tell_how_it_depends_on_the_threshold() -> None:
-    depends = Reach(THRESHOLDS, (6.0, 6.0, 5.0, 3.0), (False,) * 4, 0.01)
+    depends = Reach(THRESHOLDS, (6.0, 5.0, 3.0, 2.0), (False,) * 4, 0.01)
     found = break_up_of([depends] * 5)
-    assert found.value_mm == 6.0
+    assert found.value_mm == 5.5
     assert found.low_mm is not None
-    assert found.low_mm < 3.0
-    assert THRESHOLDS[1] == THRESHOLD
+    assert found.high_mm is not None
+    assert 4.5 < found.low_mm < 5.0
+    assert 6.0 < found.high_mm < 6.3
+    assert (THRESHOLDS[:2], THRESHOLDS[1]) == (TELLING, THRESHOLD)
+
+
+def test_shots_count_in_parts_where_thresholds_disagree() -> None:
+    depends = [Reach(THRESHOLDS, (6.0 + shot, 3.0, 2.0, 1.0), (False,) * 4, 0.01) for shot in range(2)]
+    assert break_up_of(depends).value_mm == 4.5
+    share = connected_share(depends, np.array([2.5, 3.5, 6.5, 7.5])).share
+    np.testing.assert_allclose(share, [1, 2 / 4, 1 / 4, 0])
 
 
 def test_shots_of_which_it_is_not_known_are_counted() -> None:
