@@ -27,15 +27,13 @@ async def follow_acquisition(context: Context, duty: Duty) -> None:
 
 
 def follow_recipes(context: Context, run_id: str, shot: int) -> None:
-    """Queue what is made of a recorded shot, if a calibration is known, and it is not a single shot."""
+    """Queue what is made of a recorded shot, if its run has a calibration, and it is not a single shot."""
     if context.unkept_runs.has(run_id):
         return
     summary = context.runs.summary(run_id)
-    calibration = summary.calibration or context.calibrations.current
-    if summary.kind is not RunKind.SAMPLE or calibration is None:
-        return
-    for recipe in summary.recipes or ():
-        _queue(context, run_id, shot, calibration, recipe)
+    if summary.kind is RunKind.SAMPLE and summary.calibration is not None:
+        for recipe in summary.recipes or ():
+            _queue(context, run_id, shot, summary.calibration, recipe)
 
 
 def _queue(context: Context, run_id: str, shot: int, calibration: str, recipe: Recipe) -> None:

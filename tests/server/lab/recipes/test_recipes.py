@@ -57,6 +57,15 @@ def test_where_a_plan_states_that_nothing_is_made_nothing_is(server: Serving) ->
     assert made_of(server, nothing) == {}
 
 
+def test_a_calibration_that_is_chosen_later_makes_nothing_of_a_run_that_began_without(server: Serving) -> None:
+    run_id = server.http.post("/api/runs", json=plan_of(shots=6, rate_hz=4)).headers["location"].rsplit("/", 1)[-1]
+    use_a_calibration(server)
+    server.wait()
+    usual, _ = server.run_to_its_end(plan_of(shots=1))
+    eventually(lambda: bool(made_of(server, usual)), "what came later is queued")
+    assert made_of(server, run_id) == {}
+
+
 @pytest.mark.parametrize(
     ("changes", "text"),
     [
