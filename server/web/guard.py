@@ -149,7 +149,7 @@ class Guard:
 
     def _way_in(self, scope: Scope, headers: Headers) -> str:
         """How somebody without a token gets what he asks for; the light may be ended by everybody, at its own port."""
-        port, known = self._abort_port(), "send a token of the rig file, or sign in with a browser"
+        port, known = self._abort_port(), "set TOMOSHADOW_TOKEN to a token of the rig file, send it, or sign in with a browser"
         if scope["type"] != "http" or not re.fullmatch(_ABORT, scope["path"]) or not port:
             return known
         return f"POST http://{_name_of(headers.get('host', ''))}:{port}/abort, which needs no token; or {known}"

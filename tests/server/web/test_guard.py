@@ -42,7 +42,7 @@ def test_who_has_no_token_is_told_where_everybody_may_end_the_light(guarded: Ser
     refused = guarded.http.post(path)
     assert (refused.status_code, refused.json()["code"]) == (401, "token")
     door = f"http://127.0.0.1:{guarded.abort_listener.port}/abort"
-    assert refused.json()["remedy"].startswith(f"POST {door}, which needs no token; or send a token")
+    assert refused.json()["remedy"].startswith(f"POST {door}, which needs no token; or set TOMOSHADOW_TOKEN")
     assert httpx.post(door, timeout=60).json()["light"] == "off"
     assert "abort" not in guarded.http.post("/api/runs", json={}).json()["remedy"]
 
