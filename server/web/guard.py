@@ -43,6 +43,7 @@ _LOOKING = ("GET", "HEAD", "OPTIONS")
 _ABORT = r"/api/rig/abort|/api/runs/[^/]+/abort"
 _OF_VIEWERS = rf"/api/rig/readiness|{_ABORT}"
 _UNKNOWN = "a token is needed: header 'Authorization: Bearer <token>'"
+_GET_KNOWN = "set TOMOSHADOW_TOKEN to a token of the rig file, send it, or sign in with a browser"
 _SESSION_AGE_S = 30 * 24 * 3600
 """A browser forgets the session then; the server does so long before, unless it is used."""
 
@@ -149,10 +150,10 @@ class Guard:
 
     def _way_in(self, scope: Scope, headers: Headers) -> str:
         """How somebody without a token gets what he asks for; the light may be ended by everybody, at its own port."""
-        port, known = self._abort_port(), "set TOMOSHADOW_TOKEN to a token of the rig file, send it, or sign in with a browser"
+        port = self._abort_port()
         if scope["type"] != "http" or not re.fullmatch(_ABORT, scope["path"]) or not port:
-            return known
-        return f"POST http://{_name_of(headers.get('host', ''))}:{port}/abort, which needs no token; or {known}"
+            return _GET_KNOWN
+        return f"POST http://{_name_of(headers.get('host', ''))}:{port}/abort, which needs no token; or {_GET_KNOWN}"
 
     def _policy(self, host: str) -> str:
         """What a page may connect to: this server and the port of ABORT, and nothing else."""
