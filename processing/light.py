@@ -17,6 +17,8 @@ BRIGHTER_SHARE = 0.003
 """So many pixels are brighter, or darker than nothing: more than glare and hot pixels."""
 LEAST_LIGHT = 0.8
 """Of the background, somewhere: hardly a spray covers all of a view."""
+BRIGHTEST = 0.02
+"""So many pixels are somewhere."""
 SATURATED_SHARE = 0.01
 """So many pixels of a background at full scale: more light than the camera can tell."""
 OPAQUE = 0.6
@@ -148,11 +150,13 @@ def _unlike(lights: tuple[NDArray[np.float32], NDArray[np.float32]]) -> str:
     light, full = (one[lights[1] > NOISE] for one in lights)
     if not full.size:
         return "has a background without light; are background and dark exchanged?"
-    if np.mean(light > GAIN * full + NOISE) > BRIGHTER_SHARE or np.median(light / full) > GAIN:
+    share = light / full
+    if np.mean(light > GAIN * full + NOISE) > BRIGHTER_SHARE or np.mean(share > GAIN) > 1 / 2:
         return (
             "is brighter than its background; is there spray in the background, was it taken with less light, "
             'or are these bright particles (polarity = "bright")?'
         )
-    if (share := np.percentile(light / full, 98)) < LEAST_LIGHT:
-        return f"has at most {100 * share:.0f} % of the light of its background; was that taken with more light?"
+    if np.mean(share >= LEAST_LIGHT) < BRIGHTEST:  # to count is much faster than to sort
+        most = 100 * np.percentile(share, 100 * (1 - BRIGHTEST))
+        return f"has at most {most:.0f} % of the light of its background; was that taken with more light?"
     return ""

@@ -45,9 +45,11 @@ class GrowingLook:
 
     def _see(self, rows: slice, slab: Plane) -> None:
         along_z, along_y, along_x = self._projections
+        highest, above = along_z[rows].view(np.int32), along_y.view(np.int32)
         for z, plane in enumerate(slab):  # one by one: a plane of a slab fits into the cache
-            np.maximum(along_z[rows], plane, out=along_z[rows])
-            np.maximum(along_y[z], plane.max(axis=0), out=along_y[z])
+            bits = np.asarray(plane, np.float32).view(np.int32)  # from 0 on in the order of values, compared faster
+            np.maximum(highest, bits, out=highest)
+            np.maximum(above[z], bits.max(axis=0), out=above[z])
             along_x[z, rows] = cv2.reduce(plane, 1, cv2.REDUCE_MAX)[:, 0]  # twice as fast as numpy
             self._sum_along_z[rows] += plane
             self._sums[z] += cv2.sumElems(plane)[0]

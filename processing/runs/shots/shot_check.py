@@ -21,7 +21,7 @@ ALARM_PX, STOP_PX = LIMITS_PX[Verdict.USABLE], LIMITS_PX[Verdict.WARN]
 
 FEW_SEEDS = 300
 """Droplets of an exposure that are followed at first: a fifth of the work."""
-SURE = 3.0
+SURE = 2.0
 """Standard uncertainties."""
 
 Exposure = list[FloatArray]
