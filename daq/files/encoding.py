@@ -13,6 +13,8 @@ from isal.igzip_lib import IsalError
 from numpy.typing import NDArray
 
 DEFLATE_LEVEL = 1
+_NUMBERS_AT_ONCE = 32768
+"""Of a frame that is put together: so many stay in the cache."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +82,10 @@ def _shuffled(raw: NDArray[np.uint8], itemsize: int) -> NDArray[np.uint8]:
 
 def _unshuffled(planes: NDArray[np.uint8], itemsize: int) -> NDArray[Any]:
     least, *others = planes.reshape(itemsize, -1)
-    numbers = least.astype(f"<u{itemsize}")
-    for place, plane in enumerate(others, start=1):
-        numbers |= plane.astype(numbers.dtype) << numbers.dtype.type(8 * place)
+    numbers = np.empty(least.size, f"<u{itemsize}")
+    for first in range(0, least.size, _NUMBERS_AT_ONCE):
+        some = slice(first, first + _NUMBERS_AT_ONCE)
+        numbers[some] = least[some]
+        for place, plane in enumerate(others, start=1):
+            numbers[some] |= plane[some].astype(numbers.dtype) << numbers.dtype.type(8 * place)
     return numbers
