@@ -234,6 +234,8 @@ def test_a_run_shows_its_shots_and_why_one_is_invalid_and_what_it_waits_for(tab:
     server.http.post("/api/runs", json=plan)
     strip = tab.get_by_role("list", name="shots")
     expect(strip.get_by_role("listitem", name="shot 0: valid")).to_be_visible()
+    first = tab.get_by_role("group", name="newest shots").get_by_role("img", name="shot 0")
+    expect(first).to_have_js_property("naturalWidth", 128)
     expect(tab.get_by_label("run progress")).to_have_attribute("aria-valuenow", re.compile(r"^0\.0\d"))
     invalid = strip.get_by_role("listitem", name=re.compile("^shot 1: INVALID"))
     expect(invalid).to_have_attribute("aria-label", "shot 1: INVALID, no exposure B of view2")

@@ -1,4 +1,4 @@
-"""A small picture of a run: exposure A of its first shot, by the first of its views."""
+"""A small picture of a shot: exposure A, by the first of the views that have it."""
 
 from functools import lru_cache
 from pathlib import Path
@@ -14,17 +14,18 @@ _KEPT = 1000
 """Some 3 kB each."""
 
 
-def thumbnail_of(run_dir: Path) -> bytes:
-    """JPEG; NotFound if the first shot is not there, or cannot be read."""
+def thumbnail_of(run_dir: Path, index: int = 0) -> bytes:
+    """JPEG of a shot of a run; NotFound if it is not there, cannot be read, or has no exposure A."""
     try:
-        return _of(run_dir, shot_path(run_dir, 0).stat().st_ctime_ns)
+        return _of(run_dir, index, shot_path(run_dir, index).stat().st_ctime_ns)
     except (OSError, ShotFileError) as error:
-        raise NotFound(f"run {run_dir.name} has no picture: its first shot cannot be read") from error
+        raise NotFound(f"run {run_dir.name} has no picture: shot {index} cannot be read") from error
 
 
 @lru_cache(_KEPT)
-def _of(run_dir: Path, _changed_ns: int) -> bytes:
+def _of(run_dir: Path, index: int, _changed_ns: int) -> bytes:
     run = RunReader(run_dir)
-    views = run.read_shot(0).views.items()
-    view, image = next((view, frames.frame_a) for view, frames in views if frames.frame_a is not None)
-    return preview_jpeg(image, run.header.views[view].bits, Stretch.FULL, _WIDTH_PX)
+    for view, frames in run.read_shot(index).views.items():
+        if frames.record_a.valid:
+            return preview_jpeg(frames.frame_a, run.header.views[view].bits, Stretch.FULL, _WIDTH_PX)
+    raise NotFound(f"run {run_dir.name}, shot {index}: no view has exposure A")

@@ -73,9 +73,13 @@ def show_header(run_id: RunId, context: ContextOf) -> RunHeader:
     response_class=Response,
     responses={**responses(404), 200: {"content": {"image/jpeg": {}}}},
 )
-def show_thumbnail(run_id: RunId, context: ContextOf) -> Response:
-    """A small picture: exposure A of the first shot, by the first view."""
-    return Response(thumbnail_of(context.runs.directory(run_id)), media_type="image/jpeg")
+def show_thumbnail(
+    run_id: RunId,
+    context: ContextOf,
+    shot: Annotated[int, Query(ge=0, lt=10**9, description="of the run, from 0")] = 0,
+) -> Response:
+    """A small picture: exposure A of a shot, by the first view that has it."""
+    return Response(thumbnail_of(context.runs.directory(run_id), shot), media_type="image/jpeg")
 
 
 @router.delete("/{run_id}", responses=responses(404, 409, 423, 507))

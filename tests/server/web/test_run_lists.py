@@ -31,13 +31,16 @@ def test_a_list_of_runs_can_be_filtered_and_turned_page_by_page(server: Serving)
     assert server.http.get(f"/api/runs/{dark}").json()["references"] == []
 
 
-def test_a_run_has_a_small_picture_of_its_first_shot(server: Serving) -> None:
-    run_id, _ = server.run_to_its_end(plan_of(kind="dark", shots=1))
+def test_a_run_has_a_small_picture_of_its_first_shot_and_of_every_other(server: Serving) -> None:
+    run_id, _ = server.run_to_its_end(plan_of(kind="dark", shots=2))
     answer = server.http.get(f"/api/runs/{run_id}/thumbnail.jpg")
     assert answer.headers["content-type"] == "image/jpeg"
     pixels = cv2.imdecode(np.frombuffer(answer.content, np.uint8), cv2.IMREAD_GRAYSCALE)
     assert pixels is not None
     assert pixels.shape[1] <= 128
+    shot = server.http.get(f"/api/runs/{run_id}/thumbnail.jpg", params={"shot": 1})
+    assert shot.headers["content-type"] == "image/jpeg"
+    assert "shot 2" in server.http.get(f"/api/runs/{run_id}/thumbnail.jpg", params={"shot": 2}).json()["detail"]
     (server.services.data_dir / run_id / "shots" / "0.h5").unlink()
     assert server.http.get(f"/api/runs/{run_id}/thumbnail.jpg").status_code == 404
 

@@ -1,8 +1,9 @@
-"""ShotStrip: the shots of the run under way, one mark each, and why some of them are invalid."""
+"""ShotStrip: the shots of the run under way, one mark each, the newest as pictures, and why some are invalid."""
 
 from nicegui import ui
 
 from server.lab.events import Event, EventPublisher
+from server.web.ui.run.shot_pictures import ShotPictures
 
 _SHOWN = 150
 _CAUSES = 4
@@ -17,17 +18,24 @@ class ShotStrip:
         self._run_id: str | None = None
         self._causes: list[str] = []
         self._strip = ui.element("ul").classes("shot-strip").props("role=list aria-label=shots")
+        self._pictures = ShotPictures()
         self._invalid = ui.label("").classes("refusal").props('role=status aria-label="invalid shots"')
 
     def refresh(self, run_id: str | None) -> None:
         """Show the shots of a run that have come since."""
         if run_id != self._run_id:
             self._begin(run_id)
+        self._take_new(run_id)
+        self._pictures.refresh()
+
+    def _take_new(self, run_id: str | None) -> None:
         new = self._events.since(self._seen)
         if not new:
             return
         self._seen = new[-1].id
         shots = [one for one in new if one.name == "shot_recorded" and one.data["run_id"] == run_id]
+        if shots:
+            self._pictures.offer(shots[-1])
         with self._strip:
             for shot in shots[-_SHOWN:]:
                 self._add(shot)
@@ -39,6 +47,7 @@ class ShotStrip:
         self._run_id, self._seen = run_id, 0
         self._causes.clear()
         self._strip.clear()
+        self._pictures.begin()
         self._invalid.set_text("")
 
     def _add(self, shot: Event) -> None:
