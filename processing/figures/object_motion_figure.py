@@ -7,7 +7,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from processing.analysis.objects.liquid_objects import ObjectClass
 from processing.figures.object_figures import CLASS_COLOURS
+from processing.figures.spacing import rounded_down
 from processing.geometry import FloatArray
 
 
@@ -57,32 +59,34 @@ def object_motion_figure(shown: MovedObjects, every: MovedObjects) -> Figure:
     """Velocities of the objects of one exposure, seen along z, and speed against length of those of all."""
     figure = Figure(figsize=(9.5, 4.4), layout="constrained")
     place_axes, speed_axes = figure.subplots(1, 2)
-    for kind, colour in CLASS_COLOURS.items():
-        _draw_arrows(place_axes, shown.where(shown.classes == kind), colour)
-        _draw_speeds(speed_axes, every.where(every.classes == kind), kind, colour)
+    if len(shown):
+        _draw_arrows(place_axes, shown)
     place_axes.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
     place_axes.margins(0.15)
     place_axes.invert_yaxis()
-    place_axes.set_title("one exposure; the longest arrow is the fastest", fontsize="small")
+    place_axes.set_title("one exposure", fontsize="small", loc="left")
+    for kind, colour in CLASS_COLOURS.items():
+        _draw_speeds(speed_axes, every.where(every.classes == kind), kind, colour)
     speed_axes.set(xlabel="length [mm]", ylabel="speed [m/s]")
-    speed_axes.set_title("all exposures; bars are 95 % intervals", fontsize="small")
-    speed_axes.legend(fontsize="small")
+    speed_axes.set_title("all exposures; bars are 95 % intervals", fontsize="small", loc="left")
+    figure.legend(loc="outside lower center", ncols=len(CLASS_COLOURS), fontsize="small")
     for axes in (place_axes, speed_axes):
         axes.grid(alpha=0.25)
     return figure
 
 
-def _draw_arrows(axes: Axes, moved: MovedObjects, colour: str) -> None:
-    if not len(moved):
-        return
+def _draw_arrows(axes: Axes, moved: MovedObjects) -> None:
+    """All of one scale, in the colours of the classes."""
     (x_mm, y_mm, _), (u, v, _) = moved.points_mm.T, moved.velocities_m_s.T
-    axes.plot(x_mm, y_mm, ".", color=colour, markersize=4)
-    axes.quiver(x_mm, y_mm, u, v, color=colour, angles="xy", width=0.004)
+    colours = [CLASS_COLOURS[ObjectClass(kind)] for kind in moved.classes]
+    axes.scatter(x_mm, y_mm, s=6, c=colours)
+    arrows = axes.quiver(x_mm, y_mm, u, v, color=colours, angles="xy", width=0.004)
+    key_m_s = rounded_down(float(moved.speeds_m_s.max()))
+    axes.quiverkey(arrows, 0.8, 1.04, key_m_s, f"{key_m_s:g} m/s", labelpos="E", fontproperties={"size": "small"})
 
 
 def _draw_speeds(axes: Axes, moved: MovedObjects, kind: str, colour: str) -> None:
     if not len(moved):
         return
-    half = 1.96 * moved.speed_sd_m_s
-    name = f"{kind}s ({len(moved)})"
+    half, name = 1.96 * moved.speed_sd_m_s, f"{kind}s ({len(moved)})"
     axes.errorbar(moved.lengths_mm, moved.speeds_m_s, half, fmt="o", markersize=4, color=colour, label=name)

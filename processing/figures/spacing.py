@@ -6,6 +6,7 @@ The labels of such figures are known. The layout engine of matplotlib, which mea
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -45,3 +46,9 @@ def spaced_panels(figure: Figure, rows: int, columns: int, room: Room) -> NDArra
     }
     panels: NDArray[Any] = figure.subplots(rows, columns, squeeze=False, gridspec_kw=arrangement)
     return panels
+
+
+def rounded_down(value: float) -> float:
+    """The largest of 1, 2, 5 times a power of ten below a value: for the key of a scale."""
+    power = 10.0 ** np.floor(np.log10(max(value, 1e-9)))
+    return float(max(step for step in (power, 2 * power, 5 * power) if step <= value * (1 + 1e-9)))

@@ -17,7 +17,7 @@ PLACES_MM = 0.15
 """From place to place of a map."""
 JUDGING = 3
 """So many views must see a droplet before it is believed."""
-MOST_CELLS = 40
+MOST_CELLS = 64
 """Of a map that is kept, along an axis."""
 
 

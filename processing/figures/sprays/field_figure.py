@@ -5,6 +5,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from processing.analysis.spray.velocity_field import VelocityField
+from processing.figures.spacing import rounded_down
 from processing.geometry import FloatArray
 
 PANEL_IN, HEIGHT_IN = 4.75, 4.2
@@ -53,13 +54,7 @@ def _draw(axes: Axes, field: VelocityField, colours: FloatArray, label: str, cma
         pivot="mid",
         width=0.006,
     )
-    key_m_s = _round(longest_m_s)
+    key_m_s = rounded_down(longest_m_s)
     axes.quiverkey(arrows, 0.8, 1.04, key_m_s, f"{key_m_s:g} m/s", labelpos="E", fontproperties={"size": "small"})
     axes.set(xlabel=f"{field.across} from the axis [mm]", aspect="equal")
     axes.set_title(f"slice of {field.thickness_mm:.2g} mm", fontsize="small", loc="left")
-
-
-def _round(value: float) -> float:
-    """The largest of 1, 2, 5 times a power of ten below it."""
-    power = 10.0 ** np.floor(np.log10(max(value, 1e-9)))
-    return float(max(step for step in (power, 2 * power, 5 * power) if step <= value * (1 + 1e-9)))

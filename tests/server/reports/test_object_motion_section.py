@@ -28,7 +28,7 @@ def test_velocities_are_told_with_their_deviations_and_reasons_counted() -> None
     assert list(section.points) == ["2 without a velocity: too far"]
     (picture,) = section.pictures
     places, speeds = picture.figure.axes
-    assert len(places.collections) == 1
+    assert len(places.collections) == 2
     assert len(speeds.containers) == 1
 
 

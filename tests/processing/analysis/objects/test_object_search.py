@@ -94,10 +94,10 @@ def test_a_map_of_many_places_is_kept_coarser_and_means_the_same() -> None:
     seeing = np.full(places.shape, 4, np.uint8)
     seeing[0, :, :45] = 2
     unseen = UnseenMap.of(seeing, places)
-    assert unseen.percent.shape == (17, 30)
+    assert unseen.percent.shape == (25, 45)
     assert unseen.x_mm == pytest.approx((-0.05, 8.95))
-    np.testing.assert_array_equal(unseen.percent[:, :15], 50)
-    np.testing.assert_array_equal(unseen.percent[:, 15:], 0)
+    np.testing.assert_array_equal(unseen.percent[:, :22], 50)
+    np.testing.assert_array_equal(unseen.percent[:, 23:], 0)
     again = UnseenMap.mean_of([unseen.told(), UnseenMap.of(np.full_like(seeing, 4), places).told()])
     np.testing.assert_array_equal(again.percent, unseen.percent / 2)
     np.testing.assert_array_equal(UnseenMap.of(np.full_like(seeing, 2), places, views=2).percent, 0)
