@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "measured.md"
 STUDIES = (
     *("density", "ghosts", "average", "residuals", "calibration", "sensitivity"),
-    *("droplets", "sizes", "reality", "velocity", "tracks", "breakup", "statistics"),
+    *("droplets", "sizes", "reality", "persistence", "velocity", "tracks", "breakup", "statistics"),
 )
 
 

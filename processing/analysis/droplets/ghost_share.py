@@ -44,7 +44,7 @@ def told_share(p_real: FloatArray, sized: bool, exposures_per_shot: float = 1) -
     if not sized and share.value > MOST_BRIGHT:
         return (
             f"{100 * share.value:.1f} % are expected: of bright particles a share above {100 * MOST_BRIGHT:g} % is not "
-            "told, as 0.3 to 1.3 times as many were ghosts; twins are a witness (--twins)"
+            "told, as 0.3 to 1.3 times as many were ghosts; witnesses are twins (--twins) and unpaired_ghost_share"
         )
     return share
 
