@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 from server.cli.options import Verbs, count, positive, seed, usable_processors
-from server.cli.studies.study_command import add_study, collected, passing, report
+from server.cli.studies.study_command import add_study, collected, passing, report, seeds_of
 
 VARIED = {
     "density": "density_per_mm3",
@@ -13,6 +13,7 @@ VARIED = {
     "noise": "noise_percent",
     "calibration_error": "calibration_error_px",
     "condenser_ratio": "condenser_ratio",
+    "aperture_ratio": "aperture_ratio",
 }
 """Options, and what they change of a case."""
 
@@ -27,7 +28,14 @@ def add_sizes(studies: Verbs) -> None:
     parser.add_argument("--noise", type=positive, metavar="PERCENT", help="of the background")
     parser.add_argument("--calibration-error", type=positive, metavar="PX", help="of every view")
     parser.add_argument("--condenser-ratio", type=_ratio, metavar="RATIO", help="aperture of the light over the lens's")
+    blurred = "so many times the blur of the paper's lenses, by a smaller aperture"
+    parser.add_argument("--blur", type=_aperture, dest="aperture_ratio", metavar="FACTOR", help=blurred)
     parser.add_argument("--twins", type=seed, default=0, help="simulated twins per shot that tell ghosts")
+
+
+def _aperture(text: str) -> float:
+    """That of the lenses over the paper's, for so many times the blur."""
+    return 1 / positive(text)
 
 
 def _ratio(text: str) -> float:
@@ -53,7 +61,7 @@ def sizes(options: Namespace) -> dict[str, Any]:
         size_study,
     )
 
-    study = SizeStudy(seeds=tuple(range(options.seed, options.seed + options.repeats)), twins=options.twins)
+    study = SizeStudy(seeds=seeds_of(options), twins=options.twins)
     stated = {field: value for name, field in VARIED.items() if (value := getattr(options, name)) is not None}
     if stated:
         case = SizeCase(**stated)

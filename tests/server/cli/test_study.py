@@ -10,6 +10,7 @@ import pytest
 from processing.studies.calibration_errors import calibration_study
 from processing.studies.density import DensityStudy
 from processing.studies.recipe import PAPER_ITERATIONS
+from processing.studies.shadows.sizes import SizeStudy
 from server.cli.main import main
 
 
@@ -90,6 +91,17 @@ def test_the_density_study_states_widths_windows_and_subtraction(
     assert methods == ["mlos", "minlos", "gavlos", "smart-5", "smart-10", "smart", "mart-5"]
     assert 0 < result["seconds"]["cpu"] < 60
     assert "mean-subtracted in windows of 64^3 voxel at steps of 32" in progress
+
+
+def test_the_study_of_sizes_blurs_as_much_as_is_asked(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    small = partial(SizeStudy, shape=(40, 24, 40), image_size_px=(120, 90), margin_voxel=5)
+    monkeypatch.setattr("processing.studies.shadows.sizes.SizeStudy", small)
+    stated = ["--blur", "2", "--density", "20", "--repeats", "1"]
+    assert main(["study", "sizes", *stated, "-o", str(tmp_path), "--json"]) == 0
+    (row,) = json.loads(capsys.readouterr().out.splitlines()[-1])["rows"]
+    assert row["case"] == "20/mm³, 40 um, noise 1.2 %, aperture x 0.5"
 
 
 @pytest.mark.parametrize(("drift_px", "status", "said"), [(2.0, 0, "PASSED"), (40.0, 1, "FAILED")])
