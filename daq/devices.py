@@ -61,6 +61,10 @@ class Camera(Device, Protocol):
     def is_lost(self) -> bool:
         """The camera no longer answers, as far as is known; asking costs nothing and may come from any thread."""
 
+    @property
+    def has_half(self) -> bool:
+        """One exposure of the firing has come, the other one has not; costs nothing and may come from any thread."""
+
     def ask(self) -> None:
         """A sign of life within a second, from any thread and also in a run; DeviceError if there is none."""
 

@@ -125,6 +125,12 @@ class AravisCamera:
         return self._is_open and (device is None or device.is_lost)
 
     @property
+    def has_half(self) -> bool:
+        """One image of the two of a firing has come; which one it is, the other one proves."""
+        receiver = self._receiver
+        return receiver is not None and 0 < receiver.arrived < self._form.arrivals
+
+    @property
     def counters(self) -> StreamCounters:
         """What the stream has done since the camera was armed."""
         receiver = self._receiver

@@ -100,6 +100,11 @@ class FrameReceiver:
             return arrivals
 
     @property
+    def arrived(self) -> int:
+        """How many frames of the firing wait to be taken."""
+        return len(self._arrivals)
+
+    @property
     def counters(self) -> StreamCounters:
         """Counters since arming."""
         return self._counters

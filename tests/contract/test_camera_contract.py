@@ -21,6 +21,7 @@ from daq.shot import DoubleFrame, FiredTrain, Image, LightPulse
 from daq.simulation.camera.gige_camera import SimulatedCamera
 from daq.simulation.camera.light import Exposure
 from tests.support.memory_devices import MemoryCamera
+from tests.support.server_process import eventually
 
 pytestmark = pytest.mark.network
 
@@ -166,6 +167,20 @@ def test_a_missing_exposure_keeps_its_slot(stand: CameraStand) -> None:
     assert shot.frame_b is not None
     assert shot.frame_b.shape == SHAPE
     assert not shot.frame_b.any()
+
+
+def test_it_is_known_that_one_of_two_images_has_come() -> None:
+    with driven() as stand:
+        stand.camera.arm()
+        stand.lose_exposure_b_of(1)
+        stand.camera.begin_shot()
+        assert not stand.camera.has_half
+        stand.fire()
+        eventually(lambda: stand.camera.has_half, "the first one comes")
+        assert not stand.camera.collect(0.1).valid
+        assert not stand.camera.has_half
+        assert stand.shoot()[1].valid
+        assert not stand.camera.has_half
 
 
 def test_collects_until_the_deadline_and_no_longer(stand: CameraStand) -> None:

@@ -66,7 +66,7 @@ class MemoryCamera(MemoryDevice):
         self.timing = timing
         self.image_shape = view_format.shape
         self.bits = view_format.bits
-        self.is_lost = False
+        self.is_lost = self.has_half = False
         self.lost: set[int] = set()
         self.broken_at: int | None = None
         self.frozen: threading.Event | None = None

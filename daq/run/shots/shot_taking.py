@@ -176,8 +176,13 @@ class ShotTaker:
         return collecting.answers
 
     def _tell_missing(self, index: int, collecting: SideBySide[DoubleFrame]) -> None:
-        missing = [view for view in self._rig.cameras if view not in collecting.answers]
-        self._wait_for(f"{', '.join(missing)}: exposures A and B of shot {index}")
+        missing = {view: camera for view, camera in self._rig.cameras.items() if view not in collecting.answers}
+        half = [view for view, camera in missing.items() if camera.has_half]
+        whole = [view for view in missing if view not in half]
+        told = ((whole, "exposures A and B"), (half, "the second exposure"))
+        parts = [f"{', '.join(views)}: {what}" for views, what in told if views]
+        if parts:
+            self._wait_for(f"{'; '.join(parts)} of shot {index}")
 
     def _frames_of(self, camera: Camera) -> DoubleFrame:
         return camera.collect(self._frame_deadline_s)

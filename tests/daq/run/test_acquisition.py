@@ -426,6 +426,8 @@ def test_what_a_run_waits_for_is_told(lab: Laboratory, frozen: threading.Event) 
     waiting = await_waiting(lab, "view1: ")
     assert waiting.text == "view1: exposures A and B of shot 0"
     assert 0 <= time.monotonic() - waiting.since_s < DEADLINE_S
+    lab.memory.cameras["view1"].has_half = True
+    assert await_waiting(lab, "second").text == "view1: the second exposure of shot 0"
     lab.acquisition.abort()
     frozen.set()
     assert lab.acquisition.wait(DEADLINE_S).waiting is None
