@@ -63,14 +63,7 @@ class AravisCamera:
         How its images are sent, and what may wait for them.
     """
 
-    def __init__(
-        self,
-        name: str,
-        ip: str,
-        profile: CameraProfile,
-        shape: tuple[int, int],
-        network: Network,
-    ) -> None:
+    def __init__(self, name: str, ip: str, profile: CameraProfile, shape: tuple[int, int], network: Network) -> None:
         self._name = name
         self._ip = ip
         self._profile = profile
