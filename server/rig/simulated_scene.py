@@ -73,9 +73,8 @@ class SimulatedScene:
     def _render(self, exposure: Exposure, pulses: Sequence[Pulse]) -> Image:
         which = (exposure.view, exposure.frame, len(pulses))
         if which not in self._still:
-            image = self._scene.render(
-                exposure.view, exposure.sequence, exposure.frame, pulses, exposure.shape, exposure.bits
-            )
+            sequence = self._shown(exposure.sequence)
+            image = self._scene.render(exposure.view, sequence, exposure.frame, pulses, exposure.shape, exposure.bits)
             if not self._keeps:
                 return image
             self._still[which] = image
@@ -89,7 +88,11 @@ class SimulatedScene:
     def liquid(self, train: FiredTrain) -> FiredSpray:
         """What the nozzle gives, where it is open, at the middle of the first light pulse of a firing."""
         time_ns = _first_light_ns(train)
-        return FiredSpray(time_ns, self._scene.truth(train.sequence, time_ns))
+        return FiredSpray(time_ns, self._scene.truth(self._shown(train.sequence), time_ns))
+
+    def _shown(self, sequence: int) -> int:
+        """The firing whose liquid is seen at that one: where nothing moves, always the same."""
+        return 1 if self._keeps else sequence
 
 
 def true_cameras(config: RigConfig, seed: int) -> dict[str, PinholeCamera]:

@@ -1,6 +1,7 @@
 """The views of a simulated rig are imperfect in a known way, and the truth of them is kept."""
 
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -75,6 +76,17 @@ def test_without_light_it_is_dark_and_twice_the_light_is_twice_as_bright(small: 
     none, one, two = (float(np.median(scene.expose(exposure(pulses=count)))) for count in range(3))
     assert none < 8
     assert two - none == pytest.approx(2 * (one - none), rel=0.1) or two == 255
+
+
+def test_where_nothing_moves_the_truth_is_what_every_shot_shows(small: RigConfig) -> None:
+    assert small.simulation is not None
+    still = small.model_copy(update={"simulation": small.simulation.model_copy(update={"still": True})})
+    scene = SimulatedScene(still, lambda: 0.0)
+    scene.prepare(RunKind.SAMPLE)
+    seen = [scene.expose(replace(exposure(), sequence=sequence)) for sequence in (3, 8)]
+    true = [scene.liquid(FiredTrain(sequence)).spray for sequence in (3, 8)]
+    np.testing.assert_array_equal(*seen)
+    np.testing.assert_array_equal(*(spray.positions_mm for spray in true))
 
 
 def plan(small: RigConfig, kind: RunKind) -> RunPlan:
