@@ -83,10 +83,10 @@ def test_where_nothing_moves_the_truth_is_what_every_shot_shows(small: RigConfig
     still = small.model_copy(update={"simulation": small.simulation.model_copy(update={"still": True})})
     scene = SimulatedScene(still, lambda: 0.0)
     scene.prepare(RunKind.SAMPLE)
-    seen = [scene.expose(replace(exposure(), sequence=sequence)) for sequence in (3, 8)]
-    true = [scene.liquid(FiredTrain(sequence)).spray for sequence in (3, 8)]
-    np.testing.assert_array_equal(*seen)
-    np.testing.assert_array_equal(*(spray.positions_mm for spray in true))
+    first, later = (scene.expose(replace(exposure(), sequence=sequence)) for sequence in (3, 8))
+    np.testing.assert_array_equal(later, first)
+    true, still_true = (scene.liquid(FiredTrain(sequence)).spray.positions_mm for sequence in (3, 8))
+    np.testing.assert_array_equal(still_true, true)
 
 
 def plan(small: RigConfig, kind: RunKind) -> RunPlan:
