@@ -167,6 +167,21 @@ def test_it_is_vtk_image_data(tmp_path: Path) -> None:
         assert file["VTKHDF/PointData/intensity"].compression == "gzip"
 
 
+@pytest.mark.parametrize("voxels", list(VoxelType))
+def test_vtk_reads_a_volume(tmp_path: Path, voxels: VoxelType) -> None:
+    reader = pytest.importorskip("vtkmodules.vtkIOHDF", reason="vtk is not installed").vtkHDFReader()
+    numpy_support = pytest.importorskip("vtkmodules.util.numpy_support")
+    volume = (some_volume(TALL) * 255 if voxels is VoxelType.UINT8 else some_volume(TALL)).astype(voxels.value)
+    write_slabs(tmp_path / "one.vtkhdf", SlabVolume.of(volume), TALL, {})
+    reader.SetFileName(str(tmp_path / "one.vtkhdf"))
+    reader.Update()
+    image = reader.GetOutput()
+    assert (image.GetDimensions(), image.GetOrigin()) == (TALL.shape[::-1], TALL.origin_mm)
+    assert image.GetSpacing() == (TALL.pitch_mm,) * 3
+    seen = numpy_support.vtk_to_numpy(image.GetPointData().GetArray("intensity")).reshape(TALL.shape)
+    np.testing.assert_array_equal(seen, volume)
+
+
 def test_a_failed_write_leaves_the_old_file_and_nothing_else(tmp_path: Path) -> None:
     path = tmp_path / "one.vtkhdf"
     write_volume(path, some_volume(), GRID, {})
