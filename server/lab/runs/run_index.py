@@ -6,6 +6,7 @@ It is a cache. The directories are the truth; an index that is lost or damaged i
 import sqlite3
 import threading
 import weakref
+from collections.abc import Mapping
 from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -70,6 +71,19 @@ class RunIndex:
         except (sqlite3.Error, ValidationError):
             return None  # damaged, or of an older program: read again
 
+    def summaries(self, stamps: Mapping[str, str]) -> dict[str, RunSummary]:
+        """Those that are known of many runs at once, by name; a run whose files have changed is not among them."""
+        try:
+            with self._lock:
+                rows = self._database.execute("SELECT run_id, stamp, summary FROM run").fetchall()
+            return {
+                run_id: RunSummary.model_validate_json(summary)
+                for run_id, stamp, summary in rows
+                if stamps.get(run_id) == stamp
+            }
+        except (sqlite3.Error, ValidationError):
+            return {}  # each is read by itself
+
     def keep(self, run_id: str, stamp: str, run: IndexedRun) -> None:
         """Remember a run, if the disk takes it; what was known of it is replaced."""
         row = (run_id, stamp, run.summary.model_dump_json(), run.image_keys.astype(np.int8).tobytes())
@@ -106,6 +120,7 @@ def _opened(path: Path) -> sqlite3.Connection:
 def _with_table(path: Path | str) -> sqlite3.Connection:
     database = sqlite3.connect(path, check_same_thread=False)
     try:
+        database.execute("PRAGMA synchronous = OFF")  # what a power cut damages is read again, which costs less
         if database.execute("PRAGMA user_version").fetchone()[0] != _VERSION:
             database.execute("DROP TABLE IF EXISTS run")
         database.execute(

@@ -121,7 +121,7 @@ class RunStore:
         """
         directories = self._by_age()
         if not wanted.takes_all:
-            directories = [path for path in directories if self._is_wanted(path, wanted)]
+            directories = self._wanted(directories, wanted)
         return [self._summary_of(path) for path in directories[offset : offset + limit]], len(directories)
 
     def newest_that(self, is_wanted: Callable[[RunSummary], bool], limit: int) -> list[RunSummary]:
@@ -148,10 +148,17 @@ class RunStore:
         self._removed.add(run_id)
         self._index.forget(run_id)
 
-    def _is_wanted(self, run_dir: Path, wanted: RunFilter) -> bool:
-        if wanted.results not in (None, has_results(run_dir)):
-            return False
-        return wanted.accepts(self._summary_of(run_dir))
+    def _wanted(self, directories: list[Path], wanted: RunFilter) -> list[Path]:
+        if wanted.results is not None:
+            directories = [path for path in directories if has_results(path) == wanted.results]
+        status = self._status()
+        stamps = {path.name: _stamp(path) for path in directories if not self._is_active(path)}
+        known = self._index.summaries(stamps)
+
+        def summary_of_one(path: Path) -> RunSummary:
+            return _closed(known[path.name], status) if path.name in known else self._summary_of(path)
+
+        return [path for path in directories if wanted.accepts(summary_of_one(path))]
 
     def _by_age(self) -> list[Path]:
         """All run directories, the newest first.

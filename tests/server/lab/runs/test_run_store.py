@@ -24,6 +24,7 @@ from daq.files.run_directory import (
 from daq.run.events import RunStatus
 from daq.run.state import RunState
 from server.lab.errors import NotFound
+from server.lab.runs.run_filter import ListedOutcome, RunFilter
 from server.lab.runs.run_index import RunIndex
 from server.lab.runs.run_store import RunStore
 from server.lab.runs.run_summary import ACTIVE, DAMAGED
@@ -88,6 +89,17 @@ def test_a_run_that_has_not_changed_is_not_opened_by_another_server_either(run_d
     assert second.image_keys(run_dir.name).tolist() == list(KEYS)
     spoil(run_dir / "run.h5", noticed=True)
     assert [run.outcome for run in second.newest()] == [DAMAGED]
+
+
+def test_who_filters_a_list_opens_only_the_runs_that_have_changed(run_dir: Path, tmp_path: Path) -> None:
+    other = write_run(run_dir.with_name("20260301T120001-other"), BEGIN + timedelta(seconds=1))
+    store = RunStore(run_dir.parent, RunStatus, RunIndex(tmp_path / "runs.sqlite"))
+    completed, damaged = RunFilter(outcome=ListedOutcome.COMPLETED), RunFilter(outcome=ListedOutcome.DAMAGED)
+    assert store.page(9, 0, completed)[1] == 2
+    spoil(run_dir / "run.h5", noticed=False)
+    spoil(other / "run.h5", noticed=True)
+    assert [run.run_id for run in store.page(9, 0, completed)[0]] == [run_dir.name]
+    assert [run.run_id for run in store.page(9, 0, damaged)[0]] == [other.name]
 
 
 def test_a_shot_that_was_lost_is_told(run_dir: Path) -> None:
