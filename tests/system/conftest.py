@@ -6,6 +6,8 @@ import pytest
 from playwright.sync_api import Browser, ConsoleMessage, Page
 
 from server.cli.benchmarks.chromium import NoBrowser, chromium
+from tests.support.desk import laboratory
+from tests.support.serving import Serving
 
 
 @pytest.fixture(scope="module")
@@ -32,3 +34,14 @@ def page(browser: Browser) -> Iterator[Page]:
     yield page
     context.close()
     assert complaints == []
+
+
+@pytest.fixture
+def at_rest(server: Serving) -> Iterator[None]:
+    """Every test leaves a rig behind that nobody holds, on which nothing is wrong."""
+    yield
+    laboratory(server).close_door()
+    server.http.post("/api/rig/abort")
+    server.wait()
+    server.http.post("/api/rig/acknowledge")
+    server.free_control()

@@ -1,11 +1,8 @@
 """What is always in sight: a page that never lies, whatever happens to network and rig; headless Chromium."""
 
-import os
 import re
 import threading
 from collections.abc import Iterator
-from pathlib import Path
-from typing import Any
 
 import pytest
 from nicegui import app as pages
@@ -13,14 +10,13 @@ from playwright.sync_api import Browser, Locator, Page, Route, expect
 
 from server.web.app import create_app
 from tests.support.cut_link import CutLink, cut_link
+from tests.support.desk import PULSE, laboratory, picture, start
 from tests.support.operator import VIEWS, go_to, open_drawer
 from tests.support.server_process import eventually
 from tests.support.serving import Serving, plan_of, serving
 
-pytestmark = pytest.mark.timeout(900)
+pytestmark = [pytest.mark.timeout(900), pytest.mark.usefixtures("at_rest")]
 
-PICTURES = os.environ.get("TOMOSHADOW_PICTURES")
-PULSE = {"current_a": dict.fromkeys(VIEWS, 5)}
 AWAY_S = 3.0
 """Longer than a request may be on its way."""
 
@@ -53,21 +49,6 @@ def tab(browser: Browser, link: CutLink) -> Iterator[Page]:
     context.close()
 
 
-@pytest.fixture(autouse=True)
-def at_rest(server: Serving) -> Iterator[None]:
-    """Every test leaves a rig behind on which nothing is wrong."""
-    yield
-    laboratory(server).close_door()
-    server.http.post("/api/rig/abort")
-    server.wait()
-    server.http.post("/api/rig/acknowledge")
-    server.free_control()
-
-
-def laboratory(server: Serving) -> Any:
-    return server.services.laboratory
-
-
 def rig_state(page: Page) -> Locator:
     return page.get_by_role("status", name="rig state").locator(".rig-known")
 
@@ -83,11 +64,6 @@ def press(page: Page, name: str) -> None:
 
 def answer(page: Page) -> Locator:
     return page.get_by_role("alert", name="abort answer")
-
-
-def start(server: Serving, **changes: Any) -> None:
-    plan = plan_of(pulse=PULSE, **{"kind": "dark", "shots": 1000, "rate_hz": 5.0, **changes})
-    assert server.http.post("/api/runs", json=plan).status_code == 201
 
 
 @pytest.mark.parametrize("button", ["Start run", "Live", "Shoot one"])
@@ -192,7 +168,7 @@ def test_alarms_are_acknowledged_one_by_one(page: Page, server: Serving) -> None
     laboratory(server).generator.trip("overcurrent")
     alarms = page.get_by_role("region", name="alarms")
     expect(alarms.locator(".alarm.stop")).to_have_count(2)
-    _picture(page, "alarms")
+    picture(page, "alarms")
     alarms.get_by_role("button", name=re.compile("^Acknowledge view2")).click()
     expect(alarms.locator(".alarm.seen")).to_have_text(re.compile("view2"))
     expect(alarms.locator(".alarm.stop")).to_have_text(re.compile("pulse generator.*look for its reason"))
@@ -214,7 +190,7 @@ def test_the_bar_is_in_sight_at_every_width_dark_and_light(page: Page, server: S
     else:
         expect(page.get_by_role("status", name=re.compile("^view1: ok"))).to_be_visible()
     for shade in ("dark", "light"):
-        _picture(page, f"bar-{width}-{shade}")
+        picture(page, f"bar-{width}-{shade}")
         page.get_by_role("button", name="dark or light").click()
     laboratory(server).open_door()
     laboratory(server).generator.trip("overcurrent")
@@ -228,7 +204,7 @@ def test_the_bar_is_in_sight_at_every_width_dark_and_light(page: Page, server: S
     expect(page.get_by_text("SIMULATED")).to_be_in_viewport(ratio=1)
     expect(page.get_by_role("status", name="current calibration")).to_have_text(re.compile(r"^paper, \d+ (s|min) old$"))
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "the page is wider than the window"
-    _picture(page, f"bar-{width}-trouble")
+    picture(page, f"bar-{width}-trouble")
 
 
 @pytest.mark.parametrize("width", [800, 1280, 1600])
@@ -315,9 +291,3 @@ def test_many_reasons_of_droplets_make_no_row_of_the_height_of_the_page(page: Pa
     box = verdict.bounding_box()
     assert box is not None
     assert box["height"] < 120
-
-
-def _picture(page: Page, name: str) -> None:
-    if PICTURES:
-        page.wait_for_timeout(1000)
-        page.screenshot(path=str(Path(PICTURES) / f"{name}.png"))

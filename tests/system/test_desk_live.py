@@ -1,12 +1,9 @@
 """The pages Rig and Live in a real browser: what an operator needs to align cameras and to set light."""
 
 import math
-import os
 import re
 import threading
 from collections.abc import Iterator
-from pathlib import Path
-from typing import Any
 
 import pytest
 from nicegui import app as pages
@@ -14,16 +11,14 @@ from playwright.sync_api import Browser, Locator, Page, WebSocket, expect
 
 from server.cli.benchmarks.browsed import drag, first_page
 from server.web.app import create_app
+from tests.support.desk import laboratory, picture
 from tests.support.drifting_views import SIZE_PX
 from tests.support.live_shots import save_droplet_calibration, spray_scene
 from tests.support.operator import VIEWS, go_to
 from tests.support.server_process import eventually
 from tests.support.serving import Serving, plan_of, serving
 
-pytestmark = pytest.mark.timeout(600)
-
-PICTURES = os.environ.get("TOMOSHADOW_PICTURES")
-PULSE = {"current_a": dict.fromkeys(VIEWS, 5)}
+pytestmark = [pytest.mark.timeout(600), pytest.mark.usefixtures("at_rest")]
 
 
 @pytest.fixture(scope="module")
@@ -33,20 +28,6 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
         for camera in laboratory(server).cameras.values():
             camera.image_shape, camera._scene = SIZE_PX[::-1], spray_scene
         yield server
-
-
-@pytest.fixture(autouse=True)
-def at_rest(server: Serving) -> Iterator[None]:
-    yield
-    laboratory(server).close_door()
-    server.http.post("/api/rig/abort")
-    server.wait()
-    server.http.post("/api/rig/acknowledge")
-    server.free_control()
-
-
-def laboratory(server: Serving) -> Any:
-    return server.services.laboratory
 
 
 def open_live(page: Page, server: Serving) -> Locator:
@@ -85,7 +66,7 @@ def test_an_empty_page_says_what_to_do_first(page: Page, server: Serving) -> Non
     expect(live.get_by_text("No picture yet. Live shows the cameras and records nothing")).to_have_count(len(VIEWS))
     page.get_by_role("button", name="Set to half range").click()
     expect(page.get_by_role("status", name="light assistant")).to_contain_text("show the rig live with pulsed light")
-    _picture(page, "live-empty")
+    picture(page, "live-empty")
 
 
 def test_a_tile_tells_light_saturation_focus_and_rate(page: Page, server: Serving) -> None:
@@ -158,7 +139,7 @@ def test_the_loupe_shows_pixels_one_to_one_and_the_cross_hair_the_middle(page: P
     tile.focus()
     page.keyboard.press("ArrowRight")
     expect(point).not_to_have_text(before)
-    _picture(page, "live-loupe")
+    picture(page, "live-loupe")
 
 
 def test_the_slider_of_a_current_asks_once_and_the_form_agrees(page: Page, server: Serving) -> None:
@@ -203,7 +184,7 @@ def test_the_assistant_sets_currents_to_half_range_and_says_what_it_did(page: Pa
     expect(page.get_by_label("LED view4 / A")).to_have_value("5")
     eventually(lambda: shown_current_a(server, "view1") < 7, "it is shown")
     expect(caption(live)).to_have_text(re.compile("A (49|50|51) %"))
-    _picture(page, "live-assistant")
+    picture(page, "live-assistant")
     page.get_by_role("button", name="Set to half range").click()
     expect(advice).to_contain_text(re.compile(r"view1: \d+ % at 6[\d.]* A: left as it is, half of the range"))
     expect(caption(live, "view4")).to_have_text(re.compile("A (49|50|51) %"))
@@ -216,7 +197,7 @@ def test_the_live_volume_says_what_it_lacks_and_follows_every_shot(page: Page, s
     problem = volume.get_by_role("note", name="why there is no newer volume")
     expect(problem).to_contain_text("there is no calibration")
     expect(problem).to_contain_text("on the page Calibrate")
-    _picture(page, "live-volume-empty")
+    picture(page, "live-volume-empty")
     save_droplet_calibration(server.services.data_dir / "calibrations" / "paper.json")
     server.free_control()  # the page holds it
     assert server.http.put("/api/calibrations/current", json={"id": "paper"}).is_success
@@ -232,7 +213,7 @@ def test_the_live_volume_says_what_it_lacks_and_follows_every_shot(page: Page, s
     expect(volume.get_by_role("img", name="live iso-surface").locator("canvas")).to_be_visible()
     page.wait_for_timeout(1500)
     volume.scroll_into_view_if_needed()
-    _picture(page, "live-volume")
+    picture(page, "live-volume")
     volume.get_by_role("switch", name="live iso-surface").click()
     volume.get_by_role("switch", name="live slices").click()
     expect(volume.get_by_role("img", name="live slice z")).to_have_count(0)
@@ -282,7 +263,7 @@ def test_a_card_per_device_says_who_how_and_what_to_do(page: Page, server: Servi
     expect(camera).to_contain_text("Do: check power and cable of the camera")
     expect(page.get_by_role("region", name="interlock")).to_contain_text("Do: close the door")
     expect(camera).to_contain_text(re.compile(r"last answer \d+ s ago"))
-    _picture(page, "rig-trouble")
+    picture(page, "rig-trouble")
     laboratory(server).cameras["view1"].is_lost = False
     camera.get_by_role("button", name="Reconnect").click()
     expect(camera).to_contain_text("tomoshadow memory, view1, firmware 1")
@@ -308,7 +289,7 @@ def test_the_doctor_looks_when_asked_and_between_runs_only(page: Page, server: S
     doctor.get_by_role("button", name="Examine").click()
     expect(doctor.get_by_role("status", name="doctor")).to_have_text(re.compile(r"^\d+ things looked at: .*at \d"))
     expect(doctor).to_contain_text("network of view1")
-    _picture(page, "rig-doctor")
+    picture(page, "rig-doctor")
     server.http.put("/api/rig/live", json={"rate_hz": 2})
     expect(doctor.get_by_role("button", name="Examine")).to_be_disabled()
     expect(page.get_by_role("region", name="view1", exact=True).get_by_role("button")).to_be_disabled()
@@ -333,7 +314,7 @@ def expect_to_fit(page: Page, name: str) -> None:
         assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "the page is wider than the window"
         expect_nothing_cut(page)
         for shade in ("dark", "light"):
-            _picture(page, f"{name}-{width}-{shade}")
+            picture(page, f"{name}-{width}-{shade}")
             page.get_by_role("button", name="dark or light").click()
 
 
@@ -362,9 +343,3 @@ def wishes_of(page: Page) -> list[str]:
 
     page.on("websocket", listen)
     return wishes
-
-
-def _picture(page: Page, name: str) -> None:
-    if PICTURES:
-        page.wait_for_timeout(1000)
-        page.screenshot(path=str(Path(PICTURES) / f"{name}.png"))

@@ -1,7 +1,6 @@
 """The pages Run and Calibrate, and who may use them; headless Chromium."""
 
 import json
-import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,14 +12,13 @@ from playwright.sync_api import Browser, Locator, Page, expect
 
 from server.lab.tasks import calibrate_run
 from server.web.app import create_app
+from tests.support.desk import PULSE, laboratory, picture
 from tests.support.operator import VIEWS, go_to
 from tests.support.server_process import eventually
 from tests.support.serving import Serving, plan_of, serving
 
-pytestmark = pytest.mark.timeout(900)
+pytestmark = [pytest.mark.timeout(900), pytest.mark.usefixtures("at_rest")]
 
-PICTURES = os.environ.get("TOMOSHADOW_PICTURES")
-PULSE = {"current_a": dict.fromkeys(VIEWS, 5)}
 ANN = {"Tomoshadow-Operator": "ann@lab"}
 
 
@@ -37,21 +35,6 @@ def tab(page: Page, server: Serving) -> Page:
     page.goto(f"{server.http.base_url}/run")
     expect(page.get_by_role("status", name="rig state").locator(".rig-known")).to_have_text("READY")
     return page
-
-
-@pytest.fixture(autouse=True)
-def at_rest(server: Serving) -> Iterator[None]:
-    """Every test leaves a rig behind that nobody holds, on which nothing is wrong."""
-    yield
-    laboratory(server).close_door()
-    server.http.post("/api/rig/abort")
-    server.wait()
-    server.http.post("/api/rig/acknowledge")
-    server.free_control()
-
-
-def laboratory(server: Serving) -> Any:
-    return server.services.laboratory
 
 
 def control(page: Page) -> Locator:
@@ -337,9 +320,3 @@ def test_nothing_of_the_page_is_cut(page: Page, server: Serving, width: int, sha
         "found => found.filter(one => one.scrollWidth > one.clientWidth + 1).map(one => one.innerText)"
     )
     assert cut == []
-
-
-def picture(page: Page, name: str) -> None:
-    if PICTURES:
-        page.wait_for_timeout(1000)
-        page.screenshot(path=str(Path(PICTURES) / f"{name}.png"))

@@ -8,7 +8,7 @@ import re
 import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Literal
 
 import pytest
 from nicegui import app as pages
@@ -16,17 +16,17 @@ from playwright.sync_api import Locator, Page, expect
 
 from server.web.app import create_app
 from server.web.ui.runs.run_list import PAGE
+from tests.support.desk import PULSE, laboratory
 from tests.support.drifting_views import SIZE_PX
 from tests.support.live_shots import save_droplet_calibration, spray_scene
 from tests.support.operator import VIEWS
 from tests.support.serving import Serving, plan_of, serving
 
-pytestmark = pytest.mark.timeout(900)
+pytestmark = [pytest.mark.timeout(900), pytest.mark.usefixtures("at_rest")]
 
 Role = Literal["button", "link", "textbox", "spinbutton", "combobox", "slider", "switch", "checkbox"]
 ROLES = ("button", "link", "textbox", "spinbutton", "combobox", "slider", "switch", "checkbox", "radio", "tab")
 CONTROL = re.compile(rf'^\s*- \'?({"|".join(ROLES)}) "((?:[^"\\]|\\.)*)"', re.MULTILINE)
-PULSE = {"current_a": dict.fromkeys(VIEWS, 5)}
 
 
 @dataclass(frozen=True)
@@ -167,8 +167,7 @@ OF_THE_BAR = {(one.role, one.name) for one in BAR}
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
     pages.middleware_stack = None  # NiceGUI has one application per process; another module may have used it
     with serving(tmp_path_factory.mktemp("controls") / "runs", build=create_app, views=VIEWS) as server:
-        laboratory: Any = server.services.laboratory
-        for camera in laboratory.cameras.values():
+        for camera in laboratory(server).cameras.values():
             camera.image_shape, camera._scene = SIZE_PX[::-1], spray_scene
         save_droplet_calibration(server.services.data_dir / "calibrations" / "paper.json")
         server.http.put("/api/calibrations/current", json={"id": "paper"})
@@ -180,15 +179,6 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
         (server.services.data_dir / "templates").mkdir(exist_ok=True)
         (server.services.data_dir / "templates" / "bright.json").write_text('{"shots": 77}')
         yield server
-
-
-@pytest.fixture(autouse=True)
-def at_rest(server: Serving) -> Iterator[None]:
-    yield
-    server.http.post("/api/rig/abort")
-    server.wait()
-    server.http.post("/api/rig/acknowledge")
-    server.free_control()
 
 
 @pytest.mark.parametrize("path", TABLES)
