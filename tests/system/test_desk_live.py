@@ -142,6 +142,12 @@ def test_the_loupe_shows_pixels_one_to_one_and_the_cross_hair_the_middle(page: P
     picture(page, "live-loupe")
 
 
+def test_what_the_bench_measures_in_a_browser_is_there_to_be_measured(browser: Browser, server: Serving) -> None:
+    url = str(server.http.base_url)
+    assert 0 < (first_page(browser, url, 1).value or 0) < 60
+    assert 1 <= (drag(browser, url).value or 0) <= 10
+
+
 def test_the_slider_of_a_current_asks_once_and_the_form_agrees(page: Page, server: Serving) -> None:
     open_live(page, server)
     thumb = page.get_by_label("LED view1 current").locator(".q-slider__track-container")
@@ -164,12 +170,6 @@ def test_the_slider_of_a_current_asks_once_and_the_form_agrees(page: Page, serve
     value = number.input_value()
     go_to(page, "Run")
     expect(page.get_by_label("LED view1 / A")).to_have_value(value)
-
-
-def test_what_the_bench_measures_in_a_browser_is_there_to_be_measured(browser: Browser, server: Serving) -> None:
-    url = str(server.http.base_url)
-    assert 0 < (first_page(browser, url, 1).value or 0) < 60
-    assert 1 <= (drag(browser, url).value or 0) <= 10
 
 
 def test_the_assistant_sets_currents_to_half_range_and_says_what_it_did(page: Page, server: Serving) -> None:
