@@ -48,7 +48,7 @@ from processing.runs.shots.shot_images import frame_names, require_match
 from processing.runs.sprays.conditions import conditions_of
 from processing.runs.workbench import References, read_references
 
-METHOD_VERSION = 7
+METHOD_VERSION = 8
 """Of what the numbers in a file of droplets mean."""
 
 
