@@ -5,9 +5,10 @@ from collections.abc import Iterator
 
 import pytest
 from nicegui import app as pages
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Browser, BrowserContext, Page, expect
 
 from server.web.app import create_app
+from tests.support.cut_link import cut_link
 from tests.support.operator import VIEWS, go_to
 from tests.support.serving import Serving, serving
 
@@ -58,6 +59,31 @@ def test_a_session_that_is_ended_elsewhere_closes_its_page(page: Page, server: S
     expect(page.get_by_role("button", name="Start run")).to_be_enabled()
     page.context.request.post(f"{server.http.base_url}/sign-out", max_redirects=0)
     expect(page.get_by_role("button", name="Sign in")).to_be_visible()
+
+
+def test_a_session_that_the_server_forgot_while_it_was_away_leads_to_signing_in(
+    browser: Browser, server: Serving
+) -> None:
+    with cut_link(server.port) as link:
+        context = browser.new_context()
+        page = context.new_page()
+        page.goto(f"http://127.0.0.1:{link.port}/sign-in")
+        page.get_by_label("Token of an operator or a viewer").fill("look")
+        page.get_by_role("button", name="Sign in").click()
+        expect(page.get_by_role("status", name="connection")).to_have_text("connected")
+        link.cut()
+        expect(page.get_by_role("status", name="rig state").locator(".rig-unknown")).to_be_visible()
+        page.wait_for_function("!window.socket.active")
+        sessions = server.app.state.door.sessions
+        sessions.end(cookie_of_tab(context))
+        link.mend()
+        expect(page.get_by_role("button", name="Sign in")).to_be_visible()
+        context.close()
+
+
+def cookie_of_tab(context: BrowserContext) -> str:
+    (cookie,) = (one["value"] for one in context.cookies() if one["name"].startswith("tomoshadow-"))
+    return cookie
 
 
 def test_a_viewer_changes_neither_the_form_nor_the_live_view(page: Page, server: Serving) -> None:

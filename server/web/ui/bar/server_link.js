@@ -2,6 +2,7 @@
 // locks. Soon after, the page's own socket is closed, so that nothing waits in it to be sent later.
 const LIMIT_MS = 1000, RETRY_MS = 1000, LOST_MS = 3000, GIVE_UP_MS = 5000, LOOK_MS = 200;
 const BEATS_PER_S = 4, STALE_S = 5, RELOAD_S = 10;
+const KNOWN = "/api/rig/control";
 const LOCKED = ".q-page-container, .lockable, [id^='q-portal']";
 
 export default {
@@ -50,7 +51,10 @@ export default {
       const now = performance.now(), isHeard = now - this.heard < LIMIT_MS;
       if (!isHeard) {
         for (const [socket, began] of this.attempts) if (now - began > GIVE_UP_MS) socket.close();
-        if (now - this.tried > RETRY_MS) this.connect();
+        if (now - this.tried > RETRY_MS) {
+          this.connect();
+          askWhetherSignedIn();
+        }
       }
       const page = window.socket;
       if (page && now - this.heard > LOST_MS && page.active) page.disconnect();
@@ -76,6 +80,16 @@ export default {
     },
   },
 };
+
+// A server that was started again knows no session, and refuses every socket: it answers, and the page would wait for ever.
+async function askWhetherSignedIn() {
+  try {
+    const answer = await fetch(KNOWN, { signal: AbortSignal.timeout(GIVE_UP_MS) });
+    if (answer.status === 401) location.reload();
+  } catch {
+    // nobody is there
+  }
+}
 
 // A socket that is closed before it is open is an error to the browser.
 function leave(socket) {
