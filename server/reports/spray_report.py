@@ -5,11 +5,10 @@ Each chapter is a function of what is reported, in ``CHAPTERS``; one that has no
 
 import json
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -27,6 +26,7 @@ from processing.runs.sprays.measured_spray import MeasuredSpray
 from server.reports.liquid_sections import ReportedLiquid, break_up_section, unknown_section
 from server.reports.object_motion_section import object_motion_section
 from server.reports.page import Picture, Section, Table, write_report
+from server.reports.shots_section import VERDICT, exposure_rows, shots_section
 from server.reports.spray_tables import classes_table, doubts, figures_table, fits_table, patternation_table
 
 DEFINITIONS = (
@@ -44,8 +44,6 @@ DEFINITIONS = (
 )
 
 
-SHOT_HEAD = ("run", "shot", "exposure", "residual / noise", "hidden [%]", "verdict", "reasons")
-VERDICT = SHOT_HEAD.index("verdict")
 SAMPLES = {"adequate": "The sample is adequate.", "low sample": "The sample is low: intervals may be too narrow."}
 LEAST_ROWS = 4
 """Of a map of number density: a box that is thinner has none over that axis."""
@@ -103,7 +101,7 @@ def _summary(reported: ReportedSpray) -> Section:
 
 def _verdicts(reported: ReportedSpray) -> str:
     """How many exposures are good, doubtful, refused."""
-    counted = Counter(row[VERDICT] for row in _exposures(reported))
+    counted = Counter(row[VERDICT] for row in exposure_rows(reported.spray.shots))
     return "Verdicts on the exposures: " + ", ".join(f"{n} {verdict}" for verdict, n in counted.items()) + "."
 
 
@@ -250,31 +248,6 @@ def _of_shots(section: Callable[[Sequence[StoredDroplets]], Section | None]) -> 
     return lambda reported: section(reported.spray.shots)
 
 
-def _shots(reported: ReportedSpray) -> Section:
-    text = "Refused exposures have no droplets and do not count."
-    return Section("Shots", text, [Table(SHOT_HEAD, _exposures(reported), words=True)])
-
-
-def _exposures(reported: ReportedSpray) -> list[list[str]]:
-    return [row for shot in reported.spray.shots for row in _shot_rows(shot.provenance)]
-
-
-def _shot_rows(said: Mapping[str, Any]) -> list[list[str]]:
-    exposures = json.loads(str(said.get("exposures", "{}")))
-    return [
-        [
-            str(said.get("run", "")),
-            str(said.get("shot", "")),
-            frame.upper(),
-            "" if one.get("residual_over_noise") is None else f"{one['residual_over_noise']:.2f}",
-            f"{100 * one.get('hidden', {}).get('volume_share', 0):.1f}",
-            one["verdict"],
-            "; ".join(one.get("reasons", ())),
-        ]
-        for frame, one in exposures.items()
-    ]
-
-
 def _tables(reported: ReportedSpray) -> Section | None:
     told = reported.told
     tables = [classes_table(told)] if told.classes else []
@@ -287,5 +260,5 @@ def _definitions(_: ReportedSpray) -> Section:
 
 
 OF_THE_SPRAY: tuple[Chapter, ...] = (_sizes, _motion, _velocity_field, _patternations, _density)
-OF_LIQUID: tuple[Chapter, ...] = (_break_up, _of_shots(object_motion_section), _of_shots(unknown_section))
-CHAPTERS: tuple[Chapter, ...] = (_summary, _origin, *OF_THE_SPRAY, *OF_LIQUID, _shots, _tables, _definitions)
+OF_SHOTS: tuple[Chapter, ...] = tuple(map(_of_shots, (object_motion_section, unknown_section, shots_section)))
+CHAPTERS: tuple[Chapter, ...] = (_summary, _origin, *OF_THE_SPRAY, _break_up, *OF_SHOTS, _tables, _definitions)

@@ -42,7 +42,7 @@ def test_the_report_says_it_all_in_one_file(page: Path, capsys: pytest.CaptureFi
         "ASTM E799",
     ):
         assert said in text, said
-    assert text.count("<figure>") == 5
+    assert text.count("<figure>") == 6
     assert "exists; only --overwrite replaces it" in refused(capsys, "report", page.parent / "cone", "-o", page)
 
 
@@ -68,7 +68,7 @@ def test_a_browser_shows_every_picture_and_prints_pages(page: Path) -> None:
         wider = tab.evaluate("document.documentElement.scrollWidth > window.innerWidth")
         printed = tab.pdf(prefer_css_page_size=True)
         browser.close()
-    assert len(widths) == 5
+    assert len(widths) == 6
     assert min(widths) > 300
     assert not wider
     assert printed.startswith(b"%PDF")
