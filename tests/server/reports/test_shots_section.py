@@ -26,7 +26,8 @@ def test_every_exposure_is_in_table_and_picture() -> None:
         ("good", [1, 3]),
         ("doubtful", [2]),
     ]
-    np.testing.assert_allclose([line.get_ydata() for line in ghosts.lines[1::2]], [[2.0]] * 3)
+    told = np.array([np.asarray(line.get_ydata(), float) for line in ghosts.lines[1::2]])
+    np.testing.assert_allclose(told, [[2.0]] * 3)
 
 
 def test_of_refused_exposures_alone_there_is_no_picture() -> None:
