@@ -232,10 +232,10 @@ def _maxima_along(values: NDArray[Any], axis: int, factor: int, first: int = 0) 
         return values
     starts = [0, *range(factor - first % factor, values.shape[axis], factor)]
     ends = [*starts[1:], values.shape[axis]]
-    ahead = (slice(None),) * axis
     maxima = np.empty((*values.shape[:axis], len(starts), *values.shape[axis + 1 :]), values.dtype)
-    for number, block in enumerate(map(slice, starts, ends)):  # each to where it belongs: a copy takes as long again
-        np.maximum.reduce(values[(*ahead, block)], axis=axis, out=maxima[(*ahead, number)])
+    along, to = np.moveaxis(values, axis, 0), np.moveaxis(maxima, axis, 0)
+    for number, (start, end) in enumerate(zip(starts, ends, strict=True)):
+        np.maximum.reduce(along[start:end], axis=0, out=to[number])  # where it belongs: a copy takes as long again
     return maxima
 
 
