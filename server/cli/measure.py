@@ -13,7 +13,6 @@ from server.cli.options import (
     add_out,
     add_shots,
     add_verb,
-    parse_grid,
     setting,
     usable_processors,
 )
@@ -135,6 +134,7 @@ def _polarity(run_dir: Path) -> "Polarity":
 def _by_options(options: Namespace, calibration: "Calibration") -> "MeasureSettings":
     from processing.reconstruction.settings import GridSettings
     from processing.runs.measurement import MeasureSettings
+    from processing.runs.stated_grid import parse_grid
 
     grid = GridSettings.of(parse_grid(options.grid, calibration)) if options.grid else None
     polarity = options.polarity or _polarity(options.runs[0])

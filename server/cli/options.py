@@ -17,7 +17,6 @@ from server.cli.output import Outcome, progress
 if TYPE_CHECKING:
     from processing.calibration.calibration import Calibration
     from processing.reconstruction.settings import FrozenValue, ReconstructionSettings
-    from processing.volume import VoxelGrid
 
 Verbs: TypeAlias = "_SubParsersAction[ArgumentParser]"
 Command = Callable[[Namespace], Outcome]
@@ -36,7 +35,6 @@ OPTIONS = (
 
 MIN_SIGMA_VOXEL, MAX_SIGMA_VOXEL = 0.3, 10.0
 
-NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,2})?"
 MOST_BEYOND = 0.5
 """Of what is calibrated along an axis: farther beyond it a grid is asked about."""
 LEAST_SHARE = 1e-6
@@ -175,6 +173,7 @@ def reconstruction_settings(options: Namespace, calibration: "Calibration") -> "
     """Grid, method and options of a command as settings."""
     from processing.reconstruction.settings import GridSettings, ReconstructionSettings
     from processing.runs.pipeline import default_grid
+    from processing.runs.stated_grid import parse_grid
 
     grid = parse_grid(options.grid, calibration) if options.grid else default_grid(calibration)
     said = {name: value for name in OPTIONS if (value := getattr(options, name)) is not None}
@@ -207,37 +206,6 @@ def calibrated_share(options: Namespace, settings: "ReconstructionSettings", cal
                 "nobody has checked the calibration there"
             )
     return share
-
-
-def parse_grid(text: str, calibration: "Calibration") -> "VoxelGrid":
-    """Grid of ``X0:X1,Y0:Y1,Z0:Z1[@PITCH]``, all in mm; without a pitch the default grid's.
-
-    Raises
-    ------
-    PipelineError
-        The text is not of that form, or the box is empty or beyond all measure.
-    """
-    import numpy as np
-
-    from processing.reconstruction.settings import MAX_VOXELS
-    from processing.runs.pipeline import default_grid
-    from processing.volume import VoxelGrid
-
-    extent = rf"({NUMBER}):({NUMBER})"
-    match = re.fullmatch(rf"{extent},{extent},{extent}(?:@({NUMBER}))?", text)
-    if not match:
-        raise PipelineError(f"--grid {text!r} is not of the form X0:X1,Y0:Y1,Z0:Z1[@PITCH] in mm")
-    *bounds_mm, pitch = match.groups()
-    lower_mm, upper_mm = np.array(bounds_mm, dtype=float).reshape(3, 2).T
-    pitch_mm = float(pitch) if pitch else default_grid(calibration).pitch_mm
-    if (upper_mm <= lower_mm).any() or pitch_mm <= 0:
-        raise PipelineError(f"--grid {text!r}: every range must grow, and the pitch must be positive")
-    nx, ny, nz = (round(float(extent_mm) / pitch_mm) + 1 for extent_mm in upper_mm - lower_mm)
-    if nx * ny * nz > MAX_VOXELS:
-        raise PipelineError(
-            f"--grid {text!r}: {nx:.3g} x {ny:.3g} x {nz:.3g} voxels, at most {MAX_VOXELS:.1g} are taken"
-        )
-    return VoxelGrid((nz, ny, nx), (float(lower_mm[0]), float(lower_mm[1]), float(lower_mm[2])), pitch_mm)
 
 
 def usable_processors() -> int:

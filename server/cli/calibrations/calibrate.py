@@ -6,7 +6,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from server.cli.options import NUMBER, Verbs, add_out, add_verb, picture_beside
+from processing.decimal_text import NUMBER
+from server.cli.options import Verbs, add_out, add_verb, picture_beside
 from server.cli.output import Outcome, progress, table, tracked
 
 if TYPE_CHECKING:

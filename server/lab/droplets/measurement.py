@@ -2,9 +2,12 @@
 
 from collections.abc import Iterable
 
+from processing.calibration.calibration_file import load_calibration
 from processing.errors import BadInput
+from processing.reconstruction.settings import GridSettings
 from processing.runs.measured_images import require_backgrounds
 from processing.runs.measurement import MeasureSettings, require_measurable
+from processing.runs.stated_grid import parse_grid
 from processing.runs.workbench import read_references
 from server.lab.errors import Unprocessable
 from server.lab.jobs import Job, JobKind, shot_job
@@ -40,6 +43,26 @@ def request_measurement(
     except BadInput as error:
         raise Unprocessable(str(error)) from error
     return queue_measurement(context, run_id, shots, calibration, chosen_settings)
+
+
+def settings_within(context: Context, run_id: str, box: str) -> MeasureSettings | None:
+    """Settings of a run for a box that is stated as with ``--grid``; None, all defaults, where none is.
+
+    Raises
+    ------
+    NotFound
+        There is no such run or calibration.
+    Unprocessable
+        The box is not of that form, or no calibration is known.
+    """
+    if not box.strip():
+        return None
+    chosen, _ = requested_shots(context, run_id, (), None)
+    try:
+        grid = parse_grid(box.strip(), load_calibration(context.calibrations.path(chosen)), "Box")
+    except BadInput as error:
+        raise Unprocessable(str(error)) from error
+    return MeasureSettings(polarity=context.runs.reader(run_id).header.polarity, grid=GridSettings.of(grid))
 
 
 def queue_measurement(

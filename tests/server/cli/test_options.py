@@ -11,8 +11,9 @@ from processing.calibration.calibration_file import load_calibration
 from processing.reconstruction.choices import ReconstructionMethod
 from processing.reconstruction.settings import GridSettings, ReconstructionSettings
 from processing.runs.errors import PipelineError
+from processing.runs.stated_grid import parse_grid
 from server.cli.main import main
-from server.cli.options import parse_grid, reconstruction_settings
+from server.cli.options import reconstruction_settings
 from tests.support.command_line import GRID, refused, told
 
 

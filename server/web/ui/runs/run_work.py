@@ -8,7 +8,7 @@ from nicegui import ui
 from daq.run_plan import RunKind
 from processing.reconstruction.choices import Accuracy, VoxelType
 from processing.reconstruction.choices import ReconstructionMethod as Method
-from server.lab.droplets.measurement import request_measurement
+from server.lab.droplets.measurement import request_measurement, settings_within
 from server.lab.jobs import Job, calibration_job
 from server.lab.reconstruction import request_reconstruction
 from server.lab.runs.run_summary import ACTIVE, DAMAGED, PACKED, RunSummary
@@ -32,6 +32,8 @@ class RunWork:
                 self._accuracy = _choice("Accuracy", {one.value: one.value for one in Accuracy}, chosen.accuracy)
                 self._voxels = _choice("Voxels", {one.value: one.value for one in VoxelType}, chosen.voxels)
                 ui.button("Reconstruct", on_click=self._reconstruct).props("outline dense no-caps")
+                self._box = ui.input("Box / mm", placeholder="-5:5,-1:0,-5:5").props("dense outlined")
+                self._box.tooltip("X0:X1,Y0:Y1,Z0:Z1 of the droplets to measure; empty: all that the views see")
                 ui.button("Measure", on_click=self._measure).props("outline dense no-caps")
             self._calibrate_button = ui.button("Calibrate", on_click=self._calibrate).props("outline dense no-caps")
         self._progress = ui.column().classes("w-full gap-1").props('role=status aria-label="work on this run"')
@@ -67,7 +69,12 @@ class RunWork:
         await self._queue(lambda: request_reconstruction(self._context, self._run_id, None, None, settings))
 
     async def _measure(self) -> None:
-        await self._queue(lambda: request_measurement(self._context, self._run_id, None, None, None))
+        box = self._box.value or ""
+        await self._queue(lambda: self._measurement(box))
+
+    def _measurement(self, box: str) -> list[Job]:
+        settings = settings_within(self._context, self._run_id, box)
+        return request_measurement(self._context, self._run_id, None, None, settings)
 
     async def _calibrate(self) -> None:
         job = calibration_job(self._run_id, f"{self._run_id}-pinhole", "pinhole")

@@ -20,6 +20,8 @@ from processing.runs.measurement import MeasureSettings
 from processing.runs.pipeline import Stopped
 from processing.runs.sprays.measured_spray import read_spray
 from server.lab.droplets.measured import measured_run
+from server.lab.droplets.measurement import settings_within
+from server.lab.errors import Unprocessable
 from server.lab.events import EventPublisher
 from server.lab.job_recovery import jobs_on_disk
 from server.lab.jobs import JobKind, JobState
@@ -279,3 +281,21 @@ def test_what_was_measured_with_a_calibration_that_was_replaced_is_not_done(meas
     assert job["state"] in ("queued", "running")
     assert job["results_id"] != SETTINGS.results_id("cal")
     wait_for_jobs(measured, 3, "measurement")
+
+
+def test_a_box_is_stated_as_on_the_command_line(measured: Serving) -> None:
+    context = measured.app.state.context
+    context.calibrations.choose("cal")
+    settings = settings_within(context, "bright", " -1:1,-0.5:0.5,0:0.2@0.1 ")
+    assert settings is not None
+    assert settings.grid is not None
+    assert (settings.grid.shape, settings.grid.origin_mm) == ((3, 11, 21), (-1, -0.5, 0))
+    assert settings.polarity == "bright"
+    assert settings_within(context, "bright", " ") is None
+
+
+def test_a_box_of_another_form_is_told_by_its_name(measured: Serving) -> None:
+    context = measured.app.state.context
+    context.calibrations.choose("cal")
+    with pytest.raises(Unprocessable, match="Box '1:2' is not of the form X0:X1,Y0:Y1,Z0:Z1"):
+        settings_within(context, "bright", "1:2")
