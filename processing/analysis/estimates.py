@@ -32,6 +32,10 @@ class Estimate(FrozenValue):
     low: Annotated[float, Field(description="it is not below this, with 97.5 %")]
     high: Annotated[float, Field(description="it is not above this, with 97.5 %")]
 
+    def within(self, least: float, most: float) -> "Estimate":
+        """The same with limits that are possible: a share is not above 1."""
+        return Estimate(value=self.value, low=max(self.low, least), high=min(self.high, most))
+
 
 def draws(units: int, width: int, *, counting: bool = False) -> Iterator[FloatArray]:
     """How often each unit is taken when as many as there are are drawn with replacement; a row per draw.

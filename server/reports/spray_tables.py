@@ -148,4 +148,4 @@ def patternation_table(one: Patternation) -> Table:
 
 
 def _percent(share: Estimate) -> Row:
-    return [f"{100 * share.value:.1f}", f"{100 * max(share.low, 0):.1f} to {100 * share.high:.1f}"]
+    return [f"{100 * share.value:.1f}", f"{100 * share.low:.1f} to {100 * share.high:.1f}"]

@@ -136,7 +136,7 @@ def _shares(sample: SpraySample, cell: NDArray[np.intp], flow: FloatArray, cover
         with np.errstate(invalid="ignore", divide="ignore"):
             return np.asarray(np.column_stack([cells.sum(1), cells.sum(2)]) / cells.sum((1, 2))[:, None])
 
-    estimates = sample.estimated(shares, signed=True)
+    estimates = [one and one.within(0.0, 1.0) for one in sample.estimated(shares, signed=True)]
     by_sector = per_unit.reshape(-1, rings, sectors).sum(1)
     return {
         "sector_shares": tuple(estimates[:sectors]),

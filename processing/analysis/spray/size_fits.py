@@ -5,17 +5,19 @@
 
 Both are fitted by maximum likelihood with every droplet weighted by its volume, so that they can be compared, and small
 droplets that were not seen do little. Goodness is the largest gap between the curves of the cumulative volume; beside
-it stands the gap that chance makes: 95 % of the draws lie closer to what was measured.
+it stands the gap that chance makes: 95 % of the draws lie closer to what was measured. Shots are drawn, and droplets,
+and the larger gap counts: two shots have three draws only, which lie closer than droplets by chance do.
 """
 
 from typing import Annotated, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 from scipy.optimize import brentq
 from scipy.special import gamma, ndtr
 
-from processing.analysis.estimates import CONFIDENCE, Estimate
+from processing.analysis.estimates import CONFIDENCE, Estimate, drawn_figures
 from processing.analysis.spray.fit_intervals import LEAST_Q, MOST_Q, fit_estimates
 from processing.analysis.spray.spray_sample import SpraySample
 from processing.geometry import FloatArray
@@ -38,7 +40,7 @@ class SizeFit(FrozenValue):
     d32_um: Annotated[float | None, Field(description="Sauter's mean that it has; null where it has none: q up to 1")]
     dv50_um: Annotated[float, Field(description="median by volume that it has")]
     largest_gap: Annotated[float, Field(description="between its cumulative volume and the measured one, 0 to 1")]
-    gap_by_chance: Annotated[float, Field(description="that 95 % of the draws of shots stay below")]
+    gap_by_chance: Annotated[float, Field(description="that 95 % of the draws of shots, and of droplets, stay below")]
     fits: Annotated[bool, Field(description="whether the gap is no larger than chance makes it")]
 
     @property
@@ -129,10 +131,17 @@ def _gap(fitted: FloatArray, upper: FloatArray, weights: FloatArray) -> float:
     return float(max(np.max(np.abs(fitted - upper)), np.max(np.abs(fitted - upper + weights))))
 
 
-def _gap_by_chance(
-    sample: SpraySample, order: np.ndarray[tuple[int, ...], np.dtype[np.intp]], weights: FloatArray
-) -> float:
-    units, measured = sample.units[order], np.cumsum(weights)
+def _gap_by_chance(sample: SpraySample, order: NDArray[np.intp], weights: FloatArray) -> float:
+    """Of draws of droplets, and where there are several shots of draws of these; the larger one."""
+    by_droplet = np.arange(len(order))
+    gap = np.sqrt(sample.exposures_per_shot) * _gap_of_draws(by_droplet, len(order), weights, counting=True)
+    if sample.several:
+        gap = max(gap, _gap_of_draws(sample.units[order], sample.n_units, weights, counting=False))
+    return float(min(gap, 1.0))
+
+
+def _gap_of_draws(units: NDArray[np.intp], n_units: int, weights: FloatArray, *, counting: bool) -> float:
+    measured = np.cumsum(weights)
 
     def gaps_of(counts: FloatArray) -> FloatArray:
         drawn = np.cumsum(counts[:, units] * weights, axis=1)
@@ -140,7 +149,5 @@ def _gap_by_chance(
             gaps: FloatArray = np.max(np.abs(drawn / drawn[:, -1:] - measured), axis=1, keepdims=True)
         return gaps
 
-    if sample.n_units < 2:
-        return 1.0
-    _, drawn = sample.drawn(gaps_of)
-    return float(min(sample.widening * np.nanquantile(drawn, CONFIDENCE), 1.0))
+    _, drawn = drawn_figures(gaps_of, n_units, len(units), counting=counting)
+    return float(np.nanquantile(drawn, CONFIDENCE))

@@ -188,7 +188,7 @@ def _rank_correlation(sample: SpraySample, speeds_m_s: FloatArray) -> Estimate |
             return np.asarray((sxy - sx * sy / n) / np.sqrt((sxx - sx**2 / n) * (syy - sy**2 / n)))[:, None]
 
     (one,) = sample.estimated(correlation, signed=True)
-    return one and Estimate(value=one.value, low=max(one.low, -1.0), high=min(one.high, 1.0))
+    return one and one.within(-1.0, 1.0)
 
 
 def _by_size(sample: SpraySample, axis: SprayAxis | None) -> tuple[VelocityRow, ...]:

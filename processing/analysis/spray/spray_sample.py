@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.analysis.droplets.droplet_statistics import DIAMETER, measured_grid, measured_mm3, told_exposures
-from processing.analysis.estimates import CONFIDENCE, Estimate, Figures, drawn_figures, estimated
+from processing.analysis.estimates import CONFIDENCE, Estimate, Figures, estimated
 from processing.geometry import FloatArray
 
 VELOCITY = ("u_m_s", "v_m_s", "w_m_s")
@@ -120,10 +120,6 @@ class SpraySample:
             signed=signed,
             confidence=confidence,
         )
-
-    def drawn(self, figures: Figures) -> tuple[FloatArray, FloatArray]:
-        """Figures that look at every droplet by itself, as measured, and of every draw."""
-        return drawn_figures(figures, self.n_units, len(self), counting=not self.several)
 
 
 def spray_sample(shots: Sequence[StoredDroplets]) -> SpraySample:

@@ -47,6 +47,12 @@ def test_a_lognormal_spray_is_found_and_the_other_one_does_not_fit() -> None:
     np.testing.assert_allclose(fit.density_per_um(d_um), by_volume.pdf(d_um))
 
 
+def test_two_shots_of_one_distribution_fit_it() -> None:
+    """Two shots have three draws, which lie closer to what was measured than droplets by chance do."""
+    sprays = [lognorm.rvs(0.4, scale=40, size=200, random_state=seed) for seed in range(20)]
+    assert sum(by_name(sample_of(d_um, shots=2))["lognormal"].fits for d_um in sprays) >= 19
+
+
 def test_a_spray_of_rosin_and_rammler_has_their_exponent_and_moments_by_gamma_functions() -> None:
     d_um = rosin_rammler_um()
     fits = by_name(sample_of(d_um))

@@ -108,6 +108,14 @@ def test_an_even_cone_is_no_more_uneven_than_chance_and_a_half_one_is(cone: list
     assert half.asymmetry_by_chance < 0.4 < half.asymmetry
 
 
+def test_shares_of_sectors_stay_between_none_and_all(cone: list[StoredDroplets]) -> None:
+    sides = [rows(shot, sign * numbers(shot, "x_mm") > -1) for sign, shot in zip((1, -1), cone[:2], strict=True)]
+    (told,) = spray_statistics(sides, ASKED).patternations
+    shares = [share for share in (*told.sector_shares, *told.ring_shares) if share]
+    assert any(share.low == 0 for share in shares)
+    assert all(0 <= share.low <= share.value <= share.high <= 1 for share in shares)
+
+
 def rows(shot: StoredDroplets, which: NDArray[np.generic]) -> StoredDroplets:
     return StoredDroplets({name: column[which] for name, column in shot.columns.items()}, shot.provenance)
 
