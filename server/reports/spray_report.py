@@ -219,7 +219,8 @@ def _patternations(reported: ReportedSpray) -> Section | None:
         Picture(
             patternation_figure(one),
             f"Patternation {one.at_mm:.3g} mm from the nozzle, a slice of {one.thickness_mm:.3g} mm, {one.n} droplets. "
-            "Left: liquid by cells, grey where the box does not reach; right: shares of the sectors, 95 % intervals.",
+            "Left: liquid by cells as seen from downstream, grey where the box does not reach; "
+            f"{one.azimuths[1]} is at 90°. Right: shares of the sectors, 95 % intervals.",
             svg=True,
         )
         for one in found

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from processing.analysis.estimates import CONFIDENCE, DRAWS, SEED, Estimate
-from processing.analysis.spray.spray_axis import SprayAxis, cell_volumes_mm3
+from processing.analysis.spray.spray_axis import SprayAxis, cell_volumes_mm3, direction_name
 from processing.analysis.spray.spray_motion import MM3_PER_UM3, axial_volumes
 from processing.analysis.spray.spray_sample import SpraySample
 from processing.geometry import FloatArray
@@ -30,7 +30,10 @@ FEWEST = 20
 
 
 class Patternation(FrozenValue):
-    """Liquid by sectors and rings; sector 0 begins at x, or at z where the axis is along x."""
+    """Liquid by sectors and rings; sector 0 begins at x, or at z where the axis is along x.
+
+    Seen from downstream azimuths grow counterclockwise, so along an axis y 90 degrees are at -z.
+    """
 
     at_mm: Annotated[float, Field(description="distance from the nozzle along the axis, middle")]
     thickness_mm: Annotated[float, Field(description="so long is the slice along the axis")]
@@ -38,6 +41,7 @@ class Patternation(FrozenValue):
     weighting: Annotated[str, Field(description="what is shared out: liquid, or what flows along the axis")]
     ring_edges_mm: Annotated[tuple[float, ...], Field(description="distances from the axis")]
     sectors: Annotated[int, Field(description="of 360 degrees")]
+    azimuths: Annotated[tuple[str, str], Field(description="which way 0 and 90 degrees lie: x, -z, or a vector")]
     liquid_ppm: Annotated[
         tuple[tuple[float | None, ...], ...],
         Field(description="volume of liquid per volume, 1e-6, ring by ring, sector by sector; null: not in the box"),
@@ -98,6 +102,7 @@ def patternation(
         "weighting": "liquid that flows along the axis" if chosen.paired.any() else "liquid that is there",
         "ring_edges_mm": tuple(ring_edges_mm.tolist()),
         "sectors": sectors,
+        "azimuths": tuple(map(direction_name, axis.frame[1:])),
         "liquid_ppm": _liquid_ppm(chosen, cell, inside_mm3, exposures, covered),
         **_shares(chosen, cell, flow, covered),
     }

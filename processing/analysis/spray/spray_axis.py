@@ -57,6 +57,14 @@ class SprayAxis:
         return max(float(along_mm.min()), 0.0), float(along_mm.max())
 
 
+def direction_name(direction: FloatArray) -> str:
+    """A unit vector by the name of its axis, ``x`` or ``-z``, or by its numbers where it has none."""
+    largest = int(np.abs(direction).argmax())
+    if abs(direction[largest]) > 1 - 1e-9:
+        return ("-" if direction[largest] < 0 else "") + "xyz"[largest]
+    return "(" + ", ".join(f"{value:.2g}" for value in direction) + ")"
+
+
 def corners(box_mm: FloatArray) -> FloatArray:
     """The eight corners of a box, (8, 3)."""
     return np.stack(np.meshgrid(*box_mm.T, indexing="ij"), axis=-1).reshape(8, 3)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from processing.analysis.spray.spray_axis import SprayAxis, corners
+from processing.analysis.spray.spray_axis import SprayAxis, corners, direction_name
 from processing.analysis.spray.spray_motion import FEWEST
 from processing.analysis.spray.spray_sample import SpraySample
 from processing.geometry import FloatArray
@@ -79,8 +79,8 @@ def _field(sample: SpraySample, axis: SprayAxis, across: int, down: int) -> Velo
         return None
     means_m_s = np.where(known[..., None], sums / np.maximum(counts, 1)[..., None], np.nan)
     return VelocityField(
-        across=_towards(axis, across),
-        down=_towards(axis, down),
+        across=direction_name(_frame(axis)[across]),
+        down=direction_name(_frame(axis)[down]),
         across_mm=edges_mm[1],
         down_mm=edges_mm[0],
         thickness_mm=thickness_mm,
@@ -122,12 +122,3 @@ def _frame(axis: SprayAxis) -> FloatArray:
     for across in frame[1:]:
         across *= np.sign(across[np.abs(across).argmax()])
     return frame
-
-
-def _towards(axis: SprayAxis, which: int) -> str:
-    """A direction by its name, or by its vector where it has none."""
-    direction = _frame(axis)[which]
-    largest = int(np.abs(direction).argmax())
-    if direction[largest] > 1 - 1e-9:
-        return "xyz"[largest]
-    return "(" + ", ".join(f"{value:.2g}" for value in direction) + ")"

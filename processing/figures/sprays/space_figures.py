@@ -28,6 +28,7 @@ def patternation_figure(one: Patternation) -> Figure:
     mesh = disc.pcolormesh(edges, np.array(one.ring_edges_mm), cells, cmap="viridis", vmin=0, rasterized=True)
     disc.set_facecolor("0.85")
     disc.grid(visible=False)
+    disc.set_xticks(np.radians(range(0, 360, 45)), _azimuth_labels(one))
     disc.set_yticks(np.round(one.ring_edges_mm[1:], 1))
     disc.tick_params(axis="y", colors="white")
     disc.tick_params(labelsize="x-small")
@@ -35,6 +36,12 @@ def patternation_figure(one: Patternation) -> Figure:
     disc.set_title(f"{one.at_mm:.3g} mm from the nozzle, rings in mm", fontsize="small")
     _draw_shares(figure.add_subplot(grid[0, 1]), one)
     return figure
+
+
+def _azimuth_labels(one: Patternation) -> list[str]:
+    """Degrees, and at two of them which way that is."""
+    named = dict(zip((0, 90), one.azimuths, strict=True))
+    return [f"{degrees}°" + (f" ({named[degrees]})" if degrees in named else "") for degrees in range(0, 360, 45)]
 
 
 def _draw_shares(axes: Axes, one: Patternation) -> None:
@@ -49,7 +56,8 @@ def _draw_shares(axes: Axes, one: Patternation) -> None:
         "" if one.asymmetry is None else f"asymmetry {one.asymmetry:.3f}, by chance below {one.asymmetry_by_chance:.3f}"
     )
     axes.set_title(title, fontsize="small")
-    axes.set(xlabel="azimuth [°]", ylabel=f"share [%], {one.weighting}", xlim=(0, 360), ylim=(0, None))
+    axes.set(xlabel=f"azimuth from {one.azimuths[0]} [°]", ylabel=f"share [%], {one.weighting}")
+    axes.set(xlim=(0, 360), ylim=(0, None))
     axes.legend(fontsize="x-small")
 
 

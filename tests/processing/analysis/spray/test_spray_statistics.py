@@ -116,6 +116,13 @@ def test_shares_of_sectors_stay_between_none_and_all(cone: list[StoredDroplets])
     assert all(0 <= share.low <= share.value <= share.high <= 1 for share in shares)
 
 
+def test_azimuths_say_which_way_a_sector_lies(cone: list[StoredDroplets]) -> None:
+    towards = [rows(shot, -numbers(shot, "z_mm") > abs(numbers(shot, "x_mm"))) for shot in cone]
+    (told,) = spray_statistics(towards, ASKED).patternations
+    assert told.azimuths == ("x", "-z")
+    assert sum(value(share) for share in told.sector_shares[1:3]) == pytest.approx(1), "45 to 135 degrees"
+
+
 def rows(shot: StoredDroplets, which: NDArray[np.generic]) -> StoredDroplets:
     return StoredDroplets({name: column[which] for name, column in shot.columns.items()}, shot.provenance)
 

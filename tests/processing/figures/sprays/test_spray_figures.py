@@ -57,6 +57,7 @@ def test_cells_that_the_box_does_not_hold_are_left_out_of_the_disc(told: SpraySt
     ring, *others = one.liquid_ppm
     hidden = one.model_copy(update={"liquid_ppm": ((None, *ring[1:]), *others)})
     disc, _bar, shares = patternation_figure(hidden).axes
+    assert [label.get_text() for label in disc.get_xticklabels()][:3] == ["0° (x)", "45°", "90° (-z)"]
     (mesh,) = (artist for artist in disc.collections if hasattr(artist, "get_array"))
     drawn = mesh.get_array()
     assert drawn is not None
