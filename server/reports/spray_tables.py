@@ -7,6 +7,7 @@ from processing.analysis.spray.patternation import Patternation
 from processing.analysis.spray.size_fits import SizeFit
 from processing.analysis.spray.spray_motion import SprayMotion
 from processing.analysis.spray.spray_statistics import SprayStatistics
+from server.reports.digits import digits_of_interval, three_digits
 from server.reports.page import Table
 
 Row = list[str]
@@ -54,13 +55,8 @@ def _of_motion(motion: SprayMotion) -> Iterator[tuple[str, Estimate | None]]:
 
 
 def _cells(estimate: Estimate) -> Row:
-    value, low, high = (three_digits(one) for one in (estimate.value, estimate.low, estimate.high))
+    value, low, high = digits_of_interval(estimate.value, estimate.low, estimate.high)
     return [value, f"{low} to {high}"]
-
-
-def three_digits(value: float) -> str:
-    """No more than a figure with an interval bears, and zeros at the end where they are known."""
-    return f"{value:#.3g}".rstrip(".")
 
 
 def figures_table(told: SprayStatistics) -> Table:
@@ -72,6 +68,8 @@ def doubts(told: SprayStatistics) -> list[str]:
     """What is doubtful, unsure or missing, and what to do."""
     said = [*told.doubts, *(told.sample.reasons if told.sample else ())]
     said += [f"No {name}: {reason}" for name, reason in told.reasons.items()]
+    if told.droplets.n and told.droplets.ghost_reason:
+        said.append(f"No share of ghosts: {told.droplets.ghost_reason}")
     if told.motion and told.motion.reason:
         said.append(told.motion.reason)
     if told.extent:

@@ -4,6 +4,7 @@ from typing import Any
 
 from server.cli.options import describe_grid
 from server.cli.output import table
+from server.reports.digits import digits_of_interval
 
 
 def droplets_table(result: dict[str, Any]) -> str:
@@ -45,7 +46,17 @@ def droplets_summary(result: dict[str, Any]) -> str:
     d32_um, why = statistics["d32_um"], statistics["reason"]
     d32 = f"D32 {_with_interval(d32_um)} um" if d32_um else f"no D32: {why}"
     hidden = f", {100 * statistics['hidden_share']:.1f} % of the volume hidden" if statistics["hidden_share"] else ""
-    return f"{counted}, {density} per mm3, {d32}{hidden}, {_mean_velocity(result['velocity'])}, {grid}{_liquid(result)}"
+    told = f"{counted}, {density} per mm3, {d32}{hidden}, {_mean_velocity(result['velocity'])}, {grid}"
+    return f"{told}{_ghosts(statistics)}{_liquid(result)}"
+
+
+def _ghosts(statistics: dict[str, Any]) -> str:
+    """How many of the droplets are ghosts, or why that is not known, in a line of its own."""
+    share = statistics["ghost_share"]
+    if share is None:
+        return f"\nno share of ghosts: {statistics['ghost_reason']}"
+    percent = {name: 100 * one for name, one in share.items()}
+    return f"\nghosts among them {_with_interval(percent)} %"
 
 
 def _liquid(result: dict[str, Any]) -> str:
@@ -70,4 +81,5 @@ def _mean_velocity(velocity: dict[str, Any]) -> str:
 
 
 def _with_interval(estimate: dict[str, float]) -> str:
-    return f"{estimate['value']:.3g} ({estimate['low']:.3g} to {estimate['high']:.3g})"
+    value, low, high = digits_of_interval(estimate["value"], estimate["low"], estimate["high"])
+    return f"{value} ({low} to {high})"

@@ -54,6 +54,7 @@ def test_people_read_what_is_doubtful_and_why_figures_are_missing(
     assert "5 of 5 exposures are doubtful, and count: it is blurred" in text
     assert "No cone angle: the box does not reach around the cone" in text
     assert "density of the liquid is not known" in text
+    assert "No share of ghosts: " in text
 
 
 def test_options_say_where_the_nozzle_is(results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,0 +1,20 @@
+"""How many digits a number is told with."""
+
+from math import floor, log10
+
+NARROW = 0.01
+"""Of the number: half of an interval that three digits do not show."""
+
+
+def three_digits(value: float) -> str:
+    """No more than a figure with an interval bears, and zeros at the end where they are known."""
+    return f"{value:#.3g}".rstrip(".")
+
+
+def digits_of_interval(value: float, low: float, high: float) -> tuple[str, str, str]:
+    """A number and its limits: three digits each, or as many as tell two of half the interval where it is narrow."""
+    half = (high - low) / 2
+    if not 0 < half < NARROW * abs(value):
+        return three_digits(value), three_digits(low), three_digits(high)
+    decimals = max(0, 1 - floor(log10(half)))
+    return f"{value:.{decimals}f}", f"{low:.{decimals}f}", f"{high:.{decimals}f}"

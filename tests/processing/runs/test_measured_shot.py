@@ -1,0 +1,36 @@
+"""What is told of a shot is told of both exposures together."""
+
+from pathlib import Path
+
+import numpy as np
+
+from processing.analysis.droplets.droplet_table import SizedDroplets
+from processing.analysis.droplets.measured_exposure import MeasuredExposure, ShotVerdict
+from processing.analysis.droplets.shadows.shadow_shot import SeenShadows
+from processing.runs.measured_shot import shot_summary
+
+
+def exposure(
+    count: int, verdict: ShotVerdict = ShotVerdict.GOOD, *reasons: str
+) -> MeasuredExposure[SizedDroplets, SeenShadows]:
+    """Droplets of which nobody knows whether they are real."""
+    numbers = np.ones(count)
+    unknown = np.full(count, np.nan)
+    points, covariance = np.zeros((count, 3)), np.zeros((count, 3, 3))
+    views = np.full(count, 4)
+    droplets = SizedDroplets(points, covariance, numbers, numbers, numbers, views, numbers, unknown)
+    return MeasuredExposure(droplets, {}, 1.0, verdict, reasons)
+
+
+def reason(*exposures: MeasuredExposure[SizedDroplets, SeenShadows]) -> str:
+    return shot_summary(0, exposures, "one exposure", 0.0, Path("shot.h5")).ghost_reason or ""
+
+
+def test_why_there_is_no_share_of_ghosts_is_told_once() -> None:
+    assert reason(exposure(145), exposure(133)).startswith("p_real is told of 0 of 278 droplets; ")
+    assert reason(exposure(145), exposure(133)).count("p_real is told") == 1
+
+
+def test_of_a_doubtful_exposure_the_doubt_is_the_reason() -> None:
+    told = reason(exposure(145), exposure(133, ShotVerdict.DOUBTFUL, "it is blurred"))
+    assert told.endswith("; it is blurred")
