@@ -9,6 +9,8 @@ from daq.run.state import RunState
 class Pace:
     """Told of every status; goes by the plan until a shot has come since it was told of the run.
 
+    However late a shot is, those after it take their time.
+
     Parameters
     ----------
     now_s : Callable[[], float]
@@ -41,4 +43,4 @@ class Pace:
             each_s = 1 / status.plan.rate_hz
         else:
             return None
-        return max(0.0, left * each_s - (now_s - self._last[0]))
+        return max(0.0, left * each_s - min(each_s, now_s - self._last[0]))

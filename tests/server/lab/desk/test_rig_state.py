@@ -48,6 +48,17 @@ def test_a_run_takes_as_long_as_its_shots_do_and_before_the_first_one_as_planned
     assert pace.eta_s(RunStatus(state=RunState.DISARMING)) is None
 
 
+def test_a_shot_that_is_late_takes_no_time_from_those_that_are_still_to_come() -> None:
+    now_s = [100.0]
+    pace = Pace(lambda: now_s[0])
+    assert pace.eta_s(acquiring(0)) == 133.0
+    now_s[0] += 100
+    assert pace.eta_s(acquiring(0)) == 132.5
+    assert pace.eta_s(acquiring(10)) == 2560.0
+    now_s[0] += 1000
+    assert pace.eta_s(acquiring(10)) == 2550.0
+
+
 def test_a_rig_that_nobody_has_looked_at_for_seconds_is_not_ready() -> None:
     now_s = [0.0]
     watch = DeskWatch(RunStatus, tuple, now_s=lambda: now_s[0])
