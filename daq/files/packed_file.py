@@ -11,7 +11,8 @@ from daq.errors import DiskFull, RecorderError
 from daq.files.atomic_file import replacing
 from daq.files.columns import columns_of, frames_path
 from daq.files.header import RunHeader
-from daq.files.run_file import RUN_FILE, reading, shot_path
+from daq.files.later_notes import document_of, read_changes
+from daq.files.run_file import RUN_FILE, reading, shot_path, write_later_notes
 from daq.files.shot_file import LIBRARY_VERSIONS, create_frames, is_missing, reading_shot
 from daq.files.storage import storing
 
@@ -22,15 +23,18 @@ def pack_run(run_dir: Path, header: RunHeader, shot_count: int, out: Path) -> No
     Raises
     ------
     ShotFileError
-        A shot cannot be read: a packed run is complete or not there.
+        A shot cannot be read, or its later notes: a packed run is complete or not there.
     StorageError
         The disk of ``out`` refuses, or has no room for the run.
     """
     _require_room(run_dir, shot_count, out.parent)
+    changes = read_changes(run_dir, header)
     with storing(out.parent), replacing(out) as part:
         shutil.copyfile(run_dir / RUN_FILE, part)
         with h5py.File(part, "r+", libver=LIBRARY_VERSIONS) as packed:
             _replace_view(packed, header, shot_count)
+            if changes:
+                write_later_notes(packed, document_of(header, changes))
             for index in range(shot_count):
                 _copy_shot(shot_path(run_dir, index), header, index, packed)
 

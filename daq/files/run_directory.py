@@ -3,6 +3,7 @@
 ::
 
     RUN/run.h5          what the run is, its references, its outcome, a view over all shots   (daq.files.run_file)
+    RUN/notes.json      notes that were changed later; is there only then                     (daq.files.later_notes)
     RUN/shots/N.h5      one shot, committed by rename after fsync                             (daq.files.shot_file)
 
 Any HDF5 reader sees the whole run through ``run.h5``: ``h5py.File("run.h5")["/cameras/view1/frames"][3]``.
@@ -21,6 +22,7 @@ from numpy.typing import NDArray
 from daq.causes import Cause
 from daq.errors import RecorderError, RenamedFile, ShotFileError
 from daq.files.header import RunClosing, RunHeader, ViewFormat
+from daq.files.later_notes import NotesChange, add_change, read_changes
 from daq.files.lock_file import hold_folder
 from daq.files.packed_file import pack_run, require_free
 from daq.files.run_file import (
@@ -48,6 +50,7 @@ __all__ = [
     "Image",
     "ImageKey",
     "LightPulse",
+    "NotesChange",
     "PulsePair",
     "RecorderError",
     "ReferenceImages",
@@ -61,6 +64,7 @@ __all__ = [
     "ShotFileError",
     "Spray",
     "ViewFormat",
+    "add_change",
     "list_runs",
     "pack",
 ]
@@ -139,6 +143,11 @@ class RunReader:
             reason = f"no folder {SHOTS_FOLDER}: it was packed into one file, or its shots were taken away"
             raise ShotFileError(f"{self.run_dir}: has {reason}")
         return max(slots_of(self.run_dir), read_shot_count(self.run_dir))
+
+    @property
+    def notes_changes(self) -> tuple[NotesChange, ...]:
+        """What was written into its notes later, the oldest change first; ``header.notes`` are as recorded."""
+        return read_changes(self.run_dir, self.header)
 
     def image_keys(self) -> NDArray[np.int64]:
         """ImageKey of every shot, (shot,); a shot that cannot be read counts as INVALID."""

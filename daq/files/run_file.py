@@ -39,6 +39,7 @@ _SHOT_NAME = re.compile(r"(0|[1-9][0-9]{0,6})\.h5")
 _CLOSING_BYTES = 256 * 2**10
 """What the end of a run adds to its file at most: outcome, causes, numbers of the shots that were not stored."""
 RUN_SCHEMA = "tomoshadow-run"
+_LATER_NOTES = "later_notes"
 Reference = Literal["dark", "background"]
 ReferenceImages = Mapping[str, NDArray[np.float32]]
 
@@ -130,6 +131,17 @@ def read_closing(run_dir: Path) -> RunClosing | None:
         later = {name: _read_text(entry, name) for name in ("causes", "unstored") if name in entry}  # not in old runs
         causes, unstored = _CAUSES.validate_json(later.get("causes", "[]")), json.loads(later.get("unstored", "[]"))
         return RunClosing(outcome, cause, ended_utc, causes, tuple(unstored))
+
+
+def read_later_notes(run_dir: Path) -> str:
+    """Changes of the notes, as JSON, in a packed file; empty if there are none (``daq.files.later_notes``)."""
+    with reading(run_dir) as file:
+        return _read_text(file["entry"], _LATER_NOTES) if _LATER_NOTES in file["entry"] else ""
+
+
+def write_later_notes(file: h5py.File, changes: str) -> None:
+    """Give a packed file the changes of the notes."""
+    _write_text(file["entry"], _LATER_NOTES, changes)
 
 
 def add_references(run_dir: Path, header: RunHeader, references: Mapping[Reference, ReferenceImages]) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 from daq.errors import AlreadyHeld, DamagedFrame, ForeignFile, RenamedFile, ShotFileError
 from daq.files.atomic_file import PART_SUFFIX
 from daq.files.header import RunClosing, RunHeader
+from daq.files.later_notes import NOTES_FILE, read_changes
 from daq.files.lock_file import hold_folder
 from daq.files.run_directory import RunReader
 from daq.files.run_file import RUN_FILE, SHOTS_FOLDER, is_shot, read_shot_count, shot_path
@@ -93,6 +94,7 @@ def verify(run_dir: Path, done: Done = lambda _done, _total: None) -> Verificati
     strangers = tuple(_strangers(run_dir))
     try:
         header, closing = reader.header, reader.closing
+        strangers += tuple(_flaws_of_notes(run_dir, header))
         if not (run_dir / SHOTS_FOLDER).is_dir():
             return _without_shots(run_dir, header, closing, strangers)
         shots = reader.shot_count
@@ -162,6 +164,14 @@ def _strangers(run_dir: Path) -> list[Flaw]:
         elif not is_shot(path):
             found.append(Flaw(FlawKind.FOREIGN, name, f"{path}: no file that is named by the number of a shot"))
     return found
+
+
+def _flaws_of_notes(run_dir: Path, header: RunHeader) -> list[Flaw]:
+    try:
+        read_changes(run_dir, header)
+    except ShotFileError as error:
+        return [Flaw(FlawKind.FOREIGN, NOTES_FILE, str(error))]
+    return []
 
 
 def _open_flaw(run_dir: Path) -> Flaw:
