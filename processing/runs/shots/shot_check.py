@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from processing.calibration.calibration import Calibration
@@ -23,6 +23,7 @@ FEW_SEEDS = 300
 """Droplets of an exposure that are followed at first: a fifth of the work."""
 SURE = 2.0
 """Standard uncertainties."""
+_EXPOSURES = "AB"
 
 Exposure = list[FloatArray]
 
@@ -99,12 +100,28 @@ class ShotCheck:
 
 
 def check_exposures(shot: int, exposures: Sequence[Exposure], calibration: Calibration) -> ShotCheck:
-    """Measure the disparity of every view by the droplets (N, 2) of each exposure and view; ``shot`` is its index."""
+    """Measure the disparity of every view by the droplets (N, 2) of each exposure and view; ``shot`` is its index.
+
+    Droplets of all exposures tell together; where one exposure alone speaks against the calibration, that counts.
+    """
+    together = _checked(shot, exposures, calibration)
+    if len(exposures) == 1 or together.verdict is Verdict.REFUSE:
+        return together
+    alone = (_checked(shot, [one], calibration) for one in exposures)
+    named = (_in_exposure(name, check) for name, check in zip(_EXPOSURES, alone, strict=False))
+    return next((check for check in named if check.beyond or check.verdict is Verdict.REFUSE), together)
+
+
+def _checked(shot: int, exposures: Sequence[Exposure], calibration: Calibration) -> ShotCheck:
     try:
         require_droplets(calibration, exposures)
         return _look(shot, exposures, calibration)
     except CalibrationError as error:
         return _unmeasured(shot, exposures, calibration, error)
+
+
+def _in_exposure(name: str, check: ShotCheck) -> ShotCheck:
+    return replace(check, problem=f"exposure {name} by itself: {check.problem}") if check.problem else check
 
 
 def _look(shot: int, exposures: Sequence[Exposure], calibration: Calibration) -> ShotCheck:

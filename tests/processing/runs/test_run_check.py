@@ -55,6 +55,24 @@ def test_few_droplets_are_enough_where_they_agree_beyond_doubt(drift_px: float, 
     assert (told.worst_px < ALARM_PX) == (max(view.disparity_px for view in by_all) < ALARM_PX) == enough
 
 
+@pytest.mark.parametrize("exposure", [0, 1])
+@pytest.mark.parametrize("view", range(4))
+def test_an_exposure_that_shows_other_droplets_is_not_hidden_by_the_other_one(exposure: int, view: int) -> None:
+    """A camera that lost a frame: in one view exposure B is that of the shot before."""
+    exposures = [list(seen) for seen in droplet_shots(3, 7.0)]
+    exposures[exposure][view] = exposures[2][view]
+    check = check_exposures(0, exposures[:2], CALIBRATION)
+    assert (check.verdict, check.moved) == (Verdict.REFUSE, f"view{view + 1}")
+    assert check.problem.startswith(f"exposure {'AB'[exposure]} by itself: view{view + 1} has moved")
+
+
+@pytest.mark.parametrize("drift_px", [1.2, 2.5])
+def test_a_view_that_shook_in_one_exposure_is_not_hidden_by_the_other_one(drift_px: float) -> None:
+    exposures = [list(seen) for seen in droplet_shots(2, 7.0)]
+    exposures[1][2] = exposures[1][2] + drift_px * direction(2)
+    assert check_exposures(0, exposures, CALIBRATION).verdict is Verdict.REFUSE
+
+
 def test_two_that_moved_are_not_blamed_on_one() -> None:
     check = checked({0: (0.0, 0.7), 2: (0.8, -0.6)})
     assert check.worst_px > 0.5
