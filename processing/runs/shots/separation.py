@@ -37,10 +37,13 @@ class Separation:
 def separation_of(run: RunReader, shot: Shot) -> Separation | str:
     """Separation of a shot, or why there is none.
 
-    Every view has its own light, so each has its own pulses; views that were not lit have no say.
+    Every view has its own light, so each has its own pulses; views that were not lit have no say. A copy of A that is
+    called B was taken at no other time.
     """
     if run.header.frames_per_shot == 1:
         return NOT_DOUBLE
+    if copied := _copied(shot):
+        return f"exposure B of {', '.join(copied)} has the very pixels of A: noise never repeats, so one is a copy"
     trains = [pulses for pulses in shot.fired.pulses.values() if pulses] if shot.fired else []
     if not trains:
         stated_ns = run.header.separation_ns
@@ -49,6 +52,15 @@ def separation_of(run: RunReader, shot: Shot) -> Separation | str:
         return f"views were lit {', '.join(map(str, sorted(odd)))} times: which pulse is in which exposure is not known"
     fired_ns = [_middle_ns(second) - _middle_ns(first) for first, second in trains]
     return _separation(fired_ns, "fired")
+
+
+def _copied(shot: Shot) -> list[str]:
+    """Views whose two exposures are one image; flat ones may well be alike."""
+    return [
+        name
+        for name, seen in shot.views.items()
+        if seen.frame_b is not None and np.ptp(seen.frame_a) and np.array_equal(seen.frame_a, seen.frame_b)
+    ]
 
 
 def _separation(by_view_ns: Sequence[float], source: Literal["fired", "stated"]) -> Separation | str:

@@ -18,13 +18,18 @@ from daq.files.run_directory import (
     Shot,
     ViewFormat,
 )
+from processing.geometry import FloatArray
 from processing.runs.shots.separation import Separation, separation_of
 
 PULSES = (LightPulse(1000, 1000, 10.0), LightPulse(7400, 1000, 10.0))
 
 
 def separation(
-    run_dir: Path, pulses: dict[str, Any] | None, stated_ns: int | None, frames: Literal[1, 2] = 2
+    run_dir: Path,
+    pulses: dict[str, Any] | None,
+    stated_ns: int | None,
+    frames: Literal[1, 2] = 2,
+    images: tuple[FloatArray, FloatArray] = (np.zeros((4, 4)), np.zeros((4, 4))),
 ) -> Separation | str:
     """Of a run with one shot, as its files have it."""
     header = RunHeader(
@@ -34,8 +39,9 @@ def separation(
         frames_per_shot=frames,
         separation_ns=stated_ns,
     )
-    dark, record = np.zeros((4, 4), np.uint8), ExposureRecord(valid=True, frame_id=1, device_timestamp_ns=1)
-    views = {name: DoubleFrame(dark, dark if frames == 2 else None, record, record) for name in header.views}
+    first, second = (image.astype(np.uint8) for image in images)
+    record = ExposureRecord(valid=True, frame_id=1, device_timestamp_ns=1)
+    views = {name: DoubleFrame(first, second if frames == 2 else None, record, record) for name in header.views}
     fired = FiredTrain(1, {}, pulses) if pulses is not None else None
     with RunWriter(run_dir, header) as writer:
         writer.write_shot(Shot(0, ImageKey.SAMPLE, views, fired))
@@ -76,3 +82,12 @@ def test_an_unknown_separation_has_a_reason(
     found = separation(tmp_path / "run", pulses, stated_ns, frames)
     assert isinstance(found, str)
     assert reason in found
+
+
+@pytest.mark.parametrize("stated_ns", [None, 6400])
+def test_an_exposure_that_is_a_copy_of_the_other_has_no_time_of_its_own(tmp_path: Path, stated_ns: int | None) -> None:
+    """Droplets would stand still, however well their backgrounds differ."""
+    image = np.arange(16.0).reshape(4, 4)
+    copied = separation(tmp_path / "copied", {"view1": PULSES}, stated_ns, images=(image, image))
+    assert str(copied).startswith("exposure B of view1, view2 has the very pixels of A")
+    assert isinstance(separation(tmp_path / "two", {"view1": PULSES}, stated_ns, images=(image, image.T)), Separation)
