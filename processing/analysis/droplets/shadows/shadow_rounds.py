@@ -104,7 +104,14 @@ class ShadowRounds:
         """The very same droplets in other light, fitted to it."""
         if not len(fit.discs):
             return fit
-        fit = relit(fit, condenser_ratio, self._shot.lattice.pixels_per_voxel)
+        return self._settled(relit(fit, condenser_ratio, self._shot.lattice.pixels_per_voxel))
+
+    def left_around(self, fit: ShadowFit) -> FloatArray:
+        """What is left around each droplet, squared, once the very same droplets are fitted to the images."""
+        return self._supports(self._settled(fit)).residual ** 2
+
+    def _settled(self, fit: ShadowFit) -> ShadowFit:
+        """The very same droplets, fitted."""
         for _ in range(RELIT_ROUNDS):
             self._before_round()
             shadows = self._recorded().drawn(fit.optics, fit.discs)

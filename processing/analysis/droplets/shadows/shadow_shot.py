@@ -40,6 +40,7 @@ from processing.analysis.droplets.shadows.shadow_fit import ShadowFit, Transmiss
 from processing.analysis.droplets.shadows.shadow_light import grey, judged_by_shape, unlit
 from processing.analysis.droplets.shadows.shadow_table import sized_droplets
 from processing.analysis.droplets.shadows.shadow_union import union_defects
+from processing.analysis.droplets.shadows.veiled_shadows import veil_doubts
 from processing.analysis.droplets.size_correction import SizeCorrection
 from processing.kernels import DEFAULT_THREADS
 
@@ -170,7 +171,8 @@ def _told(shot: Transmissions, fit: ShadowFit, search: DropletSearch, sizes: Siz
     beside_px = {name: float(np.hypot(view.shift_u_px, view.shift_v_px)) for name, view in views.items()}
     limits = COHERENT_LIMITS if (fit.optics.condenser_ratio or FRINGELESS) < FRINGELESS else LIMITS
     verdict, reasons = judged(beside_px, ratio, bare, limits)
-    if doubts := (*grey(seen, shadows, judged_weights), *light_doubts(fit.light_share, len(fit.discs))):
+    veiled = grey(seen, shadows, judged_weights) or veil_doubts(shot, search, fit)
+    if doubts := (*veiled, *light_doubts(fit.light_share, len(fit.discs))):
         verdict, reasons = ShotVerdict.DOUBTFUL if verdict is ShotVerdict.GOOD else verdict, (*reasons, *doubts)
     if verdict is ShotVerdict.REFUSED:
         return MeasuredExposure(SizedDroplets.none(), views, ratio, verdict, reasons)

@@ -70,6 +70,22 @@ def test_a_black_level_without_a_dark_image_is_doubted(scene: ShadowScene) -> No
     assert any("of the light is left where shadows should be black" in reason for reason in doubted.reasons)
 
 
+@pytest.fixture(scope="module")
+def small() -> ShadowScene:
+    """Droplets of about two pixels, behind a blur of more than one: none is black in its middle."""
+    return shadow_scene(SHAPE, 14, IMAGE_SIZE_PX, seed=3, median_mm=0.035, blurs_px=(1.2,) * 4, noise=0.0)
+
+
+@pytest.mark.parametrize(("veil", "doubted"), [(0.0, False), (0.2, True), (0.5, True)])
+def test_a_veil_of_light_over_small_droplets_is_doubted(small: ShadowScene, veil: float, doubted: bool) -> None:
+    """Stray light, or a second exposure that shows no droplet there: each looks smaller, and none looks odd."""
+    rng = np.random.default_rng(4)
+    images = [veil + (1 - veil) * image + rng.normal(0, 0.012, image.shape) for image in small.images]
+    told = measure_shadows([image.astype(np.float32) for image in images], search_of(small, MARGIN_VOXEL))
+    said = "; ".join(told.reasons)
+    assert ("behind a veil" in said or "should be black" in said) == doubted, said
+
+
 def moved_px(image: Grey, rows: int) -> Grey:
     """Droplets that fall by so many rows while the light is on."""
     return np.asarray(np.mean([np.roll(image, row, axis=0) for row in range(rows)], axis=0), dtype=np.float32)
