@@ -9,8 +9,9 @@ from scipy.special import stdtrit
 
 from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.analysis.estimates import CONFIDENCE, Estimate
+from processing.analysis.shot_doubts import COMPONENTS
 from processing.analysis.velocity.common_motion import REACH_VOXEL
-from processing.analysis.velocity.velocity_statistics import COMPONENTS, velocity_statistics
+from processing.analysis.velocity.velocity_statistics import velocity_statistics
 from processing.geometry import FloatArray
 from processing.reconstruction.settings import FrozenValue, GridSettings
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.analysis.droplets.droplet_table import Columns
-from processing.analysis.velocity.velocity_statistics import COMPONENTS
+from processing.analysis.shot_doubts import COMPONENTS
 from processing.analysis.velocity.velocity_verdict import FASTEST_M_S
 from processing.geometry import FloatArray
 

@@ -11,12 +11,11 @@ from scipy.special import stdtrit
 from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.analysis.droplets.ghost_share import share_interval
 from processing.analysis.estimates import CONFIDENCE, Estimate
-from processing.analysis.shot_doubts import velocity_doubts
+from processing.analysis.shot_doubts import COMPONENTS, velocity_doubts
 from processing.analysis.velocity.unpaired_ghosts import ghost_share_by_partners
 from processing.geometry import FloatArray
 from processing.reconstruction.settings import FrozenValue
 
-COMPONENTS = ("u_m_s", "v_m_s", "w_m_s")
 NOTHING = "no shot was measured"
 OLD = "a file does not tell velocities: it is from before they were measured"
 

@@ -56,6 +56,13 @@ def test_doubtful_velocities_are_told() -> None:
     assert not doubts(*(saying(shot, velocity='{"reason": "shots have one exposure"}') for shot in SHOTS))
 
 
+@pytest.mark.parametrize("exchanged", [1, 2, 3])
+def test_shots_whose_exposures_are_exchanged_are_told_although_their_mean_is_next_to_nothing(exchanged: int) -> None:
+    told = doubts(*(moved(shot, -1) for shot in SHOTS[:exchanged]), *SHOTS[exchanged:])
+    assert f"droplets of {min(exchanged, 4 - exchanged)} of 4 shots fly against those of the others" in told
+    assert "exposures A and B exchanged" in told
+
+
 @pytest.mark.parametrize("direction", [(0, -1, 0), (0, 0, 1), (1, 0.5, 0)])
 def test_an_axis_along_which_the_droplets_do_not_fly_is_told(direction: tuple[float, float, float]) -> None:
     told = doubts(*SHOTS, axis=SprayAxis((0, 0, 0), direction))
