@@ -1,6 +1,6 @@
 """Figures of droplets that were measured: how large they are, with intervals, and where the large ones are."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -18,12 +18,12 @@ SMALLEST_PT2, LARGEST_PT2 = 4.0, 300.0
 MOST_TICKS = 8
 
 
-def sizes_figure(shots: Sequence[StoredDroplets], title: str = "") -> Figure:
+def sizes_figure(shots: Iterable[StoredDroplets], title: str = "") -> Figure:
     """Distribution of diameters by number, with its intervals, and by volume, after ISO 9276-1; means with intervals.
 
     Parameters
     ----------
-    shots : sequence of StoredDroplets
+    shots : iterable of StoredDroplets
         A shot each, as ``read_droplets`` gives it.
     title : str
         Above the figure.
@@ -33,6 +33,7 @@ def sizes_figure(shots: Sequence[StoredDroplets], title: str = "") -> Figure:
     ValueError
         There are no diameters; the text says why.
     """
+    shots = tuple(shots)
     statistics = droplet_statistics(shots)
     if statistics.reason not in (None, TOO_FEW):
         raise ValueError(f"no sizes to draw: {statistics.reason}")

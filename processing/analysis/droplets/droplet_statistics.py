@@ -2,7 +2,7 @@
 
 import json
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Annotated, Any
 
 import numpy as np
@@ -46,12 +46,12 @@ class DropletStatistics(SizeStatistics):
     ghost_reason: Annotated[str | None, Field(description="why it is null")] = None
 
 
-def droplet_statistics(shots: Sequence[StoredDroplets]) -> DropletStatistics:
+def droplet_statistics(shots: Iterable[StoredDroplets]) -> DropletStatistics:
     """Number, density, sizes and share of ghosts.
 
     Parameters
     ----------
-    shots : sequence of StoredDroplets
+    shots : iterable of StoredDroplets
         A shot each, as ``read_droplets`` gives it; of one run or several.
 
     Raises
@@ -59,6 +59,7 @@ def droplet_statistics(shots: Sequence[StoredDroplets]) -> DropletStatistics:
     DropletFileError
         A file does not say what became of its exposures, or two are of the same shot, or of two recipes.
     """
+    shots = tuple(shots)
     require_poolable(shots)
     told = [told_exposures(shot) for shot in shots]
     counted = [(shot, exposures) for shot, exposures in zip(shots, told, strict=True) if exposures]
@@ -112,10 +113,11 @@ def _require_alike(shots: Sequence[StoredDroplets]) -> None:
 
 
 def _made_by(shot: StoredDroplets) -> dict[str, object]:
-    """Version and settings of a measurement, less those that leave a droplet what it is."""
+    """Version, calibration and settings of a measurement, less those that leave a droplet what it is."""
     settings = json.loads(str(shot.provenance.get("settings", "{}")))
-    version = shot.provenance.get("method_version", 1)
-    return {"method_version": version, **{name: one for name, one in settings.items() if name not in _SAME_DROPLETS}}
+    version, calibration = shot.provenance.get("method_version", 1), shot.provenance.get("calibration")
+    made_by = {"method_version": version, "calibration": calibration}
+    return {**made_by, **{name: one for name, one in settings.items() if name not in _SAME_DROPLETS}}
 
 
 def _place(shot: StoredDroplets) -> str:

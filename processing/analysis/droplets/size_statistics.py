@@ -9,7 +9,7 @@ Nor does a bootstrap know of droplets that are larger than all that were seen, a
 volume with few droplets beyond it is not told: its interval would hold the truth far less often than it says.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from itertools import pairwise
 from typing import Annotated, Literal
 
@@ -73,13 +73,13 @@ class SizeClass(FrozenValue):
 
 
 def mean_diameters(
-    diameters_um_by_shot: Sequence[ArrayLike], exposures_per_shot: float = 1, confidence: float = CONFIDENCE
+    diameters_um_by_shot: Iterable[ArrayLike], exposures_per_shot: float = 1, confidence: float = CONFIDENCE
 ) -> SizeStatistics:
     """Mean diameters, quantiles by volume and relative span, with intervals.
 
     Parameters
     ----------
-    diameters_um_by_shot : sequence of (N,) arrays
+    diameters_um_by_shot : iterable of (N,) arrays
         Diameters of the droplets of every shot.
     exposures_per_shot : float
         2 where exposures A and B, which show the same droplets, are both in the array of a shot.
@@ -91,9 +91,10 @@ def mean_diameters(
     ValueError
         A diameter is not finite and above 0, or there are diameters where shots should be.
     """
-    if any(np.ndim(diameters_um) != 1 for diameters_um in diameters_um_by_shot):
+    by_shot = tuple(diameters_um_by_shot)
+    if any(np.ndim(diameters_um) != 1 for diameters_um in by_shot):
         raise ValueError("diameters by shot, please: a list of arrays; of a single shot [diameters_um]")
-    checked = (np.sort(_checked(diameters_um)) for diameters_um in diameters_um_by_shot)
+    checked = (np.sort(_checked(diameters_um)) for diameters_um in by_shot)
     shots = sorted((shot for shot in checked if len(shot)), key=np.ndarray.tolist)  # draws depend on no order
     diameters_um = np.concatenate([np.empty(0), *shots])
     if len(diameters_um) < FEWEST * exposures_per_shot:

@@ -1,6 +1,6 @@
 """SprayStatistics: all that the droplets of some shots say of a spray, each figure with its interval or a reason."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
@@ -101,12 +101,12 @@ class SprayStatistics(FrozenValue):
     ] = Field(default_factory=dict)
 
 
-def spray_statistics(shots: Sequence[StoredDroplets], asked: AskedFor | None = None) -> SprayStatistics:
+def spray_statistics(shots: Iterable[StoredDroplets], asked: AskedFor | None = None) -> SprayStatistics:
     """All figures of a spray.
 
     Parameters
     ----------
-    shots : sequence of StoredDroplets
+    shots : iterable of StoredDroplets
         A shot each, as ``read_droplets`` gives it; of one run or several.
     asked : AskedFor | None
         Nozzle and axis, density of the liquid.
@@ -116,7 +116,7 @@ def spray_statistics(shots: Sequence[StoredDroplets], asked: AskedFor | None = N
     DropletFileError
         As of ``droplet_statistics``.
     """
-    asked = asked or AskedFor()
+    asked, shots = asked or AskedFor(), tuple(shots)
     pooled = droplet_statistics(shots)
     if not pooled.n or any(DIAMETER not in shot.columns for shot in shots):
         why = pooled.reason or "no droplet was measured"

@@ -9,6 +9,7 @@ from pydantic import Field
 from scipy.special import stdtrit
 
 from processing.analysis.droplets.droplet_file import StoredDroplets
+from processing.analysis.droplets.droplet_statistics import require_poolable
 from processing.analysis.droplets.ghost_share import share_interval
 from processing.analysis.estimates import CONFIDENCE, Estimate
 from processing.analysis.shot_doubts import COMPONENTS, velocity_doubts
@@ -50,14 +51,21 @@ class VelocityStatistics(FrozenValue):
     doubts: Annotated[tuple[str, ...], Field(description="velocities that are doubtful, and count, or refused")] = ()
 
 
-def velocity_statistics(shots: Sequence[StoredDroplets]) -> VelocityStatistics:
+def velocity_statistics(shots: Iterable[StoredDroplets]) -> VelocityStatistics:
     """Pairs, share of paired droplets and mean velocity of all shots whose velocities are not refused.
 
     Parameters
     ----------
-    shots : sequence of StoredDroplets
+    shots : iterable of StoredDroplets
         A shot each, as ``read_droplets`` gives it.
+
+    Raises
+    ------
+    DropletFileError
+        As of ``droplet_statistics``: a shot is there twice, or two are of two recipes or calibrations.
     """
+    shots = tuple(shots)
+    require_poolable(shots)
     told = [(shot, _told(shot)) for shot in shots]
     believed = [(shot, its) for shot, its in told if its.get("pairs")]
     if not believed:

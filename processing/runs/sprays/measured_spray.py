@@ -67,8 +67,8 @@ def read_spray(folders: Sequence[Path]) -> MeasuredSpray:
 def read_files(files: Sequence[Path], name: str = "") -> MeasuredSpray:
     """The same of files of droplets, one at least, under a name."""
     shots = tuple(map(read_in_place, files))
-    require_poolable(shots)
     _require_one(shots, files, "calibration")
+    require_poolable(shots)
     _require_one(shots, files, "spray")
     return MeasuredSpray(name, shots, _axis(shots, files))
 

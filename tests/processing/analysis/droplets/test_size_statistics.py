@@ -205,4 +205,4 @@ def test_shots_that_differ_make_a_density_less_sure_and_those_that_do_not_make_i
 
 def test_every_diameter_is_no_shot_of_its_own() -> None:
     with pytest.raises(ValueError, match="diameters by shot, please"):
-        mean_diameters(np.arange(1.0, 30.0))  # type: ignore[arg-type]
+        mean_diameters(np.arange(1.0, 30.0))

@@ -1,12 +1,13 @@
 """Mean velocities of shots, and how sure they are."""
 
 import json
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from processing.analysis.droplets.droplet_file import StoredDroplets
+from processing.analysis.droplets.droplet_file import DropletFileError, StoredDroplets
 from processing.analysis.velocity.velocity_statistics import velocity_statistics
 
 
@@ -50,6 +51,15 @@ def test_the_interval_holds_the_truth_as_often_as_it_says(shots: int, of_shot: f
         assert mean is not None
         held += [one.low < true < one.high for one, true in zip((mean.u, mean.v, mean.w), (10, -5, 2), strict=True)]
     assert np.mean(held) == pytest.approx(0.95, abs=0.03)
+
+
+@pytest.mark.parametrize("others", [{}, {"settings": '{"light": "gaussian"}'}])
+def test_a_shot_that_is_there_twice_is_refused(others: dict[str, Any]) -> None:
+    """Found twice by a pattern, it would make the mean as sure as one may wish."""
+    one = shot(drawn(np.random.default_rng(4), 40))
+    twice = [replace(one, provenance={**one.provenance, "run": "spray", "shot": 3, **told}) for told in ({}, others)]
+    with pytest.raises(DropletFileError, match="run spray, shot 3: its droplets are there 2 times"):
+        velocity_statistics(twice)
 
 
 def test_without_velocities_every_reason_is_told_once() -> None:
