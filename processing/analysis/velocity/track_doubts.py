@@ -1,5 +1,6 @@
-"""Whether the velocities of tracks contradict the rate of their shots: nothing else says that it is stated wrongly."""
+"""Whether tracks contradict the rate and the order of their shots: nothing else says that these are stated wrongly."""
 
+import json
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -13,6 +14,12 @@ from processing.geometry import FloatArray
 
 MOST_APART = 1.5
 """Ratio of the median speeds of the same droplets, by tracks and by both exposures of a shot."""
+LEAST_LINKED, FEWEST = 0.1, 10
+"""Share of the droplets of a shot that are on tracks, and of those that are on tracks from a shot to the next one; of
+fewer droplets than so many nothing is said."""
+MOST_LISTED = 5
+TOGETHER = 0.5
+"""Amount of the mean velocity over the mean speed, from which on droplets have a direction."""
 
 
 def rate_doubts(tracks: Columns, shots: Sequence[StoredDroplets], rate_hz: float) -> Iterator[str]:
@@ -40,6 +47,55 @@ def rate_doubts(tracks: Columns, shots: Sequence[StoredDroplets], rate_hz: float
                 f"droplets fly at {by_tracks:.3g} m/s from shot to shot, but at {by_pairs:.3g} m/s from A to B: is the "
                 f"rate of {rate_hz:g} Hz right, and the separation?"
             )
+
+
+def order_doubts(tracks: Columns, shots: Sequence[StoredDroplets]) -> Iterator[str]:
+    """Shots out of order: on no track, followed by none, or all of them backwards, against the axis of the spray.
+
+    Parameters
+    ----------
+    tracks, shots
+        As of ``rate_doubts``; shots in their order.
+    """
+    if not len(tracks["track"]):
+        return
+    asked = "are shots in the order in which they were taken, at even times, and none missing?"
+    numbers = np.array([shot.provenance["shot"] for shot in shots], np.intp)
+    seen = np.array([np.count_nonzero(shot.columns["frame"] == "a") for shot in shots])
+    linked, going_on = _linked(tracks, numbers)
+    if len(off := numbers[(seen >= FEWEST) & (linked < LEAST_LINKED * seen)]):
+        yield f"hardly a droplet of {len(off)} of {len(shots)} shots is on a track (shot {_listed(off)}): {asked}"
+    fewer = np.minimum(linked[:-1], linked[1:])
+    if len(cuts := numbers[:-1][(fewer >= FEWEST) & (going_on < LEAST_LINKED * fewer)]):
+        yield f"hardly a track goes on after {len(cuts)} of {len(shots)} shots (shot {_listed(cuts)}): {asked}"
+    yield from _backwards(tracks, str(shots[0].provenance.get("spray", "null")))
+
+
+def _linked(tracks: Columns, numbers: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Droplets on tracks in each shot, and tracks that go on from each to the next one."""
+    shot, track = tracks["shot"].astype(np.intp), tracks["track"].astype(np.intp)
+    order = np.lexsort((shot, track))
+    ends = np.flatnonzero(np.diff(track[order])) + 1
+    first, last = shot[order][np.append(0, ends)], shot[order][np.append(ends - 1, len(order) - 1)]
+    own = np.sort(shot)
+    linked = np.searchsorted(own, numbers, "right") - np.searchsorted(own, numbers, "left")
+    begun = np.searchsorted(np.sort(first), numbers[:-1], "right")
+    return linked, begun - np.searchsorted(np.sort(last), numbers[:-1], "right")
+
+
+def _listed(numbers: NDArray[np.intp]) -> str:
+    return ", ".join(map(str, numbers[:MOST_LISTED])) + (" ..." if len(numbers) > MOST_LISTED else "")
+
+
+def _backwards(tracks: Columns, spray: str) -> Iterator[str]:
+    stated = json.loads(spray)
+    velocities_m_s = np.column_stack([np.asarray(tracks[name], np.float64) for name in COMPONENTS])
+    flying = velocities_m_s[np.isfinite(velocities_m_s).all(axis=1)]
+    if not stated or not len(flying):
+        return
+    mean_m_s, speed_m_s = flying.mean(axis=0), float(np.linalg.norm(flying, axis=1).mean())
+    if mean_m_s @ np.array(stated["axis"]) < 0 and np.linalg.norm(mean_m_s) > TOGETHER * speed_m_s:
+        yield "droplets fly against the axis of the spray: are shots in the order in which they were taken?"
 
 
 def _speeds(columns: Columns) -> FloatArray:

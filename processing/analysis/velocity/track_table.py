@@ -13,7 +13,7 @@ from processing.analysis.droplets.droplet_table import COVARIANCES as PLACES
 from processing.analysis.droplets.droplet_table import Columns
 from processing.analysis.shot_doubts import exposure_doubts
 from processing.analysis.velocity.moving_droplets import LEAST_SIZE, MovingDroplets
-from processing.analysis.velocity.track_doubts import rate_doubts
+from processing.analysis.velocity.track_doubts import order_doubts, rate_doubts
 from processing.analysis.velocity.track_motion import HALF_WINDOW, TrackPoints, track_points
 from processing.analysis.velocity.tracks import Tracks, link
 from processing.analysis.velocity.velocity_table import COVARIANCES
@@ -106,7 +106,7 @@ def track_droplets(
     points = track_points(frames, linked, half_window)
     columns = _columns(points, linked, first, grid, rate_hz) | _sizes(points, first, ordered)
     count = sum(map(len, frames))
-    doubts = (*exposure_doubts(ordered, "a"), *rate_doubts(columns, ordered, rate_hz))
+    doubts = (*exposure_doubts(ordered, "a"), *rate_doubts(columns, ordered, rate_hz), *order_doubts(columns, ordered))
     return DropletTracks(columns, linked.count, count, rate_hz, None if linked.count else NO_TRACK, doubts)
 
 

@@ -128,6 +128,32 @@ def test_what_contradicts_the_rate_is_told(tmp_path: Path, capsys: pytest.Captur
     assert "faster than any spray: is the rate of 2e+07 Hz right?" in fast
 
 
+def ordered(shown: Series, order: list[int]) -> Series:
+    return Series([shown.frames[number] for number in order], [], [], np.empty(0))
+
+
+@pytest.mark.parametrize(
+    ("order", "said"),
+    [
+        ([0, 1, 2, 3, 4, 5], []),
+        ([0, 2, 1, 3, 5, 4], ["hardly a droplet of 3 of 6 shots is on a track (shot 3, 4, 8)"]),
+        ([0, 1, 2, 7, 8, 9], ["hardly a track goes on after 1 of 6 shots (shot 5)"]),
+        ([5, 4, 3, 2, 1, 0], ["droplets fly against the axis of the spray"]),
+    ],
+)
+def test_shots_out_of_order_are_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], order: list[int], said: list[str]
+) -> None:
+    """Names that sort otherwise than they were taken: tracks fly twice as fast, or backwards, and look fine."""
+    spray = json.dumps({"nozzle_mm": [0, 0, 0], "axis": [1, 0, 0]})
+    shown_series = ordered(series(frames=10, scatter=0.1, turn=0.0), order)
+    results = write_series(tmp_path / "droplets", shown_series, rate_hz=RATE_HZ, spray=spray)
+    doubts = told(capsys, "tracks", results, "-o", tmp_path / "tracks.h5")["doubts"]
+    assert len(doubts) == len(said), doubts
+    for doubt, what in zip(doubts, said, strict=True):
+        assert doubt.startswith(what)
+
+
 def test_shots_that_are_not_good_are_told_with_their_tracks(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     said = {"a": {"verdict": "doubtful", "reasons": ["it is blurred"]}, "b": {"verdict": "refused", "reasons": []}}
     results = write_series(tmp_path / "droplets", series(frames=4), rate_hz=RATE_HZ, exposures=json.dumps(said))
