@@ -16,6 +16,8 @@ TOGETHER, AGAINST = 0.5, -0.5
 """Amount of a shot's mean velocity over its mean speed, from which on it has a direction; cosine from that of most,
 below which it flies against them."""
 FEWEST_PAIRS = 5
+MOST_FASTER, SLOWEST_M_S = 2.5, 0.1
+"""Ratio of the median speed of a shot and that of all shots, of speeds that are no rest."""
 UNSURE = {"doubtful": "are doubtful, and count", "refused": "are refused, and do not count"}
 
 
@@ -29,12 +31,32 @@ def exposure_doubts(shots: Sequence[StoredDroplets], frames: str = "ab") -> tupl
 def velocity_doubts(shots: Sequence[StoredDroplets]) -> tuple[str, ...]:
     """Doubts on the velocities; none where nobody could measure any."""
     velocities = [json.loads(str(shot.provenance.get("velocity", "{}"))) for shot in shots]
-    return (*(f"velocities of {count} shots {why}" for count, why in _unsure(velocities)), *_against(shots))
+    flying = [(shot, rows) for shot in shots if (rows := _flying(shot)) is not None]
+    unsure = (f"velocities of {count} shots {why}" for count, why in _unsure(velocities))
+    return (*unsure, *_against(flying), *_faster(flying))
 
 
-def _against(shots: Sequence[StoredDroplets]) -> Iterator[str]:
+Flying = Sequence[tuple[StoredDroplets, FloatArray]]
+"""Shots with the velocities (N, 3) of their droplets of exposure A."""
+
+
+def _faster(flying: Flying) -> Iterator[str]:
+    """Shots that fly much faster or slower than the others: their mean is that of two sprays, or of two separations."""
+    if not flying:
+        return
+    speeds_m_s = np.array([np.median(np.linalg.norm(rows, axis=1)) for _, rows in flying])
+    ratios = np.maximum(speeds_m_s, SLOWEST_M_S) / max(float(np.median(speeds_m_s)), SLOWEST_M_S)
+    if len(odd := np.flatnonzero(np.abs(np.log(ratios)) > np.log(MOST_FASTER))):
+        yield (
+            f"droplets of {len(odd)} of {len(flying)} shots fly {MOST_FASTER:g} times faster or slower than those of "
+            f"the others ({named(flying[odd[0]][0])}: {speeds_m_s[odd[0]]:.3g} m/s, all: {np.median(speeds_m_s):.3g} "
+            "m/s): is the separation right in all of them, and are they of one spray?"
+        )
+
+
+def _against(flying: Flying) -> Iterator[str]:
     """Shots that fly against most others: their mean may be next to nothing, and no axis contradicts it."""
-    ways = [(shot, way) for shot in shots if (way := _way(shot)) is not None]
+    ways = [(shot, way) for shot, rows in flying if (way := _way(rows)) is not None]
     if not ways:
         return
     units = np.array([way for _, way in ways])
@@ -47,15 +69,18 @@ def _against(shots: Sequence[StoredDroplets]) -> Iterator[str]:
         )
 
 
-def _way(shot: StoredDroplets) -> FloatArray | None:
-    """Unit vector along which the droplets of a shot fly; None where they are few, or fly anywhere."""
+def _flying(shot: StoredDroplets) -> FloatArray | None:
+    """Velocities of the droplets of A that have one; None where they are few."""
     if any(name not in shot.columns for name in COMPONENTS):
         return None
     velocities = np.column_stack([np.asarray(shot.columns[name], np.float64) for name in COMPONENTS])
     flying = velocities[np.isfinite(velocities).all(axis=1) & (shot.columns["frame"] == "a")]
-    if len(flying) < FEWEST_PAIRS:
-        return None
-    mean, speed = flying.mean(axis=0), float(np.linalg.norm(flying, axis=1).mean())
+    return np.asarray(flying) if len(flying) >= FEWEST_PAIRS else None
+
+
+def _way(velocities_m_s: FloatArray) -> FloatArray | None:
+    """Unit vector along which droplets fly; None where they fly anywhere."""
+    mean, speed = velocities_m_s.mean(axis=0), float(np.linalg.norm(velocities_m_s, axis=1).mean())
     amount = float(np.linalg.norm(mean))
     return np.asarray(mean / amount) if amount > TOGETHER * speed else None
 

@@ -22,6 +22,8 @@ MOST_ASIDE_DEG = 45.0
 """Of the mean velocity from the axis; a spray flies along its axis, however wide it is."""
 MOST_BEHIND = 0.05
 """Of the droplets; some are carried back."""
+FARTHEST_MM = 2000.0
+"""From the nozzle: no spray that is measured droplet by droplet is as long."""
 MOST_OFF_WAY_DEG = 15.0
 """Of the mean flight from the mean way that leads from the nozzle to the droplets; single ones may fly anywhere."""
 MOST_ON_ONE_SIDE = 0.98
@@ -69,6 +71,9 @@ def _of_nozzle(sample: SpraySample, axis: SprayAxis) -> Iterator[str]:
     along_mm, from_mm, azimuth_deg = axis.coordinates(sample.points_mm)
     if (share := float(np.mean(along_mm < 0))) > MOST_BEHIND:
         yield f"{100 * share:.0f} % of the droplets lie behind the nozzle: is it stated rightly, and the axis?"
+        return
+    if (away_mm := float(np.median(along_mm))) > FARTHEST_MM:
+        yield f"the nozzle is stated {away_mm:.3g} mm from the droplets: is its place in mm? Angles are seen from there"
         return
     if (off_way_deg := _off_way_deg(sample, axis)) > MOST_OFF_WAY_DEG:
         yield (

@@ -70,6 +70,20 @@ def test_an_axis_along_which_the_droplets_do_not_fly_is_told(direction: tuple[fl
     assert "is it stated rightly" in told
 
 
+@pytest.mark.parametrize("factor", [0.1, 10.0])
+def test_shots_of_another_separation_or_spray_are_told(factor: float) -> None:
+    """One run whose separation was stated in another unit makes a mean speed that neither has."""
+    told = doubts(moved(SHOTS[0], factor), *SHOTS[1:])
+    assert "droplets of 1 of 4 shots fly 2.5 times faster or slower than those of the others" in told
+    assert "is the separation right" in told
+    assert not doubts(moved(SHOTS[0], 1.5), *SHOTS[1:])
+
+
+def test_a_nozzle_in_another_unit_is_told() -> None:
+    told = doubts(*SHOTS, axis=SprayAxis((0, -12000, 0), (0, 1, 0)))
+    assert "is its place in mm?" in told
+
+
 def test_droplets_behind_the_nozzle_are_told() -> None:
     told = doubts(*SHOTS, axis=SprayAxis((0, 9, 0), (0, 1, 0)))
     assert "% of the droplets lie behind the nozzle: is it stated rightly" in told
