@@ -75,6 +75,10 @@ def read_files(files: Sequence[Path], name: str = "") -> MeasuredSpray:
 
 def _files(folder: Path) -> list[Path]:
     files = [*sorted(folder.glob(PATTERN)), *sorted(folder.glob(f"*/{PATTERN}"))]
+    if not files and any(folder.glob("*_droplets.h5")):
+        raise DropletFileError(
+            f"{folder}: has droplets of images, in 2-D: they have no place in a spray; measure --json tells their means"
+        )
     if not files:
         raise DropletFileError(f"{folder}: has no droplets ({PATTERN}): name a directory that measure wrote with -o")
     return files

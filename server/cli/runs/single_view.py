@@ -1,6 +1,7 @@
 """``tomoshadow measure`` without a calibration: images, or one view of runs, become droplets in 2-D."""
 
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +11,7 @@ from server.cli.options import positive
 from server.cli.output import Outcome, progress, table, tracked
 from server.cli.runs.batch import over_runs
 from server.cli.runs.recipes import keeping_recipe, settings_of
+from server.reports.digits import digits_of_interval
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -26,8 +28,8 @@ IN_THE_IMAGE = ("view", "um_per_px", "background")
 
 OF_RUNS = ("view", "shots")
 """Options that mean nothing of images."""
-LEAST_UM_PER_PX, MOST_UM_PER_PX = 1e-3, 1e6
-"""From beyond what light resolves to a metre."""
+LEAST_UM_PER_PX, MOST_UM_PER_PX = 0.05, 1e6
+"""From pixels of an oil immersion lens to a metre; millimetres taken for micrometres are below."""
 
 
 def add_single_view(parser: ArgumentParser) -> None:
@@ -40,7 +42,7 @@ def add_single_view(parser: ArgumentParser) -> None:
 
 def _um_per_px(text: str) -> float:
     if not LEAST_UM_PER_PX <= (value := positive(text)) <= MOST_UM_PER_PX:
-        raise ArgumentTypeError(f"{text} must be from {LEAST_UM_PER_PX:g} to {MOST_UM_PER_PX:g}")
+        raise ArgumentTypeError(f"{text} must be from {LEAST_UM_PER_PX:g} to {MOST_UM_PER_PX:g}, in um")
     return value
 
 
@@ -173,4 +175,16 @@ def _summary(result: dict[str, Any]) -> str:
     d32 = statistics[f"d32_{unit}"]
     if d32 is None:
         return f"{counted}: {statistics['reason']}"
-    return f"{counted}, D32 {d32['value']:.3g} ({d32['low']:.3g} to {d32['high']:.3g}) {unit}"
+    value, low, high = digits_of_interval(d32["value"], d32["low"], d32["high"])
+    return f"{counted}, D32 {value} ({low} to {high}) {unit}{_unmeasured(result)}"
+
+
+def _unmeasured(result: dict[str, Any]) -> str:
+    """What means lack, in a line of its own; nothing where all was measured that is a droplet."""
+    left_out: Counter[str] = sum((Counter(shot["left_out"]) for shot in result["shots"]), Counter())
+    if not left_out["small"]:
+        return ""
+    return (
+        f"\nmeans are of the larger droplets: {left_out['small']} seen are smaller than least_diameter_px of the "
+        "recipe, and not measured"
+    )

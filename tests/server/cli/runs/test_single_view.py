@@ -54,6 +54,23 @@ def test_images_are_measured_in_pixels(images: list[Path], tmp_path: Path, capsy
     assert "3 droplets in 2 images: too few droplets: means need 5" in text
 
 
+def test_means_say_that_small_droplets_are_not_in_them(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    large = [(30.0 * (1 + number), 60.0, 16.0) for number in range(6)]
+    image = tmp_path / "spray.png"
+    cv2.imwrite(str(image), grey([*large, (60.0, 100.0, 3.0), (140.0, 100.0, 3.0)], 0.5))
+    text = shown(capsys, "measure", image, "-o", tmp_path / "out")
+    assert "means are of the larger droplets: 2 seen are smaller than least_diameter_px" in text
+    cv2.imwrite(str(image), grey(large, 0.5))
+    assert "means are of" not in shown(capsys, "measure", image, "-o", tmp_path / "large")
+
+
+def test_droplets_of_images_are_no_spray(
+    images: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    told(capsys, "measure", *images, "-o", tmp_path / "out")
+    assert "has droplets of images, in 2-D" in refused(capsys, "statistics", tmp_path / "out")
+
+
 def test_diameters_that_were_edited_are_refused(images: list[Path], tmp_path: Path) -> None:
     file = tmp_path / "out" / "first_droplets.h5"
     assert main(["measure", *map(str, images), "-o", str(file.parent)]) == 0
@@ -86,7 +103,7 @@ def test_a_scale_turns_pixels_into_micrometres(
     assert first.startswith("first,a,")
 
 
-@pytest.mark.parametrize("scale", ["0", "-1", "nan", "1e300", "1e-300"])
+@pytest.mark.parametrize("scale", ["0", "-1", "nan", "1e300", "1e-300", "0.0164"])
 def test_a_scale_that_no_camera_has_is_refused(
     scale: str, images: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
