@@ -9,8 +9,8 @@ from matplotlib.ticker import LogLocator, NullFormatter
 
 from processing.geometry import FloatArray
 
-CLASSES_UM = np.geomspace(10, 200, 16)
-"""Edges of the classes of true diameters."""
+CLASSES_UM = np.geomspace(10, 270, 19)
+"""Edges of the classes of diameters; one is 30 um, from which on droplets are counted."""
 AREA_PER_UM2 = 0.012
 """Of a marker, in square points."""
 

@@ -181,8 +181,9 @@ def _motion(reported: ReportedSpray) -> Section | None:
     if motion is None or sample is None:
         return None
     text = (
-        f"{100 * motion.paired_share:.1f} % of the droplets have a velocity. Flux-weighted figures: "
-        f"{motion.flux_weighting}. In flux, the others take the mean velocity by volume."
+        f"{100 * motion.paired_share:.1f} % of the droplets have a velocity; of the others the partner was not found, "
+        "or is outside of the box in the other exposure. Flux-weighted figures: "
+        f"{motion.flux_weighting}. In the flux, droplets without a velocity take the mean one by volume."
     )
     speeds_m_s = np.linalg.norm(sample.velocities_m_s, axis=1)
     caption = (

@@ -96,6 +96,8 @@ def test_the_report_is_one_page_with_all_figures(demonstrated: tuple[Path, dict[
     ):
         assert f"<h2>{chapter}</h2>" in page
     assert "src=http" not in page
+    for judged in ("found [%]", "ghosts among them [%]"):
+        assert " to " in page.split(judged)[1].split("</tr>")[0], "each with its interval"
 
 
 def test_a_missing_camera_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

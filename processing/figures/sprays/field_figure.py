@@ -27,7 +27,14 @@ def velocity_field_figure(through: VelocityField | None, across: VelocityField |
     figure = Figure(figsize=(PANEL_IN * len(fields), HEIGHT_IN), layout="constrained")
     for axes, field in zip(figure.subplots(1, len(fields), squeeze=False).ravel(), fields, strict=True):
         if field is through:
-            _draw(axes, field, np.where(field.n > 0, field.n.astype(np.float64), np.nan), "droplets in a cell", "Blues")
+            _draw(
+                axes,
+                field,
+                np.where(field.n > 0, field.n.astype(np.float64), np.nan),
+                "droplets in a cell",
+                "Blues",
+                0.0,
+            )
             axes.set(ylabel="along the axis, from the nozzle [mm]")
             axes.invert_yaxis()
         else:
@@ -36,10 +43,11 @@ def velocity_field_figure(through: VelocityField | None, across: VelocityField |
     return figure
 
 
-def _draw(axes: Axes, field: VelocityField, colours: FloatArray, label: str, cmap: str) -> None:
+def _draw(
+    axes: Axes, field: VelocityField, colours: FloatArray, label: str, cmap: str, least: float | None = None
+) -> None:
     axes.set_facecolor("0.92")
     shown = np.ma.masked_invalid(colours)
-    least = min(0.0, float(shown.min()))
     mesh = axes.pcolormesh(field.across_mm, field.down_mm, shown, cmap=cmap, alpha=0.5, vmin=least, rasterized=True)
     axes.figure.colorbar(mesh, ax=axes, label=label, shrink=0.8)
     middles_mm = [(edges[:-1] + edges[1:]) / 2 for edges in (field.across_mm, field.down_mm)]

@@ -3,7 +3,8 @@
 import numpy as np
 from matplotlib.patches import Rectangle
 
-from processing.figures.found_figures import Placed, found_figure
+from processing.figures.found_figures import CLASSES_UM, Placed, found_figure
+from server.demo.demo_droplets import COUNTED_UM
 
 
 def test_every_group_is_named_with_its_number_and_counted_by_size() -> None:
@@ -16,3 +17,8 @@ def test_every_group_is_named_with_its_number_and_counted_by_size() -> None:
     assert [text.get_text() for text in legend.get_texts()] == ["found: 20", "missed: 3", "ghosts: 0"]
     heights = [patch.get_height() for patch in by_size.patches if isinstance(patch, Rectangle)]
     assert sum(heights) == 23
+
+
+def test_a_class_begins_where_counting_does() -> None:
+    """Else the first class of droplets from 30 um on is half empty."""
+    assert np.isclose(CLASSES_UM, COUNTED_UM).any()

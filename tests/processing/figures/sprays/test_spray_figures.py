@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib.collections import QuadMesh
 from matplotlib.quiver import Quiver
 
 from processing.analysis.spray.density_map import density_map
@@ -86,4 +87,7 @@ def test_arrows_are_drawn_where_a_mean_velocity_is_told(sample: SpraySample) -> 
         assert field
         (arrows,) = (artist for artist in axes.collections if isinstance(artist, Quiver))
         assert np.count_nonzero(~np.asarray(arrows.Umask)) == np.isfinite(field.axial_m_s).sum()
+    (mesh,) = (artist for artist in across.collections if isinstance(artist, QuadMesh))
+    assert fields[1]
+    assert mesh.norm.vmin == np.nanmin(fields[1].axial_m_s), "colours tell velocities apart"
     assert len(velocity_field_figure(None, fields[1]).axes) == 2
