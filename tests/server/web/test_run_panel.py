@@ -49,4 +49,7 @@ def test_counts_are_told_once() -> None:
     ended = replace(status, live=LivePlan(), message="ended by the operator")
     assert message_text(ended) == "live view: ended by the operator", "the run was not"
     assert message_text(replace(ended, message=str(LivePlan()))).startswith("live view at 2 Hz")
+    door = replace(status, message="the interlock is open", causes=(Cause(CauseCode.INTERLOCK_OPEN, "a door"),))
+    assert message_text(door) == "live view: the interlock is open", "the run before it had been completed"
+    assert message_text(replace(door, ended_run="run")) == "the interlock is open"
     assert message_text(replace(status, message="shot 3 is fired again")) == "shot 3 is fired again"

@@ -112,8 +112,8 @@ def counts_text(status: RunStatus, eta_s: float | None = None) -> str:
 
 
 def message_text(status: RunStatus) -> str:
-    """What happened last; nothing where that is what the counts say. Of a live view, this says so."""
-    if status.live is not None:
+    """What happened last; nothing where that is what the counts say. Of a live view, or of its end, this says so."""
+    if status.live is not None or (status.causes and not status.ended_run):
         return status.message if status.message.startswith(_LIVE) else f"{_LIVE}: {status.message}"
     return "" if status.message == status.summary else status.message
 
