@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.errors import ShotFileError
+from daq.files.later_notes import NOTES_FILE
 from daq.files.packed_file import holds_its_shots
 from daq.files.run_directory import RunReader, list_runs
 from daq.files.run_file import RUN_FILE, SHOTS_FOLDER, shot_path
@@ -268,7 +269,7 @@ def _closed(read: RunSummary, status: RunStatus) -> RunSummary:
 
 def _stamp(run_dir: Path) -> str:
     folder = str(run_dir)  # of thousands of runs: paths are joined slowly
-    return f"{_changed_ns(f'{folder}/{RUN_FILE}')} {_changed_ns(f'{folder}/{SHOTS_FOLDER}')}"
+    return " ".join(str(_changed_ns(f"{folder}/{name}")) for name in (RUN_FILE, SHOTS_FOLDER, NOTES_FILE))
 
 
 def _changed_ns(path: Path | str) -> int:

@@ -3,13 +3,14 @@
 import shlex
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict, Field
 
 from daq.causes import CauseCode
+from daq.errors import ShotFileError
 from daq.files.run_directory import RunReader
 from daq.files.run_file import read_shot_count
 from daq.frozen_model import FrozenModel
@@ -68,7 +69,10 @@ class RunSummary(FrozenModel):
     recipes: Annotated[
         tuple[Recipe, ...] | None, Field(description="what is made of its shots by itself; null: the run does not say")
     ] = None
-    notes: Annotated[RunNotes, Field(description="conditions that no device knows")] = RunNotes()
+    notes: Annotated[RunNotes, Field(description="conditions that no device knows, as they stand now")] = RunNotes()
+    notes_changed_by: Annotated[str, Field(description="who wrote them after the run; empty: as recorded")] = ""
+    notes_changed_utc: Annotated[str, Field(description="when, ISO 8601; empty: as recorded")] = ""
+    notes_flaw: Annotated[str, Field(description="why later notes cannot be read: these are as recorded")] = ""
 
 
 def summary_of(run: RunReader, image_keys: NDArray[np.int64]) -> RunSummary:
@@ -93,8 +97,20 @@ def summary_of(run: RunReader, image_keys: NDArray[np.int64]) -> RunSummary:
         calibration=(plan.calibration if plan else None) or run.header.calibration_id,
         references=plan.references if plan else (),
         recipes=plan.recipes if plan else None,
-        notes=run.header.notes,
+        **_notes_of(run),
     )
+
+
+def _notes_of(run: RunReader) -> dict[str, Any]:
+    """As they stand now; a file of later notes that is damaged hides no run."""
+    try:
+        changes = run.notes_changes
+    except ShotFileError as error:
+        return {"notes": run.header.notes, "notes_flaw": str(error)}
+    if not changes:
+        return {"notes": run.header.notes}
+    last = changes[-1]
+    return {"notes": last.notes, "notes_changed_by": last.who, "notes_changed_utc": last.at_utc}
 
 
 def summary_of_packed(run: RunReader) -> RunSummary:

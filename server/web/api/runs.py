@@ -8,6 +8,7 @@ from daq.files.run_directory import RunHeader
 from daq.run_plan import RunKind, RunPlan
 from server.lab.desk.once import described
 from server.lab.errors import Conflict
+from server.lab.runs.notes_change import NewNotes, NotesHistory, change_notes, notes_history
 from server.lab.runs.run_filter import MOST_TEXT, ListedOutcome, RunFilter
 from server.lab.runs.run_removal import RemovedRun, remove_run
 from server.lab.runs.run_summary import RunSummary
@@ -66,6 +67,19 @@ def show_run(run_id: RunId, context: ContextOf) -> RunSummary:
 def show_header(run_id: RunId, context: ContextOf) -> RunHeader:
     """Plan, configuration, devices and versions, as they were when the run started."""
     return context.runs.reader(run_id).header
+
+
+@router.get("/{run_id}/notes", responses=responses(404, 500))
+def show_notes(run_id: RunId, context: ContextOf) -> NotesHistory:
+    """Notes as they were recorded, and every change since: who, when, and what stood before."""
+    return notes_history(context.runs, run_id)
+
+
+@router.put("/{run_id}/notes", responses=responses(404, 409, 423, 500, 507))
+def put_notes(run_id: RunId, new: NewNotes, context: ContextOf, who: Who) -> RunSummary:
+    """Change the notes of a run that is over; its own file stays as it was recorded, what stood before is kept."""
+    deed = f"changed the notes of run {run_id}"
+    return command(context, who, deed, lambda: change_notes(context.runs, run_id, new, who.name))
 
 
 @router.get(

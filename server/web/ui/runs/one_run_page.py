@@ -14,9 +14,10 @@ from server.lab.runs.run_store import has_results
 from server.lab.runs.run_summary import ACTIVE, RunSummary
 from server.lab.services import Context
 from server.web.ui.drawer.event_log import line_of
+from server.web.ui.runs.notes_dialog import NotesDialog
 from server.web.ui.runs.removal_dialog import RemovalDialog
 from server.web.ui.runs.run_facts import Facts, plan_facts, provenance_facts
-from server.web.ui.runs.run_rows import is_unreadable, local_time, notes_text, run_colour, shots_text
+from server.web.ui.runs.run_rows import changed_text, is_unreadable, local_time, notes_text, run_colour, shots_text
 from server.web.ui.runs.run_work import RunWork
 from server.web.ui.runs.runs_page import STYLE_SHEET
 from server.web.ui.runs.shot_view import ShotView
@@ -102,10 +103,11 @@ class OneRunPage:
             self._told = ui.label("").classes("text-sm").props('role=status aria-label="about the run"')
             ui.space()
             self._results = ui.link("Results", f"/results/{self._run_id}").classes("text-sm")
+            self._edit = NotesDialog(self._context, self._run_id, self.reload)
             dialog = RemovalDialog(self._context, self._run_id)
             ui.button("Delete...", icon="delete", on_click=dialog.open).props("flat dense no-caps color=negative")
         self._cause = ui.label("").classes("text-sm whitespace-pre-line").props('role=status aria-label="cause"')
-        self._notes = ui.label("").classes("text-sm opacity-80")
+        self._notes = ui.label("").classes("text-sm opacity-80").props('role=status aria-label="notes"')
 
     def _tell(self, run: RunSummary) -> None:
         self._outcome.set_text(run.outcome)
@@ -120,7 +122,8 @@ class OneRunPage:
             "\n".join(text for text in (run.cause, run.remedy and f"What to do: {run.remedy}") if text)
         )
         self._cause.set_visibility(bool(run.cause))
-        self._notes.set_text(notes_text(run))
+        self._notes.set_text(" · ".join(text for text in (notes_text(run), changed_text(run)) if text))
+        self._edit.show(run)
         lines = [line_of(event) for event in self._context.services.events.since(0) if _is_of(event.data, self._run_id)]
         told_lines = [line for line in lines if line][-_EVENTS:]
         self._events.set_text("\n".join(told_lines) or "None since the server was started; causes of before are above.")

@@ -63,6 +63,13 @@ def notes_text(run: RunSummary) -> str:
     )
 
 
+def changed_text(run: RunSummary) -> str:
+    """Who changed its notes, and when; why that cannot be read."""
+    if run.notes_flaw:
+        return run.notes_flaw
+    return f"changed by {run.notes_changed_by} at {local_time(run.notes_changed_utc)}" if run.notes_changed_utc else ""
+
+
 def local_time(created_utc: str) -> str:
     """Date and time where the rig stands; what is no time stays as it is written."""
     try:

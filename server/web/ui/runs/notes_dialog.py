@@ -1,0 +1,98 @@
+"""NotesDialog: the notes of a run are changed by whoever looks at its page."""
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+from nicegui import ui
+
+from daq.errors import DaqError
+from daq.run_notes import RunNotes
+from server.lab.errors import ServerError
+from server.lab.runs.notes_change import NewNotes, change_notes
+from server.lab.runs.run_summary import ACTIVE, RunSummary
+from server.lab.services import Context
+from server.lab.starting.command import command
+from server.web.ui.draft import NOTES_FIELDS, problem_of
+from server.web.ui.runs.run_rows import is_unreadable
+from server.web.ui.visiting import told, visitor
+
+_LINES = (("operator", "Operator"), ("fluid", "Fluid"), ("nozzle", "Nozzle"))
+_LOOK = "dense outlined hide-bottom-space autocomplete=off"
+
+
+class NotesDialog:
+    """Built once per page of a run; opened by its button.
+
+    Parameters
+    ----------
+    context : Context
+        The application.
+    run_id : str
+        Whose notes they are.
+    changed : Callable[[], Awaitable[None]]
+        Called once they are changed.
+    """
+
+    def __init__(self, context: Context, run_id: str, changed: Callable[[], Awaitable[None]]) -> None:
+        self._context, self._run_id, self._changed = context, run_id, changed
+        self._seen = RunNotes()
+        self._button = ui.button("Edit notes...", icon="edit_note", on_click=self._open).props("flat dense no-caps")
+        with ui.dialog() as self._dialog, ui.card().props('aria-label="notes of the run"').classes("w-full"):
+            ui.label("Notes of this run").classes("text-base font-medium")
+            ui.label("The run stays as it was recorded; what stood here before is kept with them.").classes("text-sm")
+            self._fields: dict[str, ui.input | ui.number | ui.textarea] = dict(_built_fields())
+            self._refusal = ui.label("").classes("refusal").props("role=alert")
+            with ui.row().classes("w-full justify-end"):
+                ui.button("Leave as they are", on_click=self._dialog.close).props("flat no-caps")
+                ui.button("Save notes", on_click=self._save).props("no-caps")
+
+    def show(self, run: RunSummary) -> None:
+        """Only notes of a run that is over and can be read are changed."""
+        self._button.set_visibility(run.outcome != ACTIVE and not is_unreadable(run))
+
+    async def _open(self) -> None:
+        try:
+            run = await asyncio.to_thread(self._context.runs.summary, self._run_id)
+        except ServerError as error:
+            ui.notify(told(error), type="negative")
+            return
+        self._seen = run.notes
+        for name, field in self._fields.items():
+            field.set_value(getattr(run.notes, name))
+        self._refusal.set_text(run.notes_flaw)
+        self._dialog.open()
+
+    async def _save(self) -> None:
+        if not all([field.validate() for field in self._fields.values()]):
+            return
+        context, run_id, deed = self._context, self._run_id, f"changed the notes of run {self._run_id}"
+        try:
+            new, who = NewNotes(notes=self._written(), seen=self._seen), visitor()
+            await asyncio.to_thread(
+                command, context, who, deed, lambda: change_notes(context.runs, run_id, new, who.name)
+            )
+        except (DaqError, ServerError, ValueError) as error:
+            self._refusal.set_text(told(error))
+            return
+        self._dialog.close()
+        await self._changed()
+
+    def _written(self) -> RunNotes:
+        written = {name: field.value for name, field in self._fields.items()}
+        said = {name: value for name, value in written.items() if value not in (None, "")}
+        return RunNotes.model_validate(said | {"more": self._seen.more})
+
+
+def _built_fields() -> list[tuple[str, Any]]:
+    lines = [(name, ui.input(label, validation=_problem_of(name))) for name, label in _LINES]
+    pressure = ui.number("Pressure / bar", validation=_problem_of("pressure_bar"))
+    remark = ui.textarea("Remark", validation=_problem_of("remark"))
+    built = [*lines, ("pressure_bar", pressure), ("remark", remark)]
+    for _, field in built:
+        field.props(_LOOK).classes("w-full")
+    return built
+
+
+def _problem_of(name: str) -> Callable[[Any], str | None]:
+    return lambda value: None if value in (None, "") else problem_of(NOTES_FIELDS, name, value)
