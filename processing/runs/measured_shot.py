@@ -1,6 +1,6 @@
 """What became of a shot that was measured: its droplets, its velocities, and whether to believe them."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -13,7 +13,6 @@ from processing.analysis.droplets.measured_exposure import ShotVerdict
 from processing.analysis.droplets.shadows.shadow_shot import ShadowExposure
 from processing.analysis.estimates import Estimate
 from processing.analysis.velocity.measured_velocities import MeasuredVelocities, measure_velocities
-from processing.analysis.velocity.velocity_verdict import FASTEST_M_S
 from processing.reconstruction.settings import FrozenValue
 from processing.runs.shots.separation import Separation
 from processing.volume import VoxelGrid
@@ -94,8 +93,12 @@ def shot_velocities(
 
 def _told_velocity(velocities: MeasuredVelocities, separation: Separation) -> ShotVelocity:
     verdict, reasons = velocities.verdict, velocities.reasons
-    if velocities.pairs and (doubts := tuple(_of_separation(velocities, separation))):
-        verdict, reasons = ShotVerdict.DOUBTFUL, (*reasons, *doubts)
+    if velocities.pairs and separation.spread_ns > MOST_SPREAD * separation.mean_ns:
+        doubt = (
+            f"separations of the views differ by {separation.spread_ns:g} ns, limit {100 * MOST_SPREAD:g} % of "
+            f"{separation.mean_ns:g} ns: they see droplets at different times"
+        )
+        verdict, reasons = ShotVerdict.DOUBTFUL, (*reasons, doubt)
     return ShotVelocity(
         verdict=verdict,
         reasons=reasons,
@@ -107,20 +110,6 @@ def _told_velocity(velocities: MeasuredVelocities, separation: Separation) -> Sh
         separation_ns=separation.mean_ns,
         separation_source=separation.source,
     )
-
-
-def _of_separation(velocities: MeasuredVelocities, separation: Separation) -> Iterator[str]:
-    """Why the time from A to B is not to be trusted."""
-    if separation.spread_ns > MOST_SPREAD * separation.mean_ns:
-        yield (
-            f"separations of the views differ by {separation.spread_ns:g} ns, limit {100 * MOST_SPREAD:g} % of "
-            f"{separation.mean_ns:g} ns: they see droplets at different times"
-        )
-    if (speed_m_s := float(np.linalg.norm(velocities.mean_m_s or 0.0))) > FASTEST_M_S:
-        yield (
-            f"droplets fly at {speed_m_s:.3g} m/s, faster than any spray: is the separation of {separation.mean_ns:g} "
-            f"ns right, which is {separation.source}?"
-        )
 
 
 def shot_summary(

@@ -1,16 +1,17 @@
 """How fast the droplets of a double exposure fly, how sure that is, and whether to believe it."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from processing.analysis.droplets.droplet_table import Columns, Droplets, SizedDroplets
 from processing.analysis.droplets.measured_exposure import MeasuredExposure, Seen, ShotVerdict
 from processing.analysis.velocity.moving_droplets import MovingDroplets
 from processing.analysis.velocity.pairing import Pairing, pair
 from processing.analysis.velocity.velocity_table import MM_PER_NS, Velocities
-from processing.analysis.velocity.velocity_verdict import judged
+from processing.analysis.velocity.velocity_verdict import FASTEST_M_S, judged
 from processing.volume import VoxelGrid
 
 Rows = Droplets | SizedDroplets
@@ -95,18 +96,32 @@ def measure_velocities(
     Raises
     ------
     ValueError
-        The separation is not above 0.
+        The separation is not above 0, or droplets lie outside of the grid.
     """
     if not 0 < separation_ns < np.inf:
         raise ValueError(f"separation {separation_ns} ns: must be above 0")
     before, after = MovingDroplets.of(first.droplets, grid), MovingDroplets.of(second.droplets, grid)
+    if not (_within(before, grid).all() and _within(after, grid).all()):
+        raise ValueError("droplets lie outside of the grid: is it the one that they were measured in?")
     pairing = pair(before, after)
     stayed = _stayed(before, pairing, grid)
     verdict, reasons = judged((first, second), (before, after), pairing, stayed)
     if verdict is ShotVerdict.REFUSED:
         pairing = pairing.disbelieved()
     of_first, of_second = _velocities(first.droplets, second.droplets, pairing, separation_ns)
-    return MeasuredVelocities(of_first, of_second, separation_ns, stayed, verdict, reasons)
+    told = MeasuredVelocities(of_first, of_second, separation_ns, stayed, verdict, reasons)
+    if (speed_m_s := float(np.linalg.norm(told.mean_m_s or 0.0))) <= FASTEST_M_S:
+        return told
+    doubt = (
+        f"droplets fly at {speed_m_s:.3g} m/s, faster than any spray: is the separation of {separation_ns:g} ns right?"
+    )
+    return replace(told, verdict=ShotVerdict.DOUBTFUL, reasons=(*reasons, doubt))
+
+
+def _within(droplets: MovingDroplets, grid: VoxelGrid) -> NDArray[np.bool_]:
+    """Which droplets lie in a grid, or next to it."""
+    inside = (droplets.places > -1.5) & (droplets.places < np.array(grid.shape[::-1]) + 0.5)
+    return np.asarray(inside.all(axis=1), np.bool_)
 
 
 def _stayed(before: MovingDroplets, pairing: Pairing, grid: VoxelGrid) -> int:

@@ -42,8 +42,14 @@ def separation_of(run: RunReader, shot: Shot) -> Separation | str:
     """
     if run.header.frames_per_shot == 1:
         return NOT_DOUBLE
-    if copied := _copied(shot):
-        return f"exposure B of {', '.join(copied)} has the very pixels of A: noise never repeats, so one is a copy"
+    separation = _told(run, shot)
+    if isinstance(separation, Separation) and (copied := _copied(shot)):
+        return f"exposure B of {', '.join(copied)} has the very pixels of A: one image is there twice"
+    return separation
+
+
+def _told(run: RunReader, shot: Shot) -> Separation | str:
+    """As fired, else as stated."""
     trains = [pulses for pulses in shot.fired.pulses.values() if pulses] if shot.fired else []
     if not trains:
         stated_ns = run.header.separation_ns
@@ -55,7 +61,7 @@ def separation_of(run: RunReader, shot: Shot) -> Separation | str:
 
 
 def _copied(shot: Shot) -> list[str]:
-    """Views whose two exposures are one image; flat ones may well be alike."""
+    """Views whose two exposures are one image, which noise never makes; flat ones may well be alike."""
     return [
         name
         for name, seen in shot.views.items()

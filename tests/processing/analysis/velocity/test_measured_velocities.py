@@ -51,6 +51,21 @@ def refused(velocities: MeasuredVelocities, reason: str) -> bool:
     return velocities.verdict is ShotVerdict.REFUSED and reason in velocities.reasons[0]
 
 
+@pytest.mark.parametrize("separation_ns", [6.4, 6.4e-6])
+def test_a_separation_in_another_unit_is_doubted(separation_ns: float) -> None:
+    first, second = exposures()
+    velocities = of(first, second, separation_ns)
+    assert velocities.verdict is ShotVerdict.DOUBTFUL
+    assert f"faster than any spray: is the separation of {separation_ns:g} ns right?" in velocities.reasons[-1]
+
+
+def test_a_grid_that_they_were_not_measured_in_is_refused() -> None:
+    first, second = map(measured, exposures())
+    elsewhere = VoxelGrid(GRID.shape, (10.0, 1.0, 0.5), PITCH_MM)
+    with pytest.raises(ValueError, match="droplets lie outside of the grid"):
+        measure_velocities(first, second, elsewhere, 6400)
+
+
 def test_a_velocity_is_the_way_over_the_time() -> None:
     first, second = exposures(noise=0.0, ghosts=0.05)
     velocities = of(first, second)
