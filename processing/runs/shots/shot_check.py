@@ -15,6 +15,7 @@ from processing.calibration.errors import CalibrationError, OutOfRange
 from processing.calibration.fit.health import LIMITS_PX, judge
 from processing.calibration.verdict import Verdict
 from processing.geometry import FloatArray
+from processing.runs.shots.turned_views import turned
 
 ALARM_PX, STOP_PX = LIMITS_PX[Verdict.USABLE], LIMITS_PX[Verdict.WARN]
 """Disparity of a view above which an operator should know, and above which volumes are not worth having."""
@@ -23,6 +24,8 @@ FEW_SEEDS = 300
 """Droplets of an exposure that are followed at first: a fifth of the work."""
 SURE = 2.0
 """Standard uncertainties."""
+NEARLY_PX = ALARM_PX / 4
+"""From which disparity on views are tried in other ways: with nothing to explain nothing is asked."""
 _EXPOSURES = "AB"
 
 Exposure = list[FloatArray]
@@ -67,7 +70,7 @@ class ShotCheck:
         """The view whose motion alone explains an alarm, clearly better than that of any other would."""
         if len(self.beyond) == 1:
             return self.beyond[0]
-        if len(self.views) < 2 or self._certain_px <= ALARM_PX:
+        if len(self.views) < 2 or self.certain_px <= ALARM_PX:
             return None
         best, second = sorted(self.views, key=lambda name: self.views[name].left_px)[:2]
         clearly = self.views[second].left_px > CLEARER * max(self.views[best].left_px, NOISE_PX)
@@ -81,7 +84,7 @@ class ShotCheck:
         """
         if self.beyond:
             return Verdict.REFUSE if self.agreed else Verdict.WARN
-        return judge(self._certain_px) if self.views else None
+        return judge(self.certain_px) if self.views else None
 
     def record(self) -> dict[str, Any]:
         """What was found, for a program: JSON values."""
@@ -95,7 +98,8 @@ class ShotCheck:
         }
 
     @property
-    def _certain_px(self) -> float:
+    def certain_px(self) -> float:
+        """The largest disparity of a view that is certain."""
         return max(view.certain_px for view in self.views.values())
 
 
@@ -105,6 +109,8 @@ def check_exposures(shot: int, exposures: Sequence[Exposure], calibration: Calib
     Droplets of all exposures tell together; where one exposure alone speaks against the calibration, that counts.
     """
     together = _checked(shot, exposures, calibration)
+    if together.views and together.certain_px > NEARLY_PX and (problem := _reversed(together, exposures, calibration)):
+        return ShotCheck(shot, {}, problem, tuple(calibration.views))
     if len(exposures) == 1 or together.verdict is Verdict.REFUSE:
         return together
     alone = (_checked(shot, [one], calibration) for one in exposures)
@@ -118,6 +124,22 @@ def _checked(shot: int, exposures: Sequence[Exposure], calibration: Calibration)
         return _look(shot, exposures, calibration)
     except CalibrationError as error:
         return _unmeasured(shot, exposures, calibration, error)
+
+
+def _reversed(check: ShotCheck, exposures: Sequence[Exposure], calibration: Calibration) -> str:
+    """What was mistaken for all views at once, by which they agree clearly worse than without; empty: nothing."""
+    found = {}
+    for what, seen in turned(calibration, exposures):
+        with suppress(CalibrationError):
+            other = _measured(check.shot, seen, calibration, FEW_SEEDS)
+            if other.worst_px < check.certain_px / 2:
+                found[what] = other.worst_px
+    if not found:
+        return ""
+    return (
+        f"droplets are seen {check.worst_px:.2g} px beside where the other views put them, and {min(found.values()):.2g} "
+        f"px if {', or '.join(found)}: depth is reversed"
+    )
 
 
 def _in_exposure(name: str, check: ShotCheck) -> ShotCheck:

@@ -1,5 +1,7 @@
 """What a shot says of the views: which one has moved, how far, or too far; or that it is not one alone."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,7 @@ from processing.calibration.verdict import Verdict
 from processing.geometry import FloatArray, PinholeCamera
 from processing.runs.shots.shot_check import ALARM_PX, FEW_SEEDS, ShotCheck, check_exposures
 from processing.studies.drifting_views import direction
-from tests.support.drifting_views import calibration_of, droplet_shots, inside_mm, views
+from tests.support.drifting_views import SIZE_PX, calibration_of, droplet_shots, inside_mm, views
 
 pytestmark = pytest.mark.slow
 
@@ -71,6 +73,29 @@ def test_a_view_that_shook_in_one_exposure_is_not_hidden_by_the_other_one(drift_
     exposures = [list(seen) for seen in droplet_shots(2, 7.0)]
     exposures[1][2] = exposures[1][2] + drift_px * direction(2)
     assert check_exposures(0, exposures, CALIBRATION).verdict is Verdict.REFUSE
+
+
+def mirrored(seen: list[FloatArray]) -> list[FloatArray]:
+    return [np.column_stack([SIZE_PX[0] - 1 - one[:, 0], one[:, 1]]) for one in seen]
+
+
+def half_turned(seen: list[FloatArray]) -> list[FloatArray]:
+    return [SIZE_PX - np.array([1, 1]) - one for one in seen]
+
+
+@pytest.mark.parametrize(
+    ("turned", "said"),
+    [
+        (mirrored, "all images are mirrored left to right, or turned by 180 degrees"),
+        (half_turned, "all images are mirrored left to right, or turned by 180 degrees"),
+        (lambda seen: seen[::-1], "views are exchanged, view1 with view4, view2 with view3"),
+    ],
+)
+def test_depth_that_is_reversed_is_named(turned: Callable[[list[FloatArray]], list[FloatArray]], said: str) -> None:
+    """Seen from far away all lines of sight would meet as well; perspective leaves a few tenths of a pixel."""
+    check = check_exposures(0, [turned(list(seen)) for seen in droplet_shots(2, 7.0)], CALIBRATION)
+    assert check.verdict is Verdict.REFUSE
+    assert said in check.problem
 
 
 def test_two_that_moved_are_not_blamed_on_one() -> None:
