@@ -293,6 +293,27 @@ def test_the_shot_that_a_hand_has_picked_is_never_torn_away(page: Page, server: 
     expect(page).to_have_url(re.compile(f"/results/{newest}/.*/0$"))
 
 
+def test_notes_are_changed_on_the_page_and_nobody_overwrites_what_another_wrote(page: Page, server: Serving) -> None:
+    noted = {"fluid": "water", "more": {"flow_l_min": 1.2}}
+    run_id, _ = server.run_to_its_end(plan_of(kind="dark", shots=1, pulse=PULSE, notes=noted))
+    server.free_control()
+    address = f"/api/runs/{run_id}/notes"
+    page.goto(f"{server.http.base_url}/runs/{run_id}")
+    page.get_by_role("button", name="Edit notes...").click()
+    page.get_by_role("textbox", name="Fluid").fill("ethanol")
+    server.http.put(address, json={"notes": noted | {"fluid": "oil"}}).raise_for_status()
+    page.get_by_role("button", name="Save notes").click()
+    expect(page.get_by_role("alert").filter(has_text="changed by")).to_be_visible()
+    expect(page.get_by_role("textbox", name="Fluid")).to_have_value("ethanol")
+    page.get_by_role("button", name="Leave as they are").click()
+    page.get_by_role("button", name="Edit notes...").click()
+    expect(page.get_by_role("textbox", name="Fluid")).to_have_value("oil")
+    page.get_by_role("textbox", name="Fluid").fill("ethanol")
+    page.get_by_role("button", name="Save notes").click()
+    expect(page.get_by_role("status", name="notes")).to_contain_text("ethanol · flow_l_min: 1.2 · changed by")
+    assert [change["notes"]["fluid"] for change in server.http.get(address).json()["changes"]] == ["oil", "ethanol"]
+
+
 def test_a_run_is_deleted_by_its_name_alone(page: Page, server: Serving) -> None:
     run_id, _ = server.run_to_its_end(plan_of(kind="dark", name="in vain", shots=1, pulse=PULSE))
     page.goto(url(server, f"runs/{run_id}".replace(" ", "%20")))

@@ -78,7 +78,12 @@ def test_a_viewer_looks_and_aborts_and_does_nothing_else(guarded: Serving) -> No
     for path in ("/api/rig", "/api/runs", "/api/rig/control"):
         assert guarded.http.get(path, headers=viewer).status_code == 200
     assert guarded.http.get("/api/rig/control", headers=viewer).json()["role"] == "viewer"
-    for method, path, body in (*NEEDS_IT, ("PUT", "/api/rig/control", {}), ("POST", "/api/jobs", {"run_id": "x"})):
+    others = (
+        ("PUT", "/api/rig/control", {}),
+        ("POST", "/api/jobs", {"run_id": "x"}),
+        ("PUT", "/api/runs/x/notes", {"notes": {}}),
+    )
+    for method, path, body in (*NEEDS_IT, *others):
         answer = guarded.http.request(method, path, json=body, headers=viewer)
         assert (answer.status_code, answer.json()["code"]) == (403, "viewer"), path
         assert answer.json()["remedy"] == "sign in with the token of an operator"
