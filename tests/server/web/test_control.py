@@ -78,7 +78,7 @@ def test_a_viewer_looks_and_aborts_and_does_nothing_else(guarded: Serving) -> No
     for path in ("/api/rig", "/api/runs", "/api/rig/control"):
         assert guarded.http.get(path, headers=viewer).status_code == 200
     assert guarded.http.get("/api/rig/control", headers=viewer).json()["role"] == "viewer"
-    others = (
+    others: tuple[tuple[str, str, dict[str, object]], ...] = (
         ("PUT", "/api/rig/control", {}),
         ("POST", "/api/jobs", {"run_id": "x"}),
         ("PUT", "/api/runs/x/notes", {"notes": {}}),
