@@ -68,6 +68,8 @@ def doubts(told: SprayStatistics) -> list[str]:
     """What is doubtful, unsure or missing, and what to do."""
     said = [*told.doubts, *(told.sample.reasons if told.sample else ())]
     said += [f"No {name}: {reason}" for name, reason in told.reasons.items()]
+    if lacking := _lacking(told):
+        said.append(f"No {', '.join(lacking)}: {told.droplets.reason}")
     if told.droplets.n and told.droplets.ghost_reason:
         said.append(f"No share of ghosts: {told.droplets.ghost_reason}")
     if told.motion and told.motion.reason:
@@ -76,6 +78,13 @@ def doubts(told: SprayStatistics) -> list[str]:
         reached = (("cone angle", told.extent.cone_reason), ("penetration", told.extent.penetration_reason))
         said += [f"No {name}: {why}" for name, why in reached if why]
     return [*said, *(f"No shares at {one.at_mm:.3g} mm: {one.reason}" for one in told.patternations if one.reason)]
+
+
+def _lacking(told: SprayStatistics) -> list[str]:
+    """Means and quantiles that are not told although others are."""
+    droplets = told.droplets
+    quantiles = {"Dv0.1": droplets.dv10_um, "Dv0.5": droplets.dv50_um, "Dv0.9": droplets.dv90_um}
+    return [name for name, one in (*quantiles.items(), ("span", droplets.relative_span)) if droplets.d32_um and not one]
 
 
 def _within(value: float, estimate: Estimate | None) -> str:

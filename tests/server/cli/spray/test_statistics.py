@@ -57,6 +57,13 @@ def test_people_read_what_is_doubtful_and_why_figures_are_missing(
     assert "No share of ghosts: " in text
 
 
+def test_quantiles_that_few_droplets_do_not_tell_have_a_reason(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    few = write_results(tmp_path / "few", cone_shots(0, 2, 6))
+    assert "No Dv0.1, Dv0.5, Dv0.9, span: too few droplets" in shown(capsys, "statistics", few)
+
+
 def test_options_say_where_the_nozzle_is(results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     mute = write_results(tmp_path / "mute", cone_shots(0, 5, 120))
     assert told(capsys, "statistics", mute)["extent"] is None
