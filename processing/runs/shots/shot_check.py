@@ -137,8 +137,8 @@ def _reversed(check: ShotCheck, exposures: Sequence[Exposure], calibration: Cali
     if not found:
         return ""
     return (
-        f"droplets are seen {check.worst_px:.2g} px beside where the other views put them, and {min(found.values()):.2g} "
-        f"px if {', or '.join(found)}: depth is reversed"
+        f"droplets are seen {check.worst_px:.2g} px beside where the other views put them, and "
+        f"{min(found.values()):.2g} px if {', or '.join(found)}: depth is reversed"
     )
 
 
