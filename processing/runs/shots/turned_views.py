@@ -12,7 +12,7 @@ import numpy as np
 from processing.calibration.calibration import Calibration
 from processing.geometry import FloatArray
 
-Exposures = Sequence[Sequence[FloatArray]]
+Exposures = Sequence[list[FloatArray]]
 
 
 def turned(calibration: Calibration, exposures: Exposures) -> Iterator[tuple[str, Exposures]]:
