@@ -134,7 +134,8 @@ def test_abort_says_when_it_is_not_delivered_and_counts_when_it_is_late(browser:
     assert server.services.acquisition.status().active
     assert len(held) == 2, "it goes two ways"
     held[0].continue_()
-    expect(answer(page)).to_have_text(re.compile(r"^light off confirmed, \d+\.\d s after the click: ABORT was late"))
+    late = re.compile(r"^light off confirmed at [\d:]{8}, \d+\.\d s after the click: ABORT was late")
+    expect(answer(page)).to_have_text(late)
     assert server.wait().outcome == "aborted"
     context.close()
 
@@ -143,8 +144,15 @@ def test_abort_answers_when_nothing_runs(page: Page, server: Serving) -> None:
     page.goto(str(server.http.base_url))
     open_drawer(page)
     page.get_by_role("button", name="ABORT").click()
-    expect(answer(page)).to_have_text(re.compile("^light off confirmed"))
+    expect(answer(page)).to_have_text(re.compile(r"^light off confirmed at \d\d:\d\d:\d\d; ended nothing"))
     expect(page.get_by_role("log")).to_contain_text("ABORT of nothing: no run was under way: light confirmed off")
+
+
+def test_what_an_abort_confirmed_is_not_said_of_a_later_light(page: Page, server: Serving) -> None:
+    page.goto(str(server.http.base_url))
+    page.get_by_role("button", name="ABORT").click()
+    expect(answer(page)).to_be_visible()
+    expect(answer(page)).to_be_hidden()
 
 
 def test_the_rig_says_why_it_is_not_ready_and_the_form_too_until_it_is_mended(page: Page, server: Serving) -> None:

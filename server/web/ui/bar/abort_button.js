@@ -1,5 +1,6 @@
 // ABORT: plain requests on two ways, a port of its own and the server itself. The first answer counts, however late.
-const LIMIT_MS = 1000, KEY = "F8";
+// What was confirmed is true of its moment: it goes before somebody takes it for the light of the next run.
+const LIMIT_MS = 1000, CONFIRMED_MS = 10000, KEY = "F8";
 
 export default {
   template: `
@@ -35,7 +36,8 @@ export default {
       const ways = [own + this.paths[0], this.paths[1]].map((url) => ask(url));
       try {
         const ended = await Promise.any(ways), took = (performance.now() - began) / 1000;
-        show(`light off confirmed${1000 * took > LIMIT_MS ? `, ${took.toFixed(1)} s after the click: ABORT was late, and counted` : ""}${ended}`, "good");
+        show(`light off confirmed at ${new Date().toLocaleTimeString("en-GB")}${1000 * took > LIMIT_MS ? `, ${took.toFixed(1)} s after the click: ABORT was late, and counted` : ""}${ended}`, "good");
+        setTimeout(() => show("", ""), CONFIRMED_MS);
       } catch (errors) {
         const refusal = errors.errors.find((error) => error.status)?.message;
         show(refusal ? `${refusal}: use the hardware stop` : "NOT DELIVERED: use the hardware stop", "bad");
