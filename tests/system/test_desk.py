@@ -215,6 +215,19 @@ def test_the_bar_is_in_sight_at_every_width_dark_and_light(page: Page, server: S
     picture(page, f"bar-{width}-trouble")
 
 
+def test_a_current_calibration_whose_file_was_deleted_is_told_as_gone(page: Page, server: Serving) -> None:
+    file = server.services.data_dir / "calibrations" / "deleted.json"
+    file.write_text('{"id": "deleted"}')
+    server.http.put("/api/calibrations/current", json={"id": "deleted"})
+    page.goto(str(server.http.base_url))
+    done = page.get_by_role("link", name="Calibrate").get_by_label("done")
+    expect(done).to_be_visible()
+    file.unlink()
+    expect(page.get_by_role("status", name="current calibration")).to_have_text("deleted, its file is gone")
+    expect(done).to_be_hidden()
+    (server.services.data_dir / "calibrations" / "current").unlink()
+
+
 @pytest.mark.parametrize("width", [800, 1280, 1600])
 def test_the_state_is_one_word_however_long_the_name_of_the_calibration(
     page: Page, server: Serving, width: int

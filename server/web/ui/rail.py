@@ -33,7 +33,8 @@ def _has_good_lamps(context: Context) -> bool:
 
 
 def _is_calibrated(context: Context) -> bool:
-    return context.calibrations.current is not None
+    current = context.calibrations.current
+    return current is not None and context.calibrations.made_s(current) is not None
 
 
 def _has_completed_a_run(context: Context) -> bool:

@@ -28,9 +28,11 @@ class CalibrationChip:
 
 
 def told_of(context: Context, calibration: str) -> list[str]:
-    """How old it is, and by how much the views disagree, where that is known."""
+    """How old it is, and by how much the views disagree, where that is known; or that it is gone."""
     made_s, standing = context.calibrations.made_s(calibration), context.standing
-    told = [] if made_s is None else [f"{age_text(time.time() - made_s)} old"]
+    if made_s is None:
+        return ["its file is gone"]
+    told = [f"{age_text(time.time() - made_s)} old"]
     if standing is not None and standing.calibration == calibration and standing.views:
         told.append(f"off by {max(standing.views.values()):.2f} px")
     return told
