@@ -123,7 +123,8 @@ export default {
       const tile = this.tiles[number], now = performance.now(), { exposure, scale } = this.wanted[number];
       if (told.tile.exposure !== exposure || told.tile.scale !== scale) return; // what was wished for before
       if (told.shot !== tile.told?.shot || told.age_s < (now - tile.seen) / 1000) {
-        tile.arrivals = [...tile.arrivals, now].slice(-ARRIVALS);
+        const goesOn = told.shot > (tile.told?.shot ?? -1); // else it is of another run or live view
+        tile.arrivals = [...(goesOn ? tile.arrivals : []), now].slice(-ARRIVALS);
         const focus = told.exposures[exposure]?.focus_percent;
         if (focus != null) tile.trend = [...tile.trend, focus].slice(-TREND);
       }
