@@ -173,6 +173,9 @@ TABLES: dict[str, tuple[Touch, ...]] = {
     ),
 }
 
+OF_A_FAULT = {("button", "Acknowledge fault")}
+"""There while a fault is: a busy machine may be late with the generator's answer. test_desk.py touches its alarm."""
+
 
 @pytest.fixture(scope="module")
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
@@ -202,7 +205,7 @@ def test_every_control_of_a_page_is_touched_and_does_something(page: Page, serve
             read |= controls(page)
         DEEDS.get(one.role, click)(page, found(page, one), replace(one, text=one.text.replace("RUN", run_id)))
     touched = names(TABLES[path])
-    assert read - touched - names(BAR) == set(), "nobody touches these"
+    assert read - touched - names(BAR) - OF_A_FAULT == set(), "nobody touches these"
     assert touched - read == set(), "these are touched, and the accessibility tree does not tell of them"
 
 

@@ -110,7 +110,7 @@ def test_a_person_can_read_it(tmp_path: Path, calibration: Calibration) -> None:
     assert "right-handed" in content["axes"]
     assert content["views"]["left"]["planes"][0]["z_mm"] == -3.0
     assert max(len(line) for line in text.splitlines()) < 240
-    assert 40 < len(text.splitlines()) < 140
+    assert 40 < len(text.splitlines()) < 150
 
 
 def test_an_existing_file_is_replaced_only_on_request(tmp_path: Path, calibration: Calibration) -> None:

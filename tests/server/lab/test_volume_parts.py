@@ -18,7 +18,7 @@ from processing.runs.pipeline import reconstruct_shot
 from processing.runs.volume_parts import VolumeParts
 from processing.volume import VoxelGrid
 from server.lab.calibrations import CalibrationStore
-from server.lab.errors import Conflict, Damaged
+from server.lab.errors import Conflict, Damaged, NotFound
 from server.lab.results import keep_preview, part_of, remaking
 from server.lab.tasks import reconstruct
 from server.pictures.pictures import Colours, plane_png
@@ -126,7 +126,7 @@ def test_a_part_of_another_volume_than_was_kept_is_refused(kept: Kept) -> None:
     with pytest.raises(Conflict, match=r"shot_00000_b.vtkhdf: .*c\.json"):
         part_of(parts, volume, kept.store, ALL)
     preview_path(volume).unlink()
-    with pytest.raises(Damaged):
+    with pytest.raises(NotFound, match=r"shot_00000_b\.vtkhdf is not there any more"):
         part_of(parts, volume, kept.store, ALL)
 
 
