@@ -18,8 +18,8 @@ from processing.figures.droplet_figures import MeasuredCase, droplets_figure
 from processing.geometry import FloatArray, PinholeCamera
 from processing.kernels import DEFAULT_THREADS
 from processing.studies.report import Statement, grouped
-from processing.studies.sensitivity import Setup, misaligned, setup_cameras
-from processing.studies.simulated_droplets import Image, droplet_centres, study_cameras, study_grid
+from processing.studies.sensitivity import misaligned, spread_cameras
+from processing.studies.simulated_droplets import Image, droplet_centres, study_grid
 from processing.synthetic.bright_particles import spots_image
 from processing.synthetic.paper_rig import TABLE_1
 from processing.volume import VoxelGrid
@@ -166,11 +166,7 @@ def bright_scene(
     case: DropletCase, grid: VoxelGrid, image_size_px: tuple[int, int], rng: np.random.Generator
 ) -> BrightScene:
     """A shot of a case: droplets all over a grid, uniformly."""
-    cameras = (
-        study_cameras(image_size_px)
-        if case.views == len(TABLE_1)
-        else setup_cameras(Setup(views=case.views), image_size_px)
-    )
+    cameras = spread_cameras(case.views, image_size_px)
     count = round(case.density_per_mm3 * grid.volume_mm3)
     points_mm = grid.to_mm(droplet_centres(grid.shape, count, rng))
     heights = rng.lognormal(0, AMPLITUDE_SPREAD, count)

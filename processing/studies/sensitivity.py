@@ -24,8 +24,10 @@ from processing.studies.simulated_droplets import (
     droplet_centres,
     normalised,
     project_volume,
+    study_cameras,
     study_grid,
 )
+from processing.synthetic.paper_rig import TABLE_1
 from processing.volume import VoxelGrid
 
 FOCAL_LENGTH_MM, MAGNIFICATION = 92.5, 0.44
@@ -165,6 +167,11 @@ def _rates(study: SensitivityStudy, setup: Setup, seed: int, volume: Image) -> I
         curve = detection_curve(centres_voxel, volume, RADIUS_VOXEL)
         rates = curve.rates(half_median_threshold(curve))
         yield rates.found, rates.ghosts
+
+
+def spread_cameras(views: int, image_size_px: tuple[int, int]) -> list[PinholeCamera]:
+    """The paper's four views, or another number spread over the same angles."""
+    return study_cameras(image_size_px) if views == len(TABLE_1) else setup_cameras(Setup(views=views), image_size_px)
 
 
 def setup_cameras(setup: Setup, image_size_px: tuple[int, int]) -> list[PinholeCamera]:

@@ -155,6 +155,13 @@ def count(text: str) -> int:
     return value
 
 
+def view_count(text: str) -> int:
+    """So many views as droplets are measured by."""
+    if not 2 <= (value := whole(text)) <= 8:
+        raise ArgumentTypeError(f"{text}: 2 to 8 views are measured")
+    return value
+
+
 def setting(name: str, text: str, kind: "type[FrozenValue] | None" = None) -> Any:
     """The value of an option, with the limits of the setting of that name; by default of a reconstruction."""
     from pydantic import ValidationError

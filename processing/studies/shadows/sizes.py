@@ -7,6 +7,7 @@ counted; noise, level, blur and shift of every view are estimated from the image
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import cycle, islice
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -19,11 +20,11 @@ from processing.geometry import PinholeCamera
 from processing.kernels import DEFAULT_THREADS
 from processing.studies.droplets import IMAGE_SIZE_PX, SLAB
 from processing.studies.report import Statement, all_kept, by_case, case_statements
-from processing.studies.sensitivity import misaligned
+from processing.studies.sensitivity import misaligned, spread_cameras
 from processing.studies.shadows.size_errors import d32_of, size_errors
-from processing.studies.simulated_droplets import Image, study_cameras, study_grid
+from processing.studies.simulated_droplets import Image, study_grid
 from processing.synthetic.liquid.droplet_clouds import Box, LogNormal, droplet_cloud
-from processing.synthetic.paper_rig import paper_optics
+from processing.synthetic.paper_rig import TABLE_1, paper_optics
 from processing.synthetic.shadow_shots import Counting, transmission_images
 from processing.synthetic.spray import Spray
 from processing.volume import VoxelGrid
@@ -46,6 +47,8 @@ class SizeCase:
         Of their lognormal diameters, none below 10 um.
     noise_percent : float
         Of the background.
+    views : int
+        The paper's four, or another number spread over the same angles, with lenses like the paper's in turn.
     calibration_error_px : float
         By which each view lies beside its calibration, in a direction of its own.
     condenser_ratio : float | None
@@ -62,6 +65,7 @@ class SizeCase:
     median_um: float = 40.0
     spread: float = 0.4
     noise_percent: float = 1.2
+    views: int = len(TABLE_1)
     calibration_error_px: float = 0.0
     condenser_ratio: float | None = None
     aperture_ratio: float = 1.0
@@ -74,6 +78,8 @@ class SizeCase:
     def name(self) -> str:
         """For tables and figures."""
         parts = [f"{self.density_per_mm3:g}/mm³", f"{self.median_um:g} um", f"noise {self.noise_percent:g} %"]
+        if self.views != len(TABLE_1):
+            parts.append(f"{self.views} views")
         if self.calibration_error_px:
             parts.append(f"calibration {self.calibration_error_px:g} px off")
         if self.condenser_ratio:
@@ -184,7 +190,7 @@ def size_scene(
     case: SizeCase, grid: VoxelGrid, image_size_px: tuple[int, int], rng: np.random.Generator
 ) -> ShadowScene:
     """A shot of a case: droplets all over a grid and a little beyond, uniformly."""
-    cameras = study_cameras(image_size_px)
+    cameras = spread_cameras(case.views, image_size_px)
     spray = droplet_cloud(Box.around(grid, BESIDE_MM), case.density_per_mm3, case.sizes, rng)
     images = shadow_images(case, cameras, spray, rng)
     return ShadowScene(spray, images, [misaligned(camera, case.calibration_error_px, rng) for camera in cameras])
@@ -196,7 +202,7 @@ def shadow_images(
     """What the lenses of a case show of opaque droplets, with noise."""
     optics = [
         replace(view, f_number=view.f_number / case.aperture_ratio, condenser_ratio=case.condenser_ratio)
-        for view in paper_optics().values()
+        for view in islice(cycle(paper_optics().values()), len(cameras))
     ]
     return list(transmission_images(cameras, optics, spray, Counting.of_noise(case.noise_percent / 100), rng))
 

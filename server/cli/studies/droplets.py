@@ -1,10 +1,10 @@
 """``tomoshadow study droplets``: droplets found and ghosts, where the truth is known."""
 
-from argparse import ArgumentTypeError, Namespace
+from argparse import Namespace
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from server.cli.options import Verbs, count, positive, seed, usable_processors, width
+from server.cli.options import Verbs, count, positive, seed, usable_processors, view_count, width
 from server.cli.studies.study_command import add_study, collected, passing, report
 
 if TYPE_CHECKING:
@@ -28,15 +28,9 @@ def add_droplets(studies: Verbs) -> None:
     parser.add_argument("--density", type=positive, help="droplets per mm^3")
     parser.add_argument("--sigma", type=width, help="width of droplets in px")
     parser.add_argument("--noise", type=positive, metavar="PERCENT", help="of the median amplitude")
-    parser.add_argument("--views", type=_views, help="2 to 8, over the paper's angles")
+    parser.add_argument("--views", type=view_count, help="2 to 8, over the paper's angles")
     parser.add_argument("--calibration-error", type=positive, metavar="PX", help="of every view")
     parser.add_argument("--twins", type=seed, default=0, help="simulated twins per shot that tell ghosts")
-
-
-def _views(text: str) -> int:
-    if not 2 <= (value := int(text)) <= 8:
-        raise ArgumentTypeError(f"{text}: 2 to 8 views are measured")
-    return value
 
 
 def droplets(options: Namespace) -> dict[str, Any]:

@@ -4,13 +4,14 @@ from argparse import ArgumentTypeError, Namespace
 from dataclasses import replace
 from typing import Any
 
-from server.cli.options import Verbs, count, positive, seed, usable_processors
+from server.cli.options import Verbs, count, positive, seed, usable_processors, view_count
 from server.cli.studies.study_command import add_study, collected, passing, report, seeds_of
 
 VARIED = {
     "density": "density_per_mm3",
     "median": "median_um",
     "noise": "noise_percent",
+    "views": "views",
     "calibration_error": "calibration_error_px",
     "condenser_ratio": "condenser_ratio",
     "aperture_ratio": "aperture_ratio",
@@ -26,6 +27,7 @@ def add_sizes(studies: Verbs) -> None:
     parser.add_argument("--density", type=positive, help="droplets per mm^3")
     parser.add_argument("--median", type=positive, metavar="UM", help="of the diameters")
     parser.add_argument("--noise", type=positive, metavar="PERCENT", help="of the background")
+    parser.add_argument("--views", type=view_count, help="2 to 8, over the paper's angles")
     parser.add_argument("--calibration-error", type=positive, metavar="PX", help="of every view")
     parser.add_argument("--condenser-ratio", type=_ratio, metavar="RATIO", help="aperture of the light over the lens's")
     blurred = "so many times the blur of the paper's lenses, by a smaller aperture"

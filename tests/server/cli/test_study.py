@@ -93,15 +93,15 @@ def test_the_density_study_states_widths_windows_and_subtraction(
     assert "mean-subtracted in windows of 64^3 voxel at steps of 32" in progress
 
 
-def test_the_study_of_sizes_blurs_as_much_as_is_asked(
+def test_the_study_of_sizes_blurs_as_much_and_by_as_many_views_as_is_asked(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     small = partial(SizeStudy, shape=(40, 24, 40), image_size_px=(120, 90), margin_voxel=5)
     monkeypatch.setattr("processing.studies.shadows.sizes.SizeStudy", small)
-    stated = ["--blur", "2", "--density", "20", "--repeats", "1"]
+    stated = ["--blur", "2", "--views", "5", "--density", "20", "--repeats", "1"]
     assert main(["study", "sizes", *stated, "-o", str(tmp_path), "--json"]) == 0
     (row,) = json.loads(capsys.readouterr().out.splitlines()[-1])["rows"]
-    assert row["case"] == "20/mm³, 40 um, noise 1.2 %, aperture x 0.5"
+    assert row["case"] == "20/mm³, 40 um, noise 1.2 %, 5 views, aperture x 0.5"
 
 
 @pytest.mark.parametrize(("drift_px", "status", "said"), [(2.0, 0, "PASSED"), (40.0, 1, "FAILED")])
