@@ -12,5 +12,6 @@ void bind_images(nanobind::module_ &module);
 void bind_line_of_sight(nanobind::module_ &module);
 void bind_smart(nanobind::module_ &module);
 void bind_stamping(nanobind::module_ &module);
+void bind_zero_runs(nanobind::module_ &module);
 
 }  // namespace tomoshadow

@@ -24,6 +24,7 @@ NB_MODULE(_native, module) {
     bind_line_of_sight(module);
     bind_smart(module);
     bind_stamping(module);
+    bind_zero_runs(module);
     module.def("available_isas", &available_isas);
     module.def("selected_isa", [] { return std::string(selected_kernels().name); });
 }

@@ -14,6 +14,7 @@
 #include "host/resample.hpp"
 #include "host/smart.hpp"
 #include "host/stamping.hpp"
+#include "host/zero_runs.hpp"
 
 using namespace tomoshadow;
 
@@ -354,6 +355,20 @@ void fit_discs(const Kernels &kernels, int number) {
     std::printf("discs %d %.6f %.6f\n", number, light / logs[0].size(), sizes + sum_of(cells.data(), cells.size()));
 }
 
+void pack(int number) {
+    Random random(static_cast<uint32_t>(number) * 2654435769u + 13);
+    std::vector<uint32_t> words;
+    while (static_cast<int>(words.size()) < 1000 * number) {
+        const int length = random.below(200);
+        words.insert(words.end(), static_cast<size_t>(length), static_cast<uint32_t>(random.below(3)));
+    }
+    const std::unique_ptr<uint8_t[]> out(new uint8_t[most_packed_bytes(words.size())]);
+    const size_t bytes = pack_zero_runs(words.data(), words.size(), 1, out.get());
+    double sum = 0;
+    for (size_t k = 0; k < bytes; ++k) sum += out[k];
+    std::printf("runs %d %.6f %.6f\n", number, static_cast<double>(bytes), sum);
+}
+
 }  // namespace
 
 int main() {
@@ -365,4 +380,5 @@ int main() {
     for (int number = 0; number < 10; ++number) fit_blobs(kernels, number);
     for (int number = 0; number < 20; ++number) stamp(number);
     for (int number = 0; number < 10; ++number) fit_discs(kernels, number);
+    for (int number = 0; number < 20; ++number) pack(number);
 }
