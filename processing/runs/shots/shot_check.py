@@ -61,9 +61,9 @@ class ShotCheck:
         return max(view.disparity_px for view in self.views.values())
 
     @property
-    def beyond_doubt(self) -> bool:
-        """Every view is where it was calibrated, whatever the uncertainty of its disparity hides."""
-        return max(view.disparity_px + SURE * view.uncertainty_px for view in self.views.values()) < ALARM_PX
+    def most_px(self) -> float:
+        """No view is further off, whatever the uncertainty of its disparity hides."""
+        return max(view.disparity_px + SURE * view.uncertainty_px for view in self.views.values())
 
     @property
     def moved(self) -> str | None:
@@ -113,15 +113,17 @@ def check_exposures(shot: int, exposures: Sequence[Exposure], calibration: Calib
         return ShotCheck(shot, {}, problem, tuple(calibration.views))
     if len(exposures) == 1 or together.verdict is Verdict.REFUSE:
         return together
-    alone = (_checked(shot, [one], calibration) for one in exposures)
+    alone = (_checked(shot, [one], calibration, STOP_PX) for one in exposures)
     named = (_in_exposure(name, check) for name, check in zip(_EXPOSURES, alone, strict=False))
     return next((check for check in named if check.beyond or check.verdict is Verdict.REFUSE), together)
 
 
-def _checked(shot: int, exposures: Sequence[Exposure], calibration: Calibration) -> ShotCheck:
+def _checked(
+    shot: int, exposures: Sequence[Exposure], calibration: Calibration, limit_px: float = ALARM_PX
+) -> ShotCheck:
     try:
         require_droplets(calibration, exposures)
-        return _look(shot, exposures, calibration)
+        return _look(shot, exposures, calibration, limit_px)
     except CalibrationError as error:
         return _unmeasured(shot, exposures, calibration, error)
 
@@ -146,10 +148,10 @@ def _in_exposure(name: str, check: ShotCheck) -> ShotCheck:
     return replace(check, problem=f"exposure {name} by itself: {check.problem}") if check.problem else check
 
 
-def _look(shot: int, exposures: Sequence[Exposure], calibration: Calibration) -> ShotCheck:
-    """Few droplets are enough where they agree beyond doubt; if they do not, or do not tell, many are asked."""
+def _look(shot: int, exposures: Sequence[Exposure], calibration: Calibration, limit_px: float) -> ShotCheck:
+    """Few droplets are enough where no view can be beyond the limit; if one may be, or they do not tell, many tell."""
     with suppress(CalibrationError):
-        if (few := _measured(shot, exposures, calibration, FEW_SEEDS)).beyond_doubt:
+        if (few := _measured(shot, exposures, calibration, FEW_SEEDS)).most_px < limit_px:
             return few
     return _measured(shot, exposures, calibration, MAX_SEEDS)
 
