@@ -38,7 +38,7 @@ from daq.files.run_file import (
     slots_of,
 )
 from daq.files.run_writer import RunWriter
-from daq.files.shot_file import read_image_key, read_shot_file
+from daq.files.shot_file import Exposures, read_image_key, read_shot_file
 from daq.run_notes import RunNotes, Spray
 from daq.run_plan import ImageKey, PulsePair, RunKind, RunPlan
 from daq.shot import DoubleFrame, ExposureRecord, FiredTrain, Image, LightPulse, Shot
@@ -154,10 +154,10 @@ class RunReader:
         paths = (shot_path(self.run_dir, index) for index in range(self.shot_count))
         return np.array([read_image_key(path) for path in paths], np.int64)
 
-    def read_shot(self, index: int, exposures: str = "ab") -> Shot:
+    def read_shot(self, index: int, exposures: Exposures = "ab") -> Shot:
         """Read one shot and check it against its checksums, and its number against the name of its file.
 
-        Exposures that are not asked for are not read: their pixels are 0, what the camera said of them is there.
+        Exposure A alone is a shot as runs with single exposures have them; B stays on the disk.
         """
         path = shot_path(self.run_dir, index)
         shot = read_shot_file(path, self.header, exposures)

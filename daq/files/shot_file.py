@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import h5py
 import numpy as np
@@ -89,8 +89,12 @@ def reading_shot(path: Path, header: RunHeader) -> Iterator[h5py.File]:
         raise unreadable(path, error) from error
 
 
-def read_shot_file(path: Path, header: RunHeader, exposures: str = "ab") -> Shot:
-    """Read one shot and check it against its checksums; of exposures that nobody asked for pixels are 0.
+Exposures = Literal["a", "ab"]
+"""Of a shot: A alone, as if the run had single exposures, or all that it has."""
+
+
+def read_shot_file(path: Path, header: RunHeader, exposures: Exposures = "ab") -> Shot:
+    """Read one shot, or exposure A of it, and check it against its checksums.
 
     Raises
     ------
@@ -207,14 +211,11 @@ def _read_column(file: h5py.File, name: str, column: Column) -> Any:
 
 
 def _read_frames(
-    path: Path, file: h5py.File, view: str, view_format: ViewFormat, crc32: NDArray[Any], exposures: str
+    path: Path, file: h5py.File, view: str, view_format: ViewFormat, crc32: NDArray[Any], exposures: Exposures
 ) -> list[Image]:
     stored, shape, dtype = file[frames_path(view)].id, view_format.shape, view_format.dtype
     frames: list[Image] = []
-    for number, (name, check) in enumerate(zip("ab", crc32, strict=False)):
-        if name not in exposures:
-            frames.append(np.broadcast_to(np.zeros((), dtype), shape))
-            continue
+    for number, (name, check) in enumerate(zip(exposures, crc32, strict=False)):
         chunk = stored.read_direct_chunk((0, number, 0, 0))[1]
         try:
             frames.append(decode_frame(EncodedFrame(chunk, int(check)), shape, dtype))

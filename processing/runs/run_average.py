@@ -111,7 +111,7 @@ def _exposures(
 ) -> Exposures:
     """Images of exposure after exposure; those that may be wrong are added to ``faults``."""
     for count, index in enumerate(shots, start=1):
-        shot = run.read_shot(index, frame)
+        shot = run.read_shot(index, "a" if frame == "a" else "ab")
         require_match(run.header.run_id, shot, calibration)
         images = shot_intensities(run, shot, frame, settings, references=references, threads=threads)
         if told := {name: what for name, what in exposure_faults(run, shot, frame, images, references).items() if what}:
