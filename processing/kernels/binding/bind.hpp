@@ -7,6 +7,7 @@
 namespace tomoshadow {
 
 void bind_blobs(nanobind::module_ &module);
+void bind_block_maxima(nanobind::module_ &module);
 void bind_discs(nanobind::module_ &module);
 void bind_images(nanobind::module_ &module);
 void bind_line_of_sight(nanobind::module_ &module);

@@ -19,6 +19,7 @@ NB_MODULE(_native, module) {
     for (const int spacing : node_spacings) spacings.append(spacing);
     module.attr("NODE_SPACINGS") = nb::tuple(spacings);
     bind_blobs(module);
+    bind_block_maxima(module);
     bind_discs(module);
     bind_images(module);
     bind_line_of_sight(module);
