@@ -129,7 +129,8 @@ class GrowingPreview:
         if self._unit != 1:
             reduced *= np.float32(self._unit)
         limit = float(reduced.max())
-        voxels = np.rint(reduced * (255.0 / limit if limit > 0 else 0.0)).astype(np.uint8)
+        reduced *= np.float32(255.0 / limit if limit > 0 else 0.0)
+        voxels = np.rint(reduced, out=reduced).astype(np.uint8)
         return VolumePreview(voxels, _coarser(self._grid, self._factor, voxels.shape), limit, self._grid.shape)
 
 
