@@ -104,7 +104,7 @@ mutants: setup build/rp2040js/node_modules ## Shoot a long series and many plans
 fuzz-import: setup ## Damage manifests, tables and images in FUZZ_IMPORTS=2000 ways: each is imported or refused in a sentence.
 	@$(PYTHON) -m tests.support.fuzz_import $(FUZZ_IMPORTS) 2>/dev/null
 
-soak: setup ## PART=kill: kill the server TIMES=100 times while it records, and count what is lost; goes on where it was interrupted. PART=faults: lose each device TIMES=10 times, and time the next run. PART=cluster: kill and cut off parts of a cluster TIMES=20 times. PART=workers: how busy two workers are with TIMES=16 shots. PART=long: record TIMES=10000 shots, count what is lost, and watch the memory.
+soak: setup ## PART=kill: kill the server TIMES=100 times while it records, and count what is lost; goes on where it was interrupted. PART=faults: lose each device TIMES=10 times, and time the next run. PART=light: let everything go wrong in runs TIMES=20 times, and time how it becomes dark. PART=cluster: kill and cut off parts of a cluster TIMES=20 times. PART=workers: how busy two workers are with TIMES=16 shots. PART=long: record TIMES=10000 shots, count what is lost, and watch the memory.
 	@$(PRIVATE_NETWORK) $(PYTHON) -m tests.support.soak_$(or $(PART),kill) $(TIMES)
 
 flips: setup ## Flip 200 bits in flash, RAM and the state machines of an armed board, one at a time; six minutes of CPU time.

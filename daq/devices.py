@@ -153,7 +153,10 @@ class PulseGenerator(Device, Protocol):
         """Continuous light of low current on these views, for this time at most; the heartbeat keeps it on."""
 
     def off(self) -> None:
-        """Light off, disarm; may be called from any thread at any time, and never waits for another command."""
+        """Light off, disarm; may be called from any thread at any time, and never waits for another command.
+
+        Returns when the generator itself has confirmed that it is disarmed and dark; DeviceError if it does not.
+        """
 
     def clear(self) -> None:
         """Acknowledge latched faults; the generator stays SAFE."""

@@ -22,7 +22,7 @@ from daq.simulation.laboratory import SimulatedLaboratory
 from server.lab.engine.inline_engine import InlineEngine
 from server.lab.events import EventPublisher
 from server.lab.services import Services
-from server.rig.assembly import AssembledRig, open_rig
+from server.rig.assembly import open_rig
 from server.rig.config import RigConfig, load_config
 from server.web.app import create_api
 from tests.support.serving import DEADLINE_S, listening
@@ -125,31 +125,29 @@ def eventually(condition: Callable[[], bool], otherwise: Callable[[], object]) -
         threading.Event().wait(0.1)
 
 
+def _as_it_is(rig: Rig) -> Rig:
+    return rig
+
+
 @contextmanager
-def serving_bench(config: RigConfig, frame_s: float = 2.0) -> Iterator[BenchServing]:
-    """Serve a simulated bench until the block ends."""
+def serving_bench(
+    config: RigConfig, frame_s: float = 2.0, watch: Callable[[Rig], Rig] = _as_it_is
+) -> Iterator[BenchServing]:
+    """Serve a simulated bench until the block ends; who watches its devices stands between them and all others."""
     events, data_dir = EventPublisher(), config.server.data_dir
     with (
         open_rig(config) as assembled,
         Acquisition(
-            assembled.rig,
+            rig := watch(assembled.rig),
             data_dir,
             events.publish_run_event,
             limits=AcquisitionLimits(frame_s=frame_s),
             observers=assembled.observers,
         ) as acquisition,
         listening(
-            create_api(
-                Services(
-                    config, assembled.rig, acquisition, events, InlineEngine(), {}, laboratory=assembled.laboratory
-                )
-            )
+            create_api(Services(config, rig, acquisition, events, InlineEngine(), {}, laboratory=assembled.laboratory))
         ) as port,
         httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=DEADLINE_S) as http,
     ):
         assert isinstance(assembled.laboratory, SimulatedLaboratory)
-        yield BenchServing(http, assembled.rig, assembled.laboratory, acquisition, data_dir)
-
-
-def _services(config: RigConfig, assembled: AssembledRig, acquisition: Acquisition, events: EventPublisher) -> Services:
-    return Services(config, assembled.rig, acquisition, events, InlineEngine(), {}, laboratory=assembled.laboratory)
+        yield BenchServing(http, rig, assembled.laboratory, acquisition, data_dir)

@@ -23,6 +23,7 @@ from daq.run.limits import AcquisitionLimits
 from daq.shot import FiredTrain
 from server.rig.assembly import open_rig
 from server.rig.config import RigConfig, load_config
+from tests.support.watched_rig import Witness
 
 pytestmark = pytest.mark.network
 ROOT = Path(__file__).parents[2]
@@ -129,13 +130,16 @@ def test_a_fault_ends_a_run_as_the_page_says(cell: Cell, tmp_path: Path) -> None
     with open_rig(config) as bench:
         assert bench.laboratory is not None
         generator = FaultyFire(bench.rig.generator, PLACES[cell.place], partial(bench.laboratory.inject, fault))
-        rig = replace(bench.rig, generator=cast(PulseGenerator, generator))
+        witness = Witness()
+        rig = witness.watch(replace(bench.rig, generator=cast(PulseGenerator, generator)))
         with Acquisition(rig, tmp_path, limits=LIMITS, observers=bench.observers) as acquisition:
             if cell.kind is FaultKind.IDS_WRAP:  # between A and B of that shot; ids begin when a camera is armed
                 bench.laboratory.inject(fault.model_copy(update={"amount": 2.0 * PLACES[cell.place] - 1}))
             run_id = acquisition.start(plan_of(config, cell))
             assert not acquisition.wait(DEADLINE_S).active
             bench.rig.generator.recover()
+    if darkness := witness.darkness:
+        assert darkness.asked_before == ()
     reader, told = RunReader(tmp_path / run_id), promised(cell)
     codes = [cause.code for cause in reader.causes]
     if reader.outcome == "completed":

@@ -6,11 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from daq.errors import DeviceError
+from daq.faults import FaultKind
 from daq.files.run_directory import DoubleFrame, ExposureRecord, FiredTrain, ImageKey, Shot
 from processing.synthetic.numbered import ImageNumber, numbered
-from tests.support import soak_cluster, soak_faults, soak_long, soak_workers
+from tests.support import soak_cluster, soak_faults, soak_light, soak_long, soak_workers
 from tests.support.simulated_serving import serving_bench, tiny_config
 from tests.support.soak_kill import Killed, kill_servers, mispaired_exposures, summary
+from tests.support.watched_rig import Call, Darkness, Witness
 
 VIEWS = ("view1", "view2")
 
@@ -109,6 +112,55 @@ def test_the_table_of_faults_counts_what_was_refused() -> None:
     assert rows[0].split() == ["(none)", "2", "3.0", "4.0", "1", "2"]
     assert [row.split()[0] for row in rows[1:]] == list(soak_faults.FAULTS)
     assert origin.endswith("load 0.5 to 1.5")
+
+
+@pytest.mark.network
+@pytest.mark.slow
+def test_a_fault_that_ends_a_run_and_one_that_does_not_are_told_apart(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found: list[soak_light.Darkened] = []
+    monkeypatch.setattr(soak_light, "KINDS", [FaultKind.DROPPED_A, FaultKind.ESTOP_PRESSED])
+    monkeypatch.setattr(soak_light, "LIMIT_S", 1.0)
+    soak_light.try_all(tmp_path, 1, found.append)
+    assert found[0].darkness is None
+    assert found[1].darkness is not None
+    assert found[1].darkness.confirmed_s is not None
+    assert found[1].darkness.asked_before == ()
+
+
+def test_the_table_of_darkness_tells_what_was_never_confirmed() -> None:
+    def told(kind: FaultKind, *darkness: Darkness | None) -> list[soak_light.Darkened]:
+        return [soak_light.Darkened(kind, one, 0.5) for one in darkness]
+
+    hang, door = FaultKind.GENERATOR_HANG, FaultKind.INTERLOCK_OPEN
+    found = told(hang, Darkness(0.0, None, ())) + told(FaultKind.LATE, None)
+    found += told(door, Darkness(0.004, 0.002, ()), Darkness(0.0, 0.003, ()))
+    _, *rows, calm, machine = soak_light.summary(found).splitlines()
+    assert [row.split() for row in rows] == [
+        ["generator_hang", "1", "0.0", "0.0", "0.0", "-", "-", "-", "1"],
+        ["interlock_open", "2", "2.0", "4.0", "4.0", "2.5", "3.0", "3.0", "0"],
+        ["all", "3", "0.0", "3.9", "4.0", "2.5", "3.0", "3.0", "1"],
+    ]
+    assert calm == "the run went on with the light: late"
+    assert machine.endswith("load 0.5 to 0.5")
+
+
+def test_a_pulse_after_a_fault_and_a_question_before_the_light_is_off_are_found() -> None:
+    witness = Witness()
+
+    def call(verb: str, began_s: float, answer: object, thread: str = "acquisition") -> None:
+        witness.calls.append(Call(thread, "device", verb, began_s, began_s + 0.25, answer))
+
+    call("status", 1.0, DeviceError("device", "fault"), thread="lamp generator_0")
+    assert witness.darkness is None
+    call("collect", 2.0, DeviceError("device", "gone"), thread="frames-view1")
+    call("ask", 2.5, None, thread="a question-view1")
+    witness.pulses_s += [1.0, 2.75, 4.5]
+    call("off", 3.0, DeviceError("device", "no answer"))
+    call("off", 3.5, None)
+    call("arm", 4.0, None)
+    assert witness.darkness == Darkness(0.5, 1.5, ("device: ask", "device: off"))
 
 
 def test_the_table_of_a_cluster_counts_lost_shots() -> None:
