@@ -3,7 +3,6 @@
 from typing import Any
 
 import numpy as np
-from matplotlib.colors import to_hex, to_rgb
 
 VIEW_COLOURS = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#f0e442", "#000000")
 """Of the views, in order; a rig has eight at most."""
@@ -17,6 +16,8 @@ _STAGES = {5: (":", "^", 0.4), 10: ("--", "s", 0.0), 20: ("-", "o", -0.4)}
 
 def method_style(method: str, iterations: int) -> dict[str, Any]:
     """Colour by method; line, marker and shade by iterations."""
+    from matplotlib.colors import to_hex, to_rgb  # colours are also those of pages, which load no matplotlib
+
     line, marker, lighter = _STAGES.get(iterations, ("-", "o", 0.0))
     colour = np.array(to_rgb(METHOD_COLOURS[method]))
     shade = colour + lighter * (1 - colour if lighter > 0 else colour)

@@ -2,3 +2,8 @@
 
 It may import everything but the command line; the laboratory knows nothing of it.
 """
+
+import os
+
+os.environ.setdefault("MATPLOTLIB", "false")
+"""For NiceGUI: no page draws by it, and a server that starts would load it for a third of a second of CPU time."""

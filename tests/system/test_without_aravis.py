@@ -55,5 +55,7 @@ def test_commands_that_open_no_camera_work() -> None:
         assert expected in said
 
 
-def test_aravis_is_not_loaded_until_a_camera_is_opened() -> None:
-    assert printed("import sys, server.cli.main, server.web.serve\nprint('gi' in sys.modules)") == "False\n"
+def test_a_server_that_starts_loads_neither_aravis_nor_what_draws_and_counts() -> None:
+    heavy = ("gi", "matplotlib", "scipy.stats")
+    asked = f"import sys, server.cli.main, server.web.serve\nprint([name for name in {heavy} if name in sys.modules])"
+    assert printed(asked) == "[]\n"

@@ -6,6 +6,7 @@
 import asyncio
 from collections.abc import Sequence
 from contextlib import AsyncExitStack
+from contextvars import copy_context
 from types import TracebackType
 from typing import Any, Self
 
@@ -13,7 +14,8 @@ from dask import config
 from distributed import Client, Event, LocalCluster, Nanny
 
 from server.lab.engine.in_worker import PROGRESS_TOPIC, Errand, Prepared, abort_event, perform_errand
-from server.lab.engine.task import OnProgress, Task, TaskError, Values, settled
+from server.lab.engine.task import OnProgress, Task, TaskError, Unavailable, Values, settled
+from server.lab.errors import told
 
 ENVIRONMENT = "distributed.nanny.pre-spawn-environ"
 MEMORY_THAT_STAYS = {"MALLOC_MMAP_THRESHOLD_": 32 << 20, "MALLOC_TRIM_THRESHOLD_": 256 << 20}
@@ -24,6 +26,8 @@ _NICENESS = 10  # measured: median answer time of the server under load falls fr
 
 class DaskEngine:
     """Runs tasks in worker processes of this machine, reached on the loopback interface only.
+
+    They start by themselves: whoever enters does not wait for them, the first task does.
 
     Parameters
     ----------
@@ -40,10 +44,15 @@ class DaskEngine:
         self._modules = modules
         self._memory_limit = memory_limit
         self._stack = AsyncExitStack()
-        self._client: Client | None = None
+        self._context = copy_context()  # a client of distributed ends where it began
+        self._client: asyncio.Task[Client] | None = None
         self._listeners: dict[str, OnProgress] = {}
 
     async def __aenter__(self) -> Self:
+        self._client = asyncio.create_task(self._start(), context=self._context)
+        return self
+
+    async def _start(self) -> Client:
         environment = config.get(ENVIRONMENT) | MEMORY_THAT_STAYS
         self._stack.enter_context(config.set({ENVIRONMENT: environment}))
         cluster = await self._stack.enter_async_context(
@@ -60,11 +69,10 @@ class DaskEngine:
                 worker_class=Nanny,
             )
         )
-        client = await self._stack.enter_async_context(Client(cluster, asynchronous=True))
+        client: Client = await self._stack.enter_async_context(Client(cluster, asynchronous=True))
         await client.register_plugin(Prepared(self._modules, _NICENESS))
         client.subscribe_topic(PROGRESS_TOPIC, self._on_progress)
-        self._client = client
-        return self
+        return client
 
     async def __aexit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -78,7 +86,7 @@ class DaskEngine:
 
     async def submit(self, job_id: str, task: Task, job: Values, on_progress: OnProgress) -> dict[str, Any]:
         """See ``Engine.submit``."""
-        client = self._started()
+        client = await self._started()
         self._listeners[job_id] = on_progress
         future = client.submit(perform_errand, task, Errand(job_id, dict(job)), pure=False)
         try:
@@ -94,14 +102,20 @@ class DaskEngine:
 
     async def abort(self, job_id: str) -> None:
         """See ``Engine.abort``; cancelling the future would not stop a running task."""
-        await Event(abort_event(job_id), client=self._started()).set()
+        await Event(abort_event(job_id), client=await self._started()).set()
 
     async def close(self) -> None:
         """End scheduler and workers."""
-        self._client = None
-        await self._stack.aclose()
+        starting, self._client = self._client, None
+        if starting is not None:  # workers that are just being started are known to nobody else
+            await asyncio.wait([starting])
+        await asyncio.create_task(self._stack.aclose(), context=self._context)
 
-    def _started(self) -> Client:
+    async def _started(self) -> Client:
+        """Wait for the workers; Unavailable if they cannot start."""
         if self._client is None:
             raise TaskError("the engine is not running")
-        return self._client
+        await asyncio.wait([self._client])
+        if error := self._client.exception():
+            raise Unavailable(f"the workers did not start: {told(error)}")
+        return self._client.result()

@@ -9,7 +9,6 @@ from daq.shot import FiredTrain
 from daq.timing import CameraTiming, ShotTiming, plan_shot_timing
 from server.lab.errors import Conflict, NotFound
 from server.lab.services import Context
-from server.pictures.timing_diagram import picture, timing_diagram
 from server.rig.shot_timing import fired_timing, nominal_plan
 from server.web.api.parameters import ContextOf, RunId
 from server.web.problems import responses
@@ -57,4 +56,6 @@ def _fired(run_id: str, context: Context) -> tuple[RunPlan, FiredTrain]:
 
 
 def _drawing(timing: ShotTiming, title: str) -> Response:
+    from server.pictures.timing_diagram import picture, timing_diagram  # loads matplotlib
+
     return Response(picture(timing_diagram(timing, title), "svg"), media_type="image/svg+xml")

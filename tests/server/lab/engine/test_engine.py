@@ -12,7 +12,7 @@ import pytest
 
 from server.lab.engine.dask_engine import DaskEngine
 from server.lab.engine.inline_engine import InlineEngine
-from server.lab.engine.task import Engine, TaskAborted, TaskError
+from server.lab.engine.task import Engine, TaskAborted, TaskError, Unavailable
 
 ENGINES = pytest.mark.parametrize("make", [InlineEngine, DaskEngine])
 
@@ -109,7 +109,7 @@ def test_a_task_for_which_nobody_waits_any_more_does_not_stay_behind(make: Calla
             waiting = asyncio.ensure_future(
                 engine.submit("a", step_until_stopped, {}, lambda steps: going.set() if steps else None)
             )
-            await asyncio.wait_for(going.wait(), 20)
+            await asyncio.wait_for(going.wait(), 60)
             waiting.cancel()
             await asyncio.wait({waiting})
             return await asyncio.wait_for(engine.submit("b", double, {"value": 21}, _ignore), 10)
@@ -120,6 +120,20 @@ def test_a_task_for_which_nobody_waits_any_more_does_not_stay_behind(make: Calla
 def test_an_engine_that_was_not_started_says_so() -> None:
     with pytest.raises(TaskError, match="not running"):
         asyncio.run(DaskEngine().abort("x"))
+
+
+def test_whoever_starts_workers_does_not_wait_for_them_and_a_task_is_told_that_they_did_not_start() -> None:
+    async def go() -> None:
+        engine = DaskEngine(memory_limit="much")
+        with pytest.raises(StopIteration):  # it never gives the loop away
+            engine.__aenter__().send(None)
+        try:
+            await engine.submit("a", double, {"value": 21}, _ignore)
+        finally:
+            await engine.close()
+
+    with pytest.raises(Unavailable, match="the workers did not start: ValueError"):
+        asyncio.run(go())
 
 
 def test_workers_load_what_they_are_told_to_before_a_task_needs_it_and_keep_their_memory() -> None:
