@@ -1,8 +1,9 @@
-"""RUN/notes.json: what was written into the notes of a run after it was recorded, by whom and when.
+"""RUN/notes.json: what was written of the conditions of a run after it was recorded, by whom and when.
 
 ``run.h5`` stays as it is. The last change is what holds; a run without this file has the notes of its header.
 """
 
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated, Literal
@@ -15,7 +16,7 @@ from daq.files.header import RunHeader
 from daq.files.run_file import read_later_notes
 from daq.files.storage import storing
 from daq.frozen_model import FrozenModel
-from daq.run_notes import RunNotes
+from daq.run_notes import RunNotes, Spray
 
 NOTES_FILE = "notes.json"
 MOST_CHANGES = 200
@@ -29,6 +30,9 @@ class NotesChange(FrozenModel):
     at_utc: Annotated[str, Field(description="when, ISO 8601")]
     before: Annotated[RunNotes, Field(description="what stood there until then")]
     notes: Annotated[RunNotes, Field(description="what stands there since")]
+    spray: Annotated[
+        Spray | None, Field(description="nozzle and axis, where they were written anew too; null: they are as before")
+    ] = None
 
 
 class LaterNotes(FrozenModel):
@@ -38,6 +42,33 @@ class LaterNotes(FrozenModel):
     schema_version: Literal[1] = 1
     run_id: Annotated[str, Field(description="the run of which they are")]
     changes: Annotated[tuple[NotesChange, ...], Field(description="the oldest one first")] = ()
+
+
+@dataclass(frozen=True)
+class RunConditions:
+    """What holds of a run now.
+
+    Parameters
+    ----------
+    notes : RunNotes
+        As they were last written.
+    spray : Spray | None
+        Nozzle and axis, likewise; None where nobody knows.
+    changed : NotesChange | None
+        The last change; None where all is as recorded.
+    """
+
+    notes: RunNotes
+    spray: Spray | None
+    changed: NotesChange | None
+
+    @classmethod
+    def after(cls, header: RunHeader, changes: tuple[NotesChange, ...]) -> "RunConditions":
+        """What was recorded, and what was written since."""
+        if not changes:
+            return cls(header.notes, header.spray, None)
+        sprays = [header.spray, *(change.spray for change in changes)]
+        return cls(changes[-1].notes, next((one for one in reversed(sprays) if one), None), changes[-1])
 
 
 def read_changes(run_dir: Path, header: RunHeader) -> tuple[NotesChange, ...]:
@@ -59,8 +90,8 @@ def read_changes(run_dir: Path, header: RunHeader) -> tuple[NotesChange, ...]:
     return later.changes
 
 
-def add_change(run_dir: Path, header: RunHeader, notes: RunNotes, who: str) -> None:
-    """Write the notes of a run anew; the same ones are no change.
+def add_change(run_dir: Path, header: RunHeader, notes: RunNotes, who: str, spray: Spray | None = None) -> None:
+    """Write the notes of a run anew, and nozzle and axis where they are given; the same ones are no change.
 
     Raises
     ------
@@ -72,12 +103,13 @@ def add_change(run_dir: Path, header: RunHeader, notes: RunNotes, who: str) -> N
         The disk refuses.
     """
     changes = read_changes(run_dir, header)
-    before = changes[-1].notes if changes else header.notes
-    if notes == before:
+    now = RunConditions.after(header, changes)
+    if notes == now.notes and spray in (None, now.spray):
         return
     if len(changes) >= MOST_CHANGES:
         raise RecorderError(f"{run_dir}: its notes were changed {MOST_CHANGES} times, and take no more changes")
-    change = NotesChange(who=who, at_utc=datetime.now(UTC).isoformat(timespec="seconds"), before=before, notes=notes)
+    at_utc = datetime.now(UTC).isoformat(timespec="seconds")
+    change = NotesChange(who=who, at_utc=at_utc, before=now.notes, notes=notes, spray=spray)
     with storing(run_dir), replacing(run_dir / NOTES_FILE) as part:
         part.write_text(document_of(header, (*changes, change)), encoding="utf-8")
 

@@ -3,7 +3,7 @@
 ::
 
     RUN/run.h5          what the run is, its references, its outcome, a view over all shots   (daq.files.run_file)
-    RUN/notes.json      notes that were changed later; is there only then                     (daq.files.later_notes)
+    RUN/notes.json      notes, nozzle and axis that were changed later; is there only then    (daq.files.later_notes)
     RUN/shots/N.h5      one shot, committed by rename after fsync                             (daq.files.shot_file)
 
 Any HDF5 reader sees the whole run through ``run.h5``: ``h5py.File("run.h5")["/cameras/view1/frames"][3]``.
@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from daq.causes import Cause
 from daq.errors import RecorderError, RenamedFile, ShotFileError
 from daq.files.header import RunClosing, RunHeader, ViewFormat
-from daq.files.later_notes import NotesChange, add_change, read_changes
+from daq.files.later_notes import NotesChange, RunConditions, add_change, read_changes
 from daq.files.lock_file import hold_folder
 from daq.files.packed_file import pack_run, require_free
 from daq.files.run_file import (
@@ -54,6 +54,7 @@ __all__ = [
     "PulsePair",
     "RecorderError",
     "ReferenceImages",
+    "RunConditions",
     "RunHeader",
     "RunKind",
     "RunNotes",
@@ -148,6 +149,11 @@ class RunReader:
     def notes_changes(self) -> tuple[NotesChange, ...]:
         """What was written into its notes later, the oldest change first; ``header.notes`` are as recorded."""
         return read_changes(self.run_dir, self.header)
+
+    @property
+    def conditions(self) -> RunConditions:
+        """Notes, nozzle and axis as they hold now: those of the header, or what was written later."""
+        return RunConditions.after(self.header, self.notes_changes)
 
     def image_keys(self) -> NDArray[np.int64]:
         """ImageKey of every shot, (shot,); a shot that cannot be read counts as INVALID."""

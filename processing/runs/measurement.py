@@ -235,7 +235,7 @@ class RunMeasurement:
             "recipe_sha256": recipe_sha256("measure", METHOD_VERSION, self.settings),
             "exposures": json.dumps(told),
             "velocity": json.dumps(reason),
-            **conditions_of(self.run.header),
+            **conditions_of(self.run),
             **({"rate_hz": rate_hz} if (rate_hz := self.run.header.rate_hz) else {}),
         }
 

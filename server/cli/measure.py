@@ -200,6 +200,7 @@ def _measure_shots(
     from processing.runs.liquid.objects import liquid_summary
     from processing.runs.measurement import METHOD_VERSION
     from processing.runs.recipe import recipe_sha256
+    from processing.runs.sprays.conditions import changes_told
 
     shots: list[ShotDroplets] = []
     with closing((_elsewhere if options.scheduler else _here)(options, settings, run_dir, indices, out)) as coming:
@@ -208,8 +209,10 @@ def _measure_shots(
             for export in options.export:
                 export_droplets(out / shots[-1].file, export)
             _tell_faults(shots[-1])
-    stored = [read_droplets(out / shot.file) for shot in shots]
+    files = [out / shot.file for shot in shots]
+    stored = [read_droplets(file) for file in files]
     return {
+        "conditions_changed": _tell_changes(changes_told(stored, files)),
         "polarity": settings.polarity,
         "recipe_sha256": recipe_sha256(NAME, METHOD_VERSION, settings),
         "grid": settings.model_dump(mode="json")["grid"],
@@ -222,12 +225,18 @@ def _measure_shots(
     }
 
 
+def _tell_changes(changes: tuple[str, ...]) -> list[str]:
+    for change in changes:
+        progress(change)
+    return list(changes)
+
+
 def _tell_unchecked(run_dir: Path, settings: "MeasureSettings") -> list[dict[str, str]]:
     from daq.files.run_directory import RunReader
     from processing.runs.unchecked_images import told_unchecked, unchecked_images
 
     with RunReader(run_dir) as run:
-        undirected = run.header.frames_per_shot == 2 and run.header.spray is None
+        undirected = run.header.frames_per_shot == 2 and run.conditions.spray is None
     return told_unchecked(
         unchecked_images(settings.polarity, sizes_known=bool(settings.sizes), undirected=undirected), progress
     )

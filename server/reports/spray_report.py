@@ -123,7 +123,8 @@ def _origin(reported: ReportedSpray) -> Section:
         ],
         *_notes(reported),
     ]
-    return Section("Where the numbers come from", tables=[Table(["", ""], [row for row in rows if row[1]], words=True)])
+    table = Table(["", ""], [row for row in rows if row[1]], words=True)
+    return Section("Where the numbers come from", tables=[table], points=reported.spray.changes)
 
 
 def _stated(reported: ReportedSpray, name: str) -> list[str]:

@@ -120,7 +120,7 @@ def nozzle_of(run: RunReader, stated: NozzleNumbers | None) -> Nozzle | None:
     if stated is not None:
         x_mm, y_mm, z_mm, *axis = stated
         return Nozzle((x_mm, y_mm, z_mm), (axis[0], axis[1], axis[2])) if axis else Nozzle((x_mm, y_mm, z_mm))
-    spray = run.header.spray
+    spray = run.conditions.spray
     return Nozzle(spray.nozzle_mm, spray.axis) if spray else None
 
 

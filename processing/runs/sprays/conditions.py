@@ -1,10 +1,108 @@
-"""What the operator has written down of a run travels with what is measured of it."""
+"""What the operator has written down of a run travels with what is measured of it, and who changed it when."""
 
-from daq.files.run_directory import RunHeader
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from daq.files.run_directory import NotesChange, RunConditions, RunNotes, RunReader, ShotFileError, Spray
+from processing.analysis.droplets.droplet_file import StoredDroplets
+
+CHANGED = "conditions_changed"
+"""Of a file of droplets: who changed the conditions before it was measured, when, and what was recorded."""
+REMEDY = "what is told of the spray is of the place that was stated when it was measured: measure it again"
+
+Said = dict[str, Any]
 
 
-def conditions_of(header: RunHeader) -> dict[str, str]:
-    """What the operator has written down of a run, as far as it says anything of the spray."""
-    spray = header.spray.model_dump_json() if header.spray else ""
-    notes = header.notes.model_dump_json(exclude_defaults=True)
-    return {name: text for name, text in (("spray", spray), ("notes", notes)) if text not in ("", "{}")}
+def conditions_of(run: RunReader) -> dict[str, str]:
+    """What holds of a run now, as far as it says anything of the spray."""
+    now, header = run.conditions, run.header
+    told = _told(now.notes, now.spray)
+    if now.changed:
+        recorded = _told(header.notes, header.spray)
+        told[CHANGED] = json.dumps({"who": now.changed.who, "at_utc": now.changed.at_utc, "recorded": recorded})
+    return told
+
+
+def _told(notes: RunNotes, spray: Spray | None) -> dict[str, str]:
+    texts = {"spray": spray.model_dump_json() if spray else "", "notes": notes.model_dump_json(exclude_defaults=True)}
+    return {name: text for name, text in texts.items() if text not in ("", "{}")}
+
+
+def run_around(file: Path) -> RunReader | None:
+    """The run in whose results a file lies; None where it lies elsewhere, or nobody can read the run."""
+    folders = file.resolve().parents
+    if len(folders) < 3 or not (folders[2] / "run.h5").is_file():
+        return None
+    run = RunReader(folders[2])
+    try:
+        _ = run.header
+    except ShotFileError:
+        return None  # damaged: its droplets are good all the same
+    return run
+
+
+def spray_around(file: Path) -> Spray | None:
+    """Nozzle and axis, as the run around a file says now; later notes that are damaged do not count."""
+    run = run_around(file)
+    if run is None:
+        return None
+    try:
+        return run.conditions.spray
+    except ShotFileError:
+        return run.header.spray
+
+
+def changes_told(shots: Sequence[StoredDroplets], files: Sequence[Path]) -> tuple[str, ...]:
+    """What of the conditions was changed after a run was recorded, and what after its droplets were measured."""
+    alike = {
+        (file.parent, *map(shot.provenance.get, ("run", "spray", "notes", CHANGED))): (shot.provenance, file)
+        for shot, file in zip(shots, files, strict=True)
+    }
+    return tuple(dict.fromkeys(line for one in alike.values() for line in _of_shot(*one)))
+
+
+def _of_shot(provenance: Mapping[str, Any], file: Path) -> Iterator[str]:
+    name, measured = provenance.get("run", ""), _said(provenance)
+    if changed := json.loads(str(provenance.get(CHANGED, "null"))):
+        differs = _differences(measured, _said(changed["recorded"]), "recorded")
+        yield f"run {name} was changed by {changed['who']} at {changed['at_utc']}, after it was recorded: {differs}"
+    run = run_around(file)
+    if run is None:
+        return
+    try:
+        now = run.conditions
+    except ShotFileError as error:
+        yield f"whether run {name} was changed later is not known: {error}"
+        return
+    recorded = _said(_told(run.header.notes, run.header.spray))
+    if now.changed:
+        yield from _since(name, now, now.changed, measured if changed else recorded)
+
+
+def _since(name: str, now: RunConditions, change: NotesChange, measured: Said) -> Iterator[str]:
+    """What differs from what was measured with."""
+    said = _said(_told(now.notes, now.spray))
+    if said != measured:
+        remedy = f"; {REMEDY}" if any(said.get(one) != measured.get(one) for one in Spray.model_fields) else ""
+        differs = _differences(said, measured, "measured with")
+        yield f"run {name} was changed by {change.who} at {change.at_utc}, after it was measured: {differs}{remedy}"
+
+
+def _said(told: Mapping[str, Any]) -> Said:
+    """Every condition under its name."""
+    notes = json.loads(str(told.get("notes", "{}")))
+    return {**json.loads(str(told.get("spray", "{}"))), **notes, **notes.pop("more", {})}
+
+
+def _differences(now: Said, before: Said, was: str) -> str:
+    differing = [name for name in {**before, **now} if now.get(name) != before.get(name)]
+    told = [f"{name} is {_text(now.get(name))}, {was}: {_text(before.get(name))}" for name in differing]
+    return "; ".join(told) or "and all is again as it was"
+
+
+def _text(value: object) -> str:
+    if isinstance(value, list):
+        return f"({', '.join(f'{one:g}' for one in value)})"
+    return "not stated" if value is None else str(value)

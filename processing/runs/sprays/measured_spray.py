@@ -7,14 +7,15 @@ from itertools import combinations
 from pathlib import Path
 from typing import Any
 
-from daq.files.run_directory import RunReader, ShotFileError
 from processing.analysis.copied_shots import in_common
 from processing.analysis.droplets.droplet_file import DropletFileError, StoredDroplets
 from processing.analysis.droplets.droplet_statistics import require_poolable
 from processing.analysis.spray.spray_axis import SprayAxis
 from processing.runs.droplets_in_place import read_in_place
+from processing.runs.sprays.conditions import changes_told, spray_around
 
 PATTERN = "shot_*_droplets.h5"
+AGAIN = {"spray": "; shots that were measured before nozzle or axis were mended are measured again"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,11 +30,14 @@ class MeasuredSpray:
         A shot each.
     axis : SprayAxis | None
         As the run says; None where nobody stated it.
+    changes : tuple of str
+        What of its conditions was changed after it was recorded: by whom, and when.
     """
 
     name: str
     shots: tuple[StoredDroplets, ...]
     axis: SprayAxis | None
+    changes: tuple[str, ...] = ()
 
     @property
     def provenance(self) -> dict[str, Any]:
@@ -70,7 +74,7 @@ def read_files(files: Sequence[Path], name: str = "") -> MeasuredSpray:
     _require_one(shots, files, "calibration")
     require_poolable(shots)
     _require_one(shots, files, "spray")
-    return MeasuredSpray(name, shots, _axis(shots, files))
+    return MeasuredSpray(name, shots, _axis(shots, files), changes_told(shots, files))
 
 
 def _files(folder: Path) -> list[Path]:
@@ -96,27 +100,17 @@ def _require_one(shots: Sequence[StoredDroplets], files: Sequence[Path], what: s
         if (its := shot.provenance.get(what)) != first:
             raise DropletFileError(
                 f"{file}: measured with {what} {its}, {files[0]} with {first}: numbers of two are not pooled; "
-                "take those of one, or --compare them"
+                f"take those of one, or --compare them{AGAIN.get(what, '')}"
             )
 
 
 def _axis(shots: Sequence[StoredDroplets], files: Sequence[Path]) -> SprayAxis | None:
-    """As the files say; of older ones, which do not, as the run around them does."""
+    """As the files say; where they do not, as the run around them does: they are older, or it was stated later."""
     stated = next((json.loads(str(shot.provenance["spray"])) for shot in shots if "spray" in shot.provenance), None)
-    said = stated or next(_sprays_around(files), None)
-    return SprayAxis(tuple(said["nozzle_mm"]), tuple(said["axis"])) if said else None
-
-
-def _sprays_around(files: Sequence[Path]) -> Iterator[dict[str, Any]]:
-    for run_dir in (above for file in files[:1] for above in file.resolve().parents[2:3]):
-        if (run_dir / "run.h5").is_file():
-            try:
-                with RunReader(run_dir) as run:
-                    spray = run.header.spray
-            except ShotFileError:
-                continue  # damaged: its droplets are good all the same
-            if spray:
-                yield spray.model_dump(mode="json")
+    if stated:
+        return SprayAxis(tuple(stated["nozzle_mm"]), tuple(stated["axis"]))
+    spray = spray_around(files[0])
+    return SprayAxis(spray.nozzle_mm, spray.axis) if spray else None
 
 
 @dataclass(frozen=True, eq=False)

@@ -34,7 +34,8 @@ def statistics(options: Namespace) -> Outcome:
         return _compare(options)
     spray = read_spray(options.results)
     told = _told(options, spray)
-    return Outcome({"results": spray.name, **told.model_dump(mode="json")}, _text(spray.name, told))
+    result = {"results": spray.name, "conditions_changed": list(spray.changes), **told.model_dump(mode="json")}
+    return Outcome(result, _text(spray, told))
 
 
 def _told(options: Namespace, spray: "MeasuredSpray") -> "SprayStatistics":
@@ -53,20 +54,21 @@ def _compare(options: Namespace) -> Outcome:
     result = {
         "runs": {name: one.model_dump(mode="json") for name, one in told.items()},
         "measured_differently": list(sprays.unlike),
+        "conditions_changed": [change for spray in sprays.sprays.values() for change in spray.changes],
         "differences": [one.model_dump(mode="json") for one in found],
         "reason": None if found else NOTHING,
     }
-    texts = [*(_text(name, one) for name, one in told.items()), *sprays.unlike]
+    texts = [*(_text(spray, told[name]) for name, spray in sprays.sprays.items()), *sprays.unlike]
     return Outcome(result, "\n\n".join([*texts, _differences(found) if found else NOTHING]))
 
 
-def _text(name: str, told: "SprayStatistics") -> str:
+def _text(spray: "MeasuredSpray", told: "SprayStatistics") -> str:
     from server.reports.spray_tables import doubts, figure_rows
 
     counted = f"{told.droplets.n} droplets, shots: {told.droplets.shots}, exposures: {told.droplets.exposures}"
     sample = f"; sample: {told.sample.verdict}" if told.sample else ""
-    head = f"{name}: {counted}; sampling: {told.sampling}{sample}"
-    return "\n".join([head, table(["", "", "95 %"], figure_rows(told)), *doubts(told)])
+    head = f"{spray.name}: {counted}; sampling: {told.sampling}{sample}"
+    return "\n".join([head, table(["", "", "95 %"], figure_rows(told)), *doubts(told), *spray.changes])
 
 
 def _differences(found: "tuple[Difference, ...]") -> str:

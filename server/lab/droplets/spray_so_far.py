@@ -7,6 +7,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
+from daq.files.run_directory import RunReader, ShotFileError
 from daq.frozen_model import FrozenModel
 from daq.run_plan import ImageKey
 from processing.analysis.droplets.droplet_file import DropletFileError
@@ -29,6 +30,9 @@ class SpraySoFar(FrozenModel):
     measured: Annotated[int, Field(description="shots whose droplets are there")]
     recorded: Annotated[int, Field(description="valid sample shots of the run, so far")]
     statistics: Annotated[SprayStatistics, Field(description="of the sample; refused exposures do not count")]
+    conditions_changed: Annotated[
+        tuple[str, ...], Field(description="what of notes, nozzle and axis was changed after the run: by whom and when")
+    ] = ()
 
 
 def spray_so_far(
@@ -63,15 +67,25 @@ def spray_so_far(
     shots = tuple(measured[place] for place in places)
     files = [droplets_path(run_dir / "results" / name, shot) for shot in shots]
     try:
-        statistics = _of(tuple((file, file.stat().st_mtime_ns) for file in files), liquid_kg_m3)
-    except (DropletFileError, OSError) as error:
+        later = len(RunReader(run_dir).notes_changes)
+        statistics, changes = _of(tuple((file, file.stat().st_mtime_ns) for file in files), liquid_kg_m3, later)
+    except (DropletFileError, ShotFileError, OSError) as error:
         raise Damaged(str(error)) from error
     recorded = int(np.count_nonzero(runs.image_keys(run_id) == ImageKey.SAMPLE))
-    return SpraySoFar(results=name, shots=shots, measured=len(measured), recorded=recorded, statistics=statistics)
+    return SpraySoFar(
+        results=name,
+        shots=shots,
+        measured=len(measured),
+        recorded=recorded,
+        statistics=statistics,
+        conditions_changed=changes,
+    )
 
 
 @lru_cache(maxsize=16)
-def _of(files: tuple[tuple[Path, int], ...], liquid_kg_m3: float | None) -> SprayStatistics:
-    """Once per change of the files."""
+def _of(
+    files: tuple[tuple[Path, int], ...], liquid_kg_m3: float | None, _changes: int
+) -> tuple[SprayStatistics, tuple[str, ...]]:
+    """Once per change of the files, or of the conditions of the run: ``_changes`` counts those."""
     spray = read_files([file for file, _ in files])
-    return spray_statistics(spray.shots, AskedFor(spray.axis, liquid_kg_m3=liquid_kg_m3))
+    return spray_statistics(spray.shots, AskedFor(spray.axis, liquid_kg_m3=liquid_kg_m3)), spray.changes

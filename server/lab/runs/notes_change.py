@@ -6,7 +6,7 @@ from typing import Annotated
 from pydantic import Field
 
 from daq.files.lock_file import hold_folder
-from daq.files.run_directory import NotesChange, RunNotes, RunReader, add_change
+from daq.files.run_directory import NotesChange, RunNotes, RunReader, Spray, add_change
 from daq.files.storage import storing
 from daq.frozen_model import FrozenModel
 from server.lab.errors import Conflict
@@ -21,6 +21,7 @@ class NotesHistory(FrozenModel):
     """The notes of a run, from its start on."""
 
     recorded: Annotated[RunNotes, Field(description="as they were when the run was recorded")]
+    recorded_spray: Annotated[Spray | None, Field(description="nozzle and axis, likewise; null: nobody stated them")]
     changes: Annotated[tuple[NotesChange, ...], Field(description="since then, the oldest one first")]
 
 
@@ -28,6 +29,9 @@ class NewNotes(FrozenModel):
     """Notes that take the place of others."""
 
     notes: Annotated[RunNotes, Field(description="all of them; what is left out is empty from now on")]
+    spray: Annotated[
+        Spray | None, Field(description="nozzle and axis, for what is measured from now on; null: they stay")
+    ] = None
     seen: Annotated[
         RunNotes | None, Field(description="what stood there when they were written: if others do now, 409")
     ] = None
@@ -44,7 +48,8 @@ def notes_history(runs: RunStore, run_id: str) -> NotesHistory:
         It cannot be read, or its later notes.
     """
     run = runs.reader(run_id)
-    return NotesHistory(recorded=run.header.notes, changes=run.notes_changes)
+    header = run.header
+    return NotesHistory(recorded=header.notes, recorded_spray=header.spray, changes=run.notes_changes)
 
 
 def change_notes(runs: RunStore, run_id: str, new: NewNotes, who: str) -> RunSummary:
@@ -77,13 +82,13 @@ def change_notes(runs: RunStore, run_id: str, new: NewNotes, who: str) -> RunSum
         runs.require_closed(run_id)
         with storing(run.run_dir), hold_folder(run.run_dir):
             _require_seen(run, new.seen)
-            add_change(run.run_dir, run.header, new.notes, who)
+            add_change(run.run_dir, run.header, new.notes, who, new.spray)
     return runs.summary(run_id)
 
 
 def _require_seen(run: RunReader, seen: RunNotes | None) -> None:
-    changes = run.notes_changes
-    if seen in (None, changes[-1].notes if changes else run.header.notes):
+    now = run.conditions
+    if seen in (None, now.notes):
         return
-    by = f"by {changes[-1].who} at {changes[-1].at_utc}" if changes else "by nobody: they are as recorded"
+    by = f"by {now.changed.who} at {now.changed.at_utc}" if now.changed else "by nobody: they are as recorded"
     raise Conflict(f"the notes of run {run.header.run_id} are not those that were seen, changed {by}: look again")

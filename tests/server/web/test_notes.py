@@ -9,6 +9,7 @@ from tests.server.web.test_run_lists import listed
 from tests.support.serving import Serving, plan_of
 
 WATER, ETHANOL = {"fluid": "water"}, {"fluid": "ethanol", "pressure_bar": 6.0}
+NOZZLE = {"nozzle_mm": [0.0, -8.4, 0.0], "axis": [0.0, 1.0, 0.0]}
 
 
 def recorded(server: Serving) -> str:
@@ -29,12 +30,13 @@ def test_notes_of_a_run_can_be_changed_are_found_and_it_is_told_who_did_it(serve
     run_file = server.services.data_dir / run_id / "run.h5"
     before = run_file.read_bytes()
     assert listed(server, text="water") == (["day"], 1)
-    answer = put(server, run_id, {"notes": ETHANOL}).json()
+    answer = put(server, run_id, {"notes": ETHANOL, "spray": NOZZLE}).json()
     assert (said(answer["notes"]), answer["notes_changed_by"]) == (ETHANOL, "ann@lab")
     assert (listed(server, text="ethanol"), listed(server, text="water")) == ((["day"], 1), ([], 0))
     history = server.http.get(f"/api/runs/{run_id}/notes").json()
     (change,) = history["changes"]
     assert (said(history["recorded"]), said(change["before"])) == (WATER, WATER)
+    assert (history["recorded_spray"], change["spray"]) == (None, NOZZLE)
     assert change["at_utc"] == server.http.get(f"/api/runs/{run_id}").json()["notes_changed_utc"]
     assert run_file.read_bytes() == before
     assert said(server.http.get(f"/api/runs/{run_id}/header").json()["notes"]) == WATER

@@ -17,8 +17,8 @@ SPRAY = Spray(nozzle_mm=(1, 2, 3), axis=(0, 0, 1))
 def test_what_the_operator_wrote_travels_with_what_is_measured(tmp_path: Path) -> None:
     noted = write_run(tmp_path / "noted", spray=SPRAY, notes=RunNotes(fluid="water", pressure_bar=6.0))
     with RunReader(noted) as run, RunReader(write_run(tmp_path / "bare")) as bare:
-        said = conditions_of(run.header)
-        assert conditions_of(bare.header) == {}
+        said = conditions_of(run)
+        assert conditions_of(bare) == {}
     assert Spray.model_validate_json(said["spray"]) == SPRAY
     assert RunNotes.model_validate_json(said["notes"]) == RunNotes(fluid="water", pressure_bar=6.0)
     results = write_results(tmp_path / "results", cone_shots(0, 2, 10), **said)
