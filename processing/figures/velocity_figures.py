@@ -11,6 +11,7 @@ from matplotlib.quiver import Quiver
 
 from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.figures.droplet_figures import draw_case
+from processing.figures.spacing import rounded_down
 
 PANELS = (("x", "y", "u", "v"), ("z", "y", "w", "v"), ("x", "z", "u", "w"))
 """Across, down, and the velocities along them."""
@@ -26,7 +27,7 @@ NO_COLUMNS = "no velocities: its shot has one exposure, or is from before they w
 
 
 def velocities_figure(shot: StoredDroplets, least_p_pair: float = 0.5, title: str = "") -> Figure:
-    """Droplets of exposure A seen along z, x and y, with arrows and colours of their velocities.
+    """Droplets of exposure A in three projections, with arrows and colours of their velocities.
 
     Parameters
     ----------
@@ -58,9 +59,8 @@ def velocities_figure(shot: StoredDroplets, least_p_pair: float = 0.5, title: st
     panels = figure.subplot_mosaic(STACKED if flat else BESIDE)
     for axes, panel in zip((panels[name] for name in BESIDE), PANELS, strict=True):
         arrows = _draw_panel(axes, columns, panel, paired, speeds_m_s, m_s_per_mm)
-    figure.axes[0].quiverkey(
-        arrows, 0.04, 0.96, median_m_s, f"{median_m_s:.3g} m/s", labelpos="E", coordinates="figure"
-    )
+    key_m_s = rounded_down(max(median_m_s, LEAST))
+    figure.axes[0].quiverkey(arrows, 0.04, 0.96, key_m_s, f"{key_m_s:g} m/s", labelpos="E", coordinates="figure")
     figure.colorbar(arrows, ax=figure.axes, label="speed [m/s]")
     told = f"{np.count_nonzero(paired)} of {len(paired)} droplets of exposure A have a partner in B"
     figure.suptitle(f"{title or _named(shot)}: {told}", fontsize="medium")
@@ -91,7 +91,8 @@ def _draw_panel(
     )
     axes.set(xlabel=f"{across} [mm]", ylabel=f"{down} [mm]", aspect="equal")
     axes.margins(0.08)
-    axes.invert_yaxis()
+    if down == "y":
+        axes.invert_yaxis()  # y points down, along the spray; z points up, as in other figures across it
     return arrows
 
 

@@ -14,7 +14,7 @@ from daq.files.run_directory import RunReader
 from daq.run.acquisition import Acquisition
 from daq.run.events import RunEvent, RunMessage
 from daq.run.state import RunOutcome
-from daq.run_notes import Spray
+from daq.run_notes import RunNotes, Spray
 from daq.run_plan import PulsePair, RunKind, RunPlan
 from processing.analysis.quality import quality_factor
 from processing.calibration.calibrate import calibrate
@@ -44,6 +44,7 @@ PITCH_MM = 1 / 30
 RUN_DEADLINE_S = 240.0
 CALIBRATION_RATE_HZ, SAMPLE_RATE_HZ = 2.0, 1.0
 REFERENCE_SHOTS = 4
+NOTES = RunNotes(fluid="water, simulated", nozzle="hollow cone, 63 degrees, orifice 0.2 mm", pressure_bar=6.0)
 TRUTH_SIGMA_MM = 0.02
 """Blur of the true volume: about the Airy disk in object space, d_A / M = 0.065 to 0.09 mm, as a Gaussian core."""
 
@@ -177,6 +178,7 @@ def _record_sample(recorder: "_Runs", shots: int, calibration: Calibration) -> P
         references=tuple(references),
         calibration=calibration.id,
         spray=Spray(nozzle_mm=HOLLOW_CONE_FLOW.orifice_mm),
+        notes=NOTES,
     )
 
 

@@ -25,6 +25,8 @@ HALF_WIDTH_MM, TOP_MM, BOTTOM_MM = 5.8, -1.1, -0.4
 """Of the box, in x and z as wide as the cone and the droplets around it; the sheet ends 3 mm above."""
 COUNTED_UM = 30.0
 """Droplets found and ghosts are counted from this diameter on."""
+EXPOSURES = 2
+"""Of the shot whose droplets are measured."""
 
 
 @dataclass(frozen=True)
@@ -61,8 +63,10 @@ class MeasuredDroplets:
     found, missed, ghosts : Placed
         True droplets of both exposures that were found, true ones that were not, and found ones that are none; from
         ``COUNTED_UM`` on. Droplets that liquid hides count as missed.
-    true_d32_um : float
-        Of all true droplets in the box.
+    true_um : (N,) array
+        Diameters of all true droplets in the box, of both exposures.
+    box_mm3 : float
+        Its volume.
     velocities : JudgedVelocities | None
         Against the truth; None without velocities.
     """
@@ -74,13 +78,24 @@ class MeasuredDroplets:
     found: Placed
     missed: Placed
     ghosts: Placed
-    true_d32_um: float
+    true_um: FloatArray
+    box_mm3: float
     velocities: JudgedVelocities | None
 
     @property
     def found_share(self) -> float:
         """Of the true droplets."""
         return len(self.found) / max(len(self.found) + len(self.missed), 1)
+
+    @property
+    def true_d32_um(self) -> float:
+        """Of all true droplets in the box."""
+        return float(np.sum(self.true_um**3) / np.sum(self.true_um**2))
+
+    @property
+    def true_density_per_mm3(self) -> float:
+        """Of the same, mean of both exposures."""
+        return len(self.true_um) / EXPOSURES / self.box_mm3
 
     @property
     def ghost_share(self) -> float:
@@ -116,7 +131,8 @@ def measure_droplets(
         found=_joined(found),
         missed=_joined(missed),
         ghosts=_joined(ghosts),
-        true_d32_um=1000 * float(np.sum(true_mm**3) / np.sum(true_mm**2)),
+        true_um=1000 * true_mm,
+        box_mm3=float(np.prod(grid.shape)) * grid.pitch_mm**3,
         velocities=_judged_velocities(stored, sprays["a"], grid),
     )
 

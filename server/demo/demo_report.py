@@ -5,101 +5,114 @@ from pathlib import Path
 import numpy as np
 
 from daq.files.run_directory import RunReader
-from processing.analysis.droplets.ghost_share import share_interval
 from processing.analysis.spray.spray_statistics import AskedFor
-from processing.analysis.velocity.velocity_statistics import velocity_statistics
-from processing.figures.found_figures import Placed, found_figure
+from processing.figures.found_figures import found_figure
 from processing.figures.residual_figures import residuals_figure
 from processing.figures.velocity_figures import velocities_figure
 from processing.figures.volume_figures import isosurface_figure, shadowgraph_figure, slices_figure
 from processing.preprocessing import Intensity
 from processing.reconstruction.volume_file import read_volume
-from processing.runs.liquid.objects import LiquidSummary
 from processing.runs.results_file import volume_path
 from processing.runs.sprays.measured_spray import read_files
 from processing.volume import VoxelGrid
 from server.demo.demo import Demonstration
+from server.demo.demo_answers import answers_table
 from server.demo.demo_droplets import COUNTED_UM, MeasuredDroplets
+from server.demo.demo_liquid import MeasuredLiquid
 from server.demo.demo_summary import reasons_of
+from server.reports.digits import counted
 from server.reports.liquid_sections import ReportedLiquid, break_up_section, unknown_section
 from server.reports.object_motion_section import object_motion_section
 from server.reports.page import Picture, Section, Table, write_report
-from server.reports.spray_report import ReportedSpray, spray_sections
+from server.reports.shots_section import shots_section
+from server.reports.spray_report import (
+    ReportedSpray,
+    conditions_of,
+    definitions_section,
+    origin_section,
+    spray_sections,
+)
+from server.reports.spray_tables import doubts
 
 DETAIL_MM = 4.0
 """Edge of the cube that is shown as an iso-surface, as in Fig. 4 of the paper."""
 ISO_QUANTILE = 0.99
-EXPOSURES = 2
-"""Of the shot whose droplets are measured."""
 
 
 def write_demo_report(demo: Demonstration, file: Path) -> None:
-    """Write report.html."""
-    first = demo.results[0].shot
-    volumes = {
-        "A": read_volume(volume_path(demo.results_dir, first, "a")),
-        "B": read_volume(volume_path(demo.results_dir, first, "b")),
-    }
-    volume, grid, _ = volumes["A"]
-    title = f"shot {first}, exposure A, {demo.results[0].method.value.upper()}"
+    """Write report.html: one page of answers, then the chain from images to figures of the spray."""
+    spray = read_files([demo.droplets.file])
+    reported = ReportedSpray.of(spray, AskedFor(spray.axis))
     sections = [
-        Section("Summary", _SUMMARY_TEXT, [_against_truth(demo)]),
-        Section("Shadowgraphs", pictures=[_shadowgraphs(demo.sample_run, first)]),
-        Section("Volume", pictures=[Picture(slices_figure(volume, grid, title), "Slices and maximum projections")]),
-        Section("Detail", pictures=[_detail({name: entry[0] for name, entry in volumes.items()}, grid)]),
+        Section(
+            "Summary",
+            _SUMMARY_TEXT,
+            [answers_table(demo.droplets, demo.liquid, reported.told)],
+            (),
+            _doubts(demo, reported),
+        ),
+        origin_section(reported),
+        *_of_images(demo),
+        _break_up(demo.liquid),
+        *_said(object_motion_section(spray.shots)),
         _droplets_section(demo.droplets),
-        *_spray_sections(demo),
+        *spray_sections(reported),
+        *_said(unknown_section(spray.shots)),
+        shots_section(spray.shots),
         Section("Calibration", _CALIBRATION_TEXT, [_views(demo)], [_residuals(demo)]),
         Section("Quality and times", _QUALITY_TEXT, [_shots(demo), _steps(demo)]),
+        definitions_section(),
     ]
     write_report(file, f"A simulated hollow-cone spray, measured: {demo.sample_run.name}", sections)
 
 
 _SUMMARY_TEXT = (
     "The spray is simulated, so that its truth is known; cameras, light and everything after them do not know it. "
-    "Intervals hold 95 %; those of droplets and velocities are of one shot, and do not know how shots differ. What was "
-    "found and what are ghosts is counted by the truth, which a laboratory does not have."
+    "Intervals hold 95 %; those of droplets and velocities are of one shot, and do not know how shots differ. The "
+    "truth of sizes and density is of all droplets in the box, that of velocities of the droplets that have one."
 )
 
 
-def _against_truth(demo: Demonstration) -> Table:
-    """The answers, beside the truth."""
-    droplets, liquid = demo.droplets, demo.liquid.summary
-    d32, velocities = droplets.statistics.d32_um, droplets.velocities
-    rows = [
-        ["D32 [µm]", *(_interval(d32.value, d32.low, d32.high, 1) if d32 else ["", ""]), f"{droplets.true_d32_um:.1f}"],
-        ["break-up length [mm]", *_length(liquid), f"{demo.liquid.true_break_up_mm:.2f}"],
-        [f"droplets from {COUNTED_UM:g} µm on, found [%]", *_share(droplets.found, droplets.missed), ""],
-        ["ghosts among them [%]", *_share(droplets.ghosts, droplets.found), ""],
+def _doubts(demo: Demonstration, reported: ReportedSpray) -> list[str]:
+    """What was measured, how it was judged, and why something is not told."""
+    shot, told = demo.droplets.shot, reported.told
+    measured = (
+        f"Droplets: both exposures of shot {shot.shot}, {shot.verdict.value}. Break-up: exposure A of "
+        f"{counted(len(demo.liquid.found), 'shot')}."
+    )
+    return [measured, *conditions_of(reported), *reasons_of(demo.droplets), *doubts(told)]
+
+
+def _said(section: Section | None) -> list[Section]:
+    return [section] if section else []
+
+
+def _of_images(demo: Demonstration) -> list[Section]:
+    """Images of the first shot, and its volumes."""
+    first, method = demo.results[0].shot, demo.results[0].method.value.upper()
+    volumes = {
+        "A": read_volume(volume_path(demo.results_dir, first, "a")),
+        "B": read_volume(volume_path(demo.results_dir, first, "b")),
+    }
+    volume, grid, _ = volumes["A"]
+    slices = slices_figure(volume, grid, f"shot {first}, exposure A, {method}")
+    return [
+        Section("Shadowgraphs", pictures=[_shadowgraphs(demo.sample_run, first)]),
+        Section("Volume", pictures=[Picture(slices, _SLICES)]),
+        Section("Detail", pictures=[_detail({name: entry[0] for name, entry in volumes.items()}, grid, first)]),
     ]
-    means_m_s = velocity_statistics([droplets.stored]).mean_m_s
-    if velocities and means_m_s:
-        told = zip("uvw", (means_m_s.u, means_m_s.v, means_m_s.w), velocities.true_mean_m_s, strict=True)
-        rows += [
-            [f"mean velocity {name} [m/s]", *_interval(one.value, one.low, one.high, 2), f"{true:.2f}"]
-            for name, one, true in told
-        ]
-        rows.append(["error of a velocity component, rms [m/s]", f"{velocities.rms_m_s:.2f}", "", ""])
-    return Table(["", "measured", "95 % interval", "truth"], rows)
 
 
-def _share(chosen: Placed, others: Placed) -> list[str]:
-    """In percent, with its interval by counting; both exposures show the same droplets, and make nothing surer."""
-    count, of = len(chosen), len(chosen) + len(others)
-    low, high = share_interval(round(count / EXPOSURES), max(round(of / EXPOSURES), 1))
-    return _interval(100 * count / max(of, 1), 100 * low, 100 * high, 1)
+_SLICES = (
+    "Slices through the planes that hold most (top), and maxima along each direction (bottom). 1 is black in all "
+    "views; colours follow the square root, so that single droplets show beside the sheet."
+)
 
 
-def _length(liquid: LiquidSummary) -> list[str]:
-    found = liquid.break_up_mm
-    return _interval(found.value, found.low, found.high, 2) if found else ["none", liquid.break_up_reason or ""]
-
-
-def _interval(value: float, low: float, high: float | None, digits: int) -> list[str]:
-    upper = "beyond the field" if high is None else f"{high:.{digits}f}"
-    return [f"{value:.{digits}f}", f"{low:.{digits}f} to {upper}"]
-
-
+_VELOCITIES = (
+    "Droplets of exposure A in three projections, with arrows and colours of their velocities; dots have none: their "
+    "partner was not found, or left the box."
+)
 _DROPLETS_TEXT = (
     "A box downstream of the break-up, in both exposures of one shot. Nothing is given but the calibration; ligaments "
     "are masked. Droplets that are hidden by them count as missed. The truth is that of the simulated bench."
@@ -114,31 +127,23 @@ def _droplets_section(droplets: MeasuredDroplets) -> Section:
     pictures = [
         Picture(
             found_figure(droplets.found, droplets.missed, droplets.ghosts),
-            f"Droplets against the truth, from {COUNTED_UM:g} µm on, both exposures",
+            f"Droplets against the truth, from {COUNTED_UM:g} µm on, of both exposures: each true one is there twice, "
+            "as far apart as it flew. Left: seen along the axis, large droplets as large dots. Right: by size.",
         )
     ]
     if droplets.velocities:
         figure = velocities_figure(droplets.stored, title=f"shot {droplets.shot.shot}")
-        pictures.append(
-            Picture(figure, "Velocities of droplets that both exposures show, seen along z, x and y; dots have none")
-        )
+        pictures.append(Picture(figure, _VELOCITIES))
     return Section("Droplets", _DROPLETS_TEXT, [table], pictures, points)
 
 
-def _spray_sections(demo: Demonstration) -> list[Section]:
-    """Sizes, velocities and density of the box, as the report of any spray has them; break-up of all shots."""
-    spray = read_files([demo.droplets.file])
-    liquid = demo.liquid
+def _break_up(liquid: MeasuredLiquid) -> Section:
+    """Of exposure A of all shots, against the truth."""
     first = liquid.found[0]
     told = ReportedLiquid(
         liquid.reaches, len(liquid.found), liquid.objects, first.objects, liquid.true_mm, liquid.places
     )
-    unknown = unknown_section(spray.shots)
-    return [
-        *spray_sections(ReportedSpray.of(spray, AskedFor(spray.axis))),
-        break_up_section(told),
-        *(one for one in (object_motion_section(spray.shots), unknown) if one),
-    ]
+    return break_up_section(told)
 
 
 def _droplets_table(droplets: MeasuredDroplets) -> Table:
@@ -206,18 +211,22 @@ def _shots(demo: Demonstration) -> Table:
 
 
 def _residuals(demo: Demonstration) -> Picture:
-    return Picture(residuals_figure(demo.calibration), "Mean back-projection error per plane")
+    return Picture(
+        residuals_figure(demo.calibration),
+        "Mean back-projection error of every plane of the target; dashed: what the paper of the method stayed below.",
+    )
 
 
 def _shadowgraphs(run_dir: Path, shot: int) -> Picture:
     with RunReader(run_dir) as run:
         views = run.read_shot(shot).views
     return Picture(
-        shadowgraph_figure({name: view.frame_a for name, view in views.items()}), f"Shot {shot}, exposure A, all views"
+        shadowgraph_figure({name: view.frame_a for name, view in views.items()}),
+        f"Shot {shot}, exposure A, all views: grey values as recorded, black is 0.",
     )
 
 
-def _detail(frames: dict[str, Intensity], grid: VoxelGrid) -> Picture:
+def _detail(frames: dict[str, Intensity], grid: VoxelGrid, shot: int) -> Picture:
     """Iso-surfaces of A and B in the cube with the most liquid."""
     edge = min(round(DETAIL_MM / grid.pitch_mm), *grid.shape)
     corner = _densest_corner(frames["A"], edge)
@@ -228,7 +237,10 @@ def _detail(frames: dict[str, Intensity], grid: VoxelGrid) -> Picture:
         (edge, edge, edge), (float(origin_mm[0]), float(origin_mm[1]), float(origin_mm[2])), grid.pitch_mm
     )
     level = float(np.quantile(shown["A"], ISO_QUANTILE))
-    caption = "Iso-surfaces of exposures A and B in a cube of 4 mm"
+    caption = (
+        f"Shot {shot}: surfaces where the intensity is {level:.2f}, in exposures A and B, in the cube of "
+        f"{DETAIL_MM:g} mm that holds most; {100 * (1 - ISO_QUANTILE):.0f} % of exposure A are above."
+    )
     return Picture(isosurface_figure(shown, detail, level), caption)
 
 

@@ -15,6 +15,7 @@ from processing.figures.object_figures import BreakUpCurve, break_up_figure, uns
 from processing.geometry import FloatArray
 from processing.runs.liquid.objects import reaches_of, told_of_exposures
 from processing.volume import VoxelGrid
+from server.reports.digits import counted
 from server.reports.page import Picture, Section, Table
 
 CURVE_POINTS, BEYOND = 400, 1.25
@@ -79,7 +80,7 @@ def break_up_section(liquid: ReportedLiquid) -> Section:
     """Numbers and sizes of objects, the break-up length with its limits or the reason why there is none, the curve."""
     found = break_up_of(liquid.reaches)
     text = f"{break_up_text(found, liquid.true_mm)} {CLASSES_TEXT}"
-    figure = break_up_figure(_curve(liquid, found), _shots(found.shots), liquid.shown, liquid.places)
+    figure = break_up_figure(_curve(liquid, found), counted(found.shots, "shot"), liquid.shown, liquid.places)
     caption = (
         "Objects of one exposure, seen along z: ligaments as lines of their length and direction, others as circles as "
         "wide as they are long."
@@ -93,6 +94,15 @@ def break_up_section(liquid: ReportedLiquid) -> Section:
     return Section("Ligaments and break-up", text, [_objects_table(liquid)], [Picture(figure, caption, svg=True)])
 
 
+def break_up_rows(liquid: ReportedLiquid) -> list[list[str]]:
+    """The break-up length as a row of a table of figures; none where it is not told."""
+    found = break_up_of(liquid.reaches)
+    if found.value_mm is None or found.low_mm is None:
+        return []
+    high = "beyond the field" if found.high_mm is None else f"{found.high_mm:.2f}"
+    return [["break-up length [mm]", f"{found.value_mm:.2f}", f"{found.low_mm:.2f} to {high}"]]
+
+
 def break_up_text(found: BreakUp, true_mm: FloatArray | None = None) -> str:
     """The break-up length in a sentence or two."""
     truth = "" if true_mm is None else f" In truth it is {np.median(true_mm):.2f} mm, the median of the shots."
@@ -101,12 +111,8 @@ def break_up_text(found: BreakUp, true_mm: FloatArray | None = None) -> str:
     high = "beyond the field" if found.high_mm is None else f"{found.high_mm:.2f} mm"
     return (
         f"Break-up length {found.value_mm:.2f} mm along the axis (95 % limits {found.low_mm:.2f} mm to {high}; "
-        f"{_shots(found.shots)}).{truth}"
+        f"{counted(found.shots, 'shot')}).{truth}"
     )
-
-
-def _shots(n: int) -> str:
-    return f"{n} shot{'s' * (n != 1)}"
 
 
 def _curve(liquid: ReportedLiquid, found: BreakUp) -> BreakUpCurve | None:
@@ -120,17 +126,17 @@ def _curve(liquid: ReportedLiquid, found: BreakUp) -> BreakUpCurve | None:
 def _objects_table(liquid: ReportedLiquid) -> Table:
     rows = [_row(kind, liquid) for kind in ObjectClass if kind is not ObjectClass.DROPLET]
     head = ["", "number", "per exposure", "length, median [mm]", "10 to 90 % [mm]", "width, median [mm]"]
-    return Table(head, rows, caption=f"Liquid that is no droplet, in {liquid.exposures} exposures")
+    return Table(head, rows, caption=f"Liquid that is no droplet, in {counted(liquid.exposures, 'exposure')}")
 
 
 def _row(kind: ObjectClass, liquid: ReportedLiquid) -> list[str]:
     chosen = liquid.objects.where(liquid.objects.classes == kind)
-    counted = [f"{kind}s", f"{len(chosen)}", f"{len(chosen) / liquid.exposures:.1f}"]
+    numbers = [f"{kind}s", f"{len(chosen)}", f"{len(chosen) / liquid.exposures:.1f}"]
     if not len(chosen):
-        return [*counted, "", "", ""]
+        return [*numbers, "", "", ""]
     low_mm, median_mm, high_mm = np.percentile(chosen.lengths_mm, (10, 50, 90))
     between = f"{low_mm:.2f} to {high_mm:.2f}" if len(chosen) >= FEWEST else ""
-    return [*counted, f"{median_mm:.2f}", between, f"{np.median(chosen.widths_mm):.3f}"]
+    return [*numbers, f"{median_mm:.2f}", between, f"{np.median(chosen.widths_mm):.3f}"]
 
 
 def unknown_section(shots: Sequence[StoredDroplets]) -> Section | None:
@@ -146,7 +152,8 @@ def unknown_section(shots: Sequence[StoredDroplets]) -> Section | None:
     maps = [one["unseen"] for one in told if "unseen" in one]
     if len(maps) < len(told) or len({(*one["x_mm"], *one["y_mm"]) for one in maps}) != 1:
         return Section("Where nothing can be known", f"{BLACK_TEXT} {NO_MAP}", [table])
-    caption = f"Seen along z: how much of each line of sight fewer than three views see, mean of {len(maps)} exposures"
+    exposures = counted(len(maps), "exposure")
+    caption = f"Seen along z: how much of each line of sight fewer than three views see, mean of {exposures}."
     picture = Picture(unseen_figure(UnseenMap.mean_of(maps)), caption)
     return Section("Where nothing can be known", BLACK_TEXT, [table], [picture])
 

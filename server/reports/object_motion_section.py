@@ -8,6 +8,7 @@ import numpy as np
 from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.analysis.objects.liquid_objects import ObjectClass
 from processing.figures.object_motion_figure import MovedObjects, object_motion_figure
+from server.reports.digits import counted
 from server.reports.page import Picture, Section, Table
 
 TEXT = (
@@ -38,7 +39,7 @@ def object_motion_section(shots: Sequence[StoredDroplets]) -> Section | None:
             "standard deviation, median [m/s]",
         ],
         [_row(kind, every) for kind in TOLD],
-        caption=f"Objects of {len(asked)} shots, both exposures",
+        caption=f"Objects of {counted(len(asked), 'shot')}, both exposures",
     )
     in_a = asked[0].objects["frame"].astype("U1") == "a"
     shown, known = _known(_moved(asked[0]).where(in_a)), _known(every)
@@ -74,11 +75,11 @@ def _joined(parts: Sequence[MovedObjects]) -> MovedObjects:
 def _row(kind: ObjectClass, every: MovedObjects) -> list[str]:
     of_kind = every.where(every.classes == kind)
     known = _known(of_kind)
-    counted = [f"{kind}s", f"{len(known)}", f"{len(of_kind)}"]
+    numbers = [f"{kind}s", f"{len(known)}", f"{len(of_kind)}"]
     if not len(known):
-        return [*counted, "", "", ""]
+        return [*numbers, "", "", ""]
     low, median, high = np.percentile(known.speeds_m_s, (10, 50, 90))
-    return [*counted, f"{median:.2f}", f"{low:.2f} to {high:.2f}", f"{np.median(known.speed_sd_m_s):.3f}"]
+    return [*numbers, f"{median:.2f}", f"{low:.2f} to {high:.2f}", f"{np.median(known.speed_sd_m_s):.3f}"]
 
 
 def _without(asked: Sequence[StoredDroplets]) -> list[str]:

@@ -12,7 +12,8 @@ from matplotlib.figure import Figure
 DPI = 180
 """Dots of a picture per inch: sharp in print."""
 STYLE = """
-body { font: 16px/1.5 system-ui, sans-serif; max-width: 68rem; margin: 2rem auto; padding: 0 1rem; color: #1d2733; }
+body { font: 16px/1.5 system-ui, sans-serif; max-width: 68rem; margin: 2rem auto; padding: 0 1rem; color: #1d2733;
+  counter-reset: figure; }
 h1 { font-weight: 600; } h2 { font-weight: 600; margin-top: 2.5rem; border-bottom: 1px solid #d5dbe1; }
 table { border-collapse: collapse; margin: 1rem 0; } th, td { padding: .3rem .9rem; text-align: right; }
 th { border-bottom: 2px solid #1d2733; font-weight: 600; } td { border-bottom: 1px solid #d5dbe1; }
@@ -25,6 +26,7 @@ ul { padding-left: 1.2rem; }
 @media print {
   body { font-size: 9.5pt; max-width: none; margin: 0; padding: 0; } h1 { font-size: 16pt; }
   h2 { font-size: 12pt; margin-top: 1.2rem; break-after: avoid; } th, td { padding: .12rem .5rem; }
+  section:first-of-type { break-after: page; }
   figure, tr, table { break-inside: avoid; } thead { display: table-header-group; } p { orphans: 3; widows: 3; }
 }
 """
@@ -78,7 +80,7 @@ def _section(section: Section) -> str:
         parts.append("<ul>" + "".join(f"<li>{escape(point)}</li>" for point in section.points) + "</ul>")
     parts += [_table(table) for table in section.tables]
     parts += [_picture(picture) for picture in section.pictures]
-    return "\n".join(parts)
+    return "<section>" + "\n".join(parts) + "</section>"
 
 
 def _table(table: Table) -> str:

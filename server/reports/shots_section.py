@@ -15,6 +15,8 @@ from server.reports.page import Picture, Section, Table
 
 SHOT_HEAD = ("run", "shot", "exposure", "residual / noise", "hidden [%]", "verdict", "reasons")
 VERDICT = SHOT_HEAD.index("verdict")
+FEWEST_DRAWN = 3
+"""Exposures: of fewer the table says all."""
 CAPTION = (
     "What droplets do not explain of each exposure, over the noise: 1 where they explain all. Where it is told of one: "
     "ghosts that are expected among its droplets, with 95 % intervals."
@@ -22,11 +24,11 @@ CAPTION = (
 
 
 def shots_section(shots: Sequence[StoredDroplets]) -> Section:
-    """A table, and a picture where something was fitted."""
+    """A table, and a picture where several exposures were fitted."""
     text = "Refused exposures have no droplets and do not count."
     judged = [one for shot in shots for one in _judged(shot)]
-    fitted = any(one.residual_over_noise is not None for one in judged)
-    pictures = [Picture(shots_figure(judged), CAPTION, svg=True)] if fitted else []
+    fitted = sum(one.residual_over_noise is not None for one in judged)
+    pictures = [Picture(shots_figure(judged), CAPTION, svg=True)] if fitted >= FEWEST_DRAWN else []
     return Section("Shots", text, [Table(SHOT_HEAD, exposure_rows(shots), words=True)], pictures)
 
 

@@ -23,7 +23,7 @@ from processing.figures.sprays.field_figure import velocity_field_figure
 from processing.figures.sprays.motion_figure import motion_figure
 from processing.figures.sprays.space_figures import density_figure, patternation_figure
 from processing.runs.sprays.measured_spray import MeasuredSpray
-from server.reports.liquid_sections import ReportedLiquid, break_up_section, unknown_section
+from server.reports.liquid_sections import ReportedLiquid, break_up_rows, break_up_section, unknown_section
 from server.reports.object_motion_section import object_motion_section
 from server.reports.page import Picture, Section, Table, write_report
 from server.reports.shots_section import VERDICT, exposure_rows, shots_section
@@ -96,7 +96,15 @@ def _summary(reported: ReportedSpray) -> Section:
         f"sampling: {told.sampling}."
     )
     text = f"{counted} {SAMPLES[told.sample.verdict] if told.sample else ''} {_verdicts(reported)}"
-    return Section("Summary", text, [figures_table(told)], points=doubts(told))
+    liquid = ReportedLiquid.of_files(reported.spray.shots)
+    table = figures_table(told, break_up_rows(liquid) if liquid else ())
+    return Section("Summary", text, [table], points=[*conditions_of(reported), *doubts(told)])
+
+
+def conditions_of(reported: ReportedSpray) -> list[str]:
+    """What the operator wrote down, in a line; and what of it was changed later."""
+    notes = "; ".join(f"{name}: {value}" for name, value in _notes(reported))
+    return [*([f"Conditions: {notes}"] if notes else []), *reported.spray.changes]
 
 
 def _verdicts(reported: ReportedSpray) -> str:
@@ -105,7 +113,8 @@ def _verdicts(reported: ReportedSpray) -> str:
     return "Verdicts on the exposures: " + ", ".join(f"{n} {verdict}" for verdict, n in counted.items()) + "."
 
 
-def _origin(reported: ReportedSpray) -> Section:
+def origin_section(reported: ReportedSpray) -> Section:
+    """Runs, calibration, recipe, programs, and what the operator wrote down."""
     axis, settings = reported.asked.axis, json.loads(str(reported.spray.provenance.get("settings", "{}")))
     recipes = "; ".join(f"SHA-256 {one[:16]}..." for one in _stated(reported, "recipe_sha256")) or "not stated"
     sha256 = _stated(reported, "calibration_sha256")
@@ -124,7 +133,7 @@ def _origin(reported: ReportedSpray) -> Section:
         *_notes(reported),
     ]
     table = Table(["", ""], [row for row in rows if row[1]], words=True)
-    return Section("Where the numbers come from", tables=[table], points=reported.spray.changes)
+    return Section("Where the numbers come from", tables=[table])
 
 
 def _stated(reported: ReportedSpray, name: str) -> list[str]:
@@ -238,7 +247,7 @@ def _density(reported: ReportedSpray) -> Section | None:
     if not maps:
         return None
     scatter = ", and how shots scatter" if reported.sample.several else ""
-    caption = f"Number density, mean along the third axis: mean over all exposures{scatter}."
+    caption = f"Number density, mean along the direction that is not drawn: mean over all exposures{scatter}."
     return Section("Number density", pictures=[Picture(density_figure(maps), caption, svg=True)])
 
 
@@ -258,10 +267,19 @@ def _tables(reported: ReportedSpray) -> Section | None:
     return Section("Tables", tables=tables) if tables else None
 
 
-def _definitions(_: ReportedSpray) -> Section:
+def definitions_section(_: ReportedSpray | None = None) -> Section:
+    """What sampling, means, classes, intervals and shares are."""
     return Section("What the figures mean", points=DEFINITIONS)
 
 
 OF_THE_SPRAY: tuple[Chapter, ...] = (_sizes, _motion, _velocity_field, _patternations, _density)
 OF_SHOTS: tuple[Chapter, ...] = tuple(map(_of_shots, (object_motion_section, unknown_section, shots_section)))
-CHAPTERS: tuple[Chapter, ...] = (_summary, _origin, *OF_THE_SPRAY, _break_up, *OF_SHOTS, _tables, _definitions)
+CHAPTERS: tuple[Chapter, ...] = (
+    _summary,
+    origin_section,
+    *OF_THE_SPRAY,
+    _break_up,
+    *OF_SHOTS,
+    _tables,
+    definitions_section,
+)

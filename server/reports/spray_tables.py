@@ -1,6 +1,6 @@
 """Tables of a spray: figures with their units and intervals, for reports and for the command line."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from processing.analysis.estimates import Estimate
 from processing.analysis.spray.patternation import Patternation
@@ -27,8 +27,8 @@ def _figures(told: SprayStatistics) -> Iterator[tuple[str, Estimate | None]]:
     for percent in (10, 50, 90):
         yield f"Dv0.{percent // 10} [µm]", getattr(droplets, f"dv{percent}_um")
     yield "relative span", droplets.relative_span
-    yield "ghosts expected among them [%]", droplets.ghost_share and _in_percent(droplets.ghost_share)
-    yield "ghosts by droplets without partner [%]", told.unpaired_ghost_share and _in_percent(told.unpaired_ghost_share)
+    yield "ghosts expected among them [%]", droplets.ghost_share and in_percent(droplets.ghost_share)
+    yield "ghosts by droplets without partner [%]", told.unpaired_ghost_share and in_percent(told.unpaired_ghost_share)
     if motion:
         yield from _of_motion(motion)
     if extent:
@@ -37,8 +37,8 @@ def _figures(told: SprayStatistics) -> Iterator[tuple[str, Estimate | None]]:
         yield "penetration, 99 % of the liquid [mm]", extent.penetration_mm
 
 
-def _in_percent(share: Estimate) -> Estimate:
-    """No more digits than a share of ghosts bears."""
+def in_percent(share: Estimate) -> Estimate:
+    """A share of ghosts, with no more digits than it bears."""
     value, low, high = (round(100 * one, 2) for one in (share.value, share.low, share.high))
     return Estimate(value=value, low=low, high=high)
 
@@ -59,9 +59,9 @@ def _cells(estimate: Estimate) -> Row:
     return [value, f"{low} to {high}"]
 
 
-def figures_table(told: SprayStatistics) -> Table:
-    """All figures of a spray."""
-    return Table(["figure", "value", "95 % interval"], figure_rows(told))
+def figures_table(told: SprayStatistics, more: Sequence[Row] = ()) -> Table:
+    """All figures of a spray, and rows of what is told of it beside them."""
+    return Table(["figure", "value", "95 % interval"], [*figure_rows(told), *more])
 
 
 def doubts(told: SprayStatistics) -> list[str]:

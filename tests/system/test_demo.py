@@ -84,6 +84,7 @@ def test_the_report_is_one_page_with_all_figures(demonstrated: tuple[Path, dict[
     assert page.count("data:image/svg+xml;base64,") >= 2
     for chapter in (
         "Summary",
+        "Where the numbers come from",
         "Calibration",
         "Shadowgraphs",
         "Volume",
@@ -92,12 +93,18 @@ def test_the_report_is_one_page_with_all_figures(demonstrated: tuple[Path, dict[
         "Number density",
         "Ligaments and break-up",
         "Where nothing can be known",
+        "Shots",
+        "What the figures mean",
         "Detail",
     ):
         assert f"<h2>{chapter}</h2>" in page
     assert "src=http" not in page
-    for judged in ("found [%]", "ghosts among them [%]"):
+    for judged in ("droplets that were found [%]", "ghosts among the droplets [%]"):
         assert " to " in page.split(judged)[1].split("</tr>")[0], "each with its interval"
+    summary, origin, *_ = page.split("<section>")[1:]
+    for figure in ("D32 [µm]", "Dv0.5 [µm]", "number density [1/mm³]", "break-up length [mm]"):
+        assert figure in summary
+    assert "<td>water, simulated</td>" in origin
 
 
 def test_a_missing_camera_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -41,6 +41,7 @@ def test_every_pair_is_an_arrow_where_its_droplet_is_in_each_of_three_panels() -
         np.testing.assert_allclose(drawn_m_s, [of_pairs(f"{name}_m_s") for name in (along, below)])
         speeds = np.linalg.norm([of_pairs(f"{name}_m_s") for name in "uvw"], axis=0)
         np.testing.assert_allclose(np.asarray(arrows.get_array(), np.float64), speeds)
+        assert axes.yaxis_inverted() == (down == "y"), "z points up, as in the other figures across the spray"
     assert figure.axes[-1].get_ylabel() == "speed [m/s]"
 
 

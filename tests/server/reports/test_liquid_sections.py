@@ -10,7 +10,7 @@ from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.analysis.objects.break_up import THRESHOLDS, Reach
 from processing.analysis.objects.seeing_views import UnseenMap
 from processing.volume import VoxelGrid
-from server.reports.liquid_sections import NO_MAP, ReportedLiquid, break_up_section, unknown_section
+from server.reports.liquid_sections import NO_MAP, ReportedLiquid, break_up_rows, break_up_section, unknown_section
 
 GRID = VoxelGrid((4, 5, 6), (0.0, 0.0, 0.0), 0.1)
 
@@ -41,6 +41,8 @@ def shot(*reaches: Reach) -> StoredDroplets:
 def test_lengths_have_limits_and_truth_and_objects_are_counted_by_exposure() -> None:
     liquid = ReportedLiquid.of_files([shot(reach(length_mm), reach(9.0)) for length_mm in (4.0, 5.0, 6.0)])
     assert liquid
+    ((name, value, within),) = break_up_rows(liquid)
+    assert (name, value, " to " in within) == ("break-up length [mm]", "5.00", True)
     section = break_up_section(liquid)
     assert section.text.startswith("Break-up length 5.00 mm along the axis (95 % limits ")
     assert "3 shots" in section.text
@@ -58,6 +60,7 @@ def test_lengths_have_limits_and_truth_and_objects_are_counted_by_exposure() -> 
 def test_without_a_length_the_reason_is_told_and_there_is_no_curve() -> None:
     liquid = ReportedLiquid.of_files([shot(Reach(reason="nobody stated where the nozzle is"))])
     assert liquid
+    assert break_up_rows(liquid) == []
     section = break_up_section(liquid)
     assert section.text.startswith("No break-up length: nobody stated where the nozzle is.")
     assert len(section.pictures[0].figure.axes) == 1

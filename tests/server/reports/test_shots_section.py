@@ -30,6 +30,11 @@ def test_every_exposure_is_in_table_and_picture() -> None:
     np.testing.assert_allclose(told, [[2.0]] * 3)
 
 
+def test_two_points_are_no_picture() -> None:
+    good = {"verdict": "good", "residual_over_noise": 1.02, "reasons": []}
+    assert not shots_section([shot(a=good, b=good)]).pictures
+
+
 def test_of_refused_exposures_alone_there_is_no_picture() -> None:
     refused = {"verdict": "refused", "residual_over_noise": None, "reasons": ["covered"]}
     assert not shots_section([shot(a=refused)]).pictures

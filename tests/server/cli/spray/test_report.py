@@ -34,6 +34,7 @@ def test_the_report_says_it_all_in_one_file(page: Path, capsys: pytest.CaptureFi
         "D32 [µm]",
         "water &lt;pure&gt;",
         "<td>1.25</td>",
+        "Conditions: fluid: water &lt;pure&gt;; pressure bar: 6.0; flow l min: 1.25",
         "cal-1",
         "sampling: spatial",
         "lognormal",
@@ -66,9 +67,11 @@ def test_a_browser_shows_every_picture_and_prints_pages(page: Path) -> None:
         tab.goto(f"file://{page}")
         widths = tab.evaluate("[...document.images].map(image => image.complete && image.naturalWidth)")
         wider = tab.evaluate("document.documentElement.scrollWidth > window.innerWidth")
+        numbered = tab.evaluate("getComputedStyle(document.body).counterReset")
         printed = tab.pdf(prefer_css_page_size=True)
         browser.close()
     assert len(widths) == 6
+    assert numbered == "figure 0", "figures of all chapters are numbered through"
     assert min(widths) > 300
     assert not wider
     assert printed.startswith(b"%PDF")
