@@ -174,6 +174,21 @@ def test_a_browser_names_page_rig_and_state_of_a_tab(tab: Page, server: Serving)
     expect(tab).to_have_title(f"NOT READY · Calibrate · {rig}")
 
 
+def test_what_speaks_against_the_form_is_told_on_every_page_and_leads_to_it(tab: Page, server: Serving) -> None:
+    go_to(tab, "Run")
+    tab.get_by_label("Rate / Hz").fill("99")
+    go_to(tab, "Runs")
+    state = tab.get_by_role("status", name="rig state")
+    expect(state).to_contain_text("NOT READY: rate_hz")
+    server.http.put("/api/rig/control", headers=ANN)
+    expect(state).to_contain_text("NOT READY: ann@lab holds control")
+    server.free_control()
+    state.get_by_role("link", name="to the form").click()
+    tab.get_by_label("Rate / Hz").fill("4")
+    expect(state.locator(".rig-known")).to_have_text("READY")
+    expect(state.get_by_role("link")).to_be_hidden()
+
+
 def test_what_is_made_of_every_shot_is_what_the_page_shows(tab: Page, server: Serving) -> None:
     (server.services.data_dir / "calibrations" / "paper.json").write_text('{"id": "paper"}')
     server.http.put("/api/calibrations/current", json={"id": "paper"})

@@ -114,7 +114,9 @@ TABLES: dict[str, tuple[Touch, ...]] = {
     ),
     "/run": (
         *PULSES,
-        *(pressed(kind) for kind in ("Background", "Calibration", "Dark", "Sample")),
+        *(pressed(kind) for kind in ("Background", "Calibration")),
+        Touch("link", "to the form"),
+        *(pressed(kind) for kind in ("Dark", "Sample")),
         *fields("spinbutton", "Rate / Hz", "LED view1 / A", "Pressure / bar"),
         *fields("spinbutton", "Shots", text="1000"),
         *fields("textbox", "Name", "Operator", "Fluid", "Nozzle", "Remark", text="x"),

@@ -2,7 +2,7 @@
 
 import asyncio
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 
 from daq.run.events import RunStatus
 from server.lab.desk.alarms import Alarm, AlarmList
@@ -81,6 +81,10 @@ class DeskWatch:
     @property
     def state(self) -> RigState:
         """What acquisition does now, and what was found at the last look; not ready where that is long ago."""
+        return self.state_for(self._found)
+
+    def state_for(self, reasons: Sequence[Reason] | None) -> RigState:
+        """The same, where this speaks against a start; None: nobody knows."""
         status = self._status()
         is_known = self._found_s is not None and self._now_s() - self._found_s < _STALE_S
-        return rig_state(status, self._found if is_known else None, self._pace.eta_s(status))
+        return rig_state(status, reasons if is_known else None, self._pace.eta_s(status))

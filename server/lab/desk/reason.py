@@ -1,6 +1,6 @@
 """Reason: one thing that speaks against a start, for people and programs."""
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -13,10 +13,14 @@ Refusal = DaqError | ServerError
 """An error with a ``code``."""
 
 
+DeskCode = Literal["control_held", "viewer", "form"]
+"""Somebody else holds control, who asks may only look, the form on the page is no plan."""
+
+
 class Reason(FrozenModel):
     """One thing that speaks against a start."""
 
-    code: Annotated[RefusalCode, Field(description="for programs; a start is refused with the same one")]
+    code: Annotated[RefusalCode | DeskCode, Field(description="for programs; a start is refused with the same one")]
     text: Annotated[str, Field(description="names device, value and limit")]
     remedy: Annotated[str, Field(description="what to do about it")]
 

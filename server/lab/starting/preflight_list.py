@@ -14,13 +14,12 @@ from daq.run.references import REFERENCE_KINDS
 from daq.run.refusals import RefusalCode as Code
 from daq.run.state import RunState
 from daq.run_plan import RunKind, RunPlan
-from server.lab.desk.control import REMEDIES
 from server.lab.desk.reason import Reason
 from server.lab.desk.visitor import Visitor
-from server.lab.errors import NotFound, ServerError
+from server.lab.errors import NotFound
 from server.lab.recipes.stated import told_recipes
 from server.lab.services import Context
-from server.lab.starting.readiness import reasons_against, with_defaults
+from server.lab.starting.readiness import reasons_against_visitor, with_defaults
 
 _FRAMES_PER_SHOT = 2
 
@@ -69,19 +68,10 @@ Told = tuple[str, str]
 """Text, and remedy of a warning; an empty remedy: nothing is wrong."""
 
 
-def preflight(
-    context: Context, plan: RunPlan, who: Visitor, reasons: Sequence[Reason] | None = None
-) -> tuple[Check, ...]:
-    """Look at everything that could speak against a plan.
-
-    Parameters
-    ----------
-    reasons : Sequence[Reason] | None
-        What ``reasons_against`` has found already; None: devices are asked now, which may take a second.
-    """
+def checks_of(context: Context, plan: RunPlan, reasons: Sequence[Reason]) -> tuple[Check, ...]:
+    """Everything that could speak against a plan, where ``reasons_against`` has found these reasons."""
     plan = with_defaults(context, plan)
-    reasons = reasons_against(context, plan) if reasons is None else reasons
-    checks = [_control(context, who)]
+    checks = []
     for name, tell in _ROWS.items():
         against = [reason for reason in reasons if reason.code in CODES[name]]
         if against:
@@ -94,11 +84,10 @@ def preflight(
     return tuple(checks)
 
 
-def _control(context: Context, who: Visitor) -> Check:
-    try:
-        context.control.check(who)
-    except ServerError as error:
-        return Check(name="Control", finding=CheckResult.REFUSED, text=str(error), remedy=REMEDIES[error.code])
+def check_control(context: Context, who: Visitor) -> Check:
+    """Whether this person may start."""
+    for reason in reasons_against_visitor(context, who):
+        return Check(name="Control", finding=CheckResult.REFUSED, text=reason.text, remedy=reason.remedy)
     held = context.control.holder is not None
     return Check(name="Control", finding=CheckResult.GOOD, text="yours" if held else "free: a start takes it")
 

@@ -7,9 +7,11 @@ from daq.errors import DaqError, DeviceUnavailable
 from daq.run.refusals import RefusalCode, coded
 from daq.run_plan import RunKind, RunPlan
 from server.lab.calibration_story import misfits
-from server.lab.desk.reason import Reason, Refusal, reason_of
+from server.lab.desk.control import REMEDIES
+from server.lab.desk.reason import DeskCode, Reason, Refusal, reason_of
+from server.lab.desk.visitor import Visitor
 from server.lab.duty import Health
-from server.lab.errors import Damaged, NotFound, ServerError, Unprocessable
+from server.lab.errors import Damaged, Forbidden, Locked, NotFound, ServerError, Unprocessable
 from server.lab.recipes.stated import against_recipes, usual_recipe, with_recipes
 from server.lab.services import Context
 
@@ -25,6 +27,16 @@ def reasons_against(context: Context, plan: RunPlan | None = None) -> tuple[Reas
         others = plan.model_copy(update={"calibration": None})  # the laboratory has read it: one reason is enough
     refusals = chain(refusals_of_lab(context, plan), context.services.acquisition.refusals(others))
     return tuple(map(reason_of, refusals))
+
+
+def reasons_against_visitor(context: Context, who: Visitor) -> tuple[Reason, ...]:
+    """Why this person may not start anything now; a start is refused for it before anything else is looked at."""
+    try:
+        context.control.check(who)
+    except (Forbidden, Locked) as error:
+        code: DeskCode = "viewer" if isinstance(error, Forbidden) else "control_held"
+        return (Reason(code=code, text=str(error), remedy=REMEDIES[code]),)
+    return ()
 
 
 def refusals_of_lab(context: Context, plan: RunPlan | None) -> Iterator[Refusal]:

@@ -20,6 +20,7 @@ from server.web.ui.calibrate.calibrate_page import CalibratePage
 from server.web.ui.desk_page import DeskPage
 from server.web.ui.draft import DraftStore
 from server.web.ui.drawer.drawer import Drawer
+from server.web.ui.form_judge import FormJudge
 from server.web.ui.live.live_page import LivePage
 from server.web.ui.rail import STOPS, Rail
 from server.web.ui.results.results_page import ResultsPage
@@ -49,7 +50,7 @@ def mount_page(app: FastAPI, config: RigConfig) -> None:
     def show(request: Request) -> None:
         abort: AbortListener = app.state.abort_listener
         abort.admit(request.headers["host"])
-        Desk(app.state.context, drafts.of(app.state.context), abort.port)
+        Desk(app.state.context, *drafts.of(app.state.context), abort.port)
 
     for path in (*_PATHS, *_DEEP_PATHS):
         ui.page(path, title=f"tomoshadow: {config.name}")(show)
@@ -72,32 +73,34 @@ class _Drafts:
     """One draft for all tabs; made when the first of them is opened, because only then its folder is known."""
 
     def __init__(self) -> None:
-        self._draft: DraftStore | None = None
+        self._made: tuple[DraftStore, FormJudge] | None = None
 
-    def of(self, context: Context) -> DraftStore:
-        """The draft of this rig."""
-        if self._draft is None:
+    def of(self, context: Context) -> tuple[DraftStore, FormJudge]:
+        """The draft of this rig, and what speaks against it."""
+        if self._made is None:
             path, config = context.services.data_dir / "draft.json", context.services.config
-            self._draft = DraftStore(path, config, context.services.events, partial(may_command, context))
-        return self._draft
+            draft = DraftStore(path, config, context.services.events, partial(may_command, context))
+            self._made = draft, FormJudge(context, draft)
+        return self._made
 
 
 class Desk:
     """What one browser tab shows; a page lives as long as the tab is at its address."""
 
-    def __init__(self, context: Context, draft: DraftStore, abort_port: int) -> None:
+    def __init__(self, context: Context, draft: DraftStore, judge: FormJudge, abort_port: int) -> None:
         self._context = context
         self._events = context.services.events
         self._page: DeskPage | None = None
         self._are_lists_old = True
         self._has_tokens, self._has_left = context.services.config.server.token is not None, False
-        self._draft = draft
+        self._draft, self._judge = draft, judge
         theme.apply()
-        self._header = Header(context, abort_port)
+        self._header = Header(context, judge, abort_port)
         with ui.element("div").classes("desk"):
             self._rail = Rail(context)
             _Pages(self._routes()).classes("desk-page")
             self._drawer = Drawer(context, self._rail.drawer_button)
+        ui.timer(_REFRESH_S, judge.refresh)
         ui.timer(_REFRESH_S, self._refresh)
 
     def _leave(self) -> None:
@@ -112,7 +115,7 @@ class Desk:
             "/rig": lambda: RigPage(context, draft),
             "/live": lambda: LivePage(context, draft),
             "/calibrate": lambda: CalibratePage(context),
-            "/run": lambda: RunPage(context, draft),
+            "/run": lambda: RunPage(context, draft, self._judge),
             "/results": lambda: ResultsPage(context),
             "/runs": lambda: RunsPage(context),
         }

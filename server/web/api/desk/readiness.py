@@ -9,8 +9,8 @@ from daq.frozen_model import FrozenModel
 from daq.run_plan import RunPlan
 from server.lab.desk.reason import Reason
 from server.lab.desk.rig_state import RigState
-from server.lab.starting.preflight_list import Check, preflight
-from server.lab.starting.readiness import reasons_against
+from server.lab.starting.preflight_list import Check, check_control, checks_of
+from server.lab.starting.readiness import reasons_against, reasons_against_visitor
 from server.web.api.parameters import ContextOf, Who
 
 router = APIRouter(prefix="/api/rig/readiness", tags=["rig"])
@@ -35,5 +35,7 @@ def show_readiness(context: ContextOf) -> RigState:
 @router.post("")
 def judge_plan(plan: RunPlan, context: ContextOf, who: Who) -> PlanReadiness:
     """What speaks against starting this plan now, without starting it."""
-    reasons = reasons_against(context, plan)
-    return PlanReadiness(ready=not reasons, reasons=reasons, checks=preflight(context, plan, who, reasons))
+    of_plan = reasons_against(context, plan)
+    reasons = (*reasons_against_visitor(context, who), *of_plan)
+    checks = (check_control(context, who), *checks_of(context, plan, of_plan))
+    return PlanReadiness(ready=not reasons, reasons=reasons, checks=checks)

@@ -11,13 +11,15 @@ from server.web.ui.bar.lamp_row import LampRow
 from server.web.ui.bar.server_link import ServerLink
 from server.web.ui.bar.state_chip import StateChip, in_brief
 from server.web.ui.bar.theme_button import ThemeButton
+from server.web.ui.form_judge import FormJudge
+from server.web.ui.visiting import visitor
 
 
 class Header:
     """Built once per page, refreshed by its timer."""
 
-    def __init__(self, context: Context, abort_port: int) -> None:
-        self._context = context
+    def __init__(self, context: Context, judge: FormJudge, abort_port: int) -> None:
+        self._context, self._judge = context, judge
         self.page = ""
         """Title of the page that is open."""
         with ui.header(elevated=False).classes("desk-bar q-pa-none"):
@@ -36,8 +38,8 @@ class Header:
     def refresh(self) -> None:
         """Show what has changed."""
         self._lamps.show(self._context.lamps)
-        state = self._context.desk.state
-        self._state.show(state)
+        state = self._judge.state(visitor())
+        self._state.show(state, is_of_form=not set(state.reasons) <= set(self._context.desk.state.reasons))
         self._calibration.refresh()
         self._control.refresh()
         self._alarms.refresh()

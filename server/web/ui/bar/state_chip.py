@@ -24,13 +24,16 @@ class StateChip:
         with self._chip:
             self._text = ui.label("").classes("rig-known")
             ui.label("").classes("rig-unknown")
+            with ui.link(target="/run").classes("rig-form").props('aria-label="to the form"') as self._to_form:
+                ui.icon("edit_note", size="20px")
         with ui.button(icon="help_outline").props('flat round dense color=white aria-label="why this state"') as why:
             why.classes("lockable")
             with ui.menu().props('role=region aria-label="reasons against a start"'):
                 self._reasons = ui.column().classes("q-pa-md gap-2").style("max-width:min(560px, 90vw)")
 
-    def show(self, state: RigState) -> None:
-        """Show what has changed."""
+    def show(self, state: RigState, *, is_of_form: bool) -> None:
+        """Show what has changed; of the form of the next run, or of the rig alone."""
+        self._to_form.set_visibility(is_of_form and state.state is RigWord.NOT_READY)
         if state == self._shown:
             return
         if self._shown is None or state.reasons != self._shown.reasons:

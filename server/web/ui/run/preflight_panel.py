@@ -13,26 +13,24 @@ _ICONS = {
     CheckResult.WAIT: "hourglass_top",
     CheckResult.REFUSED: "cancel",
 }
-_OF_THE_FORM = Check(name="Form", finding=CheckResult.REFUSED, text="a field is empty or out of its limits")
 
 
 class PreflightPanel:
-    """Built once per page; told by the form what was found."""
+    """Built once per page."""
 
     def __init__(self) -> None:
         self._shown: tuple[Check, ...] = ()
         with panel("Pre-flight"):
             self._list = ui.element("ul").classes("checks")
 
-    def show(self, checks: Sequence[Check] | None) -> None:
-        """Show what was found; None: the form is no plan."""
-        found = (_OF_THE_FORM,) if checks is None else tuple(checks)
-        if found == self._shown:
+    def show(self, checks: Sequence[Check]) -> None:
+        """Show what was found."""
+        if tuple(checks) == self._shown:
             return
-        self._shown = found
+        self._shown = tuple(checks)
         self._list.clear()
         with self._list:
-            for check in found:
+            for check in checks:
                 _show(check)
 
 

@@ -1,36 +1,32 @@
 """RunForm: the next run. Limits are those of the plan and of the rig; a refusal is shown with its reason."""
 
 import asyncio
-import time
 from functools import partial
 
 from nicegui import ui
 from nicegui.events import GenericEventArguments
 
 from daq.errors import DaqError
-from daq.run_plan import RunKind, RunPlan
+from daq.run_plan import RunKind
 from server.lab.desk.once import described
-from server.lab.desk.reason import Reason
-from server.lab.desk.visitor import Visitor
 from server.lab.errors import ServerError
 from server.lab.services import Context
 from server.lab.starting.light_request import obey
-from server.lab.starting.preflight_list import PASSING, Check, preflight
-from server.lab.starting.readiness import reasons_against
+from server.lab.starting.preflight_list import PASSING
 from server.lab.starting.run_start import start_run
 from server.web.ui.bar.server_link import TICKET, light_request, shown_form
 from server.web.ui.draft import DraftStore, plan_of
+from server.web.ui.form_judge import FormJudge, Verdict
 from server.web.ui.run.chosen_runs import ChosenRuns
 from server.web.ui.run.chosen_work import ChosenWork
 from server.web.ui.run.form_fields import FormFields
-from server.web.ui.run.preflight_panel import PreflightPanel
 from server.web.ui.run.template_bar import TemplateBar
 from server.web.ui.run.templates import TemplateStore
 from server.web.ui.theme import panel
-from server.web.ui.visiting import may_command, told, visitor
+from server.web.ui.visiting import may_command, told
 
-_LOOK_AGAIN_S = 5.0
-"""Disk and references change without a word."""
+_TOLD_ELSEWHERE = {*PASSING, "form"}
+"""They end by themselves, or the field itself says what is wrong with it."""
 
 
 class RunForm:
@@ -42,15 +38,14 @@ class RunForm:
         The application.
     draft : DraftStore
         What the form shows first, and where every change goes.
-    checks : PreflightPanel
-        Shows what speaks against the form, and what does not.
+    judge : FormJudge
+        Knows what speaks against the form.
     """
 
-    def __init__(self, context: Context, draft: DraftStore, checks: PreflightPanel) -> None:
-        self._context, self._draft, self._checks = context, draft, checks
+    def __init__(self, context: Context, draft: DraftStore, judge: FormJudge) -> None:
+        self._context, self._draft, self._judge = context, draft, judge
         self._shown = draft.version
-        self._judged: object = None
-        self._judged_s = 0.0
+        self._verdict: Verdict | None = None
         templates = TemplateStore(context.services.data_dir / "templates", context.services.events)
         with panel("New run"):
             self._templates = TemplateBar(templates, draft, self._show)
@@ -65,7 +60,8 @@ class RunForm:
         self._show_kind()
 
     def refresh(self) -> None:
-        """Follow the state of acquisition, who holds control, and other tabs."""
+        """Follow the state of acquisition, who holds control, what speaks against a start, and other tabs."""
+        self._show_verdict()
         may_change = may_command(self._context)
         self._start.set_enabled(may_change and not self._context.services.acquisition.status().active)
         self._templates.allow(may_change)
@@ -79,31 +75,12 @@ class RunForm:
         """Show the reference runs and calibrations that exist now."""
         await self._chosen.reload()
 
-    async def judge(self) -> None:
-        """Look at everything again whenever form, rig or control has changed, and every few seconds."""
-        who, holder = visitor(), self._context.control.holder
-        basis = (self._context.desk.state.reasons, self._draft.version, holder and holder.who, who)
-        if basis == self._judged and time.monotonic() < self._judged_s + _LOOK_AGAIN_S:
-            return
-        self._judged, self._judged_s = basis, time.monotonic()
-        plan = self._plan()
-        if plan is None:
-            self._checks.show(None)
-            self._refusal.set_text("")
-            return
-        reasons, checks = await asyncio.to_thread(self._look, plan, who)
-        self._checks.show(checks)
-        self._refusal.set_text("\n".join(f"{one.text} ({one.remedy})" for one in reasons if one.code not in PASSING))
-
-    def _look(self, plan: RunPlan, who: Visitor) -> tuple[tuple[Reason, ...], tuple[Check, ...]]:
-        reasons = reasons_against(self._context, plan)
-        return reasons, preflight(self._context, plan, who, reasons)
-
-    def _plan(self) -> RunPlan | None:
-        try:
-            return plan_of(self._draft.values)
-        except (ValueError, TypeError):
-            return None  # the field itself says what is wrong with it
+    def _show_verdict(self) -> None:
+        verdict = self._judge.verdict
+        if verdict is not self._verdict:  # what a click was answered with stays until then
+            self._verdict = verdict
+            told_here = [one for one in verdict.reasons if one.code not in _TOLD_ELSEWHERE] if verdict else []
+            self._refusal.set_text("\n".join(f"{one.text} ({one.remedy})" for one in told_here))
 
     def _changed(self) -> None:
         self._shown = self._draft.version

@@ -8,7 +8,8 @@ import pytest
 from daq.run.refusals import RefusalCode
 from daq.run_plan import RunPlan
 from server.lab.desk.visitor import Visitor
-from server.lab.starting.preflight_list import CODES, Check, CheckResult, preflight
+from server.lab.starting.preflight_list import CODES, Check, CheckResult, check_control, checks_of
+from server.lab.starting.readiness import reasons_against
 from server.web.ui.run.chosen_runs import known_references
 from tests.server.web.test_api import use_a_calibration
 from tests.support.serving import Serving, plan_of
@@ -18,7 +19,9 @@ ANN = Visitor("a", "ann")
 
 def looked_at(server: Serving, **changes: object) -> dict[str, Check]:
     plan = RunPlan.model_validate(plan_of(**changes))
-    return {check.name: check for check in preflight(server.app.state.context, plan, ANN)}
+    context = server.app.state.context
+    found = checks_of(context, plan, reasons_against(context, plan))
+    return {check.name: check for check in (check_control(context, ANN), *found)}
 
 
 def test_every_refusal_has_its_place_in_the_list() -> None:

@@ -1,11 +1,14 @@
 """The rig is never ready where a start would be refused: every reason there is, on the rig and in the plan."""
 
+import asyncio
 import itertools
 import json
 import shutil
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import pytest
@@ -14,12 +17,18 @@ from daq.devices import Rig
 from daq.errors import DeviceError, DeviceTimeout
 from daq.network import Network
 from daq.run.refusals import REMEDIES, RefusalCode
+from server.lab.desk.rig_state import RigWord
+from server.lab.desk.visitor import Role, Visitor
+from server.web.ui.draft import DraftStore
+from server.web.ui.draft import plan_of as draft_plan
+from server.web.ui.form_judge import FormJudge
 from tests.server.web.test_api import use_a_calibration
 from tests.support.memory_rig import MemoryRig
 from tests.support.server_process import eventually
 from tests.support.serving import Serving, plan_of
 
-PULSE = {"current_a": {"view1": 5, "view2": 5}}
+FORM: dict[str, Any] = {"current_a": {"view1": 5, "view2": 5}, "volumes": "none"}
+ANN = Visitor("a", "ann")
 Situation = Callable[[Serving, pytest.MonkeyPatch], Any]
 
 
@@ -177,6 +186,12 @@ def other_size(server: Serving, patch: pytest.MonkeyPatch) -> Iterator[None]:
     yield
 
 
+@contextmanager
+def calibrated(server: Serving, patch: pytest.MonkeyPatch) -> Iterator[None]:
+    use_a_calibration(server)
+    yield
+
+
 OF_THE_RIG: dict[RefusalCode, Situation] = {
     RefusalCode.STARTING: starting,
     RefusalCode.BUSY: busy,
@@ -193,62 +208,116 @@ OF_THE_RIG: dict[RefusalCode, Situation] = {
     RefusalCode.GENERATOR_SILENT: generator_silent,
     RefusalCode.CAMERA_SILENT: camera_silent,
 }
-OF_THE_PLAN: dict[RefusalCode, tuple[Situation | None, dict[str, Any]]] = {
-    RefusalCode.CURRENT: (None, {"pulse": {"current_a": {"view1": 5, "view2": 28}}}),
-    RefusalCode.TIMING: (None, {"pulse": {**PULSE, "separation_ns": 2500}}),
+OF_THE_FORM: dict[RefusalCode, tuple[Situation | None, dict[str, Any]]] = {
+    RefusalCode.CURRENT: (None, {"current_a": {"view1": 5, "view2": 28}}),
+    RefusalCode.TIMING: (None, {"separation_ns": 2500}),
     RefusalCode.NETWORK: (thin_wire, {}),
-    RefusalCode.STAGE: (None, {"kind": "calibration", "stage_z_mm": [0.0]}),
+    RefusalCode.STAGE: (None, {"kind": "calibration", "stage_z_mm": "0"}),
     RefusalCode.REFERENCES: (None, {"references": ["nothing"]}),
     RefusalCode.CALIBRATION_UNKNOWN: (None, {"calibration": "nothing"}),
     RefusalCode.CALIBRATION_DAMAGED: (torn, {"calibration": "torn"}),
     RefusalCode.CALIBRATION_SIZE: (other_size, {"calibration": "small"}),
-    RefusalCode.RECIPE: (None, {"recipes": [{"command": "reconstruct", "settings": {"methd": "smart"}}]}),
+    RefusalCode.RECIPE: (calibrated, {"droplets": True}),
 }
+"""What stands in the form, and nothing on the rig speaks against."""
 
 
-def start(server: Serving, **changes: Any) -> dict[str, Any]:
+@contextmanager
+def judged_form(server: Serving, **values: Any) -> Iterator[tuple[FormJudge, dict[str, Any]]]:
+    """What is shown of a form that has these values, and the plan that its button starts."""
+    context = server.app.state.context
+    with TemporaryDirectory() as folder:
+        draft = DraftStore(Path(folder) / "draft.json", server.services.config, server.services.events)
+        draft.values |= FORM | values
+        judge = FormJudge(context, draft)
+        context.desk.look()
+        asyncio.run(judge.refresh())
+        yield judge, draft_plan(draft.values).model_dump(mode="json")
+
+
+def start(server: Serving, plan: dict[str, Any]) -> dict[str, Any]:
     """The problem that a start is answered with."""
-    answer = server.http.post("/api/runs", json=plan_of(**changes))
+    answer = server.http.post("/api/runs", json=plan)
     assert answer.status_code >= 400, answer.text
     return dict(answer.json())
 
 
-def judge(server: Serving, **changes: Any) -> dict[str, Any]:
-    answer = server.http.post("/api/rig/readiness", json=plan_of(**changes))
+def judge(server: Serving, plan: dict[str, Any]) -> dict[str, Any]:
+    answer = server.http.post("/api/rig/readiness", json=plan)
     assert answer.status_code == 200, answer.text
     return dict(answer.json())
 
 
 def test_every_reason_of_the_catalogue_is_tried_here_and_has_a_remedy() -> None:
-    assert {*OF_THE_RIG, *OF_THE_PLAN} == set(RefusalCode) == set(REMEDIES)
+    assert {*OF_THE_RIG, *OF_THE_FORM} == set(RefusalCode) == set(REMEDIES)
 
 
 @pytest.mark.parametrize("code", OF_THE_RIG)
 def test_a_start_is_refused_for_the_reason_that_the_rig_is_not_ready(
     server: Serving, monkeypatch: pytest.MonkeyPatch, code: RefusalCode
 ) -> None:
-    with OF_THE_RIG[code](server, monkeypatch):
-        shown, refusal, judged = server.http.get("/api/rig/readiness").json(), start(server), judge(server)
+    with OF_THE_RIG[code](server, monkeypatch), judged_form(server) as (form, plan):
+        shown, refusal, judged = server.http.get("/api/rig/readiness").json(), start(server, plan), judge(server, plan)
+        bar = form.state(ANN)
     assert shown["state"] != "ready"
     assert code in [reason["code"] for reason in shown["reasons"]]
     first = shown["reasons"][0]
     assert (refusal["code"], refusal["remedy"]) == (first["code"], first["remedy"])
     assert refusal["detail"] == first["text"]
     assert (judged["ready"], judged["reasons"][0]["code"]) == (False, first["code"])
+    assert (bar.state == RigWord.READY, bar.reasons[0].code) == (False, first["code"])
 
 
-@pytest.mark.parametrize("code", OF_THE_PLAN)
-def test_a_start_is_refused_for_the_reason_that_is_told_of_its_plan(
+@pytest.mark.parametrize("code", OF_THE_FORM)
+def test_a_start_is_refused_for_the_reason_that_every_page_tells_of_its_form(
     server: Serving, monkeypatch: pytest.MonkeyPatch, code: RefusalCode
 ) -> None:
-    situation, changes = OF_THE_PLAN[code]
+    situation, values = OF_THE_FORM[code]
     with ExitStack() as stack:
         if situation is not None:
             stack.enter_context(situation(server, monkeypatch))
+        form, plan = stack.enter_context(judged_form(server, **values))
         assert server.http.get("/api/rig/readiness").json()["state"] == "ready"
-        judged, refusal = judge(server, **changes), start(server, **changes)
+        judged, refusal, bar = judge(server, plan), start(server, plan), form.state(ANN)
     assert [reason["code"] for reason in judged["reasons"]] == [code]
     assert (refusal["code"], refusal["detail"]) == (code, judged["reasons"][0]["text"])
+    assert bar.text == f"NOT READY: {refusal['detail']}"
+    assert [reason.code for reason in bar.reasons] == [code]
+
+
+def test_who_may_not_start_reads_so_where_others_read_that_the_rig_is_ready(server: Serving) -> None:
+    control = server.app.state.context.control
+    control.require(ANN)
+    with judged_form(server) as (form, plan):
+        assert form.state(ANN).text == "READY"
+        judged, refusal = judge(server, plan), start(server, plan)
+        bob, viewer = (form.state(Visitor("b", "bob", role)) for role in (Role.OPERATOR, Role.VIEWER))
+    assert (judged["ready"], judged["reasons"][0]["code"], refusal["code"]) == (False, "control_held", "control_held")
+    assert bob.text == "NOT READY: ann holds control of this rig"
+    assert viewer.text.startswith("NOT READY: bob may look and end the light")
+    laboratory(server).open_door()
+    with judged_form(server) as (form, _):
+        bob, viewer = (form.state(Visitor("b", "bob", role)) for role in (Role.OPERATOR, Role.VIEWER))
+    assert [reason.code for reason in bob.reasons][:2] == ["control_held", "interlock_open"]
+    assert (viewer.reasons[0].code, viewer.reasons[-1].code) == ("interlock_open", "viewer")
+
+
+def test_a_form_that_is_no_plan_or_was_looked_at_long_ago_is_not_ready(server: Serving, tmp_path: Path) -> None:
+    context, now_s = server.app.state.context, [0.0]
+    draft = DraftStore(tmp_path / "draft.json", server.services.config, server.services.events)
+    form = FormJudge(context, draft, lambda: now_s[0])
+    context.desk.look()
+    assert form.state(ANN).text == "NOT READY: nobody has looked at the rig for seconds"
+    asyncio.run(form.refresh())
+    assert form.state(ANN).text == "READY"
+    draft.set("shots", 0)
+    asyncio.run(form.refresh())
+    assert form.state(ANN).text == "NOT READY: a field of the form is empty or out of its limits"
+    draft.set("shots", 1)
+    asyncio.run(form.refresh())
+    assert form.state(ANN).text == "READY"
+    now_s[0] = 15.1
+    assert form.state(ANN).state == RigWord.NOT_READY
 
 
 def test_of_several_reasons_a_start_names_the_one_that_is_told_first(
@@ -266,7 +335,8 @@ def test_of_several_reasons_a_start_names_the_one_that_is_told_first(
         with monkeypatch.context() as patch, ExitStack() as stack:
             for code in pair:
                 stack.enter_context(OF_THE_RIG[code](server, patch))
-            judged, refusal = judge(server, references=["nothing"]), start(server, references=["nothing"])
+            plan = plan_of(references=["nothing"])
+            judged, refusal = judge(server, plan), start(server, plan)
         codes = [reason["code"] for reason in judged["reasons"]]
         assert refusal["code"] == codes[0]
         assert {RefusalCode.REFERENCES} < set(codes), f"{pair}: {codes}"
@@ -281,7 +351,7 @@ def test_a_rig_that_is_ready_starts(server: Serving) -> None:
         "reasons": [],
         "eta_s": None,
     }
-    judged = judge(server)
+    judged = judge(server, plan_of())
     assert (judged["ready"], judged["reasons"]) == (True, [])
     _, status = server.run_to_its_end(plan_of())
     assert status.outcome == "completed"
