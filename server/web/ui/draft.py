@@ -29,6 +29,8 @@ USUAL_NAMES = {
     RunKind.CALIBRATION: "target",
 }
 """Names that nobody has thought of: they follow the kind of a run."""
+USUAL_SHOTS = {RunKind.SAMPLE: 10, RunKind.BACKGROUND: 20, RunKind.DARK: 10, RunKind.CALIBRATION: 1}
+"""So do numbers of shots; of a calibration per position."""
 
 _TEXTS = ("name", "stage_z_mm", "operator", "fluid", "nozzle", "remark")
 
@@ -38,7 +40,7 @@ def first_draft(config: RigConfig) -> dict[str, Any]:
     return {
         "kind": RunKind.SAMPLE.value,
         "name": USUAL_NAMES[RunKind.SAMPLE],
-        "shots": 10,
+        "shots": USUAL_SHOTS[RunKind.SAMPLE],
         "rate_hz": 2.0,
         "width_ns": 1000,
         "separation_ns": 6400,
@@ -118,8 +120,8 @@ class DraftStore:
         """
         if not self._may_change():
             return
-        if name == "kind" and self.values["name"] in USUAL_NAMES.values():
-            self.set("name", USUAL_NAMES[RunKind(value)])
+        if name == "kind":
+            self._follow_kind(RunKind(self.values["kind"]), RunKind(value))
         self.values[name] = value
         self.version += 1
         part = self._path.with_suffix(".part")
@@ -137,6 +139,12 @@ class DraftStore:
             new = {**self.values[field], view: value} if view else value
             if new != self.values[field]:
                 self.set(field, new)
+
+    def _follow_kind(self, before: RunKind, now: RunKind) -> None:
+        """Nobody has thought of what is usual for the kind before."""
+        for name, usual in (("name", USUAL_NAMES), ("shots", USUAL_SHOTS)):
+            if self.values[name] == usual[before]:
+                self.set(name, usual[now])
 
     def _stored(self) -> dict[str, Any]:
         if not self._path.is_file():

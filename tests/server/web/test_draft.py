@@ -51,14 +51,21 @@ def test_the_first_draft_is_a_plan_for_this_rig(tmp_path: Path) -> None:
     assert plan.stage_z_mm == ()
 
 
-def test_a_name_that_nobody_chose_follows_the_kind_of_the_run(tmp_path: Path) -> None:
+def test_name_and_shots_that_nobody_chose_follow_the_kind_of_the_run(tmp_path: Path) -> None:
     draft = DraftStore(tmp_path / "draft.json", memory_config(tmp_path / "runs"), EventPublisher())
-    for kind, name in (("dark", "dark"), ("calibration", "target"), ("sample", "spray")):
+    usual = (
+        ("dark", "dark", 10),
+        ("calibration", "target", 1),
+        ("background", "background", 20),
+        ("sample", "spray", 10),
+    )
+    for kind, name, shots in usual:
         draft.set("kind", kind)
-        assert draft.values["name"] == name
+        assert (draft.values["name"], draft.values["shots"]) == (name, shots)
     draft.set("name", "nozzle 3")
+    draft.set("shots", 7)
     draft.set("kind", "background")
-    assert draft.values["name"] == "nozzle 3"
+    assert (draft.values["name"], draft.values["shots"]) == ("nozzle 3", 7)
 
 
 def test_only_a_calibration_run_moves_the_target_and_only_a_sample_run_has_references(tmp_path: Path) -> None:
