@@ -12,7 +12,7 @@ from daq.files.run_file import RUN_FILE
 from processing.calibration.calibration import Calibration
 from processing.calibration.calibration_record import content_id
 from processing.calibration.droplets.droplet_images import find_droplets
-from processing.calibration.droplets.self_calibration import SelfCalibration, self_calibrate
+from processing.calibration.droplets.self_calibration import SelfCalibration
 from processing.calibration.errors import CalibrationError
 from processing.calibration.fit.not_checked import DROPLETS
 from processing.calibration.sets.calibration_set import SET_FILE
@@ -22,7 +22,8 @@ from processing.reconstruction.settings import ReconstructionSettings
 from processing.runs.errors import PipelineError
 from processing.runs.manifest.importing import CALIBRATION_FOLDER, RUN_FOLDER
 from processing.runs.results_file import FrameName
-from processing.runs.shots.shot_check import Exposure, ShotCheck, check_exposures, require_droplets
+from processing.runs.shots.agreeing_shots import corrected_by
+from processing.runs.shots.shot_check import Exposure, ShotCheck, check_exposures
 from processing.runs.shots.shot_images import shot_intensities
 from processing.runs.workbench import Workbench
 
@@ -122,13 +123,13 @@ def self_calibrate_run(
     Raises
     ------
     CalibrationError
-        The droplets do not tell, or the calibration does not belong to the views of the run.
+        The droplets do not tell, or not the same in all shots, or depth is reversed; or the calibration does not
+        belong to the views of the run.
     PipelineError
         An exposure is missing.
     """
-    exposures = [exposure for of_shot in _droplets(run_dir, shots, calibration, counted) for exposure in of_shot]
-    require_droplets(calibration, exposures)
-    return self_calibrate(calibration, exposures, run_dir.name)
+    by_shot = zip(shots, _droplets(run_dir, shots, calibration, counted), strict=True)
+    return corrected_by(dict(by_shot), calibration, run_dir.name)
 
 
 def _droplets(

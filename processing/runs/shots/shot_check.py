@@ -109,13 +109,18 @@ def check_exposures(shot: int, exposures: Sequence[Exposure], calibration: Calib
     Droplets of all exposures tell together; where one exposure alone speaks against the calibration, that counts.
     """
     together = _checked(shot, exposures, calibration)
-    if together.views and together.certain_px > NEARLY_PX and (problem := _reversed(together, exposures, calibration)):
+    if problem := _reversed(together, exposures, calibration):
         return ShotCheck(shot, {}, problem, tuple(calibration.views))
     if len(exposures) == 1 or together.verdict is Verdict.REFUSE:
         return together
     alone = (_checked(shot, [one], calibration, STOP_PX) for one in exposures)
     named = (_in_exposure(name, check) for name, check in zip(_EXPOSURES, alone, strict=False))
     return next((check for check in named if check.beyond or check.verdict is Verdict.REFUSE), together)
+
+
+def depth_reversed(exposures: Sequence[Exposure], calibration: Calibration) -> str:
+    """What was mistaken for all views at once, so that near looks far; empty where droplets tell no such thing."""
+    return _reversed(_checked(0, exposures, calibration), exposures, calibration)
 
 
 def _checked(
@@ -130,6 +135,8 @@ def _checked(
 
 def _reversed(check: ShotCheck, exposures: Sequence[Exposure], calibration: Calibration) -> str:
     """What was mistaken for all views at once, by which they agree clearly worse than without; empty: nothing."""
+    if not check.views or check.certain_px <= NEARLY_PX:
+        return ""
     found = {}
     for what, seen in turned(calibration, exposures):
         with suppress(CalibrationError):
