@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from processing.imprint import imprint
 from processing.preprocessing import Frame, Intensity, Polarity
 
 FULL = 0.998
@@ -62,11 +63,30 @@ def odd_light(
         return black
     if background is None:
         return _saturated(frame[coarse], most)
-    if np.array_equal(frame[coarse], background[coarse]):
-        return "is its own background, pixel by pixel: whatever there was is divided out"
+    if own := own_shadows(frame, background, dark):
+        return own
     if (share := np.mean(background[coarse] > FULL * most)) > SATURATED_SHARE:
         return f"has a background of which {100 * share:.0f} % are saturated: shadows are too pale there"
     return _unlike((light, _above_dark(background, dark) / most)) or _saturated(frame[coarse], most)
+
+
+def own_shadows(frame: Frame, background: Intensity, dark: Intensity | None = None) -> str:
+    """What it says where an exposure of shadows is one of its own backgrounds; empty where it is not.
+
+    Parameters
+    ----------
+    frame, background, dark
+        As for ``odd_light``.
+    """
+    coarse = np.s_[::STRIDE_PX, ::STRIDE_PX]
+    if np.ptp(frame[coarse]) and np.array_equal(frame[coarse], background[coarse]):
+        return "is its own background, pixel by pixel: whatever there was is divided out"
+    if share := imprint(frame, background, dark):
+        return (
+            f"has {100 * share:.0f} % of its own shadows in its background, so they are too pale and too small: is the "
+            "shot one of its backgrounds, or are these the mean of a series with spray?"
+        )
+    return ""
 
 
 def hollowed(

@@ -11,6 +11,7 @@ import numpy as np
 from pydantic import Field
 
 from daq.files.run_directory import RunReader, Shot
+from processing.light import own_shadows
 from processing.preprocessing import Intensity, transmission
 from processing.runs.errors import PipelineError
 from processing.runs.exposure_faults import grey_values
@@ -49,6 +50,16 @@ def shadow_images(
         images.append(image)
         trust.append(sure)
     return images, trust
+
+
+def own_backgrounds(shot: Shot, frame: FrameName, references: References) -> tuple[str, ...]:
+    """What speaks against the backgrounds of an exposure of shadows, by view: that they show it as well."""
+    number, told = "ab".index(frame), []
+    for view in shot.views:
+        dark, background = (None if one is None else one[number] for one in references[view])
+        if background is not None and (own := own_shadows(grey_values(shot, view, frame), background, dark)):
+            told.append(f"{view} {own}")
+    return tuple(told)
 
 
 def require_backgrounds(run: RunReader, references: References) -> None:

@@ -1,9 +1,9 @@
 """What became of a shot that was measured: its droplets, its velocities, and whether to believe them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import Literal, TypeVar
 
 import numpy as np
 
@@ -18,8 +18,17 @@ from processing.runs.shots.separation import Separation
 from processing.volume import VoxelGrid
 
 Exposure = BrightExposure | ShadowExposure
+Measured = TypeVar("Measured", BrightExposure, ShadowExposure)
 MOST_SPREAD = 0.01
 """Of the separation: views that differ by more see droplets at different times."""
+
+
+def doubted(measured: Measured, reasons: tuple[str, ...]) -> Measured:
+    """The same exposure with reasons why it is no good, if there are any; an empty one may not be empty then."""
+    if not reasons:
+        return measured
+    verdict = ShotVerdict.REFUSED if measured.verdict is ShotVerdict.REFUSED else ShotVerdict.DOUBTFUL
+    return replace(measured, verdict=verdict, reasons=(*reasons, *measured.reasons))
 
 
 class ShotVelocity(FrozenValue):

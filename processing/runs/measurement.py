@@ -27,6 +27,7 @@ from processing.runs.liquid.objects import NozzleNumbers, RunObjects, told_objec
 from processing.runs.measured_images import (
     IgnoredPixels,
     bright_images,
+    own_backgrounds,
     require_backgrounds,
     require_fitting,
     shadow_images,
@@ -36,6 +37,7 @@ from processing.runs.measured_shot import (
     Exposure,
     MeasuredShot,
     ShotVelocity,
+    doubted,
     droplets_path,
     shot_summary,
     shot_velocities,
@@ -253,7 +255,7 @@ class RunMeasurement:
             )
         images, trust = shadow_images(self.run, shot, frame, self.references)
         known = without_ignored(dict(zip(shot.views, trust, strict=True)), self.settings.ignored)
-        return measure_shadows(
+        measured = measure_shadows(
             images,
             self.search,
             trust=list(known.values()),
@@ -264,3 +266,4 @@ class RunMeasurement:
             threads=threads,
             before_round=before_round,
         )
+        return doubted(measured, own_backgrounds(shot, frame, self.references))

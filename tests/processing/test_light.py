@@ -50,6 +50,42 @@ def test_a_shot_before_itself_is_odd() -> None:
     assert told(SHOT, SHOT).startswith("is its own background")
 
 
+def mean_of(*light: Grey) -> Grey:
+    """Each with noise of its own."""
+    noise = np.random.default_rng(5)
+    return np.asarray(np.mean([one + noise.normal(0, 2, one.shape) for one in light], axis=0))
+
+
+def of_itself(backgrounds: Grey) -> str:
+    """What is said of the shot before this mean, which has no further noise."""
+    return odd_light(grey(SHOT), "shadow", bits=8, background=backgrounds.astype(np.float32))
+
+
+@pytest.mark.parametrize("count", [2, 4, 10])
+def test_a_shot_among_its_own_backgrounds_is_odd(count: int) -> None:
+    told_share = re.match(r"has (\d+) % of its own shadows", of_itself(mean_of(SHOT, *[LIGHT] * (count - 1))))
+    assert told_share
+    assert int(told_share[1]) > 80 / count
+
+
+def test_the_mean_of_a_series_as_background_is_odd_and_that_of_other_shots_is_not() -> None:
+    others = [LIGHT * (1 - droplets(seed)) for seed in range(2, 10)]
+    assert re.match(r"has \d+ % of its own shadows in its background", of_itself(mean_of(SHOT, *others)))
+    assert "of its own shadows" not in of_itself(mean_of(*others))
+
+
+@pytest.mark.parametrize("shift_px", [0, 1, 3])
+def test_a_nozzle_that_shakes_is_no_shadow_of_the_shot(shift_px: int) -> None:
+    def nozzle(down_px: int) -> Grey:
+        edge = 1 / (1 + np.exp(-(ROWS - 40.0 - down_px) / 1.5))
+        return np.where(np.abs(COLUMNS - 64) < 20, edge, 1.0)
+
+    shot = odd_light(
+        grey(SHOT * nozzle(shift_px)), "shadow", bits=8, background=mean_of(LIGHT * nozzle(0)).astype("f4")
+    )
+    assert "of its own shadows" not in shot
+
+
 def test_light_that_the_camera_cannot_tell_is_odd() -> None:
     assert re.fullmatch(
         r"has a background of which \d+ % are saturated: shadows are too pale there", told(1.6 * SHOT, 1.6 * LIGHT)

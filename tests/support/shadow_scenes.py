@@ -1,8 +1,9 @@
 """Small shots of shadows with their truth, by an oracle: fine masks that are united, then blurred by scipy."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -115,9 +116,17 @@ class Shadows(Protocol):
 
 
 def write_shadow_run(
-    run_dir: Path, scene: Shadows, *further: Shadows, background: bool = True, later: Shadows | None = None
+    run_dir: Path,
+    scene: Shadows,
+    *further: Shadows,
+    background: bool = True,
+    later: Shadows | None = None,
+    seen_behind: Sequence[NDArray[Any]] | None = None,
 ) -> Path:
-    """Shots of one exposure before a light that falls off to one side, with its references; ``later`` is exposure B."""
+    """Shots of one exposure before a light that falls off to one side, with its references; ``later`` is exposure B.
+
+    ``seen_behind`` is by view what backgrounds show of the light, if not all.
+    """
     names = [f"view{number}" for number in range(1, 5)]
     rows, columns = scene.images[0].shape
     light = np.repeat(np.linspace(LIGHT, 0.7 * LIGHT, columns)[None], rows, axis=0)
@@ -148,7 +157,12 @@ def write_shadow_run(
     with RunWriter(run_dir, header) as writer:
         if background:
             dark = np.full((len(lit), rows, columns), DARK, np.float32)
-            writer.write_references(dict.fromkeys(names, dark), dict.fromkeys(names, lit))
+            shares = seen_behind or [np.ones((rows, columns))] * len(names)
+            backgrounds = {
+                name: np.asarray(DARK + share * (lit - DARK), np.float32)
+                for name, share in zip(names, shares, strict=True)
+            }
+            writer.write_references(dict.fromkeys(names, dark), backgrounds)
         for number, seen in enumerate((scene, *further)):
             writer.write_shot(Shot(number, ImageKey.SAMPLE, views(seen)))
         writer.finish("completed")

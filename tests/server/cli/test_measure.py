@@ -225,6 +225,20 @@ def test_shadows_of_a_run_become_droplets_with_diameters(tmp_path: Path, capsys:
         assert file["tomoshadow"].attrs["schema_version"] == 3
 
 
+def test_a_shot_among_its_own_backgrounds_is_doubtful(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Its diameters are a twentieth too small, and its droplets look like any."""
+    shot = shadow_scene((40, 30, 80), 28, (160, 90))
+    run_dir = write_shadow_run(tmp_path / "run", shot, seen_behind=[1 - (1 - image) / 4 for image in shot.images])
+    calibration = write_shadow_calibration(tmp_path / "calibration.json", shot)
+    (told_shot,) = told(
+        capsys, "measure", run_dir, "--calibration", calibration, "-o", tmp_path / "out", "--light", "gaussian"
+    )["shots"]
+    assert told_shot["verdict"] == "doubtful"
+    for number in range(1, 5):
+        assert f"view{number} has 2" in told_shot["reasons"][number - 1]
+        assert "% of its own shadows in its background" in told_shot["reasons"][number - 1]
+
+
 def test_shadows_without_any_noise_are_measured(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Of a simulation, or where all light is saturated: what is left has no noise to divide by."""
     views = cameras()

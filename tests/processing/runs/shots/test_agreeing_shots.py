@@ -54,4 +54,3 @@ def mirrored(exposures: list[Exposure]) -> None:
 def test_shots_that_do_not_tell_the_same_correct_nothing(change: Change, said: str) -> None:
     with pytest.raises(CalibrationError, match=said):
         corrected_by(shots(change), CALIBRATION, "run")
-
