@@ -33,8 +33,31 @@ ORDER = Unchecked(
 """Of double exposures in a run that does not say where its spray comes from."""
 
 
+def stated_separation(separation_ns: float) -> Unchecked:
+    """Of double exposures whose pulses nobody recorded."""
+    return Unchecked(
+        f"whether exposure B comes {separation_ns:g} ns after A, as the run states: all velocities are in proportion, "
+        "and any separation pairs as well",
+        "separation_ns as an oscilloscope shows it at the light; runs of a rig keep the pulses as they were fired",
+    )
+
+
+def stated_rate(rate_hz: float) -> Unchecked:
+    """Of a series of shots."""
+    return Unchecked(
+        f"whether there are {rate_hz:g} shots per second, as was stated: velocities along tracks are in proportion, "
+        "and accelerations by its square; only velocities from A to B would contradict it",
+        "rate_hz as the trigger has it, by a counter; double exposures with a separation tell velocities of their own",
+    )
+
+
 def unchecked_images(
-    polarity: Polarity, *, sizes_known: bool = False, single: bool = False, undirected: bool = False
+    polarity: Polarity,
+    *,
+    sizes_known: bool = False,
+    single: bool = False,
+    undirected: bool = False,
+    stated_ns: float | None = None,
 ) -> Iterator[Unchecked]:
     """What nothing tells of the images that droplets were measured in.
 
@@ -48,6 +71,8 @@ def unchecked_images(
         There is one view.
     undirected : bool
         They are double exposures, and nobody said where the liquid comes from.
+    stated_ns : float, optional
+        Separation of double exposures, where it was stated and no pulse tells it.
     """
     if polarity == "bright" or not sizes_known:
         yield PROPORTION[polarity]
@@ -55,6 +80,8 @@ def unchecked_images(
         yield SCALE
     if undirected:
         yield ORDER
+    if stated_ns is not None:
+        yield stated_separation(stated_ns)
 
 
 def told_unchecked(unchecked: Iterator[Unchecked], tell: Callable[[str], None]) -> list[dict[str, str]]:

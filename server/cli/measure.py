@@ -217,7 +217,7 @@ def _measure_shots(
         "recipe_sha256": recipe_sha256(NAME, METHOD_VERSION, settings),
         "grid": settings.model_dump(mode="json")["grid"],
         "shots": [shot.model_dump(mode="json") for shot in shots],
-        "not_checked": _tell_unchecked(run_dir, settings),
+        "not_checked": _tell_unchecked(run_dir, settings, shots),
         "statistics": droplet_statistics(stored).model_dump(mode="json"),
         "velocity": velocity_statistics(stored).model_dump(mode="json"),
         **liquid_summary(stored).model_dump(mode="json"),
@@ -231,15 +231,18 @@ def _tell_changes(changes: tuple[str, ...]) -> list[str]:
     return list(changes)
 
 
-def _tell_unchecked(run_dir: Path, settings: "MeasureSettings") -> list[dict[str, str]]:
+def _tell_unchecked(run_dir: Path, settings: "MeasureSettings", shots: "list[ShotDroplets]") -> list[dict[str, str]]:
     from daq.files.run_directory import RunReader
     from processing.runs.unchecked_images import told_unchecked, unchecked_images
 
     with RunReader(run_dir) as run:
         undirected = run.header.frames_per_shot == 2 and run.conditions.spray is None
-    return told_unchecked(
-        unchecked_images(settings.polarity, sizes_known=bool(settings.sizes), undirected=undirected), progress
+    velocities = (shot.velocity for shot in shots if shot.velocity)
+    stated_ns = next((one.separation_ns for one in velocities if one.separation_source == "stated"), None)
+    unchecked = unchecked_images(
+        settings.polarity, sizes_known=bool(settings.sizes), undirected=undirected, stated_ns=stated_ns
     )
+    return told_unchecked(unchecked, progress)
 
 
 def _here(

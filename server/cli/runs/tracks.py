@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from server.cli.options import Verbs, add_out, add_verb, positive
-from server.cli.output import Outcome
+from server.cli.output import Outcome, progress
 from server.cli.runs.export_option import add_export
 
 if TYPE_CHECKING:
@@ -54,6 +54,8 @@ def tracks(options: Namespace) -> Outcome:
 
 
 def _told(linked: "DropletTracks", shots: int, file: Path) -> dict[str, Any]:
+    from processing.runs.unchecked_images import stated_rate, told_unchecked
+
     return {
         "tracks": linked.tracks,
         "shots": shots,
@@ -63,6 +65,7 @@ def _told(linked: "DropletTracks", shots: int, file: Path) -> dict[str, Any]:
         "rate_hz": linked.rate_hz,
         "reason": linked.reason,
         "doubts": list(linked.doubts),
+        "not_checked": told_unchecked(iter([stated_rate(linked.rate_hz)] if linked.tracks else []), progress),
         "file": str(file),
         "passed": linked.tracks > 0,
     }

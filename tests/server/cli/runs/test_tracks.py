@@ -53,6 +53,8 @@ def test_tracks_of_a_series_lie_in_a_file_in_physical_units(tmp_path: Path, caps
     assert (units["u_m_s"], units["ax_m_s2"], units["cov_uv_m2_s2"]) == ("m/s", "m/s^2", "m^2/s^2")
     assert result["tracks"] == len(np.unique(columns["track"]))
     assert result["share_tracked"] > 0.9
+    (unchecked,) = result["not_checked"]
+    assert f"whether there are {RATE_HZ:g} shots per second, as was stated" in unchecked["what"]
     ids = [np.full(len(frame), -1) for frame in shown.frames]
     for track, shot, row in zip(columns["track"], columns["shot"], columns["droplet"], strict=True):
         ids[shot - 3][row] = track
