@@ -82,3 +82,15 @@ def _require_stated(seen_um: FloatArray, diameters_um: Sequence[float], most: tu
                 f"dots of {true_um:g} um look as if they had {found_um:.0f} um: are these the diameters of this "
                 f"reticle (sizes that are seen: about {seen} um), and is its calibration that of these views?"
             )
+    _require_alike(seen_um - diameters_um, diameters_um)
+
+
+def _require_alike(larger_um: FloatArray, diameters_um: Sequence[float]) -> None:
+    """Light and blur displace edges, those of small and of large dots alike; a wrong scale does not."""
+    for this_um, true_um in zip(larger_um.tolist(), diameters_um, strict=True):
+        if abs(this_um - larger_um[0]) > IN_ITS_LIGHT[0] + IN_ITS_LIGHT[1] * true_um:
+            raise ReticleError(
+                f"dots of {diameters_um[0]:g} um look {larger_um[0]:+.0f} um larger, and those of {true_um:g} um "
+                f"{this_um:+.0f} um: no light does that; are these the diameters of this reticle, and is the scale of "
+                "the calibration right?"
+            )

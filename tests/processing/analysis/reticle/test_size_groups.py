@@ -48,3 +48,15 @@ def test_diameters_that_nobody_could_tell_apart_are_refused() -> None:
 def test_droplets_are_no_reticle() -> None:
     with pytest.raises(ReticleError, match="no 3 dots of one size are seen in all views: is this the run of a reticle"):
         size_groups(np.geomspace(10, 90, 8), (20.0, 30.0))
+
+
+@pytest.mark.parametrize("scale", [0.9, 1.1])
+def test_diameters_in_another_scale_are_refused_whatever_the_light(scale: float) -> None:
+    """Behind a Gaussian blur all dots look larger, but the large ones no more than the small ones."""
+    true_um = np.array([40.0, 110.0, 180.0])
+    found_um = seen(*(true_um + 11))
+    assert set(size_groups(found_um, true_um.tolist())) == {0, 1, 2}
+    with pytest.raises(
+        ReticleError, match=r"dots of \d+ um look \+\d+ um larger, and those of \d+ um [+-]\d+ um: no light"
+    ):
+        size_groups(found_um, (scale * true_um).tolist())
