@@ -111,8 +111,13 @@ def break_up_text(found: BreakUp, true_mm: FloatArray | None = None) -> str:
     high = "beyond the field" if found.high_mm is None else f"{found.high_mm:.2f} mm"
     return (
         f"Break-up length {found.value_mm:.2f} mm along the axis (95 % limits {found.low_mm:.2f} mm to {high}; "
-        f"{counted(found.shots, 'shot')}).{truth}"
+        f"{counted(found.shots, 'shot')}).{truth}{_sentence(found.reason)}"
     )
+
+
+def _sentence(reason: str | None) -> str:
+    """What is to be said beside a value, if anything is."""
+    return f" {reason[0].upper()}{reason[1:]}{'' if reason.endswith('?') else '.'}" if reason else ""
 
 
 def _curve(liquid: ReportedLiquid, found: BreakUp) -> BreakUpCurve | None:

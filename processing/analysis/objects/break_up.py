@@ -69,6 +69,8 @@ class Reach:
         Width of the voxels that hang together.
     reason : str | None
         Why nothing is known; then there are no lengths.
+    apart_mm : (float, float) | None
+        Along the axis, from where to where a body goes that is long, too, and does not hang together with the nozzle.
     """
 
     thresholds: tuple[float, ...] = ()
@@ -76,6 +78,7 @@ class Reach:
     open: tuple[bool, ...] = ()
     voxel_mm: float = 0.0
     reason: str | None = None
+    apart_mm: tuple[float, float] | None = None
 
 
 def reach_of(voxels: DarkVoxels, nozzle: Nozzle) -> Reach:

@@ -35,7 +35,8 @@ class BreakUp:
     longer_than_mm : float | None
         Where more than half still hang together when they leave the field.
     reason : str | None
-        Why there is no value, and why it is not known of some shots.
+        Why there is no value, why it is not known of some shots, and of how many a large body lies apart: up to the end
+        of that the limits go then.
     """
 
     shots: int = 0
@@ -71,6 +72,7 @@ def break_up_of(shots: Sequence[Reach], seed: int = 0) -> BreakUp:
     if not known:
         return BreakUp(reason=reasons or "no shot was measured")
     unknown = f"not known of {len(shots) - len(known)} of {len(shots)} shots: {reasons}" if reasons else None
+    doubts = "; ".join(filter(None, (_apart(known), unknown))) or None
     reach_mm, leaves = _table(known)
     value_mm = _half_connected_mm(reach_mm.ravel(), leaves.ravel())
     drawn_mm = np.sort([_half_connected_mm(*draw) for draw in _draws(known, seed)])
@@ -78,10 +80,10 @@ def break_up_of(shots: Sequence[Reach], seed: int = 0) -> BreakUp:
     if not np.isfinite(value_mm):
         longer_mm = float(np.median(reach_mm))
         longer = f"still connected where it leaves the field: longer than {longer_mm:.2f} mm"
-        return BreakUp(len(known), longer_than_mm=longer_mm, reason="; ".join(filter(None, (longer, unknown))))
-    low_mm, high_mm = min(low_mm, value_mm), max(high_mm, value_mm)
+        return BreakUp(len(known), longer_than_mm=longer_mm, reason="; ".join(filter(None, (longer, doubts))))
+    low_mm, high_mm = min(low_mm, value_mm), max(high_mm, value_mm, _half_connected_mm(*_joined(known)))
     high = float(high_mm) if np.isfinite(high_mm) else None
-    return BreakUp(len(known), value_mm, float(low_mm), high, reason=unknown)
+    return BreakUp(len(known), value_mm, float(low_mm), high, reason=doubts)
 
 
 def connected_share(shots: Sequence[Reach], distances_mm: FloatArray, seed: int = 0) -> ConnectedShare:
@@ -103,6 +105,27 @@ def _table(shots: Sequence[Reach]) -> Lengths:
     telling = [shots[0].thresholds.index(threshold) for threshold in TELLING]
     reach_mm, leaves = np.array([shot.reach_mm for shot in shots]), np.array([shot.open for shot in shots], bool)
     return reach_mm[:, telling], leaves[:, telling]
+
+
+def _apart(shots: Sequence[Reach]) -> str | None:
+    """Of how many shots a large body lies apart."""
+    spans_mm = [shot.apart_mm for shot in shots if shot.apart_mm]
+    if not spans_mm:
+        return None
+    first_mm, last_mm = np.median(spans_mm, axis=0)
+    return (
+        f"in {len(spans_mm)} of {len(shots)} shots a large body, {first_mm:.2f} to {last_mm:.2f} mm from the nozzle "
+        "along the axis, does not hang together with it: torn off, joined by film too thin to be seen, or is the "
+        "nozzle stated wrongly?"
+    )
+
+
+def _joined(shots: Sequence[Reach]) -> Lengths:
+    """Lengths as if bodies that lie apart did hang together with the nozzle."""
+    reach_mm, leaves = _table(shots)
+    ends_mm = np.array([[shot.apart_mm[1] if shot.apart_mm else 0.0] for shot in shots])
+    longer_mm = np.maximum(reach_mm, ends_mm)
+    return longer_mm.ravel(), leaves.ravel()
 
 
 def _draws(shots: Sequence[Reach], seed: int) -> list[Lengths]:

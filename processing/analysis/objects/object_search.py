@@ -1,11 +1,12 @@
 """ObjectSearch: where objects are looked for; and all that one exposure says of liquid that is no droplet."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from processing.analysis.objects.body_apart import body_apart
 from processing.analysis.objects.break_up import THRESHOLD, Nozzle, Reach, core_of
 from processing.analysis.objects.dark_voxels import DarkVoxels, connected
 from processing.analysis.objects.hull import darkness_of, hull_of, known
@@ -147,6 +148,8 @@ def measure_objects(
         return ExposureObjects(LiquidObjects.none(), reach, *shares, reason)
     told, numbers = _connected(voxels)
     objects = _objects(told, numbers, search)
+    if search.nozzle is not None and reach.reason is None:
+        reach = replace(reach, apart_mm=body_apart(told, numbers, objects, search.nozzle))
     bodies = _bodies(told, numbers, np.flatnonzero(objects.is_told))
     return ExposureObjects(objects.told(), reach, *shares, bodies=bodies)
 

@@ -1,7 +1,7 @@
 """Chapters on ligaments, break-up, and what nobody can know: they say what files say, and why something is missing."""
 
 import json
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -55,6 +55,15 @@ def test_lengths_have_limits_and_truth_and_objects_are_counted_by_exposure() -> 
     assert "ligament (1)" in {text.get_text() for text in objects.get_legend().get_texts()}  # type: ignore[union-attr]
     known = ReportedLiquid(liquid.reaches, 6, liquid.objects, liquid.shown, np.array([4.9, 5.2, 5.0]), GRID)
     assert "In truth it is 5.00 mm" in break_up_section(known).text
+
+
+def test_a_large_body_that_lies_apart_is_told_beside_the_length() -> None:
+    apart = [replace(reach(4.0), apart_mm=(5.0, 9.0)), reach(4.2)]
+    liquid = ReportedLiquid.of_files([shot(one) for one in apart])
+    assert liquid
+    text = break_up_section(liquid).text
+    assert text.startswith("Break-up length 4.10 mm")
+    assert "In 1 of 2 shots a large body, 5.00 to 9.00 mm from the nozzle" in text
 
 
 def test_without_a_length_the_reason_is_told_and_there_is_no_curve() -> None:

@@ -1,5 +1,7 @@
 """How far liquid hangs together with the nozzle: known lengths, and all cases in which nothing is known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -105,6 +107,15 @@ def test_shots_of_which_it_is_not_known_are_counted() -> None:
     assert some.reason == "not known of 2 of 4 shots: all views are black"
     longer = break_up_of([*_reaches(5.0, open_from=0.0), Reach(reason="all views are black")])
     assert "leaves the field: longer than 5.00 mm; not known of 1 of 2 shots" in (longer.reason or "")
+
+
+def test_bodies_that_lie_apart_are_told_and_are_in_the_limits() -> None:
+    known = _reaches(4.0, 4.1, 4.2)
+    apart = break_up_of([*(replace(shot, apart_mm=(5.0, 9.0)) for shot in known[:2]), known[2]])
+    assert (apart.value_mm, apart.low_mm) == (break_up_of(known).value_mm, break_up_of(known).low_mm)
+    assert apart.high_mm == 9.0
+    assert "in 2 of 3 shots a large body, 5.00 to 9.00 mm from the nozzle" in (apart.reason or "")
+    assert break_up_of(known).reason is None
 
 
 def test_the_curve_falls_from_one_and_is_unknown_beyond_the_field() -> None:

@@ -60,11 +60,11 @@ def search() -> ObjectSearch:
     return plan_objects(study_cameras(SIZE_PX), GRID, NOZZLE)
 
 
-def _images(gap_px: float) -> list[Intensity]:
+def _images(gap_px: float, last_mm: float = 0.6) -> list[Intensity]:
     """A thread from the nozzle on, and another one below it, so many pixels away."""
     step_mm = 0.35 * DIAMETER_MM
     begins_mm = ENDS_MM + DIAMETER_MM + gap_px * GRID.pitch_mm
-    along_mm = np.concatenate([np.arange(ENDS_MM, -0.9, -step_mm), np.arange(begins_mm, 0.6, step_mm)])
+    along_mm = np.concatenate([np.arange(ENDS_MM, -0.9, -step_mm), np.arange(begins_mm, last_mm, step_mm)])
     places_mm = np.stack([0 * along_mm, along_mm, 0 * along_mm], axis=1)
     spray, rng = Spray.of_droplets(places_mm, np.full(len(along_mm), DIAMETER_MM)), np.random.default_rng(3)
     return [
@@ -109,3 +109,11 @@ def test_too_many_dark_voxels_leave_the_length_unknown_and_the_objects_told(
     found = measure_objects(images, search)
     assert found.reason is None
     assert found.reach.reason == f"more than {coarse} voxels are dark in all views"
+
+
+def test_a_long_body_that_lies_apart_is_told(search: ObjectSearch) -> None:
+    apart_mm = measure_objects(_images(8.0, last_mm=0.9), search).reach.apart_mm
+    assert apart_mm is not None
+    begins_mm = ENDS_MM + 0.5 * DIAMETER_MM + 8 * GRID.pitch_mm + 0.9
+    np.testing.assert_allclose(apart_mm, (begins_mm, 1.8 + 0.5 * DIAMETER_MM), atol=0.05)
+    assert measure_objects(_images(8.0, last_mm=0.3), search).reach.apart_mm is None
