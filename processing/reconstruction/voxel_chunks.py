@@ -20,7 +20,7 @@ from processing.kernels import _native
 PLANES_AT_ONCE = 32
 """One thread turns so many planes into chunks at a time."""
 _LEVEL = 1
-_LONGER = 1.25
+_LONGER = 1.35
 """Chunks of which only zeros are taken out may have so many times the bytes of those that are deflated."""
 Pack = Callable[[NDArray[Any]], bytes]
 
