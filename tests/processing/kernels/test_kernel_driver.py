@@ -19,7 +19,17 @@ SANITIZERS = ["-O0", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"
 MEMORY = ["-O0", "-fsanitize=address"]
 """For vectors: what is undefined but a step beyond memory is in what all share, and in the numbers of ``plain``."""
 DEADLINE_S = 200.0
-CASES = {"sight": 21, "smart": 14, "resample": 30, "prepare": 30, "blobs": 10, "stamps": 20, "discs": 10, "runs": 20}
+CASES = {
+    "sight": 21,
+    "smart": 14,
+    "resample": 30,
+    "prepare": 30,
+    "blobs": 10,
+    "stamps": 20,
+    "discs": 10,
+    "runs": 20,
+    "maxima": 20,
+}
 Results = dict[tuple[str, int], tuple[float, float]]
 
 

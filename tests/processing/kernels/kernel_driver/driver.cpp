@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "host/blobs.hpp"
+#include "host/block_maxima.hpp"
 #include "host/coverage.hpp"
 #include "host/instruction_set.hpp"
 #include "host/line_of_sight.hpp"
@@ -369,6 +370,20 @@ void pack(int number) {
     std::printf("runs %d %.6f %.6f\n", number, static_cast<double>(bytes), sum);
 }
 
+void highest(int number) {
+    Random random(static_cast<uint32_t>(number) * 2654435769u + 17);
+    const int factor = 1 + random.below(7), first_row = random.below(20);
+    const Shape shape{1 + random.below(20), 1 + random.below(20), 1 + random.below(100)};
+    const auto blocks = [&](int voxels) { return (voxels + factor - 1) / factor; };
+    const int rows = blocks(first_row + shape.ny), columns = blocks(shape.nx);
+    std::vector<float> slab, maxima(static_cast<size_t>(blocks(shape.nz)) * rows * columns);
+    const auto voxels = static_cast<size_t>(shape.nz) * shape.ny * shape.nx;
+    while (slab.size() < voxels) slab.push_back(static_cast<float>(random.uniform(0, 1)));
+    add_block_maxima({slab.data(), shape, static_cast<int64_t>(shape.ny) * shape.nx, first_row, factor, maxima.data(), rows,
+                      columns, Format::single}, 1 + number % 3);
+    std::printf("maxima %d %.6f %.6f\n", number, sum_of(maxima.data(), maxima.size()), sum_of(slab.data(), slab.size()));
+}
+
 }  // namespace
 
 int main() {
@@ -381,4 +396,5 @@ int main() {
     for (int number = 0; number < 20; ++number) stamp(number);
     for (int number = 0; number < 10; ++number) fit_discs(kernels, number);
     for (int number = 0; number < 20; ++number) pack(number);
+    for (int number = 0; number < 20; ++number) highest(number);
 }
