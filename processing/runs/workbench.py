@@ -1,12 +1,14 @@
 """Workbench: what the shots of a run share, so that each finds plan, references and memory ready."""
 
 from collections.abc import Callable, Hashable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from threading import Lock
 from typing import Any, Generic, TypeVar
 
 from daq.files.run_directory import RunReader
 from daq.files.run_file import RUN_FILE
+from processing.kernels import DEFAULT_THREADS
 from processing.preprocessing import Intensity
 from processing.reconstruction.reconstructor import Reconstructor
 
@@ -17,9 +19,11 @@ Made = TypeVar("Made")
 def read_references(run: RunReader) -> References:
     """Dark and background (exposures, rows, columns) of every view, None where there is none.
 
-    To unpack them takes longer than to reconstruct a shot.
+    To unpack them takes longer than to reconstruct a shot, and nothing else can begin: several views at once.
     """
-    return {view: (run.dark(view), run.background(view)) for view in run.header.views}
+    views = list(run.header.views)
+    with ThreadPoolExecutor(DEFAULT_THREADS, "references") as pool:
+        return dict(zip(views, pool.map(lambda view: (run.dark(view), run.background(view)), views), strict=True))
 
 
 class Latest(Generic[Made]):
