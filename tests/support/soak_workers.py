@@ -1,5 +1,6 @@
 """Two workers in two networks, one processor each, do full frames: ``make soak PART=workers TIMES=shots``.
 
+A few sprays are in all shots, beside another one each time: to draw them all takes longer than to reconstruct them.
 Prints how busy the processors were with shots, how much quicker two are than one, and whether all volumes are those
 that two processes make by themselves, bit by bit.
 """
@@ -12,7 +13,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -33,6 +34,7 @@ from server.lab.tasks import reconstruct
 from tests.support.cluster import Cluster, FarNetwork, cluster, far_network, write_certificates
 
 WORKERS = 2
+SPRAYS = 6
 LIMIT_S = 1800
 
 
@@ -63,12 +65,12 @@ class Done:
         return self.task_cpu_s / self.wall_s
 
 
-def measure(folder: Path, study: SpeedStudy, shots: int) -> tuple[list[Done], bool]:
+def measure(folder: Path, study: SpeedStudy, shots: int, tell: Callable[[Done], None]) -> tuple[list[Done], bool]:
     """One worker, then two, then two processes that nobody gives work to; and whether all wrote the same.
 
-    The last ones tell what a machine with other work on it has left.
+    The last ones tell what a machine with other work on it has left. Each is told as soon as it is done.
     """
-    run = record_run(folder, study, shots)
+    run = record_run(folder, study, shots, SPRAYS)
     certificates = write_certificates(folder / "ca")
     done = []
     with ExitStack() as stack:
@@ -78,7 +80,9 @@ def measure(folder: Path, study: SpeedStudy, shots: int) -> tuple[list[Done], bo
             _start(lab, number, network)
             _warm_up(lab, run, folder / "warm-up", number)
             done.append(_do(lab, run, folder / f"by-{number}", number))
+            tell(done[-1])
     done.append(_by_hand(run, folder / "by-hand"))
+    tell(done[-1])
     same = all(_same(folder / "by-hand", folder / f"by-{number}") for number in range(1, WORKERS + 1))
     return done, same
 
@@ -180,6 +184,10 @@ def summary(done: Sequence[Done], shots: int, same: bool) -> str:
     return f"{table(heads, rows)}\nvolumes are {'' if same else 'NOT '}the same bit by bit; {machine}"
 
 
+def _tell(done: Done) -> None:
+    sys.stderr.write(f"{done.by}: {done.wall_s:.1f} s, {done.busy:.2f} processors busy, load {done.load:.1f}\n")
+
+
 def main() -> int:
     """Print the table for so many double exposures."""
     if len(sys.argv) == 4:
@@ -188,7 +196,7 @@ def main() -> int:
     shots = int(sys.argv[1]) if len(sys.argv) > 1 else 16
     commit = subprocess.run(["git", "describe", "--always", "--dirty"], capture_output=True, text=True, check=False)
     with tempfile.TemporaryDirectory() as folder:
-        done, same = measure(Path(folder), SpeedStudy(), shots)
+        done, same = measure(Path(folder), SpeedStudy(), shots, _tell)
     sys.stdout.write(f"{summary(done, shots, same)}\ncommit {commit.stdout.strip()}\n")
     return int(not same)
 

@@ -8,8 +8,10 @@ import pytest
 
 from daq.errors import DeviceError
 from daq.faults import FaultKind
-from daq.files.run_directory import DoubleFrame, ExposureRecord, FiredTrain, ImageKey, Shot
+from daq.files.run_directory import DoubleFrame, ExposureRecord, FiredTrain, ImageKey, RunReader, Shot
+from processing.benchmarks.scene import SpeedStudy
 from processing.synthetic.numbered import ImageNumber, numbered
+from server.cli.benchmarks.recorded_run import record_run
 from tests.support import soak_cluster, soak_faults, soak_light, soak_long, soak_workers
 from tests.support.simulated_serving import serving_bench, tiny_config
 from tests.support.soak_kill import Killed, kill_servers, mispaired_exposures, summary
@@ -171,6 +173,16 @@ def test_the_table_of_a_cluster_counts_lost_shots() -> None:
     assert rows[0].split() == ["(none)", "2", "32", "3", "1", "4.0"]
     assert rows[1].split()[-5:] == ["1", "16", "0", "1", "2.0"]
     assert origin.endswith("load 0.5 to 1.5")
+
+
+def test_few_sprays_are_recorded_in_ever_new_pairs(tmp_path: Path) -> None:
+    study = SpeedStudy(shape=(9, 18, 18), image_size_px=(64, 48), droplets=20)
+    run = RunReader(record_run(tmp_path, study, 6, sprays=3).run_dir)
+    shots = [run.read_shot(index).views["view1"] for index in range(6)]
+    pairs = {(shot.frame_a.tobytes(), shot.frame_b.tobytes()) for shot in shots if shot.frame_b is not None}
+    assert len(pairs) == 6
+    assert len({image for pair in pairs for image in pair}) == 3
+    assert all(first != second for first, second in pairs)
 
 
 def test_the_table_of_workers_tells_how_busy_they_were() -> None:

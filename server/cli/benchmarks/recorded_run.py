@@ -1,6 +1,7 @@
 """A run on disk as four cameras record it, and its calibration: what chains are measured with."""
 
 from dataclasses import dataclass
+from functools import lru_cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -35,8 +36,8 @@ class RecordedRun:
         return f"--grid={','.join(spans)}@{grid.pitch_mm}"
 
 
-def record_run(folder: Path, study: SpeedStudy, shots: int) -> RecordedRun:
-    """Write droplets of the speed study, another spray in every exposure."""
+def record_run(folder: Path, study: SpeedStudy, shots: int, sprays: int | None = None) -> RecordedRun:
+    """Write droplets of the speed study: another spray in every exposure, or so many in ever new pairs."""
     cameras = study_cameras(study.image_size_px)
     names = [f"view{number}" for number in range(1, len(cameras) + 1)]
     header = RunHeader(
@@ -45,9 +46,10 @@ def record_run(folder: Path, study: SpeedStudy, shots: int) -> RecordedRun:
         views={name: ViewFormat(study.image_size_px[::-1], BITS) for name in names},
         separation_ns=6400,
     )
+    exposure = lru_cache(sprays or 0)(partial(_exposure, study, cameras))
     with RunWriter(folder / "run", header) as writer:
         for index in range(shots):
-            exposures = [_exposure(study, cameras, seed) for seed in (2 * index, 2 * index + 1)]
+            exposures = [exposure(seed) for seed in _seeds(index, sprays)]
             if index == 0:
                 _write_references(writer, names, exposures[0])
             pairs = zip(names, *exposures, strict=True)
@@ -58,6 +60,14 @@ def record_run(folder: Path, study: SpeedStudy, shots: int) -> RecordedRun:
     save_calibration(droplet_calibration(cameras, half_mm), folder / "calibration.json")
     settings = ReconstructionSettings(grid=GridSettings.of(study.grid))
     return RecordedRun(folder / "run", folder / "calibration.json", shots, settings)
+
+
+def _seeds(index: int, sprays: int | None) -> tuple[int, int]:
+    """Sprays of the two exposures of a shot; no pair comes twice before all have come."""
+    if sprays is None:
+        return 2 * index, 2 * index + 1
+    first, apart = index % sprays, 1 + index // sprays % (sprays - 1)
+    return first, (first + apart) % sprays
 
 
 def _exposure(study: SpeedStudy, cameras: list[PinholeCamera], seed: int) -> list[RawExposure]:
