@@ -77,7 +77,11 @@ def _is_headless(path: Path) -> bool:
 
 
 def _set_run_aside(run_dir: Path) -> Iterator[str]:
-    yield f"it has no {RUN_FILE} and is no run, it is set aside as {set_aside(run_dir, run_dir.parent)}"
+    has_shots = any((run_dir / SHOTS_FOLDER).glob("*.h5"))
+    aside = set_aside(run_dir, run_dir.parent)
+    remedy = f"tomoshadow repair {aside} writes it anew from its shots"
+    why, more = (f"it has no {RUN_FILE}", f"; {remedy}") if has_shots else (f"it has no {RUN_FILE} and is no run", "")
+    yield f"{why}, it is set aside as {aside}{more}"
 
 
 def set_aside(path: Path, keeper: Path) -> Path:

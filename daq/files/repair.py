@@ -11,6 +11,7 @@ from daq.errors import ShotFileError
 from daq.files.atomic_file import RESERVE_SUFFIX
 from daq.files.header import RunClosing, RunHeader
 from daq.files.lock_file import hold_folder
+from daq.files.outcome_note import note_path, write_note
 from daq.files.recovery import INTERRUPTED, close_run, last_sign_of_life_utc, set_aside
 from daq.files.run_directory import RunReader
 from daq.files.run_file import RUN_FILE, SHOTS_FOLDER, add_closing, write_run_file
@@ -56,8 +57,11 @@ def _write_lost_header(run_dir: Path) -> Iterator[str]:
     for name in (RUN_FILE, RUN_FILE + RESERVE_SUFFIX):
         if (run_dir / name).exists():
             yield f"{name} is set aside as {set_aside(run_dir / name, run_dir)}"
+    closing = RunClosing(INTERRUPTED, _OUTCOME_LOST, lived_until_utc)
+    write_note(run_dir, closing)  # for the next repair, should this one be killed before the outcome is in the file
     write_run_file(run_dir, header)
-    add_closing(run_dir, RunClosing(INTERRUPTED, _OUTCOME_LOST, lived_until_utc))
+    add_closing(run_dir, closing)
+    note_path(run_dir).unlink(missing_ok=True)
     yield f"{RUN_FILE} is written anew from the shots; {LOST_WITH_HEADER}"
 
 

@@ -9,6 +9,7 @@ import pytest
 
 from daq.causes import CauseCode
 from daq.files.recovery import INTERRUPTED_CAUSE, recover
+from daq.files.repair import repair
 from daq.files.run_directory import RunReader, RunWriter
 from tests.daq.files.test_run_directory import header_of, shot_of
 
@@ -88,6 +89,15 @@ def test_a_directory_without_run_file_is_set_aside_and_named(tmp_path: Path) -> 
     assert (aside / "shots").is_dir()
     assert (tmp_path / "calibrations").is_dir()
     assert told(tmp_path) == []
+
+
+def test_a_directory_that_has_lost_its_run_file_says_how_to_get_it_back(killed: Path) -> None:
+    (killed / "run.h5").unlink()
+    aside = killed.parent / "set-aside" / RUN_ID
+    wanted = f"{RUN_ID}: it has no run.h5, it is set aside as {aside}; tomoshadow repair {aside} writes it anew"
+    assert told(killed.parent) == [f"{wanted} from its shots"]
+    list(repair(aside))
+    assert RunReader(aside).shot_count == 2
 
 
 def test_a_damaged_run_is_named_and_hides_no_other(killed: Path) -> None:

@@ -12,6 +12,7 @@ import h5py
 import numpy as np
 import pytest
 
+from daq.files import repair as repairing
 from daq.files.run_directory import RunReader, RunWriter
 from server.cli.main import main
 from tests.daq.files.test_run_directory import assert_same, header_of, shot_of
@@ -134,6 +135,25 @@ def test_a_run_without_its_shots_says_how_many_there_were(run_dir: Path, capsys:
     (flaw,) = found["flaws"]
     assert (flaw["kind"], flaw["file"]) == ("missing", "shots")
     assert "has no folder shots; 3 shots" in flaw["text"]
+
+
+def test_a_repair_that_is_killed_before_the_outcome_is_written_is_finished_by_the_next_one(
+    run_dir: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (run_dir / "run.h5").unlink()
+    with monkeypatch.context() as killed:
+        killed.setattr(repairing, "add_closing", die)
+        with pytest.raises(KeyboardInterrupt):
+            list(repairing.repair(run_dir))
+    assert RunReader(run_dir).outcome is None
+    list(repairing.repair(run_dir))
+    reader = RunReader(run_dir)
+    assert (reader.outcome, reader.cause) == ("interrupted", "its run.h5 was lost, and with it how the run ended")
+    assert [path.name for path in run_dir.parent.iterdir()] == [run_dir.name]
+
+
+def die(*_: object) -> None:
+    raise KeyboardInterrupt
 
 
 def test_a_lost_header_is_written_anew_from_the_shots_and_what_is_lost_is_named(
