@@ -68,13 +68,12 @@ class PulseLine:
 
     def open(self) -> Reply:
         """Take the port for this process alone, end whatever was going on, and return the generator's identity."""
-        self._received = b""
         with self._translated_errors():
             # Opening alone raises DTR and RTS, which pyserial skips on a pseudo-terminal; nothing here touches them.
             self._port = serial.Serial(
                 self._path, _BAUD, timeout=_SLICE_S, write_timeout=_WRITE_LIMIT_S, exclusive=True
             )
-        self._hung_up = False
+        self._hung_up, self._received = False, b""
         try:
             self._write(ABORT_BYTE + b"\n", Command.ID, OPENING_LIMIT_S)
             return self._open_session()
@@ -279,8 +278,9 @@ class PulseLine:
         except serial.SerialTimeoutException:
             raise
         except OSError as error:
-            self._hung_up = True
-            raise DeviceUnavailable(self._name, f"{self._path}: {error}") from error
+            self._hung_up = self._port is not None
+            what = " has hung up, as with its cable out" if self._hung_up else ""
+            raise DeviceUnavailable(self._name, f"{self._path}{what}: {error}") from error
 
     def _check_not_overtaken(self, command: Command, offs: int | None) -> None:
         if offs is not None and offs != self._offs:

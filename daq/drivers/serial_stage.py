@@ -221,7 +221,8 @@ class SerialStage:
         except (serial.SerialException, OSError, termios.error, TypeError) as error:
             # pyserial reads from None, a TypeError, when another thread closes the port.
             self._close()
-            raise DeviceUnavailable(self._name, f"port {self._port}: {error}") from error
+            reason = f"port {self._port} has hung up, as with its cable out: {error}"
+            raise DeviceUnavailable(self._name, reason) from error
 
     def _reply_to(self, command: Command, line: serial.Serial) -> Reply | None:
         deadline = time.monotonic() + self._reply_limit_s

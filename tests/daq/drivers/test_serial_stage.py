@@ -112,7 +112,7 @@ def test_a_pulled_cable_is_an_error_that_names_the_port(instrument: SimulatedSta
     with driver(instrument) as stage:
         port = instrument.port
         instrument.unplug()
-        with pytest.raises(DeviceUnavailable, match=port):
+        with pytest.raises(DeviceUnavailable, match=f"{port} has hung up, as with its cable out"):
             stage.position_mm()
 
 
