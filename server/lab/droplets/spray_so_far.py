@@ -1,5 +1,6 @@
 """What a run says of its spray so far, from those of its shots that are measured; while it is recorded, too."""
 
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Annotated
@@ -35,6 +36,28 @@ class SpraySoFar(FrozenModel):
     ] = ()
 
 
+@dataclass(frozen=True)
+class MeasuredSample:
+    """Shots of a result set that are measured: an even sample of them.
+
+    Parameters
+    ----------
+    results : str
+        The result set.
+    shots : tuple of int
+        The sample.
+    files : tuple of Path
+        Its droplets.
+    measured : int
+        Shots of the result set that are measured.
+    """
+
+    results: str
+    shots: tuple[int, ...]
+    files: tuple[Path, ...]
+    measured: int
+
+
 def spray_so_far(
     runs: RunStore, run_id: str, results: str | None = None, liquid_kg_m3: float | None = None
 ) -> SpraySoFar:
@@ -58,6 +81,31 @@ def spray_so_far(
     Damaged
         A file of droplets cannot be read.
     """
+    run_dir, sample = runs.directory(run_id), measured_sample(runs, run_id, results)
+    try:
+        later = len(RunReader(run_dir).notes_changes)
+        statistics, changes = _of(tuple((file, file.stat().st_mtime_ns) for file in sample.files), liquid_kg_m3, later)
+    except (DropletFileError, ShotFileError, OSError) as error:
+        raise Damaged(str(error)) from error
+    recorded = int(np.count_nonzero(runs.image_keys(run_id) == ImageKey.SAMPLE))
+    return SpraySoFar(
+        results=sample.results,
+        shots=sample.shots,
+        measured=sample.measured,
+        recorded=recorded,
+        statistics=statistics,
+        conditions_changed=changes,
+    )
+
+
+def measured_sample(runs: RunStore, run_id: str, results: str | None) -> MeasuredSample:
+    """Files of droplets of at most 50 shots of a result set; of the newest with droplets where it is not said.
+
+    Raises
+    ------
+    NotFound
+        There is no such run, or nothing of it is measured.
+    """
     run_dir = runs.directory(run_id)
     name = results or next((one.id for one in result_sets(run_dir) if one.droplets), None)
     measured = [one.shot for one in droplet_summaries(run_dir / "results" / name)] if name else []
@@ -65,21 +113,8 @@ def spray_so_far(
         raise NotFound(f"{run_id}: no droplets are measured{f' in {name}' if name else ''}: measure some of its shots")
     places = np.unique(np.linspace(0, len(measured) - 1, MOST_SHOTS).round().astype(int))
     shots = tuple(measured[place] for place in places)
-    files = [droplets_path(run_dir / "results" / name, shot) for shot in shots]
-    try:
-        later = len(RunReader(run_dir).notes_changes)
-        statistics, changes = _of(tuple((file, file.stat().st_mtime_ns) for file in files), liquid_kg_m3, later)
-    except (DropletFileError, ShotFileError, OSError) as error:
-        raise Damaged(str(error)) from error
-    recorded = int(np.count_nonzero(runs.image_keys(run_id) == ImageKey.SAMPLE))
-    return SpraySoFar(
-        results=name,
-        shots=shots,
-        measured=len(measured),
-        recorded=recorded,
-        statistics=statistics,
-        conditions_changed=changes,
-    )
+    files = tuple(droplets_path(run_dir / "results" / name, shot) for shot in shots)
+    return MeasuredSample(name, shots, files, len(measured))
 
 
 @lru_cache(maxsize=16)

@@ -6,8 +6,11 @@ import pytest
 
 from daq.run.events import RunStatus
 from daq.run.state import RunState
+from server.lab.droplets.proposed_separation import proposed_separation
 from server.lab.droplets.spray_so_far import MOST_SHOTS, spray_so_far
+from server.lab.errors import NotFound
 from server.lab.runs.run_store import RunStore
+from server.rig.config import load_config
 from tests.support.droplet_run import write_run
 from tests.support.sampled_sprays import cone_shots, write_results
 
@@ -29,3 +32,21 @@ def test_of_many_shots_an_even_sample_is_taken_and_told(tmp_path: Path) -> None:
     assert told.statistics.motion.volume_flux_mm_s
     flux = told.statistics.motion.volume_flux_mm_s.value
     assert told.statistics.motion.mass_flux_kg_m2_s.value == pytest.approx(flux)
+
+
+def test_a_separation_is_proposed_within_what_the_cameras_of_the_rig_accept(tmp_path: Path) -> None:
+    run_dir = write_run(tmp_path / "spray", shots=3)
+    runs = RunStore(tmp_path, lambda: RunStatus(state=RunState.IDLE))
+    config = load_config(Path("configs/simulated.toml"))
+    with pytest.raises(NotFound, match="measure some of its shots"):
+        proposed_separation(runs, config, "spray")
+    results_dir = write_results(run_dir / "results" / "droplets-1", cone_shots(0, 3, 40))
+    (results_dir / "settings.json").write_text("{}")
+    far, near = (proposed_separation(runs, config, "spray", voxels=voxels) for voxels in (5.0, 0.001))
+    assert (far.results, far.shots, far.window_reason) == ("droplets-1", (0, 1, 2), None)
+    assert far.proposal.separation_ns
+    assert far.proposal.wanted_ns
+    assert far.proposal.separation_ns == pytest.approx(far.proposal.wanted_ns.value, rel=0.01)
+    assert far.window_ns
+    assert near.proposal.separation_ns == far.window_ns[0]
+    assert "cameras accept" in str(near.proposal.reason)
