@@ -13,17 +13,9 @@ from server.demo.demo_droplets import COUNTED_UM, EXPOSURES, MeasuredDroplets
 from server.demo.demo_liquid import MeasuredLiquid
 from server.reports.digits import digits_of_interval, three_digits
 from server.reports.page import Table
-from server.reports.spray_tables import in_percent
+from server.reports.spray_tables import DENSITY, OF_DROPLETS, in_percent
 
-SIZES = {
-    "d10_um": "D10 [µm]",
-    "d30_um": "D30 [µm]",
-    "d32_um": "D32 [µm]",
-    "dv10_um": "Dv0.1 [µm]",
-    "dv50_um": "Dv0.5 [µm]",
-    "dv90_um": "Dv0.9 [µm]",
-    "relative_span": "relative span",
-}
+SIZES = ("d10_um", "d30_um", "d32_um", "dv10_um", "dv50_um", "dv90_um", "relative_span")
 NOT_TOLD = ["not told", ""]
 
 Row = list[str]
@@ -42,11 +34,11 @@ def answers_table(droplets: MeasuredDroplets, liquid: MeasuredLiquid, told: Spra
 
 def _of_sizes(droplets: MeasuredDroplets, told: SprayStatistics) -> Iterator[Row]:
     density = told.droplets.number_density_per_mm3
-    yield ["number density [1/mm³]", *_within(density), three_digits(droplets.true_density_per_mm3)]
+    yield [DENSITY, *_within(density), three_digits(droplets.true_density_per_mm3)]
     true = mean_diameters([droplets.true_um], EXPOSURES)
-    for name, label in SIZES.items():
+    for name in SIZES:
         truth: Estimate | None = getattr(true, name)
-        yield [label, *_within(getattr(told.droplets, name)), three_digits(truth.value) if truth else ""]
+        yield [OF_DROPLETS[name], *_within(getattr(told.droplets, name)), three_digits(truth.value) if truth else ""]
 
 
 def _of_motion(droplets: MeasuredDroplets) -> Iterator[Row]:

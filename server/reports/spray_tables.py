@@ -1,16 +1,40 @@
 """Tables of a spray: figures with their units and intervals, for reports and for the command line."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from processing.analysis.estimates import Estimate
 from processing.analysis.spray.patternation import Patternation
 from processing.analysis.spray.size_fits import SizeFit
-from processing.analysis.spray.spray_motion import SprayMotion
 from processing.analysis.spray.spray_statistics import SprayStatistics
 from server.reports.digits import digits_of_interval, three_digits
 from server.reports.page import Table
 
 Row = list[str]
+
+
+OF_DROPLETS = {
+    **{f"d{order}_um": f"D{order} [µm]" for order in (10, 20, 30, 32, 43)},
+    **{f"dv{percent}_um": f"Dv0.{percent // 10} [µm]" for percent in (10, 50, 90)},
+    "relative_span": "relative span",
+}
+OF_MOTION = {
+    "speed_m_s": "mean speed [m/s]",
+    "axial_m_s": "mean axial velocity [m/s]",
+    "volume_flux_mm_s": "volume flux [mm³/(mm² s)]",
+    "mass_flux_kg_m2_s": "mass flux [kg/(m² s)]",
+    "size_speed_correlation": "rank correlation, diameter and speed",
+    "flux_d10_um": "D10, flux-weighted [µm]",
+    "flux_d32_um": "D32, flux-weighted [µm]",
+    "flux_dv50_um": "Dv0.5, flux-weighted [µm]",
+}
+OF_EXTENT = {
+    "cone_angle_deg": "cone angle, 90 % of the liquid [°]",
+    "cone_angle_half_deg": "cone angle, 50 % of the liquid [°]",
+    "penetration_mm": "penetration, 99 % of the liquid [mm]",
+}
+DENSITY, LIQUID = "number density [1/mm³]", "liquid in droplets [ppm of volume]"
+LABELS = {"number_density_per_mm3": DENSITY, "liquid_ppm": LIQUID, **OF_DROPLETS, **OF_MOTION, **OF_EXTENT}
+"""Figures as people read them, by the names that programs do."""
 
 
 def figure_rows(told: SprayStatistics) -> list[Row]:
@@ -19,39 +43,24 @@ def figure_rows(told: SprayStatistics) -> list[Row]:
 
 
 def _figures(told: SprayStatistics) -> Iterator[tuple[str, Estimate | None]]:
-    droplets, motion, extent = told.droplets, told.motion, told.extent
-    yield "number density [1/mm³]", droplets.number_density_per_mm3
-    yield "liquid in droplets [ppm of volume]", told.liquid_ppm
-    for name in ("d10", "d20", "d30", "d32", "d43"):
-        yield f"{name.upper()} [µm]", getattr(droplets, f"{name}_um")
-    for percent in (10, 50, 90):
-        yield f"Dv0.{percent // 10} [µm]", getattr(droplets, f"dv{percent}_um")
-    yield "relative span", droplets.relative_span
+    droplets = told.droplets
+    yield DENSITY, droplets.number_density_per_mm3
+    yield LIQUID, told.liquid_ppm
+    yield from _of(droplets, OF_DROPLETS)
     yield "ghosts expected among them [%]", droplets.ghost_share and in_percent(droplets.ghost_share)
     yield "ghosts by droplets without partner [%]", told.unpaired_ghost_share and in_percent(told.unpaired_ghost_share)
-    if motion:
-        yield from _of_motion(motion)
-    if extent:
-        yield "cone angle, 90 % of the liquid [°]", extent.cone_angle_deg
-        yield "cone angle, 50 % of the liquid [°]", extent.cone_angle_half_deg
-        yield "penetration, 99 % of the liquid [mm]", extent.penetration_mm
+    yield from _of(told.motion, OF_MOTION)
+    yield from _of(told.extent, OF_EXTENT)
+
+
+def _of(part: object, labels: Mapping[str, str]) -> Iterator[tuple[str, Estimate | None]]:
+    return ((label, getattr(part, name)) for name, label in labels.items() if part)
 
 
 def in_percent(share: Estimate) -> Estimate:
     """A share of ghosts, with no more digits than it bears."""
     value, low, high = (round(100 * one, 2) for one in (share.value, share.low, share.high))
     return Estimate(value=value, low=low, high=high)
-
-
-def _of_motion(motion: SprayMotion) -> Iterator[tuple[str, Estimate | None]]:
-    yield "mean speed [m/s]", motion.speed_m_s
-    yield "mean axial velocity [m/s]", motion.axial_m_s
-    yield "volume flux [mm³/(mm² s)]", motion.volume_flux_mm_s
-    yield "mass flux [kg/(m² s)]", motion.mass_flux_kg_m2_s
-    yield "rank correlation, diameter and speed", motion.size_speed_correlation
-    yield "D10, flux-weighted [µm]", motion.flux_d10_um
-    yield "D32, flux-weighted [µm]", motion.flux_d32_um
-    yield "Dv0.5, flux-weighted [µm]", motion.flux_dv50_um
 
 
 def _cells(estimate: Estimate) -> Row:
@@ -67,17 +76,25 @@ def figures_table(told: SprayStatistics, more: Sequence[Row] = ()) -> Table:
 def doubts(told: SprayStatistics) -> list[str]:
     """What is doubtful, unsure or missing, and what to do."""
     said = [*told.doubts, *(told.sample.reasons if told.sample else ())]
-    said += [f"No {name}: {reason}" for name, reason in told.reasons.items()]
+    said += _grouped(told.reasons)
     if lacking := _lacking(told):
         said.append(f"No {', '.join(lacking)}: {told.droplets.reason}")
     if told.droplets.n and told.droplets.ghost_reason:
         said.append(f"No share of ghosts: {told.droplets.ghost_reason}")
-    if told.motion and told.motion.reason:
+    if told.motion and told.motion.reason and not any(told.motion.reason in one for one in said):
         said.append(told.motion.reason)
     if told.extent:
         reached = (("cone angle", told.extent.cone_reason), ("penetration", told.extent.penetration_reason))
         said += [f"No {name}: {why}" for name, why in reached if why]
     return [*said, *(f"No shares at {one.at_mm:.3g} mm: {one.reason}" for one in told.patternations if one.reason)]
+
+
+def _grouped(reasons: Mapping[str, str]) -> list[str]:
+    """What is missing for one reason, in one line."""
+    missing: dict[str, list[str]] = {}
+    for name, reason in reasons.items():
+        missing.setdefault(reason, []).append(name)
+    return [f"No {', '.join(names)}: {reason}" for reason, names in missing.items()]
 
 
 def _lacking(told: SprayStatistics) -> list[str]:

@@ -7,6 +7,7 @@ of D32, Dv0.5, span and flux of 3 to 40 shots hold the truth in 85 to 90 %, from
 to 83 % (``docs/measure.md``).
 """
 
+from math import ceil
 from typing import Annotated, Literal
 
 import numpy as np
@@ -101,7 +102,7 @@ def _reasons(sizes: SizeStatistics, share: float | None, half_width: float | Non
     elif half_width > LARGEST_HALF_WIDTH:
         more = f": about {needed} shots would do" if needed else ""
         reasons.append(
-            f"D32 is known to {100 * half_width:.0f} % ({100 * CONFIDENCE:g} % confidence), not to "
+            f"D32 is known to {ceil(1000 * half_width) / 10:g} % ({100 * CONFIDENCE:g} % confidence), not to "
             f"{100 * LARGEST_HALF_WIDTH:g} %{more}"
         )
     return reasons

@@ -72,10 +72,12 @@ def _text(spray: "MeasuredSpray", told: "SprayStatistics") -> str:
 
 
 def _differences(found: "tuple[Difference, ...]") -> str:
+    from server.reports.spray_tables import LABELS
+
     rows: list[list[Any]] = [
         [
             f"{one.second} / {one.first}",
-            one.figure,
+            LABELS[one.figure],
             f"{one.ratio.value:.3f} ({one.ratio.low:.3f} to {one.ratio.high:.3f})",
             f"{one.p_corrected:.2g}",
             "differs" if one.significant else "",

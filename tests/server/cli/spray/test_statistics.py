@@ -88,8 +88,14 @@ def test_a_comparison_finds_what_differs_and_says_what_was_measured_differently(
     differing = {(one["first"], one["second"]) for one in compared["differences"] if one["significant"]}
     assert differing == {("monday", "tuesday"), ("again", "tuesday")}
     text = shown(capsys, "statistics", results / "monday", results / "tuesday", "--compare")
-    assert "tuesday / monday" in text
-    assert "differs" in text
+    compared_by_name = [line for line in text.splitlines() if line.startswith("tuesday / monday")]
+    assert any("number density [1/mm³]" in line and "differs" in line for line in compared_by_name)
+
+
+def test_what_is_missing_for_one_reason_is_told_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    nowhere = write_results(tmp_path / "nowhere", cone_shots(0, 2, 60))
+    (line,) = [line for line in shown(capsys, "statistics", nowhere).splitlines() if "nozzle and axis" in line]
+    assert line.startswith("No extent, patternations: ")
 
 
 def test_what_does_not_belong_together_is_refused_with_the_difference(
