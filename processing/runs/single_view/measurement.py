@@ -36,6 +36,13 @@ Exposure = tuple[Grey, Grey | None]
 """An image less its dark image, and the light without droplets, if that is known."""
 
 
+Verdict = Literal["good", "doubtful", "empty", "refused"]
+WORST: tuple[Verdict, ...] = ("refused", "doubtful", "good", "empty")
+"""Of the exposures of a shot the first one of these is that of the shot."""
+LEAST_MEASURED = 0.5
+"""Of the droplets that are seen whole: of fewer, means are those of a choice that size and sharpness have made."""
+
+
 class FlatShot(FrozenValue):
     """What became of an image, or of the exposures of a shot."""
 
@@ -43,7 +50,7 @@ class FlatShot(FrozenValue):
     shot: int | None
     droplets: int
     left_out: Mapping[str, int]
-    verdict: Literal["good", "empty", "refused"]
+    verdict: Verdict
     reasons: tuple[str, ...]
     cpu_s: float
     file: str
@@ -238,8 +245,20 @@ def _told(found: FlatDroplets | BadInput) -> dict[str, Any]:
     unmeasured = {"residual_over_noise": None}
     if isinstance(found, BadInput):
         return {"verdict": "refused", "reasons": [str(found)], "droplets": 0, "left_out": {}, **unmeasured}
-    verdict = "good" if len(found) else "empty"
-    return {"verdict": verdict, "reasons": [], "droplets": len(found), "left_out": found.left_out, **unmeasured}
+    doubt = _doubt(found)
+    verdict = "empty" if not len(found) else "doubtful" if doubt else "good"
+    told = {"reasons": [doubt] if doubt else [], "droplets": len(found), "left_out": found.left_out}
+    return {"verdict": verdict, **told, **unmeasured}
+
+
+def _doubt(found: FlatDroplets) -> str | None:
+    """Why means are not those of the spray: most of what is seen whole was not measured."""
+    lacking = {reason: number for reason, number in found.left_out.items() if reason != "border"}
+    seen = len(found) + sum(lacking.values())
+    if len(found) >= LEAST_MEASURED * seen:
+        return None
+    why = ", ".join(f"{number} {reason.replace('_', ' ')}" for reason, number in lacking.items())
+    return f"{len(found)} of {seen} shadows are measured ({why}): means are of those, not of the spray"
 
 
 def _columns(found: Mapping[str, FlatDroplets | BadInput], um_per_px: float | None) -> dict[str, NDArray[np.generic]]:
@@ -271,7 +290,7 @@ def _summary(source: FlatSource, told: Mapping[str, Mapping[str, Any]], cpu_s: f
         shot=source.shot,
         droplets=sum(one["droplets"] for one in told.values()),
         left_out=left_out,
-        verdict="refused" if "refused" in verdicts else "good" if "good" in verdicts else "empty",
+        verdict=next(one for one in WORST if one in verdicts),
         reasons=tuple(dict.fromkeys(reason for one in told.values() for reason in one["reasons"])),
         cpu_s=cpu_s,
         file=path.name,

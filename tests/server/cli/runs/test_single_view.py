@@ -64,6 +64,17 @@ def test_means_say_that_small_droplets_are_not_in_them(tmp_path: Path, capsys: p
     assert "means are of" not in shown(capsys, "measure", image, "-o", tmp_path / "large")
 
 
+def test_an_image_of_which_most_is_not_measured_is_doubtful(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    image, small = tmp_path / "spray.png", [(40.0 + 30 * number, 100.0, 3.0) for number in range(3)]
+    cv2.imwrite(str(image), grey([(60.0, 50.0, 16.0), (120.0, 50.0, 16.0), *small], 0.5))
+    (shot,) = told(capsys, "measure", image, "-o", tmp_path / "out")["shots"]
+    assert (shot["verdict"], shot["droplets"], shot["left_out"]) == ("doubtful", 2, {"small": 3})
+    assert shot["reasons"] == ["2 of 5 shadows are measured (3 small): means are of those, not of the spray"]
+    cv2.imwrite(str(image), grey(small, 0.5))
+    (none,) = told(capsys, "measure", image, "-o", tmp_path / "none")["shots"]
+    assert (none["verdict"], none["reasons"][0][:32]) == ("empty", "0 of 3 shadows are measured (3 s")
+
+
 def test_droplets_of_images_are_no_spray(
     images: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
