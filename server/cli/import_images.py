@@ -6,6 +6,7 @@ from typing import Any
 
 from server.cli.options import Verbs, add_out, add_verb
 from server.cli.output import Bar, Outcome, progress
+from server.reports.digits import counted
 
 
 def add(verbs: Verbs) -> None:
@@ -37,5 +38,5 @@ def imported(result: dict[str, Any]) -> str:
     if result["calibration"]:
         lines.append(f"calibration set: {result['calibration']}, {result['planes']} planes")
     if result["run"]:
-        lines.append(f"run: {result['run']}, {result['shots']} shots")
+        lines.append(f"run: {result['run']}, {counted(result['shots'], 'shot')}")
     return "\n".join(lines)

@@ -4,6 +4,7 @@ from argparse import Namespace
 
 from server.cli.options import Verbs, add_out, add_verb, run_directory
 from server.cli.output import Outcome
+from server.reports.digits import counted
 
 
 def add(verbs: Verbs) -> None:
@@ -25,4 +26,4 @@ def pack(options: Namespace) -> Outcome:
         pack_run(options.run, out)
     size_bytes = options.out.stat().st_size
     result = {"run": str(options.run), "file": str(options.out), "shots": shots, "size_bytes": size_bytes}
-    return Outcome(result, f"{options.out}: {shots} shots, {size_bytes / 1e6:.1f} MB")
+    return Outcome(result, f"{options.out}: {counted(shots, 'shot')}, {size_bytes / 1e6:.1f} MB")

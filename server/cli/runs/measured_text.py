@@ -4,7 +4,7 @@ from typing import Any
 
 from server.cli.options import describe_grid
 from server.cli.output import table
-from server.reports.digits import digits_of_interval
+from server.reports.digits import counted, digits_of_interval
 
 
 def droplets_table(result: dict[str, Any]) -> str:
@@ -41,12 +41,12 @@ def droplets_summary(result: dict[str, Any]) -> str:
     grid = describe_grid(result["grid"]["shape"], result["grid"]["pitch_mm"])
     if not statistics["exposures"]:
         return f"no shot could be measured, {grid}"
-    counted = f"{statistics['n']} droplets in {statistics['exposures']} exposures"
+    seen = f"{counted(statistics['n'], 'droplet')} in {counted(statistics['exposures'], 'exposure')}"
     density = _with_interval(statistics["number_density_per_mm3"])
     d32_um, why = statistics["d32_um"], statistics["reason"]
     d32 = f"D32 {_with_interval(d32_um)} um" if d32_um else f"no D32: {why}"
     hidden = f", {100 * statistics['hidden_share']:.1f} % of the volume hidden" if statistics["hidden_share"] else ""
-    told = f"{counted}, {density} per mm3, {d32}{hidden}, {_mean_velocity(result['velocity'])}, {grid}"
+    told = f"{seen}, {density} per mm3, {d32}{hidden}, {_mean_velocity(result['velocity'])}, {grid}"
     return f"{told}{_ghosts(statistics)}{_liquid(result)}"
 
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from server.cli.options import Verbs, add_verb, positive
 from server.cli.output import Outcome
+from server.reports.digits import counted
 
 if TYPE_CHECKING:
     from processing.analysis.velocity.separation_proposal import SeparationProposal
@@ -44,7 +45,7 @@ def separation(options: Namespace) -> Outcome:
 def _summary(found: "SeparationProposal") -> str:
     if found.separation_ns is None:
         return f"no separation is proposed: {found.reason}"
-    by = f"by {found.pairs} pairs of {found.shots} shots"
+    by = f"by {counted(found.pairs, 'pair')} of {counted(found.shots, 'shot')}"
     wanted = "" if found.wanted_ns is None else " (without limits {low:.0f} to {high:.0f} ns)".format(**_limits(found))
     moves = f"the median droplet moves by {found.will_move_voxel:.1f} voxels, 95 % by less than {_fast(found)}"
     why = f"\n{found.reason}" if found.reason else ""

@@ -11,7 +11,7 @@ from server.cli.options import positive
 from server.cli.output import Outcome, progress, table, tracked
 from server.cli.runs.batch import over_runs
 from server.cli.runs.recipes import keeping_recipe, settings_of
-from server.reports.digits import digits_of_interval
+from server.reports.digits import counted, digits_of_interval
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -171,12 +171,12 @@ def _table(result: dict[str, Any]) -> str:
 def _summary(result: dict[str, Any]) -> str:
     unit = "px" if result["um_per_px"] is None else "um"
     statistics = result["statistics"]
-    counted = f"{statistics['n']} droplets in {len(result['shots'])} images"
+    seen = f"{counted(statistics['n'], 'droplet')} in {counted(len(result['shots']), 'image')}"
     d32 = statistics[f"d32_{unit}"]
     if d32 is None:
-        return f"{counted}: {statistics['reason']}"
+        return f"{seen}: {statistics['reason']}"
     value, low, high = digits_of_interval(d32["value"], d32["low"], d32["high"])
-    return f"{counted}, D32 {value} ({low} to {high}) {unit}{_unmeasured(result)}"
+    return f"{seen}, D32 {value} ({low} to {high}) {unit}{_unmeasured(result)}"
 
 
 def _unmeasured(result: dict[str, Any]) -> str:

@@ -167,7 +167,7 @@ def test_what_exists_is_replaced_only_when_asked(
     bright: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     arguments = command(bright, tmp_path / "out", "--shots", "0:1", run="single")
-    assert "droplets in 1 exposures" in shown(capsys, *arguments)
+    assert "in 1 exposure" in shown(capsys, *arguments)
     assert "exists; only --overwrite replaces it" in refused(capsys, *arguments)
     told(capsys, *command(bright, tmp_path / "out", "--shots", "1:2", run="single"))
     told(capsys, *arguments, "--overwrite")
