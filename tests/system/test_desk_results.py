@@ -309,9 +309,15 @@ def test_notes_are_changed_on_the_page_and_nobody_overwrites_what_another_wrote(
     page.get_by_role("button", name="Edit notes...").click()
     expect(page.get_by_role("textbox", name="Fluid")).to_have_value("oil")
     page.get_by_role("textbox", name="Fluid").fill("ethanol")
+    page.get_by_role("textbox", name="Orifice at").fill("0, -8.4")
+    page.get_by_role("button", name="Save notes").click()
+    expect(page.get_by_role("alert").filter(has_text="nozzle_mm")).to_be_visible()
+    page.get_by_role("textbox", name="Orifice at").fill("0, -8.4, 0")
     page.get_by_role("button", name="Save notes").click()
     expect(page.get_by_role("status", name="notes")).to_contain_text("ethanol · flow_l_min: 1.2 · changed by")
-    assert [change["notes"]["fluid"] for change in server.http.get(address).json()["changes"]] == ["oil", "ethanol"]
+    changes = server.http.get(address).json()["changes"]
+    assert [change["notes"]["fluid"] for change in changes] == ["oil", "ethanol"]
+    assert changes[-1]["spray"] == {"nozzle_mm": [0, -8.4, 0], "axis": [0, 1, 0]}
 
 
 def test_a_run_is_deleted_by_its_name_alone(page: Page, server: Serving) -> None:

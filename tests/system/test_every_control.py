@@ -166,6 +166,7 @@ TABLES: dict[str, tuple[Touch, ...]] = {
         press("Edit notes...", option("Save notes")),
         *fields("textbox", "Operator", "Fluid", "Nozzle", "Remark", text="x"),
         *fields("spinbutton", "Pressure / bar"),
+        *fields("textbox", "Orifice at x, y, z / mm", "Axis of the spray x, y, z", text="0, -8, 1"),
         press("Save notes", status("notes", "x · x · x · 2 bar · x · changed by")),
         press("Delete...", option("Keep it")),
         press("Keep it", status("shot shown")),

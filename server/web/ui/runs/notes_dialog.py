@@ -1,4 +1,4 @@
-"""NotesDialog: the notes of a run are changed by whoever looks at its page."""
+"""NotesDialog: notes of a run, nozzle and axis are changed by whoever looks at its page."""
 
 import asyncio
 from collections.abc import Awaitable, Callable
@@ -7,17 +7,19 @@ from typing import Any
 from nicegui import ui
 
 from daq.errors import DaqError
-from daq.run_notes import RunNotes
+from daq.files.run_directory import RunConditions
+from daq.run_notes import RunNotes, Spray
 from server.lab.errors import ServerError
 from server.lab.runs.notes_change import NewNotes, change_notes
 from server.lab.runs.run_summary import ACTIVE, RunSummary
 from server.lab.services import Context
 from server.lab.starting.command import command
-from server.web.ui.draft import NOTES_FIELDS, problem_of
+from server.web.ui.draft import NOTES_FIELDS, positions, problem_of
 from server.web.ui.runs.run_rows import is_unreadable
 from server.web.ui.visiting import told, visitor
 
 _LINES = (("operator", "Operator"), ("fluid", "Fluid"), ("nozzle", "Nozzle"))
+_PLACES = (("nozzle_mm", "Orifice at x, y, z / mm"), ("axis", "Axis of the spray x, y, z"))
 _LOOK = "dense outlined hide-bottom-space autocomplete=off"
 
 
@@ -42,6 +44,7 @@ class NotesDialog:
             ui.label("Notes of this run").classes("text-base font-medium")
             ui.label("The run stays as it was recorded; what stood here before is kept with them.").classes("text-sm")
             self._fields: dict[str, ui.input | ui.number | ui.textarea] = dict(_built_fields())
+            self._places = {name: ui.input(label).props(_LOOK).classes("w-full") for name, label in _PLACES}
             self._refusal = ui.label("").classes("refusal").props("role=alert")
             with ui.row().classes("w-full justify-end"):
                 ui.button("Leave as they are", on_click=self._dialog.close).props("flat no-caps")
@@ -54,21 +57,27 @@ class NotesDialog:
     async def _open(self) -> None:
         try:
             run = await asyncio.to_thread(self._context.runs.summary, self._run_id)
+            spray = None if run.notes_flaw else (await asyncio.to_thread(self._conditions)).spray
         except ServerError as error:
             ui.notify(told(error), type="negative")
             return
         self._seen = run.notes
         for name, field in self._fields.items():
             field.set_value(getattr(run.notes, name))
+        for name, place in self._places.items():
+            place.set_value(", ".join(map(str, getattr(spray, name))) if spray else "")
         self._refusal.set_text(run.notes_flaw)
         self._dialog.open()
+
+    def _conditions(self) -> RunConditions:
+        return self._context.runs.reader(self._run_id).conditions
 
     async def _save(self) -> None:
         if not all([field.validate() for field in self._fields.values()]):
             return
         context, run_id, deed = self._context, self._run_id, f"changed the notes of run {self._run_id}"
         try:
-            new, who = NewNotes(notes=self._written(), seen=self._seen), visitor()
+            new, who = NewNotes(notes=self._written(), spray=self._spray(), seen=self._seen), visitor()
             await asyncio.to_thread(
                 command, context, who, deed, lambda: change_notes(context.runs, run_id, new, who.name)
             )
@@ -82,6 +91,11 @@ class NotesDialog:
         written = {name: field.value for name, field in self._fields.items()}
         said = {name: value for name, value in written.items() if value not in (None, "")}
         return RunNotes.model_validate(said | {"more": self._seen.more})
+
+    def _spray(self) -> Spray | None:
+        """As it is written; None where nothing is: it stays as it was."""
+        said = {name: positions(place.value) for name, place in self._places.items() if place.value}
+        return Spray.model_validate(said) if said else None
 
 
 def _built_fields() -> list[tuple[str, Any]]:
