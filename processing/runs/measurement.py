@@ -130,6 +130,8 @@ class RunMeasurement:
         Where the droplets come from, but for the shot.
     objects : RunObjects
         How liquid that is no droplet is looked for.
+    conditions : dict of str to str
+        What held of the run when the measurement was planned, whatever is mended meanwhile.
     """
 
     run: RunReader
@@ -139,6 +141,7 @@ class RunMeasurement:
     references: References
     provenance: Provenance
     objects: RunObjects
+    conditions: dict[str, str]
 
     @classmethod
     def of(
@@ -175,7 +178,7 @@ class RunMeasurement:
         require_fitting(settings.ignored, {view: calibration.views[view].mapping.image_size_px for view in views})
         provenance = provenance_of(run, calibration, calibration_file, settings, METHOD_VERSION)
         objects = RunObjects.of(run, calibration, references, grid, settings.nozzle, settings.ignored)
-        return cls(run, calibration, settings, search, references, provenance, objects)
+        return cls(run, calibration, settings, search, references, provenance, objects, conditions_of(run))
 
     def measure(
         self,
@@ -237,7 +240,7 @@ class RunMeasurement:
             "recipe_sha256": recipe_sha256("measure", METHOD_VERSION, self.settings),
             "exposures": json.dumps(told),
             "velocity": json.dumps(reason),
-            **conditions_of(self.run),
+            **self.conditions,
             **({"rate_hz": rate_hz} if (rate_hz := self.run.header.rate_hz) else {}),
         }
 
