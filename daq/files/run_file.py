@@ -226,8 +226,9 @@ def _write_text(entry: h5py.Group, name: str, text: str) -> None:
 
 def _read_text(entry: h5py.Group, name: str) -> str:
     """A text that is as it was written; in runs from before nothing tells."""
-    text: str = entry[name].asstr()[()]
-    check = entry[name].attrs.get("crc32")
+    written = entry[name]
+    text: str = written.asstr()[()]
+    check = written.attrs.get("crc32")
     if check is not None and int(check) != zlib.crc32(text.encode()):
         raise ShotFileError(f"{entry.file.filename}: its {name} is not what was written: copy it back from a backup")
     return text

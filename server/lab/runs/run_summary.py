@@ -11,6 +11,7 @@ from pydantic import ConfigDict, Field
 
 from daq.causes import CauseCode
 from daq.errors import ShotFileError
+from daq.files.header import RunClosing
 from daq.files.run_directory import RunReader
 from daq.files.run_file import read_shot_count
 from daq.frozen_model import FrozenModel
@@ -77,22 +78,23 @@ class RunSummary(FrozenModel):
 
 def summary_of(run: RunReader, image_keys: NDArray[np.int64]) -> RunSummary:
     """A run that is not active, with the ImageKey of every shot; ShotFileError if it cannot be read."""
-    plan, causes = run.header.plan, tuple(map(RunCause.model_validate, run.causes))
+    plan, closing = run.header.plan, run.closing or RunClosing(RunOutcome.INTERRUPTED, "", "")
+    causes = tuple(map(RunCause.model_validate, closing.causes))
     return RunSummary(
         run_id=run.run_dir.name,
         name=plan.name if plan else run.run_dir.name,
         kind=plan.kind if plan else None,
         created_utc=run.header.created_utc,
-        outcome=run.outcome or RunOutcome.INTERRUPTED,
-        cause=run.cause,
+        outcome=closing.outcome,
+        cause=closing.cause,
         causes=causes,
         remedy=causes[0].remedy if causes else "",
-        ended_utc=run.ended_utc,
+        ended_utc=closing.ended_utc,
         views=tuple(run.header.views),
         frames_per_shot=run.header.frames_per_shot,
         shots_planned=plan.total_shots if plan else None,
         shots_recorded=len(image_keys),
-        shots_unstored=run.unstored,
+        shots_unstored=closing.unstored,
         shots_valid=int(np.count_nonzero(image_keys != ImageKey.INVALID)),
         calibration=(plan.calibration if plan else None) or run.header.calibration_id,
         references=plan.references if plan else (),
