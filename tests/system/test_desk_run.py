@@ -183,10 +183,11 @@ def test_what_speaks_against_the_form_is_told_on_every_page_and_leads_to_it(tab:
     server.http.put("/api/rig/control", headers=ANN)
     expect(state).to_contain_text("NOT READY: ann@lab holds control")
     server.free_control()
-    state.get_by_role("link", name="to the form").click()
+    to_form = tab.get_by_role("link", name="to the form")
+    to_form.click()
     tab.get_by_label("Rate / Hz").fill("4")
     expect(state.locator(".rig-known")).to_have_text("READY")
-    expect(state.get_by_role("link")).to_be_hidden()
+    expect(to_form).to_be_hidden()
 
 
 def test_what_is_made_of_every_shot_is_what_the_page_shows(tab: Page, server: Serving) -> None:

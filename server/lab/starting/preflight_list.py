@@ -4,6 +4,7 @@ import shutil
 import time
 from collections.abc import Callable, Mapping, Sequence
 from enum import StrEnum
+from itertools import chain
 from typing import Annotated
 
 from pydantic import Field
@@ -38,6 +39,8 @@ CODES: Mapping[str, tuple[Code, ...]] = {
     "Recipe": (Code.RECIPE,),
 }
 """Every refusal has one place."""
+OF_THE_RIG = frozenset(chain.from_iterable(CODES[name] for name in ("Rig", "Interlock", "Pulse generator", "Cameras")))
+"""No form changes anything about these."""
 
 
 class CheckResult(StrEnum):

@@ -9,7 +9,7 @@ from server.lab.desk.reason import Reason
 from server.lab.desk.rig_state import RigState
 from server.lab.desk.visitor import Role, Visitor
 from server.lab.services import Context
-from server.lab.starting.preflight_list import Check, CheckResult, check_control, checks_of
+from server.lab.starting.preflight_list import OF_THE_RIG, Check, CheckResult, check_control, checks_of
 from server.lab.starting.readiness import reasons_against, reasons_against_visitor
 from server.web.ui.draft import DraftStore, plan_of
 
@@ -74,7 +74,9 @@ class FormJudge:
         rig, verdict = self._context.desk.state, self.verdict
         if verdict is None:
             return self._context.desk.state_for(rig.reasons or None)
-        found = verdict.reasons if self._basis == self._basis_now() else rig.reasons or verdict.reasons
+        found = verdict.reasons
+        if self._basis != self._basis_now():  # of the rig that is old
+            found = rig.reasons or tuple(reason for reason in found if reason.code not in OF_THE_RIG)
         of_who = reasons_against_visitor(self._context, who)
         is_viewer = who.role is Role.VIEWER  # he starts nothing anyway: what the rig lacks comes first
         return self._context.desk.state_for((*found, *of_who) if is_viewer else (*of_who, *found))

@@ -3,6 +3,7 @@
 from nicegui import ui
 
 from server.lab.services import Context
+from server.lab.starting.preflight_list import OF_THE_RIG
 from server.web.ui.bar.abort_button import AbortButton
 from server.web.ui.bar.alarm_strip import AlarmStrip
 from server.web.ui.bar.calibration_chip import CalibrationChip
@@ -39,7 +40,7 @@ class Header:
         """Show what has changed."""
         self._lamps.show(self._context.lamps)
         state = self._judge.state(visitor())
-        self._state.show(state, is_of_form=not set(state.reasons) <= set(self._context.desk.state.reasons))
+        self._state.show(state, is_of_form=any(reason.code not in OF_THE_RIG for reason in state.reasons))
         self._calibration.refresh()
         self._control.refresh()
         self._alarms.refresh()

@@ -24,8 +24,9 @@ class StateChip:
         with self._chip:
             self._text = ui.label("").classes("rig-known")
             ui.label("").classes("rig-unknown")
-            with ui.link(target="/run").classes("rig-form").props('aria-label="to the form"') as self._to_form:
-                ui.icon("edit_note", size="20px")
+        with ui.link(target="/run").classes("rig-form lockable").props('aria-label="to the form"') as self._to_form:
+            ui.icon("edit_note", size="24px")
+        self._to_form.set_visibility(False)
         with ui.button(icon="help_outline").props('flat round dense color=white aria-label="why this state"') as why:
             why.classes("lockable")
             with ui.menu().props('role=region aria-label="reasons against a start"'):
