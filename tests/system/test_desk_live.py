@@ -69,15 +69,17 @@ def test_an_empty_page_says_what_to_do_first(page: Page, server: Serving) -> Non
     picture(page, "live-empty")
 
 
-def test_the_rate_of_a_tile_is_that_of_its_run_and_not_of_the_pause_before_it(page: Page, server: Serving) -> None:
+def test_rate_and_focus_of_a_tile_are_those_of_its_run_and_begin_anew_with_it(page: Page, server: Serving) -> None:
     live = open_live(page, server)
     expect(page.get_by_role("status", name="rig state")).to_have_text("READY")
-    plan = plan_of(kind="dark", shots=4, rate_hz=2.0, pulse={"current_a": dict.fromkeys(VIEWS, 5)})
+    plan = plan_of(kind="background", shots=4, rate_hz=2.0, pulse={"current_a": dict.fromkeys(VIEWS, 5)})
     server.run_to_its_end(plan)
     expect(caption(live)).to_have_text(re.compile("^shot 3 "))
     threading.Event().wait(8.0)
     server.run_to_its_end(plan)
     expect(caption(live)).to_have_text(re.compile(r"^shot 3 · [0-2]\.\d s old .* [12]\.\d Hz$"))
+    trend = live.get_by_role("img", name="view1 focus trend").locator("path")
+    expect(trend).to_have_attribute("d", re.compile("^M[^L]*(L[^L]*){1,3}$"))  # of four shots at most
 
 
 def test_a_tile_tells_light_saturation_focus_and_rate(page: Page, server: Serving) -> None:

@@ -126,7 +126,7 @@ export default {
         const goesOn = told.shot > (tile.told?.shot ?? -1); // else it is of another run or live view
         tile.arrivals = [...(goesOn ? tile.arrivals : []), now].slice(-ARRIVALS);
         const focus = told.exposures[exposure]?.focus_percent;
-        if (focus != null) tile.trend = [...tile.trend, focus].slice(-TREND);
+        tile.trend = [...(goesOn ? tile.trend : []), ...(focus == null ? [] : [focus])].slice(-TREND);
       }
       Object.assign(tile, { told, seen: now, waiting: new Uint8Array(message, jpeg) });
       if (now - this.rendered > RENDER_MS) this.render();
