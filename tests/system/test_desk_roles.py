@@ -9,8 +9,9 @@ from playwright.sync_api import Browser, BrowserContext, Page, expect
 
 from server.web.app import create_app
 from tests.support.cut_link import cut_link
+from tests.support.desk import laboratory
 from tests.support.operator import VIEWS, go_to
-from tests.support.serving import Serving, serving
+from tests.support.serving import Serving, plan_of, serving
 
 OPERATOR = {"Authorization": "Bearer operate", "Tomoshadow-Operator": "ann@lab"}
 pytestmark = pytest.mark.timeout(900)
@@ -29,7 +30,7 @@ def sign_in(page: Page, server: Serving, name: str, token: str) -> None:
     page.get_by_label("Your name").fill(name)
     page.get_by_label("Token of an operator or a viewer").fill(token)
     page.get_by_role("button", name="Sign in").click()
-    expect(page.get_by_role("status", name="connection")).to_have_text("connected")
+    expect(page.get_by_role("status", name="connection", exact=True)).to_have_text("connected")
 
 
 def test_a_viewer_looks_and_aborts_and_signs_out(page: Page, server: Serving) -> None:
@@ -53,6 +54,46 @@ def test_a_viewer_sees_the_light_of_the_next_run_and_does_not_change_it(page: Pa
     page.context.request.post(f"{server.http.base_url}/sign-out", max_redirects=0)
 
 
+LOOKING = re.compile(
+    r"ABORT|why this state|jobs and events|dark or light|control: viewer|view\d .*|Cross-hair|Loupe 1:1|Download|slices"
+    r"|maxima|A|B|both|see the whole volume|Show|(Collapse|Expand) .*|(older|newer) runs"
+)
+ENABLED = re.compile(r'- \'?button "((?:[^"\\]|\\.)*)"(?!.*\[disabled\])')
+
+
+def test_a_viewer_finds_every_button_locked_that_does_more_than_look_and_is_told_why(
+    page: Page, server: Serving
+) -> None:
+    server.http.headers.update(OPERATOR)
+    (server.services.data_dir / "calibrations" / "paper.json").write_text('{"id": "paper"}')
+    server.http.put("/api/calibrations/current", json={"id": "paper"}).raise_for_status()
+    pulse = {"current_a": dict.fromkeys(VIEWS, 5)}
+    run_id, _ = server.run_to_its_end(plan_of(kind="calibration", shots=1, pulse=pulse))
+    run_id, _ = server.run_to_its_end(plan_of(shots=1, pulse=pulse))
+    server.free_control()
+    sign_in(page, server, "eve", "look")
+    laboratory(server).generator.trip("overcurrent")
+    for path, there in (
+        ("rig", "Examine"),
+        ("live", "Shoot one"),
+        ("calibrate", "Calibrate"),
+        ("run", "Acknowledge fault"),
+        (f"results/{run_id}", "Measure"),
+        (f"runs/{run_id}", "Delete..."),
+    ):
+        page.goto(f"{server.http.base_url}/{path}")
+        expect(page.get_by_role("button", name=there, exact=True).first).to_be_disabled()
+        expect(page.get_by_role("button", name=re.compile("^Acknowledge pulse generator"))).to_be_disabled()
+        expect(page.get_by_role("button", name="why this state")).to_be_enabled()
+        enabled = ENABLED.findall(page.locator("body").aria_snapshot())
+        assert "ABORT" in enabled
+        assert [name for name in enabled if not LOOKING.fullmatch(name)] == [], path
+        mute = page.locator("button:disabled:not([title], [title] *)")
+        assert mute.evaluate_all("found => found.map(one => one.innerText)") == [], path
+    laboratory(server).generator.clear()
+    page.context.request.post(f"{server.http.base_url}/sign-out", max_redirects=0)
+
+
 def test_a_session_that_is_ended_elsewhere_closes_its_page(page: Page, server: Serving) -> None:
     sign_in(page, server, "ann", "operate")
     expect(page.get_by_role("button", name="control: free")).to_be_visible()
@@ -70,7 +111,7 @@ def test_a_session_that_the_server_forgot_while_it_was_away_leads_to_signing_in(
         page.goto(f"http://127.0.0.1:{link.port}/sign-in")
         page.get_by_label("Token of an operator or a viewer").fill("look")
         page.get_by_role("button", name="Sign in").click()
-        expect(page.get_by_role("status", name="connection")).to_have_text("connected")
+        expect(page.get_by_role("status", name="connection", exact=True)).to_have_text("connected")
         link.cut()
         expect(page.get_by_role("status", name="rig state").locator(".rig-unknown")).to_be_visible()
         page.wait_for_function("!window.socket.active")

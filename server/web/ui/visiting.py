@@ -1,8 +1,10 @@
 """Who sits before the page, as the guard has found; asked anew for everything that is clicked."""
 
 from dataclasses import replace
+from typing import TypeVar
 
 from nicegui import ui
+from nicegui.elements.mixins.disableable_element import DisableableElement
 
 from server.lab.desk.control import REMEDIES
 from server.lab.desk.visitor import Role, Visitor
@@ -21,6 +23,24 @@ def visitor() -> Visitor:
     return _sessions().find(whoever.id) or replace(whoever, id="", role=Role.VIEWER)
 
 
+Control = TypeVar("Control", bound=DisableableElement)
+VIEWERS_MAY = "a viewer may look and end the light, and do nothing else"
+
+
+def is_viewer() -> bool:
+    """Whether who looks may do nothing else."""
+    return visitor().role is Role.VIEWER
+
+
+def for_operators(control: Control, may: bool = True) -> Control:
+    """Lock a control where it may not be used; a viewer never may, and is told why where he points at it."""
+    is_locked = is_viewer()
+    if is_locked and control.props.get("title") != VIEWERS_MAY:
+        control.props["title"] = VIEWERS_MAY
+    control.set_enabled(may and not is_locked)
+    return control
+
+
 def is_signed_in() -> bool:
     """Whether the session that opened this page goes on."""
     whoever: Visitor = ui.context.client.request.scope[VISITOR]
@@ -35,10 +55,9 @@ def rename(name: str) -> Visitor:
 
 def require_operator() -> Visitor:
     """Who has clicked, if he may do more than look; Forbidden otherwise."""
-    who = visitor()
-    if who.role is Role.VIEWER:
-        raise Forbidden("a viewer may look and end the light, and do nothing else", "viewer")
-    return who
+    if is_viewer():
+        raise Forbidden(VIEWERS_MAY, "viewer")
+    return visitor()
 
 
 def may_command(context: Context) -> bool:

@@ -11,7 +11,7 @@ from server.lab.errors import ServerError
 from server.lab.services import Context
 from server.lab.starting.alarms_now import acknowledge
 from server.lab.starting.command import tell_deed
-from server.web.ui.visiting import require_operator, told
+from server.web.ui.visiting import for_operators, require_operator, told
 
 
 class AlarmStrip:
@@ -46,6 +46,7 @@ class AlarmStrip:
                 button = ui.button("Acknowledge", on_click=partial(self._on_acknowledge, alarm.id), color=None)
                 button.props("dense flat no-caps").classes("alarm-button")
                 button.props["aria-label"] = f"Acknowledge {alarm.source}: {alarm.text}"
+                for_operators(button)
 
     async def _on_acknowledge(self, alarm_id: str) -> None:
         try:

@@ -9,14 +9,17 @@ from nicegui import ui
 from processing.calibration.verdict import Verdict
 from server.lab.calibration_story import CalibrationStory, story_of
 from server.lab.errors import ServerError
+from server.lab.jobs import JobKind
 from server.lab.services import Context
 from server.lab.starting.calibrating import use_calibration
-from server.web.ui.table import table_of
+from server.web.ui.calibrate.target_runs import UNDER_WAY
+from server.web.ui.table import SHOW, table_of
 from server.web.ui.theme import panel
 from server.web.ui.visiting import told, visitor
 
 COLOURS = {Verdict.GOOD: "positive", Verdict.USABLE: "positive", Verdict.WARN: "warning", Verdict.REFUSE: "negative"}
-_SHOW, _USE = "Show", "Use"
+_USE = "Use"
+_NOTHING = "No calibration yet: press Calibrate beside a run above."
 
 
 class CalibrationList:
@@ -36,7 +39,7 @@ class CalibrationList:
         """The one to look at first: the current one, or the newest."""
         with panel("Calibrations"):
             self._refusal = ui.label("").classes("refusal").props('role=alert aria-label="why it is not used"')
-            self._nothing = ui.label("No calibration yet: press Calibrate beside a run above.").classes("text-sm")
+            self._nothing = ui.label("").classes("text-sm").props('role=status aria-label="calibrations"')
             self._table = table_of(
                 ("name", "Calibration"),
                 ("made", "Made"),
@@ -49,9 +52,11 @@ class CalibrationList:
     async def reload(self) -> None:
         """Read the files again."""
         found = await asyncio.to_thread(self._stories)
+        jobs = await asyncio.to_thread(self._context.jobs.newest, None, UNDER_WAY, 1, [JobKind.CALIBRATION])
+        self._nothing.set_text(_being_made(jobs[0].run_id) if jobs else _NOTHING)
         self._table.rows = [_row(one) for one in found]
         self._table.set_visibility(bool(found))
-        self._nothing.set_visibility(not found)
+        self._nothing.set_visibility(bool(jobs) or not found)
         self._table.update()
         current = [one.id for one in found if one.current]
         self.proposed = next(iter([*current, *(one.id for one in found)]), None)
@@ -69,7 +74,7 @@ class CalibrationList:
     async def _on_act(self, event: Any) -> None:
         self._refusal.set_text("")
         calibration_id = event.args["id"]
-        if event.args["action"] == _SHOW:
+        if event.args["action"] == SHOW:
             await self._show(calibration_id)
             return
         try:
@@ -80,6 +85,10 @@ class CalibrationList:
             ui.notify(f"{calibration_id} is the current calibration", type="positive")
 
 
+def _being_made(run_id: str) -> str:
+    return f"A calibration is being made of {run_id}; it appears here, and is used once you press Use."
+
+
 def _row(story: CalibrationStory) -> dict[str, Any]:
     return {
         "id": story.id,
@@ -88,7 +97,7 @@ def _row(story: CalibrationStory) -> dict[str, Any]:
         "outcome": story.verdict or "not known",
         "colour": COLOURS.get(story.verdict, "blue-grey-7") if story.verdict else "blue-grey-7",
         "worst": _worst(story),
-        "actions": [_SHOW] if story.current else [_SHOW, _USE],
+        "actions": [SHOW] if story.current else [SHOW, _USE],
     }
 
 

@@ -26,7 +26,7 @@ _MODELS = {
     "auto": "auto: the one that predicts best",
 }
 _CALIBRATE = "Calibrate"
-_UNDER_WAY = (JobState.QUEUED, JobState.RUNNING)
+UNDER_WAY = (JobState.QUEUED, JobState.RUNNING)
 
 
 class TargetRuns:
@@ -66,7 +66,7 @@ def target_row(run: RunSummary, job: Job | None) -> dict[str, Any]:
     """One run; the state of its newest calibration, where there is one."""
     state = job.state if job else run.outcome
     valid = run.shots_valid if run.shots_valid is not None else "…" if run.outcome == ACTIVE else "?"
-    is_under_way = job is not None and job.state in _UNDER_WAY
+    is_under_way = job is not None and job.state in UNDER_WAY
     return {
         "id": run.run_id,
         "run": run.run_id,

@@ -11,7 +11,6 @@ from daq.errors import DaqError
 from daq.run.state import RunState
 from daq.run_plan import LivePlan
 from server.lab.desk.reason import refusal_text
-from server.lab.desk.visitor import Role
 from server.lab.errors import ServerError
 from server.lab.services import Context
 from server.lab.starting.command import tell_deed
@@ -22,7 +21,7 @@ from server.web.ui.bar.server_link import TICKET, light_request, shown_form
 from server.web.ui.draft import DraftStore, problem_of, pulse_of
 from server.web.ui.live.live_tiles import LiveTiles
 from server.web.ui.theme import panel
-from server.web.ui.visiting import may_command, visitor
+from server.web.ui.visiting import for_operators, may_command, visitor
 
 _FIELDS = LivePlan.model_fields
 _HINT = "No picture yet. Live shows the cameras and records nothing; Shoot one takes a single shot."
@@ -71,11 +70,11 @@ class LivePanel:
         status = self._acquisition.status()
         is_live = status.state is RunState.LIVE
         may_shoot = (status.resting or is_live) and may_command(self._context)
-        self._start.set_enabled(may_shoot)
+        for_operators(self._start, may_shoot)
         self._start.set_text("Apply" if is_live else "Live")
-        self._end.set_enabled(is_live and visitor().role is not Role.VIEWER)
-        self._shoot.set_enabled(may_shoot)
-        self._keep.set_visibility(bool(self._context.unkept_runs.ids) and status.resting)
+        for_operators(self._end, is_live)
+        for_operators(self._shoot, may_shoot)
+        for_operators(self._keep).set_visibility(bool(self._context.unkept_runs.ids) and status.resting)
 
     async def _on_end(self) -> None:
         async def end() -> None:

@@ -9,6 +9,7 @@ from server.lab.monitor import STALE_S
 from server.lab.services import Context
 from server.web.ui.asking import try_to
 from server.web.ui.bar.age import age_text
+from server.web.ui.visiting import for_operators
 
 _ICONS = {
     "camera": "videocam",
@@ -67,7 +68,7 @@ class DeviceView:
         self._remedy.set_text(f"Do: {card.remedy}" if card.remedy else "")
         for label in (self._who, self._detail, self._remedy):
             label.set_visibility(bool(label.text))
-        self._button.set_enabled(card.can_reconnect)
+        for_operators(self._button, card.can_reconnect)
         self._why.set_text(
             "Ask now, and open it again if it was lost; it is tried every second by itself"
             if card.can_reconnect

@@ -11,6 +11,7 @@ from server.lab.devices.rig_doctor import examine
 from server.lab.services import Context
 from server.web.ui.asking import try_to
 from server.web.ui.theme import panel
+from server.web.ui.visiting import for_operators
 
 _LAMPS = {Status.OK: "ok", Status.WARN: "warn", Status.FAIL: "fault"}
 
@@ -36,7 +37,7 @@ class DoctorPanel:
     def refresh(self) -> None:
         """Follow the state of acquisition."""
         resting = self._context.services.acquisition.status().resting
-        self._button.set_enabled(resting and not self._is_looking)
+        for_operators(self._button, resting and not self._is_looking)
         self._why.set_visibility(not resting)
 
     async def _on_click(self) -> None:

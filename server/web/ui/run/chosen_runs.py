@@ -14,6 +14,7 @@ from server.lab.runs.run_store import RunStore
 from server.lab.runs.run_summary import RunSummary
 from server.lab.services import Context
 from server.web.ui.draft import DraftStore
+from server.web.ui.visiting import for_operators
 
 _OFFERED = 30
 """Of each kind, the newest; what is chosen stands beside them, however old it is."""
@@ -54,7 +55,7 @@ class ChosenRuns:
     def allow(self, may_change: bool) -> None:
         """Nobody chooses while somebody else holds control."""
         for field in (self._references, self._calibration, self._newest):
-            field.set_enabled(may_change)
+            for_operators(field, may_change)
 
     async def reload(self) -> None:
         """Offer the runs and calibrations that exist now."""

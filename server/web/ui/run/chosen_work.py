@@ -8,6 +8,7 @@ from nicegui import ui
 from daq.run_plan import RunKind
 from processing.reconstruction.choices import ReconstructionMethod
 from server.web.ui.draft import NO_VOLUMES, DraftStore
+from server.web.ui.visiting import for_operators
 
 _VOLUMES = {NO_VOLUMES: "none"} | {one.value: f"by {one.value.upper()}" for one in ReconstructionMethod}
 
@@ -48,7 +49,7 @@ class ChosenWork:
     def allow(self, may_change: bool) -> None:
         """Nobody chooses while somebody else holds control."""
         for field in (self._volumes, self._droplets):
-            field.set_enabled(may_change)
+            for_operators(field, may_change)
 
     def show(self) -> None:
         """Show what is chosen, here or in another tab."""

@@ -18,6 +18,7 @@ from server.web.ui.draft import (
     problem_of_current,
     problem_of_positions,
 )
+from server.web.ui.visiting import for_operators
 
 _LOOK = "dense outlined hide-bottom-space"
 _NOTES = (("operator", "Operator"), ("fluid", "Fluid"), ("nozzle", "Nozzle"))
@@ -76,7 +77,7 @@ class FormFields:
     def allow(self, may_change: bool) -> None:
         """Nobody types while somebody else holds control."""
         for field in self._fields.values():
-            field.set_enabled(may_change)
+            for_operators(field, may_change)
 
     def are_good(self) -> bool:
         """Whether every value is within its limits; each field says what is wrong with it."""

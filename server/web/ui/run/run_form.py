@@ -23,7 +23,7 @@ from server.web.ui.run.form_fields import FormFields
 from server.web.ui.run.template_bar import TemplateBar
 from server.web.ui.run.templates import TemplateStore
 from server.web.ui.theme import panel
-from server.web.ui.visiting import may_command, told
+from server.web.ui.visiting import for_operators, may_command, told
 
 _TOLD_ELSEWHERE = {*PASSING, "form"}
 """They end by themselves, or the field itself says what is wrong with it."""
@@ -63,7 +63,7 @@ class RunForm:
         """Follow the state of acquisition, who holds control, what speaks against a start, and other tabs."""
         self._show_verdict()
         may_change = may_command(self._context)
-        self._start.set_enabled(may_change and not self._context.services.acquisition.status().active)
+        for_operators(self._start, may_change and not self._context.services.acquisition.status().active)
         self._templates.allow(may_change)
         self._fields.allow(may_change)
         self._chosen.allow(may_change)

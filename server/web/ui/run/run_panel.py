@@ -18,7 +18,7 @@ from server.lab.starting.command import tell_deed
 from server.web.api.at_once import at_once
 from server.web.ui.run.shot_strip import ShotStrip
 from server.web.ui.theme import panel
-from server.web.ui.visiting import require_operator, told
+from server.web.ui.visiting import for_operators, require_operator, told
 
 _LIVE = "live view"
 _NO_RUN = "no run since the server was started"
@@ -63,9 +63,9 @@ class RunPanel:
         self._outcome.set_text(status.outcome.value if status.outcome else "active" if status.active else "")
         self._outcome.props(f"color={outcome_colour(status.outcome)}")
         self._outcome.set_visibility(bool(self._outcome.text))
-        self._stop.set_enabled(status.active)
+        for_operators(self._stop, status.active)
         self._acknowledge.set_text(acknowledge_text(status))
-        self._acknowledge.set_visibility(waits_for_acknowledgement(status, self._monitor.lamps))
+        for_operators(self._acknowledge).set_visibility(waits_for_acknowledgement(status, self._monitor.lamps))
 
     async def _on_stop(self) -> None:
         await self._command(self._acquisition.stop, "stopped the run")

@@ -8,7 +8,7 @@ from server.lab.errors import ServerError
 from server.web.ui.draft import DraftStore
 from server.web.ui.run.templates import TemplateStore
 from server.web.ui.sure import is_sure
-from server.web.ui.visiting import require_operator, told
+from server.web.ui.visiting import for_operators, require_operator, told
 
 
 class TemplateBar:
@@ -41,8 +41,8 @@ class TemplateBar:
 
     def allow(self, may_change: bool) -> None:
         """Nobody fills the form while somebody else holds control."""
-        self._chosen.set_enabled(may_change)
-        self._keep.set_enabled(may_change)
+        for_operators(self._chosen, may_change)
+        for_operators(self._keep, may_change)
 
     def _add_menu(self) -> None:
         with ui.menu() as self._menu, ui.column().classes("q-pa-md gap-2").style("width:260px"):

@@ -22,6 +22,7 @@ from server.web.ui.runs.run_work import RunWork
 from server.web.ui.runs.runs_page import STYLE_SHEET
 from server.web.ui.runs.shot_view import ShotView
 from server.web.ui.theme import panel
+from server.web.ui.visiting import for_operators
 
 _EVENTS = 60
 
@@ -105,7 +106,8 @@ class OneRunPage:
             self._results = ui.link("Results", f"/results/{self._run_id}").classes("text-sm")
             self._edit = NotesDialog(self._context, self._run_id, self.reload)
             dialog = RemovalDialog(self._context, self._run_id)
-            ui.button("Delete...", icon="delete", on_click=dialog.open).props("flat dense no-caps color=negative")
+            delete = ui.button("Delete...", icon="delete", on_click=dialog.open)
+            for_operators(delete.props("flat dense no-caps color=negative"))
         self._cause = ui.label("").classes("text-sm whitespace-pre-line").props('role=status aria-label="cause"')
         self._notes = ui.label("").classes("text-sm opacity-80").props('role=status aria-label="notes"')
 

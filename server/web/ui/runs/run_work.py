@@ -15,6 +15,7 @@ from server.lab.runs.run_summary import ACTIVE, DAMAGED, PACKED, RunSummary
 from server.lab.services import Context
 from server.lab.work_progress import WorkProgress
 from server.web.ui.asking import queue
+from server.web.ui.visiting import for_operators
 
 _SHOWN = 4
 
@@ -31,11 +32,12 @@ class RunWork:
                 self._method = _choice("Method", {one.value: one.value.upper() for one in Method}, chosen.method)
                 self._accuracy = _choice("Accuracy", {one.value: one.value for one in Accuracy}, chosen.accuracy)
                 self._voxels = _choice("Voxels", {one.value: one.value for one in VoxelType}, chosen.voxels)
-                ui.button("Reconstruct", on_click=self._reconstruct).props("outline dense no-caps")
-                self._box = ui.input("Box / mm", placeholder="-5:5,-1:0,-5:5").props("dense outlined")
+                for_operators(ui.button("Reconstruct", on_click=self._reconstruct).props("outline dense no-caps"))
+                self._box = for_operators(ui.input("Box / mm", placeholder="-5:5,-1:0,-5:5").props("dense outlined"))
                 self._box.tooltip("X0:X1,Y0:Y1,Z0:Z1 of the droplets to measure; empty: all that the views see")
-                ui.button("Measure", on_click=self._measure).props("outline dense no-caps")
-            self._calibrate_button = ui.button("Calibrate", on_click=self._calibrate).props("outline dense no-caps")
+                for_operators(ui.button("Measure", on_click=self._measure).props("outline dense no-caps"))
+            self._calibrate_button = for_operators(ui.button("Calibrate", on_click=self._calibrate))
+            self._calibrate_button.props("outline dense no-caps")
         self._progress = ui.column().classes("w-full gap-1").props('role=status aria-label="work on this run"')
         self.show(None)
 
@@ -97,5 +99,5 @@ def progress_text(one: WorkProgress) -> str:
 
 
 def _choice(label: str, options: dict[str, str], value: str) -> ui.select:
-    select = ui.select(options, value=str(value)).classes("text-xs")
+    select = for_operators(ui.select(options, value=str(value)).classes("text-xs"))
     return select.props(f'dense borderless options-dense aria-label="{label}"')
