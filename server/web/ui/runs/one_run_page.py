@@ -10,6 +10,7 @@ from daq.errors import ShotFileError
 from daq.files.run_directory import RunHeader
 from daq.names import is_identifier
 from server.lab.errors import NotFound
+from server.lab.runs.notes_change import notes_history
 from server.lab.runs.run_store import has_results
 from server.lab.runs.run_summary import ACTIVE, RunSummary
 from server.lab.services import Context
@@ -17,7 +18,15 @@ from server.web.ui.drawer.event_log import line_of
 from server.web.ui.runs.notes_dialog import NotesDialog
 from server.web.ui.runs.removal_dialog import RemovalDialog
 from server.web.ui.runs.run_facts import Facts, plan_facts, provenance_facts
-from server.web.ui.runs.run_rows import changed_text, is_unreadable, local_time, notes_text, run_colour, shots_text
+from server.web.ui.runs.run_rows import (
+    changed_text,
+    earlier_text,
+    is_unreadable,
+    local_time,
+    notes_text,
+    run_colour,
+    shots_text,
+)
 from server.web.ui.runs.run_work import RunWork
 from server.web.ui.runs.runs_page import STYLE_SHEET
 from server.web.ui.runs.shot_view import ShotView
@@ -60,6 +69,7 @@ class OneRunPage:
         if not self._is_built:
             self._build(run, await asyncio.to_thread(self._header))
         self._tell(run)
+        self._earlier.set_text(await asyncio.to_thread(self._earlier_notes) if run.notes_changed_utc else "")
         self._work.show(run)
         self._results.set_visibility(await asyncio.to_thread(has_results, there))
         await self._work.reload()
@@ -71,6 +81,12 @@ class OneRunPage:
             return self._context.runs.reader(self._run_id).header
         except ShotFileError:
             return None
+
+    def _earlier_notes(self) -> str:
+        try:
+            return earlier_text(notes_history(self._context.runs, self._run_id).changes)
+        except (NotFound, ShotFileError) as error:
+            return str(error)
 
     def _tell_unknown(self, text: str) -> None:
         self._page.clear()
@@ -110,6 +126,8 @@ class OneRunPage:
             for_operators(delete.props("flat dense no-caps color=negative"))
         self._cause = ui.label("").classes("text-sm whitespace-pre-line").props('role=status aria-label="cause"')
         self._notes = ui.label("").classes("text-sm opacity-80").props('role=status aria-label="notes"')
+        self._earlier = ui.label("").classes("text-xs opacity-70 whitespace-pre-line")
+        self._earlier.props('role=status aria-label="what stood in them before"')
 
     def _tell(self, run: RunSummary) -> None:
         self._outcome.set_text(run.outcome)

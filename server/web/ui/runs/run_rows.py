@@ -1,11 +1,16 @@
 """What the list of runs says of a run. Pure."""
 
+from collections.abc import Sequence
 from datetime import datetime
 from typing import Any
 
+from daq.files.later_notes import NotesChange
 from daq.run.state import RunOutcome
+from daq.run_notes import RunNotes
 from server.lab.runs.run_summary import ACTIVE, DAMAGED, PACKED, RunSummary
 from server.web.ui.run.run_panel import outcome_colour
+
+_CHANGES = 10
 
 
 def run_row(run: RunSummary) -> dict[str, Any]:
@@ -55,7 +60,20 @@ def run_colour(run: RunSummary) -> str:
 
 def notes_text(run: RunSummary) -> str:
     """Its conditions in a line."""
-    notes = run.notes
+    return notes_line(run.notes)
+
+
+def earlier_text(changes: Sequence[NotesChange]) -> str:
+    """What stood in its notes before each change, the newest first."""
+    told = [
+        f"until {local_time(one.at_utc)}, when {one.who} changed it: {notes_line(one.before) or 'nothing'}"
+        for one in reversed(changes)
+    ]
+    return "\n".join([*told[:_CHANGES], *([f"and {len(told) - _CHANGES} before"] if len(told) > _CHANGES else [])])
+
+
+def notes_line(notes: RunNotes) -> str:
+    """Conditions in a line."""
     pressure = "" if notes.pressure_bar is None else f"{notes.pressure_bar:g} bar"
     more = [f"{name}: {value}" for name, value in notes.more.items()]
     return " · ".join(
