@@ -1,4 +1,4 @@
-"""Readings: HEAD for everything that can be read, and ETag for JSON and pictures. A pure ASGI layer.
+"""Readings: HEAD for everything that can be read, and ETag for JSON, pictures and surfaces. A pure ASGI layer.
 
 A script that asks again names the ETag it has, and gets 304 without a body where nothing has changed. HEAD is answered
 as GET: the server that speaks HTTP sends no body then.
@@ -11,11 +11,11 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 _ENDLESS = ("/api/events",)
 """No HEAD: nobody waits for their end."""
-_TAGGED = ("application/json", "image/jpeg", "image/png")
+_TAGGED = ("application/json", "image/jpeg", "image/png", "model/gltf-binary")
 
 
 class Readings:
-    """Answers HEAD below /api, and gives JSON and pictures an ETag.
+    """Answers HEAD below /api, and gives JSON, pictures and surfaces an ETag.
 
     Parameters
     ----------

@@ -165,6 +165,10 @@ def test_volumes_are_listed_sliced_projected_meshed_and_downloaded(server: Servi
             assert decode(server.http.get(picture).content).shape == (*shape, 3)
     assert server.http.get(f"{volume}/slices/z/40.png").status_code == 404
     mesh = server.http.get(f"{volume}/surface.glb", params={"level": 0.4}).content
+    for picture in (f"{volume}/slices/z/20.png", f"{volume}/surface.glb"):  # made again, it may look otherwise
+        shown = server.http.get(picture)
+        assert shown.headers["cache-control"] == "no-cache"
+        assert server.http.get(picture, headers={"If-None-Match": shown.headers["etag"]}).status_code == 304
     assert struct.unpack("<4sII", mesh[:12]) == (b"glTF", 2, len(mesh))
     assert server.http.get(f"{volume}/volume.vtkhdf").content == b"volume"
 

@@ -29,7 +29,6 @@ router = APIRouter(prefix="/api/runs/{run_id}/results", tags=["results"])
 Axis = Annotated[Literal["x", "y", "z"], Path(description="axis of the world across which the picture lies")]
 VolumeName = Annotated[str, Path(pattern=r"^shot_[0-9]{5,7}_[ab]$", description="for example shot_00012_a")]
 ColoursOf = Annotated[Colours, Query(description="heat; blue and red can be laid one upon the other")]
-_SHORTLY = {"Cache-Control": "private, max-age=60"}
 _PNG = {**responses(404, 500), 200: {"content": {"image/png": {}}}}
 
 
@@ -116,7 +115,7 @@ def show_surface(
 ) -> Response:
     """Iso-surface in mm; axes (x, -y, -z) of the world, so that viewers show the spray upright."""
     mesh = surface_of(volume_file(context.runs.directory(run_id), results_id, volume), round(level, 3))
-    return Response(mesh, media_type="model/gltf-binary", headers=_SHORTLY)
+    return Response(mesh, media_type="model/gltf-binary")
 
 
 def _volume(context: Context, run_id: str, results_id: str, volume: str) -> FilePath:
@@ -132,4 +131,4 @@ def _plane(preview: VolumePreview, axis: Axis, index: int) -> NDArray[np.uint8]:
 
 def _picture(plane: NDArray[np.uint8], axis: Axis, colours: Colours) -> Response:
     upright = plane.T if axis == "x" else plane
-    return Response(plane_png(upright, 255, colours), media_type="image/png", headers=_SHORTLY)
+    return Response(plane_png(upright, 255, colours), media_type="image/png")

@@ -22,7 +22,6 @@ router = APIRouter(prefix="/api/runs/{run_id}/results/{results_id}/{volume}", ta
 _NUMBER = r"-?[0-9]{1,6}(\.[0-9]{1,9})?"
 _RANGE = rf"^{_NUMBER}(:{_NUMBER})?$"
 _PROBLEMS = responses(404, 409, 500)
-_SHORTLY = {"Cache-Control": "private, max-age=60"}
 LineOfSight = Annotated[
     ReconstructionMethod | None,
     Query(description="by another line-of-sight method than the volume was made by; smart and mart have no parts"),
@@ -51,7 +50,7 @@ def show_full_slice(
     brightest = limit or (preview_of(file).limit if method is None else float(plane.max()))
     png = plane_png(plane.T if axis == "x" else plane, brightest, colours)
     name = _named(f"{run_id}_{results_id}_{volume}_{part.method.value}_{axis}_{at_mm:.3f}_mm.png")
-    return Response(png, media_type="image/png", headers={**_SHORTLY, **_place(part), **name})
+    return Response(png, media_type="image/png", headers={**_place(part), **name})
 
 
 @router.get(
