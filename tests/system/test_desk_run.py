@@ -172,6 +172,9 @@ def test_a_browser_names_page_rig_and_state_of_a_tab(tab: Page, server: Serving)
     expect(tab).to_have_title(f"READY · Calibrate · {rig}")
     laboratory(server).open_door()
     expect(tab).to_have_title(f"NOT READY · Calibrate · {rig}")
+    laboratory(server).cameras["view2"].is_lost = True
+    expect(tab).to_have_title(f"NOT READY, 1 alarm · Calibrate · {rig}")
+    laboratory(server).cameras["view2"].is_lost = False
 
 
 def test_what_speaks_against_the_form_is_told_on_every_page_and_leads_to_it(tab: Page, server: Serving) -> None:

@@ -23,6 +23,11 @@ class AlarmStrip:
         self._strip = ui.column().classes("alarm-strip lockable gap-0").props('role=region aria-label="alarms"')
         self._strip.set_visibility(False)
 
+    @property
+    def loud(self) -> int:
+        """How many nobody has acknowledged."""
+        return sum(not alarm.acknowledged for alarm in self._shown)
+
     def refresh(self) -> None:
         """Show what has changed."""
         alarms = tuple(sorted(self._context.desk.alarms, key=lambda alarm: (alarm.acknowledged, not alarm.severe)))

@@ -45,7 +45,7 @@ class Header:
         self._control.refresh()
         self._alarms.refresh()
         place = f"{self.page} · {self._context.services.config.name}"
-        self._link.show(self._context.beat.number, in_brief(state), place)
+        self._link.show(self._context.beat.number, in_brief(state, self._alarms.loud), place)
 
     def _add_name(self) -> None:
         config = self._context.services.config

@@ -54,6 +54,7 @@ class StateChip:
                     ui.label(f"Do: {reason.remedy}").classes("text-sm")
 
 
-def in_brief(state: RigState) -> str:
-    """The state without reason and remaining time, for the narrow tab of a browser."""
-    return state.text.partition(":" if state.state is RigWord.NOT_READY else ",")[0]
+def in_brief(state: RigState, alarms: int) -> str:
+    """The state without reason and remaining time, and how many alarms are loud, for the narrow tab of a browser."""
+    told = state.text.partition(":" if state.state is RigWord.NOT_READY else ",")[0]
+    return f"{told}, {alarms} alarm{'s' if alarms > 1 else ''}" if alarms else told
