@@ -356,3 +356,21 @@ def wishes_of(page: Page) -> list[str]:
 
     page.on("websocket", listen)
     return wishes
+
+
+def test_a_spray_is_recorded_and_seen_on_the_page_run(page: Page, server: Serving) -> None:
+    save_droplet_calibration(server.services.data_dir / "calibrations" / "paper.json")
+    server.http.put("/api/calibrations/current", json={"id": "paper"}).raise_for_status()
+    for kind in ("dark", "background"):
+        server.run_to_its_end(plan_of(kind=kind, name=kind, shots=1, pulse={"current_a": dict.fromkeys(VIEWS, 6)}))
+    page.set_viewport_size({"width": 1280, "height": 900})
+    page.goto(f"{server.http.base_url}/run")
+    for label, text in (("Shots", "400"), ("Rate / Hz", "4"), *((f"LED {view} / A", "6") for view in VIEWS)):
+        page.get_by_label(label, exact=True).fill(text)
+    page.get_by_label("Fluid").fill("water")
+    page.get_by_role("button", name="Start run").click()
+    expect(page.get_by_role("list", name="shots").get_by_role("listitem", name="shot 3: valid")).to_be_visible()
+    expect(page.get_by_role("group", name="newest shots").get_by_role("img").nth(1)).to_be_visible()
+    picture(page, "desk-run")
+    page.get_by_role("button", name="Stop").click()
+    expect(page.get_by_label("run outcome")).to_have_text("stopped")
