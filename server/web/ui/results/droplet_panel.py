@@ -59,14 +59,22 @@ class DropletPanel:
 
 def droplet_row(run: MeasuredRun) -> dict[str, str]:
     """Cells of a result set: each number with its interval, or why there is none."""
-    statistics = run.statistics
+    statistics, shots = run.statistics, told_shots([one.shot for one in run.shots])
     return {
-        "droplets": f"{statistics.n} in {statistics.exposures} exposures",
+        "droplets": f"{statistics.n} in {statistics.exposures} exposures of {shots}",
         "density": _told(statistics.number_density_per_mm3, statistics.number_density_reason),
         "d32": _told(statistics.d32_um, statistics.reason),
         "ghosts": _told(statistics.ghost_share, statistics.ghost_reason, _percent),
         "verdict": _verdicts(run),
     }
+
+
+def told_shots(shots: Sequence[int]) -> str:
+    """Which shots are measured, so that one of them can be chosen."""
+    if len(shots) == 1:
+        return f"shot {shots[0]}"
+    low, high = min(shots), max(shots)
+    return f"shots {low} to {high}" if high - low + 1 == len(shots) else f"{len(shots)} shots from {low} to {high}"
 
 
 def _told(estimate: Estimate | None, reason: str | None, written: Callable[[float], str] = "{:.3g}".format) -> str:

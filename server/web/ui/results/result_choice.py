@@ -93,7 +93,7 @@ class ResultChoice:
             self.run_id, self._results_id, self._shot = one.run_id, one.results_id, one.shot
 
     async def _offer(self, runs: list[RunSummary]) -> None:
-        problem = "" if self.run_id else NO_RESULTS
+        problem = "" if self.run_id else _no_results(self._context)
         try:
             self.sets = await asyncio.to_thread(sets_of, self._context, self.run_id) if self.run_id else []
             if self.run_id and not self.sets:
@@ -164,6 +164,13 @@ class ResultChoice:
     def _pick(self) -> None:
         """Whatever a hand has chosen stays."""
         self._newest.value = False
+
+
+def _no_results(context: Context) -> str:
+    status = context.services.acquisition.status()
+    if status.active and status.plan and status.plan.calibration and status.plan.recipes:
+        return f"Run {status.run_id} is being recorded: what is made of its shots appears here."
+    return NO_RESULTS
 
 
 def _run_label(run: RunSummary) -> str:

@@ -28,7 +28,7 @@ from server.lab.jobs import JobKind, JobState
 from server.lab.tasks import measure_shot
 from server.web.app import create_api
 from server.web.ui.drawer.job_panel import job_row
-from server.web.ui.results.droplet_panel import droplet_row
+from server.web.ui.results.droplet_panel import droplet_row, told_shots
 from tests.server.web.test_api import wait_for_jobs
 from tests.support.bright_scenes import GRID, MARGIN_VOXEL, write_bright_calibration, write_bright_run
 from tests.support.droplet_run import write_run
@@ -210,7 +210,8 @@ def test_droplets_that_are_not_those_that_were_measured_are_refused(
 def test_the_page_tells_numbers_with_intervals_and_reasons(measured: Serving) -> None:
     results_dir = next(measured.services.data_dir.glob("bright/results/droplets-*"))
     row = droplet_row(measured_run(results_dir))
-    assert row["droplets"].endswith("in 2 exposures")
+    assert row["droplets"].endswith("in 2 exposures of shots 0 to 1")
+    assert [told_shots(shots) for shots in ([0, 1, 2], [4, 0, 2])] == ["shots 0 to 2", "3 shots from 0 to 4"]
     assert re.fullmatch(r"2\d(\.\d)? \(2\d(\.\d)? to 3\d(\.\d)?\)", row["density"])
     assert row["d32"].startswith("bright particles have no diameter")
     assert re.fullmatch(r"0\.\d\d \(0\.00 to \d\.\d\d\)", row["ghosts"])
