@@ -18,6 +18,7 @@ from processing.analysis.droplets.droplet_file import FRAME, StoredDroplets, wri
 from processing.analysis.droplets.size_statistics import mean_diameters
 from processing.analysis.flat.darkness import LightError
 from processing.analysis.flat.flat_droplets import FlatDroplets, FlatSettings, measure_flat
+from processing.analysis.flat.repeated import Discs, counted_twice
 from processing.calibration.calibration_file import file_sha256
 from processing.errors import BadInput
 from processing.image_file import ImageFileError, read_image
@@ -212,6 +213,19 @@ def flat_statistics(shots: Sequence[StoredDroplets]) -> dict[str, Any]:
     sizes = mean_diameters(diameters, exposures_per_shot=sum(exposures) / max(len(exposures), 1))
     told = sizes.model_dump(mode="json")
     return {f"{name[:-3]}_{unit}" if name.endswith("_um") else name: value for name, value in told.items()}
+
+
+def droplets_twice(images: Mapping[str, StoredDroplets], um_per_px: float | None) -> tuple[str, ...]:
+    """What is counted more than once in images by name, in their order: other exposures, frames of a film, dust."""
+    return counted_twice({name: _discs(image, um_per_px) for name, image in images.items()})
+
+
+def _discs(image: StoredDroplets, um_per_px: float | None) -> Discs:
+    """Centres and diameters of the first exposure, in px."""
+    unit, scale = ("px", 1.0) if um_per_px is None else ("um", um_per_px)
+    first = image.columns[FRAME] == "a"
+    x, y, diameter = (image.columns[f"{name}_{unit}"][first] / scale for name in ("x", "y", "diameter"))
+    return np.column_stack([x, y]), np.asarray(diameter, np.float64)
 
 
 def _of_image(path: Path, background: Path | None) -> Mapping[str, Exposure]:

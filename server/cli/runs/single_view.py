@@ -132,7 +132,13 @@ def _measure_all(
     from processing.analysis.droplets.droplet_file import read_droplets
     from processing.analysis.exports.export import export_droplets
     from processing.runs.recipe import recipe_sha256
-    from processing.runs.single_view.measurement import COMMAND, METHOD_VERSION, flat_statistics, measure_source
+    from processing.runs.single_view.measurement import (
+        COMMAND,
+        METHOD_VERSION,
+        droplets_twice,
+        flat_statistics,
+        measure_source,
+    )
     from processing.runs.unchecked_images import told_unchecked, unchecked_images
 
     shots = []
@@ -142,13 +148,18 @@ def _measure_all(
             export_droplets(out / shots[-1].file, export)
         for reason in shots[-1].reasons:
             progress(f"{source.name}: {shots[-1].verdict}: {reason}")
+    stored = {shot.image or f"shot {shot.shot}": read_droplets(out / shot.file) for shot in shots}
+    doubts = droplets_twice(stored, options.um_per_px)
+    for doubt in doubts:
+        progress(doubt)
     return {
         "polarity": settings.polarity,
         "um_per_px": options.um_per_px,
         "recipe_sha256": recipe_sha256(COMMAND, METHOD_VERSION, settings),
         "shots": [shot.model_dump(mode="json") for shot in shots],
         "not_checked": told_unchecked(unchecked_images(settings.polarity, single=True), progress),
-        "statistics": flat_statistics([read_droplets(out / shot.file) for shot in shots]),
+        "statistics": flat_statistics(list(stored.values())),
+        "doubts": list(doubts),
         "passed": any(shot.verdict != "refused" for shot in shots),
     }
 
@@ -176,7 +187,11 @@ def _summary(result: dict[str, Any]) -> str:
     if d32 is None:
         return f"{seen}: {statistics['reason']}"
     value, low, high = digits_of_interval(d32["value"], d32["low"], d32["high"])
-    return f"{seen}, D32 {value} ({low} to {high}) {unit}{_unmeasured(result)}"
+    return f"{seen}, D32 {value} ({low} to {high}) {unit}{_unmeasured(result)}{_doubted(result)}"
+
+
+def _doubted(result: dict[str, Any]) -> str:
+    return "".join(f"\n{doubt}" for doubt in result["doubts"])
 
 
 def _unmeasured(result: dict[str, Any]) -> str:

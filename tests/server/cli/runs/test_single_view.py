@@ -40,6 +40,7 @@ def test_images_are_measured_in_pixels(images: list[Path], tmp_path: Path, capsy
         ("second", 1, "good"),
     ]
     assert result["shots"][1]["left_out"] == {"border": 1}
+    assert result["doubts"] == []
     stored = read_droplets(tmp_path / "out" / "first_droplets.h5")
     assert sorted(stored.columns["diameter_px"]) == pytest.approx([18, 25], rel=0.01)
     assert {name for name in stored.columns if name.endswith("_um")} == set()
@@ -52,6 +53,17 @@ def test_images_are_measured_in_pixels(images: list[Path], tmp_path: Path, capsy
     assert (statistics["n"], statistics["d32_px"], statistics["relative_span"]) == (3, None, None)
     text = shown(capsys, "measure", *images, "-o", tmp_path / "again")
     assert "3 droplets in 2 images: too few droplets: means need 5" in text
+
+
+def test_dust_that_counts_in_every_image_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """In real images of a spray half of what was measured as droplets was dust on a window."""
+    dust = [(30.0, 30.0, 6.0), (190.0, 40.0, 8.0), (110.0, 130.0, 7.0)]
+    for number, disc in enumerate([(60.0, 60.0, 18.0), (150.0, 90.0, 25.0)]):
+        cv2.imwrite(str(tmp_path / f"{number}.png"), grey([*dust, disc]))
+    arguments = ["measure", tmp_path / "0.png", tmp_path / "1.png", "--um-per-px", 5]
+    (doubt,) = told(capsys, *arguments, "-o", tmp_path / "out")["doubts"]
+    assert doubt.startswith("0 and 1: 3 droplets are in both, in the same place: is it dust on a window?")
+    assert doubt in shown(capsys, *arguments, "-o", tmp_path / "again")
 
 
 def test_means_say_that_small_droplets_are_not_in_them(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
