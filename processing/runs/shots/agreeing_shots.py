@@ -10,9 +10,9 @@ from processing.runs.shots.shot_check import (
     Exposure,
     ShotCheck,
     check_exposures,
-    depth_reversed,
     require_droplets,
 )
+from processing.runs.shots.turned_views import depth_reversed
 
 DEPTH_EXPOSURES = 6
 """Exposures by which it is asked whether depth is reversed."""
@@ -30,7 +30,7 @@ def corrected_by(by_shot: Mapping[int, Sequence[Exposure]], calibration: Calibra
     """
     exposures = [exposure for of_shot in by_shot.values() for exposure in of_shot]
     require_droplets(calibration, exposures)
-    if problem := depth_reversed(exposures[:DEPTH_EXPOSURES], calibration):
+    if problem := depth_reversed(calibration, exposures[:DEPTH_EXPOSURES]):
         raise CalibrationError(f"run {run}: {problem}. No view has moved: put images or calibration right")
     found = self_calibrate(calibration, exposures, run)
     _require_agreement(by_shot, found.calibration, run)

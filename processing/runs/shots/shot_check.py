@@ -15,7 +15,7 @@ from processing.calibration.errors import CalibrationError, OutOfRange
 from processing.calibration.fit.health import LIMITS_PX, judge
 from processing.calibration.verdict import Verdict
 from processing.geometry import FloatArray
-from processing.runs.shots.turned_views import turned
+from processing.runs.shots.turned_views import depth_reversed
 
 ALARM_PX, STOP_PX = LIMITS_PX[Verdict.USABLE], LIMITS_PX[Verdict.WARN]
 """Disparity of a view above which an operator should know, and above which volumes are not worth having."""
@@ -24,8 +24,6 @@ FEW_SEEDS = 300
 """Droplets of an exposure that are followed at first: a fifth of the work."""
 SURE = 2.0
 """Standard uncertainties."""
-NEARLY_PX = ALARM_PX / 4
-"""From which disparity on views are tried in other ways: with nothing to explain nothing is asked."""
 _EXPOSURES = "AB"
 
 Exposure = list[FloatArray]
@@ -109,18 +107,13 @@ def check_exposures(shot: int, exposures: Sequence[Exposure], calibration: Calib
     Droplets of all exposures tell together; where one exposure alone speaks against the calibration, that counts.
     """
     together = _checked(shot, exposures, calibration)
-    if problem := _reversed(together, exposures, calibration):
+    if len(calibration.views) >= MIN_VIEWS and (problem := depth_reversed(calibration, exposures)):
         return ShotCheck(shot, {}, problem, tuple(calibration.views))
     if len(exposures) == 1 or together.verdict is Verdict.REFUSE:
         return together
     alone = (_checked(shot, [one], calibration, STOP_PX) for one in exposures)
     named = (_in_exposure(name, check) for name, check in zip(_EXPOSURES, alone, strict=False))
     return next((check for check in named if check.beyond or check.verdict is Verdict.REFUSE), together)
-
-
-def depth_reversed(exposures: Sequence[Exposure], calibration: Calibration) -> str:
-    """What was mistaken for all views at once, so that near looks far; empty where droplets tell no such thing."""
-    return _reversed(_checked(0, exposures, calibration), exposures, calibration)
 
 
 def _checked(
@@ -131,24 +124,6 @@ def _checked(
         return _look(shot, exposures, calibration, limit_px)
     except CalibrationError as error:
         return _unmeasured(shot, exposures, calibration, error)
-
-
-def _reversed(check: ShotCheck, exposures: Sequence[Exposure], calibration: Calibration) -> str:
-    """What was mistaken for all views at once, by which they agree clearly worse than without; empty: nothing."""
-    if not check.views or check.certain_px <= NEARLY_PX:
-        return ""
-    found = {}
-    for what, seen in turned(calibration, exposures):
-        with suppress(CalibrationError):
-            other = _measured(check.shot, seen, calibration, FEW_SEEDS)
-            if other.worst_px < check.certain_px / 2:
-                found[what] = other.worst_px
-    if not found:
-        return ""
-    return (
-        f"droplets are seen {check.worst_px:.2g} px beside where the other views put them, and "
-        f"{min(found.values()):.2g} px if {', or '.join(found)}: depth is reversed"
-    )
 
 
 def _in_exposure(name: str, check: ShotCheck) -> ShotCheck:

@@ -1,7 +1,8 @@
-"""Views that agree nearly as they are, and fully if all of them are mirrored, or exchanged in pairs.
+"""Do views agree much better if all of them are mirrored, or exchanged in pairs? Then depth is reversed.
 
-Then depth is reversed: what is near looks far, and only perspective tells, by a few tenths of a pixel. A view that has
-moved by as much looks alike, so both are tried.
+What is near looks far then, and only perspective tells, by a few tenths of a pixel away from the middle: the mean
+disparity of a view hardly shows it. How many lines of sight meet closely does, and a view that has moved, turned or
+zoomed never makes more of them meet in a reversed world.
 """
 
 from collections.abc import Iterator, Sequence
@@ -10,9 +11,39 @@ from itertools import combinations
 import numpy as np
 
 from processing.calibration.calibration import Calibration
+from processing.calibration.droplets.disparity import measured_box
+from processing.calibration.droplets.droplet_matching import match_exposures
 from processing.geometry import FloatArray
 
+SEEDS = 300
+"""Droplets of an exposure that are followed."""
+CLOSE_PX = 0.25
+"""Root mean square, over views, of how far lines of sight may pass a droplet that they are said to meet at."""
+SURE = 5.0
+"""Standard deviations of the difference of two counts."""
+
 Exposures = Sequence[list[FloatArray]]
+
+
+def depth_reversed(calibration: Calibration, exposures: Exposures) -> str:
+    """What was mistaken for all views at once, so that near looks far; empty where droplets do not say so for sure."""
+    met = _met(calibration, exposures)
+    found = {what: _met(calibration, seen) for what, seen in turned(calibration, exposures)}
+    sure = {what: count for what, count in found.items() if count - met > SURE * np.sqrt(count + met)}
+    if not sure:
+        return ""
+    return (
+        f"all views agree on {met} droplets within {CLOSE_PX:g} px, and on {max(sure.values())} if "
+        f"{', or '.join(sure)}: depth is reversed"
+    )
+
+
+def _met(calibration: Calibration, exposures: Exposures) -> int:
+    """At how many droplets lines of sight of all views meet closely."""
+    mappings = [view.mapping for view in calibration.views.values()]
+    matches = match_exposures(mappings, exposures, measured_box(calibration), 2 * CLOSE_PX, SEEDS)
+    beside_px = np.sqrt((matches.disparities_px**2).sum(axis=2).mean(axis=1))
+    return int(np.count_nonzero(beside_px < CLOSE_PX))
 
 
 def turned(calibration: Calibration, exposures: Exposures) -> Iterator[tuple[str, Exposures]]:

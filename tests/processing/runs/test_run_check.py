@@ -10,6 +10,8 @@ from processing.calibration.verdict import Verdict
 from processing.geometry import FloatArray, PinholeCamera
 from processing.runs.shots.shot_check import ALARM_PX, FEW_SEEDS, ShotCheck, check_exposures
 from processing.studies.drifting_views import direction
+from processing.studies.seen_droplets import droplet_calibration
+from processing.studies.simulated_droplets import study_cameras
 from tests.support.drifting_views import SIZE_PX, calibration_of, droplet_shots, inside_mm, views
 
 pytestmark = pytest.mark.slow
@@ -96,6 +98,47 @@ def test_depth_that_is_reversed_is_named(turned: Callable[[list[FloatArray]], li
     check = check_exposures(0, [turned(list(seen)) for seen in droplet_shots(2, 7.0)], CALIBRATION)
     assert check.verdict is Verdict.REFUSE
     assert said in check.problem
+
+
+WIDE_PX, WIDE_MM = (800, 500), np.array([4.2, 1.7, 2.5])
+
+
+def wide(
+    change: Callable[[list[FloatArray]], list[FloatArray]], count: int, noise_px: float, seen_share: float, seed: int
+) -> ShotCheck:
+    """Droplets of a volume so wide that disparities of mirrored views cancel in its parts; some are not found."""
+    cameras, rng = study_cameras(WIDE_PX), np.random.default_rng(seed)
+    points_mm = rng.uniform(-WIDE_MM, WIDE_MM, (count, 3))
+    seen = []
+    for camera in cameras:
+        found = rng.random(count) < seen_share
+        noise = rng.normal(0, 1, (count, 2)) * rng.lognormal(0, 0.7, (count, 1))
+        seen.append((camera.project(points_mm) + noise_px * noise)[found])
+    return check_exposures(0, [change(seen)], droplet_calibration(cameras, WIDE_MM))
+
+
+def view2_turned(seen: list[FloatArray]) -> list[FloatArray]:
+    """By a tenth of a degree about its axis."""
+    angle, middle_px = np.deg2rad(0.1), (np.array(WIDE_PX) - 1) / 2
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    return [seen[0], (seen[1] - middle_px) @ turn + middle_px, *seen[2:]]
+
+
+def all_mirrored(seen: list[FloatArray]) -> list[FloatArray]:
+    return [np.column_stack([WIDE_PX[0] - 1 - one[:, 0], one[:, 1]]) for one in seen]
+
+
+def test_a_view_that_was_turned_is_no_reversed_depth() -> None:
+    check = wide(view2_turned, 900, 0.15, 1.0, 5)
+    assert "depth is reversed" not in check.problem
+    assert check.views["view2"].disparity_px == pytest.approx(0.23, abs=0.1)
+
+
+def test_depth_that_is_reversed_shows_where_disparities_cancel() -> None:
+    check = wide(all_mirrored, 400, 0.08, 0.75, 2)
+    assert check.verdict is Verdict.REFUSE
+    assert "if all images are mirrored left to right" in check.problem
+    assert not wide(lambda seen: seen, 400, 0.08, 0.75, 2).beyond
 
 
 def test_two_that_moved_are_not_blamed_on_one() -> None:
