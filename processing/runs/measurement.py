@@ -3,11 +3,12 @@
 import hashlib
 import json
 import time
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Self
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from daq.files.run_directory import RunReader, Shot
@@ -19,8 +20,10 @@ from processing.analysis.droplets.shadows.shadow_shot import measure_shadows
 from processing.analysis.droplets.size_correction import SizeCorrection, SizeRows
 from processing.calibration.calibration import Calibration
 from processing.calibration.calibration_file import load_calibration
+from processing.calibration.droplets.disparity import MIN_VIEWS
+from processing.calibration.droplets.droplet_images import find_droplets
 from processing.kernels import DEFAULT_THREADS
-from processing.preprocessing import Polarity
+from processing.preprocessing import Intensity, Polarity
 from processing.reconstruction.settings import FrozenValue, GridSettings
 from processing.runs.errors import PipelineError
 from processing.runs.liquid.objects import NozzleNumbers, RunObjects, told_objects
@@ -47,6 +50,7 @@ from processing.runs.recipe import recipe_sha256
 from processing.runs.results_file import FrameName, Provenance, claim_results
 from processing.runs.shots.separation import separation_of
 from processing.runs.shots.shot_images import frame_names, require_match
+from processing.runs.shots.turned_views import depth_reversed
 from processing.runs.sprays.conditions import conditions_of
 from processing.runs.workbench import References, read_references
 
@@ -253,12 +257,14 @@ class RunMeasurement:
         twins, seed = self.settings.twins, self.settings.seed + shot.index
         if self.settings.polarity == "bright":
             images = bright_images(self.run, shot, frame, self.references)
-            return measure_bright(
+            measured = measure_bright(
                 images, self.search, twins=twins, seed=seed, threads=threads, before_round=before_round
             )
+            brightest = max(float(np.percentile(image[::4, ::4], 99.9)) for image in images)
+            return doubted(measured, self._reversed(shot, [image / max(brightest, 1e-6) for image in images]))
         images, trust = shadow_images(self.run, shot, frame, self.references)
         known = without_ignored(dict(zip(shot.views, trust, strict=True)), self.settings.ignored)
-        measured = measure_shadows(
+        shadows = measure_shadows(
             images,
             self.search,
             trust=list(known.values()),
@@ -269,4 +275,12 @@ class RunMeasurement:
             threads=threads,
             before_round=before_round,
         )
-        return doubted(measured, own_backgrounds(shot, frame, self.references))
+        reasons = (*own_backgrounds(shot, frame, self.references), *self._reversed(shot, [1 - one for one in images]))
+        return doubted(shadows, reasons)
+
+    def _reversed(self, shot: Shot, lights: Sequence[Intensity]) -> tuple[str, ...]:
+        """What droplets that are bright in the images of an exposure say of depth, where that is reversed."""
+        views = {name: self.calibration.views[name] for name in shot.views}
+        seen = [find_droplets(np.clip(light, 0, None)) for light in lights]
+        told = depth_reversed(replace(self.calibration, views=views), [seen]) if len(views) >= MIN_VIEWS else ""
+        return (told,) if told else ()

@@ -13,11 +13,17 @@ DRIFT_PX = 2
 
 
 def write_droplet_run(
-    run_dir: Path, density_per_mm3: float = DENSITY_PER_MM3, view_count: int = 4, covered: str = ""
+    run_dir: Path,
+    density_per_mm3: float = DENSITY_PER_MM3,
+    view_count: int = 4,
+    covered: str = "",
+    *,
+    drift_px: int = DRIFT_PX,
+    mirrored: bool = False,
 ) -> Path:
     """Two shots; the picture of view2 lies two pixels further right than when it was calibrated.
 
-    A covered view is dark.
+    A covered view is dark; mirrored are all of them.
     """
     rng = np.random.default_rng(11)
     cameras = {f"view{number}": camera for number, camera in enumerate(views()[:view_count], start=1)}
@@ -35,7 +41,8 @@ def write_droplet_run(
             for _ in "ab":
                 points_mm = rng.uniform(-HALF_MM, HALF_MM, (int(density_per_mm3 * np.prod(2 * HALF_MM)), 3))
                 images = {name: droplet_image(camera, points_mm, rng) for name, camera in cameras.items()}
-                images["view2"] = np.roll(images["view2"], DRIFT_PX, axis=1)
+                images["view2"] = np.roll(images["view2"], drift_px, axis=1)
+                images = {name: image[:, ::-1] if mirrored else image for name, image in images.items()}
                 images = {name: image * (name != covered) for name, image in images.items()}
                 exposures.append({name: np.round(200 * image).astype(np.uint8) for name, image in images.items()})
             shot_views = {name: DoubleFrame(exposures[0][name], exposures[1][name], SEEN, SEEN) for name in cameras}

@@ -27,6 +27,8 @@ Exposures = Sequence[list[FloatArray]]
 
 def depth_reversed(calibration: Calibration, exposures: Exposures) -> str:
     """What was mistaken for all views at once, so that near looks far; empty where droplets do not say so for sure."""
+    if not all(len(droplets) for seen in exposures for droplets in seen):
+        return ""
     met = _met(calibration, exposures)
     found = {what: _met(calibration, seen) for what, seen in turned(calibration, exposures)}
     sure = {what: count for what, count in found.items() if count - met > SURE * np.sqrt(count + met)}

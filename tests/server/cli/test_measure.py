@@ -11,10 +11,13 @@ import pytest
 from daq.files.run_directory import DoubleFrame, ImageKey, RunHeader, RunWriter, Shot, ViewFormat
 from processing.analysis.droplets.droplet_file import read_droplets
 from processing.analysis.droplets.ghost_share import matches
+from processing.calibration.calibration_file import save_calibration
 from processing.reconstruction.settings import GridSettings
 from server.cli.main import main
 from tests.support.bright_scenes import BOX, GRID, scene, write_bright_calibration, write_bright_run
 from tests.support.command_line import refused, shown, told
+from tests.support.drifting_run import write_droplet_run
+from tests.support.drifting_views import calibration_of, views
 from tests.support.droplet_run import (
     DROPLETS_A_MM,
     SEEN,
@@ -259,6 +262,17 @@ def test_shadows_without_any_noise_are_measured(tmp_path: Path, capsys: pytest.C
     box = "--grid=-2:2,-2:2,-2:2"
     result = told(capsys, "measure", tmp_path / "run", "--calibration", calibration, box, "-o", tmp_path / "out")
     assert result["shots"][0]["droplets"] == len(DROPLETS_A_MM)
+
+
+def test_images_that_are_mirrored_in_all_views_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """All lines of sight nearly meet: depth is reversed, and only perspective tells."""
+    run_dir = write_droplet_run(tmp_path / "run", drift_px=0, mirrored=True)
+    save_calibration(calibration_of(views()), tmp_path / "calibration.json")
+    arguments = ["measure", run_dir, "--calibration", tmp_path / "calibration.json", "--shots", "0:1"]
+    (shot,) = told(capsys, *arguments, "--grid=-1:1,-0.5:0.5,-1:1", "-o", tmp_path / "out", status=1)["shots"]
+    assert shot["verdict"] == "refused"
+    assert "if all images are mirrored left to right, or turned by 180 degrees" in shot["reasons"][0]
+    assert shot["reasons"][0].endswith("depth is reversed")
 
 
 def test_shadows_without_a_background_are_refused_in_a_sentence(
