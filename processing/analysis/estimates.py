@@ -18,6 +18,10 @@ from processing.geometry import FloatArray
 from processing.reconstruction.settings import FrozenValue
 
 CONFIDENCE = 0.95
+FEW_SHOTS = 10
+"""Fewer shots that happen to be alike would make an interval narrower than the number of their droplets allows: of 200
+simulated sprays of two shots 8 to 25 % were so, and a third of these intervals held the truth. So droplets are drawn,
+too, and the wider interval counts. More shots are hardly ever so alike."""
 DRAWS, SEED = 400, 0
 DROPLETS_AT_A_TIME = 2**18
 """Of all draws that are made at once: memory."""
@@ -35,6 +39,12 @@ class Estimate(FrozenValue):
     def within(self, least: float, most: float) -> "Estimate":
         """The same with limits that are possible: a share is not above 1."""
         return Estimate(value=self.value, low=max(self.low, least), high=min(self.high, most))
+
+    def no_surer_than(self, other: "Estimate | None") -> "Estimate":
+        """The same with limits that are nowhere narrower than others."""
+        if other is None:
+            return self
+        return Estimate(value=self.value, low=min(self.low, other.low), high=max(self.high, other.high))
 
 
 def draws(units: int, width: int, *, counting: bool = False) -> Iterator[FloatArray]:

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
 from scipy.special import chdtri
 
-from processing.analysis.estimates import CONFIDENCE, Estimate, estimated, weighted_quantiles
+from processing.analysis.estimates import CONFIDENCE, FEW_SHOTS, Estimate, estimated, weighted_quantiles
 from processing.geometry import FloatArray
 from processing.masked import require_unmasked
 from processing.reconstruction.settings import FrozenValue
@@ -103,8 +103,12 @@ def mean_diameters(
     several = len(shots) > 1
     units = np.repeat(np.arange(len(shots)), [len(shot) for shot in shots]) if several else np.arange(len(diameters_um))
     order = np.argsort(diameters_um, kind="stable")
-    widening = 1.0 if several else np.sqrt(exposures_per_shot)
-    estimates = _estimates(diameters_um[order], units[order], float(widening), confidence)
+    own = float(np.sqrt(exposures_per_shot))
+    estimates = _estimates(diameters_um[order], units[order], 1.0 if several else own, confidence)
+    if several and len(shots) < FEW_SHOTS:
+        counted = _estimates(diameters_um[order], np.arange(len(order)), own, confidence)
+        counted.pop(SPAN, None)  # of a span, intervals that are narrower than that hold the truth in 81 to 88 % of 90 %
+        estimates = {name: one.no_surer_than(counted.get(name)) for name, one in estimates.items()}
     known = _known(estimates, diameters_um[order], FEWEST * exposures_per_shot)
     told = {
         "n": len(diameters_um),

@@ -4,6 +4,7 @@ Droplets are counted in fine classes of ln d, so that a fit of a draw takes no l
 """
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from processing.analysis.estimates import Estimate, Figures
 from processing.analysis.spray.spray_sample import SpraySample
@@ -23,15 +24,17 @@ def fit_estimates(sample: SpraySample) -> dict[str, tuple[Estimate | None, Estim
     edges = np.linspace(logs.min(), logs.max(), CLASSES + 1)
     classes = np.clip(np.searchsorted(edges, logs, side="right") - 1, 0, CLASSES - 1)
     cubes = sample.cubes_um3 / sample.cubes_um3.max()
-    volumes = np.zeros((sample.n_units, CLASSES))
-    np.add.at(volumes, (sample.units, classes), cubes)
     own = np.bincount(classes, cubes, CLASSES)
     means = np.where(own > 0, np.bincount(classes, cubes * logs, CLASSES) / np.maximum(own, 1e-300), edges[:-1])
-    scale_um, spread, x_um, q = sample.estimated(_figures(volumes, means))
+
+    def figures_of(drawn: SpraySample) -> Figures:
+        return _figures(csr_array((cubes, (drawn.units, classes)), shape=(drawn.n_units, CLASSES)), means)
+
+    scale_um, spread, x_um, q = sample.estimated(figures_of)
     return {"lognormal": (scale_um, spread), "rosin-rammler": (x_um, q)}
 
 
-def _figures(volumes: FloatArray, logs: FloatArray) -> Figures:
+def _figures(volumes: csr_array, logs: FloatArray) -> Figures:
     """Median and standard deviation of ln d, X and q (rows, 4), of how often each unit is taken."""
 
     def figures(counts: FloatArray) -> FloatArray:

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from processing.analysis.estimates import CONFIDENCE, DRAWS, SEED, Estimate
+from processing.analysis.droplets.size_statistics import garwood
+from processing.analysis.estimates import CONFIDENCE, DRAWS, SEED, Estimate, Figures
 from processing.analysis.spray.spray_axis import SprayAxis, cell_volumes_mm3, direction_name
 from processing.analysis.spray.spray_motion import MM3_PER_UM3, axial_volumes
 from processing.analysis.spray.spray_sample import SpraySample
@@ -132,23 +133,43 @@ def _shares(sample: SpraySample, cell: NDArray[np.intp], flow: FloatArray, cover
             "reason": "the box does not hold the spray all around at this distance: measure a wider box, or nearer to "
             "the nozzle"
         }
-    rings, sectors = covered.shape
-    per_unit = np.zeros((sample.n_units, covered.size))
-    np.add.at(per_unit, (sample.units, cell), flow / covered.ravel()[cell])
+    whole_flow = flow / covered.ravel()[cell]
+    if whole_flow.sum() <= 0:
+        return {"reason": "nothing flows along the axis in the mean: are nozzle and axis stated rightly?"}
+    sectors = covered.shape[1]
 
-    def shares(counts: FloatArray) -> FloatArray:
-        cells = (counts @ per_unit).reshape(-1, rings, sectors)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            return np.asarray(np.column_stack([cells.sum(1), cells.sum(2)]) / cells.sum((1, 2))[:, None])
+    def shares_of(drawn: SpraySample) -> Figures:
+        per_unit = _by_cell(drawn, cell, whole_flow, covered.shape)
+        by_share = np.column_stack([per_unit.sum(1), per_unit.sum(2)])
 
-    estimates = [one and one.within(0.0, 1.0) for one in sample.estimated(shares, signed=True)]
-    by_sector = per_unit.reshape(-1, rings, sectors).sum(1)
+        def shares(counts: FloatArray) -> FloatArray:
+            parts = counts @ by_share
+            with np.errstate(invalid="ignore", divide="ignore"):
+                return np.asarray(parts / parts[:, :sectors].sum(1, keepdims=True))
+
+        return shares
+
+    estimates = [one and _possible(one, len(sample)) for one in sample.estimated(shares_of, signed=True)]
+    by_sector = _by_cell(sample, cell, whole_flow, covered.shape).sum(1)
     return {
         "sector_shares": tuple(estimates[:sectors]),
         "ring_shares": tuple(estimates[sectors:]),
         "asymmetry": float(_asymmetry(by_sector.sum(0))),
         "asymmetry_by_chance": sample.widening * _by_chance(by_sector),
     }
+
+
+def _possible(share: Estimate, n: int) -> Estimate:
+    """The same within 0 and 1; where none of n droplets is, up to what counting allows."""
+    most = garwood(0)[1] / n if share.value == 0 else 0.0
+    return share.no_surer_than(Estimate(value=0.0, low=share.low, high=most)).within(0.0, 1.0)
+
+
+def _by_cell(sample: SpraySample, cell: NDArray[np.intp], flow: FloatArray, shape: tuple[int, ...]) -> FloatArray:
+    """What flows in every cell, by units: (units, rings, sectors)."""
+    per_unit = np.zeros((sample.n_units, int(np.prod(shape))))
+    np.add.at(per_unit, (sample.units, cell), flow)
+    return per_unit.reshape(-1, *shape)
 
 
 def _asymmetry(liquid: FloatArray) -> FloatArray:

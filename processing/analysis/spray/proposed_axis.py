@@ -9,7 +9,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from processing.analysis.estimates import Estimate
+from processing.analysis.estimates import Estimate, Figures
 from processing.analysis.spray.spray_axis import SprayAxis
 from processing.analysis.spray.spray_sample import SpraySample
 from processing.geometry import FloatArray
@@ -70,9 +70,13 @@ def proposed_axis(sample: SpraySample) -> ProposedAxis:
     if len(flying) < FEWEST:
         return ProposedAxis(reason=NO_VELOCITIES)
     ways = flying.velocities_m_s / np.linalg.norm(flying.velocities_m_s, axis=1, keepdims=True)
-    sums = flying.totals(_addends(ways, flying.points_mm))
     scatter2 = _scatter2(ways, flying.points_mm)
-    told = flying.estimated(lambda counts: _figures(sums(counts), scatter2), signed=True)
+
+    def figures_of(drawn: SpraySample) -> Figures:
+        sums = drawn.totals(_addends(ways, drawn.points_mm))
+        return lambda counts: _figures(sums(counts), scatter2)
+
+    told = flying.estimated(figures_of, signed=True)
     axis = _unit(ways.mean(axis=0))
     nozzle = [one for one in told[:3] if one is not None]
     nozzle_mm = np.array([one.value for one in nozzle])

@@ -12,6 +12,7 @@ from processing.analysis.copied_shots import copies, named
 from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.analysis.shot_doubts import exposure_doubts, velocity_doubts
 from processing.analysis.spray.spray_axis import SprayAxis
+from processing.analysis.spray.spray_motion import FEWEST, all_alike
 from processing.analysis.spray.spray_sample import SpraySample
 from processing.analysis.velocity.velocity_verdict import FASTEST_M_S
 from processing.geometry import FloatArray
@@ -52,6 +53,7 @@ def spray_doubts(
         *velocity_doubts(shots),
         *copied,
         *_of_conditions(shots),
+        *(_of_equals(sample) if sample else ()),
         *(_of_motion(sample, axis) if sample else ()),
         *(_of_nozzle(sample, axis) if sample and axis and len(sample) else ()),
     )
@@ -125,6 +127,17 @@ def _on_one_side(from_mm: FloatArray, azimuth_deg: FloatArray, around_mm: float)
     side = unit @ unit.mean(axis=0) > 0
     width_mm = float(np.sqrt((from_mm[:, None] * unit).var(axis=0).sum()))
     return float(np.mean(side)) > MOST_ON_ONE_SIDE and float(np.percentile(from_mm, 5)) > width_mm < 3 * around_mm
+
+
+def _of_equals(sample: SpraySample) -> Iterator[str]:
+    """What no measurement gives: numbers without any scatter, whose intervals have no width."""
+    if len(sample) < FEWEST:
+        return
+    if all_alike(sample.diameters_um):
+        yield f"all {len(sample)} diameters are the very same: nothing is measured so; intervals of sizes have no width"
+    velocities_m_s = sample.velocities_m_s[sample.paired]
+    if len(velocities_m_s) >= FEWEST and all(map(all_alike, velocities_m_s.T)):
+        yield f"all {len(velocities_m_s)} velocities are the very same: nothing is measured so; intervals have no width"
 
 
 def _of_motion(sample: SpraySample, axis: SprayAxis | None) -> Iterator[str]:

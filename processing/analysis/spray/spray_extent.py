@@ -12,7 +12,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from processing.analysis.estimates import Estimate, weighted_quantiles
+from processing.analysis.estimates import Estimate, Figures, weighted_quantiles
 from processing.analysis.spray.spray_axis import SprayAxis, cell_volumes_mm3
 from processing.analysis.spray.spray_sample import SpraySample
 from processing.geometry import FloatArray
@@ -76,12 +76,13 @@ def spray_extent(sample: SpraySample, axis: SprayAxis) -> SprayExtent:
 
 def _quantiles(sample: SpraySample, values: FloatArray, shares: tuple[float, ...]) -> list[Estimate | None]:
     order = np.argsort(values, kind="stable")
-    sorted_values, units, cubes = values[order], sample.units[order], sample.cubes_um3[order]
+    sorted_values, cubes = values[order], sample.cubes_um3[order]
 
-    def quantiles(counts: FloatArray) -> FloatArray:
-        return weighted_quantiles(sorted_values, counts[:, units] * cubes, shares)
+    def quantiles_of(drawn: SpraySample) -> Figures:
+        units = drawn.units[order]
+        return lambda counts: weighted_quantiles(sorted_values, counts[:, units] * cubes, shares)
 
-    return sample.estimated(quantiles, by_droplet=True)
+    return sample.estimated(quantiles_of, by_droplet=True)
 
 
 def _covered(axis: SprayAxis, box_mm: FloatArray, angle_deg: float) -> float:

@@ -17,7 +17,7 @@ import numpy as np
 from pydantic import Field
 
 from processing.analysis.droplets.size_statistics import size_classes
-from processing.analysis.estimates import CONFIDENCE, Estimate, weighted_quantiles
+from processing.analysis.estimates import CONFIDENCE, Estimate, Figures, weighted_quantiles
 from processing.analysis.spray.spray_axis import SprayAxis
 from processing.analysis.spray.spray_sample import SpraySample
 from processing.geometry import FloatArray
@@ -26,12 +26,16 @@ from processing.reconstruction.settings import FrozenValue
 FEWEST = 5
 """Droplets with a velocity in a row of a table, and in all."""
 RINGS = 8
+ALIKE = 1e-9
+"""Of a number: what differs by less is the same."""
 MM3_PER_UM3 = 1e-9
 MM_S_PER_M_S = 1e3
-NO_VELOCITIES = "no droplet has a velocity: measure a run of two exposures, A and B, with velocities"
+NO_VELOCITIES = "fewer than 5 droplets have a velocity: measure a run of two exposures, A and B, with velocities"
 NO_AXIS = (
     "nozzle and axis of the spray are not known: state them with --nozzle X,Y,Z --axis X,Y,Z, or in the run's notes"
 )
+ALL_ALIKE = "all diameters or all speeds are the very same, so there is no correlation"
+AGAINST = "no liquid flows along the stated axis in the mean, so there is no flux: is its direction stated rightly?"
 NO_DENSITY = "the density of the liquid is not known: state it with --liquid-density KG_M3"
 FLUX_WEIGHTING = "each droplet that has a velocity, by the amount of its velocity along the axis"
 
@@ -88,17 +92,28 @@ def spray_motion(sample: SpraySample, axis: SprayAxis | None, liquid_kg_m3: floa
         return None
     speeds_m_s = np.linalg.norm(paired.velocities_m_s, axis=1)
     *mean_m_s, speed = _means(paired, np.column_stack([paired.velocities_m_s, speeds_m_s]), signed=[True] * 3 + [False])
-    flowing = _flow(sample, paired, axis, liquid_kg_m3) if axis else {"reason": NO_AXIS}
+    correlation = _rank_correlation(paired, speeds_m_s)
+    flowing = _flow(sample, paired, axis, liquid_kg_m3) if axis else {}
+    has_flux = flowing.get("volume_flux_mm_s") is not None
+    no_flux = NO_AXIS if axis is None else None if has_flux else AGAINST
+    no_mass = NO_DENSITY if axis and not liquid_kg_m3 else None
+    reasons = (None if correlation else ALL_ALIKE, no_flux, no_mass)
     told = {
         "paired_share": len(paired) / len(sample),
         "mean_m_s": tuple(mean_m_s),
         "speed_m_s": speed,
-        "size_speed_correlation": _rank_correlation(paired, speeds_m_s),
+        "size_speed_correlation": correlation,
         "by_size": _by_size(paired, axis),
         "liquid_kg_m3": liquid_kg_m3,
+        "reason": "; ".join(filter(None, reasons)) or None,
         **flowing,
     }
     return SprayMotion.model_validate(told)
+
+
+def all_alike(values: FloatArray) -> bool:
+    """Whether values do not differ, but for rounding."""
+    return bool(np.ptp(values) <= ALIKE * np.abs(values).max())
 
 
 def axial_volumes(sample: SpraySample, axis: SprayAxis) -> FloatArray:
@@ -127,69 +142,92 @@ def _flow(sample: SpraySample, paired: SpraySample, axis: SprayAxis, liquid_kg_m
         "flux_d10_um": flux_d10,
         "flux_d32_um": flux_d32,
         "flux_dv50_um": flux_dv50,
-        "reason": None if liquid_kg_m3 else NO_DENSITY,
     }
 
 
 def _means(sample: SpraySample, values: FloatArray, signed: Sequence[bool]) -> list[Estimate | None]:
     """Means by number of columns of values."""
-    total = sample.totals(np.column_stack([values, np.ones(len(sample))]))
 
-    def means(counts: FloatArray) -> FloatArray:
-        sums = total(counts)
-        with np.errstate(invalid="ignore"):
-            return np.asarray(sums[:, :-1] / sums[:, -1:])
+    def means_of(drawn: SpraySample) -> Figures:
+        total = drawn.totals(np.column_stack([values, np.ones(len(drawn))]))
+        return lambda counts: _ratios(total(counts))
 
-    return sample.estimated(means, signed=np.array(signed))
+    return sample.estimated(means_of, signed=np.array(signed))
+
+
+def _ratios(sums: FloatArray) -> FloatArray:
+    """Of columns to the last one."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.asarray(sums[:, :-1] / sums[:, -1:])
 
 
 def volume_flux(sample: SpraySample, axis: SprayAxis, confidence: float = CONFIDENCE) -> Estimate | None:
     """Liquid per area and time along the axis, in mm/s; droplets without partner are drawn with the others."""
     axial_m_s = np.where(sample.paired, axis.frame[0] @ sample.velocities_m_s.T, 0.0)
     columns = np.column_stack([sample.cubes_um3, sample.cubes_um3 * sample.paired, sample.cubes_um3 * axial_m_s])
-    total = sample.totals(columns)
 
-    def flux(counts: FloatArray) -> FloatArray:
-        liquid, known, moved = np.moveaxis(total(counts), 1, 0)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            carried = liquid * moved / known
-        mm3_per_mm3 = MM3_PER_UM3 * np.pi / 6 * carried[:, None] / sample.measured_mm3(counts)
-        return np.asarray(MM_S_PER_M_S * mm3_per_mm3)
+    def flux_of(drawn: SpraySample) -> Figures:
+        total = drawn.totals(columns)
+        return lambda counts: _flux(total(counts), drawn.measured_mm3(counts))
 
-    (one,) = sample.estimated(flux, confidence=confidence)
-    return one
+    (one,) = sample.estimated(flux_of, signed=sample.has_empty_shots, confidence=confidence)
+    return one and one.within(0.0, np.inf)
+
+
+def _flux(sums: FloatArray, measured_mm3: FloatArray) -> FloatArray:
+    """Of all liquid, of what has a velocity, and of what that carries, (rows, 3)."""
+    liquid, known, moved = np.moveaxis(sums, 1, 0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        carried = liquid * moved / known
+    return np.asarray(MM_S_PER_M_S * MM3_PER_UM3 * np.pi / 6 * carried[:, None] / measured_mm3)
 
 
 def _flux_diameters(sample: SpraySample, weights: FloatArray) -> list[Estimate | None]:
     order = np.argsort(sample.diameters_um, kind="stable")
-    d_um, units = sample.diameters_um[order], sample.units[order]
+    d_um = sample.diameters_um[order]
     columns = weights[:, None] * sample.diameters_um[:, None] ** np.arange(4)
-    by_volume, total = columns[order, 3], sample.totals(columns)
+    by_volume = columns[order, 3]
 
-    def diameters(counts: FloatArray) -> FloatArray:
-        sums = total(counts)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            d10, d32 = sums[:, 1] / sums[:, 0], sums[:, 3] / sums[:, 2]
-        return np.column_stack([d10, d32, weighted_quantiles(d_um, counts[:, units] * by_volume, (0.5,))])
+    def diameters_of(drawn: SpraySample) -> Figures:
+        units, total = drawn.units[order], drawn.totals(columns)
 
-    return sample.estimated(diameters, by_droplet=True)
+        def diameters(counts: FloatArray) -> FloatArray:
+            sums = total(counts)
+            with np.errstate(invalid="ignore", divide="ignore"):
+                d10, d32 = sums[:, 1] / sums[:, 0], sums[:, 3] / sums[:, 2]
+            return np.column_stack([d10, d32, weighted_quantiles(d_um, counts[:, units] * by_volume, (0.5,))])
+
+        return diameters
+
+    return sample.estimated(diameters_of, by_droplet=True)
 
 
 def _rank_correlation(sample: SpraySample, speeds_m_s: FloatArray) -> Estimate | None:
-    """Pearson's correlation of the ranks in the whole sample; limits stay within -1 and 1."""
+    """Pearson's correlation of the ranks in the whole sample; limits stay within -1 and 1.
+
+    Where all diameters or all speeds are alike there is none.
+    """
     from scipy.stats import rankdata  # takes 0.4 s to load, which a server that starts has no use for
 
+    if all_alike(sample.diameters_um) or all_alike(speeds_m_s):
+        return None
     ranks = np.column_stack([rankdata(sample.diameters_um), rankdata(speeds_m_s)])
     x, y = (ranks / len(ranks) - 0.5).T
-    total = sample.totals(np.column_stack([np.ones(len(x)), x, y, x * x, y * y, x * y]))
+    columns = np.column_stack([np.ones(len(x)), x, y, x * x, y * y, x * y])
 
-    def correlation(counts: FloatArray) -> FloatArray:
-        n, sx, sy, sxx, syy, sxy = np.moveaxis(total(counts), 1, 0)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            return np.asarray((sxy - sx * sy / n) / np.sqrt((sxx - sx**2 / n) * (syy - sy**2 / n)))[:, None]
+    def correlation_of(drawn: SpraySample) -> Figures:
+        total = drawn.totals(columns)
+        return lambda counts: _correlation(total(counts))
 
-    (one,) = sample.estimated(correlation, signed=True)
+    (one,) = sample.estimated(correlation_of, signed=True)
     return one and one.within(-1.0, 1.0)
+
+
+def _correlation(sums: FloatArray) -> FloatArray:
+    """Pearson's, (rows, 1), of sums of 1, x, y, x x, y y, x y."""
+    n, sx, sy, sxx, syy, sxy = np.moveaxis(sums, 1, 0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.asarray((sxy - sx * sy / n) / np.sqrt((sxx - sx**2 / n) * (syy - sy**2 / n)))[:, None]
 
 
 def _by_size(sample: SpraySample, axis: SprayAxis | None) -> tuple[VelocityRow, ...]:

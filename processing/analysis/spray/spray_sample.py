@@ -1,6 +1,6 @@
 """SpraySample: the droplets of some shots together, and what is drawn to say how sure their figures are."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.analysis.droplets.droplet_statistics import DIAMETER, measured_grid, measured_mm3, told_exposures
-from processing.analysis.estimates import CONFIDENCE, Estimate, Figures, estimated
+from processing.analysis.estimates import CONFIDENCE, FEW_SHOTS, Estimate, Figures, estimated
 from processing.geometry import FloatArray
 
 VELOCITY = ("u_m_s", "v_m_s", "w_m_s")
@@ -52,6 +52,11 @@ class SpraySample:
     def several(self) -> bool:
         """Whether there are shots to draw; of a single one droplets are drawn."""
         return len(self.volumes_mm3) > 1
+
+    @property
+    def has_empty_shots(self) -> bool:
+        """Whether shots have no droplets: then totals have no logarithm, and their intervals are of themselves."""
+        return bool(len(np.unique(self.shot)) < len(self.volumes_mm3))
 
     @property
     def paired(self) -> NDArray[np.bool_]:
@@ -99,9 +104,14 @@ class SpraySample:
             return counts @ self.volumes_mm3[:, None]
         return np.full((len(counts), 1), self.volumes_mm3.sum())
 
+    @property
+    def as_one_shot(self) -> "SpraySample":
+        """The same droplets as if one shot had them all: then droplets are drawn."""
+        return replace(self, shot=np.zeros_like(self.shot), volumes_mm3=self.volumes_mm3.sum(keepdims=True))
+
     def estimated(
         self,
-        figures: Figures,
+        figures_of: "FiguresOf",
         signed: bool | NDArray[np.bool_] = False,
         confidence: float = CONFIDENCE,
         *,
@@ -109,10 +119,20 @@ class SpraySample:
     ) -> list[Estimate | None]:
         """Figures with intervals over shots; of a single shot over its droplets, whose number is left to chance.
 
-        Those that look at every droplet by itself say so: fewer draws are then made at once.
+        Of few shots they are nowhere narrower than those over droplets. Figures that look at every droplet by itself
+        say so: fewer draws are then made at once.
         """
+        told = self._drawn(figures_of, signed, confidence, by_droplet)
+        if not self.several or len(np.unique(self.shot)) >= FEW_SHOTS:
+            return told
+        counted = self.as_one_shot._drawn(figures_of, signed, confidence, by_droplet)
+        return [one and one.no_surer_than(other) for one, other in zip(told, counted, strict=True)]
+
+    def _drawn(
+        self, figures_of: "FiguresOf", signed: bool | NDArray[np.bool_], confidence: float, by_droplet: bool
+    ) -> list[Estimate | None]:
         return estimated(
-            figures,
+            figures_of(self),
             self.n_units,
             len(self) if by_droplet else 1,
             counting=not self.several,
@@ -120,6 +140,10 @@ class SpraySample:
             signed=signed,
             confidence=confidence,
         )
+
+
+FiguresOf = Callable[[SpraySample], Figures]
+"""Figures of a sample, as a function of how often each of its units is taken."""
 
 
 def spray_sample(shots: Sequence[StoredDroplets]) -> SpraySample:

@@ -15,7 +15,7 @@ from processing.analysis.droplets.droplet_statistics import (
     droplet_statistics,
 )
 from processing.analysis.droplets.size_statistics import SizeClass, size_classes
-from processing.analysis.estimates import Estimate
+from processing.analysis.estimates import Estimate, Figures
 from processing.analysis.spray.patternation import Patternation, patternation
 from processing.analysis.spray.proposed_axis import ProposedAxis, proposed_axis
 from processing.analysis.spray.sample_size import SampleVerdict, sample_verdict
@@ -32,7 +32,6 @@ from processing.analysis.spray.spray_motion import (
 )
 from processing.analysis.spray.spray_sample import SpraySample, spray_sample
 from processing.analysis.velocity.velocity_statistics import velocity_statistics
-from processing.geometry import FloatArray
 from processing.reconstruction.settings import FrozenValue
 
 LIQUIDS_KG_M3 = (50.0, 30_000.0)
@@ -160,13 +159,12 @@ def _in_space(sample: SpraySample, asked: AskedFor) -> tuple[SprayExtent | None,
 
 
 def _liquid_ppm(sample: SpraySample) -> Estimate | None:
-    volumes_mm3 = sample.totals(MM3_PER_UM3 * np.pi / 6 * sample.cubes_um3[:, None])
+    def ppm_of(drawn: SpraySample) -> Figures:
+        volumes_mm3 = drawn.totals(MM3_PER_UM3 * np.pi / 6 * drawn.cubes_um3[:, None])
+        return lambda counts: np.asarray(1e6 * volumes_mm3(counts) / drawn.measured_mm3(counts))
 
-    def ppm(counts: FloatArray) -> FloatArray:
-        return np.asarray(1e6 * volumes_mm3(counts) / sample.measured_mm3(counts))
-
-    (one,) = sample.estimated(ppm)
-    return one
+    (one,) = sample.estimated(ppm_of, signed=sample.has_empty_shots)
+    return one and one.within(0.0, np.inf)
 
 
 def _reasons(sample: SpraySample, proposed: ProposedAxis | None, fits: bool, motion: bool) -> dict[str, str]:

@@ -18,6 +18,7 @@ from processing.geometry import FloatArray
 from processing.reconstruction.settings import FrozenValue
 
 NOTHING = "no shot was measured"
+ONE_PAIR = "a single pair of droplets, which does not tell how velocities differ: measure more shots"
 OLD = "a file does not tell velocities: it is from before they were measured"
 
 
@@ -80,10 +81,11 @@ def velocity_statistics(shots: Iterable[StoredDroplets]) -> VelocityStatistics:
         shots=len(believed),
         pairs=pairs,
         share_paired=Estimate(value=min(1.0, pairs / stayed), low=low, high=high),
-        mean_m_s=_mean(velocities_m_s if several else list(velocities_m_s[0][:, None])),
+        mean_m_s=_mean(velocities_m_s),
         intervals_over="shots" if several else "pairs",
         unpaired_ghost_share=None if isinstance(ghosts, str) else ghosts,
         unpaired_ghost_reason=ghosts if isinstance(ghosts, str) else None,
+        reason=None if pairs > 1 else ONE_PAIR,
         doubts=velocity_doubts(shots),
     )
 
@@ -104,15 +106,24 @@ def _of_pairs(shot: StoredDroplets) -> FloatArray:
     return np.column_stack([np.asarray(shot.columns[name], np.float64)[paired] for name in COMPONENTS])
 
 
-def _mean(units: Sequence[FloatArray]) -> MeanVelocity:
-    """Mean of rows (N, 3) that come in units, which differ from each other (ratio of sums)."""
-    rows = np.concatenate(units)
+def _mean(shots: Sequence[FloatArray]) -> MeanVelocity | None:
+    """Mean of the pairs (N, 3) of shots; its limits are nowhere narrower than those over pairs. None of one pair."""
+    rows = np.concatenate(shots)
+    if len(rows) < 2:
+        return None
     mean = rows.mean(axis=0)
-    apart = np.array([np.sum(unit - mean, axis=0) for unit in units]) / len(rows)
-    variance = np.sum(apart**2, axis=0) * len(units) / (len(units) - 1)
-    reach = stdtrit(len(units) - 1, (1 + CONFIDENCE) / 2) * np.sqrt(variance)
+    reach = _reach(rows - mean)
+    if len(shots) > 1:
+        reach = np.maximum(reach, _reach(np.array([np.sum(shot - mean, axis=0) for shot in shots])))
     u, v, w = (
         Estimate(value=value, low=value - half, high=value + half)
-        for value, half in zip(mean.tolist(), reach.tolist(), strict=True)
+        for value, half in zip(mean.tolist(), (reach / len(rows)).tolist(), strict=True)
     )
     return MeanVelocity(u=u, v=v, w=w)
+
+
+def _reach(apart: FloatArray) -> FloatArray:
+    """From a sum to its limits, by how far apart from the mean its terms (units, 3) are."""
+    units = len(apart)
+    sd = np.sqrt(np.sum(apart**2, axis=0) * units / (units - 1))
+    return np.asarray(stdtrit(units - 1, (1 + CONFIDENCE) / 2) * sd)

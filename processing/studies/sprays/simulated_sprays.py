@@ -16,6 +16,8 @@ from processing.geometry import FloatArray
 MEDIAN_UM, BOX_MM3 = 40.0, 100.0
 SPEED_M_S, SPEED_PER_UM = 5.0, 0.1
 """Speed along the axis is the first plus the second times the diameter: large ones fly faster."""
+ALIKE = 0.01
+"""Shots whose medians differ by less are called alike."""
 Law = Literal["lognormal", "rosin-rammler"]
 
 
@@ -52,8 +54,8 @@ class SprayCase:
     @property
     def name(self) -> str:
         """For tables and figures."""
-        spread = f"{self.law} {self.spread:g}"
-        return f"{self.shots} shots of {self.droplets:g} droplets, {spread}"
+        alike = ", shots alike" if self.between < ALIKE else ""
+        return f"{self.shots} shots of {self.droplets:g} droplets, {self.law} {self.spread:g}{alike}"
 
 
 def sampled(case: SprayCase, rng: np.random.Generator) -> SpraySample:

@@ -29,6 +29,8 @@ CASES = (
     SprayCase(10, 1000, 0.4),
     SprayCase(10, 400, 4.0, law="rosin-rammler"),
     SprayCase(2, 500, 0.25, asked=False),
+    *(SprayCase(shots, 100, 0.25, asked=False) for shots in (2, 3, 5)),
+    *(SprayCase(shots, 100, 0.25, between=0.001, numbers=0.02, asked=False) for shots in (2, 3, 5)),
     SprayCase(5, 20, 0.4, asked=False),
     SprayCase(10, 100, 0.4, asked=False),
     SprayCase(10, 100, 0.6, asked=False),

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.analysis.estimates import Estimate
 from processing.analysis.spray.spray_axis import SprayAxis
-from processing.analysis.spray.spray_motion import NO_AXIS, NO_DENSITY, NO_VELOCITIES
+from processing.analysis.spray.spray_motion import AGAINST, ALL_ALIKE, NO_AXIS, NO_DENSITY, NO_VELOCITIES
 from processing.analysis.spray.spray_statistics import AskedFor, SprayStatistics, spray_statistics
 from processing.volume import VoxelGrid
-from tests.support.sampled_sprays import BOX, cone_shots, stored_shot
+from tests.support.sampled_sprays import BOX, cone_points_mm, cone_shots, stored_shot
 
 DOWN = SprayAxis((0, 0, 0), (0, 2, 0))
 ASKED = AskedFor(DOWN, liquid_kg_m3=1000.0)
@@ -75,6 +75,82 @@ def test_flux_and_density_are_what_the_droplets_carry(cone: list[StoredDroplets]
     weights = down_mm_s * d_mm**2
     assert value(told.motion.flux_d32_um) == pytest.approx(1000 * weights @ d_mm / weights.sum())
     assert value(told.motion.flux_d32_um) > value(told.droplets.d32_um), "large ones fly faster"
+
+
+def _shot(diameters_um: NDArray[np.float64], velocity_m_s: tuple[float, float, float], shot: int) -> StoredDroplets:
+    """Droplets all around the axis that fly alike."""
+    points_mm = cone_points_mm(np.random.default_rng(shot), len(diameters_um), 20.0, 4.0)
+    return stored_shot(diameters_um, points_mm, np.tile(velocity_m_s, (len(diameters_um), 1)), shot)
+
+
+def _sizes(count: int = 60) -> NDArray[np.float64]:
+    return np.asarray(40 * np.exp(0.3 * np.random.default_rng(7).standard_normal(count)))
+
+
+def _width(estimate: Estimate | None) -> float:
+    """Over the value."""
+    assert estimate
+    return (estimate.high - estimate.low) / estimate.value
+
+
+def test_shots_that_happen_to_be_alike_are_no_surer_than_their_droplets() -> None:
+    sizes_um = _sizes()
+    alike = [_shot(sizes_um[::step], (0.0, 10.0, 0.0), shot) for shot, step in enumerate((1, -1))]
+    told = spray_statistics(alike, ASKED)
+    together = spray_statistics([_shot(np.tile(sizes_um, 2), (0.0, 10.0, 0.0), 0)], ASKED)
+    assert told.motion
+    assert together.motion
+    for few, counted in (
+        (told.droplets.d32_um, together.droplets.d32_um),
+        (told.liquid_ppm, together.liquid_ppm),
+        (told.motion.volume_flux_mm_s, together.motion.volume_flux_mm_s),
+        (told.motion.flux_d32_um, together.motion.flux_d32_um),
+        (told.fits[0].scale_within_um, together.fits[0].scale_within_um),
+    ):
+        assert _width(few) == pytest.approx(_width(counted), rel=0.2)
+
+
+def test_a_shot_without_droplets_makes_nothing_sure() -> None:
+    empty = stored_shot(np.empty(0), np.empty((0, 3)), np.empty((0, 3)), 1)
+    told = spray_statistics([*cone_shots(shots=1), empty], ASKED)
+    assert told.motion
+    assert _width(told.motion.speed_m_s) > 0
+    assert _width(told.motion.by_size[4].speed_m_s) > 0
+    for total in (told.liquid_ppm, told.motion.volume_flux_mm_s):
+        assert total
+        assert total.low == 0
+        assert total.high > 2 * total.value
+
+
+def test_droplets_that_do_not_differ_are_told() -> None:
+    same = spray_statistics([_shot(np.full(60, 50.0), (0.0, 10.0, 0.0), shot) for shot in range(2)], ASKED)
+    assert [doubt.split(":")[0] for doubt in same.doubts] == [
+        "all 120 diameters are the very same",
+        "all 120 velocities are the very same",
+    ]
+    assert same.motion
+    assert same.motion.size_speed_correlation is None
+    assert ALL_ALIKE in (same.motion.reason or "")
+
+
+def test_droplets_that_stand_still_or_fly_back_have_no_flux_and_no_shares() -> None:
+    still = spray_statistics([_shot(_sizes(), (0.0, 0.0, 0.0), shot) for shot in range(2)], ASKED)
+    back = spray_statistics([_shot(_sizes(), (0.0, -10.0, 0.0), shot) for shot in range(2)], ASKED)
+    for told in (still, back):
+        assert told.motion
+        assert told.motion.volume_flux_mm_s is None
+        assert AGAINST in (told.motion.reason or "")
+        (pattern,) = told.patternations
+        assert (pattern.sector_shares, pattern.asymmetry) == ((), None)
+        assert "nothing flows along the axis" in (pattern.reason or "")
+
+
+def test_an_empty_ring_may_be_empty_by_chance(told: SprayStatistics) -> None:
+    (pattern,) = told.patternations
+    shares = [share for share in pattern.ring_shares if share and share.value == 0]
+    assert shares
+    for share in shares:
+        assert 0 < share.high == pytest.approx(3.69 / pattern.n, rel=0.01)
 
 
 def test_speeds_follow_the_sizes(told: SprayStatistics) -> None:

@@ -53,6 +53,20 @@ def test_the_interval_holds_the_truth_as_often_as_it_says(shots: int, of_shot: f
     assert np.mean(held) == pytest.approx(0.95, abs=0.03)
 
 
+def test_shots_that_happen_to_be_alike_are_no_surer_than_their_pairs() -> None:
+    rows = drawn(np.random.default_rng(5), 40)
+    alike = velocity_statistics([shot(rows), shot(rows)]).mean_m_s
+    together = velocity_statistics([shot(np.tile(rows, (2, 1)))]).mean_m_s
+    assert alike is not None
+    assert alike == together
+
+
+def test_a_single_pair_does_not_tell_how_velocities_differ() -> None:
+    statistics = velocity_statistics([shot(np.array([[1.0, 2.0, 3.0]]))])
+    assert (statistics.pairs, statistics.mean_m_s) == (1, None)
+    assert "a single pair" in (statistics.reason or "")
+
+
 @pytest.mark.parametrize("others", [{}, {"settings": '{"light": "gaussian"}'}])
 def test_a_shot_that_is_there_twice_is_refused(others: dict[str, Any]) -> None:
     """Found twice by a pattern, it would make the mean as sure as one may wish."""
