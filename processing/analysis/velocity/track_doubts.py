@@ -18,6 +18,9 @@ LEAST_LINKED, FEWEST = 0.1, 10
 """Share of the droplets of a shot that are on tracks, and of those that are on tracks from a shot to the next one; of
 fewer droplets than so many nothing is said."""
 MOST_LISTED = 5
+STILL, MOST_STILL = 2.0, 0.5
+"""Standard deviations of the velocity below which nothing is known to move, and share of the droplets."""
+VARIANCES = ("cov_uu_m2_s2", "cov_vv_m2_s2", "cov_ww_m2_s2")
 TOGETHER = 0.5
 """Amount of the mean velocity over the mean speed, from which on droplets have a direction."""
 
@@ -69,6 +72,23 @@ def order_doubts(tracks: Columns, shots: Sequence[StoredDroplets]) -> Iterator[s
     if len(cuts := numbers[:-1][(fewer >= FEWEST) & (going_on < LEAST_LINKED * fewer)]):
         yield f"hardly a track goes on after {len(cuts)} of {len(shots)} shots (shot {_listed(cuts)}): {asked}"
     yield from _backwards(tracks, str(shots[0].provenance.get("spray", "null")))
+
+
+def still_doubts(tracks: Columns) -> Iterator[str]:
+    """Droplets that do not move: dirt does not.
+
+    Parameters
+    ----------
+    tracks
+        As of ``rate_doubts``.
+    """
+    speeds_m_s = _speeds(tracks)
+    sd_m_s = np.sqrt(np.sum([np.asarray(tracks[name], np.float64) for name in VARIANCES], axis=0))
+    known = np.isfinite(speeds_m_s) & np.isfinite(sd_m_s)
+    if known.sum() < FEWEST:
+        return
+    if (share := float(np.mean(speeds_m_s[known] < STILL * sd_m_s[known]))) > MOST_STILL:
+        yield f"{100 * share:.0f} % of the droplets on tracks stand still, as sure as that is known: is it dirt?"
 
 
 def _linked(tracks: Columns, numbers: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

@@ -12,10 +12,11 @@ from processing.analysis.droplets.droplet_file import DropletFileError, StoredDr
 from processing.analysis.droplets.droplet_table import COVARIANCES as PLACES
 from processing.analysis.droplets.droplet_table import Columns
 from processing.analysis.shot_doubts import exposure_doubts
+from processing.analysis.velocity.common_motion import FEWEST
 from processing.analysis.velocity.moving_droplets import LEAST_SIZE, MovingDroplets
-from processing.analysis.velocity.track_doubts import order_doubts, rate_doubts
+from processing.analysis.velocity.track_doubts import order_doubts, rate_doubts, still_doubts
 from processing.analysis.velocity.track_motion import HALF_WINDOW, TrackPoints, track_points
-from processing.analysis.velocity.tracks import Tracks, link
+from processing.analysis.velocity.tracks import LEAST_LENGTH, Tracks, link
 from processing.analysis.velocity.velocity_table import COVARIANCES
 from processing.count import require_count
 from processing.geometry import FloatArray
@@ -106,8 +107,25 @@ def track_droplets(
     points = track_points(frames, linked, half_window)
     columns = _columns(points, linked, first, grid, rate_hz) | _sizes(points, first, ordered)
     count = sum(map(len, frames))
-    doubts = (*exposure_doubts(ordered, "a"), *rate_doubts(columns, ordered, rate_hz), *order_doubts(columns, ordered))
-    return DropletTracks(columns, linked.count, count, rate_hz, None if linked.count else NO_TRACK, doubts)
+    doubts = (
+        *exposure_doubts(ordered, "a"),
+        *rate_doubts(columns, ordered, rate_hz),
+        *order_doubts(columns, ordered),
+        *still_doubts(columns),
+    )
+    return DropletTracks(columns, linked.count, count, rate_hz, None if linked.count else _why(frames), doubts)
+
+
+def _why(frames: Sequence[MovingDroplets]) -> str:
+    """Why there is no track."""
+    seen = [len(frame) for frame in frames if len(frame)]
+    if not seen:
+        return "no droplet was measured in any shot"
+    if len(seen) < LEAST_LENGTH:
+        return f"a track takes {LEAST_LENGTH} shots with droplets, and there are {len(seen)}"
+    if max(seen) < FEWEST:
+        return f"shots have {max(seen)} droplets at most: {FEWEST} tell which way they fly, fewer may be anything"
+    return NO_TRACK
 
 
 _NOBODY = MovingDroplets(np.empty((0, 3)), np.empty((0, 3, 3)), np.empty(0))

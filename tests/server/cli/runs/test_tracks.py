@@ -1,6 +1,7 @@
 """``tomoshadow tracks``: droplets of a series become tracks in physical units; bad input gets one clear sentence."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -176,3 +177,30 @@ def test_tracks_are_exported_beside_their_file_and_not_over_another(
     assert all(file.is_file() for file in written)
     (tmp_path / "tracks.h5").unlink()
     assert "tracks.csv" in refused(capsys, *command)
+
+
+@pytest.mark.parametrize(
+    ("droplets", "frames", "reason"),
+    [
+        (0, 4, "no droplet was measured in any shot"),
+        (50, 2, "a track takes 3 shots with droplets, and there are 2"),
+        (2, 5, "shots have 2 droplets at most: 3 tell which way they fly"),
+    ],
+)
+def test_where_there_are_too_few_droplets_it_says_so(tmp_path: Path, droplets: int, frames: int, reason: str) -> None:
+    shown = series(frames=5)
+    few = replace(shown, frames=[frame.where(np.arange(droplets)) for frame in shown.frames[:frames]])
+    results = write_series(tmp_path / "droplets", few, rate_hz=RATE_HZ)
+    told = track_droplets([read_droplets(file) for file in sorted(results.glob("*_droplets.h5"))])
+    assert reason in (told.reason or "")
+
+
+def test_what_stands_still_is_doubtful(tmp_path: Path) -> None:
+    """A little noise, as shots that are all the same are taken for copies."""
+    first, rng = series(frames=5).frames[0], np.random.default_rng(1)
+    noises = [rng.multivariate_normal(np.zeros(3), first.covariance[0], len(first)) for _ in range(5)]
+    still = replace(series(frames=5), frames=[replace(first, places=first.places + noise) for noise in noises])
+    results = write_series(tmp_path / "droplets", still, rate_hz=RATE_HZ)
+    told = track_droplets([read_droplets(file) for file in sorted(results.glob("*_droplets.h5"))])
+    assert told.tracks > 0
+    assert any("stand still" in doubt and "is it dirt?" in doubt for doubt in told.doubts)
