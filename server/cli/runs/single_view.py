@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from processing.analysis.flat.flat_droplets import FlatSettings
     from processing.preprocessing import Polarity
     from processing.runs.results_file import Provenance
-    from processing.runs.single_view.measurement import FlatSource
+    from processing.runs.single_view.sources import FlatSource
 
 IN_SPACE = ("grid", "twins", "light", "sizes", "ignore", "scheduler")
 """Options that need a calibration."""
@@ -55,7 +55,8 @@ def measure_single_view(options: Namespace) -> Outcome:
         Images and runs at once, or options that need a calibration.
     """
     from processing.analysis.flat.flat_droplets import FlatSettings
-    from processing.runs.single_view.measurement import COMMAND, METHOD_VERSION, image_origin, image_sources
+    from processing.runs.single_view.measurement import COMMAND, METHOD_VERSION
+    from processing.runs.single_view.sources import image_origin, image_sources
 
     refuse(options, IN_SPACE, "needs --calibration")
     if any(not export.is_flat for export in options.export):
@@ -95,7 +96,7 @@ def _polarity(options: Namespace, images: bool) -> "Polarity":
 
 def _measure_run(options: Namespace, settings: "FlatSettings", run_dir: Path, out: Path) -> Outcome:
     from daq.files.run_directory import RunReader
-    from processing.runs.single_view.measurement import shot_sources
+    from processing.runs.single_view.sources import shot_sources
 
     with RunReader(run_dir) as run:
         if run.header.polarity != settings.polarity:
