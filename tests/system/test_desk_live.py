@@ -359,8 +359,8 @@ def wishes_of(page: Page) -> list[str]:
 
 
 def test_a_spray_is_recorded_and_seen_on_the_page_run(page: Page, server: Serving) -> None:
-    save_droplet_calibration(server.services.data_dir / "calibrations" / "paper.json")
-    server.http.put("/api/calibrations/current", json={"id": "paper"}).raise_for_status()
+    save_droplet_calibration(server.services.data_dir / "calibrations" / "spray.json")
+    server.http.put("/api/calibrations/current", json={"id": "spray"}).raise_for_status()
     for kind in ("dark", "background"):
         server.run_to_its_end(plan_of(kind=kind, name=kind, shots=1, pulse={"current_a": dict.fromkeys(VIEWS, 6)}))
     page.set_viewport_size({"width": 1280, "height": 900})
