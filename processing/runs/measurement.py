@@ -261,7 +261,7 @@ class RunMeasurement:
                 images, self.search, twins=twins, seed=seed, threads=threads, before_round=before_round
             )
             brightest = max(float(np.percentile(image[::4, ::4], 99.9)) for image in images)
-            return doubted(measured, self._reversed(shot, [image / max(brightest, 1e-6) for image in images]))
+            return doubted(measured, self._reversed(shot, frame, [image / max(brightest, 1e-6) for image in images]))
         images, trust = shadow_images(self.run, shot, frame, self.references)
         known = without_ignored(dict(zip(shot.views, trust, strict=True)), self.settings.ignored)
         shadows = measure_shadows(
@@ -275,11 +275,16 @@ class RunMeasurement:
             threads=threads,
             before_round=before_round,
         )
-        reasons = (*own_backgrounds(shot, frame, self.references), *self._reversed(shot, [1 - one for one in images]))
+        reasons = (
+            *own_backgrounds(shot, frame, self.references),
+            *self._reversed(shot, frame, [1 - one for one in images]),
+        )
         return doubted(shadows, reasons)
 
-    def _reversed(self, shot: Shot, lights: Sequence[Intensity]) -> tuple[str, ...]:
-        """What droplets that are bright in the images of an exposure say of depth, where that is reversed."""
+    def _reversed(self, shot: Shot, frame: FrameName, lights: Sequence[Intensity]) -> tuple[str, ...]:
+        """What droplets that are bright in images say of depth, where that is reversed; B has the cameras of A."""
+        if frame == "b":
+            return ()
         views = {name: self.calibration.views[name] for name in shot.views}
         seen = [find_droplets(np.clip(light, 0, None)) for light in lights]
         told = depth_reversed(replace(self.calibration, views=views), [seen]) if len(views) >= MIN_VIEWS else ""

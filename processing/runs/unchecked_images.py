@@ -33,6 +33,15 @@ ORDER = Unchecked(
 """Of double exposures in a run that does not say where its spray comes from."""
 
 
+DEPTH = Unchecked(
+    "whether all images are mirrored left to right or turned by 180 degrees, or views exchanged in pairs: sights "
+    "hardly diverge in this volume, and near and far would be exchanged",
+    "a larger volume, in which perspective tells (tomoshadow check asks all of it); or nothing, where settings of "
+    "cameras and programs are those of the target",
+)
+"""Of a volume that is small against its distance."""
+
+
 def stated_separation(separation_ns: float) -> Unchecked:
     """Of double exposures whose pulses nobody recorded."""
     return Unchecked(
@@ -58,6 +67,7 @@ def unchecked_images(
     single: bool = False,
     undirected: bool = False,
     stated_ns: float | None = None,
+    shallow: bool = False,
 ) -> Iterator[Unchecked]:
     """What nothing tells of the images that droplets were measured in.
 
@@ -73,6 +83,8 @@ def unchecked_images(
         They are double exposures, and nobody said where the liquid comes from.
     stated_ns : float, optional
         Separation of double exposures, where it was stated and no pulse tells it.
+    shallow : bool
+        Perspective is too weak to tell near from far.
     """
     if polarity == "bright" or not sizes_known:
         yield PROPORTION[polarity]
@@ -82,6 +94,8 @@ def unchecked_images(
         yield ORDER
     if stated_ns is not None:
         yield stated_separation(stated_ns)
+    if shallow:
+        yield DEPTH
 
 
 def told_unchecked(unchecked: Iterator[Unchecked], tell: Callable[[str], None]) -> list[dict[str, str]]:

@@ -217,7 +217,7 @@ def _measure_shots(
         "recipe_sha256": recipe_sha256(NAME, METHOD_VERSION, settings),
         "grid": settings.model_dump(mode="json")["grid"],
         "shots": [shot.model_dump(mode="json") for shot in shots],
-        "not_checked": _tell_unchecked(run_dir, settings, shots),
+        "not_checked": _tell_unchecked(options.calibration, run_dir, settings, shots),
         "statistics": droplet_statistics(stored).model_dump(mode="json"),
         "velocity": velocity_statistics(stored).model_dump(mode="json"),
         **liquid_summary(stored).model_dump(mode="json"),
@@ -231,16 +231,27 @@ def _tell_changes(changes: tuple[str, ...]) -> list[str]:
     return list(changes)
 
 
-def _tell_unchecked(run_dir: Path, settings: "MeasureSettings", shots: "list[ShotDroplets]") -> list[dict[str, str]]:
+def _tell_unchecked(
+    calibration_file: Path, run_dir: Path, settings: "MeasureSettings", shots: "list[ShotDroplets]"
+) -> list[dict[str, str]]:
     from daq.files.run_directory import RunReader
+    from processing.calibration.calibration_file import load_calibration
+    from processing.runs.pipeline import default_grid
+    from processing.runs.shots.turned_views import CLOSE_PX, reversed_shows_px
     from processing.runs.unchecked_images import told_unchecked, unchecked_images
 
     with RunReader(run_dir) as run:
         undirected = run.header.frames_per_shot == 2 and run.conditions.spray is None
     velocities = (shot.velocity for shot in shots if shot.velocity)
     stated_ns = next((one.separation_ns for one in velocities if one.separation_source == "stated"), None)
+    calibration = load_calibration(calibration_file)
+    grid = settings.grid.to_grid() if settings.grid else default_grid(calibration)
     unchecked = unchecked_images(
-        settings.polarity, sizes_known=bool(settings.sizes), undirected=undirected, stated_ns=stated_ns
+        settings.polarity,
+        sizes_known=bool(settings.sizes),
+        undirected=undirected,
+        stated_ns=stated_ns,
+        shallow=reversed_shows_px(calibration, grid) < CLOSE_PX,
     )
     return told_unchecked(unchecked, progress)
 

@@ -13,12 +13,16 @@ import numpy as np
 from processing.calibration.calibration import Calibration
 from processing.calibration.droplets.disparity import measured_box
 from processing.calibration.droplets.droplet_matching import match_exposures
+from processing.calibration.triangulation import triangulate
 from processing.geometry import FloatArray
+from processing.volume import VoxelGrid
 
 SEEDS = 300
 """Droplets of an exposure that are followed."""
 CLOSE_PX = 0.25
 """Root mean square, over views, of how far lines of sight may pass a droplet that they are said to meet at."""
+_ASKED = 200
+"""Places of a volume."""
 SURE = 5.0
 """Standard deviations of the difference of two counts."""
 
@@ -38,6 +42,17 @@ def depth_reversed(calibration: Calibration, exposures: Exposures) -> str:
         f"all views agree on {met} droplets within {CLOSE_PX:g} px, and on {max(sure.values())} if "
         f"{', or '.join(sure)}: depth is reversed"
     )
+
+
+def reversed_shows_px(calibration: Calibration, grid: VoxelGrid) -> float:
+    """How far, root mean square, lines of sight would pass droplets of a grid if all images were mirrored."""
+    views = list(calibration.views.values())
+    points_mm = grid.to_mm(np.random.default_rng(0).uniform(0, np.array(grid.shape) - 1, (_ASKED, 3)))
+    seen_px = np.stack([view.mapping.project(points_mm) for view in views], axis=1)
+    seen_px[:, :, 0] = [view.mapping.image_size_px[0] - 1 for view in views] - seen_px[:, :, 0]
+    middle_mm = np.tile(points_mm.mean(axis=0), (_ASKED, 1))
+    _, left_px = triangulate([view.mapping for view in views], seen_px, middle_mm, iterations=6)
+    return float(np.sqrt((left_px**2).sum(axis=2).mean()))
 
 
 def _met(calibration: Calibration, exposures: Exposures) -> int:

@@ -55,7 +55,8 @@ def test_droplets_of_a_run_lie_in_files_where_they_are(
         "shot", "droplets", "ghost_share", "ghost_interval", "residual_over_noise", "verdict", "cpu_s", "file"
     }  # fmt: skip
     assert (shot["shot"], shot["verdict"], result["polarity"]) == (0, "good", "bright")
-    (unchecked,) = result["not_checked"]
+    unchecked, depth = result["not_checked"]
+    assert "sights hardly diverge in this volume" in depth["what"]
     assert "in proportion to light: any gamma fits bright particles" in unchecked["what"]
     assert unchecked["state"] == "gamma 1 in the settings of the cameras"
     assert shot["ghost_share"] < 0.03
@@ -206,7 +207,7 @@ def test_shadows_of_a_run_become_droplets_with_diameters(tmp_path: Path, capsys:
     shot, arguments = shadow_run(tmp_path)
     result = told(capsys, *arguments)
     assert (result["polarity"], result["shots"][0]["verdict"]) == ("shadow", "good")
-    assert ["a gamma near to 1 fits shadows" in one["what"] for one in result["not_checked"]] == [True]
+    assert ["a gamma near to 1 fits shadows" in one["what"] for one in result["not_checked"]] == [True, False]
     stored = read_droplets(tmp_path / "out" / result["shots"][0]["file"])
     points_mm = np.column_stack([stored.columns[f"{axis}_mm"] for axis in "xyz"])
     of_found, of_truth = matches(points_mm, shot.points_mm, shot.grid.pitch_mm)
@@ -269,7 +270,8 @@ def test_images_that_are_mirrored_in_all_views_are_named(tmp_path: Path, capsys:
     run_dir = write_droplet_run(tmp_path / "run", drift_px=0, mirrored=True)
     save_calibration(calibration_of(views()), tmp_path / "calibration.json")
     arguments = ["measure", run_dir, "--calibration", tmp_path / "calibration.json", "--shots", "0:1"]
-    (shot,) = told(capsys, *arguments, "--grid=-1:1,-0.5:0.5,-1:1", "-o", tmp_path / "out", status=1)["shots"]
+    result = told(capsys, *arguments, "--grid=-1:1,-0.5:0.5,-1:1", "-o", tmp_path / "out", status=1)
+    (shot,) = result["shots"]
     assert shot["verdict"] == "refused"
     assert "if all images are mirrored left to right, or turned by 180 degrees" in shot["reasons"][0]
     assert shot["reasons"][0].endswith("depth is reversed")
