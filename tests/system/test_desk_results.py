@@ -319,7 +319,10 @@ def test_notes_are_changed_on_the_page_and_nobody_overwrites_what_another_wrote(
     assert [change["notes"]["fluid"] for change in changes] == ["oil", "ethanol"]
     assert changes[-1]["spray"] == {"nozzle_mm": [0, -8.4, 0], "axis": [0, 1, 0]}
     before = page.get_by_role("status", name="what stood in them before")
-    expect(before).to_have_text(re.compile(r"^until .*changed it: oil · flow.*\nuntil .*: water · flow_l_min: 1\.2$"))
+    placed = "and put the orifice at 0, -8.4, 0 mm, the axis along 0, 1, 0"
+    expect(before).to_have_text(
+        re.compile(rf"^until .*changed it {placed}: oil · flow.*\nuntil .*: water · flow_l_min: 1\.2$")
+    )
 
 
 def test_a_run_is_deleted_by_its_name_alone(page: Page, server: Serving) -> None:

@@ -6,7 +6,7 @@ from typing import Any
 
 from daq.files.later_notes import NotesChange
 from daq.run.state import RunOutcome
-from daq.run_notes import RunNotes
+from daq.run_notes import RunNotes, Spray
 from server.lab.runs.run_summary import ACTIVE, DAMAGED, PACKED, RunSummary
 from server.web.ui.run.run_panel import outcome_colour
 
@@ -66,10 +66,18 @@ def notes_text(run: RunSummary) -> str:
 def earlier_text(changes: Sequence[NotesChange]) -> str:
     """What stood in its notes before each change, the newest first."""
     told = [
-        f"until {local_time(one.at_utc)}, when {one.who} changed it: {notes_line(one.before) or 'nothing'}"
+        f"until {local_time(one.at_utc)}, when {one.who} changed it{_spray_told(one.spray)}: "
+        f"{notes_line(one.before) or 'nothing'}"
         for one in reversed(changes)
     ]
     return "\n".join([*told[:_CHANGES], *([f"and {len(told) - _CHANGES} before"] if len(told) > _CHANGES else [])])
+
+
+def _spray_told(spray: Spray | None) -> str:
+    if spray is None:
+        return ""
+    orifice, axis = (", ".join(f"{one:g}" for one in place) for place in (spray.nozzle_mm, spray.axis))
+    return f" and put the orifice at {orifice} mm, the axis along {axis}"
 
 
 def notes_line(notes: RunNotes) -> str:
