@@ -23,6 +23,8 @@ FEW_SHOTS = 10
 simulated sprays of two shots 8 to 25 % were so, and a third of these intervals held the truth. So droplets are drawn,
 too, and the wider interval counts. More shots are hardly ever so alike."""
 DRAWS, SEED = 400, 0
+COUNTED_DRAWS = 100
+"""Of droplets, where shots are drawn, too: a lower limit of the width may be known to 7 %."""
 DROPLETS_AT_A_TIME = 2**18
 """Of all draws that are made at once: memory."""
 Figures = Callable[[FloatArray], FloatArray]
@@ -47,7 +49,7 @@ class Estimate(FrozenValue):
         return Estimate(value=self.value, low=min(self.low, other.low), high=max(self.high, other.high))
 
 
-def draws(units: int, width: int, *, counting: bool = False) -> Iterator[FloatArray]:
+def draws(units: int, width: int, *, counting: bool = False, number: int = DRAWS) -> Iterator[FloatArray]:
     """How often each unit is taken when as many as there are are drawn with replacement; a row per draw.
 
     Parameters
@@ -58,15 +60,17 @@ def draws(units: int, width: int, *, counting: bool = False) -> Iterator[FloatAr
         Droplets that a row is about: memory.
     counting : bool
         Each unit is taken a Poisson number of times: how many there are is left to chance, too.
+    number : int
+        Of draws.
 
     Yields
     ------
     (rows, units) array
-        Some draws; all together ``DRAWS``, the same every time.
+        Some draws; all together ``number``, the same every time.
     """
     rng, rows = np.random.default_rng(SEED), max(1, DROPLETS_AT_A_TIME // max(width, units, 1))
-    for first in range(0, DRAWS, rows):
-        taken = min(rows, DRAWS - first)
+    for first in range(0, number, rows):
+        taken = min(rows, number - first)
         yield _taken(rng, taken, units) if not counting else rng.poisson(1.0, (taken, units)).astype(np.float64)
 
 
@@ -75,10 +79,12 @@ def _taken(rng: np.random.Generator, rows: int, units: int) -> FloatArray:
     return np.bincount(places.ravel(), minlength=places.size).reshape(places.shape).astype(np.float64)
 
 
-def drawn_figures(figures: Figures, units: int, width: int, *, counting: bool = False) -> tuple[FloatArray, FloatArray]:
+def drawn_figures(
+    figures: Figures, units: int, width: int, *, counting: bool = False, number: int = DRAWS
+) -> tuple[FloatArray, FloatArray]:
     """Figures as measured, (k,), and of every draw, (draws, k)."""
     (values,) = figures(np.ones((1, units)))
-    return values, np.concatenate([figures(counts) for counts in draws(units, width, counting=counting)])
+    return values, np.concatenate([figures(counts) for counts in draws(units, width, counting=counting, number=number)])
 
 
 def standard_error(drawn: FloatArray, units: int, signed: bool | NDArray[np.bool_] = False) -> FloatArray:
@@ -113,6 +119,7 @@ def estimated(
     width: int,
     *,
     counting: bool = False,
+    number: int = DRAWS,
     widening: float = 1.0,
     signed: bool | NDArray[np.bool_] = False,
     confidence: float = CONFIDENCE,
@@ -123,7 +130,7 @@ def estimated(
     ----------
     figures : callable
         Of how often each unit is taken.
-    units, width, counting
+    units, width, counting, number
         As of ``draws``.
     widening : float
         Of the intervals; the root of 2 where exposures A and B show the same droplets, and droplets are drawn.
@@ -134,7 +141,7 @@ def estimated(
     """
     if units < 2:
         return [None] * figures(np.ones((1, units))).shape[1]
-    values, drawn = drawn_figures(figures, units, width, counting=counting)
+    values, drawn = drawn_figures(figures, units, width, counting=counting, number=number)
     half_widths = widening * reach(units, confidence) * standard_error(drawn, units, signed)
     return [
         Estimate(value=value, low=low, high=high) if np.isfinite([value, low, high]).all() else None

@@ -18,7 +18,15 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
 from scipy.special import chdtri
 
-from processing.analysis.estimates import CONFIDENCE, FEW_SHOTS, Estimate, estimated, weighted_quantiles
+from processing.analysis.estimates import (
+    CONFIDENCE,
+    COUNTED_DRAWS,
+    DRAWS,
+    FEW_SHOTS,
+    Estimate,
+    estimated,
+    weighted_quantiles,
+)
 from processing.geometry import FloatArray
 from processing.masked import require_unmasked
 from processing.reconstruction.settings import FrozenValue
@@ -106,7 +114,7 @@ def mean_diameters(
     own = float(np.sqrt(exposures_per_shot))
     estimates = _estimates(diameters_um[order], units[order], 1.0 if several else own, confidence)
     if several and len(shots) < FEW_SHOTS:
-        counted = _estimates(diameters_um[order], np.arange(len(order)), own, confidence)
+        counted = _estimates(diameters_um[order], np.arange(len(order)), own, confidence, COUNTED_DRAWS)
         counted.pop(SPAN, None)  # of a span, intervals that are narrower than that hold the truth in 81 to 88 % of 90 %
         estimates = {name: one.no_surer_than(counted.get(name)) for name, one in estimates.items()}
     known = _known(estimates, diameters_um[order], FEWEST * exposures_per_shot)
@@ -231,7 +239,7 @@ def _size_class(
 
 
 def _estimates(
-    diameters_um: FloatArray, units: NDArray[np.intp], widening: float, confidence: float
+    diameters_um: FloatArray, units: NDArray[np.intp], widening: float, confidence: float, number: int = DRAWS
 ) -> dict[str, Estimate]:
     """Figures of sorted diameters, with intervals; diameters by their logarithm, so that no limit is below 0."""
     powers = diameters_um ** np.arange(5)[:, None]
@@ -240,6 +248,7 @@ def _estimates(
         lambda counts: _figures(diameters_um, powers, counts[:, units]),
         int(units.max()) + 1,
         len(diameters_um),
+        number=number,
         widening=widening,
         signed=np.array([name == SPAN for name in names]),
         confidence=confidence,

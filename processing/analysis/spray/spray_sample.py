@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.analysis.droplets.droplet_statistics import DIAMETER, measured_grid, measured_mm3, told_exposures
-from processing.analysis.estimates import CONFIDENCE, FEW_SHOTS, Estimate, Figures, estimated
+from processing.analysis.estimates import CONFIDENCE, COUNTED_DRAWS, DRAWS, FEW_SHOTS, Estimate, Figures, estimated
 from processing.geometry import FloatArray
 
 VELOCITY = ("u_m_s", "v_m_s", "w_m_s")
@@ -125,17 +125,23 @@ class SpraySample:
         told = self._drawn(figures_of, signed, confidence, by_droplet)
         if not self.several or len(np.unique(self.shot)) >= FEW_SHOTS:
             return told
-        counted = self.as_one_shot._drawn(figures_of, signed, confidence, by_droplet)
+        counted = self.as_one_shot._drawn(figures_of, signed, confidence, by_droplet, COUNTED_DRAWS)
         return [one and one.no_surer_than(other) for one, other in zip(told, counted, strict=True)]
 
     def _drawn(
-        self, figures_of: "FiguresOf", signed: bool | NDArray[np.bool_], confidence: float, by_droplet: bool
+        self,
+        figures_of: "FiguresOf",
+        signed: bool | NDArray[np.bool_],
+        confidence: float,
+        by_droplet: bool,
+        number: int = DRAWS,
     ) -> list[Estimate | None]:
         return estimated(
             figures_of(self),
             self.n_units,
             len(self) if by_droplet else 1,
             counting=not self.several,
+            number=number,
             widening=self.widening,
             signed=signed,
             confidence=confidence,
