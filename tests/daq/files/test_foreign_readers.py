@@ -6,6 +6,8 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+import xarray
+from nexusformat.nexus import nxload
 
 from daq.files.run_directory import RunNotes, RunPlan, RunReader, Spray
 from daq.run_plan import PulsePair
@@ -62,16 +64,13 @@ def test_a_nozzle_that_is_nowhere_is_refused(wrong: dict[str, Any], reason: str)
 
 
 def test_nexusformat_reads_a_run(run_dir: Path) -> None:
-    nexus = pytest.importorskip("nexusformat.nexus", reason="nexusformat is not installed")
-    root = nexus.nxload(str(run_dir / "run.h5"))
+    root = nxload(str(run_dir / "run.h5"))
     assert "view1:NXdetector" in root.tree
     data = root["entry/data_view1"]
     np.testing.assert_array_equal(data.nxsignal[0, 1].nxdata, RunReader(run_dir).read_shot(0).views["view1"].frame_b)
 
 
 def test_xarray_reads_a_run(run_dir: Path) -> None:
-    pytest.importorskip("h5netcdf", reason="h5netcdf is not installed")
-    xarray = pytest.importorskip("xarray", reason="xarray is not installed")
     view = xarray.open_dataset(run_dir / "run.h5", group="/cameras/view1", engine="h5netcdf", phony_dims="sort")
     np.testing.assert_array_equal(view.frames[0, 0], RunReader(run_dir).read_shot(0).views["view1"].frame_a)
     assert view.device_timestamp_ns.attrs["units"] == "ns"

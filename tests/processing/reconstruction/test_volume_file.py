@@ -9,6 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkIOHDF import vtkHDFReader
 
 from processing.reconstruction.choices import VoxelType
 from processing.reconstruction.slab_volume import SLAB_ROWS, SlabVolume
@@ -169,8 +171,7 @@ def test_it_is_vtk_image_data(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("voxels", list(VoxelType))
 def test_vtk_reads_a_volume(tmp_path: Path, voxels: VoxelType) -> None:
-    reader = pytest.importorskip("vtkmodules.vtkIOHDF", reason="vtk is not installed").vtkHDFReader()
-    numpy_support = pytest.importorskip("vtkmodules.util.numpy_support")
+    reader = vtkHDFReader()
     volume = (some_volume(TALL) * 255 if voxels is VoxelType.UINT8 else some_volume(TALL)).astype(voxels.value)
     write_slabs(tmp_path / "one.vtkhdf", SlabVolume.of(volume), TALL, {})
     reader.SetFileName(str(tmp_path / "one.vtkhdf"))
@@ -178,7 +179,7 @@ def test_vtk_reads_a_volume(tmp_path: Path, voxels: VoxelType) -> None:
     image = reader.GetOutput()
     assert (image.GetDimensions(), image.GetOrigin()) == (TALL.shape[::-1], TALL.origin_mm)
     assert image.GetSpacing() == (TALL.pitch_mm,) * 3
-    seen = numpy_support.vtk_to_numpy(image.GetPointData().GetArray("intensity")).reshape(TALL.shape)
+    seen = vtk_to_numpy(image.GetPointData().GetArray("intensity")).reshape(TALL.shape)
     np.testing.assert_array_equal(seen, volume)
 
 

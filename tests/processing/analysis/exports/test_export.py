@@ -10,6 +10,9 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+from pyarrow import parquet
+from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkIOHDF import vtkHDFReader
 
 from processing.analysis.droplets.droplet_file import DropletFileError, read_droplets, write_columns, write_droplets
 from processing.analysis.droplets.droplet_table import Droplets
@@ -97,7 +100,6 @@ def test_csv_has_every_digit_and_no_nan(file: Path) -> None:
 
 
 def test_parquet_keeps_columns_types_and_provenance(file: Path) -> None:
-    parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed, extra [tables]")
     table = parquet.read_table(export_droplets(file, "parquet"))
     stored = read_droplets(file)
     assert table.column_names == ["shot", *stored.columns]
@@ -117,18 +119,17 @@ def test_without_pyarrow_the_remedy_is_named(file: Path, monkeypatch: pytest.Mon
 
 
 def test_vtk_reads_points_and_arrays(file: Path) -> None:
-    reader = pytest.importorskip("vtkmodules.vtkIOHDF", reason="vtk is not installed").vtkHDFReader()
-    numpy_support = pytest.importorskip("vtkmodules.util.numpy_support")
+    reader = vtkHDFReader()
     reader.SetFileName(str(export_droplets(file, "vtk")))
     reader.Update()
     points, stored = reader.GetOutput(), read_droplets(file).columns
     assert (points.GetNumberOfPoints(), points.GetNumberOfVerts(), points.GetNumberOfCells()) == (8, 8, 8)
-    xyz = numpy_support.vtk_to_numpy(points.GetPoints().GetData())
+    xyz = vtk_to_numpy(points.GetPoints().GetData())
     np.testing.assert_array_equal(xyz, np.column_stack([stored[f"{axis}_mm"] for axis in "xyz"]))
     arrays = points.GetPointData()
     for name in ("amplitude", "residual", "cov_xz_mm2"):
-        np.testing.assert_array_equal(numpy_support.vtk_to_numpy(arrays.GetArray(name)), stored[name])
-    assert numpy_support.vtk_to_numpy(arrays.GetArray("exposure")).tolist() == [0] * 5 + [1] * 3
+        np.testing.assert_array_equal(vtk_to_numpy(arrays.GetArray(name)), stored[name])
+    assert vtk_to_numpy(arrays.GetArray("exposure")).tolist() == [0] * 5 + [1] * 3
 
 
 @pytest.mark.parametrize("n", [8, 0])
@@ -154,7 +155,6 @@ def test_a_shot_without_droplets_is_a_table_without_rows(empty: Path) -> None:
     text = export_droplets(empty, "csv").read_text().splitlines()
     assert len(text) == 1
     assert text[0].startswith("shot,frame,x_mm")
-    parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed, extra [tables]")
     schema = parquet.read_table(export_droplets(empty, "parquet")).schema
     assert [str(schema.field(name).type) for name in ("frame", "x_mm")] == ["string", "double"]
 
@@ -184,7 +184,6 @@ def test_tracks_are_a_row_per_droplet_in_csv_and_parquet(tracks: Path) -> None:
     assert list(rows[0]) == list(stored)
     assert [float(row["u_m_s"]) for row in rows] == stored["u_m_s"].tolist()
     assert [row["p_link"] == "" for row in rows] == np.isnan(stored["p_link"]).tolist()
-    parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed, extra [tables]")
     table = parquet.read_table(export_tracks(tracks, "parquet"))
     assert table["track"].to_pylist() == stored["track"].tolist()
     assert json.loads(table.schema.metadata[b"tomoshadow"])["rate_hz"] == 2000.0
