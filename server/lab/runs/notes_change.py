@@ -33,7 +33,8 @@ class NewNotes(FrozenModel):
         Spray | None, Field(description="nozzle and axis, for what is measured from now on; null: they stay")
     ] = None
     seen: Annotated[
-        RunNotes | None, Field(description="what stood there when they were written: if others do now, 409")
+        int | None,
+        Field(ge=0, description="how many changes there had been when they were written: if there are others, 409"),
     ] = None
 
 
@@ -86,9 +87,9 @@ def change_notes(runs: RunStore, run_id: str, new: NewNotes, who: str) -> RunSum
     return runs.summary(run_id)
 
 
-def _require_seen(run: RunReader, seen: RunNotes | None) -> None:
-    now = run.conditions
-    if seen in (None, now.notes):
+def _require_seen(run: RunReader, seen: int | None) -> None:
+    changes = run.notes_changes
+    if seen in (None, len(changes)):
         return
-    by = f"by {now.changed.who} at {now.changed.at_utc}" if now.changed else "by nobody: they are as recorded"
+    by = f"by {changes[-1].who} at {changes[-1].at_utc}" if changes else "by nobody: they are as recorded"
     raise Conflict(f"the notes of run {run.header.run_id} are not those that were seen, changed {by}: look again")

@@ -47,11 +47,23 @@ def test_notes_of_a_run_can_be_changed_are_found_and_it_is_told_who_did_it(serve
 
 def test_two_who_change_them_do_not_overwrite_each_other(server: Serving) -> None:
     run_id = recorded(server)
-    assert put(server, run_id, {"notes": ETHANOL, "seen": WATER}).status_code == 200
-    refused = put(server, run_id, {"notes": {"fluid": "oil"}, "seen": WATER})
+    assert put(server, run_id, {"notes": ETHANOL, "seen": 0}).status_code == 200
+    refused = put(server, run_id, {"notes": {"fluid": "oil"}, "seen": 0})
     assert refused.status_code == 409
     assert "changed by ann@lab at" in refused.json()["detail"]
-    assert put(server, run_id, {"notes": {"fluid": "oil"}, "seen": ETHANOL}).status_code == 200
+    assert put(server, run_id, {"notes": {"fluid": "oil"}, "seen": 1}).status_code == 200
+
+
+def test_nor_do_two_who_change_nozzle_and_axis_alone(server: Serving) -> None:
+    run_id = recorded(server)
+    assert put(server, run_id, {"notes": WATER, "spray": NOZZLE, "seen": 0}).status_code == 200
+    elsewhere = NOZZLE | {"nozzle_mm": [1.0, 0.0, 0.0]}
+    refused = put(server, run_id, {"notes": WATER, "spray": elsewhere, "seen": 0})
+    assert (refused.status_code, server.http.get(f"/api/runs/{run_id}/notes").json()["changes"][-1]["spray"]) == (
+        409,
+        NOZZLE,
+    )
+    assert put(server, run_id, {"notes": WATER, "spray": elsewhere, "seen": 1}).status_code == 200
 
 
 def test_it_needs_control_and_limits_are_those_of_a_plan(server: Serving) -> None:

@@ -6,7 +6,7 @@ from typing import Any
 
 from nicegui import ui
 
-from daq.errors import DaqError
+from daq.errors import DaqError, ShotFileError
 from daq.files.run_directory import RunConditions
 from daq.run_notes import RunNotes, Spray
 from server.lab.errors import ServerError
@@ -38,7 +38,7 @@ class NotesDialog:
 
     def __init__(self, context: Context, run_id: str, changed: Callable[[], Awaitable[None]]) -> None:
         self._context, self._run_id, self._changed = context, run_id, changed
-        self._seen = RunNotes()
+        self._more, self._seen = RunNotes().more, 0
         self._button = ui.button("Edit notes...", icon="edit_note", on_click=self._open).props("flat dense no-caps")
         for_operators(self._button)
         with ui.dialog() as self._dialog, ui.card().props('aria-label="notes of the run"').classes("w-full"):
@@ -57,21 +57,26 @@ class NotesDialog:
 
     async def _open(self) -> None:
         try:
-            run = await asyncio.to_thread(self._context.runs.summary, self._run_id)
-            spray = None if run.notes_flaw else (await asyncio.to_thread(self._conditions)).spray
-        except ServerError as error:
+            now, self._seen, flaw = await asyncio.to_thread(self._read)
+        except (DaqError, ServerError) as error:
             ui.notify(told(error), type="negative")
             return
-        self._seen = run.notes
+        self._more = now.notes.more
         for name, field in self._fields.items():
-            field.set_value(getattr(run.notes, name))
+            field.set_value(getattr(now.notes, name))
         for name, place in self._places.items():
-            place.set_value(", ".join(map(str, getattr(spray, name))) if spray else "")
-        self._refusal.set_text(run.notes_flaw)
+            place.set_value(", ".join(map(str, getattr(now.spray, name))) if now.spray else "")
+        self._refusal.set_text(flaw)
         self._dialog.open()
 
-    def _conditions(self) -> RunConditions:
-        return self._context.runs.reader(self._run_id).conditions
+    def _read(self) -> tuple[RunConditions, int, str]:
+        """What holds now, how many changes have led there, and why those cannot be read."""
+        run = self._context.runs.reader(self._run_id)
+        try:
+            changes, flaw = run.notes_changes, ""
+        except ShotFileError as error:
+            changes, flaw = (), str(error)
+        return RunConditions.after(run.header, changes), len(changes), flaw
 
     async def _save(self) -> None:
         if not all([field.validate() for field in self._fields.values()]):
@@ -91,7 +96,7 @@ class NotesDialog:
     def _written(self) -> RunNotes:
         written = {name: field.value for name, field in self._fields.items()}
         said = {name: value for name, value in written.items() if value not in (None, "")}
-        return RunNotes.model_validate(said | {"more": self._seen.more})
+        return RunNotes.model_validate(said | {"more": self._more})
 
     def _spray(self) -> Spray | None:
         """As it is written; None where nothing is: it stays as it was."""
