@@ -95,6 +95,8 @@ class DraftStore:
         Told of a damaged file.
     may_change : Callable[[], bool]
         Asked before every change whether he may who asks for it: pages lock what he may not, and sockets do not.
+    has_stage : bool
+        Whether the rig has one.
     """
 
     def __init__(
@@ -103,10 +105,13 @@ class DraftStore:
         config: RigConfig,
         events: EventPublisher,
         may_change: Callable[[], bool] = lambda: True,
+        *,
+        has_stage: bool = True,
     ) -> None:
         self._may_change = may_change
         self._path = path
         self._events = events
+        self._has_stage = has_stage
         self.values = first_draft(config) | self._stored()
         first, stored = first_draft(config)["current_a"], self.values["current_a"]
         self.values["current_a"] = {view: stored.get(view, current_a) for view, current_a in first.items()}
@@ -127,6 +132,11 @@ class DraftStore:
         part = self._path.with_suffix(".part")
         part.write_text(json.dumps({**self._stored(), name: value}))
         part.replace(self._path)
+
+    @property
+    def plan(self) -> RunPlan:
+        """What the form describes for this rig; ValueError if that is no plan."""
+        return plan_of(self.values, self._has_stage)
 
     def adopt(self, shown: Mapping[str, str]) -> None:
         """Take over what the page shows, by ``data-draft``: the last letters may have been lost in a network.
@@ -223,8 +233,8 @@ def recipes_of(values: dict[str, Any]) -> tuple[Recipe, ...]:
     return tuple(recipe for recipe in chosen if recipe)
 
 
-def plan_of(values: dict[str, Any]) -> RunPlan:
-    """The plan that a draft describes.
+def plan_of(values: dict[str, Any], has_stage: bool = True) -> RunPlan:
+    """The plan that a draft describes; only a rig with a stage moves the target, and has to know where to.
 
     Raises
     ------
@@ -232,6 +242,9 @@ def plan_of(values: dict[str, Any]) -> RunPlan:
         It describes none.
     """
     kind = RunKind(values["kind"])
+    moves = kind is RunKind.CALIBRATION and has_stage
+    if moves and problem_of_positions(values["stage_z_mm"]):
+        raise ValueError("stage_z_mm: no positions of the target")
     return RunPlan(
         name=values["name"],
         kind=kind,
@@ -239,7 +252,7 @@ def plan_of(values: dict[str, Any]) -> RunPlan:
         rate_hz=values["rate_hz"],
         pulse=pulse_of(values),
         notes=notes_of(values),
-        stage_z_mm=positions(values["stage_z_mm"]) if kind is RunKind.CALIBRATION else (),
+        stage_z_mm=positions(values["stage_z_mm"]) if moves else (),
         references=tuple(values["references"]) if kind is RunKind.SAMPLE else (),
         calibration=values["calibration"] if kind is RunKind.SAMPLE else None,
         recipes=recipes_of(values) if kind is RunKind.SAMPLE else None,

@@ -11,7 +11,7 @@ from server.lab.desk.visitor import Role, Visitor
 from server.lab.services import Context
 from server.lab.starting.preflight_list import OF_THE_RIG, Check, CheckResult, check_control, checks_of
 from server.lab.starting.readiness import reasons_against, reasons_against_visitor
-from server.web.ui.draft import DraftStore, plan_of
+from server.web.ui.draft import DraftStore
 
 _LOOK_AGAIN_S = 5.0
 """Disk and references change without a word."""
@@ -91,7 +91,7 @@ class FormJudge:
 
     def _look(self) -> Verdict:
         try:
-            plan = plan_of(self._draft.values)
+            plan = self._draft.plan
         except (ValueError, TypeError):
             return Verdict((_NO_PLAN,), (Check(name="Form", finding=CheckResult.REFUSED, text=_NO_PLAN.text),))
         reasons = reasons_against(self._context, plan)

@@ -78,8 +78,9 @@ class _Drafts:
     def of(self, context: Context) -> tuple[DraftStore, FormJudge]:
         """The draft of this rig, and what speaks against it."""
         if self._made is None:
-            path, config = context.services.data_dir / "draft.json", context.services.config
-            draft = DraftStore(path, config, context.services.events, partial(may_command, context))
+            services, may_change = context.services, partial(may_command, context)
+            path, has_stage = services.data_dir / "draft.json", services.rig.stage is not None
+            draft = DraftStore(path, services.config, services.events, may_change, has_stage=has_stage)
             self._made = draft, FormJudge(context, draft)
         return self._made
 

@@ -77,6 +77,16 @@ def test_only_a_calibration_run_moves_the_target_and_only_a_sample_run_has_refer
     assert plan_of(values).references == ("dark-1",)
 
 
+def test_a_target_is_moved_somewhere_where_there_is_a_stage_and_nowhere_else(tmp_path: Path) -> None:
+    config, path = memory_config(tmp_path / "runs"), tmp_path / "draft.json"
+    moved = DraftStore(path, config, EventPublisher())
+    moved.set("kind", "calibration")
+    assert DraftStore(path, config, EventPublisher(), has_stage=False).plan.stage_z_mm == ()
+    moved.set("stage_z_mm", " ")
+    with pytest.raises(ValueError, match="stage_z_mm"):
+        _ = moved.plan
+
+
 @pytest.mark.parametrize(
     ("name", "value", "problem"),
     [

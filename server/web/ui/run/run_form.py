@@ -15,7 +15,7 @@ from server.lab.starting.light_request import obey
 from server.lab.starting.preflight_list import PASSING
 from server.lab.starting.run_start import start_run
 from server.web.ui.bar.server_link import TICKET, light_request, shown_form
-from server.web.ui.draft import DraftStore, plan_of
+from server.web.ui.draft import DraftStore
 from server.web.ui.form_judge import FormJudge, Verdict
 from server.web.ui.run.chosen_runs import ChosenRuns
 from server.web.ui.run.chosen_work import ChosenWork
@@ -105,7 +105,7 @@ class RunForm:
             self._draft.adopt(shown)
             if not self._fields.are_good():
                 return
-            plan = plan_of(self._draft.values)
+            plan = self._draft.plan
             start = partial(start_run, self._context, plan)
             await asyncio.to_thread(obey, self._context, request, described("run", plan), start)
         except (DaqError, ServerError, ValueError) as error:
