@@ -189,7 +189,7 @@ def test_progress_counts_the_jobs_of_one_run_by_result_set(tmp_path: Path) -> No
     newer, older = table.progress("one")
     assert (newer.results_id, newer.waiting) == ("smart-1", 1)
     assert (older.shots, older.done, older.failed, older.waiting) == (2, 1, 1, 0)
-    assert progress_text(older) == "mlos-1: 1 of 2 shots done, 1 failed"
+    assert progress_text(older) == "mlos-1: 1 of 2 shots done, 1 failed or aborted"
     assert table.progress("none") == []
     table.close()
 

@@ -94,7 +94,7 @@ def can_be_worked_on(run: RunSummary) -> bool:
 
 def progress_text(one: WorkProgress) -> str:
     """How far a result set is."""
-    failed = f", {one.failed} failed" if one.failed else ""
+    failed = f", {one.failed} failed or aborted" if one.failed else ""
     return f"{one.results_id}: {one.done} of {one.shots} shots done{failed}"
 
 
