@@ -293,6 +293,23 @@ def test_the_shot_that_a_hand_has_picked_is_never_torn_away(page: Page, server: 
     expect(page).to_have_url(re.compile(f"/results/{newest}/.*/0$"))
 
 
+def test_a_run_is_changed_and_deleted_by_nobody_while_somebody_else_holds_control(page: Page, server: Serving) -> None:
+    run_id, _ = server.run_to_its_end(plan_of(kind="dark", shots=1, pulse=PULSE))
+    server.free_control()
+    page.goto(f"{server.http.base_url}/runs/{run_id}")
+    buttons = [page.get_by_role("button", name=name) for name in ("Edit notes...", "Delete...")]
+    for button in buttons:
+        expect(button).to_be_enabled()
+    server.http.put("/api/rig/control", headers={"Tomoshadow-Operator": "ann@lab"}).raise_for_status()
+    for button in buttons:
+        expect(button).to_be_disabled()
+        expect(button).to_have_attribute("title", re.compile("^ann@lab holds control of this rig: wait, or take"))
+    server.free_control()
+    for button in buttons:
+        expect(button).to_be_enabled()
+        expect(button).not_to_have_attribute("title", re.compile("."))
+
+
 def test_notes_are_changed_on_the_page_and_nobody_overwrites_what_another_wrote(page: Page, server: Serving) -> None:
     noted = {"fluid": "water", "more": {"flow_l_min": 1.2}}
     run_id, _ = server.run_to_its_end(plan_of(kind="dark", shots=1, pulse=PULSE, notes=noted))

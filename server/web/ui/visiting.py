@@ -32,12 +32,12 @@ def is_viewer() -> bool:
     return visitor().role is Role.VIEWER
 
 
-def for_operators(control: Control, may: bool = True) -> Control:
-    """Lock a control where it may not be used; a viewer never may, and is told why where he points at it."""
-    is_locked = is_viewer()
-    if is_locked and control.props.get("title") != VIEWERS_MAY:
-        control.props["title"] = VIEWERS_MAY
-    control.set_enabled(may and not is_locked)
+def for_operators(control: Control, may: bool = True, why: str = "") -> Control:
+    """Lock a control where it may not be used, and say why where one points at it; a viewer never may."""
+    is_locked, why = is_viewer(), VIEWERS_MAY if is_viewer() else why
+    if why != control.props.get("title", ""):
+        control.props.set_bool("title", why)
+    control.set_enabled(may and not is_locked and not why)
     return control
 
 
@@ -62,11 +62,16 @@ def require_operator() -> Visitor:
 
 def may_command(context: Context) -> bool:
     """Whether who looks may make light and change its form: no viewer, and nobody while somebody else holds control."""
+    return not why_not(context)
+
+
+def why_not(context: Context) -> str:
+    """Why who looks may change nothing now; empty: he may."""
     try:
         context.control.check(visitor())
-    except ServerError:
-        return False
-    return True
+    except ServerError as error:
+        return told(error)
+    return ""
 
 
 def told(error: Exception) -> str:

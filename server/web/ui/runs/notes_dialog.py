@@ -16,7 +16,7 @@ from server.lab.services import Context
 from server.lab.starting.command import command
 from server.web.ui.draft import NOTES_FIELDS, positions, problem_of
 from server.web.ui.runs.run_rows import is_unreadable
-from server.web.ui.visiting import for_operators, told, visitor
+from server.web.ui.visiting import told, visitor
 
 _LINES = (("operator", "Operator"), ("fluid", "Fluid"), ("nozzle", "Nozzle"))
 _PLACES = (("nozzle_mm", "Orifice at x, y, z / mm"), ("axis", "Axis of the spray x, y, z"))
@@ -39,8 +39,8 @@ class NotesDialog:
     def __init__(self, context: Context, run_id: str, changed: Callable[[], Awaitable[None]]) -> None:
         self._context, self._run_id, self._changed = context, run_id, changed
         self._more, self._seen = RunNotes().more, 0
-        self._button = ui.button("Edit notes...", icon="edit_note", on_click=self._open).props("flat dense no-caps")
-        for_operators(self._button)
+        self.button = ui.button("Edit notes...", icon="edit_note", on_click=self._open).props("flat dense no-caps")
+        """Opens it."""
         with ui.dialog() as self._dialog, ui.card().props('aria-label="notes of the run"').classes("w-full"):
             ui.label("Notes of this run").classes("text-base font-medium")
             ui.label("The run stays as it was recorded; what stood here before is kept with them.").classes("text-sm")
@@ -53,7 +53,7 @@ class NotesDialog:
 
     def show(self, run: RunSummary) -> None:
         """Only notes of a run that is over and can be read are changed."""
-        self._button.set_visibility(run.outcome != ACTIVE and not is_unreadable(run))
+        self.button.set_visibility(run.outcome != ACTIVE and not is_unreadable(run))
 
     async def _open(self) -> None:
         try:

@@ -31,7 +31,7 @@ from server.web.ui.runs.run_work import RunWork
 from server.web.ui.runs.runs_page import STYLE_SHEET
 from server.web.ui.runs.shot_view import ShotView
 from server.web.ui.theme import panel
-from server.web.ui.visiting import for_operators
+from server.web.ui.visiting import for_operators, why_not
 
 _EVENTS = 60
 
@@ -56,7 +56,10 @@ class OneRunPage:
         self._page = ui.element("div").classes("columns one")
 
     async def refresh(self) -> None:
-        """Shots come by the list."""
+        """Shots come by the list; nobody changes or deletes a run while somebody else holds control."""
+        if self._is_built:
+            for control in (self._edit.button, self._delete):
+                for_operators(control, why=why_not(self._context))
 
     async def reload(self) -> None:
         """Read the run again."""
@@ -122,8 +125,8 @@ class OneRunPage:
             self._results = ui.link("Results", f"/results/{self._run_id}").classes("text-sm")
             self._edit = NotesDialog(self._context, self._run_id, self.reload)
             dialog = RemovalDialog(self._context, self._run_id)
-            delete = ui.button("Delete...", icon="delete", on_click=dialog.open)
-            for_operators(delete.props("flat dense no-caps color=negative"))
+            self._delete = ui.button("Delete...", icon="delete", on_click=dialog.open)
+            self._delete.props("flat dense no-caps color=negative")
         self._cause = ui.label("").classes("text-sm whitespace-pre-line").props('role=status aria-label="cause"')
         self._notes = ui.label("").classes("text-sm opacity-80").props('role=status aria-label="notes"')
         self._earlier = ui.label("").classes("text-xs opacity-70 whitespace-pre-line")
