@@ -115,6 +115,7 @@ TABLES: dict[str, tuple[Touch, ...]] = {
     "/run": (
         *PULSES,
         *(pressed(kind) for kind in ("Background", "Calibration")),
+        *fields("spinbutton", "Shots", text="0"),
         Touch("link", "to the form"),
         *(pressed(kind) for kind in ("Dark", "Sample")),
         *fields("spinbutton", "Rate / Hz", "LED view1 / A", "Pressure / bar"),
