@@ -1,32 +1,38 @@
 """The first page of the demonstration's report: conditions, and what the spray is asked for, beside the truth."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from processing.analysis.droplets.ghost_share import share_interval
 from processing.analysis.droplets.size_statistics import mean_diameters
 from processing.analysis.estimates import Estimate
-from processing.analysis.spray.spray_statistics import SprayStatistics
+from processing.analysis.spray.spray_extent import spray_extent
+from processing.analysis.spray.spray_motion import spray_motion
+from processing.analysis.spray.spray_sample import SpraySample
+from processing.analysis.spray.spray_statistics import AskedFor, SprayStatistics
 from processing.analysis.velocity.velocity_statistics import velocity_statistics
 from processing.figures.found_figures import Placed
 from processing.runs.liquid.objects import LiquidSummary
-from server.demo.demo_droplets import COUNTED_UM, EXPOSURES, MeasuredDroplets
+from server.demo.demo_droplets import EXPOSURES, MeasuredDroplets
 from server.demo.demo_liquid import MeasuredLiquid
 from server.reports.digits import digits_of_interval, three_digits
 from server.reports.page import Table
-from server.reports.spray_tables import DENSITY, OF_DROPLETS, in_percent
+from server.reports.spray_tables import DENSITY, LABELS, in_percent
 
-SIZES = ("d10_um", "d30_um", "d32_um", "dv10_um", "dv50_um", "dv90_um", "relative_span")
+SIZES = ("d10_um", "d30_um", "d32_um", "d43_um", "dv10_um", "dv50_um", "dv90_um", "relative_span")
+FLOW = ("flux_d32_um", "mass_flux_kg_m2_s")
+CONE = ("cone_angle_deg", "cone_angle_half_deg")
 NOT_TOLD = ["not told", ""]
 
 Row = list[str]
 
 
-def answers_table(droplets: MeasuredDroplets, liquid: MeasuredLiquid, told: SprayStatistics) -> Table:
+def answers_table(droplets: MeasuredDroplets, liquid: MeasuredLiquid, told: SprayStatistics, asked: AskedFor) -> Table:
     """What is measured, how sure, and the truth."""
     rows = [
         ["break-up length [mm]", *_length(liquid.summary), f"{liquid.true_break_up_mm:.2f}"],
         *_of_sizes(droplets, told),
         *_of_motion(droplets),
+        *_of_the_spray(droplets.truth, told, asked),
         *_of_ghosts(droplets, told),
     ]
     return Table(["", "measured", "95 % interval", "truth"], rows)
@@ -35,10 +41,7 @@ def answers_table(droplets: MeasuredDroplets, liquid: MeasuredLiquid, told: Spra
 def _of_sizes(droplets: MeasuredDroplets, told: SprayStatistics) -> Iterator[Row]:
     density = told.droplets.number_density_per_mm3
     yield [DENSITY, *_within(density), three_digits(droplets.true_density_per_mm3)]
-    true = mean_diameters([droplets.true_um], EXPOSURES)
-    for name in SIZES:
-        truth: Estimate | None = getattr(true, name)
-        yield [OF_DROPLETS[name], *_within(getattr(told.droplets, name)), three_digits(truth.value) if truth else ""]
+    yield from _against(SIZES, told.droplets, mean_diameters([droplets.truth.diameters_um], EXPOSURES))
 
 
 def _of_motion(droplets: MeasuredDroplets) -> Iterator[Row]:
@@ -51,15 +54,29 @@ def _of_motion(droplets: MeasuredDroplets) -> Iterator[Row]:
     yield ["error of a velocity component, rms [m/s]", "", "", f"{droplets.velocities.rms_m_s:.2f}"]
 
 
+def _of_the_spray(truth: SpraySample, told: SprayStatistics, asked: AskedFor) -> Iterator[Row]:
+    """Flux and cone angles, beside those of all true droplets in the box."""
+    if asked.axis is None:
+        return
+    yield from _against(FLOW, told.motion, spray_motion(truth, asked.axis, asked.liquid_kg_m3))
+    yield from _against(CONE, told.extent, spray_extent(truth, asked.axis))
+
+
+def _against(names: Sequence[str], measured: object, true: object) -> Iterator[Row]:
+    """Figures of these names, each beside the same one of the truth."""
+    for name in names:
+        told, truth = (getattr(part, name, None) for part in (measured, true))
+        yield [LABELS[name], *_within(told), three_digits(truth.value) if truth else ""]
+
+
 def _of_ghosts(droplets: MeasuredDroplets, told: SprayStatistics) -> Iterator[Row]:
-    """As the images tell it, where they do; as the truth counts it, from 30 um on."""
+    """As the images tell it, where they do; as the truth counts it, of large ones."""
     expected, unpaired = told.droplets.ghost_share, told.unpaired_ghost_share
-    counted, beyond = _counted(droplets.ghosts, droplets.found), f"truth: from {COUNTED_UM:g} µm on"
-    yield [f"ghosts among the droplets [%], {beyond}", *_within(expected and in_percent(expected)), counted]
+    counted = _counted(droplets.ghosts, droplets.found)
+    yield ["ghosts among the droplets [%]", *_within(expected and in_percent(expected)), counted]
     if unpaired:
         yield ["the same, by droplets without a partner [%]", *_within(in_percent(unpaired)), ""]
-    found = _counted(droplets.found, droplets.missed)
-    yield [f"true droplets that were found [%], {beyond}", "", "", found]
+    yield ["true droplets that were found [%]", "", "", _counted(droplets.found, droplets.missed)]
 
 
 def _counted(chosen: Placed, others: Placed) -> str:

@@ -1,6 +1,6 @@
 """Droplets of the demonstration: a box downstream of the break-up is measured in one shot, and judged by the truth."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,6 +10,7 @@ from daq.files.run_directory import RunReader
 from processing.analysis.droplets.droplet_file import StoredDroplets, read_droplets
 from processing.analysis.droplets.droplet_statistics import DropletStatistics, droplet_statistics
 from processing.analysis.droplets.ghost_share import RADIUS_VOXEL, matches
+from processing.analysis.spray.spray_sample import SpraySample, bounds_mm
 from processing.calibration.calibration import Calibration
 from processing.figures.found_figures import Placed
 from processing.geometry import FloatArray
@@ -63,10 +64,8 @@ class MeasuredDroplets:
     found, missed, ghosts : Placed
         True droplets of both exposures that were found, true ones that were not, and found ones that are none; from
         ``COUNTED_UM`` on. Droplets that liquid hides count as missed.
-    true_um : (N,) array
-        Diameters of all true droplets in the box, of both exposures.
-    box_mm3 : float
-        Its volume.
+    truth : SpraySample
+        All true droplets in the box, of both exposures.
     velocities : JudgedVelocities | None
         Against the truth; None without velocities.
     """
@@ -78,8 +77,7 @@ class MeasuredDroplets:
     found: Placed
     missed: Placed
     ghosts: Placed
-    true_um: FloatArray
-    box_mm3: float
+    truth: SpraySample
     velocities: JudgedVelocities | None
 
     @property
@@ -90,12 +88,12 @@ class MeasuredDroplets:
     @property
     def true_d32_um(self) -> float:
         """Of all true droplets in the box."""
-        return float(np.sum(self.true_um**3) / np.sum(self.true_um**2))
+        return float(np.sum(self.truth.cubes_um3) / np.sum(self.truth.diameters_um**2))
 
     @property
     def true_density_per_mm3(self) -> float:
         """Of the same, mean of both exposures."""
-        return len(self.true_um) / EXPOSURES / self.box_mm3
+        return len(self.truth) / float(self.truth.volumes_mm3.sum())
 
     @property
     def ghost_share(self) -> float:
@@ -122,7 +120,6 @@ def measure_droplets(
         sprays = true_sprays(run, shot, truth_file)
     stored = read_droplets(results_dir / told.file)
     found, missed, ghosts = zip(*(_judged(stored, frame, spray, grid) for frame, spray in sprays.items()), strict=True)
-    true_mm = np.concatenate([_droplets(spray).inside(grid).diameters_mm for spray in sprays.values()])
     return MeasuredDroplets(
         file=results_dir / told.file,
         shot=told,
@@ -131,8 +128,7 @@ def measure_droplets(
         found=_joined(found),
         missed=_joined(missed),
         ghosts=_joined(ghosts),
-        true_um=1000 * true_mm,
-        box_mm3=float(np.prod(grid.shape)) * grid.pitch_mm**3,
+        truth=true_sample(list(sprays.values()), grid),
         velocities=_judged_velocities(stored, sprays["a"], grid),
     )
 
@@ -145,6 +141,21 @@ def true_sprays(run: RunReader, shot: int, truth_file: Path) -> Mapping[str, Spr
     first, second = next(iter(fired.pulses.values()))
     spray = read_true_spray(truth_file, fired.sequence).spray
     return {"a": spray, "b": spray.advanced(1e-9 * (second.start_ns - first.start_ns))}
+
+
+def true_sample(exposures: Sequence[Spray], grid: VoxelGrid) -> SpraySample:
+    """All droplets of one shot that are in a box, as if each had been measured without error."""
+    within = [_droplets(spray).inside(grid) for spray in exposures]
+    diameters_um = 1000 * np.concatenate([one.diameters_mm for one in within])
+    return SpraySample(
+        diameters_um=diameters_um,
+        points_mm=np.concatenate([one.positions_mm for one in within]),
+        velocities_m_s=np.concatenate([one.velocities_mm_per_s for one in within]) / 1000,
+        shot=np.zeros(len(diameters_um), np.intp),
+        volumes_mm3=np.array([len(within) * float(np.prod(grid.shape)) * grid.pitch_mm**3]),
+        exposures_per_shot=len(within),
+        box_mm=bounds_mm(grid),
+    )
 
 
 def _droplets(spray: Spray) -> Spray:

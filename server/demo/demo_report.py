@@ -37,17 +37,20 @@ from server.reports.spray_tables import doubts
 DETAIL_MM = 4.0
 """Edge of the cube that is shown as an iso-surface, as in Fig. 4 of the paper."""
 ISO_QUANTILE = 0.99
+WATER_KG_M3 = 998.0
+"""At 20 degrees: what the simulated nozzle sprays."""
 
 
 def write_demo_report(demo: Demonstration, file: Path) -> None:
     """Write report.html: one page of answers, then the chain from images to figures of the spray."""
     spray = read_files([demo.droplets.file])
-    reported = ReportedSpray.of(spray, AskedFor(spray.axis))
+    asked = AskedFor(spray.axis, liquid_kg_m3=WATER_KG_M3)
+    reported = ReportedSpray.of(spray, asked)
     sections = [
         Section(
             "Summary",
             _SUMMARY_TEXT,
-            [answers_table(demo.droplets, demo.liquid, reported.told)],
+            [answers_table(demo.droplets, demo.liquid, reported.told, asked)],
             (),
             _doubts(demo, reported),
         ),
@@ -69,7 +72,8 @@ def write_demo_report(demo: Demonstration, file: Path) -> None:
 _SUMMARY_TEXT = (
     "The spray is simulated, so that its truth is known; cameras, light and everything after them do not know it. "
     "Intervals hold 95 %; those of droplets and velocities are of one shot, and do not know how shots differ. The "
-    "truth of sizes and density is of all droplets in the box, that of velocities of the droplets that have one."
+    "truth of sizes, density, flux and cone angles is of all droplets in the box, that of mean velocities of the "
+    f"droplets that have one; ghosts and droplets that were found are counted from {COUNTED_UM:g} µm on."
 )
 
 

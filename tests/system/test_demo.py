@@ -102,7 +102,13 @@ def test_the_report_is_one_page_with_all_figures(demonstrated: tuple[Path, dict[
     for judged in ("droplets that were found [%]", "ghosts among the droplets [%]"):
         assert " to " in page.split(judged)[1].split("</tr>")[0], "each with its interval"
     summary, origin, *_ = page.split("<section>")[1:]
-    for figure in ("D32 [µm]", "Dv0.5 [µm]", "number density [1/mm³]", "break-up length [mm]"):
+    for figure in (
+        "D32 [µm]",
+        "Dv0.5 [µm]",
+        "number density [1/mm³]",
+        "break-up length [mm]",
+        "cone angle, 50 % of the liquid [°]",
+    ):
         assert figure in summary
     assert "<td>water, simulated</td>" in origin
 

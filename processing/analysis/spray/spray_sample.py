@@ -11,6 +11,7 @@ from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.analysis.droplets.droplet_statistics import DIAMETER, measured_grid, measured_mm3, told_exposures
 from processing.analysis.estimates import CONFIDENCE, COUNTED_DRAWS, DRAWS, FEW_SHOTS, Estimate, Figures, estimated
 from processing.geometry import FloatArray
+from processing.volume import VoxelGrid
 
 VELOCITY = ("u_m_s", "v_m_s", "w_m_s")
 
@@ -187,5 +188,10 @@ def _common_box(shots: Sequence[StoredDroplets]) -> FloatArray | None:
     grids = {measured_grid(shot) for shot in shots}
     if len(grids) != 1 or (grid := grids.pop()) is None:
         return None
+    return bounds_mm(grid)
+
+
+def bounds_mm(grid: VoxelGrid) -> FloatArray:
+    """Lower and upper corner of a grid, (2, 3): half a voxel beyond its outermost centres."""
     first, last = np.array([[axis[0], axis[-1]] for axis in (grid.x_mm, grid.y_mm, grid.z_mm)]).T
     return np.array([first - grid.pitch_mm / 2, last + grid.pitch_mm / 2])
