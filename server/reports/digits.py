@@ -5,10 +5,14 @@ from math import floor, log10
 NARROW = 0.01
 """Of the number: half of an interval that three digits do not show."""
 
+WRITTEN_OUT = 1e6
+"""Smaller numbers have no exponent."""
+
 
 def three_digits(value: float) -> str:
     """No more than a figure with an interval bears, and zeros at the end where they are known."""
-    return f"{value:#.3g}".rstrip(".")
+    told = f"{value:#.3g}".rstrip(".")
+    return f"{float(told):.0f}" if "e+" in told and abs(value) < WRITTEN_OUT else told
 
 
 def digits_of_interval(value: float, low: float, high: float) -> tuple[str, str, str]:

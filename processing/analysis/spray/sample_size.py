@@ -7,14 +7,14 @@ of D32, Dv0.5, span and flux of 3 to 40 shots hold the truth in 85 to 90 %, from
 to 83 % (``docs/measure.md``).
 """
 
-from math import ceil
+from math import ceil, sqrt
 from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field
 
 from processing.analysis.droplets.size_statistics import SizeStatistics
-from processing.analysis.estimates import CONFIDENCE
+from processing.analysis.estimates import CONFIDENCE, reach
 from processing.analysis.spray.spray_sample import SpraySample
 from processing.reconstruction.settings import FrozenValue
 
@@ -22,6 +22,8 @@ MOST_EXTREME = 0.02
 """Share of the volume in the largest droplet."""
 LARGEST_HALF_WIDTH = 0.05
 """Of the 95 % interval of D32, over its value, of a sample that is adequate."""
+MANY = 10**6
+"""Shots of which Student's t is the normal distribution's."""
 FEWEST_SHOTS = 5
 """Student's t of fewer is above 2.8, and says little of how shots differ."""
 
@@ -58,7 +60,7 @@ def sample_verdict(sample: SpraySample, sizes: SizeStatistics) -> SampleVerdict:
     share, largest_um, without_um = extreme_droplet(sample)
     needed = None
     if half_width is not None and sizes.intervals_over == "shots":
-        needed = int(np.ceil(sizes.shots * max((half_width / LARGEST_HALF_WIDTH) ** 2, 1 / sizes.shots)))
+        needed = shots_needed(half_width, sizes.shots)
     reasons = tuple(_reasons(sizes, share, half_width, needed))
     return SampleVerdict(
         verdict="low sample" if reasons else "adequate",
@@ -69,6 +71,23 @@ def sample_verdict(sample: SpraySample, sizes: SizeStatistics) -> SampleVerdict:
         d32_half_width=half_width,
         shots_for_5_percent=needed,
     )
+
+
+def shots_needed(half_width: float, shots: int) -> int:
+    """How many shots a half width of 5 % takes, where so many have another one: its Student's t falls with them.
+
+    Parameters
+    ----------
+    half_width : float
+        Of the 95 % interval over its value.
+    shots : int
+        That it is of, two at least.
+    """
+    scatter = half_width * sqrt(shots) / reach(shots)
+    needed = max(ceil((scatter * reach(MANY) / LARGEST_HALF_WIDTH) ** 2), 2)
+    while scatter * reach(needed) > LARGEST_HALF_WIDTH * sqrt(needed):
+        needed += 1
+    return needed
 
 
 def _half_width(sizes: SizeStatistics) -> float | None:

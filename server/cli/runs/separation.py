@@ -2,13 +2,14 @@
 
 from argparse import Namespace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from server.cli.options import Verbs, add_verb, positive
 from server.cli.output import Outcome
 from server.reports.digits import counted
 
 if TYPE_CHECKING:
+    from processing.analysis.estimates import Estimate
     from processing.analysis.velocity.separation_proposal import SeparationProposal
 
 
@@ -46,14 +47,16 @@ def _summary(found: "SeparationProposal") -> str:
     if found.separation_ns is None:
         return f"no separation is proposed: {found.reason}"
     by = f"by {counted(found.pairs, 'pair')} of {counted(found.shots, 'shot')}"
-    wanted = "" if found.wanted_ns is None else " (without limits {low:.0f} to {high:.0f} ns)".format(**_limits(found))
+    wanted = "" if found.wanted_ns is None else f" ({_before(found.wanted_ns)})"
     moves = f"the median droplet moves by {found.will_move_voxel:.1f} voxels, 95 % by less than {_fast(found)}"
     why = f"\n{found.reason}" if found.reason else ""
     return f"{found.separation_ns} ns{wanted}, {by}: {moves}{why}"
 
 
-def _limits(found: "SeparationProposal") -> dict[str, Any]:
-    return found.wanted_ns.model_dump() if found.wanted_ns else {}
+def _before(wanted_ns: "Estimate") -> str:
+    return (
+        f"before rounding and limits {wanted_ns.value:.0f}, over shots {wanted_ns.low:.0f} to {wanted_ns.high:.0f} ns"
+    )
 
 
 def _fast(found: "SeparationProposal") -> str:

@@ -6,7 +6,8 @@ from scipy.special import gamma
 from scipy.stats import lognorm, weibull_min
 
 from processing.analysis.droplets.size_statistics import mean_diameters
-from processing.analysis.spray.sample_size import MOST_EXTREME, sample_verdict
+from processing.analysis.estimates import reach
+from processing.analysis.spray.sample_size import MOST_EXTREME, sample_verdict, shots_needed
 from processing.analysis.spray.size_fits import SizeFit, size_fits
 from processing.analysis.spray.spray_sample import SpraySample, spray_sample
 from tests.support.sampled_sprays import stored_shot
@@ -109,6 +110,13 @@ def test_a_few_shots_say_how_many_it_would_take() -> None:
     assert few.shots_for_5_percent
     assert few.shots_for_5_percent > 4
     assert f"about {few.shots_for_5_percent} shots would do" in few.reasons[-1]
+
+
+@pytest.mark.parametrize("shots", [2, 3, 5, 40])
+def test_few_shots_do_not_ask_for_more_than_many_that_scatter_alike(shots: int) -> None:
+    """A scatter of 12 % needs 25 shots: 2.06 times 12 % over 5 is 5 %; few shots have a far larger t themselves."""
+    half_width = 0.12 * reach(shots) / np.sqrt(shots)
+    assert shots_needed(half_width, shots) == 25
 
 
 def _verdict(d_um: np.ndarray[tuple[int, ...], np.dtype[np.float64]], shots: int = 10):  # type: ignore[no-untyped-def]
