@@ -60,7 +60,8 @@ def sample_verdict(sample: SpraySample, sizes: SizeStatistics) -> SampleVerdict:
     share, largest_um, without_um = extreme_droplet(sample)
     needed = None
     if half_width is not None and sizes.intervals_over == "shots":
-        needed = shots_needed(half_width, sizes.shots)
+        counted = sizes.shots * (_counted_half_width(sample) / LARGEST_HALF_WIDTH) ** 2
+        needed = max(shots_needed(half_width, sizes.shots), ceil(counted), FEWEST_SHOTS)
     reasons = tuple(_reasons(sizes, share, half_width, needed))
     return SampleVerdict(
         verdict="low sample" if reasons else "adequate",
@@ -93,6 +94,13 @@ def shots_needed(half_width: float, shots: int) -> int:
 def _half_width(sizes: SizeStatistics) -> float | None:
     d32 = sizes.d32_um
     return None if d32 is None else float(np.log(d32.high / d32.low) / 2)
+
+
+def _counted_half_width(sample: SpraySample) -> float:
+    """Of D32 over its value, if nothing but the number of droplets were left to chance; two exposures are one."""
+    cubes, squares = sample.cubes_um3, sample.diameters_um**2
+    weights = cubes / cubes.sum() - squares / squares.sum()
+    return reach(MANY) * float(np.sqrt(sample.exposures_per_shot * np.sum(weights**2)))
 
 
 def extreme_droplet(sample: SpraySample) -> tuple[float | None, float | None, float | None]:

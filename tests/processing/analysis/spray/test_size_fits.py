@@ -119,5 +119,14 @@ def test_few_shots_do_not_ask_for_more_than_many_that_scatter_alike(shots: int) 
     assert shots_needed(half_width, shots) == 25
 
 
+def test_two_shots_that_are_alike_need_as_many_as_their_droplets_do() -> None:
+    """Chance made them alike: between them is next to no scatter, and a D32 of 60 droplets is not known to 5 %."""
+    d_um = np.repeat(lognorm.ppf((np.arange(60) + 0.5) / 60, 0.4, scale=40), 2)
+    alike = _verdict(d_um, shots=2)
+    assert alike.d32_half_width is not None
+    assert alike.shots_for_5_percent == pytest.approx(2 * (alike.d32_half_width / 0.05) ** 2, rel=0.3)
+    assert _verdict(np.repeat(np.linspace(39, 41, 60), 2), shots=2).shots_for_5_percent == 5
+
+
 def _verdict(d_um: np.ndarray[tuple[int, ...], np.dtype[np.float64]], shots: int = 10):  # type: ignore[no-untyped-def]
     return sample_verdict(sample_of(d_um, shots), mean_diameters([d_um[shot::shots] for shot in range(shots)]))
