@@ -92,13 +92,17 @@ def spray_sections(reported: ReportedSpray, chapters: Sequence[Chapter] = ()) ->
 def _summary(reported: ReportedSpray) -> Section:
     told = reported.told
     counted = (
-        f"{told.droplets.n} droplets, exposures: {told.droplets.exposures}, shots: {told.droplets.shots}; "
-        f"sampling: {told.sampling}."
+        f"{told.droplets.n} droplets, exposures: {told.droplets.exposures}{_twice(told)}, "
+        f"shots: {told.droplets.shots}; sampling: {told.sampling}."
     )
     text = f"{counted} {SAMPLES[told.sample.verdict] if told.sample else ''} {_verdicts(reported)}"
     liquid = ReportedLiquid.of_files(reported.spray.shots)
     table = figures_table(told, break_up_rows(liquid) if liquid else ())
     return Section("Summary", text, [table], points=[*conditions_of(reported), *doubts(told)])
+
+
+def _twice(told: SprayStatistics) -> str:
+    return " (A and B show the same droplets)" if told.droplets.exposures > told.droplets.shots else ""
 
 
 def conditions_of(reported: ReportedSpray) -> list[str]:
@@ -246,7 +250,9 @@ def _density(reported: ReportedSpray) -> Section | None:
     maps = [one for one in found if one and len(one.mean_per_mm3) >= LEAST_ROWS]
     if not maps:
         return None
-    scatter = ", and how shots scatter" if reported.sample.several else ""
+    scatter = (
+        "; rms: how shots scatter, beside what chance alone would make (Poisson)" if reported.sample.several else ""
+    )
     caption = f"Number density, mean along the direction that is not drawn: mean over all exposures{scatter}."
     return Section("Number density", pictures=[Picture(density_figure(maps), caption, svg=True)])
 

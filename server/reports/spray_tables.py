@@ -142,11 +142,11 @@ def classes_table(told: SprayStatistics) -> Table:
     """Classes of diameters after ISO 9276-1."""
     rows = [
         [
-            f"{one.low_um:.4g} to {one.high_um:.4g}",
+            f"{one.low_um:#.4g} to {one.high_um:#.4g}",
             f"{one.n}",
-            f"{one.q0_per_um.value:.3g}",
-            f"{one.q2_per_um:.3g}",
-            f"{one.q3_per_um:.3g}",
+            three_digits(one.q0_per_um.value),
+            three_digits(one.q2_per_um),
+            three_digits(one.q3_per_um),
             f"{one.cumulative_q0:.3f}",
             f"{one.cumulative_q2:.3f}",
             f"{one.cumulative_q3:.3f}",

@@ -9,19 +9,20 @@ import numpy as np
 from pydantic import Field
 
 from processing.analysis.droplets.droplet_file import DropletFileError, StoredDroplets
-from processing.analysis.droplets.ghost_share import told_share
+from processing.analysis.droplets.ghost_share import MANY_OBJECTS, told_share
 from processing.analysis.droplets.size_statistics import SizeStatistics, mean_diameters, shots_density
 from processing.analysis.estimates import Estimate
 from processing.reconstruction.settings import GridSettings
 from processing.volume import VoxelGrid
 
-DIAMETER, REFUSED = "diameter_um", "refused"
+DIAMETER, GOOD, REFUSED = "diameter_um", "good", "refused"
 NO_DIAMETERS = "bright particles have no diameter: only shadows tell how large a droplet is"
 IN_PIXELS, NO_SCALE = "diameter_px", "diameters are in pixels: measure with --um-per-px"
 P_REAL, NO_P_REAL = (
     "p_real",
     "a single view, and files from before it was told, do not say how probably droplets are real",
 )
+BESIDE_LIQUID = f"it was not tried beside more ligaments and the like than {100 * MANY_OBJECTS:g} % of the droplets"
 NOTHING_COUNTED = "no exposure could be measured"
 _SAME_DROPLETS = ("grid", "margin_voxel", "twins", "seed", "nozzle")
 """Settings that say where droplets are looked for, how ghosts are counted, and where the nozzle is."""
@@ -192,4 +193,18 @@ def _ghost_share(shots: Sequence[StoredDroplets], per_shot: float) -> Estimate |
     if any(P_REAL not in shot.columns for shot in shots):
         return NO_P_REAL
     p_real = np.concatenate([np.asarray(shot.columns[P_REAL], np.float64) for shot in shots])
-    return told_share(p_real, all(DIAMETER in shot.columns for shot in shots), per_shot)
+    sized = all(DIAMETER in shot.columns for shot in shots)
+    if all(map(_beside_liquid, shots)):
+        return told_share(p_real, sized, per_shot, BESIDE_LIQUID)
+    return told_share(p_real, sized, per_shot)
+
+
+def _beside_liquid(shot: StoredDroplets) -> bool:
+    """Whether that is why nothing says how probably the droplets of any exposure are real."""
+    exposures = json.loads(str(shot.provenance["exposures"]))
+    return all(
+        exposure["verdict"] == GOOD
+        and exposure.get("hidden", {}).get("liquid_objects", 0)
+        > MANY_OBJECTS * np.count_nonzero(shot.columns["frame"] == frame)
+        for frame, exposure in exposures.items()
+    )

@@ -20,10 +20,14 @@ MOST_BRIGHT = 0.01
 """Of bright particles a share above is not told: 0.8 to 3.5 times the true one was expected, most in noise"""
 MODEL_SD = 0.2
 """Relative, beyond chance: of true over expected ghosts among the cases that were tried."""
+MANY_OBJECTS = 0.01
+"""Ligaments and the like per droplet: they may have round ends, which are told as droplets, and surely real ones."""
 _TAIL = (1 - CONFIDENCE) / 2
 
 
-def told_share(p_real: FloatArray, sized: bool, exposures_per_shot: float = 1) -> Estimate | str:
+def told_share(
+    p_real: FloatArray, sized: bool, exposures_per_shot: float = 1, untried: str = f"it is {P_REAL_TRIED}"
+) -> Estimate | str:
     """Which share of some droplets are ghosts, as ``p_real`` has it, or why it is not told.
 
     Parameters
@@ -34,12 +38,14 @@ def told_share(p_real: FloatArray, sized: bool, exposures_per_shot: float = 1) -
         Whether they are shadows, which have diameters, or bright particles.
     exposures_per_shot : float
         2 where exposures A and B, which show the same droplets, are both in the array.
+    untried : str
+        Why ``p_real`` is not a number, where more is known of that than where it may be so.
     """
     told = p_real[np.isfinite(p_real)]
     if not len(p_real):
         return NOTHING_MEASURED
     if len(told) < LEAST_TOLD * len(p_real):
-        return f"p_real is told of {len(told)} of {len(p_real)} droplets; it is {P_REAL_TRIED}"
+        return f"p_real is told of {len(told)} of {len(p_real)} droplets; {untried}"
     share = expected_share(float(np.sum(1 - told)), len(told), exposures_per_shot)
     if not sized and share.value > MOST_BRIGHT:
         return (

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from processing.analysis.droplets.droplet_search import DropletSearch
 from processing.analysis.droplets.droplet_table import DropletRows
 from processing.analysis.droplets.gaussian_blobs import Image
-from processing.analysis.droplets.ghost_share import GhostShare, matches, told_share
+from processing.analysis.droplets.ghost_share import MANY_OBJECTS, GhostShare, matches, told_share
 from processing.analysis.estimates import Estimate
 from processing.geometry import FloatArray
 
@@ -22,8 +22,6 @@ MOST_SHIFT_PX = 0.3
 """Views that lie farther beside their calibration are refused."""
 MANY_GHOSTS = 0.1
 """Share in a twin from which on a shot is doubtful: ghosts can explain images as well as the truth does."""
-MANY_OBJECTS = 0.01
-"""Ligaments and the like per droplet: they may have round ends, which are told as droplets, and surely real ones."""
 MOST_HIDDEN = 0.5
 """Share of the volume that may be hidden."""
 EVEN, MOSTLY = 1.05, 0.9

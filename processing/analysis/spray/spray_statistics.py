@@ -142,7 +142,7 @@ def _of_sample(sample: SpraySample, pooled: DropletStatistics, asked: AskedFor) 
         extent=extent,
         proposed_axis=proposed,
         patternations=patternations,
-        reasons=_reasons(sample, proposed, bool(fits), motion is not None) | _missing(asked, patternations),
+        reasons=_reasons(sample, proposed, bool(fits), motion is not None) | _missing(sample, asked, patternations),
     )
 
 
@@ -180,11 +180,14 @@ def _reasons(sample: SpraySample, proposed: ProposedAxis | None, fits: bool, mot
     return reasons
 
 
-def _missing(asked: AskedFor, patternations: Sequence[Patternation]) -> dict[str, str]:
+def _missing(sample: SpraySample, asked: AskedFor, patternations: Sequence[Patternation]) -> dict[str, str]:
     """Why patternations that are asked for are not there."""
     if asked.axis is None or len(patternations) >= max(len(asked.at_mm), 1):
         return {}
     told_mm = {one.at_mm for one in patternations}
     where = ", ".join(f"{at_mm:g}" for at_mm in asked.at_mm if at_mm not in told_mm)
     few = "fewer than 20 droplets in the slice across the axis, or no common box"
+    if sample.box_mm is not None:
+        reach = "{:.3g} to {:.3g}".format(*asked.axis.reach_mm(sample.box_mm))
+        few = f"fewer than 20 droplets in the slice across the axis; the box reaches from {reach} mm"
     return {"patternations": f"{where} mm from the nozzle: {few}" if where else few}

@@ -57,6 +57,15 @@ def test_ghosts_are_those_of_all_droplets_whose_probability_is_told() -> None:
     assert (old.ghost_share, "files from before" in (old.ghost_reason or "")) == (None, True)
 
 
+@pytest.mark.parametrize(("objects", "beside"), [(1, True), (0, False)])
+def test_beside_ligaments_they_are_the_reason(objects: int, beside: bool) -> None:
+    """And no list of all that may be one."""
+    seen = {"a": exposure() | {"hidden": {"liquid_objects": objects, "volume_share": 0.0}}}
+    told = droplet_statistics([with_p_real(shot([20.0, 30.0], exposures=seen), np.nan, np.nan)])
+    assert ("beside more ligaments and the like than 1 % of the droplets" in str(told.ghost_reason)) == beside
+    assert ("more or less than four views" in str(told.ghost_reason)) != beside
+
+
 def test_exposures_of_one_shot_show_the_same_droplets_twice() -> None:
     both = {"a": exposure(), "b": exposure()}
     statistics = droplet_statistics([shot([20.0, 30.0, 20.0, 30.0], exposures=both)])

@@ -271,7 +271,10 @@ def test_what_cannot_be_known_is_null_with_a_reason_and_a_remedy(cone: list[Stor
     assert "--nozzle" in NO_AXIS
     assert blind.motion
     assert (blind.motion.volume_flux_mm_s, blind.motion.reason) == (None, NO_AXIS)
-    weightless = spray_statistics(cone, AskedFor(DOWN)).motion
+    beyond = spray_statistics(cone, AskedFor(DOWN, at_mm=(99.0,)))
+    assert beyond.reasons["patternations"].startswith("99 mm from the nozzle: fewer than 20 droplets in the slice")
+    assert "; the box reaches from " in beyond.reasons["patternations"]
+    weightless = beyond.motion
     assert weightless
     assert (weightless.mass_flux_kg_m2_s, weightless.reason) == (None, NO_DENSITY)
     still = [rows(shot, np.arange(len(shot.columns["frame"]))) for shot in cone]
