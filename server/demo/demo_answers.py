@@ -88,7 +88,7 @@ def _counted(chosen: Placed, others: Placed) -> str:
 
 def _length(liquid: LiquidSummary) -> Row:
     found = liquid.break_up_mm
-    return _interval(found.value, found.low, found.high, 2) if found else ["none", liquid.break_up_reason or ""]
+    return _interval(found.value, found.low, found.high, 2) if found else NOT_TOLD
 
 
 def _within(one: Estimate | None) -> Row:

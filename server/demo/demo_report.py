@@ -84,7 +84,9 @@ def _doubts(demo: Demonstration, reported: ReportedSpray) -> list[str]:
         f"Droplets: both exposures of shot {shot.shot}, {shot.verdict.value}. Break-up: exposure A of "
         f"{counted(len(demo.liquid.found), 'shot')}."
     )
-    return [measured, *conditions_of(reported), *reasons_of(demo.droplets), *doubts(told)]
+    liquid = demo.liquid.summary
+    unknown = [] if liquid.break_up_mm else [f"No break-up length: {liquid.break_up_reason}"]
+    return [measured, *conditions_of(reported), *reasons_of(demo.droplets), *unknown, *doubts(told)]
 
 
 def _said(section: Section | None) -> list[Section]:

@@ -17,7 +17,7 @@ body { font: 16px/1.5 system-ui, sans-serif; max-width: 68rem; margin: 2rem auto
 h1 { font-weight: 600; } h2 { font-weight: 600; margin-top: 2.5rem; border-bottom: 1px solid #d5dbe1; }
 table { border-collapse: collapse; margin: 1rem 0; } th, td { padding: .3rem .9rem; text-align: right; }
 th { border-bottom: 2px solid #1d2733; font-weight: 600; } td { border-bottom: 1px solid #d5dbe1; }
-th:first-child, td:first-child { text-align: left; }
+th:first-child, td:first-child { text-align: left; } table:not(.words) td + td { white-space: nowrap; }
 table.words th, table.words td { text-align: left; } caption { text-align: left; color: #5b6875; }
 figure { margin: 1.5rem 0; counter-increment: figure; } img { max-width: 100%; } figcaption { color: #5b6875; }
 figcaption::before { content: "Figure " counter(figure) ". "; font-weight: 600; }

@@ -47,6 +47,7 @@ DEFINITIONS = (
 SAMPLES = {"adequate": "The sample is adequate.", "low sample": "The sample is low: intervals may be too narrow."}
 LEAST_ROWS = 4
 """Of a map of number density: a box that is thinner has none over that axis."""
+WITH_UNIT = {"pressure_bar": "pressure [bar]"}
 Chapter = Callable[["ReportedSpray"], Section | None]
 
 
@@ -171,7 +172,7 @@ def _notes(reported: ReportedSpray) -> list[list[str]]:
         more = notes.pop("more", {})
         for name, value in {**notes, **more}.items():
             values.setdefault(name, {})[str(value)] = None
-    return [[name.replace("_", " "), " and ".join(said)] for name, said in values.items()]
+    return [[WITH_UNIT.get(name, name.replace("_", " ")), " and ".join(said)] for name, said in values.items()]
 
 
 def _sizes(reported: ReportedSpray) -> Section | None:

@@ -34,7 +34,7 @@ def test_the_report_says_it_all_in_one_file(page: Path, capsys: pytest.CaptureFi
         "D32 [µm]",
         "water &lt;pure&gt;",
         "<td>1.25</td>",
-        "Conditions: fluid: water &lt;pure&gt;; pressure bar: 6.0; flow l min: 1.25",
+        "Conditions: fluid: water &lt;pure&gt;; pressure [bar]: 6.0; flow l min: 1.25",
         "cal-1",
         "sampling: spatial",
         "lognormal",
