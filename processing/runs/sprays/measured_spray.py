@@ -56,7 +56,7 @@ def read_spray(folders: Sequence[Path]) -> MeasuredSpray:
     Parameters
     ----------
     folders : sequence of Path
-        Pooled.
+        Pooled. Of a run those in its own ``results``, if there is one of droplets.
 
     Raises
     ------
@@ -64,6 +64,7 @@ def read_spray(folders: Sequence[Path]) -> MeasuredSpray:
         There are none, or they do not belong together: of two recipes or calibrations, or of sprays whose nozzles are
         at two places. The text names both.
     """
+    folders = [_of_run(folder) if (folder / "run.h5").is_file() else folder for folder in folders]
     files = [file for folder in folders for file in _files(folder)]
     return read_files(files, ", ".join(dict.fromkeys(map(_name, folders))))
 
@@ -75,6 +76,18 @@ def read_files(files: Sequence[Path], name: str = "") -> MeasuredSpray:
     require_poolable(shots)
     _require_one(shots, files, "spray")
     return MeasuredSpray(name, shots, _axis(shots, files), changes_told(shots, files))
+
+
+def _of_run(run_dir: Path) -> Path:
+    """Where the droplets of a run are, of which the server measured them in one way."""
+    found = sorted({file.parent for file in run_dir.glob(f"results/*/{PATTERN}")})
+    if not found:
+        raise DropletFileError(
+            f"{run_dir}: is a run, and its own results have no droplets: name the directory that measure wrote with -o"
+        )
+    if len(found) > 1:
+        raise DropletFileError(f"{run_dir}: was measured in several ways: name one of {', '.join(map(str, found))}")
+    return found[0]
 
 
 def _files(folder: Path) -> list[Path]:

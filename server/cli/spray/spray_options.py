@@ -15,7 +15,12 @@ Triple = tuple[float, float, float]
 
 def add_sprays(parser: ArgumentParser) -> None:
     """Let a command be told the results of measurements, and what is known of the spray."""
-    parser.add_argument("results", type=Path, nargs="+", help="directories that measure wrote; their shots are pooled")
+    parser.add_argument(
+        "results",
+        type=Path,
+        nargs="+",
+        help="directories that measure wrote, or runs that the server measured; their shots are pooled",
+    )
     parser.add_argument(
         "--nozzle", type=_triple, metavar="X,Y,Z", help="middle of the orifice in mm; default: as the run says"
     )

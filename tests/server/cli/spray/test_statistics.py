@@ -36,6 +36,19 @@ def test_shots_of_all_results_are_pooled_and_the_run_says_where_the_nozzle_is(
     assert one["patternations"][0]["at_mm"] == pytest.approx(10)
 
 
+def test_of_a_run_its_own_results_are_taken_where_there_is_no_choice(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = tmp_path / "monday"
+    (run / "results").mkdir(parents=True)
+    (run / "run.h5").touch()
+    assert "is a run, and its own results have no droplets" in refused(capsys, "statistics", run)
+    write_results(run / "results" / "droplets-1", cone_shots(0, 2, 30), run="monday", spray=SPRAY)
+    assert told(capsys, "statistics", run)["results"] == "monday/droplets-1"
+    write_results(run / "results" / "droplets-2", cone_shots(0, 2, 30), run="monday", spray=SPRAY)
+    assert f"name one of {run / 'results' / 'droplets-1'}, " in refused(capsys, "statistics", run)
+
+
 def test_people_read_figures_with_units_and_intervals(results: Path, capsys: pytest.CaptureFixture[str]) -> None:
     text = shown(capsys, "statistics", results / "monday", "--at", "9")
     assert "sampling: spatial" in text
