@@ -61,7 +61,7 @@ def average_volumes(files: list[Path]) -> tuple[Intensity, VoxelGrid]:
     Raises
     ------
     VolumeFileError
-        There are none, their grids, calibrations or settings differ, two are of one exposure, or one was renamed or
+        There are none, their runs, grids, calibrations or settings differ, two are of one exposure, or one was renamed or
         changed.
     """
     if not files:
@@ -106,14 +106,15 @@ def _own_name(provenance: Provenance) -> str:
 
 
 def _made_by(provenance: Provenance) -> dict[str, object]:
-    """Calibration, version of the methods, and settings of a volume, one by one. Its grid speaks for itself."""
+    """Run, calibration, version of the methods, and settings of a volume, one by one. Its grid speaks for itself."""
     settings = json.loads(str(provenance.get("settings", "{}")))
     settings.pop("grid", None)
-    version = provenance.get("method_version", 1)
-    return {"calibration": provenance.get("calibration"), "method_version": version, **settings}
+    told = {name: provenance.get(name) for name in ("run", *_LATER, "calibration")}
+    return {**told, "method_version": provenance.get("method_version", 1), **settings}
 
 
 def _differing(its: Mapping[str, object], others: Mapping[str, object]) -> str:
     """What is not the same, for a person; empty where all is."""
     names = [name for name in {**its, **others} if its.get(name) != others.get(name)]
+    names = [name for name in names if name not in _LATER or None not in (its.get(name), others.get(name))]
     return ", ".join(f"{name} {its.get(name)} instead of {others.get(name)}" for name in names)

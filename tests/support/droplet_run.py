@@ -64,11 +64,10 @@ def write_run(
     views = {name: ViewFormat(SHAPE, bits) for name in cameras()}
     header = RunHeader(
         run_id=run_dir.name,
-        created_utc="2026-01-01T00:00:00+00:00",
         views=views,
         polarity=polarity,
         separation_ns=6400,
-        **told,
+        **{"created_utc": "2026-01-01T00:00:00+00:00", **told},
     )
     with RunWriter(run_dir, header) as writer:
         for index in range(shots):

@@ -338,6 +338,24 @@ def test_volumes_of_different_settings_have_no_average(
         average_volumes(volume_files(run_dir / "results"))
 
 
+@pytest.mark.parametrize(
+    ("name", "told", "complaint"),
+    [
+        ("tuesday", {}, "run tuesday instead of run of"),
+        ("run", {"created_utc": "2026-01-02T00:00:00+00:00"}, "run_created_utc 2026-01-02T00:00:00.* instead of 2026-"),
+    ],
+)
+def test_volumes_of_two_runs_in_one_folder_have_no_average(
+    run_dir: Path, calibration_file: Path, tmp_path: Path, name: str, told: dict[str, str], complaint: str
+) -> None:
+    reconstructed(run_dir, calibration_file)
+    other = write_run(tmp_path / "second" / name, shots=4, **told)
+    reconstruct_shot(other, 3, calibration_file, SETTINGS, tmp_path / "others")
+    volume_path(tmp_path / "others", 3, "a").replace(volume_path(run_dir / "results", 3, "a"))
+    with pytest.raises(VolumeFileError, match=f"shot_00003_a.vtkhdf: {complaint}"):
+        average_volumes(volume_files(run_dir / "results", "a"))
+
+
 def test_volumes_of_different_calibrations_have_no_average(run_dir: Path, tmp_path: Path) -> None:
     calibrations = [write_calibration(tmp_path / f"{px}.json", holdout_px=px) for px in (0.02, 0.03)]
     for file, folder in zip(calibrations, ("results", "others"), strict=True):
