@@ -18,6 +18,13 @@ def copies(shots: Sequence[StoredDroplets]) -> list[tuple[StoredDroplets, Stored
     return [(shot, other) for shot, other in those_before if other is not shot]
 
 
+def copies_told(shots: Sequence[StoredDroplets]) -> tuple[str, ...]:
+    """The same, for people."""
+    return tuple(
+        f"{named(shot)} has the very droplets of {named(other)}: one is a copy" for shot, other in copies(shots)
+    )
+
+
 def in_common(first: Iterable[StoredDroplets], second: Iterable[StoredDroplets]) -> int:
     """How many shots are in both: by their droplets, or, measured in another way, by their names."""
     known = {one for shot in second for one in (named(shot), _print_of(shot)) if one}

@@ -1,5 +1,6 @@
 """What is wrong with the images of an exposure, so that its volume may look fine and be none: told with the volume."""
 
+import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -14,6 +15,8 @@ from processing.runs.results_file import FrameName
 from processing.runs.workbench import References
 
 Faults = Mapping[str, tuple[str, ...] | Mapping[str, str]]
+COPIED_ROWS = 16
+"""Every so many rows are asked whether an exposure is a copy: noise never repeats."""
 FAULTS = ("blind_views", "dim_views", "odd_light")
 MOST_LOST = 0.01
 """Of the sum of all intensities, in voxels that were too faint for bytes."""
@@ -29,6 +32,18 @@ def exposure_faults(
         "dim_views": tuple(view for view in bits if is_dim(grey_values(shot, view, frame), bits[view])),
         "odd_light": _odd_light(run, shot, frame, images, references),
     }
+
+
+def copied(shot: Shot, frame: FrameName, images: Sequence[Intensity], before: dict[bytes, int]) -> Mapping[str, int]:
+    """Which shot has the very pixels of this one in all views, of those ``before``, which it joins.
+
+    Nothing of images that are empty.
+    """
+    if not any(image.any() for image in images):
+        return {}
+    rows = b"".join(grey_values(shot, view, frame)[::COPIED_ROWS].tobytes() for view in shot.views)
+    first = before.setdefault(hashlib.blake2b(rows).digest(), shot.index)
+    return {} if first == shot.index else {"copy_of": first}
 
 
 def stored_faults(volume_file: Path) -> Mapping[str, Any]:
@@ -53,6 +68,8 @@ def fault_lines(faults: Mapping[str, Any]) -> list[str]:
     lines += [f"{name} {what}" for name, what in faults.get("odd_light", {}).items()]
     if (lost := faults.get("lost_share", 0.0)) > MOST_LOST:
         lines.append(f"{100 * lost:.2g} % of the intensity is in voxels too faint for uint8; take float16")
+    if (other := faults.get("copy_of")) is not None:
+        lines.append(f"has the very images of shot {other}: one is a copy, and it counts twice")
     if faults.get("empty"):
         lines.append("the volume is empty, no voxel is above 0")
     return lines

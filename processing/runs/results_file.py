@@ -61,8 +61,8 @@ def average_volumes(files: list[Path]) -> tuple[Intensity, VoxelGrid]:
     Raises
     ------
     VolumeFileError
-        There are none, their runs, grids, calibrations or settings differ, two are of one exposure, or one was renamed or
-        changed.
+        There are none, their runs, grids, calibrations or settings differ, two are of one exposure, or one was
+        renamed or changed.
     """
     if not files:
         raise VolumeFileError("there are no volumes to average")

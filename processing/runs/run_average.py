@@ -14,7 +14,7 @@ from processing.preprocessing import Intensity
 from processing.reconstruction.mean_line_of_sight import MeanVolume, mean_volume
 from processing.reconstruction.reconstructor import Reconstructor
 from processing.reconstruction.settings import ReconstructionSettings
-from processing.runs.exposure_faults import exposure_faults
+from processing.runs.exposure_faults import copied, exposure_faults
 from processing.runs.pipeline import plan_of
 from processing.runs.results_file import FrameName
 from processing.runs.shots.shot_images import require_match, shot_intensities
@@ -110,11 +110,16 @@ def _exposures(
     faults: list[Mapping[str, Any]],
 ) -> Exposures:
     """Images of exposure after exposure; those that may be wrong are added to ``faults``."""
+    before: dict[bytes, int] = {}
     for count, index in enumerate(shots, start=1):
         shot = run.read_shot(index, "a" if frame == "a" else "ab")
         require_match(run.header.run_id, shot, calibration)
         images = shot_intensities(run, shot, frame, settings, references=references, threads=threads)
-        if told := {name: what for name, what in exposure_faults(run, shot, frame, images, references).items() if what}:
+        found: dict[str, Any] = {
+            **exposure_faults(run, shot, frame, images, references),
+            **copied(shot, frame, images, before),
+        }
+        if told := {name: what for name, what in found.items() if what or name == "copy_of"}:
             faults.append({"shot": index, **told})
         yield images
         done(count, len(shots))

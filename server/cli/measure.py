@@ -193,6 +193,7 @@ def _measure_run(options: Namespace, settings: "MeasureSettings", run_dir: Path,
 def _measure_shots(
     options: Namespace, settings: "MeasureSettings", run_dir: Path, indices: list[int], out: Path
 ) -> dict[str, Any]:
+    from processing.analysis.copied_shots import copies_told
     from processing.analysis.droplets.droplet_file import read_droplets
     from processing.analysis.droplets.droplet_statistics import droplet_statistics
     from processing.analysis.exports.export import export_droplets
@@ -212,7 +213,8 @@ def _measure_shots(
     files = [out / shot.file for shot in shots]
     stored = [read_droplets(file) for file in files]
     return {
-        "conditions_changed": _tell_changes(changes_told(stored, files)),
+        "conditions_changed": _told(changes_told(stored, files)),
+        "copies": _told(copies_told(stored)),
         "polarity": settings.polarity,
         "recipe_sha256": recipe_sha256(NAME, METHOD_VERSION, settings),
         "grid": settings.model_dump(mode="json")["grid"],
@@ -225,10 +227,10 @@ def _measure_shots(
     }
 
 
-def _tell_changes(changes: tuple[str, ...]) -> list[str]:
-    for change in changes:
-        progress(change)
-    return list(changes)
+def _told(doubts: tuple[str, ...]) -> list[str]:
+    for doubt in doubts:
+        progress(doubt)
+    return list(doubts)
 
 
 def _tell_unchecked(

@@ -58,9 +58,13 @@ def write_run(
     bits: int = 8,
     polarity: Polarity = "shadow",
     droplets_mm: NDArray[np.float64] = DROPLETS_A_MM,
+    copies: bool = False,
     **told: Any,
 ) -> Path:
-    """Record shots; in the invalid ones exposure B of view2 is missing; covered views are dark; more of the header."""
+    """Record shots; in the invalid ones exposure B of view2 is missing; covered views are dark; more of the header.
+
+    No two shots are the very same, unless they are copies.
+    """
     views = {name: ViewFormat(SHAPE, bits) for name in cameras()}
     header = RunHeader(
         run_id=run_dir.name,
@@ -71,17 +75,23 @@ def write_run(
     )
     with RunWriter(run_dir, header) as writer:
         for index in range(shots):
-            writer.write_shot(_shot(index, droplets_mm, valid=index not in invalid, covered=covered, bits=bits))
+            speck = 0 if copies else index % 100
+            shot = _shot(index, droplets_mm, valid=index not in invalid, covered=covered, bits=bits, speck=speck)
+            writer.write_shot(shot)
         writer.finish("completed")
     return run_dir
 
 
-def _shot(index: int, droplets_mm: NDArray[np.float64], *, valid: bool, covered: tuple[str, ...], bits: int) -> Shot:
+def _shot(
+    index: int, droplets_mm: NDArray[np.float64], *, valid: bool, covered: tuple[str, ...], bits: int, speck: int
+) -> Shot:
+    """A shot whose first pixel is darker by so many counts."""
     views = {}
+    darker = np.pad([[speck]], [(0, side - 1) for side in SHAPE])
     for name, camera in cameras().items():
         light = name not in covered
         frame_a, frame_b = (
-            grey_values(light * shadowgraph(camera, droplets_mm + step * MOTION_MM), bits) for step in (0, 1)
+            grey_values(light * (shadowgraph(camera, droplets_mm + step * MOTION_MM) - darker), bits) for step in (0, 1)
         )
         views[name] = DoubleFrame(frame_a, frame_b, SEEN, SEEN)
     if not valid:

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from processing.analysis.copied_shots import copies, named
+from processing.analysis.copied_shots import copies_told
 from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.analysis.shot_doubts import exposure_doubts, velocity_doubts
 from processing.analysis.spray.spray_axis import SprayAxis
@@ -47,11 +47,10 @@ def spray_doubts(
     axis : SprayAxis | None
         As stated.
     """
-    copied = [f"{named(shot)} has the very droplets of {named(other)}: one is a copy" for shot, other in copies(shots)]
     return (
         *exposure_doubts(shots),
         *velocity_doubts(shots),
-        *copied,
+        *copies_told(shots),
         *_of_conditions(shots),
         *(_of_equals(sample) if sample else ()),
         *(_of_motion(sample, axis) if sample else ()),

@@ -346,7 +346,7 @@ def test_volumes_of_different_settings_have_no_average(
     ],
 )
 def test_volumes_of_two_runs_in_one_folder_have_no_average(
-    run_dir: Path, calibration_file: Path, tmp_path: Path, name: str, told: dict[str, str], complaint: str
+    run_dir: Path, calibration_file: Path, tmp_path: Path, name: str, told: dict[str, Any], complaint: str
 ) -> None:
     reconstructed(run_dir, calibration_file)
     other = write_run(tmp_path / "second" / name, shots=4, **told)

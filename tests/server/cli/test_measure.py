@@ -12,6 +12,7 @@ from daq.files.run_directory import DoubleFrame, ImageKey, RunHeader, RunWriter,
 from processing.analysis.droplets.droplet_file import read_droplets
 from processing.analysis.droplets.ghost_share import matches
 from processing.calibration.calibration_file import save_calibration
+from processing.geometry import FloatArray
 from processing.reconstruction.settings import GridSettings
 from server.cli.main import main
 from tests.support.bright_scenes import BOX, GRID, scene, write_bright_calibration, write_bright_run
@@ -243,8 +244,7 @@ def test_a_shot_among_its_own_backgrounds_is_doubtful(tmp_path: Path, capsys: py
         assert "% of its own shadows in its background" in told_shot["reasons"][number - 1]
 
 
-def test_shadows_without_any_noise_are_measured(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Of a simulation, or where all light is saturated: what is left has no noise to divide by."""
+def write_noiseless_run(run_dir: Path, droplets_mm: FloatArray, shots: int = 1) -> Path:
     views = cameras()
     header = RunHeader(
         run_id="run",
@@ -253,16 +253,32 @@ def test_shadows_without_any_noise_are_measured(tmp_path: Path, capsys: pytest.C
         frames_per_shot=1,
         polarity="shadow",
     )
-    images = {name: DoubleFrame(shadowgraph(camera, DROPLETS_A_MM), None, SEEN, SEEN) for name, camera in views.items()}
-    with RunWriter(tmp_path / "run", header) as writer:
+    images = {name: DoubleFrame(shadowgraph(camera, droplets_mm), None, SEEN, SEEN) for name, camera in views.items()}
+    with RunWriter(run_dir, header) as writer:
         light = np.full((1, *SHAPE), 200, np.float32)
         writer.write_references(dict.fromkeys(views, 0 * light), dict.fromkeys(views, light))
-        writer.write_shot(Shot(0, ImageKey.SAMPLE, images))
+        for index in range(shots):
+            writer.write_shot(Shot(index, ImageKey.SAMPLE, images))
         writer.finish("completed")
+    return run_dir
+
+
+def test_shadows_without_any_noise_are_measured(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Of a simulation, or where all light is saturated: what is left has no noise to divide by."""
+    run_dir = write_noiseless_run(tmp_path / "run", DROPLETS_A_MM)
     calibration = write_calibration(tmp_path / "calibration.json")
     box = "--grid=-2:2,-2:2,-2:2"
-    result = told(capsys, "measure", tmp_path / "run", "--calibration", calibration, box, "-o", tmp_path / "out")
+    result = told(capsys, "measure", run_dir, "--calibration", calibration, box, "-o", tmp_path / "out")
     assert result["shots"][0]["droplets"] == len(DROPLETS_A_MM)
+
+
+def test_a_shot_that_is_a_copy_of_another_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    apart_mm = np.array([[0, 0, 0], [0, 0.6, 0], [0, -0.7, 0]])
+    run_dir = write_noiseless_run(tmp_path / "run", np.vstack([DROPLETS_A_MM + one for one in apart_mm]), shots=2)
+    calibration = write_calibration(tmp_path / "calibration.json")
+    box = "--grid=-2:2,-2:2,-2:2"
+    result = told(capsys, "measure", run_dir, "--calibration", calibration, box, "-o", tmp_path / "out")
+    assert result["copies"] == ["run, shot 1 has the very droplets of run, shot 0: one is a copy"]
 
 
 def test_images_that_are_mirrored_in_all_views_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
