@@ -51,6 +51,7 @@ class RunGuard:
                     light.check_permitted(self._rig)
                 self._rig.interlock.wait_for_change(self._period_s)
         except DaqError as error:
-            if not self._ending.at_once:  # else somebody has switched off, and nobody waits for the guard
+            # Else somebody has switched off: a silent generator would be asked for one more second.
+            if not (self._ending.at_once or self._done.is_set()):
                 light.try_to_switch_off(self._rig)
             self._ending.fail(error, code_of(error, self._rig))

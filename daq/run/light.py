@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 
 from daq.devices import GeneratorState, GeneratorStatus, Rig
-from daq.errors import DaqError, DeviceError, DeviceRefused, InterlockOpen
+from daq.errors import DaqError, DeviceError, DeviceRefused, DeviceUnavailable, InterlockOpen
 from daq.run.refusals import RefusalCode, coded, raise_first
 
 _RETRY_S = 0.05
@@ -79,12 +79,15 @@ def try_to_switch_off(rig: Rig) -> None:
 
 
 def confirm_off(rig: Rig, deadline_s: float) -> str | None:
-    """Switch off until the generator itself says that it is off; returns why that could not be confirmed."""
+    """Switch off until the generator itself says that it is off; returns why that could not be confirmed.
+
+    A port that has hung up carries no answer until it is opened anew: nobody waits for one.
+    """
     deadline = time.monotonic() + deadline_s
     pause = threading.Event()
     while reason := _reason_not_off(rig):
-        if time.monotonic() >= deadline:
-            return reason
+        if isinstance(reason, DeviceUnavailable) or time.monotonic() >= deadline:
+            return str(reason)
         pause.wait(_RETRY_S)
     return None
 
@@ -108,12 +111,12 @@ def acknowledge_faults(rig: Rig) -> None:
     _check_off(rig)
 
 
-def _reason_not_off(rig: Rig) -> str | None:
+def _reason_not_off(rig: Rig) -> DeviceError | None:
     try:
         switch_off(rig)
         _check_off(rig)
     except DeviceError as error:
-        return str(error)
+        return error
     return None
 
 

@@ -181,6 +181,19 @@ def test_a_reset_is_an_error_and_leaves_no_light(firmware: FirmwareProcess, gene
     assert generator.fire().sequence == 1
 
 
+def test_a_train_that_was_lost_before_arming_is_not_armed_whoever_found_the_reset(
+    firmware: FirmwareProcess, generator: SerialPulseGenerator
+) -> None:
+    generator.off()
+    generator.configure(shot_timing())
+    firmware.reset()
+    with pytest.raises(DeviceError, match="was reset"):  # as its lamp may be told
+        generator.status()
+    with pytest.raises(DeviceRefused, match="no pulse train"):
+        generator.arm(1)
+    assert generator.status().state is GeneratorState.SAFE
+
+
 def test_a_watchdog_reset_is_a_fault(firmware: FirmwareProcess, generator: SerialPulseGenerator) -> None:
     firmware.reset(by_watchdog=True)
     with pytest.raises(DeviceError, match="was reset"):

@@ -5,7 +5,7 @@ import threading
 import pytest
 
 from daq.devices import GeneratorState
-from daq.errors import DeviceError, DeviceTimeout, InterlockOpen
+from daq.errors import DeviceError, DeviceTimeout, DeviceUnavailable, InterlockOpen
 from daq.run import light
 from daq.run_plan import PulsePair, RunPlan
 from daq.timing import plan_shot_timing
@@ -56,6 +56,20 @@ def test_a_generator_that_does_not_answer_is_not_known_to_be_off(
     assert light.confirm_off(memory.rig, 0.0) == "generator: no answer to 'off' within 1 s"
     with pytest.raises(DeviceTimeout):
         light.switch_off(memory.rig)
+
+
+def test_nobody_waits_for_the_answer_of_a_port_that_has_hung_up(
+    memory: MemoryRig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[str] = []
+
+    def gone() -> None:
+        asked.append("off")
+        raise DeviceUnavailable("generator", "its port has hung up")
+
+    monkeypatch.setattr(memory.generator, "off", gone)
+    assert light.confirm_off(memory.rig, 0.2) == "generator: its port has hung up"
+    assert asked == ["off"]
 
 
 def test_an_interlock_that_is_still_open_is_the_reason_why_nothing_can_be_acknowledged(memory: MemoryRig) -> None:
