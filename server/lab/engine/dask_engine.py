@@ -4,6 +4,7 @@
 # distributed is typed in parts only.
 
 import asyncio
+import time
 from collections.abc import Sequence
 from contextlib import AsyncExitStack
 from contextvars import copy_context
@@ -21,13 +22,17 @@ ENVIRONMENT = "distributed.nanny.pre-spawn-environ"
 MEMORY_THAT_STAYS = {"MALLOC_MMAP_THRESHOLD_": 32 << 20, "MALLOC_TRIM_THRESHOLD_": 256 << 20}
 """Distributed lets workers give memory back at once; measured: finding it anew doubles the CPU time of a shot."""
 
+START_AGAIN_S = 10.0
+"""After workers could not start; to try it costs a second of a processor."""
+
 _NICENESS = 10  # measured: median answer time of the server under load falls from 65 to 24 ms
 
 
 class DaskEngine:
     """Runs tasks in worker processes of this machine, reached on the loopback interface only.
 
-    They start by themselves: whoever enters does not wait for them, the first task does.
+    They start by themselves: whoever enters does not wait for them, the first task does. If they could not, a later
+    task starts them again.
 
     Parameters
     ----------
@@ -46,13 +51,25 @@ class DaskEngine:
         self._stack = AsyncExitStack()
         self._context = copy_context()  # a client of distributed ends where it began
         self._client: asyncio.Task[Client] | None = None
+        self._began_s = 0.0
         self._listeners: dict[str, OnProgress] = {}
 
     async def __aenter__(self) -> Self:
-        self._client = asyncio.create_task(self._start(), context=self._context)
+        self._begin()
         return self
 
+    def _begin(self) -> None:
+        self._began_s = time.monotonic()
+        self._client = asyncio.create_task(self._start(), context=self._context)
+
     async def _start(self) -> Client:
+        try:
+            return await self._enter()
+        except Exception:
+            await self._stack.aclose()
+            raise
+
+    async def _enter(self) -> Client:
         environment = config.get(ENVIRONMENT) | MEMORY_THAT_STAYS
         self._stack.enter_context(config.set({ENVIRONMENT: environment}))
         cluster = await self._stack.enter_async_context(
@@ -115,7 +132,15 @@ class DaskEngine:
         """Wait for the workers; Unavailable if they cannot start."""
         if self._client is None:
             raise TaskError("the engine is not running")
-        await asyncio.wait([self._client])
-        if error := self._client.exception():
+        if self._has_failed and time.monotonic() - self._began_s > START_AGAIN_S:
+            self._begin()
+        starting = self._client
+        await asyncio.wait([starting])
+        if error := starting.exception():
             raise Unavailable(f"the workers did not start: {told(error)}")
-        return self._client.result()
+        return starting.result()
+
+    @property
+    def _has_failed(self) -> bool:
+        starting = self._client
+        return starting is not None and starting.done() and starting.exception() is not None

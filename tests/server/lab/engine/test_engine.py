@@ -9,7 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from dask import config
 
+from server.lab.engine import dask_engine
 from server.lab.engine.dask_engine import DaskEngine
 from server.lab.engine.inline_engine import InlineEngine
 from server.lab.engine.task import Engine, TaskAborted, TaskError, Unavailable
@@ -134,6 +136,25 @@ def test_whoever_starts_workers_does_not_wait_for_them_and_a_task_is_told_that_t
 
     with pytest.raises(Unavailable, match="the workers did not start: ValueError"):
         asyncio.run(go())
+
+
+def test_workers_that_could_not_start_are_started_again_by_a_later_task(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scratch = tmp_path / "scratch"
+    scratch.touch()  # no folder: as where a disk is not mounted
+
+    async def go() -> dict[str, Any]:
+        with config.set({"temporary-directory": str(scratch)}):
+            async with DaskEngine() as engine:
+                for _ in range(2):
+                    with pytest.raises(Unavailable, match="the workers did not start"):
+                        await engine.submit("a", double, {"value": 20}, _ignore)
+                scratch.unlink()
+                monkeypatch.setattr(dask_engine, "START_AGAIN_S", 0.0)
+                return await engine.submit("b", double, {"value": 21}, _ignore)
+
+    assert asyncio.run(go()) == {"value": 42}
 
 
 def test_workers_load_what_they_are_told_to_before_a_task_needs_it_and_keep_their_memory() -> None:
