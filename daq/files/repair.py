@@ -11,10 +11,10 @@ from daq.errors import ShotFileError
 from daq.files.atomic_file import RESERVE_SUFFIX
 from daq.files.header import RunClosing, RunHeader
 from daq.files.lock_file import hold_folder
-from daq.files.outcome_note import note_path, write_note
+from daq.files.outcome_note import read_note, write_note
 from daq.files.recovery import INTERRUPTED, close_run, last_sign_of_life_utc, set_aside
 from daq.files.run_directory import RunReader
-from daq.files.run_file import RUN_FILE, SHOTS_FOLDER, add_closing, write_run_file
+from daq.files.run_file import RUN_FILE, SHOTS_FOLDER, write_run_file
 from daq.files.shot_file import read_formats, read_shot_file
 from daq.files.storage import storing
 from daq.files.verification import FlawKind, verify
@@ -57,21 +57,29 @@ def _write_lost_header(run_dir: Path) -> Iterator[str]:
     for name in (RUN_FILE, RUN_FILE + RESERVE_SUFFIX):
         if (run_dir / name).exists():
             yield f"{name} is set aside as {set_aside(run_dir / name, run_dir)}"
-    closing = RunClosing(INTERRUPTED, _OUTCOME_LOST, lived_until_utc)
-    write_note(run_dir, closing)  # for the next repair, should this one be killed before the outcome is in the file
+    # The outcome comes last, with the count of shots: by this repair, or by the next one if this one is killed.
+    if read_note(run_dir) is None:
+        write_note(run_dir, RunClosing(INTERRUPTED, _OUTCOME_LOST, lived_until_utc))
     write_run_file(run_dir, header)
-    add_closing(run_dir, closing)
-    note_path(run_dir).unlink(missing_ok=True)
     yield f"{RUN_FILE} is written anew from the shots; {LOST_WITH_HEADER}"
 
 
 def _header_of_shots(run_dir: Path) -> RunHeader:
-    for path in sorted((run_dir / SHOTS_FOLDER).glob("*.h5")):
+    """What a shot tells of its run: one that names this directory, if there is any, as others may be strangers."""
+    paths = sorted((run_dir / SHOTS_FOLDER).glob("*.h5"))
+    for path in (*(path for path in paths if _run_of(path) == run_dir.name), *paths):
         try:
             return _header_of_shot(path)
         except ShotFileError:
             continue
     raise ShotFileError(f"{run_dir}: its {RUN_FILE} cannot be read, and no shot is left that tells what it was")
+
+
+def _run_of(path: Path) -> str | None:
+    try:
+        return read_formats(path)[0]
+    except ShotFileError:
+        return None
 
 
 def _header_of_shot(path: Path) -> RunHeader:

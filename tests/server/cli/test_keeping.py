@@ -13,6 +13,8 @@ import numpy as np
 import pytest
 
 from daq.files import repair as repairing
+from daq.files.header import RunClosing
+from daq.files.outcome_note import write_note
 from daq.files.run_directory import RunReader, RunWriter
 from server.cli.main import main
 from tests.daq.files.test_run_directory import assert_same, header_of, shot_of
@@ -142,7 +144,7 @@ def test_a_repair_that_is_killed_before_the_outcome_is_written_is_finished_by_th
 ) -> None:
     (run_dir / "run.h5").unlink()
     with monkeypatch.context() as killed:
-        killed.setattr(repairing, "add_closing", die)
+        killed.setattr(repairing, "verify", die)
         with pytest.raises(KeyboardInterrupt):
             list(repairing.repair(run_dir))
     assert RunReader(run_dir).outcome is None
@@ -154,6 +156,31 @@ def test_a_repair_that_is_killed_before_the_outcome_is_written_is_finished_by_th
 
 def die(*_: object) -> None:
     raise KeyboardInterrupt
+
+
+def test_a_stray_copy_is_no_shot_of_a_run_whose_header_was_lost(
+    run_dir: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (run_dir / "run.h5").unlink()
+    shutil.copy(run_dir / "shots" / "2.h5", run_dir / "shots" / "77.h5")
+    assert told(capsys, "repair", run_dir)["sound"], "shots 3 to 77 are not missing"
+    assert RunReader(run_dir).shot_count == 3
+
+
+def test_a_lost_header_is_never_that_of_a_stranger_among_the_shots(run_dir: Path) -> None:
+    (run_dir / "run.h5").unlink()
+    of_another_run(run_dir)
+    shot(run_dir, 1).rename(shot(run_dir, 0))
+    list(repairing.repair(run_dir))
+    assert RunReader(run_dir).header.run_id == run_dir.name
+    assert [path.name for path in (run_dir / "shots").iterdir()] == ["2.h5"]
+
+
+def test_a_lost_header_does_not_take_the_place_of_an_outcome_that_the_disk_had_refused(run_dir: Path) -> None:
+    (run_dir / "run.h5").unlink()
+    write_note(run_dir, RunClosing("failed", "the disk was full", "2026-11-22T10:16:00+00:00"))
+    list(repairing.repair(run_dir))
+    assert (RunReader(run_dir).outcome, RunReader(run_dir).cause) == ("failed", "the disk was full")
 
 
 def test_a_lost_header_is_written_anew_from_the_shots_and_what_is_lost_is_named(
