@@ -64,7 +64,7 @@ def read_spray(folders: Sequence[Path]) -> MeasuredSpray:
         There are none, or they do not belong together: of two recipes or calibrations, or of sprays whose nozzles are
         at two places. The text names both.
     """
-    folders = [_of_run(folder) if (folder / "run.h5").is_file() else folder for folder in folders]
+    folders = [measured_in(folder) for folder in folders]
     files = [file for folder in folders for file in _files(folder)]
     return read_files(files, ", ".join(dict.fromkeys(map(_name, folders))))
 
@@ -78,8 +78,18 @@ def read_files(files: Sequence[Path], name: str = "") -> MeasuredSpray:
     return MeasuredSpray(name, shots, _axis(shots, files), changes_told(shots, files))
 
 
+def measured_in(folder: Path) -> Path:
+    """Where droplets are: in the folder itself, but of a run in its own results.
+
+    Raises
+    ------
+    DropletFileError
+        It is a run of which nothing, or more than one thing, is measured there.
+    """
+    return _of_run(folder) if (folder / "run.h5").is_file() else folder
+
+
 def _of_run(run_dir: Path) -> Path:
-    """Where the droplets of a run are, of which the server measured them in one way."""
     found = sorted({file.parent for file in run_dir.glob(f"results/*/{PATTERN}")})
     if not found:
         raise DropletFileError(

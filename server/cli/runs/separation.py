@@ -28,10 +28,11 @@ def separation(options: Namespace) -> Outcome:
     from processing.analysis.droplets.droplet_file import DropletFileError
     from processing.analysis.velocity.separation_proposal import MOVED_VOXEL, propose_separation
     from processing.runs.droplets_in_place import read_in_place
+    from processing.runs.sprays.measured_spray import measured_in
     from server.rig.config import load_config
     from server.rig.optics_table import optics_table
 
-    files = sorted(options.results.glob("shot_*_droplets.h5"))
+    files = sorted(measured_in(options.results).glob("shot_*_droplets.h5"))
     if not files:
         raise DropletFileError(f"{options.results}: has no droplets of shots; measure them first (tomoshadow measure)")
     window_ns = None

@@ -34,12 +34,13 @@ def tracks(options: Namespace) -> Outcome:
     from processing.analysis.velocity.track_table import track_droplets
     from processing.runs.droplets_in_place import read_in_place
     from processing.runs.overwriting import require_free
+    from processing.runs.sprays.measured_spray import measured_in
 
     for export in options.export:
         export.require()
     exports = [export_path(options.out, export) for export in options.export]
     require_free(options.out, *exports, overwrite=options.overwrite)
-    files = sorted(options.results.glob("shot_*_droplets.h5"))
+    files = sorted(measured_in(options.results).glob("shot_*_droplets.h5"))
     if not files:
         raise DropletFileError(f"{options.results}: has no droplets of shots; measure them first (tomoshadow measure)")
     shots = [read_in_place(file) for file in files]

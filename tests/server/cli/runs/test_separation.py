@@ -58,4 +58,7 @@ def test_without_velocities_or_shots_the_reason_is_told(tmp_path: Path, capsys: 
     assert result["separation_ns"] is None
     assert result["reason"].startswith("no motion in common; where droplets move by more than 25 voxels")
     (tmp_path / "empty").mkdir()
+    (tmp_path / "run.h5").touch()
+    assert "is a run, and its own results have no droplets" in refused(capsys, "separation", tmp_path)
+    assert "is a run, and its own results" in refused(capsys, "tracks", tmp_path, "-o", tmp_path / "tracks.h5")
     assert "has no droplets of shots" in refused(capsys, "separation", tmp_path / "empty")
