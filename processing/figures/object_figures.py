@@ -50,13 +50,13 @@ def objects_figure(curves: Mapping[str, BreakUpCurve], shot: ObjectsShot) -> Fig
     return figure
 
 
-def break_up_figure(curve: BreakUpCurve | None, name: str, objects: LiquidObjects, grid: VoxelGrid | None) -> Figure:
+def break_up_figure(curve: BreakUpCurve | None, name: str, objects: LiquidObjects) -> Figure:
     """Break-up curve, if there is one, and the objects of one exposure."""
     figure = Figure(figsize=(9.5 if curve else 5, 4.4), layout="constrained")
     *curve_axes, object_axes = figure.subplots(1, 2 if curve else 1, squeeze=False).ravel()
     if curve:
         draw_break_up(curve_axes[0], {name: curve})
-    draw_objects(object_axes, objects, grid)
+    draw_objects(object_axes, objects, None)
     return figure
 
 
@@ -119,7 +119,7 @@ def draw_unseen(axes: Axes, unseen: UnseenMap) -> None:
     image = axes.imshow(share, extent=span_mm, cmap="magma_r", vmin=0, vmax=max(1.0, float(share.max())))
     axes.figure.colorbar(image, ax=axes, label="depth seen by < 3 views [%]", shrink=0.75)
     axes.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
-    axes.set_title(f"{np.mean(share):.1f} % of the volume", fontsize="small")
+    axes.set_title(f"{np.mean(share):.1f} % of the volume is seen by < 3 views", fontsize="small")
 
 
 def _frame(axes: Axes, grid: VoxelGrid | None) -> None:

@@ -16,7 +16,6 @@ from processing.runs.liquid.objects import COUNTED, LiquidSummary, RunObjects, s
 from processing.runs.workbench import read_references
 from processing.synthetic.liquid.connected_balls import connected_length_mm
 from processing.synthetic.liquid.nozzles import HOLLOW_CONE_FLOW
-from processing.volume import VoxelGrid
 from server.demo.demo_droplets import measured_box, true_sprays
 
 
@@ -30,13 +29,10 @@ class MeasuredLiquid:
         A shot each.
     true_mm : (shots,) array
         How far the balls of the simulated liquid touch, from the nozzle on.
-    places : VoxelGrid
-        At which it is known how many views see.
     """
 
     found: tuple[ExposureObjects, ...]
     true_mm: FloatArray
-    places: VoxelGrid
 
     @property
     def objects(self) -> LiquidObjects:
@@ -69,4 +65,4 @@ def measure_liquid(run_dir: Path, shots: Sequence[int], calibration: Calibration
         sprays = [true_sprays(run, shot, truth_file)["a"] for shot in shots]
     orifice_mm = np.array(HOLLOW_CONE_FLOW.orifice_mm)
     true_mm = [connected_length_mm(spray, orifice_mm, NEAR_MM) for spray in sprays]
-    return MeasuredLiquid(tuple(found), np.array(true_mm), objects.search.places)
+    return MeasuredLiquid(tuple(found), np.array(true_mm))

@@ -146,9 +146,7 @@ def _droplets_section(droplets: MeasuredDroplets) -> Section:
 def _break_up(liquid: MeasuredLiquid) -> Section:
     """Of exposure A of all shots, against the truth."""
     first = liquid.found[0]
-    told = ReportedLiquid(
-        liquid.reaches, len(liquid.found), liquid.objects, first.objects, liquid.true_mm, liquid.places
-    )
+    told = ReportedLiquid(liquid.reaches, len(liquid.found), liquid.objects, first.objects, liquid.true_mm)
     return break_up_section(told)
 
 

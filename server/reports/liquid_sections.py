@@ -14,7 +14,6 @@ from processing.analysis.objects.seeing_views import UnseenMap
 from processing.figures.object_figures import BreakUpCurve, break_up_figure, unseen_figure
 from processing.geometry import FloatArray
 from processing.runs.liquid.objects import reaches_of, told_of_exposures
-from processing.volume import VoxelGrid
 from server.reports.digits import counted
 from server.reports.page import Picture, Section, Table
 
@@ -53,8 +52,6 @@ class ReportedLiquid:
         Of the exposure that is drawn.
     true_mm : (shots,) array | None
         Where it ends in truth, if that is known.
-    places : VoxelGrid | None
-        Of what is drawn.
     """
 
     reaches: Sequence[Reach]
@@ -62,7 +59,6 @@ class ReportedLiquid:
     objects: LiquidObjects
     shown: LiquidObjects
     true_mm: FloatArray | None = None
-    places: VoxelGrid | None = None
 
     @classmethod
     def of_files(cls, shots: Sequence[StoredDroplets]) -> "ReportedLiquid | None":
@@ -80,7 +76,7 @@ def break_up_section(liquid: ReportedLiquid) -> Section:
     """Numbers and sizes of objects, the break-up length with its limits or the reason why there is none, the curve."""
     found = break_up_of(liquid.reaches)
     text = f"{break_up_text(found, liquid.true_mm)} {CLASSES_TEXT}"
-    figure = break_up_figure(_curve(liquid, found), counted(found.shots, "shot"), liquid.shown, liquid.places)
+    figure = break_up_figure(_curve(liquid, found), counted(found.shots, "shot"), liquid.shown)
     caption = (
         "Objects of one exposure, seen along z: ligaments as lines of their length and direction, others as circles as "
         "wide as they are long."

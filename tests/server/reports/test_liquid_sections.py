@@ -53,7 +53,7 @@ def test_lengths_have_limits_and_truth_and_objects_are_counted_by_exposure() -> 
     curve, objects = section.pictures[0].figure.axes
     assert "share of shots" in curve.get_ylabel()
     assert "ligament (1)" in {text.get_text() for text in objects.get_legend().get_texts()}  # type: ignore[union-attr]
-    known = ReportedLiquid(liquid.reaches, 6, liquid.objects, liquid.shown, np.array([4.9, 5.2, 5.0]), GRID)
+    known = ReportedLiquid(liquid.reaches, 6, liquid.objects, liquid.shown, np.array([4.9, 5.2, 5.0]))
     assert "In truth it is 5.00 mm" in break_up_section(known).text
 
 
