@@ -85,7 +85,7 @@ def test_shares_that_cannot_be_known_are_told_and_mapped_where_images_were_seen(
     assert mapped
     assert NO_MAP not in mapped.text
     (axes, _) = mapped.pictures[0].figure.axes
-    assert axes.get_title() == "25.0 % of the volume"
+    assert axes.get_title() == "25.0 % of the volume is seen by < 3 views"
     elsewhere = unknown_section([_mapped(shots[0], GRID), _mapped(shots[0], VoxelGrid((4, 5, 7), (0, 0, 0), 0.1))])
     assert elsewhere
     assert NO_MAP in elsewhere.text
