@@ -176,6 +176,8 @@ def reading(run_dir: Path) -> Iterator[h5py.File]:
     path = run_dir / RUN_FILE
     if not path.exists():
         missing = f"no run, it has no {RUN_FILE}" if run_dir.is_dir() else "there is no such directory"
+        if run_dir.is_file():
+            missing = "is a file, and a run is a directory: images become one by tomoshadow import"
         raise ShotFileError(f"{run_dir}: {missing}")
     try:
         if not has_whole_heaps(path):

@@ -277,6 +277,9 @@ def test_a_run_that_is_none(calibration_file: Path, tmp_path: Path, capsys: pyte
     assert refused(capsys, *arguments) == f"{tmp_path / 'nowhere'}: there is no such directory"
     (tmp_path / "nowhere").mkdir()
     assert refused(capsys, *arguments) == f"{tmp_path / 'nowhere'}: no run, it has no run.h5"
+    (tmp_path / "image.png").touch()
+    told_of_file = refused(capsys, "reconstruct", tmp_path / "image.png", *arguments[2:])
+    assert "is a file, and a run is a directory: images become one by tomoshadow import" in told_of_file
     assert not (tmp_path / "out").exists()
 
 
