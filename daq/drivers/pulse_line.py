@@ -59,8 +59,7 @@ class PulseLine:
         self._port: serial.Serial | None = None
         self._hung_up = False
         self._asking = threading.Lock()
-        self._counting = threading.Lock()
-        self._offs = 0
+        self._last_off = object()  # another one before and after each abort byte
         self._sequence = 0
         self._boot = 0
         self.restarts = 0  # of the microcontroller, or of its port, as far as they were found out
@@ -94,7 +93,7 @@ class PulseLine:
         return self._hung_up or self._port is None
 
     def _open_session(self) -> Reply:
-        identity = self._converse(Request(0, Command.ID), OPENING_LIMIT_S, offs=None)
+        identity = self._converse(Request(0, Command.ID), OPENING_LIMIT_S, last_off=None)
         spoken = identity.fields.get("protocol")
         if spoken is not None and spoken != str(PROTOCOL_VERSION):
             raise ProtocolError(self._name, other_protocol(spoken, PROTOCOL_VERSION))
@@ -141,9 +140,9 @@ class PulseLine:
 
     def answer(self, command: Command, *fields: int) -> Reply:
         """Like `ask`, but a refusal is an answer, not an error."""
-        offs = self._offs
+        last_off = self._last_off
         with self._alone(command):
-            reply = self._converse(self._numbered(command, fields), LIMIT_S, offs)
+            reply = self._converse(self._numbered(command, fields), LIMIT_S, last_off)
             self._check_boot(reply)
         return reply
 
@@ -167,11 +166,11 @@ class PulseLine:
 
     def off(self) -> Reply:
         """Send the abort byte past everybody who waits, then ask for confirmation."""
-        with self._counting:
-            self._offs += 1
+        self._last_off = object()
         self._write(ABORT_BYTE, Command.OFF, _WRITE_LIMIT_S)
+        self._last_off = object()
         with self._alone(Command.OFF):
-            reply = self._converse(self._numbered(Command.OFF, ()), LIMIT_S, offs=None)
+            reply = self._converse(self._numbered(Command.OFF, ()), LIMIT_S, last_off=None)
             self._has_restarted(reply)
         return reply
 
@@ -190,16 +189,17 @@ class PulseLine:
         self._sequence = self._sequence % MAX_SEQUENCE + 1
         return Request(self._sequence, command, fields)
 
-    def _converse(self, request: Request, limit_s: float, offs: int | None) -> Reply:
-        """Send until answered: the generator carries out a repeated line only once."""
+    def _converse(self, request: Request, limit_s: float, last_off: object | None) -> Reply:
+        """Send until answered, and after an abort byte, for which the board forgets lines; it does each only once."""
         deadline_s = self._clock_s() + limit_s
         heard: Counter[Heard] = Counter()
         while self._clock_s() < deadline_s:
-            self._check_not_overtaken(request.command, offs)
+            self._check_not_overtaken(request.command, last_off)
+            sent_after = self._last_off
             self._write(encode_request(request), request.command, limit_s)
             repeat_s = min(deadline_s, self._clock_s() + _REPEAT_S)
-            while self._clock_s() < repeat_s:
-                self._check_not_overtaken(request.command, offs)
+            while self._clock_s() < repeat_s and self._last_off is sent_after:
+                self._check_not_overtaken(request.command, last_off)
                 reply = self._next_reply(request)
                 if isinstance(reply, Reply):
                     return reply
@@ -282,8 +282,8 @@ class PulseLine:
             what = " has hung up, as with its cable out" if self._hung_up else ""
             raise DeviceUnavailable(self._name, f"{self._path}{what}: {error}") from error
 
-    def _check_not_overtaken(self, command: Command, offs: int | None) -> None:
-        if offs is not None and offs != self._offs:
+    def _check_not_overtaken(self, command: Command, last_off: object | None) -> None:
+        if last_off is not None and last_off is not self._last_off:
             raise DeviceOvertaken(self._name, f"{command} was overtaken by off")
 
     def _check_boot(self, reply: Reply) -> None:

@@ -14,6 +14,7 @@ import pytest
 import serial
 
 from daq.devices import GeneratorState
+from daq.drivers import pulse_line
 from daq.drivers.pulse_framing import DamagedLine
 from daq.drivers.pulse_limits import kept_limits, store_limits
 from daq.drivers.pulse_line import PulseLine
@@ -144,6 +145,31 @@ def test_off_does_not_wait_for_a_command_without_answer() -> None:
         thread.join(5.0)
         assert outcome == ["FIRE was overtaken by off"]
         assert generator.status().state is GeneratorState.SAFE
+
+
+def test_an_off_that_another_one_made_the_board_forget_is_sent_again_at_once(
+    firmware: FirmwareProcess, generator: SerialPulseGenerator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The abort byte of the other one clears what the board has received and not read yet."""
+    asked, ended = threading.Event(), list[str]()
+
+    def encode(request: Request) -> bytes:
+        asked.set()
+        return encode_request(request)
+
+    def off() -> None:
+        generator.off()
+        ended.append("off")
+
+    monkeypatch.setattr(pulse_line, "_REPEAT_S", 60.0)
+    monkeypatch.setattr(pulse_line, "encode_request", encode)
+    firmware.lose_replies(1)
+    first = threading.Thread(target=off)
+    first.start()
+    assert asked.wait(5.0)
+    generator.off()
+    first.join(5.0)
+    assert ended == ["off"]
 
 
 def test_a_killed_generator_is_unavailable(firmware: FirmwareProcess, generator: SerialPulseGenerator) -> None:
