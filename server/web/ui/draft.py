@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -115,6 +116,7 @@ class DraftStore:
         self.values = first_draft(config) | self._stored()
         first, stored = first_draft(config)["current_a"], self.values["current_a"]
         self.values["current_a"] = {view: stored.get(view, current_a) for view, current_a in first.items()}
+        self._unkept: dict[str, Any] = {}
         self.version = 0
         """Grows with every change, so that other tabs see that there was one."""
 
@@ -129,9 +131,15 @@ class DraftStore:
             self._follow_kind(RunKind(self.values["kind"]), RunKind(value))
         self.values[name] = value
         self.version += 1
+        self._unkept[name] = value
+        with suppress(OSError):  # the bar tells of a disk that is full, or gone; it gets all with the next change
+            self._keep()
+
+    def _keep(self) -> None:
         part = self._path.with_suffix(".part")
-        part.write_text(json.dumps({**self._stored(), name: value}))
+        part.write_text(json.dumps({**self._stored(), **self._unkept}))
         part.replace(self._path)
+        self._unkept.clear()
 
     @property
     def plan(self) -> RunPlan:

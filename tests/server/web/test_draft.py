@@ -25,6 +25,17 @@ def test_a_draft_outlives_the_server(tmp_path: Path) -> None:
     assert DraftStore(tmp_path / "draft.json", config, EventPublisher()).values["shots"] == 77
 
 
+def test_what_the_disk_refuses_stays_in_the_form_and_is_kept_with_the_next_change(tmp_path: Path) -> None:
+    config, path = memory_config(tmp_path / "runs"), tmp_path / "away" / "draft.json"
+    draft = DraftStore(path, config, EventPublisher())
+    draft.set("shots", 77)
+    assert draft.values["shots"] == 77
+    path.parent.mkdir()
+    draft.set("fluid", "water")
+    again = DraftStore(path, config, EventPublisher()).values
+    assert (again["shots"], again["fluid"]) == (77, "water")
+
+
 @pytest.mark.parametrize("text", ['{"shots": 7', "[]", '{"kind": "party"}', '{"current_a": 3}', "\x00\x01", ""])
 def test_a_torn_draft_is_kept_aside_and_the_first_one_is_shown(tmp_path: Path, text: str) -> None:
     config, events, path = memory_config(tmp_path / "runs"), EventPublisher(), tmp_path / "draft.json"

@@ -1,9 +1,11 @@
 """Forms that are kept under a name."""
 
+import re
 from pathlib import Path
 
 import pytest
 
+from daq.errors import StorageError
 from server.lab.errors import Unprocessable
 from server.lab.events import EventPublisher
 from server.web.ui.draft import first_draft
@@ -45,3 +47,9 @@ def test_a_name_leads_nowhere_else(tmp_path: Path, name: str) -> None:
     with pytest.raises(Unprocessable, match="is no name for a template"):
         templates.save(name, {})
     assert templates.load(name) == {}
+
+
+def test_a_disk_that_refuses_is_named(tmp_path: Path) -> None:
+    (tmp_path / "templates").write_text("a file where the folder should be")
+    with pytest.raises(StorageError, match=re.escape(str(tmp_path))):
+        TemplateStore(tmp_path / "templates", EventPublisher()).save("bright", {"shots": 7})

@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 from nicegui import ui
 
+from daq.errors import DaqError
 from server.lab.errors import ServerError
 from server.web.ui.draft import DraftStore
 from server.web.ui.run.templates import TemplateStore
@@ -67,7 +68,7 @@ class TemplateBar:
             if name in self._templates.names() and not await is_sure(f"Replace the template {name}?", "Replace"):
                 return
             self._templates.save(name, self._draft.values)
-        except (ServerError, OSError) as error:
+        except (DaqError, ServerError, OSError) as error:
             ui.notify(told(error), type="negative")
         else:
             self._menu.close()

@@ -6,6 +6,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from daq.files.atomic_file import replacing
+from daq.files.storage import storing
 from daq.names import is_identifier
 from server.lab.damage import set_aside
 from server.lab.errors import Unprocessable
@@ -42,13 +43,23 @@ class TemplateStore:
         return (self._read(path) if is_identifier(name) and path.is_file() else None) or {}
 
     def save(self, name: str, values: dict[str, Any]) -> None:
-        """Keep a form; one of the same name is replaced. Unprocessable if that is no name for a file."""
+        """Keep a form; one of the same name is replaced.
+
+        Raises
+        ------
+        Unprocessable
+            That is no name for a file.
+        StorageError
+            The disk refuses.
+        """
         if not is_identifier(name):
             raise Unprocessable(f"{name!r} is no name for a template: letters, digits, space . _ -")
-        self._folder.mkdir(parents=True, exist_ok=True)
         kept = {key: value for key, value in values.items() if key not in _OF_THE_DAY}
-        with replacing(self._folder / f"{name}.json") as part:
-            part.write_text(StoredDraft.model_validate(kept).model_dump_json(exclude_unset=True, indent=1))
+        text = StoredDraft.model_validate(kept).model_dump_json(exclude_unset=True, indent=1)
+        with storing(self._folder.parent):
+            self._folder.mkdir(parents=True, exist_ok=True)
+            with replacing(self._folder / f"{name}.json") as part:
+                part.write_text(text)
 
     def remove(self, name: str) -> None:
         """Forget a template."""
