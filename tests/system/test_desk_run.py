@@ -197,6 +197,7 @@ def test_what_is_made_of_every_shot_is_what_the_page_shows(tab: Page, server: Se
     (server.services.data_dir / "calibrations" / "paper.json").write_text('{"id": "paper"}')
     server.http.put("/api/calibrations/current", json={"id": "paper"})
     server.free_control()
+    tab.reload()  # the page may still be told that somebody held control for a moment, which closes a list
     tab.get_by_role("button", name="Sample").click()
     tab.get_by_label("Shots", exact=True).fill("1")
     tab.get_by_label("Volumes", exact=True).click()
@@ -219,6 +220,27 @@ def test_what_is_made_of_every_shot_is_what_the_page_shows(tab: Page, server: Se
 def jobs_of(server: Serving, run_id: str | None) -> list[dict[str, Any]]:
     jobs = server.http.get("/api/jobs", params={"run_id": run_id or ""}).json()
     return [job for job in jobs if job["kind"] == "reconstruction"]
+
+
+def test_a_chosen_calibration_whose_file_is_gone_gives_way_to_no_other(tab: Page, server: Serving) -> None:
+    folder = server.services.data_dir / "calibrations"
+    for name in ("lens", "paper"):
+        (folder / f"{name}.json").write_text(f'{{"id": "{name}"}}')
+    server.http.put("/api/calibrations/current", json={"id": "paper"})
+    server.free_control()
+    tab.reload()  # the page may still be told that somebody held control for a moment, which closes a list
+    tab.get_by_role("button", name="Sample").click()
+    tab.get_by_role("combobox", name="Calibration; none: current").click()
+    tab.get_by_role("option", name="lens", exact=True).click()
+    expect(row(tab, "Calibration")).to_contain_text("lens")
+    (folder / "lens.json").unlink()
+    server.run_to_its_end(plan_of(kind="dark", shots=1, pulse=PULSE))  # lists are read again
+    server.free_control()
+    expect(tab.get_by_role("region", name="New run").get_by_text("lens: is gone")).to_be_visible()
+    expect(row(tab, "Calibration")).to_contain_text("there is no calibration 'lens'")
+    tab.get_by_role("combobox", name="Calibration; none: current").click()
+    tab.get_by_role("option", name="paper (current)").click()
+    expect(tab.get_by_role("region", name="New run").get_by_text("lens: is gone")).to_have_count(0)
 
 
 def test_a_kind_brings_its_name(tab: Page) -> None:

@@ -38,6 +38,7 @@ class ChosenRuns:
     def __init__(self, context: Context, draft: DraftStore, changed: Callable[[], None]) -> None:
         self._context, self._draft, self._changed = context, draft, changed
         self._known: list[RunSummary] = []
+        self._calibrations: dict[str, str] = {}
         with ui.column().classes("w-full gap-2") as self._box:
             self._references = ui.select(
                 {}, label="Dark and background runs", multiple=True, value=[], on_change=self._keep_references
@@ -65,23 +66,17 @@ class ChosenRuns:
         )
         self._known = runs
         self._pin_what_is_missing()
-        known = {item.id: item.id + (" (current)" if item.current else "") for item in calibrations}
+        self._calibrations = {item.id: item.id + (" (current)" if item.current else "") for item in calibrations}
         self._calibration.set_label(_CALIBRATION if any(item.current for item in calibrations) else _NO_CALIBRATION)
-        chosen = self._draft.values["calibration"]
-        self._calibration.set_options(known, value=chosen if chosen in known else None)
         self.show()
 
     def show(self) -> None:
         """Show what is chosen, here or in another tab."""
         chosen = self._draft.values["references"]
-        labels = {run.run_id: _label(run) for run in self._known}
-        gone = {run_id: f"{run_id}: is gone" for run_id in chosen if run_id not in labels}
-        if self._references.options != labels | gone or self._references.value != chosen:
-            self._references.set_options(labels | gone, value=list(chosen))
+        _offer(self._references, {run.run_id: _label(run) for run in self._known}, chosen, list(chosen))
         self._newest.set_visibility(bool(chosen) and set(newest_of(self._known).values()) != set(chosen))
         calibration = self._draft.values["calibration"]
-        if calibration in (*self._calibration.options, None) and self._calibration.value != calibration:
-            self._calibration.set_value(calibration)
+        _offer(self._calibration, self._calibrations, [calibration] if calibration else [], calibration)
 
     def _pin_what_is_missing(self) -> None:
         """Propose the newest of each kind of which none is chosen, until the operator has chosen himself."""
@@ -113,6 +108,13 @@ class ChosenRuns:
         if event.value != self._draft.values["calibration"]:
             self._draft.set("calibration", event.value)
             self._changed()
+
+
+def _offer(field: ui.select, known: dict[str, str], chosen: Iterable[str], value: Any) -> None:
+    """Offer what is known; what was chosen, and is gone since, gives way to nothing else unasked."""
+    offered = known | {one: f"{one}: is gone" for one in chosen if one not in known}
+    if field.options != offered or field.value != value:
+        field.set_options(offered, value=value)
 
 
 def known_references(runs: RunStore, chosen: Iterable[str]) -> list[RunSummary]:
