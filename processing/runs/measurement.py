@@ -54,7 +54,7 @@ from processing.runs.shots.turned_views import depth_reversed
 from processing.runs.sprays.conditions import conditions_of
 from processing.runs.workbench import References, read_references
 
-METHOD_VERSION = 8
+METHOD_VERSION = 9
 """Of what the numbers in a file of droplets mean."""
 
 

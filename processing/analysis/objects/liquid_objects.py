@@ -23,6 +23,8 @@ LEAST_LENGTH_VOXEL = 8.0
 """Shorter objects are droplets, as far as anyone can tell."""
 LEAST_OWN_SHARE = 0.5
 """Of the silhouettes in three views: what has less may be a ghost."""
+TOO_WIDE_VOXEL = 0.5
+"""So much wider is a silhouette of whole cells, in the mean of width and thickness of blurred threads."""
 STRIP, ELLIPSE = float(np.sqrt(12)), 4.0
 """Width of a strip, and axis of an ellipse, over the standard deviation of its area."""
 Columns = dict[str, NDArray[np.generic]]
@@ -50,7 +52,8 @@ class LiquidObjects:
     classes : (N,) array of ObjectClass
         What each looks like.
     lengths_mm, widths_mm, thicknesses_mm : (N,) arrays
-        Along the longest, middle and shortest axis.
+        Along the longest, middle and shortest axis; width and thickness are those of what is half as dark as the object
+        is at most, and a voxel at least.
     length_sd_mm : (N,) array
         Standard deviation of all three: a voxel, and what the silhouettes disagree on.
     directions : (N, 3) array
@@ -166,19 +169,33 @@ def liquid_objects(
         classes[core] = ObjectClass.CORE
     factors = np.where(classes == ObjectClass.LIGAMENT, STRIP, ELLIPSE)
     sizes_mm = sds_mm * factors[:, None]
+    across_mm = factors[:, None] * _across_sds_mm(voxels, objects, sight, axes[:, :, 1::-1]) - TOO_WIDE_VOXEL * pitch_mm
+    thicknesses_mm, widths_mm = np.sort(np.maximum(across_mm, pitch_mm), axis=1).T
     sheet = classes == ObjectClass.SHEET
     misfit_mm = factors**2 * shapes.misfit_mm2 / (2 * sizes_mm[:, 0])
     return LiquidObjects(
         _middles(points_mm, objects),
         classes,
         sizes_mm[:, 0],
-        sizes_mm[:, 1],
-        sizes_mm[:, 2],
+        widths_mm,
+        thicknesses_mm,
         np.hypot(pitch_mm, misfit_mm),
         _downwards(np.where(sheet[:, None], axes[:, :, 0], axes[:, :, 2])),
         shapes.own_share,
         _open(voxels, objects),
     )
+
+
+def _across_sds_mm(voxels: DarkVoxels, objects: NDArray[np.int32], sight: FloatArray, axes: FloatArray) -> FloatArray:
+    """Standard deviations (N, 2) along two axes (N, 3, 2) of what is half as dark as the darkest voxel of each object.
+
+    That is where its edge is, however blurred; what hangs together is looked for in paler ones.
+    """
+    darkest = np.zeros(int(objects.max()) + 1)
+    np.maximum.at(darkest, objects, voxels.darkness)
+    inner = voxels.darkness >= darkest[objects] / 2
+    tensors_mm2 = shapes_of(voxels.points_mm[inner], objects[inner], sight, voxels.grid.pitch_mm).tensors_mm2
+    return np.asarray(np.sqrt(np.maximum(np.einsum("nia,nij,nja->na", axes, tensors_mm2, axes), 0)))
 
 
 def _classes(sds_mm: FloatArray, shapes: Shapes, pitch_mm: float) -> NDArray[np.str_]:

@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+from scipy.special import ndtr
 
 from processing.analysis.objects.object_search import ObjectSearch, all_objects, measure_objects, plan_objects
 from processing.analysis.objects.seeing_views import UnseenMap, map_grid, unknown_shares
+from processing.geometry import FloatArray, ViewMapping
 from processing.preprocessing import Intensity
 from processing.studies.simulated_droplets import study_cameras, study_grid
 from processing.volume import VoxelGrid
@@ -56,6 +58,33 @@ def test_one_view_that_knows_nothing_says_nothing_against_what_others_see(search
     trust[3][:] = 0
     assert len(measure_objects(images, search).objects) == 0
     assert measure_objects(images, search, trust=trust).objects.open.any()
+
+
+@pytest.mark.parametrize("blur_px", [0.7, 1.2, 2.0])
+@pytest.mark.parametrize("diameter_px", [5.0, 8.0, 16.0])
+def test_a_blurred_thread_is_as_wide_as_it_is(search: ObjectSearch, diameter_px: float, blur_px: float) -> None:
+    """Blur makes the edge of what is a third dark wider than the edge, and a silhouette is made of whole voxels."""
+    pixel_mm = GRID.pitch_mm
+    images = [_thread_image(camera, 0.5 * diameter_px, 0.4, blur_px) for camera in search.mappings]
+    found = measure_objects(images, search).objects
+    assert found.classes.tolist() == ["ligament"]
+    sd_mm, diameter_mm = float(found.length_sd_mm[0]), diameter_px * pixel_mm
+    np.testing.assert_allclose(found.lengths_mm, 0.8, atol=2 * sd_mm)
+    across_mm = np.array([found.widths_mm[0], found.thicknesses_mm[0]])
+    np.testing.assert_allclose(across_mm.mean(), diameter_mm, atol=0.8 * sd_mm)
+    np.testing.assert_allclose(across_mm, diameter_mm, atol=2 * sd_mm)
+
+
+def _thread_image(camera: ViewMapping, radius_px: float, half_length_mm: float, blur_px: float) -> Intensity:
+    """Light behind a thread along y in the middle, with the edges of a Gaussian blur: by its formula."""
+    ends = camera.project(np.array([[0.0, -half_length_mm, 0.0], [0.0, half_length_mm, 0.0]]))
+    row, column = np.mgrid[: SIZE_PX[1], : SIZE_PX[0]]
+    across = _blurred_slit(column, ends[0, 0] - radius_px, ends[0, 0] + radius_px, blur_px)
+    return (1 - across * _blurred_slit(row, ends[0, 1], ends[1, 1], blur_px)).astype(np.float32)
+
+
+def _blurred_slit(places: FloatArray, low: float, high: float, blur_px: float) -> FloatArray:
+    return np.asarray(ndtr((high - places) / blur_px) - ndtr((low - places) / blur_px))
 
 
 def test_two_views_do_not_tell_shapes() -> None:
