@@ -46,10 +46,10 @@ def check_shot(run_dir: Path, shot: int, calibration: Calibration, workbench: Wo
     return check_exposures(shot, exposures, calibration)
 
 
-def check_ends(
+def check_few(
     run_dir: Path, shots: Sequence[int], calibration: Calibration, workbench: Workbench | None = None
 ) -> list[ShotCheck]:
-    """Check the first and the last of some shots: what was wrong all along, and what has gone wrong meanwhile.
+    """Check the first, the middle and the last of some shots: what was wrong all along, or has gone wrong meanwhile.
 
     Views of the calibration that the run lacks are left out.
 
@@ -63,9 +63,9 @@ def check_ends(
     with RunReader(run_dir) as run:
         calibration.require_usable(run.header.views)
         seen = replace(calibration, views={name: calibration.views[name] for name in run.header.views})
-    ends = list(dict.fromkeys((shots[0], shots[-1])))
-    found = _droplets(run_dir, ends, seen, workbench=workbench)
-    return [check_exposures(shot, exposures, seen) for shot, exposures in zip(ends, found, strict=True)]
+    few = list(dict.fromkeys((shots[0], shots[len(shots) // 2], shots[-1])))
+    found = _droplets(run_dir, few, seen, workbench=workbench)
+    return [check_exposures(shot, exposures, seen) for shot, exposures in zip(few, found, strict=True)]
 
 
 def run_beside(calibration_set: Path) -> Path | None:

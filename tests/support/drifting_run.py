@@ -1,5 +1,6 @@
 """A run of droplets seen by four views, one of which has moved since it was calibrated."""
 
+from collections.abc import Container
 from pathlib import Path
 
 import numpy as np
@@ -20,8 +21,10 @@ def write_droplet_run(
     *,
     drift_px: int = DRIFT_PX,
     mirrored: bool = False,
+    shots: int = 2,
+    drifting: Container[int] = range(100),
 ) -> Path:
-    """Two shots; the picture of view2 lies two pixels further right than when it was calibrated.
+    """Shots; in those that drift, view2's picture lies two pixels further right than when it was calibrated.
 
     A covered view is dark; mirrored are all of them.
     """
@@ -36,12 +39,12 @@ def write_droplet_run(
         separation_ns=6400,
     )
     with RunWriter(run_dir, header) as writer:
-        for index in range(2):
+        for index in range(shots):
             exposures = []
             for _ in "ab":
                 points_mm = rng.uniform(-HALF_MM, HALF_MM, (int(density_per_mm3 * np.prod(2 * HALF_MM)), 3))
                 images = {name: droplet_image(camera, points_mm, rng) for name, camera in cameras.items()}
-                images["view2"] = np.roll(images["view2"], drift_px, axis=1)
+                images["view2"] = np.roll(images["view2"], drift_px * (index in drifting), axis=1)
                 images = {name: image[:, ::-1] if mirrored else image for name, image in images.items()}
                 images = {name: image * (name != covered) for name, image in images.items()}
                 exposures.append({name: np.round(200 * image).astype(np.uint8) for name, image in images.items()})

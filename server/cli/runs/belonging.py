@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Belonging:
-    """What the droplets of the first and the last shot say of the calibration.
+    """What the droplets of the first, the middle and the last shot say of the calibration.
 
     Parameters
     ----------
@@ -82,11 +82,11 @@ def stored_belonging(files: "Sequence[Path]") -> dict[str, Any] | None:
 def ask_droplets(
     run_dir: Path, shots: Sequence[int], calibration: "Calibration", workbench: "Workbench | None" = None
 ) -> Belonging:
-    """Check the first and the last shot; what speaks against the calibration is told at once."""
+    """Check the first, the middle and the last shot; what speaks against the calibration is told at once."""
     from processing.calibration.verdict import Verdict
-    from processing.runs.run_check import check_ends
+    from processing.runs.run_check import check_few
 
-    asked = Belonging(run_dir.name, tuple(check_ends(run_dir, shots, calibration, workbench)))
+    asked = Belonging(run_dir.name, tuple(check_few(run_dir, shots, calibration, workbench)))
     for check in asked.checks:
         if check.verdict in (Verdict.WARN, Verdict.REFUSE):
             progress(f"{run_dir.name}: {check_line(check)}")

@@ -42,6 +42,16 @@ def test_a_view_that_has_moved_does_not_pass_in_silence(
         assert (mean["passed"], mean["belonging"]) == (False, answer["belonging"])
 
 
+def test_a_view_that_moves_and_comes_back_does_not_pass_in_silence(
+    calibration_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run_dir = write_droplet_run(tmp_path / "run", shots=3, drifting=(1,))
+    arguments = ["average", run_dir, "--calibration", calibration_file, GRID, "-o", tmp_path / "mean.vtkhdf"]
+    belonging = told(capsys, *arguments, status=1)["belonging"]
+    assert belonging["verdict"] == "refuse"
+    assert [(shot["shot"], shot["moved"]) for shot in belonging["shots"]] == [(0, None), (1, "view2"), (2, None)]
+
+
 def test_what_droplets_do_not_tell_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     run_dir, calibration_file = write_run(tmp_path / "run"), write_calibration(tmp_path / "calibration.json")
     arguments = ["reconstruct", run_dir, "--calibration", calibration_file, GRID, "-o", tmp_path / "volumes"]
