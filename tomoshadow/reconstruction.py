@@ -141,7 +141,8 @@ def intensity(
     Warns
     -----
     UserWarning
-        The light of the frame does not fit its background or its polarity: the result looks fine, and is not.
+        The light of the frame does not fit its background or its polarity, or its grey values fewer bits: the result
+        looks fine, and is not.
     """
     require_count("minimum_window_px", minimum_window_px)
     if not 1 <= require_count("bits", bits, 1) <= 16 or (frame.size and int(frame.max()) >= 2**bits):
@@ -160,6 +161,10 @@ def intensity(
     )
     if odd := odd_light(frame, polarity, bits=bits, dark=dark, background=background):
         warnings.warn(f"the image {odd}", stacklevel=2)
+    if frame.size and preprocessing.is_dim(frame, bits):
+        warnings.warn(
+            "the image uses less than 1/8 of its grey values; is light missing, or are its bits too many?", stacklevel=2
+        )
     return result
 
 

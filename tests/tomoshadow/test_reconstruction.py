@@ -167,6 +167,13 @@ def test_light_that_does_not_fit_is_a_warning(references: dict[str, Any], warnin
         ts.intensity(FRAME, bits=8, **references)
 
 
+def test_grey_values_of_fewer_bits_than_stated_are_a_warning() -> None:
+    """12 bits in files of 16: the noise floor is 16 times too high, and next to nothing is left of bright particles."""
+    particle = (4000 * spot("view1")).astype(np.uint16)
+    with pytest.warns(UserWarning, match="less than 1/8 of its grey values; .* are its bits too many"):
+        ts.intensity(particle, bits=16, polarity="bright")
+
+
 def test_a_view_sees_the_volume_once() -> None:
     with pytest.raises(ValueError, match="views view1 are named twice"):
         ts.plan(calibration(), GRID, views=["view1", "view1", "view2"])
