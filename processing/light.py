@@ -4,8 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from processing.imprint import imprint
-from processing.preprocessing import Frame, Intensity, Polarity
+from processing.preprocessing import Frame, Intensity, Polarity, is_dim
 
+DIM_LIGHT = "uses less than 1/8 of its grey values; is light missing, or are its bits too many?"
 FULL = 0.998
 """Of the full scale: nobody knows how much more light it was."""
 STRIDE_PX = 4
@@ -68,6 +69,11 @@ def odd_light(
     if (share := np.mean(background[coarse] > FULL * most)) > SATURATED_SHARE:
         return f"has a background of which {100 * share:.0f} % are saturated: shadows are too pale there"
     return _unlike((light, _above_dark(background, dark) / most)) or _saturated(frame[coarse], most)
+
+
+def dim_light(frame: Frame, bits: int) -> str:
+    """What it says where no grey value of that many significant bits is bright; empty where one is."""
+    return DIM_LIGHT if frame.size and is_dim(frame, bits) else ""
 
 
 def own_shadows(frame: Frame, background: Intensity, dark: Intensity | None = None) -> str:

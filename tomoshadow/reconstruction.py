@@ -14,7 +14,7 @@ from processing import preprocessing
 from processing.calibration.calibration import Calibration
 from processing.count import require_count
 from processing.kernels import DEFAULT_THREADS
-from processing.light import odd_light
+from processing.light import dim_light, odd_light
 from processing.masked import require_unmasked
 from processing.preprocessing import Intensity, Polarity, Preprocessing
 from processing.reconstruction import smart as iterative
@@ -141,8 +141,7 @@ def intensity(
     Warns
     -----
     UserWarning
-        The light of the frame does not fit its background or its polarity, or its grey values fewer bits: the result
-        looks fine, and is not.
+        The light of the frame does not fit its background, polarity or bits: the result looks fine, and is not.
     """
     require_count("minimum_window_px", minimum_window_px)
     if not 1 <= require_count("bits", bits, 1) <= 16 or (frame.size and int(frame.max()) >= 2**bits):
@@ -159,12 +158,9 @@ def intensity(
     result = preprocessing.intensity(
         frame, Preprocessing(polarity, minimum_window_px, noise_floor), bits=bits, dark=dark, background=background
     )
-    if odd := odd_light(frame, polarity, bits=bits, dark=dark, background=background):
-        warnings.warn(f"the image {odd}", stacklevel=2)
-    if frame.size and preprocessing.is_dim(frame, bits):
-        warnings.warn(
-            "the image uses less than 1/8 of its grey values; is light missing, or are its bits too many?", stacklevel=2
-        )
+    odd = odd_light(frame, polarity, bits=bits, dark=dark, background=background)
+    for what in filter(None, (odd, dim_light(frame, bits))):
+        warnings.warn(f"the image {what}", stacklevel=2)
     return result
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from daq.files.run_directory import RunReader, Shot
-from processing.light import hollowed, odd_light
+from processing.light import DIM_LIGHT, hollowed, odd_light
 from processing.preprocessing import Frame, Intensity, is_dim
 from processing.reconstruction.volume_file import open_volume
 from processing.runs.errors import PipelineError
@@ -61,10 +61,7 @@ def fault_lines(faults: Mapping[str, Any]) -> list[str]:
         f"{name} sees nothing; is the shot empty, or a lens covered, a light off?"
         for name in faults.get("blind_views", ())
     ]
-    lines += [
-        f"{name} uses less than 1/8 of its grey values; is light missing, or are its bits too many?"
-        for name in faults.get("dim_views", ())
-    ]
+    lines += [f"{name} {DIM_LIGHT}" for name in faults.get("dim_views", ())]
     lines += [f"{name} {what}" for name, what in faults.get("odd_light", {}).items()]
     if (lost := faults.get("lost_share", 0.0)) > MOST_LOST:
         lines.append(f"{100 * lost:.2g} % of the intensity is in voxels too faint for uint8; take float16")
