@@ -209,8 +209,11 @@ def test_what_is_made_of_every_shot_is_what_the_page_shows(tab: Page, server: Se
     run_id = server.wait().run_id
     eventually(lambda: jobs_of(server, run_id) != [], "a volume is asked for")
     assert {job["settings"]["method"] for job in jobs_of(server, run_id)} == {"minlos"}
+    hint = tab.get_by_text("Droplets are looked for in all that the views see")
+    expect(hint).to_be_hidden()
     tab.get_by_role("checkbox", name="Droplets too").click()
     expect(row(tab, "Recipe")).to_contain_text("droplets")
+    expect(hint).to_be_visible()
     tab.get_by_role("checkbox", name="Droplets too").click()
     tab.get_by_label("Volumes", exact=True).click()
     tab.get_by_role("option", name="none").click()

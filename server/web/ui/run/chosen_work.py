@@ -10,6 +10,10 @@ from processing.reconstruction.choices import ReconstructionMethod
 from server.web.ui.draft import NO_VOLUMES, DraftStore
 from server.web.ui.visiting import for_operators
 
+ALL_SEEN = (
+    "Droplets are looked for in all that the views see: where liquid still hangs together that takes minutes a shot, and "
+    "ends in a refusal. To look into a box alone, leave this off, and press Measure on the page of the run."
+)
 _VOLUMES = {NO_VOLUMES: "none"} | {one.value: f"by {one.value.upper()}" for one in ReconstructionMethod}
 
 
@@ -26,21 +30,27 @@ class ChosenWork:
 
     def __init__(self, draft: DraftStore, changed: Callable[[], None]) -> None:
         self._draft, self._changed = draft, changed
-        with ui.row().classes("w-full items-center no-wrap gap-2") as self._box:
+        with ui.column().classes("w-full gap-1") as self._box:
+            self._build()
+
+    def _build(self) -> None:
+        values = self._draft.values
+        with ui.row().classes("w-full items-center no-wrap gap-2"):
             self._volumes = ui.select(
                 _VOLUMES,
                 label="Volumes",
-                value=draft.values["volumes"],
+                value=values["volumes"],
                 on_change=lambda event: self._keep("volumes", event.value),
             )
             self._volumes.props("dense outlined options-dense").classes("grow").tooltip("Made of every shot by itself")
             self._droplets = ui.checkbox(
                 "Droplets too",
-                value=draft.values["droplets"],
+                value=values["droplets"],
                 on_change=lambda event: self._keep("droplets", event.value),
             )
             self._droplets.props('aria-label="Droplets too"')
             self._droplets.tooltip("Measured in every shot by itself, against the background run")
+        ui.label(ALL_SEEN).classes("text-xs opacity-80").bind_visibility_from(self._droplets, "value")
 
     def show_kind(self, kind: RunKind) -> None:
         """Nothing is made of any other run than one of the spray."""
