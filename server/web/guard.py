@@ -11,7 +11,7 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from http.cookies import CookieError, SimpleCookie
 from ipaddress import ip_address
-from urllib.parse import urlsplit
+from urllib.parse import urlencode, urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.requests import HTTPConnection
@@ -143,7 +143,7 @@ class Guard:
         if visitor is not None:
             return _not_for_viewers(scope) if visitor.role is Role.VIEWER and _is_command(scope) else None
         if "text/html" in headers.get("accept", ""):
-            return RedirectResponse(SIGN_IN_PATH, 303)
+            return RedirectResponse(f"{SIGN_IN_PATH}?{urlencode({'page': scope['path']})}", 303)
         answer = problem(HTTPConnection(scope), 401, _UNKNOWN, code="token", remedy=self._way_in(scope, headers))
         answer.headers["WWW-Authenticate"] = "Bearer"
         return answer

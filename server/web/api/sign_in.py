@@ -1,9 +1,10 @@
 """/sign-in and /sign-out: a token becomes a session, whose cookie scripts of other sites neither read nor send."""
 
+import re
 from html import escape
 from typing import Annotated
 
-from fastapi import APIRouter, Form, Request
+from fastapi import APIRouter, Form, Query, Request
 from fastapi.responses import HTMLResponse, RedirectResponse, Response
 
 from server.lab.services import Context
@@ -13,6 +14,8 @@ from server.web.guard import SIGN_IN_PATH, address_of, cookie_of, session_cookie
 
 router = APIRouter(include_in_schema=False)
 SIGN_OUT_PATH = "/sign-out"
+_OWN_PAGE = re.compile(r"/([\w.~-][\w.~/-]*)?", re.ASCII)
+"""A path of this server; ``//elsewhere`` and ``/\\elsewhere`` would lead away."""
 _FORM = """<!doctype html><html lang="en"><meta charset="utf-8"><title>tomoshadow: sign in</title>
 <meta name="viewport" content="width=device-width"><link rel="icon" href="data:,">
 <style>
@@ -45,8 +48,9 @@ async def sign_in(
     door: DoorOf,
     context: ContextOf,
     name: Annotated[str, Form(max_length=200)] = "",
+    page: Annotated[str, Query(max_length=1000)] = "/",
 ) -> Response:
-    """Check the token and begin a session."""
+    """Check the token, begin a session, and lead to the page that was asked for."""
     address = address_of(request.scope)
     if wait_s := door.tries.wait_s(address):
         return _form(f"Too many wrong tokens: wait {wait_s} s.", 429, {"Retry-After": str(wait_s)})
@@ -59,7 +63,7 @@ async def sign_in(
     _end_session(request, door, context)
     visitor = door.sessions.begin(role, address, name)
     context.services.events.publish("deed", who=visitor.name, text=f"signed in as {role}")
-    answer = RedirectResponse("/", 303)
+    answer = RedirectResponse(page if _OWN_PAGE.fullmatch(page) else "/", 303)
     answer.headers["Set-Cookie"] = session_cookie(visitor.id, request.headers, request.url.scheme == "https")
     return answer
 

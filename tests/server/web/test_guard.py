@@ -54,7 +54,7 @@ def test_with_the_token_scripts_come_in(guarded: Serving) -> None:
 def test_a_browser_is_led_to_the_form_and_gets_a_cookie_that_scripts_cannot_read(guarded: Serving) -> None:
     with httpx.Client(base_url=guarded.http.base_url) as browser:
         led = browser.get("/", headers={"Accept": "text/html"})
-        assert (led.status_code, led.headers["location"]) == (303, "/sign-in")
+        assert (led.status_code, led.headers["location"]) == (303, "/sign-in?page=%2F")
         assert "password" in browser.get("/sign-in").text
         assert browser.post("/sign-in", data={"token": "wrong"}).status_code == 401
         signed_in = browser.post("/sign-in", data={"token": TOKEN})
@@ -62,6 +62,21 @@ def test_a_browser_is_led_to_the_form_and_gets_a_cookie_that_scripts_cannot_read
         assert "httponly" in cookie
         assert "samesite=strict" in cookie
         assert browser.get("/api/rig").status_code == 200
+
+
+def test_who_signs_in_comes_to_the_page_that_was_asked_for(guarded: Serving) -> None:
+    with httpx.Client(base_url=guarded.http.base_url) as browser:
+        way = browser.get("/runs/20260101T000000-spray/shots/7", headers={"Accept": "text/html"}).headers["location"]
+        signed_in = browser.post(way, data={"token": TOKEN})
+    assert signed_in.headers["location"] == "/runs/20260101T000000-spray/shots/7"
+
+
+@pytest.mark.parametrize(
+    "page", ["//evil.example", "https://evil.example", "/\\evil.example", "", "/a?b", "/a\r\nb", "/%0a"]
+)
+def test_signing_in_leads_to_no_other_server(guarded: Serving, page: str) -> None:
+    answer = guarded.http.post("/sign-in", params={"page": page}, data={"token": TOKEN})
+    assert (answer.status_code, answer.headers["location"]) == (303, "/")
 
 
 @pytest.mark.parametrize(
