@@ -26,7 +26,7 @@ class StoredTracks:
     columns : dict of name to (N,) array
         A row per droplet on a track, track by track and shot by shot.
     provenance : dict
-        Where they come from; ``rate_hz`` and ``doubts``, a JSON list, among it.
+        Where they come from; ``rate_hz``, ``half_window`` and ``doubts``, a JSON list, among it.
     """
 
     columns: Columns
@@ -50,7 +50,7 @@ def write_tracks(path: Path, tracks: DropletTracks, provenance: Mapping[str, Val
         for name, values in tracks.columns.items():
             group.create_dataset(name, data=values).attrs["units"] = unit_of(name)
         told: dict[str, Value] = {"schema": SCHEMA, "schema_version": SCHEMA_VERSION, "rate_hz": tracks.rate_hz}
-        told["doubts"] = json.dumps(tracks.doubts)
+        told |= {"half_window": tracks.half_window, "doubts": json.dumps(tracks.doubts)}
         file.create_group(PROVENANCE).attrs.update({**provenance, **told})
 
 

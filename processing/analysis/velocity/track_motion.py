@@ -1,9 +1,10 @@
 """Velocity and acceleration along tracks: a parabola through a droplet and those before and after it on its track."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from processing.analysis.velocity.common_motion import Indices
 from processing.analysis.velocity.moving_droplets import MovingDroplets
@@ -18,6 +19,8 @@ UNKNOWN = 1e4
 """Standard deviation of what nothing is known of, in voxels and frames."""
 LEAST_VARIANCE = 1e-6
 """Of a place, in square voxels: droplets without noise have some."""
+TRACK_AFTER_TRACK = 1 << 32
+"""Frames in which all tracks would follow one another without ever being near."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +38,8 @@ class TrackPoints:
         By the covariances of the places.
     acceleration_sd : (N, 3) array
         Standard deviation, likewise.
+    place_covariance : (N, 3, 3) array
+        Likewise.
     """
 
     track: Indices
@@ -45,6 +50,51 @@ class TrackPoints:
     accelerations: FloatArray
     velocity_covariance: FloatArray
     acceleration_sd: FloatArray
+    place_covariance: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class SeenPoints:
+    """Droplets on tracks as they were measured, track by track, frame by frame.
+
+    Parameters
+    ----------
+    track, frame, row : (N,) int arrays
+        As of ``TrackPoints``.
+    places : (N, 3) array
+        In voxels.
+    covariance : (N, 3, 3) array
+        Of the places.
+    """
+
+    track: Indices
+    frame: Indices
+    row: Indices
+    places: FloatArray
+    covariance: FloatArray
+
+    @classmethod
+    def of(cls, frames: Sequence[MovingDroplets], tracks: Tracks) -> "SeenPoints":
+        """The droplets of all tracks."""
+        track, frame, row = _by_track(tracks)
+        seen = [frames[k].where(row[frame == k]) for k in range(len(frames))]
+        order = np.argsort(np.argsort(frame, kind="stable"), kind="stable")
+        places = np.concatenate([np.empty((0, 3)), *(one.places for one in seen)])[order]
+        covariance = np.concatenate([np.empty((0, 3, 3)), *(one.covariance for one in seen)])[order]
+        return cls(track, frame, row, places, covariance + LEAST_VARIANCE * np.eye(3))
+
+    def where(self, chosen: NDArray[np.bool_]) -> "SeenPoints":
+        """The chosen ones."""
+        return SeenPoints(
+            self.track[chosen], self.frame[chosen], self.row[chosen], self.places[chosen], self.covariance[chosen]
+        )
+
+    def apart(self, frames: int) -> tuple[Indices, Indices]:
+        """Points, and those that come so many frames later on the same track."""
+        when = self.track.astype(np.int64) * TRACK_AFTER_TRACK + self.frame
+        other = np.searchsorted(when, when + frames).clip(max=len(when) - 1)
+        own = np.flatnonzero(when[other] == when + frames)
+        return own, other[own]
 
 
 def track_points(frames: Sequence[MovingDroplets], tracks: Tracks, half_window: int = HALF_WINDOW) -> TrackPoints:
@@ -59,22 +109,18 @@ def track_points(frames: Sequence[MovingDroplets], tracks: Tracks, half_window: 
     half_window : int
         So many frames before and after a droplet have a say; at the ends of a track fewer.
     """
-    track, frame, row = _by_track(tracks)
-    seen = [frames[k].where(row[frame == k]) for k in range(len(frames))]
-    order = np.argsort(np.argsort(frame, kind="stable"), kind="stable")
-    places = np.concatenate([np.empty((0, 3)), *(one.places for one in seen)])[order]
-    covariance = np.concatenate([np.empty((0, 3, 3)), *(one.covariance for one in seen)])[order]
-    motion, uncertainty = _parabolas(track, frame, places, covariance, half_window)
-    return TrackPoints(
-        track,
-        frame,
-        row,
-        motion[:, 0],
-        motion[:, 1],
-        motion[:, 2],
-        uncertainty[:, 3:6, 3:6],
-        np.sqrt(np.einsum("nii->ni", uncertainty[:, 6:, 6:])),
-    )
+    parabolas = _Parabolas.of(SeenPoints.of(frames, tracks))
+    for further in range(1, min(half_window, len(frames)) + 1):
+        parabolas.widen(further)
+    return parabolas.solved()
+
+
+def smoothed(seen: SeenPoints, most: int) -> Iterator[TrackPoints]:
+    """The points with half windows of 1, 2, 3 and so on, up to ``most`` frames."""
+    parabolas = _Parabolas.of(seen)
+    for further in range(1, most + 1):
+        parabolas.widen(further)
+        yield parabolas.solved()
 
 
 def _by_track(tracks: Tracks) -> tuple[Indices, Indices, Indices]:
@@ -87,35 +133,53 @@ def _by_track(tracks: Tracks) -> tuple[Indices, Indices, Indices]:
     return track[chosen], frame[chosen], row[chosen]
 
 
-def _parabolas(
-    track: Indices, frame: Indices, places: FloatArray, covariance: FloatArray, half_window: int
-) -> tuple[FloatArray, FloatArray]:
-    """Place, velocity and acceleration (N, 3, 3) at every point, and the covariance (N, 9, 9) of the nine."""
-    normal = np.zeros((len(track), 9, 9))
-    right = np.zeros((len(track), 9))
-    votes = np.zeros(len(track), np.intp)
-    weights = np.linalg.inv(covariance + LEAST_VARIANCE * np.eye(3))
-    for step in range(-half_window, half_window + 1):
-        own, other = _neighbours(track, frame, step, half_window)
-        after = (frame[other] - frame[own]).astype(np.float64)
-        basis = np.stack([np.ones_like(after), after, after**2 / 2], axis=1)
-        block = np.einsum("na,nb,nij->naibj", basis, basis, weights[other]).reshape(-1, 9, 9)
-        pull = np.einsum("nij,nj->ni", weights[other], places[other] - places[own])
-        np.add.at(normal, own, block)
-        np.add.at(right, own, np.einsum("na,ni->nai", basis, pull).reshape(-1, 9))
-        np.add.at(votes, own, 1)
-    free = normal + np.eye(9) / UNKNOWN**2
-    uncertainty = np.asarray(np.linalg.inv(free), np.float64)
-    motion = np.einsum("nij,nj->ni", uncertainty, right).reshape(-1, 3, 3)
-    motion[:, 0] += places
-    motion[votes < PARABOLA, 1:] = np.nan
-    uncertainty[votes < PARABOLA] = np.nan
-    return motion, uncertainty
+@dataclass(frozen=True, eq=False)
+class _Parabolas:
+    """Normal equations of the parabola at every point, for its place, velocity and acceleration; sums that grow."""
 
+    seen: SeenPoints
+    weights: FloatArray
+    normal: FloatArray
+    right: FloatArray
+    votes: Indices
 
-def _neighbours(track: Indices, frame: Indices, step: int, half_window: int) -> tuple[Indices, Indices]:
-    """Points, and those that come so many points later on the same track, within the window."""
-    own = np.arange(max(0, -step), len(track) - max(0, step))
-    other = own + step
-    near = (track[own] == track[other]) & (np.abs(frame[other] - frame[own]) <= half_window)
-    return own[near], other[near]
+    @classmethod
+    def of(cls, seen: SeenPoints) -> "_Parabolas":
+        """Through every point by itself."""
+        count = len(seen.track)
+        nothing = np.zeros((count, 9, 9)), np.zeros((count, 9)), np.zeros(count, np.intp)
+        parabolas = cls(seen, np.asarray(np.linalg.inv(seen.covariance), np.float64), *nothing)
+        parabolas._add(0)
+        return parabolas
+
+    def widen(self, frames: int) -> None:
+        """The points so many frames before and after have a say, too."""
+        self._add(frames)
+        self._add(-frames)
+
+    def _add(self, frames: int) -> None:
+        own, other = self.seen.apart(frames)
+        basis = np.array([1.0, frames, frames**2 / 2])
+        pull = np.einsum("nij,nj->ni", self.weights[other], self.seen.places[other] - self.seen.places[own])
+        self.normal[own] += np.einsum("a,b,nij->naibj", basis, basis, self.weights[other]).reshape(-1, 9, 9)
+        self.right[own] += np.einsum("a,ni->nai", basis, pull).reshape(-1, 9)
+        self.votes[own] += 1
+
+    def solved(self) -> TrackPoints:
+        """By the points that had a say."""
+        uncertainty = np.asarray(np.linalg.inv(self.normal + np.eye(9) / UNKNOWN**2), np.float64)
+        motion = np.einsum("nij,nj->ni", uncertainty, self.right).reshape(-1, 3, 3)
+        motion[:, 0] += self.seen.places
+        motion[self.votes < PARABOLA, 1:] = np.nan
+        uncertainty[self.votes < PARABOLA] = np.nan
+        return TrackPoints(
+            self.seen.track,
+            self.seen.frame,
+            self.seen.row,
+            motion[:, 0],
+            motion[:, 1],
+            motion[:, 2],
+            uncertainty[:, 3:6, 3:6],
+            np.sqrt(np.einsum("nii->ni", uncertainty[:, 6:, 6:])),
+            uncertainty[:, :3, :3],
+        )

@@ -14,6 +14,7 @@ from processing.analysis.droplets.droplet_table import Columns
 from processing.analysis.shot_doubts import exposure_doubts
 from processing.analysis.velocity.common_motion import FEWEST
 from processing.analysis.velocity.moving_droplets import LEAST_SIZE, MovingDroplets
+from processing.analysis.velocity.noise_curve import NoiseCurve, noise_curve
 from processing.analysis.velocity.track_doubts import order_doubts, rate_doubts, still_doubts
 from processing.analysis.velocity.track_motion import HALF_WINDOW, TrackPoints, track_points
 from processing.analysis.velocity.tracks import LEAST_LENGTH, Tracks, link
@@ -52,6 +53,10 @@ class DropletTracks:
         Why there is no track.
     doubts : tuple of str
         Why not to trust them: verdicts on the shots, velocities that contradict the rate.
+    half_window : int
+        Shots before and after a droplet that have a say in its motion.
+    noise_curve : NoiseCurve | None
+        What other half windows would show; None with few droplets on tracks.
     """
 
     columns: Columns
@@ -60,6 +65,8 @@ class DropletTracks:
     rate_hz: float
     reason: str | None
     doubts: tuple[str, ...] = ()
+    half_window: int = HALF_WINDOW
+    noise_curve: NoiseCurve | None = None
 
     @property
     def share_tracked(self) -> float:
@@ -85,7 +92,8 @@ def track_droplets(
     rate_hz : float, optional
         Shots per second; default: what their files say.
     half_window : int
-        Velocity and acceleration are those of a parabola through so many frames before and after.
+        Velocity and acceleration are those of a parabola through so many frames before and after; ``noise_curve`` of
+        the tracks says which are of least error.
 
     Raises
     ------
@@ -113,7 +121,9 @@ def track_droplets(
         *order_doubts(columns, ordered),
         *still_doubts(columns),
     )
-    return DropletTracks(columns, linked.count, count, rate_hz, None if linked.count else _why(frames), doubts)
+    reason = None if linked.count else _why(frames)
+    curve = noise_curve(frames, linked, grid.pitch_mm, rate_hz)
+    return DropletTracks(columns, linked.count, count, rate_hz, reason, doubts, half_window, curve)
 
 
 def _why(frames: Sequence[MovingDroplets]) -> str:

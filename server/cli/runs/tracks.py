@@ -1,14 +1,18 @@
 """``tomoshadow tracks``: the measured droplets of a series of shots become tracks."""
 
 from argparse import Namespace
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from server.cli.options import Verbs, add_out, add_verb, positive
+import numpy as np
+
+from server.cli.options import Verbs, add_out, add_verb, count, positive
 from server.cli.output import Outcome, progress
 from server.cli.runs.export_option import add_export
 
 if TYPE_CHECKING:
+    from processing.analysis.velocity.noise_curve import NoiseCurve
     from processing.analysis.velocity.track_table import DropletTracks
 
 KEPT = ("run", "run_created_utc", "calibration", "calibration_sha256", "grid", "recipe_sha256", "tomoshadow")
@@ -22,6 +26,13 @@ def add(verbs: Verbs) -> None:
     add_out(parser, "file of the tracks, *.h5")
     parser.add_argument(
         "--rate-hz", type=positive, metavar="HZ", help="of the shots, at even times; default: as the run states it"
+    )
+    parser.add_argument(
+        "--half-window",
+        type=count,
+        default=2,
+        metavar="N",
+        help="shots before and after with a say in motion, default 2",
     )
     add_export(parser, "tracks")
 
@@ -44,7 +55,7 @@ def tracks(options: Namespace) -> Outcome:
     if not files:
         raise DropletFileError(f"{options.results}: has no droplets of shots; measure them first (tomoshadow measure)")
     shots = [read_in_place(file) for file in files]
-    linked = track_droplets(shots, options.rate_hz)
+    linked = track_droplets(shots, options.rate_hz, options.half_window)
     write_tracks(
         options.out, linked, {name: one for name in KEPT if (one := shots[0].provenance.get(name)) is not None}
     )
@@ -64,6 +75,8 @@ def _told(linked: "DropletTracks", shots: int, file: Path) -> dict[str, Any]:
         "share_tracked": linked.share_tracked,
         "median_length": linked.median_length,
         "rate_hz": linked.rate_hz,
+        "half_window": linked.half_window,
+        "noise_curve": _plain(linked.noise_curve),
         "reason": linked.reason,
         "doubts": list(linked.doubts),
         "not_checked": told_unchecked(iter([stated_rate(linked.rate_hz)] if linked.tracks else []), progress),
@@ -78,4 +91,16 @@ def _summary(result: dict[str, Any]) -> str:
         return "\n".join([nothing, *result["doubts"]])
     tracked = f"{100 * result['share_tracked']:.1f} % of {result['droplets']} droplets of {result['shots']} shots"
     told = f"{result['tracks']} tracks with {tracked}, {result['median_length']:g} in a median one; {result['file']}"
-    return "\n".join([told, *result["doubts"]])
+    return "\n".join([told, *_proposed(result), *result["doubts"]])
+
+
+def _plain(curve: "NoiseCurve | None") -> dict[str, Any] | None:
+    """For JSON."""
+    return None if curve is None else {name: np.asarray(value).tolist() for name, value in asdict(curve).items()}
+
+
+def _proposed(result: dict[str, Any]) -> list[str]:
+    if not (curve := result["noise_curve"]):
+        return []
+    least = f"{curve['for_velocity']} for velocities, {curve['for_acceleration']} for accelerations"
+    return [f"half window of least error: {least}; {result['half_window']} was taken (--half-window)"]

@@ -172,7 +172,7 @@ def test_an_export_that_cannot_be_written_leaves_the_old_one(file: Path) -> None
 def test_tracks_are_read_as_they_were_written(tracks: Path, file: Path) -> None:
     stored = read_tracks(tracks)
     assert stored.columns["shot"].tolist() == [3, 4, 6, 3, 4, 5, 6]
-    assert stored.provenance == {"run": 'a "spray"', "rate_hz": 2000.0, "doubts": "[]"}
+    assert stored.provenance == {"run": 'a "spray"', "rate_hz": 2000.0, "half_window": 2, "doubts": "[]"}
     with pytest.raises(DropletFileError, match="not a readable file of tracks"):
         read_tracks(file)
 

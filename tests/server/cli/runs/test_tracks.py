@@ -11,6 +11,7 @@ import pytest
 
 from processing.analysis.droplets.droplet_file import DropletFileError, read_droplets, write_columns, write_droplets
 from processing.analysis.droplets.droplet_table import Droplets
+from processing.analysis.velocity.track_file import read_tracks
 from processing.analysis.velocity.track_table import track_droplets
 from processing.reconstruction.settings import GridSettings
 from processing.studies.velocity.track_truth import whole_and_right
@@ -54,6 +55,7 @@ def test_tracks_of_a_series_lie_in_a_file_in_physical_units(tmp_path: Path, caps
     assert (units["u_m_s"], units["ax_m_s2"], units["cov_uv_m2_s2"]) == ("m/s", "m/s^2", "m^2/s^2")
     assert result["tracks"] == len(np.unique(columns["track"]))
     assert result["share_tracked"] > 0.9
+    assert (result["half_window"], attributes["half_window"]) == (2, 2)
     (unchecked,) = result["not_checked"]
     assert f"whether there are {RATE_HZ:g} shots per second, as was stated" in unchecked["what"]
     ids = [np.full(len(frame), -1) for frame in shown.frames]
@@ -72,6 +74,22 @@ def test_tracks_of_a_series_lie_in_a_file_in_physical_units(tmp_path: Path, caps
     assert np.median(np.abs(error_m_s) / np.sqrt(columns["cov_uu_m2_s2"][known])) == pytest.approx(0.6745, rel=0.15)
     seen_mm = [shown.frames[frame].places[row][0] * GRID.pitch_mm + GRID.origin_mm[0] for frame, row in rows]
     assert np.median(np.abs(columns["x_mm"] - seen_mm)) < 0.035 * GRID.pitch_mm
+
+
+def test_the_half_window_of_least_error_is_proposed_and_may_be_chosen(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    results = write_series(tmp_path / "droplets", series(frames=9, turn=0.0), rate_hz=RATE_HZ)
+    command = ("tracks", results, "-o", tmp_path / "tracks.h5", "--overwrite")
+    curve = told(capsys, *command)["noise_curve"]
+    assert curve["half_windows"] == [1, 2, 3, 4]
+    assert all(len(curve[name]) == 4 for name in curve if name.endswith(("_um", "_m_s", "_m_s2")))
+    assert curve["velocity_noise_m_s"][0] == pytest.approx(0.035 / 2**0.5 * GRID.pitch_mm * 1e-3 * RATE_HZ, rel=0.01)
+    assert curve["for_velocity"] >= 3
+    said = f"half window of least error: {curve['for_velocity']} for velocities, {curve['for_acceleration']} for acc"
+    assert said in shown(capsys, *command)
+    assert "; 4 was taken" in shown(capsys, *command, "--half-window", 4)
+    assert read_tracks(tmp_path / "tracks.h5").provenance["half_window"] == 4
 
 
 def test_a_shot_that_is_not_there_is_a_frame_without_droplets(
