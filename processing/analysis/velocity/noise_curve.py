@@ -5,7 +5,8 @@ A narrow filter lets noise through, a wide one smooths motion away. Acceleration
 counted. Let v_h be the velocity by a parabola of half window h, and V_h its variance by the covariances of the places.
 As v_h is the best linear estimate from its window, and v_1 another one, cov(v_h, v_1) = V_h (Hausman, Econometrica 46,
 1978). So <(v_h - v_1)^2> = bias_h^2 + V_1 - V_h as long as v_1 smooths nothing away, and the squared error of v_h is
-<(v_h - v_1)^2> - V_1 + 2 V_h. Likewise for accelerations, and by another narrow window than the narrowest.
+<(v_h - v_1)^2> - V_1 + 2 V_h. Likewise for accelerations, and by another narrow window than the narrowest. Means <> are
+weighted by how exactly the narrowest window knows each droplet, as a few hidden ones would have all the say.
 """
 
 from collections.abc import Sequence
@@ -35,6 +36,8 @@ M_PER_MM, UM_PER_MM = 1e-3, 1e3
 @dataclass(frozen=True, eq=False)
 class NoiseCurve:
     """Of all droplets with one of their track in the frames just before and after; a component, all three together.
+
+    Each droplet counts by how exactly it is known.
 
     Parameters
     ----------
@@ -81,12 +84,14 @@ def noise_curve(frames: Sequence[MovingDroplets], tracks: Tracks, pitch_mm: floa
         return None
     longest = int(np.bincount(seen.track).max())
     widths = np.arange(1, int(np.clip((longest - 1) // 2, 1, MOST_HALF_WINDOW)) + 1)
+    weights = 1 / np.sum(narrowest.acceleration_sd[chosen] ** 2, axis=1)
+    weights /= weights.sum()
     residuals, motions = [], []
     for points in smoothed(seen, len(widths)):
         residuals.append(_residuals(seen, points, chosen))
         motions.append(_motions(points, chosen))
-    velocity, acceleration = (_Smoothed(*quantity) for quantity in np.moveaxis(np.array(motions), 0, 2))
-    residual_um, residual_noise_um = np.sqrt(residuals).T * pitch_mm * UM_PER_MM
+    velocity, acceleration = (_Smoothed(one[0], one[1], weights) for one in np.moveaxis(np.array(motions), 0, 2))
+    residual_um, residual_noise_um = np.sqrt(_mean(np.array(residuals), weights)).T * pitch_mm * UM_PER_MM
     m_s = pitch_mm * M_PER_MM * rate_hz
     return NoiseCurve(
         widths,
@@ -112,11 +117,11 @@ def _rightly_linked(narrowest: TrackPoints) -> NDArray[np.intp]:
     return known[~np.isin(track, track[wild])]
 
 
-def _residuals(seen: SeenPoints, points: TrackPoints, chosen: NDArray[np.intp]) -> tuple[float, float]:
-    """Mean square of a component, as seen and by noise alone: a fit takes part of the noise away."""
-    left = (seen.covariance - points.place_covariance)[chosen]
-    squares = (seen.places - points.places)[chosen] ** 2
-    return float(squares.mean()), max(float(np.einsum("nii->n", left).mean()) / 3, 0.0)
+def _residuals(seen: SeenPoints, points: TrackPoints, chosen: NDArray[np.intp]) -> FloatArray:
+    """Squares as seen, and by noise alone, of which a fit takes part away: (2, N, 3)."""
+    left = np.einsum("nii->ni", seen.covariance - points.place_covariance)
+    squares = (seen.places - points.places) ** 2
+    return np.array([squares[chosen], np.maximum(left[chosen], 0)])
 
 
 def _motions(points: TrackPoints, chosen: NDArray[np.intp]) -> FloatArray:
@@ -126,22 +131,29 @@ def _motions(points: TrackPoints, chosen: NDArray[np.intp]) -> FloatArray:
     return np.array([velocities, (points.accelerations[chosen], points.acceleration_sd[chosen] ** 2)])
 
 
+def _mean(squares: FloatArray, weights: FloatArray) -> FloatArray:
+    """Of a component, over the droplets."""
+    return np.asarray(np.einsum("...ni,n->...", squares, weights) / 3)
+
+
 @dataclass(frozen=True, eq=False)
 class _Smoothed:
-    """Velocities or accelerations of all half windows, and their variances by noise: (H, N, 3)."""
+    """Velocities or accelerations of all half windows, their variances by noise (H, N, 3), and weights (N,)."""
 
     values: FloatArray
     variances: FloatArray
+    weights: FloatArray
 
     @property
     def sd(self) -> FloatArray:
         """As seen."""
-        return np.asarray(np.sqrt(self.values.var(axis=1).mean(axis=1)))
+        means = np.einsum("hni,n->hi", self.values, self.weights)
+        return np.asarray(np.sqrt(_mean((self.values - means[:, None]) ** 2, self.weights)))
 
     @property
     def noise(self) -> FloatArray:
         """Standard deviation by noise alone."""
-        return np.asarray(np.sqrt(self.variances.mean(axis=(1, 2))))
+        return np.asarray(np.sqrt(_mean(self.variances, self.weights)))
 
     def least(self) -> int:
         """The half window of least error; then, as 1 is noisy, by one that is narrow enough for what was found."""
@@ -150,5 +162,5 @@ class _Smoothed:
     def _least(self, reference: int) -> int:
         """By a half window that smooths nothing away."""
         values, noise = self.values[reference - 1 :], self.noise[reference - 1 :] ** 2
-        squared_errors = ((values - values[0]) ** 2).mean(axis=(1, 2)) - noise[0] + 2 * noise
+        squared_errors = _mean((values - values[0]) ** 2, self.weights) - noise[0] + 2 * noise
         return reference + int(np.argmin(squared_errors))
