@@ -10,7 +10,8 @@ weighted by how exactly the narrowest window knows each droplet, as a few hidden
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,6 +61,10 @@ class NoiseCurve:
     acceleration_noise_m_s2: FloatArray
     for_velocity: int
     for_acceleration: int
+
+    def plain(self) -> dict[str, Any]:
+        """Lists and whole numbers by their names, as JSON has them."""
+        return {name: np.asarray(value).tolist() for name, value in asdict(self).items()}
 
 
 def noise_curve(frames: Sequence[MovingDroplets], tracks: Tracks, pitch_mm: float, rate_hz: float) -> NoiseCurve | None:

@@ -1,18 +1,14 @@
 """``tomoshadow tracks``: the measured droplets of a series of shots become tracks."""
 
 from argparse import Namespace
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-import numpy as np
 
 from server.cli.options import Verbs, add_out, add_verb, count, positive
 from server.cli.output import Outcome, progress
 from server.cli.runs.export_option import add_export
 
 if TYPE_CHECKING:
-    from processing.analysis.velocity.noise_curve import NoiseCurve
     from processing.analysis.velocity.track_table import DropletTracks
 
 KEPT = ("run", "run_created_utc", "calibration", "calibration_sha256", "grid", "recipe_sha256", "tomoshadow")
@@ -76,7 +72,7 @@ def _told(linked: "DropletTracks", shots: int, file: Path) -> dict[str, Any]:
         "median_length": linked.median_length,
         "rate_hz": linked.rate_hz,
         "half_window": linked.half_window,
-        "noise_curve": _plain(linked.noise_curve),
+        "noise_curve": linked.noise_curve.plain() if linked.noise_curve else None,
         "reason": linked.reason,
         "doubts": list(linked.doubts),
         "not_checked": told_unchecked(iter([stated_rate(linked.rate_hz)] if linked.tracks else []), progress),
@@ -92,11 +88,6 @@ def _summary(result: dict[str, Any]) -> str:
     tracked = f"{100 * result['share_tracked']:.1f} % of {result['droplets']} droplets of {result['shots']} shots"
     told = f"{result['tracks']} tracks with {tracked}, {result['median_length']:g} in a median one; {result['file']}"
     return "\n".join([told, *_proposed(result), *result["doubts"]])
-
-
-def _plain(curve: "NoiseCurve | None") -> dict[str, Any] | None:
-    """For JSON."""
-    return None if curve is None else {name: np.asarray(value).tolist() for name, value in asdict(curve).items()}
 
 
 def _proposed(result: dict[str, Any]) -> list[str]:
