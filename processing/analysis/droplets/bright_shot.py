@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from processing.analysis.droplets.bright_finder import MODEL_SHARE, BrightFit, find_bright, rms, rms_of
 from processing.analysis.droplets.companions import judged_by_company
@@ -13,7 +14,6 @@ from processing.analysis.droplets.gaussian_blobs import BlobImages, BlobOptics, 
 from processing.analysis.droplets.ghost_share import GhostShare, pooled
 from processing.analysis.droplets.image_noise import noise_of
 from processing.analysis.droplets.measured_exposure import (
-    Hidden,
     MeasuredExposure,
     RatioLimits,
     ShotVerdict,
@@ -27,6 +27,7 @@ from processing.analysis.droplets.measured_exposure import (
     told_real,
 )
 from processing.analysis.droplets.reality import Evidence, Reality, crowding, twins_of
+from processing.analysis.hidden import Hidden
 from processing.geometry import FloatArray
 from processing.kernels import DEFAULT_THREADS
 
@@ -116,7 +117,7 @@ def measure_bright(
     if verdict is ShotVerdict.REFUSED:
         return MeasuredExposure(Droplets.none(), views, ratio, verdict, reasons)
     droplets = _droplets(shot, fit, residuals, search, left, noises).within(search.grid)
-    hidden = Hidden(volume_share=_unseen_share(shot, search))
+    hidden = Hidden.of(search.grid.shape, lambda shares: _is_seen(shot, search, search.places_at(shares)))
     found = MeasuredExposure(droplets, views, ratio, verdict, reasons, hidden=hidden)
     told = told_real(judged_by_volume(judged_by_company(found, search.grid)))
     count = twins_of(twins, len(images))
@@ -127,12 +128,11 @@ def measure_bright(
     return told_real(judged_by_twins(told, ghosts))
 
 
-def _unseen_share(shot: BlobImages, search: DropletSearch) -> float:
-    """Share of the grid that lies beyond the image of a view: a droplet there is not found, and not missed."""
+def _is_seen(shot: BlobImages, search: DropletSearch, positions_voxel: FloatArray) -> NDArray[np.bool_]:
+    """Which places (N, 3) lie in the images of all views: beyond them a droplet is not found, and not missed."""
     sizes_px = np.array([image.shape[::-1] for image in shot.images])
-    seen_px = search.lattice.seen_px(search.places())
-    inside = np.all((seen_px >= 0) & (seen_px <= sizes_px[:, None] - 1), axis=(0, 2))
-    return float(np.mean(~inside))
+    seen_px = search.lattice.seen_px(positions_voxel)
+    return np.asarray(np.all((seen_px >= 0) & (seen_px <= sizes_px[:, None] - 1), axis=(0, 2)), np.bool_)
 
 
 def _seen(optics: BlobOptics, noises: FloatArray, left: FloatArray, names: Sequence[str]) -> dict[str, SeenView]:

@@ -23,12 +23,6 @@ HULL_SHIFT = 4
 """Bits of a pixel to which outlines in images are drawn."""
 
 
-ASKED_POINTS = 40_000
-"""All over the grid; a share is known to 0.1 %."""
-PLASTIC = 1.2207440846057596
-"""Its powers spread points evenly in three dimensions (Roberts's sequence)."""
-
-
 def keep_on() -> None:
     """Before a round of a search, who waits may raise what ends it; this one does not."""
 
@@ -61,11 +55,10 @@ class DropletSearch:
     plan: Plan
     names: tuple[str, ...]
 
-    def places(self) -> FloatArray:
-        """Points (N, 3) spread evenly over the grid, x, y, z in voxels of what is searched."""
-        evenly = np.outer(np.arange(1, ASKED_POINTS + 1), PLASTIC ** -np.arange(1.0, 4.0)) % 1
+    def places_at(self, shares: FloatArray) -> FloatArray:
+        """Points (N, 3) x, y, z in voxels of what is searched; given as shares of the grid, from 0 to 1."""
         margin_voxel = 0.5 * (np.array(self.searched.shape) - np.array(self.grid.shape))[::-1]
-        return np.asarray(margin_voxel - 0.5 + evenly * np.array(self.grid.shape[::-1]), dtype=np.float64)
+        return np.asarray(margin_voxel - 0.5 + shares * np.array(self.grid.shape[::-1]), dtype=np.float64)
 
     def pixels_into_search(self) -> list[NDArray[np.bool_]]:
         """Pixels (rows, columns) of each view that look into what is searched; what others see is not searched for."""

@@ -13,6 +13,7 @@ from processing.analysis.droplets.droplet_table import DropletRows
 from processing.analysis.droplets.gaussian_blobs import Image
 from processing.analysis.droplets.ghost_share import MANY_OBJECTS, GhostShare, matches, told_share
 from processing.analysis.estimates import Estimate
+from processing.analysis.hidden import Hidden
 from processing.geometry import FloatArray
 
 if TYPE_CHECKING:
@@ -41,26 +42,6 @@ class ShotVerdict(StrEnum):
     EMPTY = "empty"
     DOUBTFUL = "doubtful"
     REFUSED = "refused"
-
-
-@dataclass(frozen=True)
-class Hidden:
-    """What could not be measured of an exposure.
-
-    Parameters
-    ----------
-    liquid_objects : int
-        Ligaments, sheets and other liquid that is no droplet, which is masked.
-    volume_share : float
-        Of the grid: what too few views can judge, as it lies in masked liquid, before or behind it, or beyond their
-        images; of bright particles what not all views see.
-    droplets : int
-        That are seen, but by too few views to be told.
-    """
-
-    liquid_objects: int = 0
-    volume_share: float = 0.0
-    droplets: int = 0
 
 
 NOTHING_HIDDEN = Hidden()

@@ -3,7 +3,6 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from processing.analysis.droplets.droplet_search import DropletSearch
 from processing.analysis.droplets.gaussian_blobs import Image
 from processing.analysis.droplets.shadows.shadow_fit import ShadowFit, Transmissions
 from processing.geometry import FloatArray
@@ -38,9 +37,9 @@ def _known(trust: Image, seen_px: FloatArray) -> NDArray[np.bool_]:
     return known
 
 
-def unjudged_share(shot: Transmissions, fit: ShadowFit, search: DropletSearch) -> float:
-    """Share of the grid of which too few views know something."""
-    return float(np.mean(knowing_views(shot, fit, search.places()) < judging_views(len(shot.images))))
+def is_judged(shot: Transmissions, fit: ShadowFit, positions_voxel: FloatArray) -> NDArray[np.bool_]:
+    """Of which places (N, 3) enough views know something."""
+    return np.asarray(knowing_views(shot, fit, positions_voxel) >= judging_views(len(shot.images)), np.bool_)
 
 
 def beside_what_is_not_known(knowing: NDArray[np.int64], views: int, ratio: float, covered: float) -> tuple[str, ...]:

@@ -11,7 +11,6 @@ from processing.analysis.droplets.droplet_table import SizedDroplets
 from processing.analysis.droplets.gaussian_blobs import Image
 from processing.analysis.droplets.ghost_share import GhostShare, pooled
 from processing.analysis.droplets.measured_exposure import (
-    Hidden,
     MeasuredExposure,
     RatioLimits,
     ShotVerdict,
@@ -28,9 +27,9 @@ from processing.analysis.droplets.measured_exposure import (
 from processing.analysis.droplets.reality import twins_of
 from processing.analysis.droplets.shadows.judged_volume import (
     beside_what_is_not_known,
+    is_judged,
     judging_views,
     knowing_views,
-    unjudged_share,
 )
 from processing.analysis.droplets.shadows.light_search import Light, light_doubts
 from processing.analysis.droplets.shadows.masked_liquid import liquid_objects, lumps
@@ -42,6 +41,7 @@ from processing.analysis.droplets.shadows.shadow_table import sized_droplets
 from processing.analysis.droplets.shadows.shadow_union import union_defects
 from processing.analysis.droplets.shadows.veiled_shadows import veil_doubts
 from processing.analysis.droplets.size_correction import SizeCorrection
+from processing.analysis.hidden import Hidden
 from processing.kernels import DEFAULT_THREADS
 
 LIMITS = RatioLimits(trusted=1.25, refused=2.0)
@@ -186,9 +186,10 @@ def _told(shot: Transmissions, fit: ShadowFit, search: DropletSearch, sizes: Siz
     raw = behind_gaussian_blur(shot, search, fit)[known]
     droplets = sized_droplets(shot, seen, shadows, fit.where(known), raw, search, sizes)
     lump = lumps(fit.where(known).discs, droplets.residual)
-    hidden = Hidden(
+    hidden = Hidden.of(
+        search.grid.shape,
+        lambda shares: is_judged(shot, fit, search.places_at(shares)),
         liquid_objects=_counted(liquid_objects(fit.liquid)) + _counted(lump),
-        volume_share=unjudged_share(shot, fit, search),
         droplets=int(np.count_nonzero(within_grid(fit.discs.positions_voxel[~known], search))),
     )
     told = droplets.where(lump < 0).within(search.grid)

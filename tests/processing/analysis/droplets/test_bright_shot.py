@@ -11,7 +11,6 @@ from processing.analysis.droplets.droplet_search import plan_droplets
 from processing.analysis.droplets.gaussian_blobs import Image
 from processing.analysis.droplets.ghost_share import GhostShare, matches, told_share
 from processing.analysis.droplets.measured_exposure import (
-    Hidden,
     RatioLimits,
     ShotVerdict,
     judged,
@@ -19,6 +18,7 @@ from processing.analysis.droplets.measured_exposure import (
     told_real,
 )
 from processing.analysis.estimates import Estimate
+from processing.analysis.hidden import Hidden
 from processing.reconstruction.errors import ReconstructionError
 from processing.studies.droplets import BrightScene, DropletCase
 from processing.volume import VoxelGrid
@@ -254,5 +254,10 @@ def test_what_a_view_does_not_see_is_not_empty(truth: BrightScene, shot: BrightE
     ]
     assert seen_mm3 == pytest.approx(np.mean(np.all(inside, axis=0)) * wide.volume_mm3, rel=0.02)
     assert (shot.hidden.volume_share < 0.1, shot.verdict) == (True, "good")
+    assert told.hidden.measured_percent
+    percent = np.array(told.hidden.measured_percent["xy"])
+    assert percent.mean() == pytest.approx(100 * (1 - told.hidden.volume_share), abs=1)
+    assert (percent[:, [0, -1]] == 0).all(), "no view reaches as far"
+    assert percent[len(percent) // 2, percent.shape[1] // 2] == 100
     assert told.verdict == "doubtful"
     assert "too few views see" in told.reasons[-1]

@@ -95,6 +95,10 @@ def test_a_ligament_is_masked_and_droplets_beside_it_are_found(
     assert (shot.verdict, ghosts) == (ShotVerdict.GOOD, 0)
     assert shot.hidden.liquid_objects == 1
     assert 0 < shot.hidden.volume_share < 0.25
+    assert shot.hidden.measured_percent
+    for percent in shot.hidden.measured_percent.values():
+        assert np.mean(percent) == pytest.approx(100 * (1 - shot.hidden.volume_share), abs=1)
+        assert np.max(percent) == 100, "a ligament hides what is near it"
     assert len(missed) <= 2 + shot.hidden.volume_share * len(scene.droplets)
     assert len(shot.droplets) > 0.75 * len(scene.droplets.inside(GRID))
     apart_mm = np.linalg.norm(shot.droplets.points_mm[:, None] - ligament.positions_mm[None], axis=2)
