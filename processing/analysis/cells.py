@@ -1,6 +1,7 @@
 """Cells of a box over two of its axes, and which share of each could be measured."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,3 +59,35 @@ def _in_cells(shares: FloatArray) -> list[list[int]]:
     cells = shares.reshape(rows, _PER_CELL, columns, _PER_CELL).mean(axis=(1, 3))
     percent: list[list[int]] = np.rint(100 * cells).astype(int).tolist()
     return percent
+
+
+def measured_shares(shots: Sequence[Sequence[Mapping[str, Any]]], box_mm: FloatArray) -> dict[str, FloatArray]:
+    """What files say of the cells of a box, by plane: (S, rows, columns) shares, added up over a shot's exposures.
+
+    Parameters
+    ----------
+    shots : sequence of sequence
+        What was told of the exposures of each shot.
+    box_mm : (2, 3) array
+        Lower and upper corner.
+
+    Returns
+    -------
+    dict
+        Without the planes of which an exposure says nothing, or of other cells.
+    """
+    along = dict(zip("xyz", cells_along(box_mm[1] - box_mm[0]), strict=True))
+    found = {}
+    for plane in PLANES:
+        shape = along[plane[1]], along[plane[0]]
+        told: list[list[Any]] = [[_share(exposure, plane, shape) for exposure in shot] for shot in shots]
+        if told and all(share is not None for shot in told for share in shot):
+            found[plane] = np.array([np.sum(shot, axis=0) for shot in told], np.float64)
+    return found
+
+
+def _share(exposure: Mapping[str, Any], plane: str, shape: tuple[int, int]) -> FloatArray | None:
+    rows = ((exposure.get("hidden") or {}).get("measured_percent") or {}).get(plane) or []
+    if len(rows) != shape[0] or any(len(row) != shape[1] for row in rows):
+        return None
+    return np.asarray(rows, np.float64) / 100

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from processing.analysis.droplets.droplet_file import StoredDroplets
-from processing.analysis.spray.density_map import density_map
+from processing.analysis.spray.density_map import NO_CELLS, density_maps
 from processing.analysis.spray.spray_axis import SprayAxis
 from processing.analysis.spray.spray_sample import SpraySample, spray_sample
 from processing.analysis.spray.spray_statistics import AskedFor, SprayStatistics, spray_statistics
@@ -45,8 +45,6 @@ DEFINITIONS = (
 
 
 SAMPLES = {"adequate": "The sample is adequate.", "low sample": "The sample is low: intervals may be too narrow."}
-LEAST_ROWS = 4
-"""Of a map of number density: a box that is thinner has none over that axis."""
 WITH_UNIT = {"pressure_bar": "pressure [bar]"}
 Chapter = Callable[["ReportedSpray"], Section | None]
 
@@ -247,15 +245,16 @@ def _patternations(reported: ReportedSpray) -> Section | None:
 def _density(reported: ReportedSpray) -> Section | None:
     if reported.sample is None:
         return None
-    found = (density_map(reported.sample, "x", down) for down in ("y", "z"))
-    maps = [one for one in found if one and len(one.mean_per_mm3) >= LEAST_ROWS]
+    maps = density_maps(reported.sample)
     if not maps:
         return None
-    scatter = (
-        "; rms: how shots scatter, beside what chance alone would make (Poisson)" if reported.sample.several else ""
-    )
-    caption = f"Number density, mean along the direction that is not drawn: mean over all exposures{scatter}."
-    return Section("Number density", pictures=[Picture(density_figure(maps), caption, svg=True)])
+    caption = "Number density per volume that could be measured, mean along the direction that is not drawn: mean over "
+    caption += "all exposures, grey where less than half of a cell could be measured"
+    if reported.sample.several:
+        caption += "; rms: how shots scatter, beside what chance alone would make (Poisson)"
+    known = all(one.measured_share is not None for one in maps)
+    pictures = [Picture(density_figure(maps), f"{caption}.", svg=True)]
+    return Section("Number density", "" if known else f"Not corrected cell by cell: {NO_CELLS}.", pictures=pictures)
 
 
 def _break_up(reported: ReportedSpray) -> Section | None:

@@ -12,6 +12,7 @@ from processing.reconstruction.settings import GridSettings
 
 class _Hidden(BaseModel):
     volume_share: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] = 0.0
+    measured_percent: dict[str, list[list[Annotated[int, Field(ge=0, le=100)]]]] | None = None
 
 
 class _Exposure(BaseModel):

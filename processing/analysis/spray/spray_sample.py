@@ -1,12 +1,13 @@
 """SpraySample: the droplets of some shots together, and what is drawn to say how sure their figures are."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from processing.analysis.cells import measured_shares
 from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.analysis.droplets.droplet_statistics import DIAMETER, measured_grid, measured_mm3, told_exposures
 from processing.analysis.estimates import CONFIDENCE, COUNTED_DRAWS, DRAWS, FEW_SHOTS, Estimate, Figures, estimated
@@ -36,6 +37,9 @@ class SpraySample:
         2 where A and B, which show the same droplets, are both there.
     box_mm : (2, 3) array | None
         Lower and upper corner of what was measured in every shot; None where shots differ in it.
+    measured_shares : dict of plane to (S, rows, columns) array
+        Of each cell of the box over two axes, what could be measured: shares, added up over the exposures of a shot;
+        empty where a file does not say, or shots differ in their box.
     """
 
     diameters_um: FloatArray
@@ -45,6 +49,7 @@ class SpraySample:
     volumes_mm3: FloatArray
     exposures_per_shot: float = 1.0
     box_mm: FloatArray | None = None
+    measured_shares: Mapping[str, FloatArray] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.diameters_um)
@@ -108,7 +113,13 @@ class SpraySample:
     @property
     def as_one_shot(self) -> "SpraySample":
         """The same droplets as if one shot had them all: then droplets are drawn."""
-        return replace(self, shot=np.zeros_like(self.shot), volumes_mm3=self.volumes_mm3.sum(keepdims=True))
+        together = {plane: shares.sum(axis=0, keepdims=True) for plane, shares in self.measured_shares.items()}
+        return replace(
+            self,
+            shot=np.zeros_like(self.shot),
+            volumes_mm3=self.volumes_mm3.sum(keepdims=True),
+            measured_shares=together,
+        )
 
     def estimated(
         self,
@@ -163,6 +174,7 @@ def spray_sample(shots: Sequence[StoredDroplets]) -> SpraySample:
     """
     told = [(shot, told_exposures(shot)) for shot in shots]
     counted = [(shot, exposures) for shot, exposures in told if exposures]
+    box_mm = _common_box([shot for shot, _ in counted])
     return SpraySample(
         diameters_um=_joined([np.asarray(shot.columns[DIAMETER], np.float64) for shot, _ in counted]),
         points_mm=_joined([_columns(shot, ("x_mm", "y_mm", "z_mm")) for shot, _ in counted], 3),
@@ -170,7 +182,8 @@ def spray_sample(shots: Sequence[StoredDroplets]) -> SpraySample:
         shot=np.repeat(np.arange(len(counted)), [len(shot.columns["frame"]) for shot, _ in counted]),
         volumes_mm3=np.array([measured_mm3(shot, exposures) for shot, exposures in counted], np.float64),
         exposures_per_shot=sum(len(exposures) for _, exposures in counted) / max(len(counted), 1),
-        box_mm=_common_box([shot for shot, _ in counted]),
+        box_mm=box_mm,
+        measured_shares={} if box_mm is None else measured_shares([exposures for _, exposures in counted], box_mm),
     )
 
 

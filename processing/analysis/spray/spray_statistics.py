@@ -16,6 +16,7 @@ from processing.analysis.droplets.droplet_statistics import (
 )
 from processing.analysis.droplets.size_statistics import SizeClass, size_classes
 from processing.analysis.estimates import Estimate, Figures
+from processing.analysis.spray.density_map import ToldDensity, density_maps
 from processing.analysis.spray.patternation import Patternation, patternation
 from processing.analysis.spray.proposed_axis import ProposedAxis, proposed_axis
 from processing.analysis.spray.sample_size import SampleVerdict, sample_verdict
@@ -39,7 +40,7 @@ LIQUIDS_KG_M3 = (50.0, 30_000.0)
 SLICE = 0.25
 """Of the box's reach along the axis: length of the slice of a patternation."""
 CORRECTIONS = (
-    "densities are per volume that could be measured: what liquid hides is taken off",
+    "densities are per volume that could be measured: what liquid hides is taken off, in maps cell by cell",
     "diameters are corrected as the files say (diameter_um; diameter_raw_um is not)",
     "not corrected: droplets that are too small or too faint to be found, and ghosts; their shares are in the studies",
 )
@@ -91,6 +92,7 @@ class SprayStatistics(FrozenValue):
         ProposedAxis | None, Field(description="where nobody stated nozzle and axis: by how droplets fly")
     ] = None
     patternations: Annotated[tuple[Patternation, ...], Field(description="liquid by sectors and rings")] = ()
+    density_maps: Annotated[tuple[ToldDensity, ...], Field(description="number density over x and y, x and z")] = ()
     corrections: Annotated[tuple[str, ...], Field(description="what is corrected, and what is not")] = CORRECTIONS
     doubts: Annotated[
         tuple[str, ...], Field(description="why not to trust the figures: verdicts of exposures, what contradicts")
@@ -142,6 +144,7 @@ def _of_sample(sample: SpraySample, pooled: DropletStatistics, asked: AskedFor) 
         extent=extent,
         proposed_axis=proposed,
         patternations=patternations,
+        density_maps=tuple(map(ToldDensity.of, density_maps(sample))),
         reasons=_reasons(sample, proposed, bool(fits), motion is not None) | _missing(sample, asked, patternations),
     )
 

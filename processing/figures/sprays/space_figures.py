@@ -13,6 +13,7 @@ from processing.geometry import FloatArray
 
 ARC = 16
 """Straight edges of the arc of a sector."""
+PER_MM3 = "droplets [1/mm³]"
 
 
 def patternation_figure(one: Patternation) -> Figure:
@@ -62,32 +63,46 @@ def _draw_shares(axes: Axes, one: Patternation) -> None:
 
 
 def density_figure(maps: Sequence[DensityMap]) -> Figure:
-    """Mean number density, and of several shots how they scatter.
+    """Mean number density, of several shots how they scatter, and which share could be measured if not all was.
 
     Parameters
     ----------
     maps : sequence of DensityMap
-        Over two axes each; a row of pictures, or of single shots a picture.
+        Over two axes each; a row of pictures, or of those with a single picture side by side.
     """
-    several = any(np.isfinite(one.rms_per_mm3).any() for one in maps)
-    shape = (len(maps), 2) if several else (1, len(maps))
-    figure = Figure(figsize=(9.5 if shape[1] > 1 else 5, 3.6 * shape[0]), layout="constrained")
+    panels = [_panels(one) for one in maps]
+    most = max(map(len, panels))
+    shape = (len(maps), most) if most > 1 else (1, len(maps))
+    figure = Figure(figsize=(4.75 * shape[1] if shape[1] > 1 else 5, 3.6 * shape[0]), layout="constrained")
     axes = np.array(figure.subplots(*shape, squeeze=False), dtype=object).reshape(len(maps), -1)
-    for places, one in zip(axes, maps, strict=True):
-        _draw_map(places[0], one, one.mean_per_mm3, "mean")
-        if several:
-            rms, chance = float(np.mean(one.rms_per_mm3)), float(np.mean(one.chance_per_mm3))
-            title = f"rms of the shots: mean {rms:.3g}, by counting alone {chance:.3g}"
-            _draw_map(places[1], one, one.rms_per_mm3, title)
+    for places, one, drawn in zip(axes, maps, panels, strict=True):
+        for place, (values, title, label) in zip(places, drawn, strict=False):
+            _draw_map(place, one, values, title, label)
+        for place in places[len(drawn) :]:
+            place.set_axis_off()
     return figure
 
 
-def _draw_map(axes: Axes, one: DensityMap, values: FloatArray, title: str) -> None:
+def _panels(one: DensityMap) -> list[tuple[FloatArray, str, str]]:
+    """Values, title and what they are."""
+    panels = [(one.mean_per_mm3, "mean", PER_MM3)]
+    if np.isfinite(one.rms_per_mm3).any():
+        rms, chance = float(np.nanmean(one.rms_per_mm3)), float(np.nanmean(one.chance_per_mm3))
+        title = f"rms of the shots: mean {rms:.3g}, by counting alone {chance:.3g}"
+        panels.append((one.rms_per_mm3, title, PER_MM3))
+    if one.measured_share is not None and (one.measured_share < 1).any():
+        title = f"{100 * float(np.mean(one.measured_share)):.3g} % of the volume could be measured"
+        panels.append((100 * one.measured_share, title, "could be measured [%]"))
+    return panels
+
+
+def _draw_map(axes: Axes, one: DensityMap, values: FloatArray, title: str, label: str) -> None:
     mesh = axes.pcolormesh(
         one.across_mm, one.down_mm, np.ma.masked_invalid(values), cmap="viridis", vmin=0, rasterized=True
     )
+    axes.set_facecolor("0.85")
     axes.set(aspect="equal", xlabel=f"{one.across} [mm]", ylabel=f"{one.down} [mm]")
     if one.down == "y":
         axes.invert_yaxis()
-    axes.figure.colorbar(mesh, ax=axes, label="droplets [1/mm³]", shrink=0.8)
+    axes.figure.colorbar(mesh, ax=axes, label=label, shrink=0.8)
     axes.set_title(title, fontsize="small")
