@@ -27,7 +27,14 @@ from server.reports.liquid_sections import ReportedLiquid, break_up_rows, break_
 from server.reports.object_motion_section import object_motion_section
 from server.reports.page import Picture, Section, Table, write_report
 from server.reports.shots_section import VERDICT, exposure_rows, shots_section
-from server.reports.spray_tables import classes_table, doubts, figures_table, fits_table, patternation_table
+from server.reports.spray_tables import (
+    classes_table,
+    detection_table,
+    doubts,
+    figures_table,
+    fits_table,
+    patternation_table,
+)
 
 DEFINITIONS = (
     "Sampling is spatial: a flash sees the droplets that are in a volume at an instant (ASTM E799). Flux-weighted "
@@ -269,6 +276,7 @@ def _of_shots(section: Callable[[Sequence[StoredDroplets]], Section | None]) -> 
 def _tables(reported: ReportedSpray) -> Section | None:
     told = reported.told
     tables = [classes_table(told)] if told.classes else []
+    tables += [detection_table(told.detection)] if told.detection else []
     tables += [patternation_table(one) for one in told.patternations if one.sector_shares]
     return Section("Tables", tables=tables) if tables else None
 

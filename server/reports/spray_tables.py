@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 
 from processing.analysis.estimates import Estimate
+from processing.analysis.spray.detection import LEAST_FOUND, ClassDetection
 from processing.analysis.spray.patternation import Patternation
 from processing.analysis.spray.size_fits import SizeFit
 from processing.analysis.spray.spray_statistics import SprayStatistics
@@ -157,6 +158,23 @@ def classes_table(told: SprayStatistics) -> Table:
     caption = (
         "Classes of diameters, ISO 9276-1: densities q and cumulative shares Q by number (0), area (2), volume (3)"
     )
+    return Table(head, rows, caption=caption)
+
+
+def detection_table(classes: tuple[ClassDetection, ...]) -> Table:
+    """What is found of each class, by twins, and how many there are then."""
+    rows = [
+        [
+            f"{one.low_um:#.4g} to {one.high_um:#.4g}",
+            f"{one.n}",
+            f"{one.placed}",
+            *(_percent(one.found_share) if one.found_share else ["", ""]),
+            _within(one.n_corrected.value, one.n_corrected) if one.n_corrected else "not known",
+        ]
+        for one in classes
+    ]
+    head = ["diameter [µm]", "n", "in twins", "found of these [%]", "95 % interval [%]", "n corrected, 95 %"]
+    caption = f"Found by twins, and n over that share, where it is surely not below {100 * LEAST_FOUND:g} %"
     return Table(head, rows, caption=caption)
 
 

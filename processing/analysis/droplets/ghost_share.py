@@ -2,13 +2,15 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import repeat
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from scipy.special import betaincinv, gammaincinv
 
 from processing.analysis.droplets.droplet_table import P_REAL_TRIED
-from processing.analysis.droplets.size_statistics import NOTHING_MEASURED
+from processing.analysis.droplets.size_statistics import NOTHING_MEASURED, class_numbers
 from processing.analysis.estimates import CONFIDENCE, Estimate
 from processing.geometry import FloatArray
 
@@ -71,6 +73,23 @@ def expected_share(ghosts: float, droplets: int, exposures_per_shot: float = 1) 
 
 
 @dataclass(frozen=True)
+class FoundOfClass:
+    """Droplets of a class of diameters that a twin has, and what was found of them.
+
+    Parameters
+    ----------
+    number : int
+        Of the class, as of ``class_numbers``.
+    placed, found : int
+        Of so many droplets where they could be measured so many were found.
+    """
+
+    number: int
+    placed: int
+    found: int
+
+
+@dataclass(frozen=True)
 class GhostShare:
     """Ghosts among found droplets.
 
@@ -78,10 +97,13 @@ class GhostShare:
     ----------
     ghosts, found : int
         Of so many found droplets so many were ghosts.
+    classes : tuple of FoundOfClass
+        How many of the true ones were found, by their diameters; none where they have no diameters.
     """
 
     ghosts: int
     found: int
+    classes: tuple[FoundOfClass, ...] = ()
 
     @property
     def share(self) -> float | None:
@@ -104,7 +126,23 @@ def share_interval(chosen: int, of: int) -> tuple[float, float]:
 def pooled(shares: Iterable[GhostShare]) -> GhostShare:
     """Counts of many together."""
     counted = list(shares)
-    return GhostShare(sum(share.ghosts for share in counted), sum(share.found for share in counted))
+    ghosts, found = sum(share.ghosts for share in counted), sum(share.found for share in counted)
+    return GhostShare(ghosts, found, pooled_classes(one for share in counted for one in share.classes))
+
+
+def found_by_class(diameters_um: FloatArray, is_found: NDArray[np.bool_]) -> tuple[FoundOfClass, ...]:
+    """How many of some droplets were found, by classes of their diameters (N,)."""
+    numbers = class_numbers(diameters_um)
+    return pooled_classes(map(FoundOfClass, numbers.tolist(), repeat(1), is_found.astype(int).tolist()))
+
+
+def pooled_classes(classes: Iterable[FoundOfClass]) -> tuple[FoundOfClass, ...]:
+    """Counts of many together, the smallest droplets first."""
+    together: dict[int, tuple[int, int]] = {}
+    for one in classes:
+        placed, found = together.get(one.number, (0, 0))
+        together[one.number] = placed + one.placed, found + one.found
+    return tuple(FoundOfClass(number, *counts) for number, counts in sorted(together.items()))
 
 
 def matches(found: FloatArray, truth: FloatArray, radius: float = RADIUS_VOXEL) -> tuple[FloatArray, FloatArray]:

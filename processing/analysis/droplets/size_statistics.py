@@ -202,6 +202,11 @@ def size_classes(diameters_um: ArrayLike, exposures_per_shot: float = 1) -> tupl
     )
 
 
+def class_numbers(diameters_um: ArrayLike) -> NDArray[np.intp]:
+    """Of which class diameters are, (N,): number k begins at 10 ** (k / 20) um."""
+    return np.floor(CLASSES_PER_DECADE * np.log10(_checked(diameters_um)) + 1e-9).astype(np.intp)
+
+
 def _checked(diameters_um: ArrayLike) -> FloatArray:
     require_unmasked("diameters", diameters_um)
     array = np.asarray(diameters_um, dtype=np.float64).ravel()

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Annotated, Any
 
-from pydantic import BaseModel, Field, Json, ValidationError
+from pydantic import BaseModel, Field, Json, ValidationError, model_validator
 
 from daq.files.run_directory import Spray
 from processing.analysis.droplets.measured_exposure import ShotVerdict
@@ -15,7 +15,24 @@ class _Hidden(BaseModel):
     measured_percent: dict[str, list[list[Annotated[int, Field(ge=0, le=100)]]]] | None = None
 
 
+class _FoundOfClass(BaseModel):
+    number: int
+    placed: Annotated[int, Field(ge=0)]
+    found: Annotated[int, Field(ge=0)]
+
+    @model_validator(mode="after")
+    def _no_more_than_there_were(self) -> "_FoundOfClass":
+        if self.found > self.placed:
+            raise ValueError(f"{self.found} droplets found of {self.placed}")
+        return self
+
+
+class _Twins(BaseModel):
+    classes: tuple[_FoundOfClass, ...] = ()
+
+
 class _Exposure(BaseModel):
+    twins: _Twins | None = None
     verdict: ShotVerdict
     reasons: tuple[str, ...] = ()
     hidden: _Hidden = _Hidden()

@@ -17,6 +17,7 @@ from processing.analysis.droplets.droplet_statistics import (
 from processing.analysis.droplets.size_statistics import SizeClass, size_classes
 from processing.analysis.estimates import Estimate, Figures
 from processing.analysis.spray.density_map import ToldDensity, density_maps
+from processing.analysis.spray.detection import NO_TWINS, ClassDetection, detection
 from processing.analysis.spray.patternation import Patternation, patternation
 from processing.analysis.spray.proposed_axis import ProposedAxis, proposed_axis
 from processing.analysis.spray.sample_size import SampleVerdict, sample_verdict
@@ -42,7 +43,8 @@ SLICE = 0.25
 CORRECTIONS = (
     "densities are per volume that could be measured: what liquid hides is taken off, in maps cell by cell",
     "diameters are corrected as the files say (diameter_um; diameter_raw_um is not)",
-    "not corrected: droplets that are too small or too faint to be found, and ghosts; their shares are in the studies",
+    "not corrected: droplets that are too small or too faint to be found, and ghosts; their shares are in the studies, "
+    "and where twins were made (--twins), what is found of each class is in detection",
 )
 
 
@@ -85,6 +87,10 @@ class SprayStatistics(FrozenValue):
     liquid_ppm: Annotated[Estimate | None, Field(description="volume of liquid in droplets per volume, 1e-6")] = None
     sample: Annotated[SampleVerdict | None, Field(description="is it large enough; null without diameters")] = None
     classes: Annotated[tuple[SizeClass, ...], Field(description="by number, area, volume: ISO 9276-1, R20")] = ()
+    detection: Annotated[
+        tuple[ClassDetection, ...] | None, Field(description="what is found of each class, by twins, and n over it")
+    ] = None
+    detection_reason: Annotated[str | None, Field(description="why it is null")] = None
     fits: Annotated[tuple[SizeFit, ...], Field(description="lognormal and Rosin-Rammler, the better one first")] = ()
     motion: Annotated[SprayMotion | None, Field(description="velocities and flux")] = None
     extent: Annotated[SprayExtent | None, Field(description="cone angle and penetration")] = None
@@ -122,11 +128,14 @@ def spray_statistics(shots: Iterable[StoredDroplets], asked: AskedFor | None = N
     if not pooled.n or any(DIAMETER not in shot.columns for shot in shots):
         why = pooled.reason or "no droplet was measured"
         reasons = dict.fromkeys(("sample", "fits", "motion", "extent"), why)
-        return SprayStatistics(droplets=pooled, reasons=reasons, doubts=spray_doubts(shots, None, asked.axis))
+        doubts = spray_doubts(shots, None, asked.axis)
+        return SprayStatistics(droplets=pooled, reasons=reasons, doubts=doubts, detection_reason=why)
     sample = spray_sample(shots)
     told = _of_sample(sample, pooled, asked)
     ghosts, doubts = velocity_statistics(shots).unpaired_ghost_share, spray_doubts(shots, sample, asked.axis)
-    return told.model_copy(update={"doubts": doubts, "unpaired_ghost_share": ghosts})
+    found = detection(shots, told.classes, sample.exposures_per_shot)
+    update = {"detection": found, "detection_reason": NO_TWINS if found is None else None}
+    return told.model_copy(update={"doubts": doubts, "unpaired_ghost_share": ghosts, **update})
 
 
 def _of_sample(sample: SpraySample, pooled: DropletStatistics, asked: AskedFor) -> SprayStatistics:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from processing.analysis.droplets.droplet_search import DropletSearch, keep_on
 from processing.analysis.droplets.droplet_table import SizedDroplets
 from processing.analysis.droplets.gaussian_blobs import Image
-from processing.analysis.droplets.ghost_share import GhostShare, pooled
+from processing.analysis.droplets.ghost_share import GhostShare, found_by_class, matches, pooled
 from processing.analysis.droplets.measured_exposure import (
     MeasuredExposure,
     RatioLimits,
@@ -143,7 +143,7 @@ def measure_shadows(
     if not count or told.verdict is not ShotVerdict.GOOD:
         return told
     rng = np.random.default_rng(seed)
-    ghosts = pooled(_twin_ghosts(shot, fit, search, rng, before_round) for _ in range(count))
+    ghosts = pooled(_twin_ghosts(shot, fit, search, sizes, rng, before_round) for _ in range(count))
     return told_real(judged_by_twins(told, ghosts))
 
 
@@ -265,10 +265,11 @@ def _twin_ghosts(
     shot: Transmissions,
     fit: ShadowFit,
     search: DropletSearch,
+    sizes: SizeCorrection | None,
     rng: np.random.Generator,
     before_round: Callable[[], None],
 ) -> GhostShare:
-    """Ghosts of a twin: the droplets moved, united, made noisy, and found again."""
+    """Ghosts of a twin, and what is missed: the droplets moved, united, made noisy, and found again."""
     recorded, truth = _recorded(shot), Discs(moved(fit.discs.positions_voxel, search, rng), fit.discs.squares_voxel2)
     defects = union_defects(recorded, fit.optics, truth)
     drawn = recorded.drawn(fit.optics, truth).transmissions
@@ -279,4 +280,9 @@ def _twin_ghosts(
     trust = replace(shot, trust=tuple(map(np.ones_like, images))).masked(fit.masks).trust
     light: Light = fit.optics.condenser_ratio or "gaussian"
     found = find_shadows(replace(shot, images=images, trust=trust), search, light, before_round).discs
-    return ghosts_within(found.positions_voxel, truth.positions_voxel, search)
+    ghosts = ghosts_within(found.positions_voxel, truth.positions_voxel, search)
+    could = within_grid(truth.positions_voxel, search) & is_judged(shot, fit, truth.positions_voxel)
+    is_found = matches(found.positions_voxel, truth.positions_voxel)[1] >= 0
+    diameters_um = 2000 * truth.radii_voxel * search.searched.pitch_mm
+    told_um = diameters_um if sizes is None else sizes.corrected(diameters_um)
+    return replace(ghosts, classes=found_by_class(told_um[could], is_found[could]))

@@ -72,6 +72,8 @@ def test_a_droplet_that_is_nowhere_is_told(tmp_path: Path, place_mm: float) -> N
         *[(name, "{") for name in ("exposures", "grid", "spray", "settings", "notes", "velocity")],
         ("exposures", '{"a": {"verdict": "great"}}'),
         ("exposures", '{"a": {"verdict": "good", "hidden": {"volume_share": 2.0}}}'),
+        ("exposures", '{"a": {"verdict": "good", "hidden": {"measured_percent": {"xy": [[101]]}}}}'),
+        ("exposures", '{"a": {"verdict": "good", "twins": {"classes": [{"number": 3, "placed": 1, "found": 2}]}}}'),
         ("grid", '{"shape": [0, 1, 2], "origin_mm": [0, 0, 0], "pitch_mm": 0.1}'),
         ("spray", '{"nozzle_mm": [0, 1]}'),
         ("notes", "[1]"),

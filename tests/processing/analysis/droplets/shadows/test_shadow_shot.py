@@ -38,6 +38,10 @@ def test_a_shot_without_faults_is_good_and_its_twin_has_no_ghosts_or_few(shot: S
     assert shot.twins is not None
     assert shot.twins.found > 0.8 * len(shot.droplets)
     assert shot.twins.ghosts <= 2
+    placed, found = (sum(getattr(one, name) for one in shot.twins.classes) for name in ("placed", "found"))
+    assert 0.95 * placed < found <= placed < 1.3 * len(shot.droplets)
+    edges_um = [10 ** (one.number / 20) for one in shot.twins.classes]
+    assert edges_um[0] < 1.1 * shot.droplets.diameters_um.min() < shot.droplets.diameters_um.max() < 1.3 * edges_um[-1]
 
 
 def test_covariances_say_how_far_places_and_diameters_are_off(scene: ShadowScene, shot: ShadowExposure) -> None:
