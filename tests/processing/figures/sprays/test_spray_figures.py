@@ -77,6 +77,19 @@ def test_shots_scatter_beside_the_mean_and_of_one_shot_there_is_the_mean(sample:
     assert [axes.get_title() for axes in density_figure([single, single]).axes if axes.get_title()] == ["mean", "mean"]
 
 
+def test_what_could_not_be_measured_is_grey_and_its_share_is_drawn_beside_it(sample: SpraySample) -> None:
+    shares = np.ones((4, 10, 24))
+    shares[:, :, :6] = 0.3
+    found = density_map(replace(sample, measured_shares={"xy": shares}))
+    assert found
+    mean, _rms, share = (axes for axes in density_figure([found]).axes if axes.get_title())
+    assert share.get_title() == "82.5 % of the volume could be measured"
+    (mesh,) = (artist for artist in mean.collections if isinstance(artist, QuadMesh))
+    drawn = mesh.get_array()
+    assert drawn is not None
+    np.testing.assert_array_equal(np.ma.getmaskarray(drawn).reshape(10, 24), shares[0] < 0.5)
+
+
 def test_arrows_are_drawn_where_a_mean_velocity_is_told(sample: SpraySample) -> None:
     assert ASKED.axis
     fields = field_through_axis(sample, ASKED.axis), field_across_axis(sample, ASKED.axis)

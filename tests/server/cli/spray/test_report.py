@@ -1,8 +1,10 @@
 """``tomoshadow report``: one page with everything in it, that a browser shows and prints."""
 
+import json
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 from playwright.sync_api import sync_playwright
 
@@ -55,6 +57,20 @@ def test_what_shots_of_two_runs_do_not_share_is_said_of_both(tmp_path: Path) -> 
     text = (tmp_path / "report.html").read_text()
     assert "6.0 and 20.0" in text
     assert "measured by tomoshadow 1.0 and 1.1" in text
+
+
+def test_what_is_hidden_and_what_twins_find_is_in_the_report(tmp_path: Path) -> None:
+    """Half of the box is half hidden; of 200 droplets from 28 to 32 um the twins found 180."""
+    percent = [[50] * 12 + [100] * 12] * 10
+    twin = {"ghosts": 0, "found": 180, "classes": [{"number": 29, "placed": 200, "found": 180}]}
+    told = {"verdict": "good", "hidden": {"measured_percent": {"xy": percent}}, "twins": twin}
+    shots = [stored_shot(np.full(40, 30.0), shot=shot, exposures=json.dumps({"a": told})) for shot in range(2)]
+    assert main(["report", str(write_results(tmp_path / "hidden", shots)), "-o", str(tmp_path / "report.html")]) == 0
+    text = (tmp_path / "report.html").read_text()
+    assert "Found by twins" in text
+    assert "<td>90.0</td>" in text
+    assert "<td>88.9 (" in text
+    assert "Not corrected cell by cell" in text, "over x and z nothing is known"
 
 
 @pytest.mark.slow

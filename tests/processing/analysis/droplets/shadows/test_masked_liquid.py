@@ -5,12 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from processing.analysis.cells import measured_shares
 from processing.analysis.droplets.droplet_search import plan_droplets
 from processing.analysis.droplets.ghost_share import matches
 from processing.analysis.droplets.measured_exposure import ShotVerdict
 from processing.analysis.droplets.shadows.masked_liquid import liquid_objects, lumps
 from processing.analysis.droplets.shadows.opaque_discs import Discs
 from processing.analysis.droplets.shadows.shadow_shot import ShadowExposure, measure_shadows
+from processing.analysis.spray.spray_sample import bounds_mm
 from processing.geometry import FloatArray, PinholeCamera
 from processing.studies.simulated_droplets import study_cameras, study_grid
 from processing.synthetic.liquid.droplet_clouds import Box, LogNormal, droplet_cloud
@@ -99,6 +101,8 @@ def test_a_ligament_is_masked_and_droplets_beside_it_are_found(
     for percent in shot.hidden.measured_percent.values():
         assert np.mean(percent) == pytest.approx(100 * (1 - shot.hidden.volume_share), abs=1)
         assert np.max(percent) == 100, "a ligament hides what is near it"
+    shares = measured_shares([[shot.told()]], bounds_mm(GRID))
+    assert set(shares) == set(shot.hidden.measured_percent), "cells of voxels are those of the box"
     assert len(missed) <= 2 + shot.hidden.volume_share * len(scene.droplets)
     assert len(shot.droplets) > 0.75 * len(scene.droplets.inside(GRID))
     apart_mm = np.linalg.norm(shot.droplets.points_mm[:, None] - ligament.positions_mm[None], axis=2)
