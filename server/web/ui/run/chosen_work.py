@@ -11,8 +11,8 @@ from server.web.ui.draft import NO_VOLUMES, DraftStore
 from server.web.ui.visiting import for_operators
 
 ALL_SEEN = (
-    "Droplets are looked for in all that the views see: where liquid still hangs together that takes minutes a shot, and "
-    "ends in a refusal. To look into a box alone, leave this off, and press Measure on the page of the run."
+    "Droplets are looked for in all that the views see: where liquid still hangs together that takes minutes a shot, "
+    "and ends in a refusal. To look into a box alone, leave this off, and press Measure on the page of the run."
 )
 _VOLUMES = {NO_VOLUMES: "none"} | {one.value: f"by {one.value.upper()}" for one in ReconstructionMethod}
 
