@@ -164,6 +164,7 @@ def test_what_the_bench_measures_in_a_browser_is_there_to_be_measured(browser: B
 def test_the_slider_of_a_current_asks_once_and_the_form_agrees(page: Page, server: Serving) -> None:
     open_live(page, server)
     thumb = page.get_by_label("LED view1 current").locator(".q-slider__track-container")
+    thumb.hover()  # waits until the page has come to rest: a slider that moves away is not dragged
     box = thumb.bounding_box()
     assert box is not None
     page.evaluate(
@@ -368,6 +369,8 @@ def test_a_spray_is_recorded_and_seen_on_the_page_run(page: Page, server: Servin
     for label, text in (("Shots", "400"), ("Rate / Hz", "4"), *((f"LED {view} / A", "6") for view in VIEWS)):
         page.get_by_label(label, exact=True).fill(text)
     page.get_by_label("Fluid").fill("water")
+    if (newest := page.get_by_role("button", name="Use the newest")).is_visible():  # other tests have run before
+        newest.click()
     page.get_by_role("button", name="Start run").click()
     expect(page.get_by_role("list", name="shots").get_by_role("listitem", name="shot 3: valid")).to_be_visible()
     expect(page.get_by_role("group", name="newest shots").get_by_role("img").nth(1)).to_be_visible()

@@ -16,6 +16,7 @@ import pytest
 
 from daq.causes import CauseCode
 from daq.devices import PulseGenerator
+from daq.errors import DeviceUnavailable
 from daq.faults import LABORATORY_FAULTS, Fault, FaultKind
 from daq.files.run_directory import ImageKey, PulsePair, RunKind, RunPlan, RunReader
 from daq.run.acquisition import Acquisition
@@ -23,6 +24,7 @@ from daq.run.limits import AcquisitionLimits
 from daq.shot import FiredTrain
 from server.rig.assembly import open_rig
 from server.rig.config import RigConfig, load_config
+from tests.support.server_process import eventually
 from tests.support.watched_rig import Witness
 
 pytestmark = pytest.mark.network
@@ -122,6 +124,14 @@ def plan_of(config: RigConfig, cell: Cell) -> RunPlan:
     )
 
 
+def comes_back(generator: PulseGenerator) -> bool:
+    try:
+        generator.recover()
+    except DeviceUnavailable:
+        return False
+    return True
+
+
 @pytest.mark.parametrize("cell", ALL_CELLS if os.environ.get("TOMOSHADOW_ALL_FAULTS") else CELLS, ids=str)
 def test_a_fault_ends_a_run_as_the_page_says(cell: Cell, tmp_path: Path) -> None:
     config = small_config()
@@ -137,7 +147,7 @@ def test_a_fault_ends_a_run_as_the_page_says(cell: Cell, tmp_path: Path) -> None
                 bench.laboratory.inject(fault.model_copy(update={"amount": 2.0 * PLACES[cell.place] - 1}))
             run_id = acquisition.start(plan_of(config, cell))
             assert not acquisition.wait(DEADLINE_S).active
-            bench.rig.generator.recover()
+            eventually(lambda: comes_back(bench.rig.generator), "the generator is plugged in again")
     if darkness := witness.darkness:
         assert darkness.asked_before == ()
     reader, told = RunReader(tmp_path / run_id), promised(cell)
