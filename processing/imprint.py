@@ -60,7 +60,9 @@ def imprint(frame: Frame, background: Intensity, dark: Intensity | None = None) 
     shadow = 1 - light[rows, columns] / full[rows, columns]
     dip = np.where(lit & (around > 0), 1 - full / np.maximum(around, 1e-6), 0)
     share = float(np.median(dip[rows, columns] / shadow))
-    return share if share > max(LEAST, SURE * _by_chance(dip, rows, columns, shadow)) else 0.0
+    if share <= LEAST:  # chance costs most, and would change nothing
+        return 0.0
+    return share if share > SURE * _by_chance(dip, rows, columns, shadow) else 0.0
 
 
 def _around(full: NDArray[np.float32], free: NDArray[np.bool_]) -> NDArray[np.float32]:

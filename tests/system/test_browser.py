@@ -182,6 +182,7 @@ def test_what_an_operator_chose_stays_and_what_another_page_chose_is_shown(page:
     page.get_by_role("option", name=re.compile("-spray")).click()
     expect(page.get_by_label("Result set", exact=True).first).to_have_value(re.compile("MLOS"))
     shot = page.get_by_role("status", name="shot shown")
+    expect(shot).to_have_text("shot 4 (5 of 5)")  # of the run that was chosen, not of the one before
     page.get_by_role("slider", name="shot", exact=True).locator("[tabindex='0']").first.focus()
     page.keyboard.press("ArrowLeft")
     picked = re.compile("^shot 3 ")
