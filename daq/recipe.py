@@ -15,7 +15,10 @@ class Recipe(FrozenModel):
     ]
     settings: Annotated[
         dict[str, JsonValue],
-        Field(description="of the command; what is left out has its default, and is spelled out in the run"),
+        Field(
+            description="of the command; what is left out has its default, and is spelled out in the run; a grid may "
+            "be stated as with --grid"
+        ),
     ] = Field(default_factory=dict)
     sha256: Annotated[
         str,

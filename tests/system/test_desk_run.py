@@ -209,11 +209,15 @@ def test_what_is_made_of_every_shot_is_what_the_page_shows(tab: Page, server: Se
     run_id = server.wait().run_id
     eventually(lambda: jobs_of(server, run_id) != [], "a volume is asked for")
     assert {job["settings"]["method"] for job in jobs_of(server, run_id)} == {"minlos"}
-    hint = tab.get_by_text("Droplets are looked for in all that the views see")
-    expect(hint).to_be_hidden()
+    box = tab.get_by_role("textbox", name="Box of the droplets / mm")
+    expect(box).to_be_hidden()
     tab.get_by_role("checkbox", name="Droplets too").click()
-    expect(row(tab, "Recipe")).to_contain_text("droplets")
-    expect(hint).to_be_visible()
+    expect(row(tab, "Recipe")).to_contain_text("droplets are measured against a background run")
+    expect(tab.get_by_text("Where it is empty, all that the views see is searched")).to_be_visible()
+    box.fill("0:1")
+    expect(row(tab, "Recipe")).to_contain_text("paper.json")  # that has to tell the pixels of a box, and cannot
+    box.fill("")
+    expect(row(tab, "Recipe")).not_to_contain_text("paper.json")
     tab.get_by_role("checkbox", name="Droplets too").click()
     tab.get_by_label("Volumes", exact=True).click()
     tab.get_by_role("option", name="none").click()

@@ -123,6 +123,7 @@ TABLES: dict[str, tuple[Touch, ...]] = {
         *fields("textbox", "Name", "Operator", "Fluid", "Nozzle", "Remark", text="x"),
         *fields("combobox", "Volumes", "Calibration; none: current", "Dark and background runs", "Template"),
         Touch("checkbox", "Droplets too"),
+        *fields("textbox", "Box of the droplets / mm", text="-1:1,-1:1,-1:1"),
         Touch("checkbox", "Droplets too"),
         press("keep as a template", option("Save template")),
         *fields("textbox", "Save as", text="kept"),

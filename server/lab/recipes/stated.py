@@ -2,19 +2,22 @@
 
 import json
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 
-from pydantic import ValidationError
+from pydantic import JsonValue, ValidationError
 
 from daq.files.header import RunHeader
 from daq.recipe import Recipe
 from daq.run.refusals import RefusalCode
 from daq.run_plan import RunKind, RunPlan
+from processing.calibration.calibration_file import load_calibration
+from processing.errors import BadInput
 from processing.reconstruction.settings import METHOD_VERSION as VOLUME_VERSION
-from processing.reconstruction.settings import FrozenValue, ReconstructionSettings
-from processing.runs.errors import PipelineError
+from processing.reconstruction.settings import FrozenValue, GridSettings, ReconstructionSettings
 from processing.runs.measurement import METHOD_VERSION as DROPLET_VERSION
 from processing.runs.measurement import MeasureSettings, require_measurable
 from processing.runs.recipe import recipe_sha256
+from processing.runs.stated_grid import parse_grid
 from server.lab.errors import NotFound, Unprocessable
 from server.lab.runs.run_store import RunStore
 
@@ -32,15 +35,15 @@ def usual_recipe(settings: ReconstructionSettings) -> Recipe:
     return spelled_out(Recipe(command="reconstruct", settings=settings.model_dump(mode="json")))
 
 
-def spelled_out(recipe: Recipe) -> Recipe:
-    """The same with every setting and the hash.
+def spelled_out(recipe: Recipe, calibration: Path | None = None) -> Recipe:
+    """The same with every setting and the hash; a grid may be stated as with ``--grid``, and a calibration's pixels.
 
     Raises
     ------
     Unprocessable
         A setting is misspelt or wrong, or the hash is that of other settings, or of another version of the method.
     """
-    settings = settings_of(recipe)
+    settings = settings_of(_with_voxels(recipe, calibration))
     version = _COMMANDS[recipe.command][1]
     sha256 = recipe_sha256(recipe.command, version, settings)
     if recipe.sha256 not in ("", sha256):
@@ -58,27 +61,40 @@ def settings_of(recipe: Recipe) -> FrozenValue:
     except ValidationError as error:
         first = error.errors()[0]
         raise _wrong(recipe, f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from error
-    except PipelineError as error:
+    except BadInput as error:
         raise _wrong(recipe, str(error)) from error
     return settings
 
 
-def with_recipes(plan: RunPlan, usual: Recipe) -> RunPlan:
+def _with_voxels(recipe: Recipe, calibration: Path | None) -> Recipe:
+    box = recipe.settings.get("grid")
+    if not isinstance(box, str):
+        return recipe
+    if calibration is None:
+        raise _wrong(recipe, f"box {box!r}: its voxels are those of a calibration, and none is chosen")
+    try:
+        grid = GridSettings.of(parse_grid(box.strip(), load_calibration(calibration), "box"))
+    except (BadInput, OSError) as error:
+        raise _wrong(recipe, str(error)) from error
+    return recipe.model_copy(update={"settings": {**recipe.settings, "grid": grid.model_dump(mode="json")}})
+
+
+def with_recipes(plan: RunPlan, usual: Recipe, calibration: Path | None = None) -> RunPlan:
     """A sample run states what is made of it; recipes that cannot be followed stay as they are, and are refused."""
     if plan.kind is not RunKind.SAMPLE:
         return plan
     stated = (usual,) if plan.recipes is None else plan.recipes
     try:
-        return plan.model_copy(update={"recipes": tuple(map(spelled_out, stated))})
+        return plan.model_copy(update={"recipes": tuple(spelled_out(one, calibration) for one in stated)})
     except Unprocessable:
         return plan
 
 
-def against_recipes(runs: RunStore, plan: RunPlan) -> Iterator[Unprocessable]:
+def against_recipes(runs: RunStore, plan: RunPlan, calibration: Path | None = None) -> Iterator[Unprocessable]:
     """Why what a plan states cannot be made of its shots."""
     for recipe in plan.recipes or ():
         try:
-            spelled_out(recipe)
+            spelled_out(recipe, calibration)
         except Unprocessable as error:
             yield error
     if plan.recipes and plan.kind is not RunKind.SAMPLE:
@@ -96,10 +112,18 @@ def told_recipes(recipes: tuple[Recipe, ...]) -> str:
 def _told(recipe: Recipe) -> str:
     settings = recipe.settings
     if recipe.command == "measure":
-        what = "droplets"
+        what = f"droplets in {_told_box(settings.get('grid'))}"
     else:
         what = f"volumes by {str(settings.get('method')).upper()}, accuracy {settings.get('accuracy')}"
     return f"{what} (recipe {recipe.sha256[:8]})"
+
+
+def _told_box(grid: JsonValue) -> str:
+    if not isinstance(grid, dict):
+        return str(grid or "all that the views see")
+    voxels = GridSettings.model_validate_json(json.dumps(grid)).to_grid()
+    spans_mm = (getattr(voxels, f"{axis}_mm")[[0, -1]] for axis in "xyz")
+    return f"the box {','.join(f'{first:.4g}:{last:.4g}' for first, last in spans_mm)}"
 
 
 def _measures(plan: RunPlan) -> bool:

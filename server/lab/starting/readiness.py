@@ -1,7 +1,9 @@
 """Readiness: what speaks against a start. ``run_start`` raises the first refusal, the desk shows all of them."""
 
 from collections.abc import Iterator
+from contextlib import suppress
 from itertools import chain
+from pathlib import Path
 
 from daq.errors import DaqError, DeviceUnavailable
 from daq.run.refusals import RefusalCode, coded
@@ -46,18 +48,26 @@ def refusals_of_lab(context: Context, plan: RunPlan | None) -> Iterator[Refusal]
     if plan is not None and plan.calibration is not None:
         yield from _against_calibration(context, plan.calibration)
     if plan is not None:
-        yield from against_recipes(context.runs, plan)
+        yield from against_recipes(context.runs, plan, _calibration_file(context, plan))
 
 
 def with_defaults(context: Context, plan: RunPlan) -> RunPlan:
     """A sample run that does not say them gets current calibration and usual recipe, so that they travel with it."""
-    return with_recipes(_with_calibration(context, plan), usual_recipe(context.services.settings))
+    plan = _with_calibration(context, plan)
+    return with_recipes(plan, usual_recipe(context.services.settings), _calibration_file(context, plan))
 
 
 def _with_calibration(context: Context, plan: RunPlan) -> RunPlan:
     if plan.calibration is not None or plan.kind is not RunKind.SAMPLE:
         return plan
     return plan.model_copy(update={"calibration": context.calibrations.current})
+
+
+def _calibration_file(context: Context, plan: RunPlan) -> Path | None:
+    """Whether it exists or not; None where that is no name."""
+    with suppress(NotFound):
+        return context.calibrations.path(plan.calibration or "")
+    return None
 
 
 def _silent_cameras(context: Context) -> Iterator[DaqError]:

@@ -33,7 +33,7 @@ USUAL_NAMES = {
 USUAL_SHOTS = {RunKind.SAMPLE: 10, RunKind.BACKGROUND: 20, RunKind.DARK: 10, RunKind.CALIBRATION: 1}
 """So do numbers of shots; of a calibration per position."""
 
-_TEXTS = ("name", "stage_z_mm", "operator", "fluid", "nozzle", "remark")
+_TEXTS = ("name", "stage_z_mm", "droplet_box", "operator", "fluid", "nozzle", "remark")
 
 
 def first_draft(config: RigConfig) -> dict[str, Any]:
@@ -51,6 +51,7 @@ def first_draft(config: RigConfig) -> dict[str, Any]:
         "calibration": None,
         "volumes": ReconstructionMethod.MLOS.value,
         "droplets": False,
+        "droplet_box": "",
         "operator": "",
         "fluid": "",
         "nozzle": "",
@@ -75,6 +76,7 @@ class StoredDraft(BaseModel):
     calibration: str | None = None
     volumes: ReconstructionMethod | Literal["none"] = ReconstructionMethod.MLOS
     droplets: bool = False
+    droplet_box: str | None = None
     operator: str | None = None
     fluid: str | None = None
     nozzle: str | None = None
@@ -237,7 +239,9 @@ def pulse_of(values: dict[str, Any]) -> PulsePair:
 def recipes_of(values: dict[str, Any]) -> tuple[Recipe, ...]:
     """What is made of every shot by itself."""
     volumes = Recipe(command="reconstruct", settings={"method": values["volumes"]})
-    chosen = (values["volumes"] != NO_VOLUMES and volumes, values["droplets"] and Recipe(command="measure"))
+    box = (values["droplet_box"] or "").strip()
+    droplets = Recipe(command="measure", settings={"grid": box} if box else {})
+    chosen = (values["volumes"] != NO_VOLUMES and volumes, values["droplets"] and droplets)
     return tuple(recipe for recipe in chosen if recipe)
 
 

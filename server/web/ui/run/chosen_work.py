@@ -10,9 +10,9 @@ from processing.reconstruction.choices import ReconstructionMethod
 from server.web.ui.draft import NO_VOLUMES, DraftStore
 from server.web.ui.visiting import for_operators
 
-ALL_SEEN = (
-    "Droplets are looked for in all that the views see: where liquid still hangs together that takes minutes a shot, "
-    "and ends in a refusal. To look into a box alone, leave this off, and press Measure on the page of the run."
+WHERE = (
+    "State a box behind the break-up, x, y and z from:to in mm. Where it is empty, all that the views see is searched: "
+    "where liquid still hangs together that takes minutes a shot, and ends in a refusal."
 )
 _VOLUMES = {NO_VOLUMES: "none"} | {one.value: f"by {one.value.upper()}" for one in ReconstructionMethod}
 
@@ -50,7 +50,15 @@ class ChosenWork:
             )
             self._droplets.props('aria-label="Droplets too"')
             self._droplets.tooltip("Measured in every shot by itself, against the background run")
-        ui.label(ALL_SEEN).classes("text-xs opacity-80").bind_visibility_from(self._droplets, "value")
+        with ui.column().classes("w-full gap-1").bind_visibility_from(self._droplets, "value"):
+            self._where = ui.input(
+                "Box of the droplets / mm",
+                value=values["droplet_box"],
+                placeholder="-5:5,-1:0,-5:5",
+                on_change=lambda event: self._keep("droplet_box", event.value),
+            )
+            self._where.props('dense outlined stack-label data-draft="droplet_box"').classes("w-full")
+            ui.label(WHERE).classes("text-xs opacity-80")
 
     def show_kind(self, kind: RunKind) -> None:
         """Nothing is made of any other run than one of the spray."""
@@ -58,13 +66,14 @@ class ChosenWork:
 
     def allow(self, may_change: bool) -> None:
         """Nobody chooses while somebody else holds control."""
-        for field in (self._volumes, self._droplets):
+        for field in (self._volumes, self._droplets, self._where):
             for_operators(field, may_change)
 
     def show(self) -> None:
         """Show what is chosen, here or in another tab."""
         self._volumes.set_value(self._draft.values["volumes"])
         self._droplets.set_value(self._draft.values["droplets"])
+        self._where.set_value(self._draft.values["droplet_box"])
 
     def _keep(self, name: str, value: Any) -> None:
         if value != self._draft.values[name]:

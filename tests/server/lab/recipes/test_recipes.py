@@ -1,18 +1,27 @@
 """What is made of every shot by itself is what the plan of its run states, and the run says it with its hash."""
 
 import re
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-from processing.reconstruction.settings import METHOD_VERSION, ReconstructionSettings
+from daq.recipe import Recipe
+from daq.run.refusals import RefusalCode
+from processing.calibration.calibration_file import load_calibration
+from processing.reconstruction.settings import METHOD_VERSION, GridSettings, ReconstructionSettings
 from processing.runs.measurement import MeasureSettings
 from processing.runs.recipe import recipe_sha256
+from processing.runs.stated_grid import parse_grid
+from server.lab.errors import Unprocessable
+from server.lab.recipes.stated import settings_of, spelled_out, told_recipes
 from tests.server.web.test_api import use_a_calibration
+from tests.support.live_shots import save_droplet_calibration
 from tests.support.server_process import eventually
 from tests.support.serving import Serving, plan_of
 
 SMART = {"command": "reconstruct", "settings": {"method": "smart", "iterations": 5}}
+BOX = "-1:1,-0.5:0.5,-1:1"
 
 
 def made_of(server: Serving, run_id: str) -> dict[str, Any]:
@@ -38,6 +47,41 @@ def test_what_a_plan_states_is_made_of_its_shots_and_stands_in_the_run_with_its_
     assert volumes["settings"] == settings.model_dump(mode="json")
     assert volumes["sha256"] == recipe_sha256("reconstruct", METHOD_VERSION, settings)
     assert droplets["settings"] == measured
+
+
+def test_the_box_that_a_plan_states_has_the_pixels_of_its_calibration(server: Serving, tmp_path: Path) -> None:
+    calibration = server.services.data_dir / "calibrations" / "cal.json"
+    save_droplet_calibration(calibration)
+    measure = Recipe(command="measure", settings={"grid": BOX})
+    stated = spelled_out(measure, calibration)
+    grid = GridSettings.of(parse_grid(BOX, load_calibration(calibration)))
+    assert settings_of(stated) == MeasureSettings(polarity="shadow", grid=grid)
+    assert spelled_out(stated) == stated
+    background, _ = server.run_to_its_end(plan_of(kind="background", shots=1))
+    plan = plan_of(references=[background], calibration="cal", recipes=[measure.model_dump()])
+    checks = server.http.post("/api/rig/readiness", json=plan).json()["checks"]
+    (recipe,) = (check["text"] for check in checks if check["name"] == "Recipe")
+    assert re.match(r"droplets in the box -1:1,-0\.5:0\.\d+,-1:1 ", recipe), recipe
+
+
+@pytest.mark.parametrize(
+    ("box", "calibration", "text"),
+    [
+        ("0:1", "cal.json", "'0:1' is not of the form X0:X1,Y0:Y1,Z0:Z1"),
+        ("1:0,0:1,0:1", "cal.json", "every range must grow"),
+        (BOX, "gone.json", "gone.json"),
+        (BOX, "", "none is chosen"),
+    ],
+)
+def test_a_box_without_sense_or_calibration_is_refused(tmp_path: Path, box: str, calibration: str, text: str) -> None:
+    save_droplet_calibration(tmp_path / "cal.json")
+    with pytest.raises(Unprocessable, match=re.escape(text)) as refused:
+        spelled_out(Recipe(command="measure", settings={"grid": box}), tmp_path / calibration if calibration else None)
+    assert refused.value.code == RefusalCode.RECIPE
+
+
+def test_without_a_box_all_that_the_views_see_is_told() -> None:
+    assert told_recipes((spelled_out(Recipe(command="measure")),)).startswith("droplets in all that the views see ")
 
 
 def test_where_a_plan_states_nothing_the_usual_is_made_and_stated(server: Serving) -> None:
