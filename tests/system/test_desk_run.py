@@ -67,11 +67,16 @@ def test_who_does_not_hold_control_changes_the_light_nowhere(tab: Page, server: 
     expect(current).to_be_enabled()
     server.http.put("/api/rig/control", headers=ANN)
     expect(current).to_be_disabled()
+    why = "ann@lab holds control of this rig: the hand in the bar takes it over"
     for name in ("Live", "Shoot one", "Set to half range"):
         expect(tab.get_by_role("button", name=name, exact=True)).to_be_disabled()
+        expect(tab.get_by_role("button", name=name, exact=True)).to_have_attribute("title", why)
     expect(tab.get_by_role("slider", name="LED view1 current")).to_have_attribute("aria-disabled", "true")
     go_to(tab, "Run")
     expect(tab.locator(".q-field--disabled").filter(has_text="Template")).to_be_visible()
+    expect(tab.get_by_role("button", name="Start run")).to_have_attribute("title", why)
+    server.free_control()
+    expect(tab.get_by_role("button", name="Start run")).not_to_have_attribute("title", re.compile("."))
 
 
 def test_a_change_in_one_tab_appears_in_the_other(tab: Page, browser: Browser, server: Serving) -> None:

@@ -8,6 +8,7 @@ from pydantic import Field
 
 from daq.frozen_model import FrozenModel
 from daq.run.events import RunStatus
+from daq.run.refusals import RefusalCode
 from daq.run.state import RunState
 from server.lab.desk.reason import Reason
 
@@ -53,6 +54,8 @@ def _text(word: RigWord, status: RunStatus, reasons: Sequence[Reason] | None, et
         counts = f"{title} {status.shots_recorded}/{status.shots_planned}"
         return counts if eta_s is None else f"{counts}, {minutes(eta_s)} left"
     if word is RigWord.NOT_READY:
+        if reasons and reasons[0].code == RefusalCode.BUSY:
+            return "ENDED: the rig is being looked at"  # that was found before the end
         return f"{title}: {reasons[0].text if reasons else 'nobody has looked at the rig for seconds'}"
     return title
 

@@ -8,7 +8,7 @@ from nicegui.elements.mixins.disableable_element import DisableableElement
 
 from server.lab.desk.control import REMEDIES
 from server.lab.desk.visitor import Role, Visitor
-from server.lab.errors import Forbidden, ServerError
+from server.lab.errors import Forbidden, Locked
 from server.lab.services import Context
 from server.web.guard import SESSIONS, VISITOR
 from server.web.sessions import Sessions
@@ -66,11 +66,13 @@ def may_command(context: Context) -> bool:
 
 
 def why_not(context: Context) -> str:
-    """Why who looks may change nothing now; empty: he may."""
+    """Why who looks may change nothing now, in a few words for what he points at; empty: he may."""
     try:
         context.control.check(visitor())
-    except ServerError as error:
-        return told(error)
+    except Forbidden:
+        return VIEWERS_MAY
+    except Locked as error:
+        return f"{error}: the hand in the bar takes it over"
     return ""
 
 

@@ -15,7 +15,7 @@ from server.web.ui.bar.server_link import TICKET, shown_form
 from server.web.ui.draft import PULSE_FIELDS, DraftStore, problem_of, problem_of_current
 from server.web.ui.drag_slider import DragSlider
 from server.web.ui.theme import panel
-from server.web.ui.visiting import for_operators, may_command
+from server.web.ui.visiting import for_operators, why_not
 
 _RELEASED = "(value) => emit({ ...(window.desk?.ticket() ?? {}), value })"
 _STEP_A = 0.1
@@ -64,9 +64,9 @@ class LightPanel:
 
     def refresh(self) -> None:
         """Nobody changes the light while somebody else holds control."""
-        may_change = may_command(self._context)
+        why = why_not(self._context)
         for field in (*self._times, *self._numbers.values(), *self._sliders.values(), self._half):
-            for_operators(field, may_change)
+            for_operators(field, why=why)
 
     def _limit_a(self, view: str) -> float:
         return self._context.services.config.views[view].max_current_a

@@ -21,7 +21,7 @@ from server.web.ui.bar.server_link import TICKET, light_request, shown_form
 from server.web.ui.draft import DraftStore, problem_of, pulse_of
 from server.web.ui.live.live_tiles import LiveTiles
 from server.web.ui.theme import panel
-from server.web.ui.visiting import for_operators, may_command, visitor
+from server.web.ui.visiting import for_operators, visitor, why_not
 
 _FIELDS = LivePlan.model_fields
 _HINT = "No picture yet. Live shows the cameras and records nothing; Shoot one takes a single shot."
@@ -69,11 +69,11 @@ class LivePanel:
         """Follow the state of acquisition."""
         status = self._acquisition.status()
         is_live = status.state is RunState.LIVE
-        may_shoot = (status.resting or is_live) and may_command(self._context)
-        for_operators(self._start, may_shoot)
+        may_shoot, why = status.resting or is_live, why_not(self._context)
+        for_operators(self._start, may_shoot, why)
         self._start.set_text("Apply" if is_live else "Live")
         for_operators(self._end, is_live)
-        for_operators(self._shoot, may_shoot)
+        for_operators(self._shoot, may_shoot, why)
         for_operators(self._keep).set_visibility(bool(self._context.unkept_runs.ids) and status.resting)
 
     async def _on_end(self) -> None:

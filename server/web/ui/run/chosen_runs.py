@@ -53,10 +53,10 @@ class ChosenRuns:
         """Only a sample run has any."""
         self._box.set_visibility(kind is RunKind.SAMPLE)
 
-    def allow(self, may_change: bool) -> None:
-        """Nobody chooses while somebody else holds control."""
+    def allow(self, why: str) -> None:
+        """Nobody chooses while somebody else holds control; why, where that is so."""
         for field in (self._references, self._calibration, self._newest):
-            for_operators(field, may_change)
+            for_operators(field, why=why)
 
     async def reload(self) -> None:
         """Offer the runs and calibrations that exist now."""

@@ -64,10 +64,10 @@ class ChosenWork:
         """Nothing is made of any other run than one of the spray."""
         self._box.set_visibility(kind is RunKind.SAMPLE)
 
-    def allow(self, may_change: bool) -> None:
-        """Nobody chooses while somebody else holds control."""
+    def allow(self, why: str) -> None:
+        """Nobody chooses while somebody else holds control; why, where that is so."""
         for field in (self._volumes, self._droplets, self._where):
-            for_operators(field, may_change)
+            for_operators(field, why=why)
 
     def show(self) -> None:
         """Show what is chosen, here or in another tab."""

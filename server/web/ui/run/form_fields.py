@@ -74,10 +74,10 @@ class FormFields:
         self._shots.set_label("Shots per position" if moves else "Shots")
         self._positions.set_visibility(moves)
 
-    def allow(self, may_change: bool) -> None:
-        """Nobody types while somebody else holds control."""
+    def allow(self, why: str) -> None:
+        """Nobody types while somebody else holds control; why, where that is so."""
         for field in self._fields.values():
-            for_operators(field, may_change)
+            for_operators(field, why=why)
 
     def are_good(self) -> bool:
         """Whether every value is within its limits; each field says what is wrong with it."""

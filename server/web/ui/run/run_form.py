@@ -23,7 +23,7 @@ from server.web.ui.run.form_fields import FormFields
 from server.web.ui.run.template_bar import TemplateBar
 from server.web.ui.run.templates import TemplateStore
 from server.web.ui.theme import panel
-from server.web.ui.visiting import for_operators, may_command, told
+from server.web.ui.visiting import for_operators, told, why_not
 
 _TOLD_ELSEWHERE = {*PASSING, "form"}
 """They end by themselves, or the field itself says what is wrong with it."""
@@ -62,12 +62,10 @@ class RunForm:
     def refresh(self) -> None:
         """Follow the state of acquisition, who holds control, what speaks against a start, and other tabs."""
         self._show_verdict()
-        may_change = may_command(self._context)
-        for_operators(self._start, may_change and not self._context.services.acquisition.status().active)
-        self._templates.allow(may_change)
-        self._fields.allow(may_change)
-        self._chosen.allow(may_change)
-        self._work.allow(may_change)
+        why = why_not(self._context)
+        for_operators(self._start, not self._context.services.acquisition.status().active, why)
+        for part in (self._templates, self._fields, self._chosen, self._work):
+            part.allow(why)
         if self._draft.version != self._shown:
             self._show()
 

@@ -40,10 +40,10 @@ class TemplateBar:
         """Offer the templates that there are."""
         self._chosen.set_options(self._templates.names())
 
-    def allow(self, may_change: bool) -> None:
-        """Nobody fills the form while somebody else holds control."""
-        for_operators(self._chosen, may_change)
-        for_operators(self._keep, may_change)
+    def allow(self, why: str) -> None:
+        """Nobody fills the form while somebody else holds control; why, where that is so."""
+        for_operators(self._chosen, why=why)
+        for_operators(self._keep, why=why)
 
     def _add_menu(self) -> None:
         with ui.menu() as self._menu, ui.column().classes("q-pa-md gap-2").style("width:260px"):

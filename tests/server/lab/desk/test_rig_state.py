@@ -12,6 +12,7 @@ from server.lab.desk.reason import Reason
 from server.lab.desk.rig_state import RigWord, rig_state
 
 DOOR = Reason(code=RefusalCode.INTERLOCK_OPEN, text="door: the interlock is open", remedy="close the door")
+BUSY = Reason(code=RefusalCode.BUSY, text="a run is under way", remedy="wait for its end, or stop it")
 PLAN = RunPlan(name="spray", shots=266, rate_hz=2.0, pulse=PulsePair(current_a={"view1": 5.0}))
 
 
@@ -31,6 +32,7 @@ def test_only_a_rig_at_rest_without_a_reason_is_ready(state: RunState) -> None:
 
 def test_the_text_says_what_belongs_to_the_state() -> None:
     assert rig_state(RunStatus(), (DOOR,)).text == "NOT READY: door: the interlock is open"
+    assert rig_state(RunStatus(), (BUSY, DOOR)).text == "ENDED: the rig is being looked at"
     assert rig_state(RunStatus(), None).text == "NOT READY: nobody has looked at the rig for seconds"
     assert rig_state(acquiring(12), (), 127.4).text == "ACQUIRING 12/266, 2:07 left"
     assert rig_state(acquiring(12), (), 3600.0 + 61).text == "ACQUIRING 12/266, 1:01:01 left"
