@@ -303,7 +303,9 @@ def test_a_run_is_changed_and_deleted_by_nobody_while_somebody_else_holds_contro
     server.http.put("/api/rig/control", headers={"Tomoshadow-Operator": "ann@lab"}).raise_for_status()
     for button in buttons:
         expect(button).to_be_disabled()
-        expect(button).to_have_attribute("title", "ann@lab holds control of this rig: the hand in the bar takes it over")
+        expect(button).to_have_attribute(
+            "title", "ann@lab holds control of this rig: the hand in the bar takes it over"
+        )
     server.free_control()
     for button in buttons:
         expect(button).to_be_enabled()
