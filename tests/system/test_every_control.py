@@ -137,9 +137,11 @@ TABLES: dict[str, tuple[Touch, ...]] = {
         press("Stop", status("rig state", "READY")),
     ),
     "/results/RUN": (
-        *fields("combobox", "Run", "Result set", "Slices by", "Method", "Accuracy", "Voxels"),
+        *fields("combobox", "Run", "Result set", "Slices, region by", "Method", "Accuracy", "Voxels"),
         *(Touch("slider", name) for name in ("shot", "slice x", "slice y", "slice z", "iso level")),
-        *(pressed(name) for name in ("B", "both", "A", "maxima", "slices")),
+        *(pressed(name) for name in ("B", "both", "A", "maxima", "region")),
+        *fields("spinbutton", "Region ± / mm"),
+        pressed("slices"),
         press("see the whole volume", lambda page: page.get_by_role("img", name="iso-surface").locator("canvas")),
         press("Download", lambda page: page.locator(".q-menu a").first),
         *(Touch("link", f"Volume {exposure} for ParaView (VTKHDF)") for exposure in "AB"),

@@ -178,6 +178,19 @@ def test_a_slice_comes_as_a_picture_of_every_voxel(looking: Looking, axis: str, 
     assert shown.content == plane_png(plane.T if axis == "x" else plane, 0.25, Colours.RED)
 
 
+@pytest.mark.parametrize(("axis", "number"), [("x", 2), ("y", 1), ("z", 0)])
+def test_a_region_is_seen_along_an_axis_by_another_method_too(looking: Looking, axis: str, number: int) -> None:
+    where = {"x_mm": "-0.5:0.25", "y_mm": "0.3:0.9", "z_mm": "-1.0:0.5"}
+    answer = looking.ask("region.png", axis=axis, colours="blue", limit=0.25, **where)
+    assert answer.status_code == 200, answer.text
+    region = looking.ask("region.f32", **where)
+    shape = tuple(map(int, region.headers["tomoshadow-shape"].split(",")))
+    plane = np.frombuffer(region.content, "<f4").reshape(shape).max(number)
+    assert answer.content == plane_png(plane.T if axis == "x" else plane, 0.25, Colours.BLUE)
+    other = looking.ask("region.png", axis=axis, method="minlos", **where)
+    assert (other.status_code, other.headers["tomoshadow-method"]) == (200, "minlos")
+
+
 @pytest.mark.parametrize(
     ("what", "query", "status", "told"),
     [
@@ -192,6 +205,7 @@ def test_a_slice_comes_as_a_picture_of_every_voxel(looking: Looking, axis: str, 
         ("region.f32", {"x_mm": "0.5:-0.5"}, 422, "x from 0.5 to -0.5 mm: no voxel there"),
         ("region.f32", {"x_mm": "0.01:0.02"}, 422, "x from 0.01 to 0.02 mm: no voxel there"),
         ("region.f32", {"x_mm": "1:2:3"}, 422, "x_mm"),
+        ("region.png", {"axis": "z", "z_mm": "5:6"}, 422, "z from 5 to 6 mm: no voxel there"),
     ],
 )
 def test_what_makes_no_sense_is_refused_in_a_sentence(

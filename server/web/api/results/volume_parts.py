@@ -29,28 +29,50 @@ LineOfSight = Annotated[
 Range = Annotated[
     str | None, Query(pattern=_RANGE, description="from:to in mm, or one place for the nearest plane; default: all")
 ]
+Axis = Annotated[Literal["x", "y", "z"], Query(description="of the world, across which the picture lies")]
+Limit = Annotated[float | None, Query(gt=0, le=1e6, description="intensity of the brightest colour")]
+_PICTURE = {**_PROBLEMS, 200: {"content": {"image/png": {}}}}
 
 
-@router.get("/slice.png", response_class=Response, responses={**_PROBLEMS, 200: {"content": {"image/png": {}}}})
+@router.get("/slice.png", response_class=Response, responses=_PICTURE)
 def show_full_slice(
     run_id: RunId,
     results_id: ResultsId,
     volume: VolumeName,
     context: ContextOf,
-    axis: Annotated[Literal["x", "y", "z"], Query(description="of the world, across which the slice lies")],
+    axis: Axis,
     at_mm: Annotated[float, Query(ge=-1e6, le=1e6, description="where; the nearest plane is shown")],
     method: LineOfSight = None,
     colours: ColoursOf = Colours.HEAT,
-    limit: Annotated[float | None, Query(gt=0, le=1e6, description="intensity of the brightest colour")] = None,
+    limit: Limit = None,
 ) -> Response:
     """A slice of the volume, coloured as its preview; by another method, up to the brightest voxel of the slice."""
     part = _part(context, run_id, results_id, volume, {axis: (at_mm, at_mm)}, method)
-    plane = part.voxels.squeeze("zyx".index(axis))
     file = volume_file(context.runs.directory(run_id), results_id, volume)
-    brightest = limit or (preview_of(file).limit if method is None else float(plane.max()))
-    png = plane_png(plane.T if axis == "x" else plane, brightest, colours)
-    name = _named(f"{run_id}_{results_id}_{volume}_{part.method.value}_{axis}_{at_mm:.3f}_mm.png")
-    return Response(png, media_type="image/png", headers={**_place(part), **name})
+    brightest = limit or (preview_of(file).limit if method is None else float(part.voxels.max()))
+    name = f"{run_id}_{results_id}_{volume}_{part.method.value}_{axis}_{at_mm:.3f}_mm.png"
+    return _picture(part, axis, brightest, colours, name)
+
+
+@router.get("/region.png", response_class=Response, responses=_PICTURE)
+def show_region_maximum(
+    run_id: RunId,
+    results_id: ResultsId,
+    volume: VolumeName,
+    context: ContextOf,
+    axis: Axis,
+    x_mm: Range = None,
+    y_mm: Range = None,
+    z_mm: Range = None,
+    method: LineOfSight = None,
+    colours: ColoursOf = Colours.HEAT,
+    limit: Limit = None,
+) -> Response:
+    """The largest values of a region along an axis, coloured up to the brightest one of them."""
+    ranges_mm = {"x": _span(x_mm), "y": _span(y_mm), "z": _span(z_mm)}
+    part = _part(context, run_id, results_id, volume, ranges_mm, method)
+    name = f"{run_id}_{results_id}_{volume}_{part.method.value}_region_{axis}.png"
+    return _picture(part, axis, limit or float(part.voxels.max()), colours, name)
 
 
 @router.get(
@@ -90,6 +112,12 @@ def _part(
 ) -> VolumePart:
     file = volume_file(context.runs.directory(run_id), results_id, volume)
     return part_of(context.parts, file, context.calibrations, ranges_mm, method)
+
+
+def _picture(part: VolumePart, axis: str, brightest: float, colours: Colours, name: str) -> Response:
+    plane = part.voxels.max("zyx".index(axis))
+    png = plane_png(plane.T if axis == "x" else plane, brightest, colours)
+    return Response(png, media_type="image/png", headers={**_place(part), **_named(name)})
 
 
 def _span(text: str | None) -> tuple[float, float] | None:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from daq.errors import DaqError
 from processing.reconstruction.choices import ReconstructionMethod
+from processing.reconstruction.volume_part import RangesMm
 from server.lab.errors import ServerError
 from server.lab.results import part_of, preview_of, volume_file
 from server.lab.services import Context
@@ -71,18 +72,15 @@ def see(context: Context, looked: LookedAt, names: dict[str, str]) -> list[SeenE
 
 
 def try_full(
-    context: Context, seen: Sequence[SeenExposure], at_mm: dict[str, float], method: ReconstructionMethod | None
+    context: Context, seen: Sequence[SeenExposure], parts_mm: Sequence[RangesMm], method: ReconstructionMethod | None
 ) -> FullSlices:
-    """Make the slices of a place once, so that those that are asked for next are there at once; or say why not."""
+    """Make parts once, so that those that are asked for next are there at once; or say why not."""
     limits = {one.frame: one.preview.limit for one in seen}
     try:
         for one in seen:
-            planes = [
-                part_of(context.parts, one.file, context.calibrations, {axis: (at_mm[axis], at_mm[axis])}, method)
-                for axis in AXES
-            ]
+            parts = [part_of(context.parts, one.file, context.calibrations, part_mm, method) for part_mm in parts_mm]
             if method is not None:
-                limits[one.frame] = max(float(part.voxels.max()) for part in planes) or 1.0
+                limits[one.frame] = max(float(part.voxels.max()) for part in parts) or 1.0
     except (DaqError, ServerError) as error:
         return FullSlices(method, limits, str(error))
     return FullSlices(method, limits)

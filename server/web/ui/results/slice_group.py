@@ -1,12 +1,17 @@
-"""SliceGroup: three slices through one place, each with its slider; a click in one moves the two others."""
+"""SliceGroup: three slices through one place, each with its slider; a click in one moves the two others.
+
+In their place it shows the largest values of a cube around that place, or of all, along each axis.
+"""
 
 from collections.abc import Callable, Sequence
+from enum import StrEnum
 from urllib.parse import urlencode
 
 import numpy as np
 from nicegui import ui
 from numpy.typing import NDArray
 
+from processing.reconstruction.volume_part import RangesMm, part_within
 from processing.volume import VoxelGrid
 from server.pictures.pictures import Colours
 from server.web.ui.results.seen_exposure import AXES, SHADES, FullSlices, SeenExposure
@@ -17,6 +22,14 @@ _REST_S = 0.2
 _MOST_DOTS = 300
 Dots = dict[str, NDArray[np.float64]]
 """Points x, y, z in mm, (N, 3), by exposure."""
+
+
+class Shown(StrEnum):
+    """What the pictures show."""
+
+    SLICES = "slices"
+    REGION = "region"
+    MAXIMA = "maxima"
 
 
 class FreeSlider(ui.slider):
@@ -35,7 +48,8 @@ class SliceGroup:
         self._at: dict[str, int] = dict.fromkeys(AXES, 0)
         self._rested: dict[str, int] = {}
         self._dots: Dots = {}
-        self._are_maxima = False
+        self._shown = Shown.SLICES
+        self._reach_mm = 1.0
         self._views: dict[str, SliceView] = {}
         self._labels: dict[str, ui.label] = {}
         self._sliders: dict[str, FreeSlider] = {}
@@ -72,10 +86,22 @@ class SliceGroup:
         self._full = full
         self._settle()
 
-    def show_maxima(self, are_maxima: bool) -> None:
-        """Show maxima along each axis, or slices."""
-        self._are_maxima = are_maxima
+    @property
+    def parts_mm(self) -> list[RangesMm]:
+        """What is wanted at full resolution: three planes, or a region."""
+        at_mm = self.at_mm
+        if self._shown is Shown.REGION:
+            return [self._region_mm()]
+        return [{axis: (at_mm[axis], at_mm[axis])} for axis in AXES]
+
+    def choose(self, shown: Shown, reach_mm: float) -> None:
+        """Show slices, maxima of the cube that reaches so far around the cross-hair, or of all."""
+        self._shown, self._reach_mm, self._full = shown, reach_mm, None
         self._draw()
+
+    def _region_mm(self) -> dict[str, tuple[float, float]]:
+        at_mm = self.at_mm
+        return {axis: (at_mm[axis] - self._reach_mm, at_mm[axis] + self._reach_mm) for axis in AXES}
 
     def mark(self, dots: Dots) -> None:
         """Show droplets."""
@@ -116,37 +142,50 @@ class SliceGroup:
             return
         at_mm = self.at_mm
         for axis in AXES:
-            self._labels[axis].set_text(
-                f"maximum along {axis}" if self._are_maxima else f"{axis} = {at_mm[axis]:.3f} mm"
-            )
+            self._labels[axis].set_text(self._place_text(axis, at_mm[axis]))
             self._views[axis].point_out(at_mm, self._dots_near(axis, at_mm[axis]))
             self._views[axis].show([self._layer(axis, one) for one in self._seen])
         if self._rested != self._at:
             self._rest.activate()
 
+    def _place_text(self, axis: str, place_mm: float) -> str:
+        if self._shown is Shown.REGION:
+            return f"maximum along {axis}, {place_mm - self._reach_mm:.3f} to {place_mm + self._reach_mm:.3f} mm"
+        return f"maximum along {axis}" if self._shown is Shown.MAXIMA else f"{axis} = {place_mm:.3f} mm"
+
     def _layer(self, axis: str, one: SeenExposure) -> Layer:
         colours = Colours.HEAT if len(self._seen) == 1 else SHADES[one.frame]
         preview, full_grid = one.preview.grid, one.preview.full_grid
         shade = f"?colours={colours.value}"
-        if self._are_maxima:
+        if self._shown is Shown.MAXIMA:
             address = f"{one.folder}/projections/{axis}.png{shade}"
         else:
             number = int(np.abs(getattr(preview, f"{axis}_mm") - self.at_mm[axis]).argmin())
             address = f"{one.folder}/slices/{axis}/{number}.png{shade}"
-        full = "" if self._are_maxima else self._full_address(axis, one, colours)
+        full = self._full_address(axis, one, colours)
+        if full and self._shown is Shown.REGION:
+            full_grid = part_within(full_grid, self._region_mm()).grid(full_grid)
         return Layer(one.folder, address, spans_of(preview, axis), full, spans_of(full_grid, axis))
 
     def _full_address(self, axis: str, one: SeenExposure, colours: Colours) -> str:
-        if self._full is None or self._full.problem or self._rested.get(axis) != self._at[axis]:
+        is_region = self._shown is Shown.REGION
+        is_at_rest = self._rested == self._at if is_region else self._rested.get(axis) == self._at[axis]
+        if self._shown is Shown.MAXIMA or self._full is None or self._full.problem or not is_at_rest:
             return ""
-        asked = {"axis": axis, "at_mm": repr(self.at_mm[axis]), "colours": colours.value}
+        asked = {"axis": axis, "colours": colours.value}
+        if is_region:
+            asked |= {f"{name}_mm": f"{low:.6f}:{high:.6f}" for name, (low, high) in self._region_mm().items()}
+            asked["limit"] = repr(self._full.limits[one.frame])
+        else:
+            asked["at_mm"] = repr(self.at_mm[axis])
         if self._full.method is not None:
             asked |= {"method": self._full.method.value, "limit": repr(self._full.limits[one.frame])}
-        return f"{one.folder}/slice.png?{urlencode(asked)}"
+        return f"{one.folder}/{'region' if is_region else 'slice'}.png?{urlencode(asked)}"
 
     def _dots_near(self, axis: str, place_mm: float) -> list[tuple[float, float, float, str]]:
-        """Droplets that a slice shows: those within one voxel of the preview; of maxima, all."""
-        reach_mm = np.inf if self._are_maxima else self._seen[0].preview.grid.pitch_mm
+        """Droplets that a slice shows: those within one voxel of the preview; of a region its own; of maxima, all."""
+        pitch_mm = self._seen[0].preview.grid.pitch_mm
+        reach_mm = {Shown.SLICES: pitch_mm, Shown.REGION: self._reach_mm, Shown.MAXIMA: np.inf}[self._shown]
         found: list[tuple[float, float, float, str]] = []
         for frame, points_mm in self._dots.items():
             near = points_mm[np.abs(points_mm[:, "xyz".index(axis)] - place_mm) <= reach_mm]

@@ -10,13 +10,13 @@ from server.lab.services import Context
 from server.web.ui.results.colour_bar import ColourBar
 from server.web.ui.results.looked_at import LookedAt
 from server.web.ui.results.seen_exposure import FullSlices, SeenExposure, see, try_full
-from server.web.ui.results.slice_group import Dots, SliceGroup
+from server.web.ui.results.slice_group import Dots, Shown, SliceGroup
 from server.web.ui.results.surface_view import SurfaceView
 from server.web.ui.theme import panel
 
 _BOTH, _OWN = "both", "own"
 _EXPOSURES = {"a": "A", "b": "B", _BOTH: "both"}
-_PICTURES = {"slices": "slices", "maxima": "maxima"}
+_PICTURES = {one.value: one.value for one in Shown}
 
 
 class VolumeView:
@@ -29,6 +29,7 @@ class VolumeView:
         self._method: ReconstructionMethod | None = None
         self._dots: Dots = {}
         self._seen: list[SeenExposure] = []
+        self._asked = object()
         self._panel = panel("Volume")
         self._panel.set_visibility(False)
         self._is_built = False
@@ -42,7 +43,11 @@ class VolumeView:
                 self._exposures.props('dense no-caps unelevated aria-label="exposures"')
                 self._pictures = ui.toggle(_PICTURES, value="slices", on_change=self._choose_pictures)
                 self._pictures.props('dense no-caps unelevated aria-label="kind of picture"')
-                self._by = ui.select({_OWN: "as made"}, value=_OWN, label="Slices by", on_change=self._sharpen)
+                self._reach = ui.number("Region ± / mm", value=1, min=0.05, step=0.5, on_change=self._choose_pictures)
+                self._reach.props("dense outlined").classes("region-reach").bind_visibility_from(
+                    self._pictures, "value", value=Shown.REGION.value
+                )
+                self._by = ui.select({_OWN: "as made"}, value=_OWN, label="Slices, region by", on_change=self._sharpen)
                 self._by.props("dense outlined options-dense").classes("by-method")
                 self._with_droplets = ui.switch("droplets", value=True, on_change=self._mark).props("dense")
                 self._state = ui.label("").classes("view-state").props('role=status aria-label="resolution"')
@@ -104,20 +109,30 @@ class VolumeView:
             await self._sharpen()
 
     async def _sharpen(self) -> None:
-        """Ask whether there are slices at full resolution by the method that is wanted."""
+        """Ask whether slices, or the region, are to be had at full resolution by the method that is wanted."""
         if not (seen := self._seen):
             return
         method = None if self._by.value == _OWN else ReconstructionMethod(self._by.value)
         self._bars.show(seen, None)
         self._state.set_text("preview, full resolution is being made")
-        full = await asyncio.to_thread(try_full, self._context, seen, self._slices.at_mm, method)
-        if seen is self._seen:
+        asked = self._asked = object()
+        full = await asyncio.to_thread(self._try_full, seen, method)
+        if asked is self._asked:
             self._slices.sharpen(full)
             self._bars.show(seen, full)
             self._state.set_text(state_text(full, self._method))
 
-    def _choose_pictures(self) -> None:
-        self._slices.show_maxima(self._pictures.value == "maxima")
+    def _try_full(self, seen: list[SeenExposure], method: ReconstructionMethod | None) -> FullSlices:
+        if self._pictures.value == Shown.MAXIMA:
+            return FullSlices(
+                method, {}, "these are the largest values of all of the volume; region has those of a part"
+            )
+        return try_full(self._context, seen, self._slices.parts_mm, method)
+
+    async def _choose_pictures(self) -> None:
+        if self._reach.value:
+            self._slices.choose(Shown(self._pictures.value), self._reach.value)
+            await self._sharpen()
 
     def _mark(self) -> None:
         chosen = self._exposures.value
@@ -128,7 +143,7 @@ class VolumeView:
 
 
 def state_text(full: FullSlices, made_by: ReconstructionMethod | None) -> str:
-    """What the slices show: by which method, how finely, and why not otherwise."""
+    """What slices or region show: by which method, how finely, and why not otherwise."""
     own = made_by.value.upper() if made_by else "as made"
     if full.problem:
         return f"{own}, preview only: {full.problem}"
