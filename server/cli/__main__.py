@@ -2,6 +2,6 @@
 
 import sys
 
-from server.cli.main import main
+from server.cli.main import program
 
-sys.exit(main())
+sys.exit(program())

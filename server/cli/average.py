@@ -1,7 +1,6 @@
 """``tomoshadow average``: the mean of stored volumes, or of a run whose volumes need not be stored."""
 
 import json
-import os
 from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -52,7 +51,6 @@ def add(verbs: Verbs) -> None:
 
 def average(options: Namespace) -> Outcome:
     """Average what there is: volumes, or shots with a calibration."""
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy is loaded: its threads wait for each other
     from processing.runs.overwriting import require_free
 
     require_free(options.out, picture_beside(options.out), overwrite=options.overwrite)

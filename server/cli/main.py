@@ -4,6 +4,7 @@ Exit status: 0 done, 1 failed (also a result that says ``passed: false``), 2 bad
 """
 
 import json
+import os
 import re
 import sys
 from argparse import ArgumentParser, Namespace
@@ -70,7 +71,18 @@ COMMANDS = (
 )
 """In the order of the help. Each adds its own parser; what is heavy is imported when it runs, so that help is quick."""
 
+BLAS_THREADS = "OPENBLAS_NUM_THREADS"
+"""Says how many threads numpy multiplies matrices by; it looks as it is loaded."""
 _NEGATIVE = re.compile(r"-\.?\d")
+
+
+def program() -> int:
+    """Run the command of this process, and all that it starts, with one BLAS thread unless somebody chose otherwise.
+
+    Matrices are small here: more threads wait for each other for longer than they work.
+    """
+    os.environ.setdefault(BLAS_THREADS, "1")
+    return main()
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

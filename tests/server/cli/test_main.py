@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from processing.errors import BadInput
-from server.cli.main import COMMANDS, main
+from server.cli.main import BLAS_THREADS, COMMANDS, main
 from tests.support.command_line import refused
 from tests.support.fresh_interpreter import modules_after, packages_of
 
@@ -60,6 +60,35 @@ for words in {WORDS}:
     modules = modules_after(code)
     assert {command.__name__ for command in COMMANDS} <= modules
     assert not packages_of(modules) & HEAVY
+
+
+@pytest.mark.parametrize(("chosen", "threads"), [(None, "1"), ("3", "3")])
+def test_a_program_multiplies_matrices_by_one_thread_unless_somebody_chose_otherwise(
+    chosen: str | None, threads: str
+) -> None:
+    code = f"""
+import os, sys
+from contextlib import suppress
+from server.cli.main import program
+sys.argv = ["tomoshadow", "--help"]
+with suppress(SystemExit):
+    program()
+assert "numpy" not in sys.modules
+print(os.environ["{BLAS_THREADS}"])
+"""
+    others = {name: value for name, value in os.environ.items() if name != BLAS_THREADS}
+    environment = others | ({BLAS_THREADS: chosen} if chosen else {})
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, timeout=60)
+    assert done.stdout.splitlines()[-1:] == [threads], done.stderr
+
+
+def test_a_command_leaves_the_environment_of_its_caller_alone(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv(BLAS_THREADS, raising=False)
+    before = dict(os.environ)
+    refused(capsys, "average", tmp_path, "-o", tmp_path / "mean.h5")
+    assert dict(os.environ) == before
 
 
 def test_every_command_has_help(capsys: pytest.CaptureFixture[str]) -> None:
