@@ -20,7 +20,6 @@ from processing.analysis.droplets.shadows.shadow_shot import measure_shadows
 from processing.analysis.droplets.size_correction import SizeCorrection, SizeRows
 from processing.calibration.calibration import Calibration
 from processing.calibration.calibration_file import load_calibration
-from processing.calibration.droplets.disparity import MIN_VIEWS
 from processing.calibration.droplets.droplet_images import find_droplets
 from processing.kernels import DEFAULT_THREADS
 from processing.preprocessing import Intensity, Polarity
@@ -287,5 +286,5 @@ class RunMeasurement:
             return ()
         views = {name: self.calibration.views[name] for name in shot.views}
         seen = [find_droplets(np.clip(light, 0, None)) for light in lights]
-        told = depth_reversed(replace(self.calibration, views=views), [seen]) if len(views) >= MIN_VIEWS else ""
+        told = depth_reversed(replace(self.calibration, views=views), [seen])
         return (told,) if told else ()

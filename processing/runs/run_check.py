@@ -23,7 +23,7 @@ from processing.runs.errors import PipelineError
 from processing.runs.manifest.importing import CALIBRATION_FOLDER, RUN_FOLDER
 from processing.runs.results_file import FrameName
 from processing.runs.shots.agreeing_shots import corrected_by
-from processing.runs.shots.shot_check import Exposure, ShotCheck, check_exposures
+from processing.runs.shots.shot_check import Exposure, ShotCheck, check_shots
 from processing.runs.shots.shot_images import shot_intensities
 from processing.runs.workbench import Workbench
 
@@ -42,8 +42,8 @@ def check_shot(run_dir: Path, shot: int, calibration: Calibration, workbench: Wo
     PipelineError
         An exposure is missing.
     """
-    (exposures,) = _droplets(run_dir, [shot], calibration, workbench=workbench)
-    return check_exposures(shot, exposures, calibration)
+    (check,) = check_shots(_droplets(run_dir, [shot], calibration, workbench=workbench), calibration)
+    return check
 
 
 def check_few(
@@ -64,8 +64,7 @@ def check_few(
         calibration.require_usable(run.header.views)
         seen = replace(calibration, views={name: calibration.views[name] for name in run.header.views})
     few = list(dict.fromkeys((shots[0], shots[len(shots) // 2], shots[-1])))
-    found = _droplets(run_dir, few, seen, workbench=workbench)
-    return [check_exposures(shot, exposures, seen) for shot, exposures in zip(few, found, strict=True)]
+    return check_shots(_droplets(run_dir, few, seen, workbench=workbench), seen)
 
 
 def run_beside(calibration_set: Path) -> Path | None:
@@ -81,7 +80,7 @@ def checked_by_run(calibration: Calibration, run_dir: Path) -> Calibration:
     A run that does not tell, as it has few droplets or other views, is noted.
     """
     try:
-        checks = [check_shot(run_dir, shot, calibration) for shot in _first_shots(run_dir)]
+        checks = check_shots(_droplets(run_dir, _first_shots(run_dir), calibration), calibration)
     except CalibrationError as error:
         return _noted(calibration, run_dir, str(error))
     doubts = [_doubt(run_dir.name, check, check.verdict) for check in checks if check.verdict]
@@ -128,8 +127,7 @@ def self_calibrate_run(
     PipelineError
         An exposure is missing.
     """
-    by_shot = zip(shots, _droplets(run_dir, shots, calibration, counted), strict=True)
-    return corrected_by(dict(by_shot), calibration, run_dir.name)
+    return corrected_by(_droplets(run_dir, shots, calibration, counted), calibration, run_dir.name)
 
 
 def _droplets(
@@ -138,13 +136,14 @@ def _droplets(
     calibration: Calibration,
     counted: Counted = in_silence,
     workbench: Workbench | None = None,
-) -> list[list[Exposure]]:
+) -> dict[int, list[Exposure]]:
     """Droplets by shot, exposure and view, in the order of the views of the calibration."""
     calibration.require_world()
     settings = ReconstructionSettings()
     with (workbench or Workbench()).occupied() as bench, RunReader(run_dir) as run:
         _check_views(run, calibration)
-        found, references = [], bench.references(run)
+        found: dict[int, list[Exposure]] = {}
+        references = bench.references(run)
         for index in counted(shots, lambda index: f"droplets of shot {index}"):
             shot = run.read_shot(index)
             if not shot.valid:
@@ -154,7 +153,7 @@ def _droplets(
                 seen = shot_intensities(run, shot, frame, settings, references=references)
                 images = dict(zip(shot.views, seen, strict=True))
                 exposures.append([find_droplets(images[name]) for name in calibration.views])
-            found.append(exposures)
+            found[index] = exposures
     return found
 
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from processing.calibration.calibration import Calibration, Model
 from processing.geometry import FloatArray, PinholeCamera, ViewMapping
+from processing.runs.shots.shot_check import Exposure, ShotCheck, check_shots
 from processing.studies.seen_droplets import droplet_calibration, droplet_views, seen_droplets
 from processing.studies.simulated_droplets import AZIMUTHS_DEG
 
@@ -37,3 +38,9 @@ def calibration_of(mappings: Sequence[ViewMapping], model: Model = Model.PINHOLE
 def inside_mm(count: int = 300) -> FloatArray:
     """Points all over the measured volume."""
     return np.random.default_rng(3).uniform(-HALF_MM, HALF_MM, (count, 3))
+
+
+def check_one(exposures: Sequence[Exposure], calibration: Calibration) -> ShotCheck:
+    """What a shot by itself says."""
+    (check,) = check_shots({0: exposures}, calibration)
+    return check

@@ -9,13 +9,12 @@ from processing.calibration.verdict import Verdict
 from processing.runs.shots.shot_check import (
     Exposure,
     ShotCheck,
-    check_exposures,
+    check_places,
+    exposures_in_turn,
     require_droplets,
 )
 from processing.runs.shots.turned_views import depth_reversed
 
-DEPTH_EXPOSURES = 6
-"""Exposures by which it is asked whether depth is reversed."""
 ASKED_AGAIN = 10
 """Shots, up to twice as many, that must agree with the correction, each by itself."""
 
@@ -30,7 +29,7 @@ def corrected_by(by_shot: Mapping[int, Sequence[Exposure]], calibration: Calibra
     """
     exposures = [exposure for of_shot in by_shot.values() for exposure in of_shot]
     require_droplets(calibration, exposures)
-    if problem := depth_reversed(calibration, exposures[:DEPTH_EXPOSURES]):
+    if problem := depth_reversed(calibration, exposures_in_turn(by_shot)):
         raise CalibrationError(f"run {run}: {problem}. No view has moved: put images or calibration right")
     found = self_calibrate(calibration, exposures, run)
     _require_agreement(by_shot, found.calibration, run)
@@ -39,7 +38,7 @@ def corrected_by(by_shot: Mapping[int, Sequence[Exposure]], calibration: Calibra
 
 def _require_agreement(by_shot: Mapping[int, Sequence[Exposure]], corrected: Calibration, run: str) -> None:
     asked = list(by_shot)[:: max(1, len(by_shot) // ASKED_AGAIN)]
-    checks = [check_exposures(shot, by_shot[shot], corrected) for shot in asked]
+    checks = [check_places(shot, by_shot[shot], corrected) for shot in asked]
     if against := [check for check in checks if check.verdict in (Verdict.WARN, Verdict.REFUSE)]:
         raise CalibrationError(
             f"run {run}: {len(against)} of {len(checks)} shots that were asked by themselves speak against what all "

@@ -1,8 +1,9 @@
 """What the droplets of one shot say of a calibration: how far each view is from where the others put them."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from itertools import chain, zip_longest
 from typing import Any
 
 from processing.calibration.calibration import Calibration
@@ -101,14 +102,27 @@ class ShotCheck:
         return max(view.certain_px for view in self.views.values())
 
 
-def check_exposures(shot: int, exposures: Sequence[Exposure], calibration: Calibration) -> ShotCheck:
-    """Measure the disparity of every view by the droplets (N, 2) of each exposure and view; ``shot`` is its index.
+def check_shots(by_shot: Mapping[int, Sequence[Exposure]], calibration: Calibration) -> list[ShotCheck]:
+    """Measure the disparity of every view by the droplets (N, 2) of each exposure and view, for some shots of a run.
+
+    Whether depth is reversed is asked once, of all shots together; if it is, none of them tells anything else.
+    """
+    if problem := depth_reversed(calibration, exposures_in_turn(by_shot)):
+        return [ShotCheck(shot, {}, problem, tuple(calibration.views)) for shot in by_shot]
+    return [check_places(shot, exposures, calibration) for shot, exposures in by_shot.items()]
+
+
+def exposures_in_turn(by_shot: Mapping[int, Sequence[Exposure]]) -> list[Exposure]:
+    """Exposure A of every shot, then B of every shot."""
+    return [one for one in chain.from_iterable(zip_longest(*by_shot.values())) if one is not None]
+
+
+def check_places(shot: int, exposures: Sequence[Exposure], calibration: Calibration) -> ShotCheck:
+    """Measure the disparity of every view in one shot, where depth is known not to be reversed.
 
     Droplets of all exposures tell together; where one exposure alone speaks against the calibration, that counts.
     """
     together = _checked(shot, exposures, calibration)
-    if len(calibration.views) >= MIN_VIEWS and (problem := depth_reversed(calibration, exposures)):
-        return ShotCheck(shot, {}, problem, tuple(calibration.views))
     if len(exposures) == 1 or together.verdict is Verdict.REFUSE:
         return together
     alone = (_checked(shot, [one], calibration, STOP_PX) for one in exposures)

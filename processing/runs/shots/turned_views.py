@@ -5,13 +5,13 @@ disparity of a view hardly shows it. How many lines of sight meet closely does, 
 zoomed never makes more of them meet in a reversed world.
 """
 
-from collections.abc import Iterator, Sequence
-from itertools import combinations
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import accumulate, combinations
 
 import numpy as np
 
 from processing.calibration.calibration import Calibration
-from processing.calibration.droplets.disparity import measured_box
+from processing.calibration.droplets.disparity import MIN_VIEWS, measured_box
 from processing.calibration.droplets.droplet_matching import match_exposures
 from processing.calibration.triangulation import triangulate
 from processing.geometry import FloatArray
@@ -19,6 +19,8 @@ from processing.volume import VoxelGrid
 
 SEEDS = 300
 """Droplets of an exposure that are followed."""
+ENOUGH = 600
+"""Droplets of all exposures together, of the view that sees fewest: more exposures are not asked."""
 CLOSE_PX = 0.25
 """Root mean square, over views, of how far lines of sight may pass a droplet that they are said to meet at."""
 _ASKED = 200
@@ -29,12 +31,16 @@ SURE = 5.0
 Exposures = Sequence[list[FloatArray]]
 
 
-def depth_reversed(calibration: Calibration, exposures: Exposures) -> str:
-    """What was mistaken for all views at once, so that near looks far; empty where droplets do not say so for sure."""
-    if not all(len(droplets) for seen in exposures for droplets in seen):
+def depth_reversed(calibration: Calibration, exposures: Iterable[list[FloatArray]]) -> str:
+    """What was mistaken for all views at once, so that near looks far; empty where droplets do not say so for sure.
+
+    The cameras of a run are mounted once: exposures of all its shots tell together, the first ones that are enough.
+    """
+    asked = _enough(exposures)
+    if not asked or len(calibration.views) < MIN_VIEWS:
         return ""
-    met = _met(calibration, exposures)
-    found = {what: _met(calibration, seen) for what, seen in turned(calibration, exposures)}
+    met = _met(calibration, asked)
+    found = {what: _met(calibration, seen) for what, seen in turned(calibration, asked)}
     sure = {what: count for what, count in found.items() if count - met > SURE * np.sqrt(count + met)}
     if not sure:
         return ""
@@ -42,6 +48,13 @@ def depth_reversed(calibration: Calibration, exposures: Exposures) -> str:
         f"all views agree on {met} droplets within {CLOSE_PX:g} px, and on {max(sure.values())} if "
         f"{', or '.join(sure)}: depth is reversed"
     )
+
+
+def _enough(exposures: Iterable[list[FloatArray]]) -> Exposures:
+    """The first exposures in which all views see droplets, until these are enough."""
+    seen = [exposure for exposure in exposures if all(map(len, exposure))]
+    before = accumulate((min(SEEDS, *map(len, exposure)) for exposure in seen), initial=0)
+    return [exposure for exposure, count in zip(seen, before, strict=False) if count < ENOUGH]
 
 
 def reversed_shows_px(calibration: Calibration, grid: VoxelGrid) -> float:

@@ -8,11 +8,12 @@ import pytest
 from processing.calibration.droplets.disparity import ViewDisparity, measured_box, shot_disparity
 from processing.calibration.verdict import Verdict
 from processing.geometry import FloatArray, PinholeCamera
-from processing.runs.shots.shot_check import ALARM_PX, FEW_SEEDS, ShotCheck, check_exposures
+from processing.runs.shots.shot_check import ALARM_PX, FEW_SEEDS, ShotCheck, check_shots
+from processing.runs.shots.turned_views import depth_reversed
 from processing.studies.drifting_views import direction
 from processing.studies.seen_droplets import droplet_calibration
 from processing.studies.simulated_droplets import study_cameras
-from tests.support.drifting_views import SIZE_PX, calibration_of, droplet_shots, inside_mm, views
+from tests.support.drifting_views import SIZE_PX, calibration_of, check_one, droplet_shots, inside_mm, views
 
 pytestmark = pytest.mark.slow
 
@@ -27,7 +28,7 @@ def checked(drifts_px: dict[int, tuple[float, float]], count: int = 120) -> Shot
     for view, mapping in enumerate(MAPPINGS):
         image_px = mapping.project(inside_mm(count)) + drifts_px.get(view, (0.0, 0.0))
         seen.append(image_px + rng.normal(0, 0.05, image_px.shape))
-    return check_exposures(0, [seen], CALIBRATION)
+    return check_one([seen], CALIBRATION)
 
 
 def photographed(density_per_mm3: float, view: int = 0, drift_px: float = 0.0) -> ShotCheck:
@@ -35,7 +36,7 @@ def photographed(density_per_mm3: float, view: int = 0, drift_px: float = 0.0) -
     exposures = [list(seen) for seen in droplet_shots(2, density_per_mm3)]
     for seen in exposures:
         seen[view] = seen[view] + drift_px * direction(view)
-    return check_exposures(0, exposures, CALIBRATION)
+    return check_one(exposures, CALIBRATION)
 
 
 @pytest.mark.parametrize("drift_px", [(0.45, 0.0), (0.0, -0.45), (1.5, 1.0)])
@@ -54,7 +55,7 @@ def test_few_droplets_are_enough_where_they_agree_beyond_doubt(drift_px: float, 
         seen[0] += drift_px * direction(0)
     assert all(len(seen) > FEW_SEEDS for one in exposures for seen in one)
     by_all = shot_disparity(MAPPINGS, exposures, measured_box(CALIBRATION))
-    told = check_exposures(0, exposures, CALIBRATION)
+    told = check_one(exposures, CALIBRATION)
     assert (tuple(told.views.values()) != by_all) == enough
     assert (told.worst_px < ALARM_PX) == (max(view.disparity_px for view in by_all) < ALARM_PX) == enough
 
@@ -65,7 +66,7 @@ def test_an_exposure_that_shows_other_droplets_is_not_hidden_by_the_other_one(ex
     """A camera that lost a frame: in one view exposure B is that of the shot before."""
     exposures = [list(seen) for seen in droplet_shots(3, 7.0)]
     exposures[exposure][view] = exposures[2][view]
-    check = check_exposures(0, exposures[:2], CALIBRATION)
+    check = check_one(exposures[:2], CALIBRATION)
     assert (check.verdict, check.moved) == (Verdict.REFUSE, f"view{view + 1}")
     assert check.problem.startswith(f"exposure {'AB'[exposure]} by itself: view{view + 1} has moved")
 
@@ -74,7 +75,7 @@ def test_an_exposure_that_shows_other_droplets_is_not_hidden_by_the_other_one(ex
 def test_a_view_that_shook_in_one_exposure_is_not_hidden_by_the_other_one(drift_px: float) -> None:
     exposures = [list(seen) for seen in droplet_shots(2, 7.0)]
     exposures[1][2] = exposures[1][2] + drift_px * direction(2)
-    assert check_exposures(0, exposures, CALIBRATION).verdict is Verdict.REFUSE
+    assert check_one(exposures, CALIBRATION).verdict is Verdict.REFUSE
 
 
 def mirrored(seen: list[FloatArray]) -> list[FloatArray]:
@@ -95,9 +96,26 @@ def half_turned(seen: list[FloatArray]) -> list[FloatArray]:
 )
 def test_depth_that_is_reversed_is_named(turned: Callable[[list[FloatArray]], list[FloatArray]], said: str) -> None:
     """Seen from far away all lines of sight would meet as well; perspective leaves a few tenths of a pixel."""
-    check = check_exposures(0, [turned(list(seen)) for seen in droplet_shots(2, 7.0)], CALIBRATION)
+    check = check_one([turned(list(seen)) for seen in droplet_shots(2, 7.0)], CALIBRATION)
     assert check.verdict is Verdict.REFUSE
     assert said in check.problem
+
+
+def test_shots_of_a_run_tell_together_that_depth_is_reversed_where_each_has_too_few_droplets() -> None:
+    exposures = [mirrored(list(seen)) for seen in droplet_shots(6, 0.5)]
+    by_shot = {shot: exposures[2 * shot : 2 * shot + 2] for shot in range(3)}
+    assert not any("reversed" in check_one(one, CALIBRATION).problem for one in by_shot.values())
+    with_a_lens_covered = {7: [[*exposures[0][:3], np.empty((0, 2))]], **by_shot}
+    checks = check_shots(with_a_lens_covered, CALIBRATION)
+    assert [check.shot for check in checks] == [7, 0, 1, 2]
+    assert all(check.problem.endswith("depth is reversed") for check in checks)
+    assert {check.verdict for check in checks} == {Verdict.REFUSE}
+
+
+def test_no_more_exposures_are_asked_for_depth_than_are_enough() -> None:
+    """What is told counts droplets."""
+    exposures = [mirrored(list(seen)) for seen in droplet_shots(6, 7.0)]
+    assert depth_reversed(CALIBRATION, exposures) == depth_reversed(CALIBRATION, exposures[:2]) != ""
 
 
 WIDE_PX, WIDE_MM = (800, 500), np.array([4.2, 1.7, 2.5])
@@ -114,7 +132,7 @@ def wide(
         found = rng.random(count) < seen_share
         noise = rng.normal(0, 1, (count, 2)) * rng.lognormal(0, 0.7, (count, 1))
         seen.append((camera.project(points_mm) + noise_px * noise)[found])
-    return check_exposures(0, [change(seen)], droplet_calibration(cameras, WIDE_MM))
+    return check_one([change(seen)], droplet_calibration(cameras, WIDE_MM))
 
 
 def view2_turned(seen: list[FloatArray]) -> list[FloatArray]:
@@ -192,7 +210,7 @@ def test_spots_of_noise_do_not_stop_reconstruction() -> None:
     """Images without a droplet: as many spots as noise makes, in each view elsewhere."""
     rng = np.random.default_rng(11)
     spots = [rng.uniform(0, mapping.image_size_px, (800, 2)) for mapping in MAPPINGS]
-    assert check_exposures(0, [spots], CALIBRATION).verdict in (Verdict.WARN, None)
+    assert check_one([spots], CALIBRATION).verdict in (Verdict.WARN, None)
 
 
 @pytest.mark.parametrize("density_per_mm3", [0.5, 2.0, 7.0, 14.0, 20.0, 28.0, 40.0])
@@ -218,7 +236,7 @@ def test_too_few_droplets_do_not_tell(density_per_mm3: float, drift_px: float) -
 
 def test_a_view_that_sees_nothing_has_not_moved() -> None:
     (seen,) = droplet_shots(1, 2.0)
-    assert check_exposures(0, [[*seen[:3], np.empty((0, 2))]], CALIBRATION).verdict is None
+    assert check_one([[*seen[:3], np.empty((0, 2))]], CALIBRATION).verdict is None
 
 
 REFRACTIVE_INDEX = 1.52
@@ -240,7 +258,7 @@ def behind_glass(points_mm: FloatArray, camera: PinholeCamera, thickness_mm: flo
 def test_a_window_that_came_after_the_calibration_is_no_good_one(thickness_mm: float) -> None:
     cameras = [mapping for mapping in MAPPINGS if isinstance(mapping, PinholeCamera)]
     seen = [camera.project(behind_glass(inside_mm(120), camera, thickness_mm)) for camera in cameras]
-    assert check_exposures(0, [seen], CALIBRATION).verdict in (Verdict.WARN, Verdict.REFUSE)
+    assert check_one([seen], CALIBRATION).verdict in (Verdict.WARN, Verdict.REFUSE)
 
 
 @pytest.mark.parametrize("offset_px", [(4.0, 0.0), (40.0, 0.0), (16.0, 8.0)])

@@ -6,8 +6,7 @@ from processing.calibration.droplets.agreement import strangers
 from processing.calibration.droplets.disparity import measured_box
 from processing.calibration.verdict import Verdict
 from processing.geometry import FloatArray
-from processing.runs.shots.shot_check import check_exposures
-from tests.support.drifting_views import calibration_of, inside_mm, views
+from tests.support.drifting_views import calibration_of, check_one, inside_mm, views
 
 CALIBRATION = calibration_of(views())
 MAPPINGS = [view.mapping for view in CALIBRATION.views.values()]
@@ -39,7 +38,7 @@ def test_a_handful_of_droplets_does_not_tell() -> None:
 def test_a_thousand_droplets_that_disagree_are_an_alarm_however_close_they_are() -> None:
     """Their neighbours stand less than 12 px apart; in three views no view can be named."""
     three = calibration_of(views()[:3])
-    check = check_exposures(0, [seen(1000, mirrored=(1,))[:3]], three)
+    check = check_one([seen(1000, mirrored=(1,))[:3]], three)
     assert (check.verdict, check.beyond) == (Verdict.WARN, tuple(three.views))
     assert check.problem.endswith("several views have moved further than 3 px, or most spots are noise")
-    assert check_exposures(0, [seen(1000)[:3]], three).verdict in (Verdict.GOOD, Verdict.USABLE, None)
+    assert check_one([seen(1000)[:3]], three).verdict in (Verdict.GOOD, Verdict.USABLE, None)
