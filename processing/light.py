@@ -1,8 +1,11 @@
 """Does the light of an exposure fit its background and its polarity? What does not makes volumes that look fine."""
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
+from processing.exchanged_light import better_background
 from processing.imprint import imprint
 from processing.preprocessing import Frame, Intensity, Polarity, is_dim
 
@@ -40,6 +43,7 @@ def odd_light(
     bits: int,
     dark: Intensity | None = None,
     background: Intensity | None = None,
+    others: Mapping[str, Intensity] | None = None,
 ) -> str:
     """What is odd with the light of an exposure; empty where nothing is.
 
@@ -53,6 +57,8 @@ def odd_light(
         Significant bits of a grey value.
     dark, background : (rows, columns) float32 array, optional
         As for ``processing.preprocessing.intensity``.
+    others : mapping of name to (rows, columns) float32 array, optional
+        Backgrounds of other views, which may be exchanged.
     """
     coarse, most = np.s_[::STRIDE_PX, ::STRIDE_PX], np.float32(2**bits - 1)
     light = _above_dark(frame, dark) / most
@@ -64,8 +70,8 @@ def odd_light(
         return black
     if background is None:
         return _saturated(frame[coarse], most)
-    if own := own_shadows(frame, background, dark):
-        return own
+    if wrong := odd_background(frame, background, dark, others):
+        return wrong
     if (share := np.mean(background[coarse] > FULL * most)) > SATURATED_SHARE:
         return f"has a background of which {100 * share:.0f} % are saturated: shadows are too pale there"
     return _unlike((light, _above_dark(background, dark) / most)) or _saturated(frame[coarse], most)
@@ -76,12 +82,17 @@ def dim_light(frame: Frame, bits: int) -> str:
     return DIM_LIGHT if frame.size and is_dim(frame, bits) else ""
 
 
-def own_shadows(frame: Frame, background: Intensity, dark: Intensity | None = None) -> str:
-    """What it says where an exposure of shadows is one of its own backgrounds; empty where it is not.
+def odd_background(
+    frame: Frame,
+    background: Intensity,
+    dark: Intensity | None = None,
+    others: Mapping[str, Intensity] | None = None,
+) -> str:
+    """What it says where a background shows the shadows of its exposure, or is another's; empty where it is fine.
 
     Parameters
     ----------
-    frame, background, dark
+    frame, background, dark, others
         As for ``odd_light``.
     """
     coarse = np.s_[::STRIDE_PX, ::STRIDE_PX]
@@ -92,6 +103,8 @@ def own_shadows(frame: Frame, background: Intensity, dark: Intensity | None = No
             f"has {100 * share:.0f} % of its own shadows in its background, so they are too pale and too small: is the "
             "shot one of its backgrounds, or are these the mean of a series with spray?"
         )
+    if better := better_background(frame, background, dark, others):
+        return f"does not fit its background, but {better}: is that exchanged, or turned?"
     return ""
 
 

@@ -10,8 +10,8 @@ from processing.analysis.droplets.shadows.shadow_shot import ShadowExposure, mea
 from processing.calibration.calibration import Calibration
 from processing.coherent_light import MOST_RATIO
 from processing.count import require_count
+from processing.grey_image import require_image
 from processing.kernels import DEFAULT_THREADS
-from processing.masked import require_unmasked
 from processing.preprocessing import Intensity, Polarity
 from processing.volume import VoxelGrid
 
@@ -77,7 +77,7 @@ def measure(
         require_count(name, count)
     require_count("threads", threads, 1)
     for name, image in images.items():
-        require_unmasked(name, image)
+        require_image(name, image)
     names = tuple(images)
     calibration.require_usable(names)
     mappings = [calibration.views[name].mapping for name in names]

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from processing import preprocessing
 from processing.calibration.calibration import Calibration
 from processing.count import require_count
+from processing.grey_image import require_image, require_intensities
 from processing.kernels import DEFAULT_THREADS
 from processing.light import dim_light, odd_light
 from processing.masked import require_unmasked
@@ -147,11 +148,8 @@ def intensity(
     if not 1 <= require_count("bits", bits, 1) <= 16 or (frame.size and int(frame.max()) >= 2**bits):
         raise ValueError(f"bits {bits} of 1 to 16 reach to {2**bits - 1}, a pixel is {frame.max(initial=0)}")
     for name, array in (("frame", frame), ("background", background), ("dark", dark)):
-        require_unmasked(name, array)
-    for name, reference in (("background", background), ("dark", dark)):
-        if reference is not None and not np.isfinite(reference).all():
-            row, column = np.argwhere(~np.isfinite(reference))[0]
-            raise ValueError(f"{name}: pixel (column {column}, row {row}) is {reference[row, column]}")
+        if array is not None:
+            require_image(name, array)
     if polarity == "bright" and background is not None:
         raise ValueError("bright particles are before no light: subtract what there is without them as dark")
     dark, background = (None if one is None else np.ascontiguousarray(one, np.float32) for one in (dark, background))
@@ -187,6 +185,11 @@ def mlos(plan: Plan, images: Images, *, out: NDArray[Any] | None = None, threads
     ------
     ValueError
         Images or ``out`` do not fit the plan.
+
+    Warns
+    -----
+    UserWarning
+        An image can be none of intensities: it reaches far above 1, or most of it is blocked.
     """
     return _by_sight(ReconstructionMethod.MLOS, plan, images, out, threads)
 
@@ -293,8 +296,5 @@ def _in_order(plan: Plan, images: Images) -> list[Intensity]:
     """The images of the views in the order of the plan."""
     if set(images) != set(plan.names):
         raise ValueError(f"images of {sorted(images)}, the plan has views {sorted(plan.names)}")
-    for name, image in images.items():
-        require_unmasked(name, image)
-        if not np.issubdtype(np.asarray(image).dtype, np.floating):
-            raise ValueError(f"{name}: its image is of {np.asarray(image).dtype}; make grey values intensities first")
+    require_intensities(images)
     return [images[name] for name in plan.names]

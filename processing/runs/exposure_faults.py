@@ -81,6 +81,12 @@ def grey_values(shot: Shot, view: str, frame: FrameName) -> Frame:
     return pixels
 
 
+def other_backgrounds(references: References, view: str, frame: FrameName) -> dict[str, Intensity]:
+    """Backgrounds that may be exchanged with that of a view, and what they are called."""
+    backgrounds = {name: background for name, (_, background) in references.items() if name != view}
+    return {f"that of {name}": one["ab".index(frame)] for name, one in backgrounds.items() if one is not None}
+
+
 def _odd_light(
     run: RunReader, shot: Shot, frame: FrameName, images: Sequence[Intensity], references: References
 ) -> dict[str, str]:
@@ -88,6 +94,7 @@ def _odd_light(
     for view, image in zip(shot.views, images, strict=True):
         dark, background = (None if one is None else one["ab".index(frame)] for one in references[view])
         grey, polarity, bits = grey_values(shot, view, frame), run.header.polarity, run.header.views[view].bits
-        odd = odd_light(grey, polarity, bits=bits, dark=dark, background=background)
+        others = other_backgrounds(references, view, frame)
+        odd = odd_light(grey, polarity, bits=bits, dark=dark, background=background, others=others)
         said[view] = odd or hollowed(grey, image, polarity, bits=bits, dark=dark, background=background)
     return {view: what for view, what in said.items() if what}

@@ -11,10 +11,10 @@ import numpy as np
 from pydantic import Field
 
 from daq.files.run_directory import RunReader, Shot
-from processing.light import own_shadows
+from processing.light import odd_background
 from processing.preprocessing import Intensity, transmission
 from processing.runs.errors import PipelineError
-from processing.runs.exposure_faults import grey_values
+from processing.runs.exposure_faults import grey_values, other_backgrounds
 from processing.runs.results_file import FrameName
 from processing.runs.workbench import References
 
@@ -52,13 +52,14 @@ def shadow_images(
     return images, trust
 
 
-def own_backgrounds(shot: Shot, frame: FrameName, references: References) -> tuple[str, ...]:
-    """What speaks against the backgrounds of an exposure of shadows, by view: that they show it as well."""
+def odd_backgrounds(shot: Shot, frame: FrameName, references: References) -> tuple[str, ...]:
+    """What speaks against the backgrounds of an exposure of shadows, by view: that they show it, or are another's."""
     number, told = "ab".index(frame), []
     for view in shot.views:
         dark, background = (None if one is None else one[number] for one in references[view])
-        if background is not None and (own := own_shadows(grey_values(shot, view, frame), background, dark)):
-            told.append(f"{view} {own}")
+        others = other_backgrounds(references, view, frame)
+        if background is not None and (odd := odd_background(grey_values(shot, view, frame), background, dark, others)):
+            told.append(f"{view} {odd}")
     return tuple(told)
 
 

@@ -29,7 +29,7 @@ from processing.runs.liquid.objects import NozzleNumbers, RunObjects, told_objec
 from processing.runs.measured_images import (
     IgnoredPixels,
     bright_images,
-    own_backgrounds,
+    odd_backgrounds,
     require_backgrounds,
     require_fitting,
     shadow_images,
@@ -275,7 +275,7 @@ class RunMeasurement:
             before_round=before_round,
         )
         reasons = (
-            *own_backgrounds(shot, frame, self.references),
+            *odd_backgrounds(shot, frame, self.references),
             *self._reversed(shot, frame, [1 - one for one in images]),
         )
         return doubted(shadows, reasons)

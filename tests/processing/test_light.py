@@ -29,12 +29,8 @@ def grey(light: Grey) -> NDArray[np.uint8]:
 
 
 def told(shot: Grey, background: Grey | None, polarity: Polarity = "shadow", dark: Grey | None = None) -> str:
-    references = {
-        name: grey(image).astype(np.float32)
-        for name, image in (("dark", dark), ("background", background))
-        if image is not None
-    }
-    return odd_light(grey(shot), polarity, bits=8, **references)
+    seen_dark, seen_light = (None if one is None else grey(one).astype(np.float32) for one in (dark, background))
+    return odd_light(grey(shot), polarity, bits=8, dark=seen_dark, background=seen_light)
 
 
 SHOT = LIGHT * (1 - droplets(1))
@@ -48,6 +44,40 @@ def test_shadows_before_their_own_light_are_fine(gain: float) -> None:
 
 def test_a_shot_before_itself_is_odd() -> None:
     assert told(SHOT, SHOT).startswith("is its own background")
+
+
+LEANING: Grey = LIGHT * (1 + 0.1 * (COLUMNS - 64) / 64 - 0.05 * (ROWS - 48) / 48)
+
+
+@pytest.mark.parametrize(
+    ("background", "better"),
+    [
+        (LEANING[::-1, ::-1], "the same one turned by half"),
+        (LEANING[:, ::-1], "the same one with left and right exchanged"),
+        ((LEANING - 0.1 * (ROWS - 48))[::-1], "the same one upside down"),
+    ],
+)
+def test_a_background_that_is_turned_is_told(background: Grey, better: str) -> None:
+    shot = background[::-1, ::-1] if "half" in better else background[:, ::-1] if "left" in better else background[::-1]
+    assert told(shot * (1 - droplets(1)), background) == (
+        f"does not fit its background, but {better}: is that exchanged, or turned?"
+    )
+
+
+def test_a_background_of_another_view_is_told() -> None:
+    backgrounds = {f"that of view{n}": grey(light).astype(np.float32) for n, light in ((1, LEANING), (2, LIGHT))}
+    shot = grey(LEANING * (1 - droplets(1)))
+    assert odd_light(shot, "shadow", bits=8, background=backgrounds["that of view1"], others=backgrounds) == ""
+    wrong = odd_light(shot, "shadow", bits=8, background=backgrounds["that of view2"], others=backgrounds)
+    assert wrong.startswith("does not fit its background, but that of view1")
+
+
+@pytest.mark.parametrize("missing", [0.3, 0.6, 0.9])
+@pytest.mark.parametrize("flicker", [0.95, 1.05])
+def test_a_cloud_at_one_side_is_no_other_background(missing: float, flicker: float) -> None:
+    cloud = missing / (1 + np.exp((64 - COLUMNS) / 12)) * (1 - 0.3 * ROWS / 96)
+    for light in (LIGHT, LEANING, LEANING[:, ::-1]):
+        assert "does not fit" not in told(flicker * light * (1 - cloud) * (1 - droplets(1)), light)
 
 
 def mean_of(*light: Grey) -> Grey:

@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 import tomoshadow as ts
-from tests.tomoshadow.test_reconstruction import CAMERAS, GRID, calibration, images
+from tests.tomoshadow.test_reconstruction import CAMERAS, DROPLET_MM, GRID, calibration, images
 
 MASKED: Any = np.ma.masked_greater(np.random.default_rng(1).uniform(1, 99, (64, 64, 64)).astype(np.float32), 90)
 PLAIN: Any = MASKED.data
+FINE = ts.VoxelGrid.centred((18, 45, 60), 0.0667)
+"""About a voxel per pixel."""
 BOARD = ts.Checkerboard(columns=11, rows=7, pitch_mm=2.0)
 
 
@@ -39,12 +41,50 @@ def test_masked_values_do_not_count_as_they_are(tmp_path: Path, taken: str) -> N
         TAKEN[taken](tmp_path)
 
 
+def test_masks_have_no_droplets() -> None:
+    masks: Any = {name: image > 0.5 for name, image in images().items()}
+    with pytest.raises(ValueError, match="view1: is of bool, which has no grey values"):
+        ts.measure(calibration(), masks, FINE, polarity="shadow")
+
+
+def test_a_droplet_before_nothing_at_all_is_measured() -> None:
+    """Its view has no noise and hardly a bright pixel: there is nothing to divide by."""
+    counts: Any = {name: np.floor(200 * image) for name, image in images().items()}
+    found = ts.measure(calibration(), counts, FINE)
+    np.testing.assert_allclose(found.droplets.points_mm, DROPLET_MM, atol=0.02)
+
+
 @pytest.mark.parametrize("method", ["mlos", "smart"])
 def test_grey_values_are_no_intensities(method: str) -> None:
     """Shadows as they are recorded are bright where nothing is: a volume of what is free."""
     frames: Any = {name: np.full(camera.image_size_px[::-1], 200, np.uint8) for name, camera in CAMERAS.items()}
     with pytest.raises(ValueError, match="view1: its image is of uint8; make grey values intensities first"):
         getattr(ts, method)(ts.plan(calibration(), GRID), frames)
+
+
+SHADOW = np.where(np.hypot(*np.mgrid[-40:40, -50:50]) < 10, 50.0, 200.0)
+
+
+@pytest.mark.parametrize(
+    ("image", "background", "problem"),
+    [
+        (SHADOW > 100, None, "image: is of bool, which has no grey values"),
+        (SHADOW * 1j, None, "image: is of complex128"),
+        (np.dstack([SHADOW] * 3), None, r"image: .* is \(rows, columns\), not \(80, 100, 3\)"),
+        (SHADOW, np.where(SHADOW < 100, np.nan, SHADOW), r"background: pixel \(column 4\d, row 3\d\) is nan"),
+        (SHADOW, SHADOW[:1] + 9, r"background image \(1, 100\) does not fit the image \(80, 100\)"),
+    ],
+)
+def test_what_is_no_image_of_grey_values_has_no_droplets(image: Any, background: Any, problem: str) -> None:
+    with pytest.raises(ValueError, match=problem):
+        ts.measure_flat(image, background=background)
+
+
+def test_a_background_that_is_turned_hides_no_droplet() -> None:
+    light = 1 + 0.006 * np.arange(-50, 50)
+    assert len(ts.measure_flat(SHADOW * light, background=200 * np.ones((80, 1)) * light)) == 1
+    with pytest.raises(ts.BadInput, match="but the same one with left and right exchanged"):
+        ts.measure_flat(SHADOW * light, background=200 * np.ones((80, 1)) * light[::-1])
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])

@@ -174,6 +174,31 @@ def test_grey_values_of_fewer_bits_than_stated_are_a_warning() -> None:
         ts.intensity(particle, bits=16, polarity="bright")
 
 
+def test_a_background_that_is_turned_is_a_warning() -> None:
+    """Light falls off to one side, as that of LEDs does: mild shadows, or none, where there is a spray."""
+    light = np.asarray(210 * (1 - 0.1 * np.arange(50)[None, :] / 50) * np.ones((40, 1)), np.float32)
+    frame = np.where(FRAME == 60, light / 3, light).astype(np.uint8)
+    assert ts.intensity(frame, bits=8, background=light).max() > 0.5
+    with pytest.warns(UserWarning, match="does not fit its background, but the same one with left and right exchanged"):
+        ts.intensity(frame, bits=8, background=light[:, ::-1])
+
+
+@pytest.mark.parametrize("method", ["mlos", "minlos", "gavlos", "smart", "mart"])
+@pytest.mark.parametrize(
+    ("spoil", "warning"),
+    [
+        (lambda image: 255 * image, r"view2: its image reaches 2\d\d.*, intensities 1: .* are these grey values"),
+        (lambda image: 1 - image, "view2: its image is above 0.5 in half of its pixels: is it the light that is left"),
+    ],
+)
+def test_what_can_be_no_intensity_is_a_warning(method: str, spoil: Any, warning: str) -> None:
+    seen = images()
+    seen["view2"] = spoil(seen["view2"])
+    options = {"iterations": 1} if method in ("smart", "mart") else {}
+    with pytest.warns(UserWarning, match=warning):
+        getattr(ts, method)(ts.plan(calibration(), GRID), seen, **options)
+
+
 def test_a_view_sees_the_volume_once() -> None:
     with pytest.raises(ValueError, match="views view1 are named twice"):
         ts.plan(calibration(), GRID, views=["view1", "view1", "view2"])

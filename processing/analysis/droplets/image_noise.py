@@ -23,5 +23,5 @@ def noise_of(image: NDArray[np.float32], known: NDArray[np.bool_] | None = None)
     mixed = along_rows[:, 1:-1] - 0.5 * (along_rows[:, :-2] + along_rows[:, 2:])
     if known is not None and known.any():
         mixed, image = mixed[known[1:-1, 1:-1]], image[known]
-    brightest = float(np.quantile(image, 0.999) - np.quantile(image, 0.01))
+    brightest = float(np.quantile(image, 0.999) - np.quantile(image, 0.01)) or float(np.ptp(image))
     return max(float(np.median(np.abs(mixed))) / 0.6745 / 1.5, LEAST_NOISE * brightest)

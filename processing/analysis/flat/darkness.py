@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from processing.analysis.droplets.image_noise import noise_of
 from processing.errors import BadInput
+from processing.exchanged_light import better_background
 from processing.preprocessing import Polarity
 
 FITS = 6
@@ -106,6 +107,8 @@ def _given(grey: Image, light: Image) -> Image:
             f"has at most {100 * most / full:.0f} % of the light of its background: is that of another exposure, or of "
             "other bits?"
         )
+    if better := better_background(grey, light):
+        raise LightError(f"does not fit its background, but {better}: is that exchanged, or turned?")
     return light
 
 

@@ -15,7 +15,7 @@ from processing.analysis.flat.discs_in_outline import Disc, discs_in
 from processing.analysis.flat.outline import Outline, outline_around
 from processing.analysis.flat.spots import Spot, find_spots
 from processing.geometry import FloatArray
-from processing.masked import require_unmasked
+from processing.grey_image import require_image
 from processing.preprocessing import Polarity
 from processing.reconstruction.settings import FrozenValue
 
@@ -140,13 +140,13 @@ def measure_flat(
     LightError
         There is no light that droplets could be dark before.
     ValueError
-        A pixel is infinite or not a number.
+        What is given is no image of grey values, or the two differ in shape.
     """
-    require_unmasked("image", image)
-    require_unmasked("background", background)
-    if not np.isfinite(image).all():
-        row, column = np.argwhere(~np.isfinite(image))[0]
-        raise ValueError(f"pixel (column {column}, row {row}) is {image[row, column]}")
+    require_image("image", image)
+    if background is not None:
+        require_image("background", background)
+        if np.shape(background) != np.shape(image):
+            raise ValueError(f"background image {np.shape(background)} does not fit the image {np.shape(image)}")
     how = settings or FlatSettings()
     seen = darkness_of(image, how.polarity, background)
     smoothed = cv2.blur(seen.values, (3, 3)).astype(np.float32)
