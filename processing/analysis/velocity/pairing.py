@@ -20,6 +20,7 @@ from processing.analysis.velocity.partners import (
     Spread,
     candidates_near,
     likely_of,
+    odds_of,
     partners_of,
 )
 from processing.geometry import FloatArray
@@ -75,7 +76,7 @@ def pair(first: MovingDroplets, second: MovingDroplets) -> Pairing:
     for _ in range(ROUNDS if len(common) else 0):
         shifts = predicted(known, first.places)
         candidates = candidates_near(first, second, shifts)
-        likely = likely_of(candidates, first, second, spread)
+        likely = likely_of(candidates, odds_of(candidates, first, second, spread))
         spread = _renewed(candidates, likely, first, second)
         found = partners_of(candidates, likely, len(first), len(second))
         (own,) = np.nonzero(found[0].partner >= 0)

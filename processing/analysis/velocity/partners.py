@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import min_weight_full_bipartite_matching
 from scipy.spatial import cKDTree
 
 from processing.analysis.velocity.common_motion import Indices
@@ -89,25 +91,34 @@ def candidates_near(first: MovingDroplets, second: MovingDroplets, shifts: Float
     return Candidates(own, other, second.places[other] - there[own])
 
 
-def likely_of(candidates: Candidates, first: MovingDroplets, second: MovingDroplets, spread: Spread) -> FloatArray:
-    """Probability of every candidate, among all candidates of both and that neither has a partner."""
-    if not len(candidates.own):
-        return np.empty(0)
-    odds = _odds(candidates, first, second, spread)
-    of_own = np.bincount(candidates.own, odds, len(first))[candidates.own]
-    of_other = np.bincount(candidates.other, odds, len(second))[candidates.other]
-    return np.asarray(odds / (1 + of_own + of_other - odds))
-
-
-def _odds(candidates: Candidates, first: MovingDroplets, second: MovingDroplets, spread: Spread) -> FloatArray:
+def odds_of(candidates: Candidates, first: MovingDroplets, second: MovingDroplets, spread: Spread) -> FloatArray:
     """Of every candidate: that the two are one droplet, over that they are strangers."""
     own, other = candidates.own, candidates.other
+    if not len(own):
+        return np.empty(0)
     covariance = first.covariance[own] + second.covariance[other] + spread.scatter**2 * np.eye(3)
     far = np.einsum("ni,ni->n", candidates.misses, np.linalg.solve(covariance, candidates.misses[..., None])[..., 0])
     there = np.exp(-0.5 * far) / np.sqrt((2 * np.pi) ** 3 * np.linalg.det(covariance))
     stranger = np.sqrt(_density(first.places)[own] * _density(second.places)[other])
     alike = _alikeness(first.log_sizes[own], second.log_sizes[other], spread.unlikeness, second.log_sizes)
     return np.asarray(spread.share / (1 - spread.share) ** 2 * there / stranger * alike)
+
+
+def likely_of(candidates: Candidates, odds: FloatArray) -> FloatArray:
+    """Probability of every candidate, among all candidates of both and that neither has a partner."""
+    of_own, of_other = (np.bincount(ends, odds)[ends] for ends in (candidates.own, candidates.other))
+    return np.asarray(odds / (1 + of_own + of_other - odds))
+
+
+def assigned(candidates: Candidates, odds: FloatArray, firsts: int, seconds: int) -> Indices:
+    """Which candidates are partners, each droplet once, if all of them together are to be as likely as can be."""
+    alone, costs = np.arange(firsts), -np.log(np.maximum(odds, np.finfo(np.float64).tiny))
+    rows, columns = np.append(candidates.own, alone), np.append(candidates.other, seconds + alone)
+    costs = np.append(costs, np.zeros(firsts))
+    weights = 1 + costs - costs.min(initial=0)  # none may be 0; as each of A has one, that is added to all alike
+    graph = csr_array((weights, (rows, columns)), (firsts, seconds + firsts))
+    _, partner = min_weight_full_bipartite_matching(graph)
+    return np.flatnonzero(partner[candidates.own] == candidates.other)
 
 
 def _alikeness(own: FloatArray, other: FloatArray, unlikeness: float, everyone: FloatArray) -> FloatArray:

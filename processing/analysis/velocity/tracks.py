@@ -1,9 +1,10 @@
 """Droplets of a series in time, linked to tracks over all frames.
 
 Two frames give the first motion, as two exposures do (``pairing``). From then on every track says where its droplet
-should be next, and a new one moves like the tracks around it. Candidates are weighed as partners are; where no one is
-likelier than all else together, a track waits, and is linked again beyond the gap. How much droplets accelerate, how
-alike they look from frame to frame, and how many are seen again is estimated on the way.
+should be next, and a new one moves like the tracks around it. Candidates are weighed as partners are, and all tracks
+and droplets of a frame are assigned together; a track whose droplet is not there waits, and is linked again beyond the
+gap. How much droplets accelerate, how alike they look from frame to frame, and how many are seen again is estimated on
+the way.
 """
 
 from collections.abc import Sequence
@@ -15,7 +16,14 @@ from processing.analysis.velocity.common_motion import Indices
 from processing.analysis.velocity.local_motion import KnownMotion, predicted
 from processing.analysis.velocity.moving_droplets import MovingDroplets
 from processing.analysis.velocity.pairing import LEAST_SCATTER_VOXEL, SHARES, pair
-from processing.analysis.velocity.partners import LEAST_UNLIKENESS, Spread, candidates_near, likely_of, partners_of
+from processing.analysis.velocity.partners import (
+    LEAST_UNLIKENESS,
+    Spread,
+    assigned,
+    candidates_near,
+    likely_of,
+    odds_of,
+)
 from processing.analysis.velocity.track_states import TrackStates
 from processing.geometry import FloatArray
 
@@ -98,19 +106,17 @@ class _Linker:
         onward = self.tracks.onward(self.acceleration)
         spread = Spread(0.0, self.spread.unlikeness, self.spread.share)
         candidates = candidates_near(onward.droplets, seen, np.zeros((1, 3)))
-        likely = likely_of(candidates, onward.droplets, seen, spread)
-        of_tracks, of_seen = partners_of(candidates, likely, len(onward), len(seen))
-        rows = np.flatnonzero(of_tracks.partner >= 0)
-        linked = of_tracks.partner[rows]
-        ids = np.full(len(seen), NO_TRACK, np.intp)
-        ids[linked] = onward.ids[rows]
+        odds = odds_of(candidates, onward.droplets, seen, spread)
+        chosen = assigned(candidates, odds, len(onward), len(seen))
+        rows, linked = candidates.own[chosen], candidates.other[chosen]
+        ids, p_link = np.full(len(seen), NO_TRACK, np.intp), np.full(len(seen), np.nan)
+        ids[linked], p_link[linked] = onward.ids[rows], likely_of(candidates, odds)[chosen]
         new = np.flatnonzero(ids == NO_TRACK)
         ids[new] = self.next_id + np.arange(len(new))
         tracks = onward.seen(rows, seen.where(linked))
         scatter, velocities = _around(tracks, seen.places[new], self.scatter)
         begun = TrackStates.begun(ids[new], seen.where(new), velocities, scatter)
         going = tracks.where(np.flatnonzero(tracks.missed < MOST_MISSED))
-        p_link = np.where(of_seen.partner >= 0, of_seen.p_pair, np.nan)
         after = _Linker(
             going.joined(begun),
             scatter,

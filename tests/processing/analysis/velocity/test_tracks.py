@@ -2,12 +2,18 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import linear_sum_assignment
 
 from processing.analysis.velocity.moving_droplets import MovingDroplets
+from processing.analysis.velocity.partners import Candidates, assigned
 from processing.analysis.velocity.track_motion import track_points
 from processing.analysis.velocity.tracks import link
+from processing.geometry import FloatArray
 from processing.studies.velocity.track_truth import whole_and_right
 from tests.support.droplet_series import Series, series
+
+OTHERS = 10_000_000
+"""Added to the label of a droplet: that of the one beside it."""
 
 
 @pytest.mark.parametrize(
@@ -36,6 +42,41 @@ def test_a_track_goes_on_beyond_frames_without_its_droplet() -> None:
     whole, right = whole_and_right(link(hidden).ids, labels)
     assert whole > 0.98
     assert right > 0.99
+
+
+def test_tracks_of_droplets_side_by_side_are_whole() -> None:
+    """Either one of two could be either track: together they are assigned, one by one neither is sure enough."""
+    shown = doubled(series(5, 14.0, frames=20))
+    whole, right = whole_and_right(link(shown.frames).ids, shown.labels)
+    assert whole > 0.97
+    assert right > 0.99
+
+
+def doubled(shown: Series) -> Series:
+    """Each droplet with another one beside it, 1.5 voxels off, that is alike and flies along."""
+    rng, frames, labels = np.random.default_rng(5), [], []
+    beside: dict[int, FloatArray] = {}
+    for frame, label in zip(shown.frames, shown.labels, strict=True):
+        true = np.flatnonzero(label >= 0)
+        away = np.array([beside.setdefault(one, rng.normal(0, 0.9, 3)) for one in label[true].tolist()])
+        places = frame.places[true] + away + rng.normal(0, 0.05, away.shape)
+        looks = frame.log_sizes[true] + rng.normal(0, 0.05, len(true))
+        both = (np.vstack([frame.places, places]), np.concatenate([frame.covariance, frame.covariance[true]]))
+        frames.append(MovingDroplets(*both, np.append(frame.log_sizes, looks)))
+        labels.append(np.append(label, OTHERS + label[true]))
+    return Series(frames, labels, shown.velocities, shown.accelerations)
+
+
+def test_droplets_are_assigned_as_scipy_does_with_all_costs_at_hand() -> None:
+    rng = np.random.default_rng(3)
+    for firsts, seconds in [(6, 9), (9, 6), (7, 7), (1, 1), (4, 0), (0, 4)]:
+        own, other = np.nonzero(rng.random((firsts, seconds)) < 0.5)
+        odds = rng.lognormal(0, 2, len(own))
+        chosen = assigned(Candidates(own, other, np.zeros((len(own), 3))), odds, firsts, seconds)
+        costs = np.zeros((firsts, seconds))
+        costs[own, other] = np.minimum(-np.log(odds), 0)
+        assert -np.log(odds[chosen]).sum() == pytest.approx(costs[linear_sum_assignment(costs)].sum())
+        assert len(np.unique(own[chosen])) == len(np.unique(other[chosen])) == len(chosen)
 
 
 def test_ghosts_make_no_tracks() -> None:
