@@ -165,7 +165,8 @@ def shot_summary(
 def _ghost_share(exposures: Sequence[Exposure]) -> Estimate | str:
     """Of the exposures together; where one does not tell, why."""
     p_real = np.concatenate([one.droplets.p_real for one in exposures])
-    together = told_share(p_real, exposures[0].droplets.sized, len(exposures))
+    first = min(exposures, key=lambda one: one.beside_liquid)
+    together = told_share(p_real, first.droplets.sized, len(exposures), first.untried)
     reasons = dict.fromkeys(one.ghost_share for one in exposures if isinstance(one.ghost_share, str))
     of_both = isinstance(together, str) and all(one.verdict is ShotVerdict.GOOD for one in exposures)
     return together if of_both or not reasons else "; ".join(reasons)

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from processing.analysis.droplets.droplet_file import DropletFileError, StoredDroplets
-from processing.analysis.droplets.ghost_share import MANY_OBJECTS, told_share
+from processing.analysis.droplets.ghost_share import BESIDE_LIQUID, MANY_OBJECTS, told_share
 from processing.analysis.droplets.size_statistics import SizeStatistics, mean_diameters, shots_density
 from processing.analysis.estimates import Estimate
 from processing.reconstruction.settings import GridSettings
@@ -22,7 +22,6 @@ P_REAL, NO_P_REAL = (
     "p_real",
     "a single view, and files from before it was told, do not say how probably droplets are real",
 )
-BESIDE_LIQUID = f"it was not tried beside more ligaments and the like than {100 * MANY_OBJECTS:g} % of the droplets"
 NOTHING_COUNTED = "no exposure could be measured"
 _SAME_DROPLETS = ("grid", "margin_voxel", "twins", "seed", "nozzle")
 """Settings that say where droplets are looked for, how ghosts are counted, and where the nozzle is."""

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from scipy.special import betaincinv, gammaincinv
 
-from processing.analysis.droplets.droplet_table import P_REAL_TRIED
 from processing.analysis.droplets.size_statistics import NOTHING_MEASURED, class_numbers
 from processing.analysis.estimates import CONFIDENCE, Estimate
 from processing.geometry import FloatArray
@@ -24,11 +23,13 @@ MODEL_SD = 0.2
 """Relative, beyond chance: of true over expected ghosts among the cases that were tried."""
 MANY_OBJECTS = 0.01
 """Ligaments and the like per droplet: they may have round ends, which are told as droplets, and surely real ones."""
+BESIDE_LIQUID = f"it was not tried beside more ligaments and the like than {100 * MANY_OBJECTS:g} % of the droplets"
+UNTRIED = "it was not tried on droplets like the others: docs/measure.md lists on which it was"
 _TAIL = (1 - CONFIDENCE) / 2
 
 
 def told_share(
-    p_real: FloatArray, sized: bool, exposures_per_shot: float = 1, untried: str = f"it is {P_REAL_TRIED}"
+    p_real: FloatArray, sized: bool, exposures_per_shot: float = 1, untried: str = UNTRIED
 ) -> Estimate | str:
     """Which share of some droplets are ghosts, as ``p_real`` has it, or why it is not told.
 

@@ -11,7 +11,14 @@ from numpy.typing import NDArray
 from processing.analysis.droplets.droplet_search import DropletSearch
 from processing.analysis.droplets.droplet_table import DropletRows
 from processing.analysis.droplets.gaussian_blobs import Image
-from processing.analysis.droplets.ghost_share import MANY_OBJECTS, GhostShare, matches, told_share
+from processing.analysis.droplets.ghost_share import (
+    BESIDE_LIQUID,
+    MANY_OBJECTS,
+    UNTRIED,
+    GhostShare,
+    matches,
+    told_share,
+)
 from processing.analysis.estimates import Estimate
 from processing.analysis.hidden import Hidden
 from processing.geometry import FloatArray
@@ -80,8 +87,19 @@ class MeasuredExposure(Generic[Rows, Seen]):
     @property
     def ghost_share(self) -> Estimate | str:
         """Which share of the droplets are ghosts, or why that is not told."""
-        doubted = self.verdict in (ShotVerdict.DOUBTFUL, ShotVerdict.REFUSED)
-        return "; ".join(self.reasons) if doubted else told_share(self.droplets.p_real, self.droplets.sized)
+        if self.verdict in (ShotVerdict.DOUBTFUL, ShotVerdict.REFUSED):
+            return "; ".join(self.reasons)
+        return told_share(self.droplets.p_real, self.droplets.sized, untried=self.untried)
+
+    @property
+    def beside_liquid(self) -> bool:
+        """Whether there is more liquid that is no droplet than what ghosts were tried beside."""
+        return self.hidden.liquid_objects > MANY_OBJECTS * len(self.droplets)
+
+    @property
+    def untried(self) -> str:
+        """Why it may not be told how probably droplets are real."""
+        return BESIDE_LIQUID if self.beside_liquid else UNTRIED
 
     def told(self) -> dict[str, object]:
         """What files say of it, beside the droplets."""
@@ -240,7 +258,7 @@ def judged_by_twins(shot: "MeasuredExposure[Rows, Seen]", ghosts: GhostShare) ->
 
 def told_real(shot: "MeasuredExposure[Rows, Seen]") -> "MeasuredExposure[Rows, Seen]":
     """A shot that tells how probably droplets are real, or does not: only in good ones of droplets that was tried."""
-    tried = shot.verdict is ShotVerdict.GOOD and shot.hidden.liquid_objects <= MANY_OBJECTS * len(shot.droplets)
+    tried = shot.verdict is ShotVerdict.GOOD and not shot.beside_liquid
     return shot if tried else replace(shot, droplets=shot.droplets.unsure())
 
 

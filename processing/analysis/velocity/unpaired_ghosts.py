@@ -14,7 +14,7 @@ from scipy.special import ndtri
 
 from processing.analysis.droplets.droplet_file import DIAMETER, FRAME, StoredDroplets
 from processing.analysis.droplets.droplet_statistics import NO_P_REAL, NO_VOLUME, P_REAL, measured_grid
-from processing.analysis.droplets.droplet_table import P_REAL_TRIED, Columns
+from processing.analysis.droplets.droplet_table import Columns
 from processing.analysis.estimates import CONFIDENCE, Estimate
 from processing.geometry import FloatArray
 from processing.volume import VoxelGrid
@@ -100,7 +100,7 @@ def unpaired_ghost_share(shots: Sequence[Watched]) -> Estimate | str:
     if len(sure) < max(FEWEST_SURE, len(sizes) / 2):
         return (
             f"{len(sure)} of {len(sizes)} droplets that should be in both exposures are surely real (p_real above "
-            f"{SURE:g}), asked for are {FEWEST_SURE} and half of all; p_real is {P_REAL_TRIED}"
+            f"{SURE:g}), asked for are {FEWEST_SURE} and half of all"
         )
     count = min(len(sure) // FEWEST_SURE, MOST_CLASSES)
     classes = np.digitize(sizes, np.quantile(sure, np.arange(1, count) / count))

@@ -1,5 +1,6 @@
 """What is told of a shot is told of both exposures together."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -7,6 +8,7 @@ import numpy as np
 from processing.analysis.droplets.droplet_table import SizedDroplets
 from processing.analysis.droplets.measured_exposure import MeasuredExposure, ShotVerdict
 from processing.analysis.droplets.shadows.shadow_shot import SeenShadows
+from processing.analysis.hidden import Hidden
 from processing.runs.measured_shot import shot_summary
 
 
@@ -29,6 +31,13 @@ def reason(*exposures: MeasuredExposure[SizedDroplets, SeenShadows]) -> str:
 def test_why_there_is_no_share_of_ghosts_is_told_once() -> None:
     assert reason(exposure(145), exposure(133)).startswith("p_real is told of 0 of 278 droplets; ")
     assert reason(exposure(145), exposure(133)).count("p_real is told") == 1
+
+
+def test_beside_ligaments_they_are_the_reason_in_one_sentence() -> None:
+    beside = [replace(exposure(count), hidden=Hidden(liquid_objects=15)) for count in (145, 133)]
+    told = "p_real is told of 0 of 278 droplets; it was not tried "
+    assert reason(*beside) == f"{told}beside more ligaments and the like than 1 % of the droplets"
+    assert reason(beside[0], exposure(133)).startswith(f"{told}on droplets like the others")
 
 
 def test_of_a_doubtful_exposure_the_doubt_is_the_reason() -> None:

@@ -98,7 +98,7 @@ def test_beside_many_ligaments_nothing_tells_of_ghosts(shot: BrightExposure) -> 
     many = told_real(replace(shot, hidden=Hidden(liquid_objects=1 + len(shot.droplets) // 100)))
     assert told_real(shot).ghost_share == shot.ghost_share
     assert isinstance(many.ghost_share, str)
-    assert many.ghost_share.endswith("beside ligaments and the like")
+    assert many.ghost_share.endswith("beside more ligaments and the like than 1 % of the droplets")
 
 
 def test_a_shot_whose_twin_is_full_of_ghosts_is_doubtful(shot: BrightExposure) -> None:
