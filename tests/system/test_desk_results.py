@@ -218,6 +218,8 @@ def test_both_exposures_lie_one_upon_the_other_and_another_method_is_tried(
     expect(resolution(page)).to_have_text("MINLOS, full resolution")
     expect(addresses.nth(3)).to_have_attribute("href", re.compile(r"_b/region\.png.*method=minlos"))
     at_mm = float((slice_of(page, "y").get_attribute("data-at") or "").split()[0])
+    frames = page.locator(".slice-view .slice-frame")
+    expect(frames).to_have_count(3)
     page.get_by_label("Region ± / mm").fill("0.4")
     expect(place(page, "x")).to_have_text(f"maximum along x, {at_mm - 0.4:.3f} to {at_mm + 0.4:.3f} mm")
     for number in (1, 3):
@@ -225,6 +227,7 @@ def test_both_exposures_lie_one_upon_the_other_and_another_method_is_tried(
         assert page.request.get(url(server, (addresses.nth(number).get_attribute("href") or "").lstrip("/"))).ok
     page.get_by_role("button", name="maxima").click()
     expect(resolution(page)).to_contain_text("MLOS, preview only: these are the largest values of all")
+    expect(frames).to_have_count(0)
     page.get_by_role("button", name="slices", exact=True).click()
     choose(page, "Result set", re.compile("SMART"))
     choose(page, "Slices, region by", re.compile("as made, SMART"))
@@ -383,11 +386,11 @@ def test_the_page_of_results_fits_every_width(page: Page, server: Serving, old_r
 
 
 def _picture(page: Page, name: str, width: int) -> None:
-    """Dark and light."""
+    """Light, as the system of a test is, and dark."""
     if not PICTURES:
         return
     page.set_viewport_size({"width": width, "height": 1000})
-    for shade in ("dark", "light"):
+    for shade in ("light", "dark"):
         page.wait_for_timeout(1500)
         page.screenshot(path=str(Path(PICTURES) / f"{name}-{shade}.png"))
         page.get_by_role("button", name="dark or light").click()

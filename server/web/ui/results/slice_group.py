@@ -141,9 +141,10 @@ class SliceGroup:
         if not self._seen:
             return
         at_mm = self.at_mm
+        region_mm = self._region_mm() if self._shown is Shown.REGION else None
         for axis in AXES:
             self._labels[axis].set_text(self._place_text(axis, at_mm[axis]))
-            self._views[axis].point_out(at_mm, self._dots_near(axis, at_mm[axis]))
+            self._views[axis].point_out(at_mm, self._dots_near(axis, at_mm[axis]), region_mm)
             self._views[axis].show([self._layer(axis, one) for one in self._seen])
         if self._rested != self._at:
             self._rest.activate()

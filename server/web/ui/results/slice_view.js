@@ -12,6 +12,7 @@ export default {
             <image v-if="layer.preview" :href="layer.preview" v-bind="placed(layer.preview_mm)" preserveAspectRatio="none" class="coarse" />
             <image v-if="layer.full" :key="layer.full" :href="layer.full" v-bind="placed(layer.full_mm)" preserveAspectRatio="none" />
           </g>
+          <rect v-if="framed" v-bind="placed(framed)" class="slice-frame" />
           <circle v-for="(dot, number) in dots" :key="number" :cx="x(dot[0])" :cy="y(dot[1])" :r="dot[2]" :class="['slice-dot', dot[3]]" />
           <line :x1="x(at[0])" :x2="x(at[0])" :y1="plot.y" :y2="plot.y + plot.height" class="slice-cross" />
           <line :x1="plot.x" :x2="plot.x + plot.width" :y1="y(at[1])" :y2="y(at[1])" class="slice-cross" />
@@ -28,7 +29,7 @@ export default {
         <text :transform="'translate(' + (plot.x - 34) + ' ' + (plot.y + plot.height / 2) + ') rotate(-90)'" text-anchor="middle">{{ names[1] }} / mm</text>
       </svg>
     </figure>`,
-  props: { label: String, names: Array, range_mm: Array, ticks: Array, at: Array, layers: Array, dots: Array, tallest: Number },
+  props: { label: String, names: Array, range_mm: Array, ticks: Array, at: Array, layers: Array, dots: Array, framed: Array, tallest: Number },
   data: () => ({ width: 0, held: false, clip: "slice-" + Math.random().toString(36).slice(2) }),
   mounted() {
     this.watch = new ResizeObserver(() => { this.width = Math.floor(this.$refs.box.clientWidth); });

@@ -53,7 +53,7 @@ class SliceView(Element, component="slice_view.js"):
         self._props.update(
             label=f"slice {axis}", names=list(SHOWN_AXES[axis]), range_mm=[[0, 1], [0, 1]], ticks=[[], []]
         )
-        self._props.update(at=[0, 0], layers=[], dots=[], tallest=320)
+        self._props.update(at=[0, 0], layers=[], dots=[], framed=None, tallest=320)
 
         def pick(event: GenericEventArguments) -> None:
             on_pick(axis, float(event.args[0]), float(event.args[1]))
@@ -71,9 +71,16 @@ class SliceView(Element, component="slice_view.js"):
         self._props["layers"] = [asdict(layer) for layer in layers]
         self.update()
 
-    def point_out(self, at_mm: dict[str, float], dots: Sequence[tuple[float, float, float, str]]) -> None:
-        """Put the cross-hair, and circles: to the right, down, radius in px, class."""
-        self._props.update(at=[at_mm[name] for name in SHOWN_AXES[self.axis]], dots=[list(dot) for dot in dots])
+    def point_out(
+        self,
+        at_mm: dict[str, float],
+        dots: Sequence[tuple[float, float, float, str]],
+        region_mm: dict[str, Span] | None = None,
+    ) -> None:
+        """Put the cross-hair, circles (to the right, down, radius in px, class), and a frame around a region."""
+        across = SHOWN_AXES[self.axis]
+        self._props.update(at=[at_mm[name] for name in across], dots=[list(dot) for dot in dots])
+        self._props["framed"] = region_mm and [region_mm[name] for name in across]
         self.update()
 
 
