@@ -6,13 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from processing.analysis.velocity import HALF_WINDOW
 from processing.analysis.velocity.common_motion import Indices
 from processing.analysis.velocity.moving_droplets import MovingDroplets
 from processing.analysis.velocity.tracks import Tracks
 from processing.geometry import FloatArray
 
-HALF_WINDOW = 2
-"""Frames before and after a droplet that have a say: five points smooth noise to a third and blur little."""
 PARABOLA = 3
 """Points without which there is no motion."""
 UNKNOWN = 1e4
@@ -109,7 +108,7 @@ def track_points(frames: Sequence[MovingDroplets], tracks: Tracks, half_window: 
     half_window : int
         So many frames before and after a droplet have a say; at the ends of a track fewer.
     """
-    parabolas = _Parabolas.of(SeenPoints.of(frames, tracks))
+    parabolas = _Parabolas(SeenPoints.of(frames, tracks))
     for further in range(1, min(half_window, len(frames)) + 1):
         parabolas.widen(further)
     return parabolas.solved()
@@ -117,7 +116,7 @@ def track_points(frames: Sequence[MovingDroplets], tracks: Tracks, half_window: 
 
 def smoothed(seen: SeenPoints, most: int) -> Iterator[TrackPoints]:
     """The points with half windows of 1, 2, 3 and so on, up to ``most`` frames."""
-    parabolas = _Parabolas.of(seen)
+    parabolas = _Parabolas(seen)
     for further in range(1, most + 1):
         parabolas.widen(further)
         yield parabolas.solved()
@@ -133,49 +132,39 @@ def _by_track(tracks: Tracks) -> tuple[Indices, Indices, Indices]:
     return track[chosen], frame[chosen], row[chosen]
 
 
-@dataclass(frozen=True, eq=False)
 class _Parabolas:
-    """Normal equations of the parabola at every point, for its place, velocity and acceleration; sums that grow."""
+    """Normal equations of the parabola at every point, for its place, velocity and acceleration: sums that grow.
 
-    seen: SeenPoints
-    weights: FloatArray
-    normal: FloatArray
-    right: FloatArray
-    votes: Indices
+    Parameters
+    ----------
+    seen : SeenPoints
+        At first every parabola goes through its own point alone.
+    """
 
-    @classmethod
-    def of(cls, seen: SeenPoints) -> "_Parabolas":
-        """Through every point by itself."""
+    def __init__(self, seen: SeenPoints) -> None:
         count = len(seen.track)
-        nothing = np.zeros((count, 9, 9)), np.zeros((count, 9)), np.zeros(count, np.intp)
-        parabolas = cls(seen, np.asarray(np.linalg.inv(seen.covariance), np.float64), *nothing)
-        parabolas._add(0)
-        return parabolas
+        self._seen = seen
+        self._weights = np.asarray(np.linalg.inv(seen.covariance), np.float64)
+        self._normal, self._right = np.zeros((count, 9, 9)), np.zeros((count, 9))
+        self._votes = np.zeros(count, np.intp)
+        self._add(0)
 
     def widen(self, frames: int) -> None:
         """The points so many frames before and after have a say, too."""
         self._add(frames)
         self._add(-frames)
 
-    def _add(self, frames: int) -> None:
-        own, other = self.seen.apart(frames)
-        basis = np.array([1.0, frames, frames**2 / 2])
-        pull = np.einsum("nij,nj->ni", self.weights[other], self.seen.places[other] - self.seen.places[own])
-        self.normal[own] += np.einsum("a,b,nij->naibj", basis, basis, self.weights[other]).reshape(-1, 9, 9)
-        self.right[own] += np.einsum("a,ni->nai", basis, pull).reshape(-1, 9)
-        self.votes[own] += 1
-
     def solved(self) -> TrackPoints:
         """By the points that had a say."""
-        uncertainty = np.asarray(np.linalg.inv(self.normal + np.eye(9) / UNKNOWN**2), np.float64)
-        motion = np.einsum("nij,nj->ni", uncertainty, self.right).reshape(-1, 3, 3)
-        motion[:, 0] += self.seen.places
-        motion[self.votes < PARABOLA, 1:] = np.nan
-        uncertainty[self.votes < PARABOLA] = np.nan
+        uncertainty = np.asarray(np.linalg.inv(self._normal + np.eye(9) / UNKNOWN**2), np.float64)
+        motion = np.einsum("nij,nj->ni", uncertainty, self._right).reshape(-1, 3, 3)
+        motion[:, 0] += self._seen.places
+        motion[self._votes < PARABOLA, 1:] = np.nan
+        uncertainty[self._votes < PARABOLA] = np.nan
         return TrackPoints(
-            self.seen.track,
-            self.seen.frame,
-            self.seen.row,
+            self._seen.track,
+            self._seen.frame,
+            self._seen.row,
             motion[:, 0],
             motion[:, 1],
             motion[:, 2],
@@ -183,3 +172,11 @@ class _Parabolas:
             np.sqrt(np.einsum("nii->ni", uncertainty[:, 6:, 6:])),
             uncertainty[:, :3, :3],
         )
+
+    def _add(self, frames: int) -> None:
+        own, other = self._seen.apart(frames)
+        basis = np.array([1.0, frames, frames**2 / 2])
+        pull = np.einsum("nij,nj->ni", self._weights[other], self._seen.places[other] - self._seen.places[own])
+        self._normal[own] += np.einsum("a,b,nij->naibj", basis, basis, self._weights[other]).reshape(-1, 9, 9)
+        self._right[own] += np.einsum("a,ni->nai", basis, pull).reshape(-1, 9)
+        self._votes[own] += 1

@@ -12,11 +12,12 @@ from processing.analysis.droplets.droplet_file import DropletFileError, StoredDr
 from processing.analysis.droplets.droplet_table import COVARIANCES as PLACES
 from processing.analysis.droplets.droplet_table import Columns
 from processing.analysis.shot_doubts import exposure_doubts
+from processing.analysis.velocity import HALF_WINDOW
 from processing.analysis.velocity.common_motion import FEWEST
 from processing.analysis.velocity.moving_droplets import LEAST_SIZE, MovingDroplets
 from processing.analysis.velocity.noise_curve import NoiseCurve, noise_curve
 from processing.analysis.velocity.track_doubts import order_doubts, rate_doubts, still_doubts
-from processing.analysis.velocity.track_motion import HALF_WINDOW, TrackPoints, track_points
+from processing.analysis.velocity.track_motion import TrackPoints, track_points
 from processing.analysis.velocity.tracks import LEAST_LENGTH, Tracks, link
 from processing.analysis.velocity.velocity_table import COVARIANCES
 from processing.count import require_count

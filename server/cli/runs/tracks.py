@@ -4,6 +4,7 @@ from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from processing.analysis.velocity import HALF_WINDOW
 from server.cli.options import Verbs, add_out, add_verb, count, positive
 from server.cli.output import Outcome, progress
 from server.cli.runs.export_option import add_export
@@ -26,9 +27,9 @@ def add(verbs: Verbs) -> None:
     parser.add_argument(
         "--half-window",
         type=count,
-        default=2,
+        default=HALF_WINDOW,
         metavar="N",
-        help="shots before and after with a say in motion, default 2",
+        help=f"shots before and after with a say in motion, default {HALF_WINDOW}",
     )
     add_export(parser, "tracks")
 
