@@ -3,8 +3,11 @@
 A torn or damaged shot keeps its place and its name: without it, other programs would not see those after it.
 """
 
+from collections import Counter
 from collections.abc import Iterator
+from contextlib import suppress
 from datetime import UTC, datetime
+from itertools import islice
 from pathlib import Path
 
 from daq.errors import ShotFileError
@@ -23,6 +26,8 @@ LOST_WITH_HEADER = (
     "lost with the old one: plan, configuration, devices, versions, calibration, polarity (shadow is written), rate, "
     "means of dark and background, how it ended"
 )
+ASKED_SHOTS = 100
+"""The first readable shots that are asked what run they are of: a long run is not opened from end to end."""
 _OUTCOME_LOST = "its run.h5 was lost, and with it how the run ended"
 _SET_ASIDE = (FlawKind.FOREIGN, FlawKind.RENAMED)
 
@@ -61,17 +66,25 @@ def _write_lost_header(run_dir: Path) -> Iterator[str]:
     if read_note(run_dir) is None:
         write_note(run_dir, RunClosing(INTERRUPTED, _OUTCOME_LOST, lived_until_utc))
     write_run_file(run_dir, header)
-    yield f"{RUN_FILE} is written anew from the shots; {LOST_WITH_HEADER}"
+    yield f"{RUN_FILE} is written anew from the shots{_renamed(run_dir, header)}; {LOST_WITH_HEADER}"
+
+
+def _renamed(run_dir: Path, header: RunHeader) -> str:
+    """What it says where shots do not name their directory."""
+    if header.run_id == run_dir.name:
+        return ""
+    return f" as run {header.run_id}, which most of the first {ASKED_SHOTS} name: none of these names {run_dir.name}"
 
 
 def _header_of_shots(run_dir: Path) -> RunHeader:
-    """What a shot tells of its run: one that names this directory, if there is any, as others may be strangers."""
+    """What a shot tells of its run: one of this directory, or of what most are, as others may be strangers."""
     paths = sorted((run_dir / SHOTS_FOLDER).glob("*.h5"))
-    for path in (*(path for path in paths if _run_of(path) == run_dir.name), *paths):
-        try:
+    told = dict(islice(((path, run_id) for path in paths if (run_id := _run_of(path))), ASKED_SHOTS))
+    often = Counter(told.values())
+    trusted = sorted(told, key=lambda path: (told[path] == run_dir.name, often[told[path]]), reverse=True)
+    for path in (*trusted, *paths):
+        with suppress(ShotFileError):
             return _header_of_shot(path)
-        except ShotFileError:
-            continue
     raise ShotFileError(f"{run_dir}: its {RUN_FILE} cannot be read, and no shot is left that tells what it was")
 
 

@@ -176,6 +176,26 @@ def test_a_lost_header_is_never_that_of_a_stranger_among_the_shots(run_dir: Path
     assert [path.name for path in (run_dir / "shots").iterdir()] == ["2.h5"]
 
 
+def test_a_lost_header_of_a_renamed_run_is_what_most_of_its_first_shots_tell(run_dir: Path) -> None:
+    (run_dir / "run.h5").unlink()
+    of_another_run(run_dir)
+    shot(run_dir, 0).rename(shot(run_dir, 3))
+    shot(run_dir, 1).rename(shot(run_dir, 0))
+    renamed = run_dir.rename(run_dir.with_name("renamed"))
+    said = list(repairing.repair(renamed))
+    assert RunReader(renamed).header.run_id == HEADER.run_id
+    assert f"as run {HEADER.run_id}, which most of the first 100 name: none of these names renamed;" in said[0]
+
+
+def test_no_more_shots_than_the_first_are_asked_whose_they_are(run_dir: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (run_dir / "run.h5").unlink()
+    of_another_run(run_dir)
+    shot(run_dir, 1).rename(shot(run_dir, 0))
+    monkeypatch.setattr(repairing, "ASKED_SHOTS", 1)
+    list(repairing.repair(run_dir))
+    assert RunReader(run_dir).header.run_id != HEADER.run_id
+
+
 def test_a_lost_header_does_not_take_the_place_of_an_outcome_that_the_disk_had_refused(run_dir: Path) -> None:
     (run_dir / "run.h5").unlink()
     write_note(run_dir, RunClosing("failed", "the disk was full", "2026-11-22T10:16:00+00:00"))
