@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from processing.exchanged_light import better_background
 from processing.imprint import imprint
+from processing.interlaced import ALTERNATING, rows_alternate
 from processing.preprocessing import Frame, Intensity, Polarity, is_dim
 
 DIM_LIGHT = "uses less than 1/8 of its grey values; is light missing, or are its bits too many?"
@@ -60,6 +61,8 @@ def odd_light(
     others : mapping of name to (rows, columns) float32 array, optional
         Backgrounds of other views, which may be exchanged.
     """
+    if rows_alternate(frame):
+        return ALTERNATING
     coarse, most = np.s_[::STRIDE_PX, ::STRIDE_PX], np.float32(2**bits - 1)
     light = _above_dark(frame, dark) / most
     if np.mean(light < -NOISE) > BRIGHTER_SHARE:

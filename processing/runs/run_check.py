@@ -20,6 +20,7 @@ from processing.calibration.verdict import Doubt, Verdict
 from processing.progress import Counted, in_silence
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.runs.errors import PipelineError
+from processing.runs.exposure_faults import odd_lights
 from processing.runs.manifest.importing import CALIBRATION_FOLDER, RUN_FOLDER
 from processing.runs.results_file import FrameName
 from processing.runs.shots.agreeing_shots import corrected_by
@@ -65,6 +66,21 @@ def check_few(
         seen = replace(calibration, views={name: calibration.views[name] for name in run.header.views})
     few = list(dict.fromkeys((shots[0], shots[len(shots) // 2], shots[-1])))
     return check_shots(_droplets(run_dir, few, seen, workbench=workbench), seen)
+
+
+def odd_images(run_dir: Path, shot: int, workbench: Workbench) -> tuple[str, ...]:
+    """What speaks against the images of a shot, whatever its droplets say of a calibration.
+
+    Raises
+    ------
+    PipelineError
+        An exposure is missing.
+    """
+    with workbench.occupied() as bench, RunReader(run_dir) as run:
+        recorded, references = run.read_shot(shot), bench.references(run)
+        frames = _FRAMES[: run.header.frames_per_shot]
+        odd = {frame: odd_lights(run, recorded, frame, references) for frame in frames}
+    return tuple(f"exposure {frame}: {view} {what}" for frame, said in odd.items() for view, what in said.items())
 
 
 def run_beside(calibration_set: Path) -> Path | None:

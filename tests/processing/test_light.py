@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from processing.interlaced import rows_alternate
 from processing.light import hollowed, odd_light
 from processing.preprocessing import Polarity, Preprocessing, intensity
 
@@ -185,3 +186,29 @@ def test_bright_particles_can_be_hollow_too(window_px: int, hollow: bool) -> Non
     frame = grey(12 + 200.0 * (np.hypot(ROWS - 40, COLUMNS - 70) < 12))
     image = intensity(frame, Preprocessing("bright", window_px), bits=8)
     assert bool(hollowed(frame, image, "bright", bits=8)) == hollow
+
+
+def woven(first: Grey, second: Grey) -> Grey:
+    """The even rows of one, the odd rows of the other."""
+    return np.where(ROWS % 2, second, first)
+
+
+@pytest.mark.parametrize("polarity", ["shadow", "bright"])
+def test_two_fields_of_video_are_told(polarity: Polarity) -> None:
+    seen = [180 * one if polarity == "bright" else LIGHT * (1 - one) for one in (droplets(1), droplets(2))]
+    background = LIGHT if polarity == "shadow" else None
+    assert told(woven(*seen), background, polarity).startswith("has rows that alternate: are these two fields of video")
+
+
+@pytest.mark.parametrize("gain", [0.9, 1.1])
+def test_rows_that_differ_everywhere_are_those_of_a_camera(gain: float) -> None:
+    uneven = np.where(ROWS % 2, gain, 1.0)
+    assert told(uneven * SHOT, uneven * LIGHT) == ""
+    assert told(SHOT[:, ::-1].T.copy(), LIGHT[:, ::-1].T.copy()) == ""
+
+
+def test_nothing_at_all_does_not_alternate() -> None:
+    for level in (0.0, 0.1, 77.7):
+        assert not rows_alternate(np.full((96, 128), level, np.float32))
+        assert not rows_alternate(np.full((96, 128), level, np.uint8))
+    assert not rows_alternate(np.zeros((3, 128), np.uint8))

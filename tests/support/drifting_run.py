@@ -21,12 +21,13 @@ def write_droplet_run(
     *,
     drift_px: int = DRIFT_PX,
     mirrored: bool = False,
+    interlaced: bool = False,
     shots: int = 2,
     drifting: Container[int] = range(100),
 ) -> Path:
     """Shots; in those that drift, view2's picture lies two pixels further right than when it was calibrated.
 
-    A covered view is dark; mirrored are all of them.
+    A covered view is dark; mirrored are all of them. Odd rows of interlaced ones show the droplets 0.1 mm beside.
     """
     rng = np.random.default_rng(11)
     cameras = {f"view{number}": camera for number, camera in enumerate(views()[:view_count], start=1)}
@@ -44,6 +45,10 @@ def write_droplet_run(
             for _ in "ab":
                 points_mm = rng.uniform(-HALF_MM, HALF_MM, (int(density_per_mm3 * np.prod(2 * HALF_MM)), 3))
                 images = {name: droplet_image(camera, points_mm, rng) for name, camera in cameras.items()}
+                if interlaced:
+                    later_mm = points_mm + (0.1, 0, 0)
+                    for name, camera in cameras.items():
+                        images[name][1::2] = droplet_image(camera, later_mm, rng)[1::2]
                 images["view2"] = np.roll(images["view2"], drift_px * (index in drifting), axis=1)
                 images = {name: image[:, ::-1] if mirrored else image for name, image in images.items()}
                 images = {name: image * (name != covered) for name, image in images.items()}

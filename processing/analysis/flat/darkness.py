@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from processing.analysis.droplets.image_noise import noise_of
 from processing.errors import BadInput
 from processing.exchanged_light import better_background
+from processing.interlaced import ALTERNATING, rows_alternate
 from processing.preprocessing import Polarity
 
 FITS = 6
@@ -75,8 +76,10 @@ def darkness_of(image: NDArray[np.generic], polarity: Polarity, background: NDAr
     ------
     LightError
         Shadows, and the light is not much more than the noise; or much of the image lies on the other side of the
-        light, so that this is not known.
+        light, so that this is not known; or rows alternate.
     """
+    if rows_alternate(image):
+        raise LightError(ALTERNATING)
     grey = np.asarray(image, np.float32)
     rows, columns = _without_frame(grey)
     inner = grey[rows, columns]

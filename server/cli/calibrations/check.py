@@ -26,16 +26,20 @@ def check(options: Namespace) -> Outcome:
     """Check shot by shot; it has not passed where a shot would stop reconstruction."""
     from processing.calibration.calibration_file import load_calibration
     from processing.calibration.verdict import Verdict
-    from processing.runs.run_check import check_shot
+    from processing.runs.run_check import check_shot, odd_images
     from processing.runs.shots.shot_check import ALARM_PX, STOP_PX
+    from processing.runs.workbench import Workbench
 
-    calibration = load_calibration(options.calibration)
-    shots = []
+    calibration, workbench = load_calibration(options.calibration), Workbench()
+    shots, odd = [], []
     for index in tracked(selected_shots(options.run, options.shots)):
-        measured = check_shot(options.run, index, calibration)
+        measured = check_shot(options.run, index, calibration, workbench)
         progress(f"{options.run.name}: {check_line(measured)}")
         shots.append(measured)
-    verdicts = [shot.verdict for shot in shots if shot.verdict is not None]
+        odd.append(odd_images(options.run, index, workbench))
+        for what in odd[-1]:
+            progress(f"{options.run.name}: shot {index}, {what}")
+    verdicts = [shot.verdict for shot in shots if shot.verdict is not None] + [Verdict.WARN] * any(odd)
     result = {
         "passed": Verdict.REFUSE not in verdicts,
         "run": options.run.name,
@@ -43,7 +47,7 @@ def check(options: Namespace) -> Outcome:
         "alarm_px": ALARM_PX,
         "stop_px": STOP_PX,
         "verdict": max(verdicts, key=list(Verdict).index) if verdicts else None,
-        "shots": [shot.record() for shot in shots],
+        "shots": [{**shot.record(), "odd_light": list(what)} for shot, what in zip(shots, odd, strict=True)],
     }
     return Outcome(result, views_table(result))
 

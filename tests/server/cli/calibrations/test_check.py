@@ -105,6 +105,20 @@ def test_a_view_that_sees_no_droplet_is_named(
     assert re.match(blind, refused["error"])
 
 
+def test_droplets_of_two_fields_of_video_are_no_good_witnesses(
+    calibration_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Each is seen in all views at once, so that lines of sight meet; their places and numbers are of no time."""
+    woven = write_droplet_run(tmp_path / "woven", drift_px=0, interlaced=True, shots=1)
+    result = told(capsys, "check", woven, "--calibration", calibration_file)
+    assert result["shots"][0]["verdict"] in ("good", "usable")
+    assert result["verdict"] == "warn"
+    assert "exposure a: view1 has rows that alternate" in result["shots"][0]["odd_light"][0]
+    fine = write_droplet_run(tmp_path / "fine", drift_px=0, shots=1)
+    result = told(capsys, "check", fine, "--calibration", calibration_file)
+    assert (result["verdict"], result["shots"][0]["odd_light"]) == ("good", [])
+
+
 def test_calibration_of_other_views_is_refused(
     calibration_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
