@@ -46,13 +46,21 @@ def copied(shot: Shot, frame: FrameName, images: Sequence[Intensity], before: di
     return {} if first == shot.index else {"copy_of": first}
 
 
-def stored_faults(volume_file: Path) -> Mapping[str, Any]:
-    """Shot and faults of a stored volume; empty if it tells none."""
+def stored_faults(volume_file: Path, copy_of: Path | None = None) -> Mapping[str, Any]:
+    """Shot and faults of a stored volume, and the shot of another one that has its voxels; empty if it tells none."""
     with open_volume(volume_file) as volume:
         told = {name: json.loads(str(volume.provenance[name])) for name in FAULTS if name in volume.provenance}
         if volume.lost_share > MOST_LOST:
             told["lost_share"] = volume.lost_share
-        return {"shot": volume.provenance["shot"], **told} if told else {}
+        if copy_of:
+            told["copy_of"] = _shot_of(copy_of)
+        return {"shot": _shot_of(volume_file), **told} if told else {}
+
+
+def _shot_of(volume_file: Path) -> Any:
+    """Index of a shot, as its volume has it; the name of one that does not say."""
+    with open_volume(volume_file) as volume:
+        return volume.provenance.get("shot", volume_file.name)
 
 
 def fault_lines(faults: Mapping[str, Any]) -> list[str]:

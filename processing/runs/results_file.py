@@ -1,5 +1,6 @@
 """A results directory: ``settings.json`` and one volume per exposure, ``shot_00012_a.vtkhdf``."""
 
+import hashlib
 import json
 from collections.abc import Mapping
 from pathlib import Path
@@ -9,10 +10,12 @@ import numpy as np
 
 from daq.files.atomic_file import commit, own_part_path, sync
 from processing.preprocessing import Intensity
-from processing.reconstruction.volume_file import VolumeFileError, open_volume
+from processing.reconstruction.volume_file import StoredVolume, VolumeFileError, open_volume
 from processing.volume import VoxelGrid
 
 SETTINGS_FILE = "settings.json"
+COPIED_PLANES = 8
+"""Every so many planes are asked whether a volume is a copy: noise never repeats."""
 FrameName = Literal["a", "b"]
 Provenance = Mapping[str, str | int | float]
 
@@ -55,8 +58,10 @@ def claim_results(results_dir: Path, provenance: Provenance) -> None:
         raise VolumeFileError(f"{results_dir}: holds results of another run, calibration or settings; choose another")
 
 
-def average_volumes(files: list[Path]) -> tuple[Intensity, VoxelGrid]:
-    """Mean of volumes on one grid.
+def average_volumes(files: list[Path]) -> tuple[Intensity, VoxelGrid, dict[Path, Path]]:
+    """Mean of volumes on one grid, and which of them has the very voxels of which one before it.
+
+    Of empty ones nothing is said: they are all alike.
 
     Raises
     ------
@@ -70,6 +75,8 @@ def average_volumes(files: list[Path]) -> tuple[Intensity, VoxelGrid]:
         grid, made_by = first.grid, _made_by(first.provenance)
     total = np.zeros(grid.shape, np.float32)
     counted: dict[str, Path] = {}
+    seen: dict[bytes, Path] = {}
+    copies: dict[Path, Path] = {}
     for file in files:
         with open_volume(file) as volume:
             if volume.grid != grid:
@@ -80,14 +87,25 @@ def average_volumes(files: list[Path]) -> tuple[Intensity, VoxelGrid]:
                 raise VolumeFileError(f"{file}: the same exposure as {first_file.name}; it would count twice")
             if (called := _own_name(volume.provenance)) not in ("", file.name):
                 raise VolumeFileError(f"{file}: was renamed, and is {called}: another shot, or another exposure")
-            for first_row, slab in volume.slabs():
-                if not np.isfinite(slab).all():
-                    raise VolumeFileError(f"{file}: was changed: a voxel is infinite, or not a number")
-                if slab.min(initial=0) < 0:
-                    raise VolumeFileError(f"{file}: was changed: a voxel is negative")
-                total[:, first_row : first_row + slab.shape[1]] += slab
+            if (voxels := _added(volume, total)) and (first_file := seen.setdefault(voxels, file)) != file:
+                copies[file] = first_file
     total /= np.float32(len(files))
-    return total, grid
+    return total, grid, copies
+
+
+def _added(volume: StoredVolume, total: Intensity) -> bytes:
+    """Add a volume to a sum; a hash of some of its planes, empty where nothing is in them."""
+    voxels, empty = hashlib.blake2b(), True
+    for first_row, slab in volume.slabs():
+        if not np.isfinite(slab).all():
+            raise VolumeFileError(f"{volume.path}: was changed: a voxel is infinite, or not a number")
+        if slab.min(initial=0) < 0:
+            raise VolumeFileError(f"{volume.path}: was changed: a voxel is negative")
+        total[:, first_row : first_row + slab.shape[1]] += slab
+        asked = slab[::COPIED_PLANES]
+        voxels.update(asked.tobytes())
+        empty = empty and not asked.any()
+    return b"" if empty else voxels.digest()
 
 
 def _exposure(provenance: Provenance) -> str:

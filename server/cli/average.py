@@ -80,9 +80,9 @@ def _average_results(options: Namespace) -> dict[str, Any]:
             f"{options.results}: there are no volumes of exposure {options.exposure.upper()} to average; the server "
             "keeps previews: name the run and its --calibration"
         )
-    volume, grid = average_volumes(files)
+    volume, grid, copies = average_volumes(files)
     mean = MeanVolume.of(volume)
-    faults = [told for file in files if (told := stored_faults(file))]
+    faults = [told for file in files if (told := stored_faults(file, copies.get(file)))]
     if (belonging := stored_belonging(files)) is None:
         return _written(options, mean, grid, len(files), faults, {})
     if belonging["verdict"] in ("warn", "refuse"):

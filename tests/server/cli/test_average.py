@@ -119,12 +119,17 @@ def test_exposures_that_may_be_wrong_are_told_with_the_mean(
     assert json.loads(str(read_volume(tmp_path / "mean.vtkhdf")[2]["faults"])) == faults
 
 
+@pytest.mark.parametrize("straight", [False, True], ids=["of results", "of a run"])
 def test_a_shot_that_is_a_copy_of_another_is_told_with_the_mean(
-    calibration_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    straight: bool, calibration_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     run_dir = write_run(tmp_path / "copies", shots=2, copies=True)
-    options = ["--calibration", str(calibration_file), f"--grid={GRID}", "-o", str(tmp_path / "mean.vtkhdf")]
-    assert main(["average", str(run_dir), *options, "--json"]) == 0
+    options = ["--calibration", str(calibration_file), f"--grid={GRID}"]
+    source = [str(run_dir), *options]
+    if not straight:
+        told(capsys, "reconstruct", run_dir, *options, "-o", tmp_path / "out")
+        source = [str(tmp_path / "out")]
+    assert main(["average", *source, "-o", str(tmp_path / "mean.vtkhdf"), "--json"]) == 0
     output = capsys.readouterr()
     assert json.loads(output.out.splitlines()[-1])["faults"] == [{"shot": 1, "copy_of": 0}]
     assert "shot 1, exposure a: has the very images of shot 0: one is a copy, and it counts twice" in output.err
