@@ -12,7 +12,7 @@ from processing.analysis.objects.liquid_objects import LiquidObjects
 from processing.analysis.objects.object_search import ExposureObjects
 from processing.calibration.calibration import Calibration
 from processing.geometry import FloatArray
-from processing.runs.liquid.objects import COUNTED, LiquidSummary, RunObjects, summary_of
+from processing.runs.liquid.objects import LiquidSummary, RunObjects, summary_of
 from processing.runs.workbench import read_references
 from processing.synthetic.liquid.connected_balls import connected_length_mm
 from processing.synthetic.liquid.nozzles import HOLLOW_CONE_FLOW
@@ -35,9 +35,9 @@ class MeasuredLiquid:
     true_mm: FloatArray
 
     @property
-    def objects(self) -> LiquidObjects:
-        """Of all shots."""
-        return LiquidObjects.joined([one.objects for one in self.found])
+    def objects(self) -> list[LiquidObjects]:
+        """Of each shot."""
+        return [one.objects for one in self.found]
 
     @property
     def reaches(self) -> list[Reach]:
@@ -47,7 +47,7 @@ class MeasuredLiquid:
     @property
     def summary(self) -> LiquidSummary:
         """Numbers of objects, and the break-up length."""
-        return summary_of({kind: self.objects.count(kind) for kind in COUNTED}, self.reaches)
+        return summary_of(self.objects, len(self.found), self.reaches)
 
     @property
     def true_break_up_mm(self) -> float:

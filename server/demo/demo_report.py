@@ -145,9 +145,8 @@ def _droplets_section(droplets: MeasuredDroplets) -> Section:
 
 def _break_up(liquid: MeasuredLiquid) -> Section:
     """Of exposure A of all shots, against the truth."""
-    first = liquid.found[0]
-    told = ReportedLiquid(liquid.reaches, len(liquid.found), liquid.objects, first.objects, liquid.true_mm)
-    return break_up_section(told)
+    objects = liquid.objects
+    return break_up_section(ReportedLiquid(liquid.reaches, len(objects), objects, objects[0], liquid.true_mm))
 
 
 def _droplets_table(droplets: MeasuredDroplets) -> Table:

@@ -2,9 +2,8 @@
 
 from math import floor, log10
 
-NARROW = 0.01
-"""Of the number: half of an interval that three digits do not show."""
-
+NARROW, NONE = 0.01, 1e-9
+"""Of the number: half of an interval that three digits do not show, and of one that is none but for rounding."""
 WRITTEN_OUT = 1e6
 """Smaller numbers have no exponent."""
 
@@ -18,7 +17,7 @@ def three_digits(value: float) -> str:
 def digits_of_interval(value: float, low: float, high: float) -> tuple[str, str, str]:
     """A number and its limits: three digits each, or as many as tell two of half the interval where it is narrow."""
     half = (high - low) / 2
-    if not 0 < half < NARROW * abs(value):
+    if not NONE * abs(value) < half < NARROW * abs(value):
         return three_digits(value), three_digits(low), three_digits(high)
     decimals = max(0, 1 - floor(log10(half)))
     return f"{value:.{decimals}f}", f"{low:.{decimals}f}", f"{high:.{decimals}f}"

@@ -10,17 +10,17 @@ from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.analysis.objects.break_up import Reach
 from processing.analysis.objects.connected_share import BreakUp, break_up_of, connected_share
 from processing.analysis.objects.liquid_objects import LiquidObjects, ObjectClass
+from processing.analysis.objects.object_sizes import MedianSizes, median_sizes
 from processing.analysis.objects.seeing_views import UnseenMap
 from processing.figures.object_figures import BreakUpCurve, break_up_figure, unseen_figure
 from processing.geometry import FloatArray
-from processing.runs.liquid.objects import reaches_of, told_of_exposures
+from processing.runs.liquid.objects import objects_of, reaches_of, told_of_exposures
 from server.reports.digits import counted
 from server.reports.page import Picture, Section, Table
+from server.reports.spray_tables import cells_of
 
 CURVE_POINTS, BEYOND = 400, 1.25
 """Of the break-up curve, which ends so far beyond the longest length."""
-FEWEST = 5
-"""Objects whose lengths have a spread."""
 CLASSES_TEXT = (
     "A ligament's longest axis is 1.8 times the next; a sheet's shortest is 1.8 times shorter than the next; a cluster "
     "is several bodies that touch, a ring or a net; the core hangs together with the nozzle. Shorter ones are droplets."
@@ -46,8 +46,8 @@ class ReportedLiquid:
         How far it hangs together with the nozzle, a shot each.
     exposures : int
         In which objects were looked for.
-    objects : LiquidObjects
-        Of all exposures.
+    by_shot : sequence of LiquidObjects
+        Of all exposures of each shot.
     shown : LiquidObjects
         Of the exposure that is drawn.
     true_mm : (shots,) array | None
@@ -56,7 +56,7 @@ class ReportedLiquid:
 
     reaches: Sequence[Reach]
     exposures: int
-    objects: LiquidObjects
+    by_shot: Sequence[LiquidObjects]
     shown: LiquidObjects
     true_mm: FloatArray | None = None
 
@@ -66,10 +66,14 @@ class ReportedLiquid:
         exposures = sum(len(told_of_exposures(shot)) for shot in shots)
         if not exposures:
             return None
-        found = [LiquidObjects.of(shot.objects) for shot in shots]
-        first = shots[0].objects
+        first = next(shot.objects for shot in shots if told_of_exposures(shot))
+        found = objects_of(shots)
         shown = found[0].where(first["frame"] == "a") if first else found[0]
-        return cls(reaches_of(shots), exposures, LiquidObjects.joined(found), shown)
+        return cls(reaches_of(shots), exposures, found, shown)
+
+    def medians(self, kind: ObjectClass) -> MedianSizes | None:
+        """Of the objects of a class."""
+        return median_sizes(self.by_shot, kind, self.exposures)
 
 
 def break_up_section(liquid: ReportedLiquid) -> Section:
@@ -90,8 +94,14 @@ def break_up_section(liquid: ReportedLiquid) -> Section:
     return Section("Ligaments and break-up", text, [_objects_table(liquid)], [Picture(figure, caption, svg=True)])
 
 
-def break_up_rows(liquid: ReportedLiquid) -> list[list[str]]:
-    """The break-up length as a row of a table of figures; none where it is not told."""
+def liquid_rows(liquid: ReportedLiquid) -> list[list[str]]:
+    """Break-up length and medians of ligaments as rows of a table of figures, as far as they are told."""
+    medians = liquid.medians(ObjectClass.LIGAMENT)
+    sizes = [("length", medians.length_mm), ("width", medians.width_mm)] if medians else []
+    return [*_break_up_rows(liquid), *([f"ligaments, median {name} [mm]", *cells_of(one)] for name, one in sizes)]
+
+
+def _break_up_rows(liquid: ReportedLiquid) -> list[list[str]]:
     found = break_up_of(liquid.reaches)
     if found.value_mm is None or found.low_mm is None:
         return []
@@ -127,17 +137,21 @@ def _curve(liquid: ReportedLiquid, found: BreakUp) -> BreakUpCurve | None:
 def _objects_table(liquid: ReportedLiquid) -> Table:
     rows = [_row(kind, liquid) for kind in ObjectClass if kind is not ObjectClass.DROPLET]
     head = ["", "number", "per exposure", "length, median [mm]", "10 to 90 % [mm]", "width, median [mm]"]
-    return Table(head, rows, caption=f"Liquid that is no droplet, in {counted(liquid.exposures, 'exposure')}")
+    caption = f"Liquid that is no droplet, in {counted(liquid.exposures, 'exposure')}; medians with 95 % intervals"
+    return Table(head, rows, caption=caption)
 
 
 def _row(kind: ObjectClass, liquid: ReportedLiquid) -> list[str]:
-    chosen = liquid.objects.where(liquid.objects.classes == kind)
+    chosen = LiquidObjects.joined([one.where(one.classes == kind) for one in liquid.by_shot])
     numbers = [f"{kind}s", f"{len(chosen)}", f"{len(chosen) / liquid.exposures:.1f}"]
     if not len(chosen):
         return [*numbers, "", "", ""]
-    low_mm, median_mm, high_mm = np.percentile(chosen.lengths_mm, (10, 50, 90))
-    between = f"{low_mm:.2f} to {high_mm:.2f}" if len(chosen) >= FEWEST else ""
-    return [*numbers, f"{median_mm:.2f}", between, f"{np.median(chosen.widths_mm):.3f}"]
+    medians = liquid.medians(kind)
+    if medians is None:
+        return [*numbers, f"{np.median(chosen.lengths_mm):.2f}", "", f"{np.median(chosen.widths_mm):.3f}"]
+    low_mm, high_mm = np.percentile(chosen.lengths_mm, (10, 90))
+    length, width = ("{} ({})".format(*cells_of(one)) for one in (medians.length_mm, medians.width_mm))
+    return [*numbers, length, f"{low_mm:.2f} to {high_mm:.2f}", width]
 
 
 def unknown_section(shots: Sequence[StoredDroplets]) -> Section | None:

@@ -23,7 +23,7 @@ from processing.figures.sprays.field_figure import velocity_field_figure
 from processing.figures.sprays.motion_figure import motion_figure
 from processing.figures.sprays.space_figures import density_figure, patternation_figure
 from processing.runs.sprays.measured_spray import MeasuredSpray
-from server.reports.liquid_sections import ReportedLiquid, break_up_rows, break_up_section, unknown_section
+from server.reports.liquid_sections import ReportedLiquid, break_up_section, liquid_rows, unknown_section
 from server.reports.object_motion_section import object_motion_section
 from server.reports.page import Picture, Section, Table, write_report
 from server.reports.shots_section import VERDICT, exposure_rows, shots_section
@@ -103,7 +103,7 @@ def _summary(reported: ReportedSpray) -> Section:
     )
     text = f"{counted} {SAMPLES[told.sample.verdict] if told.sample else ''} {_verdicts(reported)}"
     liquid = ReportedLiquid.of_files(reported.spray.shots)
-    table = figures_table(told, break_up_rows(liquid) if liquid else ())
+    table = figures_table(told, liquid_rows(liquid) if liquid else ())
     return Section("Summary", text, [table], points=[*conditions_of(reported), *doubts(told)])
 
 

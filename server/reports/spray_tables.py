@@ -40,7 +40,7 @@ LABELS = {"number_density_per_mm3": DENSITY, "liquid_ppm": LIQUID, **OF_DROPLETS
 
 def figure_rows(told: SprayStatistics) -> list[Row]:
     """Name with unit, value and interval of every figure that a spray has."""
-    return [[name, *_cells(estimate)] for name, estimate in _figures(told) if estimate]
+    return [[name, *cells_of(estimate)] for name, estimate in _figures(told) if estimate]
 
 
 def _figures(told: SprayStatistics) -> Iterator[tuple[str, Estimate | None]]:
@@ -64,7 +64,8 @@ def in_percent(share: Estimate) -> Estimate:
     return Estimate(value=value, low=low, high=high)
 
 
-def _cells(estimate: Estimate) -> Row:
+def cells_of(estimate: Estimate) -> Row:
+    """Value, and interval."""
     value, low, high = digits_of_interval(estimate.value, estimate.low, estimate.high)
     return [value, f"{low} to {high}"]
 

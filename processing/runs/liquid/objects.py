@@ -12,8 +12,9 @@ from daq.files.run_directory import RunReader, Shot
 from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.analysis.objects.break_up import Nozzle, Reach
 from processing.analysis.objects.connected_share import break_up_of
-from processing.analysis.objects.liquid_objects import ObjectClass
+from processing.analysis.objects.liquid_objects import LiquidObjects, ObjectClass
 from processing.analysis.objects.object_search import ObjectSearch, measure_objects, plan_objects
+from processing.analysis.objects.object_sizes import MedianSizes, median_sizes
 from processing.analysis.objects.object_velocities import MovingObjects, object_velocities
 from processing.calibration.calibration import Calibration
 from processing.kernels import DEFAULT_THREADS
@@ -158,6 +159,9 @@ class LiquidSummary(FrozenValue):
     ligaments: Annotated[int, Field(description="in all exposures")] = 0
     sheets: Annotated[int, Field(description="in all exposures")] = 0
     clusters: Annotated[int, Field(description="in all exposures; neither of both, or several that touch")] = 0
+    ligament_medians: Annotated[MedianSizes | None, Field(description="of all ligaments; null of fewer than five")] = (
+        None
+    )
     break_up_mm: Annotated[BreakUpLength | None, Field(description="how far liquid hangs together")] = None
     break_up_longer_than_mm: Annotated[
         float | None, Field(description="where more than half leave the field before they end")
@@ -171,14 +175,19 @@ NO_OBJECTS = "nobody looked for it: bright particles, or a file of an older prog
 
 def liquid_summary(shots: Sequence[StoredDroplets]) -> LiquidSummary:
     """Objects of some shots by their files; the break-up length is of the first exposure of each."""
-    told = [one for shot in shots for one in told_of_exposures(shot)]
-    counts = {kind: sum(int(one[f"{kind}s"]) for one in told) for kind in COUNTED}
-    return summary_of(counts, reaches_of(shots))
+    return summary_of(objects_of(shots), sum(len(told_of_exposures(shot)) for shot in shots), reaches_of(shots))
 
 
-def summary_of(counts: Mapping[ObjectClass, int], reaches: Sequence[Reach]) -> LiquidSummary:
-    """Objects by their classes, and the break-up length of one exposure each of some shots."""
-    counted = LiquidSummary.model_validate({f"{kind}s": counts[kind] for kind in COUNTED})
+def objects_of(shots: Sequence[StoredDroplets]) -> list[LiquidObjects]:
+    """Objects of all exposures of each shot in which anybody looked for them."""
+    return [LiquidObjects.of(shot.objects) for shot in shots if told_of_exposures(shot)]
+
+
+def summary_of(by_shot: Sequence[LiquidObjects], exposures: int, reaches: Sequence[Reach]) -> LiquidSummary:
+    """Objects of some shots by their classes, in so many exposures, and the break-up length of one exposure each."""
+    counts = {f"{kind}s": sum(one.count(kind) for one in by_shot) for kind in COUNTED}
+    medians = median_sizes(by_shot, ObjectClass.LIGAMENT, exposures)
+    counted = LiquidSummary.model_validate({**counts, "ligament_medians": medians})
     if not reaches:
         return counted.model_copy(update={"break_up_reason": NO_OBJECTS})
     found = break_up_of(reaches)

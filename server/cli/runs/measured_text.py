@@ -63,7 +63,7 @@ def _liquid(result: dict[str, Any]) -> str:
     """What is no droplet, in a line of its own; nothing where nobody looked."""
     if result["polarity"] != "shadow":
         return ""
-    objects = ", ".join(f"{result[name]} {name}" for name in ("ligaments", "sheets", "clusters"))
+    objects = ", ".join(f"{result[name]} {name}{_sizes(result, name)}" for name in ("ligaments", "sheets", "clusters"))
     length = result["break_up_mm"]
     if length is None:
         return f"\n{objects}; no break-up length: {result['break_up_reason']}"
@@ -71,6 +71,15 @@ def _liquid(result: dict[str, Any]) -> str:
     unknown = f"; {result['break_up_reason']}" if result["break_up_reason"] else ""
     told = f"break-up length {length['value']:.2f} mm ({length['low']:.2f} to {most})"
     return f"\n{objects}; {told}, shots: {result['break_up_shots']}{unknown}"
+
+
+def _sizes(result: dict[str, Any], name: str) -> str:
+    """Medians of ligaments, where they are told."""
+    medians = result["ligament_medians"] if name == "ligaments" else None
+    if medians is None:
+        return ""
+    length, width = (_with_interval(medians[size]) for size in ("length_mm", "width_mm"))
+    return f" (medians: {length} mm long, {width} mm wide)"
 
 
 def _mean_velocity(velocity: dict[str, Any]) -> str:

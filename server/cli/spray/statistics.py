@@ -28,13 +28,15 @@ def add(verbs: Verbs) -> None:
 
 def statistics(options: Namespace) -> Outcome:
     """Pool the shots of all results, or compare them."""
+    from processing.runs.liquid.objects import liquid_summary
     from processing.runs.sprays.measured_spray import read_spray
 
     if options.compare:
         return _compare(options)
     spray = read_spray(options.results)
-    told = _told(options, spray)
-    result = {"results": spray.name, "conditions_changed": list(spray.changes), **told.model_dump(mode="json")}
+    told, liquid = _told(options, spray), liquid_summary(spray.shots).model_dump(mode="json")
+    changes = list(spray.changes)
+    result = {"results": spray.name, "conditions_changed": changes, "liquid": liquid, **told.model_dump(mode="json")}
     return Outcome(result, _text(spray, told))
 
 

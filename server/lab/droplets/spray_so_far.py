@@ -13,6 +13,7 @@ from daq.frozen_model import FrozenModel
 from daq.run_plan import ImageKey
 from processing.analysis.droplets.droplet_file import DropletFileError
 from processing.analysis.spray.spray_statistics import AskedFor, SprayStatistics, spray_statistics
+from processing.runs.liquid.objects import LiquidSummary, liquid_summary
 from processing.runs.measured_shot import droplets_path
 from processing.runs.sprays.measured_spray import read_files
 from server.lab.errors import Damaged, NotFound
@@ -31,6 +32,7 @@ class SpraySoFar(FrozenModel):
     measured: Annotated[int, Field(description="shots whose droplets are there")]
     recorded: Annotated[int, Field(description="valid sample shots of the run, so far")]
     statistics: Annotated[SprayStatistics, Field(description="of the sample; refused exposures do not count")]
+    liquid: Annotated[LiquidSummary, Field(description="ligaments, sheets and break-up of the same shots")]
     conditions_changed: Annotated[
         tuple[str, ...], Field(description="what of notes, nozzle and axis was changed after the run: by whom and when")
     ] = ()
@@ -84,7 +86,8 @@ def spray_so_far(
     run_dir, sample = runs.directory(run_id), measured_sample(runs, run_id, results)
     try:
         later = len(RunReader(run_dir).notes_changes)
-        statistics, changes = _of(tuple((file, file.stat().st_mtime_ns) for file in sample.files), liquid_kg_m3, later)
+        files = tuple((file, file.stat().st_mtime_ns) for file in sample.files)
+        statistics, liquid, changes = _of(files, liquid_kg_m3, later)
     except (DropletFileError, ShotFileError, OSError) as error:
         raise Damaged(str(error)) from error
     recorded = int(np.count_nonzero(runs.image_keys(run_id) == ImageKey.SAMPLE))
@@ -94,6 +97,7 @@ def spray_so_far(
         measured=sample.measured,
         recorded=recorded,
         statistics=statistics,
+        liquid=liquid,
         conditions_changed=changes,
     )
 
@@ -120,7 +124,8 @@ def measured_sample(runs: RunStore, run_id: str, results: str | None) -> Measure
 @lru_cache(maxsize=16)
 def _of(
     files: tuple[tuple[Path, int], ...], liquid_kg_m3: float | None, _changes: int
-) -> tuple[SprayStatistics, tuple[str, ...]]:
+) -> tuple[SprayStatistics, LiquidSummary, tuple[str, ...]]:
     """Once per change of the files, or of the conditions of the run: ``_changes`` counts those."""
     spray = read_files([file for file, _ in files])
-    return spray_statistics(spray.shots, AskedFor(spray.axis, liquid_kg_m3=liquid_kg_m3)), spray.changes
+    statistics = spray_statistics(spray.shots, AskedFor(spray.axis, liquid_kg_m3=liquid_kg_m3))
+    return statistics, liquid_summary(spray.shots), spray.changes

@@ -10,7 +10,7 @@ from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.analysis.objects.break_up import THRESHOLDS, Reach
 from processing.analysis.objects.seeing_views import UnseenMap
 from processing.volume import VoxelGrid
-from server.reports.liquid_sections import NO_MAP, ReportedLiquid, break_up_rows, break_up_section, unknown_section
+from server.reports.liquid_sections import NO_MAP, ReportedLiquid, break_up_section, liquid_rows, unknown_section
 
 GRID = VoxelGrid((4, 5, 6), (0.0, 0.0, 0.0), 0.1)
 
@@ -41,19 +41,20 @@ def shot(*reaches: Reach) -> StoredDroplets:
 def test_lengths_have_limits_and_truth_and_objects_are_counted_by_exposure() -> None:
     liquid = ReportedLiquid.of_files([shot(reach(length_mm), reach(9.0)) for length_mm in (4.0, 5.0, 6.0)])
     assert liquid
-    ((name, value, within),) = break_up_rows(liquid)
+    (name, value, within), *ligaments = liquid_rows(liquid)
     assert (name, value, " to " in within) == ("break-up length [mm]", "5.00", True)
+    assert ligaments[0][:2] == ["ligaments, median length [mm]", "0.500"]
     section = break_up_section(liquid)
     assert section.text.startswith("Break-up length 5.00 mm along the axis (95 % limits ")
     assert "3 shots" in section.text
     (table,) = section.tables
     rows = {row[0]: row[1:] for row in table.rows}
-    assert rows["ligaments"] == ["6", "1.0", "0.50", "0.50 to 0.50", "0.100"]
+    assert rows["ligaments"] == ["6", "1.0", "0.500 (0.500 to 0.500)", "0.50 to 0.50", "0.100 (0.100 to 0.100)"]
     assert rows["clusters"] == ["0", "0.0", "", "", ""]
     curve, objects = section.pictures[0].figure.axes
     assert "share of shots" in curve.get_ylabel()
     assert "ligament (1)" in {text.get_text() for text in objects.get_legend().get_texts()}  # type: ignore[union-attr]
-    known = ReportedLiquid(liquid.reaches, 6, liquid.objects, liquid.shown, np.array([4.9, 5.2, 5.0]))
+    known = ReportedLiquid(liquid.reaches, 6, liquid.by_shot, liquid.shown, np.array([4.9, 5.2, 5.0]))
     assert "In truth it is 5.00 mm" in break_up_section(known).text
 
 
@@ -69,7 +70,7 @@ def test_a_large_body_that_lies_apart_is_told_beside_the_length() -> None:
 def test_without_a_length_the_reason_is_told_and_there_is_no_curve() -> None:
     liquid = ReportedLiquid.of_files([shot(Reach(reason="nobody stated where the nozzle is"))])
     assert liquid
-    assert break_up_rows(liquid) == []
+    assert liquid_rows(liquid) == []
     section = break_up_section(liquid)
     assert section.text.startswith("No break-up length: nobody stated where the nozzle is.")
     assert len(section.pictures[0].figure.axes) == 1

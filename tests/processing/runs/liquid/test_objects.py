@@ -12,8 +12,11 @@ from daq.files.run_directory import RunReader
 from daq.run_notes import Spray
 from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.analysis.objects.break_up import THRESHOLDS, Nozzle, Reach
+from processing.analysis.objects.liquid_objects import LiquidObjects
 from processing.runs.liquid.objects import NO_OBJECTS, liquid_summary, nozzle_of, place_and_axis
 from tests.support.droplet_run import write_run
+
+COLUMNS = tuple(LiquidObjects.none().columns())
 
 
 def test_the_nozzle_is_that_of_the_run_unless_another_is_stated(tmp_path: Path) -> None:
@@ -33,11 +36,13 @@ def test_numbers_that_are_no_nozzle_are_refused(numbers: tuple[float, ...]) -> N
 
 
 def _shot(*reaches: Reach) -> StoredDroplets:
-    counts = {"ligaments": 2, "sheets": 1, "clusters": 0}
+    """Two ligaments and a sheet in each exposure."""
     exposures: dict[str, Any] = {
-        frame: {"objects": {**counts, "reach": asdict(reach)}} for frame, reach in zip("ab", reaches, strict=False)
+        frame: {"objects": {"reach": asdict(reach)}} for frame, reach in zip("ab", reaches, strict=False)
     }
-    return StoredDroplets({"frame": np.empty(0, "U1")}, {"exposures": json.dumps(exposures)})
+    objects = {name: np.tile((0.4, 0.6, 2.0), len(reaches)) for name in COLUMNS}
+    objects["class"] = np.tile(["ligament", "ligament", "sheet"], len(reaches))
+    return StoredDroplets({"frame": np.empty(0, "U1")}, {"exposures": json.dumps(exposures)}, objects)
 
 
 def _reach(length_mm: float, leaves: bool = False) -> Reach:
@@ -49,6 +54,10 @@ def test_the_first_exposure_of_each_shot_counts() -> None:
     assert found.break_up_mm is not None
     assert found.break_up_mm.value == 5.0
     assert (found.ligaments, found.sheets, found.clusters) == (12, 6, 0)
+    assert found.ligament_medians
+    assert found.ligament_medians.length_mm.value == pytest.approx(0.5)
+    assert found.ligament_medians.length_mm.low < 0.5 < found.ligament_medians.length_mm.high
+    assert liquid_summary([_shot(_reach(4.0))]).ligament_medians is None
 
 
 def test_what_is_not_known_is_null_with_its_reason() -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from processing.analysis.spray.spray_statistics import SprayStatistics
+from processing.runs.liquid.objects import NO_OBJECTS
 from tests.support.command_line import refused, shown, told
 from tests.support.sampled_sprays import cone_shots, in_box, write_results
 
@@ -28,6 +29,7 @@ def test_shots_of_all_results_are_pooled_and_the_run_says_where_the_nozzle_is(
     both = told(capsys, "statistics", results / "monday", results / "tuesday")
     above = told(capsys, "statistics", results)
     assert (one.pop("results"), one.pop("conditions_changed")) == ("monday", [])
+    assert one.pop("liquid")["break_up_reason"] == NO_OBJECTS
     assert SprayStatistics.model_validate(one).extent
     assert both["droplets"]["shots"] == above["droplets"]["shots"] == 10
     assert both["droplets"] == above["droplets"]

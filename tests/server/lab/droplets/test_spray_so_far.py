@@ -6,6 +6,7 @@ import pytest
 
 from daq.run.events import RunStatus
 from daq.run.state import RunState
+from processing.runs.liquid.objects import NO_OBJECTS
 from server.lab.droplets.proposed_separation import proposed_separation
 from server.lab.droplets.spray_so_far import MOST_SHOTS, spray_so_far
 from server.lab.errors import NotFound
@@ -30,6 +31,7 @@ def test_of_many_shots_an_even_sample_is_taken_and_told(tmp_path: Path) -> None:
     assert told.statistics.motion
     assert told.statistics.motion.mass_flux_kg_m2_s
     assert told.statistics.motion.volume_flux_mm_s
+    assert (told.liquid.ligaments, told.liquid.break_up_reason) == (0, NO_OBJECTS)
     flux = told.statistics.motion.volume_flux_mm_s.value
     assert told.statistics.motion.mass_flux_kg_m2_s.value == pytest.approx(flux)
 
