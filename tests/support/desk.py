@@ -1,22 +1,71 @@
 """What tests of the desk in a browser share: the far ends of its rig, runs that go on, pictures."""
 
+import json
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from playwright.sync_api import Page
+from nicegui import app as pages
+from playwright.sync_api import Browser, ConsoleMessage, Page
 
+from server.web.app import create_app
+from tests.support.drifting_views import SIZE_PX
+from tests.support.live_shots import spray_scene
 from tests.support.operator import VIEWS
-from tests.support.serving import Serving, plan_of
+from tests.support.serving import Serving, plan_of, serving
 
 PICTURES = os.environ.get("TOMOSHADOW_PICTURES")
 """Folder for pictures of pages; without it none are taken."""
 PULSE = {"current_a": dict.fromkeys(VIEWS, 5)}
 
 
+@contextmanager
+def serving_desk(data_dir: Path, **options: Any) -> Iterator[Serving]:
+    """Serve a rig in memory with its pages until the block ends.
+
+    NiceGUI has one application per process: what an earlier server has put around it goes.
+    """
+    pages.middleware_stack = None
+    pages.user_middleware.clear()
+    with serving(data_dir, views=VIEWS, **{"build": create_app, **options}) as server:
+        yield server
+
+
+@contextmanager
+def opened_tab(browser: Browser) -> Iterator[Page]:
+    """A tab of a person of its own; fails at its end if the page has complained."""
+    context = browser.new_context(viewport={"width": 1600, "height": 950})
+    page, complaints = context.new_page(), list[str]()
+
+    def listen(message: ConsoleMessage) -> None:
+        if message.type == "error" or (message.type == "warning" and "GPU stall" not in message.text):
+            complaints.append(message.text)
+
+    page.on("console", listen)
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    yield page
+    context.close()
+    assert complaints == []
+
+
+def choose_calibration(server: Serving, name: str = "paper") -> None:
+    """Make a file that is none the current calibration; nobody holds control afterwards."""
+    (server.services.data_dir / "calibrations" / f"{name}.json").write_text(json.dumps({"id": name}))
+    server.http.put("/api/calibrations/current", json={"id": name}).raise_for_status()
+    server.free_control()
+
+
 def laboratory(server: Serving) -> Any:
     """The far ends of its rig in memory."""
     return server.services.laboratory
+
+
+def show_spray(server: Serving) -> None:
+    """A spray is before its cameras, as droplets are seen."""
+    for camera in laboratory(server).cameras.values():
+        camera.image_shape, camera._scene = SIZE_PX[::-1], spray_scene
 
 
 def start(server: Serving, **changes: Any) -> None:

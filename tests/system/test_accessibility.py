@@ -1,33 +1,20 @@
 """Every page for everybody: nothing serious or critical of what axe-core looks for, dark and light; in Chromium."""
 
-from collections.abc import Iterator
 from typing import Literal
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from nicegui import app as pages
 from playwright.sync_api import Page
 
-from server.web.app import create_app
 from server.web.ui.rail import STOPS
-from tests.support.operator import VIEWS, go_to, open_drawer
-from tests.support.serving import Serving, plan_of, serving
+from tests.support.desk import PULSE, choose_calibration
+from tests.support.operator import go_to, open_drawer
+from tests.support.serving import Serving, plan_of
 
 pytestmark = pytest.mark.timeout(900)
 
-PULSE = {"current_a": dict.fromkeys(VIEWS, 5)}
 OF_QUASAR = (".q-loading-bar",)
 """Elements of Quasar itself that nothing of ours can mend: the line at the top while something loads has no name."""
-
-
-@pytest.fixture(scope="module")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
-    pages.middleware_stack = None  # NiceGUI has one application per process; another module may have used it
-    with serving(tmp_path_factory.mktemp("everybody") / "runs", build=create_app, views=VIEWS) as server:
-        (server.services.data_dir / "calibrations" / "paper.json").write_text('{"id": "paper"}')
-        server.http.put("/api/calibrations/current", json={"id": "paper"})
-        server.run_to_its_end(plan_of(shots=2, pulse=PULSE))
-        yield server
 
 
 def findings(page: Page) -> list[str]:
@@ -43,6 +30,8 @@ def findings(page: Page) -> list[str]:
 
 @pytest.mark.parametrize("scheme", ["dark", "light"])
 def test_nothing_serious_is_found_on_any_page(page: Page, server: Serving, scheme: Literal["dark", "light"]) -> None:
+    choose_calibration(server)
+    server.run_to_its_end(plan_of(shots=2, pulse=PULSE))
     page.emulate_media(color_scheme=scheme)
     page.goto(str(server.http.base_url))
     open_drawer(page)

@@ -1,6 +1,5 @@
 """The operator's page in a real browser: headless Chromium, a real server, every device honest."""
 
-import os
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -9,7 +8,6 @@ from typing import Any
 
 import pytest
 from fastapi import FastAPI
-from nicegui import app as pages
 from playwright.sync_api import Page, expect
 
 from daq.run.events import ShotRecorded
@@ -19,16 +17,16 @@ from server.lab.jobs import JobKind
 from server.lab.services import Services
 from server.lab.tasks import check_run
 from server.web.app import create_app
+from tests.server.web.test_api import wait_for_jobs
+from tests.support.desk import PICTURES, PULSE, choose_calibration, serving_desk
 from tests.support.drifting_run import DRIFT_PX, write_droplet_run
 from tests.support.drifting_views import calibration_of, views
 from tests.support.operator import VIEWS, drive_the_page, go_to, open_drawer
-from tests.support.serving import Serving, plan_of, serving, tell_nothing
+from tests.support.serving import Serving, plan_of, tell_nothing
 
 pytestmark = pytest.mark.timeout(900)
 
-PICTURES = os.environ.get("TOMOSHADOW_PICTURES")
 DRIFTED = "drifted"
-PULSE = {"current_a": dict.fromkeys(VIEWS, 5)}
 
 
 def check_drifted(job: dict[str, Any], should_stop: Callable[[], bool]) -> dict[str, Any]:
@@ -40,23 +38,11 @@ def build(services: Services) -> FastAPI:
     return create_app(replace(services, tasks={**services.tasks, JobKind.CHECK: check_drifted}))
 
 
-@pytest.fixture(scope="module")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
-    data_dir = tmp_path_factory.mktemp("browser") / "runs"
-    data_dir.mkdir()
-    (data_dir / "draft.json").write_text('{"shots": 7')
-    pages.middleware_stack = None  # NiceGUI has one application per process; another module may have used it
-    with serving(data_dir, build=build, views=VIEWS) as server:
-        (data_dir / "calibrations" / "paper.json").write_text('{"id": "paper"}')
-        server.http.put("/api/calibrations/current", json={"id": "paper"})
+@pytest.fixture
+def server(tmp_path: Path) -> Iterator[Serving]:
+    with serving_desk(tmp_path / "runs", build=build) as server:
+        choose_calibration(server)
         yield server
-
-
-@pytest.fixture(autouse=True)
-def nobody_holds_control(server: Serving) -> Iterator[None]:
-    """Every test has a browser of its own, and so is another person."""
-    yield
-    server.free_control()
 
 
 def _take_picture(page: Page, name: str) -> None:
@@ -132,6 +118,7 @@ def test_a_drift_raises_an_alarm_and_a_larger_one_stops_reconstruction(page: Pag
 
 
 def test_a_torn_draft_does_not_keep_the_page_from_opening(page: Page, server: Serving) -> None:
+    (server.services.data_dir / "draft.json").write_text('{"shots": 7')
     page.goto(str(server.http.base_url))
     expect(page.get_by_role("button", name="Start run")).to_be_visible()
     (aside,) = server.services.data_dir.glob("draft.json.damaged-*")
@@ -143,10 +130,6 @@ def test_a_reference_that_the_operator_chose_is_not_replaced_by_a_newer_one(page
     server.run_to_its_end(plan_of(kind="dark", name="proposed", shots=1, pulse=PULSE))
     page.goto(str(server.http.base_url))
     chosen = page.get_by_role("region", name="New run").locator(".q-chip")
-    newest = page.get_by_role("button", name="Use the newest")
-    expect(newest.or_(chosen.filter(has_text="proposed")).first).to_be_visible()
-    if newest.is_visible():  # a dark run of another test was proposed before, and stays until somebody says otherwise
-        newest.click()
     expect(chosen.filter(has_text="proposed")).to_have_count(1)
     page.get_by_label("Dark and background runs").click()
     page.get_by_role("option", name="dark: proposed").click()
@@ -175,6 +158,11 @@ def test_work_that_fails_has_a_red_lamp(page: Page, server: Serving) -> None:
 
 
 def test_what_an_operator_chose_stays_and_what_another_page_chose_is_shown(page: Page, server: Serving) -> None:
+    server.run_to_its_end(plan_of(name="spray", shots=5, pulse=PULSE))
+    wait_for_jobs(server, 5)
+    server.run_to_its_end(plan_of(shots=1, pulse=PULSE))
+    wait_for_jobs(server, 6)
+    server.free_control()
     page.goto(str(server.http.base_url))
     open_drawer(page)
     go_to(page, "Results")

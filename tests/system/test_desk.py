@@ -5,29 +5,24 @@ import threading
 from collections.abc import Iterator
 
 import pytest
-from nicegui import app as pages
 from playwright.sync_api import Browser, Locator, Page, Route, expect
 
-from server.web.app import create_app
 from tests.support.cut_link import CutLink, cut_link
-from tests.support.desk import PULSE, laboratory, picture, start
-from tests.support.operator import VIEWS, go_to, open_drawer
+from tests.support.desk import PULSE, choose_calibration, laboratory, picture, start
+from tests.support.operator import go_to, open_drawer
 from tests.support.server_process import eventually
-from tests.support.serving import Serving, plan_of, serving
+from tests.support.serving import Serving, plan_of
 
-pytestmark = [pytest.mark.timeout(900), pytest.mark.usefixtures("at_rest")]
+pytestmark = pytest.mark.timeout(900)
 
 AWAY_S = 3.0
 """Longer than a request may be on its way."""
 
 
-@pytest.fixture(scope="module")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
-    pages.middleware_stack = None  # NiceGUI has one application per process; another module may have used it
-    with serving(tmp_path_factory.mktemp("desk") / "runs", build=create_app, views=VIEWS) as server:
-        (server.services.data_dir / "calibrations" / "paper.json").write_text('{"id": "paper"}')
-        server.http.put("/api/calibrations/current", json={"id": "paper"})
-        yield server
+@pytest.fixture
+def server(server: Serving) -> Serving:
+    choose_calibration(server)
+    return server
 
 
 @pytest.fixture
@@ -216,16 +211,13 @@ def test_the_bar_is_in_sight_at_every_width_dark_and_light(page: Page, server: S
 
 
 def test_a_current_calibration_whose_file_was_deleted_is_told_as_gone(page: Page, server: Serving) -> None:
-    file = server.services.data_dir / "calibrations" / "deleted.json"
-    file.write_text('{"id": "deleted"}')
-    server.http.put("/api/calibrations/current", json={"id": "deleted"})
+    choose_calibration(server, "deleted")
     page.goto(str(server.http.base_url))
     done = page.get_by_role("link", name="Calibrate").get_by_label("done")
     expect(done).to_be_visible()
-    file.unlink()
+    (server.services.data_dir / "calibrations" / "deleted.json").unlink()
     expect(page.get_by_role("status", name="current calibration")).to_have_text("deleted, its file is gone")
     expect(done).to_be_hidden()
-    (server.services.data_dir / "calibrations" / "current").unlink()
 
 
 @pytest.mark.parametrize("width", [800, 1280, 1600])
@@ -233,16 +225,13 @@ def test_the_state_is_one_word_however_long_the_name_of_the_calibration(
     page: Page, server: Serving, width: int
 ) -> None:
     long = "20261129T171653-spray-pinhole-of-a-long-day"
-    (server.services.data_dir / "calibrations" / f"{long}.json").write_text(f'{{"id": "{long}"}}')
-    server.http.put("/api/calibrations/current", json={"id": long}).raise_for_status()
-    server.free_control()
+    choose_calibration(server, long)
     page.set_viewport_size({"width": width, "height": 900})
     page.goto(str(server.http.base_url))
     expect(page.get_by_role("status", name="current calibration")).to_contain_text(long)
     expect(rig_state(page)).to_have_text("READY")
     box, calibration = rig_state(page).bounding_box(), page.get_by_role("status", name="current calibration")
     expect(calibration).to_have_attribute("title", long)
-    server.http.put("/api/calibrations/current", json={"id": "paper"}).raise_for_status()
     bar = page.locator(".desk-row").bounding_box()
     assert box is not None
     assert bar is not None

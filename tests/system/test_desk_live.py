@@ -3,31 +3,24 @@
 import math
 import re
 import threading
-from collections.abc import Iterator
 
 import pytest
-from nicegui import app as pages
 from playwright.sync_api import Browser, Locator, Page, WebSocket, expect
 
 from server.cli.benchmarks.browsed import drag, first_page
-from server.web.app import create_app
-from tests.support.desk import laboratory, picture
-from tests.support.drifting_views import SIZE_PX
-from tests.support.live_shots import save_droplet_calibration, spray_scene
+from tests.support.desk import laboratory, picture, show_spray
+from tests.support.live_shots import save_droplet_calibration
 from tests.support.operator import VIEWS, go_to
 from tests.support.server_process import eventually
-from tests.support.serving import Serving, plan_of, serving
+from tests.support.serving import Serving, plan_of
 
-pytestmark = [pytest.mark.timeout(600), pytest.mark.usefixtures("at_rest")]
+pytestmark = pytest.mark.timeout(600)
 
 
-@pytest.fixture(scope="module")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
-    pages.middleware_stack = None  # NiceGUI has one application per process; another module may have used it
-    with serving(tmp_path_factory.mktemp("live") / "runs", build=create_app, views=VIEWS) as server:
-        for camera in laboratory(server).cameras.values():
-            camera.image_shape, camera._scene = SIZE_PX[::-1], spray_scene
-        yield server
+@pytest.fixture
+def server(server: Serving) -> Serving:
+    show_spray(server)
+    return server
 
 
 def open_live(page: Page, server: Serving) -> Locator:
@@ -369,8 +362,6 @@ def test_a_spray_is_recorded_and_seen_on_the_page_run(page: Page, server: Servin
     for label, text in (("Shots", "400"), ("Rate / Hz", "4"), *((f"LED {view} / A", "6") for view in VIEWS)):
         page.get_by_label(label, exact=True).fill(text)
     page.get_by_label("Fluid").fill("water")
-    if (newest := page.get_by_role("button", name="Use the newest")).is_visible():  # other tests have run before
-        newest.click()
     page.get_by_role("button", name="Start run").click()
     expect(page.get_by_role("list", name="shots").get_by_role("listitem", name="shot 3: valid")).to_be_visible()
     expect(page.get_by_role("group", name="newest shots").get_by_role("img").nth(1)).to_be_visible()

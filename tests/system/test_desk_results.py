@@ -1,13 +1,11 @@
 """The pages of runs and results: whatever was recorded can be found again, and looked at; headless Chromium."""
 
-import os
 import re
-from collections.abc import Iterator
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
-from nicegui import app as pages
 from playwright.sync_api import Locator, Page, expect
 
 from processing.analysis.droplets.droplet_file import StoredDroplets
@@ -16,18 +14,16 @@ from processing.reconstruction.settings import GridSettings, ReconstructionSetti
 from processing.runs.pipeline import reconstruct_shots
 from processing.volume import VoxelGrid
 from server.lab.results import keep_preview
-from server.web.app import create_app
 from tests.server.web.test_api import wait_for_jobs
+from tests.support.desk import PICTURES, PULSE, choose_calibration
 from tests.support.droplet_run import write_calibration, write_run
-from tests.support.operator import VIEWS, go_to
+from tests.support.operator import go_to
 from tests.support.sampled_sprays import cone_shots, write_results
-from tests.support.serving import Serving, plan_of, serving
+from tests.support.serving import Serving, plan_of
 
 pytestmark = pytest.mark.timeout(900)
 
-PICTURES = os.environ.get("TOMOSHADOW_PICTURES")
 expect.set_options(timeout=15_000)
-PULSE = {"current_a": dict.fromkeys(VIEWS, 5)}
 OLD = "old-spray"
 FILLED = """scene => {
     const box = getElement(scene).$el;
@@ -39,33 +35,28 @@ SMART = MLOS.model_copy(update={"method": ReconstructionMethod.SMART, "iteration
 
 
 @pytest.fixture(scope="module")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
-    pages.middleware_stack = None  # NiceGUI has one application per process; another module may have used it
-    with serving(tmp_path_factory.mktemp("results") / "runs", build=create_app, views=VIEWS) as server:
-        yield server
-
-
-@pytest.fixture(autouse=True)
-def at_rest(server: Serving) -> Iterator[None]:
-    """The browser of a test is another person than that of the next one."""
-    yield
-    server.free_control()
-
-
-@pytest.fixture(scope="module")
-def old_run(server: Serving) -> Path:
-    """A run of January, reconstructed twice and measured by commands: no job of this server knows of it."""
-    calibration = write_calibration(server.services.data_dir / "calibrations" / "c.json")
+def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A data directory with a run of January, reconstructed twice and measured by commands."""
+    data_dir = tmp_path_factory.mktemp("kept")
+    (data_dir / "calibrations").mkdir()
+    calibration = write_calibration(data_dir / "calibrations" / "c.json")
     measured = [_within(shot) for shot in cone_shots(0, 2, 30)]
     cone_mm = np.stack([measured[1].columns[f"{axis}_mm"].astype(float) for axis in "xyz"], axis=1)
-    run_dir = write_run(server.services.data_dir / OLD, shots=5, invalid=(2,), droplets_mm=cone_mm)
+    run_dir = write_run(data_dir / OLD, shots=5, invalid=(2,), droplets_mm=cone_mm)
     for settings in (SMART, MLOS):
         out = run_dir / "results" / settings.results_id("c")
         list(reconstruct_shots(run_dir, [0, 1, 3], calibration, settings, out, keep=keep_preview))
     of_run = {"run": OLD, "grid": GridSettings.of(GRID).model_dump_json()}
     results_dir = write_results(run_dir / "results" / "droplets-1", measured, **of_run)
     (results_dir / "settings.json").write_text("{}")
-    return run_dir
+    return data_dir
+
+
+@pytest.fixture
+def old_run(server: Serving, kept: Path) -> Path:
+    """That run; no job of this server knows of it."""
+    shutil.copytree(kept, server.services.data_dir, dirs_exist_ok=True)
+    return server.services.data_dir / OLD
 
 
 def _within(shot: StoredDroplets) -> StoredDroplets:
@@ -290,8 +281,7 @@ def _camera(scene: Locator) -> list[float]:
 
 def test_the_shot_that_a_hand_has_picked_is_never_torn_away(page: Page, server: Serving, old_run: Path) -> None:
     page.goto(url(server, "results"))
-    (server.services.data_dir / "calibrations" / "paper.json").write_text('{"id": "paper"}')
-    server.http.put("/api/calibrations/current", json={"id": "paper"})
+    choose_calibration(server)
     sample, _ = server.run_to_its_end(plan_of(name="later", shots=2, pulse=PULSE))
     wait_for_jobs(server, 2)
     expect(page).to_have_url(re.compile(f"/results/{sample}/.*/1$"))

@@ -1,27 +1,24 @@
-"""What a viewer sees and may do; headless Chromium. A module of its own: NiceGUI has one application per process."""
+"""What a viewer sees and may do; headless Chromium."""
 
 import re
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
-from nicegui import app as pages
 from playwright.sync_api import Browser, BrowserContext, Page, expect
 
-from server.web.app import create_app
 from tests.support.cut_link import cut_link
-from tests.support.desk import laboratory
+from tests.support.desk import choose_calibration, laboratory, serving_desk
 from tests.support.operator import VIEWS, go_to
-from tests.support.serving import Serving, plan_of, serving
+from tests.support.serving import Serving, plan_of
 
 OPERATOR = {"Authorization": "Bearer operate", "Tomoshadow-Operator": "ann@lab"}
 pytestmark = pytest.mark.timeout(900)
 
 
-@pytest.fixture(scope="module")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
-    pages.middleware_stack = None
-    data_dir = tmp_path_factory.mktemp("roles") / "runs"
-    with serving(data_dir, build=create_app, views=VIEWS, token="operate", viewer_token="look") as server:
+@pytest.fixture
+def server(tmp_path: Path) -> Iterator[Serving]:
+    with serving_desk(tmp_path / "runs", token="operate", viewer_token="look") as server:
         yield server
 
 
@@ -51,7 +48,6 @@ def test_a_viewer_sees_the_light_of_the_next_run_and_does_not_change_it(page: Pa
     for name in ("Pulse width / ns", "Separation / ns", "LED view1 / A"):
         expect(page.get_by_label(name)).to_be_disabled()
     expect(page.get_by_role("button", name="Set to half range")).to_be_disabled()
-    page.context.request.post(f"{server.http.base_url}/sign-out", max_redirects=0)
 
 
 LOOKING = re.compile(
@@ -65,8 +61,7 @@ def test_a_viewer_finds_every_button_locked_that_does_more_than_look_and_is_told
     page: Page, server: Serving
 ) -> None:
     server.http.headers.update(OPERATOR)
-    (server.services.data_dir / "calibrations" / "paper.json").write_text('{"id": "paper"}')
-    server.http.put("/api/calibrations/current", json={"id": "paper"}).raise_for_status()
+    choose_calibration(server)
     pulse = {"current_a": dict.fromkeys(VIEWS, 5)}
     run_id, _ = server.run_to_its_end(plan_of(kind="calibration", shots=1, pulse=pulse))
     run_id, _ = server.run_to_its_end(plan_of(shots=1, pulse=pulse))
@@ -90,8 +85,6 @@ def test_a_viewer_finds_every_button_locked_that_does_more_than_look_and_is_told
         assert [name for name in enabled if not LOOKING.fullmatch(name)] == [], path
         mute = page.locator("button:disabled:not([title], [title] *)")
         assert mute.evaluate_all("found => found.map(one => one.innerText)") == [], path
-    laboratory(server).generator.clear()
-    page.context.request.post(f"{server.http.base_url}/sign-out", max_redirects=0)
 
 
 def test_a_session_that_is_ended_elsewhere_closes_its_page(page: Page, server: Serving) -> None:
@@ -141,5 +134,3 @@ def test_a_viewer_changes_neither_the_form_nor_the_live_view(page: Page, server:
         expect(page.get_by_role("button", name=name)).to_be_disabled()
     for label in ("Pulse width / ns", "LED view1 / A"):
         expect(page.get_by_label(label)).to_be_disabled()
-    server.http.delete("/api/rig/live", headers=OPERATOR).raise_for_status()
-    server.free_control()

@@ -2,31 +2,22 @@
 
 import json
 import re
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-from nicegui import app as pages
 from playwright.sync_api import Browser, Locator, Page, expect
 
 from server.lab.tasks import calibrate_run
-from server.web.app import create_app
-from tests.support.desk import PULSE, laboratory, picture
-from tests.support.operator import VIEWS, go_to
+from server.web.ui.draft import first_draft
+from tests.support.desk import PULSE, choose_calibration, laboratory, picture
+from tests.support.operator import go_to
 from tests.support.server_process import eventually
-from tests.support.serving import Serving, plan_of, serving
+from tests.support.serving import Serving, plan_of
 
-pytestmark = [pytest.mark.timeout(900), pytest.mark.usefixtures("at_rest")]
+pytestmark = pytest.mark.timeout(900)
 
 ANN = {"Tomoshadow-Operator": "ann@lab"}
-
-
-@pytest.fixture(scope="module")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
-    pages.middleware_stack = None  # NiceGUI has one application per process; another module may have used it
-    with serving(tmp_path_factory.mktemp("desk_run") / "runs", build=create_app, views=VIEWS) as server:
-        yield server
 
 
 @pytest.fixture
@@ -199,9 +190,7 @@ def test_what_speaks_against_the_form_is_told_on_every_page_and_leads_to_it(tab:
 
 
 def test_what_is_made_of_every_shot_is_what_the_page_shows(tab: Page, server: Serving) -> None:
-    (server.services.data_dir / "calibrations" / "paper.json").write_text('{"id": "paper"}')
-    server.http.put("/api/calibrations/current", json={"id": "paper"})
-    server.free_control()
+    choose_calibration(server)
     tab.reload()  # the page may still be told that somebody held control for a moment, which closes a list
     tab.get_by_role("button", name="Sample").click()
     tab.get_by_label("Shots", exact=True).fill("1")
@@ -237,9 +226,7 @@ def jobs_of(server: Serving, run_id: str | None) -> list[dict[str, Any]]:
 def test_a_chosen_calibration_whose_file_is_gone_gives_way_to_no_other(tab: Page, server: Serving) -> None:
     folder = server.services.data_dir / "calibrations"
     for name in ("lens", "paper"):
-        (folder / f"{name}.json").write_text(f'{{"id": "{name}"}}')
-    server.http.put("/api/calibrations/current", json={"id": "paper"})
-    server.free_control()
+        choose_calibration(server, name)
     tab.reload()  # the page may still be told that somebody held control for a moment, which closes a list
     tab.get_by_role("button", name="Sample").click()
     tab.get_by_role("combobox", name="Calibration; none: current").click()
@@ -283,12 +270,15 @@ def test_a_run_shows_its_shots_and_why_one_is_invalid_and_what_it_waits_for(tab:
 
 
 def test_references_stay_as_they_are_and_a_newer_one_is_only_told(tab: Page, server: Serving) -> None:
-    first, _ = server.run_to_its_end(plan_of(kind="background", shots=1, pulse=PULSE))
+    background = plan_of(
+        kind="background", shots=1, pulse={"current_a": first_draft(server.services.config)["current_a"]}
+    )
+    first, _ = server.run_to_its_end(background)
     tab.get_by_role("button", name="Sample").click()
     chosen = tab.get_by_role("region", name="New run").locator(".q-chip")
     expect(chosen.filter(has_text="background")).to_have_count(1)
     pinned = chosen.filter(has_text="background").inner_text()
-    second, _ = server.run_to_its_end(plan_of(kind="background", shots=1, pulse=PULSE))
+    second, _ = server.run_to_its_end(background)
     assert first != second
     expect(row(tab, "References")).to_contain_text(f"a newer background exists: {second}")
     assert chosen.filter(has_text="background").inner_text() == pinned

@@ -6,24 +6,20 @@ added anywhere, or is no longer there, fails; and each has to do something. Head
 
 import re
 import shutil
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import pytest
-from nicegui import app as pages
 from playwright.sync_api import Locator, Page, expect
 
-from server.web.app import create_app
 from server.web.ui.runs.run_list import PAGE
-from tests.support.desk import PULSE, laboratory
-from tests.support.drifting_views import SIZE_PX
-from tests.support.live_shots import save_droplet_calibration, spray_scene
-from tests.support.operator import VIEWS
-from tests.support.serving import Serving, plan_of, serving
+from tests.support.desk import PULSE, show_spray
+from tests.support.live_shots import save_droplet_calibration
+from tests.support.serving import Serving, plan_of
 
-pytestmark = [pytest.mark.timeout(900), pytest.mark.usefixtures("at_rest")]
+pytestmark = pytest.mark.timeout(900)
 
 Role = Literal["button", "link", "textbox", "spinbutton", "combobox", "slider", "switch", "checkbox"]
 ROLES = ("button", "link", "textbox", "spinbutton", "combobox", "slider", "switch", "checkbox", "radio", "tab")
@@ -184,27 +180,9 @@ OF_A_FAULT = {("button", "Acknowledge fault")}
 """There while a fault is: a busy machine may be late with the generator's answer. test_desk.py touches its alarm."""
 
 
-@pytest.fixture(scope="module")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
-    pages.middleware_stack = None  # NiceGUI has one application per process; another module may have used it
-    with serving(tmp_path_factory.mktemp("controls") / "runs", build=create_app, views=VIEWS) as server:
-        for camera in laboratory(server).cameras.values():
-            camera.image_shape, camera._scene = SIZE_PX[::-1], spray_scene
-        save_droplet_calibration(server.services.data_dir / "calibrations" / "paper.json")
-        server.http.put("/api/calibrations/current", json={"id": "paper"})
-        server.free_control()
-        run_id, _ = server.run_to_its_end(plan_of(kind="dark", shots=1, pulse=PULSE))
-        server.run_to_its_end(plan_of(shots=3, pulse=PULSE))
-        for number in range(PAGE):
-            shutil.copytree(server.services.data_dir / run_id, server.services.data_dir / f"{run_id}{number}")
-        (server.services.data_dir / "templates").mkdir(exist_ok=True)
-        (server.services.data_dir / "templates" / "bright.json").write_text('{"shots": 77}')
-        yield server
-
-
 @pytest.mark.parametrize("path", TABLES)
 def test_every_control_of_a_page_is_touched_and_does_something(page: Page, server: Serving, path: str) -> None:
-    run_id, read = run_of(server), set[tuple[str, str]]()
+    run_id, read = prepared(server, PAGE if path == "/runs" else 0), set[tuple[str, str]]()
     page.goto(f"{server.http.base_url}{path.replace('RUN', run_id)}")
     for one in TABLES[path]:
         found(page, one).wait_for()
@@ -216,8 +194,19 @@ def test_every_control_of_a_page_is_touched_and_does_something(page: Page, serve
     assert touched - read == set(), "these are touched, and the accessibility tree does not tell of them"
 
 
-def run_of(server: Serving) -> str:
-    return str(server.http.get("/api/runs?kind=sample").json()[-1]["run_id"])
+def prepared(server: Serving, more_runs: int) -> str:
+    """Whatever a page may offer is there, and nobody holds control; a run with results."""
+    show_spray(server)
+    save_droplet_calibration(server.services.data_dir / "calibrations" / "paper.json")
+    server.http.put("/api/calibrations/current", json={"id": "paper"}).raise_for_status()
+    dark, _ = server.run_to_its_end(plan_of(kind="dark", shots=1, pulse=PULSE))
+    run_id, _ = server.run_to_its_end(plan_of(shots=3, pulse=PULSE))
+    for number in range(more_runs):
+        shutil.copytree(server.services.data_dir / dark, server.services.data_dir / f"{dark}{number}")
+    (server.services.data_dir / "templates").mkdir(exist_ok=True)
+    (server.services.data_dir / "templates" / "bright.json").write_text('{"shots": 77}')
+    server.free_control()
+    return run_id
 
 
 def controls(page: Page) -> set[tuple[str, str]]:

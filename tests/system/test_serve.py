@@ -13,8 +13,9 @@ from typing import Any
 
 import httpx
 import pytest
-from playwright.sync_api import Page
+from playwright.sync_api import Browser
 
+from tests.support.desk import opened_tab
 from tests.support.operator import VIEWS, drive_the_page
 
 pytestmark = [pytest.mark.network, pytest.mark.timeout(900)]
@@ -85,8 +86,8 @@ def calibrate(client: httpx.Client, run_id: str) -> None:
     assert client.put("/api/calibrations/current", json={"id": calibrations[0]["id"]}).status_code == 200
 
 
-def test_from_target_to_volume_in_a_browser(tmp_path: Path, page: Page) -> None:
-    with served(tmp_path) as (client, process):
+def test_from_target_to_volume_in_a_browser(tmp_path: Path, browser: Browser) -> None:
+    with served(tmp_path) as (client, process), opened_tab(browser) as page:
         target_run = record(client, "calibration", 1, stage_z_mm=[-4.5, -2.5, -0.5, 1.5, 4.5])
         calibrate(client, target_run)
         record(client, "dark", 2)
