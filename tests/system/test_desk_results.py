@@ -103,6 +103,7 @@ def test_before_there_is_anything_both_pages_say_what_to_do_first(page: Page, se
     expect(page.get_by_text("Record the first one on the page Run")).to_be_visible()
     go_to(page, "Results")
     expect(page.get_by_role("status", name="results")).to_contain_text("Choose a calibration on the page Calibrate")
+    expect(page.get_by_role("navigation").get_by_role("link", name="Results").get_by_label("done")).to_be_hidden()
 
 
 def test_runs_are_found_by_what_they_are(page: Page, server: Serving, old_run: Path) -> None:
@@ -250,8 +251,14 @@ def test_the_camera_stays_when_the_shot_changes(page: Page, server: Serving, old
     scene.scroll_into_view_if_needed()
     at_first = _camera(scene)
     scene.locator("canvas").drag_to(scene, source_position={"x": 60, "y": 60}, target_position={"x": 160, "y": 120})
+    dragged = _camera(scene)
+    assert dragged != at_first
+    scene.focus()
+    page.keyboard.press("Shift+ArrowRight")
+    page.wait_for_function(
+        "([scene, x]) => Math.abs(getElement(scene).camera.position.x - x) > 1e-3", arg=[_id(scene), dragged[0]]
+    )
     turned = _camera(scene)
-    assert turned != at_first
     press(page, "shot", "ArrowRight")
     expect(shot_shown(page)).to_have_text("shot 1 (2 of 3)")
     expect(resolution(page)).to_have_text("MLOS, full resolution")
@@ -285,6 +292,7 @@ def test_the_shot_that_a_hand_has_picked_is_never_torn_away(page: Page, server: 
     sample, _ = server.run_to_its_end(plan_of(name="later", shots=2, pulse=PULSE))
     wait_for_jobs(server, 2)
     expect(page).to_have_url(re.compile(f"/results/{sample}/.*/1$"))
+    expect(page.get_by_role("navigation").get_by_role("link", name="Results").get_by_label("done")).to_be_visible()
     expect(page.get_by_role("status", name="work on this run")).to_contain_text("2 of 2 shots done")
     expect(page.get_by_label("Result set", exact=True).first).to_have_value(re.compile("MLOS nominal"))
     press(page, "shot", "ArrowLeft")

@@ -7,6 +7,7 @@ from nicegui import ui
 
 from daq.run.state import RunOutcome
 from server.lab.duty import Health
+from server.lab.jobs import JobKind, JobState
 from server.lab.services import Context
 
 
@@ -19,7 +20,7 @@ class Stop:
     path, title, icon : str
         Where it is, what it is called, how it looks.
     is_done : Callable[[Context], bool] | None
-        Whether what it is for is done; None: it is never done.
+        Whether what it is for is done; None: looking is never done.
     """
 
     path: str
@@ -41,12 +42,18 @@ def _has_completed_a_run(context: Context) -> bool:
     return context.services.acquisition.status().outcome is RunOutcome.COMPLETED
 
 
+def _has_results_of_the_last_run(context: Context) -> bool:
+    run_id = context.services.acquisition.status().run_id
+    made = (JobKind.RECONSTRUCTION, JobKind.MEASUREMENT)
+    return run_id is not None and bool(context.jobs.newest(run_id, [JobState.DONE], 1, made))
+
+
 STOPS = (
     Stop("/rig", "Rig", "precision_manufacturing", _has_good_lamps),
     Stop("/live", "Live", "videocam"),
     Stop("/calibrate", "Calibrate", "straighten", _is_calibrated),
     Stop("/run", "Run", "play_circle", _has_completed_a_run),
-    Stop("/results", "Results", "view_in_ar"),
+    Stop("/results", "Results", "view_in_ar", _has_results_of_the_last_run),
     Stop("/runs", "Runs", "list_alt"),
 )
 

@@ -10,6 +10,7 @@ from nicegui.elements.scene import Object3D
 from processing.volume import VoxelGrid
 from server.lab.services import Context
 from server.web.api.live_volume import VOLUME_PATH
+from server.web.ui.scene_box import scene_box
 from server.web.ui.theme import panel
 
 _LEVEL = 0.3
@@ -72,8 +73,7 @@ class LiveVolumePanel:
             if self._wanted.value or self._surface.value:
                 LiveSlices()
             if self._surface.value:
-                self._scene = ui.scene(grid=False, background_color="#0b0f14", fps=15).classes("scene-box")
-                self._scene.props('role=img aria-label="live iso-surface"')
+                self._scene = scene_box("live iso-surface")
 
     def _look_at(self, grid: VoxelGrid) -> None:
         assert self._scene is not None  # noqa: S101 - asked by refresh

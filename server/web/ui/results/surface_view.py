@@ -8,11 +8,10 @@ from nicegui import ui
 from processing.volume import VoxelGrid
 from server.web.ui.results.seen_exposure import SeenExposure
 from server.web.ui.results.slice_group import Dots, FreeSlider
+from server.web.ui.scene_box import scene_box
 
 _COLOURS = {"a": [0.35, 0.6, 1.0], "b": [1.0, 0.4, 0.3]}
 _MOST_DOTS = 20_000
-_FOLLOW = """() => new ResizeObserver(() => window.dispatchEvent(new Event("resize"))).observe(getElement(%d).$el)"""
-"""A scene follows the window, and not what lies beside it, as the drawer does."""
 
 
 class SurfaceView:
@@ -23,9 +22,7 @@ class SurfaceView:
         self._grid: VoxelGrid | None = None
         self._dots: Dots = {}
         self._is_level_chosen = False
-        self._scene = ui.scene(grid=False, background_color="#0b0f14", fps=15).classes("scene-box")
-        self._scene.props('role=img aria-label="iso-surface"')
-        self._scene.on("init", js_handler=_FOLLOW % self._scene.id)
+        self._scene = scene_box("iso-surface")
         with ui.row().classes("w-full items-center no-wrap gap-3"):
             self._label = ui.label("Iso level").classes("text-xs whitespace-nowrap")
             self._level = FreeSlider(min=0.01, max=0.99, step=0.01, value=0.3).props('dense aria-label="iso level"')
