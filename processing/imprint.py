@@ -4,6 +4,8 @@ A shot that is one of its own backgrounds, or a background that is the mean of a
 nothing else shows it.
 """
 
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +28,8 @@ STRUCTURE = 0.5
 """Of the light around it: a background that is darker beside a shadow has a nozzle there, or dirt."""
 FEW = 30
 """Pixels tell nothing."""
+MANY = 1000
+"""Of a quarter of the pixels that are asked: these tell by themselves that a background shows nothing."""
 LEAST = 0.03
 """Share of the shadows; less of it does no harm to diameters."""
 SHIFTS = 24
@@ -45,45 +49,75 @@ def imprint(frame: Frame, background: Intensity, dark: Intensity | None = None) 
         As for ``processing.preprocessing.intensity``.
     """
     step = max(1, int(np.sqrt(frame.size / ASKED_PX)))
-    coarse = np.s_[::step, ::step]
-    below = np.float32(0) if dark is None else dark[coarse]
-    full, light = (np.asarray(one[coarse] - below, np.float32) for one in (background, frame))
-    most = full.max()
-    lit = (full > LIT * most) & (full < SATURATED * most)
-    shaded = lit & (light < (1 - SHADED) * full)
-    around = _around(full, lit & ~shaded)
-    bright = full > np.maximum(LIT * most, STRUCTURE * around)
-    told = shaded & (around > 0) & ~_near_structure(~bright & ~shaded)
-    rows, columns = np.nonzero(told)
-    if len(rows) < FEW:
+    quick = _Shadows.of(frame, background, dark, 2 * step, NEIGHBOURS // 2 + 1)
+    if len(quick.told) > MANY and quick.share < LEAST / 2:
         return 0.0
-    shadow = 1 - light[rows, columns] / full[rows, columns]
-    dip = np.where(lit & (around > 0), 1 - full / np.maximum(around, 1e-6), 0)
-    share = float(np.median(dip[rows, columns] / shadow))
-    if share <= LEAST:  # chance costs most, and would change nothing
+    shadows = _Shadows.of(frame, background, dark, step, NEIGHBOURS)
+    if len(shadows.told) < FEW or (share := shadows.share) <= LEAST:  # chance costs most, and would change nothing
         return 0.0
-    return share if share > SURE * _by_chance(dip, rows, columns, shadow) else 0.0
+    return share if share > SURE * shadows.by_chance() else 0.0
 
 
-def _around(full: NDArray[np.float32], free: NDArray[np.bool_]) -> NDArray[np.float32]:
+@dataclass(frozen=True, eq=False)
+class _Shadows:
+    """Pixels of an exposure that lie in a shadow, and the background there.
+
+    Parameters
+    ----------
+    told : (N,) int array
+        Their indices.
+    depth : (N,) array
+        Missing share of the light.
+    full, around : (rows, columns) arrays
+        Light of the background, and its mean around each pixel where no shadow is, 0 where nothing tells that.
+    """
+
+    told: NDArray[np.intp]
+    depth: NDArray[np.float32]
+    full: NDArray[np.float32]
+    around: NDArray[np.float32]
+
+    @classmethod
+    def of(cls, frame: Frame, background: Intensity, dark: Intensity | None, step: int, neighbours: int) -> "_Shadows":
+        """Of every so many rows and columns, with so many of these around each pixel."""
+        coarse = np.s_[::step, ::step]
+        below = np.float32(0) if dark is None else dark[coarse]
+        full, light = (np.asarray(one[coarse] - below, np.float32) for one in (background, frame))
+        most = full.max()
+        lit = (full > LIT * most) & (full < SATURATED * most)
+        shaded = lit & (light < (1 - SHADED) * full)
+        around = _around(full, lit & ~shaded, neighbours)
+        bright = full > np.maximum(LIT * most, STRUCTURE * around)
+        told = np.flatnonzero(shaded & (around > 0) & ~_near(~bright & ~shaded, neighbours))
+        return cls(told, 1 - light.ravel()[told] / full.ravel()[told], full, np.where(lit, around, 0))
+
+    @property
+    def share(self) -> float:
+        """Of them that the background shows as well."""
+        there = self.full.ravel()[self.told] / self.around.ravel()[self.told]
+        return float(np.median((1 - there) / self.depth))
+
+    def by_chance(self) -> float:
+        """Standard deviation of the share if the same shadows lay elsewhere over the background."""
+        dip = np.where(self.around > 0, 1 - self.full / np.maximum(self.around, 1e-6), 0)
+        height, width = dip.shape
+        rows, columns = np.divmod(self.told, width)
+        rng = np.random.default_rng(0)
+        shifts = zip(rng.integers(NEIGHBOURS, height - NEIGHBOURS, SHIFTS), rng.integers(0, width, SHIFTS), strict=True)
+        shares = [
+            np.median(dip[(rows + down) % height, (columns + along) % width] / self.depth) for down, along in shifts
+        ]
+        return float(np.std(shares))
+
+
+def _around(full: NDArray[np.float32], free: NDArray[np.bool_], neighbours: int) -> NDArray[np.float32]:
     """Mean light of the free pixels around each, 0 where there are few."""
     weight = free.astype(np.float32)
-    size = (NEIGHBOURS, NEIGHBOURS)
+    size = (neighbours, neighbours)
     share, light = cv2.blur(weight, size), cv2.blur(full * weight, size)
     return np.where(share > OPEN_SHARE, light / np.maximum(share, OPEN_SHARE), 0).astype(np.float32)
 
 
-def _near_structure(structure: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _near(structure: NDArray[np.bool_], neighbours: int) -> NDArray[np.bool_]:
     """Beside what is dark in the background and no shadow of the exposure: a nozzle shakes, and liquid clings to it."""
-    return cv2.dilate(structure.astype(np.uint8), np.ones((NEIGHBOURS, NEIGHBOURS), np.uint8)) > 0
-
-
-def _by_chance(
-    dip: NDArray[np.float32], rows: NDArray[np.intp], columns: NDArray[np.intp], shadow: NDArray[np.float32]
-) -> float:
-    """Standard deviation of the share if the same shadows lay elsewhere over the background."""
-    height, width = dip.shape
-    rng = np.random.default_rng(0)
-    shifts = zip(rng.integers(NEIGHBOURS, height - NEIGHBOURS, SHIFTS), rng.integers(0, width, SHIFTS), strict=True)
-    shares = [np.median(dip[(rows + down) % height, (columns + along) % width] / shadow) for down, along in shifts]
-    return float(np.std(shares))
+    return cv2.dilate(structure.astype(np.uint8), np.ones((neighbours, neighbours), np.uint8)) > 0

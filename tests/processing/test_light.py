@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from processing.imprint import imprint
 from processing.interlaced import rows_alternate
 from processing.light import hollowed, odd_light
 from processing.preprocessing import Polarity, Preprocessing, intensity
@@ -103,6 +104,14 @@ def test_the_mean_of_a_series_as_background_is_odd_and_that_of_other_shots_is_no
     others = [LIGHT * (1 - droplets(seed)) for seed in range(2, 10)]
     assert re.match(r"has \d+ % of its own shadows in its background", of_itself(mean_of(SHOT, *others)))
     assert "of its own shadows" not in of_itself(mean_of(*others))
+
+
+@pytest.mark.parametrize(("share", "told"), [(0.0, False), (0.02, False), (0.06, True)])
+def test_a_quick_look_at_many_shadows_misses_none_in_the_background(share: float, told: bool) -> None:
+    light, missing = (np.tile(one, (5, 5)) for one in (LIGHT, droplets(1)))
+    background = (light * (1 - share * missing)).astype(np.float32)
+    found = imprint(grey(light * (1 - missing)), background)
+    assert found == pytest.approx(share, abs=0.01) if told else found == 0
 
 
 @pytest.mark.parametrize("shift_px", [0, 1, 3])
