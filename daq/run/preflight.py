@@ -19,7 +19,8 @@ from daq.run.refusals import RefusalCode, raise_first, refused, refusing
 from daq.run_plan import RunKind, RunPlan
 from daq.timing import ShotTiming, plan_shot_timing
 
-_FRAMES_PER_SHOT = 2
+FRAMES_PER_SHOT = 2
+"""Of a recorded shot, in every view: exposures A and B."""
 _REFERENCE_ITEM_BYTES = 4
 _SOFTWARE = ("tomoshadow", "numpy", "h5py", "isal", "pydantic")
 
@@ -209,7 +210,7 @@ def _check_stage(rig: Rig, plan: RunPlan) -> None:
 
 def _check_network(rig: Rig, plan: RunPlan, views: Mapping[str, ViewFormat]) -> None:
     """Images that come faster than the wires carry them are lost, or pile up in the cameras."""
-    shot_s = rig.network.shot_s({view: _FRAMES_PER_SHOT * one.frame_bytes for view, one in views.items()})
+    shot_s = rig.network.shot_s({view: FRAMES_PER_SHOT * one.frame_bytes for view, one in views.items()})
     if shot_s > 1 / plan.rate_hz:
         shared = rig.network.shared_gbit_s
         wires = f"the {shared:g} Gbit/s that the cameras share" if shared else f"{rig.network.camera_gbit_s:g} Gbit/s"
@@ -221,9 +222,9 @@ def _check_network(rig: Rig, plan: RunPlan, views: Mapping[str, ViewFormat]) -> 
 
 def _check_disk(data_dir: Path, plan: RunPlan, views: Mapping[str, ViewFormat], margin_bytes: int) -> None:
     """Compare with the uncompressed size: how well a spray compresses is not known before."""
-    shot_bytes = _FRAMES_PER_SHOT * sum(view.frame_bytes for view in views.values())
+    shot_bytes = FRAMES_PER_SHOT * sum(view.frame_bytes for view in views.values())
     pixels = sum(view.shape[0] * view.shape[1] for view in views.values())
-    reference_bytes = 2 * _FRAMES_PER_SHOT * pixels * _REFERENCE_ITEM_BYTES if plan.references else 0
+    reference_bytes = 2 * FRAMES_PER_SHOT * pixels * _REFERENCE_ITEM_BYTES if plan.references else 0
     needed = plan.total_shots * shot_bytes + reference_bytes + margin_bytes
     free = shutil.disk_usage(_existing(data_dir)).free
     if needed > free:

@@ -12,11 +12,11 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from daq.files.run_directory import RunReader, Shot
-from processing.analysis.droplets.bright_shot import measure_bright
+from processing.analysis.droplets.bright_shot import BrightExposure, measure_bright
 from processing.analysis.droplets.droplet_file import write_droplets
 from processing.analysis.droplets.droplet_search import MARGIN_VOXEL, DropletSearch, plan_droplets
 from processing.analysis.droplets.shadows.light_search import Light
-from processing.analysis.droplets.shadows.shadow_shot import measure_shadows
+from processing.analysis.droplets.shadows.shadow_shot import ShadowExposure, measure_shadows
 from processing.analysis.droplets.size_correction import SizeCorrection, SizeRows
 from processing.calibration.calibration import Calibration
 from processing.calibration.calibration_file import load_calibration
@@ -253,24 +253,33 @@ class RunMeasurement:
                 raise Stopped(f"{self.run.run_dir.name}, shot {shot.index}: stopped in exposure {frame}")
 
         before_round()
-        twins, seed = self.settings.twins, self.settings.seed + shot.index
-        if self.settings.polarity == "bright":
-            images = bright_images(self.run, shot, frame, self.references)
-            measured = measure_bright(
-                images, self.search, twins=twins, seed=seed, threads=threads, before_round=before_round
-            )
-            brightest = max(float(np.percentile(image[::4, ::4], 99.9)) for image in images)
-            return doubted(measured, self._reversed(shot, frame, [image / max(brightest, 1e-6) for image in images]))
+        measure = self._bright if self.settings.polarity == "bright" else self._shadows
+        return measure(shot, frame, threads, before_round)
+
+    def _bright(self, shot: Shot, frame: FrameName, threads: int, before_round: Callable[[], None]) -> BrightExposure:
+        images = bright_images(self.run, shot, frame, self.references)
+        measured = measure_bright(
+            images,
+            self.search,
+            twins=self.settings.twins,
+            seed=self.settings.seed + shot.index,
+            threads=threads,
+            before_round=before_round,
+        )
+        brightest = max(float(np.percentile(image[::4, ::4], 99.9)) for image in images)
+        return doubted(measured, self._reversed(shot, frame, [image / max(brightest, 1e-6) for image in images]))
+
+    def _shadows(self, shot: Shot, frame: FrameName, threads: int, before_round: Callable[[], None]) -> ShadowExposure:
         images, trust = shadow_images(self.run, shot, frame, self.references)
         known = without_ignored(dict(zip(shot.views, trust, strict=True)), self.settings.ignored)
-        shadows = measure_shadows(
+        measured = measure_shadows(
             images,
             self.search,
             trust=list(known.values()),
             light=self.settings.light,
             sizes=SizeCorrection.of(self.settings.sizes) if self.settings.sizes else None,
-            twins=twins,
-            seed=seed,
+            twins=self.settings.twins,
+            seed=self.settings.seed + shot.index,
             threads=threads,
             before_round=before_round,
         )
@@ -278,7 +287,7 @@ class RunMeasurement:
             *odd_backgrounds(shot, frame, self.references),
             *self._reversed(shot, frame, [1 - one for one in images]),
         )
-        return doubted(shadows, reasons)
+        return doubted(measured, reasons)
 
     def _reversed(self, shot: Shot, frame: FrameName, lights: Sequence[Intensity]) -> tuple[str, ...]:
         """What droplets that are bright in images say of depth, where that is reversed; B has the cameras of A."""

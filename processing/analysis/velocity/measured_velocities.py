@@ -10,7 +10,7 @@ from processing.analysis.droplets.droplet_table import Columns, Droplets, SizedD
 from processing.analysis.droplets.measured_exposure import MeasuredExposure, Seen, ShotVerdict
 from processing.analysis.velocity.moving_droplets import MovingDroplets
 from processing.analysis.velocity.pairing import Pairing, pair
-from processing.analysis.velocity.velocity_table import MM_PER_NS, Velocities
+from processing.analysis.velocity.velocity_table import M_S_PER_MM_NS, Velocities
 from processing.analysis.velocity.velocity_verdict import FASTEST_M_S, judged
 from processing.volume import VoxelGrid
 
@@ -134,7 +134,7 @@ def _stayed(before: MovingDroplets, pairing: Pairing, grid: VoxelGrid) -> int:
 
 def _velocities(before: Rows, after: Rows, pairing: Pairing, separation_ns: float) -> tuple[Velocities, Velocities]:
     own, other = pairing.pairs
-    m_s_per_mm = MM_PER_NS / separation_ns
+    m_s_per_mm = M_S_PER_MM_NS / separation_ns
     velocities_m_s = m_s_per_mm * (after.points_mm[other] - before.points_mm[own])
     covariance_m2_s2 = m_s_per_mm**2 * (before.covariance_mm2[own] + after.covariance_mm2[other])
     return (

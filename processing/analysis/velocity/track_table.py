@@ -15,7 +15,7 @@ from processing.analysis.shot_doubts import exposure_doubts
 from processing.analysis.velocity import HALF_WINDOW
 from processing.analysis.velocity.common_motion import FEWEST
 from processing.analysis.velocity.moving_droplets import LEAST_SIZE, MovingDroplets
-from processing.analysis.velocity.noise_curve import NoiseCurve, noise_curve
+from processing.analysis.velocity.noise_curve import M_PER_MM, NoiseCurve, noise_curve
 from processing.analysis.velocity.track_doubts import order_doubts, rate_doubts, still_doubts
 from processing.analysis.velocity.track_motion import TrackPoints, track_points
 from processing.analysis.velocity.tracks import LEAST_LENGTH, Tracks, link
@@ -25,7 +25,6 @@ from processing.geometry import FloatArray
 from processing.reconstruction.settings import GridSettings
 from processing.volume import VoxelGrid
 
-M_PER_MM = 1e-3
 MOST_FRAMES = 100_000
 """From the first shot to the last one, with those that are not there."""
 SIZES = ("diameter_um", "amplitude")

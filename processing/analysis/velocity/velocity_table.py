@@ -10,8 +10,7 @@ from processing.analysis.velocity.common_motion import Indices
 from processing.analysis.velocity.partners import Partners
 from processing.geometry import FloatArray
 
-MM_PER_NS = 1e6
-"""In m/s."""
+M_S_PER_MM_NS = 1e6
 COVARIANCES = ("uu", "uv", "uw", "vv", "vw", "ww")
 NO_PARTNER = -1
 

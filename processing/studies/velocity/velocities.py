@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from processing.analysis.droplets.droplet_search import MARGIN_VOXEL, plan_droplets
 from processing.analysis.droplets.ghost_share import RADIUS_VOXEL, matches
 from processing.analysis.velocity.measured_velocities import MeasuredVelocities, measure_velocities
-from processing.analysis.velocity.velocity_table import MM_PER_NS
+from processing.analysis.velocity.velocity_table import M_S_PER_MM_NS
 from processing.figures.velocity_figures import LinkedCase, linked_figure
 from processing.geometry import FloatArray
 from processing.kernels import DEFAULT_THREADS
@@ -186,7 +186,7 @@ def _errors(
     """Root mean square errors of displacements in voxels, and robust standard deviation of z-scores."""
     if not len(rows):
         return dict.fromkeys(("rms_u_voxel", "rms_v_voxel", "rms_w_voxel", "z_sd"), float("nan"))
-    m_s_per_mm = MM_PER_NS / velocities.separation_ns
+    m_s_per_mm = M_S_PER_MM_NS / velocities.separation_ns
     errors_m_s = velocities.first.velocities_m_s[rows] - m_s_per_mm * moved_mm
     scores = errors_m_s / np.sqrt(np.einsum("nii->ni", velocities.first.covariance_m2_s2[rows]))
     u, v, w = (np.sqrt(np.mean(errors_m_s**2, axis=0)) / (m_s_per_mm * pitch_mm)).tolist()

@@ -11,6 +11,7 @@ from pydantic import Field
 
 from daq.files.header import ViewFormat
 from daq.frozen_model import FrozenModel
+from daq.run.preflight import FRAMES_PER_SHOT
 from daq.run.references import REFERENCE_KINDS
 from daq.run.refusals import RefusalCode as Code
 from daq.run.state import RunState
@@ -21,8 +22,6 @@ from server.lab.errors import NotFound
 from server.lab.recipes.stated import told_recipes
 from server.lab.services import Context
 from server.lab.starting.readiness import reasons_against_visitor, with_defaults
-
-_FRAMES_PER_SHOT = 2
 
 CODES: Mapping[str, tuple[Code, ...]] = {
     "Rig": (Code.STARTING, Code.BUSY, Code.LIGHT_NOT_OFF, Code.PROGRAM_ENDING, Code.NOT_ACKNOWLEDGED),
@@ -119,7 +118,7 @@ def _timing(_context: Context, plan: RunPlan) -> Told:
 
 def _network(context: Context, plan: RunPlan) -> Told:
     rig = context.services.rig
-    shot_s = rig.network.shot_s({view: _FRAMES_PER_SHOT * size for view, size in _frame_bytes(context).items()})
+    shot_s = rig.network.shot_s({view: FRAMES_PER_SHOT * size for view, size in _frame_bytes(context).items()})
     return f"{percent(shot_s * plan.rate_hz)} of the wires: a shot takes {1e3 * shot_s:.0f} ms", ""
 
 
@@ -129,7 +128,7 @@ def percent(share: float) -> str:
 
 
 def _disk(context: Context, plan: RunPlan) -> Told:
-    needed = plan.total_shots * _FRAMES_PER_SHOT * sum(_frame_bytes(context).values())
+    needed = plan.total_shots * FRAMES_PER_SHOT * sum(_frame_bytes(context).values())
     free = shutil.disk_usage(context.services.data_dir).free
     took = _duration(plan.total_shots / plan.rate_hz)
     return f"{_gigabytes(needed)} of {_gigabytes(free)} free; {took} at {plan.rate_hz:g} Hz", ""
