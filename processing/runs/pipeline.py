@@ -59,17 +59,20 @@ class Options(TypedDict, total=False):
         What else is known of a shot, for its volumes; asked once there is something to write.
     keep : Keep
         What is kept of a volume; all of it by default, as VTKHDF.
+    look : callable
+        Shown the images of each exposure of a shot.
     """
 
     workbench: Workbench
     threads: int
     told: Callable[[], Provenance]
     keep: Keep
+    look: Callable[[int, Sequence[Intensity]], None]
 
 
 @dataclass(frozen=True, eq=False)
 class _Chain:
-    """What all exposures of a run share."""
+    """What all exposures of a run share; of a single lane, the next exposure is read while one is reconstructed."""
 
     run: RunReader
     calibration: Calibration
@@ -80,11 +83,6 @@ class _Chain:
     views: Mapping[str, PlannedView]
     threads: int
     writing: Lock = field(default_factory=Lock)
-
-    @property
-    def is_alone(self) -> bool:
-        """No other lane works while one reads."""
-        return len(self.lanes) == 1
 
     @property
     def grid(self) -> VoxelGrid:
@@ -158,7 +156,7 @@ def reconstruct_shots(
         ``should_stop`` said so.
     """
     threads, keep = options.get("threads", DEFAULT_THREADS), options.get("keep", write_slabs)
-    told = options.get("told", dict)
+    told, look = options.get("told", dict), options.get("look")
     started_cpu_s = time.process_time()
     with (options.get("workbench") or Workbench()).occupied() as bench, RunReader(run_dir) as run:
         chain = _chain_of(run, calibration_file, settings, bench, threads, len(shots))
@@ -166,7 +164,9 @@ def reconstruct_shots(
         def volumes_of(lane: Reconstructor, shot: int) -> list[VolumeRecord]:
             volumes = []
             exposures = _exposures(chain, lane, shot)
-            for exposure in read_ahead(exposures) if chain.is_alone else exposures:
+            for exposure in read_ahead(exposures) if len(chain.lanes) == 1 else exposures:
+                if look:
+                    look(exposure.shot, exposure.images)
                 if should_stop():
                     raise Stopped(f"{run_dir.name}, shot {exposure.shot}: stopped before exposure {exposure.frame}")
                 with chain.writing:  # whoever is first makes the folder, and has told what is known for all
@@ -182,12 +182,7 @@ def reconstruct_shots(
 
 
 def _chain_of(
-    run: RunReader,
-    calibration_file: Path,
-    settings: ReconstructionSettings,
-    bench: Workbench,
-    threads: int,
-    shots: int,
+    run: RunReader, calibration_file: Path, settings: ReconstructionSettings, bench: Workbench, threads: int, shots: int
 ) -> _Chain:
     lanes = 1 if settings.method.iterative else min(_MOST_LANES, threads, shots)
     threads //= lanes
@@ -208,7 +203,9 @@ def _exposures(chain: _Chain, lane: Reconstructor, index: int) -> Iterator[_Expo
     run, settings, references = chain.run, chain.settings, chain.references
     shot = run.read_shot(index)
     require_match(run.run_dir.name, shot, chain.calibration)
-    for frame, memory in zip(frame_names(run), lane.images if chain.is_alone else 2 * lane.images[:1], strict=False):
+    for frame, memory in zip(
+        frame_names(run), lane.images if len(chain.lanes) == 1 else 2 * lane.images[:1], strict=False
+    ):
         images = shot_intensities(run, shot, frame, settings, memory, references=references, threads=chain.threads)
         yield _Exposure(index, frame, images, exposure_faults(run, shot, frame, images, references))
 

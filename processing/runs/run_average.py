@@ -17,6 +17,7 @@ from processing.reconstruction.settings import ReconstructionSettings
 from processing.runs.exposure_faults import copied, exposure_faults
 from processing.runs.pipeline import plan_of
 from processing.runs.results_file import FrameName
+from processing.runs.shots.meeting_lines import MeetingLines, SeldomMeeting
 from processing.runs.shots.shot_images import require_match, shot_intensities
 from processing.runs.workbench import References, Workbench
 from processing.volume import VoxelGrid
@@ -38,12 +39,15 @@ class RunAverage:
         How many.
     faults : tuple
         Shots whose images may be wrong, and how: ``shot``, and what ``exposure_faults`` has found.
+    seldom : list of int
+        Shots in which lines of sight meet much more seldom than in the others, see ``SeldomMeeting``.
     """
 
     mean: MeanVolume
     grid: VoxelGrid
     exposures: int
     faults: tuple[Mapping[str, Any], ...]
+    seldom: list[int]
 
 
 def average_run(
@@ -89,13 +93,22 @@ def average_run(
         calibration.require_usable(run.header.views)
         plan = plan_of(calibration, settings, tuple(run.header.views))
         faults: list[Mapping[str, Any]] = []
+        meeting = SeldomMeeting(MeetingLines.of(calibration, tuple(run.header.views)))
         references = bench.references(run)
         exposures = _exposures(run, shots, frame, calibration, settings, references, done, threads, faults)
+        exposures = _looked_at(exposures, shots, meeting)
         if settings.method.iterative:
             mean = MeanVolume.of(_mean_of_each(Reconstructor.of(plan, settings, threads), exposures))
         else:
             mean = mean_volume(plan, exposures, settings.method, threads=threads)
-        return RunAverage(mean, plan.grid, len(shots), tuple(faults))
+        return RunAverage(mean, plan.grid, len(shots), tuple(faults), meeting.shots())
+
+
+def _looked_at(exposures: Exposures, shots: Sequence[int], meeting: SeldomMeeting) -> Exposures:
+    """The same exposures, each asked whether lines of sight meet in it."""
+    for index, images in zip(shots, exposures, strict=True):
+        meeting.look(index, images)
+        yield images
 
 
 def _exposures(

@@ -21,7 +21,7 @@ from server.cli.options import (
     usable_processors,
 )
 from server.cli.output import Bar, Outcome, progress
-from server.cli.runs.belonging import ask_droplets, stored_belonging
+from server.cli.runs.belonging import ask_droplets, ask_seldom, stored_belonging
 from server.cli.runs.faults import tell_faults
 
 if TYPE_CHECKING:
@@ -113,6 +113,7 @@ def _average_run(options: Namespace) -> dict[str, Any]:
             workbench=workbench,
         )
     belonging = ask_droplets(options.results, shots, calibration, workbench)
+    belonging = ask_seldom(belonging, averaged.seldom, options.results, calibration, workbench)
     made_by: Provenance = {
         "calibration": calibration.id,
         "settings": settings.model_dump_json(),

@@ -24,7 +24,7 @@ from server.cli.options import (
 )
 from server.cli.output import Outcome, progress, table, tracked
 from server.cli.runs.batch import add_runs, over_runs
-from server.cli.runs.belonging import Belonging, ask_droplets
+from server.cli.runs.belonging import Belonging, ask_droplets, ask_seldom
 from server.cli.runs.faults import tell_faults
 from server.cli.runs.recipes import add_recipe, keeping_recipe, settings_of, with_grid
 from server.cli.runs.resuming import resumable
@@ -113,19 +113,25 @@ def _reconstruct_run(
 def _reconstruct_shots(
     options: Namespace, settings: "ReconstructionSettings", run_dir: Path, indices: list[int], out: Path
 ) -> "tuple[list[ShotResult], Belonging]":
+    from daq.files.run_directory import RunReader
     from processing.calibration.calibration_file import load_calibration
-    from processing.runs.pipeline import reconstruct_shots
+    from processing.runs.pipeline import Options, reconstruct_shots
+    from processing.runs.shots.meeting_lines import MeetingLines, SeldomMeeting
+
+    calibration = load_calibration(options.calibration)
+    with RunReader(run_dir) as run:
+        meeting = SeldomMeeting(MeetingLines.of(calibration, list(run.header.views)) if len(indices) > 1 else None)
 
     @cache
     def belonging() -> Belonging:
-        return ask_droplets(run_dir, indices, load_calibration(options.calibration))
+        return ask_droplets(run_dir, indices, calibration)
 
     shots: list[ShotResult] = []
     if options.scheduler:
         coming = _elsewhere(options, settings, run_dir, indices, out, belonging())
     else:
-        threads, told = usable_processors(), lambda: belonging().provenance
-        coming = reconstruct_shots(run_dir, indices, options.calibration, settings, out, threads=threads, told=told)
+        known: Options = {"threads": usable_processors(), "told": lambda: belonging().provenance, "look": meeting.look}
+        coming = reconstruct_shots(run_dir, indices, options.calibration, settings, out, **known)
     with closing(coming):
         for _ in tracked(indices, lambda index: f"{run_dir.name}: shot {index} by {settings.method}"):
             shot = next(coming)
@@ -133,7 +139,7 @@ def _reconstruct_shots(
                 _tell_slow_views(shot)
             _tell_faults(shot)
             shots.append(shot)
-    return shots, belonging()
+    return shots, ask_seldom(belonging(), meeting.shots(), run_dir, calibration)
 
 
 def _elsewhere(

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Belonging:
-    """What the droplets of the first, the middle and the last shot say of the calibration.
+    """What the droplets of the first, the middle and the last shot say of the calibration, and of those that stand out.
 
     Parameters
     ----------
@@ -83,11 +83,31 @@ def ask_droplets(
     run_dir: Path, shots: Sequence[int], calibration: "Calibration", workbench: "Workbench | None" = None
 ) -> Belonging:
     """Check the first, the middle and the last shot; what speaks against the calibration is told at once."""
-    from processing.calibration.verdict import Verdict
     from processing.runs.run_check import check_few
 
     asked = Belonging(run_dir.name, tuple(check_few(run_dir, shots, calibration, workbench)))
+    _tell(asked)
+    return asked
+
+
+def ask_seldom(
+    asked: Belonging,
+    seldom: Sequence[int],
+    run_dir: Path,
+    calibration: "Calibration",
+    workbench: "Workbench | None" = None,
+) -> Belonging:
+    """Check shots in which lines of sight meet seldom, too, but for those that were asked."""
+    if not (others := [shot for shot in seldom if shot not in {check.shot for check in asked.checks}]):
+        return asked
+    more = ask_droplets(run_dir, others, calibration, workbench)
+    return Belonging(asked.run, (*asked.checks, *more.checks))
+
+
+def _tell(asked: Belonging) -> None:
+    """What speaks against the calibration."""
+    from processing.calibration.verdict import Verdict
+
     for check in asked.checks:
         if check.verdict in (Verdict.WARN, Verdict.REFUSE):
-            progress(f"{run_dir.name}: {check_line(check)}")
-    return asked
+            progress(f"{asked.run}: {check_line(check)}")

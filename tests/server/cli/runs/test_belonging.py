@@ -7,6 +7,7 @@ import pytest
 
 from processing.calibration.calibration_file import save_calibration
 from processing.reconstruction.volume_file import read_volume
+from processing.runs.shots.meeting_lines import SeldomMeeting
 from tests.support.command_line import told
 from tests.support.drifting_run import write_droplet_run
 from tests.support.drifting_views import calibration_of, views
@@ -50,6 +51,27 @@ def test_a_view_that_moves_and_comes_back_does_not_pass_in_silence(
     belonging = told(capsys, *arguments, status=1)["belonging"]
     assert belonging["verdict"] == "refuse"
     assert [(shot["shot"], shot["moved"]) for shot in belonging["shots"]] == [(0, None), (1, "view2"), (2, None)]
+
+
+@pytest.mark.parametrize(
+    ("command", "out"), [("reconstruct", "volumes"), ("average", "mean.vtkhdf")], ids=["reconstruct", "average"]
+)
+def test_a_view_that_moves_for_a_shot_that_nobody_asks_in_full_does_not_pass_in_silence(
+    command: str, out: str, calibration_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Neither the first, nor the middle, nor the last shot; lines of sight meet seldom in it."""
+    run_dir = write_droplet_run(tmp_path / "run", shots=6, drifting=(1,))
+    arguments = [command, run_dir, "--calibration", calibration_file, GRID, "-o", tmp_path / out]
+    belonging = told(capsys, *arguments, status=1)["belonging"]
+    assert belonging["verdict"] == "refuse"
+    asked = [(shot["shot"], shot["moved"]) for shot in belonging["shots"]]
+    assert asked == [(0, None), (3, None), (5, None), (1, "view2")]
+
+
+def test_no_shot_stands_out_where_all_are_alike_or_droplets_few() -> None:
+    for counts in ({}, {0: 0, 1: 0}, {0: 9, 1: 0}, {0: 30, 1: 18, 2: 40, 3: 31}, dict.fromkeys(range(9), 50)):
+        assert SeldomMeeting(None, counts).shots() == []
+    assert SeldomMeeting(None, {0: 30, 1: 12, 2: 40, 3: 31, 4: 2}).shots() == [4, 1]
 
 
 def test_what_droplets_do_not_tell_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
