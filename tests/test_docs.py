@@ -183,8 +183,12 @@ def test_a_break_up_length_without_an_upper_limit_is_written_down(
     }
     liquid = {"break_up_mm": break_up_mm, "break_up_reason": "it is too dense", "shots": 8, "true_break_up_mm": 5.4}
     said = {"views": {}, "quality_factor": 0.5, "shots_valid": 8, "shots_planned": 8}
-    table = PARTS["demo"].table({**said, "droplets": droplets, "liquid": liquid})
+    cone = {"measured": {"value": 62.1, "low": 60.0, "high": 64.3}, "true": 63.0}
+    spray = {"cone_angle_deg": cone, "mass_flux_kg_m2_s": {"measured": None, "true": None}}
+    table = PARTS["demo"].table({**said, "droplets": droplets, "liquid": liquid, "spray": spray})
     assert f"| {told} | 5.40 |" in table
+    assert "| cone angle, 90 % of the liquid [°] | 62.1 (60.0 to 64.3) | 63.0 |" in table
+    assert "| mass flux [kg/(m² s)] | not told |  |" in table
 
 
 @pytest.fixture

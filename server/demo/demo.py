@@ -17,6 +17,7 @@ from daq.run.state import RunOutcome
 from daq.run_notes import RunNotes, Spray
 from daq.run_plan import PulsePair, RunKind, RunPlan
 from processing.analysis.quality import quality_factor
+from processing.analysis.spray.spray_statistics import AskedFor
 from processing.calibration.calibrate import calibrate
 from processing.calibration.calibration import Calibration
 from processing.calibration.calibration_file import file_sha256, save_calibration
@@ -27,6 +28,7 @@ from processing.reconstruction.volume_file import read_volume
 from processing.runs.pipeline import default_grid, reconstruct_shot
 from processing.runs.results_file import volume_path
 from processing.runs.shots.shot_result import ShotResult
+from processing.runs.sprays.measured_spray import read_files
 from processing.runs.workbench import Workbench
 from processing.synthetic.liquid.nozzles import HOLLOW_CONE_FLOW
 from processing.synthetic.spray import droplet_volume
@@ -34,6 +36,7 @@ from processing.synthetic.truth_file import read_true_cameras, read_true_spray
 from processing.volume import VoxelGrid
 from server.demo.demo_droplets import MeasuredDroplets, measure_droplets
 from server.demo.demo_liquid import MeasuredLiquid, measure_liquid
+from server.reports.spray_report import ReportedSpray
 from server.rig.assembly import AssembledRig, open_rig
 from server.rig.config import ConfigError, RigConfig, load_config
 from server.rig.rig_lock import hold_data_dir
@@ -45,6 +48,8 @@ RUN_DEADLINE_S = 240.0
 CALIBRATION_RATE_HZ, SAMPLE_RATE_HZ = 2.0, 1.0
 REFERENCE_SHOTS = 4
 NOTES = RunNotes(fluid="water, simulated", nozzle="hollow cone, 63 degrees, orifice 0.2 mm", pressure_bar=6.0)
+WATER_KG_M3 = 998.0
+"""At 20 degrees: what the simulated nozzle sprays."""
 TRUTH_SIGMA_MM = 0.02
 """Blur of the true volume: about the Airy disk in object space, d_A / M = 0.065 to 0.09 mm, as a Gaussian core."""
 
@@ -77,6 +82,7 @@ class Demonstration:
     quality_factors: tuple[float, ...]
     droplets: MeasuredDroplets
     liquid: MeasuredLiquid
+    spray: ReportedSpray
     shots_planned: int
     shots_recorded: int
     shots_valid: int
@@ -124,6 +130,8 @@ def demonstrate(
         liquid = measure_liquid(sample, valid, calibration, sample / TRUTH_FILE)
     with watch.step("judge"):
         progress("comparing with the truth")
+        measured = read_files([droplets.file])
+        spray = ReportedSpray.of(measured, AskedFor(measured.axis, liquid_kg_m3=WATER_KG_M3))
         qualities = tuple(_quality(sample, results_dir, result.shot) for result in results)
     return Demonstration(
         calibration=calibration,
@@ -134,6 +142,7 @@ def demonstrate(
         quality_factors=qualities,
         droplets=droplets,
         liquid=liquid,
+        spray=spray,
         shots_planned=shots,
         shots_recorded=recorded,
         shots_valid=len(results),

@@ -8,7 +8,7 @@ from processing.analysis.estimates import Estimate
 from processing.analysis.spray.spray_extent import spray_extent
 from processing.analysis.spray.spray_motion import spray_motion
 from processing.analysis.spray.spray_sample import SpraySample
-from processing.analysis.spray.spray_statistics import AskedFor, SprayStatistics
+from processing.analysis.spray.spray_statistics import SprayStatistics
 from processing.analysis.velocity.velocity_statistics import velocity_statistics
 from processing.figures.found_figures import Placed
 from processing.runs.liquid.objects import LiquidSummary
@@ -16,6 +16,7 @@ from server.demo.demo_droplets import EXPOSURES, MeasuredDroplets
 from server.demo.demo_liquid import MeasuredLiquid
 from server.reports.digits import digits_of_interval, three_digits
 from server.reports.page import Table
+from server.reports.spray_report import ReportedSpray
 from server.reports.spray_tables import DENSITY, LABELS, in_percent
 
 SIZES = ("d10_um", "d30_um", "d32_um", "d43_um", "dv10_um", "dv50_um", "dv90_um", "relative_span")
@@ -24,15 +25,18 @@ CONE = ("cone_angle_deg", "cone_angle_half_deg")
 NOT_TOLD = ["not told", ""]
 
 Row = list[str]
+Answer = tuple[Estimate | None, Estimate | None]
+"""As measured, and in truth."""
 
 
-def answers_table(droplets: MeasuredDroplets, liquid: MeasuredLiquid, told: SprayStatistics, asked: AskedFor) -> Table:
+def answers_table(droplets: MeasuredDroplets, liquid: MeasuredLiquid, spray: ReportedSpray) -> Table:
     """What is measured, how sure, and the truth."""
+    told = spray.told
     rows = [
         ["break-up length [mm]", *_length(liquid.summary), f"{liquid.true_break_up_mm:.2f}"],
         *_of_sizes(droplets, told),
         *_of_motion(droplets),
-        *_of_the_spray(droplets.truth, told, asked),
+        *(_row(name, *pair) for name, pair in spray_answers(droplets.truth, spray).items()),
         *_of_ghosts(droplets, told),
     ]
     return Table(["", "measured", "95 % interval", "truth"], rows)
@@ -41,7 +45,8 @@ def answers_table(droplets: MeasuredDroplets, liquid: MeasuredLiquid, told: Spra
 def _of_sizes(droplets: MeasuredDroplets, told: SprayStatistics) -> Iterator[Row]:
     density = told.droplets.number_density_per_mm3
     yield [DENSITY, *_within(density), three_digits(droplets.true_density_per_mm3)]
-    yield from _against(SIZES, told.droplets, mean_diameters([droplets.truth.diameters_um], EXPOSURES))
+    true = mean_diameters([droplets.truth.diameters_um], EXPOSURES)
+    yield from (_row(name, *pair) for name, pair in _against(SIZES, told.droplets, true).items())
 
 
 def _of_motion(droplets: MeasuredDroplets) -> Iterator[Row]:
@@ -54,19 +59,21 @@ def _of_motion(droplets: MeasuredDroplets) -> Iterator[Row]:
     yield ["error of a velocity component, rms [m/s]", "", "", f"{droplets.velocities.rms_m_s:.2f}"]
 
 
-def _of_the_spray(truth: SpraySample, told: SprayStatistics, asked: AskedFor) -> Iterator[Row]:
-    """Flux and cone angles, beside those of all true droplets in the box."""
-    if asked.axis is None:
-        return
-    yield from _against(FLOW, told.motion, spray_motion(truth, asked.axis, asked.liquid_kg_m3))
-    yield from _against(CONE, told.extent, spray_extent(truth, asked.axis))
+def spray_answers(truth: SpraySample, spray: ReportedSpray) -> dict[str, Answer]:
+    """Flux and cone angles by their names, beside those of all true droplets in the box; none without an axis."""
+    told, axis = spray.told, spray.asked.axis
+    if axis is None:
+        return {}
+    flow = _against(FLOW, told.motion, spray_motion(truth, axis, spray.asked.liquid_kg_m3))
+    return flow | _against(CONE, told.extent, spray_extent(truth, axis))
 
 
-def _against(names: Sequence[str], measured: object, true: object) -> Iterator[Row]:
-    """Figures of these names, each beside the same one of the truth."""
-    for name in names:
-        told, truth = (getattr(part, name, None) for part in (measured, true))
-        yield [LABELS[name], *_within(told), three_digits(truth.value) if truth else ""]
+def _against(names: Sequence[str], measured: object, true: object) -> dict[str, Answer]:
+    return {name: (getattr(measured, name, None), getattr(true, name, None)) for name in names}
+
+
+def _row(name: str, told: Estimate | None, true: Estimate | None) -> Row:
+    return [LABELS[name], *_within(told), three_digits(true.value) if true else ""]
 
 
 def _of_ghosts(droplets: MeasuredDroplets, told: SprayStatistics) -> Iterator[Row]:

@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 
 from daq.files.run_directory import RunReader
-from processing.analysis.spray.spray_statistics import AskedFor
 from processing.figures.found_figures import found_figure
 from processing.figures.residual_figures import residuals_figure
 from processing.figures.velocity_figures import velocities_figure
@@ -13,7 +12,6 @@ from processing.figures.volume_figures import isosurface_figure, shadowgraph_fig
 from processing.preprocessing import Intensity
 from processing.reconstruction.volume_file import read_volume
 from processing.runs.results_file import volume_path
-from processing.runs.sprays.measured_spray import read_files
 from processing.volume import VoxelGrid
 from server.demo.demo import Demonstration
 from server.demo.demo_answers import answers_table
@@ -37,31 +35,28 @@ from server.reports.spray_tables import doubts
 DETAIL_MM = 4.0
 """Edge of the cube that is shown as an iso-surface, as in Fig. 4 of the paper."""
 ISO_QUANTILE = 0.99
-WATER_KG_M3 = 998.0
-"""At 20 degrees: what the simulated nozzle sprays."""
 
 
 def write_demo_report(demo: Demonstration, file: Path) -> None:
     """Write report.html: one page of answers, then the chain from images to figures of the spray."""
-    spray = read_files([demo.droplets.file])
-    asked = AskedFor(spray.axis, liquid_kg_m3=WATER_KG_M3)
-    reported = ReportedSpray.of(spray, asked)
+    reported = demo.spray
+    shots = reported.spray.shots
     sections = [
         Section(
             "Summary",
             _SUMMARY_TEXT,
-            [answers_table(demo.droplets, demo.liquid, reported.told, asked)],
+            [answers_table(demo.droplets, demo.liquid, reported)],
             (),
             _doubts(demo, reported),
         ),
         origin_section(reported),
         *_of_images(demo),
         _break_up(demo.liquid),
-        *_said(object_motion_section(spray.shots)),
+        *_said(object_motion_section(shots)),
         _droplets_section(demo.droplets),
         *spray_sections(reported),
-        *_said(unknown_section(spray.shots)),
-        shots_section(spray.shots),
+        *_said(unknown_section(shots)),
+        shots_section(shots),
         Section("Calibration", _CALIBRATION_TEXT, [_views(demo)], [_residuals(demo)]),
         Section("Quality and times", _QUALITY_TEXT, [_shots(demo), _steps(demo)]),
         definitions_section(),

@@ -5,7 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from processing.analysis.estimates import Estimate
 from server.demo.demo import Demonstration
+from server.demo.demo_answers import spray_answers
 from server.demo.demo_droplets import COUNTED_UM, MeasuredDroplets
 from server.demo.demo_liquid import MeasuredLiquid
 
@@ -28,9 +30,14 @@ def summary(demo: Demonstration, report: Path) -> dict[str, Any]:
         "quality_factor": float(np.mean(demo.quality_factors)),
         "droplets": _measured(demo.droplets),
         "liquid": _liquid(demo.liquid),
+        "spray": {name: _answer(*pair) for name, pair in spray_answers(demo.droplets.truth, demo.spray).items()},
         "seconds": demo.seconds,
         "report": str(report),
     }
+
+
+def _answer(told: Estimate | None, true: Estimate | None) -> dict[str, Any]:
+    return {"measured": told and told.model_dump(mode="json"), "true": true and true.value}
 
 
 def _measured(droplets: MeasuredDroplets) -> dict[str, Any]:

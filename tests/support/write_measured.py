@@ -13,6 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from processing.synthetic.paper_rig import TABLE_1
+from server.reports.digits import digits_of_interval, three_digits
+from server.reports.spray_tables import LABELS
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "measured.md"
@@ -83,7 +85,8 @@ def _demonstration(said: Mapping[str, Any]) -> str:
     rows = [(name, *(f"{view[key]:.4f}" for key in errors), view["verdict"]) for name, view in said["views"].items()]
     quality = f"Quality factor of MLOS against the true spray: {said['quality_factor']:.2f}"
     shots = f"{said['shots_valid']} of {said['shots_planned']} shots valid.\n"
-    return f"{_markdown(head, rows)}\n{quality}; {shots}\n{_measured(said['droplets'])}\n{_flow(said)}"
+    tables = (_measured(said["droplets"]), _flow(said), _spray(said["spray"]))
+    return "\n".join([_markdown(head, rows), f"{quality}; {shots}", *tables])
 
 
 def _measured(said: Mapping[str, Any]) -> str:
@@ -115,6 +118,19 @@ def _flow(said: Mapping[str, Any]) -> str:
     )
     rms = f"{droplets['velocity_rms_m_s']:.2f}"
     return _markdown(head, [(_length(liquid), f"{liquid['true_break_up_mm']:.2f}", told, true, rms)])
+
+
+def _spray(said: Mapping[str, Mapping[str, Any]]) -> str:
+    """A table of the spray as a whole."""
+    rows = [
+        (LABELS[name], _interval(one["measured"]), "" if one["true"] is None else three_digits(one["true"]))
+        for name, one in said.items()
+    ]
+    return _markdown(("of the spray", "measured (95 %)", "true"), rows)
+
+
+def _interval(told: Mapping[str, float] | None) -> str:
+    return "not told" if told is None else "{} ({} to {})".format(*digits_of_interval(**told))
 
 
 def _length(liquid: Mapping[str, Any]) -> str:
