@@ -62,4 +62,5 @@ def found_figure(found: Placed, missed: Placed, ghosts: Placed, title: str = "")
 
 def _draw_from_above(axes: Axes, droplets: Placed, colour: str, label: str) -> None:
     x_mm, _, z_mm = droplets.points_mm.T
-    axes.scatter(x_mm, z_mm, s=AREA_PER_UM2 * droplets.diameters_um**2, c=colour, alpha=0.7, linewidths=0, label=label)
+    axes.scatter(x_mm, z_mm, s=AREA_PER_UM2 * droplets.diameters_um**2, c=colour, alpha=0.7, linewidths=0)
+    axes.plot([], [], "o", color=colour, alpha=0.7, markeredgewidth=0, label=label)

@@ -62,7 +62,7 @@ def object_motion_figure(shown: MovedObjects, every: MovedObjects) -> Figure:
     if len(shown):
         _draw_arrows(place_axes, shown)
     place_axes.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
-    place_axes.margins(0.15)
+    place_axes.margins(0.25)
     place_axes.invert_yaxis()
     place_axes.set_title("one exposure", fontsize="small", loc="left")
     for kind, colour in CLASS_COLOURS.items():

@@ -130,6 +130,8 @@ def _show(axes: Axes, image: NDArray[np.float32], grid: VoxelGrid, axis: int, sc
     extent = (across_mm[0] - half_mm, across_mm[-1] + half_mm, down_mm[-1] + half_mm, down_mm[0] - half_mm)
     axes.set(xlabel=f"{names[1]} [mm]", ylabel=f"{names[0]} [mm]")
     picture = axes.imshow(image, cmap="magma", norm=scale, extent=extent, interpolation="antialiased")
+    if names[0] == "z":
+        axes.invert_yaxis()  # y points down, along the spray; z points up, as in other figures across it
     axes.ticklabel_format(useOffset=False)
     return picture
 

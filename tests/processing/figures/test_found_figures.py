@@ -15,6 +15,9 @@ def test_every_group_is_named_with_its_number_and_counted_by_size() -> None:
     legend = above.get_legend()
     assert legend is not None
     assert [text.get_text() for text in legend.get_texts()] == ["found: 20", "missed: 3", "ghosts: 0"]
+    sizes = {getattr(handle, "get_markersize", lambda: None)() for handle in legend.legend_handles}
+    assert len(sizes) == 1, "dots of the legend are of one size, whatever droplets come first"
+    assert None not in sizes
     heights = [patch.get_height() for patch in by_size.patches if isinstance(patch, Rectangle)]
     assert sum(heights) == 23
 

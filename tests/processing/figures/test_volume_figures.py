@@ -25,6 +25,12 @@ def test_slices_have_the_extent_of_the_grid() -> None:
     assert drawn(figure) > 1000
 
 
+def test_y_points_down_along_the_spray_and_z_up_as_in_other_figures() -> None:
+    for axes in slices_figure(ball(), GRID).axes[:6]:
+        low, high = axes.get_ylim()
+        assert (low < high) == (axes.get_ylabel() == "z [mm]")
+
+
 @pytest.mark.parametrize("shape", [(8, 8, 60), (30, 30, 30)])
 def test_slices_stand_apart_whatever_the_volume(shape: tuple[int, int, int]) -> None:
     volume = 1e-5 * np.random.default_rng(1).random(shape, np.float32)
