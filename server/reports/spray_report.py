@@ -3,18 +3,15 @@
 Each chapter is a function of what is reported, in ``CHAPTERS``; one that has nothing to say returns None.
 """
 
-import json
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
 
 from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.analysis.spray.density_map import NO_CELLS, density_maps
-from processing.analysis.spray.spray_axis import SprayAxis
 from processing.analysis.spray.spray_sample import SpraySample, spray_sample
 from processing.analysis.spray.spray_statistics import AskedFor, SprayStatistics, spray_statistics
 from processing.analysis.spray.velocity_field import field_across_axis, field_through_axis
@@ -25,7 +22,8 @@ from processing.figures.sprays.space_figures import density_figure, patternation
 from processing.runs.sprays.measured_spray import MeasuredSpray
 from server.reports.liquid_sections import ReportedLiquid, break_up_section, liquid_rows, unknown_section
 from server.reports.object_motion_section import object_motion_section
-from server.reports.page import Picture, Section, Table, write_report
+from server.reports.origin_section import notes_of, origin_of
+from server.reports.page import Picture, Section, write_report
 from server.reports.shots_section import VERDICT, exposure_rows, shots_section
 from server.reports.spray_tables import (
     classes_table,
@@ -52,7 +50,6 @@ DEFINITIONS = (
 
 
 SAMPLES = {"adequate": "The sample is adequate.", "low sample": "The sample is low: intervals may be too narrow."}
-WITH_UNIT = {"pressure_bar": "pressure [bar]"}
 Chapter = Callable[["ReportedSpray"], Section | None]
 
 
@@ -113,7 +110,7 @@ def _twice(told: SprayStatistics) -> str:
 
 def conditions_of(reported: ReportedSpray) -> list[str]:
     """What the operator wrote down, in a line; and what of it was changed later."""
-    notes = "; ".join(f"{name}: {value}" for name, value in _notes(reported))
+    notes = "; ".join(f"{name}: {value}" for name, value in notes_of(reported.spray))
     return [*([f"Conditions: {notes}"] if notes else []), *reported.spray.changes]
 
 
@@ -125,59 +122,7 @@ def _verdicts(reported: ReportedSpray) -> str:
 
 def origin_section(reported: ReportedSpray) -> Section:
     """Runs, calibration, recipe, programs, and what the operator wrote down."""
-    axis, settings = reported.asked.axis, json.loads(str(reported.spray.provenance.get("settings", "{}")))
-    recipes = "; ".join(f"SHA-256 {one[:16]}..." for one in _stated(reported, "recipe_sha256")) or "not stated"
-    sha256 = _stated(reported, "calibration_sha256")
-    rows = [
-        ["results", reported.spray.name],
-        ["runs", ", ".join(reported.spray.runs)],
-        ["calibration", f"{_said(reported, 'calibration')}, SHA-256 {' and '.join(one[:16] for one in sha256)}..."],
-        ["recipe", f"{recipes}, method {_said(reported, 'method_version')}"],
-        ["measured as", f"{settings.get('polarity', '')}, light {settings.get('light', 'not stated')}"],
-        ["box [mm]", _box(reported.sample)],
-        ["nozzle and axis", _axis(axis)],
-        [
-            "programs",
-            f"measured by tomoshadow {_said(reported, 'tomoshadow')}, reported by {version('tomoshadow')}",
-        ],
-        *_notes(reported),
-    ]
-    table = Table(["", ""], [row for row in rows if row[1]], words=True)
-    return Section("Where the numbers come from", tables=[table])
-
-
-def _stated(reported: ReportedSpray, name: str) -> list[str]:
-    """What the shots say of themselves, each once."""
-    said = (shot.provenance.get(name) for shot in reported.spray.shots)
-    return list(dict.fromkeys(str(one) for one in said if one is not None))
-
-
-def _said(reported: ReportedSpray, name: str) -> str:
-    return " and ".join(_stated(reported, name))
-
-
-def _box(sample: SpraySample | None) -> str:
-    if sample is None or sample.box_mm is None:
-        return ""
-    low_mm, high_mm = sample.box_mm
-    return ", ".join(f"{axis} {a:.4g} to {b:.4g}" for axis, a, b in zip("xyz", low_mm, high_mm, strict=True))
-
-
-def _axis(axis: SprayAxis | None) -> str:
-    if axis is None:
-        return "not known"
-    nozzle, direction = (", ".join(f"{value:.4g}" for value in triple) for triple in (axis.nozzle_mm, axis.direction))
-    return f"nozzle at ({nozzle}) mm, axis along ({direction})"
-
-
-def _notes(reported: ReportedSpray) -> list[list[str]]:
-    """What the operator has written down, of all runs."""
-    values: dict[str, dict[str, None]] = {}
-    for notes in map(json.loads, _stated(reported, "notes")):
-        more = notes.pop("more", {})
-        for name, value in {**notes, **more}.items():
-            values.setdefault(name, {})[str(value)] = None
-    return [[WITH_UNIT.get(name, name.replace("_", " ")), " and ".join(said)] for name, said in values.items()]
+    return origin_of(reported.spray, reported.asked.axis, reported.sample)
 
 
 def _sizes(reported: ReportedSpray) -> Section | None:
