@@ -237,6 +237,16 @@ def test_droplets_lie_over_the_slices_and_in_a_table_that_leads_to_them(
     at_mm = {axis: float(first.get_by_role("cell").nth(1 + number).inner_text()) for number, axis in enumerate("xyz")}
     first.click()
     expect(place(page, "x")).to_have_text(re.compile(f"x = {round(at_mm['x'] / 0.05) * 0.05:.3f} mm"))
+    expect(page.get_by_role("switch", name="droplets")).to_be_in_viewport()
+    depths_mm = [float(row.get_by_role("cell").nth(3).inner_text()) for row in table.get_by_role("row").all()[1:]]
+    beside = next(number for number, z_mm in enumerate(depths_mm, 1) if abs(z_mm) > 0.5 * 41 * 0.05)
+    table.get_by_role("row").nth(beside).click()
+    expect(page.get_by_text("It lies outside of the volume, along z")).to_be_visible()
+    second = table.get_by_role("row").nth(2)
+    x_mm = float(second.get_by_role("cell").nth(1).inner_text())
+    second.focus()
+    page.keyboard.press("Enter")
+    expect(place(page, "x")).to_have_text(re.compile(f"x = {round(x_mm / 0.05) * 0.05:.3f} mm"))
     assert slice_of(page, "z").locator("circle").count() > 0
     expect(page.get_by_role("region", name="Droplets", exact=True)).to_contain_text("droplets-1")
     press(page, "shot", "ArrowRight")

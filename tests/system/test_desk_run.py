@@ -207,7 +207,7 @@ def test_what_is_made_of_every_shot_is_what_the_page_shows(tab: Page, server: Se
     expect(box).to_be_hidden()
     tab.get_by_role("checkbox", name="Droplets too").click()
     expect(row(tab, "Recipe")).to_contain_text("droplets are measured against a background run")
-    expect(tab.get_by_text("Where it is empty, all that the views see is searched")).to_be_visible()
+    expect(tab.get_by_text("which holds all of the spray at its height")).to_be_visible()
     box.fill("0:1")
     expect(row(tab, "Recipe")).to_contain_text("paper.json")  # that has to tell the pixels of a box, and cannot
     box.fill("")

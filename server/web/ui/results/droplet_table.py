@@ -22,6 +22,12 @@ _COLUMNS = {
 }
 _SHOWN_AS = {"exposure": "value", "diameter_um": "value.toFixed(value < 100 ? 1 : 0)", "p_real": "value.toFixed(2)"}
 _UNKNOWN = "unknown"
+_ROW = """
+<q-tr :props="props" tabindex="0" @click="$parent.$emit('pick', [props.row.x_mm, props.row.y_mm, props.row.z_mm])"
+    @keydown.enter="$parent.$emit('pick', [props.row.x_mm, props.row.y_mm, props.row.z_mm])">
+  <q-td v-for="one in props.cols" :key="one.name" :props="props">{{ one.value }}</q-td>
+</q-tr>"""
+"""By themselves rows of a table hear no keys."""
 
 
 class DropletTable:
@@ -46,7 +52,8 @@ class DropletTable:
                 "w-full cursor-pointer"
             )
             self._table.props("dense flat")
-            self._table.on("rowClick", self._on_row, [[], ["x_mm", "y_mm", "z_mm"], None])
+            self._table.add_slot("body", _ROW)
+            self._table.on("pick", self._on_row)
         self._panel.set_visibility(False)
 
     def show(self, droplets: StoredDroplets | None) -> None:
@@ -58,7 +65,7 @@ class DropletTable:
         self._table.update()
 
     def _on_row(self, event: Any) -> None:
-        x_mm, y_mm, z_mm = (float(event.args[1][name]) for name in ("x_mm", "y_mm", "z_mm"))
+        x_mm, y_mm, z_mm = (float(place_mm) for place_mm in event.args)
         self._go_to((x_mm, y_mm, z_mm))
 
 

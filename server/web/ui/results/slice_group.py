@@ -15,7 +15,7 @@ from processing.reconstruction.volume_part import RangesMm, part_within
 from processing.volume import VoxelGrid
 from server.pictures.pictures import Colours
 from server.web.ui.results.seen_exposure import AXES, SHADES, FullSlices, SeenExposure
-from server.web.ui.results.slice_view import SHOWN_AXES, Layer, SliceView, spans_of
+from server.web.ui.results.slice_view import SHOWN_AXES, Layer, SliceView, edges_of, spans_of
 
 _REST_S = 0.2
 """Full resolution is asked for once the hand rests."""
@@ -114,6 +114,12 @@ class SliceGroup:
         for axis, number in zip("zyx", index.tolist(), strict=True):
             self._put(axis, round(number))
         self._draw()
+
+    def beside(self, place_mm: Sequence[float]) -> str:
+        """Along which axes the volume does not reach a place x, y, z; empty: it does."""
+        spans = (edges_of(self._grid, axis) for axis in "xyz")
+        outside = [not low <= at_mm <= high for at_mm, (low, high) in zip(place_mm, spans, strict=True)]
+        return ", ".join(axis for axis, is_outside in zip("xyz", outside, strict=True) if is_outside)
 
     def _pick(self, axis: str, right_mm: float, down_mm: float) -> None:
         place_mm = self.at_mm | dict(zip(SHOWN_AXES[axis], (right_mm, down_mm), strict=True))

@@ -77,9 +77,13 @@ class VolumeView:
             self._mark()
 
     def go_to(self, place_mm: tuple[float, float, float]) -> None:
-        """Put the cross-hair somewhere."""
-        if self._seen:
-            self._slices.go_to(place_mm)
+        """Put the cross-hair somewhere, and bring it into sight."""
+        if not self._seen:
+            return
+        self._slices.go_to(place_mm)
+        ui.run_javascript(f"getHtmlElement({self._panel.id}).scrollIntoView()")
+        if beside := self._slices.beside(place_mm):
+            ui.notify(f"It lies outside of the volume, along {beside}: the cross-hair is as near as there are voxels")
 
     def _offer(self, names: dict[str, str], method: ReconstructionMethod | None) -> None:
         self._method = method

@@ -11,8 +11,9 @@ from server.web.ui.draft import NO_VOLUMES, DraftStore
 from server.web.ui.visiting import for_operators
 
 WHERE = (
-    "State a box behind the break-up, x, y and z from:to in mm. Where it is empty, all that the views see is searched: "
-    "where liquid still hangs together that takes minutes a shot, and ends in a refusal."
+    "A flat box behind the break-up, x, y and z from:to in mm, which holds all of the spray at its height. Where it is "
+    "empty, all that the views see is searched: where liquid still hangs together that takes minutes a shot, and ends "
+    "in a refusal."
 )
 _VOLUMES = {NO_VOLUMES: "none"} | {one.value: f"by {one.value.upper()}" for one in ReconstructionMethod}
 
