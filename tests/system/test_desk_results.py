@@ -20,6 +20,7 @@ from tests.support.droplet_run import write_calibration, write_run
 from tests.support.operator import go_to
 from tests.support.sampled_sprays import cone_shots, write_results
 from tests.support.serving import Serving, plan_of
+from tests.system.test_every_control import NO_KEYS
 
 pytestmark = pytest.mark.timeout(900)
 
@@ -242,6 +243,10 @@ def test_droplets_lie_over_the_slices_and_in_a_table_that_leads_to_them(
     beside = next(number for number, z_mm in enumerate(depths_mm, 1) if abs(z_mm) > 0.5 * 41 * 0.05)
     table.get_by_role("row").nth(beside).click()
     expect(page.get_by_text("It lies outside of the volume, along z")).to_be_visible()
+    assert page.evaluate(NO_KEYS) == []
+    table.get_by_role("columnheader", name="x, mm").focus()
+    page.keyboard.press("Enter")
+    expect(table.get_by_role("columnheader", name="x, mm")).to_have_class(re.compile(r"\bsorted\b"))
     second = table.get_by_role("row").nth(2)
     x_mm = float(second.get_by_role("cell").nth(1).inner_text())
     second.focus()

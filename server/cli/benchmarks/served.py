@@ -7,7 +7,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from datetime import datetime
+from datetime import datetime, timedelta
 from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
@@ -162,7 +162,7 @@ def _recorded(server: Server, config: Path, shots: int, calibration: str | None)
 
 
 def _write_runs(data_dir: Path, runs: int) -> None:
-    """As many copies of one small run."""
+    """As many copies of one small run, a minute after each other."""
     seen, frame = ExposureRecord(True, 1), np.zeros((6, 8), np.uint8)
     header = RunHeader(
         run_id="20260101T000000-bench", created_utc="2026-01-01T00:00:00+00:00", views={"view1": ViewFormat((6, 8), 8)}
@@ -172,7 +172,7 @@ def _write_runs(data_dir: Path, runs: int) -> None:
         writer.write_shot(Shot(0, ImageKey.SAMPLE, {"view1": DoubleFrame(frame, frame, seen, seen)}))
         writer.finish("completed")
     for number in range(1, runs):
-        shutil.copytree(first, data_dir / f"20260101T000000-bench{number}")
+        shutil.copytree(first, data_dir / f"{datetime(2026, 1, 1) + timedelta(minutes=number):%Y%m%dT%H%M%S}-bench")
 
 
 def _until(is_so: Callable[[], bool], what: str) -> None:

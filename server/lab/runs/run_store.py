@@ -286,7 +286,7 @@ def _begun(run_dir: Path, _changed_ns: int) -> RunSummary:
     return summary_of(RunReader(run_dir), np.empty(0, np.int64))
 
 
-@lru_cache(maxsize=4096)
+@lru_cache(maxsize=65_536)
 def _created(run_dir: Path, changed_ns: int, written: str | None) -> datetime:
     """What the header says; if nobody can read it, when its file was changed."""
     try:

@@ -23,11 +23,13 @@ _COLUMNS = {
 _SHOWN_AS = {"exposure": "value", "diameter_um": "value.toFixed(value < 100 ? 1 : 0)", "p_real": "value.toFixed(2)"}
 _UNKNOWN = "unknown"
 _ROW = """
-<q-tr :props="props" tabindex="0" @click="$parent.$emit('pick', [props.row.x_mm, props.row.y_mm, props.row.z_mm])"
+<q-tr :props="props" tabindex="0" class="cursor-pointer"
+    @click="$parent.$emit('pick', [props.row.x_mm, props.row.y_mm, props.row.z_mm])"
     @keydown.enter="$parent.$emit('pick', [props.row.x_mm, props.row.y_mm, props.row.z_mm])">
   <q-td v-for="one in props.cols" :key="one.name" :props="props">{{ one.value }}</q-td>
 </q-tr>"""
-"""By themselves rows of a table hear no keys."""
+_HEAD = """<q-th :props="props" tabindex="0" @keydown.enter="props.sort(props.col)">{{ props.col.label }}</q-th>"""
+"""By themselves rows and heads of a table hear no keys."""
 
 
 class DropletTable:
@@ -48,10 +50,9 @@ class DropletTable:
                 }
                 for name, label in _COLUMNS.items()
             ]
-            self._table = ui.table(columns=columns, rows=[], row_key="id", pagination=10).classes(
-                "w-full cursor-pointer"
-            )
+            self._table = ui.table(columns=columns, rows=[], row_key="id", pagination=10).classes("w-full")
             self._table.props("dense flat")
+            self._table.add_slot("header-cell", _HEAD)
             self._table.add_slot("body", _ROW)
             self._table.on("pick", self._on_row)
         self._panel.set_visibility(False)
