@@ -6,7 +6,7 @@
 import asyncio
 import time
 from collections.abc import Sequence
-from contextlib import AsyncExitStack
+from contextlib import AsyncExitStack, suppress
 from contextvars import copy_context
 from types import TracebackType
 from typing import Any, Self
@@ -125,7 +125,8 @@ class DaskEngine:
         """End scheduler and workers."""
         starting, self._client = self._client, None
         if starting is not None:  # workers that are just being started are known to nobody else
-            await asyncio.wait([starting])
+            with suppress(Exception):  # if they could not, nobody has missed them
+                await asyncio.shield(starting)
         await asyncio.create_task(self._stack.aclose(), context=self._context)
 
     async def _started(self) -> Client:

@@ -1,4 +1,5 @@
 import asyncio
+import gc
 import os
 import signal
 import sys
@@ -155,6 +156,23 @@ def test_workers_that_could_not_start_are_started_again_by_a_later_task(
                 return await engine.submit("b", double, {"value": 21}, _ignore)
 
     assert asyncio.run(go()) == {"value": 42}
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # distributed leaves a socket open
+def test_workers_that_could_not_start_and_that_nobody_needed_end_without_a_word(tmp_path: Path) -> None:
+    scratch = tmp_path / "scratch"
+    scratch.touch()
+    complaints: list[dict[str, Any]] = []
+
+    async def go() -> None:
+        asyncio.get_running_loop().set_exception_handler(lambda _, context: complaints.append(context))
+        with config.set({"temporary-directory": str(scratch)}):
+            async with DaskEngine():
+                pass
+        gc.collect()
+
+    asyncio.run(go())
+    assert complaints == []
 
 
 def test_workers_load_what_they_are_told_to_before_a_task_needs_it_and_keep_their_memory() -> None:
