@@ -42,6 +42,14 @@ DEPTH = Unchecked(
 """Of a volume that is small against its distance."""
 
 
+def stated_scale(um_per_px: float) -> Unchecked:
+    """Of images whose magnification nobody recorded."""
+    return Unchecked(
+        f"whether a pixel is {um_per_px:g} um wide in the spray, as was stated: all lengths are in proportion",
+        "um_per_px by a reticle in the plane of the spray; runs of a rig have its magnification",
+    )
+
+
 def stated_separation(separation_ns: float) -> Unchecked:
     """Of double exposures whose pulses nobody recorded."""
     return Unchecked(
@@ -65,6 +73,7 @@ def unchecked_images(
     *,
     sizes_known: bool = False,
     single: bool = False,
+    um_per_px: float | None = None,
     undirected: bool = False,
     stated_ns: float | None = None,
     shallow: bool = False,
@@ -79,6 +88,8 @@ def unchecked_images(
         Diameters were compared with those of dots.
     single : bool
         There is one view.
+    um_per_px : float, optional
+        Width of a pixel of it, where that was stated and no magnification tells it.
     undirected : bool
         They are double exposures, and nobody said where the liquid comes from.
     stated_ns : float, optional
@@ -90,6 +101,8 @@ def unchecked_images(
         yield PROPORTION[polarity]
     if single:
         yield SCALE
+    if um_per_px is not None:
+        yield stated_scale(um_per_px)
     if undirected:
         yield ORDER
     if stated_ns is not None:

@@ -90,7 +90,7 @@ def detect_recorded(
         azimuths_deg=checked_deg,
         rolls_deg=believed_deg,
         mirrored=tuple(mirrored),
-        scales_px_per_mm=_nominal_scales(configuration),
+        scales_px_per_mm=nominal_scales(configuration),
         unit_stated=True,
     )
 
@@ -136,7 +136,7 @@ def _of_views(configuration: dict[str, Any], key: str) -> dict[str, float]:
     return {name: float(view[key]) for name, view in views.items() if key in view}
 
 
-def _nominal_scales(configuration: dict[str, Any]) -> dict[str, float]:
+def nominal_scales(configuration: dict[str, Any]) -> dict[str, float]:
     """Scale of every view by magnification and pixels; runs from elsewhere may not say."""
     return {
         name: image_scale_px_per_mm(view["lens"]["magnification"], view["sensor"]["pixel_pitch_um"])

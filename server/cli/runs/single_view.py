@@ -97,6 +97,7 @@ def _polarity(options: Namespace, images: bool) -> "Polarity":
 def _measure_run(options: Namespace, settings: "FlatSettings", run_dir: Path, out: Path) -> Outcome:
     from daq.files.run_directory import RunReader
     from processing.runs.single_view.sources import shot_sources
+    from processing.runs.single_view.stated_scale import rig_um_per_px
 
     with RunReader(run_dir) as run:
         if run.header.polarity != settings.polarity:
@@ -106,11 +107,17 @@ def _measure_run(options: Namespace, settings: "FlatSettings", run_dir: Path, ou
             )
         sources = shot_sources(run, options.view, selected_shots(run_dir, options.shots))
         view = options.view or next(iter(run.header.views))
-        return _measure(options, settings, sources, out, {"run": run.header.run_id, "view": view})
+        origin: Provenance = {"run": run.header.run_id, "view": view}
+        return _measure(options, settings, sources, out, origin, rig_um_per_px(run.header, view))
 
 
 def _measure(
-    options: Namespace, settings: "FlatSettings", sources: "list[FlatSource]", place: Path, origin: "Provenance"
+    options: Namespace,
+    settings: "FlatSettings",
+    sources: "list[FlatSource]",
+    place: Path,
+    origin: "Provenance",
+    by_rig_um_per_px: float | None = None,
 ) -> Outcome:
     from processing.analysis.exports.export import export_path
     from processing.runs.overwriting import replacing, require_free
@@ -119,16 +126,21 @@ def _measure(
     if options.overwrite:
         require_free(place, overwrite=True, made_with=(SETTINGS_FILE,))
         with replacing(place) as out:
-            result = _measure_all(options, settings, sources, out, origin)
+            result = _measure_all(options, settings, sources, out, origin, by_rig_um_per_px)
     else:
         files = [source.droplets_path(place) for source in sources]
         require_free(*files, *(export_path(file, kind) for file in files for kind in options.export), overwrite=False)
-        result = _measure_all(options, settings, sources, place, origin)
+        result = _measure_all(options, settings, sources, place, origin, by_rig_um_per_px)
     return Outcome(result, f"{_table(result)}\n{place}: {_summary(result)}")
 
 
 def _measure_all(
-    options: Namespace, settings: "FlatSettings", sources: "list[FlatSource]", out: Path, origin: "Provenance"
+    options: Namespace,
+    settings: "FlatSettings",
+    sources: "list[FlatSource]",
+    out: Path,
+    origin: "Provenance",
+    by_rig_um_per_px: float | None,
 ) -> dict[str, Any]:
     from processing.analysis.droplets.droplet_file import read_droplets
     from processing.analysis.exports.export import export_droplets
@@ -140,6 +152,7 @@ def _measure_all(
         flat_statistics,
         measure_source,
     )
+    from processing.runs.single_view.stated_scale import scale_doubts
     from processing.runs.unchecked_images import told_unchecked, unchecked_images
 
     shots = []
@@ -150,7 +163,9 @@ def _measure_all(
         for reason in shots[-1].reasons:
             progress(f"{source.name}: {shots[-1].verdict}: {reason}")
     stored = {shot.image or f"shot {shot.shot}": read_droplets(out / shot.file) for shot in shots}
-    doubts = droplets_twice(stored, options.um_per_px)
+    doubts = (*droplets_twice(stored, options.um_per_px), *scale_doubts(options.um_per_px, by_rig_um_per_px))
+    unchecked_um_per_px = options.um_per_px if by_rig_um_per_px is None else None
+    unchecked = unchecked_images(settings.polarity, single=True, um_per_px=unchecked_um_per_px)
     for doubt in doubts:
         progress(doubt)
     return {
@@ -158,7 +173,7 @@ def _measure_all(
         "um_per_px": options.um_per_px,
         "recipe_sha256": recipe_sha256(COMMAND, METHOD_VERSION, settings),
         "shots": [shot.model_dump(mode="json") for shot in shots],
-        "not_checked": told_unchecked(unchecked_images(settings.polarity, single=True), progress),
+        "not_checked": told_unchecked(unchecked, progress),
         "statistics": flat_statistics(list(stored.values())),
         "doubts": list(doubts),
         "passed": any(shot.verdict != "refused" for shot in shots),

@@ -135,13 +135,14 @@ def test_a_scale_that_no_camera_has_is_refused(
     assert f"--um-per-px: {scale} must be" in capsys.readouterr().err
 
 
-def write_single(run_dir: Path) -> Path:
+def write_single(run_dir: Path, **told_of_it: Any) -> Path:
     """A run of one view, dark image and background known, two exposures."""
     header = RunHeader(
         run_id=run_dir.name,
         created_utc="2026-01-01T00:00:00+00:00",
         views={"side": ViewFormat(SHAPE, 8)},
         separation_ns=6400,
+        **told_of_it,
     )
     seen = ExposureRecord(valid=True, frame_id=1, device_timestamp_ns=1)
     shot = Shot(0, ImageKey.SAMPLE, {"side": DoubleFrame(grey(DISCS), grey(DISCS[:1]), seen, seen)})
@@ -158,6 +159,27 @@ def test_a_run_of_one_view_is_measured_exposure_by_exposure(tmp_path: Path, caps
     stored = read_droplets(tmp_path / "out" / shot["file"])
     assert stored.columns["frame"].tolist() == ["a", "a", "b"]
     assert (stored.provenance["run"], stored.provenance["view"]) == ("single", "side")
+
+
+@pytest.mark.parametrize(("stated", "doubted"), [(4.0, False), (4.3, False), (8.0, True), (3.5, True)])
+def test_a_scale_that_is_not_that_of_the_rig_is_doubted(
+    stated: float, doubted: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rig = {"views": {"side": {"lens": {"magnification": 2.0}, "sensor": {"pixel_pitch_um": 8.0}}}}
+    run_dir = write_single(tmp_path / "single", configuration=rig)
+    result = told(capsys, "measure", run_dir, "-o", tmp_path / "out", "--um-per-px", stated)
+    assert [f"stated to be {stated:g} um" in doubt and "4 um of it" in doubt for doubt in result["doubts"]] == (
+        [True] * doubted
+    )
+    assert not [one for one in result["not_checked"] if "um wide" in one["what"]]
+
+
+def test_a_scale_that_nothing_contradicts_is_not_checked(
+    images: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    result = told(capsys, "measure", images[0], "-o", tmp_path / "out", "--um-per-px", "8.3")
+    (one,) = [one for one in result["not_checked"] if "um wide" in one["what"]]
+    assert one["what"].startswith("whether a pixel is 8.3 um wide in the spray, as was stated")
 
 
 def test_one_of_several_views_must_be_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
