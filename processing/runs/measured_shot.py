@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal, TypeVar
+from typing import Literal
 
 import numpy as np
 
@@ -18,12 +18,11 @@ from processing.runs.shots.separation import Separation
 from processing.volume import VoxelGrid
 
 Exposure = BrightExposure | ShadowExposure
-Measured = TypeVar("Measured", BrightExposure, ShadowExposure)
 MOST_SPREAD = 0.01
 """Of the separation: views that differ by more see droplets at different times."""
 
 
-def doubted(measured: Measured, reasons: tuple[str, ...]) -> Measured:
+def doubted(measured: Exposure, reasons: tuple[str, ...]) -> Exposure:
     """The same exposure with reasons why it is no good, if there are any; an empty one may not be empty then."""
     if not reasons:
         return measured

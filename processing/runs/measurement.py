@@ -12,12 +12,13 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from daq.files.run_directory import RunReader, Shot
-from processing.analysis.droplets.bright_shot import BrightExposure, measure_bright
+from processing.analysis.droplets.bright_shot import measure_bright
 from processing.analysis.droplets.droplet_file import write_droplets
 from processing.analysis.droplets.droplet_search import MARGIN_VOXEL, DropletSearch, plan_droplets
 from processing.analysis.droplets.shadows.light_search import Light
-from processing.analysis.droplets.shadows.shadow_shot import ShadowExposure, measure_shadows
+from processing.analysis.droplets.shadows.shadow_shot import measure_shadows
 from processing.analysis.droplets.size_correction import SizeCorrection, SizeRows
+from processing.analysis.near_or_far import SIGHTS, depth_reversed
 from processing.calibration.calibration import Calibration
 from processing.calibration.calibration_file import load_calibration
 from processing.calibration.droplets.droplet_images import find_droplets
@@ -49,10 +50,12 @@ from processing.runs.recipe import recipe_sha256
 from processing.runs.results_file import FrameName, Provenance, claim_results
 from processing.runs.shots.separation import separation_of
 from processing.runs.shots.shot_images import frame_names, require_match
-from processing.runs.shots.turned_views import depth_reversed
+from processing.runs.shots.turned_views import meeting_sights
 from processing.runs.sprays.conditions import conditions_of
 from processing.runs.workbench import References, read_references
 
+_Found = tuple[Exposure, Sequence[Intensity], tuple[str, ...]]
+"""What an exposure shows, its images with droplets bright, and why they are no good."""
 METHOD_VERSION = 9
 """Of what the numbers in a file of droplets mean."""
 
@@ -217,7 +220,8 @@ class RunMeasurement:
         require_match(self.run.run_dir.name, recorded, self.calibration)
         claim_results(results_dir, self.provenance)
         frames = frame_names(self.run)
-        exposures = tuple(self._exposure(recorded, frame, threads, should_stop) for frame in frames)
+        measured = [self._exposure(recorded, frame, threads, should_stop) for frame in frames]
+        exposures = tuple(exposure for exposure, _ in measured)
         by_frame = dict(zip(frames, exposures, strict=True))
         velocities, velocity = shot_velocities(exposures, self.search.grid, separation_of(self.run, recorded))
         objects = self.objects.measure(recorded, [frame for frame in frames if by_frame[frame].views], threads)
@@ -226,7 +230,7 @@ class RunMeasurement:
         write_droplets(
             file,
             {str(frame): one.droplets for frame, one in by_frame.items()},
-            {**self.provenance, **self._told_of(shot, told, velocity)},
+            {**self.provenance, **self._told_of(shot, told, velocity), SIGHTS: json.dumps(measured[0][1])},
             velocities=velocities.columns() if velocities else None,
             objects={str(frame): moving for frame, moving in objects.items()},
         )
@@ -247,16 +251,22 @@ class RunMeasurement:
             **({"rate_hz": rate_hz} if (rate_hz := self.run.header.rate_hz) else {}),
         }
 
-    def _exposure(self, shot: Shot, frame: FrameName, threads: int, should_stop: Callable[[], bool]) -> Exposure:
+    def _exposure(
+        self, shot: Shot, frame: FrameName, threads: int, should_stop: Callable[[], bool]
+    ) -> tuple[Exposure, dict[str, int]]:
+        """What an exposure shows, and at how many droplets lines of sight meet; B has the cameras of A."""
+
         def before_round() -> None:
             if should_stop():
                 raise Stopped(f"{self.run.run_dir.name}, shot {shot.index}: stopped in exposure {frame}")
 
         before_round()
         measure = self._bright if self.settings.polarity == "bright" else self._shadows
-        return measure(shot, frame, threads, before_round)
+        exposure, lights, reasons = measure(shot, frame, threads, before_round)
+        sights = self._sights(shot, lights) if frame != "b" else {}
+        return doubted(exposure, (*reasons, *filter(None, [depth_reversed(sights)]))), sights
 
-    def _bright(self, shot: Shot, frame: FrameName, threads: int, before_round: Callable[[], None]) -> BrightExposure:
+    def _bright(self, shot: Shot, frame: FrameName, threads: int, before_round: Callable[[], None]) -> _Found:
         images = bright_images(self.run, shot, frame, self.references)
         measured = measure_bright(
             images,
@@ -267,15 +277,14 @@ class RunMeasurement:
             before_round=before_round,
         )
         brightest = max(float(np.percentile(image[::4, ::4], 99.9)) for image in images)
-        return doubted(measured, self._reversed(shot, frame, [image / max(brightest, 1e-6) for image in images]))
+        return measured, [image / max(brightest, 1e-6) for image in images], ()
 
-    def _shadows(self, shot: Shot, frame: FrameName, threads: int, before_round: Callable[[], None]) -> ShadowExposure:
+    def _shadows(self, shot: Shot, frame: FrameName, threads: int, before_round: Callable[[], None]) -> _Found:
         images, trust = shadow_images(self.run, shot, frame, self.references)
-        known = without_ignored(dict(zip(shot.views, trust, strict=True)), self.settings.ignored)
         measured = measure_shadows(
             images,
             self.search,
-            trust=list(known.values()),
+            trust=list(without_ignored(dict(zip(shot.views, trust, strict=True)), self.settings.ignored).values()),
             light=self.settings.light,
             sizes=SizeCorrection.of(self.settings.sizes) if self.settings.sizes else None,
             twins=self.settings.twins,
@@ -283,17 +292,9 @@ class RunMeasurement:
             threads=threads,
             before_round=before_round,
         )
-        reasons = (
-            *odd_backgrounds(shot, frame, self.references),
-            *self._reversed(shot, frame, [1 - one for one in images]),
-        )
-        return doubted(measured, reasons)
+        return measured, [1 - one for one in images], odd_backgrounds(shot, frame, self.references)
 
-    def _reversed(self, shot: Shot, frame: FrameName, lights: Sequence[Intensity]) -> tuple[str, ...]:
-        """What droplets that are bright in images say of depth, where that is reversed; B has the cameras of A."""
-        if frame == "b":
-            return ()
+    def _sights(self, shot: Shot, lights: Sequence[Intensity]) -> dict[str, int]:
         views = {name: self.calibration.views[name] for name in shot.views}
         seen = [find_droplets(np.clip(light, 0, None)) for light in lights]
-        told = depth_reversed(replace(self.calibration, views=views), [seen])
-        return (told,) if told else ()
+        return meeting_sights(replace(self.calibration, views=views), [seen])

@@ -42,6 +42,14 @@ DEPTH = Unchecked(
 """Of a volume that is small against its distance."""
 
 
+SPARSE = Unchecked(
+    "whether all images are mirrored left to right or turned by 180 degrees, or views exchanged in pairs: droplets are "
+    "too few to tell it, and near and far would be exchanged",
+    "more shots, or more droplets in them; or nothing, where settings of cameras and programs are those of the target",
+)
+"""Of shots with few droplets."""
+
+
 def stated_scale(um_per_px: float) -> Unchecked:
     """Of images whose magnification nobody recorded."""
     return Unchecked(
@@ -77,6 +85,7 @@ def unchecked_images(
     undirected: bool = False,
     stated_ns: float | None = None,
     shallow: bool = False,
+    sparse: bool = False,
 ) -> Iterator[Unchecked]:
     """What nothing tells of the images that droplets were measured in.
 
@@ -96,6 +105,8 @@ def unchecked_images(
         Separation of double exposures, where it was stated and no pulse tells it.
     shallow : bool
         Perspective is too weak to tell near from far.
+    sparse : bool
+        Droplets are too few for that.
     """
     if polarity == "bright" or not sizes_known:
         yield PROPORTION[polarity]
@@ -109,6 +120,8 @@ def unchecked_images(
         yield stated_separation(stated_ns)
     if shallow:
         yield DEPTH
+    elif sparse:
+        yield SPARSE
 
 
 def told_unchecked(unchecked: Iterator[Unchecked], tell: Callable[[str], None]) -> list[dict[str, str]]:

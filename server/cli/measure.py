@@ -197,6 +197,7 @@ def _measure_shots(
     from processing.analysis.droplets.droplet_file import read_droplets
     from processing.analysis.droplets.droplet_statistics import droplet_statistics
     from processing.analysis.exports.export import export_droplets
+    from processing.analysis.near_or_far import depth_doubts, sights_of
     from processing.analysis.velocity.velocity_statistics import velocity_statistics
     from processing.runs.liquid.objects import liquid_summary
     from processing.runs.measurement import METHOD_VERSION
@@ -215,11 +216,12 @@ def _measure_shots(
     return {
         "conditions_changed": _told(changes_told(stored, files)),
         "copies": _told(copies_told(stored)),
+        "depth": _told(depth_doubts(stored)),
         "polarity": settings.polarity,
         "recipe_sha256": recipe_sha256(NAME, METHOD_VERSION, settings),
         "grid": settings.model_dump(mode="json")["grid"],
         "shots": [shot.model_dump(mode="json") for shot in shots],
-        "not_checked": _tell_unchecked(options.calibration, run_dir, settings, shots),
+        "not_checked": _tell_unchecked(options.calibration, run_dir, settings, shots, sights_of(stored)),
         "statistics": droplet_statistics(stored).model_dump(mode="json"),
         "velocity": velocity_statistics(stored).model_dump(mode="json"),
         **liquid_summary(stored).model_dump(mode="json"),
@@ -234,12 +236,17 @@ def _told(doubts: tuple[str, ...]) -> list[str]:
 
 
 def _tell_unchecked(
-    calibration_file: Path, run_dir: Path, settings: "MeasureSettings", shots: "list[ShotDroplets]"
+    calibration_file: Path,
+    run_dir: Path,
+    settings: "MeasureSettings",
+    shots: "list[ShotDroplets]",
+    sights: dict[str, int],
 ) -> list[dict[str, str]]:
     from daq.files.run_directory import RunReader
+    from processing.analysis.near_or_far import CLOSE_PX, depth_known, depth_reversed
     from processing.calibration.calibration_file import load_calibration
     from processing.runs.pipeline import default_grid
-    from processing.runs.shots.turned_views import CLOSE_PX, reversed_shows_px
+    from processing.runs.shots.turned_views import reversed_shows_px
     from processing.runs.unchecked_images import told_unchecked, unchecked_images
 
     with RunReader(run_dir) as run:
@@ -254,6 +261,7 @@ def _tell_unchecked(
         undirected=undirected,
         stated_ns=stated_ns,
         shallow=reversed_shows_px(calibration, grid) < CLOSE_PX,
+        sparse=not depth_known(sights) and not depth_reversed(sights),
     )
     return told_unchecked(unchecked, progress)
 

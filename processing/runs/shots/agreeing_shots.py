@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
+from processing.analysis.near_or_far import depth_reversed
 from processing.calibration.calibration import Calibration
 from processing.calibration.droplets.self_calibration import SelfCalibration, self_calibrate
 from processing.calibration.errors import CalibrationError
@@ -13,7 +14,7 @@ from processing.runs.shots.shot_check import (
     exposures_in_turn,
     require_droplets,
 )
-from processing.runs.shots.turned_views import depth_reversed
+from processing.runs.shots.turned_views import meeting_sights
 
 ASKED_AGAIN = 10
 """Shots, up to twice as many, that must agree with the correction, each by itself."""
@@ -29,7 +30,7 @@ def corrected_by(by_shot: Mapping[int, Sequence[Exposure]], calibration: Calibra
     """
     exposures = [exposure for of_shot in by_shot.values() for exposure in of_shot]
     require_droplets(calibration, exposures)
-    if problem := depth_reversed(calibration, exposures_in_turn(by_shot)):
+    if problem := depth_reversed(meeting_sights(calibration, exposures_in_turn(by_shot))):
         raise CalibrationError(f"run {run}: {problem}. No view has moved: put images or calibration right")
     found = self_calibrate(calibration, exposures, run)
     _require_agreement(by_shot, found.calibration, run)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from itertools import chain, zip_longest
 from typing import Any
 
+from processing.analysis.near_or_far import depth_reversed
 from processing.calibration.calibration import Calibration
 from processing.calibration.droplets.agreement import strangers
 from processing.calibration.droplets.disparity import MIN_VIEWS, REACH_PX, ViewDisparity, measured_box, shot_disparity
@@ -16,7 +17,7 @@ from processing.calibration.errors import CalibrationError, OutOfRange
 from processing.calibration.fit.health import LIMITS_PX, judge
 from processing.calibration.verdict import Verdict
 from processing.geometry import FloatArray
-from processing.runs.shots.turned_views import depth_reversed
+from processing.runs.shots.turned_views import meeting_sights
 
 ALARM_PX, STOP_PX = LIMITS_PX[Verdict.USABLE], LIMITS_PX[Verdict.WARN]
 """Disparity of a view above which an operator should know, and above which volumes are not worth having."""
@@ -107,7 +108,7 @@ def check_shots(by_shot: Mapping[int, Sequence[Exposure]], calibration: Calibrat
 
     Whether depth is reversed is asked once, of all shots together; if it is, none of them tells anything else.
     """
-    if problem := depth_reversed(calibration, exposures_in_turn(by_shot)):
+    if problem := depth_reversed(meeting_sights(calibration, exposures_in_turn(by_shot))):
         return [ShotCheck(shot, {}, problem, tuple(calibration.views)) for shot in by_shot]
     return [check_places(shot, exposures, calibration) for shot, exposures in by_shot.items()]
 

@@ -10,6 +10,7 @@ from itertools import accumulate, combinations
 
 import numpy as np
 
+from processing.analysis.near_or_far import AS_SEEN, CLOSE_PX
 from processing.calibration.calibration import Calibration
 from processing.calibration.droplets.disparity import MIN_VIEWS, measured_box
 from processing.calibration.droplets.droplet_matching import match_exposures
@@ -21,33 +22,21 @@ SEEDS = 300
 """Droplets of an exposure that are followed."""
 ENOUGH = 600
 """Droplets of all exposures together, of the view that sees fewest: more exposures are not asked."""
-CLOSE_PX = 0.25
-"""Root mean square, over views, of how far lines of sight may pass a droplet that they are said to meet at."""
 _ASKED = 200
 """Places of a volume."""
-SURE = 5.0
-"""Standard deviations of the difference of two counts."""
-
 Exposures = Sequence[list[FloatArray]]
 
 
-def depth_reversed(calibration: Calibration, exposures: Iterable[list[FloatArray]]) -> str:
-    """What was mistaken for all views at once, so that near looks far; empty where droplets do not say so for sure.
+def meeting_sights(calibration: Calibration, exposures: Iterable[list[FloatArray]]) -> dict[str, int]:
+    """At how many droplets lines of sight of all views meet closely, as images are, and if they were turned.
 
     The cameras of a run are mounted once: exposures of all its shots tell together, the first ones that are enough.
     """
     asked = _enough(exposures)
     if not asked or len(calibration.views) < MIN_VIEWS:
-        return ""
-    met = _met(calibration, asked)
+        return {}
     found = {what: _met(calibration, seen) for what, seen in turned(calibration, asked)}
-    sure = {what: count for what, count in found.items() if count - met > SURE * np.sqrt(count + met)}
-    if not sure:
-        return ""
-    return (
-        f"all views agree on {met} droplets within {CLOSE_PX:g} px, and on {max(sure.values())} if "
-        f"{', or '.join(sure)}: depth is reversed"
-    )
+    return {AS_SEEN: _met(calibration, asked), **found}
 
 
 def _enough(exposures: Iterable[list[FloatArray]]) -> Exposures:

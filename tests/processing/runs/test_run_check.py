@@ -9,7 +9,7 @@ from processing.calibration.droplets.disparity import ViewDisparity, measured_bo
 from processing.calibration.verdict import Verdict
 from processing.geometry import FloatArray, PinholeCamera
 from processing.runs.shots.shot_check import ALARM_PX, FEW_SEEDS, ShotCheck, check_shots
-from processing.runs.shots.turned_views import depth_reversed
+from processing.runs.shots.turned_views import meeting_sights
 from processing.studies.drifting_views import direction
 from processing.studies.seen_droplets import droplet_calibration
 from processing.studies.simulated_droplets import study_cameras
@@ -115,7 +115,7 @@ def test_shots_of_a_run_tell_together_that_depth_is_reversed_where_each_has_too_
 def test_no_more_exposures_are_asked_for_depth_than_are_enough() -> None:
     """What is told counts droplets."""
     exposures = [mirrored(list(seen)) for seen in droplet_shots(6, 7.0)]
-    assert depth_reversed(CALIBRATION, exposures) == depth_reversed(CALIBRATION, exposures[:2]) != ""
+    assert meeting_sights(CALIBRATION, exposures) == meeting_sights(CALIBRATION, exposures[:2]) != {}
 
 
 WIDE_PX, WIDE_MM = (800, 500), np.array([4.2, 1.7, 2.5])

@@ -291,6 +291,19 @@ def test_images_that_are_mirrored_in_all_views_are_named(tmp_path: Path, capsys:
     assert shot["verdict"] == "refused"
     assert "if all images are mirrored left to right, or turned by 180 degrees" in shot["reasons"][0]
     assert shot["reasons"][0].endswith("depth is reversed")
+    (told_of_all,) = result["depth"]
+    assert told_of_all.startswith("all shots together: all views agree on ")
+
+
+def test_few_droplets_do_not_tell_near_from_far_and_that_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run_dir = write_droplet_run(tmp_path / "run", density_per_mm3=0.3, drift_px=0, shots=1)
+    save_calibration(calibration_of(views()), tmp_path / "calibration.json")
+    arguments = ["measure", run_dir, "--calibration", tmp_path / "calibration.json", "-o", tmp_path / "out"]
+    result = told(capsys, *arguments, "--grid=-3.5:3.5,-3:3,-2.5:2.5")
+    assert any("droplets are too few to tell it, and near and far" in one["what"] for one in result["not_checked"])
+    assert result["depth"] == []
 
 
 def test_shadows_without_a_background_are_refused_in_a_sentence(
