@@ -20,9 +20,16 @@ TOKEN = "correct horse battery staple"
 
 
 @pytest.fixture(scope="module")
-def guarded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
+def with_token(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
     with serving(tmp_path_factory.mktemp("guard") / "runs", token=TOKEN) as server:
         yield server
+
+
+@pytest.fixture
+def guarded(with_token: Serving) -> Serving:
+    """Its client is signed in by no earlier test."""
+    with_token.http.cookies.clear()
+    return with_token
 
 
 def bearer(token: str) -> dict[str, str]:

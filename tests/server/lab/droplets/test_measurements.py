@@ -11,6 +11,7 @@ from typing import Any
 import h5py
 import httpx
 import pytest
+from fastapi import FastAPI
 
 from processing.analysis.droplets.droplet_file import DropletFileError, read_droplets
 from processing.analysis.droplets.droplet_search import DropletSearch, plan_droplets
@@ -25,6 +26,7 @@ from server.lab.errors import Unprocessable
 from server.lab.events import EventPublisher
 from server.lab.job_recovery import jobs_on_disk
 from server.lab.jobs import JobKind, JobState
+from server.lab.services import Services
 from server.lab.tasks import measure_shot
 from server.web.app import create_api
 from server.web.ui.drawer.job_panel import job_row
@@ -44,20 +46,27 @@ REQUEST = {"run_id": "bright", "calibration": "cal", "settings": SETTINGS.model_
 
 
 @pytest.fixture(scope="module")
-def measured(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Serving]:
-    """A server with a bright run of two shots, both measured, and one of shadows."""
+def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A data directory with a bright run of two shots, both measured, and one of shadows."""
     data_dir = tmp_path_factory.mktemp("lab") / "runs"
     write_bright_run(data_dir / "bright", shots=2)
     write_run(data_dir / "shadows")
     (data_dir / "calibrations").mkdir()
     write_bright_calibration(data_dir / "calibrations" / "cal.json")
-
-    with serving(
-        data_dir,
-        build=lambda given: create_api(replace(given, tasks={**given.tasks, JobKind.MEASUREMENT: measure_shot})),
-    ) as server:
+    with serving(data_dir, build=build) as server:
         assert ask(server).status_code == 202
         wait_for_jobs(server, 2, "measurement")
+    return data_dir
+
+
+def build(services: Services) -> FastAPI:
+    return create_api(replace(services, tasks={**services.tasks, JobKind.MEASUREMENT: measure_shot}))
+
+
+@pytest.fixture
+def measured(kept: Path, tmp_path: Path) -> Iterator[Serving]:
+    """A server for every test, on a copy of that directory."""
+    with serving(shutil.copytree(kept, tmp_path / "runs"), build=build) as server:
         yield server
 
 
@@ -156,10 +165,8 @@ def test_what_cannot_be_measured_is_refused_with_its_reason(measured: Serving) -
 def test_a_damaged_file_is_named(measured: Serving) -> None:
     address, _ = results_of(measured)
     path = next(measured.services.data_dir.glob("bright/results/*/shot_00000_droplets.h5"))
-    whole = path.read_bytes()
-    path.write_bytes(whole[:1000])
+    path.write_bytes(path.read_bytes()[:1000])
     answer = measured.http.get(address)
-    path.write_bytes(whole)
     assert answer.status_code == 500
     assert "shot_00000_droplets.h5: not a readable file of droplets" in answer.json()["detail"]
 
@@ -271,14 +278,11 @@ def test_jobs_of_a_run_plan_once_until_settings_or_calibration_are_others(
 
 
 def test_what_was_measured_with_a_calibration_that_was_replaced_is_not_done(measured: Serving) -> None:
-    """The last test: it leaves a second set of results."""
     file = measured.services.data_dir / "calibrations" / "cal.json"
-    before = file.read_bytes()
     calibration = load_calibration(file)
     anew = replace(calibration, notes=("made again",))
     save_calibration(anew.with_id(content_id(anew)), file, overwrite=True)
     (job,) = ask(measured, shots=[0]).json()
-    file.write_bytes(before)
     assert job["state"] in ("queued", "running")
     assert job["results_id"] != SETTINGS.results_id("cal")
     wait_for_jobs(measured, 3, "measurement")
