@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from daq.files.run_directory import RunReader, Shot
 from processing.light import DIM_LIGHT, hollowed, odd_light
 from processing.preprocessing import Frame, Intensity, is_dim
@@ -41,9 +43,16 @@ def copied(shot: Shot, frame: FrameName, images: Sequence[Intensity], before: di
     """
     if not any(image.any() for image in images):
         return {}
-    rows = b"".join(grey_values(shot, view, frame)[::COPIED_ROWS].tobytes() for view in shot.views)
-    first = before.setdefault(hashlib.blake2b(rows).digest(), shot.index)
+    first = before.setdefault(images_print(shot, [frame]), shot.index)
     return {} if first == shot.index else {"copy_of": first}
+
+
+def images_print(shot: Shot, frames: Sequence[FrameName]) -> bytes:
+    """A hash of some rows of all exposures of a shot; empty where all pixels are alike."""
+    rows = [grey_values(shot, view, frame)[::COPIED_ROWS] for frame in frames for view in shot.views]
+    if not any(np.ptp(one) for one in rows):
+        return b""
+    return hashlib.blake2b(b"".join(one.tobytes() for one in rows), digest_size=16).digest()
 
 
 def stored_faults(volume_file: Path, copy_of: Path | None = None) -> Mapping[str, Any]:

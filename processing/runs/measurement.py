@@ -12,6 +12,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from daq.files.run_directory import RunReader, Shot
+from processing.analysis.copied_shots import IMAGES
 from processing.analysis.droplets.bright_shot import measure_bright
 from processing.analysis.droplets.droplet_file import write_droplets
 from processing.analysis.droplets.droplet_search import MARGIN_VOXEL, DropletSearch, plan_droplets
@@ -26,6 +27,7 @@ from processing.kernels import DEFAULT_THREADS
 from processing.preprocessing import Intensity, Polarity
 from processing.reconstruction.settings import FrozenValue, GridSettings
 from processing.runs.errors import PipelineError
+from processing.runs.exposure_faults import images_print
 from processing.runs.liquid.objects import NozzleNumbers, RunObjects, told_objects
 from processing.runs.measured_images import (
     IgnoredPixels,
@@ -80,7 +82,6 @@ class MeasureSettings(FrozenValue):
         tuple[IgnoredPixels, ...],
         Field(description="rectangles of shadow images that are not asked, VIEW=LEFT:RIGHT,TOP:BOTTOM in px"),
     ] = ()
-
     nozzle: Annotated[NozzleNumbers | None, Field(description="x, y, z in mm, and axis; default: the run's own")] = None
 
     @model_validator(mode="after")
@@ -227,10 +228,11 @@ class RunMeasurement:
         objects = self.objects.measure(recorded, [frame for frame in frames if by_frame[frame].views], threads)
         told = {frame: {**one.told(), **told_objects(objects.get(frame))} for frame, one in by_frame.items()}
         file = droplets_path(results_dir, shot)
+        seen = {SIGHTS: json.dumps(measured[0][1]), IMAGES: images_print(recorded, frames).hex()}
         write_droplets(
             file,
             {str(frame): one.droplets for frame, one in by_frame.items()},
-            {**self.provenance, **self._told_of(shot, told, velocity), SIGHTS: json.dumps(measured[0][1])},
+            {**self.provenance, **self._told_of(shot, told, velocity), **seen},
             velocities=velocities.columns() if velocities else None,
             objects={str(frame): moving for frame, moving in objects.items()},
         )

@@ -161,6 +161,7 @@ def test_the_recipe_that_was_written_measures_the_same(
     assert again["recipe_sha256"] == first["recipe_sha256"]
     one, two = (read_droplets(tmp_path / name / "shot_00000_droplets.h5") for name in ("one", "two"))
     assert two.provenance == one.provenance
+    assert len(str(one.provenance["images"])) == 32, "a hash, by which the same shot of another import is known"
     assert one.provenance["recipe_sha256"] == first["recipe_sha256"]
     for name, column in one.columns.items():
         np.testing.assert_array_equal(two.columns[name], column, name)

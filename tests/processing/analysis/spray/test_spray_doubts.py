@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from processing.analysis.copied_shots import in_common
 from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.analysis.spray.spray_axis import SprayAxis
 from processing.analysis.spray.spray_statistics import AskedFor, spray_statistics
@@ -143,6 +144,16 @@ def test_droplets_that_fly_in_all_directions_contradict_no_axis() -> None:
 def test_a_shot_that_is_a_copy_of_another_one_is_told_whatever_it_is_called() -> None:
     copied = replace(SHOTS[1], provenance={**SHOTS[1].provenance, "run": "renamed", "shot": 9})
     assert doubts(*SHOTS, copied) == "renamed, shot 9 has the very droplets of spray, shot 1: one is a copy"
+
+
+def test_a_shot_that_was_imported_twice_and_measured_in_two_ways_is_told_by_its_images() -> None:
+    once = [saying(shot, images=f"{number:032x}") for number, shot in enumerate(SHOTS)]
+    columns = {name: one[5:] for name, one in once[1].columns.items()}
+    again = replace(saying(once[1], run="imported again"), columns=columns)
+    assert doubts(*once, again) == "imported again, shot 1 has the very images of spray, shot 1: one is a copy"
+    assert in_common([again], once) == 1
+    assert in_common([saying(again, images="another")], once) == 0
+    assert not doubts(*(saying(shot, images="") for shot in SHOTS))
 
 
 def test_an_exposure_that_is_hidden_as_a_whole_leaves_the_others_what_they_are() -> None:
