@@ -229,7 +229,7 @@ def smart(
     plan : Plan
         Geometry of views and grid.
     images : mapping of view to (rows, columns) float32 array
-        Intensities, not negative; see ``intensity``.
+        Intensities, 0 to 1, not negative; see ``intensity``. A warning tells those that can be none.
     iterations : int
         At most so many; the paper found 20 to be enough.
     relaxation : float
