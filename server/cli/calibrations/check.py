@@ -26,6 +26,7 @@ def check(options: Namespace) -> Outcome:
     """Check shot by shot; it has not passed where a shot would stop reconstruction."""
     from processing.calibration.calibration_file import load_calibration
     from processing.calibration.verdict import Verdict
+    from processing.interlaced import ALTERNATING
     from processing.runs.run_check import check_shot, odd_images
     from processing.runs.shots.shot_check import ALARM_PX, STOP_PX
     from processing.runs.workbench import Workbench
@@ -39,7 +40,8 @@ def check(options: Namespace) -> Outcome:
         odd.append(odd_images(options.run, index, workbench))
         for what in odd[-1]:
             progress(f"{options.run.name}: shot {index}, {what}")
-    verdicts = [shot.verdict for shot in shots if shot.verdict is not None] + [Verdict.WARN] * any(odd)
+    woven = any(what.endswith(ALTERNATING) for told in odd for what in told)
+    verdicts = [shot.verdict for shot in shots if shot.verdict is not None] + [Verdict.WARN] * woven
     result = {
         "passed": Verdict.REFUSE not in verdicts,
         "run": options.run.name,
