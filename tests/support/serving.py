@@ -192,9 +192,9 @@ def listening(app: FastAPI) -> Iterator[int]:
         assert started.wait(DEADLINE_S)
         yield server.servers[0].sockets[0].getsockname()[1]
     finally:
-        if door := getattr(app.state, "abort_listener", None):
-            door._server.should_exit = True  # it takes as long as the other one to end, and so they end together
         server.end()
+        if door := getattr(getattr(app, "state", None), "abort_listener", None):
+            door._server.should_exit = True  # it takes as long as the other one to end, and so they end together
         thread.join(DEADLINE_S)
 
 
