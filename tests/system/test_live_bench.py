@@ -19,6 +19,7 @@ from daq.run_plan import LivePlan, PulsePair, RunPlan
 from daq.shot import Shot
 from server.rig.assembly import AssembledRig, open_rig
 from server.rig.config import load_config
+from tests.support.simulated_serving import CURRENT_A, tiny_config
 
 pytestmark = pytest.mark.network
 SMALL = load_config(Path("configs/simulated_small.toml"))
@@ -127,12 +128,15 @@ def test_an_abort_darkens_and_what_comes_next_works(assembled: AssembledRig, tmp
         await_true(lambda: acquisition.newest_shot is not shot)
 
 
-def test_a_camera_that_dies_is_named_and_holds_up_no_darkness(assembled: AssembledRig, tmp_path: Path) -> None:
-    """The last test of this module: the camera stays dead."""
-    laboratory = assembled.laboratory
-    assert laboratory is not None
-    with showing(assembled, tmp_path, LIT) as (acquisition, _):
-        laboratory.inject(Fault(kind=FaultKind.KILLED, view="view2"))
+def test_a_camera_that_dies_is_named_and_holds_up_no_darkness(tmp_path: Path) -> None:
+    """On a rig of its own: the camera stays dead."""
+    lit = LivePlan(rate_hz=5, pulse=PulsePair(current_a=CURRENT_A))
+    with (
+        open_rig(tiny_config(tmp_path / "runs", subnet=12)) as assembled,
+        showing(assembled, tmp_path, lit) as (acquisition, _),
+    ):
+        assert assembled.laboratory is not None
+        assembled.laboratory.inject(Fault(kind=FaultKind.KILLED, view="view2"))
         await_true(lambda: is_dark(assembled))
         status = acquisition.wait(DEADLINE_S)
         assert status.state is RunState.IDLE

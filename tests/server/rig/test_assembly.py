@@ -11,7 +11,7 @@ from daq.errors import DeviceRefused, DeviceUnavailable
 from daq.faults import Fault, FaultKind, ScriptedFault
 from daq.run_plan import PulsePair, RunKind, RunPlan
 from daq.shot import DoubleFrame
-from daq.simulation.gpio_chip import ChipUnsupported, SimulatedSwitchLine
+from daq.simulation.gpio_chip import ChipUnsupported, SimulatedSwitchLine, free_line
 from daq.simulation.laboratory import SimulatedLaboratory
 from daq.timing import plan_shot_timing
 from processing.synthetic.truth_file import read_true_spray
@@ -19,6 +19,8 @@ from server.rig.assembly import AssembledRig, open_rig
 from server.rig.config import RigConfig, SimulationConfig, load_config
 
 pytestmark = pytest.mark.network
+FRAME_S = 1.5
+"""In which all frames have come on a busy machine; the generator hears nothing meanwhile, and waits for 3 s."""
 
 
 def small(simulation: SimulationConfig) -> RigConfig:
@@ -81,7 +83,7 @@ def fire(assembled: AssembledRig) -> Mapping[str, DoubleFrame]:
     for camera in cameras.values():
         camera.begin_shot()
     assembled.rig.generator.fire()
-    return {name: camera.collect(0.8) for name, camera in cameras.items()}
+    return {name: camera.collect(FRAME_S) for name, camera in cameras.items()}
 
 
 def test_every_device_is_the_real_driver_and_names_itself(assembled: AssembledRig) -> None:
@@ -183,7 +185,7 @@ def test_scripted_faults_happen_at_their_firing_and_the_light_ends_with_the_rig(
 
 def test_the_gpio_chip_is_used_where_the_machine_can_have_one(assembled: AssembledRig) -> None:
     try:
-        SimulatedSwitchLine(0)
+        SimulatedSwitchLine(free_line())  # that of ``assembled`` would be cut
     except ChipUnsupported as reason:
         pytest.skip(str(reason))
     assert assembled.rig.interlock.identity().serial.startswith("gpiochip-simulated line")
