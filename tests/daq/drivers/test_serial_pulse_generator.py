@@ -336,6 +336,13 @@ def test_another_protocol_is_named() -> None:
         pass
 
 
+@pytest.fixture
+def soon(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whoever has said nothing right within a second is judged by what he has said."""
+    monkeypatch.setattr(pulse_line, "OPENING_LIMIT_S", 1.0)
+
+
+@pytest.mark.usefixtures("soon")
 def test_firmware_of_an_older_protocol_is_named() -> None:
     """To it, no line of this driver has a number: error 4, in its own form."""
     with (
@@ -346,6 +353,7 @@ def test_firmware_of_an_older_protocol_is_named() -> None:
         pass
 
 
+@pytest.mark.usefixtures("soon")
 def test_a_line_that_only_echoes_is_named() -> None:
     with (
         instrument(lambda line: line) as port,
