@@ -110,9 +110,7 @@ def require_measurable(run_name: str, recorded: Polarity, settings: MeasureSetti
         )
     for stated, what in ((settings.ignored, "pixels to ignore are"), (settings.nozzle, "a nozzle is")):
         if recorded == "bright" and stated:
-            raise PipelineError(
-                f"{what} for shadows: of bright particles all pixels are asked, and nothing hangs together"
-            )
+            raise PipelineError(f"{what} for shadows: of bright particles all pixels are asked, none hang together")
     if recorded == "bright" and settings.light != "estimated":
         raise PipelineError(f"light {settings.light} is for shadows: bright particles have no diameter to correct")
 
