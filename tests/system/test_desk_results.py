@@ -13,6 +13,7 @@ from processing.reconstruction.choices import ReconstructionMethod
 from processing.reconstruction.settings import GridSettings, ReconstructionSettings
 from processing.runs.pipeline import reconstruct_shots
 from processing.volume import VoxelGrid
+from server.lab.jobs import reconstruction_job
 from server.lab.results import keep_preview
 from tests.server.web.test_api import wait_for_jobs
 from tests.support.desk import PICTURES, PULSE, choose_calibration
@@ -105,6 +106,14 @@ def test_before_there_is_anything_both_pages_say_what_to_do_first(page: Page, se
     go_to(page, "Results")
     expect(page.get_by_role("status", name="results")).to_contain_text("Choose a calibration on the page Calibrate")
     expect(page.get_by_role("navigation").get_by_role("link", name="Results").get_by_label("done")).to_be_hidden()
+
+
+def test_before_the_first_volume_is_there_the_page_says_that_it_is_being_made(page: Page, server: Serving) -> None:
+    server.app.state.context.jobs.add(reconstruction_job("first", 0, "calibration", "mlos", {}))
+    page.goto(url(server, "results"))
+    expect(page.get_by_role("status", name="results")).to_have_text(
+        "Run first is being worked on: what is made of its shots appears here."
+    )
 
 
 def test_runs_are_found_by_what_they_are(page: Page, server: Serving, old_run: Path) -> None:

@@ -7,6 +7,7 @@ from urllib.parse import quote
 from nicegui import ui
 
 from server.lab.errors import NotFound
+from server.lab.jobs import JobKind, JobState
 from server.lab.results import ResultSet
 from server.lab.runs.run_summary import RunSummary
 from server.lab.services import Context
@@ -27,6 +28,8 @@ NO_RESULTS = (
     "Nothing has been made of any run yet. Choose a calibration on the page Calibrate and record a run of kind sample: "
     "its shots are reconstructed by themselves. Or open a run on the page Runs, and press Reconstruct."
 )
+_UNDER_WAY = (JobState.QUEUED, JobState.RUNNING)
+_MAKING = (JobKind.RECONSTRUCTION, JobKind.MEASUREMENT)
 
 
 class ResultChoice:
@@ -93,7 +96,7 @@ class ResultChoice:
             self.run_id, self._results_id, self._shot = one.run_id, one.results_id, one.shot
 
     async def _offer(self, runs: list[RunSummary]) -> None:
-        problem = "" if self.run_id else _no_results(self._context)
+        problem = "" if self.run_id else await asyncio.to_thread(_no_results, self._context)
         try:
             self.sets = await asyncio.to_thread(sets_of, self._context, self.run_id) if self.run_id else []
             if self.run_id and not self.sets:
@@ -170,7 +173,8 @@ def _no_results(context: Context) -> str:
     status = context.services.acquisition.status()
     if status.active and status.plan and status.plan.calibration and status.plan.recipes:
         return f"Run {status.run_id} is being recorded: what is made of its shots appears here."
-    return NO_RESULTS
+    jobs = context.jobs.newest(states=_UNDER_WAY, limit=1, kinds=_MAKING)
+    return f"Run {jobs[0].run_id} is being worked on: what is made of its shots appears here." if jobs else NO_RESULTS
 
 
 def _run_label(run: RunSummary) -> str:
