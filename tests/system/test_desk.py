@@ -298,6 +298,32 @@ def test_a_long_name_pushes_nothing_of_a_job_out_of_sight(page: Page, server: Se
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "the page is wider than the window"
 
 
+def test_jobs_and_events_are_found_by_words(page: Page, server: Serving) -> None:
+    first, second = (server.run_to_its_end(plan_of(name=name, shots=1, pulse=PULSE))[0] for name in ("first", "second"))
+    page.goto(str(server.http.base_url))
+    open_drawer(page)
+    log, jobs = page.get_by_role("log"), page.get_by_role("region", name="Processing")
+    words = page.get_by_role("textbox", name="Filter jobs and events")
+    expect(jobs.get_by_role("cell", name=first).first).to_be_visible()
+    expect(log).to_contain_text(f"{first}: idle")
+    words.fill("SECOND")
+    expect(log).not_to_contain_text(first)
+    expect(log).to_contain_text(f"{second}: idle")
+    expect(jobs.get_by_role("cell", name=first)).to_have_count(0)
+    expect(jobs.get_by_role("cell", name=second).first).to_be_visible()
+    words.fill("")
+    expect(log).to_contain_text(f"{first}: idle")
+    expect(jobs.get_by_role("cell", name=first).first).to_be_visible()
+
+
+def test_the_drawer_squeezes_no_narrow_page(page: Page, server: Serving) -> None:
+    page.set_viewport_size({"width": 800, "height": 900})
+    page.goto(str(server.http.base_url))
+    before = page.locator(".desk-page").bounding_box()
+    open_drawer(page)
+    assert page.locator(".desk-page").bounding_box() == before
+
+
 def test_many_reasons_of_droplets_make_no_row_of_the_height_of_the_page(page: Page, server: Serving) -> None:
     run_id, _ = server.run_to_its_end(plan_of(kind="dark", shots=1, pulse=PULSE))
     named = "a reason " * 21 + "more"

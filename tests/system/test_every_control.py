@@ -75,6 +75,7 @@ BAR = (
     press("ABORT", lambda page: page.get_by_role("alert", name="abort answer").filter(has_text="light off confirmed")),
     press("why this state", region("reasons against a start")),
     press("jobs and events", lambda page: page.get_by_role("log")),
+    *fields("textbox", "Filter jobs and events", text="shot"),
     press("dark or light", lambda page: page.locator(".body--dark")),
     press("control: free", region("control of the rig")),
     press("Take control", option("control: you")),

@@ -25,7 +25,9 @@ class Drawer:
         self._events = context.services.events
         self._seen = max(0, self._events.newest - _EVENTS_SHOWN)
         with ui.element("aside").classes("drawer").props('aria-label="jobs and events"') as self._box:
+            words = ui.input("Filter jobs and events").props("dense outlined debounce=200")
             self._jobs, self._log = JobPanel(context), EventLog()
+        words.on_value_change(lambda: self._filter(words.value))
         self._box.set_visibility(False)
         button.on_click(lambda: self._box.set_visibility(not self._box.visible))
 
@@ -36,6 +38,10 @@ class Drawer:
         if events:
             self._seen = events[-1].id
         return events
+
+    def _filter(self, words: str) -> None:
+        self._jobs.filter(words)
+        self._log.filter(words)
 
     async def reload(self) -> None:
         """Read the jobs again."""

@@ -1,5 +1,6 @@
 """EventLog: the last events as lines, for the operator's eye."""
 
+from collections import deque
 from datetime import datetime
 
 from nicegui import ui
@@ -7,20 +8,35 @@ from nicegui import ui
 from server.lab.events import Event
 from server.web.ui.theme import panel
 
+_KEPT = 200
+
 
 class EventLog:
     """Built once per page; gets the events of its timer."""
 
     def __init__(self) -> None:
+        self._lines, self._words = deque[str](maxlen=_KEPT), ""
         with panel("Events"):
-            self._log = ui.log(max_lines=200).classes("w-full text-xs").style("height:150px")
+            self._log = ui.log(max_lines=_KEPT).classes("w-full text-xs").style("height:150px")
             self._log.props('role=log tabindex=0 aria-label="event log"')
 
     def add(self, events: list[Event]) -> None:
         """Append events that say something to a person."""
         for event in events:
             if line := line_of(event):
-                self._log.push(line)
+                self._lines.append(line)
+                self._show(line)
+
+    def filter(self, words: str) -> None:
+        """Show those of the last events that have these words in their line; all of them for none."""
+        self._words = words.lower()
+        self._log.clear()
+        for line in self._lines:
+            self._show(line)
+
+    def _show(self, line: str) -> None:
+        if self._words in line.lower():
+            self._log.push(line)
 
 
 def line_of(event: Event) -> str | None:

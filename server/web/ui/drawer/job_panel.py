@@ -39,6 +39,10 @@ class JobPanel:
         self._table.rows = [job_row(job, self._context.calibrations.current) for job in jobs]
         self._table.update()
 
+    def filter(self, words: str) -> None:
+        """Show those of the newest jobs that have these words in a cell; all of them for none."""
+        self._table.set_filter(words)
+
     async def _on_act(self, event: Any) -> None:
         if event.args["action"] == "Abort":
             await try_to(lambda: self._context.runner.abort(event.args["id"]))
