@@ -58,7 +58,7 @@ from processing.runs.workbench import References, read_references
 
 _Found = tuple[Exposure, Sequence[Intensity], tuple[str, ...]]
 """What an exposure shows, its images with droplets bright, and why they are no good."""
-METHOD_VERSION = 9
+METHOD_VERSION = 10
 """Of what the numbers in a file of droplets mean."""
 
 
@@ -218,12 +218,12 @@ class RunMeasurement:
         recorded = self.run.read_shot(shot)
         require_match(self.run.run_dir.name, recorded, self.calibration)
         claim_results(results_dir, self.provenance)
-        frames = frame_names(self.run)
-        measured = [self._exposure(recorded, frame, threads, should_stop) for frame in frames]
+        measured = [self._exposure(recorded, frame, threads, should_stop) for frame in frame_names(self.run)]
         exposures = tuple(exposure for exposure, _ in measured)
-        by_frame = dict(zip(frames, exposures, strict=True))
+        by_frame = dict(zip(frame_names(self.run), exposures, strict=True))
         velocities, velocity = shot_velocities(exposures, self.search.grid, separation_of(self.run, recorded))
-        objects = self.objects.measure(recorded, [frame for frame in frames if by_frame[frame].views], threads)
+        droplets = {frame: one.droplets for frame, one in by_frame.items() if one.views}
+        objects = self.objects.measure(recorded, droplets, threads)
         told = {frame: {**one.told(), **told_objects(objects.get(frame))} for frame, one in by_frame.items()}
         file = droplets_path(results_dir, shot)
         seen = {SIGHTS: json.dumps(measured[0][1]), IMAGES: images_print(recorded, frames).hex()}

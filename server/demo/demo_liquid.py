@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from daq.files.run_directory import RunReader
+from processing.analysis.droplets.droplet_table import SizedDroplets
 from processing.analysis.objects.break_up import NEAR_MM, Reach
 from processing.analysis.objects.liquid_objects import LiquidObjects
 from processing.analysis.objects.object_search import ExposureObjects
@@ -61,7 +62,7 @@ def measure_liquid(run_dir: Path, shots: Sequence[int], calibration: Calibration
         objects = RunObjects.of(run, calibration, read_references(run), measured_box(calibration), None, ())
         if objects.search is None:
             raise ValueError(f"{run_dir.name}: no shadows")
-        found = [objects.measure(run.read_shot(shot), ("a",))["a"].found for shot in shots]
+        found = [objects.measure(run.read_shot(shot), {"a": SizedDroplets.none()})["a"].found for shot in shots]
         sprays = [true_sprays(run, shot, truth_file)["a"] for shot in shots]
     orifice_mm = np.array(HOLLOW_CONE_FLOW.orifice_mm)
     true_mm = [connected_length_mm(spray, orifice_mm, NEAR_MM) for spray in sprays]

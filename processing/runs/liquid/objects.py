@@ -10,12 +10,14 @@ from pydantic import AfterValidator, Field
 
 from daq.files.run_directory import RunReader, Shot
 from processing.analysis.droplets.droplet_file import StoredDroplets
+from processing.analysis.droplets.droplet_table import Droplets, SizedDroplets
 from processing.analysis.objects.break_up import Nozzle, Reach
 from processing.analysis.objects.connected_share import break_up_of
 from processing.analysis.objects.liquid_objects import LiquidObjects, ObjectClass
 from processing.analysis.objects.object_search import ObjectSearch, measure_objects, plan_objects
 from processing.analysis.objects.object_sizes import MedianSizes, median_sizes
 from processing.analysis.objects.object_velocities import MovingObjects, object_velocities
+from processing.analysis.objects.told_droplets import without_told
 from processing.calibration.calibration import Calibration
 from processing.kernels import DEFAULT_THREADS
 from processing.preprocessing import Intensity
@@ -84,17 +86,22 @@ class RunObjects:
         return cls(run, references, ignored, plan_objects(mappings, grid, nozzle_of(run, nozzle)))
 
     def measure(
-        self, shot: Shot, frames: Sequence[FrameName], threads: int = DEFAULT_THREADS
+        self, shot: Shot, droplets: Mapping[FrameName, Droplets | SizedDroplets], threads: int = DEFAULT_THREADS
     ) -> dict[FrameName, MovingObjects]:
-        """Objects of some exposures, with their velocities where both are there; none of bright particles."""
+        """Objects of exposures but those that droplets of theirs explain, with velocities where both are there.
+
+        There are none of bright particles.
+        """
         search = self.search
         if search is None:
             return {}
-        seen = {frame: self._seen(shot, frame) for frame in frames}
+        seen = {frame: self._seen(shot, frame) for frame in droplets}
         found = {
             frame: measure_objects(images, search, trust=trust, threads=threads)
             for frame, (images, trust) in seen.items()
         }
+        sized = {frame: told for frame, told in droplets.items() if isinstance(told, SizedDroplets)}
+        found |= {frame: without_told(found[frame], told, search) for frame, told in sized.items()}
         light = {frame: [_known(*one) for one in zip(*both, strict=True)] for frame, both in seen.items()}
         separation = separation_of(self.run, shot)
         if isinstance(separation, str) or len(found) != len(BOTH):

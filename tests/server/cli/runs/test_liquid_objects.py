@@ -129,3 +129,22 @@ def test_bright_particles_have_no_nozzle_and_no_objects(tmp_path: Path, capsys: 
     write_bright_run(tmp_path / "run", shots=1)
     write_bright_calibration(tmp_path / "calibration.json")
     assert "a nozzle is for shadows" in refused(capsys, *_command(tmp_path, tmp_path / "out", "--nozzle=0,0,0"))
+
+
+def test_droplets_close_to_each_other_are_no_ligament(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    rng, cameras = np.random.default_rng(3), study_cameras((280, 160))
+    pair_mm = np.array([[0.0, 0.6, -0.075], [0.01, 0.62, 0.075]])
+    others_mm = np.column_stack([np.linspace(-0.5, 0.5, 12), np.tile([0.8, 0.95], 6), rng.uniform(-0.5, 0.5, 12)])
+    spray = Spray.of_droplets(np.vstack([pair_mm, others_mm]), np.array([0.1] * 2 + [0.06] * 12))
+    images = [
+        (render_transmittance(camera, spray, optics) + rng.normal(0, 0.01, (160, 280))).astype(np.float32)
+        for camera, optics in zip(cameras, paper_optics().values(), strict=True)
+    ]
+    write_shadow_run(tmp_path / "run", Seen(images, cameras))
+    write_shadow_calibration(tmp_path / "calibration.json", Seen(images, cameras))
+    grid = "--grid=-0.7:0.7,0.45:1.0,-0.7:0.7@0.0166"
+    answer = told(
+        capsys,
+        *["measure", tmp_path / "run", "--calibration", tmp_path / "calibration.json", "-o", tmp_path / "out", grid],
+    )
+    assert (answer["shots"][0]["droplets"], answer["ligaments"]) == (14, 0)
