@@ -34,6 +34,14 @@ class RecipeError(BadInput):
     """A recipe cannot be followed; the text names file, line and key."""
 
 
+_SINGLE_VIEW = "measure-single-view"
+_REMEDIES = {
+    ("measure", _SINGLE_VIEW): "; state the --calibration",
+    (_SINGLE_VIEW, "measure"): "; leave out --calibration",
+}
+"""What makes of one command the other, which a recipe may be for."""
+
+
 class _Recipe(FrozenValue):
     schema_name: Annotated[Literal["tomoshadow/recipe"], Field(alias="schema")]
     schema_version: Literal[1]
@@ -64,7 +72,7 @@ def read_recipe(path: Path, command: str, method_version: int, kind: type[Settin
     text = _text(path)
     recipe = _validated(path, text, (), _document(path, text), _Recipe)
     if recipe.command != command:
-        problem = f"a recipe for {recipe.command}, not for {command}"
+        problem = f"a recipe for {recipe.command}, not for {command}{_REMEDIES.get((recipe.command, command), '')}"
         raise _error(path, text, ("command",), problem)
     if recipe.method_version not in (None, method_version):
         raise _error(

@@ -77,6 +77,7 @@ def test_what_a_recipe_does_not_say_has_its_default(tmp_path: Path) -> None:
         (HEAD + "[settings.grid]\npitch_um = 1\n", r"line 5: settings\.grid\.pitch_um: there is no such key"),
         (HEAD + "[setting]\ntwins = 1\n", r"line 4: setting: there is no such key here.*schema, schema_version"),
         (HEAD.replace("measure", "reconstruct"), r"line 3: command: a recipe for reconstruct, not for"),
+        (HEAD.replace("measure", "measure-single-view"), r"not for measure; leave out --calibration"),
         (HEAD + "method_version = 8\n", r"line 4: method_version: numbers of version 8 .* not comparable"),
         (HEAD.replace("= 1", "= 2"), r"line 2: schema_version: Input should be 1"),
         (HEAD.replace("schema =", "# schema ="), r"recipe\.toml: schema: this key is missing"),
@@ -86,6 +87,12 @@ def test_what_a_recipe_does_not_say_has_its_default(tmp_path: Path) -> None:
 def test_what_is_wrong_is_named_with_its_line(tmp_path: Path, text: str, error: str) -> None:
     with pytest.raises(RecipeError, match=error):
         measured(tmp_path, text)
+
+
+def test_a_recipe_for_a_calibration_says_what_is_missing(tmp_path: Path) -> None:
+    (tmp_path / "recipe.toml").write_text(HEAD)
+    with pytest.raises(RecipeError, match=r"for measure, not for measure-single-view; state the --calibration"):
+        read_recipe(tmp_path / "recipe.toml", "measure-single-view", 1, MeasureSettings)
 
 
 def test_a_recipe_that_is_not_there_or_not_text_is_named(tmp_path: Path) -> None:
