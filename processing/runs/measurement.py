@@ -226,7 +226,7 @@ class RunMeasurement:
         objects = self.objects.measure(recorded, droplets, threads)
         told = {frame: {**one.told(), **told_objects(objects.get(frame))} for frame, one in by_frame.items()}
         file = droplets_path(results_dir, shot)
-        seen = {SIGHTS: json.dumps(measured[0][1]), IMAGES: images_print(recorded, frames).hex()}
+        seen = {SIGHTS: json.dumps(measured[0][1]), IMAGES: images_print(recorded, tuple(by_frame)).hex()}
         write_droplets(
             file,
             {str(frame): one.droplets for frame, one in by_frame.items()},

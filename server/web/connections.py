@@ -5,12 +5,15 @@ Every open connection takes a file of the process. Were they all taken, no shot 
 
 import asyncio
 from collections.abc import Iterable
+from contextlib import suppress
 from typing import Any
 
 import uvicorn
 from fastapi import FastAPI
 from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
+from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
+from websockets.exceptions import InvalidState
 
 MOST = 400
 """Of one port: a process may as a rule have 1024 files open."""
@@ -36,11 +39,21 @@ def config_of(app: FastAPI, **more: Any) -> uvicorn.Config:
     return uvicorn.Config(
         app,
         http=_Bounded,
+        ws=_Socket,
         proxy_headers=False,  # or whoever sits at this computer says that he comes from anywhere
         access_log=False,
         ws_per_message_deflate=False,  # pictures are compressed already: it would double what a live view costs
         **{"log_level": "warning", "timeout_graceful_shutdown": _SHUTDOWN_S, **more},
     )
+
+
+class _Socket(WebSocketsSansIOProtocol):
+    """What a page hears the server by."""
+
+    def shutdown(self) -> None:
+        """End it with the server; a page that is being closed at this very moment breaks off nothing."""
+        with suppress(InvalidState):
+            super().shutdown()
 
 
 class _Bounded(HttpToolsProtocol):

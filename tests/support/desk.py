@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from nicegui import app as pages
+from nicegui import background_tasks
 from playwright.sync_api import Browser, ConsoleMessage, Page
 
 from server.web.app import create_app
@@ -25,10 +26,13 @@ PULSE = {"current_a": dict.fromkeys(VIEWS, 5)}
 def serving_desk(data_dir: Path, **options: Any) -> Iterator[Serving]:
     """Serve a rig in memory with its pages until the block ends.
 
-    NiceGUI has one application per process: what an earlier server has put around it goes.
+    NiceGUI has one application per process: what an earlier server has put around it goes, and so do tasks that began
+    while that one ended; NiceGUI would wait for them for ever, as their loop is over.
     """
     pages.middleware_stack = None
     pages.user_middleware.clear()
+    for tasks in (background_tasks.running_tasks, background_tasks.lazy_tasks_running):
+        tasks.clear()
     with serving(data_dir, views=VIEWS, **{"build": create_app, **options}) as server:
         yield server
 

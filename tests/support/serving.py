@@ -196,6 +196,7 @@ def listening(app: FastAPI) -> Iterator[int]:
         if door := getattr(getattr(app, "state", None), "abort_listener", None):
             door._server.should_exit = True  # it takes as long as the other one to end, and so they end together
         thread.join(DEADLINE_S)
+        assert not thread.is_alive(), "the server has not ended"
 
 
 class _Server(uvicorn.Server):

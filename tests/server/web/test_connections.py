@@ -5,11 +5,13 @@ import socket
 import threading
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import httpx
 import pytest
+import uvicorn
 from starlette.types import Receive, Scope, Send
+from uvicorn.server import ServerState
 from websockets.sync.client import connect
 
 from server.web import abort_listener, body_limit, connections
@@ -104,3 +106,29 @@ def test_who_asks_for_much_and_reads_nothing_is_let_go(monkeypatch: pytest.Monke
     with listening(app) as port, socket.create_connection(("127.0.0.1", port)) as reader:
         reader.sendall(b"GET / HTTP/1.1\r\nHost: here\r\n\r\n")
         assert ended.wait(20)
+
+
+async def _closed_by_both(config: uvicorn.Config) -> bytes:
+    """What a page is told that closes its socket in the very moment in which the server ends."""
+    loop, protocol = asyncio.get_running_loop(), cast(Any, config.ws_protocol_class)(config, ServerState(), {})
+    async with await loop.create_server(lambda: protocol, "127.0.0.1", 0) as listener:
+        reader, writer = await asyncio.open_connection(*listener.sockets[0].getsockname())
+        head = "GET / HTTP/1.1\r\nHost: x\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13"
+        writer.write(f"{head}\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n".encode())
+        await asyncio.wait_for(reader.readuntil(b"\r\n\r\n"), LIMIT_S)
+        protocol.data_received(bytes([0x88, 0x82, 0, 0, 0, 0, 0x03, 0xE9]))
+        protocol.shutdown()
+        said = await asyncio.wait_for(reader.read(), LIMIT_S)
+        writer.close()
+    return said
+
+
+def test_a_page_that_closes_while_the_server_ends_breaks_off_nothing() -> None:
+    async def accept(_scope: Scope, receive: Receive, send: Send) -> None:
+        await receive()
+        await send({"type": "websocket.accept"})
+        await receive()
+
+    config = connections.config_of(accept, log_level="error")  # type: ignore[arg-type]
+    config.load()
+    assert asyncio.run(_closed_by_both(config)) == bytes([0x88, 0x02, 0x03, 0xE9])
