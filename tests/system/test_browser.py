@@ -21,7 +21,7 @@ from tests.server.web.test_api import wait_for_jobs
 from tests.support.desk import PICTURES, PULSE, choose_calibration, serving_desk
 from tests.support.drifting_run import DRIFT_PX, write_droplet_run
 from tests.support.drifting_views import calibration_of, views
-from tests.support.operator import VIEWS, drive_the_page, go_to, open_drawer
+from tests.support.operator import VIEWS, drive_the_page, go_to, open_drawer, press_for_light
 from tests.support.serving import Serving, plan_of, tell_nothing
 
 pytestmark = pytest.mark.timeout(900)
@@ -88,7 +88,7 @@ def test_an_operator_takes_a_single_shot_and_keeps_it(page: Page, server: Servin
     page.goto(str(server.http.base_url))
     go_to(page, "Live")
     live, runs = page.get_by_role("region", name="Live"), page.get_by_role("region", name="Runs")
-    live.get_by_role("button", name="Shoot one").click()
+    press_for_light(live.get_by_role("button", name="Shoot one"))
     expect(live.get_by_role("status", name="view1 newest shot")).to_have_text(re.compile("^shot 0 · "))
     go_to(page, "Runs")
     expect(runs.get_by_text("single-shot")).to_have_count(1)

@@ -10,7 +10,7 @@ from playwright.sync_api import Browser, Locator, Page, WebSocket, expect
 from server.cli.benchmarks.browsed import drag, first_page
 from tests.support.desk import laboratory, picture, show_spray
 from tests.support.live_shots import save_droplet_calibration
-from tests.support.operator import VIEWS, go_to
+from tests.support.operator import VIEWS, go_to, press_for_light
 from tests.support.server_process import eventually
 from tests.support.serving import Serving, plan_of
 
@@ -31,7 +31,7 @@ def open_live(page: Page, server: Serving) -> Locator:
 def show_live(page: Page, server: Serving, rate_hz: str = "4") -> Locator:
     live = open_live(page, server)
     live.get_by_label("Live / Hz").fill(rate_hz)
-    live.get_by_role("button", name="Live", exact=True).click()
+    press_for_light(live.get_by_role("button", name="Live", exact=True))
     expect(page.get_by_role("status", name="rig state")).to_have_text("LIVE")
     return live
 
@@ -361,7 +361,7 @@ def test_a_spray_is_recorded_and_seen_on_the_page_run(page: Page, server: Servin
     for label, text in (("Shots", "400"), ("Rate / Hz", "4"), *((f"LED {view} / A", "6") for view in VIEWS)):
         page.get_by_label(label, exact=True).fill(text)
     page.get_by_label("Fluid").fill("water")
-    page.get_by_role("button", name="Start run").click()
+    press_for_light(page.get_by_role("button", name="Start run"))
     expect(page.get_by_role("list", name="shots").get_by_role("listitem", name="shot 3: valid")).to_be_visible()
     expect(page.get_by_role("group", name="newest shots").get_by_role("img").nth(1)).to_be_visible()
     picture(page, "desk-run")

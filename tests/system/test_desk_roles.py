@@ -52,7 +52,7 @@ def test_a_viewer_sees_the_light_of_the_next_run_and_does_not_change_it(page: Pa
 
 LOOKING = re.compile(
     r"ABORT|why this state|jobs and events|dark or light|control: viewer|view\d .*|Cross-hair|Loupe 1:1|Download|slices"
-    r"|maxima|A|B|both|see the whole volume|Show|(Collapse|Expand) .*|(older|newer) runs"
+    r"|region|maxima|A|B|both|see the whole volume|Show|(Collapse|Expand) .*|(older|newer) runs"
 )
 ENABLED = re.compile(r'- \'?button "((?:[^"\\]|\\.)*)"(?!.*\[disabled\])')
 

@@ -11,7 +11,7 @@ from playwright.sync_api import Browser, Locator, Page, expect
 from server.lab.tasks import calibrate_run
 from server.web.ui.draft import first_draft
 from tests.support.desk import PULSE, choose_calibration, laboratory, picture
-from tests.support.operator import go_to
+from tests.support.operator import go_to, press_for_light
 from tests.support.server_process import eventually
 from tests.support.serving import Serving, plan_of
 
@@ -39,7 +39,7 @@ def row(page: Page, name: str) -> Locator:
 def test_the_first_action_takes_control_and_a_take_over_is_seen(tab: Page, server: Serving) -> None:
     expect(control(tab)).to_have_text(re.compile("free"))
     tab.get_by_label("Shots", exact=True).fill("2")
-    tab.get_by_role("button", name="Start run").click()
+    press_for_light(tab.get_by_role("button", name="Start run"))
     expect(control(tab)).to_have_text(re.compile("you"))
     server.wait()
     server.http.put("/api/rig/control", headers=ANN)
@@ -50,6 +50,18 @@ def test_the_first_action_takes_control_and_a_take_over_is_seen(tab: Page, serve
     tab.get_by_role("button", name="Take control").click()
     expect(control(tab)).to_have_text(re.compile("you"))
     expect(tab.get_by_role("button", name="Start run")).to_be_enabled()
+
+
+def test_why_a_click_was_refused_stays_to_be_read_whatever_is_judged_meanwhile(tab: Page, server: Serving) -> None:
+    tab.evaluate("window.desk.ticket = () => ({})")
+    tab.get_by_role("button", name="Start run").click()
+    refusal = tab.get_by_role("region", name="New run").get_by_role("alert")
+    expect(refusal).to_contain_text("this page had not heard the server yet: nothing was started")
+    tab.get_by_label("Shots", exact=True).fill("3")
+    expect(row(tab, "Disk")).to_contain_text("2 s at")
+    expect(refusal).to_contain_text("nothing was started")
+    expect(refusal).to_have_text("")
+    assert server.services.acquisition.status().run_id is None
 
 
 def test_who_does_not_hold_control_changes_the_light_nowhere(tab: Page, server: Serving) -> None:
@@ -107,7 +119,7 @@ def test_what_no_device_knows_travels_with_the_run(tab: Page, server: Serving) -
     for label, text in (("Operator", "ann"), ("Fluid", "water"), ("Nozzle", "N 3"), ("Pressure / bar", "40")):
         tab.get_by_label(label).fill(text)
     tab.get_by_label("Remark").fill("windows cleaned")
-    tab.get_by_role("button", name="Start run").click()
+    press_for_light(tab.get_by_role("button", name="Start run"))
     expect(tab.get_by_role("status", name="run counts")).to_have_text("1 / 1 shots recorded, 1 valid")
     run_id = server.wait().run_id
     notes = server.http.get(f"/api/runs/{run_id}/header").json()["notes"]
@@ -197,7 +209,7 @@ def test_what_is_made_of_every_shot_is_what_the_page_shows(tab: Page, server: Se
     tab.get_by_label("Volumes", exact=True).click()
     tab.get_by_role("option", name="by MINLOS").click()
     expect(row(tab, "Recipe")).to_contain_text("volumes by MINLOS, accuracy nominal (recipe ")
-    tab.get_by_role("button", name="Start run").click()
+    press_for_light(tab.get_by_role("button", name="Start run"))
     made = tab.get_by_role("status", name="made by itself")
     expect(made).to_contain_text("Of every shot: volumes by MINLOS")
     run_id = server.wait().run_id

@@ -177,8 +177,11 @@ TABLES: dict[str, tuple[Touch, ...]] = {
     ),
 }
 
-OF_A_FAULT = {("button", "Acknowledge fault")}
-"""There while a fault is: a busy machine may be late with the generator's answer. test_desk.py touches its alarm."""
+SOMETIMES = {("button", "Acknowledge fault"), ("switch", "droplets")}
+"""There while a fault is, as a busy machine may be late with the generator's answer, and once a measurement has ended.
+
+test_desk.py touches the alarm of such a fault, test_desk_results.py the switch.
+"""
 
 
 NO_KEYS = """() => {
@@ -202,7 +205,7 @@ def test_every_control_of_a_page_is_touched_and_does_something(page: Page, serve
         DEEDS.get(one.role, click)(page, found(page, one), replace(one, text=one.text.replace("RUN", run_id)))
     assert page.evaluate(NO_KEYS) == [], "these can be clicked, and no key reaches them"
     touched = names(TABLES[path])
-    assert read - touched - names(BAR) - OF_A_FAULT == set(), "nobody touches these"
+    assert read - touched - names(BAR) - SOMETIMES == set(), "nobody touches these"
     assert touched - read == set(), "these are touched, and the accessibility tree does not tell of them"
 
 

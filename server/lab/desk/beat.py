@@ -9,6 +9,8 @@ from collections.abc import Callable
 from server.lab.errors import Stale
 
 PERIOD_S = 0.25
+NEVER = 0
+"""The beat of a page that has heard none yet."""
 MOST_BEHIND_S = 2.0
 """Older requests make no light."""
 
@@ -35,6 +37,8 @@ class Beat:
 
     def require_fresh(self, heard: int) -> None:
         """Refuse what was asked for after a beat of long ago, or one that has not been yet."""
+        if heard == NEVER:
+            raise Stale("this page had not heard the server yet: nothing was started, click again", "stale_request")
         behind_s = (self.number - heard) * PERIOD_S
         if behind_s > MOST_BEHIND_S:
             reason = f"this request was {behind_s:.1f} s on its way, more than {MOST_BEHIND_S:g} s: nothing was started"

@@ -3,14 +3,13 @@
 from nicegui.element import Element
 from pydantic import ValidationError
 
-from server.lab.desk.beat import PERIOD_S
+from server.lab.desk.beat import NEVER, PERIOD_S
 from server.lab.starting.light_request import LightRequest
 from server.web.api.desk.beat import BEAT_PATH
 from server.web.ui.visiting import visitor
 
 TICKET = "() => emit(window.desk?.ticket() ?? {})"
 """Handler in the browser of every button that makes light: which beat was heard last, and what the form shows."""
-_NEVER = 0
 BEATS_PER_S = round(1 / PERIOD_S)
 
 
@@ -36,7 +35,7 @@ def light_request(ticket: object) -> LightRequest:
         request = LightRequest.model_validate({name: _said(ticket).get(name) for name in ("key", "beat")})
     except ValidationError:
         request = LightRequest()
-    beat = _NEVER if request.beat is None else request.beat
+    beat = NEVER if request.beat is None else request.beat
     return LightRequest(key=request.key, beat=beat, who=visitor())
 
 

@@ -1,6 +1,7 @@
 """RunForm: the next run. Limits are those of the plan and of the rig; a refusal is shown with its reason."""
 
 import asyncio
+import time
 from functools import partial
 
 from nicegui import ui
@@ -25,6 +26,8 @@ from server.web.ui.run.templates import TemplateStore
 from server.web.ui.theme import panel
 from server.web.ui.visiting import for_operators, told, why_not
 
+_READ_S = 5.0
+"""So long a person has to read why a click was refused; then what speaks against a start now is told alone."""
 _TOLD_ELSEWHERE = {*PASSING, "form"}
 """They end by themselves, or the field itself says what is wrong with it."""
 
@@ -46,6 +49,7 @@ class RunForm:
         self._context, self._draft, self._judge = context, draft, judge
         self._shown = draft.version
         self._verdict: Verdict | None = None
+        self._refused_s = -_READ_S
         templates = TemplateStore(context.services.data_dir / "templates", context.services.events)
         with panel("New run"):
             self._templates = TemplateBar(templates, draft, self._show)
@@ -75,7 +79,7 @@ class RunForm:
 
     def _show_verdict(self) -> None:
         verdict = self._judge.verdict
-        if verdict is not self._verdict:  # what a click was answered with stays until then
+        if verdict is not self._verdict and time.monotonic() - self._refused_s >= _READ_S:
             self._verdict = verdict
             told_here = [one for one in verdict.reasons if one.code not in _TOLD_ELSEWHERE] if verdict else []
             self._refusal.set_text("\n".join(f"{one.text} ({one.remedy})" for one in told_here))
@@ -108,5 +112,6 @@ class RunForm:
             await asyncio.to_thread(obey, self._context, request, described("run", plan), start)
         except (DaqError, ServerError, ValueError) as error:
             self._refusal.set_text(told(error))
+            self._refused_s = time.monotonic()
         else:
             self._refusal.set_text("")

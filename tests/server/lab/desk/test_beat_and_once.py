@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from daq.run_plan import RunPlan
-from server.lab.desk.beat import MOST_BEHIND_S, PERIOD_S, Beat
+from server.lab.desk.beat import MOST_BEHIND_S, NEVER, PERIOD_S, Beat
 from server.lab.desk.once import Once, described
 from server.lab.desk.request_table import RequestTable, opened_requests
 from server.lab.errors import Conflict, Stale, Unprocessable
@@ -22,6 +22,8 @@ def test_a_beat_is_fresh_for_two_seconds_and_not_before_it_has_been() -> None:
     now_s[0] += MOST_BEHIND_S
     beat.require_fresh(heard)
     now_s[0] += PERIOD_S
+    with pytest.raises(Stale, match="had not heard the server yet"):
+        beat.require_fresh(NEVER)
     with pytest.raises(Stale, match=r"was 2\.2 s on its way"):
         beat.require_fresh(heard)
     with pytest.raises(Stale, match="has not had"):
