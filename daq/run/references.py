@@ -77,7 +77,8 @@ def _differing(its: PulsePair, planned: PulsePair) -> str:
     Each exposure gets one pulse, so that their separation does not matter. A dark run has no light, whatever it names.
     """
     lights = [
-        ("width_ns", its.width_ns, planned.width_ns),
-        *((f"current_a of {view}", its.current_a.get(view), planned.current_a[view]) for view in planned.current_a),
+        ("pulse width", "ns", its.width_ns, planned.width_ns),
+        *((f"current of {view}", "A", its.current_a.get(view), planned.current_a[view]) for view in planned.current_a),
     ]
-    return ", ".join(f"{name} {lit} instead of {wanted}" for name, lit, wanted in lights if lit != wanted)
+    differing = [one for one in lights if one[2] != one[3]]
+    return ", ".join(f"{name} {lit} {unit} instead of {wanted} {unit}" for name, unit, lit, wanted in differing)

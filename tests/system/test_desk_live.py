@@ -10,7 +10,7 @@ from playwright.sync_api import Browser, Locator, Page, WebSocket, expect
 from server.cli.benchmarks.browsed import drag, first_page
 from tests.support.desk import laboratory, picture, show_spray
 from tests.support.live_shots import save_droplet_calibration
-from tests.support.operator import VIEWS, go_to, press_for_light
+from tests.support.operator import VIEWS, go_to, open_drawer, press_for_light
 from tests.support.server_process import eventually
 from tests.support.serving import Serving, plan_of
 
@@ -248,7 +248,10 @@ def test_a_refusal_of_the_live_view_has_its_remedy(page: Page, server: Serving) 
     live = open_live(page, server)
     laboratory(server).open_door()
     live.get_by_role("button", name="Live", exact=True).click()
-    expect(live.get_by_role("alert", name="live refusal")).to_contain_text("(close the door)")
+    refusal = live.get_by_role("alert", name="live refusal")
+    expect(refusal).to_contain_text("(close the door)")
+    laboratory(server).close_door()
+    expect(refusal).to_have_text("")
 
 
 def test_a_card_per_device_says_who_how_and_what_to_do(page: Page, server: Serving) -> None:
@@ -311,6 +314,8 @@ def test_the_live_page_fits_every_width_dark_and_light(page: Page, server: Servi
     live = show_live(page, server)
     expect(caption(live)).to_have_text(re.compile("Hz$"))
     expect_to_fit(page, "live")
+    open_drawer(page)
+    expect_to_fit(page, "live-drawer")
 
 
 def expect_to_fit(page: Page, name: str) -> None:
@@ -319,6 +324,7 @@ def expect_to_fit(page: Page, name: str) -> None:
         page.wait_for_function(f"innerWidth === {width}")
         assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "the page is wider than the window"
         expect_nothing_cut(page)
+        expect_none_over_another(page)
         for shade in ("dark", "light"):
             picture(page, f"{name}-{width}-{shade}")
             page.get_by_role("button", name="dark or light").click()
@@ -337,6 +343,15 @@ def expect_nothing_cut(page: Page) -> None:
         " && getComputedStyle(one).display !== 'inline').map(one => one.className + ': ' + one.textContent)"
     )
     assert cut == []
+
+
+def expect_none_over_another(page: Page) -> None:
+    """Name and buttons of a tile lie beside or below each other."""
+    covered = page.locator(".live-head").evaluate_all("""heads => heads.filter(head => {
+        const [name, choice] = [...head.children].map(one => one.getBoundingClientRect());
+        return choice && name.right > choice.left && name.bottom > choice.top;
+    }).map(head => head.textContent)""")
+    assert covered == []
 
 
 def wishes_of(page: Page) -> list[str]:

@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -279,6 +280,23 @@ def test_a_run_shows_its_shots_and_why_one_is_invalid_and_what_it_waits_for(tab:
     expect(waits).to_have_text(re.compile(r"^waits for the time of shot \d, \d\.\d s$"))
     expect(tab.get_by_role("status", name="run counts")).to_contain_text("left")
     picture(tab, "run-acquiring")
+    tab.reload()
+    expect(first).to_have_js_property("naturalWidth", 128)
+    expect(tab.get_by_role("group", name="newest shots").get_by_role("img", name="shot 1")).to_be_visible()
+
+
+def test_the_rail_ticks_what_is_done(tab: Page, server: Serving) -> None:
+    def done(title: str) -> Locator:
+        return tab.get_by_role("link", name=title, exact=True).get_by_label(re.compile("^done: "))
+
+    expect(done("Rig")).to_be_visible()
+    for title in ("Live", "Calibrate", "Run", "Results", "Runs"):
+        expect(done(title)).to_be_hidden()
+    run_id, _ = server.run_to_its_end(plan_of(kind="dark", shots=1, pulse=PULSE))
+    for title in ("Live", "Run", "Runs"):
+        expect(done(title)).to_be_visible()
+    shutil.rmtree(server.services.data_dir / run_id)
+    expect(done("Runs")).to_be_hidden()
 
 
 def test_references_stay_as_they_are_and_a_newer_one_is_only_told(tab: Page, server: Serving) -> None:

@@ -70,9 +70,13 @@ class RunStore:
         path = self._data_dir / run_id
         if not is_identifier(run_id):
             raise NotFound(f"{_NO_ID.format(run_id)}: rename the folder, if there is one")
-        if not (path / RUN_FILE).is_file():
+        if not self.has(run_id):
             raise NotFound(f"there is no run {run_id!r}")
         return path
+
+    def has(self, run_id: str) -> bool:
+        """Whether the file of a run is there."""
+        return is_identifier(run_id) and (self._data_dir / run_id / RUN_FILE).is_file()
 
     def reader(self, run_id: str) -> RunReader:
         """Reader of a run; NotFound if there is none."""
@@ -81,7 +85,7 @@ class RunStore:
     def summary(self, run_id: str) -> RunSummary:
         """What a run is and how it went, although its directory may be gone now; NotFound if there is none."""
         status = self._status()
-        is_lost = run_id not in self._removed and not (self._data_dir / run_id / RUN_FILE).is_file()
+        is_lost = run_id not in self._removed and not self.has(run_id)
         if status.run_id == run_id and status.plan and is_lost:
             return summary_of_absent(run_id, status, status.plan)
         return self._summary_of(self.directory(run_id))

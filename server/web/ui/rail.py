@@ -19,18 +19,26 @@ class Stop:
     ----------
     path, title, icon : str
         Where it is, what it is called, how it looks.
-    is_done : Callable[[Context], bool] | None
-        Whether what it is for is done; None: looking is never done.
+    is_done : Callable[[Context], bool]
+        Whether what it is for is done; asked four times a second for each tab.
+    done : str
+        What its tick says.
     """
 
     path: str
     title: str
     icon: str
-    is_done: Callable[[Context], bool] | None = None
+    is_done: Callable[[Context], bool]
+    done: str
 
 
 def _has_good_lamps(context: Context) -> bool:
     return all(lamp.health is Health.OK for lamp in context.lamps)
+
+
+def _has_seen_every_view(context: Context) -> bool:
+    shot = context.services.acquisition.newest_shot
+    return shot is not None and shot.valid
 
 
 def _is_calibrated(context: Context) -> bool:
@@ -48,13 +56,18 @@ def _has_results_of_the_last_run(context: Context) -> bool:
     return run_id is not None and bool(context.jobs.newest(run_id, [JobState.DONE], 1, made))
 
 
+def _is_the_last_run_stored(context: Context) -> bool:
+    status = context.services.acquisition.status()
+    return status.outcome is not None and status.run_id is not None and context.runs.has(status.run_id)
+
+
 STOPS = (
-    Stop("/rig", "Rig", "precision_manufacturing", _has_good_lamps),
-    Stop("/live", "Live", "videocam"),
-    Stop("/calibrate", "Calibrate", "straighten", _is_calibrated),
-    Stop("/run", "Run", "play_circle", _has_completed_a_run),
-    Stop("/results", "Results", "view_in_ar", _has_results_of_the_last_run),
-    Stop("/runs", "Runs", "list_alt"),
+    Stop("/rig", "Rig", "precision_manufacturing", _has_good_lamps, "every device answers"),
+    Stop("/live", "Live", "videocam", _has_seen_every_view, "the newest picture of every view came whole"),
+    Stop("/calibrate", "Calibrate", "straighten", _is_calibrated, "a calibration is chosen"),
+    Stop("/run", "Run", "play_circle", _has_completed_a_run, "the last run is complete"),
+    Stop("/results", "Results", "view_in_ar", _has_results_of_the_last_run, "the last run has volumes or droplets"),
+    Stop("/runs", "Runs", "list_alt", _is_the_last_run_stored, "the last run has ended and is stored"),
 )
 
 
@@ -84,11 +97,12 @@ class Rail:
     def refresh(self) -> None:
         """Show what is done."""
         for stop, tick in self._ticks.items():
-            tick.set_visibility(stop.is_done is not None and stop.is_done(self._context))
+            tick.set_visibility(stop.is_done(self._context))
 
 
 def _fill(link: ui.link, stop: Stop) -> ui.icon:
     with link.props(f'aria-label="{stop.title}"'):
         ui.icon(stop.icon, size="22px")
         ui.label(stop.title)
-        return ui.icon("check_circle", size="14px").classes("rail-tick").props('aria-label="done"')
+        tick = ui.icon("check_circle", size="14px").classes("rail-tick").props(f'aria-label="done: {stop.done}"')
+        return tick.tooltip(f"Done: {stop.done}")

@@ -601,8 +601,8 @@ def test_only_dark_and_background_runs_of_this_rig_are_references(lab: Laborator
 @pytest.mark.parametrize(
     ("pulse", "difference"),
     [
-        ({"current_a": {"view1": 20.0, "view2": 6.0}}, r"current_a of view2 12\.0 instead of 6\.0$"),
-        ({"current_a": {"view1": 20.0, "view2": 12.0}, "width_ns": 500}, "width_ns 1000 instead of 500$"),
+        ({"current_a": {"view1": 20.0, "view2": 6.0}}, r"current of view2 12\.0 A instead of 6\.0 A$"),
+        ({"current_a": {"view1": 20.0, "view2": 12.0}, "width_ns": 500}, "pulse width 1000 ns instead of 500 ns$"),
     ],
 )
 def test_a_background_that_was_lit_otherwise_is_refused_with_the_difference(

@@ -29,13 +29,13 @@ def reason(*exposures: MeasuredExposure[SizedDroplets, SeenShadows]) -> str:
 
 
 def test_why_there_is_no_share_of_ghosts_is_told_once() -> None:
-    assert reason(exposure(145), exposure(133)).startswith("p_real is told of 0 of 278 droplets; ")
-    assert reason(exposure(145), exposure(133)).count("p_real is told") == 1
+    assert reason(exposure(145), exposure(133)).startswith("0 of 278 droplets have a probability to be real; ")
+    assert reason(exposure(145), exposure(133)).count("have a probability") == 1
 
 
 def test_beside_ligaments_they_are_the_reason_in_one_sentence() -> None:
     beside = [replace(exposure(count), hidden=Hidden(liquid_objects=15)) for count in (145, 133)]
-    told = "p_real is told of 0 of 278 droplets; it was not tried "
+    told = "0 of 278 droplets have a probability to be real; it was not tried "
     assert reason(*beside) == f"{told}beside more ligaments and the like than 1 % of the droplets"
     assert reason(beside[0], exposure(133)).startswith(f"{told}on droplets like the others")
 

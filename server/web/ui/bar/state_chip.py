@@ -22,7 +22,7 @@ class StateChip:
         self._shown: RigState | None = None
         self._chip = ui.element("div").classes("rig-state lockable").props('role=status aria-label="rig state"')
         with self._chip:
-            self._text = ui.label("").classes("rig-known")
+            self._text = ui.label("").classes("rig-known").props("tabindex=0")
             ui.label("").classes("rig-unknown")
         with ui.link(target="/run").classes("rig-form lockable").props('aria-label="to the form"') as self._to_form:
             ui.icon("edit_note", size="24px")

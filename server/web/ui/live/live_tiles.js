@@ -11,7 +11,7 @@ export default {
         <span v-if="point" class="live-point">{{ views[point.number] }}: column {{ point.column }}, row {{ point.row }} px</span>
       </div>
       <div class="live-grid" :data-pictures="pictures">
-        <figure v-for="(view, number) in views" :key="view" :ref="figure => figures[number] = figure" :data-number="number" class="live-tile">
+        <figure v-for="(view, number) in views" :key="view" :aria-label="view" :ref="figure => figures[number] = figure" :data-number="number" class="live-tile">
           <div v-show="!wanted[number].folded" class="live-picture">
             <canvas :ref="canvas => canvases[number] = canvas" width="560" height="420" role="img" :aria-label="view + ' live view'" :class="{ old: shown[number].old }"
               :tabindex="full && tools['Loupe 1:1'] ? 0 : null" @mousemove="look($event, number)" @mouseleave="point = null" @keydown="step($event, number)"></canvas>
@@ -19,15 +19,17 @@ export default {
             <div v-if="!shown[number].caption" class="live-empty">{{ hint }}</div>
             <canvas v-if="full && tools['Loupe 1:1'] && point && point.number === number" ref="loupe" class="live-loupe" :width="size" :height="size" :style="place" role="img" :aria-label="view + ' loupe'"></canvas>
           </div>
-          <figcaption>{{ view }}
-            <span :class="['lamp', shown[number].lamp]" role="status" :aria-label="view + ' ' + texts[shown[number].lamp]"></span>
-          </figcaption>
-          <div v-if="full" class="live-choice" role="group" :aria-label="view + ' picture'">
-            <template v-if="!wanted[number].folded">
-              <button type="button" v-for="exposure in ['a', 'b']" :key="exposure" :aria-pressed="wanted[number].exposure === exposure" :aria-label="view + ' exposure ' + exposure.toUpperCase()" @click="choose(number, { exposure })">{{ exposure.toUpperCase() }}</button>
-              <button type="button" :aria-pressed="wanted[number].scale === 'auto'" :aria-label="view + ' stretched grey scale'" title="fixed: black is 0, white is full scale; stretched: from the darkest to the brightest grey value" @click="choose(number, { scale: wanted[number].scale === 'auto' ? 'full' : 'auto' })">{{ wanted[number].scale === 'auto' ? 'stretched' : 'fixed' }}</button>
-            </template>
-            <button type="button" :aria-pressed="wanted[number].folded" :aria-label="view + ' hidden'" title="A hidden view costs nothing" @click="choose(number, { folded: !wanted[number].folded })">{{ wanted[number].folded ? 'show' : 'hide' }}</button>
+          <div class="live-head">
+            <div class="live-name">{{ view }}
+              <span :class="['lamp', shown[number].lamp]" role="status" :aria-label="view + ' ' + texts[shown[number].lamp]"></span>
+            </div>
+            <div v-if="full" class="live-choice" role="group" :aria-label="view + ' picture'">
+              <template v-if="!wanted[number].folded">
+                <button type="button" v-for="exposure in ['a', 'b']" :key="exposure" :aria-pressed="wanted[number].exposure === exposure" :aria-label="view + ' exposure ' + exposure.toUpperCase()" @click="choose(number, { exposure })">{{ exposure.toUpperCase() }}</button>
+                <button type="button" :aria-pressed="wanted[number].scale === 'auto'" :aria-label="view + ' stretched grey scale'" title="fixed: black is 0, white is full scale; stretched: from the darkest to the brightest grey value" @click="choose(number, { scale: wanted[number].scale === 'auto' ? 'full' : 'auto' })">{{ wanted[number].scale === 'auto' ? 'stretched' : 'fixed' }}</button>
+              </template>
+              <button type="button" :aria-pressed="wanted[number].folded" :aria-label="view + ' hidden'" title="A hidden view costs nothing" @click="choose(number, { folded: !wanted[number].folded })">{{ wanted[number].folded ? 'show' : 'hide' }}</button>
+            </div>
           </div>
           <div :class="['live-caption', { missing: shown[number].missing }]" role="status" :aria-label="view + ' newest shot'">{{ wanted[number].folded ? 'hidden' : shown[number].caption }}</div>
           <div v-if="full && shown[number].figures && !wanted[number].folded" class="live-figures" role="group" :aria-label="view + ' figures'">
@@ -44,7 +46,7 @@ export default {
             <div class="live-focus" title="Steepest edges: change of the grey value per pixel, in percent of the light. Higher is sharper; the line shows how it went">
               <svg viewBox="0 0 80 20" preserveAspectRatio="none" role="img" :aria-label="view + ' focus trend'"><path :d="shown[number].trend" /></svg>
               <span>{{ shown[number].focus }}</span>
-            </div>
+              </div>
           </div>
         </figure>
       </div>
@@ -226,7 +228,13 @@ function captionOf(tile, now) {
   const exposures = Object.entries(tile.told.exposures).map(([name, figures]) => name.toUpperCase() + (figures === null
     ? " missing"
     : ` ${figures.light_percent.toFixed(0)} %` + (figures.saturated_percent > 0 ? `, ${figures.saturated_percent.toFixed(2)} % saturated` : "")));
-  return [`shot ${tile.told.shot}`, age < 100 ? `${age.toFixed(1)} s old` : "old", ...exposures, ...(rate ? [`${rate.toFixed(1)} Hz`] : [])].join(" · ");
+  return [`shot ${tile.told.shot}`, `${agedOf(age)} old`, ...exposures, ...(rate ? [`${rate.toFixed(1)} Hz`] : [])].join(" · ");
+}
+
+// The first seconds count by tenths; what is old by minutes and hours.
+function agedOf(age) {
+  if (age < 100) return `${age.toFixed(1)} s`;
+  return age < 6000 ? `${Math.floor(age / 60)} min` : `${Math.floor(age / 3600)} h`;
 }
 
 // Pictures that came per second; none once they stay away.

@@ -1,6 +1,7 @@
 """ShotPictures: the newest shots of the run under way as small pictures, one a second at most."""
 
 import time
+from collections.abc import Sequence
 
 from nicegui import ui
 
@@ -16,27 +17,28 @@ class ShotPictures:
 
     def __init__(self) -> None:
         self._row = ui.element("div").classes("shot-pictures").props('role=group aria-label="newest shots"')
-        self._next: Event | None = None
-        self._drawn_s = 0.0
+        self._next: list[Event] = []
+        self._drawn_s: float | None = None
 
     def begin(self) -> None:
         """Another run."""
         self._row.clear()
-        self._next, self._drawn_s = None, 0.0
+        self._next, self._drawn_s = [], None
 
-    def offer(self, shot: Event) -> None:
-        """A shot is on the disk; it is shown unless a newer one comes before it is time."""
-        self._next = shot
+    def offer(self, shots: Sequence[Event]) -> None:
+        """Shots are on the disk: a page that comes later shows the last ones, any other the newest when it is time."""
+        self._next = list(shots[-_SHOWN:] if self._drawn_s is None else shots[-1:])
 
     def refresh(self) -> None:
-        """Show the newest shot, if it is time."""
-        if self._next is None or time.monotonic() - self._drawn_s < _EVERY_S:
+        """Show what is new, if it is time."""
+        if not self._next or (self._drawn_s is not None and time.monotonic() - self._drawn_s < _EVERY_S):
             return
         with self._row:
-            _draw(self._next)
+            for shot in self._next:
+                _draw(shot)
         for old in list(self._row)[:-_SHOWN]:
             old.delete()
-        self._next, self._drawn_s = None, time.monotonic()
+        self._next, self._drawn_s = [], time.monotonic()
 
 
 def _draw(shot: Event) -> None:

@@ -35,7 +35,7 @@ class ShotStrip:
         self._seen = new[-1].id
         shots = [one for one in new if one.name == "shot_recorded" and one.data["run_id"] == run_id]
         if shots:
-            self._pictures.offer(shots[-1])
+            self._pictures.offer(shots)
         with self._strip:
             for shot in shots[-_SHOWN:]:
                 self._add(shot)

@@ -122,4 +122,4 @@ def test_references_say_what_differs_and_what_is_newer(server: Serving) -> None:
     assert f"a newer background exists: {new}" in found.text
     brighter = {"current_a": {"view1": 6, "view2": 5}}
     refused = looked_at(server, references=[new], pulse=brighter)["References"]
-    assert "current_a of view1 5.0 instead of 6.0" in refused.text
+    assert "current of view1 5.0 A instead of 6.0 A" in refused.text
