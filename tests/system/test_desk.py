@@ -274,6 +274,23 @@ def test_no_words_of_the_page_are_cut(page: Page, server: Serving, width: int) -
     expect(live.get_by_role("button", name="Keep shot")).to_be_hidden()
 
 
+def test_no_page_scrolls_sideways_beside_the_open_drawer(page: Page, server: Serving) -> None:
+    choose_calibration(server, "a-calibration-with-quite-a-long-name-of-a-day")
+    long_name = "a-run-with-quite-a-long-name-of-a-day-in-november"
+    server.run_to_its_end(plan_of(kind="background", name=long_name, shots=1, pulse=PULSE))
+    page.set_viewport_size({"width": 1280, "height": 900})
+    page.goto(str(server.http.base_url))
+    open_drawer(page)
+    for title in ("Rig", "Live", "Calibrate", "Run", "Results", "Runs"):
+        go_to(page, title)
+        expect(page.locator(".desk-page .panel").first).to_be_visible()
+        wide = page.locator(".desk-page, .desk-page .column").evaluate_all(
+            "found => found.filter(one => one.scrollWidth > one.clientWidth + 1).length"
+        )
+        assert wide == 0, f"{title} is wider than its place"
+        picture(page, f"drawer-{title}")
+
+
 @pytest.mark.parametrize("path", ["nothing", "calibrate/none", "runs/one/two", "results/one/two"])
 def test_at_an_address_that_is_none_there_are_bar_rail_and_abort(browser: Browser, server: Serving, path: str) -> None:
     context = browser.new_context()

@@ -68,16 +68,23 @@ def _show_head(story: CalibrationStory) -> None:
             ui.badge(story.verdict, color=COLOURS[story.verdict]).props('aria-label="verdict"')
         if story.current:
             ui.badge("current", color="primary")
-    made = story.created_utc[:16].replace("T", " ")
-    ui.label(f"made {made or 'nobody knows when'} UTC of {story.source or 'unknown images'}").classes(
-        "text-xs opacity-70"
-    )
+    ui.label(_made(story)).classes("text-xs opacity-70")
     if story.remedy:
         ui.label(f"To do better: {story.remedy}").props('role=status aria-label="remedy"').classes(
             "text-sm font-medium"
         )
     for note in story.notes:
         ui.label(note).classes("text-xs opacity-70")
+
+
+def _made(story: CalibrationStory) -> str:
+    """When, and of what, as far as its file says so."""
+    when = (
+        f"made {story.created_utc[:16].replace('T', ' ')} UTC"
+        if story.created_utc
+        else "its file does not say when it was made"
+    )
+    return f"{when}, of {story.source}" if story.source else f"{when}; of which images is not known"
 
 
 def _show_views(views: Mapping[str, ViewFigures]) -> None:

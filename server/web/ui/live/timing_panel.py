@@ -26,7 +26,7 @@ class TimingPanel:
         self._draft = draft
         self._drawn: dict[str, Any] = {}
         with panel("Timing"):
-            self._sketch = ui.html("", sanitize=False).classes("w-full")
+            self._sketch = ui.html("", sanitize=False).classes("w-full timing")
             self._problem = ui.label("").classes("refusal").props('role=alert aria-label="timing problem"')
             link = ui.link("All edges of the shot", new_tab=True).classes("text-xs")
             self._link = link.tooltip("Camera triggers, exposures and pulses at the nominal currents, in a new tab")
