@@ -21,10 +21,10 @@ from processing.preprocessing import Intensity, Polarity, Preprocessing
 from processing.reconstruction import smart as iterative
 from processing.reconstruction.choices import Accuracy, ReconstructionMethod
 from processing.reconstruction.line_of_sight import line_of_sight
+from processing.reconstruction.planning.calibrated_plan import default_grid
 from processing.reconstruction.planning.common_volume import too_coarse
 from processing.reconstruction.planning.plan import Plan, plan_reconstruction
 from processing.reconstruction.smart import SmartResult
-from processing.runs.pipeline import default_grid
 from processing.volume import VoxelGrid
 
 Volume = NDArray[np.float32]

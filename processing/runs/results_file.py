@@ -1,21 +1,21 @@
 """A results directory: ``settings.json`` and one volume per exposure, ``shot_00012_a.vtkhdf``."""
 
-import hashlib
 import json
 from collections.abc import Mapping
+from importlib.metadata import version
 from pathlib import Path
 from typing import Literal
 
-import numpy as np
-
 from daq.files.atomic_file import commit, own_part_path, sync
-from processing.preprocessing import Intensity
-from processing.reconstruction.volume_file import StoredVolume, VolumeFileError, open_volume
-from processing.volume import VoxelGrid
+from daq.files.run_directory import RunReader
+from processing.calibration.calibration import Calibration
+from processing.calibration.calibration_file import file_sha256
+from processing.reconstruction.settings import FrozenValue
+from processing.reconstruction.volume_file import VolumeFileError
 
 SETTINGS_FILE = "settings.json"
-COPIED_PLANES = 8
-"""Every so many planes are asked whether a volume is a copy: noise never repeats."""
+LATER_FIELDS = ("run_created_utc",)
+"""Of a provenance; results from before lack it. Two runs may have one name: imports are called as their folders."""
 FrameName = Literal["a", "b"]
 Provenance = Mapping[str, str | int | float]
 
@@ -30,8 +30,20 @@ def volume_files(results_dir: Path, frame: FrameName | None = None) -> list[Path
     return sorted(results_dir.glob(f"shot_*_{frame or '[ab]'}.vtkhdf"))
 
 
-_LATER = ("run_created_utc",)
-"""Of a provenance; results from before lack it. Two runs may have one name: imports are called as their folders."""
+def provenance_of(
+    run: RunReader, calibration: Calibration, calibration_file: Path, settings: FrozenValue, method_version: int
+) -> Provenance:
+    """Where results of a run come from."""
+    return {
+        "run": run.header.run_id,
+        "run_created_utc": run.header.created_utc,
+        "calibration": calibration.id,
+        "calibration_file": calibration_file.name,
+        "calibration_sha256": file_sha256(calibration_file),
+        "settings": settings.model_dump_json(),
+        "method_version": method_version,
+        "tomoshadow": version("tomoshadow"),
+    }
 
 
 def claim_results(results_dir: Path, provenance: Provenance) -> None:
@@ -54,85 +66,5 @@ def claim_results(results_dir: Path, provenance: Provenance) -> None:
     except ValueError as error:
         raise VolumeFileError(f"{file}: damaged ({error}); choose another directory, or --overwrite it") from error
     asked = json.loads(json.dumps(dict(provenance)))
-    if {**{name: asked[name] for name in _LATER if name in asked}, **written} != asked:
+    if {**{name: asked[name] for name in LATER_FIELDS if name in asked}, **written} != asked:
         raise VolumeFileError(f"{results_dir}: holds results of another run, calibration or settings; choose another")
-
-
-def average_volumes(files: list[Path]) -> tuple[Intensity, VoxelGrid, dict[Path, Path]]:
-    """Mean of volumes on one grid, and which of them has the very voxels of which one before it.
-
-    Of empty ones nothing is said: they are all alike.
-
-    Raises
-    ------
-    VolumeFileError
-        There are none, their runs, grids, calibrations or settings differ, two are of one exposure, or one was
-        renamed or changed.
-    """
-    if not files:
-        raise VolumeFileError("there are no volumes to average")
-    with open_volume(files[0]) as first:
-        grid, made_by = first.grid, _made_by(first.provenance)
-    total = np.zeros(grid.shape, np.float32)
-    counted: dict[str, Path] = {}
-    seen: dict[bytes, Path] = {}
-    copies: dict[Path, Path] = {}
-    for file in files:
-        with open_volume(file) as volume:
-            if volume.grid != grid:
-                raise VolumeFileError(f"{file}: its grid {volume.grid} differs from {grid}, that of {files[0].name}")
-            if differing := _differing(_made_by(volume.provenance), made_by):
-                raise VolumeFileError(f"{file}: {differing} of {files[0].name}; these have no common mean")
-            if (first_file := counted.setdefault(_exposure(volume.provenance) or str(file), file)) != file:
-                raise VolumeFileError(f"{file}: the same exposure as {first_file.name}; it would count twice")
-            if (called := _own_name(volume.provenance)) not in ("", file.name):
-                raise VolumeFileError(f"{file}: was renamed, and is {called}: another shot, or another exposure")
-            if (voxels := _added(volume, total)) and (first_file := seen.setdefault(voxels, file)) != file:
-                copies[file] = first_file
-    total /= np.float32(len(files))
-    return total, grid, copies
-
-
-def _added(volume: StoredVolume, total: Intensity) -> bytes:
-    """Add a volume to a sum; a hash of some of its planes, empty where nothing is in them."""
-    voxels, empty = hashlib.blake2b(), True
-    for first_row, slab in volume.slabs():
-        if not np.isfinite(slab).all():
-            raise VolumeFileError(f"{volume.path}: was changed: a voxel is infinite, or not a number")
-        if slab.min(initial=0) < 0:
-            raise VolumeFileError(f"{volume.path}: was changed: a voxel is negative")
-        total[:, first_row : first_row + slab.shape[1]] += slab
-        asked = slab[::COPIED_PLANES]
-        voxels.update(asked.tobytes())
-        empty = empty and not asked.any()
-    return b"" if empty else voxels.digest()
-
-
-def _exposure(provenance: Provenance) -> str:
-    """Run, shot and frame of a volume; empty where it does not say."""
-    names = ("run", "shot", "frame")
-    return (
-        ", ".join(f"{name} {provenance[name]}" for name in names) if all(name in provenance for name in names) else ""
-    )
-
-
-def _own_name(provenance: Provenance) -> str:
-    """How the file of a volume was called; empty where it does not say."""
-    if not _exposure(provenance):
-        return ""
-    return volume_path(Path(), int(provenance["shot"]), "a" if provenance["frame"] == "a" else "b").name
-
-
-def _made_by(provenance: Provenance) -> dict[str, object]:
-    """Run, calibration, version of the methods, and settings of a volume, one by one. Its grid speaks for itself."""
-    settings = json.loads(str(provenance.get("settings", "{}")))
-    settings.pop("grid", None)
-    told = {name: provenance.get(name) for name in ("run", *_LATER, "calibration")}
-    return {**told, "method_version": provenance.get("method_version", 1), **settings}
-
-
-def _differing(its: Mapping[str, object], others: Mapping[str, object]) -> str:
-    """What is not the same, for a person; empty where all is."""
-    names = [name for name in {**its, **others} if its.get(name) != others.get(name)]
-    names = [name for name in names if name not in _LATER or None not in (its.get(name), others.get(name))]
-    return ", ".join(f"{name} {its.get(name)} instead of {others.get(name)}" for name in names)

@@ -6,9 +6,9 @@ import numpy as np
 
 from processing.calibration.calibration import Calibration
 from processing.decimal_text import NUMBER
+from processing.reconstruction.planning.calibrated_plan import default_grid
 from processing.reconstruction.settings import MAX_VOXELS
 from processing.runs.errors import PipelineError
-from processing.runs.pipeline import default_grid
 from processing.volume import VoxelGrid
 
 _RANGE = rf"({NUMBER}):({NUMBER})"

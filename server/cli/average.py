@@ -72,7 +72,8 @@ def _average_results(options: Namespace) -> dict[str, Any]:
     from processing.reconstruction.mean_line_of_sight import MeanVolume
     from processing.reconstruction.volume_file import VolumeFileError
     from processing.runs.exposure_faults import stored_faults
-    from processing.runs.results_file import average_volumes, volume_files
+    from processing.runs.results_file import volume_files
+    from processing.runs.volumes.stored_average import average_volumes
 
     files = volume_files(options.results, options.exposure)
     if not files:
@@ -94,7 +95,7 @@ def _average_results(options: Namespace) -> dict[str, Any]:
 def _average_run(options: Namespace) -> dict[str, Any]:
     from processing.calibration.calibration_file import load_calibration
     from processing.reconstruction.settings import METHOD_VERSION
-    from processing.runs.run_average import average_run
+    from processing.runs.volumes.run_average import average_run
     from processing.runs.workbench import Workbench
 
     calibration = load_calibration(options.calibration)

@@ -16,7 +16,7 @@ def add_light(parser: ArgumentParser) -> None:
 
 
 def _light(text: str) -> "float | str":
-    from processing.runs.measurement import MeasureSettings
+    from processing.runs.droplets.measure_settings import MeasureSettings
 
     light: float | str = setting("light", text, MeasureSettings)
     return light

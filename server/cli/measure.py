@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 
     from processing.calibration.calibration import Calibration
     from processing.preprocessing import Polarity
-    from processing.runs.measured_shot import ShotDroplets
-    from processing.runs.measurement import MeasureSettings
+    from processing.runs.droplets.measure_settings import MeasureSettings
+    from processing.runs.droplets.measured_shot import ShotDroplets
 
 NAME = "measure"
 SAID = ("polarity", "grid", "twins", "light", "sizes", "ignore", "nozzle")
@@ -80,7 +80,7 @@ def add(verbs: Verbs) -> None:
 
 
 def _twins(text: str) -> int:
-    from processing.runs.measurement import MeasureSettings
+    from processing.runs.droplets.measure_settings import MeasureSettings
 
     return int(setting("twins", text, MeasureSettings))
 
@@ -108,7 +108,7 @@ def _nozzle(text: str) -> tuple[float, ...]:
 def measure(options: Namespace) -> Outcome:
     """Measure run by run, shot by shot."""
     from processing.calibration.calibration_file import load_calibration
-    from processing.runs.measurement import METHOD_VERSION, MeasureSettings
+    from processing.runs.droplets.measure_settings import METHOD_VERSION, MeasureSettings
 
     for export in options.export:
         export.require()
@@ -133,7 +133,7 @@ def _polarity(run_dir: Path) -> "Polarity":
 
 def _by_options(options: Namespace, calibration: "Calibration") -> "MeasureSettings":
     from processing.reconstruction.settings import GridSettings
-    from processing.runs.measurement import MeasureSettings
+    from processing.runs.droplets.measure_settings import MeasureSettings
     from processing.runs.stated_grid import parse_grid
 
     grid = GridSettings.of(parse_grid(options.grid, calibration)) if options.grid else None
@@ -171,8 +171,8 @@ def _light_and_sizes(options: Namespace, calibration: "Calibration") -> dict[str
 
 def _measure_run(options: Namespace, settings: "MeasureSettings", run_dir: Path, place: Path) -> Outcome:
     from processing.analysis.exports.export import export_path
-    from processing.runs.measured_shot import droplets_path
-    from processing.runs.measurement import require_measurable
+    from processing.runs.droplets.measure_settings import require_measurable
+    from processing.runs.droplets.measured_shot import droplets_path
     from processing.runs.overwriting import replacing, require_free
     from processing.runs.results_file import SETTINGS_FILE
 
@@ -199,8 +199,8 @@ def _measure_shots(
     from processing.analysis.exports.export import export_droplets
     from processing.analysis.near_or_far import depth_doubts, sights_of
     from processing.analysis.velocity.velocity_statistics import velocity_statistics
+    from processing.runs.droplets.measure_settings import METHOD_VERSION
     from processing.runs.liquid.objects import liquid_summary
-    from processing.runs.measurement import METHOD_VERSION
     from processing.runs.recipe import recipe_sha256
     from processing.runs.sprays.conditions import changes_told
 
@@ -245,7 +245,7 @@ def _tell_unchecked(
     from daq.files.run_directory import RunReader
     from processing.analysis.near_or_far import CLOSE_PX, depth_known, depth_reversed
     from processing.calibration.calibration_file import load_calibration
-    from processing.runs.pipeline import default_grid
+    from processing.reconstruction.planning.calibrated_plan import default_grid
     from processing.runs.shots.turned_views import reversed_shows_px
     from processing.runs.unchecked_images import told_unchecked, unchecked_images
 
@@ -270,7 +270,7 @@ def _here(
     options: Namespace, settings: "MeasureSettings", run_dir: Path, indices: list[int], out: Path
 ) -> "Generator[ShotDroplets, None, None]":
     from daq.files.run_directory import RunReader
-    from processing.runs.measurement import RunMeasurement
+    from processing.runs.droplets.measurement import RunMeasurement
 
     with RunReader(run_dir) as run:
         measurement = RunMeasurement.of(run, indices[0], options.calibration, settings)
@@ -281,7 +281,7 @@ def _here(
 def _elsewhere(
     options: Namespace, settings: "MeasureSettings", run_dir: Path, indices: list[int], out: Path
 ) -> "Generator[ShotDroplets, None, None]":
-    from processing.runs.measured_shot import ShotDroplets
+    from processing.runs.droplets.measured_shot import ShotDroplets
     from server.lab.tasks import measure_shot
 
     job = {"settings": settings.model_dump(mode="json")}

@@ -178,8 +178,8 @@ def setting(name: str, text: str, kind: "type[FrozenValue] | None" = None) -> An
 
 def reconstruction_settings(options: Namespace, calibration: "Calibration") -> "ReconstructionSettings":
     """Grid, method and options of a command as settings."""
+    from processing.reconstruction.planning.calibrated_plan import default_grid
     from processing.reconstruction.settings import GridSettings, ReconstructionSettings
-    from processing.runs.pipeline import default_grid
     from processing.runs.stated_grid import parse_grid
 
     grid = parse_grid(options.grid, calibration) if options.grid else default_grid(calibration)
@@ -189,8 +189,8 @@ def reconstruction_settings(options: Namespace, calibration: "Calibration") -> "
 
 def calibrated_share(options: Namespace, settings: "ReconstructionSettings", calibration: "Calibration") -> float:
     """Which part of the calibrated volume the grid holds; of a grid that nobody stated, the user is told."""
+    from processing.reconstruction.planning.calibrated_plan import default_grid
     from processing.reconstruction.planning.common_volume import share_within
-    from processing.runs.pipeline import default_grid
 
     grid = settings.grid.to_grid() if settings.grid else default_grid(calibration)
     ranges_mm = (calibration.x_range_mm, calibration.y_range_mm, calibration.z_range_mm)

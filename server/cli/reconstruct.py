@@ -115,8 +115,8 @@ def _reconstruct_shots(
 ) -> "tuple[list[ShotResult], Belonging]":
     from daq.files.run_directory import RunReader
     from processing.calibration.calibration_file import load_calibration
-    from processing.runs.pipeline import Options, reconstruct_shots
     from processing.runs.shots.meeting_lines import MeetingLines, SeldomMeeting
+    from processing.runs.volumes.pipeline import Options, reconstruct_shots
 
     calibration = load_calibration(options.calibration)
     with RunReader(run_dir) as run:

@@ -23,12 +23,13 @@ from processing.calibration.calibration import Calibration
 from processing.calibration.calibration_file import file_sha256, save_calibration
 from processing.calibration.sets.calibration_set import load_calibration_set
 from processing.geometry import FloatArray
+from processing.reconstruction.planning.calibrated_plan import default_grid
 from processing.reconstruction.settings import GridSettings, ReconstructionSettings
 from processing.reconstruction.volume_file import read_volume
-from processing.runs.pipeline import default_grid, reconstruct_shot
 from processing.runs.results_file import volume_path
 from processing.runs.shots.shot_result import ShotResult
 from processing.runs.sprays.measured_spray import read_files
+from processing.runs.volumes.pipeline import reconstruct_shot
 from processing.runs.workbench import Workbench
 from processing.synthetic.liquid.nozzles import HOLLOW_CONE_FLOW
 from processing.synthetic.spray import droplet_volume

@@ -14,10 +14,11 @@ from processing.analysis.spray.spray_sample import SpraySample, bounds_mm
 from processing.calibration.calibration import Calibration
 from processing.figures.found_figures import Placed
 from processing.geometry import FloatArray
+from processing.reconstruction.planning.calibrated_plan import default_grid
 from processing.reconstruction.settings import GridSettings
-from processing.runs.measured_shot import ShotDroplets
-from processing.runs.measurement import MeasureSettings, RunMeasurement
-from processing.runs.pipeline import default_grid
+from processing.runs.droplets.measure_settings import MeasureSettings
+from processing.runs.droplets.measured_shot import ShotDroplets
+from processing.runs.droplets.measurement import RunMeasurement
 from processing.synthetic.spray import LiquidKind, Spray
 from processing.synthetic.truth_file import read_true_spray
 from processing.volume import VoxelGrid

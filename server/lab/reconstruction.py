@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 
 from daq.run_plan import ImageKey
 from processing.reconstruction.settings import ReconstructionSettings
-from processing.runs.measurement import MeasureSettings
+from processing.runs.droplets.measure_settings import MeasureSettings
 from server.lab.errors import Unprocessable
 from server.lab.jobs import Job, reconstruction_job
 from server.lab.results import result_calibration

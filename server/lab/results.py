@@ -21,7 +21,7 @@ from processing.reconstruction.slab_volume import SlabVolume
 from processing.reconstruction.volume_file import VolumeFileError, open_volume, write_slabs
 from processing.reconstruction.volume_part import PartError, RangesMm
 from processing.runs.results_file import SETTINGS_FILE, Provenance, volume_files
-from processing.runs.volume_parts import Recipe, VolumePart, VolumeParts, stored_part
+from processing.runs.volumes.volume_parts import Recipe, VolumePart, VolumeParts, stored_part
 from processing.volume import VoxelGrid
 from server.lab.calibrations import CalibrationStore
 from server.lab.errors import Conflict, Damaged, NotFound, Unprocessable

@@ -13,7 +13,7 @@ from typing import Any
 
 from daq.files.atomic_file import PART_SUFFIX
 from processing.calibration.verdict import BELONGING
-from processing.runs.measured_shot import droplets_path
+from processing.runs.droplets.measured_shot import droplets_path
 from server.lab.calibrations import CalibrationStore
 from server.lab.duty import Duty, pause
 from server.lab.engine.task import Engine, Task, TaskAborted, TaskError, Unavailable

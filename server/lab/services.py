@@ -12,7 +12,7 @@ from daq.run.events import RunStatus
 from daq.run_plan import LivePlan, RunPlan
 from daq.shot import Shot
 from processing.reconstruction.settings import ReconstructionSettings
-from processing.runs.volume_parts import VolumeParts
+from processing.runs.volumes.volume_parts import VolumeParts
 from server.lab.calibrations import CalibrationStore
 from server.lab.desk.beat import Beat
 from server.lab.desk.control import Control

@@ -15,9 +15,10 @@ from processing.calibration.verdict import BELONGING
 from processing.kernels import DEFAULT_THREADS
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.reconstruction.volume_file import write_slabs
-from processing.runs.measurement import MeasureSettings, RunMeasurement
-from processing.runs.pipeline import Keep, reconstruct_shot
+from processing.runs.droplets.measure_settings import MeasureSettings
+from processing.runs.droplets.measurement import RunMeasurement
 from processing.runs.run_check import check_shot
+from processing.runs.volumes.pipeline import Keep, reconstruct_shot
 from processing.runs.workbench import Workbench
 from server.lab.engine.task import Task
 from server.lab.jobs import JobKind

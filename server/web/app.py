@@ -17,7 +17,7 @@ from starlette.exceptions import HTTPException
 from starlette.routing import Match
 
 from daq.errors import DaqError
-from processing.runs.volume_parts import VolumeParts
+from processing.runs.volumes.volume_parts import VolumeParts
 from server.lab.calibrations import CalibrationStore
 from server.lab.desk.control import Control
 from server.lab.desk.desk_watch import DeskWatch

@@ -25,7 +25,7 @@ from daq.files.run_directory import RunReader
 from processing.benchmarks.scene import SpeedStudy
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.reconstruction.volume_file import open_volume
-from processing.runs.pipeline import reconstruct_shots
+from processing.runs.volumes.pipeline import reconstruct_shots
 from server.cli.benchmarks.recorded_run import RecordedRun, record_run
 from server.cli.output import endable, table
 from server.lab.engine.cluster_engine import ClusterEngine

@@ -11,7 +11,7 @@ from playwright.sync_api import Locator, Page, expect
 from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.reconstruction.choices import ReconstructionMethod
 from processing.reconstruction.settings import GridSettings, ReconstructionSettings
-from processing.runs.pipeline import reconstruct_shots
+from processing.runs.volumes.pipeline import reconstruct_shots
 from processing.volume import VoxelGrid
 from server.lab.jobs import reconstruction_job
 from server.lab.results import keep_preview

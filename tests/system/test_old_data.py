@@ -15,9 +15,9 @@ from daq.files.run_directory import RunReader, list_runs
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.reconstruction.volume_file import read_volume
 from processing.runs.manifest.importing import import_manifest
-from processing.runs.pipeline import reconstruct_shot
 from processing.runs.results_file import volume_path
 from processing.runs.shots.shot_result import ShotResult
+from processing.runs.volumes.pipeline import reconstruct_shot
 from server.lab.events import EventPublisher
 from server.lab.job_recovery import jobs_on_disk
 from server.lab.jobs import Job, JobKind, JobState, JobTable

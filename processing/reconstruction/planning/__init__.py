@@ -1,4 +1,4 @@
 """The plan of a reconstruction: everything that depends on calibration and grid alone.
 
-It knows geometry and kernels; every method takes a ``Plan``.
+It knows geometry, calibrations and kernels; every method takes a ``Plan``.
 """

@@ -22,9 +22,9 @@ from processing.calibration.calibration import Calibration
 from processing.kernels import DEFAULT_THREADS
 from processing.preprocessing import Intensity
 from processing.reconstruction.errors import ReconstructionError
+from processing.reconstruction.planning.calibrated_plan import default_grid
 from processing.reconstruction.settings import FrozenValue
 from processing.runs.measured_images import shadow_images, without_ignored
-from processing.runs.pipeline import default_grid
 from processing.runs.results_file import FrameName
 from processing.runs.shots.separation import separation_of
 from processing.runs.workbench import References

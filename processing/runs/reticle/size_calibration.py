@@ -19,11 +19,11 @@ from processing.calibration.calibration import Calibration
 from processing.calibration.droplets.droplet_matching import Box
 from processing.geometry import FloatArray
 from processing.preprocessing import Intensity
+from processing.reconstruction.planning.calibrated_plan import default_grid
 from processing.reconstruction.settings import FrozenValue
+from processing.runs.droplets.measure_settings import MeasureSettings, require_measurable
 from processing.runs.measured_images import require_backgrounds, shadow_images
-from processing.runs.measurement import MeasureSettings, require_measurable
 from processing.runs.overwriting import replacing
-from processing.runs.pipeline import default_grid
 from processing.runs.shots.shot_images import frame_names, require_match
 from processing.runs.workbench import read_references
 

@@ -11,9 +11,9 @@ from typing import Any
 from processing.benchmarks import targets
 from processing.benchmarks.baseline import Timing, measure_once
 from processing.benchmarks.targets import Measured
-from processing.runs.pipeline import reconstruct_shots
 from processing.runs.results_file import FrameName
-from processing.runs.volume_parts import Recipe, VolumeParts
+from processing.runs.volumes.pipeline import reconstruct_shots
+from processing.runs.volumes.volume_parts import Recipe, VolumeParts
 from server.cli.benchmarks.recorded_run import RecordedRun
 from server.cli.benchmarks.whole_command import cost_of
 from server.lab.engine.dask_engine import DaskEngine

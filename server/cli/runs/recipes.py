@@ -11,7 +11,7 @@ from processing.runs.errors import PipelineError
 if TYPE_CHECKING:
     from processing.calibration.calibration import Calibration
     from processing.reconstruction.settings import FrozenValue, ReconstructionSettings
-    from processing.runs.measurement import MeasureSettings
+    from processing.runs.droplets.measure_settings import MeasureSettings
 
 Settings = TypeVar("Settings", bound="FrozenValue")
 OnGrid = TypeVar("OnGrid", "ReconstructionSettings", "MeasureSettings")
@@ -63,8 +63,8 @@ def settings_of(
 
 def with_grid(settings: OnGrid, calibration: "Calibration") -> OnGrid:
     """Settings that name their grid; where they do not, the default of the calibration."""
+    from processing.reconstruction.planning.calibrated_plan import default_grid
     from processing.reconstruction.settings import GridSettings
-    from processing.runs.pipeline import default_grid
 
     if settings.grid is not None:
         return settings

@@ -12,8 +12,8 @@ from processing.analysis.droplets.droplet_file import DropletFileError, StoredDr
 from processing.analysis.droplets.droplet_statistics import DropletStatistics, droplet_statistics, hidden_share
 from processing.analysis.droplets.measured_exposure import ShotVerdict
 from processing.analysis.velocity.velocity_statistics import VelocityStatistics, velocity_statistics
+from processing.runs.droplets.measured_shot import droplets_path
 from processing.runs.droplets_in_place import read_in_place
-from processing.runs.measured_shot import droplets_path
 from server.lab.errors import Damaged, NotFound
 from server.lab.results import droplet_summaries
 

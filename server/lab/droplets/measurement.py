@@ -5,8 +5,8 @@ from collections.abc import Iterable
 from processing.calibration.calibration_file import load_calibration
 from processing.errors import BadInput
 from processing.reconstruction.settings import GridSettings
+from processing.runs.droplets.measure_settings import MeasureSettings, require_measurable
 from processing.runs.measured_images import require_backgrounds
-from processing.runs.measurement import MeasureSettings, require_measurable
 from processing.runs.stated_grid import parse_grid
 from processing.runs.workbench import read_references
 from server.lab.errors import Unprocessable

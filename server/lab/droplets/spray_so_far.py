@@ -13,8 +13,8 @@ from daq.frozen_model import FrozenModel
 from daq.run_plan import ImageKey
 from processing.analysis.droplets.droplet_file import DropletFileError
 from processing.analysis.spray.spray_statistics import AskedFor, SprayStatistics, spray_statistics
+from processing.runs.droplets.measured_shot import droplets_path
 from processing.runs.liquid.objects import LiquidSummary, liquid_summary
-from processing.runs.measured_shot import droplets_path
 from processing.runs.sprays.measured_spray import read_files
 from server.lab.errors import Damaged, NotFound
 from server.lab.results import droplet_summaries, result_sets

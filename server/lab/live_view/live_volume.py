@@ -25,12 +25,12 @@ from processing.errors import BadInput
 from processing.preprocessing import Intensity, intensity
 from processing.reconstruction.choices import ReconstructionMethod
 from processing.reconstruction.line_of_sight import volume_seen
+from processing.reconstruction.planning.calibrated_plan import default_grid, plan_of
 from processing.reconstruction.planning.plan import Plan
 from processing.reconstruction.seen_exposure import SeenExposure
 from processing.reconstruction.settings import GridSettings, ReconstructionSettings
 from processing.reconstruction.slab_volume import SLAB_ROWS
 from processing.reconstruction.volume_part import Part
-from processing.runs.pipeline import default_grid, plan_of
 from processing.runs.shots.shot_images import require_match
 from processing.runs.workbench import Latest
 from processing.volume import VoxelGrid

@@ -6,7 +6,7 @@ from daq.recipe import Recipe
 from daq.run.events import ShotRecorded
 from daq.run_plan import RunKind
 from processing.reconstruction.settings import ReconstructionSettings
-from processing.runs.measurement import MeasureSettings
+from processing.runs.droplets.measure_settings import MeasureSettings
 from server.lab.droplets.measurement import queue_measurement
 from server.lab.duty import Duty
 from server.lab.events import RUN_EVENTS

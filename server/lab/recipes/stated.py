@@ -14,8 +14,8 @@ from processing.calibration.calibration_file import load_calibration
 from processing.errors import BadInput
 from processing.reconstruction.settings import METHOD_VERSION as VOLUME_VERSION
 from processing.reconstruction.settings import FrozenValue, GridSettings, ReconstructionSettings
-from processing.runs.measurement import METHOD_VERSION as DROPLET_VERSION
-from processing.runs.measurement import MeasureSettings, require_measurable
+from processing.runs.droplets.measure_settings import METHOD_VERSION as DROPLET_VERSION
+from processing.runs.droplets.measure_settings import MeasureSettings, require_measurable
 from processing.runs.recipe import recipe_sha256
 from processing.runs.stated_grid import parse_grid
 from server.lab.errors import NotFound, Unprocessable

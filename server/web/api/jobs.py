@@ -9,7 +9,7 @@ from pydantic import Field
 from daq.frozen_model import FrozenModel
 from daq.names import Identifier
 from processing.reconstruction.settings import ReconstructionSettings
-from processing.runs.measurement import MeasureSettings
+from processing.runs.droplets.measure_settings import MeasureSettings
 from server.lab.desk.once import described
 from server.lab.desk.visitor import Visitor
 from server.lab.droplets.measurement import request_measurement

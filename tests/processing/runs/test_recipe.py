@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from processing.reconstruction.choices import Accuracy, ReconstructionMethod, VoxelType
 from processing.reconstruction.settings import GridSettings, ReconstructionSettings
-from processing.runs.measurement import MeasureSettings
+from processing.runs.droplets.measure_settings import MeasureSettings
 from processing.runs.recipe import RecipeError, read_recipe, recipe_sha256, write_recipe
 
 MM = st.floats(-100, 100)

@@ -101,7 +101,7 @@ def test_a_command_takes_the_processors_that_it_may_use(
         raise PipelineError(f"{threads} threads")
 
     monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0, 2, 5})
-    monkeypatch.setattr(f"processing.runs.{work}", tell)
+    monkeypatch.setattr(f"processing.runs.volumes.{work}", tell)
     arguments = [command, run_dir, "--calibration", calibration_file, f"--grid={GRID}", "-o", tmp_path / "out"]
     assert refused(capsys, *arguments) == "3 threads"
 

@@ -256,7 +256,7 @@ def test_a_volume_beyond_the_memory_fails_without_a_traceback(
     def too_much(*_: object, **_options: object) -> None:
         np.empty(2**62, dtype=np.uint8)
 
-    monkeypatch.setattr("processing.runs.pipeline.reconstruct_shots", too_much)
+    monkeypatch.setattr("processing.runs.volumes.pipeline.reconstruct_shots", too_much)
     arguments = ["reconstruct", run_dir, "--calibration", calibration_file, f"--grid={GRID}", "-o", tmp_path / "out"]
     assert main([*map(str, arguments)]) == 1
     assert "Unable to allocate" in capsys.readouterr().err

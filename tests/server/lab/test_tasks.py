@@ -13,7 +13,7 @@ from daq.files.run_directory import RunReader
 from processing.reconstruction.choices import VoxelType
 from processing.reconstruction.settings import GridSettings, ReconstructionSettings
 from processing.reconstruction.volume_file import read_volume, write_volume
-from processing.runs.pipeline import reconstruct_shot
+from processing.runs.volumes.pipeline import reconstruct_shot
 from processing.runs.workbench import References, read_references
 from processing.volume import VoxelGrid
 from server.lab.errors import Damaged
@@ -126,7 +126,7 @@ def test_a_preview_that_does_not_say_how_it_was_made_is_named(tmp_path: Path) ->
 
 def test_a_worker_loads_neither_web_nor_commands() -> None:
     modules = modules_after("import server.lab.tasks")
-    assert "processing.runs.pipeline" in modules
+    assert "processing.runs.volumes.pipeline" in modules
     assert not {module for module in modules if module.startswith(("server.cli", "server.web"))}
     assert not packages_of(modules) & {"fastapi", "starlette", "nicegui", "uvicorn"}
 

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from processing.reconstruction.choices import ReconstructionMethod, VoxelType
 from processing.reconstruction.settings import GridSettings, ReconstructionSettings
 from processing.reconstruction.volume_file import read_volume
-from processing.runs.pipeline import reconstruct_shot
-from processing.runs.volume_parts import VolumeParts
+from processing.runs.volumes.pipeline import reconstruct_shot
+from processing.runs.volumes.volume_parts import VolumeParts
 from processing.volume import VoxelGrid
 from server.lab.calibrations import CalibrationStore
 from server.lab.errors import Conflict, Damaged, NotFound

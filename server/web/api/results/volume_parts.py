@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Query, Response
 
 from processing.reconstruction.choices import ReconstructionMethod
-from processing.runs.volume_parts import VolumePart
+from processing.runs.volumes.volume_parts import VolumePart
 from server.lab.results import part_of, preview_of, volume_file
 from server.lab.services import Context
 from server.pictures.pictures import Colours, plane_png

@@ -17,8 +17,8 @@ from processing.analysis.droplets.droplet_file import DropletFileError, read_dro
 from processing.analysis.droplets.droplet_search import DropletSearch, plan_droplets
 from processing.calibration.calibration_file import load_calibration, save_calibration
 from processing.calibration.calibration_record import content_id
-from processing.runs.measurement import MeasureSettings
-from processing.runs.pipeline import Stopped
+from processing.runs.droplets.measure_settings import MeasureSettings
+from processing.runs.errors import Stopped
 from processing.runs.sprays.measured_spray import read_spray
 from server.lab.droplets.measured import measured_run
 from server.lab.droplets.measurement import settings_within
@@ -255,7 +255,7 @@ def test_jobs_of_a_run_plan_once_until_settings_or_calibration_are_others(
         planned.append(given)
         return plan_droplets(*given, **more)
 
-    monkeypatch.setattr("processing.runs.measurement.plan_droplets", counted)
+    monkeypatch.setattr("processing.runs.droplets.measurement.plan_droplets", counted)
     calibration = write_bright_calibration(tmp_path / "cal.json")
 
     def plans_after(shot: int, seed: int, out: str) -> int:

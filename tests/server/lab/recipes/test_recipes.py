@@ -10,7 +10,7 @@ from daq.recipe import Recipe
 from daq.run.refusals import RefusalCode
 from processing.calibration.calibration_file import load_calibration
 from processing.reconstruction.settings import METHOD_VERSION, GridSettings, ReconstructionSettings
-from processing.runs.measurement import MeasureSettings
+from processing.runs.droplets.measure_settings import MeasureSettings
 from processing.runs.recipe import recipe_sha256
 from processing.runs.stated_grid import parse_grid
 from server.lab.errors import Unprocessable

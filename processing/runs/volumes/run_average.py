@@ -12,10 +12,10 @@ from processing.calibration.calibration import Calibration
 from processing.kernels import DEFAULT_THREADS
 from processing.preprocessing import Intensity
 from processing.reconstruction.mean_line_of_sight import MeanVolume, mean_volume
+from processing.reconstruction.planning.calibrated_plan import plan_of
 from processing.reconstruction.reconstructor import Reconstructor
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.runs.exposure_faults import copied, exposure_faults
-from processing.runs.pipeline import plan_of
 from processing.runs.results_file import FrameName
 from processing.runs.shots.meeting_lines import MeetingLines, SeldomMeeting
 from processing.runs.shots.shot_images import require_match, shot_intensities

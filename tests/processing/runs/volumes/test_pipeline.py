@@ -16,17 +16,19 @@ from processing.calibration.calibration_file import load_calibration
 from processing.calibration.errors import CalibrationError
 from processing.calibration.verdict import Verdict
 from processing.reconstruction.choices import ReconstructionMethod, VoxelType
+from processing.reconstruction.planning.calibrated_plan import default_grid
 from processing.reconstruction.planning.plan import plan_reconstruction
 from processing.reconstruction.planning.planned_view import PlannedView
 from processing.reconstruction.planning.rectified_view import RESAMPLING_PX
 from processing.reconstruction.reconstructor import Reconstructor
 from processing.reconstruction.settings import GridSettings, ReconstructionSettings
 from processing.reconstruction.volume_file import VolumeFileError, open_volume, read_volume
-from processing.runs.errors import PipelineError
-from processing.runs.pipeline import Stopped, default_grid, reconstruct_shot, reconstruct_shots
-from processing.runs.results_file import average_volumes, claim_results, volume_files, volume_path
+from processing.runs.errors import PipelineError, Stopped
+from processing.runs.results_file import claim_results, volume_files, volume_path
 from processing.runs.shots.shot_images import shot_intensities
 from processing.runs.shots.shot_result import ShotResult
+from processing.runs.volumes.pipeline import reconstruct_shot, reconstruct_shots
+from processing.runs.volumes.stored_average import average_volumes
 from processing.runs.workbench import Workbench
 from processing.volume import VoxelGrid
 from tests.support.droplet_run import DROPLETS_A_MM, MOTION_MM, SHAPE, cameras, write_calibration, write_run

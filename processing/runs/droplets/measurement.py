@@ -1,44 +1,30 @@
 """One shot + one calibration -> droplets on disk. Every shot by itself, whoever asks for it."""
 
-import hashlib
 import json
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Self
 
 import numpy as np
-from pydantic import Field, model_validator
 
 from daq.files.run_directory import RunReader, Shot
 from processing.analysis.copied_shots import IMAGES
 from processing.analysis.droplets.bright_shot import measure_bright
 from processing.analysis.droplets.droplet_file import write_droplets
-from processing.analysis.droplets.droplet_search import MARGIN_VOXEL, DropletSearch, plan_droplets
-from processing.analysis.droplets.shadows.light_search import Light
+from processing.analysis.droplets.droplet_search import DropletSearch, plan_droplets
 from processing.analysis.droplets.shadows.shadow_shot import measure_shadows
-from processing.analysis.droplets.size_correction import SizeCorrection, SizeRows
+from processing.analysis.droplets.size_correction import SizeCorrection
 from processing.analysis.near_or_far import SIGHTS, depth_reversed
 from processing.calibration.calibration import Calibration
 from processing.calibration.calibration_file import load_calibration
 from processing.calibration.droplets.droplet_images import find_droplets
 from processing.kernels import DEFAULT_THREADS
-from processing.preprocessing import Intensity, Polarity
-from processing.reconstruction.settings import FrozenValue, GridSettings
-from processing.runs.errors import PipelineError
-from processing.runs.exposure_faults import images_print
-from processing.runs.liquid.objects import NozzleNumbers, RunObjects, told_objects
-from processing.runs.measured_images import (
-    IgnoredPixels,
-    bright_images,
-    odd_backgrounds,
-    require_backgrounds,
-    require_fitting,
-    shadow_images,
-    without_ignored,
-)
-from processing.runs.measured_shot import (
+from processing.preprocessing import Intensity
+from processing.reconstruction.planning.calibrated_plan import default_grid
+from processing.reconstruction.settings import GridSettings
+from processing.runs.droplets.measure_settings import METHOD_VERSION, MeasureSettings, require_measurable
+from processing.runs.droplets.measured_shot import (
     Exposure,
     MeasuredShot,
     ShotVelocity,
@@ -47,9 +33,19 @@ from processing.runs.measured_shot import (
     shot_summary,
     shot_velocities,
 )
-from processing.runs.pipeline import Stopped, default_grid, provenance_of
+from processing.runs.errors import Stopped
+from processing.runs.exposure_faults import images_print
+from processing.runs.liquid.objects import RunObjects, told_objects
+from processing.runs.measured_images import (
+    bright_images,
+    odd_backgrounds,
+    require_backgrounds,
+    require_fitting,
+    shadow_images,
+    without_ignored,
+)
 from processing.runs.recipe import recipe_sha256
-from processing.runs.results_file import FrameName, Provenance, claim_results
+from processing.runs.results_file import FrameName, Provenance, claim_results, provenance_of
 from processing.runs.shots.separation import separation_of
 from processing.runs.shots.shot_images import frame_names, require_match
 from processing.runs.shots.turned_views import meeting_sights
@@ -58,61 +54,6 @@ from processing.runs.workbench import References, read_references
 
 _Found = tuple[Exposure, Sequence[Intensity], tuple[str, ...]]
 """What an exposure shows, its images with droplets bright, and why they are no good."""
-METHOD_VERSION = 10
-"""Of what the numbers in a file of droplets mean."""
-
-
-class MeasureSettings(FrozenValue):
-    """How droplets are measured; travels with every result."""
-
-    polarity: Annotated[Polarity, Field(description="bright particles on black, or shadows")] = "bright"
-    grid: Annotated[GridSettings | None, Field(description="default: what all views see, one voxel per pixel")] = None
-    margin_voxel: Annotated[int, Field(ge=0, le=500, description="so far around the grid droplets are looked for")] = (
-        MARGIN_VOXEL
-    )
-    twins: Annotated[
-        int, Field(ge=0, le=100, description="simulated twins per exposure in which ghosts are counted; 0: none")
-    ] = 0
-    seed: Annotated[int, Field(ge=0, description="of the twins")] = 0
-    light: Annotated[Light, Field(description="of shadows: condenser ratio; incoherent, gaussian or estimated")] = (
-        "estimated"
-    )
-    sizes: Annotated[SizeRows, Field(description="of the dots of a reticle, um: found in this light, true, sd")] = ()
-    ignored: Annotated[
-        tuple[IgnoredPixels, ...],
-        Field(description="rectangles of shadow images that are not asked, VIEW=LEFT:RIGHT,TOP:BOTTOM in px"),
-    ] = ()
-    nozzle: Annotated[NozzleNumbers | None, Field(description="x, y, z in mm, and axis; default: the run's own")] = None
-
-    @model_validator(mode="after")
-    def _sizes_of_one_light(self) -> Self:
-        if self.sizes and self.light == "estimated":
-            raise ValueError("sizes were found in one light: state it, as size-calibration does")
-        return self
-
-    def results_id(self, calibration: str) -> str:
-        """Name of the results directory: droplets, and a hash of method, settings and the calibration's name."""
-        digest = hashlib.sha256(f"{calibration}\n{recipe_sha256('measure', METHOD_VERSION, self)}".encode()).hexdigest()
-        return f"droplets-{digest[:8]}"
-
-
-def require_measurable(run_name: str, recorded: Polarity, settings: MeasureSettings) -> None:
-    """Refuse what cannot be measured, before anything is read.
-
-    Raises
-    ------
-    PipelineError
-        A polarity other than the run's, or settings of shadows for bright particles.
-    """
-    if settings.polarity != recorded:
-        raise PipelineError(
-            f"{run_name}: its images are recorded as {recorded}, they are not measured as {settings.polarity}"
-        )
-    for stated, what in ((settings.ignored, "pixels to ignore are"), (settings.nozzle, "a nozzle is")):
-        if recorded == "bright" and stated:
-            raise PipelineError(f"{what} for shadows: of bright particles all pixels are asked, none hang together")
-    if recorded == "bright" and settings.light != "estimated":
-        raise PipelineError(f"light {settings.light} is for shadows: bright particles have no diameter to correct")
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,19 +159,25 @@ class RunMeasurement:
         recorded = self.run.read_shot(shot)
         require_match(self.run.run_dir.name, recorded, self.calibration)
         claim_results(results_dir, self.provenance)
-        measured = [self._exposure(recorded, frame, threads, should_stop) for frame in frame_names(self.run)]
+        frames = frame_names(self.run)
+        measured = [self._exposure(recorded, frame, threads, should_stop) for frame in frames]
         exposures = tuple(exposure for exposure, _ in measured)
-        by_frame = dict(zip(frame_names(self.run), exposures, strict=True))
+        by_frame = dict(zip(frames, exposures, strict=True))
         velocities, velocity = shot_velocities(exposures, self.search.grid, separation_of(self.run, recorded))
-        droplets = {frame: one.droplets for frame, one in by_frame.items() if one.views}
-        objects = self.objects.measure(recorded, droplets, threads)
+        seen = {frame: exposure.droplets for frame, exposure in by_frame.items() if exposure.views}
+        objects = self.objects.measure(recorded, seen, threads)
         told = {frame: {**one.told(), **told_objects(objects.get(frame))} for frame, one in by_frame.items()}
+        sights = measured[0][1]
         file = droplets_path(results_dir, shot)
-        seen = {SIGHTS: json.dumps(measured[0][1]), IMAGES: images_print(recorded, tuple(by_frame)).hex()}
         write_droplets(
             file,
-            {str(frame): one.droplets for frame, one in by_frame.items()},
-            {**self.provenance, **self._told_of(shot, told, velocity), **seen},
+            {str(frame): exposure.droplets for frame, exposure in by_frame.items()},
+            {
+                **self.provenance,
+                **self._told_of(shot, told, velocity),
+                SIGHTS: json.dumps(sights),
+                IMAGES: images_print(recorded, frames).hex(),
+            },
             velocities=velocities.columns() if velocities else None,
             objects={str(frame): moving for frame, moving in objects.items()},
         )
@@ -281,10 +228,11 @@ class RunMeasurement:
 
     def _shadows(self, shot: Shot, frame: FrameName, threads: int, before_round: Callable[[], None]) -> _Found:
         images, trust = shadow_images(self.run, shot, frame, self.references)
+        known = without_ignored(dict(zip(shot.views, trust, strict=True)), self.settings.ignored)
         measured = measure_shadows(
             images,
             self.search,
-            trust=list(without_ignored(dict(zip(shot.views, trust, strict=True)), self.settings.ignored).values()),
+            trust=list(known.values()),
             light=self.settings.light,
             sizes=SizeCorrection.of(self.settings.sizes) if self.settings.sizes else None,
             twins=self.settings.twins,

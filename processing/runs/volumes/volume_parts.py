@@ -17,13 +17,13 @@ from processing.calibration.calibration_file import file_sha256, load_calibratio
 from processing.kernels import DEFAULT_THREADS
 from processing.preprocessing import Intensity
 from processing.reconstruction.choices import ReconstructionMethod
+from processing.reconstruction.planning.calibrated_plan import plan_of
 from processing.reconstruction.planning.plan import Plan
 from processing.reconstruction.seen_exposure import SeenExposure
 from processing.reconstruction.settings import METHOD_VERSION, ReconstructionSettings
 from processing.reconstruction.volume_file import open_volume
 from processing.reconstruction.volume_part import RangesMm, part_within
 from processing.runs.errors import PipelineError
-from processing.runs.pipeline import plan_of
 from processing.runs.results_file import FrameName, Provenance
 from processing.runs.shots.shot_images import require_match, shot_intensities
 from processing.runs.workbench import Latest, References, read_references
