@@ -3,11 +3,13 @@
 import asyncio
 import time
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 
 from daq.run.events import RunStatus
+from daq.run.state import RunState
 from server.lab.desk.alarms import Alarm, AlarmList
 from server.lab.desk.pace import Pace
-from server.lab.desk.reason import Reason
+from server.lab.desk.reason import UNSEEN, Reason
 from server.lab.desk.rig_state import RigState, rig_state
 from server.lab.duty import Duty, pause
 
@@ -19,6 +21,15 @@ Look = Callable[[], tuple[Reason, ...]]
 """Finds everything that speaks against a start; blocks."""
 FindAlarms = Callable[[], Iterable[Alarm]]
 """Finds everything that is wrong; blocks."""
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """What a look has found, what acquisition did then, and when."""
+
+    reasons: tuple[Reason, ...]
+    state: RunState
+    at_s: float
 
 
 class DeskWatch:
@@ -47,8 +58,7 @@ class DeskWatch:
         self._alarms = AlarmList()
         self._now_s = now_s
         self._pace = Pace(now_s)
-        self._found: tuple[Reason, ...] = ()
-        self._found_s: float | None = None
+        self._seen: _Seen | None = None
 
     async def run(self, duty: Duty) -> None:
         """Look until cancelled."""
@@ -61,8 +71,8 @@ class DeskWatch:
 
     def look(self) -> RigState:
         """Look now; blocks."""
-        self._found = self._look()
-        self._found_s = self._now_s()
+        state = self._status().state
+        self._seen = _Seen(self._look(), state, self._now_s())
         return self.state
 
     def look_for_alarms(self) -> tuple[Alarm, ...]:
@@ -80,11 +90,15 @@ class DeskWatch:
 
     @property
     def state(self) -> RigState:
-        """What acquisition does now, and what was found at the last look; not ready where that is long ago."""
-        return self.state_for(self._found)
+        """What acquisition does now, and what was found at the last look."""
+        return self.state_for(self._seen.reasons if self._seen else ())
 
-    def state_for(self, reasons: Sequence[Reason] | None) -> RigState:
-        """The same, where this speaks against a start; None: nobody knows."""
+    def state_for(self, reasons: Sequence[Reason]) -> RigState:
+        """The same, where this speaks against a start."""
         status = self._status()
-        is_known = self._found_s is not None and self._now_s() - self._found_s < _STALE_S
-        return rig_state(status, reasons if is_known else None, self._pace.eta_s(status))
+        return rig_state(status, reasons if self._has_seen(status.state) else (UNSEEN,), self._pace.eta_s(status))
+
+    def _has_seen(self, state: RunState) -> bool:
+        """Whether somebody has looked, not long ago, while acquisition did what it does now."""
+        seen = self._seen
+        return seen is not None and seen.state is state and self._now_s() - seen.at_s < _STALE_S

@@ -13,8 +13,8 @@ Refusal = DaqError | ServerError
 """An error with a ``code``."""
 
 
-DeskCode = Literal["control_held", "viewer", "form"]
-"""Somebody else holds control, who asks may only look, the form on the page is no plan."""
+DeskCode = Literal["control_held", "viewer", "form", "unseen"]
+"""Somebody else holds control, who asks may only look, the form on the page is no plan, nobody has looked yet."""
 
 
 class Reason(FrozenModel):
@@ -23,6 +23,14 @@ class Reason(FrozenModel):
     code: Annotated[RefusalCode | DeskCode, Field(description="for programs; a start is refused with the same one")]
     text: Annotated[str, Field(description="names device, value and limit")]
     remedy: Annotated[str, Field(description="what to do about it")]
+
+
+UNSEEN = Reason(
+    code="unseen",
+    text="the rig is being looked at",
+    remedy="wait a second; if it stays, a device does not answer: its lamp says which",
+)
+"""Nobody knows what speaks against a start: a run or a live view has just ended, or a look takes long."""
 
 
 def reason_of(refusal: Refusal) -> Reason:

@@ -8,7 +8,6 @@ from pydantic import Field
 
 from daq.frozen_model import FrozenModel
 from daq.run.events import RunStatus
-from daq.run.refusals import RefusalCode
 from daq.run.state import RunState
 from server.lab.desk.reason import Reason
 
@@ -36,28 +35,24 @@ class RigState(FrozenModel):
     eta_s: Annotated[float | None, Field(description="until the last shot of the run under way; null: nobody knows")]
 
 
-def rig_state(status: RunStatus, reasons: Sequence[Reason] | None, eta_s: float | None = None) -> RigState:
-    """Add up what acquisition does and what speaks against a start; None: nobody knows."""
+def rig_state(status: RunStatus, reasons: Sequence[Reason], eta_s: float | None = None) -> RigState:
+    """Add up what acquisition does and what speaks against a start."""
     word = _word(status.state, reasons)
-    return RigState(state=word, text=_text(word, status, reasons, eta_s), reasons=tuple(reasons or ()), eta_s=eta_s)
+    return RigState(state=word, text=_text(word, status, reasons, eta_s), reasons=tuple(reasons), eta_s=eta_s)
 
 
-def _word(state: RunState, reasons: Sequence[Reason] | None) -> RigWord:
+def _word(state: RunState, reasons: Sequence[Reason]) -> RigWord:
     if state is not RunState.IDLE:
         return RigWord(state.value)
-    return RigWord.READY if reasons is not None and not reasons else RigWord.NOT_READY
+    return RigWord.NOT_READY if reasons else RigWord.READY
 
 
-def _text(word: RigWord, status: RunStatus, reasons: Sequence[Reason] | None, eta_s: float | None) -> str:
+def _text(word: RigWord, status: RunStatus, reasons: Sequence[Reason], eta_s: float | None) -> str:
     title = word.value.upper()
     if word is RigWord.ACQUIRING:
         counts = f"{title} {status.shots_recorded}/{status.shots_planned}"
         return counts if eta_s is None else f"{counts}, {minutes(eta_s)} left"
-    if word is RigWord.NOT_READY:
-        if reasons and reasons[0].code == RefusalCode.BUSY:
-            return "ENDED: the rig is being looked at"  # that was found before the end
-        return f"{title}: {reasons[0].text if reasons else 'nobody has looked at the rig for seconds'}"
-    return title
+    return f"{title}: {reasons[0].text}" if word is RigWord.NOT_READY else title
 
 
 def minutes(time_s: float) -> str:

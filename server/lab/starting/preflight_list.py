@@ -16,7 +16,7 @@ from daq.run.references import REFERENCE_KINDS
 from daq.run.refusals import RefusalCode as Code
 from daq.run.state import RunState
 from daq.run_plan import RunKind, RunPlan
-from server.lab.desk.reason import Reason
+from server.lab.desk.reason import UNSEEN, Reason
 from server.lab.desk.visitor import Visitor
 from server.lab.errors import NotFound
 from server.lab.recipes.stated import told_recipes
@@ -38,7 +38,9 @@ CODES: Mapping[str, tuple[Code, ...]] = {
     "Recipe": (Code.RECIPE,),
 }
 """Every refusal has one place."""
-OF_THE_RIG = frozenset(chain.from_iterable(CODES[name] for name in ("Rig", "Interlock", "Pulse generator", "Cameras")))
+OF_THE_RIG: frozenset[str] = frozenset(
+    chain(*(CODES[name] for name in ("Rig", "Interlock", "Pulse generator", "Cameras")), (UNSEEN.code,))
+)
 """No form changes anything about these."""
 
 

@@ -5,11 +5,11 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from server.lab.desk.reason import Reason
-from server.lab.desk.rig_state import RigState
+from server.lab.desk.reason import UNSEEN, Reason
+from server.lab.desk.rig_state import RigState, RigWord
 from server.lab.desk.visitor import Role, Visitor
 from server.lab.services import Context
-from server.lab.starting.preflight_list import OF_THE_RIG, Check, CheckResult, check_control, checks_of
+from server.lab.starting.preflight_list import Check, CheckResult, check_control, checks_of
 from server.lab.starting.readiness import reasons_against, reasons_against_visitor
 from server.web.ui.draft import DraftStore
 
@@ -17,6 +17,8 @@ _LOOK_AGAIN_S = 5.0
 """Disk and references change without a word."""
 _STALE_S = 15.0
 """A disk that hangs holds up a look; then nobody knows."""
+_Rig = tuple[RigWord, tuple[Reason, ...]]
+"""What the rig is up to, and what speaks against a start."""
 _NO_PLAN = Reason(
     code="form",
     text="a field of the form is empty or out of its limits",
@@ -26,8 +28,9 @@ _NO_PLAN = Reason(
 
 @dataclass(frozen=True)
 class Verdict:
-    """What one look has found: reasons against a start, the first one first, and all that was looked at."""
+    """What one look has found: the rig, reasons against a start, the first one first, and all that was looked at."""
 
+    rig: _Rig
     reasons: tuple[Reason, ...]
     checks: tuple[Check, ...]
 
@@ -59,11 +62,12 @@ class FormJudge:
 
     async def refresh(self) -> None:
         """Look again whenever form or rig has changed, and every few seconds; nothing where a look goes on."""
-        is_fresh = self._basis == self._basis_now() and self._now_s() - self._begun_s < _LOOK_AGAIN_S
+        basis = self._rig, self._draft.version
+        is_fresh = self._basis == basis and self._now_s() - self._begun_s < _LOOK_AGAIN_S
         if self._is_looking or is_fresh:
             return
         self._is_looking = True
-        self._basis, self._begun_s = self._basis_now(), self._now_s()
+        self._basis, self._begun_s = basis, self._now_s()
         try:
             self._verdict, self._found_s = await asyncio.to_thread(self._look), self._now_s()
         finally:
@@ -71,28 +75,28 @@ class FormJudge:
 
     def state(self, who: Visitor) -> RigState:
         """Rig, form, and whether this person may start: ready only where his start would not be refused."""
-        rig, verdict = self._context.desk.state, self.verdict
-        if verdict is None:
-            return self._context.desk.state_for(rig.reasons or None)
-        found = verdict.reasons
-        if self._basis != self._basis_now():  # of the rig that is old
-            found = rig.reasons or tuple(reason for reason in found if reason.code not in OF_THE_RIG)
+        desk, verdict = self._context.desk, self.verdict
+        if verdict is None or verdict.rig != self._rig:
+            return desk.state_for(desk.state.reasons or (UNSEEN,))
         of_who = reasons_against_visitor(self._context, who)
         is_viewer = who.role is Role.VIEWER  # he starts nothing anyway: what the rig lacks comes first
-        return self._context.desk.state_for((*found, *of_who) if is_viewer else (*of_who, *found))
+        return desk.state_for((*verdict.reasons, *of_who) if is_viewer else (*of_who, *verdict.reasons))
 
     def checks(self, who: Visitor) -> tuple[Check, ...]:
         """Everything that was looked at, with who holds control."""
         verdict = self.verdict
         return (check_control(self._context, who), *verdict.checks) if verdict else ()
 
-    def _basis_now(self) -> object:
-        return self._context.desk.state.reasons, self._draft.version
+    @property
+    def _rig(self) -> _Rig:
+        rig = self._context.desk.state
+        return rig.state, rig.reasons
 
     def _look(self) -> Verdict:
+        rig = self._rig
         try:
             plan = self._draft.plan
         except (ValueError, TypeError):
-            return Verdict((_NO_PLAN,), (Check(name="Form", finding=CheckResult.REFUSED, text=_NO_PLAN.text),))
+            return Verdict(rig, (_NO_PLAN,), (Check(name="Form", finding=CheckResult.REFUSED, text=_NO_PLAN.text),))
         reasons = reasons_against(self._context, plan)
-        return Verdict(reasons, checks_of(self._context, plan, reasons))
+        return Verdict(rig, reasons, checks_of(self._context, plan, reasons))

@@ -17,6 +17,7 @@ from daq.devices import Rig
 from daq.errors import DeviceError, DeviceTimeout
 from daq.network import Network
 from daq.run.refusals import REMEDIES, RefusalCode
+from server.lab.desk.reason import UNSEEN
 from server.lab.desk.rig_state import RigWord
 from server.lab.desk.visitor import Role, Visitor
 from server.web.ui.draft import DraftStore
@@ -257,8 +258,8 @@ def test_a_start_is_refused_for_the_reason_that_the_rig_is_not_ready(
     server: Serving, monkeypatch: pytest.MonkeyPatch, code: RefusalCode
 ) -> None:
     with OF_THE_RIG[code](server, monkeypatch), judged_form(server) as (form, plan):
-        shown, refusal, judged = server.http.get("/api/rig/readiness").json(), start(server, plan), judge(server, plan)
-        bar = form.state(ANN)
+        shown, bar = server.http.get("/api/rig/readiness").json(), form.state(ANN)
+        refusal, judged = start(server, plan), judge(server, plan)
     assert shown["state"] != "ready"
     assert code in [reason["code"] for reason in shown["reasons"]]
     first = shown["reasons"][0]
@@ -278,7 +279,7 @@ def test_a_start_is_refused_for_the_reason_that_every_page_tells_of_its_form(
             stack.enter_context(situation(server, monkeypatch))
         form, plan = stack.enter_context(judged_form(server, **values))
         assert server.http.get("/api/rig/readiness").json()["state"] == "ready"
-        judged, refusal, bar = judge(server, plan), start(server, plan), form.state(ANN)
+        judged, bar, refusal = judge(server, plan), form.state(ANN), start(server, plan)
     assert [reason["code"] for reason in judged["reasons"]] == [code]
     assert (refusal["code"], refusal["detail"]) == (code, judged["reasons"][0]["text"])
     assert bar.text == f"NOT READY: {refusal['detail']}"
@@ -307,7 +308,7 @@ def test_a_form_that_is_no_plan_or_was_looked_at_long_ago_is_not_ready(server: S
     draft = DraftStore(tmp_path / "draft.json", server.services.config, server.services.events)
     form = FormJudge(context, draft, lambda: now_s[0])
     context.desk.look()
-    assert form.state(ANN).text == "NOT READY: nobody has looked at the rig for seconds"
+    assert form.state(ANN).text == "NOT READY: the rig is being looked at"
     asyncio.run(form.refresh())
     assert form.state(ANN).text == "READY"
     draft.set("shots", 0)
@@ -318,6 +319,27 @@ def test_a_form_that_is_no_plan_or_was_looked_at_long_ago_is_not_ready(server: S
     assert form.state(ANN).text == "READY"
     now_s[0] = 15.1
     assert form.state(ANN).state == RigWord.NOT_READY
+
+
+def test_after_a_live_view_nothing_is_ready_before_rig_and_form_have_been_looked_at(
+    server: Serving, tmp_path: Path
+) -> None:
+    context = server.app.state.context
+    draft = DraftStore(tmp_path / "draft.json", server.services.config, server.services.events)
+    form = FormJudge(context, draft)
+    assert server.http.put("/api/rig/live", json={"rate_hz": 10, "pulse": None}).status_code == 200
+    eventually(lambda: context.desk.look().state == RigWord.LIVE, "a live view goes on")
+    asyncio.run(form.refresh())
+    assert form.state(ANN).state == RigWord.LIVE
+    acquisition(server).end_live()
+    eventually(lambda: acquisition(server).status().resting, "the live view has ended")
+    assert (form.state(ANN).text, form.state(ANN).reasons) == ("NOT READY: the rig is being looked at", (UNSEEN,))
+    context.desk.look()
+    assert form.state(ANN).text == "NOT READY: the rig is being looked at"
+    assert "a live view goes on: a start ends it" in [check.text for check in form.checks(ANN)]
+    asyncio.run(form.refresh())
+    assert form.state(ANN).text == "READY"
+    assert "at rest" in [check.text for check in form.checks(ANN)]
 
 
 def test_of_several_reasons_a_start_names_the_one_that_is_told_first(
