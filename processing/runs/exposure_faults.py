@@ -39,11 +39,12 @@ def exposure_faults(
 def copied(shot: Shot, frame: FrameName, images: Sequence[Intensity], before: dict[bytes, int]) -> Mapping[str, int]:
     """Which shot has the very pixels of this one in all views, of those ``before``, which it joins.
 
-    Nothing of images that are empty.
+    Nothing of images that are empty, or without any contrast.
     """
-    if not any(image.any() for image in images):
+    known_by = images_print(shot, [frame]) if any(image.any() for image in images) else b""
+    if not known_by:
         return {}
-    first = before.setdefault(images_print(shot, [frame]), shot.index)
+    first = before.setdefault(known_by, shot.index)
     return {} if first == shot.index else {"copy_of": first}
 
 
