@@ -36,8 +36,7 @@ def rows_alternate(frame: NDArray[np.generic]) -> bool:
         return False
     rows = frame[: windows * WINDOW_PX, ::STEP_PX].astype(np.float32).reshape(windows, WINDOW_PX, -1)
     finest, cosine, sine, light = (_PATTERNS @ rows).transpose(1, 0, 2)
-    some = np.s_[:, ::4]
-    level = float(np.median(light[some]))
-    finest = finest - light * np.median(finest[some]) / (level or 1.0)
-    quiet = (SLIGHT * level) ** 2 + ROUNDED * np.issubdtype(frame.dtype, np.integer)
+    everywhere = np.sum(finest * light) / max(float(np.sum(light**2)), 1e-9)
+    finest = finest - everywhere * light
+    quiet = (SLIGHT * float(np.median(light[:, ::4]))) ** 2 + ROUNDED * np.issubdtype(frame.dtype, np.integer)
     return bool(np.mean(finest**2) > MOST_ALTERNATING * (np.mean(cosine**2 + sine**2) + quiet))

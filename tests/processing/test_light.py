@@ -216,6 +216,15 @@ def test_rows_that_differ_everywhere_are_those_of_a_camera(gain: float) -> None:
     assert told(SHOT[:, ::-1].T.copy(), LIGHT[:, ::-1].T.copy()) == ""
 
 
+@pytest.mark.parametrize("brightest", [200, 3000])
+def test_bright_droplets_on_black_do_not_alternate(brightest: float) -> None:
+    """Half of the noise is below black: what is left of it has no share of rows that alternate to speak of."""
+    for seed in range(20):
+        noise = np.random.default_rng(seed).normal(0, brightest / 100, LIGHT.shape)
+        seen = np.clip(np.round(brightest * droplets(seed) + noise), 0, None)
+        assert not rows_alternate(seen.astype(np.uint16)), seed
+
+
 def test_nothing_at_all_does_not_alternate() -> None:
     for level in (0.0, 0.1, 77.7):
         assert not rows_alternate(np.full((96, 128), level, np.float32))
