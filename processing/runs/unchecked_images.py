@@ -1,8 +1,9 @@
 """What may be wrong with images without showing in them: told with what is measured, and what to state."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict
 
+from daq.files.run_directory import RunHeader
 from processing.calibration.verdict import Unchecked
 from processing.preprocessing import Polarity
 
@@ -48,6 +49,20 @@ SPARSE = Unchecked(
     "more shots, or more droplets in them; or nothing, where settings of cameras and programs are those of the target",
 )
 """Of shots with few droplets."""
+
+
+CROPPED = Unchecked(
+    "whether images of target and shots show the same part of every sensor: rows that were cut elsewhere in all views "
+    "alike move all droplets along y by as much, and everything agrees",
+    "nothing where OffsetY and Height of all cameras were the same for both, and no program cut rows; else images of "
+    "the target that are cut as those of the shots are",
+)
+"""Of images from elsewhere; a rig reads whole images, of target and shots alike."""
+
+
+def unknown_crop(header: RunHeader) -> list[Unchecked]:
+    """What nothing tells of where the images of a run were cut."""
+    return [CROPPED] if "import" in header.configuration else []
 
 
 def stated_scale(um_per_px: float) -> Unchecked:
@@ -124,7 +139,7 @@ def unchecked_images(
         yield SPARSE
 
 
-def told_unchecked(unchecked: Iterator[Unchecked], tell: Callable[[str], None]) -> list[dict[str, str]]:
+def told_unchecked(unchecked: Iterable[Unchecked], tell: Callable[[str], None]) -> list[dict[str, str]]:
     """Tell people each of them in a line; what programs get."""
     found = list(unchecked)
     for one in found:

@@ -247,9 +247,10 @@ def _tell_unchecked(
     from processing.calibration.calibration_file import load_calibration
     from processing.reconstruction.planning.calibrated_plan import default_grid
     from processing.runs.shots.turned_views import reversed_shows_px
-    from processing.runs.unchecked_images import told_unchecked, unchecked_images
+    from processing.runs.unchecked_images import told_unchecked, unchecked_images, unknown_crop
 
     with RunReader(run_dir) as run:
+        cropped = unknown_crop(run.header)
         undirected = run.header.frames_per_shot == 2 and run.conditions.spray is None
     velocities = (shot.velocity for shot in shots if shot.velocity)
     stated_ns = next((one.separation_ns for one in velocities if one.separation_source == "stated"), None)
@@ -263,7 +264,7 @@ def _tell_unchecked(
         shallow=reversed_shows_px(calibration, grid) < CLOSE_PX,
         sparse=not depth_known(sights) and not depth_reversed(sights),
     )
-    return told_unchecked(unchecked, progress)
+    return told_unchecked([*unchecked, *cropped], progress)
 
 
 def _here(

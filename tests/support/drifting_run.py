@@ -24,10 +24,12 @@ def write_droplet_run(
     interlaced: bool = False,
     shots: int = 2,
     drifting: Container[int] = range(100),
+    cut_px: int = 0,
 ) -> Path:
     """Shots; in those that drift, view2's picture lies two pixels further right than when it was calibrated.
 
     A covered view is dark; mirrored are all of them. Odd rows of interlaced ones show the droplets 0.1 mm beside.
+    Images from elsewhere were cut so many rows lower than those of the target.
     """
     rng = np.random.default_rng(11)
     cameras = {f"view{number}": camera for number, camera in enumerate(views()[:view_count], start=1)}
@@ -38,6 +40,7 @@ def write_droplet_run(
         views={name: ViewFormat(shape, 8) for name in cameras},
         polarity="bright",
         separation_ns=6400,
+        configuration={"import": {"manifest": "cut.toml"}} if cut_px else {},
     )
     with RunWriter(run_dir, header) as writer:
         for index in range(shots):
@@ -50,6 +53,7 @@ def write_droplet_run(
                     for name, camera in cameras.items():
                         images[name][1::2] = droplet_image(camera, later_mm, rng)[1::2]
                 images["view2"] = np.roll(images["view2"], drift_px * (index in drifting), axis=1)
+                images = {name: np.roll(image, -cut_px, axis=0) for name, image in images.items()}
                 images = {name: image[:, ::-1] if mirrored else image for name, image in images.items()}
                 images = {name: image * (name != covered) for name, image in images.items()}
                 exposures.append({name: np.round(200 * image).astype(np.uint8) for name, image in images.items()})

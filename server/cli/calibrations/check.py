@@ -24,11 +24,13 @@ def add(verbs: Verbs) -> None:
 
 def check(options: Namespace) -> Outcome:
     """Check shot by shot; it has not passed where a shot would stop reconstruction."""
+    from daq.files.run_directory import RunReader
     from processing.calibration.calibration_file import load_calibration
     from processing.calibration.verdict import Verdict
     from processing.interlaced import ALTERNATING
     from processing.runs.run_check import check_shot, odd_images
     from processing.runs.shots.shot_check import ALARM_PX, STOP_PX
+    from processing.runs.unchecked_images import told_unchecked, unknown_crop
     from processing.runs.workbench import Workbench
 
     calibration, workbench = load_calibration(options.calibration), Workbench()
@@ -40,6 +42,8 @@ def check(options: Namespace) -> Outcome:
         odd.append(odd_images(options.run, index, workbench))
         for what in odd[-1]:
             progress(f"{options.run.name}: shot {index}, {what}")
+    with RunReader(options.run) as run:
+        unchecked = told_unchecked(unknown_crop(run.header), progress)
     woven = any(what.endswith(ALTERNATING) for told in odd for what in told)
     verdicts = [shot.verdict for shot in shots if shot.verdict is not None] + [Verdict.WARN] * woven
     result = {
@@ -50,6 +54,7 @@ def check(options: Namespace) -> Outcome:
         "stop_px": STOP_PX,
         "verdict": max(verdicts, key=list(Verdict).index) if verdicts else None,
         "shots": [{**shot.record(), "odd_light": list(what)} for shot, what in zip(shots, odd, strict=True)],
+        "not_checked": unchecked,
     }
     return Outcome(result, views_table(result))
 

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +11,7 @@ from server.cli.output import progress
 
 if TYPE_CHECKING:
     from processing.calibration.calibration import Calibration
+    from processing.calibration.verdict import Unchecked
     from processing.runs.shots.shot_check import ShotCheck
     from processing.runs.workbench import Workbench
 
@@ -25,10 +26,13 @@ class Belonging:
         Name of the run.
     checks : tuple of ShotCheck
         A shot each.
+    unchecked : tuple of Unchecked
+        What droplets cannot tell.
     """
 
     run: str
     checks: "tuple[ShotCheck, ...]"
+    unchecked: "tuple[Unchecked, ...]" = ()
 
     @property
     def verdict(self) -> str | None:
@@ -45,7 +49,11 @@ class Belonging:
 
     def record(self) -> dict[str, Any]:
         """What was found, for a program: JSON values."""
-        return {"verdict": self.verdict, "shots": [check.record() for check in self.checks]}
+        return {
+            "verdict": self.verdict,
+            "shots": [check.record() for check in self.checks],
+            "not_checked": [asdict(one) for one in self.unchecked],
+        }
 
     @property
     def provenance(self) -> dict[str, str]:
@@ -56,7 +64,11 @@ class Belonging:
 
     @property
     def text(self) -> str:
-        """A line for a person."""
+        """A line for a person, and one for whatever cannot be known."""
+        return "\n".join([self._told, *(f"not checked: {one.what}; state {one.state}" for one in self.unchecked)])
+
+    @property
+    def _told(self) -> str:
         told = [check for check in self.checks if check.verdict]
         if not told:
             return (
@@ -83,9 +95,13 @@ def ask_droplets(
     run_dir: Path, shots: Sequence[int], calibration: "Calibration", workbench: "Workbench | None" = None
 ) -> Belonging:
     """Check the first, the middle and the last shot; what speaks against the calibration is told at once."""
+    from daq.files.run_directory import RunReader
     from processing.runs.run_check import check_few
+    from processing.runs.unchecked_images import unknown_crop
 
-    asked = Belonging(run_dir.name, tuple(check_few(run_dir, shots, calibration, workbench)))
+    with RunReader(run_dir) as run:
+        unchecked = tuple(unknown_crop(run.header))
+    asked = Belonging(run_dir.name, tuple(check_few(run_dir, shots, calibration, workbench)), unchecked)
     _tell(asked)
     return asked
 
@@ -101,7 +117,7 @@ def ask_seldom(
     if not (others := [shot for shot in seldom if shot not in {check.shot for check in asked.checks}]):
         return asked
     more = ask_droplets(run_dir, others, calibration, workbench)
-    return Belonging(asked.run, (*asked.checks, *more.checks))
+    return replace(asked, checks=(*asked.checks, *more.checks))
 
 
 def _tell(asked: Belonging) -> None:

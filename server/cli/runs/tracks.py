@@ -76,7 +76,7 @@ def _told(linked: "DropletTracks", shots: int, file: Path) -> dict[str, Any]:
         "noise_curve": linked.noise_curve.plain() if linked.noise_curve else None,
         "reason": linked.reason,
         "doubts": list(linked.doubts),
-        "not_checked": told_unchecked(iter([stated_rate(linked.rate_hz)] if linked.tracks else []), progress),
+        "not_checked": told_unchecked([stated_rate(linked.rate_hz)] if linked.tracks else [], progress),
         "file": str(file),
         "passed": linked.tracks > 0,
     }

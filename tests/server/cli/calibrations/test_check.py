@@ -60,6 +60,20 @@ def test_moved_view_stops_and_a_corrected_calibration_is_good_again(
     assert after["passed"] is True
 
 
+@pytest.mark.parametrize("cut_px", [0, 8], ids=["of a rig", "from elsewhere"])
+def test_rows_that_were_cut_alike_in_all_views_are_not_checked(
+    cut_px: int, calibration_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Droplets agree whether they are where they seem to be or not."""
+    run_dir = write_droplet_run(tmp_path / "run", drift_px=0, shots=1, cut_px=cut_px)
+    arguments = (run_dir, "--calibration", calibration_file)
+    checked = told(capsys, "check", *arguments)
+    made = told(capsys, "reconstruct", *arguments, "--grid=-1:1,-1:1,-1:1@0.1", "-o", tmp_path / "out")["belonging"]
+    for answer in (checked, made):
+        assert answer["verdict"] == "good"
+        assert ["rows that were cut elsewhere" in one["what"] for one in answer["not_checked"]] == [True] * bool(cut_px)
+
+
 def test_droplets_are_part_of_the_verdict_of_a_calibration(
     run_dir: Path, calibration_file: Path, tmp_path: Path
 ) -> None:
