@@ -14,9 +14,12 @@ from processing.calibration.verdict import Verdict
 from processing.runs.run_check import checked_by_run
 from processing.runs.shots.shot_check import ShotCheck
 from server.cli.calibrations.check import check_line, views_table
-from tests.support.command_line import told
+from tests.support.command_line import refused, told
 from tests.support.drifting_run import DRIFT_PX, write_droplet_run
 from tests.support.drifting_views import calibration_of, inside_mm, views
+from tests.support.droplet_run import write_run
+
+GRID = "--grid=-1:1,-1:1,-1:1@0.1"
 
 
 @pytest.fixture(scope="module")
@@ -68,10 +71,21 @@ def test_rows_that_were_cut_alike_in_all_views_are_not_checked(
     run_dir = write_droplet_run(tmp_path / "run", drift_px=0, shots=1, cut_px=cut_px)
     arguments = (run_dir, "--calibration", calibration_file)
     checked = told(capsys, "check", *arguments)
-    made = told(capsys, "reconstruct", *arguments, "--grid=-1:1,-1:1,-1:1@0.1", "-o", tmp_path / "out")["belonging"]
+    made = told(capsys, "reconstruct", *arguments, GRID, "-o", tmp_path / "out")["belonging"]
     for answer in (checked, made):
         assert answer["verdict"] == "good"
         assert ["rows that were cut elsewhere" in one["what"] for one in answer["not_checked"]] == [True] * bool(cut_px)
+
+
+@pytest.mark.parametrize("command", ["check", "reconstruct", "average"])
+def test_images_of_another_size_than_those_of_the_target_are_refused(
+    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run_dir, calibration_file = write_run(tmp_path / "run"), tmp_path / "calibration.json"
+    save_calibration(calibration_of(views()[:3]), calibration_file)
+    more = [] if command == "check" else [GRID, "-o", tmp_path / "out"]
+    complaint = refused(capsys, command, run_dir, "--calibration", calibration_file, *more)
+    assert "view1: image of 160 x 120 px, calibrated for (400, 300)" in complaint
 
 
 def test_droplets_are_part_of_the_verdict_of_a_calibration(
