@@ -20,6 +20,7 @@ from processing.geometry import FloatArray
 
 NO_CONDITIONS = ("operator", "remark", "more")
 """Of the notes, what may differ in one spray; what is in ``more`` is looked at by its own names."""
+NOT_STATED = "not stated"
 MOST_ASIDE_DEG = 45.0
 """Of the mean velocity from the axis; a spray flies along its axis, however wide it is."""
 MOST_BEHIND = 0.05
@@ -60,13 +61,20 @@ def spray_doubts(
     )
 
 
+def noted(shots: Sequence[StoredDroplets]) -> dict[str, str]:
+    """What the operator has written down of some shots, by name; several values where shots differ."""
+    notes = [json.loads(str(shot.provenance.get("notes", "{}"))) for shot in shots]
+    stated = [{**one, **one.get("more", {})} for one in notes]
+    names = dict.fromkeys(name for one in stated for name in one if name not in NO_CONDITIONS)
+    return {name: " and ".join(dict.fromkeys(str(one.get(name, NOT_STATED)) for one in stated)) for name in names}
+
+
 def _of_conditions(shots: Sequence[StoredDroplets]) -> Iterator[str]:
-    """What the operator has written down of some shots, and of others otherwise."""
-    noted = [json.loads(str(shot.provenance.get("notes", "{}"))) for shot in shots]
-    stated = [{**notes, **notes.get("more", {})} for notes in noted]
-    for name in dict.fromkeys(name for one in stated for name in one if name not in NO_CONDITIONS):
-        if len(values := dict.fromkeys(str(one.get(name, "not stated")) for one in stated)) > 1:
-            yield f"shots differ in {name}: {' and '.join(values)}; they are no one spray"
+    """What is not the same of all shots."""
+    alike = noted(shots[:1])
+    for name, values in noted(shots).items():
+        if values != alike.get(name, NOT_STATED):
+            yield f"shots differ in {name}: {values}; they are no one spray"
 
 
 def _of_nozzle(sample: SpraySample, axis: SprayAxis) -> Iterator[str]:

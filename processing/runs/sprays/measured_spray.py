@@ -11,6 +11,7 @@ from processing.analysis.copied_shots import in_common
 from processing.analysis.droplets.droplet_file import DropletFileError, StoredDroplets
 from processing.analysis.droplets.droplet_statistics import require_poolable
 from processing.analysis.spray.spray_axis import SprayAxis
+from processing.analysis.spray.spray_doubts import NOT_STATED, noted
 from processing.runs.droplets_in_place import read_in_place
 from processing.runs.sprays.conditions import changes_told, spray_around
 
@@ -190,9 +191,9 @@ def _shared(sprays: Sequence[MeasuredSpray]) -> Iterator[str]:
 
 
 def _unlike(first: MeasuredSpray, other: MeasuredSpray) -> str:
-    its, others = (_made_by(spray.provenance) for spray in (other, first))
+    its, others = ({**_made_by(spray.provenance), **_stated(spray.shots)} for spray in (other, first))
     return "; ".join(
-        f"{name}: {its.get(name)} and {others.get(name)}"
+        f"{name}: {its.get(name, NOT_STATED)} and {others.get(name, NOT_STATED)}"
         for name in {**its, **others}
         if its.get(name) != others.get(name)
     )
@@ -203,3 +204,12 @@ def _made_by(provenance: Mapping[str, Any]) -> dict[str, object]:
     names = ("calibration", "method_version")
     settings = json.loads(str(provenance.get("settings", "{}")))
     return {**{name: provenance.get(name) for name in names}, **settings}
+
+
+def _stated(shots: Sequence[StoredDroplets]) -> dict[str, object]:
+    """What people say of a spray, and how far apart its exposures are."""
+    velocities = [json.loads(str(shot.provenance.get("velocity", "{}"))) for shot in shots]
+    apart = dict.fromkeys(
+        f"{one['separation_ns'] / 1000:.4g} us as {one['separation_source']}" for one in velocities if "separation_ns" in one
+    )
+    return {**noted(shots), **({"separation": " and ".join(apart)} if apart else {})}

@@ -1,5 +1,6 @@
 """Results as sprays: where the nozzle is, by the files, or by the run that they lie in."""
 
+import json
 from pathlib import Path
 
 import pytest
@@ -64,6 +65,31 @@ def test_shots_that_are_in_both_of_two_sprays_are_told(tmp_path: Path) -> None:
     for two in (copied, again):
         (told,) = read_compared([monday, two]).unlike
         assert f"{two.name} and monday have 2 shots in common" in told
+
+
+def test_what_operators_state_of_sprays_that_are_compared_is_told(tmp_path: Path) -> None:
+    notes = [RunNotes(operator=who, fluid=fluid, nozzle=name) for who, fluid, name in (
+        ("Ada", "water", "A4"), ("Bo", "ethanol", "A5"), ("Ada", "water", "A4")
+    )]  # fmt: skip
+    separations = [{"separation_ns": ns, "separation_source": "stated"} for ns in (6400.0, 3200.0, 6400.0001)]
+    results = [
+        write_results(
+            tmp_path / name,
+            cone_shots(number, 2, 20),
+            run=name,
+            notes=notes[number].model_dump_json(exclude_defaults=True),
+            velocity=json.dumps(separations[number]),
+        )
+        for number, name in enumerate(("one", "two", "like"))
+    ]
+    assert read_compared([results[0], results[2]]).unlike == ()
+    assert read_compared(results[:2]).unlike == (
+        "two and one differ in fluid: ethanol and water; nozzle: A5 and A4; "
+        "separation: 3.2 us as stated and 6.4 us as stated",
+    )
+    mute = write_results(tmp_path / "mute", cone_shots(3, 2, 20), run="mute")
+    (told,) = read_compared([results[0], mute]).unlike
+    assert told.startswith("mute and one differ in fluid: not stated and water; ")
 
 
 def test_nozzles_at_two_places_are_told_where_sprays_are_compared(tmp_path: Path) -> None:
