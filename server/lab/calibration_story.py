@@ -9,6 +9,8 @@ from pydantic import Field, ValidationError
 from daq.frozen_model import FrozenModel
 from processing.calibration.verdict import Verdict
 from server.lab.errors import Damaged
+from server.lab.jobs import Job, JobKind
+from server.lab.results import result_calibration
 from server.lab.services import Context
 
 _STANDS_OUT = 2.0
@@ -138,3 +140,18 @@ def _plane(stored: Mapping[str, Any]) -> PlaneFigures:
     z_mm = stored.get("z_mm")
     figures = {name: stored.get(name) for name in PlaneFigures.model_fields}
     return PlaneFigures.model_validate({**figures, "name": stored["name"] if z_mm is None else f"z = {z_mm:.3f} mm"})
+
+
+def replaced_since(context: Context, job: Job) -> bool:
+    """Whether the file that has the name of a job's calibration now is another one than that of the job."""
+    now = context.calibrations.content_id(job.calibration)
+    return bool(now) and _content_of(context, job) not in (None, "", now)
+
+
+def _content_of(context: Context, job: Job) -> str | None:
+    """Hash of the calibration that a job has made or used; None or empty where nobody knows it, or not yet."""
+    if job.kind is JobKind.CALIBRATION:
+        return (job.result or {}).get("calibration")
+    if job.kind is JobKind.CHECK or job.results_id is None:
+        return job.settings.get("content")
+    return result_calibration(context.services.data_dir / job.run_id, job.results_id)

@@ -57,6 +57,14 @@ def test_a_calibration_can_be_used_unless_it_is_used_already() -> None:
     assert job_row(job, current="cal")["actions"] == []
 
 
+def test_a_calibration_that_was_replaced_under_its_name_is_told_and_cannot_be_used() -> None:
+    job = calibration_job("run", "cal", "pinhole").model_copy(update={"state": JobState.DONE})
+    row = job_row(job, current="other", replaced=True)
+    assert row["actions"] == []
+    assert row["detail"] == "calibration cal was replaced since: this is of the one that had its name before"
+    assert job_row(job, current="other")["detail"] == ""
+
+
 def test_of_a_target_that_is_packed_no_calibration_is_offered_and_why_is_told() -> None:
     row = target_row(RUN, None)
     assert (row["actions"], row["detail"]) == (["Calibrate"], "")

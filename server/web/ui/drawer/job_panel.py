@@ -9,6 +9,7 @@ from nicegui import ui
 from processing.analysis.droplets.measured_exposure import ShotVerdict
 from processing.calibration.verdict import BELONGING, Verdict
 from processing.runs.exposure_faults import fault_lines
+from server.lab.calibration_story import replaced_since
 from server.lab.jobs import Job, JobKind, JobState, JobTable
 from server.lab.services import Context
 from server.lab.starting.calibrating import use_calibration
@@ -35,9 +36,13 @@ class JobPanel:
 
     async def reload(self) -> None:
         """Read the job table again."""
-        jobs = await asyncio.to_thread(listed_jobs, self._context.jobs)
-        self._table.rows = [job_row(job, self._context.calibrations.current) for job in jobs]
+        self._table.rows = await asyncio.to_thread(self._rows)
         self._table.update()
+
+    def _rows(self) -> list[dict[str, Any]]:
+        """Of the disk: whose calibrations were replaced since."""
+        current = self._context.calibrations.current
+        return [job_row(job, current, replaced_since(self._context, job)) for job in listed_jobs(self._context.jobs)]
 
     def filter(self, words: str) -> None:
         """Show those of the newest jobs that have these words in a cell; all of them for none."""
@@ -60,9 +65,14 @@ def listed_jobs(jobs: JobTable) -> list[Job]:
     return [*jobs.oldest(JobState.RUNNING), *jobs.newest(None, others, _SHOWN)]
 
 
-def job_row(job: Job, current: str | None = None) -> dict[str, Any]:
-    """One job in the table, what came of it included; the current calibration is used already."""
-    can_be_used = job.kind is JobKind.CALIBRATION and job.calibration != current
+def job_row(job: Job, current: str | None = None, replaced: bool = False) -> dict[str, Any]:
+    """One job in the table, what came of it included; the current calibration is used already.
+
+    Of a calibration that was replaced since, there is nothing any more that could be used.
+    """
+    can_be_used = job.kind is JobKind.CALIBRATION and job.calibration != current and not replaced
+    said = job.error or "; ".join(told for told in (_DETAIL[job.kind](job), _belonging(job)) if told)
+    another = f"calibration {job.calibration} was replaced since: this is of the one that had its name before"
     choices = {
         JobState.QUEUED: ["Abort"],
         JobState.RUNNING: ["Abort"],
@@ -74,7 +84,7 @@ def job_row(job: Job, current: str | None = None) -> dict[str, Any]:
         "run": job.run_id,
         "outcome": job.state,
         "colour": "warning" if job.state is JobState.DONE and _is_doubtful(job) else outcome_colour(job.state),
-        "detail": job.error or "; ".join(told for told in (_DETAIL[job.kind](job), _belonging(job)) if told),
+        "detail": "; ".join(told for told in (said, another if replaced else "") if told),
         "actions": choices.get(job.state, []),
         "calibration": job.calibration,
     }
