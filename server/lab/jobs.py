@@ -11,7 +11,6 @@ The table is a catalogue: run directories hold the truth, and ``server.lab.job_r
 """
 
 import json
-import sqlite3
 import threading
 from collections.abc import Callable, Collection, Iterable, Mapping
 from datetime import UTC, datetime
@@ -24,7 +23,7 @@ from pydantic import Field, ValidationError
 
 from daq.frozen_model import FrozenModel
 from server.lab.errors import Conflict, NotFound
-from server.lab.table_file import changing
+from server.lab.table_file import changing, table_at
 from server.lab.work_progress import PROGRESS_QUERY, WorkProgress
 
 
@@ -143,6 +142,17 @@ _SELECT = """
 """
 
 
+_TABLE = """
+    PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL;
+    CREATE TABLE IF NOT EXISTS job (
+        number INTEGER PRIMARY KEY, id TEXT NOT NULL UNIQUE, run_id TEXT NOT NULL, state TEXT NOT NULL,
+        document TEXT NOT NULL
+    );
+    CREATE INDEX IF NOT EXISTS job_by_state ON job (state, number);
+    CREATE INDEX IF NOT EXISTS job_by_run ON job (run_id, number);
+"""
+
+
 class JobTable:
     """All jobs, in one SQLite file; may be used from any thread.
 
@@ -154,18 +164,8 @@ class JobTable:
 
     def __init__(self, path: Path) -> None:
         self._lock = threading.Lock()
-        self._database = sqlite3.connect(path, check_same_thread=False, isolation_level=None)
+        self._database = table_at(path, _TABLE)
         self._changing = partial(changing, self._database, self._lock, path)
-        self._database.executescript("""
-            PRAGMA journal_mode = WAL;
-            PRAGMA synchronous = NORMAL;
-            CREATE TABLE IF NOT EXISTS job (
-                number INTEGER PRIMARY KEY, id TEXT NOT NULL UNIQUE, run_id TEXT NOT NULL, state TEXT NOT NULL,
-                document TEXT NOT NULL
-            );
-            CREATE INDEX IF NOT EXISTS job_by_state ON job (state, number);
-            CREATE INDEX IF NOT EXISTS job_by_run ON job (run_id, number);
-        """)
 
     def close(self) -> None:
         """Close the file, once nobody reads or writes it any more."""

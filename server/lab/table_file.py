@@ -1,4 +1,4 @@
-"""Changing a table that lies in a SQLite file: what the disk refuses is told as it is of every other file."""
+"""Tables that lie in SQLite files: what the disk refuses is told as it is of every other file."""
 
 import errno
 import sqlite3
@@ -10,6 +10,17 @@ from threading import Lock
 from daq.files.storage import storing
 
 _NUMBERS = {sqlite3.SQLITE_FULL: errno.ENOSPC, sqlite3.SQLITE_READONLY: errno.EROFS}
+
+
+def table_at(path: Path, script: str) -> sqlite3.Connection:
+    """A database that any thread may use, once a script has been run in it; closed where that fails."""
+    database = sqlite3.connect(path, check_same_thread=False, isolation_level=None)
+    try:
+        database.executescript(script)
+    except sqlite3.Error:
+        database.close()
+        raise
+    return database
 
 
 @contextmanager

@@ -11,6 +11,7 @@ from typing import Any
 
 from server.lab.damage import set_aside, tell
 from server.lab.events import EventPublisher
+from server.lab.table_file import table_at
 
 REQUESTS_FILE = "requests.sqlite"
 _KEPT = 10_000
@@ -23,6 +24,15 @@ class Obeyed:
     what: str
     is_answered: bool
     answer: Any
+
+
+_TABLE = """
+    PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL;
+    CREATE TABLE IF NOT EXISTS request (
+        number INTEGER PRIMARY KEY, key TEXT NOT NULL UNIQUE, what TEXT NOT NULL, answer TEXT
+    );
+    SELECT number, key, what, answer FROM request LIMIT 1;
+"""
 
 
 class RequestTable:
@@ -45,15 +55,7 @@ class RequestTable:
         self._tell = tell
         self._is_told = False
         self._lock = threading.Lock()
-        self._database = sqlite3.connect(path, check_same_thread=False, isolation_level=None)
-        self._database.executescript("""
-            PRAGMA journal_mode = WAL;
-            PRAGMA synchronous = NORMAL;
-            CREATE TABLE IF NOT EXISTS request (
-                number INTEGER PRIMARY KEY, key TEXT NOT NULL UNIQUE, what TEXT NOT NULL, answer TEXT
-            );
-            SELECT number, key, what, answer FROM request LIMIT 1;
-        """)
+        self._database = table_at(path, _TABLE)
 
     def close(self) -> None:
         """Close the file."""

@@ -136,3 +136,11 @@ def test_a_disk_that_takes_no_job_is_told(tmp_path: Path, pragma: str, kind: typ
         jobs = [reconstruction_job("run", shot, "cal", "mlos-1", {}) for shot in range(1000)]
         with pytest.raises(kind, match=r"jobs\.sqlite"):
             table.restore(jobs)
+
+
+def test_a_table_that_cannot_be_read_is_closed_again(tmp_path: Path) -> None:
+    (tmp_path / "jobs.sqlite").write_bytes(b"no table" * 1000)
+    opened = len(list(Path("/proc/self/fd").iterdir()))
+    with pytest.raises(sqlite3.DatabaseError):
+        JobTable(tmp_path / "jobs.sqlite")
+    assert len(list(Path("/proc/self/fd").iterdir())) == opened

@@ -1,7 +1,9 @@
 """Deleting a run: by its name only, never under somebody's hands, and nothing of it is left."""
 
 from collections import Counter
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -37,8 +39,10 @@ class House:
 
 
 @pytest.fixture
-def house(tmp_path: Path) -> House:
-    return House(tmp_path)
+def house(tmp_path: Path) -> Iterator[House]:
+    house = House(tmp_path)
+    with closing(house.jobs), closing(house.index):
+        yield house
 
 
 def test_a_run_goes_with_its_results_jobs_and_what_was_remembered_of_it(house: House) -> None:
