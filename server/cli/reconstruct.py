@@ -30,9 +30,10 @@ from server.cli.runs.recipes import add_recipe, keeping_recipe, settings_of, wit
 from server.cli.runs.resuming import resumable
 
 if TYPE_CHECKING:
-    from collections.abc import Generator
+    from collections.abc import Generator, Mapping
 
     from processing.reconstruction.settings import ReconstructionSettings
+    from processing.runs.shots.meetings import Exposure
     from processing.runs.shots.shot_result import ShotResult
 
 NAME = "reconstruct"
@@ -113,14 +114,11 @@ def _reconstruct_run(
 def _reconstruct_shots(
     options: Namespace, settings: "ReconstructionSettings", run_dir: Path, indices: list[int], out: Path
 ) -> "tuple[list[ShotResult], Belonging]":
-    from daq.files.run_directory import RunReader
     from processing.calibration.calibration_file import load_calibration
-    from processing.runs.shots.meeting_lines import MeetingLines, SeldomMeeting
+    from processing.runs.shots.meetings import pale_views, seldom_meeting
     from processing.runs.volumes.pipeline import Options, reconstruct_shots
 
     calibration = load_calibration(options.calibration)
-    with RunReader(run_dir) as run:
-        meeting = SeldomMeeting(MeetingLines.of(calibration, list(run.header.views)) if len(indices) > 1 else None)
 
     @cache
     def belonging() -> Belonging:
@@ -130,7 +128,7 @@ def _reconstruct_shots(
     if options.scheduler:
         coming = _elsewhere(options, settings, run_dir, indices, out, belonging())
     else:
-        known: Options = {"threads": usable_processors(), "told": lambda: belonging().provenance, "look": meeting.look}
+        known: Options = {"threads": usable_processors(), "told": lambda: belonging().provenance}
         coming = reconstruct_shots(run_dir, indices, options.calibration, settings, out, **known)
     with closing(coming):
         for _ in tracked(indices, lambda index: f"{run_dir.name}: shot {index} by {settings.method}"):
@@ -139,7 +137,9 @@ def _reconstruct_shots(
                 _tell_slow_views(shot)
             _tell_faults(shot)
             shots.append(shot)
-    return shots, ask_seldom(belonging(), meeting.shots(), run_dir, calibration)
+    meetings = {key: one for shot in shots for key, one in shot.meetings.items()}
+    told = [_with_pale(shot, pale_views(meetings)) for shot in shots]
+    return told, ask_seldom(belonging(), seldom_meeting(meetings), run_dir, calibration)
 
 
 def _elsewhere(
@@ -164,6 +164,16 @@ def _tell_slow_views(shot: "ShotResult") -> None:
         if view.reason:
             nodes = f"nodes {view.node_spacing_voxel} voxels apart"
             progress(f"{name} takes the exact way, which is slower ({nodes}): {view.reason}")
+
+
+def _with_pale(shot: "ShotResult", pale: "Mapping[Exposure, Mapping[str, str]]") -> "ShotResult":
+    """The same shot, with what the others say of its views, which is told."""
+    volumes = []
+    for volume in shot.volumes:
+        views = pale.get((volume.shot, volume.frame), {})
+        tell_faults(f"shot {volume.shot}, exposure {volume.frame}", {"odd_light": views})
+        volumes.append(volume.model_copy(update={"odd_light": {**views, **volume.odd_light}}))
+    return shot.model_copy(update={"volumes": tuple(volumes)})
 
 
 def _tell_faults(shot: "ShotResult") -> None:

@@ -23,7 +23,7 @@ from server.lab.jobs import Job, JobKind, JobState, JobTable
 from server.lab.results import is_kept, remaking
 from server.lab.watch import CalibrationWatch
 
-_CHECKS_REMEMBERED = 1000
+_CHECKS_REMEMBERED, _VOLUMES_REMEMBERED = 1000, 100
 _LOOK_AGAIN_S = 5.0
 _REST_S = 1.0
 _STORE_S = 600.0
@@ -176,6 +176,8 @@ class JobRunner:
         self._table.requeue_interrupted()
         for job in reversed(self._table.newest(limit=_CHECKS_REMEMBERED, kinds=[JobKind.CHECK])):
             self._watch.learn(job)
+        for job in reversed(self._table.newest(limit=_VOLUMES_REMEMBERED, kinds=[JobKind.RECONSTRUCTION])):
+            self._watch.compared(job, job.result or {})
 
     def _waiting(self, running: frozenset[str]) -> list[Job]:
         """Who may be next: checks and all else take turns, so that neither keeps the other waiting.
@@ -240,7 +242,7 @@ class JobRunner:
             await self._move(job.id, JobState.FAILED, error=str(error))
         else:
             known = {} if belonging is None else {BELONGING: belonging}
-            await self._move(job.id, JobState.DONE, result={**result, **known})
+            await self._move(job.id, JobState.DONE, result={**self._watch.compared(job, result), **known})
 
     def _is_lost(self, job: Job) -> bool:
         """Whether the files of a done job are gone, or some of them."""

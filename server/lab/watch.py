@@ -3,6 +3,9 @@
 A check takes seconds and shots may come faster. So one check of a run is under way at a time; when it has ended, the
 newest shot that was asked for meanwhile is next. Slow runs are checked shot by shot, fast ones by a sample. The volumes
 of the shot that is checked first do not wait, and say that they are not checked yet; those of all others do.
+
+Volumes come with figures by which the exposures of a run are compared: shots in which lines of sight meet seldom are
+checked too, and views that are pale beside those of the shots before are told with the volumes.
 """
 
 import threading
@@ -13,12 +16,16 @@ from pydantic import Field
 
 from daq.frozen_model import FrozenModel
 from processing.calibration.verdict import Verdict
+from processing.runs.shots.meetings import Exposure, Meeting, meetings_of, pale_views, seldom_meeting
 from processing.runs.shots.shot_check import ALARM_PX, STOP_PX
+from processing.runs.workbench import Latest
 from server.lab.events import EventPublisher
 from server.lab.jobs import ENDED, Job, JobKind, JobState, check_job
 
 _TRUSTING = (JobKind.RECONSTRUCTION, JobKind.MEASUREMENT)
 """Jobs that make nothing good of a calibration that does not fit."""
+_RESULTS_COMPARED, _EXPOSURES_COMPARED = 8, 400
+"""Of so many results, the newest exposures are known; the others are long ago."""
 _ALARMING = (Verdict.WARN, Verdict.REFUSE)
 _REMEDY = (
     "The shots are kept: correct the calibration by the droplets (tomoshadow self-calibrate) or calibrate anew, "
@@ -81,6 +88,8 @@ class _Account:
     under_way: int | None = None
     next_shot: int | None = None
     has_ended: bool = False
+    asked: set[int] = field(default_factory=set)
+    odd: set[int] = field(default_factory=set)
     told: set[int] = field(default_factory=set)
     standing: CalibrationStanding | None = None
     newest: dict[str, Any] | None = None
@@ -112,6 +121,7 @@ class CalibrationWatch:
         self._events = events
         self._lock = threading.Lock()
         self._accounts: dict[Pair, _Account] = {}
+        self._meetings: Latest[dict[Exposure, Meeting]] = Latest(_RESULTS_COMPARED)
         self.standing: CalibrationStanding | None = None
         """Of the run that was checked last."""
 
@@ -128,12 +138,13 @@ class CalibrationWatch:
                 return None
             job = check_job(run_id, shot, calibration, content)
             account.under_way, account.next_shot = shot, None
+            account.asked.add(shot)
             return job
 
     def learn(self, job: Job) -> Job | None:
-        """Take notice of the state of a check; returns the check that follows one that has ended, if any."""
+        """Take notice of the state of a job; returns the check that follows it, if any."""
         if job.kind is not JobKind.CHECK:
-            return None
+            return self._check_of_odd(job) if job.state is JobState.DONE else None
         content = str(job.settings.get("content", ""))
         with self._lock:
             known = self._accounts.get((job.run_id, job.calibration))
@@ -149,6 +160,36 @@ class CalibrationWatch:
             following = account.next_shot
         self._tell(before, account.standing)
         return None if following is None else self.next_check(job.run_id, job.calibration, following, content)
+
+    def _check_of_odd(self, job: Job) -> Job | None:
+        """The check of a shot in which lines of sight meet seldom; none while another shot waits to be checked."""
+        with self._lock:
+            account = self._accounts.get((job.run_id, job.calibration))
+            seldom = seldom_meeting(self._meetings.of((job.run_id, job.results_id), dict))
+            if account is None or account.next_shot is not None:
+                return None
+            odd = next((shot for shot in seldom if shot not in account.asked), None)
+            if odd is None:
+                return None
+            account.odd.add(odd)
+        return self.next_check(job.run_id, job.calibration, odd, account.content)
+
+    def compared(self, job: Job, result: dict[str, Any]) -> dict[str, Any]:
+        """What came of a job, with what other shots of the same results say of its views."""
+        own = meetings_of(result.get("volumes", []))
+        if not own:
+            return result
+        with self._lock:
+            known = self._meetings.of((job.run_id, job.results_id), dict)
+            known |= own
+            for exposure in list(known)[:-_EXPOSURES_COMPARED]:
+                del known[exposure]
+            pale = pale_views(known)
+        volumes = [
+            {**one, "odd_light": {**pale.get((one["shot"], one["frame"]), {}), **one["odd_light"]}}
+            for one in result["volumes"]
+        ]
+        return {**result, "volumes": volumes}
 
     def belonging(self, job: Job) -> dict[str, Any] | None:
         """What checks have said so far of run and calibration of a job that trusts them; None of every other job.
@@ -197,8 +238,8 @@ class CalibrationWatch:
             return account.standing
         shot: int = result["shot"]
         account.told.add(shot)
-        if account.standing and account.standing.shot > shot:
-            return account.standing
+        if shot in account.odd or (account.standing and account.standing.shot > shot):
+            return account.standing  # what is so of one shot alone stops no others
         return CalibrationStanding(
             run_id=job.run_id,
             calibration=job.calibration,

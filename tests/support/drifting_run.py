@@ -1,12 +1,14 @@
 """A run of droplets seen by four views, one of which has moved since it was calibrated."""
 
-from collections.abc import Container
+from collections.abc import Callable, Container, Mapping
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 
 from daq.files.run_directory import DoubleFrame, ExposureRecord, ImageKey, RunHeader, RunWriter, Shot, ViewFormat
 from processing.studies.seen_droplets import droplet_image
+from processing.synthetic.stamping import FloatImage
 from tests.support.drifting_views import DENSITY_PER_MM3, HALF_MM, SIZE_PX, views
 
 SEEN = ExposureRecord(valid=True, frame_id=1, device_timestamp_ns=1)
@@ -25,11 +27,12 @@ def write_droplet_run(
     shots: int = 2,
     drifting: Container[int] = range(100),
     cut_px: int = 0,
+    odd: Mapping[int, Callable[[FloatImage], FloatImage]] = MappingProxyType({}),
 ) -> Path:
     """Shots; in those that drift, view2's picture lies two pixels further right than when it was calibrated.
 
     A covered view is dark; mirrored are all of them. Odd rows of interlaced ones show the droplets 0.1 mm beside.
-    Images from elsewhere were cut so many rows lower than those of the target.
+    Images from elsewhere were cut so many rows lower than those of the target. In odd shots view2 is changed.
     """
     rng = np.random.default_rng(11)
     cameras = {f"view{number}": camera for number, camera in enumerate(views()[:view_count], start=1)}
@@ -52,6 +55,7 @@ def write_droplet_run(
                     later_mm = points_mm + (0.1, 0, 0)
                     for name, camera in cameras.items():
                         images[name][1::2] = droplet_image(camera, later_mm, rng)[1::2]
+                images["view2"] = odd.get(index, np.asarray)(images["view2"])
                 images["view2"] = np.roll(images["view2"], drift_px * (index in drifting), axis=1)
                 images = {name: np.roll(image, -cut_px, axis=0) for name, image in images.items()}
                 images = {name: image[:, ::-1] if mirrored else image for name, image in images.items()}

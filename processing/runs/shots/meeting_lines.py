@@ -5,7 +5,7 @@ seldom than in the other shots of a run, all droplets are asked (``check_shot``)
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -13,9 +13,10 @@ import numpy as np
 from processing.calibration.calibration import Calibration
 from processing.calibration.droplets.disparity import MIN_VIEWS, measured_box
 from processing.calibration.droplets.droplet_images import find_droplets
-from processing.calibration.droplets.droplet_matching import Box, match_droplets
-from processing.geometry import ViewMapping
+from processing.calibration.droplets.droplet_matching import Box, Matches, match_droplets
+from processing.geometry import FloatArray, ViewMapping
 from processing.preprocessing import Intensity
+from processing.runs.shots.meetings import Meeting
 
 SEEDS = 100
 """Droplets of one view that are followed."""
@@ -23,12 +24,7 @@ MIDDLE = 0.5
 """Of the measured volume, along x, y and z."""
 CLOSE_PX = 1.0
 """Lines of sight that pass a droplet so closely, in all images, meet there."""
-SELDOM = 0.5
-"""Of how often they meet in half of the shots."""
-SURE = 3.0
-"""Standard deviations of the count that is missed."""
-MOST_ODD = 3
-"""Shots that are then asked in full."""
+_AROUND = np.array([-1, 0, 1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,14 +33,17 @@ class MeetingLines:
 
     Parameters
     ----------
+    views : sequence of str
+        Their names, in the order of the images.
     mappings : sequence of ViewMapping
-        The views, in the order of the images.
+        Of these views.
     box : Box
         The measured volume.
     parts : sequence of (slice, slice)
         Rows and columns of each image that see its middle.
     """
 
+    views: Sequence[str]
     mappings: Sequence[ViewMapping]
     box: Box
     parts: Sequence[tuple[slice, slice]]
@@ -63,49 +62,40 @@ class MeetingLines:
             return None
         mappings = [calibration.views[name].mapping for name in views]
         box = measured_box(calibration)
-        return cls(mappings, box, [_part(mapping, box) for mapping in mappings])
+        return cls(views, mappings, box, [_part(mapping, box) for mapping in mappings])
 
-    def count(self, images: Sequence[Intensity]) -> int:
+    def meeting(self, images: Sequence[Intensity]) -> Meeting:
         """At how many droplets of an exposure lines of sight of all views meet; none in images of another size."""
         sizes_px = [image.shape[::-1] for image in images]
         if sizes_px != [mapping.image_size_px for mapping in self.mappings]:
-            return 0
+            return Meeting(droplets=0)
         droplets_px = [
             find_droplets(image[part]) + (part[1].start, part[0].start)
             for image, part in zip(images, self.parts, strict=True)
         ]
         if not all(map(len, droplets_px)):
-            return 0
-        return len(match_droplets(self.mappings, droplets_px, self.box, CLOSE_PX, SEEDS))
+            return Meeting(droplets=0)
+        matches = match_droplets(self.mappings, droplets_px, self.box, CLOSE_PX, SEEDS)
+        return self._shown(images, matches) if len(matches) else Meeting(droplets=0)
+
+    def _shown(self, images: Sequence[Intensity], matches: Matches) -> Meeting:
+        seen_px = [mapping.project(matches.points_mm) for mapping in self.mappings] + matches.disparities_px.swapaxes(
+            0, 1
+        )
+        peaks = np.stack([_peaks(image, centres_px) for image, centres_px in zip(images, seen_px, strict=True)])
+        lower, upper = np.percentile(peaks / np.median(peaks, axis=0), (25, 75), axis=1)
+        errors = (upper - lower) / np.sqrt(len(matches))  # of the quartile of a normal distribution
+        contrasts, by_chance = (dict(zip(self.views, one.round(4).tolist(), strict=True)) for one in (lower, errors))
+        return Meeting(droplets=len(matches), contrasts=contrasts, errors=by_chance)
 
 
-@dataclass(frozen=True, eq=False)
-class SeldomMeeting:
-    """Looks at the exposures of shot after shot, and knows in which of them lines of sight meet seldom.
-
-    Parameters
-    ----------
-    lines : MeetingLines, optional
-        Without, no shot stands out.
-    counts : dict of int to int
-        By shot: at how many droplets lines of sight meet, in the exposure where these are fewer.
-    """
-
-    lines: MeetingLines | None
-    counts: dict[int, int] = field(default_factory=dict)
-
-    def look(self, shot: int, images: Sequence[Intensity]) -> None:
-        """Count in one exposure."""
-        if self.lines:
-            count = self.lines.count(images)
-            self.counts[shot] = min(count, self.counts.get(shot, count))
-
-    def shots(self) -> list[int]:
-        """Shots in which they meet much more seldom than in the others; the most seldom first, no more than a few."""
-        usual = float(np.median(list(self.counts.values()))) if self.counts else 0.0
-        least = min(SELDOM * usual, usual - SURE * np.sqrt(usual))
-        odd = [shot for shot, count in self.counts.items() if count < least]
-        return sorted(odd, key=lambda shot: self.counts[shot])[:MOST_ODD]
+def _peaks(image: Intensity, centres_px: FloatArray) -> FloatArray:
+    """The highest pixel (N,) around each of some places."""
+    columns, rows = np.rint(centres_px).astype(int).T
+    height, width = image.shape
+    down = np.clip(rows[:, None, None] + _AROUND[:, None], 0, height - 1)
+    along = np.clip(columns[:, None, None] + _AROUND, 0, width - 1)
+    return np.asarray(image[down, along].max(axis=(1, 2)), np.float64)
 
 
 def _part(mapping: ViewMapping, box: Box) -> tuple[slice, slice]:

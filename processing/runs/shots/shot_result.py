@@ -6,6 +6,7 @@ from processing.reconstruction.choices import ReconstructionMethod
 from processing.reconstruction.planning.planned_view import PlannedView
 from processing.reconstruction.settings import FrozenValue, GridSettings
 from processing.runs.results_file import FrameName
+from processing.runs.shots.meetings import Exposure, Meeting
 
 
 class VolumeRecord(FrozenValue):
@@ -15,7 +16,8 @@ class VolumeRecord(FrozenValue):
     see nothing in this exposure, no pixel above the noise floor: a shot may be empty, or a lens be covered.
     ``dim_views`` have no grey value above 1/8 of the full scale: light is missing, or the run states too many bits.
     ``odd_light`` says of a view what does not fit its background or the polarity. ``empty``: no voxel is above 0.
-    ``lost_share`` of the sum of all intensities is in voxels that were too faint for bytes.
+    ``lost_share`` of the sum of all intensities is in voxels that were too faint for bytes. ``meeting`` is what other
+    exposures of the run are compared with; of two views there is none.
     """
 
     shot: int
@@ -28,6 +30,7 @@ class VolumeRecord(FrozenValue):
     odd_light: Mapping[str, str] = {}
     empty: bool = False
     lost_share: float = 0.0
+    meeting: Meeting | None = None
 
 
 class ShotResult(FrozenValue):
@@ -40,3 +43,8 @@ class ShotResult(FrozenValue):
     volumes: tuple[VolumeRecord, ...]
     cpu_s: float
     peak_rss_mb: float
+
+    @property
+    def meetings(self) -> dict[Exposure, Meeting]:
+        """Of its exposures, those that have one."""
+        return {(one.shot, one.frame): one.meeting for one in self.volumes if one.meeting}

@@ -16,6 +16,8 @@ from processing.reconstruction.reconstructor import Reconstructor
 from processing.reconstruction.settings import METHOD_VERSION, ReconstructionSettings
 from processing.runs.exposure_faults import Faults, exposure_faults
 from processing.runs.results_file import FrameName, Provenance, provenance_of
+from processing.runs.shots.meeting_lines import MeetingLines
+from processing.runs.shots.meetings import Meeting
 from processing.runs.shots.read_ahead import read_ahead
 from processing.runs.shots.shot_images import frame_names, require_match, shot_intensities
 from processing.runs.workbench import References, Workbench
@@ -27,12 +29,13 @@ _MOST_LANES = 2
 
 @dataclass(frozen=True, eq=False)
 class Exposure:
-    """Images of an exposure, ready to be reconstructed, and what is wrong with them."""
+    """Images of an exposure, ready to be reconstructed, what is wrong with them, and what others are compared with."""
 
     shot: int
     frame: FrameName
     images: list[Intensity]
     faults: Faults
+    meeting: Meeting | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +58,8 @@ class Chain:
         Where the volumes come from, but for shot and frame.
     views : mapping of str to PlannedView
         How each view is seen.
+    lines : MeetingLines, optional
+        Where lines of sight of all views meet; of few views they tell nothing.
     threads : int
         Of every lane.
     writing : Lock
@@ -68,6 +73,7 @@ class Chain:
     references: References
     provenance: Provenance
     views: Mapping[str, PlannedView]
+    lines: MeetingLines | None
     threads: int
     writing: Lock = field(default_factory=Lock)
 
@@ -102,7 +108,8 @@ class Chain:
         )
         views = {name: PlannedView.of(view) for name, view in zip(shown, reconstructors[0].plan.views, strict=True)}
         provenance = {**made_by, "views": json.dumps({name: view.model_dump() for name, view in views.items()})}
-        return cls(run, calibration, settings, reconstructors, bench.references(run), provenance, views, threads)
+        lines, references = MeetingLines.of(calibration, shown), bench.references(run)
+        return cls(run, calibration, settings, reconstructors, references, provenance, views, lines, threads)
 
     @property
     def grid(self) -> VoxelGrid:
@@ -127,7 +134,8 @@ class Chain:
             images = shot_intensities(
                 run, shot, frame, self.settings, memory, references=references, threads=self.threads
             )
-            yield Exposure(index, frame, images, exposure_faults(run, shot, frame, images, references))
+            meeting = self.lines.meeting(images) if self.lines else None
+            yield Exposure(index, frame, images, exposure_faults(run, shot, frame, images, references), meeting)
 
 
 def _reconstructors(

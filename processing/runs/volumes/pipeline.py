@@ -11,7 +11,6 @@ from typing import TypedDict, Unpack
 
 from daq.files.run_directory import RunReader
 from processing.kernels import DEFAULT_THREADS
-from processing.preprocessing import Intensity
 from processing.reconstruction.reconstructor import Reconstructor
 from processing.reconstruction.settings import METHOD_VERSION, GridSettings, ReconstructionSettings
 from processing.reconstruction.slab_volume import SlabVolume
@@ -43,15 +42,12 @@ class Options(TypedDict, total=False):
         What else is known of a shot, for its volumes; asked once there is something to write.
     keep : Keep
         What is kept of a volume; all of it by default, as VTKHDF.
-    look : callable
-        Shown the images of each exposure of a shot.
     """
 
     workbench: Workbench
     threads: int
     told: Callable[[], Provenance]
     keep: Keep
-    look: Callable[[int, Sequence[Intensity]], None]
 
 
 def reconstruct_shot(
@@ -112,7 +108,6 @@ def reconstruct_shots(
     threads = options.get("threads", DEFAULT_THREADS)
     keep = options.get("keep", write_slabs)
     told = options.get("told", dict)
-    look = options.get("look")
     started_cpu_s = time.process_time()
     with (options.get("workbench") or Workbench()).occupied() as bench, RunReader(run_dir) as run:
         chain = Chain.of(run, calibration_file, settings, bench, threads=threads, shots=len(shots))
@@ -120,8 +115,6 @@ def reconstruct_shots(
         def volumes_of(lane: Reconstructor, shot: int) -> list[VolumeRecord]:
             volumes = []
             for exposure in chain.exposures(lane, shot):
-                if look:
-                    look(exposure.shot, exposure.images)
                 if should_stop():
                     raise Stopped(f"{run_dir.name}, shot {exposure.shot}: stopped before exposure {exposure.frame}")
                 with chain.writing:  # whoever is first makes the folder, and has told what is known for all
@@ -157,7 +150,7 @@ def _reconstruct(
         empty=slabs.empty,
         lost_share=volume.losses.intensity_share if volume.losses else 0.0,
     )
-    return record.model_copy(update=exposure.faults)
+    return record.model_copy(update={**exposure.faults, "meeting": exposure.meeting})
 
 
 def _named(chain: Chain, exposure: Exposure) -> Provenance:

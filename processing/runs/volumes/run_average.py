@@ -17,7 +17,8 @@ from processing.reconstruction.reconstructor import Reconstructor
 from processing.reconstruction.settings import ReconstructionSettings
 from processing.runs.exposure_faults import copied, exposure_faults
 from processing.runs.results_file import FrameName
-from processing.runs.shots.meeting_lines import MeetingLines, SeldomMeeting
+from processing.runs.shots.meeting_lines import MeetingLines
+from processing.runs.shots.meetings import Exposure, Meeting, Meetings, pale_views, seldom_meeting
 from processing.runs.shots.shot_images import require_match, shot_intensities
 from processing.runs.workbench import References, Workbench
 from processing.volume import VoxelGrid
@@ -40,7 +41,7 @@ class RunAverage:
     faults : tuple
         Shots whose images may be wrong, and how: ``shot``, and what ``exposure_faults`` has found.
     seldom : list of int
-        Shots in which lines of sight meet much more seldom than in the others, see ``SeldomMeeting``.
+        Shots in which lines of sight meet much more seldom than in the others, see ``seldom_meeting``.
     """
 
     mean: MeanVolume
@@ -93,22 +94,38 @@ def average_run(
         calibration.require_usable(run.header.views)
         plan = plan_of(calibration, settings, tuple(run.header.views))
         faults: list[Mapping[str, Any]] = []
-        meeting = SeldomMeeting(MeetingLines.of(calibration, tuple(run.header.views)))
+        lines, meetings = MeetingLines.of(calibration, tuple(run.header.views)), dict[Exposure, Meeting]()
         references = bench.references(run)
         exposures = _exposures(run, shots, frame, calibration, settings, references, done, threads, faults)
-        exposures = _looked_at(exposures, shots, meeting)
+        if lines:
+            exposures = _looked_at(exposures, shots, frame, lines, meetings)
         if settings.method.iterative:
             mean = MeanVolume.of(_mean_of_each(Reconstructor.of(plan, settings, threads), exposures))
         else:
             mean = mean_volume(plan, exposures, settings.method, threads=threads)
-        return RunAverage(mean, plan.grid, len(shots), tuple(faults), meeting.shots())
+        return RunAverage(mean, plan.grid, len(shots), _with_pale(faults, meetings), seldom_meeting(meetings))
 
 
-def _looked_at(exposures: Exposures, shots: Sequence[int], meeting: SeldomMeeting) -> Exposures:
+def _looked_at(
+    exposures: Exposures,
+    shots: Sequence[int],
+    frame: FrameName,
+    lines: MeetingLines,
+    meetings: dict[Exposure, Meeting],
+) -> Exposures:
     """The same exposures, each asked whether lines of sight meet in it."""
     for index, images in zip(shots, exposures, strict=True):
-        meeting.look(index, images)
+        meetings[index, frame] = lines.meeting(images)
         yield images
+
+
+def _with_pale(faults: Sequence[Mapping[str, Any]], meetings: Meetings) -> tuple[Mapping[str, Any], ...]:
+    """Faults of exposures, those included that only the others tell; in the order of the shots."""
+    by_shot = {fault["shot"]: fault for fault in faults}
+    for (shot, _), views in pale_views(meetings).items():
+        known = by_shot.get(shot, {"shot": shot})
+        by_shot[shot] = {**known, "odd_light": {**views, **known.get("odd_light", {})}}
+    return tuple(by_shot[shot] for shot in sorted(by_shot))
 
 
 def _exposures(

@@ -8,7 +8,7 @@ from processing.calibration.fit.health import judge
 from processing.calibration.verdict import Verdict
 from processing.runs.shots.shot_check import ALARM_PX
 from server.lab.events import EventPublisher
-from server.lab.jobs import Job, JobState, check_job, reconstruction_job
+from server.lab.jobs import Job, JobKind, JobState, check_job, reconstruction_job
 from server.lab.watch import CalibrationWatch
 
 RUN, CALIBRATION = "run", "cal"
@@ -205,3 +205,35 @@ def test_after_a_start_the_newest_content_counts() -> None:
         check = check_job(RUN, 0, CALIBRATION, content)
         watch.learn(check.model_copy(update={"state": JobState.DONE, "result": ended(0, disparity_px).result}))
     assert watch.refusal(reconstruction(1)) is None
+
+
+def made(watch: CalibrationWatch, shot: int, droplets: int = 40, contrast: float = 0.9) -> tuple[Job | None, str]:
+    """Volumes of a shot come: the check that follows, and what is odd with view2."""
+    meeting = {"droplets": droplets, "contrasts": {"view2": contrast}, "errors": {"view2": 0.01}}
+    volume = {"shot": shot, "frame": "a", "odd_light": {}, "meeting": meeting}
+    result = watch.compared(reconstruction(shot), {"volumes": [volume]})
+    done = reconstruction(shot).model_copy(update={"state": JobState.DONE, "result": result})
+    return watch.learn(done), result["volumes"][0]["odd_light"].get("view2", "")
+
+
+def test_a_shot_in_which_lines_of_sight_meet_seldom_is_checked_and_stops_no_others() -> None:
+    watch, _ = watch_of([0.1])
+    assert [made(watch, shot)[0] for shot in range(4)] == [None] * 4
+    odd, _ = made(watch, 4, droplets=3)
+    assert odd is not None
+    assert (odd.kind, odd.shot) == (JobKind.CHECK, 4)
+    assert made(watch, 5, droplets=2)[0] is None, "one check at a time"
+    following = watch.learn(ended(4, 2.0))
+    assert following is not None
+    assert following.shot == 5
+    assert watch.refusal(reconstruction(6)) is None
+    assert (watch.belonging(reconstruction(6)) or {})["verdict"] == Verdict.REFUSE
+    assert watch.learn(ended(5, 2.0)) is None
+    assert made(watch, 6)[0] is None, "each of them once"
+
+
+def test_a_view_that_is_pale_is_told_with_the_volumes_of_its_shot() -> None:
+    watch, _ = watch_of([])
+    assert [made(watch, shot)[1] for shot in range(3)] == [""] * 3
+    assert made(watch, 3, contrast=0.5)[1].startswith("shows droplets with 56 % of the contrast")
+    assert made(watch, 4)[1] == ""

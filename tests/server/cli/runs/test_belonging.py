@@ -1,13 +1,18 @@
 """reconstruct and average ask droplets whether run and calibration belong together: volumes look fine either way."""
 
 import json
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
 
 from processing.calibration.calibration_file import save_calibration
 from processing.reconstruction.volume_file import read_volume
-from processing.runs.shots.meeting_lines import SeldomMeeting
+from processing.runs.shots.meetings import Exposure, Meeting, pale_views, seldom_meeting
+from processing.synthetic.stamping import FloatImage
+from server.cli.main import main
 from tests.support.command_line import told
 from tests.support.drifting_run import write_droplet_run
 from tests.support.drifting_views import calibration_of, views
@@ -68,10 +73,59 @@ def test_a_view_that_moves_for_a_shot_that_nobody_asks_in_full_does_not_pass_in_
     assert asked == [(0, None), (3, None), (5, None), (1, "view2")]
 
 
+def out_of_focus(image: FloatImage) -> FloatImage:
+    return np.asarray(cv2.GaussianBlur(image, (0, 0), 1.2), np.float32)
+
+
+def half_veiled(image: FloatImage) -> FloatImage:
+    left = np.arange(image.shape[1]) < image.shape[1] / 2
+    return np.where(left, np.float32(0.6) * image, image)
+
+
+@pytest.mark.parametrize(("command", "change"), [("reconstruct", out_of_focus), ("average", half_veiled)])
+def test_a_view_that_is_pale_for_one_shot_is_told(
+    command: str,
+    change: Callable[[FloatImage], FloatImage],
+    calibration_file: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Lines of sight meet as ever, and volumes look fine."""
+    run_dir = write_droplet_run(tmp_path / "run", drift_px=0, shots=3, odd={1: change})
+    arguments = [command, run_dir, "--calibration", calibration_file, GRID, "-o", tmp_path / "mean.vtkhdf", "--json"]
+    assert main([str(one) for one in arguments]) == 0
+    output = capsys.readouterr()
+    answer = json.loads(output.out.splitlines()[-1])
+    told = answer["volumes"] if command == "reconstruct" else answer["faults"]
+    odd = {(one["shot"], view): what for one in told for view, what in one["odd_light"].items()}
+    assert list(odd) == [(1, "view2")]
+    assert "% of the contrast that it has in other shots" in odd[1, "view2"]
+    assert f"shot 1, exposure a: view2 {odd[1, 'view2']}" in output.err
+
+
+def test_contrasts_that_scatter_or_are_few_make_no_view_pale() -> None:
+    def said(contrasts: Sequence[float], droplets: int = 40, error: float = 0.01) -> list[int]:
+        meetings: dict[Exposure, Meeting] = {
+            (shot, "a"): Meeting(droplets=droplets, contrasts={"view1": one}, errors={"view1": error})
+            for shot, one in enumerate(contrasts)
+        }
+        return [shot for shot, _ in pale_views(meetings)]
+
+    assert said([0.9, 0.91, 0.6]) == [2]
+    assert said([0.9, 0.91, 0.8]) == []
+    assert said([0.9, 0.6]) == []
+    assert said([0.9, 0.91, 0.6], droplets=9) == []
+    assert said([0.9, 0.91, 0.6], error=0.07) == []
+
+
+def odd_of(counts: dict[int, int]) -> list[int]:
+    return seldom_meeting({(shot, "a"): Meeting(droplets=count) for shot, count in counts.items()})
+
+
 def test_no_shot_stands_out_where_all_are_alike_or_droplets_few() -> None:
     for counts in ({}, {0: 0, 1: 0}, {0: 9, 1: 0}, {0: 30, 1: 18, 2: 40, 3: 31}, dict.fromkeys(range(9), 50)):
-        assert SeldomMeeting(None, counts).shots() == []
-    assert SeldomMeeting(None, {0: 30, 1: 12, 2: 40, 3: 31, 4: 2}).shots() == [4, 1]
+        assert odd_of(counts) == []
+    assert odd_of({0: 30, 1: 12, 2: 40, 3: 31, 4: 2}) == [4, 1]
 
 
 def test_what_droplets_do_not_tell_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,0 +1,93 @@
+"""What the exposures of a run say of each other: in which of them lines of sight meet seldom, and views are pale.
+
+A single exposure tells neither: how many droplets there are differs from spray to spray, and how sharp a view is from
+rig to rig. So each keeps its figures, which cost a hundredth of a second, and they are compared as they come.
+"""
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field
+
+from processing.reconstruction.settings import FrozenValue
+from processing.runs.results_file import FrameName
+
+SELDOM = 0.5
+"""Of how often lines of sight meet in half of the shots."""
+MISSED = 3.0
+"""Standard deviations of the count that is missed."""
+MOST_ODD = 3
+"""Shots that are then asked in full."""
+PALE = 0.85
+"""Of the usual contrast: a view that is less sharp by the size of a droplet, or a third darker over half of it."""
+SURE = 5.0
+"""Standard deviations of a contrast."""
+FEWEST = 10
+"""Of fewer droplets contrasts say nothing."""
+FEWEST_EXPOSURES = 3
+"""Of fewer, which is the odd one nobody knows."""
+
+
+class Meeting(FrozenValue):
+    """At how many droplets of an exposure lines of sight of all views meet, and how well each view shows these."""
+
+    droplets: Annotated[int, Field(description="of some in the middle of the volume")]
+    contrasts: Annotated[
+        Mapping[str, float],
+        Field(description="by view: three quarters of them are more intense than so many times the middle view's"),
+    ] = {}
+    errors: Annotated[Mapping[str, float], Field(description="standard deviations of these by chance")] = {}
+
+
+Exposure = tuple[int, FrameName]
+"""Shot and exposure."""
+Meetings = Mapping[Exposure, Meeting]
+
+
+def meetings_of(volumes: list[dict[str, Any]]) -> dict[Exposure, Meeting]:
+    """Of records of volumes, those that have one."""
+    told = [one for one in volumes if one.get("meeting")]
+    return {(one["shot"], one["frame"]): Meeting.model_validate(one["meeting"]) for one in told}
+
+
+def seldom_meeting(meetings: Meetings) -> list[int]:
+    """Shots in which lines of sight meet much more seldom than in the others; a few, the most seldom first.
+
+    Of a shot that exposure counts in which they are fewer.
+    """
+    counts: dict[int, int] = {}
+    for (shot, _), meeting in meetings.items():
+        counts[shot] = min(meeting.droplets, counts.get(shot, meeting.droplets))
+    usual = float(np.median(list(counts.values()))) if counts else 0.0
+    least = min(SELDOM * usual, usual - MISSED * np.sqrt(usual))
+    odd = [shot for shot, count in counts.items() if count < least]
+    return sorted(odd, key=counts.__getitem__)[:MOST_ODD]
+
+
+def pale_views(meetings: Meetings) -> dict[Exposure, dict[str, str]]:
+    """What is said of views that show droplets much paler, beside the other views, than in most exposures of a run."""
+    said: dict[Exposure, dict[str, str]] = {}
+    for frame in dict.fromkeys(frame for _, frame in meetings):
+        told = {key: one for key, one in meetings.items() if key[1] == frame and one.droplets >= FEWEST}
+        if len(told) < FEWEST_EXPOSURES:
+            continue
+        for view in next(iter(told.values())).contrasts:
+            said |= {key: {**said.get(key, {}), view: text} for key, text in _pale(told, view).items()}
+    return said
+
+
+def _pale(told: Meetings, view: str) -> dict[Exposure, str]:
+    droplets = np.array([one.droplets for one in told.values()])
+    contrasts = np.array([one.contrasts[view] for one in told.values()])
+    usual = float(np.median(contrasts))
+    by_chance = float(np.median([one.errors[view] for one in told.values()] * np.sqrt(droplets))) / np.sqrt(droplets)
+    pale = contrasts < usual - np.maximum((1 - PALE) * usual, SURE * by_chance)
+    return {key: _text(contrast / usual) for key, contrast, is_so in zip(told, contrasts, pale, strict=True) if is_so}
+
+
+def _text(share: float) -> str:
+    return (
+        f"shows droplets with {100 * share:.0f} % of the contrast that it has in other shots, beside the other views: "
+        "is it out of focus, or veiled?"
+    )
