@@ -32,7 +32,7 @@ def exposure_faults(
     return {
         "blind_views": tuple(view for view, image in zip(shot.views, images, strict=True) if not image.any()),
         "dim_views": tuple(view for view in bits if is_dim(grey_values(shot, view, frame), bits[view])),
-        "odd_light": _odd_light(run, shot, frame, images, references),
+        "odd_light": odd_lights(run, shot, frame, references, images),
     }
 
 
@@ -105,24 +105,16 @@ def other_backgrounds(references: References, view: str, frame: FrameName) -> di
     return {f"that of {name}": one["ab".index(frame)] for name, one in backgrounds.items() if one is not None}
 
 
-def odd_lights(run: RunReader, shot: Shot, frame: FrameName, references: References) -> dict[str, str]:
-    """What is odd with the light of an exposure, by view; see ``odd_light``."""
-    said = {}
-    for view in shot.views:
+def odd_lights(
+    run: RunReader, shot: Shot, frame: FrameName, references: References, images: Sequence[Intensity] | None = None
+) -> dict[str, str]:
+    """What is odd with the light of an exposure, by view; see ``odd_light``, and with its images ``hollowed``."""
+    said, polarity = {}, run.header.polarity
+    for number, view in enumerate(shot.views):
         dark, background = (None if one is None else one["ab".index(frame)] for one in references[view])
         grey, bits = grey_values(shot, view, frame), run.header.views[view].bits
         others = other_backgrounds(references, view, frame)
-        said[view] = odd_light(grey, run.header.polarity, bits=bits, dark=dark, background=background, others=others)
+        said[view] = odd_light(grey, polarity, bits=bits, dark=dark, background=background, others=others)
+        if images is not None and not said[view]:
+            said[view] = hollowed(grey, images[number], polarity, bits=bits, dark=dark, background=background)
     return {view: what for view, what in said.items() if what}
-
-
-def _odd_light(
-    run: RunReader, shot: Shot, frame: FrameName, images: Sequence[Intensity], references: References
-) -> dict[str, str]:
-    said = odd_lights(run, shot, frame, references)
-    for view, image in zip(shot.views, images, strict=True):
-        dark, background = (None if one is None else one["ab".index(frame)] for one in references[view])
-        grey, polarity, bits = grey_values(shot, view, frame), run.header.polarity, run.header.views[view].bits
-        lost = "" if view in said else hollowed(grey, image, polarity, bits=bits, dark=dark, background=background)
-        said |= {view: lost} if lost else {}
-    return {view: said[view] for view in shot.views if view in said}

@@ -110,7 +110,7 @@ class SpraySample:
             return counts @ self.volumes_mm3[:, None]
         return np.full((len(counts), 1), self.volumes_mm3.sum())
 
-    @property
+    @cached_property
     def as_one_shot(self) -> "SpraySample":
         """The same droplets as if one shot had them all: then droplets are drawn."""
         together = {plane: shares.sum(axis=0, keepdims=True) for plane, shares in self.measured_shares.items()}
