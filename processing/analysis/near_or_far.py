@@ -5,7 +5,7 @@ Shots of few droplets tell it together.
 
 import json
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -40,15 +40,25 @@ def depth_known(counts: Mapping[str, int]) -> bool:
 
 def sights_of(shots: Sequence[StoredDroplets]) -> dict[str, int]:
     """Counts of all shots together; of those from before, none."""
+    return added(json.loads(str(shot.provenance.get(SIGHTS, "{}"))) for shot in shots)
+
+
+def added(several: Iterable[Mapping[str, int]]) -> dict[str, int]:
+    """Counts of several shots together."""
     together: Counter[str] = Counter()
-    for shot in shots:
-        together.update(json.loads(str(shot.provenance.get(SIGHTS, "{}"))))
+    for one in several:
+        together.update(one)
     return dict(together)
 
 
 def depth_doubts(shots: Sequence[StoredDroplets]) -> tuple[str, ...]:
     """What all shots together say."""
-    told = depth_reversed(sights_of(shots))
+    return doubts_of(sights_of(shots))
+
+
+def doubts_of(together: Mapping[str, int]) -> tuple[str, ...]:
+    """What counts of all shots together say."""
+    told = depth_reversed(together)
     return (f"all shots together: {told}",) if told else ()
 
 

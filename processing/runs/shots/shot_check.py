@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import chain, zip_longest
 from typing import Any
 
@@ -47,6 +47,8 @@ class ShotCheck:
         Views one of which, at least, has moved further than can be measured; none, where droplets do not tell that.
     agreed : bool
         Some views agree. Where none do, none is known to be wrong: the spots of noisy images are no droplets.
+    sights : dict of str to int
+        At how many droplets of all shots that were asked at once lines of sight meet, by what is assumed.
     """
 
     shot: int
@@ -54,6 +56,7 @@ class ShotCheck:
     problem: str = ""
     beyond: tuple[str, ...] = ()
     agreed: bool = True
+    sights: Mapping[str, int] = field(default_factory=dict)
 
     @property
     def worst_px(self) -> float:
@@ -108,9 +111,11 @@ def check_shots(by_shot: Mapping[int, Sequence[Exposure]], calibration: Calibrat
 
     Whether depth is reversed is asked once, of all shots together; if it is, none of them tells anything else.
     """
-    if problem := depth_reversed(meeting_sights(calibration, exposures_in_turn(by_shot))):
-        return [ShotCheck(shot, {}, problem, tuple(calibration.views)) for shot in by_shot]
-    return [check_places(shot, exposures, calibration) for shot, exposures in by_shot.items()]
+    sights = meeting_sights(calibration, exposures_in_turn(by_shot))
+    if problem := depth_reversed(sights):
+        return [ShotCheck(shot, {}, problem, tuple(calibration.views), sights=sights) for shot in by_shot]
+    checks = (check_places(shot, exposures, calibration) for shot, exposures in by_shot.items())
+    return [replace(check, sights=sights) for check in checks]
 
 
 def exposures_in_turn(by_shot: Mapping[int, Sequence[Exposure]]) -> list[Exposure]:

@@ -25,6 +25,7 @@ def add(verbs: Verbs) -> None:
 def check(options: Namespace) -> Outcome:
     """Check shot by shot; it has not passed where a shot would stop reconstruction."""
     from daq.files.run_directory import RunReader
+    from processing.analysis.near_or_far import added, doubts_of
     from processing.calibration.calibration_file import load_calibration
     from processing.calibration.verdict import Verdict
     from processing.interlaced import ALTERNATING
@@ -44,8 +45,11 @@ def check(options: Namespace) -> Outcome:
             progress(f"{options.run.name}: shot {index}, {what}")
     with RunReader(options.run) as run:
         unchecked = told_unchecked(unknown_crop(run.header), progress)
+    for doubt in (depth := doubts_of(added(shot.sights for shot in shots))):
+        progress(f"{options.run.name}: {doubt}")
     woven = any(what.endswith(ALTERNATING) for told in odd for what in told)
-    verdicts = [shot.verdict for shot in shots if shot.verdict is not None] + [Verdict.WARN] * woven
+    verdicts = [shot.verdict for shot in shots if shot.verdict is not None]
+    verdicts += [Verdict.WARN] * woven + [Verdict.REFUSE] * bool(depth)
     result = {
         "passed": Verdict.REFUSE not in verdicts,
         "run": options.run.name,
@@ -54,6 +58,7 @@ def check(options: Namespace) -> Outcome:
         "stop_px": STOP_PX,
         "verdict": max(verdicts, key=list(Verdict).index) if verdicts else None,
         "shots": [{**shot.record(), "odd_light": list(what)} for shot, what in zip(shots, odd, strict=True)],
+        "depth": list(depth),
         "not_checked": unchecked,
     }
     return Outcome(result, views_table(result))

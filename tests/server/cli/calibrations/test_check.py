@@ -77,6 +77,19 @@ def test_rows_that_were_cut_alike_in_all_views_are_not_checked(
         assert ["rows that were cut elsewhere" in one["what"] for one in answer["not_checked"]] == [True] * bool(cut_px)
 
 
+def test_shots_of_few_droplets_tell_together_that_depth_is_reversed(
+    calibration_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Each by itself finds that views agree."""
+    run_dir = write_droplet_run(tmp_path / "run", 0.4, drift_px=0, shots=3, mirrored=True)
+    checked = told(capsys, "check", run_dir, "--calibration", calibration_file, status=1)
+    assert {shot["verdict"] for shot in checked["shots"]} <= {"good", "usable", None}
+    assert (checked["passed"], checked["verdict"]) == (False, "refuse")
+    (depth,) = checked["depth"]
+    assert depth.startswith("all shots together: all views agree on ")
+    assert depth.endswith("depth is reversed")
+
+
 @pytest.mark.parametrize("command", ["check", "reconstruct", "average"])
 def test_images_of_another_size_than_those_of_the_target_are_refused(
     command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
