@@ -15,6 +15,8 @@ CLOSE_PX = 0.25
 """Root mean square, over views, of how far lines of sight may pass a droplet that they are said to meet at."""
 SURE = 5.0
 """Standard deviations of the difference of two counts."""
+ENOUGH = 600
+"""Droplets of several shots at which lines of sight meet."""
 AS_SEEN = "as images are"
 SIGHTS = "sights"
 """Of a shot: at how many droplets lines of sight meet, by what is assumed; a JSON table."""
@@ -44,9 +46,11 @@ def sights_of(shots: Sequence[StoredDroplets]) -> dict[str, int]:
 
 
 def added(several: Iterable[Mapping[str, int]]) -> dict[str, int]:
-    """Counts of several shots together."""
+    """Counts of several shots together, of the first ones that are enough: of many more, chance is sure of anything."""
     together: Counter[str] = Counter()
     for one in several:
+        if max(together.values(), default=0) >= ENOUGH:
+            break
         together.update(one)
     return dict(together)
 

@@ -8,6 +8,7 @@ from types import MappingProxyType
 from typing import Any
 
 from daq.files.run_directory import RunReader
+from processing.analysis.near_or_far import SIGHTS
 from processing.calibration.calibrate import calibrate
 from processing.calibration.calibration_file import file_sha256, load_calibration, save_calibration
 from processing.calibration.sets.calibration_set import load_calibration_set
@@ -89,7 +90,8 @@ def check_run(job: dict[str, Any], should_stop: Callable[[], bool]) -> dict[str,
     """Measure how well the calibration still fits one shot."""
     calibration = load_calibration(Path(job["calibration_file"]))
     should_stop()
-    return check_shot(Path(job["run_dir"]), job["shot"], calibration, WORKBENCH).record()
+    checked = check_shot(Path(job["run_dir"]), job["shot"], calibration, WORKBENCH)
+    return {**checked.record(), SIGHTS: dict(checked.sights)}
 
 
 def _threads(job: Mapping[str, Any]) -> int:

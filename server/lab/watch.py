@@ -15,6 +15,7 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from daq.frozen_model import FrozenModel
+from processing.analysis.near_or_far import SIGHTS, added, doubts_of
 from processing.calibration.verdict import Verdict
 from processing.runs.shots.meetings import Exposure, Meeting, meetings_of, pale_views, seldom_meeting
 from processing.runs.shots.shot_check import ALARM_PX, STOP_PX
@@ -94,6 +95,7 @@ class _Account:
     standing: CalibrationStanding | None = None
     newest: dict[str, Any] | None = None
     worst: dict[str, Any] | None = None
+    sights: dict[str, int] = field(default_factory=dict)
 
     def note(self, job: Job) -> None:
         """Keep what a check that has ended says: the newest, and the worst of those that tell."""
@@ -175,7 +177,9 @@ class CalibrationWatch:
         return self.next_check(job.run_id, job.calibration, odd, account.content)
 
     def compared(self, job: Job, result: dict[str, Any]) -> dict[str, Any]:
-        """What came of a job, with what other shots of the same results say of its views."""
+        """What came of a job, with what other shots say of it: of checks, together; of volumes, of the same results."""
+        if job.kind is JobKind.CHECK:
+            return self._with_depth(job, result)
         own = meetings_of(result.get("volumes", []))
         if not own:
             return result
@@ -190,6 +194,19 @@ class CalibrationWatch:
             for one in result["volumes"]
         ]
         return {**result, "volumes": volumes}
+
+    def _with_depth(self, job: Job, result: dict[str, Any]) -> dict[str, Any]:
+        """A check that is refused if all shots together say that depth is reversed, whatever it says by itself."""
+        with self._lock:
+            account = self._accounts.get((job.run_id, job.calibration))
+            if account is None or account.content != job.settings.get("content", ""):
+                return result
+            account.sights = added([account.sights, result.get(SIGHTS, {})])
+            doubts = doubts_of(account.sights)
+        if not doubts or result["verdict"] == Verdict.REFUSE:
+            return result
+        nothing: dict[str, Any] = {"moved": None, "views": {}, "uncertainty_px": {}}
+        return {**result, **nothing, "verdict": Verdict.REFUSE, "problem": doubts[0]}
 
     def belonging(self, job: Job) -> dict[str, Any] | None:
         """What checks have said so far of run and calibration of a job that trusts them; None of every other job.

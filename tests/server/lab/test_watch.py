@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import pytest
 
+from processing.analysis.near_or_far import AS_SEEN
 from processing.calibration.fit.health import judge
 from processing.calibration.verdict import Verdict
 from processing.runs.shots.shot_check import ALARM_PX
@@ -237,3 +238,18 @@ def test_a_view_that_is_pale_is_told_with_the_volumes_of_its_shot() -> None:
     assert [made(watch, shot)[1] for shot in range(3)] == [""] * 3
     assert made(watch, 3, contrast=0.5)[1].startswith("shows droplets with 56 % of the contrast")
     assert made(watch, 4)[1] == ""
+
+
+def test_shots_of_few_droplets_tell_together_that_depth_is_reversed() -> None:
+    watch, _ = watch_of([])
+    verdicts = []
+    for shot in range(4):
+        assert watch.next_check(RUN, CALIBRATION, shot) is not None
+        check = ended(shot, 0.1)
+        result = {**(check.result or {}), "sights": {AS_SEEN: 19, "all images are mirrored": 47}}
+        result = watch.compared(check, result)
+        verdicts.append(result["verdict"])
+        watch.learn(check.model_copy(update={"result": result}))
+    assert verdicts == [judge(0.1), judge(0.1), Verdict.REFUSE, Verdict.REFUSE]
+    refusal = watch.refusal(reconstruction(4))
+    assert "all shots together: all views agree on 76 droplets within 0.25 px, and on 188 if" in (refusal or "")
