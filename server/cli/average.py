@@ -73,6 +73,7 @@ def _average_results(options: Namespace) -> dict[str, Any]:
     from processing.reconstruction.volume_file import VolumeFileError
     from processing.runs.exposure_faults import stored_faults
     from processing.runs.results_file import volume_files
+    from processing.runs.shots.meetings import stored_meetings, with_odd
     from processing.runs.volumes.stored_average import average_volumes
 
     files = volume_files(options.results, options.exposure)
@@ -83,7 +84,8 @@ def _average_results(options: Namespace) -> dict[str, Any]:
         )
     volume, grid, copies = average_volumes(files)
     mean = MeanVolume.of(volume)
-    faults = [told for file in files if (told := stored_faults(file, copies.get(file)))]
+    told = [told for file in files if (told := stored_faults(file, copies.get(file)))]
+    faults = with_odd(told, stored_meetings(files))
     if (belonging := stored_belonging(files)) is None:
         return _written(options, mean, grid, len(files), faults, {})
     if belonging["verdict"] in ("warn", "refuse"):

@@ -4,15 +4,19 @@ A single exposure tells neither: how many droplets there are differs from spray 
 rig to rig. So each keeps its figures, which cost a hundredth of a second, and they are compared as they come.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field
 
 from processing.reconstruction.settings import FrozenValue
+from processing.reconstruction.volume_file import open_volume
 from processing.runs.results_file import FrameName
 
+MEETING = "meeting"
+"""Of a stored volume: what its exposure is compared with others by; a JSON table."""
 SELDOM = 0.5
 """Of how often lines of sight meet in half of the shots."""
 MISSED = 3.0
@@ -51,6 +55,18 @@ def meetings_of(volumes: list[dict[str, Any]]) -> dict[Exposure, Meeting]:
     return {(one["shot"], one["frame"]): Meeting.model_validate(one["meeting"]) for one in told}
 
 
+def stored_meetings(volume_files: Iterable[Path]) -> dict[Exposure, Meeting]:
+    """What the exposures of stored volumes are compared by; of older ones nothing."""
+    found: dict[Exposure, Meeting] = {}
+    for file in volume_files:
+        with open_volume(file) as volume:
+            told = volume.provenance
+        if MEETING in told:
+            frame: FrameName = "b" if told["frame"] == "b" else "a"
+            found[int(told["shot"]), frame] = Meeting.model_validate_json(str(told[MEETING]))
+    return found
+
+
 def seldom_meeting(meetings: Meetings) -> list[int]:
     """Shots in which lines of sight meet much more seldom than in the others; a few, the most seldom first.
 
@@ -75,6 +91,19 @@ def pale_views(meetings: Meetings) -> dict[Exposure, dict[str, str]]:
         for view in next(iter(told.values())).contrasts:
             said |= {key: {**said.get(key, {}), view: text} for key, text in _pale(told, view).items()}
     return said
+
+
+def with_odd(faults: Sequence[Mapping[str, Any]], meetings: Meetings) -> list[Mapping[str, Any]]:
+    """Faults of exposures of one kind, and those that only the others tell."""
+    pale = {shot: views for (shot, _), views in pale_views(meetings).items()}
+    known = [
+        {**fault, "odd_light": {**pale[fault["shot"]], **fault.get("odd_light", {})}}
+        if fault["shot"] in pale
+        else fault
+        for fault in faults
+    ]
+    others = pale.keys() - {fault["shot"] for fault in faults}
+    return [*known, *({"shot": shot, "odd_light": pale[shot]} for shot in sorted(others))]
 
 
 def _pale(told: Meetings, view: str) -> dict[Exposure, str]:

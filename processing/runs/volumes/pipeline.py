@@ -20,6 +20,7 @@ from processing.runs.recipe import recipe_sha256
 from processing.runs.results_file import Provenance, claim_results, volume_path
 from processing.runs.shots.clocked_slabs import ClockedSlabs
 from processing.runs.shots.lanes import in_lanes
+from processing.runs.shots.meetings import MEETING
 from processing.runs.shots.shot_result import ShotResult, VolumeRecord
 from processing.runs.volumes.chain import Chain, Exposure
 from processing.runs.workbench import Workbench
@@ -156,6 +157,8 @@ def _reconstruct(
 def _named(chain: Chain, exposure: Exposure) -> Provenance:
     """Where a volume comes from, and what is wrong with its images."""
     found = {name: json.dumps(which) for name, which in exposure.faults.items() if which}
+    if exposure.meeting:
+        found[MEETING] = exposure.meeting.model_dump_json()
     return {**chain.provenance, **found, "recipe_sha256": recipe_sha256("reconstruct", METHOD_VERSION, chain.settings)}
 
 

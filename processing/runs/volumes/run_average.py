@@ -18,7 +18,7 @@ from processing.reconstruction.settings import ReconstructionSettings
 from processing.runs.exposure_faults import copied, exposure_faults
 from processing.runs.results_file import FrameName
 from processing.runs.shots.meeting_lines import MeetingLines
-from processing.runs.shots.meetings import Exposure, Meeting, Meetings, pale_views, seldom_meeting
+from processing.runs.shots.meetings import Exposure, Meeting, seldom_meeting, with_odd
 from processing.runs.shots.shot_images import require_match, shot_intensities
 from processing.runs.workbench import References, Workbench
 from processing.volume import VoxelGrid
@@ -103,7 +103,7 @@ def average_run(
             mean = MeanVolume.of(_mean_of_each(Reconstructor.of(plan, settings, threads), exposures))
         else:
             mean = mean_volume(plan, exposures, settings.method, threads=threads)
-        return RunAverage(mean, plan.grid, len(shots), _with_pale(faults, meetings), seldom_meeting(meetings))
+        return RunAverage(mean, plan.grid, len(shots), tuple(with_odd(faults, meetings)), seldom_meeting(meetings))
 
 
 def _looked_at(
@@ -117,15 +117,6 @@ def _looked_at(
     for index, images in zip(shots, exposures, strict=True):
         meetings[index, frame] = lines.meeting(images)
         yield images
-
-
-def _with_pale(faults: Sequence[Mapping[str, Any]], meetings: Meetings) -> tuple[Mapping[str, Any], ...]:
-    """Faults of exposures, those included that only the others tell; in the order of the shots."""
-    by_shot = {fault["shot"]: fault for fault in faults}
-    for (shot, _), views in pale_views(meetings).items():
-        known = by_shot.get(shot, {"shot": shot})
-        by_shot[shot] = {**known, "odd_light": {**views, **known.get("odd_light", {})}}
-    return tuple(by_shot[shot] for shot in sorted(by_shot))
 
 
 def _exposures(

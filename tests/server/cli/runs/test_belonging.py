@@ -96,11 +96,14 @@ def test_a_view_that_is_pale_for_one_shot_is_told(
     assert main([str(one) for one in arguments]) == 0
     output = capsys.readouterr()
     answer = json.loads(output.out.splitlines()[-1])
-    told = answer["volumes"] if command == "reconstruct" else answer["faults"]
-    odd = {(one["shot"], view): what for one in told for view, what in one["odd_light"].items()}
+    exposures = answer["volumes"] if command == "reconstruct" else answer["faults"]
+    odd = {(one["shot"], view): what for one in exposures for view, what in one["odd_light"].items()}
     assert list(odd) == [(1, "view2")]
     assert "% of the contrast that it has in other shots" in odd[1, "view2"]
     assert f"shot 1, exposure a: view2 {odd[1, 'view2']}" in output.err
+    if command == "reconstruct":
+        (fault,) = told(capsys, "average", tmp_path / "mean.vtkhdf", "-o", tmp_path / "mean2.vtkhdf")["faults"]
+        assert (fault["shot"], list(fault["odd_light"])) == (1, ["view2"])
 
 
 def test_contrasts_that_scatter_or_are_few_make_no_view_pale() -> None:
