@@ -151,5 +151,9 @@ class RenamedFile(ShotFileError):
     """The file holds another shot than its name says."""
 
 
+class DamagedNumbers(ShotFileError):
+    """The numbers of a shot are not those that were written beside its frames."""
+
+
 class DamagedFrame(ShotFileError):
     """The bytes of an exposure are not those that were written; the text names view and exposure."""

@@ -13,7 +13,7 @@ from daq.files.columns import columns_of, frames_path
 from daq.files.header import RunHeader
 from daq.files.later_notes import document_of, read_changes
 from daq.files.run_file import RUN_FILE, reading, shot_path, write_later_notes
-from daq.files.shot_file import LIBRARY_VERSIONS, create_frames, is_missing, reading_shot
+from daq.files.shot_file import LIBRARY_VERSIONS, create_frames, is_missing, read_shot_of, reading_shot
 from daq.files.storage import storing
 
 
@@ -76,6 +76,7 @@ def _replace_view(packed: h5py.File, header: RunHeader, shot_count: int) -> None
 
 
 def _copy_shot(path: Path, header: RunHeader, index: int, packed: h5py.File) -> None:
+    read_shot_of(path, header, index)
     columns, chunks = _read_as_it_is(path, header)
     for name, value in columns.items():
         packed[name][index] = value

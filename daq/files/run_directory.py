@@ -20,25 +20,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.causes import Cause
-from daq.errors import RecorderError, RenamedFile, ShotFileError
+from daq.errors import RecorderError, ShotFileError
 from daq.files.header import RunClosing, RunHeader, ViewFormat
 from daq.files.later_notes import NotesChange, RunConditions, add_change, read_changes
 from daq.files.lock_file import hold_folder
 from daq.files.packed_file import pack_run, require_free
+from daq.files.references_file import Reference, ReferenceImages, read_reference
 from daq.files.run_file import (
     RUN_FILE,
     SHOTS_FOLDER,
-    Reference,
-    ReferenceImages,
     read_closing,
     read_header,
-    read_reference,
     read_shot_count,
     shot_path,
     slots_of,
 )
 from daq.files.run_writer import RunWriter
-from daq.files.shot_file import Exposures, read_image_key, read_shot_file
+from daq.files.shot_file import Exposures, read_image_key, read_shot_of
 from daq.run_notes import RunNotes, Spray
 from daq.run_plan import ImageKey, PulsePair, RunKind, RunPlan
 from daq.shot import DoubleFrame, ExposureRecord, FiredTrain, Image, LightPulse, Shot
@@ -165,11 +163,7 @@ class RunReader:
 
         Exposure A alone is a shot as runs with single exposures have them; B stays on the disk.
         """
-        path = shot_path(self.run_dir, index)
-        shot = read_shot_file(path, self.header, exposures)
-        if shot.index != index:
-            raise RenamedFile(f"{path}: holds shot {shot.index}, and is named otherwise: give it its name back")
-        return shot
+        return read_shot_of(shot_path(self.run_dir, index), self.header, index, exposures)
 
     def dark(self, view: str) -> NDArray[np.float32] | None:
         """Mean image without light, (frame, row, column) in counts; None if the run has none."""

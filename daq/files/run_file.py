@@ -11,19 +11,17 @@ import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import h5py
 import numpy as np
 from h5py import h5d, h5p, h5s, h5t
-from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
 from daq.causes import Cause
 from daq.errors import RecorderError, ShotFileError
 from daq.files.atomic_file import amending, replacing, reserve, spending_reserve
-from daq.files.columns import columns_of, frames_path, view_path
-from daq.files.encoding import encode_frame, inflate
+from daq.files.columns import columns_of, frames_path
 from daq.files.header import RunClosing, RunHeader
 from daq.files.shot_file import LIBRARY_VERSIONS, SCHEMA_VERSION, create_groups, unreadable
 from daq.files.text_heap import has_whole_heaps
@@ -34,14 +32,14 @@ _LATER_FIELDS = ("rate_hz", "notes", "spray")
 """Of the header; runs from before have their defaults."""
 _CAUSES = TypeAdapter(tuple[Cause, ...])
 SHOTS_FOLDER = "shots"
+_SOURCE = f"{SHOTS_FOLDER}/%b.h5"
+"""Where the view over all shots looks for shot %b."""
 _SHOT_NAME = re.compile(r"(0|[1-9][0-9]{0,6})\.h5")
 """Up to ten million, which no plan reaches: a stray number of more digits would be a slot for every number below it."""
 _CLOSING_BYTES = 256 * 2**10
 """What the end of a run adds to its file at most: outcome, causes, numbers of the shots that were not stored."""
 RUN_SCHEMA = "tomoshadow-run"
 _LATER_NOTES = "later_notes"
-Reference = Literal["dark", "background"]
-ReferenceImages = Mapping[str, NDArray[np.float32]]
 
 
 def shot_path(run_dir: Path, index: int) -> Path:
@@ -79,7 +77,7 @@ def read_header(run_dir: Path) -> RunHeader:
 
 def set_devices(run_dir: Path, devices: Mapping[str, Mapping[str, str]]) -> None:
     """Write down what the devices say they are: they are asked when the run exists already."""
-    with _changing(amending(run_dir / RUN_FILE)) as file:
+    with changing(amending(run_dir / RUN_FILE)) as file:
         del file["entry/devices"]
         _write_text(file["entry"], "devices", json.dumps(devices, indent=1))
 
@@ -92,7 +90,7 @@ def add_closing(run_dir: Path, closing: RunClosing) -> None:
     RecorderError
         The run has an outcome already.
     """
-    with _changing(spending_reserve(run_dir / RUN_FILE)) as file:
+    with changing(spending_reserve(run_dir / RUN_FILE)) as file:
         if "outcome" in file["entry"]:
             raise RecorderError(f"{run_dir}: has an outcome already, {file['entry/outcome'].asstr()[()]}")
         _write_text(file["entry"], "outcome", closing.outcome)
@@ -133,6 +131,24 @@ def read_closing(run_dir: Path) -> RunClosing | None:
         return RunClosing(outcome, cause, ended_utc, causes, tuple(unstored))
 
 
+def other_programs_see(run_dir: Path, header: RunHeader) -> Iterator[str]:
+    """What a reader of HDF5 sees in ``run.h5`` that is not what the shots hold, or not what was written of the run."""
+    with reading(run_dir) as file:
+        texts = [item for group in ("", "user", "sample") for item in file[f"entry/{group}"].values() if _is_text(item)]
+        for text in texts:
+            try:
+                _read_text(text.parent, text.name.rpartition("/")[2])
+            except ShotFileError as error:
+                yield str(error)
+        paths = (*map(frames_path, header.views), *columns_of(header))
+        for path in paths:
+            if path in file and not _shows_shots(file[path]):
+                yield (
+                    f"{file.filename}: {path} is not that of the shots: other programs see something else there; "
+                    "copy it back from a backup"
+                )
+
+
 def read_later_notes(run_dir: Path) -> str:
     """Changes of the notes, as JSON, in a packed file; empty if there are none (``daq.files.later_notes``)."""
     with reading(run_dir) as file:
@@ -142,32 +158,6 @@ def read_later_notes(run_dir: Path) -> str:
 def write_later_notes(file: h5py.File, changes: str) -> None:
     """Give a packed file the changes of the notes."""
     _write_text(file["entry"], _LATER_NOTES, changes)
-
-
-def add_references(run_dir: Path, header: RunHeader, references: Mapping[Reference, ReferenceImages]) -> None:
-    """Store mean images, (frame, row, column) float32 per view.
-
-    Raises
-    ------
-    RecorderError
-        An image does not have the format of its view, or the run has such references already.
-    """
-    for name, images in references.items():
-        for view, stack in images.items():
-            _check_reference(run_dir, header, f"{name} of {view}", view, stack)
-    with _changing(amending(run_dir / RUN_FILE)) as file:
-        for name, images in references.items():
-            for view, stack in images.items():
-                if view_path(view, name) in file:
-                    raise RecorderError(f"{run_dir}: has a {name} of {view} already")
-                _create_reference(file, view_path(view, name), np.asarray(stack, "<f4"))
-
-
-def read_reference(run_dir: Path, view: str, name: Reference) -> NDArray[np.float32] | None:
-    """Mean image (frame, row, column) of a view; None if the run has none."""
-    with reading(run_dir) as file:
-        path = view_path(view, name)
-        return _read_images(file[path]) if path in file else None
 
 
 @contextmanager
@@ -192,7 +182,8 @@ def reading(run_dir: Path) -> Iterator[h5py.File]:
 
 
 @contextmanager
-def _changing(copied: AbstractContextManager[Path]) -> Iterator[h5py.File]:
+def changing(copied: AbstractContextManager[Path]) -> Iterator[h5py.File]:
+    """Open a copy of ``run.h5`` that takes its place when it is closed."""
     with copied as copy, h5py.File(copy, "r+", libver=LIBRARY_VERSIONS) as file:
         yield file
 
@@ -202,12 +193,12 @@ def _write_entry(entry: h5py.Group, header: RunHeader) -> None:
     entry.attrs["NX_class"] = "NXentry"
     for name, value in header.model_dump(mode="json").items():
         _write_text(entry, name, json.dumps(value, indent=1))
-    entry["title"] = header.plan.name if header.plan else header.run_id
+    _write_text(entry, "title", header.plan.name if header.plan else header.run_id)
     entry["definition"] = RUN_SCHEMA
     entry["definition"].attrs["version"] = str(SCHEMA_VERSION)
     _write_conditions(entry, header.notes)
-    entry["entry_identifier"] = header.run_id
-    entry["start_time"] = header.created_utc
+    _write_text(entry, "entry_identifier", header.run_id)
+    _write_text(entry, "start_time", header.created_utc)
     instrument = entry.create_group("instrument")
     instrument.attrs["NX_class"] = "NXinstrument"
     for view in header.views:
@@ -236,13 +227,23 @@ def _read_text(entry: h5py.Group, name: str) -> str:
     return text
 
 
+def _is_text(item: h5py.Group | h5py.Dataset) -> bool:
+    return isinstance(item, h5py.Dataset) and h5py.check_string_dtype(item.dtype) is not None
+
+
+def _shows_shots(dataset: h5py.Dataset) -> bool:
+    """Whether it is the view that ``_create_virtual`` has made."""
+    sources = dataset.virtual_sources() if dataset.is_virtual else []
+    return [(one.file_name, one.dset_name) for one in sources] == [(_SOURCE, dataset.name)]
+
+
 def _write_conditions(entry: h5py.Group, notes: RunNotes) -> None:
     """What the notes say, where NeXus readers look for it."""
     user, sample = entry.create_group("user"), entry.create_group("sample")
     user.attrs["NX_class"], sample.attrs["NX_class"] = "NXuser", "NXsample"
-    user["name"] = notes.operator
-    sample["name"] = notes.fluid
-    sample["description"] = "; ".join(part for part in (notes.nozzle, notes.remark) if part)
+    _write_text(user, "name", notes.operator)
+    _write_text(sample, "name", notes.fluid)
+    _write_text(sample, "description", "; ".join(part for part in (notes.nozzle, notes.remark) if part))
     if notes.pressure_bar is not None:
         sample["pressure"] = notes.pressure_bar
         sample["pressure"].attrs["units"] = "bar"
@@ -265,34 +266,5 @@ def _create_virtual(file: h5py.File, path: str, dtype: np.dtype[Any], shape: tup
     space = h5s.create_simple(source, endless)
     space.select_hyperslab(zeros, (h5s.UNLIMITED, *(1,) * len(shape)), source, source)
     layout = h5p.create(h5p.DATASET_CREATE)
-    layout.set_virtual(space, f"{SHOTS_FOLDER}/%b.h5".encode(), path.encode(), h5s.create_simple(source))
+    layout.set_virtual(space, _SOURCE.encode(), path.encode(), h5s.create_simple(source))
     return h5py.Dataset(h5d.create(file.id, path.encode(), h5t.py_create(dtype, logical=True), space, layout))
-
-
-def _check_reference(run_dir: Path, header: RunHeader, what: str, view: str, stack: NDArray[np.float32]) -> None:
-    if view not in header.views:
-        raise RecorderError(f"{run_dir}: {what}: the run has views {sorted(header.views)}")
-    expected = (header.frames_per_shot, *header.views[view].shape)
-    if stack.shape != expected:
-        raise RecorderError(f"{run_dir}: {what} has shape {stack.shape}, the run stores {expected}")
-
-
-def _read_images(stored: h5py.Dataset) -> NDArray[np.float32]:
-    """As ``_create_reference`` has written them, inflated by ISA-L: HDF5 itself takes three times as long."""
-    images = np.empty(stored.shape, np.float32)
-    for number, image in enumerate(images):
-        chunk = stored.id.read_direct_chunk((number, 0, 0))[1]
-        try:
-            image[:] = inflate(chunk, image.shape, np.dtype("<f4"))
-        except ValueError as error:
-            raise OSError(f"{stored.name}: {error}") from error
-    return images
-
-
-def _create_reference(file: h5py.File, path: str, stack: NDArray[np.float32]) -> None:
-    dataset = file.create_dataset(
-        path, stack.shape, stack.dtype, chunks=(1, *stack.shape[1:]), compression="gzip", shuffle=True
-    )
-    dataset.attrs.update(units="counts", dimensions="frame,row,column")
-    for number, image in enumerate(stack):
-        dataset.id.write_direct_chunk((number, 0, 0), encode_frame(image).chunk)

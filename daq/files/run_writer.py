@@ -11,12 +11,11 @@ from daq.errors import RecorderError
 from daq.files.atomic_file import PART_SUFFIX, commit, part_path, reserve_path, sync
 from daq.files.header import RunClosing, RunHeader
 from daq.files.lock_file import hold_folder
+from daq.files.references_file import ReferenceImages, add_references
 from daq.files.run_file import (
     RUN_FILE,
     SHOTS_FOLDER,
-    ReferenceImages,
     add_closing,
-    add_references,
     reserve_closing,
     set_devices,
     shot_path,

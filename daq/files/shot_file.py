@@ -1,5 +1,6 @@
 """RUN/shots/N.h5: one shot. Written to a part, fsynced, committed by rename; never written again."""
 
+import zlib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -11,7 +12,7 @@ import numpy as np
 from h5py import h5d, h5p, h5s, h5t
 from numpy.typing import NDArray
 
-from daq.errors import DamagedFrame, ForeignFile, RecorderError, ShotFileError
+from daq.errors import DamagedFrame, DamagedNumbers, ForeignFile, RecorderError, RenamedFile, ShotFileError
 from daq.files.columns import Column, columns_of, crc32_path, frames_path, shot_from_columns, shot_to_columns, view_path
 from daq.files.encoding import EncodedFrame, decode_frame, encode_frame, is_shuffled
 from daq.files.header import RunHeader, ViewFormat
@@ -25,6 +26,8 @@ SHOT_SCHEMA = "tomoshadow-shot"
 SCHEMA_VERSION = 1
 SHOT_VERSION = 2
 """Of shot files: in those of version 1 the later columns are missing."""
+_SEAL = "columns_crc32"
+"""Attribute with the CRC-32 of all columns, those of the frames among them; files from before have none."""
 
 
 @dataclass(frozen=True)
@@ -74,6 +77,7 @@ def write_encoded_shot(path: Path, encoded: EncodedShot, header: RunHeader) -> N
                 frames.id.write_direct_chunk((0, number, 0, 0), frame.chunk)
         for name, values in encoded.columns.items():
             _create_column(file, name, described[name], values)
+        file.attrs[_SEAL] = np.uint32(_crc32_of(header.run_id, encoded.columns))
 
 
 @contextmanager
@@ -103,11 +107,20 @@ def read_shot_file(path: Path, header: RunHeader, exposures: Exposures = "ab") -
     """
     with reading_shot(path, header) as file:
         columns = {name: _read_column(file, name, column) for name, column in columns_of(header).items()}
+        _check_seal(path, file, columns)
         frames = {
             view: _read_frames(path, file, view, view_format, columns[crc32_path(view)], exposures)
             for view, view_format in header.views.items()
         }
         return shot_from_columns(columns, frames)
+
+
+def read_shot_of(path: Path, header: RunHeader, index: int, exposures: Exposures = "ab") -> Shot:
+    """Read the shot that has this number, likewise; ShotFileError too if the file holds another one."""
+    shot = read_shot_file(path, header, exposures)
+    if shot.index != index:
+        raise RenamedFile(f"{path}: holds shot {shot.index}, and is named otherwise: give it its name back")
+    return shot
 
 
 def read_image_key(path: Path) -> ImageKey:
@@ -208,6 +221,20 @@ def _read_column(file: h5py.File, name: str, column: Column) -> Any:
     values = np.empty(stored.shape, stored.dtype)
     stored.read(h5s.ALL, h5s.ALL, values)
     return values[0]
+
+
+def _crc32_of(run_id: str, columns: Mapping[str, Any]) -> int:
+    """CRC-32 of all numbers of a shot, each after its path."""
+    check = zlib.crc32(run_id.encode())
+    for name in sorted(columns):
+        check = zlib.crc32(np.asarray(columns[name]).tobytes(), zlib.crc32(name.encode(), check))
+    return check
+
+
+def _check_seal(path: Path, file: h5py.File, columns: Mapping[str, Any]) -> None:
+    written = file.attrs.get(_SEAL)
+    if written is not None and int(written) != _crc32_of(_text(file.attrs["run_id"]), columns):
+        raise DamagedNumbers(f"{path}: its numbers are not those that were written: copy it back from a backup")
 
 
 def _read_frames(

@@ -1,17 +1,18 @@
 """Is a run whole? Every frame is read and its CRC compared; what is wrong is named, file by file."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
-from daq.errors import AlreadyHeld, DamagedFrame, ForeignFile, RenamedFile, ShotFileError
+from daq.errors import AlreadyHeld, DamagedFrame, DamagedNumbers, ForeignFile, RenamedFile, ShotFileError
 from daq.files.atomic_file import PART_SUFFIX
 from daq.files.header import RunClosing, RunHeader
 from daq.files.later_notes import NOTES_FILE, read_changes
 from daq.files.lock_file import hold_folder
+from daq.files.references_file import damaged_references
 from daq.files.run_directory import RunReader
-from daq.files.run_file import RUN_FILE, SHOTS_FOLDER, is_shot, read_shot_count, shot_path
+from daq.files.run_file import RUN_FILE, SHOTS_FOLDER, is_shot, other_programs_see, read_shot_count, shot_path
 
 Done = Callable[[int, int], None]
 _EOF_ADDRESS = slice(28, 36)
@@ -97,7 +98,7 @@ def verify(run_dir: Path, done: Done = lambda _done, _total: None) -> Verificati
         strangers += tuple(_flaws_of_notes(run_dir, header))
         if not (run_dir / SHOTS_FOLDER).is_dir():
             return _without_shots(run_dir, header, closing, strangers)
-        shots = reader.shot_count
+        shots, strangers = reader.shot_count, (*_flaws_of_run_file(run_dir, header), *strangers)
     except ShotFileError as error:
         there = (run_dir / RUN_FILE).exists()
         text = f"{error}; tomoshadow repair {run_dir} writes it anew from the shots, where one can be read"
@@ -140,7 +141,12 @@ def _kind_of(path: Path, error: ShotFileError) -> FlawKind:
         return FlawKind.MISSING
     if _is_truncated(path):
         return FlawKind.TRUNCATED
-    kinds = {ForeignFile: FlawKind.FOREIGN, RenamedFile: FlawKind.RENAMED, DamagedFrame: FlawKind.DAMAGED}
+    kinds: dict[type[Exception], FlawKind] = {
+        ForeignFile: FlawKind.FOREIGN,
+        RenamedFile: FlawKind.RENAMED,
+        DamagedFrame: FlawKind.DAMAGED,
+        DamagedNumbers: FlawKind.DAMAGED,
+    }
     return kinds.get(type(error), FlawKind.UNREADABLE)
 
 
@@ -172,6 +178,12 @@ def _flaws_of_notes(run_dir: Path, header: RunHeader) -> list[Flaw]:
     except ShotFileError as error:
         return [Flaw(FlawKind.FOREIGN, NOTES_FILE, str(error))]
     return []
+
+
+def _flaws_of_run_file(run_dir: Path, header: RunHeader) -> Iterator[Flaw]:
+    """What is wrong in run.h5 beside what it tells of the run: its references, and what other programs see in it."""
+    for text in (*damaged_references(run_dir, header), *other_programs_see(run_dir, header)):
+        yield Flaw(FlawKind.DAMAGED, RUN_FILE, text)
 
 
 def _open_flaw(run_dir: Path) -> Flaw:

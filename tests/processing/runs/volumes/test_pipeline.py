@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from daq.files.references_file import add_references
 from daq.files.run_directory import RunReader
-from daq.files.run_file import add_references
 from processing.calibration.calibration_file import load_calibration
 from processing.calibration.errors import CalibrationError
 from processing.calibration.verdict import Verdict

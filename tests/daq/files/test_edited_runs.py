@@ -1,0 +1,142 @@
+"""A run that was edited after it was written says so: its numbers, its references, its view of all shots."""
+
+import shutil
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from daq.errors import ShotFileError
+from daq.files.run_directory import RunReader, RunWriter, pack
+from daq.files.verification import FlawKind, verify
+from tests.daq.files.test_run_directory import FORMATS, header_of, shot_of
+
+REFERENCES = {name: np.full((2, *view.shape), 7, np.float32) for name, view in FORMATS.items()}
+Edit = Callable[[h5py.File], None]
+
+
+@pytest.fixture
+def run_dir(tmp_path: Path) -> Path:
+    path = tmp_path / "20261122T101530-spray"
+    with RunWriter(path, header_of()) as writer:
+        writer.write_references(REFERENCES, REFERENCES)
+        for index in range(2):
+            writer.write_shot(shot_of(header_of(), index))
+        writer.finish("completed")
+    return path
+
+
+def edited(path: Path, edit: Edit) -> None:
+    with h5py.File(path, "r+") as file:
+        edit(file)
+
+
+def exchange(file: h5py.File, one: str, other: str) -> None:
+    file.move(one, "away")
+    file.move(other, one)
+    file.move("away", other)
+
+
+def columns_in(path: Path) -> list[str]:
+    names: list[str] = []
+    with h5py.File(path) as file:
+        file.visititems(lambda name, item: names.append(name) if isinstance(item, h5py.Dataset) else None)
+    return names
+
+
+def changed(name: str) -> Edit:
+    def edit(file: h5py.File) -> None:
+        values = file[name][()]
+        file[name][()] = ~values if values.dtype == bool else np.nan_to_num(values) + 1
+
+    return edit
+
+
+def test_no_number_of_a_shot_is_changed_unseen(run_dir: Path) -> None:
+    assert verify(run_dir).sound
+    path = run_dir / "shots" / "1.h5"
+    written, unseen = path.read_bytes(), []
+    for name in columns_in(path):
+        edited(path, changed(name))
+        flaws = verify(run_dir).flaws
+        unseen += [] if [flaw.file for flaw in flaws] == ["shots/1.h5"] else [name]
+        path.write_bytes(written)
+    assert unseen == []
+
+
+@pytest.mark.parametrize(
+    "edit",
+    [
+        lambda file: exchange(file, "cameras/view1", "cameras/view2"),
+        lambda file: file.attrs.modify("schema_version", 1),
+    ],
+    ids=["views exchanged", "an older version"],
+)
+def test_numbers_stay_those_of_their_view_and_version(tmp_path: Path, edit: Edit) -> None:
+    header = header_of({"view1": FORMATS["view1"], "view2": FORMATS["view1"]})
+    with RunWriter(tmp_path / "run", header) as writer:
+        writer.write_shot(replace(shot_of(header, 0), refires=1))
+    edited(tmp_path / "run" / "shots" / "0.h5", edit)
+    told = [flaw.kind for flaw in verify(tmp_path / "run").flaws if flaw.file == "shots/0.h5"]
+    assert told == [FlawKind.DAMAGED]
+
+
+def test_a_shot_from_before_it_had_a_checksum_of_its_numbers_is_read(run_dir: Path) -> None:
+    for index in range(2):
+        edited(run_dir / "shots" / f"{index}.h5", lambda file: file.attrs.pop("columns_crc32"))
+    assert verify(run_dir).sound
+
+
+def test_a_reference_that_was_changed_is_told(run_dir: Path) -> None:
+    edited(run_dir / "run.h5", changed("cameras/view2/background"))
+    assert [(flaw.kind, flaw.file) for flaw in verify(run_dir).flaws] == [(FlawKind.DAMAGED, "run.h5")]
+    with pytest.raises(ShotFileError, match="background of view2 is not what was written"):
+        RunReader(run_dir).background("view2")
+
+
+def test_a_flipped_bit_of_a_reference_is_found_by_who_verifies(run_dir: Path) -> None:
+    with h5py.File(run_dir / "run.h5") as file:
+        chunk = file["cameras/view1/dark"].id.get_chunk_info(1)
+    content = bytearray((run_dir / "run.h5").read_bytes())
+    content[chunk.byte_offset + chunk.size // 2] ^= 0x10
+    (run_dir / "run.h5").write_bytes(content)
+    assert [(flaw.kind, flaw.file) for flaw in verify(run_dir).flaws] == [(FlawKind.DAMAGED, "run.h5")]
+
+
+def replaced(file: h5py.File) -> None:
+    values = file["cameras/view1/pulse_current_a"][()]
+    del file["cameras/view1/pulse_current_a"]
+    file["cameras/view1/pulse_current_a"] = values + 1
+
+
+@pytest.mark.parametrize(
+    ("edit", "what"),
+    [
+        (lambda file: exchange(file, "cameras/view1", "cameras/view2"), "/cameras/view1/"),
+        (replaced, "/cameras/view1/pulse_current_a"),
+        (lambda file: file["entry/start_time"].write_direct(np.array("1999", object)), "start_time"),
+    ],
+    ids=["views exchanged", "numbers of its own", "a time of NeXus"],
+)
+def test_what_other_programs_see_is_what_the_shots_hold(run_dir: Path, edit: Edit, what: str) -> None:
+    edited(run_dir / "run.h5", edit)
+    (flaw, *_) = verify(run_dir).flaws
+    assert (flaw.kind, flaw.file) == (FlawKind.DAMAGED, "run.h5")
+    assert what in flaw.text
+
+
+@pytest.mark.parametrize("damage", ["exchanged", "edited"])
+def test_what_is_not_as_it_was_written_is_not_packed(run_dir: Path, tmp_path: Path, damage: str) -> None:
+    one, other = (run_dir / "shots" / f"{index}.h5" for index in range(2))
+    if damage == "exchanged":
+        shutil.move(one, tmp_path / "away")
+        shutil.move(other, one)
+        shutil.move(tmp_path / "away", other)
+    else:
+        edited(other, lambda file: file["cameras/view1/frames"].write_direct(np.zeros((1, 2, 12, 16), "u1")))
+    with pytest.raises(ShotFileError, match=r"\.h5: (holds shot 1|exposure A of view1: damaged)"):
+        pack(run_dir, tmp_path / "packed.h5")
+    assert not (tmp_path / "packed.h5").exists()
