@@ -185,7 +185,7 @@ class AravisCamera:
         receiver = FrameReceiver(self._name, device.open_stream(self._form, self._network.socket_buffer_bytes))
         receiver.start()
         self._receiver = receiver
-        self._last_id = self._late_frames = 0
+        self._last_id, self._late_frames = None, 0  # not every camera counts from 1: a lone first frame proves nothing
         try:
             device.start()
             for setting in settings:

@@ -158,7 +158,8 @@ def test_images_of_a_shot_stay_as_they_are(stand: CameraStand) -> None:
 
 def test_a_missing_exposure_keeps_its_slot(stand: CameraStand) -> None:
     stand.camera.arm()
-    stand.lose_exposure_b_of(1)
+    assert stand.shoot(1.0)[1].valid
+    stand.lose_exposure_b_of(2)
     sequence, shot = stand.shoot(1.0)
     assert not shot.valid
     assert shot.record_a.valid

@@ -31,6 +31,7 @@ JUMBO = Network(packet_bytes=9000)
 IP, SHAPE = "127.0.0.32", (240, 320)
 PROFILE = load_camera_profile(Path(__file__).parents[3] / "configs" / "cameras" / "simulated.toml")
 TIMING = PROFILE.camera_timing
+LAST_ID = 65535
 HEARTBEAT_LIMIT_S = 9.0
 """A silent camera is reported lost after 5.4 to 5.9 s."""
 ALL_LIGHT = (
@@ -157,7 +158,20 @@ def test_a_lost_exposure_is_flagged_in_its_slot(wire: Wire, fault: str, lost: st
     assert wire.camera.counters.missing_frames == 1
 
 
+@pytest.mark.parametrize("blocks", [0, LAST_ID - 1], ids=["from 1", "from 2"])
+def test_a_lone_exposure_of_the_first_shot_is_not_guessed_as_cameras_count_from_anywhere(
+    wire: Wire, blocks: int
+) -> None:
+    wire.camera.disarm()
+    wire.simulated.faults.blocks_before_wrap, wire.simulated.faults.dropped_b = blocks, 1
+    wire.camera.arm()
+    _, shot = wire.shoot(0.5)
+    assert [record.valid for record in (shot.record_a, shot.record_b)] == [False, False]
+    wire.assert_good_shot()
+
+
 def test_a_lone_exposure_after_an_incomplete_shot_is_not_guessed(wire: Wire) -> None:
+    wire.assert_good_shot()
     wire.simulated.faults.dropped_b = 1
     assert wire.shoot(0.5)[1].record_a.valid
     wire.simulated.faults.dropped_a = 1

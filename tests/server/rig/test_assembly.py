@@ -126,7 +126,7 @@ def test_a_pulse_that_comes_beyond_exposure_b_is_lost(assembled: AssembledRig) -
 
 def test_a_dropped_exposure_is_flagged_and_the_next_shot_is_whole(assembled: AssembledRig) -> None:
     first, second = shoot(assembled, Fault(kind=FaultKind.DROPPED_B, view="view1"), shots=2)
-    assert (first["view1"].record_a.valid, first["view1"].record_b.valid) == (True, False)
+    assert not first["view1"].record_b.valid
     assert all(frames.valid for frames in second.values())
 
 
