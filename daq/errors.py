@@ -25,6 +25,7 @@
     └── ShotFileError         a run directory or a shot file cannot be read
         ├── ForeignFile         it belongs to another run, or is no shot
         ├── RenamedFile         it is another shot of this run
+        ├── DamagedNumbers      its numbers are not those that were written
         └── DamagedFrame        the bytes of an exposure are not those that were written
 """
 

@@ -1,12 +1,12 @@
 """Dark and background runs that belong to a run: found by id, checked, averaged."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from daq.errors import PlanError, ShotFileError
+from daq.errors import DeviceRefused, PlanError, ShotFileError
 from daq.files.run_directory import ReferenceImages, RunReader, ViewFormat, list_runs
 from daq.run.state import RunOutcome
 from daq.run_plan import PulsePair, RunKind, RunPlan
@@ -50,6 +50,37 @@ def mean_images(run_dirs: tuple[Path, ...]) -> ReferenceImages:
                 for number, frame in enumerate(frames):
                     total[number] += frame
     return {view: (total / count).astype(np.float32) for view, total in sums.items()}
+
+
+def require_same_cameras(run_dirs: Iterable[Path], devices: Mapping[str, Mapping[str, str]]) -> None:
+    """Refuse references of which a view had another camera: its pixels are others, and so is where it looks.
+
+    Parameters
+    ----------
+    run_dirs : iterable of Path
+        The reference runs.
+    devices : Mapping[str, Mapping[str, str]]
+        Who the devices of this rig are, as a run keeps it; of one that did not answer nothing is known.
+
+    Raises
+    ------
+    DeviceRefused
+        Names the view, the run and both cameras.
+    """
+    for run_dir in run_dirs:
+        header = RunReader(run_dir).header
+        for view in header.views:
+            was, this = (_camera(told.get(view, {})) for told in (header.devices, devices))
+            if was and this and was != this:
+                reason = (
+                    f"{run_dir.name} was recorded by {was}, and this is {this}: record dark and background again, "
+                    "calibrate again, or put the camera back"
+                )
+                raise DeviceRefused(view, reason)
+
+
+def _camera(identity: Mapping[str, str]) -> str:
+    return " ".join(identity.get(name, "") for name in ("vendor", "model", "serial")).strip()
 
 
 def _checked_kind(run_id: str, reader: RunReader, views: Mapping[str, ViewFormat], pulse: PulsePair) -> RunKind:

@@ -6,6 +6,7 @@ from contextlib import ExitStack
 from dataclasses import asdict
 from datetime import UTC, datetime
 from functools import partial
+from itertools import chain
 from pathlib import Path
 
 from daq.errors import DeviceError, RecorderError, StorageError
@@ -17,7 +18,7 @@ from daq.run import light
 from daq.run.darkness import attempt, darken, fail
 from daq.run.guard import RunGuard
 from daq.run.recorder import Recorder
-from daq.run.references import mean_images
+from daq.run.references import mean_images, require_same_cameras
 from daq.run.shooting import Shooting
 from daq.run.shots.shot_check import InvalidStreak, ShotFindings, Thresholds, check_exposures, light_thresholds
 from daq.run.shots.shot_taking import ShotTaker
@@ -129,7 +130,10 @@ class RunSession:
             self._run.progress.move(RunStep.ARMED)
 
     def _write_devices(self) -> None:
-        """Ask every device who it is, and name it in the run; one that is needed and does not answer ends it."""
+        """Ask every device who it is, and name it in the run.
+
+        One that is needed and does not answer ends it, and so does a camera that is not the one of the references.
+        """
         devices, silent = {}, list[DeviceError]()
         for device in self._rig.devices:
             try:
@@ -141,6 +145,7 @@ class RunSession:
         self._writer.write_devices(devices)
         if silent:
             raise silent[0]
+        require_same_cameras(chain(*self._references.values()), devices)
 
     def _copy_references(self) -> Thresholds:
         """Let dark and background images travel with the run; returns the levels above which an exposure is lit."""

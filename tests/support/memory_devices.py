@@ -26,13 +26,14 @@ MAX_LIGHT_A = 0.5
 class MemoryDevice:
     """Name, identity, and a life without meaning; ``journal`` is shared by all devices of a rig. It is never lost.
 
-    ``mute`` lets it give no answer when it is asked who it is.
+    ``mute`` lets it give no answer when it is asked who it is, and ``serial`` is what it answers.
     """
 
     def __init__(self, name: str, journal: list[str]) -> None:
         self.name = name
         self.journal = journal
         self.mute = False
+        self.serial = name
 
     def __enter__(self) -> Self:
         return self
@@ -45,7 +46,7 @@ class MemoryDevice:
     def identity(self) -> DeviceIdentity:
         if self.mute:
             raise DeviceTimeout(self.name, "identity", 0.5)
-        return DeviceIdentity("tomoshadow", "memory", self.name, "1")
+        return DeviceIdentity("tomoshadow", "memory", self.serial, "1")
 
     def recover(self) -> None:
         """Nothing was lost."""

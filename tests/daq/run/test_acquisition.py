@@ -613,6 +613,22 @@ def test_a_background_that_was_lit_otherwise_is_refused_with_the_difference(
         lab.acquisition.start(plan_of(references=(background,), pulse=PulsePair(**pulse)))
 
 
+@pytest.mark.parametrize("kind", [RunKind.DARK, RunKind.BACKGROUND])
+def test_a_reference_of_another_camera_at_the_same_place_ends_the_run_before_there_is_light(
+    lab: Laboratory, kind: RunKind
+) -> None:
+    reference = lab.run(plan_of(1, kind=kind)).run_dir.name
+    lab.memory.cameras["view2"].serial = "77"
+    lab.memory.journal.clear()
+    run = lab.run(plan_of(1, references=(reference,)))
+    assert (run.outcome, run.shot_count) == (RunOutcome.FAILED, 0)
+    assert f"{reference} was recorded by tomoshadow memory view2, and this is tomoshadow memory 77" in run.cause
+    assert run.cause.startswith("view2: ")
+    assert not any("fire" in entry for entry in lab.memory.journal)
+    lab.memory.cameras["view2"].serial = "view2"
+    assert lab.run(plan_of(1, references=(reference,))).outcome == RunOutcome.COMPLETED
+
+
 def test_the_separation_of_the_pulses_and_the_light_of_a_dark_run_do_not_matter(lab: Laboratory) -> None:
     dark, background = (lab.run(plan_of(1, kind=kind)).run_dir.name for kind in (RunKind.DARK, RunKind.BACKGROUND))
     pulse = PulsePair(current_a={"view1": 20.0, "view2": 12.0}, separation_ns=20_000)
