@@ -29,6 +29,7 @@ def series(
     step: tuple[float, float, float] = (4.0, 3.0, 1.5),
     scatter: float = 0.15,
     turn: float = 0.02,
+    gradient: float = 0.006,
     found: float = 0.985,
     ghosts: float = 0.005,
     noise: float = 0.035,
@@ -37,7 +38,7 @@ def series(
     rng = np.random.default_rng(seed)
     beyond = np.abs(step) * frames * 1.5 + 10
     places = rng.uniform(-beyond, BOX + beyond, (round(density_per_mm3 / 60**3 * np.prod(BOX + 2 * beyond)), 3))
-    velocities = step + (places - BOX / 2) @ rng.normal(0, 0.006, (3, 3)).T + rng.normal(0, scatter, places.shape)
+    velocities = step + (places - BOX / 2) @ rng.normal(0, gradient, (3, 3)).T + rng.normal(0, scatter, places.shape)
     accelerations, log_sizes = rng.normal(0, turn, places.shape), rng.normal(0, 0.5, len(places))
     out = Series([], [], [], accelerations)
     for _ in range(frames):

@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.analysis.droplets.droplet_table import Columns
 from processing.analysis.shot_doubts import COMPONENTS
+from processing.analysis.velocity.common_motion import Indices
+from processing.analysis.velocity.moving_droplets import MovingDroplets
+from processing.analysis.velocity.pairing import pair
 from processing.analysis.velocity.velocity_verdict import FASTEST_M_S
 from processing.geometry import FloatArray
 
@@ -23,6 +26,11 @@ STILL, MOST_STILL = 2.0, 0.5
 VARIANCES = ("cov_uu_m2_s2", "cov_vv_m2_s2", "cov_ww_m2_s2")
 TOGETHER = 0.5
 """Amount of the mean velocity over the mean speed, from which on droplets have a direction."""
+LEAST_JUMP, SURE = 0.15, 5.0
+"""Share of its way by which a median droplet is farther at once, and standard deviations by which that is known."""
+THIN = 0.5
+"""Share of the droplets of a shot that tracks link to the next one, below which they are paired anew."""
+TINY = 1e-12
 
 
 def rate_doubts(tracks: Columns, shots: Sequence[StoredDroplets], rate_hz: float) -> Iterator[str]:
@@ -89,6 +97,71 @@ def still_doubts(tracks: Columns) -> Iterator[str]:
         return
     if (share := float(np.mean(speeds_m_s[known] < STILL * sd_m_s[known]))) > MOST_STILL:
         yield f"{100 * share:.0f} % of the droplets on tracks stand still, as sure as that is known: is it dirt?"
+
+
+def uneven_doubts(frames: Sequence[MovingDroplets], ids: Sequence[Indices], first: int) -> Iterator[str]:
+    """All droplets faster or slower at once, as they look where a shot is missing, or times are uneven.
+
+    Accelerations that last, as by gravity or drag, are no doubt: what is told differs from those of the other shots.
+
+    Parameters
+    ----------
+    frames : sequence of MovingDroplets
+        Of all shots, in their order.
+    ids : sequence of (N,) int arrays
+        Track of each droplet; -1 where it has none.
+    first : int
+        Number of the first shot.
+    """
+    pairs = [_same_droplets(frames[one : one + 2], ids[one : one + 2]) for one in range(len(frames) - 1)]
+    known = [
+        (first + middle, *change)
+        for middle in range(1, len(frames) - 1)
+        if (change := _change(frames[middle - 1 : middle + 2], pairs[middle - 1 : middle + 1]))
+    ]
+    if not known:
+        return
+    numbers, changes, sds, ways = (np.array(column) for column in zip(*known, strict=True))
+    jumps, way = np.abs(changes - np.median(changes)), float(np.median(ways))
+    odd = (jumps > SURE * sds) & (jumps > LEAST_JUMP * way)
+    if odd.any():
+        where = f"{np.count_nonzero(odd)} of {len(frames)} shots (shot {_listed(numbers[odd])})"
+        yield (
+            f"all droplets together are suddenly faster or slower, by up to {100 * jumps.max() / way:.0f} % of their "
+            f"way, at {where}: are shots at even times, and none missing? Velocities and accelerations are wrong there"
+        )
+
+
+def _same_droplets(frames: Sequence[MovingDroplets], ids: Sequence[Indices]) -> tuple[Indices, Indices]:
+    """Indices of the same droplets in two frames: by their tracks, or, where hardly one goes on, by pairing."""
+    _, own, other = np.intersect1d(ids[0], ids[1], return_indices=True)
+    on_tracks = ids[0][own] >= 0
+    if np.count_nonzero(on_tracks) < THIN * min(map(len, frames)):
+        return pair(*frames).pairs
+    return own[on_tracks], other[on_tracks]
+
+
+def _change(
+    frames: Sequence[MovingDroplets], pairs: Sequence[tuple[Indices, Indices]]
+) -> tuple[float, float, float] | None:
+    """By how much a median droplet flies farther after the middle one of three frames than before it.
+
+    Returns
+    -------
+    tuple of three floats, or None
+        Change, its standard deviation, and the way, in voxels; None of too few droplets.
+    """
+    (before, own), (again, after) = pairs
+    _, early, late = np.intersect1d(own, again, return_indices=True)
+    if len(early) < FEWEST:
+        return None
+    came = frames[1].places[own[early]] - frames[0].places[before[early]]
+    went = frames[2].places[after[late]] - frames[1].places[again[late]]
+    ways = np.linalg.norm(came + went, axis=1) / 2
+    changes = np.einsum("ni,ni->n", went - came, came + went) / np.maximum(2 * ways, TINY)
+    middle = float(np.median(changes))
+    sd = 1.4826 * float(np.median(np.abs(changes - middle))) * np.sqrt(np.pi / 2 / len(changes))
+    return middle, float(sd), float(np.median(ways))
 
 
 def _linked(tracks: Columns, numbers: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

@@ -16,7 +16,7 @@ from processing.analysis.velocity import HALF_WINDOW
 from processing.analysis.velocity.common_motion import FEWEST
 from processing.analysis.velocity.moving_droplets import LEAST_SIZE, MovingDroplets
 from processing.analysis.velocity.noise_curve import M_PER_MM, NoiseCurve, noise_curve
-from processing.analysis.velocity.track_doubts import order_doubts, rate_doubts, still_doubts
+from processing.analysis.velocity.track_doubts import order_doubts, rate_doubts, still_doubts, uneven_doubts
 from processing.analysis.velocity.track_motion import TrackPoints, track_points
 from processing.analysis.velocity.tracks import LEAST_LENGTH, Tracks, link
 from processing.analysis.velocity.velocity_table import COVARIANCES
@@ -119,6 +119,7 @@ def track_droplets(
         *exposure_doubts(ordered, "a"),
         *rate_doubts(columns, ordered, rate_hz),
         *order_doubts(columns, ordered),
+        *uneven_doubts(frames, linked.ids, first),
         *still_doubts(columns),
     )
     reason = None if linked.count else _why(frames)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from processing.analysis.velocity.moving_droplets import MovingDroplets
+from processing.analysis.velocity.track_doubts import uneven_doubts
 from processing.analysis.velocity.tracks import link
 
 pytestmark = pytest.mark.skipif(
@@ -38,7 +39,9 @@ def test_all_links_of_myptv_are_found() -> None:
         MovingDroplets(one[:, 1:4] / VOXEL_MM, np.tile(covariance, (len(one), 1, 1)), np.zeros(len(one)))
         for one in frames
     ]
-    theirs, ours = links([one[:, TRAJECTORY].astype(int) for one in frames]), links(list(link(moving).ids))
+    linked = link(moving)
+    theirs, ours = links([one[:, TRAJECTORY].astype(int) for one in frames]), links(list(linked.ids))
     assert len(theirs) == 212
     assert theirs <= ours
     assert len(ours) <= len(theirs) + 10  # of particles that they left alone
+    assert list(uneven_doubts(moving, linked.ids, 0)) == []

@@ -153,12 +153,15 @@ def ordered(shown: Series, order: list[int]) -> Series:
     return Series([shown.frames[number] for number in order], [], [], np.empty(0))
 
 
+TOGETHER = "all droplets together are suddenly faster or slower"
+
+
 @pytest.mark.parametrize(
     ("order", "said"),
     [
         ([0, 1, 2, 3, 4, 5], []),
-        ([0, 2, 1, 3, 5, 4], ["hardly a droplet of 3 of 6 shots is on a track (shot 3, 4, 8)"]),
-        ([0, 1, 2, 7, 8, 9], ["hardly a track goes on after 1 of 6 shots (shot 5)"]),
+        ([0, 2, 1, 3, 5, 4], ["hardly a droplet of 3 of 6 shots is on a track (shot 3, 4, 8)", TOGETHER]),
+        ([0, 1, 2, 7, 8, 9], ["hardly a track goes on after 1 of 6 shots (shot 5)", TOGETHER]),
         ([5, 4, 3, 2, 1, 0], ["droplets fly against the axis of the spray"]),
     ],
 )
@@ -173,6 +176,31 @@ def test_shots_out_of_order_are_told(
     assert len(doubts) == len(said), doubts
     for doubt, what in zip(doubts, said, strict=True):
         assert doubt.startswith(what)
+
+
+TENTHS = series(density_per_mm3=8, frames=77, step=(0.12, 0.06, 0.02), scatter=0.003, turn=0.0, gradient=0.0003)
+"""Ten frames for each that a camera would take: shots at any times can be chosen."""
+
+
+@pytest.mark.parametrize(
+    ("tenths", "told_of"),
+    [
+        ([0, 10, 20, 30, 40, 50, 60], None),
+        ([0, 10, 21, 33, 46, 60, 75], None),  # faster and faster, as what falls
+        ([0, 10, 20, 40, 50, 60, 70], "2 of 7 shots (shot 5, 6)"),
+        ([0, 10, 20, 30, 50, 70], "1 of 6 shots (shot 6)"),
+        ([0, 10, 22, 30, 39, 51, 60], "3 of 7 shots (shot 5, 7, 8)"),
+    ],
+)
+def test_shots_at_uneven_times_are_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], tenths: list[int], told_of: str | None
+) -> None:
+    """Slow droplets stay on their tracks where a shot is missing, and seem to be faster there."""
+    results = write_series(tmp_path / "droplets", ordered(TENTHS, tenths), rate_hz=RATE_HZ)
+    doubts = told(capsys, "tracks", results, "-o", tmp_path / "tracks.h5")["doubts"]
+    uneven = [doubt for doubt in doubts if doubt.startswith(TOGETHER)]
+    assert len(uneven) == (told_of is not None), doubts
+    assert told_of is None or told_of in uneven[0]
 
 
 def test_shots_that_are_not_good_are_told_with_their_tracks(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
