@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cache
+from typing import Literal
 
 import numpy as np
 from scipy.ndimage import map_coordinates
@@ -12,9 +13,13 @@ from processing.studies.simulated_droplets import study_cameras
 
 AIRY_PX = 3.9
 """Diameter of the Airy disk in the image."""
+BLUR_PX = 0.9
+"""Of a lens that is not sharp."""
 PER_AIRY, SIZE, SOURCE_POINTS = 8, 128, 40
 DIAMETERS_UM = (30.0, 60.0, 110.0, 200.0)
 IMAGE_SIZE_PX = (420, 300)
+Ratio = float | Literal["gaussian"] | None
+"""Of the light's aperture to the lens's; None: light from all directions; gaussian: all that is seen is a blur."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +33,7 @@ class ReticleScene:
 
 
 def reticle_scene(
-    condenser_ratio: float | None,
+    condenser_ratio: Ratio,
     *,
     diameters_um: tuple[float, ...] = DIAMETERS_UM,
     columns: int = 5,
@@ -60,7 +65,7 @@ def _darken(
     point_mm: FloatArray,
     diameter_um: float,
     axes: tuple[FloatArray, FloatArray],
-    ratio: float | None,
+    ratio: Ratio,
 ) -> None:
     step_mm = 0.02
     sides = [(camera.project(point_mm + step_mm * a) - camera.project(point_mm - step_mm * a))[0] for a in axes]
@@ -75,7 +80,7 @@ def _darken(
 
 
 @cache
-def ellipse_image(matrix_airy: tuple[float, float, float, float], ratio: float | None) -> FloatArray:
+def ellipse_image(matrix_airy: tuple[float, float, float, float], ratio: Ratio) -> FloatArray:
     """Light around an ellipse, the unit circle times a matrix (column, row), blurred by the area of a pixel too."""
     f = np.fft.fftfreq(SIZE, 1 / PER_AIRY)
     along, down = f[None, :], f[:, None]
@@ -84,6 +89,9 @@ def ellipse_image(matrix_airy: tuple[float, float, float, float], ratio: float |
     with np.errstate(invalid="ignore"):
         ellipse = abs(a * d - b * c) * np.where(k > 0, j1(2 * np.pi * k) / k, np.pi)
     pixel = np.sinc(along / AIRY_PX) * np.sinc(down / AIRY_PX)
+    if ratio == "gaussian":
+        passed = np.exp(-2 * (np.pi * BLUR_PX / AIRY_PX) ** 2 * (along**2 + down**2))
+        return np.asarray(np.fft.fftshift(1 - PER_AIRY**2 * np.fft.ifft2(ellipse * passed * pixel).real))
     if ratio is None:
         # What is left of a spatial frequency in incoherent light.
         s = np.minimum(np.hypot(along, down) / 2.44, 1)

@@ -14,6 +14,7 @@ from processing.analysis.droplets.shadows.light_search import (
     Light,
     Relit,
     SeenLight,
+    light_doubts,
     seen_light,
     stated_ratio,
 )
@@ -115,8 +116,8 @@ def measure_reticle(
     views = reticle.fitted(seen_in.condenser_ratio)
     _require_black(np.concatenate([view.greys for view in views]))
     found_um = reticle.diameters_um(views)
-    most = IN_ANY_LIGHT if seen_in.condenser_ratio is None else IN_ITS_LIGHT
-    numbers = size_groups(found_um.mean(axis=1), diameters_um, most)
+    unknown = light == "gaussian" or light_doubts(seen_in.share, len(found_um))
+    numbers = size_groups(found_um.mean(axis=1), diameters_um, IN_ANY_LIGHT if unknown else IN_ITS_LIGHT)
     groups = tuple(
         _group(true_um, found_um[numbers == number]) for number, true_um in enumerate(map(float, diameters_um))
     )

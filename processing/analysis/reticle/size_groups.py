@@ -15,8 +15,8 @@ LEAST_RATIO = 1.08
 GAP_SHARE = 0.4
 """Of the least step between two diameters, as logarithms: a wider gap parts two sizes."""
 IN_ANY_LIGHT, IN_ITS_LIGHT = (12.0, 0.2), (4.0, 0.03)
-"""What a correction may be, in um and beside it of a diameter, behind a Gaussian blur and in a light that shows; more,
-and the diameters are those of another reticle."""
+"""What a correction may be, in um and beside it of a diameter, where nobody knows the light, and where dots tell it, or
+that none shows; more, and the diameters are those of another reticle."""
 
 
 class ReticleError(BadInput):

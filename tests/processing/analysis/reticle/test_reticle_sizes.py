@@ -34,6 +34,13 @@ def test_in_another_light_the_same_dots_look_larger() -> None:
     assert min(group.found_um - group.true_um for group in found.groups) > 6
 
 
+def test_where_no_light_shows_another_scale_is_refused() -> None:
+    """Behind an unsharp lens dots look as large as they are: a tenth more is none of the light's."""
+    scene = reticle_scene("gaussian", diameters_um=(60.0, 130.0), columns=5)
+    with pytest.raises(ReticleError, match="66 um look as if they had 60 um"):
+        measure_reticle(scene.images[:3], scene.cameras[:3], BOX, (66.0, 143.0))
+
+
 def test_few_dots_do_not_tell_the_light() -> None:
     scene = reticle_scene(0.8, diameters_um=DIAMETERS_UM, columns=3)
     with pytest.raises(ReticleError, match="6 dots do not tell"):
