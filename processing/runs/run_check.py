@@ -26,6 +26,7 @@ from processing.runs.results_file import FrameName
 from processing.runs.shots.agreeing_shots import corrected_by
 from processing.runs.shots.shot_check import Exposure, ShotCheck, check_shots
 from processing.runs.shots.shot_images import shot_intensities
+from processing.runs.shots.stated_lengths import other_scale
 from processing.runs.workbench import Workbench
 
 CHECKED_SHOTS = 3
@@ -43,7 +44,7 @@ def check_shot(run_dir: Path, shot: int, calibration: Calibration, workbench: Wo
     PipelineError
         An exposure is missing.
     """
-    (check,) = check_shots(_droplets(run_dir, [shot], calibration, workbench=workbench), calibration)
+    (check,) = _checked(run_dir, [shot], calibration, workbench)
     return check
 
 
@@ -65,7 +66,7 @@ def check_few(
         calibration.require_usable(run.header.views)
         seen = replace(calibration, views={name: calibration.views[name] for name in run.header.views})
     few = list(dict.fromkeys((shots[0], shots[len(shots) // 2], shots[-1])))
-    return check_shots(_droplets(run_dir, few, seen, workbench=workbench), seen)
+    return _checked(run_dir, few, seen, workbench)
 
 
 def odd_images(run_dir: Path, shot: int, workbench: Workbench) -> tuple[str, ...]:
@@ -144,6 +145,16 @@ def self_calibrate_run(
         An exposure is missing.
     """
     return corrected_by(_droplets(run_dir, shots, calibration, counted), calibration, run_dir.name)
+
+
+def _checked(
+    run_dir: Path, shots: Sequence[int], calibration: Calibration, workbench: Workbench | None
+) -> list[ShotCheck]:
+    """What droplets say of the views, and the rig of the run of all lengths."""
+    checks = check_shots(_droplets(run_dir, shots, calibration, workbench=workbench), calibration)
+    with RunReader(run_dir) as run:
+        lengths = other_scale(run.header, calibration)
+    return [replace(check, lengths=lengths) for check in checks]
 
 
 def _droplets(

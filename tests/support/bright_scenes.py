@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -46,8 +46,12 @@ def write_bright_run(
     covered: tuple[str, ...] = (),
     moving: DoubleScene | None = None,
     separation_ns: int | None = 6400,
+    **told: Any,
 ) -> Path:
-    """Shots of the same scene, B the same as A but of a moving one; covered views record noise alone."""
+    """Shots of the same scene, B the same as A but of a moving one; covered views record noise alone.
+
+    ``told`` is more of the header.
+    """
     images = moving.images if moving else (scene().images,) * 2
     rng = np.random.default_rng(0)
     names = [f"view{number}" for number in range(1, 5)]
@@ -58,6 +62,7 @@ def write_bright_run(
         frames_per_shot=frames,
         separation_ns=separation_ns if frames == 2 else None,
         polarity="bright",
+        **told,
     )
     recorded = ExposureRecord(valid=True, frame_id=1, device_timestamp_ns=1)
     views = {}

@@ -1,8 +1,9 @@
 """A run of droplets seen by four views, one of which has moved since it was calibrated."""
 
-from collections.abc import Callable, Container, Mapping
+from collections.abc import Callable, Container, Iterable, Mapping
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +14,12 @@ from tests.support.drifting_views import DENSITY_PER_MM3, HALF_MM, SIZE_PX, view
 
 SEEN = ExposureRecord(valid=True, frame_id=1, device_timestamp_ns=1)
 DRIFT_PX = 2
+
+
+def rig_of(views: Iterable[str], magnification: float) -> dict[str, Any]:
+    """What a header keeps of a rig whose lenses magnify so much."""
+    optics = {"lens": {"magnification": magnification}, "sensor": {"pixel_pitch_um": 7.4}}
+    return {"views": dict.fromkeys(views, optics)}
 
 
 def write_droplet_run(
@@ -28,11 +35,13 @@ def write_droplet_run(
     drifting: Container[int] = range(100),
     cut_px: int = 0,
     odd: Mapping[int, Callable[[FloatImage], FloatImage]] = MappingProxyType({}),
+    magnification: float | None = None,
 ) -> Path:
     """Shots; in those that drift, view2's picture lies two pixels further right than when it was calibrated.
 
     A covered view is dark; mirrored are all of them. Odd rows of interlaced ones show the droplets 0.1 mm beside.
     Images from elsewhere were cut so many rows lower than those of the target. In odd shots view2 is changed.
+    The rig may state the magnification of its lenses.
     """
     rng = np.random.default_rng(11)
     cameras = {f"view{number}": camera for number, camera in enumerate(views()[:view_count], start=1)}
@@ -43,7 +52,9 @@ def write_droplet_run(
         views={name: ViewFormat(shape, 8) for name in cameras},
         polarity="bright",
         separation_ns=6400,
-        configuration={"import": {"manifest": "cut.toml"}} if cut_px else {},
+        configuration=(cut_px and {"import": {"manifest": "cut.toml"}})
+        or (magnification and rig_of(cameras, magnification))
+        or {},
     )
     with RunWriter(run_dir, header) as writer:
         for index in range(shots):

@@ -3,7 +3,7 @@
 import json
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +18,6 @@ from processing.analysis.droplets.size_correction import SizeCorrection
 from processing.analysis.near_or_far import SIGHTS, depth_reversed
 from processing.calibration.calibration import Calibration
 from processing.calibration.calibration_file import load_calibration
-from processing.calibration.droplets.droplet_images import find_droplets
 from processing.kernels import DEFAULT_THREADS
 from processing.preprocessing import Intensity
 from processing.reconstruction.planning.calibrated_plan import default_grid
@@ -48,7 +47,8 @@ from processing.runs.recipe import recipe_sha256
 from processing.runs.results_file import FrameName, Provenance, claim_results, provenance_of
 from processing.runs.shots.separation import separation_of
 from processing.runs.shots.shot_images import frame_names, require_match
-from processing.runs.shots.turned_views import meeting_sights
+from processing.runs.shots.stated_lengths import other_scale
+from processing.runs.shots.turned_views import sights_in
 from processing.runs.sprays.conditions import conditions_of
 from processing.runs.workbench import References, read_references
 
@@ -210,8 +210,9 @@ class RunMeasurement:
         before_round()
         measure = self._bright if self.settings.polarity == "bright" else self._shadows
         exposure, lights, reasons = measure(shot, frame, threads, before_round)
-        sights = self._sights(shot, lights) if frame != "b" else {}
-        return doubted(exposure, (*reasons, *filter(None, [depth_reversed(sights)]))), sights
+        sights = sights_in(self.calibration, list(shot.views), lights) if frame != "b" else {}
+        doubts = (depth_reversed(sights), other_scale(self.run.header, self.calibration))
+        return doubted(exposure, (*reasons, *filter(None, doubts))), sights
 
     def _bright(self, shot: Shot, frame: FrameName, threads: int, before_round: Callable[[], None]) -> _Found:
         images = bright_images(self.run, shot, frame, self.references)
@@ -241,8 +242,3 @@ class RunMeasurement:
             before_round=before_round,
         )
         return measured, [1 - one for one in images], odd_backgrounds(shot, frame, self.references)
-
-    def _sights(self, shot: Shot, lights: Sequence[Intensity]) -> dict[str, int]:
-        views = {name: self.calibration.views[name] for name in shot.views}
-        seen = [find_droplets(np.clip(light, 0, None)) for light in lights]
-        return meeting_sights(replace(self.calibration, views=views), [seen])

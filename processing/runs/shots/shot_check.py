@@ -49,6 +49,8 @@ class ShotCheck:
         Some views agree. Where none do, none is known to be wrong: the spots of noisy images are no droplets.
     sights : dict of str to int
         At how many droplets of all shots that were asked at once lines of sight meet, by what is assumed.
+    lengths : str
+        Why all lengths may be those of another lens, which no droplet tells.
     """
 
     shot: int
@@ -57,6 +59,7 @@ class ShotCheck:
     beyond: tuple[str, ...] = ()
     agreed: bool = True
     sights: Mapping[str, int] = field(default_factory=dict)
+    lengths: str = ""
 
     @property
     def worst_px(self) -> float:
@@ -83,11 +86,13 @@ class ShotCheck:
     def verdict(self) -> Verdict | None:
         """By the limits of a hold-out error: ``warn`` is an alarm, ``refuse`` stops reconstruction.
 
-        A view that has moved further than can be measured is refused too; where no views agree, that is an alarm.
+        A view that has moved further than can be measured is refused too; where no views agree, that is an alarm, and
+        so are lengths in another scale.
         """
         if self.beyond:
             return Verdict.REFUSE if self.agreed else Verdict.WARN
-        return judge(self.certain_px) if self.views else None
+        told = judge(self.certain_px) if self.views else None
+        return Verdict.WARN if self.lengths and told is not Verdict.REFUSE else told
 
     def record(self) -> dict[str, Any]:
         """What was found, for a program: JSON values."""
@@ -97,7 +102,7 @@ class ShotCheck:
             "moved": self.moved,
             "views": {name: view.disparity_px for name, view in self.views.items()},
             "uncertainty_px": {name: view.uncertainty_px for name, view in self.views.items()},
-            "problem": self.problem or None,
+            "problem": "; ".join(filter(None, (self.problem, self.lengths))) or None,
         }
 
     @property

@@ -6,6 +6,7 @@ zoomed never makes more of them meet in a reversed world.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from itertools import accumulate, combinations
 
 import numpy as np
@@ -13,9 +14,11 @@ import numpy as np
 from processing.analysis.near_or_far import AS_SEEN, CLOSE_PX
 from processing.calibration.calibration import Calibration
 from processing.calibration.droplets.disparity import MIN_VIEWS, measured_box
+from processing.calibration.droplets.droplet_images import find_droplets
 from processing.calibration.droplets.droplet_matching import match_exposures
 from processing.calibration.triangulation import triangulate
 from processing.geometry import FloatArray
+from processing.preprocessing import Intensity
 from processing.volume import VoxelGrid
 
 SEEDS = 300
@@ -37,6 +40,13 @@ def meeting_sights(calibration: Calibration, exposures: Iterable[list[FloatArray
         return {}
     found = {what: _met(calibration, seen) for what, seen in turned(calibration, asked)}
     return {AS_SEEN: _met(calibration, asked), **found}
+
+
+def sights_in(calibration: Calibration, names: Sequence[str], lights: Sequence[Intensity]) -> dict[str, int]:
+    """The same of the images of one exposure, with droplets bright, of some views of a calibration."""
+    seen = [find_droplets(np.clip(light, 0, None)) for light in lights]
+    views = {name: calibration.views[name] for name in names}
+    return meeting_sights(replace(calibration, views=views), [seen])
 
 
 def _enough(exposures: Iterable[list[FloatArray]]) -> Exposures:

@@ -67,7 +67,8 @@ def check(options: Namespace) -> Outcome:
 def check_line(measured: "ShotCheck") -> str:
     """One shot for a person."""
     meaning = _MEANING.get(measured.verdict) if measured.verdict else None
-    return f"shot {measured.shot}: {_finding(measured)}" + (f"  {meaning}" if meaning else "")
+    told = "; ".join(filter(None, (_finding(measured), measured.lengths)))
+    return f"shot {measured.shot}: {told}" + (f"  {meaning}" if meaning else "")
 
 
 def _finding(measured: "ShotCheck") -> str:

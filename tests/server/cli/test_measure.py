@@ -17,7 +17,7 @@ from processing.reconstruction.settings import GridSettings
 from server.cli.main import main
 from tests.support.bright_scenes import BOX, GRID, scene, write_bright_calibration, write_bright_run
 from tests.support.command_line import refused, shown, told
-from tests.support.drifting_run import write_droplet_run
+from tests.support.drifting_run import rig_of, write_droplet_run
 from tests.support.drifting_views import calibration_of, views
 from tests.support.droplet_run import (
     DROPLETS_A_MM,
@@ -294,6 +294,17 @@ def test_images_that_are_mirrored_in_all_views_are_named(tmp_path: Path, capsys:
     assert shot["reasons"][0].endswith("depth is reversed")
     (told_of_all,) = result["depth"]
     assert told_of_all.startswith("all shots together: all views agree on ")
+
+
+def test_droplets_in_another_scale_than_that_of_the_rig_are_doubtful(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    names = [f"view{number}" for number in range(1, 5)]
+    write_bright_run(tmp_path / "run", configuration=rig_of(names, 0.22))
+    write_bright_calibration(tmp_path / "calibration.json")
+    (shot,) = told(capsys, *command(tmp_path, tmp_path / "out"))["shots"]
+    assert shot["verdict"] == "doubtful"
+    assert "29.7 px/mm by magnification and pixels of the rig: is the calibration that of another" in shot["reasons"][0]
 
 
 def test_few_droplets_do_not_tell_near_from_far_and_that_is_said(

@@ -33,6 +33,23 @@ def calibration_file(tmp_path: Path) -> Path:
     return tmp_path / "old.json"
 
 
+@pytest.mark.parametrize(("magnification", "verdict"), [(0.45, "good"), (0.9, "warn")])
+def test_a_calibration_in_another_scale_than_the_rig_is_an_alarm(
+    calibration_file: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    magnification: float,
+    verdict: str,
+) -> None:
+    """A factor of all lengths moves no view: another lens, or another focus, and droplets agree all the same."""
+    run_dir = write_droplet_run(tmp_path / "run", drift_px=0, shots=1, magnification=magnification)
+    result = told(capsys, "check", run_dir, "--calibration", calibration_file)
+    assert result["verdict"] == verdict
+    (shot,) = result["shots"]
+    assert max(shot["views"].values()) < 0.2
+    assert ("is the calibration that of another lens" in str(shot["problem"])) == (verdict == "warn")
+
+
 def test_moved_view_stops_and_a_corrected_calibration_is_good_again(
     run_dir: Path, calibration_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
