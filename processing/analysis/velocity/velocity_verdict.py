@@ -7,6 +7,7 @@ from processing.analysis.droplets.measured_exposure import MeasuredExposure, See
 from processing.analysis.velocity.common_motion import REACH_VOXEL
 from processing.analysis.velocity.moving_droplets import MovingDroplets
 from processing.analysis.velocity.pairing import Pairing
+from processing.geometry import FloatArray
 
 LEAST_SHARE, TRUSTED_SHARE = 0.1, 0.5
 """Of the droplets that should be in the grid in both: with fewer pairs velocities are refused, or doubtful."""
@@ -16,6 +17,8 @@ FASTEST_M_S = 1000.0
 """No spray is as fast; diesel at 300 MPa leaves its nozzle with 800 m/s."""
 LEAST_NOISE = 0.1
 """Of the noise of displacements. An image that is there twice has none."""
+STILL, MOST_STILL = 2.0, 0.5
+"""Standard deviations of the displacement below which nothing is known to move, and share of the droplets."""
 Verdict = tuple[ShotVerdict, tuple[str, ...]]
 
 
@@ -53,6 +56,7 @@ def judged(
     doubts = [f"exposure {name} is doubtful" for name, one in zip("AB", exposures, strict=True) if one.reasons]
     doubts += [_few(share, TRUSTED_SHARE)] if share < TRUSTED_SHARE else []
     doubts += [_ambiguous(wrong)] if wrong > MOST_WRONG else []
+    doubts += [_at_rest(still)] if (still := _still_share(droplets, pairing)) > MOST_STILL else []
     return (ShotVerdict.DOUBTFUL if doubts else ShotVerdict.GOOD), tuple(doubts)
 
 
@@ -64,17 +68,35 @@ def _nothing_common(first: MovingDroplets, second: MovingDroplets) -> str:
 
 
 def _is_copy(droplets: tuple[MovingDroplets, MovingDroplets], pairing: Pairing) -> bool:
+    moved, variances = _moved(droplets, pairing)
+    return bool(np.median(moved**2 - LEAST_NOISE**2 * variances) <= 0)
+
+
+def _still_share(droplets: tuple[MovingDroplets, MovingDroplets], pairing: Pairing) -> float:
+    """Of the droplets with a partner, those that are not known to move."""
+    moved, variances = _moved(droplets, pairing)
+    return float(np.mean(np.sum(moved**2, axis=1) < STILL**2 * np.sum(variances, axis=1)))
+
+
+def _moved(droplets: tuple[MovingDroplets, MovingDroplets], pairing: Pairing) -> tuple[FloatArray, FloatArray]:
+    """Displacement of every pair (N, 3), in voxels, and its variances."""
     first, second = droplets
     own, other = pairing.pairs
-    moved = second.places[other] - first.places[own]
     variances = np.einsum("nii->ni", first.covariance[own] + second.covariance[other])
-    return bool(np.median(moved**2 - LEAST_NOISE**2 * variances) <= 0)
+    return second.places[other] - first.places[own], variances
 
 
 def _few(share: float, limit: float) -> str:
     return (
         f"{100 * share:.0f} % of the droplets that should be in both exposures have a partner, limit {100 * limit:.0f} "
         "%: are A and B of one shot, and are droplets seen in both?"
+    )
+
+
+def _at_rest(share: float) -> str:
+    return (
+        f"{100 * share:.0f} % of the droplets stand still from A to B, as sure as that is known: is it dirt, or are "
+        "both exposures of one flash? A longer separation tells slow droplets"
     )
 
 

@@ -184,6 +184,16 @@ def test_droplets_that_stand_still_are_paired() -> None:
     assert of(first, second).verdict is ShotVerdict.GOOD
 
 
+@pytest.mark.parametrize(("way_voxel", "still"), [(0.0, True), (0.3, False)])
+def test_where_none_is_known_to_move_velocities_are_doubtful(way_voxel: float, still: bool) -> None:
+    """Both exposures in one flash, each with noise of its own: nothing moves, and all droplets have a partner."""
+    first, _ = exposures()
+    noise = np.random.default_rng(2).normal(0, 0.05, first.droplets.places.shape)
+    velocities = of(first, first.placed(first.droplets.places + noise + (0, way_voxel, 0)))
+    assert velocities.verdict is (ShotVerdict.DOUBTFUL if still else ShotVerdict.GOOD)
+    assert any("stand still" in reason for reason in velocities.reasons) == still
+
+
 @pytest.mark.parametrize("counts", [(1, 1), (1, 200), (200, 1), (2, 2)])
 def test_too_few_droplets_are_refused(counts: tuple[int, int]) -> None:
     first, second = (few(one, count) for one, count in zip(exposures(), counts, strict=True))
