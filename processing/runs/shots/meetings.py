@@ -88,7 +88,7 @@ def pale_views(meetings: Meetings) -> dict[Exposure, dict[str, str]]:
         told = {key: one for key, one in meetings.items() if key[1] == frame and one.droplets >= FEWEST}
         if len(told) < FEWEST_EXPOSURES:
             continue
-        for view in next(iter(told.values())).contrasts:
+        for view in sorted(set.intersection(*(set(one.contrasts) for one in told.values()))):
             said |= {key: {**said.get(key, {}), view: text} for key, text in _pale(told, view).items()}
     return said
 

@@ -85,6 +85,6 @@ def test_a_calibration_that_was_replaced_under_its_name_is_no_longer_that_of_its
         reconstruction_job("run", 0, "cal", "mlos-1", {}),
         reconstruction_job("run", 1, "cal", "nothing-yet", {}),
     ]
-    for content, replaced in (("cal-1", [False] * 4), ("cal-2", [True, True, True, False])):
+    for content, replaced in (("cal-1", set()), ("cal-2", {job.id for job in jobs[:3]})):
         (data_dir / "calibrations" / "cal.json").write_text(json.dumps({"id": content}))
-        assert [replaced_since(context, job) for job in jobs] == replaced
+        assert replaced_since(context, jobs) == replaced

@@ -41,8 +41,9 @@ class JobPanel:
 
     def _rows(self) -> list[dict[str, Any]]:
         """Of the disk: whose calibrations were replaced since."""
-        current = self._context.calibrations.current
-        return [job_row(job, current, replaced_since(self._context, job)) for job in listed_jobs(self._context.jobs)]
+        jobs, current = listed_jobs(self._context.jobs), self._context.calibrations.current
+        replaced = replaced_since(self._context, jobs)
+        return [job_row(job, current, job.id in replaced) for job in jobs]
 
     def filter(self, words: str) -> None:
         """Show those of the newest jobs that have these words in a cell; all of them for none."""
