@@ -39,6 +39,8 @@ if TYPE_CHECKING:
 NAME = "reconstruct"
 STATED = {"method", "accuracy", "voxels", "grid", "minimum_window_px", "noise_floor"}
 """Settings that are told with the result."""
+MOST_COMPARED = 100
+"""Volumes that were there before."""
 
 
 def add(verbs: Verbs) -> None:
@@ -115,7 +117,8 @@ def _reconstruct_shots(
     options: Namespace, settings: "ReconstructionSettings", run_dir: Path, indices: list[int], out: Path
 ) -> "tuple[list[ShotResult], Belonging]":
     from processing.calibration.calibration_file import load_calibration
-    from processing.runs.shots.meetings import pale_views, seldom_meeting
+    from processing.runs.results_file import volume_files
+    from processing.runs.shots.meetings import pale_views, seldom_meeting, stored_meetings
     from processing.runs.volumes.pipeline import Options, reconstruct_shots
 
     calibration = load_calibration(options.calibration)
@@ -137,9 +140,12 @@ def _reconstruct_shots(
                 _tell_slow_views(shot)
             _tell_faults(shot)
             shots.append(shot)
-    meetings = {key: one for shot in shots for key, one in shot.meetings.items()}
+    made = {volume.file for shot in shots for volume in shot.volumes}
+    others = [file for file in volume_files(out) if file.name not in made][-MOST_COMPARED:]
+    meetings = stored_meetings(others) | {key: one for shot in shots for key, one in shot.meetings.items()}
     told = [_with_pale(shot, pale_views(meetings)) for shot in shots]
-    return told, ask_seldom(belonging(), seldom_meeting(meetings), run_dir, calibration)
+    seldom = [shot for shot in seldom_meeting(meetings) if shot in indices]
+    return told, ask_seldom(belonging(), seldom, run_dir, calibration)
 
 
 def _elsewhere(

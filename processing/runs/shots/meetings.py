@@ -5,6 +5,7 @@ rig to rig. So each keeps its figures, which cost a hundredth of a second, and t
 """
 
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -12,7 +13,7 @@ import numpy as np
 from pydantic import Field
 
 from processing.reconstruction.settings import FrozenValue
-from processing.reconstruction.volume_file import open_volume
+from processing.reconstruction.volume_file import VolumeFileError, open_volume
 from processing.runs.results_file import FrameName
 
 MEETING = "meeting"
@@ -56,12 +57,11 @@ def meetings_of(volumes: list[dict[str, Any]]) -> dict[Exposure, Meeting]:
 
 
 def stored_meetings(volume_files: Iterable[Path]) -> dict[Exposure, Meeting]:
-    """What the exposures of stored volumes are compared by; of older ones nothing."""
+    """What the exposures of stored volumes are compared by; of older ones, and what nobody can read, nothing."""
     found: dict[Exposure, Meeting] = {}
     for file in volume_files:
-        with open_volume(file) as volume:
+        with suppress(VolumeFileError, ValueError, KeyError), open_volume(file) as volume:
             told = volume.provenance
-        if MEETING in told:
             frame: FrameName = "b" if told["frame"] == "b" else "a"
             found[int(told["shot"]), frame] = Meeting.model_validate_json(str(told[MEETING]))
     return found

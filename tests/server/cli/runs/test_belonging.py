@@ -102,6 +102,10 @@ def test_a_view_that_is_pale_for_one_shot_is_told(
     assert "% of the contrast that it has in other shots" in odd[1, "view2"]
     assert f"shot 1, exposure a: view2 {odd[1, 'view2']}" in output.err
     if command == "reconstruct":
+        (tmp_path / "mean.vtkhdf" / "shot_00001_a.vtkhdf").unlink()
+        (tmp_path / "mean.vtkhdf" / "shot_00001_b.vtkhdf").unlink()
+        alone = told(capsys, *arguments[:-1], "--shots", "1:2")["volumes"]
+        assert [list(one["odd_light"]) for one in alone] == [["view2"]] * 2
         (fault,) = told(capsys, "average", tmp_path / "mean.vtkhdf", "-o", tmp_path / "mean2.vtkhdf")["faults"]
         assert (fault["shot"], list(fault["odd_light"])) == (1, ["view2"])
 
