@@ -8,14 +8,7 @@ from typing import TYPE_CHECKING, Any
 from server.cli.chosen_shots import selected_shots
 from server.cli.cluster.scheduler_option import add_scheduler, require_followed, shots_elsewhere
 from server.cli.light_option import add_light
-from server.cli.options import (
-    Verbs,
-    add_out,
-    add_shots,
-    add_verb,
-    setting,
-    usable_processors,
-)
+from server.cli.options import Verbs, add_out, add_shots, add_verb, setting, usable_processors
 from server.cli.output import Outcome, progress, tracked
 from server.cli.runs.batch import add_runs, over_runs
 from server.cli.runs.export_option import add_export
@@ -193,16 +186,7 @@ def _measure_run(options: Namespace, settings: "MeasureSettings", run_dir: Path,
 def _measure_shots(
     options: Namespace, settings: "MeasureSettings", run_dir: Path, indices: list[int], out: Path
 ) -> dict[str, Any]:
-    from processing.analysis.copied_shots import copies_told
-    from processing.analysis.droplets.droplet_file import read_droplets
-    from processing.analysis.droplets.droplet_statistics import droplet_statistics
     from processing.analysis.exports.export import export_droplets
-    from processing.analysis.near_or_far import depth_doubts, sights_of
-    from processing.analysis.velocity.velocity_statistics import velocity_statistics
-    from processing.runs.droplets.measure_settings import METHOD_VERSION
-    from processing.runs.liquid.objects import liquid_summary
-    from processing.runs.recipe import recipe_sha256
-    from processing.runs.sprays.conditions import changes_told
 
     shots: list[ShotDroplets] = []
     with closing((_elsewhere if options.scheduler else _here)(options, settings, run_dir, indices, out)) as coming:
@@ -211,7 +195,23 @@ def _measure_shots(
             for export in options.export:
                 export_droplets(out / shots[-1].file, export)
             _tell_faults(shots[-1])
-    files = [out / shot.file for shot in shots]
+    return _result(options, settings, run_dir, shots, [out / shot.file for shot in shots])
+
+
+def _result(
+    options: Namespace, settings: "MeasureSettings", run_dir: Path, shots: "list[ShotDroplets]", files: list[Path]
+) -> dict[str, Any]:
+    """What the shots say together, of which people are told what casts doubt."""
+    from processing.analysis.copied_shots import copies_told
+    from processing.analysis.droplets.droplet_file import read_droplets
+    from processing.analysis.droplets.droplet_statistics import droplet_statistics
+    from processing.analysis.near_or_far import depth_doubts, sights_of
+    from processing.analysis.velocity.velocity_statistics import velocity_statistics
+    from processing.runs.droplets.measure_settings import METHOD_VERSION
+    from processing.runs.liquid.objects import liquid_summary
+    from processing.runs.recipe import recipe_sha256
+    from processing.runs.sprays.conditions import changes_told
+
     stored = [read_droplets(file) for file in files]
     return {
         "conditions_changed": _told(changes_told(stored, files)),

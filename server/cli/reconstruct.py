@@ -81,9 +81,7 @@ def _reconstruct_run(
     options: Namespace, settings: "ReconstructionSettings", share: float, run_dir: Path, place: Path
 ) -> Outcome:
     from daq.files.run_directory import RunReader
-    from processing.reconstruction.settings import METHOD_VERSION
     from processing.runs.overwriting import replacing, require_free
-    from processing.runs.recipe import recipe_sha256
     from processing.runs.results_file import SETTINGS_FILE, volume_path
     from processing.runs.shots.shot_images import frame_names
 
@@ -99,7 +97,17 @@ def _reconstruct_run(
         require_free(*volumes, overwrite=False)
         with resumable(place, indices, lambda index: [volume_path(place, index, frame) for frame in frames]):
             shots, belonging = _reconstruct_shots(options, settings, run_dir, indices, place)
-    result = {
+    result = _result(settings, share, shots, belonging)
+    return Outcome(result, f"{volumes_table(result)}\n{place}: {_summary(result)}\n{belonging.text}")
+
+
+def _result(
+    settings: "ReconstructionSettings", share: float, shots: "list[ShotResult]", belonging: Belonging
+) -> dict[str, Any]:
+    from processing.reconstruction.settings import METHOD_VERSION
+    from processing.runs.recipe import recipe_sha256
+
+    return {
         "passed": belonging.passed,
         **settings.model_dump(mode="json", include=STATED),
         "recipe_sha256": recipe_sha256(NAME, METHOD_VERSION, settings),
@@ -110,7 +118,6 @@ def _reconstruct_run(
         "cpu_s": sum(shot.cpu_s for shot in shots),
         "peak_rss_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
     }
-    return Outcome(result, f"{volumes_table(result)}\n{place}: {_summary(result)}\n{belonging.text}")
 
 
 def _reconstruct_shots(

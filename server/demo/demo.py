@@ -1,7 +1,7 @@
 """The demonstration: the whole chain on the simulated bench, from the target on its stage to volumes and droplets."""
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -113,20 +113,14 @@ def demonstrate(
         with watch.step("acquire"):
             sample = _record_sample(recorder, shots, calibration)
     recorded, valid = _recorded_and_valid(sample)
-    grid = default_grid(calibration, PITCH_MM)
+    file, grid = calibration_path(out, calibration.id), default_grid(calibration, PITCH_MM)
     settings = ReconstructionSettings(grid=GridSettings.of(grid))
     results_dir = sample / "results" / settings.results_id(calibration.id)
     with watch.step("reconstruct"):
-        results, workbench = [], Workbench()
-        for shot in valid:
-            progress(f"reconstructing shot {shot} by {settings.method.value}")
-            file = calibration_path(out, calibration.id)
-            results.append(reconstruct_shot(sample, shot, file, settings, results_dir, workbench=workbench))
+        results = tuple(_reconstructed(sample, valid, file, settings, results_dir, progress))
     with watch.step("measure"):
         progress(f"measuring the droplets of shot {valid[0]} in a box downstream of the break-up")
-        droplets = measure_droplets(
-            sample, valid[0], calibration, calibration_path(out, calibration.id), sample / TRUTH_FILE
-        )
+        droplets = measure_droplets(sample, valid[0], calibration, file, sample / TRUTH_FILE)
         progress("looking for ligaments and the break-up in exposure A of every shot")
         liquid = measure_liquid(sample, valid, calibration, sample / TRUTH_FILE)
     with watch.step("judge"):
@@ -138,7 +132,7 @@ def demonstrate(
         calibration=calibration,
         true_error_px=true_errors_px(calibration, sample, grid),
         sample_run=sample,
-        results=tuple(results),
+        results=results,
         results_dir=results_dir,
         quality_factors=qualities,
         droplets=droplets,
@@ -237,6 +231,21 @@ class _Runs:
             raise DaqError(f"{run_dir.name}: {status.outcome or status.state}, {status.message}")
         self._progress(f"{run_dir.name}: {status.shots_valid} of {status.shots_planned} shots valid")
         return run_dir
+
+
+def _reconstructed(
+    sample: Path,
+    shots: Sequence[int],
+    calibration_file: Path,
+    settings: ReconstructionSettings,
+    results_dir: Path,
+    progress: Progress,
+) -> Iterator[ShotResult]:
+    """Reconstruct shot after shot, and tell which."""
+    workbench = Workbench()
+    for shot in shots:
+        progress(f"reconstructing shot {shot} by {settings.method.value}")
+        yield reconstruct_shot(sample, shot, calibration_file, settings, results_dir, workbench=workbench)
 
 
 def _recorded_and_valid(run_dir: Path) -> tuple[int, list[int]]:

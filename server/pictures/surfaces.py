@@ -8,6 +8,7 @@ The mesh is in mm with the axes of the world turned for viewers that have y up: 
 
 import json
 import struct
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -55,9 +56,16 @@ def surface_glb(preview: VolumePreview, level: float, colour: Colour = BLUE) -> 
 def glb(positions: Array, normals: Array, faces: Array, colour: Colour = BLUE) -> bytes:
     """Binary glTF 2.0 of one mesh; positions and normals (N, 3), faces (M, 3) indices."""
     parts = [faces.astype("<u4").tobytes(), positions.astype("<f4").tobytes(), normals.astype("<f4").tobytes()]
-    offsets = np.cumsum([0, *map(len, parts)]).tolist()
+    document = json.dumps(_document(positions, faces.size, list(map(len, parts)), colour))
+    chunks = _chunk(b"JSON", document.encode(), b" ") + _chunk(b"BIN\0", b"".join(parts), b"\0")
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
+
+
+def _document(positions: Array, indices: int, lengths_byte: Sequence[int], colour: Colour) -> dict[str, Any]:
+    """What glTF says of a mesh, whose indices, positions and normals follow each other in one buffer."""
+    offsets = np.cumsum([0, *lengths_byte]).tolist()
     targets = (_ELEMENT_ARRAY_BUFFER, _ARRAY_BUFFER, _ARRAY_BUFFER)
-    document = {
+    return {
         "asset": {"version": "2.0", "generator": "tomoshadow"},
         "scene": 0,
         "scenes": [{"nodes": [0]}],
@@ -71,11 +79,11 @@ def glb(positions: Array, normals: Array, faces: Array, colour: Colour = BLUE) -
         ],
         "buffers": [{"byteLength": offsets[-1]}],
         "bufferViews": [
-            {"buffer": 0, "byteOffset": offset, "byteLength": len(part), "target": target}
-            for offset, part, target in zip(offsets, parts, targets, strict=False)
+            {"buffer": 0, "byteOffset": offset, "byteLength": length, "target": target}
+            for offset, length, target in zip(offsets, lengths_byte, targets, strict=False)
         ],
         "accessors": [
-            {"bufferView": 0, "componentType": _UINT, "count": faces.size, "type": "SCALAR"},
+            {"bufferView": 0, "componentType": _UINT, "count": indices, "type": "SCALAR"},
             {
                 "bufferView": 1,
                 "componentType": _FLOAT,
@@ -84,11 +92,9 @@ def glb(positions: Array, normals: Array, faces: Array, colour: Colour = BLUE) -
                 "min": positions.min(axis=0).tolist(),
                 "max": positions.max(axis=0).tolist(),
             },
-            {"bufferView": 2, "componentType": _FLOAT, "count": len(normals), "type": "VEC3"},
+            {"bufferView": 2, "componentType": _FLOAT, "count": len(positions), "type": "VEC3"},
         ],
     }
-    chunks = _chunk(b"JSON", json.dumps(document).encode(), b" ") + _chunk(b"BIN\0", b"".join(parts), b"\0")
-    return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
 
 
 def _chunk(kind: bytes, content: bytes, padding: bytes) -> bytes:

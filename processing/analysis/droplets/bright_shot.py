@@ -109,6 +109,24 @@ def measure_bright(
     fit = find_bright(shot, search, before_round)
     residuals = shot.residuals(fit.optics, fit.blobs)
     left = np.array([noise_of(residual) for residual in residuals])
+    told = _told(shot, fit, search, residuals, left, noises)
+    count = twins_of(twins, len(images))
+    if not count or told.verdict is not ShotVerdict.GOOD:
+        return told
+    rng = np.random.default_rng(seed)
+    ghosts = pooled(_twin_ghosts(shot, fit, search, left, rng, before_round) for _ in range(count))
+    return told_real(judged_by_twins(told, ghosts))
+
+
+def _told(
+    shot: BlobImages,
+    fit: BrightFit,
+    search: DropletSearch,
+    residuals: Sequence[Image],
+    left: FloatArray,
+    noises: FloatArray,
+) -> BrightExposure:
+    """What a fit tells, and whether to believe it."""
     unit = rms_of(np.maximum(left, MODEL_SHARE * fit.scale * fit.optics.gains))
     ratio, bare = rms(residuals) / unit, rms(shot.residuals(fit.optics, Blobs.none())) / unit
     views = _seen(fit.optics, noises, left, search.names)
@@ -119,13 +137,7 @@ def measure_bright(
     droplets = _droplets(shot, fit, residuals, search, left, noises).within(search.grid)
     hidden = Hidden.of(search.grid.shape, lambda shares: _is_seen(shot, search, search.places_at(shares)))
     found = MeasuredExposure(droplets, views, ratio, verdict, reasons, hidden=hidden)
-    told = told_real(judged_by_volume(judged_by_company(found, search.grid)))
-    count = twins_of(twins, len(images))
-    if not count or told.verdict is not ShotVerdict.GOOD:
-        return told
-    rng = np.random.default_rng(seed)
-    ghosts = pooled(_twin_ghosts(shot, fit, search, left, rng, before_round) for _ in range(count))
-    return told_real(judged_by_twins(told, ghosts))
+    return told_real(judged_by_volume(judged_by_company(found, search.grid)))
 
 
 def _is_seen(shot: BlobImages, search: DropletSearch, positions_voxel: FloatArray) -> NDArray[np.bool_]:

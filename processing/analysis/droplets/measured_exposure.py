@@ -201,35 +201,42 @@ def judged(
     limits : RatioLimits
         Of the ratio.
     """
-    if ratio >= limits.refused:
-        reason = (
-            f"droplets explain the images to {ratio:.2f} times the noise only, limit {limits.refused}: do calibration "
-            "and views belong together (tomoshadow check), is the spray too dense, or are droplets seen outside "
-            "of what was searched?"
+    if reasons := _refusals(beside_px, ratio, limits.refused):
+        return ShotVerdict.REFUSED, reasons
+    if reason := _doubt(ratio, bare, limits.trusted):
+        return ShotVerdict.DOUBTFUL, (reason,)
+    return ShotVerdict.GOOD, ()
+
+
+def _refusals(beside_px: Mapping[str, float], ratio: float, limit: float) -> tuple[str, ...]:
+    if ratio >= limit:
+        return (
+            f"droplets explain the images to {ratio:.2f} times the noise only, limit {limit}: do calibration and views "
+            "belong together (tomoshadow check), is the spray too dense, or are droplets seen outside of what was "
+            "searched?",
         )
-        return ShotVerdict.REFUSED, (reason,)
-    refused = [
+    return tuple(
         f"{name} lies {shift_px:.2f} px beside its calibration, limit {MOST_SHIFT_PX} px: correct it by the droplets "
         "(tomoshadow self-calibrate) or calibrate again"
         for name, shift_px in beside_px.items()
         if shift_px > MOST_SHIFT_PX
-    ]
-    if refused:
-        return ShotVerdict.REFUSED, tuple(refused)
-    if ratio >= limits.trusted:
-        reason = (
-            f"droplets explain the images to {ratio:.2f} times the noise, more than {limits.trusted}: how many are "
-            "ghosts cannot be told"
+    )
+
+
+def _doubt(ratio: float, bare: float, limit: float) -> str:
+    """Why what droplets leave unexplained casts doubt on them; empty where it does not."""
+    if ratio >= limit:
+        return (
+            f"droplets explain the images to {ratio:.2f} times the noise, more than {limit}: how many are ghosts "
+            "cannot be told"
         )
-        return ShotVerdict.DOUBTFUL, (reason,)
-    if ratio >= EVEN and (share := (bare**2 - ratio**2) / (bare**2 - 1)) < MOSTLY:
-        reason = (
-            f"droplets explain {100 * max(0.0, share):.0f} % of what views see beyond their noise, limit "
-            f"{100 * MOSTLY:.0f} %: the rest is too small or too faint to be told as droplets, and missing in number "
-            "density and mean sizes"
-        )
-        return ShotVerdict.DOUBTFUL, (reason,)
-    return ShotVerdict.GOOD, ()
+    if ratio < EVEN or (share := (bare**2 - ratio**2) / (bare**2 - 1)) >= MOSTLY:
+        return ""
+    return (
+        f"droplets explain {100 * max(0.0, share):.0f} % of what views see beyond their noise, limit "
+        f"{100 * MOSTLY:.0f} %: the rest is too small or too faint to be told as droplets, and missing in number "
+        "density and mean sizes"
+    )
 
 
 def judged_by_volume(shot: "MeasuredExposure[Rows, Seen]") -> "MeasuredExposure[Rows, Seen]":

@@ -137,9 +137,24 @@ def _shares(sample: SpraySample, cell: NDArray[np.intp], flow: FloatArray, cover
     if whole_flow.sum() <= 0:
         return {"reason": "nothing flows along the axis in the mean: are nozzle and axis stated rightly?"}
     sectors = covered.shape[1]
+    estimates = _estimated_shares(sample, cell, whole_flow, covered.shape)
+    by_sector = _by_cell(sample, cell, whole_flow, covered.shape).sum(1)
+    return {
+        "sector_shares": tuple(estimates[:sectors]),
+        "ring_shares": tuple(estimates[sectors:]),
+        "asymmetry": float(_asymmetry(by_sector.sum(0))),
+        "asymmetry_by_chance": sample.widening * _by_chance(by_sector),
+    }
+
+
+def _estimated_shares(
+    sample: SpraySample, cell: NDArray[np.intp], flow: FloatArray, shape: tuple[int, ...]
+) -> list[Estimate | None]:
+    """Of all that flows, first of every sector, then of every ring."""
+    sectors = shape[1]
 
     def shares_of(drawn: SpraySample) -> Figures:
-        per_unit = _by_cell(drawn, cell, whole_flow, covered.shape)
+        per_unit = _by_cell(drawn, cell, flow, shape)
         by_share = np.column_stack([per_unit.sum(1), per_unit.sum(2)])
 
         def shares(counts: FloatArray) -> FloatArray:
@@ -149,14 +164,7 @@ def _shares(sample: SpraySample, cell: NDArray[np.intp], flow: FloatArray, cover
 
         return shares
 
-    estimates = [one and _possible(one, len(sample)) for one in sample.estimated(shares_of, signed=True)]
-    by_sector = _by_cell(sample, cell, whole_flow, covered.shape).sum(1)
-    return {
-        "sector_shares": tuple(estimates[:sectors]),
-        "ring_shares": tuple(estimates[sectors:]),
-        "asymmetry": float(_asymmetry(by_sector.sum(0))),
-        "asymmetry_by_chance": sample.widening * _by_chance(by_sector),
-    }
+    return [one and _possible(one, len(sample)) for one in sample.estimated(shares_of, signed=True)]
 
 
 def _possible(share: Estimate, n: int) -> Estimate:

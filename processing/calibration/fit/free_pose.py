@@ -44,33 +44,38 @@ def fit_free_poses(boards: Sequence[PlaneObservation], image_size_px: tuple[int,
     """
     if len(boards) < MIN_BOARDS:
         raise CalibrationError(f"{len(boards)} boards in free poses, at least {MIN_BOARDS} are needed")
-    criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-10)
+    matrix, coefficients, rotations, shifts_mm = _solved(boards, image_size_px)
+    poses = tuple(
+        BoardPose(board.name, np.asarray(cv2.Rodrigues(rotation)[0], np.float64), shift_mm)
+        for board, rotation, shift_mm in zip(boards, rotations, shifts_mm, strict=True)
+    )
+    _check_tilts(poses)
+    return FreePoseFit(PinholeCamera(matrix, np.eye(3), np.zeros(3), image_size_px, coefficients[:5]), poses)
+
+
+def _solved(
+    boards: Sequence[PlaneObservation], image_size_px: tuple[int, int]
+) -> tuple[FloatArray, FloatArray, list[FloatArray], list[FloatArray]]:
+    """Camera matrix and coefficients; rotation vector and shift in mm of every board."""
     try:
-        _, matrix, coefficients, rotations, translations = cv2.calibrateCamera(
+        _, matrix, coefficients, rotations, shifts_mm = cv2.calibrateCamera(
             [board.points_mm.astype(np.float32) for board in boards],
             [board.image_px.astype(np.float32) for board in boards],
             image_size_px,
             np.eye(3),
             np.zeros(5),
-            criteria=criteria,
+            criteria=(cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-10),
         )
     except cv2.error as error:
         raise CalibrationError(f"{len(boards)} boards do not determine a camera: {error.err}") from error
     if not np.all(np.isfinite(matrix)):
         raise CalibrationError(f"{len(boards)} boards do not determine a camera: they are all parallel")
-    camera = PinholeCamera(
+    return (
         np.asarray(matrix, dtype=np.float64),
-        np.eye(3),
-        np.zeros(3),
-        image_size_px,
-        np.asarray(coefficients, dtype=np.float64).ravel()[:5],
+        np.asarray(coefficients, dtype=np.float64).ravel(),
+        [np.asarray(one, dtype=np.float64) for one in rotations],
+        [np.asarray(one, dtype=np.float64).ravel() for one in shifts_mm],
     )
-    poses = tuple(
-        BoardPose(board.name, np.asarray(cv2.Rodrigues(rotation)[0], np.float64), np.asarray(shift, np.float64).ravel())
-        for board, rotation, shift in zip(boards, rotations, translations, strict=True)
-    )
-    _check_tilts(poses)
-    return FreePoseFit(camera, poses)
 
 
 def _check_tilts(poses: Sequence[BoardPose]) -> None:

@@ -38,15 +38,7 @@ def check_placements(calibration_set: CalibrationSet, mappings: Mapping[str, Vie
     middle_mm, azimuths_deg = calibration_set.middle_mm, calibration_set.azimuths_deg
     turned_deg = turned_views(mappings, middle_mm, azimuths_deg)
     if turned_deg and (len(turned_deg) < len(mappings) or len(set(turned_deg.values())) > 1):
-        texts = [_turned(calibration_set, name, mappings[name], middle_mm, turn) for name, turn in turned_deg.items()]
-        undecided = same_either_way(mappings, middle_mm, turned_deg)
-        texts += [f"{name}: looks the same either way; if it is turned too, say --roll for it" for name in undecided]
-        texts += [f"or {question}" for question in _exchanged(mappings, middle_mm, azimuths_deg)]
-        all_turned = len(turned_deg) + len(undecided) == len(mappings)
-        upright = _upright(calibration_set, turned_deg) if all_turned else ""
-        if likelier := upright or _stretched(calibration_set, mappings, middle_mm):
-            texts = [likelier, *(f"else: {text}" for text in texts)]
-        raise CalibrationError("; ".join(texts))
+        raise CalibrationError("; ".join(_some_turned(calibration_set, mappings, middle_mm, turned_deg)))
     if turned_deg:
         turn_deg = next(iter(turned_deg.values()))
         yield Doubt(
@@ -71,6 +63,23 @@ def check_placements(calibration_set: CalibrationSet, mappings: Mapping[str, Vie
             f"{one} and {other} seem to stand in one place: if one of them hangs upside down (roll_deg) or looks by a "
             "mirror (mirrored), say so, else their lines of sight do not meet",
         )
+
+
+def _some_turned(
+    calibration_set: CalibrationSet,
+    mappings: Mapping[str, ViewMapping],
+    middle_mm: FloatArray,
+    turned_deg: Mapping[str, int],
+) -> list[str]:
+    """What may be the reason where some views see the axes turned and others do not, the likeliest one first."""
+    texts = [_turned(calibration_set, name, mappings[name], middle_mm, turn) for name, turn in turned_deg.items()]
+    undecided = same_either_way(mappings, middle_mm, turned_deg)
+    texts += [f"{name}: looks the same either way; if it is turned too, say --roll for it" for name in undecided]
+    texts += [f"or {question}" for question in _exchanged(mappings, middle_mm, calibration_set.azimuths_deg)]
+    all_turned = len(turned_deg) + len(undecided) == len(mappings)
+    upright = _upright(calibration_set, turned_deg) if all_turned else ""
+    likelier = upright or _stretched(calibration_set, mappings, middle_mm)
+    return [likelier, *(f"else: {text}" for text in texts)] if likelier else texts
 
 
 def _doubtful(

@@ -124,19 +124,7 @@ def write_run(
     source: ManifestFile, run: RunEntry, shots: Sequence[ShotSource], reader: ExposureReader, run_dir: Path, done: Done
 ) -> tuple[str, ...]:
     """Write shots as a run with the means of its backgrounds and darks; notes on what may be wrong with them."""
-    header = RunHeader(
-        run_id=run_dir.parent.name,
-        created_utc=datetime.now(UTC).isoformat(timespec="seconds"),
-        views=reader.formats,
-        frames_per_shot=run.frames_per_shot,
-        configuration={"import": {"manifest": source.path.name, "sha256": _sha256(source.text)}},
-        software={"tomoshadow": version("tomoshadow")},
-        polarity=run.polarity,
-        separation_ns=run.separation_ns,
-        rate_hz=run.rate_hz,
-        notes=run.notes,
-        spray=source.manifest.spray,
-    )
+    header = _header(source, run, reader, run_dir.parent.name)
     references, copies = {ImageKey.DARK: _Mean(), ImageKey.BACKGROUND: _Mean()}, _Copies()
     with RunWriter(run_dir, header) as writer:
         for index, origin in enumerate(shots):
@@ -152,6 +140,22 @@ def write_run(
             writer.write_references(dark=means[ImageKey.DARK], background=means[ImageKey.BACKGROUND])
         writer.finish("completed", f"imported from {source.path.name}")
     return notes
+
+
+def _header(source: ManifestFile, run: RunEntry, reader: ExposureReader, run_id: str) -> RunHeader:
+    return RunHeader(
+        run_id=run_id,
+        created_utc=datetime.now(UTC).isoformat(timespec="seconds"),
+        views=reader.formats,
+        frames_per_shot=run.frames_per_shot,
+        configuration={"import": {"manifest": source.path.name, "sha256": _sha256(source.text)}},
+        software={"tomoshadow": version("tomoshadow")},
+        polarity=run.polarity,
+        separation_ns=run.separation_ns,
+        rate_hz=run.rate_hz,
+        notes=run.notes,
+        spray=source.manifest.spray,
+    )
 
 
 def _frames(reader: ExposureReader, shot: ShotSource, camera: str) -> DoubleFrame:

@@ -95,26 +95,33 @@ def calibrate_views(options: Namespace) -> Outcome:
         save_calibration(calibration, out)
         residuals_figure(calibration).savefig(out.with_name(figure.name), dpi=120)
         drawn = calibration_pictures(options.set, calibration_set, calibration, out)
-    figures = [options.out.with_name(picture.name) for picture in drawn]
-    for note in calibration.notes:
-        progress(note)
-    refused = {name: view for name, view in calibration.views.items() if view.verdict is Verdict.REFUSE}
-    for name, view in refused.items():
-        progress(f"{name}: REFUSED, {view.reasons[0]}: reconstruction does not start with it")
-    for unchecked in calibration.not_checked:
-        progress(f"not checked: {unchecked.what}; it would be by {unchecked.state}")
+    _tell(calibration)
+    figures = [str(options.out.with_name(picture.name)) for picture in drawn]
     result = {
-        "passed": not refused,
+        "passed": all(view.verdict is not Verdict.REFUSE for view in calibration.views.values()),
         "calibration": str(options.out),
         "id": calibration.id,
         "figure": str(figure),
-        "figures": [str(picture) for picture in figures],
+        "figures": figures,
         "notes": list(calibration.notes),
         "not_checked": [asdict(unchecked) for unchecked in calibration.not_checked],
         **view_errors(calibration),
     }
-    drawn_in = ", ".join(map(str, [figure, *figures]))
+    drawn_in = ", ".join([str(figure), *figures])
     return Outcome(result, f"{views_table(calibration)}\n{calibration.id}: {options.out}, pictures in {drawn_in}")
+
+
+def _tell(calibration: "Calibration") -> None:
+    """Notes, views that are refused, and what was not checked."""
+    from processing.calibration.verdict import Verdict
+
+    for note in calibration.notes:
+        progress(note)
+    for name, view in calibration.views.items():
+        if view.verdict is Verdict.REFUSE:
+            progress(f"{name}: REFUSED, {view.reasons[0]}: reconstruction does not start with it")
+    for unchecked in calibration.not_checked:
+        progress(f"not checked: {unchecked.what}; it would be by {unchecked.state}")
 
 
 def views_table(calibration: "Calibration") -> str:
@@ -149,40 +156,39 @@ def _scale_and_azimuth(view: "ViewCalibration", middle_mm: "FloatArray | None") 
 
 def view_errors(calibration: "Calibration") -> dict[str, Any]:
     """Residuals of a calibration by view, as the JSON of ``calibrate`` has them."""
+    middle_mm = _middle_mm(calibration)
+    return {"views": {name: _errors(view, middle_mm) for name, view in calibration.views.items()}}
+
+
+def _errors(view: "ViewCalibration", middle_mm: "FloatArray | None") -> dict[str, Any]:
     from processing.calibration.fit.covariance import worst_position_std_px
 
-    middle_mm = _middle_mm(calibration)
     return {
-        "views": {
-            name: {
-                "model": view.model.value,
-                "n_points": view.n_points,
-                "n_rejected": view.n_rejected,
-                "mean_error_px": view.mean_error_px,
-                "rms_px": view.rms_px,
-                "max_error_px": view.max_error_px,
-                "holdout_error_px": view.holdout_error_px,
-                "rays_miss_px": view.rays_miss_px,
-                "candidates_holdout_error_px": dict(view.candidates_holdout_error_px),
-                "position_std_px": worst_position_std_px(view),
-                "planes": [
-                    {
-                        "name": plane.name,
-                        "z_mm": plane.z_mm,
-                        "mean_error_px": plane.mean_error_px,
-                        "rms_px": plane.rms_px,
-                        "max_error_px": plane.max_error_px,
-                        "holdout_error_px": plane.holdout_error_px,
-                    }
-                    for plane in view.planes
-                ],
-                "worst_plane": view.worst_plane.name,
-                "placement": _placement(view, middle_mm),
-                "verdict": view.verdict.value,
-                "reasons": list(view.reasons),
+        "model": view.model.value,
+        "n_points": view.n_points,
+        "n_rejected": view.n_rejected,
+        "mean_error_px": view.mean_error_px,
+        "rms_px": view.rms_px,
+        "max_error_px": view.max_error_px,
+        "holdout_error_px": view.holdout_error_px,
+        "rays_miss_px": view.rays_miss_px,
+        "candidates_holdout_error_px": dict(view.candidates_holdout_error_px),
+        "position_std_px": worst_position_std_px(view),
+        "planes": [
+            {
+                "name": plane.name,
+                "z_mm": plane.z_mm,
+                "mean_error_px": plane.mean_error_px,
+                "rms_px": plane.rms_px,
+                "max_error_px": plane.max_error_px,
+                "holdout_error_px": plane.holdout_error_px,
             }
-            for name, view in calibration.views.items()
-        }
+            for plane in view.planes
+        ],
+        "worst_plane": view.worst_plane.name,
+        "placement": _placement(view, middle_mm),
+        "verdict": view.verdict.value,
+        "reasons": list(view.reasons),
     }
 
 

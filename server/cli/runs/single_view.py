@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from processing.analysis.flat.flat_droplets import FlatSettings
     from processing.preprocessing import Polarity
     from processing.runs.results_file import Provenance
+    from processing.runs.single_view.measurement import FlatShot
     from processing.runs.single_view.sources import FlatSource
 
 IN_SPACE = ("grid", "twins", "light", "sizes", "ignore", "scheduler")
@@ -142,18 +143,8 @@ def _measure_all(
     origin: "Provenance",
     by_rig_um_per_px: float | None,
 ) -> dict[str, Any]:
-    from processing.analysis.droplets.droplet_file import read_droplets
     from processing.analysis.exports.export import export_droplets
-    from processing.runs.recipe import recipe_sha256
-    from processing.runs.single_view.measurement import (
-        COMMAND,
-        METHOD_VERSION,
-        droplets_twice,
-        flat_statistics,
-        measure_source,
-    )
-    from processing.runs.single_view.stated_scale import scale_doubts
-    from processing.runs.unchecked_images import told_unchecked, unchecked_images
+    from processing.runs.single_view.measurement import measure_source
 
     shots = []
     for source in tracked(sources, lambda source: source.name):
@@ -162,6 +153,19 @@ def _measure_all(
             export_droplets(out / shots[-1].file, export)
         for reason in shots[-1].reasons:
             progress(f"{source.name}: {shots[-1].verdict}: {reason}")
+    return _result(options, settings, shots, out, by_rig_um_per_px)
+
+
+def _result(
+    options: Namespace, settings: "FlatSettings", shots: "list[FlatShot]", out: Path, by_rig_um_per_px: float | None
+) -> dict[str, Any]:
+    """What the images say together, of which people are told what casts doubt."""
+    from processing.analysis.droplets.droplet_file import read_droplets
+    from processing.runs.recipe import recipe_sha256
+    from processing.runs.single_view.measurement import COMMAND, METHOD_VERSION, droplets_twice, flat_statistics
+    from processing.runs.single_view.stated_scale import scale_doubts
+    from processing.runs.unchecked_images import told_unchecked, unchecked_images
+
     stored = {shot.image or f"shot {shot.shot}": read_droplets(out / shot.file) for shot in shots}
     doubts = (*droplets_twice(stored, options.um_per_px), *scale_doubts(options.um_per_px, by_rig_um_per_px))
     unchecked_um_per_px = options.um_per_px if by_rig_um_per_px is None else None

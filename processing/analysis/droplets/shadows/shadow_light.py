@@ -1,17 +1,27 @@
-"""Whether the light of a shot is that of its background, and shadows are black and round."""
+"""What speaks against an exposure of shadows: its light, what discs leave of it, shadows that are grey or not round."""
 
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from processing.analysis.droplets.droplet_search import DropletSearch
 from processing.analysis.droplets.droplet_table import SizedDroplets
 from processing.analysis.droplets.gaussian_blobs import Image
-from processing.analysis.droplets.measured_exposure import MeasuredExposure, Seen, ShotVerdict
-from processing.analysis.droplets.shadows.light_search import LEAST_DROPLETS
+from processing.analysis.droplets.measured_exposure import MeasuredExposure, RatioLimits, Seen, ShotVerdict, judged
+from processing.analysis.droplets.shadows.light_search import LEAST_DROPLETS, light_doubts
 from processing.analysis.droplets.shadows.masked_liquid import UNEXPLAINED
 from processing.analysis.droplets.shadows.opaque_discs import DiscImages, Shadows
+from processing.analysis.droplets.shadows.shadow_fit import ShadowFit, Transmissions, rms_over_noise
+from processing.analysis.droplets.shadows.veiled_shadows import veil_doubts
 
+LIMITS = RatioLimits(trusted=1.25, refused=2.0)
+"""Of discs: overlapping shadows leave something even where all droplets are right. Simulated shots of 28 to 40 droplets
+per mm^3, up to 1.25 have 0.3 to 1.7 % ghosts, from 1.33 to 1.45 2 to 5 %."""
+COHERENT_LIMITS = RatioLimits(trusted=1.1, refused=2.0)
+"""In partially coherent light fringes look like faint droplets: 0 % ghosts at 1.06, 4 % at 1.16, 18 % at 1.24."""
+FRINGELESS = 1.2
+"""Light of more than so many apertures of the lens makes no fringes."""
 LIGHTS = (0.5, 2.0)
 """Of the background: where nearly nothing is in its way, the light of an exposure must be between."""
 FREE_PERCENTILE = 98
@@ -45,9 +55,42 @@ def _without_light(name: str, image: Image, trust: Image) -> str:
     )
 
 
-def grey(seen: DiscImages, shadows: Shadows, weights: Sequence[Image]) -> tuple[str, ...]:
+def judged_by_light(
+    shot: Transmissions, fit: ShadowFit, search: DropletSearch, asked: DiscImages, shadows: Shadows, ratio: float
+) -> tuple[ShotVerdict, tuple[str, ...]]:
+    """Verdict and reasons.
+
+    Parameters
+    ----------
+    shot, fit, search : Transmissions, ShadowFit, DropletSearch
+        What was recorded, what is known of it, and where droplets were looked for.
+    asked : DiscImages
+        What was seen, with weights of the pixels that look into the grid alone.
+    shadows : Shadows
+        What the discs of the fit would show.
+    ratio : float
+        Residual over noise, with all discs.
+    """
+    bare = rms_over_noise(asked, [np.ones_like(image) for image in asked.images])
+    beside_px = dict(zip(search.names, np.hypot(*fit.optics.shifts_px.T).tolist(), strict=True))
+    limits = COHERENT_LIMITS if (fit.optics.condenser_ratio or FRINGELESS) < FRINGELESS else LIMITS
+    verdict, reasons = judged(beside_px, ratio, bare, limits)
+    veiled = grey(asked, shadows) or veil_doubts(shot, search, fit)
+    doubts = (*veiled, *light_doubts(fit.light_share, len(fit.discs)))
+    if doubts and verdict is ShotVerdict.GOOD:
+        verdict = ShotVerdict.DOUBTFUL
+    return verdict, (*reasons, *doubts)
+
+
+def covered_share(asked: DiscImages, shadows: Shadows) -> float:
+    """Share of the views that droplets cover, where they are asked."""
+    views = zip(shadows.transmissions, asked.weights, strict=True)
+    return float(np.mean([np.mean(1 - drawn[weight > 0]) if np.any(weight > 0) else 0.0 for drawn, weight in views]))
+
+
+def grey(seen: DiscImages, shadows: Shadows) -> tuple[str, ...]:
     """What speaks against shadows that are not dark enough; empty where they are, or none is large enough to tell."""
-    views = zip(seen.images, shadows.transmissions, weights, strict=True)
+    views = zip(seen.images, shadows.transmissions, seen.weights, strict=True)
     asked = [(image - drawn, weight, (drawn < BLACK) & (weight > 0)) for image, drawn, weight in views]
     left = np.concatenate([beyond[black] for beyond, _, black in asked])
     if len(left) < BLACK_PIXELS:

@@ -12,12 +12,10 @@ from processing.analysis.droplets.gaussian_blobs import Image
 from processing.analysis.droplets.ghost_share import GhostShare, found_by_class, matches, pooled
 from processing.analysis.droplets.measured_exposure import (
     MeasuredExposure,
-    RatioLimits,
     ShotVerdict,
     blind_verdict,
     check_images,
     ghosts_within,
-    judged,
     judged_by_twins,
     judged_by_volume,
     moved,
@@ -31,26 +29,17 @@ from processing.analysis.droplets.shadows.judged_volume import (
     judging_views,
     knowing_views,
 )
-from processing.analysis.droplets.shadows.light_search import Light, light_doubts
+from processing.analysis.droplets.shadows.light_search import Light
 from processing.analysis.droplets.shadows.masked_liquid import liquid_objects, lumps
-from processing.analysis.droplets.shadows.opaque_discs import DiscImages, Discs, Shadows
+from processing.analysis.droplets.shadows.opaque_discs import DiscImages, Discs
 from processing.analysis.droplets.shadows.shadow_finder import behind_gaussian_blur, find_shadows
 from processing.analysis.droplets.shadows.shadow_fit import ShadowFit, Transmissions, rms_over_noise, seen_by
-from processing.analysis.droplets.shadows.shadow_light import grey, judged_by_shape, unlit
+from processing.analysis.droplets.shadows.shadow_light import covered_share, judged_by_light, judged_by_shape, unlit
 from processing.analysis.droplets.shadows.shadow_table import sized_droplets
 from processing.analysis.droplets.shadows.shadow_union import union_defects
-from processing.analysis.droplets.shadows.veiled_shadows import veil_doubts
 from processing.analysis.droplets.size_correction import SizeCorrection
 from processing.analysis.hidden import Hidden
 from processing.kernels import DEFAULT_THREADS
-
-LIMITS = RatioLimits(trusted=1.25, refused=2.0)
-"""Of discs: overlapping shadows leave something even where all droplets are right. Simulated shots of 28 to 40 droplets
-per mm^3, up to 1.25 have 0.3 to 1.7 % ghosts, from 1.33 to 1.45 2 to 5 %."""
-COHERENT_LIMITS = RatioLimits(trusted=1.1, refused=2.0)
-"""In partially coherent light fringes look like faint droplets: 0 % ghosts at 1.06, 4 % at 1.16, 18 % at 1.24."""
-FRINGELESS = 1.2
-"""Light of more than so many apertures of the lens makes no fringes."""
 
 
 @dataclass(frozen=True)
@@ -163,43 +152,36 @@ def _told(shot: Transmissions, fit: ShadowFit, search: DropletSearch, sizes: Siz
     """What a fit tells, and whether to believe it."""
     shadows, into_grid = _recorded(shot).drawn(fit.optics, fit.discs), shot.cut(search.pixels_into_grid())
     seen = seen_by(shot, fit, shadows.transmissions)
-    judged_weights = tuple(map(np.multiply, seen.weights, into_grid))
-    asked = replace(seen, weights=judged_weights)
+    asked = replace(seen, weights=tuple(map(np.multiply, seen.weights, into_grid)))
     ratio = rms_over_noise(asked, shadows.transmissions)
-    bare = rms_over_noise(asked, [np.ones_like(image) for image in seen.images])
     views = _seen(fit, search, _masked_shares(fit, into_grid))
-    beside_px = {name: float(np.hypot(view.shift_u_px, view.shift_v_px)) for name, view in views.items()}
-    limits = COHERENT_LIMITS if (fit.optics.condenser_ratio or FRINGELESS) < FRINGELESS else LIMITS
-    verdict, reasons = judged(beside_px, ratio, bare, limits)
-    veiled = grey(seen, shadows, judged_weights) or veil_doubts(shot, search, fit)
-    if doubts := (*veiled, *light_doubts(fit.light_share, len(fit.discs))):
-        verdict, reasons = ShotVerdict.DOUBTFUL if verdict is ShotVerdict.GOOD else verdict, (*reasons, *doubts)
+    verdict, reasons = judged_by_light(shot, fit, search, asked, shadows, ratio)
     if verdict is ShotVerdict.REFUSED:
         return MeasuredExposure(SizedDroplets.none(), views, ratio, verdict, reasons)
     knowing = knowing_views(shot, fit, fit.discs.positions_voxel)
     known = knowing >= judging_views(len(shot.images))
     inside = known & within_grid(fit.discs.positions_voxel, search)
-    covered = _covered(shadows, judged_weights)
-    few = beside_what_is_not_known(knowing[inside], len(shot.images), ratio, covered)
+    few = beside_what_is_not_known(knowing[inside], len(shot.images), ratio, covered_share(asked, shadows))
     if verdict is ShotVerdict.GOOD and few:
         verdict, reasons = ShotVerdict.DOUBTFUL, few
     raw = behind_gaussian_blur(shot, search, fit)[known]
     droplets = sized_droplets(shot, seen, shadows, fit.where(known), raw, search, sizes)
     lump = lumps(fit.where(known).discs, droplets.residual)
-    hidden = Hidden.of(
+    told = droplets.where(lump < 0).within(search.grid)
+    hidden = _hidden(shot, fit, search, known, lump)
+    return MeasuredExposure(told, views, ratio, verdict, reasons, hidden=hidden)
+
+
+def _hidden(
+    shot: Transmissions, fit: ShadowFit, search: DropletSearch, known: NDArray[np.bool_], lump: NDArray[np.intp]
+) -> Hidden:
+    """What could not be measured: beside objects of liquid, lumps of known discs, and where too few views know."""
+    return Hidden.of(
         search.grid.shape,
         lambda shares: is_judged(shot, fit, search.places_at(shares)),
         liquid_objects=_counted(liquid_objects(fit.liquid)) + _counted(lump),
         droplets=int(np.count_nonzero(within_grid(fit.discs.positions_voxel[~known], search))),
     )
-    told = droplets.where(lump < 0).within(search.grid)
-    return MeasuredExposure(told, views, ratio, verdict, reasons, hidden=hidden)
-
-
-def _covered(shadows: Shadows, weights: Sequence[Image]) -> float:
-    """Share of the views that droplets cover, where they are asked."""
-    views = zip(shadows.transmissions, weights, strict=True)
-    return float(np.mean([np.mean(1 - drawn[asked > 0]) if np.any(asked > 0) else 0.0 for drawn, asked in views]))
 
 
 def _unseen(trusts: Sequence[Image], into_grid: Sequence[NDArray[np.bool_]], names: Sequence[str]) -> str:
