@@ -4,13 +4,12 @@ An image is a function of (seed, prepared kind, view, sequence number, frame, li
 camera threads may render at the same time and in any order.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from enum import StrEnum
 from functools import lru_cache
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from processing.geometry import PinholeCamera
 from processing.synthetic.illumination import dust_transmittance, light_field
@@ -136,40 +135,9 @@ class Scene:
         seeds = [self._seed, _KIND_SEEDS[kind], self._view_seeds[view], sequence, "AB".index(frame)]
         return camera_image(light, self._sensor, bits, np.random.Generator(np.random.SFC64(seeds)))
 
-    def warm_up(
-        self, sequences: Iterable[int], pulse_times_ns: Sequence[int], width_ns: int = NOMINAL_WIDTH_NS
-    ) -> None:
-        """Render a coming run's shadows, so that its exposures only need their noise.
-
-        Parameters
-        ----------
-        sequences : iterable of int
-            Numbers of the coming firings; beyond ``cache_mb`` the first ones are forgotten again.
-        pulse_times_ns : sequence of int
-            Starts of the light pulses, zero is the trigger of the shot.
-        width_ns : int
-            Their duration.
-        """
-        for sequence in sequences:
-            for view in self.cameras:
-                for start_ns in pulse_times_ns:
-                    self._shadow(self._kind, view, sequence, (start_ns, width_ns, 0.0))
-
     def truth(self, sequence: int, time_ns: float) -> Spray:
         """The liquid of one firing at a time after its trigger."""
         return self._spray_at_trigger(sequence).advanced(time_ns * 1e-9)
-
-    def truth_record(self, sequence: int, time_ns: float) -> dict[str, NDArray[np.generic]]:
-        """``truth`` as plain arrays, to be stored beside a run."""
-        spray = self.truth(sequence, time_ns)
-        return {
-            "time_ns": np.asarray(time_ns),
-            "position_mm": spray.positions_mm,
-            "diameter_mm": spray.diameters_mm,
-            "velocity_mm_per_s": spray.velocities_mm_per_s,
-            "kind": spray.kinds,
-            "opacity": spray.opacities,
-        }
 
     def _field(self, view: str) -> FloatImage:
         """Light of a view without spray at its nominal exposure."""

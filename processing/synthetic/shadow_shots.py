@@ -36,11 +36,6 @@ class Counting:
         """Shot noise alone, a share ``relative`` of the background where nothing stands in the light."""
         return cls(relative**-2, 0.0, background_frames)
 
-    @property
-    def relative_noise(self) -> float:
-        """Standard deviation of a pixel in full light over the background: 1.2 % by default."""
-        return float(np.sqrt(self.background_e + self.read_noise_e**2) / self.background_e)
-
     def transmission(self, transmittance: FloatImage, rng: np.random.Generator) -> FloatImage:
         """A transmittance as it is measured, float32; noise goes below 0 and above 1."""
         counts = self._counts(transmittance, rng)

@@ -9,7 +9,6 @@ the timer then seems to be wrong, and the ring oscillator right.
 from rp2040py.rp2040 import RP2040
 
 RING_KHZ = 6500
-CRYSTAL_KHZ = 12_000
 
 _CLOCKS, _TIMER = 0x40008, 0x40054
 _MIN_KHZ, _MAX_KHZ, _INTERVAL, _SOURCE, _STATUS, _RESULT = 0x84, 0x88, 0x90, 0x94, 0x98, 0x9C
