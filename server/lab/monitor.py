@@ -18,7 +18,8 @@ from server.lab.duty import Duty, Health, Lamp, pause
 from server.lab.errors import Conflict, NotFound, told
 from server.rig.laboratory import Laboratory
 
-_PERIOD_S = 1.0
+PERIOD_S = 1.0
+"""Every device is asked so often."""
 STALE_S = 2.5
 """No lamp is green whose answer is older; devices are asked once a second, and have a second to answer."""
 _LOW_DISK_BYTES = 20e9
@@ -51,6 +52,8 @@ class RigMonitor:
         Of a simulated rig. It has a lamp where it runs in another process.
     now_s : Callable[[], float]
         A clock that never goes back.
+    period_s : float
+        Every device is asked so often.
     """
 
     def __init__(
@@ -60,11 +63,13 @@ class RigMonitor:
         resting: Callable[[], bool] = _always,
         laboratory: Laboratory | None = None,
         now_s: Clock = time.monotonic,
+        period_s: float = PERIOD_S,
     ) -> None:
         self._rig = rig
         self._data_dir = data_dir
         self._resting = resting
         self._laboratory = laboratory
+        self._period_s = period_s
         self._who: dict[str, DeviceIdentity] = {}
         self._watched = tuple(_Watched(name, kind, look, now_s) for name, kind, look in self._looks())
         self._threads = {name: ThreadPoolExecutor(1, f"lamp {name}") for name, _, _ in self._looks()}
@@ -103,6 +108,11 @@ class RigMonitor:
             for watched in self._watched:
                 group.create_task(self._keep_asking(watched, duty))
 
+    def close(self) -> None:
+        """Ask no more: the threads end, one that waits for a silent device when it has been answered or not."""
+        for thread in self._threads.values():
+            thread.shutdown(wait=False, cancel_futures=True)
+
     async def ask(self) -> None:
         """Ask every device once."""
         await asyncio.gather(*map(self._ask, self._watched))
@@ -111,7 +121,7 @@ class RigMonitor:
         while True:
             with duty.item(watched.name):
                 await self._ask(watched)
-            await pause(_PERIOD_S)
+            await pause(self._period_s)
 
     async def _ask(self, watched: "_Watched") -> None:
         await asyncio.get_running_loop().run_in_executor(self._threads[watched.name], watched.ask)

@@ -24,7 +24,7 @@ from server.lab.events import EventPublisher
 from server.lab.jobs import JobKind, JobTable
 from server.lab.live_view.live_feed import LiveFeed
 from server.lab.live_view.live_volume import LiveVolume
-from server.lab.monitor import RigMonitor
+from server.lab.monitor import PERIOD_S, RigMonitor
 from server.lab.runner import JobRunner
 from server.lab.runs.run_store import RunStore
 from server.lab.runs.unkept_runs import UnkeptRuns
@@ -74,6 +74,8 @@ class Services:
         What surrounds the rig, if it is simulated.
     host_names : tuple[str, ...]
         Names of this server beside the loopback ones.
+    asked_every_s : float
+        So often every device is asked, and the state of the rig looked at twice as often.
     """
 
     config: RigConfig
@@ -85,6 +87,7 @@ class Services:
     settings: ReconstructionSettings = field(default_factory=ReconstructionSettings)
     laboratory: Laboratory | None = None
     host_names: tuple[str, ...] = ()
+    asked_every_s: float = PERIOD_S
 
     @property
     def data_dir(self) -> Path:

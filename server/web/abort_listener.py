@@ -21,6 +21,7 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from daq.errors import DaqError
 from server.web.connections import welcome
+from server.web.ending_server import EndingServer
 from server.web.guard import is_ours, site_of
 from server.web.problems import MEDIA_TYPE
 
@@ -62,7 +63,7 @@ class AbortListener:
             access_log=False,
             timeout_graceful_shutdown=1,
         )
-        self._server = uvicorn.Server(config)
+        self._server = EndingServer(config)
         self._thread = threading.Thread(
             target=self._server.run, kwargs={"sockets": [held]}, name="abort listener", daemon=True
         )
@@ -74,8 +75,12 @@ class AbortListener:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._server.should_exit = True
+        self.end()
         self._thread.join(_END_S)
+
+    def end(self) -> None:
+        """Let it end; the end of the block waits for that."""
+        self._server.end()
 
     @property
     def port(self) -> int:

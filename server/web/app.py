@@ -197,6 +197,7 @@ async def _life(app: FastAPI, services: Services, abort_port: socket.socket | No
         index = stack.enter_context(closing(RunIndex(services.data_dir / INDEX_FILE)))
         requests = stack.enter_context(opened_requests(services.data_dir / REQUESTS_FILE, services.events))
         context = app.state.context = _context(services, jobs_table, index, Once(table=requests))
+        stack.callback(context.monitor.close)
         held = abort_port or stack.enter_context(port.listening(services.config.server.host, 0))
         app.state.abort_listener = stack.enter_context(_abort_listener(services, held))
         await context.monitor.ask()
@@ -231,8 +232,19 @@ def _context(services: Services, table: JobTable, index: RunIndex, once: Once) -
         jobs=table,
         runner=JobRunner(services.engine, table, services.tasks, services.events, services.data_dir, store, watch),
         watch=watch,
-        monitor=RigMonitor(services.rig, services.data_dir, lambda: acquisition.status().resting, services.laboratory),
-        desk=DeskWatch(acquisition.status, lambda: reasons_against(context), lambda: alarms_now(context)),
+        monitor=RigMonitor(
+            services.rig,
+            services.data_dir,
+            lambda: acquisition.status().resting,
+            services.laboratory,
+            period_s=services.asked_every_s,
+        ),
+        desk=DeskWatch(
+            acquisition.status,
+            lambda: reasons_against(context),
+            lambda: alarms_now(context),
+            period_s=services.asked_every_s / 2,
+        ),
         live=LiveFeed(services.rig.cameras, lambda: acquisition.newest_shot, acquisition.keep_live),
         live_volume=LiveVolume(
             services.rig.cameras,

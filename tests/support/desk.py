@@ -54,6 +54,23 @@ def opened_tab(browser: Browser) -> Iterator[Page]:
     assert complaints == []
 
 
+_WITHOUT_KEYS = """() => {
+    const keys = "a[href], button, input, textarea, [tabindex]:not([tabindex='-1'])";
+    const hears = one => one.closest(keys + ", label, .q-field") || one.querySelector(keys);
+    const isClicked = one => getComputedStyle(one).cursor === "pointer" && one.getClientRects().length > 0;
+    const found = [...document.querySelectorAll("body *")].filter(one => isClicked(one) && !hears(one));
+    return found.map(one => `${one.tagName} ${one.className} ${one.innerText}`);
+}"""
+
+
+def without_keys(page: Page) -> list[str]:
+    """What can be clicked, and no key reaches.
+
+    A slice is clicked too, and has a slider instead; an iso-surface is turned by keys in test_desk_results.py.
+    """
+    return list(page.evaluate(_WITHOUT_KEYS))
+
+
 def choose_calibration(server: Serving, name: str = "paper") -> None:
     """Make a file that is none the current calibration; nobody holds control afterwards."""
     (server.services.data_dir / "calibrations" / f"{name}.json").write_text(json.dumps({"id": name}))

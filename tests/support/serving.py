@@ -1,14 +1,12 @@
 """The application on a real socket of the loopback interface, in a thread of the test."""
 
-import asyncio
 import json
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
-from unittest.mock import patch
 
 import httpx
 import numpy as np
@@ -19,9 +17,7 @@ from daq.run.acquisition import Acquisition
 from daq.run.events import RunStatus
 from processing.calibration.calibration_file import file_sha256
 from processing.volume import VoxelGrid
-from server.lab import monitor
 from server.lab.calibrations import CalibrationStore
-from server.lab.desk import desk_watch
 from server.lab.engine.inline_engine import InlineEngine
 from server.lab.engine.task import Engine
 from server.lab.events import EventPublisher
@@ -31,9 +27,12 @@ from server.pictures.previews import make_preview, preview_path, save_preview
 from server.web.abort_listener import AbortListener
 from server.web.app import create_api
 from server.web.connections import config_of
+from server.web.ending_server import EndingServer
 from tests.support.memory_rig import VIEWS, memory_config, served_rig
 
 DEADLINE_S = 60.0
+ASKED_EVERY_S = 0.2
+"""Devices are asked more often than is of use to people: tests wait for what is found."""
 
 
 @dataclass(frozen=True)
@@ -148,6 +147,7 @@ def assembled(
                 JobKind.CHECK: tell_nothing,
             },
             laboratory=laboratory,
+            asked_every_s=ASKED_EVERY_S,
         )
 
 
@@ -162,23 +162,13 @@ def serving(
     viewer_token: str | None = None,
 ) -> Iterator[Serving]:
     """Serve a rig in memory until the block ends."""
-    with (
-        assembled(data_dir, engine=engine, views=views, token=token, viewer_token=viewer_token) as services,
-        looking_every(0.1),
-    ):
+    with assembled(data_dir, engine=engine, views=views, token=token, viewer_token=viewer_token) as services:
         app = build(services)
         with (
             listening(app) as port,
             httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=DEADLINE_S) as http,
         ):
             yield Serving(http, port, services, app)
-
-
-@contextmanager
-def looking_every(period_s: float) -> Iterator[None]:
-    """Servers look at their devices more often than is of use to people: tests wait for what they find."""
-    with patch.object(monitor, "_PERIOD_S", period_s), patch.object(desk_watch, "_PERIOD_S", period_s):
-        yield
 
 
 @contextmanager
@@ -194,13 +184,13 @@ def listening(app: FastAPI) -> Iterator[int]:
     finally:
         server.end()
         if door := getattr(getattr(app, "state", None), "abort_listener", None):
-            door._server.should_exit = True  # it takes as long as the other one to end, and so they end together
+            door.end()  # it takes as long as the other one to end, and so they end together
         thread.join(DEADLINE_S)
         assert not thread.is_alive(), "the server has not ended"
 
 
-class _Server(uvicorn.Server):
-    """Says when it listens, and ends at once when told to."""
+class _Server(EndingServer):
+    """Says when it listens."""
 
     def __init__(self, config: uvicorn.Config, started: threading.Event) -> None:
         super().__init__(config)
@@ -208,15 +198,4 @@ class _Server(uvicorn.Server):
 
     async def startup(self, *arguments: Any, **named: Any) -> None:
         await super().startup(*arguments, **named)
-        self._loop, self._ended = asyncio.get_running_loop(), asyncio.Event()
         self._listens.set()
-
-    async def main_loop(self) -> None:
-        await self.on_tick(0)
-        await self._ended.wait()
-
-    def end(self) -> None:
-        """From any thread."""
-        self.should_exit = True
-        with suppress(AttributeError, RuntimeError):  # it has not begun, or is over
-            self._loop.call_soon_threadsafe(self._ended.set)

@@ -25,7 +25,7 @@ from server.lab.services import Services
 from server.rig.assembly import open_rig
 from server.rig.config import RigConfig, load_config
 from server.web.app import create_api
-from tests.support.serving import DEADLINE_S, listening, looking_every
+from tests.support.serving import ASKED_EVERY_S, DEADLINE_S, listening
 
 VIEWS = ("view1", "view2")
 CURRENT_A = {"view1": 25.0, "view2": 9.9}
@@ -144,9 +144,19 @@ def serving_bench(
             limits=AcquisitionLimits(frame_s=frame_s),
             observers=assembled.observers,
         ) as acquisition,
-        looking_every(0.3),
         listening(
-            create_api(Services(config, rig, acquisition, events, InlineEngine(), {}, laboratory=assembled.laboratory))
+            create_api(
+                Services(
+                    config,
+                    rig,
+                    acquisition,
+                    events,
+                    InlineEngine(),
+                    {},
+                    laboratory=assembled.laboratory,
+                    asked_every_s=2 * ASKED_EVERY_S,
+                )
+            )
         ) as port,
         httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=DEADLINE_S) as http,
     ):

@@ -16,12 +16,11 @@ from processing.volume import VoxelGrid
 from server.lab.jobs import reconstruction_job
 from server.lab.results import keep_preview
 from tests.server.web.test_api import wait_for_jobs
-from tests.support.desk import PICTURES, PULSE, choose_calibration
+from tests.support.desk import PICTURES, PULSE, choose_calibration, without_keys
 from tests.support.droplet_run import write_calibration, write_run
 from tests.support.operator import go_to
 from tests.support.sampled_sprays import cone_shots, write_results
 from tests.support.serving import Serving, plan_of
-from tests.system.test_every_control import NO_KEYS
 
 pytestmark = pytest.mark.timeout(900)
 
@@ -252,7 +251,7 @@ def test_droplets_lie_over_the_slices_and_in_a_table_that_leads_to_them(
     beside = next(number for number, z_mm in enumerate(depths_mm, 1) if abs(z_mm) > 0.5 * 41 * 0.05)
     table.get_by_role("row").nth(beside).click()
     expect(page.get_by_text("It lies outside of the volume, along z")).to_be_visible()
-    assert page.evaluate(NO_KEYS) == []
+    assert without_keys(page) == []
     table.get_by_role("columnheader", name="x, mm").focus()
     page.keyboard.press("Enter")
     expect(table.get_by_role("columnheader", name="x, mm")).to_have_class(re.compile(r"\bsorted\b"))

@@ -15,7 +15,7 @@ import pytest
 from playwright.sync_api import Locator, Page, expect
 
 from server.web.ui.runs.run_list import PAGE
-from tests.support.desk import PULSE, show_spray
+from tests.support.desk import PULSE, show_spray, without_keys
 from tests.support.live_shots import save_droplet_calibration
 from tests.support.serving import Serving, plan_of
 
@@ -184,16 +184,6 @@ test_desk.py touches the alarm of such a fault, test_desk_results.py the switch.
 """
 
 
-NO_KEYS = """() => {
-    const keys = "a[href], button, input, textarea, [tabindex]:not([tabindex='-1'])";
-    const hears = one => one.closest(keys + ", label, .q-field") || one.querySelector(keys);
-    const isClicked = one => getComputedStyle(one).cursor === "pointer" && one.getClientRects().length > 0;
-    const found = [...document.querySelectorAll("body *")].filter(one => isClicked(one) && !hears(one));
-    return found.map(one => `${one.tagName} ${one.className} ${one.innerText}`);
-}"""
-"""A slice is clicked too, and has a slider instead; an iso-surface is turned by keys in test_desk_results.py."""
-
-
 @pytest.mark.parametrize("path", TABLES)
 def test_every_control_of_a_page_is_touched_and_does_something(page: Page, server: Serving, path: str) -> None:
     run_id, read = prepared(server, PAGE if path == "/runs" else 0), set[tuple[str, str]]()
@@ -203,7 +193,7 @@ def test_every_control_of_a_page_is_touched_and_does_something(page: Page, serve
         if path.replace("RUN", run_id) in page.url:
             read |= controls(page)
         DEEDS.get(one.role, click)(page, found(page, one), replace(one, text=one.text.replace("RUN", run_id)))
-    assert page.evaluate(NO_KEYS) == [], "these can be clicked, and no key reaches them"
+    assert without_keys(page) == [], "these can be clicked, and no key reaches them"
     touched = names(TABLES[path])
     assert read - touched - names(BAR) - SOMETIMES == set(), "nobody touches these"
     assert touched - read == set(), "these are touched, and the accessibility tree does not tell of them"

@@ -13,7 +13,6 @@ from server.lab.desk.reason import UNSEEN, Reason
 from server.lab.desk.rig_state import RigState, rig_state
 from server.lab.duty import Duty, pause
 
-_PERIOD_S = 0.5
 _STALE_S = 3.0
 """A rig that nobody has looked at for so long is not ready; a silent generator takes a second."""
 
@@ -40,9 +39,11 @@ class DeskWatch:
     status : Callable[[], RunStatus]
         What acquisition does; asked whenever somebody wants to know the state.
     look, find_alarms : Look, FindAlarms
-        Asked twice a second, outside of the event loop.
+        Asked again and again, outside of the event loop.
     now_s : Callable[[], float]
         A clock that never goes back.
+    period_s : float
+        After which they are asked again.
     """
 
     def __init__(
@@ -51,12 +52,14 @@ class DeskWatch:
         look: Look,
         find_alarms: FindAlarms = tuple,
         now_s: Callable[[], float] = time.monotonic,
+        period_s: float = 0.5,
     ) -> None:
         self._status = status
         self._look = look
         self._find_alarms = find_alarms
         self._alarms = AlarmList()
         self._now_s = now_s
+        self._period_s = period_s
         self._pace = Pace(now_s)
         self._seen: _Seen | None = None
 
@@ -67,7 +70,7 @@ class DeskWatch:
                 await asyncio.to_thread(self.look)
             with duty.item("alarms"):
                 await asyncio.to_thread(self.look_for_alarms)
-            await pause(_PERIOD_S)
+            await pause(self._period_s)
 
     def look(self) -> RigState:
         """Look now; blocks."""

@@ -1,8 +1,12 @@
 """The command line itself: usage, help, exit status, and readers that have seen enough."""
 
+import io
 import os
+import re
 import subprocess
 import sys
+from contextlib import redirect_stdout
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -13,32 +17,25 @@ from tests.support.command_line import refused
 from tests.support.fresh_interpreter import modules_after, packages_of
 
 ROOT = Path(__file__).parents[3]
-CLIENTS = ("run", "watch", "abort", "runs")
-CHAIN = (
-    "demo",
-    "serve",
-    *CLIENTS,
-    "doctor",
-    "import",
-    "calibrate",
-    "check",
-    "self-calibrate",
-    "reconstruct",
-    "average",
-)
-STUDIES = ("density", "ghosts", "average", "residuals", "calibration", "sensitivity")
-TOOLS = ("info", "selftest", "scope", "light", "flash")
-WORDS = [
-    [],
-    *([command] for command in (*CHAIN, "study", "optics", "bench", "firmware", "verify", "repair", "pack")),
-    *(["study", study] for study in STUDIES),
-    *(["firmware", tool] for tool in TOOLS),
-]
-"""Of every command."""
 HEAVY = {
     *("numpy", "cv2", "h5py", "scipy", "skimage", "matplotlib", "pydantic"),
     *("fastapi", "starlette", "nicegui", "uvicorn", "dask", "distributed", "gi", "serial", "gpiod"),
 }
+
+
+@cache
+def help_of(*words: str) -> str:
+    told = io.StringIO()
+    with redirect_stdout(told), pytest.raises(SystemExit) as ended:
+        main([*words, "--help"])
+    assert ended.value.code == 0
+    return told.getvalue()
+
+
+def all_words(*before: str) -> list[list[str]]:
+    """Words of a command and of all that its help names."""
+    verbs = re.findall(r"^ {4}([a-z][a-z-]*)(?: |$)", help_of(*before), re.MULTILINE)
+    return [[*before], *(words for verb in verbs for words in all_words(*before, verb))]
 
 
 def test_unknown_usage_exits_with_2(capsys: pytest.CaptureFixture[str]) -> None:
@@ -53,7 +50,7 @@ def test_help_loads_nothing_that_is_heavy() -> None:
     code = f"""
 from contextlib import suppress
 from server.cli.main import main
-for words in {WORDS}:
+for words in {all_words()}:
     with suppress(SystemExit):
         main([*words, "--help"])
 """
@@ -91,12 +88,12 @@ def test_a_command_leaves_the_environment_of_its_caller_alone(
     assert dict(os.environ) == before
 
 
-def test_every_command_has_help(capsys: pytest.CaptureFixture[str]) -> None:
-    for words in WORDS:
-        with pytest.raises(SystemExit) as stopped:
-            main([*words, "--help"])
-        assert stopped.value.code == 0
-        assert capsys.readouterr().out.startswith(" ".join(["usage: tomoshadow", *words]))
+def test_every_command_has_help() -> None:
+    found = all_words()
+    assert len([words for words in found if len(words) == 1]) == len(COMMANDS)
+    assert {"study", "firmware"} == {words[0] for words in found if len(words) == 2}
+    for words in found:
+        assert help_of(*words).startswith(" ".join(["usage: tomoshadow", *words]))
 
 
 def test_bad_input_is_told_apart_from_failure(

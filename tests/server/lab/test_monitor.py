@@ -11,6 +11,7 @@ from server.lab.duty import Duty, Health, Lamp
 from server.lab.events import EventPublisher
 from server.lab.monitor import STALE_S, RigMonitor
 from tests.support.memory_rig import MemoryRig
+from tests.support.serving import DEADLINE_S, serving
 
 
 def lamps_of(memory: MemoryRig, tmp_path: Path) -> dict[str, Lamp]:
@@ -140,3 +141,13 @@ def test_however_often_a_slow_device_is_asked_for_no_other_lamp_gets_old(tmp_pat
 
     asyncio.run(ask())
     assert {lamp.name: lamp.health for lamp in monitor.lamps}["interlock"] is Health.OK
+
+
+def test_the_threads_of_lamps_end_with_their_server(tmp_path: Path) -> None:
+    before = set(threading.enumerate())
+    with serving(tmp_path):
+        lamps = [one for one in set(threading.enumerate()) - before if one.name.startswith("lamp ")]
+        assert lamps
+    for lamp in lamps:
+        lamp.join(DEADLINE_S)
+    assert not [lamp.name for lamp in lamps if lamp.is_alive()]
