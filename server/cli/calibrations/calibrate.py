@@ -12,6 +12,7 @@ from server.cli.output import Outcome, progress, table, tracked
 
 if TYPE_CHECKING:
     from processing.calibration.calibration import Calibration, ViewCalibration
+    from processing.calibration.observation import CalibrationSet
     from processing.geometry import FloatArray
 
 
@@ -74,13 +75,11 @@ def stated_roll(text: str) -> tuple[str, float]:
 def calibrate_views(options: Namespace) -> Outcome:
     """Fit, and write the calibration; it has not passed where a view is refused."""
     from processing.calibration.calibrate import calibrate
-    from processing.calibration.calibration_file import save_calibration
     from processing.calibration.sets.calibration_set import load_calibration_set
     from processing.calibration.verdict import Verdict
-    from processing.figures.residual_figures import residuals_figure
-    from processing.runs.overwriting import replacing, require_free
+    from processing.runs.overwriting import require_free
     from processing.runs.run_check import checked_by_run, run_beside
-    from server.pictures.calibration_pictures import calibration_pictures, picture_paths
+    from server.pictures.calibration_pictures import picture_paths
 
     figure = picture_beside(options.out)
     require_free(options.out, figure, *picture_paths(options.out), overwrite=options.overwrite)
@@ -91,12 +90,8 @@ def calibrate_views(options: Namespace) -> Outcome:
     run_dir = options.run or run_beside(options.set)
     if run_dir is not None:
         calibration = checked_by_run(calibration, run_dir)
-    with replacing(options.out) as out:
-        save_calibration(calibration, out)
-        residuals_figure(calibration).savefig(out.with_name(figure.name), dpi=120)
-        drawn = calibration_pictures(options.set, calibration_set, calibration, out)
+    figures = [str(picture) for picture in _written(options, calibration_set, calibration, figure)]
     _tell(calibration)
-    figures = [str(options.out.with_name(picture.name)) for picture in drawn]
     result = {
         "passed": all(view.verdict is not Verdict.REFUSE for view in calibration.views.values()),
         "calibration": str(options.out),
@@ -109,6 +104,22 @@ def calibrate_views(options: Namespace) -> Outcome:
     }
     drawn_in = ", ".join([str(figure), *figures])
     return Outcome(result, f"{views_table(calibration)}\n{calibration.id}: {options.out}, pictures in {drawn_in}")
+
+
+def _written(
+    options: Namespace, calibration_set: "CalibrationSet", calibration: "Calibration", figure: Path
+) -> list[Path]:
+    """Write the calibration, the figure of its residuals and pictures of its set; where these are."""
+    from processing.calibration.calibration_file import save_calibration
+    from processing.figures.residual_figures import residuals_figure
+    from processing.runs.overwriting import replacing
+    from server.pictures.calibration_pictures import calibration_pictures
+
+    with replacing(options.out) as out:
+        save_calibration(calibration, out)
+        residuals_figure(calibration).savefig(out.with_name(figure.name), dpi=120)
+        drawn = calibration_pictures(options.set, calibration_set, calibration, out)
+    return [options.out.with_name(picture.name) for picture in drawn]
 
 
 def _tell(calibration: "Calibration") -> None:
