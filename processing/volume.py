@@ -77,6 +77,11 @@ class VoxelGrid:
         offsets_mm: NDArray[np.float64] = np.asarray(points_mm) - np.asarray(self.origin_mm)
         return offsets_mm[..., ::-1] / self.pitch_mm
 
+    def holds(self, points_mm: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Which points (N, 3), x, y, z in mm, lie in a voxel."""
+        index = self.to_index(points_mm)
+        return np.asarray(np.all((index >= -0.5) & (index < np.array(self.shape) - 0.5), axis=1))
+
     def to_mm(self, indices: NDArray[np.float64]) -> NDArray[np.float64]:
         """Points (x, y, z) in mm of fractional voxel indices (z, y, x); the inverse of ``to_index``."""
         offsets_mm: NDArray[np.float64] = np.asarray(indices)[..., ::-1] * self.pitch_mm

@@ -30,20 +30,15 @@ def copies(shots: Sequence[StoredDroplets]) -> list[tuple[StoredDroplets, Stored
 def copies_told(shots: Sequence[StoredDroplets]) -> tuple[str, ...]:
     """The same, for people."""
     return tuple(
-        f"{named(shot)} has the very {_shared(shot, other)} of {named(other)}: one is a copy"
+        f"{shot.name} has the very {_shared(shot, other)} of {other.name}: one is a copy"
         for shot, other in copies(shots)
     )
 
 
 def in_common(first: Iterable[StoredDroplets], second: Iterable[StoredDroplets]) -> int:
     """How many shots are in both: by their droplets, or, measured in another way, by their images or names."""
-    known = {one for shot in second for one in (named(shot), *_prints_of(shot))}
-    return sum(not known.isdisjoint((named(shot), *_prints_of(shot))) for shot in first)
-
-
-def named(shot: StoredDroplets) -> str:
-    """Run and shot."""
-    return f"{shot.provenance.get('run', 'a run')}, shot {shot.provenance.get('shot', '?')}"
+    known = {one for shot in second for one in (shot.name, *_prints_of(shot))}
+    return sum(not known.isdisjoint((shot.name, *_prints_of(shot))) for shot in first)
 
 
 def _prints_of(shot: StoredDroplets) -> list[str]:

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from processing.analysis.copied_shots import named
 from processing.analysis.droplets.droplet_file import StoredDroplets
 from processing.geometry import FloatArray
 
@@ -49,7 +48,7 @@ def _faster(flying: Flying) -> Iterator[str]:
     if len(odd := np.flatnonzero(np.abs(np.log(ratios)) > np.log(MOST_FASTER))):
         yield (
             f"droplets of {len(odd)} of {len(flying)} shots fly {MOST_FASTER:g} times faster or slower than those of "
-            f"the others ({named(flying[odd[0]][0])}: {speeds_m_s[odd[0]]:.3g} m/s, all: {np.median(speeds_m_s):.3g} "
+            f"the others ({flying[odd[0]][0].name}: {speeds_m_s[odd[0]]:.3g} m/s, all: {np.median(speeds_m_s):.3g} "
             "m/s): is the separation right in all of them, and are they of one spray?"
         )
 
@@ -64,7 +63,7 @@ def _against(flying: Flying) -> Iterator[str]:
     main *= np.sign(np.median(np.sign(main))) or 1.0
     if odd := [shot for (shot, _), cosine in zip(ways, main, strict=True) if cosine < AGAINST]:
         yield (
-            f"droplets of {len(odd)} of {len(ways)} shots fly against those of the others ({named(odd[0])}): are "
+            f"droplets of {len(odd)} of {len(ways)} shots fly against those of the others ({odd[0].name}): are "
             "exposures A and B exchanged in some? Their mean velocity is of no spray"
         )
 

@@ -44,13 +44,13 @@ def velocities_figure(shot: StoredDroplets, least_p_pair: float = 0.5, title: st
         There are no velocities; the text says why.
     """
     if "u_m_s" not in shot.columns:
-        raise ValueError(f"{_named(shot)}: {_reasons(shot) or NO_COLUMNS}")
+        raise ValueError(f"{shot.name}: {_reasons(shot) or NO_COLUMNS}")
     first = shot.columns["frame"] == "a"
     columns = {name: np.asarray(column)[first] for name, column in shot.columns.items()}
     speeds_m_s = np.linalg.norm([columns[f"{name}_m_s"].astype(np.float64) for name in "uvw"], axis=0)
     paired = np.isfinite(speeds_m_s) & (columns["p_pair"] >= least_p_pair)
     if not paired.any():
-        raise ValueError(f"{_named(shot)}: {_reasons(shot) or f'no pair has a p_pair of {least_p_pair:g}'}")
+        raise ValueError(f"{shot.name}: {_reasons(shot) or f'no pair has a p_pair of {least_p_pair:g}'}")
     median_m_s = float(np.median(speeds_m_s[paired]))
     widest_mm = max(float(np.ptp(columns[f"{axis}_mm"])) for axis in "xyz")
     m_s_per_mm = max(median_m_s, LEAST) / (LENGTH_SHARE * max(widest_mm, LEAST))
@@ -63,7 +63,7 @@ def velocities_figure(shot: StoredDroplets, least_p_pair: float = 0.5, title: st
     figure.axes[0].quiverkey(arrows, 0.04, 0.96, key_m_s, f"{key_m_s:g} m/s", labelpos="E", coordinates="figure")
     figure.colorbar(arrows, ax=figure.axes, label="speed [m/s]")
     told = f"{np.count_nonzero(paired)} of {len(paired)} droplets of exposure A have a partner in B"
-    figure.suptitle(f"{title or _named(shot)}: {told}", fontsize="medium")
+    figure.suptitle(f"{title or shot.name}: {told}", fontsize="medium")
     return figure
 
 
@@ -94,10 +94,6 @@ def _draw_panel(
     if down == "y":
         axes.invert_yaxis()  # y points down, along the spray; z points up, as in other figures across it
     return arrows
-
-
-def _named(shot: StoredDroplets) -> str:
-    return f"{shot.provenance.get('run', 'a run')}, shot {shot.provenance.get('shot', '?')}"
 
 
 def _reasons(shot: StoredDroplets) -> str:

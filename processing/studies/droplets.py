@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from processing.analysis.droplets.bright_shot import measure_bright
 from processing.analysis.droplets.droplet_search import MARGIN_VOXEL, plan_droplets
-from processing.analysis.droplets.droplet_table import Droplets
+from processing.analysis.droplets.droplet_table import Droplets, SizedDroplets
 from processing.analysis.droplets.ghost_share import RADIUS_VOXEL, matches
 from processing.figures.droplet_figures import MeasuredCase, droplets_figure
 from processing.geometry import FloatArray, PinholeCamera
@@ -214,14 +214,26 @@ def _row(study: DropletStudy, case: DropletCase, seed: int, threads: int) -> Dro
 
 
 def _errors(droplets: Droplets, truth_mm: FloatArray, match: FloatArray, pitch_mm: float) -> tuple[float, float]:
-    """Root mean square error in voxels and robust standard deviation of z-scores, without what all have in common."""
-    real = match >= 0
-    if np.count_nonzero(real) < 2:
+    """Root mean square error in voxels and robust standard deviation of z-scores."""
+    if np.count_nonzero(match >= 0) < 2:
         return float("nan"), float("nan")
+    errors_mm, scores = place_errors(droplets, truth_mm, match)
+    return float(np.sqrt(np.mean(errors_mm**2))) / pitch_mm, robust_sd(scores)
+
+
+def place_errors(
+    droplets: Droplets | SizedDroplets, truth_mm: FloatArray, match: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Errors of real droplets (N, 3), without what all have in common, and over what their covariance says."""
+    real = match >= 0
     errors_mm = droplets.points_mm[real] - truth_mm[match[real]]
     errors_mm = errors_mm - np.median(errors_mm, axis=0)
-    scores = errors_mm / np.sqrt(np.einsum("nii->ni", droplets.covariance_mm2[real]))
-    return float(np.sqrt(np.mean(errors_mm**2))) / pitch_mm, float(np.median(np.abs(scores))) / 0.6745
+    return errors_mm, errors_mm / np.sqrt(np.einsum("nii->ni", droplets.covariance_mm2[real]))
+
+
+def robust_sd(errors: FloatArray) -> float:
+    """Standard deviation about zero of errors that are normal, whatever a few wild ones do."""
+    return float(np.median(np.abs(errors))) / 0.6745
 
 
 def droplet_line(row: DropletRow) -> str:

@@ -47,8 +47,6 @@ SWEEPS, FINAL_SWEEPS = 12, 60
 TOLERANCE, FINAL_TOLERANCE = 3e-3, 3e-4
 OPTICS_EVERY = 3
 """Rounds from one estimate of the optics to the next."""
-BEYOND_VOXEL = 1.5
-"""A droplet that leaves the searched grid farther than this is dropped."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +124,8 @@ def _round(shot: BlobImages, search: DropletSearch, fit: BrightFit, number: int)
     prune = (PRUNE_FIRST + (PRUNE_LAST - PRUNE_FIRST) * fallen) * fit.scale
     for least in (0.25 * prune, prune):
         grown = _fitted(shot, grown.brighter_than(max(least, 0.7 * fit.faintest)))
-    blobs = _inside(merged(grown.blobs, APART_VOXEL), search)
+    blobs = merged(grown.blobs, APART_VOXEL)
+    blobs = blobs.where(search.reaches(blobs.positions_voxel))
     if len(blobs):
         grown = replace(fit, blobs=blobs, scale=_typical(blobs.amplitudes))
         if number % OPTICS_EVERY == 0:
@@ -169,11 +168,6 @@ def _finished(shot: BlobImages, fit: BrightFit) -> BrightFit:
         fit = replace(fit, optics=refined_optics(shot, fit.optics, fit.blobs, shifts=True))
         fit = _fitted(shot, fit, sweeps=FINAL_SWEEPS, tolerance=FINAL_TOLERANCE)
     return fit.brighter_than(max(PRUNE_LAST * fit.scale, fit.faintest))
-
-
-def _inside(blobs: Blobs, search: DropletSearch) -> Blobs:
-    most = np.array(search.searched.shape[::-1]) - 1 + BEYOND_VOXEL
-    return blobs.where(np.all((blobs.positions_voxel > -BEYOND_VOXEL) & (blobs.positions_voxel < most), axis=1))
 
 
 def rms(images: Sequence[Image]) -> float:

@@ -71,6 +71,11 @@ class StoredDroplets:
     provenance: dict[str, Value]
     objects: dict[str, NDArray[np.generic]] = field(default_factory=dict)
 
+    @property
+    def name(self) -> str:
+        """Run and shot, for people."""
+        return f"{self.provenance.get('run', 'a run')}, shot {self.provenance.get('shot', '?')}"
+
 
 def write_droplets(
     path: Path,

@@ -27,6 +27,8 @@ def keep_on() -> None:
     """Before a round of a search, who waits may raise what ends it; this one does not."""
 
 
+BEYOND_VOXEL = 1.5
+"""A droplet that leaves what is searched farther than this is dropped."""
 CANDIDATE_PITCH_VOXEL = 1.5
 """Candidates need be no nearer to their droplet: the fit moves them."""
 
@@ -59,6 +61,11 @@ class DropletSearch:
         """Points (N, 3) x, y, z in voxels of what is searched; given as shares of the grid, from 0 to 1."""
         margin_voxel = 0.5 * (np.array(self.searched.shape) - np.array(self.grid.shape))[::-1]
         return np.asarray(margin_voxel - 0.5 + shares * np.array(self.grid.shape[::-1]), dtype=np.float64)
+
+    def reaches(self, positions_voxel: FloatArray) -> NDArray[np.bool_]:
+        """Which positions (N, 3), x, y, z in voxels of what is searched, lie in it, or little beyond."""
+        most = np.array(self.searched.shape[::-1]) - 1 + BEYOND_VOXEL
+        return np.asarray(np.all((positions_voxel > -BEYOND_VOXEL) & (positions_voxel < most), axis=1))
 
     def pixels_into_search(self) -> list[NDArray[np.bool_]]:
         """Pixels (rows, columns) of each view that look into what is searched; what others see is not searched for."""

@@ -107,7 +107,7 @@ def _require_alike(shots: Sequence[StoredDroplets]) -> None:
         for name in {**its, **others}:
             if its.get(name) != others.get(name):
                 raise DropletFileError(
-                    f"{_named(shot)}: measured with {name} {its.get(name)}, {_named(first)} with {others.get(name)}: "
+                    f"{shot.name}: measured with {name} {its.get(name)}, {first.name} with {others.get(name)}: "
                     "numbers of two recipes are not comparable; take those of one"
                 )
 
@@ -131,7 +131,7 @@ def _place(shot: StoredDroplets) -> str:
 def told_exposures(shot: StoredDroplets) -> list[Mapping[str, Any]]:
     """What was told of the exposures that are not refused."""
     if "exposures" not in shot.provenance:
-        raise DropletFileError(f"{_named(shot)}: its file does not say what became of its exposures")
+        raise DropletFileError(f"{shot.name}: its file does not say what became of its exposures")
     exposures = json.loads(str(shot.provenance["exposures"])).values()
     return [exposure for exposure in exposures if exposure["verdict"] != REFUSED]
 
@@ -139,10 +139,6 @@ def told_exposures(shot: StoredDroplets) -> list[Mapping[str, Any]]:
 def hidden_share(exposure: Mapping[str, Any]) -> float:
     """Share of the volume that could not be measured; older files do not know of any."""
     return float(exposure.get("hidden", {}).get("volume_share", 0.0))
-
-
-def _named(shot: StoredDroplets) -> str:
-    return f"{shot.provenance.get('run', 'a run')}, shot {shot.provenance.get('shot', '?')}"
 
 
 def _sizes(shots: Sequence[StoredDroplets], per_shot: float) -> SizeStatistics:
@@ -156,7 +152,7 @@ def _sizes(shots: Sequence[StoredDroplets], per_shot: float) -> SizeStatistics:
     diameters_um = [np.asarray(shot.columns[DIAMETER], np.float64) for shot in shots]
     for shot, its_um in zip(shots, diameters_um, strict=True):
         if not (np.isfinite(its_um) & (its_um > 0)).all():
-            raise DropletFileError(f"{_named(shot)}: was changed: a diameter is not finite, or not above 0")
+            raise DropletFileError(f"{shot.name}: was changed: a diameter is not finite, or not above 0")
     return mean_diameters(diameters_um, per_shot)
 
 

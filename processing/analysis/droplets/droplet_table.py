@@ -88,7 +88,7 @@ class Droplets:
 
     def within(self, grid: VoxelGrid) -> "Droplets":
         """Those in a grid, to half a voxel beyond its outermost centres, its own volume."""
-        return _rows(self, _inside(self.points_mm, grid))
+        return _rows(self, grid.holds(self.points_mm))
 
     def unsure(self) -> "Droplets":
         """The same, of none of which is told how probably it is real."""
@@ -149,7 +149,7 @@ class SizedDroplets:
 
     def within(self, grid: VoxelGrid) -> "SizedDroplets":
         """Those in a grid, to half a voxel beyond its outermost centres, its own volume."""
-        return _rows(self, _inside(self.points_mm, grid))
+        return _rows(self, grid.holds(self.points_mm))
 
     def unsure(self) -> "SizedDroplets":
         """The same, of none of which is told how probably it is real."""
@@ -171,11 +171,6 @@ Table = TypeVar("Table", Droplets, SizedDroplets)
 
 def _rows(table: Table, chosen: NDArray[np.bool_]) -> Table:
     return type(table)(**{field.name: getattr(table, field.name)[chosen] for field in fields(table)})
-
-
-def _inside(points_mm: FloatArray, grid: VoxelGrid) -> NDArray[np.bool_]:
-    index = grid.to_index(points_mm)
-    return np.asarray(np.all((index >= -0.5) & (index < np.array(grid.shape) - 0.5), axis=1))
 
 
 def _places(points_mm: FloatArray) -> Columns:

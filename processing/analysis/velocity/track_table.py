@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from processing.analysis.copied_shots import copies, named
+from processing.analysis.copied_shots import copies
 from processing.analysis.droplets.droplet_file import DropletFileError, StoredDroplets
 from processing.analysis.droplets.droplet_table import COVARIANCES as PLACES
 from processing.analysis.droplets.droplet_table import Columns
@@ -171,9 +171,7 @@ def _require_one_series(ordered: Sequence[StoredDroplets]) -> None:
         if one == other:
             raise DropletFileError(f"shot {one} is there twice")
     for copied, original in copies(ordered):
-        raise DropletFileError(
-            f"{named(copied)} has the very droplets of {named(original)}: one is a copy; take it away"
-        )
+        raise DropletFileError(f"{copied.name} has the very droplets of {original.name}: one is a copy; take it away")
     if numbers[-1] - numbers[0] >= MOST_FRAMES:
         raise DropletFileError(f"shots {numbers[0]} to {numbers[-1]}: a series has at most {MOST_FRAMES} frames")
 

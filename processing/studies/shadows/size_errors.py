@@ -4,6 +4,7 @@ import numpy as np
 
 from processing.analysis.droplets.droplet_table import SizedDroplets
 from processing.geometry import FloatArray
+from processing.studies.droplets import place_errors, robust_sd
 from processing.synthetic.spray import Spray
 
 JUDGED_UM = (20.0, 60.0)
@@ -22,23 +23,17 @@ def size_errors(droplets: SizedDroplets, truth: Spray, match: FloatArray, pitch_
     real = match >= 0
     if np.count_nonzero(real) < 2:
         return dict.fromkeys(("rms_voxel", "bias_um", "sd_um", "z_sd", "z_size", "held", "size_held"), float("nan"))
-    errors_mm = droplets.points_mm[real] - truth.positions_mm[match[real]]
-    errors_mm = errors_mm - np.median(errors_mm, axis=0)
+    errors_mm, scores = place_errors(droplets, truth.positions_mm, match)
     true_um = 1000 * truth.diameters_mm[match[real]]
     errors_um = droplets.diameters_um[real] - true_um
     judged_um = errors_um[(true_um > JUDGED_UM[0]) & (true_um < JUDGED_UM[1])]
-    scores = errors_mm / np.sqrt(np.einsum("nii->ni", droplets.covariance_mm2[real]))
     size_scores = errors_um / droplets.diameter_sd_um[real]
     return {
         "rms_voxel": float(np.sqrt(np.mean(errors_mm**2))) / pitch_mm,
         "bias_um": float(np.median(judged_um)),
-        "sd_um": _robust_sd(judged_um),
-        "z_sd": float(np.median(np.abs(scores))) / 0.6745,
-        "z_size": _robust_sd(size_scores),
+        "sd_um": robust_sd(judged_um - np.median(judged_um)),
+        "z_sd": robust_sd(scores),
+        "z_size": robust_sd(size_scores - np.median(size_scores)),
         "held": float(np.mean(np.abs(scores) < SIGMAS_95)),
         "size_held": float(np.mean(np.abs(size_scores) < SIGMAS_95)),
     }
-
-
-def _robust_sd(values: FloatArray) -> float:
-    return float(np.median(np.abs(values - np.median(values)))) / 0.6745

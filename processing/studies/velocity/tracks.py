@@ -20,6 +20,7 @@ from processing.analysis.velocity.tracks import link
 from processing.figures.velocity_figures import LinkedCase, linked_figure
 from processing.geometry import FloatArray
 from processing.kernels import DEFAULT_THREADS
+from processing.studies.droplets import robust_sd
 from processing.studies.report import Statement, all_kept, by_case, case_statements
 from processing.studies.simulated_droplets import study_cameras, study_grid
 from processing.studies.velocity.double_scenes import case_images
@@ -182,11 +183,7 @@ def _errors(points: TrackPoints, labels: Sequence[Labels], flying: FlyingDroplet
     velocity_sd = np.sqrt(np.einsum("nii->ni", points.velocity_covariance[known]))
     scores = (velocity / velocity_sd, acceleration / points.acceleration_sd[known])
     rms = (float(np.sqrt(np.mean(errors**2))) for errors in (velocity, acceleration))
-    return dict(zip(MOTION, (*rms, *map(_robust, scores)), strict=True))
-
-
-def _robust(scores: FloatArray) -> float:
-    return float(np.median(np.abs(scores))) / 0.6745
+    return dict(zip(MOTION, (*rms, *map(robust_sd, scores)), strict=True))
 
 
 def track_line(row: TrackRow) -> str:

@@ -19,7 +19,7 @@ from processing.analysis.velocity.velocity_table import M_S_PER_MM_NS
 from processing.figures.velocity_figures import LinkedCase, linked_figure
 from processing.geometry import FloatArray
 from processing.kernels import DEFAULT_THREADS
-from processing.studies.droplets import IMAGE_SIZE_PX, SLAB
+from processing.studies.droplets import IMAGE_SIZE_PX, SLAB, robust_sd
 from processing.studies.report import Statement, all_kept, by_case, case_statements
 from processing.studies.simulated_droplets import study_grid
 from processing.studies.velocity.double_scenes import SEPARATION_NS, DoubleScene, double_scene
@@ -158,7 +158,7 @@ def _row(
     own = np.flatnonzero(velocities.first.paired)
     label = labels[0][own]
     right = (label >= 0) & (label == labels[1][velocities.first.partners.partner[own]])
-    both = _inside(scene.before.positions_mm, grid) & _inside(scene.after.positions_mm, grid)
+    both = grid.holds(scene.before.positions_mm) & grid.holds(scene.after.positions_mm)
     ways_voxel = np.linalg.norm(scene.moved_mm[both], axis=1) / grid.pitch_mm
     return VelocityRow(
         case=case.name,
@@ -175,11 +175,6 @@ def _row(
     )
 
 
-def _inside(points_mm: FloatArray, grid: VoxelGrid) -> NDArray[np.bool_]:
-    index = grid.to_index(points_mm)
-    return np.asarray(np.all((index >= -0.5) & (index < np.array(grid.shape) - 0.5), axis=1))
-
-
 def _errors(
     velocities: MeasuredVelocities, rows: NDArray[np.intp], moved_mm: FloatArray, pitch_mm: float
 ) -> dict[str, float]:
@@ -190,7 +185,7 @@ def _errors(
     errors_m_s = velocities.first.velocities_m_s[rows] - m_s_per_mm * moved_mm
     scores = errors_m_s / np.sqrt(np.einsum("nii->ni", velocities.first.covariance_m2_s2[rows]))
     u, v, w = (np.sqrt(np.mean(errors_m_s**2, axis=0)) / (m_s_per_mm * pitch_mm)).tolist()
-    return {"rms_u_voxel": u, "rms_v_voxel": v, "rms_w_voxel": w, "z_sd": float(np.median(np.abs(scores))) / 0.6745}
+    return {"rms_u_voxel": u, "rms_v_voxel": v, "rms_w_voxel": w, "z_sd": robust_sd(scores)}
 
 
 def velocity_line(row: VelocityRow) -> str:

@@ -4,8 +4,8 @@ from argparse import Namespace
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from server.cli.options import Verbs, count, positive, seed, usable_processors, view_count, width
-from server.cli.studies.study_command import add_study, collected, passing, report
+from server.cli.options import Verbs, positive, seed, usable_processors, view_count, width
+from server.cli.studies.study_command import add_repeats, add_study, collected, passing, report, seeds_of
 
 if TYPE_CHECKING:
     from processing.studies.droplets import DropletCase
@@ -23,8 +23,7 @@ VARIED = {
 def add_droplets(studies: Verbs) -> None:
     """Add the study; without options that vary a case, it tries all cases for which something is asked for."""
     parser = add_study(studies, "droplets", droplets, "droplets found and ghosts when images are explained by droplets")
-    parser.add_argument("--seed", type=seed, default=301, help="of the first shot of a case")
-    parser.add_argument("--repeats", type=count, default=5, help="shots of a case")
+    add_repeats(parser, "shot", 5)
     parser.add_argument("--density", type=positive, help="droplets per mm^3")
     parser.add_argument("--sigma", type=width, help="width of droplets in px")
     parser.add_argument("--noise", type=positive, metavar="PERCENT", help="of the median amplitude")
@@ -44,7 +43,7 @@ def droplets(options: Namespace) -> dict[str, Any]:
         droplet_study,
     )
 
-    study = DropletStudy(seeds=tuple(range(options.seed, options.seed + options.repeats)), twins=options.twins)
+    study = DropletStudy(seeds=seeds_of(options), twins=options.twins)
     case = _stated_case(options)
     if case:
         study = replace(study, cases=(case,))

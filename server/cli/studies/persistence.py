@@ -3,15 +3,14 @@
 from argparse import Namespace
 from typing import Any
 
-from server.cli.options import Verbs, count, seed, usable_processors
-from server.cli.studies.study_command import add_study, collected, passing, report, seeds_of
+from server.cli.options import Verbs, usable_processors
+from server.cli.studies.study_command import add_repeats, add_study, collected, passing, report, seeds_of
 
 
 def add_persistence(studies: Verbs) -> None:
     """Add the study."""
     parser = add_study(studies, "persistence", persistence, "how many ghosts droplets without a partner in B tell")
-    parser.add_argument("--seed", type=seed, default=301, help="of the first double exposure of a case")
-    parser.add_argument("--repeats", type=count, default=3, help="double exposures of a case")
+    add_repeats(parser, "double exposure", 3)
 
 
 def persistence(options: Namespace) -> dict[str, Any]:

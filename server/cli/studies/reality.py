@@ -3,15 +3,14 @@
 from argparse import Namespace
 from typing import Any
 
-from server.cli.options import Verbs, count, seed, usable_processors
-from server.cli.studies.study_command import add_study, collected, passing, report, seeds_of
+from server.cli.options import Verbs, usable_processors
+from server.cli.studies.study_command import add_repeats, add_study, collected, passing, report, seeds_of
 
 
 def add_reality(studies: Verbs) -> None:
     """Add the study."""
     parser = add_study(studies, "reality", reality, "how probably droplets are told to be real, and how many are")
-    parser.add_argument("--seed", type=seed, default=301, help="of the first shot of a case")
-    parser.add_argument("--repeats", type=count, default=3, help="shots of a case")
+    add_repeats(parser, "shot", 3)
 
 
 def reality(options: Namespace) -> dict[str, Any]:

@@ -4,8 +4,8 @@ from argparse import ArgumentTypeError, Namespace
 from dataclasses import replace
 from typing import Any
 
-from server.cli.options import Verbs, count, positive, seed, usable_processors, view_count
-from server.cli.studies.study_command import add_study, collected, passing, report, seeds_of
+from server.cli.options import Verbs, positive, seed, usable_processors, view_count
+from server.cli.studies.study_command import add_repeats, add_study, collected, passing, report, seeds_of
 
 VARIED = {
     "density": "density_per_mm3",
@@ -22,8 +22,7 @@ VARIED = {
 def add_sizes(studies: Verbs) -> None:
     """Add the study; without options that vary a case, it tries all cases for which something is asked for."""
     parser = add_study(studies, "sizes", sizes, "droplets found, ghosts and sizes in shadow images")
-    parser.add_argument("--seed", type=seed, default=301, help="of the first shot of a case")
-    parser.add_argument("--repeats", type=count, default=5, help="shots of a case")
+    add_repeats(parser, "shot", 5)
     parser.add_argument("--density", type=positive, help="droplets per mm^3")
     parser.add_argument("--median", type=positive, metavar="UM", help="of the diameters")
     parser.add_argument("--noise", type=positive, metavar="PERCENT", help="of the background")

@@ -33,8 +33,7 @@ def add_study(studies: Verbs, name: str, study: Study, summary: str) -> Argument
 def add_linked(studies: Verbs, name: str, study: Study, summary: str, each: str, first_seed: int) -> None:
     """Add a study of droplets that fly; without a density it tries all cases for which something is asked for."""
     parser = add_study(studies, name, study, summary)
-    parser.add_argument("--seed", type=seed, default=first_seed, help=f"of the first {each} of a case")
-    parser.add_argument("--repeats", type=count, default=5, help="how many of a case")
+    add_repeats(parser, each, 5, first_seed)
     parser.add_argument("--droplets", choices=("bright", "opaque"), help="bright particles, or droplets in shadows")
     parser.add_argument("--density", type=positive, help="droplets per mm^3")
 
@@ -46,6 +45,12 @@ def linked_cases(options: Namespace, kind: Callable[..., Case], asked_for: tuple
     stated = {"droplets": options.droplets, "density_per_mm3": options.density}
     stated = {name: value for name, value in stated.items() if value is not None}
     return (asked_case(kind(**stated), asked_for),) if stated else asked_for
+
+
+def add_repeats(parser: ArgumentParser, each: str, repeats: int, first_seed: int = 301) -> None:
+    """Add the options that ``seeds_of`` asks."""
+    parser.add_argument("--seed", type=seed, default=first_seed, help=f"of the first {each} of a case")
+    parser.add_argument("--repeats", type=count, default=repeats, help="how many of a case")
 
 
 def seeds_of(options: Namespace) -> tuple[int, ...]:

@@ -51,8 +51,6 @@ OPTICS_EVERY = 2
 """Rounds from one estimate of optics and defects to the next."""
 APART_VOXEL, APART_RADII = 1.2, 0.7
 """A candidate keeps so far from droplets, or so many radii of theirs."""
-BEYOND_VOXEL = 1.5
-"""A droplet that leaves the searched grid farther than this is dropped."""
 SWEEPS = (Sweeps(4, move=False, tolerance=0.01), Sweeps(8, tolerance=0.01))
 FINAL_SWEEPS = Sweeps(30, tolerance=3e-4)
 
@@ -185,7 +183,8 @@ class ShadowRounds:
             discs = discs.where(kept)
             if sweeps is SWEEPS[0]:
                 seen = replace(seen, weights=seen_by(self._shot, fit, shadows.transmissions).weights)
-        return fit.with_discs(_inside(merged_discs(discs), self._search))
+        discs = merged_discs(discs)
+        return fit.with_discs(discs.where(self._search.reaches(discs.positions_voxel)))
 
     def _estimated(self, fit: ShadowFit, *, unite: bool) -> ShadowFit:
         seen = self._seen(fit)
@@ -240,8 +239,3 @@ def _last(fit: ShadowFit) -> float:
 
 def _significant(discs: Discs, information: FloatArray) -> NDArray[np.bool_]:
     return np.asarray(discs.squares_voxel2 * np.sqrt(information) > SIGNIFICANCE)
-
-
-def _inside(discs: Discs, search: DropletSearch) -> Discs:
-    most = np.array(search.searched.shape[::-1]) - 1 + BEYOND_VOXEL
-    return discs.where(np.all((discs.positions_voxel > -BEYOND_VOXEL) & (discs.positions_voxel < most), axis=1))
