@@ -48,7 +48,10 @@ def test_the_share_is_that_of_the_droplets_of_which_it_is_told() -> None:
 @pytest.mark.parametrize(
     ("p_real", "why"),
     [
-        ([0.9, np.nan, np.nan], "1 of 3 droplets have a probability to be real; it was not tried on droplets"),
+        (
+            [0.9, np.nan, np.nan],
+            "unknown: the probability to be real is known of 1 of 3 droplets; it was not tried on ",
+        ),
         ([], "no droplet was measured"),
     ],
 )
