@@ -123,7 +123,7 @@ def _told_box(grid: JsonValue) -> str:
         return str(grid or "all that the views see")
     voxels = GridSettings.model_validate_json(json.dumps(grid)).to_grid()
     spans_mm = (getattr(voxels, f"{axis}_mm")[[0, -1]] for axis in "xyz")
-    return f"the box {','.join(f'{first:.4g}:{last:.4g}' for first, last in spans_mm)}"
+    return f"the box {','.join(f'{first:.4g}:{last:.4g}' for first, last in spans_mm)} mm"
 
 
 def _measures(plan: RunPlan) -> bool:

@@ -30,7 +30,8 @@ _NAME = """<q-td :props="props">
 <a class="run-link" :href="'/runs/' + encodeURIComponent(props.value)">{{ props.value }}</a>
 <div class="run-more">{{ props.row.notes }}</div></q-td>"""
 _OUTCOME = """<q-td :props="props"><q-badge :color="props.row.colour" :label="props.value" />
-<div class="run-more">{{ props.row.cause }}</div><div class="run-more remedy">{{ props.row.remedy }}</div></q-td>"""
+<div class="run-more">{{ props.row.cause }}</div>
+<div v-if="props.row.remedy" class="run-more remedy">Do: {{ props.row.remedy }}</div></q-td>"""
 _ANY = "any"
 _RESULTS = {_ANY: "any results", True: "with results", False: "without results"}
 _NO_RUN = "There is no run yet. Record the first one on the page Run, or bring images in by: tomoshadow import"

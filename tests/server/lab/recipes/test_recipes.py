@@ -61,7 +61,7 @@ def test_the_box_that_a_plan_states_has_the_pixels_of_its_calibration(server: Se
     plan = plan_of(references=[background], calibration="cal", recipes=[measure.model_dump()])
     checks = server.http.post("/api/rig/readiness", json=plan).json()["checks"]
     (recipe,) = (check["text"] for check in checks if check["name"] == "Recipe")
-    assert re.match(r"droplets in the box -1:1,-0\.5:0\.\d+,-1:1 ", recipe), recipe
+    assert re.match(r"droplets in the box -1:1,-0\.5:0\.\d+,-1:1 mm ", recipe), recipe
 
 
 @pytest.mark.parametrize(
