@@ -250,7 +250,10 @@ def test_droplets_lie_over_the_slices_and_in_a_table_that_leads_to_them(
     depths_mm = [float(row.get_by_role("cell").nth(3).inner_text()) for row in table.get_by_role("row").all()[1:]]
     beside = next(number for number, z_mm in enumerate(depths_mm, 1) if abs(z_mm) > 0.5 * 41 * 0.05)
     table.get_by_role("row").nth(beside).click()
-    expect(page.get_by_text("It lies outside of the volume, along z")).to_be_visible()
+    outside = page.get_by_text("This droplet lies outside of the volume, along z")
+    expect(outside).to_be_visible()
+    first.click()
+    expect(outside).to_be_hidden(timeout=6_000)
     assert without_keys(page) == []
     table.get_by_role("columnheader", name="x, mm").focus()
     page.keyboard.press("Enter")
@@ -265,6 +268,15 @@ def test_droplets_lie_over_the_slices_and_in_a_table_that_leads_to_them(
     press(page, "shot", "ArrowRight")
     expect(shot_shown(page)).to_have_text("shot 3 (3 of 3)")
     expect(table).to_be_hidden()
+
+
+def test_where_no_volume_is_shown_no_row_of_a_droplet_promises_to_lead_there(
+    page: Page, server: Serving, old_run: Path
+) -> None:
+    page.goto(url(server, f"results/{OLD}/droplets-1/1"))
+    table = page.get_by_role("region", name="Droplets of this shot")
+    expect(table).to_contain_text("droplets; choose volumes above to see where they lie")
+    assert table.locator("tbody tr[tabindex], tbody tr.cursor-pointer").count() == 0
 
 
 def test_the_camera_stays_when_the_shot_changes(page: Page, server: Serving, old_run: Path) -> None:
@@ -314,7 +326,11 @@ def test_the_shot_that_a_hand_has_picked_is_never_torn_away(page: Page, server: 
     choose_calibration(server)
     sample, _ = server.run_to_its_end(plan_of(name="later", shots=2, pulse=PULSE))
     wait_for_jobs(server, 2)
-    expect(page).to_have_url(re.compile(f"/results/{sample}/.*/1$"))
+    expect(shot_shown(page)).to_have_text("shot 1 (2 of 2)")
+    expect(page).to_have_url(re.compile("/results$"))
+    page.reload()
+    expect(shot_shown(page)).to_have_text("shot 1 (2 of 2)")
+    expect(page.get_by_role("switch", name="newest")).to_be_checked()
     expect(page.get_by_role("navigation").get_by_role("link", name="Results").get_by_label("done")).to_be_visible()
     expect(page.get_by_role("status", name="work on this run")).to_contain_text("2 of 2 shots done")
     expect(page.get_by_label("Result set", exact=True).first).to_have_value(re.compile("MLOS nominal"))
@@ -325,6 +341,9 @@ def test_the_shot_that_a_hand_has_picked_is_never_torn_away(page: Page, server: 
     page.get_by_role("button", name="jobs and events").click()
     expect(page.get_by_role("region", name="Processing")).to_contain_text(newest)
     expect(page).to_have_url(re.compile(f"/results/{sample}/.*/0$"))
+    page.get_by_role("switch", name="newest").click()
+    expect(page.get_by_role("combobox", name="Run", exact=True)).to_have_value(re.compile(newest))
+    expect(page).to_have_url(re.compile("/results$"))
     page.get_by_role("switch", name="newest").click()
     expect(page).to_have_url(re.compile(f"/results/{newest}/.*/0$"))
 
@@ -403,6 +422,8 @@ def test_the_page_of_results_fits_every_width(page: Page, server: Serving, old_r
     page.get_by_role("button", name="both").click()
     expect(slice_of(page, "y").locator("image")).to_have_count(4)
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "the page is wider than the window"
+    chosen = page.get_by_role("region", name="Result", exact=True).locator(".q-field__native > span")
+    assert chosen.evaluate_all("found => found.filter(one => one.scrollWidth > one.clientWidth + 1).length") == 0
     _picture(page, f"desk-results-{width}", width)
 
 

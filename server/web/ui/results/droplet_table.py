@@ -23,8 +23,8 @@ _COLUMNS = {
 _SHOWN_AS = {"exposure": "value", "diameter_um": "value.toFixed(value < 100 ? 1 : 0)", "p_real": "value.toFixed(2)"}
 _UNKNOWN = "unknown"
 _ROW = """
-<q-tr :props="props" tabindex="0" class="cursor-pointer"
-    @click="$parent.$emit('pick', [props.row.x_mm, props.row.y_mm, props.row.z_mm])"
+<q-tr :props="props" :tabindex="props.row.leads ? 0 : undefined" :class="{'cursor-pointer': props.row.leads}"
+    @click="props.row.leads && $parent.$emit('pick', [props.row.x_mm, props.row.y_mm, props.row.z_mm])"
     @keydown.enter="$parent.$emit('pick', [props.row.x_mm, props.row.y_mm, props.row.z_mm])">
   <q-td v-for="one in props.cols" :key="one.name" :props="props">{{ one.value }}</q-td>
 </q-tr>"""
@@ -57,11 +57,12 @@ class DropletTable:
             self._table.on("pick", self._on_row)
         self._panel.set_visibility(False)
 
-    def show(self, droplets: StoredDroplets | None) -> None:
-        """Show those of another shot, or none."""
-        rows = droplet_rows(droplets) if droplets else []
+    def show(self, droplets: StoredDroplets | None, leads: bool) -> None:
+        """Show those of another shot, or none; rows lead to their places where there is a volume to see them in."""
+        rows = [row | {"leads": leads} for row in droplet_rows(droplets)] if droplets else []
         self._panel.set_visibility(droplets is not None)
-        self._count.set_text(f"{len(droplets.columns['frame']) if droplets else 0} droplets; a row leads to its place")
+        where = "a row leads to its place" if leads else "choose volumes above to see where they lie"
+        self._count.set_text(f"{len(droplets.columns['frame']) if droplets else 0} droplets; {where}")
         self._table.rows = rows
         self._table.update()
 

@@ -28,6 +28,7 @@ NO_RESULTS = (
     "Nothing has been made of any run yet. Choose a calibration on the page Calibrate and record a run of kind sample: "
     "its shots are reconstructed by themselves. Or open a run on the page Runs, and press Reconstruct."
 )
+_FOLLOWING = "/results"
 _UNDER_WAY = (JobState.QUEUED, JobState.RUNNING)
 _MAKING = (JobKind.RECONSTRUCTION, JobKind.MEASUREMENT)
 
@@ -49,6 +50,7 @@ class ResultChoice:
         self._context, self._on_look = context, on_look
         self.run_id, self._results_id, shot = asked
         self._shot = int(shot) if shot.isascii() and shot.isdigit() else None
+        self._address = ""
         self.sets: list[ResultSet] = []
         with panel("Result"):
             self._build()
@@ -128,7 +130,16 @@ class ResultChoice:
             self._label.set_text(f"shot {self._shot} ({place + 1} of {len(shots)})")
         self._slider.set_visibility(len(shots) > 1)
         self._shots.set_visibility(bool(shots))
+        self._show_address()
         await self._on_look()
+
+    def _show_address(self) -> None:
+        """While the newest is followed the address says so: whoever loads the page again goes on following."""
+        looked = self.looked
+        address = _FOLLOWING if self._newest.value else looked.address if looked else ""
+        if address and address != self._address:
+            self._address = address
+            ui.navigate.history.replace(address)
 
     def offer_downloads(self, files: dict[str, str]) -> None:
         """Offer files, by label and address."""
@@ -161,6 +172,7 @@ class ResultChoice:
                 await self._take_set()
 
     async def _on_newest(self) -> None:
+        self._show_address()
         if self._newest.value:
             await self.reload()
 

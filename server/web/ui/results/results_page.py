@@ -36,7 +36,6 @@ class ResultsPage:
         for sheet in (STYLE_OF_RUNS, _STYLE_SHEET):
             ui.add_css(sheet)
         self._context = context
-        self._address = ""
         with ui.element("div").classes("columns one"):
             self._choice = ResultChoice(context, (run_id, results_id, shot), self._look)
             self._volume = VolumeView(context)
@@ -59,19 +58,16 @@ class ResultsPage:
         await self._droplets.show(choice.run_id, choice.sets)
         if (looked := choice.looked) is None or (shown := choice.shown) is None:
             await self._volume.show(LookedAt(choice.run_id, "", 0), {}, None)
-            self._table.show(None)
+            self._table.show(None, leads=False)
             choice.offer_downloads({})
             return
-        if looked.address != self._address:
-            self._address = looked.address
-            ui.navigate.history.replace(looked.address)
         names = exposures_of(shown, looked.shot)
         measured = set_with_droplets(choice.sets, shown, looked.shot)
         choice.offer_downloads(_files(looked, names, measured.id if measured else None))
         await self._volume.show(looked, names, method_of(shown))
         droplets = await asyncio.to_thread(self._read, looked, measured.id) if measured else None
         if looked == choice.looked:  # nobody has gone on meanwhile
-            self._table.show(droplets)
+            self._table.show(droplets, leads=bool(names))
             self._volume.mark(dots_of(droplets))
 
     async def _offer_work(self, run_id: str) -> None:

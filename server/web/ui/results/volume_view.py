@@ -29,6 +29,7 @@ class VolumeView:
         self._method: ReconstructionMethod | None = None
         self._dots: Dots = {}
         self._seen: list[SeenExposure] = []
+        self._outside: ui.notification | None = None
         self._asked = object()
         self._panel = panel("Volume")
         self._panel.set_visibility(False)
@@ -63,6 +64,7 @@ class VolumeView:
         if (looked, names) == (self._looked, self._names):
             return
         self._looked, self._names, self._dots = looked, names, {}
+        self._take_back()
         if names:
             if not self._is_built:
                 self._build()
@@ -80,10 +82,18 @@ class VolumeView:
         """Put the cross-hair somewhere, and bring it into sight."""
         if not self._seen:
             return
+        self._take_back()
         self._slices.go_to(place_mm)
         ui.run_javascript(f"getHtmlElement({self._panel.id}).scrollIntoView()")
         if beside := self._slices.beside(place_mm):
-            ui.notify(f"It lies outside of the volume, along {beside}: the cross-hair is as near as there are voxels")
+            text = f"This droplet lies outside of the volume, along {beside}: its row leads to the nearest voxels"
+            self._outside = ui.notification(text, timeout=10)
+
+    def _take_back(self) -> None:
+        """What was said of one droplet is not said of the next."""
+        if self._outside:
+            self._outside.dismiss()
+            self._outside = None
 
     def _offer(self, names: dict[str, str], method: ReconstructionMethod | None) -> None:
         self._method = method
