@@ -264,6 +264,11 @@ def test_droplets_lie_over_the_slices_and_in_a_table_that_leads_to_them(
     page.keyboard.press("Enter")
     expect(place(page, "x")).to_have_text(re.compile(f"x = {round(x_mm / 0.05) * 0.05:.3f} mm"))
     assert slice_of(page, "z").locator("circle").count() > 0
+    page.get_by_role("button", name="B", exact=True).click()
+    expect(slice_of(page, "z").locator("circle")).to_have_count(0)
+    second.click()
+    expect(page.get_by_role("button", name="A", exact=True)).to_have_attribute("aria-pressed", "true")
+    expect(slice_of(page, "z").locator("circle")).not_to_have_count(0)
     expect(page.get_by_role("region", name="Droplets", exact=True)).to_contain_text("droplets-1")
     press(page, "shot", "ArrowRight")
     expect(shot_shown(page)).to_have_text("shot 3 (3 of 3)")

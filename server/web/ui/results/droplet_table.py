@@ -24,8 +24,8 @@ _SHOWN_AS = {"exposure": "value", "diameter_um": "value.toFixed(value < 100 ? 1 
 _UNKNOWN = "unknown"
 _ROW = """
 <q-tr :props="props" :tabindex="props.row.leads ? 0 : undefined" :class="{'cursor-pointer': props.row.leads}"
-    @click="props.row.leads && $parent.$emit('pick', [props.row.x_mm, props.row.y_mm, props.row.z_mm])"
-    @keydown.enter="$parent.$emit('pick', [props.row.x_mm, props.row.y_mm, props.row.z_mm])">
+    @click="props.row.leads && $parent.$emit('pick', props.row)"
+    @keydown.enter="$parent.$emit('pick', props.row)">
   <q-td v-for="one in props.cols" :key="one.name" :props="props">{{ one.value }}</q-td>
 </q-tr>"""
 _HEAD = """<q-th :props="props" tabindex="0" @keydown.enter="props.sort(props.col)">{{ props.col.label }}</q-th>"""
@@ -35,7 +35,7 @@ _HEAD = """<q-th :props="props" tabindex="0" @keydown.enter="props.sort(props.co
 class DropletTable:
     """Built once per page; hidden where the shot is not measured."""
 
-    def __init__(self, go_to: Callable[[tuple[float, float, float]], None]) -> None:
+    def __init__(self, go_to: Callable[[tuple[float, float, float], str], None]) -> None:
         self._go_to = go_to
         with panel("Droplets of this shot") as self._panel:
             self._count = ui.label("").classes("text-sm")
@@ -67,8 +67,8 @@ class DropletTable:
         self._table.update()
 
     def _on_row(self, event: Any) -> None:
-        x_mm, y_mm, z_mm = (float(place_mm) for place_mm in event.args)
-        self._go_to((x_mm, y_mm, z_mm))
+        row = event.args
+        self._go_to((float(row["x_mm"]), float(row["y_mm"]), float(row["z_mm"])), str(row["exposure"]).lower())
 
 
 def droplet_rows(droplets: StoredDroplets) -> list[dict[str, Any]]:

@@ -78,11 +78,13 @@ class VolumeView:
             self._with_droplets.set_visibility(bool(dots))
             self._mark()
 
-    def go_to(self, place_mm: tuple[float, float, float]) -> None:
-        """Put the cross-hair somewhere, and bring it into sight."""
+    def go_to(self, place_mm: tuple[float, float, float], frame: str) -> None:
+        """Put the cross-hair somewhere in an exposure, and bring it into sight."""
         if not self._seen:
             return
         self._take_back()
+        if frame in self._names and self._exposures.value != _BOTH:
+            self._exposures.value = frame
         self._slices.go_to(place_mm)
         ui.run_javascript(f"getHtmlElement({self._panel.id}).scrollIntoView()")
         if beside := self._slices.beside(place_mm):
