@@ -99,6 +99,36 @@ def test_a_change_in_one_tab_appears_in_the_other(tab: Page, browser: Browser, s
     context.close()
 
 
+def test_two_tabs_that_change_the_form_in_one_moment_show_both_changes(
+    tab: Page, browser: Browser, server: Serving
+) -> None:
+    context = browser.new_context()
+    other = context.new_page()
+    other.goto(f"{server.http.base_url}/run")
+    expect(other.get_by_label("Shots", exact=True)).to_have_value("10")
+    for number in range(11, 15):
+        tab.get_by_label("Name", exact=True).fill(f"day {number}")
+        other.get_by_label("Shots", exact=True).fill(str(number))
+        expect(other.get_by_label("Name", exact=True)).to_have_value(f"day {number}")
+        expect(tab.get_by_label("Shots", exact=True)).to_have_value(str(number))
+    context.close()
+
+
+def test_the_live_page_shows_the_light_that_another_tab_has_changed(
+    tab: Page, browser: Browser, server: Serving
+) -> None:
+    context = browser.new_context()
+    live = context.new_page()
+    live.goto(f"{server.http.base_url}/live")
+    expect(live.get_by_label("Pulse width / ns")).to_have_value("1000")
+    tab.get_by_label("Pulse width / ns").fill("900")
+    tab.get_by_label("LED view2 / A").fill("7.5")
+    expect(live.get_by_label("Pulse width / ns")).to_have_value("900")
+    expect(live.get_by_label("LED view2 / A")).to_have_value("7.5")
+    expect(live.get_by_role("slider", name="LED view2 current")).to_have_attribute("aria-valuenow", "7.5")
+    context.close()
+
+
 def test_the_pre_flight_list_has_figures_and_follows_form_and_rig(tab: Page, server: Serving) -> None:
     tab.get_by_label("Shots", exact=True).fill("1200")
     tab.get_by_label("Rate / Hz").fill("4")

@@ -3,6 +3,7 @@
 import asyncio
 import time
 from collections.abc import Awaitable, Callable
+from typing import Any
 
 from nicegui import ui
 from nicegui.events import GenericEventArguments
@@ -48,7 +49,8 @@ class LightPanel:
         self._apply = apply
         self._seen: dict[str, list[SeenLight]] = {view: [] for view in context.services.config.views}
         self._numbers: dict[str, ui.number] = {}
-        self._times: list[ui.number] = []
+        self._times: dict[str, ui.number] = {}
+        self._shown = draft.version
         self._sliders: dict[str, DragSlider] = {}
         with panel("Light"):
             with ui.row().classes("w-full no-wrap gap-2"):
@@ -63,10 +65,19 @@ class LightPanel:
             ui.label("Sets every LED so that its background has half of the range, by the newest shot.")
 
     def refresh(self) -> None:
-        """Nobody changes the light while somebody else holds control."""
+        """Follow what other tabs change; nobody changes the light while somebody else holds control."""
         why = why_not(self._context)
-        for field in (*self._times, *self._numbers.values(), *self._sliders.values(), self._half):
+        for field in (*self._times.values(), *self._numbers.values(), *self._sliders.values(), self._half):
             for_operators(field, why=why)
+        if self._draft.version != self._shown:
+            self._show()
+
+    def _show(self) -> None:
+        self._shown = self._draft.version
+        for name, number in self._times.items():
+            number.set_value(self._draft.values[name])
+        for view, number in self._numbers.items():
+            number.set_value(self._draft.values["current_a"].get(view))
 
     def _limit_a(self, view: str) -> float:
         return self._context.services.config.views[view].max_current_a
@@ -76,11 +87,11 @@ class LightPanel:
             label,
             value=self._draft.values[name],
             precision=0,
-            on_change=lambda event: self._draft.set(name, event.value),
+            on_change=lambda event: self._keep(name, event.value),
             validation=lambda value: problem_of(PULSE_FIELDS, name, value),
         )
         number.props(f"dense outlined hide-bottom-space data-draft={name}").classes("flex-1 min-w-0")
-        self._times.append(number)
+        self._times[name] = number
 
     def _add_current(self, view: str) -> None:
         limit_a, value = self._limit_a(view), self._draft.values["current_a"].get(view)
@@ -99,7 +110,11 @@ class LightPanel:
 
     def _keep_current(self, view: str, value: float | None) -> None:
         self._sliders[view].set_value(value or 0.0)
-        self._draft.set("current_a", {**self._draft.values["current_a"], view: value})
+        self._keep("current_a", {**self._draft.values["current_a"], view: value})
+
+    def _keep(self, name: str, value: Any) -> None:
+        if value != self._draft.values[name]:
+            self._draft.set(name, value)
 
     async def _slid(self, view: str, event: GenericEventArguments) -> None:
         self._numbers[view].set_value(round(float(event.args["value"]), 2))
