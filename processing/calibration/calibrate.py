@@ -29,6 +29,7 @@ from processing.calibration.fit.not_checked import not_checked
 from processing.calibration.fit.placement_check import check_placements
 from processing.calibration.fit.plane_order import check_plane_order
 from processing.calibration.fit.ray_check import check_rays, rays_miss_px
+from processing.calibration.fit.reach_check import check_reach
 from processing.calibration.fit.scale_check import check_scales
 from processing.calibration.observation import CalibrationSet, PlaneObservation, ViewObservations, stacked
 from processing.calibration.verdict import Doubt
@@ -104,11 +105,14 @@ def _all_views(calibration_set: CalibrationSet, wanted: Model | None, counted: C
     return views
 
 
-def _doubts(calibration_set: CalibrationSet, views: Mapping[str, ViewCalibration]) -> Iterator[Doubt]:
-    """What speaks against views that fit their own points."""
-    yield from check_scales(calibration_set, views)
-    yield from check_placements(calibration_set, {name: view.mapping for name, view in views.items()})
-    yield from check_rays(views)
+def _doubts(calibration_set: CalibrationSet, views: Mapping[str, ViewCalibration]) -> Sequence[Doubt]:
+    """What speaks against views that fit their own points; a view that is wrong tells nothing of where others reach."""
+    doubts = [
+        *check_scales(calibration_set, views),
+        *check_placements(calibration_set, {name: view.mapping for name, view in views.items()}),
+        *check_rays(views),
+    ]
+    return doubts or list(check_reach(views, _common_z_range_mm(calibration_set)))
 
 
 def _placed_view(name: str, seen: ViewObservations, wanted: Model | None) -> ViewCalibration:
