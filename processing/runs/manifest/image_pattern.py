@@ -10,6 +10,9 @@ from string import Formatter
 
 _FIELDS = {"view": r"[A-Za-z0-9][A-Za-z0-9_.-]*", "shot": r"\d+"}
 _NUMBER = re.compile(r"(0[1-9]\d?)?d?")
+_ANY = "(?i:{})"
+"""Capital letters or not."""
+_REMEDY = "pad {shot}, and write capital letters, as files are"
 
 
 @dataclass(frozen=True)
@@ -62,7 +65,8 @@ class ImagePattern:
         Raises
         ------
         ValueError
-            A file has its number padded otherwise than the pattern, or it is not clear where a name ends.
+            A file has its number padded otherwise than the pattern, or other capital letters; or it is not clear where
+            a name ends.
         """
         if views is None and self._touching:
             raise ValueError(f"{self.text}: {{view}} and {{shot}} touch, so name the cameras: views = [...]")
@@ -71,19 +75,19 @@ class ImagePattern:
         return {view: found[view] for view in sorted(found) if found[view]}
 
     def _views(self, names: Sequence[str]) -> set[str]:
-        expression = self._expression()
+        expression = self._expression(capitals=_ANY)
         return {match["view"] for name in names if (match := expression.fullmatch(name))}
 
     def _numbers(self, names: Sequence[str], view: str) -> set[int]:
         """Of the shots of a view."""
-        numbers, expression = set[int](), self._expression(view)
+        numbers, expression = set[int](), self._expression(view, capitals=_ANY)
         for match in filter(None, map(expression.fullmatch, names)):
             written = {int(text) for name, text in match.groupdict().items() if name != "view"}
             if len(written) > 1:  # a number that comes twice says two things
                 continue
             shot = min(written, default=0)
             if (called := self.file(view, shot)) != match[0]:
-                raise ValueError(f"{match[0]} is there, and is {called} by {self.text}: pad {{shot}} as files are")
+                raise ValueError(f"{match[0]} is there, and is {called} by {self.text}: {_REMEDY}")
             numbers.add(shot)
         return numbers
 
@@ -93,21 +97,30 @@ class ImagePattern:
 
     @cached_property
     def _wildcards(self) -> str:
-        return "".join(glob.escape(literal) + ("*" if name else "") for literal, name, _, _ in self._parts)
+        """Of all that the pattern may mean, whatever letters are capitals."""
+        return "".join(_either(literal) + ("*" if name else "") for literal, name, _, _ in self._parts)
 
     @cached_property
     def _touching(self) -> bool:
         """Whether a name and a number follow one another with nothing between them that could tell them apart."""
         return any(not literal and number > 0 for number, (literal, name, _, _) in enumerate(self._parts) if name)
 
-    def _expression(self, view: str | None = None) -> re.Pattern[str]:
+    def _expression(self, view: str | None = None, capitals: str = "{}") -> re.Pattern[str]:
         """With groups ``view``, which says the same where it comes again, and ``shot0``, ``shot3``, ... for numbers."""
         fields = _FIELDS if view is None else {**_FIELDS, "view": re.escape(view)}
         text, named = "", False
         for number, (literal, name, _, _) in enumerate(self._parts):
-            text += re.escape(literal)
+            text += capitals.format(re.escape(literal)) if literal else ""
             if name == "view":
                 text, named = text + ("(?P=view)" if named else f"(?P<view>{fields[name]})"), True
             elif name:
                 text += f"(?P<shot{number}>{fields[name]})"
         return re.compile(text)
+
+
+def _either(literal: str) -> str:
+    """For ``glob``: the same text, each letter large or small."""
+    letters = (
+        f"[{one.lower()}{one.upper()}]" if one.isascii() and one.isalpha() else glob.escape(one) for one in literal
+    )
+    return "".join(letters)

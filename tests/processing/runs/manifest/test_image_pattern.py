@@ -35,6 +35,25 @@ def test_numbers_that_are_padded_otherwise_are_told_and_not_left_out(tmp_path: P
     assert ImagePattern(text).found(tmp_path, ["b"]) == {"b": [123]}
 
 
+@pytest.mark.parametrize("name", ["day7/a_1_b.TIF", "day7/a_1_B.tif", "Day7/a_1_b.tif"])
+def test_capital_letters_are_told_and_their_file_is_not_left_out(tmp_path: Path, name: str) -> None:
+    """Where the first shots or the last were written by another program, they would be missing without a word."""
+    for there in (name, "day7/a_2_b.tif", "day7/A_3_b.tif", "day7/a_x_b.TIF"):
+        (tmp_path / there).parent.mkdir(exist_ok=True)
+        (tmp_path / there).touch()
+    pattern = ImagePattern("day7/{view}_{shot}_b.tif")
+    told = ""
+    try:
+        pattern.found(tmp_path, ["a"])
+    except ValueError as error:
+        told = str(error)
+    assert f"{name} is there, and is day7/a_1_b.tif by day7/" in told
+    assert pattern.found(tmp_path, ["A"]) == {"A": [3]}
+    (tmp_path / "day7" / "c_1_b.TIF").touch()
+    with pytest.raises(ValueError, match="is there, and is day7/"):
+        pattern.found(tmp_path)
+
+
 @pytest.mark.parametrize("text", ["{view}{shot}.png", "{view}{shot:02d}.png", "{shot:02d}{view}.png"])
 def test_a_name_and_a_number_that_touch_are_told_apart_by_names_that_are_known(tmp_path: Path, text: str) -> None:
     """Else left12 is shot 2 of left1."""
