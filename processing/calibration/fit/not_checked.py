@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 
+from processing.calibration.fit.scale_check import steps_are_told
 from processing.calibration.observation import CalibrationSet
 from processing.calibration.verdict import Unchecked
 
@@ -43,12 +44,7 @@ def not_checked(
             "all of them mirrored alike",
             f"azimuth_deg of {', '.join(unplaced)}",
         )
-    levels_mm = {plane.z_mm for view in calibration_set.views.values() for plane in view.planes}
-    if unplaced and len(levels_mm) == 2:
-        yield Unchecked(
-            "whether the two planes are as far apart as z_mm says: cameras fit any distance of two",
-            f"a third plane, or azimuth_deg of {', '.join(unplaced)}",
-        )
+    yield from _steps(calibration_set, unplaced, shapeless)
     if unscaled := [name for name in calibration_set.views if name not in calibration_set.scales_px_per_mm]:
         yield Unchecked(
             f"whether the scale of {', '.join(unscaled)} is right: pitch_mm, z_mm, and their unit",
@@ -69,3 +65,20 @@ def not_checked(
     if len(calibration_set.views) > 1:
         yield DROPLETS
     yield ALIKE
+
+
+def _steps(calibration_set: CalibrationSet, unplaced: Sequence[str], shapeless: Sequence[str]) -> Iterator[Unchecked]:
+    """Whether z is in proportion to x and y: all steps too long fit as well, with pixels that are nearly square."""
+    levels_mm = {plane.z_mm for view in calibration_set.views.values() for plane in view.planes}
+    shaped = [name for name in calibration_set.views if name not in shapeless]
+    if unplaced and len(levels_mm) == 2:
+        yield Unchecked(
+            "whether the two planes are as far apart as z_mm says: cameras fit any distance of two",
+            f"a third plane, or azimuth_deg of {', '.join(unplaced)}",
+        )
+    elif shaped and not steps_are_told(calibration_set.azimuths_deg.get(name, 0.0) for name in shaped):
+        yield Unchecked(
+            "whether z_mm and the pitch of the target are in proportion: cameras fit steps of the stage that are all "
+            "some percent too long or too short",
+            "azimuth_deg of two oblique views or more",
+        )

@@ -1,6 +1,6 @@
 """Are lengths what they are said to be? A wrong pitch, or another unit, fits as well as the right one."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -104,7 +104,7 @@ def _longer(calibration_set: CalibrationSet, mappings: Mapping[str, ViewMapping]
     """One length of z for which all pixels are square, and views stand where the rig says."""
     said_deg = calibration_set.azimuths_deg
     cameras = {name: each for name, each in mappings.items() if isinstance(each, PinholeCamera) and name in said_deg}
-    if sum(OBLIQUE_DEG < line_angle_deg(said_deg[name]) < 90 - OBLIQUE_DEG for name in cameras) < 2:
+    if not steps_are_told(said_deg[name] for name in cameras):
         return
     longer, uneven = _best(_longer_z, (0.7, 1.4), list(cameras.values()))
     stands_deg = np.array([sight_azimuth_deg(camera, calibration_set.middle_mm) for camera in cameras.values()])
@@ -119,6 +119,11 @@ def _longer(calibration_set: CalibrationSet, mappings: Mapping[str, ViewMapping]
         f"if z were {longer:.3g} times as long, all pixels would be square, and azimuths {then_apart_deg:.1f} deg "
         f"beside those of the rig, not {apart_deg:.1f}: is the step of the stage right, or is it {pitch or 'x and y'}?",
     )
+
+
+def steps_are_told(azimuths_deg: Iterable[float]) -> bool:
+    """Whether views that were said to stand there tell a length of z: two oblique ones do."""
+    return sum(OBLIQUE_DEG < line_angle_deg(angle) < 90 - OBLIQUE_DEG for angle in azimuths_deg) >= 2
 
 
 def _askew(mappings: Mapping[str, ViewMapping]) -> Iterator[Doubt]:

@@ -58,6 +58,16 @@ def test_a_third_plane_or_the_azimuths_tell(
     assert not [one for one in calibration.not_checked if "two planes" in one.what]
 
 
+@pytest.mark.parametrize("azimuths_deg", [{}, {"view1": 45.0}, AZIMUTHS_DEG], ids=["none", "one", "both"])
+def test_steps_of_the_stage_that_are_all_too_short_are_told_or_said_to_be_unknown(
+    azimuths_deg: Mapping[str, float],
+) -> None:
+    calibration = calibrated((-4, -2, 0, 2, 4), (-3.88, -1.94, 0, 1.94, 3.88), azimuths_deg)
+    told = any("if z were 1.03" in note for note in calibration.notes)
+    said = any("in proportion" in one.what for one in calibration.not_checked)
+    assert (told, said) == ((True, False) if len(azimuths_deg) == 2 else (False, True))
+
+
 @pytest.mark.parametrize(("model", "says"), [("pinhole", False), ("polynomial", True)])
 def test_a_polynomial_says_that_it_fits_any_pitch_and_step(model: str, says: bool) -> None:
     calibration = calibrated((-4, -2, 0, 2, 4), (-4.2, -2.1, 0, 2.1, 4.2), model=model)
