@@ -123,7 +123,8 @@ def _longer(calibration_set: CalibrationSet, mappings: Mapping[str, ViewMapping]
 
 def steps_are_told(azimuths_deg: Iterable[float]) -> bool:
     """Whether views that were said to stand there tell a length of z: two oblique ones do."""
-    return sum(OBLIQUE_DEG < line_angle_deg(angle) < 90 - OBLIQUE_DEG for angle in azimuths_deg) >= 2
+    oblique = [OBLIQUE_DEG < line_angle_deg(angle) < 90 - OBLIQUE_DEG for angle in azimuths_deg]
+    return bool(np.sum(oblique) >= 2)
 
 
 def _askew(mappings: Mapping[str, ViewMapping]) -> Iterator[Doubt]:
