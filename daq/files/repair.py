@@ -7,7 +7,6 @@ from collections import Counter
 from collections.abc import Iterator
 from contextlib import suppress
 from datetime import UTC, datetime
-from itertools import islice
 from pathlib import Path
 
 from daq.errors import ShotFileError
@@ -20,14 +19,12 @@ from daq.files.run_directory import RunReader
 from daq.files.run_file import RUN_FILE, SHOTS_FOLDER, write_run_file
 from daq.files.shot_file import read_formats, read_shot_file
 from daq.files.storage import storing
-from daq.files.verification import FlawKind, verify
+from daq.files.verification import ASKED_SHOTS, FlawKind, is_strange, runs_of_shots, verify
 
 LOST_WITH_HEADER = (
     "lost with the old one: plan, configuration, devices, versions, calibration, polarity (shadow is written), rate, "
     "means of dark and background, how it ended"
 )
-ASKED_SHOTS = 100
-"""The first readable shots that are asked what run they are of: a long run is not opened from end to end."""
 _OUTCOME_LOST = "its run.h5 was lost, and with it how the run ended"
 _SET_ASIDE = (FlawKind.FOREIGN, FlawKind.RENAMED)
 
@@ -53,12 +50,11 @@ def repair(run_dir: Path) -> Iterator[str]:
 
 
 def _write_lost_header(run_dir: Path) -> Iterator[str]:
-    try:
-        _ = RunReader(run_dir).header
-        return
-    except ShotFileError:
-        header = _header_of_shots(run_dir)
-        lived_until_utc = last_sign_of_life_utc(run_dir / SHOTS_FOLDER)
+    with suppress(ShotFileError):
+        if not is_strange(run_dir, RunReader(run_dir).header):
+            return
+    header = _header_of_shots(run_dir)
+    lived_until_utc = last_sign_of_life_utc(run_dir / SHOTS_FOLDER)
     for name in (RUN_FILE, RUN_FILE + RESERVE_SUFFIX):
         if (run_dir / name).exists():
             yield f"{name} is set aside as {set_aside(run_dir / name, run_dir)}"
@@ -79,20 +75,13 @@ def _renamed(run_dir: Path, header: RunHeader) -> str:
 def _header_of_shots(run_dir: Path) -> RunHeader:
     """What a shot tells of its run: one of this directory, or of what most are, as others may be strangers."""
     paths = sorted((run_dir / SHOTS_FOLDER).glob("*.h5"))
-    told = dict(islice(((path, run_id) for path in paths if (run_id := _run_of(path))), ASKED_SHOTS))
+    told = runs_of_shots(run_dir)
     often = Counter(told.values())
     trusted = sorted(told, key=lambda path: (told[path] == run_dir.name, often[told[path]]), reverse=True)
     for path in (*trusted, *paths):
         with suppress(ShotFileError):
             return _header_of_shot(path)
     raise ShotFileError(f"{run_dir}: its {RUN_FILE} cannot be read, and no shot is left that tells what it was")
-
-
-def _run_of(path: Path) -> str | None:
-    try:
-        return read_formats(path)[0]
-    except ShotFileError:
-        return None
 
 
 def _header_of_shot(path: Path) -> RunHeader:

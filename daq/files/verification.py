@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from enum import StrEnum
+from itertools import islice
 from pathlib import Path
 
 from daq.errors import AlreadyHeld, DamagedFrame, DamagedNumbers, ForeignFile, RenamedFile, ShotFileError
@@ -13,10 +14,13 @@ from daq.files.lock_file import hold_folder
 from daq.files.references_file import damaged_references
 from daq.files.run_directory import RunReader
 from daq.files.run_file import RUN_FILE, SHOTS_FOLDER, is_shot, other_programs_see, read_shot_count, shot_path
+from daq.files.shot_file import read_formats
 
 Done = Callable[[int, int], None]
 _EOF_ADDRESS = slice(28, 36)
 """Where the superblock of HDF5, version 2 and 3, says how long its file is (HDF5 File Format Specification, II.A)."""
+ASKED_SHOTS = 100
+"""The first readable shots that are asked what run they are of: a long run is not opened from end to end."""
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
@@ -95,6 +99,8 @@ def verify(run_dir: Path, done: Done = lambda _done, _total: None) -> Verificati
     strangers = tuple(_strangers(run_dir))
     try:
         header, closing = reader.header, reader.closing
+        if is_strange(run_dir, header):
+            return Verification(None, 0, 0, 0, (_strange(run_dir, header), *strangers))
         strangers += tuple(_flaws_of_notes(run_dir, header))
         if not (run_dir / SHOTS_FOLDER).is_dir():
             return _without_shots(run_dir, header, closing, strangers)
@@ -112,6 +118,35 @@ def verify(run_dir: Path, done: Done = lambda _done, _total: None) -> Verificati
     sound = shots - len(bad)
     frames = sound * header.frames_per_shot * len(header.views)
     return Verification(closing.outcome if closing else None, shots, sound, frames, (*flaws, *bad, *strangers))
+
+
+def runs_of_shots(run_dir: Path) -> dict[Path, str]:
+    """Which run the first readable shots are of, as each of them says."""
+    paths = sorted((run_dir / SHOTS_FOLDER).glob("*.h5"))
+    return dict(islice(((path, run_id) for path in paths if (run_id := _run_of(path))), ASKED_SHOTS))
+
+
+def is_strange(run_dir: Path, header: RunHeader) -> bool:
+    """Whether run.h5 is of another run than the directory and its shots."""
+    if header.run_id == run_dir.name:
+        return False
+    told = runs_of_shots(run_dir).values()
+    return bool(told) and header.run_id not in told
+
+
+def _run_of(path: Path) -> str | None:
+    try:
+        return read_formats(path)[0]
+    except ShotFileError:
+        return None
+
+
+def _strange(run_dir: Path, header: RunHeader) -> Flaw:
+    text = (
+        f"{run_dir / RUN_FILE}: is that of run {header.run_id}, and no shot here is: copy its own back from a backup; "
+        f"tomoshadow repair {run_dir} sets it aside and writes one anew from the shots"
+    )
+    return Flaw(FlawKind.FOREIGN, RUN_FILE, text)
 
 
 def _without_shots(

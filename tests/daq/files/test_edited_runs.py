@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from daq.errors import ShotFileError
+from daq.files.repair import repair
 from daq.files.run_directory import RunReader, RunWriter, pack
 from daq.files.verification import FlawKind, verify
 from tests.daq.files.test_run_directory import FORMATS, header_of, shot_of
@@ -126,6 +127,21 @@ def test_what_other_programs_see_is_what_the_shots_hold(run_dir: Path, edit: Edi
     (flaw, *_) = verify(run_dir).flaws
     assert (flaw.kind, flaw.file) == (FlawKind.DAMAGED, "run.h5")
     assert what in flaw.text
+
+
+def test_the_run_file_of_another_run_is_the_stranger_and_not_all_the_shots(run_dir: Path, tmp_path: Path) -> None:
+    other = header_of().model_copy(update={"run_id": "20261123T080000-other"})
+    with RunWriter(tmp_path / other.run_id, other) as writer:
+        writer.write_shot(shot_of(other, 0))
+        writer.finish("completed")
+    shutil.copy(tmp_path / other.run_id / "run.h5", run_dir / "run.h5")
+    flaws = [(flaw.kind, flaw.file) for flaw in verify(run_dir).flaws]
+    told = list(repair(run_dir))
+    assert sorted(path.name for path in (run_dir / "shots").iterdir()) == ["0.h5", "1.h5"], told
+    assert flaws == [(FlawKind.FOREIGN, "run.h5")]
+    assert RunReader(run_dir).header.run_id == run_dir.name
+    assert verify(run_dir).sound
+    assert any("run.h5 is set aside" in step for step in told)
 
 
 @pytest.mark.parametrize("damage", ["exchanged", "edited"])

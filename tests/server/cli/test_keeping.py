@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from daq.files import repair as repairing
+from daq.files import verification
 from daq.files.header import RunClosing
 from daq.files.outcome_note import write_note
 from daq.files.run_directory import RunReader, RunWriter
@@ -191,7 +192,7 @@ def test_no_more_shots_than_the_first_are_asked_whose_they_are(run_dir: Path, mo
     (run_dir / "run.h5").unlink()
     of_another_run(run_dir)
     shot(run_dir, 1).rename(shot(run_dir, 0))
-    monkeypatch.setattr(repairing, "ASKED_SHOTS", 1)
+    monkeypatch.setattr(verification, "ASKED_SHOTS", 1)
     list(repairing.repair(run_dir))
     assert RunReader(run_dir).header.run_id != HEADER.run_id
 
