@@ -1,5 +1,6 @@
 """Dark and background runs that belong to a run: found by id, checked, averaged."""
 
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
@@ -7,10 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq.errors import DeviceRefused, PlanError, ShotFileError
-from daq.files.run_directory import ReferenceImages, RunReader, ViewFormat, list_runs
+from daq.files.run_directory import ReferenceImages, RunHeader, RunReader, ViewFormat, list_runs
 from daq.run.state import RunOutcome
 from daq.run_plan import PulsePair, RunKind, RunPlan
 
+_EXPOSURES = ("exposure_a_ns", "exposure_b_ns")
 REFERENCE_KINDS = (RunKind.DARK, RunKind.BACKGROUND)
 
 
@@ -52,35 +54,52 @@ def mean_images(run_dirs: tuple[Path, ...]) -> ReferenceImages:
     return {view: (total / count).astype(np.float32) for view, total in sums.items()}
 
 
-def require_same_cameras(run_dirs: Iterable[Path], devices: Mapping[str, Mapping[str, str]]) -> None:
-    """Refuse references of which a view had another camera: its pixels are others, and so is where it looks.
+def require_same_cameras(run_dirs: Iterable[Path], header: RunHeader, devices: Mapping[str, Mapping[str, str]]) -> None:
+    """Refuse references of which a view had another camera, or one that was told otherwise: its pixels are others.
 
     Parameters
     ----------
     run_dirs : iterable of Path
         The reference runs.
+    header : RunHeader
+        Of the run that they shall belong to.
     devices : Mapping[str, Mapping[str, str]]
-        Who the devices of this rig are, as a run keeps it; of one that did not answer nothing is known.
+        Who its devices are; of one that did not answer nothing is known.
 
     Raises
     ------
     DeviceRefused
-        Names the view, the run and both cameras.
+        Names the view, the run and the difference.
     """
     for run_dir in run_dirs:
-        header = RunReader(run_dir).header
-        for view in header.views:
-            was, this = (_camera(told.get(view, {})) for told in (header.devices, devices))
+        reference = RunReader(run_dir).header
+        for view in reference.views:
+            was, this = (_camera(told.get(view, {})) for told in (reference.devices, devices))
             if was and this and was != this:
-                reason = (
-                    f"{run_dir.name} was recorded by {was}, and this is {this}: record dark and background again, "
-                    "calibrate again, or put the camera back"
-                )
-                raise DeviceRefused(view, reason)
+                reason = f"{run_dir.name} was recorded by {was}, and this is {this}: put the camera back, or"
+                raise DeviceRefused(view, f"{reason} record dark and background again, and calibrate again")
+            if difference := _told_otherwise(*(_settings(one, view) for one in (reference, header))):
+                reason = f"for {run_dir.name} the camera was told otherwise than its profile says: {difference}"
+                raise DeviceRefused(view, f"{reason}; record dark and background again")
 
 
 def _camera(identity: Mapping[str, str]) -> str:
     return " ".join(identity.get(name, "") for name in ("vendor", "model", "serial")).strip()
+
+
+def _settings(header: RunHeader, view: str) -> Counter[str]:
+    """What the camera of a view is told, and how long it exposes; empty in runs from before this was kept."""
+    profile = header.configuration.get("camera_profiles", {}).get(view, {})
+    told = [f"{one['feature']} = {one['value']}" for one in profile.get("features", ())]
+    exposures = [f"{name} = {value}" for name, value in profile.get("timing", {}).items() if name in _EXPOSURES]
+    return Counter((*told, *exposures))
+
+
+def _told_otherwise(then: Counter[str], now: Counter[str]) -> str:
+    """The differences, but for their order; empty where there are none, or nothing is known."""
+    if not then or not now:
+        return ""
+    return ", ".join([f"{one} then" for one in then - now] + [f"{one} now" for one in now - then])
 
 
 def _checked_kind(run_id: str, reader: RunReader, views: Mapping[str, ViewFormat], pulse: PulsePair) -> RunKind:

@@ -145,7 +145,7 @@ class RunSession:
         self._writer.write_devices(devices)
         if silent:
             raise silent[0]
-        require_same_cameras(chain(*self._references.values()), devices)
+        require_same_cameras(chain(*self._references.values()), self._writer.header, devices)
 
     def _copy_references(self) -> Thresholds:
         """Let dark and background images travel with the run; returns the levels above which an exposure is lit."""

@@ -38,7 +38,7 @@ from processing.volume import VoxelGrid
 from server.demo.demo_droplets import MeasuredDroplets, measure_droplets
 from server.demo.demo_liquid import MeasuredLiquid, measure_liquid
 from server.reports.spray_report import ReportedSpray
-from server.rig.assembly import AssembledRig, open_rig
+from server.rig.assembly import AssembledRig, open_rig, recorded_configuration
 from server.rig.config import ConfigError, RigConfig, load_config
 from server.rig.rig_lock import hold_data_dir
 from server.rig.simulated_operator import TRUTH_FILE
@@ -212,7 +212,7 @@ class _Runs:
             assembled.rig,
             data_dir,
             self._tell,
-            configuration=config.model_dump(mode="json"),
+            configuration=recorded_configuration(config),
             hash_calibration=lambda name: file_sha256(calibration_path(data_dir.parent, name)),
             limits=config.acquisition.to_limits(),
             observers=assembled.observers,

@@ -4,6 +4,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from typing import Any
 
 from daq.devices import Interlock, Rig
 from daq.drivers.aravis_camera import AravisCamera
@@ -102,6 +103,13 @@ def wire_rig(config: RigConfig) -> Iterator[AssembledRig]:
             yield AssembledRig(_rig(config, profiles, _gpio_interlock(config)))
         else:
             yield _simulation(config, config.simulation, profiles, far_ends)
+
+
+def recorded_configuration(config: RigConfig) -> dict[str, Any]:
+    """What every run keeps of its rig: also what each camera is told, as its profile is a file that may change."""
+    profiles = {name: load_camera_profile(view.camera.profile) for name, view in config.views.items()}
+    told = {name: profile.model_dump(mode="json") for name, profile in profiles.items()}
+    return {**config.model_dump(mode="json"), "camera_profiles": told}
 
 
 @contextmanager

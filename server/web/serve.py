@@ -10,7 +10,7 @@ from server.lab.engine.engine_choice import engine_of
 from server.lab.events import EventPublisher
 from server.lab.services import Services
 from server.lab.tasks import TASKS
-from server.rig.assembly import AssembledRig, open_rig
+from server.rig.assembly import AssembledRig, open_rig, recorded_configuration
 from server.rig.config import RigConfig
 from server.web.app import create_app, serve
 
@@ -65,7 +65,7 @@ def _acquisition(config: RigConfig, assembled: AssembledRig, events: EventPublis
         assembled.rig,
         data_dir,
         events.publish_run_event,
-        configuration=config.model_dump(mode="json"),
+        configuration=recorded_configuration(config),
         hash_calibration=lambda name: file_sha256(calibrations.path(name)),
         limits=config.acquisition.to_limits(),
         observers=assembled.observers,

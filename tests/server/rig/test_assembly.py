@@ -15,7 +15,7 @@ from daq.simulation.gpio_chip import ChipUnsupported, SimulatedSwitchLine, free_
 from daq.simulation.laboratory import SimulatedLaboratory
 from daq.timing import plan_shot_timing
 from processing.synthetic.truth_file import read_true_spray
-from server.rig.assembly import AssembledRig, open_rig
+from server.rig.assembly import AssembledRig, open_rig, recorded_configuration
 from server.rig.config import RigConfig, SimulationConfig, load_config
 
 pytestmark = pytest.mark.network
@@ -35,6 +35,20 @@ def elsewhere(config: RigConfig) -> RigConfig:
         for number, (name, view) in enumerate(config.views.items(), 1)
     }
     return config.model_copy(update={"views": views})
+
+
+def test_a_run_keeps_what_its_cameras_are_told_and_not_only_where_that_was_written(tmp_path: Path) -> None:
+    config = small(SimulationConfig())
+    profile = tmp_path / "camera.toml"
+    text = config.views["view1"].camera.profile.read_text()
+    profile.write_text(text.replace("exposure_b_ns = 30_000_000", "exposure_b_ns = 31_000_000"))
+    camera = config.views["view1"].camera.model_copy(update={"profile": profile})
+    views = {**config.views, "view1": config.views["view1"].model_copy(update={"camera": camera})}
+    told = recorded_configuration(config.model_copy(update={"views": views}))["camera_profiles"]
+    assert {name: one["timing"]["exposure_b_ns"] for name, one in told.items()} == {
+        name: 31_000_000 if name == "view1" else 30_000_000 for name in config.views
+    }
+    assert {"feature": "ExposureMode", "value": "DoubleFrame", "tolerance": 0.0} in told["view2"]["features"]
 
 
 @pytest.fixture(scope="module")
