@@ -27,8 +27,12 @@ from server.cli.runs.faults import tell_faults
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from processing.calibration.calibration import Calibration
     from processing.reconstruction.mean_line_of_sight import MeanVolume
+    from processing.reconstruction.settings import ReconstructionSettings
     from processing.runs.results_file import Provenance
+    from processing.runs.volumes.run_average import RunAverage
+    from processing.runs.workbench import Workbench
     from processing.volume import VoxelGrid
 
 
@@ -97,24 +101,13 @@ def _average_results(options: Namespace) -> dict[str, Any]:
 def _average_run(options: Namespace) -> dict[str, Any]:
     from processing.calibration.calibration_file import load_calibration
     from processing.reconstruction.settings import METHOD_VERSION
-    from processing.runs.volumes.run_average import average_run
     from processing.runs.workbench import Workbench
 
     calibration = load_calibration(options.calibration)
     settings = reconstruction_settings(options, calibration)
     shots = selected_shots(options.results, options.shots)
     share, workbench = calibrated_share(options, settings, calibration), Workbench()
-    with Bar() as bar:
-        averaged = average_run(
-            options.results,
-            shots,
-            calibration,
-            settings,
-            lambda done, of: bar.step(done, of, f"{options.results.name}: {done} exposures"),
-            frame=options.exposure,
-            threads=usable_processors(),
-            workbench=workbench,
-        )
+    averaged = _averaged(options, shots, calibration, settings, workbench)
     belonging = ask_droplets(options.results, shots, calibration, workbench)
     belonging = ask_seldom(belonging, averaged.seldom, options.results, calibration, workbench)
     made_by: Provenance = {
@@ -127,6 +120,28 @@ def _average_run(options: Namespace) -> dict[str, Any]:
     progress(belonging.text)
     told = {"passed": belonging.passed, "belonging": belonging.record()}
     return {**told, **written, "method": settings.method.value, "calibrated_share": share}
+
+
+def _averaged(
+    options: Namespace,
+    shots: list[int],
+    calibration: "Calibration",
+    settings: "ReconstructionSettings",
+    workbench: "Workbench",
+) -> "RunAverage":
+    from processing.runs.volumes.run_average import average_run
+
+    with Bar() as bar:
+        return average_run(
+            options.results,
+            shots,
+            calibration,
+            settings,
+            lambda done, of: bar.step(done, of, f"{options.results.name}: {done} exposures"),
+            frame=options.exposure,
+            threads=usable_processors(),
+            workbench=workbench,
+        )
 
 
 def _written(

@@ -1,11 +1,14 @@
 """``tomoshadow self-calibrate``: a calibration is corrected by the droplets in the shots of a run."""
 
 from argparse import Namespace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from server.cli.chosen_shots import selected_shots
 from server.cli.options import Verbs, add_calibrated_run, add_out, add_shots, add_verb
 from server.cli.output import Outcome, progress, table, tracked
+
+if TYPE_CHECKING:
+    from processing.calibration.droplets.self_calibration import SelfCalibration
 
 
 def add(verbs: Verbs) -> None:
@@ -28,10 +31,13 @@ def self_calibrate(options: Namespace) -> Outcome:
     corrected = self_calibrate_run(options.run, shots, calibration, tracked)
     save_calibration(corrected.calibration, options.out, overwrite=options.overwrite)
     progress(corrected.calibration.notes[-1])
-    result = {
-        "calibration": str(options.out),
-        "id": corrected.calibration.id,
-        "parent": calibration.id,
+    named = {"calibration": str(options.out), "id": corrected.calibration.id, "parent": calibration.id}
+    result = {**named, **_figures(corrected)}
+    return Outcome(result, views_table(result))
+
+
+def _figures(corrected: "SelfCalibration") -> dict[str, Any]:
+    return {
         "moved": corrected.moved,
         "sub_volumes": corrected.sub_volumes,
         "droplets": corrected.droplets,
@@ -46,7 +52,6 @@ def self_calibrate(options: Namespace) -> Outcome:
             for name in corrected.calibration.views
         },
     }
-    return Outcome(result, views_table(result))
 
 
 def views_table(result: dict[str, Any]) -> str:
