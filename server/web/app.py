@@ -223,27 +223,25 @@ def _abort_listener(services: Services, held: socket.socket) -> AbortListener:
 def _context(services: Services, table: JobTable, index: RunIndex, once: Once) -> Context:
     store = CalibrationStore(services.data_dir / "calibrations")
     watch = CalibrationWatch(services.events)
-    acquisition = services.acquisition
+    acquisition, period_s = services.acquisition, services.asked_every_s
+
+    def resting() -> bool:
+        return acquisition.status().resting
+
     context = Context(
         services=services,
-        runs=RunStore(services.data_dir, services.acquisition.status, index),
+        runs=RunStore(services.data_dir, acquisition.status, index),
         unkept_runs=UnkeptRuns(services.data_dir, table),
         calibrations=store,
         jobs=table,
         runner=JobRunner(services.engine, table, services.tasks, services.events, services.data_dir, store, watch),
         watch=watch,
-        monitor=RigMonitor(
-            services.rig,
-            services.data_dir,
-            lambda: acquisition.status().resting,
-            services.laboratory,
-            period_s=services.asked_every_s,
-        ),
+        monitor=RigMonitor(services.rig, services.data_dir, resting, services.laboratory, period_s=period_s),
         desk=DeskWatch(
             acquisition.status,
             lambda: reasons_against(context),
             lambda: alarms_now(context),
-            period_s=services.asked_every_s / 2,
+            period_s=period_s / 2,
         ),
         live=LiveFeed(services.rig.cameras, lambda: acquisition.newest_shot, acquisition.keep_live),
         live_volume=LiveVolume(
@@ -254,7 +252,7 @@ def _context(services: Services, table: JobTable, index: RunIndex, once: Once) -
             services.settings,
         ),
         parts=VolumeParts(),
-        control=Control(lambda: not acquisition.status().resting, services.events.publish),
+        control=Control(lambda: not resting(), services.events.publish),
         once=once,
         duties=tuple(Duty(name, services.events) for name in _DUTIES),
     )
