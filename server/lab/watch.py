@@ -145,8 +145,10 @@ class CalibrationWatch:
 
     def learn(self, job: Job) -> Job | None:
         """Take notice of the state of a job; returns the check that follows it, if any."""
+        if job.kind is JobKind.RECONSTRUCTION and job.state is JobState.DONE:
+            return self._check_of_odd(job)
         if job.kind is not JobKind.CHECK:
-            return self._check_of_odd(job) if job.state is JobState.DONE else None
+            return None
         content = str(job.settings.get("content", ""))
         with self._lock:
             known = self._accounts.get((job.run_id, job.calibration))

@@ -79,10 +79,8 @@ class MeetingLines:
         return self._shown(images, matches) if len(matches) else Meeting(droplets=0)
 
     def _shown(self, images: Sequence[Intensity], matches: Matches) -> Meeting:
-        seen_px = [mapping.project(matches.points_mm) for mapping in self.mappings] + matches.disparities_px.swapaxes(
-            0, 1
-        )
-        peaks = np.stack([_peaks(image, centres_px) for image, centres_px in zip(images, seen_px, strict=True)])
+        seen = zip(images, self.mappings, np.moveaxis(matches.disparities_px, 1, 0), strict=True)
+        peaks = np.stack([_peaks(image, one.project(matches.points_mm) + beside_px) for image, one, beside_px in seen])
         lower, upper = np.percentile(peaks / np.median(peaks, axis=0), (25, 75), axis=1)
         errors = (upper - lower) / np.sqrt(len(matches))  # of the quartile of a normal distribution
         contrasts, by_chance = (dict(zip(self.views, one.round(4).tolist(), strict=True)) for one in (lower, errors))
