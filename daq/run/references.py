@@ -111,7 +111,7 @@ def _checked_kind(run_id: str, reader: RunReader, views: Mapping[str, ViewFormat
     if header.plan is None or kind not in REFERENCE_KINDS:
         raise PlanError(f"references: run {run_id!r} is {kind or 'imported'}, not dark or background")
     if header.views != views:
-        raise PlanError(f"references: run {run_id!r} has views {header.views}, the rig {dict(views)}")
+        raise PlanError(f"references: run {run_id!r} has views {_told(header.views)}; the rig has {_told(views)}")
     if kind.image_key not in image_keys:
         raise PlanError(f"references: run {run_id!r} has no valid shot")
     if outcome != RunOutcome.COMPLETED:
@@ -119,6 +119,15 @@ def _checked_kind(run_id: str, reader: RunReader, views: Mapping[str, ViewFormat
     if kind is RunKind.BACKGROUND and (differing := _differing(header.plan.pulse, pulse)):
         raise PlanError(f"references: background {run_id!r} has other light than the plan: {differing}")
     return kind
+
+
+def _told(views: Mapping[str, ViewFormat]) -> str:
+    """Views with what their images are; those that are alike together."""
+    alike: dict[str, list[str]] = {}
+    for name, view in views.items():
+        rows, columns = view.shape
+        alike.setdefault(f"{columns} x {rows} px, {view.bits} bit", []).append(name)
+    return ", ".join(f"{', '.join(names)} ({images})" for images, names in alike.items())
 
 
 def _differing(its: PulsePair, planned: PulsePair) -> str:

@@ -108,17 +108,19 @@ def refusals_of_use(context: Context, calibration_id: str) -> Sequence[str]:
 
 
 def misfits(context: Context, calibration_id: str) -> list[str]:
-    """Views whose camera delivers other images than the calibration is made for."""
-    sizes_px, found = context.calibrations.image_sizes_px(calibration_id), []
+    """Views whose camera delivers other images than the calibration is made for; those that are alike together."""
+    sizes_px = context.calibrations.image_sizes_px(calibration_id)
+    alike: dict[tuple[tuple[int, int], tuple[int, int]], list[str]] = {}
     for view, camera in context.services.rig.cameras.items():
         rows, columns = camera.image_shape
-        width, height = sizes_px.get(view, (columns, rows))
-        if (width, height) != (columns, rows):
-            found.append(
-                f"{calibration_id!r} is made for images of {width} x {height} px of {view}, "
-                f"its camera delivers {columns} x {rows} px"
-            )
-    return found
+        made_for = sizes_px.get(view, (columns, rows))
+        if made_for != (columns, rows):
+            alike.setdefault((made_for, (columns, rows)), []).append(view)
+    return [
+        f"{calibration_id!r} is made for images of {width} x {height} px of {', '.join(views)}, "
+        f"not of {columns} x {rows} px"
+        for ((width, height), (columns, rows)), views in alike.items()
+    ]
 
 
 def _worst_px(view: ViewFigures) -> float:

@@ -594,7 +594,9 @@ def test_only_dark_and_background_runs_of_this_rig_are_references(lab: Laborator
         lab.acquisition.start(plan_of(references=(unlit.run_dir.name,)))
     dark = lab.run(plan_of(1, kind=RunKind.DARK))
     lab.memory.cameras["view1"].image_shape = (8, 8)
-    with pytest.raises(PlanError, match="has views"):
+    own, ours = r"view1 \(32 x 24 px, 8 bit\)", r"view1 \(8 x 8 px, 8 bit\)"
+    same = r"view2 \(40 x 16 px, 12 bit\)"
+    with pytest.raises(PlanError, match=f"has views {own}, {same}; the rig has {ours}, {same}$"):
         lab.acquisition.start(plan_of(references=(dark.run_dir.name,)))
 
 
